@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from camtool.arrays import Ints
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import ProgramError
 from camtool.findings import Finding, Severity
 from camtool.kernels import words
@@ -299,70 +299,103 @@ def _refuse_spacing(block: Block) -> None:
     block.fail("words are not parted by exactly one space", mend="write G00 X1.0 Y1.0")
 
 
-# What the machine's timers make of a program's lines and feeds.
+# What the machine's timers make of a program's lines and feeds: some rows at a time, since the
+# columns of what becomes of each would need more room than the program.
+
+ROWS_AT_ONCE: Final = 1 << 14
+"""So many rows are looked at together."""
 
 
-def _timer_findings(path: Toolpath, machine: FlashcutMachine) -> tuple[Finding, ...]:
+@dataclass
+class _Worst:
+    """How many rows something is wrong with, the worst of them, and by how much."""
+
+    count: int = 0
+    row: int = -1
+    most: float = 0.0
+
+    def add(self, rows: Ints, sizes: Floats) -> None:
+        """Further rows (K,) and how wrong each is (K,)."""
+        self.count += len(rows)
+        if len(rows) and sizes.max() > self.most:
+            self.row, self.most = int(rows[sizes.argmax()]), float(sizes.max())
+
+
+def _timer_findings(path: Toolpath, machine: FlashcutMachine) -> Iterator[Finding]:
     """What feeds become, and which moves of both axes get steps too many on their shorter one."""
     controller = machine.controller
     if not isinstance(controller, FlashcutController):
-        return ()
-    return (*_limited_feeds(path, machine, controller), *_too_long(path, machine, controller))
-
-
-def _limited_feeds(
-    path: Toolpath, machine: FlashcutMachine, controller: FlashcutController
-) -> Iterator[Finding]:
-    """FEED_HELD: cuts whose feed the shortest half period does not let them have."""
-    rows = np.flatnonzero(path.is_feed)
-    steps_mm = np.array([axis.coded_step_mm for axis in machine.axes])
-    travel = (path.end - path.starts)[rows]
-    moves = np.column_stack([to_steps(travel[:, k], float(steps_mm[k])) != 0 for k in range(3)])
-    alone = (moves.sum(axis=1) == 1) & ~path.is_arc[rows]
-    step_mm = np.where(moves[:, 2] & alone, steps_mm[2], steps_mm[:2].max())
-    asked = path.feed[rows]
-    fastest = feeds_of(shortest_ms(alone, controller), step_mm, controller)
-    late = np.flatnonzero(asked > fastest * (1.0 + LIMITED_GUARD))
-    if len(late):
-        worst = int(late[(asked[late] / fastest[late]).argmax()])
-        gets = float(fastest[worst])
-        slow = gets < WARNED_PART * asked[worst]
-        yield (FEED_HELD_ALONE if alone[worst] else FEED_HELD)(
-            severity=Severity.WARNING if slow else Severity.INFO,
-            where=f"block {int(path.block[rows[worst]]) + 1}",
-            measured=gets,
-            limit=asked[worst],
-            count=len(late),
+        return
+    late, long, rapids = _Worst(), _Worst(), False
+    for low in range(0, len(path), ROWS_AT_ONCE):
+        rows = _Rows(path, slice(low, low + ROWS_AT_ONCE), machine)
+        fastest, _ = rows.fastest_feeds(controller)
+        with np.errstate(invalid="ignore"):
+            found = np.flatnonzero(rows.feed > fastest * (1.0 + LIMITED_GUARD))
+        late.add(low + found, rows.feed[found] / fastest[found])
+        extra = rows.steps_too_many(controller)
+        found = np.flatnonzero(extra > 0)
+        long.add(low + found, extra[found].astype(np.float64))
+        rapids = rapids or bool((rows.kind[found] == Kind.RAPID).any())
+    if late.count:
+        yield _limited(path, machine, controller, late)
+    if long.count:
+        rows = _Rows(path, slice(long.row, long.row + 1), machine)
+        shorter = int(rows.steps[0, :2].argmin())
+        yield EXECUTED_OTHERWISE(
+            where=f"block {int(path.block[long.row]) + 1}",
+            measured=long.most * 1000.0 * rows.step_mm[shorter],
+            limit=0.0,
+            count=long.count,
+            steps=int(long.most),
+            stays=controller.goes_on_from == "programmed",
+            rapids=rapids,
         )
 
 
-def _too_long(
-    path: Toolpath, machine: FlashcutMachine, controller: FlashcutController
-) -> tuple[Finding, ...]:
-    rows = np.flatnonzero(path.is_motion & ~path.is_arc)
-    x_mm, y_mm = machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm
-    travel = np.abs(path.end - path.starts)[rows]
-    steps = np.column_stack([to_steps(travel[:, 0], x_mm), to_steps(travel[:, 1], y_mm)])
-    feed = np.where(path.is_feed, path.feed, np.inf)[rows]
-    alone = (steps == 0).any(axis=1)
-    half_period = half_periods_ms(feed, max(x_mm, y_mm), alone, controller)
-    whole = np.minimum(half_period, MOST_MS).astype(np.int64)
-    extra = steps_too_many(steps.max(axis=1), steps.min(axis=1), whole, controller)
-    count = int((extra > 0).sum())
-    if not count:
-        return ()
-    worst = int(extra.argmax())
-    most_um = float(extra[worst]) * 1000.0 * (y_mm if steps[worst].argmin() else x_mm)
-    rapids = bool((path.kind[rows[extra > 0]] == Kind.RAPID).any())
-    stays = controller.goes_on_from == "programmed"
-    return (
-        EXECUTED_OTHERWISE(
-            where=f"block {int(path.block[rows[worst]]) + 1}",
-            measured=most_um,
-            limit=0.0,
-            count=count,
-            steps=int(extra[worst]),
-            stays=stays,
-            rapids=rapids,
-        ),
+def _limited(
+    path: Toolpath, machine: FlashcutMachine, controller: FlashcutController, late: _Worst
+) -> Finding:
+    """FEED_HELD: cuts whose feed the shortest half period does not let them have."""
+    row = _Rows(path, slice(late.row, late.row + 1), machine)
+    fastest, alone = row.fastest_feeds(controller)
+    gets, asked = float(fastest[0]), row.feed[0]
+    return (FEED_HELD_ALONE if alone[0] else FEED_HELD)(
+        severity=Severity.WARNING if gets < WARNED_PART * asked else Severity.INFO,
+        where=f"block {int(path.block[late.row]) + 1}",
+        measured=gets,
+        limit=asked,
+        count=late.count,
     )
+
+
+class _Rows:
+    """Some rows of a toolpath: `kind` (K,), `feed` (K,) mm/min, NaN where they do not cut, `steps`
+    (K, 3) of the axes without their signs."""
+
+    def __init__(self, path: Toolpath, rows: slice, machine: FlashcutMachine) -> None:
+        self.kind = path.kind[rows]
+        self.feed = path.feed[rows]
+        self.step_mm = np.array([axis.coded_step_mm for axis in machine.axes])
+        start = path.start if rows.start == 0 else path.end[rows.start - 1]
+        travel = np.abs(np.diff(path.end[rows], axis=0, prepend=start[None, :]))
+        self.steps = np.column_stack(
+            [to_steps(travel[:, axis], float(self.step_mm[axis])) for axis in range(3)]
+        )
+
+    def fastest_feeds(self, controller: FlashcutController) -> tuple[Floats, Bools]:
+        """(K,) mm/min at the shortest half period, and which rows move one axis alone."""
+        moves = self.steps != 0
+        alone = (moves.sum(axis=1) == 1) & (self.kind < Kind.ARC_CW)
+        step_mm = np.where(moves[:, 2] & alone, self.step_mm[2], self.step_mm[:2].max())
+        return feeds_of(shortest_ms(alone, controller), step_mm, controller), alone
+
+    def steps_too_many(self, controller: FlashcutController) -> Ints:
+        """(K,) that lines and rapids make on their shorter axis of X and Y."""
+        steps = self.steps[:, :2]
+        feed = np.where(self.kind == Kind.LINE, self.feed, np.inf)
+        alone = (steps == 0).any(axis=1)
+        half_period = half_periods_ms(feed, float(self.step_mm[:2].max()), alone, controller)
+        whole = np.minimum(half_period, MOST_MS).astype(np.int64)
+        extra = steps_too_many(steps.max(axis=1), steps.min(axis=1), whole, controller)
+        return np.where(self.kind < Kind.ARC_CW, extra, 0)

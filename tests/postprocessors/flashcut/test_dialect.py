@@ -5,7 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from camtool_postprocessors.flashcut import read as reader
 from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from camtool.errors import MachineError, PostError, ProgramError
 from camtool.findings import Code, Finding, Severity
@@ -178,6 +180,24 @@ def test_what_a_feed_becomes_is_said() -> None:
     assert held(square + b"M30\n", *alone) == [
         (Severity.WARNING, "block 1", pytest.approx(5.182, abs=1e-3))
     ]
+
+
+@given(part_rows=st.integers(1, 7), seed=st.integers(0, 2**32 - 1))
+@settings(deadline=None)
+def test_findings_do_not_depend_on_how_many_rows_are_looked_at_together(
+    part_rows: int, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    moves = rng.integers(0, 60, (20, 2)) / 10.0
+    codes = rng.choice(["G00", "G01"], 20).tolist()
+    lines = [
+        f"{code} X{x:.1f} Y{y:.1f}" for code, (x, y) in zip(codes, moves.tolist(), strict=True)
+    ]
+    data = "\n".join(["G01 X0.1 Y0.0 F14.1", *lines, "G01 Z-0.1", "M30", ""]).encode()
+    whole = read(data).findings
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(reader, "ROWS_AT_ONCE", part_rows)
+        assert read(data).findings == whole
 
 
 def test_the_spindle_may_not_stop() -> None:
