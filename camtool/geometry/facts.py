@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -236,7 +236,7 @@ def _closed_segments(lines: Polylines) -> Segments | None:
     cells = ((middle - middle.min(axis=0)) / span * ((1 << _MORTON_BITS) - 1)).astype(np.int64)
     order = closed[np.argsort(_spread(cells[:, 0]) | _spread(cells[:, 1]) << 1, kind="stable")]
     segments = Segments.of(lines.select(order))
-    return Segments(**{**vars(segments), "path": order[segments.path]})
+    return replace(segments, path=order[segments.path])
 
 
 _MORTON_BITS = 16

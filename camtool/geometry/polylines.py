@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -150,9 +151,10 @@ def segment_rows(lines: Polylines) -> Ints:
 class Segments:
     """Lines and arcs in columns, K rows; `path` (K,) says which polyline each came from.
 
-    `start`, `end` (K, 2) mm; `bulge` (K,). For arcs `centre` (K, 2) mm, `radius` (K,) mm and the
-    signed `sweep` (K,) rad hold; lines have centre NaN, radius inf and sweep 0. `start_angle`
-    (K,) rad is the direction from the centre to the start (NaN for lines).
+    `start`, `end` (K, 2) mm; `bulge` (K,). What follows from these is computed when it is asked
+    for: for arcs `centre` (K, 2) mm, `radius` (K,) mm and the signed `sweep` (K,) rad; lines have
+    centre NaN, radius inf and sweep 0. `start_angle` (K,) rad is the direction from the centre to
+    the start (NaN for lines).
 
         s = sweep/4, b = tan s, chord c = |end − start|:
         radius = c (1 + b²) / (4 |b|);
@@ -163,10 +165,6 @@ class Segments:
     end: Floats
     bulge: Floats
     path: Ints
-    centre: Floats
-    radius: Floats
-    sweep: Floats
-    start_angle: Floats
 
     @classmethod
     def of(cls, lines: Polyline | Polylines) -> Segments:
@@ -187,45 +185,45 @@ class Segments:
         cls, start: Floats, end: Floats, bulge: Floats, path: Ints | None = None
     ) -> Segments:
         """Segments from their end points (K, 2) and bulges (K,)."""
-        chord = end - start
-        is_arc = bulge != 0.0
-        safe = np.where(is_arc, bulge, 1.0)
-        turned = np.column_stack([-chord[:, 1], chord[:, 0]])
-        middle = 0.5 * (start + end) + ((1.0 - safe**2) / (4.0 * safe))[:, None] * turned
-        length = np.hypot(chord[:, 0], chord[:, 1])
-        radius = length * (1.0 + safe**2) / (4.0 * np.abs(safe))
-        centre = np.where(is_arc[:, None], middle, np.nan)
-        return cls(
-            start=start,
-            end=end,
-            bulge=bulge,
-            path=np.zeros(len(bulge), dtype=np.int64) if path is None else path,
-            centre=centre,
-            radius=np.where(is_arc, radius, np.inf),
-            sweep=4.0 * np.arctan(bulge),
-            start_angle=np.arctan2(start[:, 1] - centre[:, 1], start[:, 0] - centre[:, 0]),
-        )
+        return cls(start, end, bulge, np.zeros(len(bulge), np.int64) if path is None else path)
 
     def __len__(self) -> int:
         return len(self.bulge)
 
     def __getitem__(self, rows: Bools | Ints | slice) -> Segments:
         """The chosen rows."""
-        return Segments(
-            self.start[rows],
-            self.end[rows],
-            self.bulge[rows],
-            self.path[rows],
-            self.centre[rows],
-            self.radius[rows],
-            self.sweep[rows],
-            self.start_angle[rows],
-        )
+        return Segments(self.start[rows], self.end[rows], self.bulge[rows], self.path[rows])
 
     @property
     def is_arc(self) -> Bools:
         """(K,) true where the row is an arc."""
         return np.asarray(self.bulge != 0.0)
+
+    @cached_property
+    def centre(self) -> Floats:
+        """(K, 2) mm."""
+        chord, safe = self.end - self.start, np.where(self.is_arc, self.bulge, 1.0)
+        turned = np.column_stack([-chord[:, 1], chord[:, 0]])
+        middle = 0.5 * (self.start + self.end) + ((1.0 - safe**2) / (4.0 * safe))[:, None] * turned
+        return np.where(self.is_arc[:, None], middle, np.nan)
+
+    @cached_property
+    def radius(self) -> Floats:
+        """(K,) mm."""
+        chord, safe = self.end - self.start, np.where(self.is_arc, self.bulge, 1.0)
+        length = np.hypot(chord[:, 0], chord[:, 1])
+        return np.where(self.is_arc, length * (1.0 + safe**2) / (4.0 * np.abs(safe)), np.inf)
+
+    @cached_property
+    def sweep(self) -> Floats:
+        """(K,) rad."""
+        return np.asarray(4.0 * np.arctan(self.bulge))
+
+    @cached_property
+    def start_angle(self) -> Floats:
+        """(K,) rad."""
+        spoke = self.start - self.centre
+        return np.asarray(np.arctan2(spoke[:, 1], spoke[:, 0]))
 
 
 def _checked(vertices: Floats, offsets: Ints, closed: Bools | list[bool]) -> Floats:

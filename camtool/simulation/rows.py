@@ -19,8 +19,12 @@ are exact in a float."""
 
 def placed(toolpath: Toolpath, home: Floats) -> Toolpath:
     """The toolpath with events at the ends of the moves before them, and homing at `home` (3,)
-    mm."""
+    mm; the very toolpath where they are there."""
     kind, count = toolpath.kind, len(toolpath)
+    events = np.flatnonzero(~toolpath.is_motion)
+    homes = np.isin(kind[events], (Kind.HOME_XY, Kind.HOME_Z)).any()
+    if not homes and (toolpath.end[events] == toolpath.begins(events)).all():
+        return toolpath
     end = toolpath.end.copy()
     for axis, homing in ((0, Kind.HOME_XY), (1, Kind.HOME_XY), (2, Kind.HOME_Z)):
         end[kind == homing, axis] = home[axis]

@@ -110,8 +110,9 @@ class Toolpath:
 
     def __post_init__(self) -> None:
         count = len(self.kind)
-        if not self.modes:
-            object.__setattr__(self, "mode", np.full(count, -1))
+        if not self.modes:  # one number, seen as many
+            silent = np.broadcast_to(np.full(1, -1), count)
+            object.__setattr__(self, "mode", silent)
         shapes = {
             "kind": (count,),
             "end": (count, 3),
@@ -120,7 +121,7 @@ class Toolpath:
             "value": (count,),
             "source": (count,),
             "block": (count,),
-            "mode": (count,),
+            **({"mode": (count,)} if self.modes else {}),
             "start": (3,),
         }
         for name, shape in shapes.items():
@@ -144,6 +145,10 @@ class Toolpath:
     def starts(self) -> Floats:
         """(N, 3) mm: where each row begins."""
         return np.concatenate([self.start[None, :], self.end[:-1]]) if len(self) else self.end
+
+    def begins(self, rows: Ints) -> Floats:
+        """(M, 3) mm: where each of these rows (M,) begins."""
+        return np.where((rows > 0)[:, None], self.end[rows - 1], self.start)
 
     @property
     def is_arc(self) -> Bools:
@@ -181,8 +186,8 @@ class Toolpath:
         return int(ends[0]) + 1 if len(ends) else len(self)
 
     def first(self, rows: int) -> Toolpath:
-        """The first rows alone."""
-        return self.picked(np.arange(min(rows, len(self))))
+        """The first rows alone; the very toolpath where these are all."""
+        return self if rows >= len(self) else self.picked(np.arange(rows))
 
     def picked(self, row: Ints, **others: Ints | Floats) -> Toolpath:
         """Rows (M,) of this one, in that order and as often as they are named; `others`: columns

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -39,13 +40,25 @@ class Found:
 
 
 class MoveIndex:
-    """Cutting moves, to be searched by place, contour and height."""
+    """Cutting moves, to be searched by place, contour and height; its tables are made by the first
+    search."""
 
     def __init__(self, cuts: CutMoves) -> None:
         self.cuts = cuts
-        self.contour = cuts.contour[cuts.segments.path]
-        self.boxes = segment_boxes(cuts.segments)
-        self._table = _table(cuts)
+
+    @cached_property
+    def contour(self) -> Ints:
+        """(K,) the contour of each segment."""
+        return self.cuts.contour[self.cuts.segments.path]
+
+    @cached_property
+    def boxes(self) -> Floats:
+        """(K, 4) mm, of each segment."""
+        return segment_boxes(self.cuts.segments)
+
+    @cached_property
+    def _table(self) -> Floats:
+        return _table(self.cuts)
 
     def nearest(
         self,
@@ -127,14 +140,14 @@ def _table(cuts: CutMoves) -> Floats:
     table = np.zeros((len(segments), at.COLUMNS))
     table[:, [at.AX, at.AY]], table[:, [at.BX, at.BY]] = segments.start, segments.end
     arcs = np.flatnonzero(segments.is_arc)
-    turn = np.where(segments.bulge[arcs] < 0.0, -1.0, 1.0)[:, None]
-    centre = segments.centre[arcs]
-    table[arcs, at.CX], table[arcs, at.CY] = centre.T
-    table[arcs, at.RADIUS] = segments.radius[arcs]
+    bent = segments[arcs]
+    turn = np.where(bent.bulge < 0.0, -1.0, 1.0)[:, None]
+    table[arcs, at.CX], table[arcs, at.CY] = bent.centre.T
+    table[arcs, at.RADIUS] = bent.radius
     # Normals that point into the wedge from its two edges.
-    table[arcs, at.UX], table[arcs, at.UY] = (turn * (segments.start[arcs] - centre)).T
-    table[arcs, at.VX], table[arcs, at.VY] = (turn * (segments.end[arcs] - centre)).T
-    table[arcs, at.SWEEP] = np.abs(segments.sweep[arcs])
+    table[arcs, at.UX], table[arcs, at.UY] = (turn * (bent.start - bent.centre)).T
+    table[arcs, at.VX], table[arcs, at.VY] = (turn * (bent.end - bent.centre)).T
+    table[arcs, at.SWEEP] = np.abs(bent.sweep)
     table[:, at.Z], table[:, at.RISE] = begin, end - begin
     length = segment_lengths(segments)
     table[:, at.SLOPE] = np.abs(end - begin) / np.where(length > 0.0, length, 1.0)

@@ -36,8 +36,8 @@ from camtool.verification.circles import (
 )
 from camtool.verification.cuts import CutMoves, moved_lengths
 from camtool.verification.figures import Figure, RowFigures, add_ledger, empty_columns, row_figures
-from camtool.verification.matching import Goal, Match
-from camtool.verification.nearest import ANY_CONTOUR, MoveIndex, run_peaks
+from camtool.verification.matching import Match
+from camtool.verification.nearest import ANY_CONTOUR, run_peaks
 
 if TYPE_CHECKING:
     from camtool.kernels.judging import Sums, Task
@@ -61,6 +61,17 @@ class SeenCircle:
     bins: Floats
 
 
+@dataclass(frozen=True, eq=False)
+class Paths:
+    """The cuts of a program and the wanted ones (one object, where it is compared with itself),
+    the full circles of these, and by how much heights may differ, mm."""
+
+    decoded: CutMoves
+    wanted: CutMoves
+    circles: list[Circle]
+    depth_mm: float
+
+
 ROWS_AT_ONCE = 16_384
 """A fused run says after so many rows how far it is."""
 
@@ -68,20 +79,20 @@ ROWS_AT_ONCE = 16_384
 class SlidePass:
     """Takes the motion in order; its figures are complete after `finish`."""
 
-    def __init__(self, decoded: MoveIndex, goal: Goal, match: Match, trace: TraceSize) -> None:
-        self.circles = goal.circles
-        self.circle_figures: list[CircleFigures] = [UNSEEN] * len(goal.circles)
-        self.reversing: list[Reversing | None] = [None] * len(goal.circles)
+    def __init__(self, paths: Paths, match: Match, trace: TraceSize) -> None:
+        self.circles = paths.circles
+        self.circle_figures: list[CircleFigures] = [UNSEEN] * len(paths.circles)
+        self.reversing: list[Reversing | None] = [None] * len(paths.circles)
         self.both_ways: list[BothWays] = []
         self.bins: dict[int, Floats] = {}
-        self._pairs = Pairs(goal.circles)
-        self._cuts = decoded.cuts
+        self._pairs = Pairs(paths.circles)
+        self._cuts = paths.decoded
         self._ledger = still_ledger(np.arange(len(match.contour)))
-        self._first, self._last = _rows_of_circles(match.circle, len(goal.circles))
+        self._first, self._last = _rows_of_circles(match.circle, len(paths.circles))
         self._slot = _slots(self._first, self._last)
         seen = np.flatnonzero(self._last >= 0)
         self._closing = seen[np.argsort(self._last[seen], kind="stable")].tolist()
-        self._task = _task(decoded, goal, match, self._slot)
+        self._task = _task(paths, match, self._slot)
         slots = int(self._slot.max(initial=-1)) + 1
         self._sums = _sums(len(match.contour), slots, len(self._task.moves.table), trace)
         self._start, self._most = trace.start, trace.most
@@ -190,13 +201,14 @@ def largest(errors: Floats, which: Bools) -> float:
     return float(picked.max()) if len(picked) else math.nan
 
 
-def _task(decoded: MoveIndex, goal: Goal, match: Match, slot: Ints) -> Task:
+def _task(paths: Paths, match: Match, slot: Ints) -> Task:
     from camtool.kernels.judging import Moves, Task, bin_directions
     from camtool.kernels.move_tree import move_tree
 
-    own = move_table(decoded.cuts)
-    wanted = own if goal.moves is decoded else move_table(goal.moves.cuts)
-    known = bool((match.only[decoded.cuts.is_cut] != ANY_CONTOUR).all())
+    decoded = paths.decoded
+    own = move_table(decoded)
+    wanted = own if paths.wanted is decoded else move_table(paths.wanted)
+    known = bool((match.only[decoded.is_cut] != ANY_CONTOUR).all())
     by_contour = known and len(wanted.moves) >= MANY_MOVES
     tree = move_tree(wanted.boxes, wanted.contour if by_contour else None)
     return Task(
@@ -207,9 +219,9 @@ def _task(decoded: MoveIndex, goal: Goal, match: Match, slot: Ints) -> Task:
             if len(slot)
             else [own.of_row, wanted.ranges(match.only), match.circle, match.circle]
         ),
-        window=_heights(decoded, goal.depth_mm),
+        window=_heights(decoded, paths.depth_mm),
         off=np.ascontiguousarray(match.off_mm[:, 0]),
-        centre=np.array([circle.centre_mm for circle in goal.circles]).reshape(-1, 2),
+        centre=np.array([circle.centre_mm for circle in paths.circles]).reshape(-1, 2),
         directions=bin_directions(),
     )
 
@@ -228,9 +240,9 @@ def _sums(rows: int, slots: int, moves: int, trace: TraceSize) -> Sums:
     )
 
 
-def _heights(decoded: MoveIndex, depth_mm: float) -> Floats:
+def _heights(decoded: CutMoves, depth_mm: float) -> Floats:
     """(N, 2) mm: the lowest and highest height with which each row is compared."""
-    toolpath = decoded.cuts.toolpath
+    toolpath = decoded.toolpath
     ends = np.column_stack([toolpath.starts[:, 2], toolpath.end[:, 2]])
     return np.asarray(np.sort(ends, axis=1) + np.array([-depth_mm, depth_mm]))
 

@@ -74,7 +74,7 @@ from camtool.verification.shape import (
     points_wanted,
     wanted_shape,
 )
-from camtool.verification.slides import SeenCircle, SlidePass, Trace, largest, trace_size
+from camtool.verification.slides import Paths, SeenCircle, SlidePass, Trace, largest, trace_size
 
 __all__ = ["Case", "Verification", "VerifyOptions", "judge", "verify"]
 
@@ -134,6 +134,40 @@ def judge(
 ) -> Verification:
     """Judge a case by the chunks of its motion, or by a run that is judged as it is simulated."""
     progress = progress or Progress()
+    paths, coverage, conformance, turned = _compared(case)
+    cuts, wanted = paths.decoded, paths.wanted
+    cutter = cutter_of(case.options, cuts)
+    shape_points = points_wanted(cuts, cutter)
+    points = max(case.options.trace_points, shape_points or 0)
+    slides = SlidePass(paths, coverage.match, trace_size(case.decoded, case.spacing_mm, points))
+    if isinstance(motion, Iterable):
+        for chunk in motion:
+            slides.add(chunk)
+            progress.done = int(chunk.row[-1]) + 1 if len(chunk.row) else progress.done
+    else:
+        slides.run(motion, progress)
+    slides.finish()
+    rows = slides.rows
+    tally = tally_of(rows, case.decoded, cuts.is_cut)
+    extents = toolpath_extents(case.decoded)
+    motion_faults = motion_findings(cuts, case, tally, extents, rows)
+    shape = None
+    if shape_points and cutter is not None:
+        shape = wanted_shape(wanted, cutter, case.options.kept)
+    planned = () if case.wanted is None else case.wanted.findings
+    overcut = overcut_findings(shape, {finding.code for finding in planned})
+    findings = _all_findings(case, coverage, conformance, (*turned, *motion_faults, *overcut))
+    result = Result(case, cuts, wanted, coverage, slides, rows, tally, conformance)
+    trace = slides.trace()
+    report = result.report(extents, findings, trace, shape)
+    return Verification(report, trace, findings, rows, wanted, slides.seen())
+
+
+def _compared(
+    case: Case,
+) -> tuple[Paths, Coverage, Conformance | None, tuple[Finding, ...]]:
+    """What the slides are judged by, and what is known without them: coverage, conformance, and
+    CUT_OTHER_WAY. The tables of the search end here."""
     # Where the wanted moves have no motion in Z, all feed moves cut.
     flat_cuts = case.wanted is None or is_flat(case.wanted)
     quantised = case.target.model.quantised(case.decoded, case.machine)
@@ -145,33 +179,9 @@ def judge(
     goal = Goal(wanted, circles, case.coverage_mm, case.depth_mm)
     coverage = _coverage(case, decoded, goal, flat_cuts=flat_cuts)
     conformance = _conformance(case, flat_cuts=flat_cuts)
-    cutter = cutter_of(case.options, decoded.cuts)
-    shape_points = points_wanted(decoded.cuts, cutter)
-    points = max(case.options.trace_points, shape_points or 0)
-    size = trace_size(case.decoded, case.spacing_mm, points)
-    slides = SlidePass(decoded, goal, coverage.match, size)
-    if isinstance(motion, Iterable):
-        for chunk in motion:
-            slides.add(chunk)
-            progress.done = int(chunk.row[-1]) + 1 if len(chunk.row) else progress.done
-    else:
-        slides.run(motion, progress)
-    slides.finish()
-    rows = slides.rows
-    tally = tally_of(rows, case.decoded, decoded.cuts.is_cut)
-    extents = toolpath_extents(case.decoded)
-    motion_faults = motion_findings(decoded.cuts, case, tally, extents, rows)
-    shape = None
-    if shape_points and cutter is not None:
-        shape = wanted_shape(wanted.cuts, cutter, case.options.kept)
-    planned = () if case.wanted is None else case.wanted.findings
-    overcut = overcut_findings(shape, {finding.code for finding in planned})
     turned = _turned(case, decoded, goal, flat_cuts=flat_cuts)
-    findings = _all_findings(case, coverage, conformance, (*turned, *motion_faults, *overcut))
-    result = Result(case, decoded.cuts, wanted.cuts, coverage, slides, rows, tally, conformance)
-    trace = slides.trace()
-    report = result.report(extents, findings, trace, shape)
-    return Verification(report, trace, findings, rows, wanted.cuts, slides.seen())
+    paths = Paths(decoded.cuts, wanted.cuts, circles, case.depth_mm)
+    return paths, coverage, conformance, turned
 
 
 def _coverage(case: Case, decoded: MoveIndex, goal: Goal, *, flat_cuts: bool) -> Coverage:

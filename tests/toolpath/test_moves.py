@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from camtool.simulation.rows import placed
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, PolarArcs, Toolpath, mounted_before, toolpath_extents
 
@@ -152,3 +153,18 @@ def test_changes_before_the_first_feed_are_made_by_hand() -> None:
     path.rapid(1.0).line(z=-1.0, feed=9.0).event(Kind.TOOL_CHANGE, 2)
     assert mounted_before(path.finish()).tolist() == [False, True, False, False, False, False]
     assert mounted_before(ToolpathBuilder().finish()).tolist() == []
+
+
+def test_each_row_begins_where_the_one_before_ended() -> None:
+    path = ToolpathBuilder((1.0, 2.0, 3.0)).rapid(z=5).line(4, feed=10).line(y=7, feed=10).finish()
+    rows = np.array([2, 0, 0, 1])
+    assert path.begins(rows).tolist() == path.starts[rows].tolist()
+
+
+def test_nothing_is_copied_where_nothing_changes() -> None:
+    path = ToolpathBuilder().rapid(z=5).event(Kind.DWELL, 1.0).line(4, feed=10).finish()
+    assert path.first(3) is path
+    assert len(path.first(2)) == 2
+    assert placed(path, np.zeros(3)) is path
+    home = ToolpathBuilder().rapid(1, 1).event(Kind.HOME_XY).event(Kind.END).finish()
+    assert placed(home, np.array([7.0, 8.0, 9.0])).end[:, :2].tolist() == [[1, 1], [7, 8], [7, 8]]
