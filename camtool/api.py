@@ -14,10 +14,11 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
+from camtool.bounds import program_bytes
 from camtool.calibration.calibrate import Calibration, to_text
 from camtool.calibration.calibrate import calibrate as calibrated
 from camtool.comparison import Comparison, Variant, compare_program, variants_of
-from camtool.errors import CamtoolError, OptionError, ProgramError
+from camtool.errors import CamtoolError, OptionError
 from camtool.geometry.drawing import Drawing
 from camtool.jobs.keys import field_value
 from camtool.pictures.options import Options
@@ -194,12 +195,7 @@ def as_bytes(program: bytes | Program | str | Path) -> tuple[bytes, str]:
         return program, BYTES
     if isinstance(program, Program):
         return program.data, BYTES
-    try:
-        return Path(program).read_bytes(), str(program)
-    except OSError as error:
-        raise ProgramError(
-            f"cannot be read ({error.strerror})", file=str(program), mend="check the path"
-        ) from error
+    return program_bytes(Path(program), str(program)), str(program)
 
 
 # Jobs from Python: values as numbers, or as texts with units, as a job file has them.

@@ -20,6 +20,7 @@ from collections.abc import Hashable, Iterable
 from contextlib import suppress
 from pathlib import Path, PurePath
 
+from camtool.bounds import program_bytes
 from camtool.errors import OutputError, ProgramError
 
 STDOUT = "-"
@@ -258,17 +259,12 @@ def shown(name: str) -> str:
 
 
 def read_bytes(name: str) -> bytes:
-    """The bytes of a file, or of stdin for `-`; ProgramError when it cannot be read."""
+    """The bytes of a file, or of stdin for `-`; ProgramError when they cannot be read or are too
+    many."""
     if name == STDOUT and sys.stdin is None:
         raise ProgramError("there is no standard input", file=shown(name), mend="name a file")
-    try:
-        if name == STDOUT:
-            return sys.stdin.buffer.read()
-        return Path(name).read_bytes()
-    except OSError as error:
-        raise ProgramError(
-            f"cannot be read ({error.strerror})", file=shown(name), mend="check the path"
-        ) from error
+    source = sys.stdin.buffer if name == STDOUT else Path(name)
+    return program_bytes(source, shown(name))
 
 
 # Pictures that nobody asked for by name carry a seal, by which camtool knows them again.

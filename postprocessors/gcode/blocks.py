@@ -30,6 +30,7 @@ from typing import Final, Literal, NoReturn
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
+from camtool.bounds import check_count
 from camtool.errors import ProgramError
 from camtool.kernels import words
 from camtool.toolpath.program import Listing
@@ -190,12 +191,13 @@ Take = Callable[[PlainBlocks], int]
 
 def blocks_of(data: bytes, lexing: Lexing, take: Take | None = None) -> Iterator[Block]:
     """The blocks of a program one by one, but for those that `take` has taken; ProgramError at the
-    first that is none.
+    first that is none, and for more lines than a program may have.
 
     Where thousands of lines in a row are plain, Python objects for each of them would be most of
     the time; all others, and whatever `take` does not want, are given here. So `take` need not
     know any fault: it leaves the block.
     """
+    check_count(max(data.count(b"\n"), data.count(b"\r")), "line")
     _check_bytes(data, lexing)
     reader = _Lines(data, lexing)
     at, number, index = 0, 1, 0

@@ -17,6 +17,7 @@ from typing import Final
 
 import numpy as np
 
+from camtool import bounds
 from camtool.arrays import Bools, Floats
 from camtool.findings import Finding
 from camtool.kernels import words
@@ -435,6 +436,11 @@ class ModalReader:
             block.fail_at("P", f"an arc of more than {MOST_TURNS} turns")
         if abs(value - turns) > TURNS_TOLERANCE or turns < 1:
             block.fail_at("P", "the turns of an arc are a whole number from 1")
+        if len(self.path) + turns > bounds.MAX_MOVES:
+            message = (
+                f"with the turns of this arc the program has more than {bounds.MAX_MOVES} moves"
+            )
+            block.fail_at("P", message, mend=bounds.SPLIT_PROGRAM)
         return turns
 
     def _centre(self, block: Block, start: Point, numbers: dict[str, float]) -> Point:

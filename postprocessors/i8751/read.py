@@ -22,6 +22,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from camtool.arrays import Floats, Ints
+from camtool.bounds import check_count
 from camtool.errors import ProgramError
 from camtool.findings import Finding
 from camtool.toolpath.moves import Kind, Toolpath
@@ -241,6 +242,7 @@ class PacketReader:
             self._record()
 
     def _record(self) -> None:
+        check_count(len(self._steps) + 1, "record")
         match = self._pattern.match(self._data, self._at)
         if match is None:
             self._walk()
@@ -576,6 +578,7 @@ def _check_replies(runs: list[_Run], expected: list[str]) -> None:
 def text_lines(data: bytes) -> list[str]:
     """The lines of a text without their ends (CR LF, LF or CR); ProgramError at the first byte
     that is no printable ASCII."""
+    check_count(max(data.count(b"\n"), data.count(b"\r")), "line")
     odd = re.search(rb"[^\x20-\x7e\t\r\n]", data)
     if odd:
         lines = re.split(rb"\r\n|\n|\r", data[: odd.start()])

@@ -17,6 +17,7 @@ from typing import Final, NoReturn
 import numpy as np
 
 from camtool.arrays import Bools, Ints
+from camtool.bounds import check_count as check_size
 from camtool.errors import ProgramError
 from camtool.toolpath.program import Listing
 
@@ -41,6 +42,9 @@ _LIST: Final = re.compile(r"\{" + r",[ \t]*".join(NAMES) + r"\}")
 HEADER: Final = ("size_of_array", "first_pointx", "first_pointy")
 BODY: Final = {"lxy": 0, "velxy": 2}
 """Which of the four rows of n numbers an array's x stands in."""
+
+NUMBERS_PER_LINE: Final = 4
+"""In a stream: two distances and two speeds."""
 
 MOST_DIGITS: Final = 5
 """The master's buffer takes six characters, a sign and five digits (L4668-4708)."""
@@ -359,6 +363,7 @@ def read_stream(data: bytes, dialect: Choices) -> Iterator[ReadJob]:
     """The jobs of a stream, checked; ProgramError naming job, number and byte."""
     if not data:
         raise ProgramError("the stream is empty", mend="a stream begins with the count of lines")
+    check_size(data.count(b"\r") // NUMBERS_PER_LINE, "line")
     feed = data.find(b"\r\n") if dialect.first_y == "number" else -1
     if feed >= 0:
         fail(f"byte {feed + 2}", "a line feed: the master takes it for part of the next number")

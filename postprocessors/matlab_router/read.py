@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
+from camtool.bounds import check_count
 from camtool.errors import ProgramError
 from camtool.findings import Finding, Sentence
 from camtool.toolpath.moves import Kind, Toolpath
@@ -89,6 +90,7 @@ class _Moves:
 
     def add(self, job: ReadJob) -> None:
         """The rows of one job."""
+        check_count(self._blocks + job.length.shape[1] + 1, "block")
         done = execute(job, self._dialect)
         self._findings.add(job, done)
         self._go_home(self._blocks)

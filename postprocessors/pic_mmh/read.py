@@ -16,6 +16,7 @@ from typing import Final, NoReturn
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
+from camtool.bounds import check_count
 from camtool.errors import ProgramError
 from camtool.findings import Finding
 from camtool.machine.model import exceeds
@@ -92,6 +93,7 @@ EVENTS: Final = {
 
 def read_program(data: bytes, machine: PicMmhMachine) -> Toolpath:
     """The moves of a program; ProgramError naming block and column when it is none."""
+    check_count(data.count(b";"), "block")
     _check_bytes(data)
     reader = _Reader(machine)
     octets = np.frombuffer(data, dtype=np.uint8)

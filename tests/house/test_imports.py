@@ -13,7 +13,17 @@ from typing import Any
 import pytest
 
 ROOT = Path(__file__).parents[2]
-BASE = {"arrays", "plain", "errors", "units", "findings", "patterns", "progress", "tables"}
+BASE = {
+    "arrays",
+    "bounds",
+    "plain",
+    "errors",
+    "units",
+    "findings",
+    "patterns",
+    "progress",
+    "tables",
+}
 SHARED = BASE | {"geometry", "kernels", "machine", "toolpath"}
 TARGETS = SHARED | {"simulation", "target"}
 JUDGE = TARGETS | {"importers", "planning"}
@@ -23,6 +33,7 @@ MADE = JUDGE | {"verification", "pictures", "run", "pipeline", "comparison"}
 ALLOWED = {
     "plain": set(),
     "errors": {"plain"},
+    "bounds": {"errors"},
     "units": {"errors"},
     "findings": {"plain"},
     "arrays": set(),

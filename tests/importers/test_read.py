@@ -15,6 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import camtool.importers
+from camtool import bounds
 from camtool.errors import DrawingError, OptionError
 from camtool.importers import read as reader
 from camtool.importers.formats import find_format
@@ -183,7 +184,7 @@ def test_a_file_is_read_in_pieces_into_the_memory_that_it_needs(
         assert tracemalloc.get_traced_memory()[1] < 4_000_000
     finally:
         tracemalloc.stop()
-    monkeypatch.setattr(reader, "_BYTES_AT_ONCE", 7)
+    monkeypatch.setattr(bounds, "_BYTES_AT_ONCE", 7)
     assert reader.file_bytes(path) == path.read_bytes()
     monkeypatch.setattr(sys, "stdin", Input(path.read_bytes()))
     assert reader.content(Path("-")) == (path.read_bytes(), reader.STDIN)
