@@ -50,6 +50,23 @@ cdef Int _reversed(Route tour, Int low, Int high, Int[:, ::1] log, Int logged) n
 @cython.locals(k=Int)
 cdef void undo(Route tour, Int[:, ::1] log, Int logged) noexcept
 
+@cython.locals(
+    count=Int, levels=Int, leaves=Int, nodes=Int, node=Int, low=Int, middle=Int, high=Int, k=Int,
+    begin=Int[::1], size=Int[::1], rows=Int[::1], leaf=Int[::1], box=double[:, ::1], wide=double,
+    tall=double
+)
+cpdef tree_of(double[:, :] points)
+
+@cython.locals(k=Int, x=double, y=double)
+cdef void _bound(
+    double[:, :] points, Int[::1] rows, Int low, Int high, double[:, ::1] box, Int node
+) noexcept
+
+@cython.locals(pivot=double, left=Int, right=Int, row=Int)
+cdef void _halve(
+    double[:, :] points, Int[::1] rows, Int low, Int middle, Int high, Int axis
+) noexcept
+
 @cython.locals(node=Int)
 cpdef void switch(Branches tree, Int row, Int change) noexcept
 

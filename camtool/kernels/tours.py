@@ -240,29 +240,64 @@ class Tree(NamedTuple):
 
 
 def tree_of(points: Floats) -> Tree:
-    """The tree of these points, N ≥ 1, all switched on; the nodes of a level all at once."""
+    """The tree of these points, N ≥ 1, finite, all switched on. A node is halved across the longer
+    side of its box."""
     count, levels = len(points), 0
     while count >> levels > LEAF:
         levels += 1
-    nodes = (2 << levels) - 1
+    leaves = 1 << levels
+    nodes = 2 * leaves - 1
     begin, size = np.zeros(nodes, np.int64), np.zeros(nodes, np.int64)
     box, rows = np.empty((nodes, 4)), np.arange(count)
-    size[0] = count
-    for level in range(levels + 1):
-        here = np.arange((1 << level) - 1, (2 << level) - 1)
-        node = np.repeat(here, size[here])
-        box[here, :2] = np.minimum.reduceat(points[rows], begin[here])
-        box[here, 2:] = np.maximum.reduceat(points[rows], begin[here])
-        if level < levels:
-            span = box[node, 2:] - box[node, :2]
-            along = np.where(span[:, 0] >= span[:, 1], points[rows, 0], points[rows, 1])
-            rows = rows[np.lexsort((along, node))]
-            half = size[here] // 2
-            begin[2 * here + 1], size[2 * here + 1] = begin[here], half
-            begin[2 * here + 2], size[2 * here + 2] = begin[here] + half, size[here] - half
     leaf = np.empty(count, np.int64)
-    leaf[rows] = node
-    return Tree(np.ascontiguousarray(points), rows, begin, size, box, size.copy(), leaf)
+    points = np.ascontiguousarray(points)
+    size[0] = count
+    for node in range(nodes):
+        low, high = begin[node], begin[node] + size[node]
+        _bound(points, rows, low, high, box, node)
+        if node < leaves - 1:
+            wide, tall = box[node, 2] - box[node, 0], box[node, 3] - box[node, 1]
+            middle = low + (high - low) // 2
+            _halve(points, rows, low, middle, high - 1, 0 if wide >= tall else 1)
+            begin[2 * node + 1], size[2 * node + 1] = low, middle - low
+            begin[2 * node + 2], size[2 * node + 2] = middle, high - middle
+        else:
+            for k in range(low, high):
+                leaf[rows[k]] = node
+    order = np.asarray(rows)
+    begins, sizes, boxes = np.asarray(begin), np.asarray(size), np.asarray(box)
+    return Tree(np.asarray(points), order, begins, sizes, boxes, sizes.copy(), np.asarray(leaf))
+
+
+def _bound(points: Floats, rows: Ints, low: int, high: int, box: Floats, node: int) -> None:
+    """The box of the rows low … high − 1 becomes that of a node."""
+    box[node, 0] = box[node, 1] = math.inf
+    box[node, 2] = box[node, 3] = -math.inf
+    for k in range(low, high):
+        x, y = points[rows[k], 0], points[rows[k], 1]
+        box[node, 0], box[node, 1] = min(box[node, 0], x), min(box[node, 1], y)
+        box[node, 2], box[node, 3] = max(box[node, 2], x), max(box[node, 3], y)
+
+
+def _halve(points: Floats, rows: Ints, low: int, middle: int, high: int, axis: int) -> None:
+    """Put the rows low … high into such an order that none before `middle` lies farther along the
+    axis than one from there on (Hoare's FIND, 1961)."""
+    while low < high:
+        pivot = points[rows[(low + high) // 2], axis]
+        left, right = low, high
+        while left <= right:
+            while points[rows[left], axis] < pivot:
+                left += 1
+            while points[rows[right], axis] > pivot:
+                right -= 1
+            if left <= right:
+                row = rows[left]
+                rows[left], rows[right] = rows[right], row
+                left, right = left + 1, right - 1
+        if right < middle:
+            low = left
+        if left > middle:
+            high = right
 
 
 class Branches:
