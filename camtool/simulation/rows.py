@@ -10,7 +10,7 @@ import numpy.typing as npt
 from camtool.arrays import Floats
 from camtool.errors import ProgramError
 from camtool.machine.model import Machine
-from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.moves import Kind, Toolpath, frozen
 
 MAX_PATH_STEPS = 1 << 40
 """Positions beyond this many steps (a million kilometres at 1 µm) are refused, so that counts
@@ -31,7 +31,7 @@ def placed(toolpath: Toolpath, home: Floats) -> Toolpath:
         known = np.where(toolpath.is_motion | (kind == homing), np.arange(count), -1)
         latest = np.maximum.accumulate(known)
         end[:, axis] = np.where(latest < 0, toolpath.start[axis], end[latest, axis])
-    return replace(toolpath, end=end)
+    return replace(toolpath, end=frozen(end))
 
 
 def check_positions(toolpath: Toolpath, machine: Machine) -> None:

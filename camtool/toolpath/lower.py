@@ -26,7 +26,7 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import OptionError, PostError
 from camtool.findings import FEED_ABOVE_LIMIT_LOWERED
 from camtool.machine.model import Machine
-from camtool.toolpath.moves import Kind, PolarArcs, Toolpath
+from camtool.toolpath.moves import Kind, PolarArcs, Toolpath, frozen
 
 MAX_CHORD_SWEEP_RAD = 0.5 * math.pi
 """No chord replaces more of an arc than this, however wide the tolerance: a circle has four."""
@@ -195,7 +195,9 @@ def _repeated(counts: Ints) -> tuple[Ints, Ints]:
 
 
 def _built(toolpath: Toolpath, row: Ints, kind: Ints, end: Floats, centre: Floats) -> Lowered:
-    """Rows of new kinds, ends and centres with all else of the rows that they came from."""
+    """Rows of new kinds, ends and centres, arrays that are theirs alone, with all else of the rows
+    that they came from."""
+    kind, end, centre = frozen(kind), frozen(end), frozen(centre)
     return Lowered(toolpath.picked(row, kind=kind, end=end, centre=centre), row)
 
 

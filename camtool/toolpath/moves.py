@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
-from typing import Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 
@@ -20,6 +20,8 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import PostError
 from camtool.findings import Finding
 from camtool.toolpath.wanted import Drawn
+
+Column = TypeVar("Column", bound=np.ndarray[Any, Any])
 
 COLUMNS = ("kind", "end", "centre", "feed", "value", "source", "block", "mode")
 """The columns of a Toolpath ..."""
@@ -128,8 +130,7 @@ class Toolpath:
             dtype = np.int64 if name in WHOLE else np.float64
             column = getattr(self, name)
             if not _is_own(column, dtype):
-                column = np.array(column, dtype=dtype)
-                column.flags.writeable = False
+                column = frozen(np.array(column, dtype=dtype))
             if column.shape != shape:
                 raise ValueError(f"column {name} has shape {column.shape}, wanted {shape}")
             object.__setattr__(self, name, column)
@@ -192,7 +193,9 @@ class Toolpath:
     def picked(self, row: Ints, **others: Ints | Floats) -> Toolpath:
         """Rows (M,) of this one, in that order and as often as they are named; `others`: columns
         that take the place of theirs."""
-        columns = {name: getattr(self, name)[row] for name in COLUMNS}
+        columns = {
+            name: frozen(getattr(self, name)[row]) for name in COLUMNS if name not in others
+        }
         drawn = None if self.drawn is None else self.drawn.picked(row)
         return replace(self, **{**columns, **others}, drawn=drawn)
 
@@ -224,6 +227,12 @@ class Toolpath:
                 source=self.text(row),
                 block=int(self.block[row]),
             )
+
+
+def frozen(column: Column) -> Column:
+    """The very array, which nobody may change any more: a Toolpath need not copy it."""
+    column.flags.writeable = False
+    return column
 
 
 def _is_own(column: object, dtype: type) -> bool:
