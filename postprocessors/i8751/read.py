@@ -13,20 +13,24 @@ from __future__ import annotations
 
 import math
 import re
+from array import array
 from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, NoReturn
 
 import numpy as np
+import numpy.typing as npt
 
 from camtool.arrays import Floats, Ints
 from camtool.bounds import check_count
 from camtool.errors import ProgramError
 from camtool.findings import Finding
+from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 
+from . import packets
 from .dialect import MOST_DWELL_BYTE_S, RECORDS_PER_PACKET, Dialect, I8751Machine
 from .findings import READ_TWO_WAYS, VALUE_ROUNDED
 from .pulses import PulseTimes
@@ -41,8 +45,13 @@ PACKET_END: Final = 0x45
 """The byte after a packet, as it is read."""
 DATA_END: Final = 0x54
 """The byte after the last packet, as it is read."""
+STANDS: Final = 5
+"""The sense of a motor that stands, as it is read."""
 
-_MOTOR: Final = rb"(?:\x05|([\x03\x04])(.)(.))"
+RECORDS_AT_ONCE: Final = 1 << 14
+"""So many records are read, and made rows, in one go."""
+
+Shorts = npt.NDArray[np.int32]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +59,8 @@ class Decoded:
     """R records as the controller holds them: steps (R, 3), signed by part axes, and waits (R, 2)
     s; `rounded` distances of a listing that were no whole steps, the worst off by so many."""
 
-    steps: Ints
-    waits: Ints
+    steps: Shorts
+    waits: Shorts
     rounded: int = 0
     worst_steps: float = 0.0
 
@@ -104,39 +113,44 @@ def _read_packets(data: bytes, dialect: Dialect) -> Decoded:
 
 def _toolpath(decoded: Decoded, machine: I8751Machine, dialect: Dialect) -> Toolpath:
     """Rows of all records, then END."""
-    steps, waits = decoded.steps, decoded.waits
+    path, times = ToolpathBuilder(), PulseTimes(dialect)
     step_mm = np.array([axis.coded_step_mm for axis in machine.axes])
-    moves_xy, moves_z = steps[:, :2].any(axis=1), steps[:, 2] != 0
-    present = np.column_stack([moves_xy, waits[:, 0] > 0, moves_z, waits[:, 1] > 0])
-    # Slots 0 to 3 of a record: X and Y, T1, Z, T2.
-    record, slot = np.nonzero(present)
-    at = np.cumsum(steps, axis=0)
-    ends = at[record]
-    # X and Y have moved before Z does.
-    before_z = slot < 2
-    ends[before_z, 2] -= steps[record[before_z], 2]
-    is_wait = slot % 2 == 1
-    kind = np.where(is_wait, np.int64(Kind.DWELL), _kinds(ends, steps[record], slot))
-    feeds = np.column_stack(_feeds(steps, step_mm, PulseTimes(dialect)))[record, slot // 2]
-    value = np.where(is_wait, waits[record, slot // 2].astype(np.float64), np.nan)
-    count = len(record) + 1
-    last = at[-1:]
-    return Toolpath(
-        kind=np.append(kind, Kind.END),
-        end=np.concatenate([ends, last]) * step_mm,
-        centre=np.full((count, 2), np.nan),
-        feed=np.append(np.where(kind == Kind.LINE, feeds, np.nan), np.nan),
-        value=np.append(value, np.nan),
-        source=np.full(count, -1),
-        block=np.append(record, len(steps)),
-        start=np.zeros(3),
-        findings=(*_findings(decoded), *_two_ways(decoded, dialect)),
-    )
+    goes_below = bool((np.cumsum(decoded.steps[:, 2]) < 0).any())
+    at = np.zeros(3, dtype=np.int64)
+    for low in range(0, len(decoded.steps), RECORDS_AT_ONCE):
+        records = slice(low, low + RECORDS_AT_ONCE)
+        steps, waits = decoded.steps[records].astype(np.int64), decoded.waits[records]
+        moves_xy, moves_z = steps[:, :2].any(axis=1), steps[:, 2] != 0
+        present = np.column_stack([moves_xy, waits[:, 0] > 0, moves_z, waits[:, 1] > 0])
+        # Slots 0 to 3 of a record: X and Y, T1, Z, T2.
+        record, slot = np.nonzero(present)
+        stands = at + np.cumsum(steps, axis=0)
+        at = stands[-1]
+        ends = stands[record]
+        # X and Y have moved before Z does.
+        before_z = slot < 2
+        ends[before_z, 2] -= steps[record[before_z], 2]
+        is_wait = slot % 2 == 1
+        lines = _kinds(ends, steps[record], slot, goes_below=goes_below)
+        kind = np.where(is_wait, np.int64(Kind.DWELL), lines)
+        feeds = np.column_stack(_feeds(steps, step_mm, times))[record, slot // 2]
+        if len(record):
+            path.moves(
+                kind=kind,
+                end=ends * step_mm,
+                centre=np.full((len(record), 2), np.nan),
+                feed=np.where(kind == Kind.LINE, feeds, np.nan),
+                value=np.where(is_wait, waits[record, slot // 2].astype(np.float64), np.nan),
+                block=low + record,
+            )
+    path.block = len(decoded.steps)
+    return path.event(Kind.END).finish((*_findings(decoded), *_two_ways(decoded, dialect)))
 
 
-def _kinds(ends: Ints, steps: Ints, slot: Ints) -> Ints:
-    """RAPID or LINE for each row, by where it runs; waits are whatever comes out."""
-    if not (ends[:, 2] < 0).any():
+def _kinds(ends: Ints, steps: Ints, slot: Ints, *, goes_below: bool) -> Ints:
+    """RAPID or LINE for each row, by where it runs; waits are whatever comes out. `goes_below`:
+    whether the program goes below part zero."""
+    if not goes_below:
         return np.full(len(ends), np.int64(Kind.LINE))
     is_z = slot >= 2
     start_z = ends[:, 2] - np.where(is_z, steps[:, 2], 0)
@@ -158,16 +172,24 @@ def _feeds(steps: Ints, step_mm: Floats, times: PulseTimes) -> list[Floats]:
 
 def _two_ways(decoded: Decoded, dialect: Dialect) -> Iterator[Finding]:
     """READ_TWO_WAYS: runs with a high byte, whose unit is 256 steps or 255."""
-    pulses = dialect.pulses(decoded.steps)
-    high = pulses // dialect.high_byte_steps
-    count = int((high > 0).sum())
-    if count and not dialect.long_runs:
-        record = int((high > 0).any(axis=1).argmax())
+    if dialect.long_runs:
+        return
+    count, record, most = 0, -1, np.zeros(3, dtype=np.int64)
+    for low in range(0, len(decoded.steps), RECORDS_AT_ONCE):
+        steps = decoded.steps[low : low + RECORDS_AT_ONCE].astype(np.int64)
+        pulses = dialect.pulses(steps)
+        high = pulses // dialect.high_byte_steps
+        found = (high > 0).any(axis=1)
+        if found.any() and record < 0:
+            record = low + int(found.argmax())
+        count += int((high > 0).sum())
+        most += high.sum(axis=0)
+    if count:
         yield READ_TWO_WAYS(
             where=f"record {record + 1}",
             measured=count,
             high_byte=dialect.high_byte,
-            steps=int(high.sum(axis=0).max()),
+            steps=int(most.max()),
         )
 
 
@@ -179,8 +201,8 @@ def _findings(decoded: Decoded) -> tuple[Finding, ...]:
 
 # Packets: bytes as the controller stores them, and refused where it could not.
 #
-# One pattern takes a whole record; only a record that does not match is walked byte by byte, to
-# find where it goes wrong.
+# Records are read by columns; only one that is none is walked byte by byte, to find where it goes
+# wrong.
 
 
 class PacketReader:
@@ -189,29 +211,52 @@ class PacketReader:
     def __init__(self, data: bytes, dialect: Dialect) -> None:
         self._data = data
         self._dialect = dialect
-        mark = re.escape(bytes([dialect.dwell_mark_byte]))
-        pair = mark + rb"(.)"
-        self._pattern = re.compile(
-            rb"\x01" + _MOTOR + rb"\x02" + _MOTOR + pair + rb"\x03" + _MOTOR + pair, re.DOTALL
-        )
-        self._steps: list[tuple[int, int, int]] = []
-        self._waits: list[tuple[int, int]] = []
+        self._parts: list[Shorts] = []
+        self._records = 0
         self._at = 0
+        self._inside = 0
+        """How many records of the packet have been read."""
 
     def read(self) -> Decoded:
         """All records of the stream."""
         self._take_key()
         while True:
-            self._packet()
+            self._records_in_a_row()
+            byte = self._peek("motor 01H of a record" + (", or 45H" if self._inside else ""))
+            if not (self._inside and byte == PACKET_END):
+                self._refuse_record(byte)
+            self._at, self._inside = self._at + 1, 0
             if self._peek("45H before it ended a packet: now 54H or another packet") == DATA_END:
                 break
             if self._dialect.key == "each-packet":
                 self._take_key()
         if self._at + 1 != len(self._data):
             raise self._fault(self._at + 1, "a byte after 54H, the end of data", "remove it")
-        return Decoded(
-            np.array(self._steps, dtype=np.int64), np.array(self._waits, dtype=np.int64)
+        table = np.concatenate(self._parts)
+        return Decoded(table[:, : packets.BEFORE], table[:, packets.BEFORE :])
+
+    def _records_in_a_row(self) -> None:
+        """All records up to the first that is none, or to where packets end."""
+        dialect = self._dialect
+        octets = np.frombuffer(self._data, dtype=np.uint8)
+        table = np.empty((RECORDS_AT_ONCE, packets.COLUMNS), dtype=np.int64)
+        rules = (
+            RECORDS_PER_PACKET,
+            dialect.high_byte_steps,
+            dialect.lost_pulses,
+            dialect.dwell_mark_byte,
+            dialect.key == "each-packet",
         )
+        count = RECORDS_AT_ONCE
+        while count == RECORDS_AT_ONCE:
+            count, self._at, self._inside = packets.records_in_a_row(
+                octets, (self._at, self._inside), rules, table
+            )
+            read = table[:count].astype(np.int32)
+            read[:, : packets.BEFORE] *= np.array(dialect.signs, dtype=np.int32)
+            self._parts.append(read)
+            self._records += count
+            check_count(self._records, "record")
 
     def _peek(self, wanted: str) -> int:
         """The byte here; a fault when there is none."""
@@ -226,63 +271,34 @@ class PacketReader:
             raise self._fault(self._at, f"{byte:02X}H is not the access key 13H", mend)
         self._at += 1
 
-    def _packet(self) -> None:
-        """Records up to and with the 45H behind the last one."""
-        for record in range(RECORDS_PER_PACKET + 1):
-            byte = self._peek("motor 01H of a record" + (", or 45H" if record else ""))
-            if record and byte == PACKET_END:
-                self._at += 1
-                return
-            if record == RECORDS_PER_PACKET:
-                raise self._fault(
-                    self._at,
-                    f"{byte:02X}H where the packet must end: it has {RECORDS_PER_PACKET} records",
-                    "end it with 45H",
-                )
-            self._record()
-
-    def _record(self) -> None:
-        check_count(len(self._steps) + 1, "record")
-        match = self._pattern.match(self._data, self._at)
-        if match is None:
-            self._walk()
-            raise self._fault(self._at, "bytes that are not a record")
-        sense1, high1, low1, sense2, high2, low2, wait1, sense3, high3, low3, wait2 = (
-            match.groups()
-        )
-        x, y, z = self._dialect.signs
-        self._steps.append(
-            (
-                x * self._moved(sense1, high1, low1, match.start(2)),
-                y * self._moved(sense2, high2, low2, match.start(5)),
-                z * self._moved(sense3, high3, low3, match.start(9)),
-            )
-        )
-        self._waits.append((wait1[0], wait2[0]))
-        self._at = match.end()
-
-    def _moved(self, sense: bytes | None, high: bytes, low: bytes, offset: int) -> int:
-        """Steps of a motor, forward positive; a motor that turns for 0 steps is a fault."""
-        if sense is None:
-            return 0
-        pulses = high[0] * self._dialect.high_byte_steps + low[0]
-        if not pulses:
+    def _refuse_record(self, byte: int) -> NoReturn:
+        """ByteFault at the first byte that keeps a record from being one."""
+        if self._inside == RECORDS_PER_PACKET:
             raise self._fault(
-                offset, "a motor turns, but for 0 steps", "write 05H for a motor that stands"
+                self._at,
+                f"{byte:02X}H where the packet must end: it has {RECORDS_PER_PACKET} records",
+                "end it with 45H",
             )
-        steps = pulses - self._dialect.lost_pulses
-        return steps if sense == b"\x03" else -steps
+        for motor in self._walk():
+            if self._data[motor + 1] != STANDS and not any(self._data[motor + 2 : motor + 4]):
+                raise self._fault(
+                    motor + 2,
+                    "a motor turns, but for 0 steps",
+                    "write 05H for a motor that stands",
+                )
+        raise self._fault(self._at, "bytes that are not a record")
 
-    def _walk(self) -> None:
-        """ByteFault at the first byte that keeps the record from being one."""
-        at = self._motor(self._at, 1)
-        at = self._wait(self._motor(at, 2), "T1")
-        self._wait(self._motor(at, 3), "T2")
+    def _walk(self) -> tuple[int, int, int]:
+        """Where the motors of the record begin; ByteFault where it has not the form of one."""
+        second = self._motor(self._at, 1)
+        third = self._wait(self._motor(second, 2), "T1")
+        self._wait(self._motor(third, 3), "T2")
+        return self._at, second, third
 
     def _motor(self, at: int, number: int) -> int:
         self._want(at, (number,), f"motor {number:02d}H")
         self._want(at + 1, (3, 4, 5), f"the sense of motor {number}: 03H, 04H or 05H")
-        if self._data[at + 1] == 5:
+        if self._data[at + 1] == STANDS:
             return at + 2
         self._want(at + 2, None, f"PH of motor {number}")
         self._want(at + 3, None, f"PL of motor {number}")
@@ -305,7 +321,7 @@ class PacketReader:
             raise self._fault(at, f"{byte:02X}H: wanted {what}", mend)
 
     def _fault(self, at: int, message: str, mend: str = "") -> ByteFault:
-        return ByteFault(at, len(self._steps), message, mend)
+        return ByteFault(at, self._records, message, mend)
 
 
 def replies(data: bytes, decoded: Decoded, dialect: Dialect) -> list[str]:
@@ -359,8 +375,8 @@ class ListingReader:
     def __init__(self, machine: I8751Machine, dialect: Dialect) -> None:
         self._step_mm = [axis.coded_step_mm for axis in machine.axes]
         self._most = dialect.encodable_steps
-        self._steps: list[list[int]] = []
-        self._waits: list[tuple[int, int]] = []
+        self._numbers = array("i")
+        """Those of all records, five each."""
         self._rounded = 0
         self._worst = 0.0
         self._line = 0
@@ -381,14 +397,10 @@ class ListingReader:
                 self._record(text, indent)
         if not ended:
             raise self._error(len(lines[-1]), "the listing breaks off", "its last line is END")
-        if not self._steps:
+        if not self._numbers:
             raise ProgramError("the program is empty", mend="a listing has records before END")
-        return Decoded(
-            np.array(self._steps, dtype=np.int64),
-            np.array(self._waits, dtype=np.int64),
-            self._rounded,
-            self._worst,
-        )
+        table = np.array(self._numbers, dtype=np.int32).reshape(-1, len(_WORDS))
+        return Decoded(table[:, :3], table[:, 3:], self._rounded, self._worst)
 
     def _record(self, text: str, indent: int) -> None:
         match = _RECORD.fullmatch(text)
@@ -402,8 +414,7 @@ class ListingReader:
             self._whole(match[group], axis, indent + match.start(group))
             for axis, group in enumerate((1, 2, 4))
         ]
-        self._steps.append(steps)
-        self._waits.append(waits)
+        self._numbers.extend((*steps, *waits))
 
     def _whole(self, text: str, axis: int, column: int) -> int:
         """A distance in steps, half a step away from zero."""
@@ -445,11 +456,9 @@ class ListingReader:
 
     def _error(self, column: int, message: str, mend: str) -> ProgramError:
         """ProgramError in the present line at a column from 0."""
-        return ProgramError(
-            message,
-            where=f"record {len(self._steps) + 1}, line {self._line}, column {column + 1}",
-            mend=mend,
-        )
+        record = len(self._numbers) // len(_WORDS) + 1
+        where = f"record {record}, line {self._line}, column {column + 1}"
+        return ProgramError(message, where=where, mend=mend)
 
 
 # The hex dump: offset, bytes, and after `;` a comment that may state the replies.

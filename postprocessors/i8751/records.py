@@ -148,8 +148,7 @@ def records_of(toolpath: Toolpath, machine: I8751Machine, dialect: Dialect) -> R
     """The records of a checked toolpath; PostError when it moves nothing, or far too much."""
     counts = Counts()
     lowered, row = _lowered(toolpath, slope_step_mm(machine), dialect, counts)
-    targets = _rounded(lowered, machine)
-    deltas = np.diff(targets, axis=0, prepend=np.zeros((1, 3), dtype=np.int64))
+    deltas = np.diff(_rounded(lowered, machine), axis=0, prepend=np.zeros((1, 3), dtype=np.int64))
     refuse(
         lowered,
         ~lowered.is_motion & deltas.any(axis=1),
@@ -167,6 +166,7 @@ def records_of(toolpath: Toolpath, machine: I8751Machine, dialect: Dialect) -> R
     owner = np.repeat(np.arange(len(lowered)), each)
     first = np.cumsum(each) - each
     steps = deltas[owner]
+    del deltas
     for index, parts in pieces.items():
         steps[first[index] : first[index] + len(parts)] = parts
     if dialect.z_alone == "with-step":
@@ -312,11 +312,16 @@ class _Plain:
                 self.counts.tools += 1
             elif kind != Kind.SET_ZERO:
                 self._note_spindle(index)
-        at = [record for record, _, _ in own]
+        steps = self.steps
+        if own:
+            at = [record for record, _, _ in own]
+            steps = np.insert(steps, at, 0, axis=0)
+            waits = np.insert(waits, at, [[0, seconds] for _, seconds, _ in own], axis=0)
+            owner = np.insert(owner, at, [index for _, _, index in own])
         return Records(
-            steps=np.insert(self.steps, at, 0, axis=0),
-            waits=np.insert(waits, at, [[0, seconds] for _, seconds, _ in own] or 0, axis=0),
-            row=row[np.insert(owner, at, [index for _, _, index in own])],
+            steps=steps,
+            waits=waits,
+            row=row[owner],
             messages=tuple(messages),
             end_row=end_row,
             counts=self.counts,

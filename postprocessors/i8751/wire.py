@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from camtool.toolpath.program import Listing
 
 from .dialect import I8751Machine
@@ -15,7 +17,9 @@ def packet_count(data: bytes, machine: I8751Machine) -> int:
     if dialect.format == "packets":
         return len(data)
     decoded = decoded_records(data, machine)
-    return len(packet_bytes(decoded.steps, decoded.waits, dialect))
+    return len(
+        packet_bytes(decoded.steps.astype(np.int64), decoded.waits.astype(np.int64), dialect)
+    )
 
 
 def listing(data: bytes, machine: I8751Machine) -> Listing:
@@ -25,6 +29,8 @@ def listing(data: bytes, machine: I8751Machine) -> Listing:
     end = f"{END_OF_DATA:02X}"
     if not len(decoded.steps):
         return Listing((end,), binary=True)
-    table, used = byte_table(decoded.steps, decoded.waits, dialect)
+    table, used = byte_table(
+        decoded.steps.astype(np.int64), decoded.waits.astype(np.int64), dialect
+    )
     lines = (row[sent].tobytes().hex(" ").upper() for row, sent in zip(table, used, strict=True))
     return Listing((*lines, end), binary=True)

@@ -73,6 +73,9 @@ MOTOR_COLUMNS: Final = (1, 5, 11)
 
 PAIR_COLUMNS: Final = (9, 15)
 
+RECORDS_AT_ONCE: Final = 3_000 * RECORDS_PER_PACKET
+"""So many records become bytes in one go, in whole packets."""
+
 TEXT_EXTENSION: Final = ".txt"
 """Listings and hex dumps are text whatever the machine calls its programs."""
 
@@ -115,8 +118,13 @@ def write_program(toolpath: Toolpath, machine: I8751Machine) -> Program:
 
 def packet_bytes(steps: Ints, waits: Ints, dialect: Dialect) -> bytes:
     """The whole stream that the computer sends for records of steps (R, 3) and waits (R, 2)."""
-    table, used = byte_table(steps, waits, dialect)
-    return table[used].tobytes() + bytes([END_OF_DATA])
+    parts = []
+    for low in range(0, len(steps), RECORDS_AT_ONCE):
+        rows = slice(low, low + RECORDS_AT_ONCE)
+        table, used = byte_table(steps[rows], waits[rows], dialect)
+        used[0, 0] &= low == 0 or dialect.key == "each-packet"
+        parts.append(table[used].tobytes())
+    return b"".join([*parts, bytes([END_OF_DATA])])
 
 
 def byte_table(steps: Ints, waits: Ints, dialect: Dialect) -> tuple[Bytes, Bools]:

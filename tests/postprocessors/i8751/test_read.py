@@ -1,6 +1,8 @@
 """What the i8751 reader makes of packets, listings and hex dumps, good and bad."""
 
+import numpy as np
 import pytest
+from camtool_postprocessors.i8751 import read as reading
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -8,7 +10,8 @@ from camtool.errors import ProgramError
 from camtool.findings import Code, Severity
 from camtool.target.registry import LoadedTarget
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.moves import COLUMNS, Kind, Toolpath
+from tests.oracles import i8751_packets
 from tests.postprocessors.i8751.machines import OPTIONS, STEP_MM, loaded
 
 RECORD = bytes.fromhex("01 03 00 64 02 05 00 02 03 04 01 2C 00 00")
@@ -385,3 +388,80 @@ def test_the_reader_starts_at_part_zero() -> None:
 def test_records_that_move_nothing() -> None:
     path = read(b"\x13" + STILL * 2 + b"\x45\x54")
     assert rows(path) == [("END", 0, 0, 0, None, 2)]
+
+
+MOTORS = st.one_of(
+    st.just(b"\x05"),
+    st.tuples(st.sampled_from(b"\x03\x04"), st.integers(0, 2), st.integers(0, 255)).map(bytes),
+)
+RECORDS = st.tuples(MOTORS, MOTORS, st.integers(0, 255), MOTORS, st.integers(0, 1))
+PIECES = st.lists(
+    st.one_of(
+        st.lists(RECORDS, min_size=1, max_size=5), st.binary(min_size=0, max_size=3), st.none()
+    ),
+    max_size=8,
+)
+
+
+def stream(pieces: list[object], mark: int, *, keys: bool) -> bytes:
+    """Packets, and among them anything."""
+    data = b"\x13"
+    for number, piece in enumerate(pieces):
+        if isinstance(piece, bytes):
+            data += piece
+        elif piece is None:
+            data = data[:-1]
+        else:
+            data += b"\x13" if keys and number else b""
+            for x, y, before, z, after in piece:  # type: ignore[attr-defined]
+                data += b"\x01" + x + b"\x02" + y + bytes([mark, before])
+                data += b"\x03" + z + bytes([mark, after])
+            data += b"\x45"
+    return data + b"\x54"
+
+
+@given(
+    PIECES,
+    st.sampled_from(["plus_backward=xz", "key=each-packet", "dwell_mark=30H", "high_byte='255'"]),
+    st.sampled_from(["first_pulse=moves", "first_pulse=repeats"]),
+    st.integers(1, 6),
+)
+def test_packets_are_read_as_one_record_at_a_time(
+    pieces: list[object], setting: str, pulse: str, at_once: int
+) -> None:
+    machine = loaded(setting, pulse).machine
+    keys, mark = setting == "key=each-packet", machine.dialect.dwell_mark_byte
+    data = stream(pieces, mark, keys=keys)
+
+    def outcome(reader: type) -> object:
+        try:
+            return reader(data, machine.dialect).read()
+        except reading.ByteFault as fault:
+            return fault.offset, fault.record, fault.message, fault.mend
+
+    wanted = outcome(i8751_packets.PacketReader)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(reading, "RECORDS_AT_ONCE", at_once)
+        found = outcome(reading.PacketReader)
+    if isinstance(found, reading.Decoded):
+        assert np.column_stack([found.steps, found.waits]).tolist() == [
+            list(record)
+            for record in wanted  # type: ignore[attr-defined]
+        ]
+    else:
+        assert found == wanted
+
+
+@given(st.lists(st.lists(RECORDS, min_size=1, max_size=5), min_size=1), st.integers(1, 6))
+def test_rows_do_not_depend_on_how_many_records_are_read_together(
+    pieces: list[object], at_once: int
+) -> None:
+    data = stream(pieces, 0, keys=False).replace(b"\x03\x00\x00", b"\x03\x00\x01")
+    data = data.replace(b"\x04\x00\x00", b"\x04\x00\x01")
+    whole = read(data)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(reading, "RECORDS_AT_ONCE", at_once)
+        parts = read(data)
+    assert parts.findings == whole.findings
+    for name in COLUMNS:
+        assert np.array_equal(getattr(parts, name), getattr(whole, name), equal_nan=True)

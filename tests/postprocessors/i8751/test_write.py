@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from camtool_postprocessors.i8751 import write as writer
 
 from camtool.errors import MachineError, PostError
 from camtool.findings import Code, Severity
@@ -288,3 +289,17 @@ def test_the_line_carries_packets_whatever_the_file_is(form: str) -> None:
     wanted = len(write(line(300, 700, 0)).data)
     assert target.target.line_bytes(data, target.machine) == wanted
     assert (len(data) == wanted) == (form == "packets")
+
+
+@pytest.mark.parametrize("key", ["once", "each-packet"])
+@pytest.mark.parametrize("count", [1, 4, 5, 6, 10, 11, 31])
+def test_bytes_do_not_depend_on_how_many_records_are_written_together(
+    key: str, count: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    dialect = loaded(f"key={key}").machine.dialect
+    rng = np.random.default_rng(count)
+    steps, waits = rng.integers(-300, 300, (count, 3)), rng.integers(0, 3, (count, 2))
+    table, used = writer.byte_table(steps, waits, dialect)
+    for at_once in (5, 10):
+        monkeypatch.setattr(writer, "RECORDS_AT_ONCE", at_once)
+        assert writer.packet_bytes(steps, waits, dialect) == table[used].tobytes() + b"\x54"
