@@ -207,6 +207,9 @@ left."""
 PAIR_COUNTS = 10
 """The speeds of a line are searched up to this far from those of its path, in counts in a tick."""
 
+LINES_AT_ONCE = 1 << 12
+"""The speeds of so many lines are searched together."""
+
 PAIR_TOLERANCE = 1e-4
 """A sum of squares of speeds that is a whole number within this comes from a program."""
 
@@ -323,7 +326,9 @@ def _speeds(path: Toolpath, way_mm: Floats, first: Ints, machine: _Machine) -> I
     wanted = np.minimum(np.where(np.isfinite(along), along / coded, 0.0), INT16)
     sent = to_steps(wanted, 1.0)
     slanted = np.flatnonzero((wanted[:, 0] > 0.0) & (wanted[:, 1] > 0.0) & (wanted[:, 2] == 0.0))
-    sent[slanted, :2] = _pairs(wanted[slanted, :2])
+    for low in range(0, len(slanted), LINES_AT_ONCE):
+        lines = slanted[low : low + LINES_AT_ONCE]
+        sent[lines, :2] = _pairs(wanted[lines, :2])
     rapid_mm = machine.rapid_mm_min / (60.0 * TICKS_PER_S)
     rapid = to_steps(min(rapid_mm, INT16 * coded[0]), float(coded[0]))
     return np.where((path.kind[first] == Kind.LINE)[:, None], sent, rapid)

@@ -289,21 +289,22 @@ class _Text:
         begin = match.start(1)
         if _WHOLE.fullmatch(match[1]) is None:
             self._refuse_words(begin, match.end(1))
-        rows: list[list[int]] = []
+        rows: list[Ints] = []
         offset = begin
         for part in _ROW_END.split(match[1]):
-            if words := part.replace(",", " ").split():
-                rows.append(list(map(int, words)))
-                if len(words) != len(rows[0]):
+            if numbers := part.replace(",", " ").strip():
+                row = np.fromstring(numbers, dtype=np.int64, sep=" ")
+                rows.append(row)
+                if len(row) != len(rows[0]):
                     self.fail(
                         offset + len(part) - len(part.lstrip()),
-                        f"a row has {len(words)} numbers, the first one {len(rows[0])}",
+                        f"a row has {len(row)} numbers, the first one {len(rows[0])}",
                         "numbers are whole tenths of a millimetre, without decimals",
                     )
             offset += len(part) + 1
         if not rows:
             self.fail(begin, "an array is empty")
-        table = np.array(rows, dtype=np.int64)
+        table = np.stack(rows)
         if np.abs(table).max() > MOST_NUMBER:
             self._refuse_words(begin, match.end(1))
         self._finish(match.end())

@@ -17,6 +17,7 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.bounds import check_count
 from camtool.errors import ProgramError
 from camtool.findings import Finding, Sentence
+from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 
 from .dialect import (
@@ -73,57 +74,44 @@ def _looks_like_text(data: bytes) -> bool:
 
 
 class _Moves:
-    """Jobs in, the columns of a toolpath out."""
+    """Jobs in, the rows of a toolpath out."""
 
     def __init__(self, machine: MatlabRouterMachine, dialect: Choices) -> None:
         self._machine = machine
         self._dialect = dialect
         self._home = np.array(machine.controller.machine_zero_mm, dtype=np.float64)
-        self._position = np.zeros(3)
-        self._kind: list[Ints] = []
-        self._end: list[Floats] = []
-        self._feed: list[Floats] = []
-        self._value: list[Floats] = []
-        self._block: list[Ints] = []
+        self._path = ToolpathBuilder()
         self._blocks = 0
         self._findings = JobFindings(machine, dialect)
 
     def add(self, job: ReadJob) -> None:
         """The rows of one job."""
-        check_count(self._blocks + job.length.shape[1] + 1, "block")
+        lines = job.length.shape[1]
+        check_count(self._blocks + lines + 1, "block")
         done = execute(job, self._dialect)
         self._findings.add(job, done)
-        self._go_home(self._blocks)
-        x, y = self._home[:2] + done.points[0] / UNITS_PER_MM
-        up, down = self._home[2], cut_z_mm(self._machine, self._dialect)
-        self._rapid((x, self._home[1], up), self._blocks)
-        self._rapid((x, y, up), self._blocks)
-        self._row(Kind.LINE, (x, y, down), self._blocks, feed=self._dialect.plunge_mm_min)
+        path = self._path
+        path.block = self._blocks
+        self._go_home()
+        x, y = (self._home[:2] + done.points[0] / UNITS_PER_MM).tolist()
+        self._rapid(x=x)
+        self._rapid(y=y)
+        down = cut_z_mm(self._machine, self._dialect)
+        path.line(z=down, feed=self._dialect.plunge_mm_min)
         if self._dialect.spindle_rpm is not None:
-            self._row(Kind.SPINDLE_CW, (x, y, down), self._blocks, value=self._dialect.spindle_rpm)
+            path.event(Kind.SPINDLE_CW, self._dialect.spindle_rpm)
         self._lines(job, done, down)
-        self._blocks += job.length.shape[1] + 1
-        last = self._blocks - 1
+        self._blocks += lines + 1
+        path.block = self._blocks - 1
         if self._dialect.spindle_rpm is not None:
-            self._row(Kind.SPINDLE_OFF, tuple(self._position), last)
+            path.event(Kind.SPINDLE_OFF)
         if self._dialect.end == "raise":
-            self._go_home(last)
+            self._go_home()
 
     def finish(self) -> Toolpath:
         """The toolpath of all jobs."""
-        self._row(Kind.END, tuple(self._position), max(0, self._blocks - 1))
-        kind = np.concatenate(self._kind)
-        return Toolpath(
-            kind=kind,
-            end=np.concatenate(self._end),
-            centre=np.full((len(kind), 2), np.nan),
-            feed=np.concatenate(self._feed),
-            value=np.concatenate(self._value),
-            source=np.full(len(kind), -1),
-            block=np.concatenate(self._block),
-            start=np.zeros(3),
-            findings=tuple(self._findings.findings()),
-        )
+        self._path.block = max(0, self._blocks - 1)
+        return self._path.event(Kind.END).finish(self._findings.findings())
 
     def _lines(self, job: ReadJob, done: Executed, z: float) -> None:
         """One row a line; two where its speeds bend it by more than the tolerance."""
@@ -131,43 +119,29 @@ class _Moves:
         self._findings.bent.add(
             run.bent, run.most_bend * UNIT_MM, f"job {job.number}, line {run.first_bent + 1}"
         )
-        if len(run.end) == 0:
-            return
-        xy = self._home[:2] + run.end / UNITS_PER_MM
         count = len(run.end)
-        self._kind.append(np.full(count, Kind.LINE, dtype=np.int64))
-        self._end.append(np.column_stack([xy, np.full(count, z)]))
-        self._feed.append(run.speed * self._machine.feed.unit_mm_min)
-        self._value.append(np.full(count, np.nan))
-        self._block.append(self._blocks + 1 + run.line)
-        self._position = self._end[-1][-1]
+        if count:
+            xy = self._home[:2] + run.end / UNITS_PER_MM
+            self._path.moves(
+                kind=np.full(count, int(Kind.LINE)),
+                end=np.column_stack([xy, np.full(count, z)]),
+                centre=np.full((count, 2), np.nan),
+                feed=run.speed * self._machine.feed.unit_mm_min,
+                block=self._blocks + 1 + run.line,
+            )
 
-    def _go_home(self, block: int) -> None:
+    def _go_home(self) -> None:
         """Z first, then X and Y (state 0, L4718-4793)."""
-        x, y, _ = self._position
-        self._rapid((x, y, self._home[2]), block)
-        self._rapid((self._home[0], y, self._home[2]), block)
-        self._rapid((self._home[0], self._home[1], self._home[2]), block)
+        x, y, z = self._home.tolist()
+        self._rapid(z=z)
+        self._rapid(x=x)
+        self._rapid(y=y)
 
-    def _rapid(self, to: tuple[float, ...], block: int) -> None:
-        if tuple(self._position) != to:
-            self._row(Kind.RAPID, to, block)
-
-    def _row(
-        self,
-        kind: Kind,
-        to: tuple[float, ...],
-        block: int,
-        *,
-        feed: float = np.nan,
-        value: float = np.nan,
-    ) -> None:
-        self._position = np.array(to, dtype=np.float64)
-        self._kind.append(np.array([kind], dtype=np.int64))
-        self._end.append(self._position[None, :])
-        self._feed.append(np.array([feed]))
-        self._value.append(np.array([value]))
-        self._block.append(np.array([block], dtype=np.int64))
+    def _rapid(self, **to: float) -> None:
+        """To a place along one axis, unless the tool is there."""
+        before = dict(zip("xyz", self._path.position, strict=True))
+        if before | to != before:
+            self._path.rapid(**to)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,7 @@ each line.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
@@ -44,15 +45,19 @@ def write_program(toolpath: Toolpath, machine: MatlabRouterMachine) -> Program:
             mend="scale the drawing up" if len(cuts.row) else "cut below the stock's top, Z < 0",
         )
     stream = dialect.format == "stream"
-    jobs = _numbers_of(made)
+    jobs, count = _numbers_of(made), len(made.offsets) - 1
     heads = np.array(made.offsets[:-1])
     return Program(
-        data=_stream(jobs, dialect) if stream else _matlab(jobs, dialect),
+        data=_stream(jobs, dialect) if stream else _matlab(jobs, count, dialect),
         extension=STREAM_EXTENSION if stream else machine.target.extension,
         target=machine.target.name,
         row_of_block=np.insert(made.lines.row, heads, -1),
         findings=(*findings, *changes.findings(dialect)),
     )
+
+
+Pair = tuple[list[int], list[int]]
+"""Numbers of X and of Y."""
 
 
 @dataclass(frozen=True)
@@ -61,38 +66,35 @@ class _JobNumbers:
 
     count: int
     first: tuple[int, int]
-    xy: tuple[list[int], list[int]]
-    lxy: tuple[list[int], list[int]]
-    velxy: tuple[list[int], list[int]]
+    xy: Pair
+    lxy: Pair
+    velxy: Pair
 
 
-def _numbers_of(jobs: Jobs) -> list[_JobNumbers]:
+def _numbers_of(jobs: Jobs) -> Iterator[_JobNumbers]:
     """All jobs as plain numbers."""
     lines = jobs.lines
-    start, end = lines.start.T.tolist(), lines.end.T.tolist()
-    length, speed = np.abs(lines.end - lines.start).T.tolist(), jobs.speed.T.tolist()
-    numbers = []
     for low, high in pairwise(jobs.offsets):
-        x, y = start[0][low], start[1][low]
-        xy = [x, *end[0][low:high]], [y, *end[1][low:high]]
-        lxy = length[0][low:high], length[1][low:high]
-        velxy = speed[0][low:high], speed[1][low:high]
-        numbers.append(_JobNumbers(high - low, (x, y), xy, lxy, velxy))
-    return numbers
+        start, end = lines.start[low:high], lines.end[low:high]
+        xy = np.concatenate([start[:1], end]).T.tolist()
+        length, speed = np.abs(end - start).T.tolist(), jobs.speed[low:high].T.tolist()
+        first = xy[0][0], xy[1][0]
+        yield _JobNumbers(high - low, first, tuple(xy), tuple(length), tuple(speed))
 
 
-def _matlab(jobs: list[_JobNumbers], dialect: Choices) -> bytes:
-    """One section a job: the last job's arrays remain when all are run; `jobs` then holds all."""
+def _matlab(jobs: Iterable[_JobNumbers], count: int, dialect: Choices) -> bytes:
+    """One section a job: the last job's arrays remain when all are run; `jobs{}` then holds all
+    `count`."""
     lines = [
-        f"% camtool: matlab-router, profile {dialect.profile}, {_count(len(jobs), 'job')}",
+        f"% camtool: matlab-router, profile {dialect.profile}, {_count(count, 'job')}",
         "% xy, lxy and first point in 0.1 mm from home; velxy in counts of the encoder in 5 ms",
         f"% serial line: {dialect.baud} baud, {dialect.data_bits} bits, no parity, 1 stop bit",
     ]
-    if len(jobs) > 1:
+    if count > 1:
         lines.append("% run one section, send it, reset the master, then run the next one")
     for number, job in enumerate(jobs, 1):
         lines += [
-            f"%% job {number} of {len(jobs)}: {_count(job.count, 'line')}",
+            f"%% job {number} of {count}: {_count(job.count, 'line')}",
             *_matrix("xy", job.xy),
             *_matrix("lxy", job.lxy),
             *_matrix("velxy", job.velxy),
@@ -100,7 +102,7 @@ def _matlab(jobs: list[_JobNumbers], dialect: Choices) -> bytes:
             f"first_pointx = {job.first[0]};",
             f"first_pointy = {job.first[1]};",
         ]
-        if len(jobs) > 1:
+        if count > 1:
             names = "xy, lxy, velxy, size_of_array, first_pointx, first_pointy"
             lines.append(f"jobs{{{number}}} = {{{names}}};")
     return ("\n".join(lines) + "\n").encode("ascii")
@@ -110,13 +112,13 @@ def _count(count: int, noun: str) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
-def _matrix(name: str, rows: tuple[list[int], list[int]]) -> list[str]:
+def _matrix(name: str, rows: Pair) -> list[str]:
     """Two rows of numbers in columns."""
     first, second = (("%5d " * len(row) % tuple(row)).rstrip() for row in rows)
     return [f"{name} = [", first, second, "];"]
 
 
-def _stream(jobs: list[_JobNumbers], dialect: Choices) -> bytes:
+def _stream(jobs: Iterable[_JobNumbers], dialect: Choices) -> bytes:
     """Each number in digits and a carriage return: lines, first x and y, all lx, ly, velx, vely
     (L4294-4360)."""
     parts = []

@@ -153,6 +153,7 @@ FORMS = [
     SQUARE.replace(b";\n", b" % remark\n"),
     SQUARE.replace(b"480     0", b"+480,\t-0"),
     SQUARE.replace(b"\n  100   100", b";100 100"),
+    SQUARE.replace(b"\n", b"\n \t\n").replace(b" \t\n]", b" , \n\n]"),
     SQUARE + b"% the end",
     SQUARE.strip(),
 ]
