@@ -11,6 +11,7 @@ cdef class Search:
     cdef double[::1] apart, memo, x, y, error
 
 cdef class Judge:
+    cdef Int low
     cdef double[:, ::1] own, window, centre, directions, figures, trace
     cdef Int[:, ::1] rows, histograms
     cdef double[:, :, ::1] bins
@@ -173,7 +174,7 @@ cdef (double, double, double) _sizes(
 cdef void _count(Int[::1] places, Int count, Int[:, ::1] histograms, Int which) noexcept
 
 @cython.locals(
-    last=Int, own=Int, k=Int, circle=Int, first=Int, upto=Int, rows=Int[:, ::1], bits=Int[::1],
+    last=Int, own=Int, of_program=Int, k=Int, circle=Int, first=Int, upto=Int, rows=Int[:, ::1], bits=Int[::1],
     places=Int[::1], shown=double, most=double, squares=double, signed=double,
     figures=double[:, ::1], window=double[:, ::1], x=double[::1], y=double[::1],
     slide_x=double[::1], slide_y=double[::1], errors=double[::1], size=double[::1], pen=double[::1]

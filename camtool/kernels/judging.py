@@ -784,7 +784,7 @@ OWN, FIRST, LAST, CIRCLE, SLOT = range(5)
 
 
 class Task(NamedTuple):
-    """What N rows are judged by.
+    """What the N rows from `low` on are judged by.
 
     own (J, 16) moves of the rows that cut (`move_errors`), the K moves that are wanted; rows
     (N, 5): which of `own` a row is, −1 where nothing is cut, first and last of the moves that it
@@ -794,6 +794,7 @@ class Task(NamedTuple):
     `circle_bins`.
     """
 
+    low: int
     own: Floats
     moves: Moves
     rows: Ints
@@ -804,9 +805,9 @@ class Task(NamedTuple):
 
 
 class Sums(NamedTuple):
-    """What is found: rows (N, 19); histograms (2, 4 BINS) of interpolation and total, every
-    fourth sample in the same place of its four; bins (S, 720, 9); trace (T, 4) x, y, error, row,
-    and its pen; the list of near moves."""
+    """What is found: rows (N, 19), those of the task; histograms (2, 4 BINS) of interpolation and
+    total, every fourth sample in the same place of its four; bins (S, 720, 9); trace (T, 4) x, y,
+    error, row, and its pen; the list of near moves."""
 
     rows: Floats
     histograms: Ints
@@ -822,7 +823,8 @@ class Judge:
     these."""
 
     def __init__(self, task: Task, sums: Sums) -> None:
-        self.own, self.rows, self.window, self.off = task.own, task.rows, task.window, task.off
+        self.low, self.own, self.rows = task.low, task.own, task.rows
+        self.window, self.off = task.window, task.off
         self.centre, self.directions = task.centre, task.directions
         self.figures, self.histograms, self.bins = sums.rows, sums.histograms, sums.bins
         self.trace, self.pen = sums.trace, sums.pen
@@ -890,6 +892,7 @@ def judge_block(row: int, count: int, judge: Judge) -> None:
     )
     errors, size, bits, places = judge.errors[:count], judge.size[:count], judge.bits, judge.places
     figures, rows, window, pen = judge.figures, judge.rows, judge.window, judge.pen
+    of_program, row = row, row - judge.low
     lag, lags = _spread(figures, row, x, y, slide_x, slide_y, judge.squares)
     last = count - 1
     figures[row, SAMPLES] += count
@@ -930,7 +933,7 @@ def judge_block(row: int, count: int, judge: Judge) -> None:
                 judge.spoke_y,
                 judge.squares,
             )
-    trace_block(row, slide_x, slide_y, size, shown, pen, judge.trace)
+    trace_block(of_program, slide_x, slide_y, size, shown, pen, judge.trace)
 
 
 def judge_samples(row: Ints, commanded: Floats, slide: Floats, task: Task, sums: Sums) -> int:

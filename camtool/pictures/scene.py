@@ -282,7 +282,7 @@ def _playback(
             made = by_feed(toolpath, machine.rapid_mm_min)
         else:
             made = Playback(
-                seconds=verification.rows.ledger.duration_s,
+                seconds=verification.rows.seconds,
                 error_mm=verification.rows.total,
                 trace_row=verification.trace.row,
                 tables=tuple(_tables(verification.report)),

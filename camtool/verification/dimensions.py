@@ -50,35 +50,6 @@ class Size:
 
 
 @dataclass(frozen=True, eq=False)
-class RowSlides:
-    """Positions of the slides in each of N rows, XY mm: `low` and `high` (N, 2), infinite where
-    they did not move; `places` (N+1, 2): their position before each row and after the last."""
-
-    low: Floats
-    high: Floats
-    places: Floats
-
-
-def places_between(start: Floats, row_end: Floats) -> Floats:
-    """(N+1, 2) mm: the position of the slides before each row and after the last. `row_end`
-    (N, 2) is the position at the end of each row, NaN for rows without motion."""
-    known = np.isfinite(row_end[:, 0])
-    latest = np.maximum.accumulate(np.where(known, np.arange(1, len(row_end) + 1), 0))
-    places = np.concatenate([start[None, :2], row_end])
-    return np.asarray(places[np.concatenate([[0], latest])])
-
-
-def closure_mm(loops: Ints, slides: RowSlides) -> float:
-    """Largest distance, mm, between where the slides begin and where they end a closed contour;
-    NaN where no contour is closed. `loops` (C, 2) are those of `camtool.verification.cuts`."""
-    begin, finish = loops[loops[:, 0] != NO_LOOP].T
-    if len(begin) == 0:
-        return math.nan
-    gap = slides.places[finish + 1] - slides.places[begin]
-    return float(np.hypot(gap[:, 0], gap[:, 1]).max())
-
-
-@dataclass(frozen=True, eq=False)
 class LoopedCuts:
     """Cutting moves and the loops (C, 2) of their contours (`camtool.verification.cuts.loops`)."""
 
@@ -86,28 +57,82 @@ class LoopedCuts:
     loops: Ints
 
 
-def sizes(
-    decoded: LoopedCuts, slides: RowSlides, goal: LoopedCuts, match: Match, gap_mm: float
-) -> Iterator[Size]:
-    """X and Y of the whole part, then of each closed contour of the wanted moves (`goal`).
+class SlideExtents:
+    """Where the slides are in the rows that determine the sizes, and where they close contours."""
 
-    `match` says to which wanted row and contour each decoded row belongs. Contours to which no
-    row belongs are left out (a finding names them).
+    def __init__(self, start: Floats, decoded: LoopedCuts, goal: LoopedCuts, match: Match) -> None:
+        """Of the wanted moves `goal`, the slides at `start` (3,) mm before they move; `match` says
+        to which wanted row and contour each decoded row belongs."""
+        count, contour = goal.cuts.contour_count, match.contour
+        self._counts = np.zeros(len(contour), dtype=np.bool_)
+        self._begins = self._counts.copy()
+        self._contour = contour
+        mine = _counting(decoded, goal, match)
+        self._counts[mine] = True
+        self._begins[mine[np.flatnonzero(np.diff(contour[mine], prepend=-1))]] = True
+        self._least = np.full((count, 2), np.inf)
+        self._most = np.full((count, 2), -np.inf)
+        self._at = start[:2]
+        # The rows before and after which the slides are at the ends of closed contours.
+        begin, finish = decoded.loops[decoded.loops[:, 0] != NO_LOOP].T
+        self._ends = begin, finish + 1
+        self._places = np.full((2, len(begin), 2), np.nan)
+
+    @property
+    def known(self) -> bool:
+        """Whether any row determines a size."""
+        return bool(self._counts.any())
+
+    @property
+    def boxes(self) -> Floats:
+        """(C, 2, 2) box [[x low, x high], [y low, y high]] of the slides in each wanted contour;
+        infinite where no row belongs to it. The position where it begins is part of it."""
+        return np.stack([self._least, self._most], axis=2)
+
+    @property
+    def closure_mm(self) -> float:
+        """Largest distance, mm, between where the slides begin and where they end a closed
+        contour; NaN where no contour is closed."""
+        gap = self._places[1] - self._places[0]
+        return float(np.hypot(gap[:, 0], gap[:, 1]).max()) if len(gap) else math.nan
+
+    def add(self, low: int, box: tuple[Floats, Floats], end: Floats) -> None:
+        """The rows from `low` on, which come in order: the slides' lowest and highest positions
+        (R, 2), (R, 2) mm, infinite where they did not move, and last ones (R, 2) mm, NaN there."""
+        rows = slice(low, low + len(end))
+        known = np.isfinite(end[:, 0])
+        latest = np.maximum.accumulate(np.where(known, np.arange(1, len(end) + 1), 0))
+        places = np.concatenate([self._at[None, :], end])[np.concatenate([[0], latest])]
+        self._at = places[-1]
+        counts, begins = self._counts[rows], self._begins[rows]
+        contour = self._contour[rows]
+        for extent, extreme, part in (
+            (self._least, np.minimum, box[0]),
+            (self._most, np.maximum, box[1]),
+        ):
+            extreme.at(extent, contour[counts], part[counts])
+            extreme.at(extent, contour[begins], places[:-1][begins])
+        for ends, found in zip(self._ends, self._places, strict=True):
+            # A place behind the last row of a block is that before the first of the next.
+            one, other = np.searchsorted(ends, [low, low + len(end) + 1])
+            found[one:other] = places[ends[one:other] - low]
+
+
+def sizes(slides: SlideExtents, goal: LoopedCuts, gap_mm: float) -> Iterator[Size]:
+    """X and Y of the whole part, then of each closed contour of the wanted moves (`goal`), by the
+    extents of the slides.
+
+    Contours to which no row belongs are left out (a finding names them).
     """
-    cuts, wanted = decoded.cuts, goal.cuts
-    if len(cuts.rows) == 0 or len(wanted.rows) == 0:
+    wanted = goal.cuts
+    if not slides.known:
         return
     closed = goal.loops[:, 0] != NO_LOOP
-    in_loop = of_loops(wanted, goal.loops)
-    counts = wanted.is_cut & (in_loop | ~np.append(closed, False)[wanted.contour])
-    mine = _counting(decoded, match, counts, closed)
-    if len(mine) == 0:
-        return
-    low, high = _predicted(cuts, slides, mine, match.contour)
+    counts = _wanted_rows(goal)
     segments = wanted.segments[np.flatnonzero(counts[wanted.segments.path])]
     boxes = segment_boxes(segments)
     centre = _extents(wanted.contour[segments.path], boxes[:, :2], boxes[:, 2:], wanted)
-    slide = _extents(match.contour[mine], low[mine], high[mine], wanted)
+    slide = slides.boxes
     known = wanted.toolpath.drawn is not None
     nominal, predicted, rough = _edges(wanted, closed, centre, slide)
     seen = np.isfinite(slide[:, 0, 0]) & np.isfinite(centre[:, 0, 0])
@@ -178,28 +203,24 @@ def _final(segments: Segments, boxes: Floats, wanted: CutMoves, gap_mm: float) -
     return np.asarray(lowest == deepest[same.reshape(-1)])
 
 
-def _counting(decoded: LoopedCuts, match: Match, counts: Bools, closed: Bools) -> Ints:
-    """The decoded rows that determine the sizes: for the `closed` (C,) wanted contours the rows
-    of their decoded loops, where there are any; otherwise the rows that follow a wanted row (W,)
-    that `counts`."""
-    of = match.contour
-    follow = counts[match.row] & (of >= 0)
+def _wanted_rows(goal: LoopedCuts) -> Bools:
+    """(W,) the wanted rows that determine sizes: those of loops, and of contours without one."""
+    wanted, closed = goal.cuts, goal.loops[:, 0] != NO_LOOP
+    in_loop = of_loops(wanted, goal.loops)
+    return np.asarray(wanted.is_cut & (in_loop | ~np.append(closed, False)[wanted.contour]))
+
+
+def _counting(decoded: LoopedCuts, goal: LoopedCuts, match: Match) -> Ints:
+    """The decoded rows that determine the sizes: for closed wanted contours the rows of their
+    decoded loops, where there are any; otherwise the rows that follow a wanted row that does."""
+    if len(decoded.cuts.rows) == 0 or len(goal.cuts.rows) == 0:
+        return np.empty(0, dtype=np.int64)
+    of, closed = match.contour, goal.loops[:, 0] != NO_LOOP
+    follow = _wanted_rows(goal)[match.row] & (of >= 0)
     looped = of_loops(decoded.cuts, decoded.loops) & (of >= 0) & np.append(closed, False)[of]
     with_loop = np.zeros(len(closed) + 1, dtype=np.bool_)
     with_loop[of[looped]] = True
     return np.flatnonzero(looped | (follow & ~with_loop[of]))
-
-
-def _predicted(
-    cuts: CutMoves, slides: RowSlides, mine: Ints, contour: Ints
-) -> tuple[Floats, Floats]:
-    """Extents (N, 2), (N, 2) of the slides in each row. For the rows `mine`, those of the first
-    row of each contour (N,) include the position where it begins."""
-    begin = mine[np.flatnonzero(np.diff(contour[mine], prepend=-1))]
-    low, high = slides.low.copy(), slides.high.copy()
-    low[begin] = np.minimum(low[begin], slides.places[begin])
-    high[begin] = np.maximum(high[begin], slides.places[begin])
-    return low, high
 
 
 def _extents(contour: Ints, low: Floats, high: Floats, wanted: CutMoves) -> Floats:

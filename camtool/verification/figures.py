@@ -6,8 +6,8 @@ memory that does not grow with the stream. The percentile comes from a histogram
 of the bin with the sample of that rank. Bins (`camtool.kernels.judging`) are between 1/256 and
 1/128 of their value wide, so the percentile is within 0.4 % of the exact value.
 
-`RowFigures` are the figures of each row of the program. All figures of contours, of the worst
-moves and of the whole motion (`Tally`) are sums and maxima over rows.
+`RowFigures` takes the figures of the rows block by block, and keeps what is needed of them: the
+figures of contours, the worst moves, and sums of the whole motion (`Tally`).
 """
 
 from __future__ import annotations
@@ -57,22 +57,19 @@ class Figure:
         bins = np.clip(leading_bits(errors) - BEFORE_FIRST, 0, BINS - 1)
         self._histogram += np.bincount(bins, minlength=BINS)
 
-    @classmethod
-    def of_rows(
-        cls, largest: Floats, squares: Floats, counts: Ints, histogram: Ints | None
-    ) -> Figure:
-        """The figure of N rows: `largest` error (N,) mm of each row, or NaN; sums of squares (N,)
-        mm²; counts (N,) of samples; `histogram` (L · BINS,) of all samples, L numbers for each
-        bin."""
-        made = cls()
-        made.count = int(counts.sum())
-        if made.count:
-            made.row = int(np.nanargmax(largest))
-            made._max = float(largest[made.row])
-            made._squares = float(squares.sum())
-        if histogram is not None:
-            made._histogram = histogram.reshape(BINS, -1).sum(axis=1)
-        return made
+    def add_rows(self, low: int, largest: Floats, squares: Floats, counts: Ints) -> None:
+        """The errors of the rows from `low` on, but for their sizes: the `largest` (R,) mm of each
+        row, or NaN; sums of squares (R,) mm²; counts (R,) of samples."""
+        if counts.any():
+            worst = int(np.nanargmax(largest))
+            if float(largest[worst]) > self._max:
+                self._max, self.row = float(largest[worst]), low + worst
+            self.count += int(counts.sum())
+        self._squares += float(squares.sum())
+
+    def add_sizes(self, histogram: Ints) -> None:
+        """The sizes of these errors: `histogram` (L · BINS,), L numbers for each bin."""
+        self._histogram += histogram.reshape(BINS, -1).sum(axis=1)
 
     @property
     def max(self) -> float:
@@ -98,40 +95,30 @@ class Figure:
         return min(middle, self._max)
 
 
-# Figures of rows.
+# Figures of rows: taken from the judge's columns some rows at a time, and only their sums kept.
 
 
 @dataclass(frozen=True, eq=False)
-class RowFigures:
-    """Figures of the N rows of the decoded toolpath, in mm and XY; rows after the end have none.
+class RowBlock:
+    """The columns (R, 19) of `camtool.kernels.judging` of the rows from `low` on, in mm and XY;
+    `is_cut` (R,): which of them cut."""
 
-    `samples` (N,): their number. For rows that cut (others have NaN as maxima and 0 as sums):
-    `interpolation` and `mechanics` (N,), the largest errors, and `interpolation_squares` and
-    `mechanics_squares` (N,) mm², their sums of squares over the samples; `known` (N,), the number
-    of samples with a total error, `total` (N,), the largest of them, `total_squares` (N,) mm²,
-    `total_sum` (N,) with sign, + to the left of the wanted move, and `total_at` (N, 2), the
-    position of the slides at the largest.
+    low: int
+    columns: Floats
+    is_cut: Bools
 
-    `low`, `high` (N, 2): extents of the slides, infinite where they did not move; `slide_end` and
-    `commanded_end` (N, 2): positions of the slides and of the controller after the last sample,
-    NaN without samples. `ledger`: the sum of the ledgers of all chunks.
-    """
+    @property
+    def rows(self) -> slice:
+        """The rows."""
+        return slice(self.low, self.low + len(self.columns))
 
-    samples: Ints
-    interpolation: Floats
-    interpolation_squares: Floats
-    mechanics: Floats
-    mechanics_squares: Floats
-    known: Ints
-    total: Floats
-    total_squares: Floats
-    total_sum: Floats
-    total_at: Floats
-    low: Floats
-    high: Floats
-    slide_end: Floats
-    commanded_end: Floats
-    ledger: Ledger
+    def count(self, column: int) -> Ints:
+        """(R,) a column of whole numbers."""
+        return self.columns[:, column].astype(np.int64)
+
+    def largest(self, column: int, seen: Bools) -> Floats:
+        """(R,) a column of largest errors, NaN but for the rows that are `seen` (R,)."""
+        return np.where(seen, self.columns[:, column], np.nan)
 
 
 def empty_columns(count: int) -> Floats:
@@ -146,47 +133,107 @@ def empty_columns(count: int) -> Floats:
     return columns
 
 
-def row_figures(columns: Floats, is_cut: Bools, ledger: Ledger) -> RowFigures:
-    """The figures in the columns (N, 19) that the judge has filled."""
-    from camtool.kernels import judging as at
+class RowFigures:
+    """The figures of the N rows of the decoded toolpath, which come in blocks, in order.
 
-    samples, known = columns[:, at.SAMPLES].astype(np.int64), columns[:, at.KNOWN].astype(np.int64)
-    judged = is_cut & (samples > 0)
+    Kept of each row: `seconds` (N,) and `total` (N,) mm, its largest total error, NaN where none
+    is known. `inner`, `lag` and `whole` are the figures of interpolation, mechanics and total;
+    `lines_mm` and `arcs_mm` the largest errors of interpolation, NaN without any; `mean_mm` the
+    signed mean of all total errors, + to the left of the wanted moves.
+    """
 
-    def largest(column: int, seen: Bools) -> Floats:
-        return np.where(seen, columns[:, column], np.nan)
+    def __init__(
+        self, cuts: CutMoves, match: Match, steps_mm: tuple[float, float], worst: int
+    ) -> None:
+        """`steps_mm`: the coded steps of X and Y; `worst`: so many rows are known as such."""
+        count = len(cuts.contour)
+        self._toolpath, self._steps_mm = cuts.toolpath, steps_mm
+        self.total = np.full(count, np.nan)
+        self.books = Books(count)
+        self.inner, self.lag, self.whole = Figure(), Figure(), Figure()
+        self.lines_mm = self.arcs_mm = math.nan
+        self.contours = ContourSums(match)
+        self.worst = WorstRows(worst)
+        self.missed, self.missed_by_others = MissedEnds(), MissedEnds()
+        self._sum = 0.0
 
-    return RowFigures(
-        samples=samples,
-        interpolation=largest(at.INNER_MAX, judged),
-        interpolation_squares=columns[:, at.INNER_SQUARES],
-        mechanics=largest(at.LAG_MAX, judged),
-        mechanics_squares=columns[:, at.LAG_SQUARES],
-        known=known,
-        total=largest(at.TOTAL_MAX, known > 0),
-        total_squares=columns[:, at.TOTAL_SQUARES],
-        total_sum=columns[:, at.TOTAL_SUM],
-        total_at=columns[:, [at.TOTAL_X, at.TOTAL_Y]],
-        low=columns[:, [at.LOW_X, at.LOW_Y]],
-        high=columns[:, [at.HIGH_X, at.HIGH_Y]],
-        slide_end=columns[:, [at.END_X, at.END_Y]],
-        commanded_end=columns[:, [at.COMMANDED_X, at.COMMANDED_Y]],
-        ledger=ledger,
-    )
+    def add(self, block: RowBlock) -> None:
+        """The next rows, all of whose samples are judged."""
+        from camtool.kernels import judging as at
+
+        columns = block.columns
+        samples, known = block.count(at.SAMPLES), block.count(at.KNOWN)
+        judged = np.where(block.is_cut, samples, 0)
+        inner = block.largest(at.INNER_MAX, judged > 0)
+        lag = block.largest(at.LAG_MAX, judged > 0)
+        total = block.largest(at.TOTAL_MAX, known > 0)
+        self.inner.add_rows(block.low, inner, columns[:, at.INNER_SQUARES], judged)
+        self.lag.add_rows(block.low, lag, columns[:, at.LAG_SQUARES], judged)
+        self.whole.add_rows(block.low, total, columns[:, at.TOTAL_SQUARES], known)
+        is_arc = np.isin(self._toolpath.kind[block.rows], (Kind.ARC_CW, Kind.ARC_CCW))
+        self.lines_mm = _larger(self.lines_mm, inner[~is_arc])
+        self.arcs_mm = _larger(self.arcs_mm, inner[is_arc])
+        self._sum += float(columns[:, at.TOTAL_SUM].sum())
+        self.total[block.rows] = total
+        self.contours.add(block, known, (inner, lag, total))
+        self.worst.add(block, (inner, lag, total))
+        self._add_ends(block.low, columns[:, [at.COMMANDED_X, at.COMMANDED_Y]])
+
+    def _add_ends(self, low: int, commanded: Floats) -> None:
+        """The positions of the controller after the next rows, against the ends of the moves."""
+        off = np.abs(commanded - self._toolpath.end[low : low + len(commanded), :2])
+        endless = ~self.books.ended[low : low + len(off)]
+        for row in np.flatnonzero(endless).tolist():
+            x, y = commanded[row].tolist()
+            self.books.endless[low + row] = x, y
+        off[~np.isfinite(off[:, 0])] = 0.0
+        self.missed.add(low, off, self._steps_mm)
+        off[endless] = 0.0
+        self.missed_by_others.add(low, off, self._steps_mm)
+
+    @property
+    def seconds(self) -> Floats:
+        """(N,) s, of each row."""
+        return self.books.seconds
+
+    @property
+    def mean_mm(self) -> float:
+        """The signed mean of all total errors, mm; NaN without any."""
+        return self._sum / self.whole.count if self.whole.count else math.nan
 
 
-def add_ledger(whole: Ledger, part: Ledger) -> None:
-    """Add the ledger of a chunk, with each row at most once, to that of the whole program."""
-    rows = part.row
-    whole.duration_s[rows] += part.duration_s
-    whole.compensation_s[rows] += part.compensation_s
-    whole.iterations[rows] += part.iterations
-    whole.steps[rows] += part.steps
-    whole.reversals[rows] += part.reversals
-    whole.ended[rows] &= part.ended
+def _larger(most: float, errors: Floats) -> float:
+    """The largest known error, mm; NaN without any."""
+    known = errors[np.isfinite(errors)]
+    return float(np.fmax(most, known.max())) if len(known) else most
 
 
 # Figures of the whole motion: steps, reversals, time, and endless arcs.
+
+
+class Books:
+    """The ledgers of all chunks: `seconds` (N,) of each row, `ended` (N,) False for rows whose
+    stop test was never met, `endless` the places in XY (mm) where these were left; the rest is
+    summed up."""
+
+    def __init__(self, count: int) -> None:
+        self.seconds = np.zeros(count)
+        self.ended = np.ones(count, dtype=np.bool_)
+        self.endless: dict[int, tuple[float, float]] = {}
+        self.steps, self.reversals = np.zeros((2, 3), dtype=np.int64)
+        self.cutting_reversals = np.zeros(3, dtype=np.int64)
+        self.iterations, self.compensation_s = 0, 0.0
+
+    def add(self, ledger: Ledger, is_cut: Bools) -> None:
+        """The ledger of a chunk, with each row at most once; `is_cut` (N,): the rows that cut."""
+        rows = ledger.row
+        self.seconds[rows] += ledger.duration_s
+        self.ended[rows] &= ledger.ended
+        self.steps += ledger.steps.sum(axis=0)
+        self.iterations += int(ledger.iterations.sum())
+        self.compensation_s += float(ledger.compensation_s.sum())
+        self.reversals += ledger.reversals.sum(axis=0)
+        self.cutting_reversals += ledger.reversals[is_cut[rows]].sum(axis=0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,24 +258,19 @@ class Tally:
         return self.cutting_s + self.air_s + self.dwell_s
 
 
-def tally_of(rows: RowFigures, decoded: Toolpath, is_cut: Bools) -> Tally:
+def tally_of(books: Books, decoded: Toolpath, is_cut: Bools) -> Tally:
     """The sums over all rows; `is_cut` (N,): the rows that cut."""
-    ledger, dwell = rows.ledger, decoded.kind == Kind.DWELL
-    air = ~is_cut & ~dwell
-    missed = np.flatnonzero(~ledger.ended).tolist()
+    dwell = decoded.kind == Kind.DWELL
     return Tally(
-        steps=ledger.steps.sum(axis=0),
-        iterations=int(ledger.iterations.sum()),
-        reversals=ledger.reversals.sum(axis=0),
-        cutting_reversals=ledger.reversals[is_cut].sum(axis=0),
-        cutting_s=float(ledger.duration_s[is_cut].sum()),
-        air_s=float(ledger.duration_s[air].sum()),
-        dwell_s=float(ledger.duration_s[dwell].sum()),
-        compensation_s=float(ledger.compensation_s.sum()),
-        endless_arcs={
-            row: (float(rows.commanded_end[row, 0]), float(rows.commanded_end[row, 1]))
-            for row in missed
-        },
+        steps=books.steps,
+        iterations=books.iterations,
+        reversals=books.reversals,
+        cutting_reversals=books.cutting_reversals,
+        cutting_s=float(books.seconds[is_cut].sum()),
+        air_s=float(books.seconds[~is_cut & ~dwell].sum()),
+        dwell_s=float(books.seconds[dwell].sum()),
+        compensation_s=books.compensation_s,
+        endless_arcs=books.endless,
     )
 
 
@@ -256,79 +298,91 @@ class ContourFigures:
     fit_mm: float
 
 
-def contour_figures(rows: RowFigures, match: Match) -> Iterator[ContourFigures]:
-    """The figures of each wanted contour to which rows with a known error belong."""
-    known = np.flatnonzero((rows.known > 0) & (match.contour >= 0))
-    if len(known) == 0:
-        return
-    of = match.contour[known]
-    count = int(of.max()) + 1
-    samples = np.bincount(of, rows.known[known], count)
-    squares = np.bincount(of, rows.total_squares[known], count)
-    sums = np.bincount(of, rows.total_sum[known], count)
-    inner, lag, off = np.zeros((3, count))
-    np.maximum.at(off, of, match.off_mm[known, 0])
-    np.maximum.at(inner, of, rows.interpolation[known])
-    np.maximum.at(lag, of, rows.mechanics[known])
-    order = known[np.lexsort((known, -rows.total[known], of))]
-    worst = order[np.flatnonzero(np.diff(match.contour[order], prepend=-1))]
-    here = match.contour[worst]
-    columns = (
-        here,
-        worst,
-        rows.total_at[worst, 0],
-        rows.total_at[worst, 1],
-        rows.total[worst],
-        np.sqrt(squares[here] / samples[here]),
-        sums[here] / samples[here],
-        inner[here],
-        lag[here],
-        off[here],
-    )
-    for contour, row, x, y, *figures in zip(*(one.tolist() for one in columns), strict=True):
-        yield ContourFigures(contour, row, (x, y), *figures)
+class ContourSums:
+    """Sums and largest errors of the wanted contours to which rows with a known error belong."""
+
+    def __init__(self, match: Match) -> None:
+        self._match = match
+        count = int(match.contour.max(initial=-1)) + 1
+        self._samples, self._squares, self._sums, *self._largest = np.zeros((6, count))
+        self._row = np.full(count, -1, dtype=np.int64)
+        self._total, self._at = np.full(count, -np.inf), np.zeros((count, 2))
+
+    def add(self, block: RowBlock, samples: Ints, errors: tuple[Floats, Floats, Floats]) -> None:
+        """The next rows: `samples` (R,) with a total error; the largest `errors` (R,) of
+        interpolation and mechanics, and in all."""
+        from camtool.kernels import judging as at
+
+        contour = self._match.contour[block.rows]
+        known = np.flatnonzero((samples > 0) & (contour >= 0))
+        of, columns = contour[known], block.columns[known]
+        inner, lag, total = (one[known] for one in errors)
+        np.add.at(self._samples, of, samples[known])
+        np.add.at(self._squares, of, columns[:, at.TOTAL_SQUARES])
+        np.add.at(self._sums, of, columns[:, at.TOTAL_SUM])
+        off = self._match.off_mm[block.rows][known, 0]
+        for largest, one in zip(self._largest, (inner, lag, off), strict=True):
+            np.maximum.at(largest, of, one)
+        order = np.lexsort((known, -total, of))
+        worst = order[np.flatnonzero(np.diff(of[order], prepend=-1))]
+        worst = worst[total[worst] > self._total[of[worst]]]
+        here = of[worst]
+        self._total[here], self._row[here] = total[worst], block.low + known[worst]
+        self._at[here] = columns[worst][:, [at.TOTAL_X, at.TOTAL_Y]]
+
+    def figures(self) -> Iterator[ContourFigures]:
+        """The figures of each of these contours."""
+        here = np.flatnonzero(self._row >= 0)
+        columns = (
+            here,
+            self._row[here],
+            *self._at[here].T,
+            self._total[here],
+            np.sqrt(self._squares[here] / self._samples[here]),
+            self._sums[here] / self._samples[here],
+            *(largest[here] for largest in self._largest),
+        )
+        for contour, row, x, y, *figures in zip(*(one.tolist() for one in columns), strict=True):
+            yield ContourFigures(contour, row, (x, y), *figures)
 
 
-def mean_error_mm(rows: RowFigures) -> float:
-    """The signed mean of all total errors, mm; NaN without any."""
-    count = int(rows.known.sum())
-    return float(rows.total_sum.sum()) / count if count else float("nan")
+class WorstRows:
+    """The rows with the largest total errors: `found` (W, 6) of row, total, interpolation and
+    mechanics mm, place x, y mm; worst first, of equals the first."""
+
+    def __init__(self, count: int) -> None:
+        self._count = count
+        self.found = np.empty((0, 6))
+
+    def add(self, block: RowBlock, errors: tuple[Floats, Floats, Floats]) -> None:
+        """The next rows and their largest `errors` (R,) of interpolation and mechanics, and in
+        all."""
+        from camtool.kernels import judging as at
+
+        inner, lag, total = errors
+        known = np.flatnonzero(~np.isnan(total))
+        known = known[np.lexsort((known, -total[known]))][: self._count]
+        place = block.columns[known][:, [at.TOTAL_X, at.TOTAL_Y]]
+        here = [block.low + known, total[known], inner[known], lag[known], place]
+        both = np.concatenate([self.found, np.column_stack(here)])
+        self.found = both[np.lexsort((both[:, 0], -both[:, 1]))][: self._count]
 
 
-def worst_rows(rows: RowFigures, count: int) -> Ints:
-    """The `count` rows with the largest total errors, worst first; of equals the first."""
-    known = np.flatnonzero(rows.known > 0)
-    order = np.lexsort((known, -rows.total[known]))
-    return np.asarray(known[order][:count])
-
-
-@dataclass(frozen=True)
 class MissedEnds:
     """The number of moves that the controller leaves beside their ends, and the row (−1 for none)
-    and the distance (mm) of the farthest."""
+    and the distance (mm) of the farthest; of several the first."""
 
-    count: int
-    row: int
-    most_mm: float
+    def __init__(self) -> None:
+        self.count, self.row, self.most_mm = 0, -1, 0.0
 
-
-def missed_ends(
-    rows: RowFigures,
-    quantised: Toolpath,
-    steps_mm: tuple[float, float],
-    without: tuple[int, ...] = (),
-) -> MissedEnds:
-    """The positions of the controller after the rows, against the ends of the `quantised` moves,
-    except for the rows `without`; `steps_mm` are the coded steps of X and Y."""
-    stood = np.isfinite(rows.commanded_end[:, 0])
-    stood[list(without)] = False
-    off = np.abs(np.where(stood[:, None], rows.commanded_end - quantised.end[:, :2], 0.0))
-    missed = (off > END_STEPS * np.array(steps_mm)).any(axis=1)
-    if not missed.any():
-        return MissedEnds(0, -1, 0.0)
-    far = np.where(missed, np.hypot(off[:, 0], off[:, 1]), 0.0)
-    row = int(far.argmax())
-    return MissedEnds(int(missed.sum()), row, float(far[row]))
+    def add(self, low: int, off: Floats, steps_mm: tuple[float, float]) -> None:
+        """How far (R, 2) mm the controller is beside the ends of the rows from `low` on."""
+        missed = np.flatnonzero((off > END_STEPS * np.array(steps_mm)).any(axis=1))
+        if len(missed):
+            far = np.hypot(*off[missed].T)
+            self.count += len(missed)
+            if far.max() > self.most_mm:
+                self.row, self.most_mm = low + int(missed[far.argmax()]), float(far.max())
 
 
 def contour_names(cuts: CutMoves) -> list[str]:

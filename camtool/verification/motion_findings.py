@@ -30,7 +30,7 @@ from camtool.units import UM_PER_MM
 from camtool.verification.case import Case
 from camtool.verification.coverage import at_point, block_name, holes_of, listed
 from camtool.verification.cuts import CutMoves
-from camtool.verification.figures import RowFigures, Tally, missed_ends
+from camtool.verification.figures import RowFigures, Tally
 
 AXES = "XYZ"
 CLEARED_COVERAGES = 2.0
@@ -49,7 +49,7 @@ def motion_findings(
     return (
         *_endless_arcs(decoded, machine, tally),
         *case.target.model.findings(case.decoded, machine, case.simulation),
-        *_missed_ends(decoded, case, tally, rows),
+        *_missed_ends(decoded, case, rows),
         *_out_of_travel(machine, extents),
         *_rapids_in_stock(decoded, case),
         *_many_reversals(machine, tally, cuts),
@@ -72,14 +72,10 @@ def _endless_arcs(decoded: Toolpath, machine: Machine, tally: Tally) -> Iterator
         )
 
 
-def _missed_ends(
-    quantised: Toolpath, case: Case, tally: Tally, rows: RowFigures
-) -> Iterator[Finding]:
+def _missed_ends(quantised: Toolpath, case: Case, rows: RowFigures) -> Iterator[Finding]:
     """Moves that end beside their programmed ends, except endless arcs: a remark where all are
     within the tolerance of coverage and of the corners that the program allows (G64 P, Q)."""
-    axes = case.machine.axes
-    steps_mm = axes.x.coded_step_mm, axes.y.coded_step_mm
-    missed = missed_ends(rows, quantised, steps_mm, without=tuple(tally.endless_arcs))
+    missed = rows.missed_by_others
     if missed.count == 0:
         return
     asked = (mode.tolerance_mm + mode.merging_mm for mode in quantised.modes if mode.tolerance_mm)

@@ -9,7 +9,6 @@ progress have bins. Memory grows with the rows of the program, not with the step
 from __future__ import annotations
 
 import heapq
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
@@ -22,7 +21,7 @@ from camtool.errors import ProgramError
 from camtool.geometry.measure import segment_boxes
 from camtool.progress import Progress
 from camtool.simulation.controller import FusedRun
-from camtool.simulation.motion import Chunk, still_ledger
+from camtool.simulation.motion import Chunk
 from camtool.toolpath.moves import Toolpath
 from camtool.verification.circles import (
     UNSEEN,
@@ -35,7 +34,8 @@ from camtool.verification.circles import (
     reversing,
 )
 from camtool.verification.cuts import CutMoves, moved_lengths
-from camtool.verification.figures import Figure, RowFigures, add_ledger, empty_columns, row_figures
+from camtool.verification.dimensions import SlideExtents
+from camtool.verification.figures import RowBlock, RowFigures, empty_columns
 from camtool.verification.matching import Match
 from camtool.verification.nearest import ANY_CONTOUR, run_peaks
 
@@ -73,35 +73,44 @@ class Paths:
 
 
 ROWS_AT_ONCE = 16_384
-"""A fused run says after so many rows how far it is."""
+"""So many rows are judged before their figures are summed up; a fused run then says how far it
+is."""
 
 
 class SlidePass:
-    """Takes the motion in order; its figures are complete after `finish`."""
+    """Takes the motion in order, and gives the figures of the rows and where the slides are in
+    them to `rows` and `extents`; its own figures are complete after `finish`."""
 
-    def __init__(self, paths: Paths, match: Match, trace: TraceSize) -> None:
+    def __init__(
+        self,
+        paths: Paths,
+        match: Match,
+        results: tuple[RowFigures, SlideExtents],
+        trace: TraceSize,
+    ) -> None:
+        self.rows, self.extents = results
         self.circles = paths.circles
         self.circle_figures: list[CircleFigures] = [UNSEEN] * len(paths.circles)
         self.reversing: list[Reversing | None] = [None] * len(paths.circles)
         self.both_ways: list[BothWays] = []
         self.bins: dict[int, Floats] = {}
         self._pairs = Pairs(paths.circles)
-        self._cuts = paths.decoded
-        self._ledger = still_ledger(np.arange(len(match.contour)))
+        self._cuts, self._is_cut = paths.decoded, paths.decoded.is_cut
         self._first, self._last = _rows_of_circles(match.circle, len(paths.circles))
         self._slot = _slots(self._first, self._last)
         seen = np.flatnonzero(self._last >= 0)
         self._closing = seen[np.argsort(self._last[seen], kind="stable")].tolist()
-        self._task = _task(paths, match, self._slot)
+        self._tasks = Tasks(paths, match, self._slot)
+        self._task = self._tasks.of(0, min(ROWS_AT_ONCE, len(self._is_cut)))
         slots = int(self._slot.max(initial=-1)) + 1
-        self._sums = _sums(len(match.contour), slots, len(self._task.moves.table), trace)
+        self._sums = _sums(len(self._is_cut), slots, len(self._task.moves.table), trace)
         self._start, self._most = trace.start, trace.most
 
     def add(self, chunk: Chunk) -> None:
         """The next samples of the program."""
         from camtool.kernels.judging import judge_samples
 
-        add_ledger(self._ledger, chunk.ledger)
+        self.rows.books.add(chunk.ledger, self._is_cut)
         if len(chunk.row) == 0:
             return
         bounds = self._bounds(int(chunk.row[0]), int(chunk.row[-1]) + 1)
@@ -128,23 +137,36 @@ class SlidePass:
 
     def run(self, steps: FusedRun, progress: Progress) -> None:
         """All rows of a controller that is judged as it is simulated."""
-        parts = {*self._bounds(0, steps.rows), *range(0, steps.rows, ROWS_AT_ONCE)}
-        for low, high in pairwise(sorted(parts)):
+        for low, high in pairwise(self._bounds(0, steps.rows)):
             self._close(low)
-            add_ledger(self._ledger, steps.judge(low, high, self._task, self._sums))
+            ledger = steps.judge(low, high, self._task, self._sums)
+            self.rows.books.add(ledger, self._is_cut)
             progress.done = high
 
-    def finish(self) -> None:
-        """End of the motion: evaluate the remaining circles."""
-        self._close(len(self._ledger.row))
+    def finish(self) -> Trace:
+        """End of the motion: evaluate what remains; the path of the slides, thinned."""
+        self._close(len(self._is_cut))
+        self._sum_up()
+        self.rows.inner.add_sizes(self._sums.histograms[0])
+        self.rows.whole.add_sizes(self._sums.histograms[1])
+        trace = trace_of(self._sums, self._start, self._is_cut, self._most)
+        del self._tasks, self._task, self._sums
+        return trace
 
     def _bounds(self, low: int, high: int) -> list[int]:
-        """`low`, `high` and the rows between them before which circles are evaluated."""
-        inner = sorted({int(self._last[circle]) + 1 for circle in self._closing})
+        """`low`, `high` and the rows between them before which circles are evaluated or figures
+        summed up."""
+        ends = {int(self._last[circle]) + 1 for circle in self._closing}
+        inner = sorted(ends.union(range(0, high, ROWS_AT_ONCE)))
         return [low, *(row for row in inner if low < row < high), high]
 
     def _close(self, row: int) -> None:
-        """Evaluate the circles that end before a row, and empty their bins."""
+        """Evaluate the circles that end before a row and empty their bins, and sum up the rows
+        that are complete."""
+        while row >= self._task.low + ROWS_AT_ONCE:
+            self._sum_up()
+            low = self._task.low + ROWS_AT_ONCE
+            self._task = self._tasks.of(low, min(low + ROWS_AT_ONCE, len(self._is_cut)))
         while self._closing and self._last[self._closing[0]] < row:
             circle = self._closing.pop(0)
             bins = self._sums.bins[self._slot[circle]]
@@ -158,6 +180,16 @@ class SlidePass:
 
             bins[:] = empty_bins(1)[0]
 
+    def _sum_up(self) -> None:
+        """Sum up the figures of the rows of the present task, and clear their columns."""
+        from camtool.kernels import judging as at
+
+        low, columns = self._task.low, self._sums.rows[: len(self._task.rows)]
+        self.rows.add(RowBlock(low, columns, self._is_cut[low : low + len(columns)]))
+        lowest, highest = columns[:, [at.LOW_X, at.LOW_Y]], columns[:, [at.HIGH_X, at.HIGH_Y]]
+        self.extents.add(low, (lowest, highest), columns[:, [at.END_X, at.END_Y]])
+        columns[:] = empty_columns(len(columns))
+
     def seen(self) -> tuple[SeenCircle, ...]:
         """The circles that the slides followed, in order; at most `BINS_KEPT`."""
         return tuple(
@@ -166,64 +198,54 @@ class SlidePass:
             if (found := self.reversing[circle]) is not None
         )
 
-    @property
-    def rows(self) -> RowFigures:
-        """The figures of each row."""
-        return row_figures(self._sums.rows, self._cuts.is_cut, self._ledger)
 
-    def trace(self) -> Trace:
-        """The slides' path, thinned."""
-        return trace_of(self._sums, self._start, self._cuts.is_cut, self._most)
+class Tasks:
+    """What the rows are judged by, some of them at a time."""
 
-    def interpolation(self) -> Figure:
-        """The interpolation error over all cutting samples."""
-        rows = self.rows
-        judged = np.where(self._cuts.is_cut, rows.samples, 0)
-        return Figure.of_rows(
-            rows.interpolation, rows.interpolation_squares, judged, self._sums.histograms[0]
+    def __init__(self, paths: Paths, match: Match, slot: Ints) -> None:
+        """`slot` (C,): the bins of each circle."""
+        from camtool.kernels.judging import Moves, bin_directions
+        from camtool.kernels.move_tree import move_tree
+
+        self._paths, self._match = paths, match
+        self._slot = np.append(slot, -1)  # the last one is for none, −1
+        wanted = move_table(paths.wanted)
+        known = bool((match.only[paths.decoded.is_cut] != ANY_CONTOUR).all())
+        by_contour = known and len(wanted.moves) >= MANY_MOVES
+        tree = move_tree(wanted.boxes, wanted.contour if by_contour else None)
+        self._contour, self._moves = wanted.contour, Moves(wanted.moves, wanted.heights, *tree)
+        self._centre = np.array([circle.centre_mm for circle in paths.circles]).reshape(-1, 2)
+        self._directions = bin_directions()
+
+    def of(self, low: int, high: int) -> Task:
+        """The task of the rows low:high."""
+        from camtool.kernels.judging import Task
+
+        match, toolpath, rows = self._match, self._paths.decoded.toolpath, np.arange(low, high)
+        own, of_row = _part_of_table(self._paths.decoded, low, high)
+        circle = match.circle[low:high]
+        ends = np.column_stack([toolpath.begins(rows)[:, 2], toolpath.end[low:high, 2]])
+        depth_mm = self._paths.depth_mm
+        return Task(
+            low=low,
+            own=own.moves,
+            moves=self._moves,
+            rows=np.column_stack(
+                [of_row, self._ranges(match.only[low:high]), circle, self._slot[circle]]
+            ),
+            window=np.sort(ends, axis=1) + np.array([-depth_mm, depth_mm]),
+            off=np.ascontiguousarray(match.off_mm[low:high, 0]),
+            centre=self._centre,
+            directions=self._directions,
         )
 
-    def mechanics(self) -> Figure:
-        """The error of the mechanics over all cutting samples, without a percentile."""
-        rows = self.rows
-        judged = np.where(self._cuts.is_cut, rows.samples, 0)
-        return Figure.of_rows(rows.mechanics, rows.mechanics_squares, judged, None)
-
-    def total(self) -> Figure:
-        """The total error over all samples that have one."""
-        rows = self.rows
-        return Figure.of_rows(rows.total, rows.total_squares, rows.known, self._sums.histograms[1])
-
-
-def largest(errors: Floats, which: Bools) -> float:
-    """The largest known error (N,) of the rows `which` (N,), mm; NaN without any."""
-    picked = errors[which & np.isfinite(errors)]
-    return float(picked.max()) if len(picked) else math.nan
-
-
-def _task(paths: Paths, match: Match, slot: Ints) -> Task:
-    from camtool.kernels.judging import Moves, Task, bin_directions
-    from camtool.kernels.move_tree import move_tree
-
-    decoded = paths.decoded
-    own = move_table(decoded)
-    wanted = own if paths.wanted is decoded else move_table(paths.wanted)
-    known = bool((match.only[decoded.is_cut] != ANY_CONTOUR).all())
-    by_contour = known and len(wanted.moves) >= MANY_MOVES
-    tree = move_tree(wanted.boxes, wanted.contour if by_contour else None)
-    return Task(
-        own=own.moves,
-        moves=Moves(wanted.moves, wanted.heights, *tree),
-        rows=np.column_stack(
-            [own.of_row, wanted.ranges(match.only), match.circle, slot[match.circle]]
-            if len(slot)
-            else [own.of_row, wanted.ranges(match.only), match.circle, match.circle]
-        ),
-        window=_heights(decoded, paths.depth_mm),
-        off=np.ascontiguousarray(match.off_mm[:, 0]),
-        centre=np.array([circle.centre_mm for circle in paths.circles]).reshape(-1, 2),
-        directions=bin_directions(),
-    )
+    def _ranges(self, only: Ints) -> Ints:
+        """(R, 2) begin and end (not included) of the contours `only` (R,), or of all moves."""
+        low = np.searchsorted(self._contour, only, side="left")
+        high = np.searchsorted(self._contour, only, side="right")
+        every = only == ANY_CONTOUR
+        low, high = np.where(every, 0, low), np.where(every, len(self._contour), high)
+        return np.column_stack([low, high])
 
 
 def _sums(rows: int, slots: int, moves: int, trace: TraceSize) -> Sums:
@@ -231,20 +253,13 @@ def _sums(rows: int, slots: int, moves: int, trace: TraceSize) -> Sums:
 
     room = 2 * trace.most + rows
     return Sums(
-        rows=empty_columns(rows),
+        rows=empty_columns(min(rows, ROWS_AT_ONCE)),
         histograms=np.zeros((2, 4 * BINS), dtype=np.int64),
         bins=empty_bins(slots),
-        trace=np.empty((room + rows + 1, 4)),
+        trace=np.empty((room + rows + 2, 4)),
         pen=new_pen(trace.stride, room),
         near=no_list(moves),
     )
-
-
-def _heights(decoded: CutMoves, depth_mm: float) -> Floats:
-    """(N, 2) mm: the lowest and highest height with which each row is compared."""
-    toolpath = decoded.toolpath
-    ends = np.column_stack([toolpath.starts[:, 2], toolpath.end[:, 2]])
-    return np.asarray(np.sort(ends, axis=1) + np.array([-depth_mm, depth_mm]))
 
 
 def _rows_of_circles(circle: Ints, count: int) -> tuple[Ints, Ints]:
@@ -282,39 +297,52 @@ def _in_order(first: Ints, last: Ints) -> Iterator[int]:
 
 @dataclass(frozen=True, eq=False)
 class MoveTable:
-    """The J rows of a toolpath that cut: `moves` (J, 16) of `camtool.kernels.judging`,
-    `boxes` (J, 4), `heights` (J, 2) mm, `contour` (J,) ascending; `of_row` (N,) is the index of
-    each row, or −1."""
+    """The J of some rows of a toolpath that cut: `moves` (J, 16) of `camtool.kernels.judging`,
+    `boxes` (J, 4), `heights` (J, 2) mm, `contour` (J,) ascending."""
 
     moves: Floats
     boxes: Floats
     heights: Floats
     contour: Ints
-    of_row: Ints
-
-    def ranges(self, only: Ints) -> Ints:
-        """(R, 2) begin and end (not included) of the contours `only` (R,), or of all moves."""
-        low = np.searchsorted(self.contour, only, side="left")
-        high = np.searchsorted(self.contour, only, side="right")
-        every = only == ANY_CONTOUR
-        low, high = np.where(every, 0, low), np.where(every, len(self.contour), high)
-        return np.ascontiguousarray(np.column_stack([low, high]))
 
 
 def move_table(cuts: CutMoves) -> MoveTable:
-    """The columns of the moves that cut."""
+    """The columns of all moves that cut."""
     from camtool.kernels import judging as at
 
-    rows, segments = cuts.rows, cuts.segments
-    first, last = cuts.first[rows], cuts.first[rows + 1] - 1
+    count, rows = int(cuts.is_cut.sum()), len(cuts.contour)
+    table = MoveTable(
+        np.empty((count, at.COLUMNS)),
+        np.empty((count, 4)),
+        np.empty((count, 2)),
+        np.empty(count, dtype=np.int64),
+    )
+    done = 0
+    for low in range(0, rows, ROWS_AT_ONCE):
+        part, _ = _part_of_table(cuts, low, min(low + ROWS_AT_ONCE, rows))
+        here = slice(done, done + len(part.moves))
+        table.moves[here], table.boxes[here] = part.moves, part.boxes
+        table.heights[here], table.contour[here] = part.heights, part.contour
+        done = here.stop
+    return table
+
+
+def _part_of_table(cuts: CutMoves, low: int, high: int) -> tuple[MoveTable, Ints]:
+    """The columns of those of the rows low:high (R,) that cut, and which of them (R,) each row
+    is, −1 for none."""
+    from camtool.kernels import judging as at
+
+    here = slice(int(cuts.first[low]), int(cuts.first[high]))
+    segments, ends_z, toolpath = cuts.segments[here], cuts.ends_z[here], cuts.toolpath
+    rows = low + np.flatnonzero(cuts.contour[low:high] >= 0)
+    first, last = cuts.first[rows] - here.start, cuts.first[rows + 1] - 1 - here.start
     start, end = segments.start[first], segments.end[last]
     is_arc, centre = segments.is_arc[first], segments.centre[first]
     sweep = np.abs(segments.sweep[first]) * (last - first + 1)
     turn = np.where(segments.bulge[first] < 0.0, -1.0, 1.0)
     chord = end - start
     square = (chord**2).sum(axis=1)
-    toolpath = cuts.toolpath
-    closed = (toolpath.starts[rows, :2] == toolpath.end[rows, :2]).all(axis=1)
+    closed = (toolpath.begins(rows)[:, :2] == toolpath.end[rows, :2]).all(axis=1)
     moves = np.zeros((len(rows), at.COLUMNS))
     moves[:, [at.AX, at.AY]], moves[:, [at.BX, at.BY]] = start, end
     moves[:, [at.DX, at.DY]] = chord
@@ -327,17 +355,16 @@ def move_table(cuts: CutMoves) -> MoveTable:
         moves[arcs, x], moves[arcs, y] = place[arcs].T
     moves[arcs, at.WIDE] = np.where(closed, at.FULL, (sweep > np.pi).astype(float))[arcs]
     boxes = segment_boxes(segments)
-    low = np.minimum(boxes[first, :2], boxes[last, :2])
-    high = np.maximum(boxes[first, 2:], boxes[last, 2:])
-    z = cuts.z
+    least = np.minimum(boxes[first, :2], boxes[last, :2])
+    most = np.maximum(boxes[first, 2:], boxes[last, 2:])
+    z = np.sort(ends_z, axis=1)
     heights = np.column_stack(
         [np.minimum(z[first, 0], z[last, 0]), np.maximum(z[first, 1], z[last, 1])]
     )
-    of_row = np.full(len(cuts.contour), -1, dtype=np.int64)
-    of_row[rows] = np.arange(len(rows))
-    return MoveTable(
-        moves, np.concatenate([low, high], axis=1), heights, cuts.contour[rows], of_row
-    )
+    of_row = np.full(high - low, -1, dtype=np.int64)
+    of_row[rows - low] = np.arange(len(rows))
+    both = np.concatenate([least, most], axis=1)
+    return MoveTable(moves, both, heights, cuts.contour[rows]), of_row
 
 
 # The path of the slides, thinned for pictures to a bounded number of points.
@@ -381,21 +408,17 @@ def trace_of(sums: Sums, start: Floats, cutting: Bools, most: int) -> Trace:
     `cutting` (N,): the rows that cut."""
     from camtool.kernels.judging import WRITTEN, unwritten
 
-    written = int(sums.pen[WRITTEN])
-    kept = np.concatenate([sums.trace[:written], unwritten(sums.pen)])
-    row, count = kept[:, 3].astype(np.int64), len(kept)
-    whole = Trace(
-        np.concatenate([start, kept[:, :2]]),
-        np.concatenate([[0.0], kept[:, 2]]),
-        np.concatenate([[0], row]),
-        np.concatenate([[False], cutting[row]]),
-    )
-    if count + 1 <= most:
-        return whole
-    longest = -(-(count + 1) // most)
-    offsets = np.append(np.arange(0, count + 1, longest), count + 1)
-    return _picked(whole, run_peaks(whole.error_mm, offsets))
-
-
-def _picked(part: Trace, which: Ints) -> Trace:
-    return Trace(part.points[which], part.error_mm[which], part.row[which], part.cutting[which])
+    written, held = int(sums.pen[WRITTEN]), unwritten(sums.pen)
+    sums.trace[written : written + len(held)] = held
+    count = written + len(held) + 1
+    chosen = np.arange(count)
+    if count > most:
+        longest = -(-count // most)
+        error = np.concatenate([[0.0], sums.trace[: count - 1, 2]])
+        chosen = run_peaks(error, np.append(np.arange(0, count, longest), count))
+    kept = sums.trace[np.maximum(chosen - 1, 0)]
+    first = chosen == 0
+    kept[first] = (*start[0], 0.0, 0.0)
+    row = kept[:, 3].astype(np.int64)
+    shown = np.append(cutting, False)[np.where(first, -1, row)]
+    return Trace(kept[:, :2].copy(), kept[:, 2].copy(), row, shown)

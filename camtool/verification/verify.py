@@ -46,21 +46,15 @@ from camtool.verification.coverage import (
 from camtool.verification.cuts import CutMoves, cut_moves, is_flat, loops, moved_lengths
 from camtool.verification.dimensions import (
     LoopedCuts,
-    RowSlides,
-    closure_mm,
-    places_between,
+    SlideExtents,
     sizes,
 )
 from camtool.verification.figures import (
     Figure,
     RowFigures,
     Tally,
-    contour_figures,
     contour_names,
-    mean_error_mm,
-    missed_ends,
     tally_of,
-    worst_rows,
 )
 from camtool.verification.matching import Goal, carried_match, own_match
 from camtool.verification.motion_findings import motion_findings
@@ -74,7 +68,7 @@ from camtool.verification.shape import (
     points_wanted,
     wanted_shape,
 )
-from camtool.verification.slides import Paths, SeenCircle, SlidePass, Trace, largest, trace_size
+from camtool.verification.slides import Paths, SeenCircle, SlidePass, Trace, trace_size
 
 __all__ = ["Case", "Verification", "VerifyOptions", "judge", "verify"]
 
@@ -139,16 +133,20 @@ def judge(
     cutter = cutter_of(case.options, cuts)
     shape_points = points_wanted(cuts, cutter)
     points = max(case.options.trace_points, shape_points or 0)
-    slides = SlidePass(paths, coverage.match, trace_size(case.decoded, case.spacing_mm, points))
+    own, looped = _looped(case, paths)
+    sizes_of = SlideExtents(case.decoded.start, own, looped, coverage.match)
+    steps_mm = case.machine.axes.x.coded_step_mm, case.machine.axes.y.coded_step_mm
+    rows = RowFigures(cuts, coverage.match, steps_mm, case.options.worst)
+    size = trace_size(case.decoded, case.spacing_mm, points)
+    slides = SlidePass(paths, coverage.match, (rows, sizes_of), size)
     if isinstance(motion, Iterable):
         for chunk in motion:
             slides.add(chunk)
             progress.done = int(chunk.row[-1]) + 1 if len(chunk.row) else progress.done
     else:
         slides.run(motion, progress)
-    slides.finish()
-    rows = slides.rows
-    tally = tally_of(rows, case.decoded, cuts.is_cut)
+    trace = slides.finish()
+    tally = tally_of(rows.books, case.decoded, cuts.is_cut)
     extents = toolpath_extents(case.decoded)
     motion_faults = motion_findings(cuts, case, tally, extents, rows)
     shape = None
@@ -157,8 +155,7 @@ def judge(
     planned = () if case.wanted is None else case.wanted.findings
     overcut = overcut_findings(shape, {finding.code for finding in planned})
     findings = _all_findings(case, coverage, conformance, (*turned, *motion_faults, *overcut))
-    result = Result(case, cuts, wanted, coverage, slides, rows, tally, conformance)
-    trace = slides.trace()
+    result = Result(case, cuts, looped, coverage, slides, tally, conformance)
     report = result.report(extents, findings, trace, shape)
     return Verification(report, trace, findings, rows, wanted, slides.seen())
 
@@ -182,6 +179,14 @@ def _compared(
     turned = _turned(case, decoded, goal, flat_cuts=flat_cuts)
     paths = Paths(decoded.cuts, wanted.cuts, circles, case.depth_mm)
     return paths, coverage, conformance, turned
+
+
+def _looped(case: Case, paths: Paths) -> tuple[LoopedCuts, LoopedCuts]:
+    """The decoded and the wanted cuts with their loops."""
+    own = LoopedCuts(paths.decoded, loops(paths.decoded, case.coverage_mm))
+    if paths.wanted is paths.decoded:
+        return own, own
+    return own, LoopedCuts(paths.wanted, loops(paths.wanted, case.coverage_mm))
 
 
 def _coverage(case: Case, decoded: MoveIndex, goal: Goal, *, flat_cuts: bool) -> Coverage:
@@ -251,10 +256,9 @@ class Result:
 
     case: Case
     cuts: CutMoves
-    wanted: CutMoves
+    goal: LoopedCuts
     coverage: Coverage
     slides: SlidePass
-    rows: RowFigures
     tally: Tally
     conformance: Conformance | None = None
 
@@ -270,13 +274,7 @@ class Result:
         case, tally = self.case, self.tally
         options = case.options
         link_s = case.machine.link.seconds(options.line_bytes or 0, tally.time_s)
-        slides = RowSlides(
-            self.rows.low,
-            self.rows.high,
-            places_between(case.decoded.start[:2], self.rows.slide_end),
-        )
         x, y, z = ((certain(low), certain(high)) for low, high in extents)
-        own = LoopedCuts(self.cuts, loops(self.cuts, case.coverage_mm))
         return Report(
             target=case.machine.target.name,
             source=options.source,
@@ -288,8 +286,8 @@ class Result:
             steps=_steps(tally),
             reversals=_reversals(tally),
             error_um=self._errors(),
-            closure_um=number(closure_mm(own.loops, slides), UM_PER_MM),
-            dimensions=self._dimensions(own, slides),
+            closure_um=number(self.slides.extents.closure_mm, UM_PER_MM),
+            dimensions=self._dimensions(),
             circles=self._circles(),
             findings=reported(findings),
             contours=self.cuts.contour_count,
@@ -307,12 +305,8 @@ class Result:
         )
 
     def _errors(self) -> record.Errors:
-        slides = self.slides
-        inside, step = slides.interpolation(), self.case.step_mm
-        is_arc = self.cuts.toolpath.is_arc
-        lines_mm = largest(self.rows.interpolation, ~is_arc)
-        arcs_mm = largest(self.rows.interpolation, is_arc)
-        total = slides.total()
+        rows, step = self.slides.rows, self.case.step_mm
+        inside, total = rows.inner, rows.whole
         return record.Errors(
             fit=self._fit(),
             rounding=_max_rms(self.coverage.rounding),
@@ -320,17 +314,17 @@ class Result:
                 max=number(inside.max, UM_PER_MM),
                 rms=number(inside.rms, UM_PER_MM),
                 p95=number(inside.p95, UM_PER_MM),
-                lines_max=number(lines_mm, UM_PER_MM),
-                arcs_max=number(arcs_mm, UM_PER_MM),
-                lines_steps=number(lines_mm / step),
-                arcs_steps=number(arcs_mm / step),
+                lines_max=number(rows.lines_mm, UM_PER_MM),
+                arcs_max=number(rows.arcs_mm, UM_PER_MM),
+                lines_steps=number(rows.lines_mm / step),
+                arcs_steps=number(rows.arcs_mm / step),
             ),
-            mechanics=_max_rms(slides.mechanics()),
+            mechanics=_max_rms(rows.lag),
             total=record.ErrorFigures(
                 number(total.max, UM_PER_MM),
                 number(total.rms, UM_PER_MM),
                 number(total.p95, UM_PER_MM),
-                number(mean_error_mm(self.rows), UM_PER_MM),
+                number(rows.mean_mm, UM_PER_MM),
             ),
             depth_max=number(_depth_error_mm(self.case, self.cuts), UM_PER_MM),
         )
@@ -338,11 +332,11 @@ class Result:
     def _fit(self) -> record.MaxRms:
         """The distance of the drawing from the wanted cutting moves; the rms is over the moves
         that are not exact."""
-        drawn, rows = self.wanted.toolpath.drawn, self.wanted.rows
+        drawn, rows = self.goal.cuts.toolpath.drawn, self.goal.cuts.rows
         if self.case.wanted is None or drawn is None or not len(rows):
             return record.MaxRms()
         largest, rms = drawn.off_mm[rows].T
-        length = np.where(largest > 0.0, moved_lengths(self.wanted.toolpath)[rows], 0.0)
+        length = np.where(largest > 0.0, moved_lengths(self.goal.cuts.toolpath)[rows], 0.0)
         mean = float((length * rms**2).sum()) / (float(length.sum()) or 1.0)
         return record.MaxRms(
             certain(float(largest.max()) * UM_PER_MM), certain(math.sqrt(mean) * UM_PER_MM)
@@ -353,12 +347,7 @@ class Result:
         known = self.case.wanted is not None and self.case.wanted.drawn is not None
         return certain(off_mm * UM_PER_MM) if known else None
 
-    def _dimensions(self, own: LoopedCuts, slides: RowSlides) -> tuple[record.Dimension, ...]:
-        match, gap_mm = self.coverage.match, self.case.coverage_mm
-        goal = own
-        if self.wanted is not self.cuts:
-            goal = LoopedCuts(self.wanted, loops(self.wanted, gap_mm))
-        found = sizes(own, slides, goal, match, gap_mm)
+    def _dimensions(self) -> tuple[record.Dimension, ...]:
         return tuple(
             record.Dimension(
                 name=size.name,
@@ -367,7 +356,7 @@ class Result:
                 error_percent=number(size.error_percent),
                 of="edge" if size.of_edge else "centre",
             )
-            for size in found
+            for size in sizes(self.slides.extents, self.goal, self.case.coverage_mm)
         )
 
     def _circles(self) -> tuple[record.CircleReport, ...]:
@@ -410,7 +399,7 @@ class Result:
         )
 
     def _contours(self) -> tuple[record.ContourReport, ...]:
-        names = contour_names(self.wanted)
+        names = contour_names(self.goal.cuts)
         return tuple(
             record.ContourReport(
                 name=names[one.contour],
@@ -423,34 +412,31 @@ class Result:
                 mechanics_um=certain(one.mechanics_mm * UM_PER_MM),
                 fit_um=self._off_um(one.fit_mm),
             )
-            for one in contour_figures(self.rows, self.coverage.match)
+            for one in self.slides.rows.contours.figures()
         )
 
     def _worst(self) -> tuple[record.WorstReport, ...]:
-        rows = self.rows
         return tuple(
             record.WorstReport(
-                block=_block(self.case, row),
-                move=row + 1,
-                at_mm=(certain(rows.total_at[row, 0]), certain(rows.total_at[row, 1])),
-                total_um=certain(rows.total[row] * UM_PER_MM),
-                interpolation_um=number(rows.interpolation[row], UM_PER_MM),
-                mechanics_um=number(rows.mechanics[row], UM_PER_MM),
-                source=self._source(row),
-                fit_um=self._off_um(float(self.coverage.match.off_mm[row, 0])),
+                block=_block(self.case, int(row)),
+                move=int(row) + 1,
+                at_mm=(certain(x), certain(y)),
+                total_um=certain(total_mm * UM_PER_MM),
+                interpolation_um=number(inner_mm, UM_PER_MM),
+                mechanics_um=number(lag_mm, UM_PER_MM),
+                source=self._source(int(row)),
+                fit_um=self._off_um(float(self.coverage.match.off_mm[int(row), 0])),
             )
-            for row in worst_rows(rows, self.case.options.worst).tolist()
+            for row, total_mm, inner_mm, lag_mm, x, y in self.slides.rows.worst.found.tolist()
         )
 
     def _source(self, row: int) -> str:
         """Layer and entity of the wanted move to which a decoded row belongs."""
         wanted = int(self.coverage.match.row[row])
-        return self.wanted.toolpath.text(wanted) if wanted >= 0 else ""
+        return self.goal.cuts.toolpath.text(wanted) if wanted >= 0 else ""
 
     def _unreached(self) -> record.UnreachedReport:
-        axes = self.case.machine.axes
-        steps = axes.x.coded_step_mm, axes.y.coded_step_mm
-        missed = missed_ends(self.rows, self.cuts.toolpath, steps)
+        missed = self.slides.rows.missed
         return record.UnreachedReport(missed.count, certain(missed.most_mm * UM_PER_MM))
 
     def _asked(self) -> record.AskedReport | None:

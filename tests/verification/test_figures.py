@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from camtool.verification.figures import Figure
 from camtool.verification.nearest import ranges, run_offsets, run_peaks
-from camtool.verification.slides import largest
 
 P95_ACCURACY = 0.004
 
@@ -73,13 +72,6 @@ def test_memory_does_not_grow_with_the_stream() -> None:
     for _ in range(50):
         figure.add(np.random.default_rng(0).random(1000), np.zeros((1000, 2)), np.zeros(1000, int))
     assert sum(np.asarray(value).nbytes for value in vars(figure).values()) <= before + 64
-
-
-def test_the_largest_error_alone() -> None:
-    none = np.zeros(3, dtype=np.bool_)
-    assert math.isnan(largest(np.array([0.2, np.nan, 0.5]), none))
-    assert largest(np.array([0.2, np.nan, 0.5]), ~none) == 0.5
-    assert math.isnan(largest(np.full(3, np.nan), ~none))
 
 
 @given(st.lists(st.integers(0, 2), max_size=30), st.integers(1, 7))
