@@ -7,8 +7,9 @@ from camtool.kernels.types cimport Int
 
 cdef class Search:
     cdef double[:, ::1] table, heights, nodes
-    cdef Int[::1] order, found, stack
-    cdef double[::1] apart, memo, x, y, error
+    cdef Int[::1] order, found, stack, parts
+    cdef double[::1] box, x, y, error
+    cdef readonly Int looked
 
 cdef class Judge:
     cdef Int low
@@ -75,42 +76,64 @@ cdef double larger(double one, double other) noexcept  # inline
 @cython.locals(k=Int)
 cdef Int first_of(double[::1] values, Int low, double value) noexcept
 
-@cython.locals(other=Int, k=Int, n=Int)
-cdef bint _is_there(double[:, ::1] table, Int[::1] found, Int count, Int move) noexcept
+cdef bint _counts(
+    Int k, Int first, Int last, double z_low, double z_high, double[:, ::1] heights
+) noexcept  # inline
 
 @cython.locals(
-    leaves=Int, count=Int, height=Int, node=Int, low=Int, place=Int, k=Int, order=Int[::1],
-    stack=Int[::1], found=Int[::1], best=double, limit=double, apart=double, table=double[:, ::1],
-    nodes=double[:, ::1], heights=double[:, ::1], memo=double[::1], distance=double[::1],
-    spot_x=double[::1], spot_y=double[::1], spot_error=double[::1]
+    leaves=Int, height=Int, node=Int, low=Int, place=Int, k=Int, nearest=Int, best=double,
+    order=Int[::1], stack=Int[::1], table=double[:, ::1], nodes=double[:, ::1],
+    heights=double[:, ::1], spot_x=double[::1], spot_y=double[::1], spot_error=double[::1]
 )
-cdef (double, Int) _search(
-    Int first, Int last, double z_low, double z_high, Search search
+cdef Int _nearest(
+    double x, double y, double within, Int first, Int last, double z_low, double z_high,
+    Search search
 ) noexcept
 
 cdef double _looser(double limit) noexcept  # inline
 
 @cython.locals(
-    kept=Int, k=Int, move=Int, found=Int[::1], table=double[:, ::1], memo=double[::1],
-    distance=double[::1]
+    count=Int, k=Int, j=Int, lane=Int, middle_x=double, middle_y=double, way_x=double,
+    way_y=double, px=double, py=double, long=double, wide=double, far=double,
+    longs="double[32]", wides="double[32]", fars="double[32]"
 )
-cdef void _keep(double nearest, Int count, Search search) noexcept
-
-@cython.locals(count=Int, memo=double[::1])
-cdef void _renew(
-    double x, double y, Int first, Int last, double z_low, double z_high, Search search
-) noexcept
-
-@cython.locals(k=Int, beyond=Int)
-cdef Int _within(double[::1] memo, double[::1] x, double[::1] y, Int low) noexcept  # wide
+cdef void _set_box(
+    double[::1] x, double[::1] y, double[::1] errors, double[::1] box
+) noexcept  # wide
 
 @cython.locals(
-    done=Int, run=Int, count=Int, k=Int, found=Int[::1], same=bint, table=double[:, ::1],
-    memo=double[::1], here=double[::1], here_x=double[::1], here_y=double[::1]
+    low_x=double, low_y=double, high_x=double, high_y=double, beside=double, reach=double
 )
-cpdef void nearest_errors(
-    double[::1] x, double[::1] y, Int first, Int last, double z_low, double z_high, Search search,
-    double[::1] out
+cdef bint _node_near(double[:, ::1] nodes, Int node, double[::1] box) noexcept  # inline
+
+@cython.locals(
+    way_x=double, way_y=double, long=double, wide=double, px=double, py=double, along=double,
+    beside=double, near_long=double, near_wide=double, far_long=double, far_wide=double,
+    square=double, to_x=double, to_y=double, further=double, across=double, side=double,
+    reach=double
+)
+cdef bint _move_near(double[:, ::1] table, Int k, double[::1] box) noexcept  # inline
+
+@cython.locals(other=Int, k=Int, n=Int)
+cdef bint _is_there(double[:, ::1] table, Int[::1] found, Int count, Int move) noexcept
+
+@cython.locals(
+    leaves=Int, height=Int, node=Int, low=Int, place=Int, k=Int, n=Int, count=Int, most=Int,
+    order=Int[::1], stack=Int[::1], found=Int[::1], table=double[:, ::1], nodes=double[:, ::1],
+    heights=double[:, ::1], box=double[::1]
+)
+cdef bint _compared(
+    double[::1] x, double[::1] y, Int own, Int first, Int last, double z_low, double z_high,
+    Search search, double[::1] errors
+) noexcept
+
+@cython.locals(
+    height=Int, low=Int, high=Int, middle=Int, k=Int, alone=bint, far=double,
+    table=double[:, ::1], parts=Int[::1], here_x=double[::1], here_y=double[::1], here=double[::1]
+)
+cpdef bint nearest_errors(
+    double[::1] x, double[::1] y, Int own, Int first, Int last, double z_low, double z_high,
+    Search search, double[::1] out
 ) noexcept
 
 @cython.locals(which=Int)
@@ -174,7 +197,8 @@ cdef (double, double, double) _sizes(
 cdef void _count(Int[::1] places, Int count, Int[:, ::1] histograms, Int which) noexcept
 
 @cython.locals(
-    last=Int, own=Int, of_program=Int, k=Int, circle=Int, first=Int, upto=Int, rows=Int[:, ::1], bits=Int[::1],
+    last=Int, own=Int, of_program=Int, k=Int, circle=Int, first=Int, upto=Int, beside=Int,
+    search=Search, rows=Int[:, ::1], bits=Int[::1],
     places=Int[::1], shown=double, most=double, squares=double, signed=double,
     figures=double[:, ::1], window=double[:, ::1], x=double[::1], y=double[::1],
     slide_x=double[::1], slide_y=double[::1], errors=double[::1], size=double[::1], pen=double[::1]

@@ -289,45 +289,37 @@ def first_of(values: Floats, low: int, value: float) -> int:
     return k
 
 
-# The nearest of many moves for points that follow each other: a short list serves many of them.
+# The nearest of many moves for points that follow each other, as the samples of a row do.
 #
-# Around a point q whose nearest move is d away, the list holds every move within d + 2ρ of q. As
-# long as a point p stays within ρ of q the nearest move of p is in the list:
+# All points are compared with one move first, their own, from which the row was written. With D
+# the largest error by that, no other move counts that is nowhere within D of the points: those
+# that come so near to the box about the points, which lies along their way, are listed from a tree
+# of the moves' boxes, and all points are compared with them.
 #
-#     |p s| ≤ |p s_q| ≤ |p q| + d ≤ ρ + d   for the nearest s of p,
-#     |q s| ≤ |q p| + |p s| ≤ d + 2ρ.
-#
-# So what is found is exact whatever ρ is; ρ only trades the search for a new list against
-# distances to moves that are not the nearest: it doubles when the last list cost less than the
-# search for it, and halves when it cost more. The search goes down a tree of the moves' boxes.
+# A long list for many points is not looked at: the move nearest to the middle one lowers the
+# errors, and each half of the points gets a list of its own. For one point, the move nearest to it
+# is what is asked for. So what is found is exact, however far the own move is.
 
 
-SEARCH_COST = 400.0
-"""A search for a list costs about as much as so many distances."""
+FEW = 8
+"""A list of so many moves is looked at for any number of points."""
 
-FIRST_REACH_MM = 0.05
-"""ρ of the first list."""
-
-MOST_REACH_MM = 1e6
-"""ρ grows no further: a kilometre is all that a program can say."""
+ENOUGH = 1024
+"""A longer list is looked at where that takes at most so many distances."""
 
 SLACK = 1e-12
-"""Limits of a list are taken this part wider, plus `SLACK_MM`: rounding must not lose a move."""
+"""Limits are taken this part wider, plus `SLACK_MM`: rounding must not lose a move."""
 
 SLACK_MM = 1e-12
 """See `SLACK`."""
 
-QX, QY, REACH, MEMO_FIRST, MEMO_LAST, Z_LOW, Z_HIGH, COUNT, LEAST, USED, LOOKED = range(11)
-"""The memo of a list, float64: the point q, ρ (−1: there is no list), which moves first:last and
-heights it holds, how many moves are in it, how many of these are as near to q as any, for how
-many points it was used, and how many nodes and moves the search for it looked at."""
-
-MEMO = 11
-"""Numbers in a memo."""
+MIDDLE_X, MIDDLE_Y, WAY_X, WAY_Y, HALF_LONG, HALF_WIDE, HALF_X, HALF_Y = range(8)
+"""A box about points, float64: its middle; the direction of their way; half of how long and wide
+it is along that, and along X and Y."""
 
 
 class Moves(NamedTuple):
-    """K moves: their table (K, 16) of `move_errors`, heights (K, 2), and the nodes (2L, 6) and
+    """K moves: their table (K, 16) of `lower_errors`, heights (K, 2), and the nodes (2L, 6) and
     order (K,) of `move_tree`."""
 
     table: Floats
@@ -336,34 +328,147 @@ class Moves(NamedTuple):
     order: Ints
 
 
-class Near(NamedTuple):
-    """A list: the moves found (K,), how far from q each is (K,) mm, and its memo (11,)."""
-
-    found: Ints
-    apart: Floats
-    memo: Floats
-
-
-def no_list(moves: int) -> Near:
-    """Room for a list of so many moves, that is none yet."""
-    memo = np.zeros(MEMO)
-    memo[REACH] = -1.0
-    return Near(np.empty(moves, dtype=np.int64), np.empty(moves), memo)
-
-
 class Search:
-    """The nearest of moves, by a list: its arrays, and room for what is looked at."""
+    """The nearest of moves: their arrays, room for what is looked at, and how many nodes and moves
+    were looked at."""
 
-    def __init__(self, moves: Moves, near: Near) -> None:
+    def __init__(self, moves: Moves) -> None:
         self.table, self.heights, self.nodes, self.order = moves
-        self.found, self.apart, self.memo = near
+        self.found, self.box = np.empty(ENOUGH, dtype=np.int64), np.empty(8)
         self.stack = np.empty(DEPTH, dtype=np.int64)
+        self.parts = np.empty(DEPTH, dtype=np.int64)
         self.x, self.y, self.error = np.empty(1), np.empty(1), np.empty(1)
+        self.looked = 0
+
+
+def _counts(k: int, first: int, last: int, z_low: float, z_high: float, heights: Floats) -> bool:
+    """Whether a move is one of first:last, at heights that overlap z_low … z_high."""
+    if k < first or k >= last:
+        return False
+    return heights[k, 0] <= z_high and heights[k, 1] >= z_low
+
+
+def _nearest(
+    x: float,
+    y: float,
+    within: float,
+    first: int,
+    last: int,
+    z_low: float,
+    z_high: float,
+    search: Search,
+) -> int:
+    """The move nearest to a point, if it is nearer than `within` mm, else −1; of those first:last
+    whose heights overlap z_low … z_high."""
+    table, heights, nodes, order = search.table, search.heights, search.nodes, search.order
+    spot_x, spot_y, spot_error, stack = search.x, search.y, search.error, search.stack
+    spot_x[0], spot_y[0] = x, y
+    leaves = len(nodes) // 2
+    best, nearest = within, -1
+    height, stack[0] = 1, 1
+    while height > 0:
+        height -= 1
+        node = stack[height]
+        search.looked += 1
+        if nodes[node, FIRST_BELOW] >= last or nodes[node, LAST_BELOW] <= first:
+            continue
+        if apart_square(nodes, node, x, y) > _looser(best) * _looser(best):
+            continue
+        if node < leaves:
+            height = wait_for_children(nodes, node, x, y, stack, height)
+            continue
+        low = (node - leaves) * LEAF
+        for place in range(low, min(low + LEAF, len(order))):
+            k = order[place]
+            if _counts(k, first, last, z_low, z_high, heights):
+                search.looked += 1
+                lower_errors(table, k, spot_x, spot_y, spot_error, True)
+                if abs(spot_error[0]) < best:
+                    best, nearest = abs(spot_error[0]), k
+    return nearest
+
+
+def _looser(limit: float) -> float:
+    return limit * (1.0 + SLACK) + SLACK_MM
+
+
+def _set_box(x: Floats, y: Floats, errors: Floats, box: Floats) -> None:
+    """Set the box about the points x, y (n ≥ 1,) and what is as near to them as their errors. Its
+    middle is that of the way from the first to the last point."""
+    count = len(x)
+    middle_x, middle_y = 0.5 * (x[0] + x[count - 1]), 0.5 * (y[0] + y[count - 1])
+    way_x, way_y = x[count - 1] - x[0], y[count - 1] - y[0]
+    length = math.sqrt(way_x * way_x + way_y * way_y)
+    way_x = way_x / length if length > 0.0 else 1.0
+    way_y = way_y / length if length > 0.0 else 0.0
+    long, wide, far, k = 0.0, 0.0, 0.0, 0
+    if count >= LANES:
+        longs, wides, fars = [0.0] * LANES, [0.0] * LANES, [0.0] * LANES
+        for lane in range(LANES):
+            longs[lane] = wides[lane] = fars[lane] = 0.0
+        while k + LANES <= count:
+            for lane in range(LANES):
+                px, py = x[k + lane] - middle_x, y[k + lane] - middle_y
+                longs[lane] = larger(longs[lane], abs(px * way_x + py * way_y))
+                wides[lane] = larger(wides[lane], abs(py * way_x - px * way_y))
+                fars[lane] = larger(fars[lane], abs(errors[k + lane]))
+            k += LANES
+        for lane in range(LANES):
+            long, wide = larger(long, longs[lane]), larger(wide, wides[lane])
+            far = larger(far, fars[lane])
+    for j in range(k, count):
+        px, py = x[j] - middle_x, y[j] - middle_y
+        long = larger(long, abs(px * way_x + py * way_y))
+        wide = larger(wide, abs(py * way_x - px * way_y))
+        far = larger(far, abs(errors[j]))
+    far = _looser(far) + SLACK * (abs(middle_x) + abs(middle_y) + long)
+    long, wide = long + far, wide + far
+    box[MIDDLE_X], box[MIDDLE_Y], box[WAY_X], box[WAY_Y] = middle_x, middle_y, way_x, way_y
+    box[HALF_LONG], box[HALF_WIDE] = long, wide
+    box[HALF_X] = abs(way_x) * long + abs(way_y) * wide
+    box[HALF_Y] = abs(way_y) * long + abs(way_x) * wide
+
+
+def _node_near(nodes: Floats, node: int, box: Floats) -> bool:
+    """Whether the box of a node may have a point in the box."""
+    low_x, low_y = nodes[node, 0] - box[MIDDLE_X], nodes[node, 1] - box[MIDDLE_Y]
+    high_x, high_y = nodes[node, 2] - box[MIDDLE_X], nodes[node, 3] - box[MIDDLE_Y]
+    if low_x > box[HALF_X] or high_x < -box[HALF_X]:
+        return False
+    if low_y > box[HALF_Y] or high_y < -box[HALF_Y]:
+        return False
+    beside = (low_y + high_y) * box[WAY_X] - (low_x + high_x) * box[WAY_Y]
+    reach = (high_y - low_y) * abs(box[WAY_X]) + (high_x - low_x) * abs(box[WAY_Y])
+    return abs(beside) <= (reach + 2.0 * box[HALF_WIDE]) * (1.0 + SLACK)
+
+
+def _move_near(table: Floats, k: int, box: Floats) -> bool:
+    """Whether a move may have a point in the box. Of an arc, the whole circle is looked at."""
+    way_x, way_y, long, wide = box[WAY_X], box[WAY_Y], box[HALF_LONG], box[HALF_WIDE]
+    if table[k, RADIUS] > 0.0:
+        px, py = table[k, CX] - box[MIDDLE_X], table[k, CY] - box[MIDDLE_Y]
+        along, beside = abs(px * way_x + py * way_y), abs(py * way_x - px * way_y)
+        near_long, near_wide = larger(along - long, 0.0), larger(beside - wide, 0.0)
+        far_long, far_wide = along + long, beside + wide
+        square = table[k, RADIUS] * table[k, RADIUS]
+        if near_long * near_long + near_wide * near_wide > square * (1.0 + SLACK):
+            return False
+        return far_long * far_long + far_wide * far_wide >= square * (1.0 - SLACK)
+    px, py = table[k, AX] - box[MIDDLE_X], table[k, AY] - box[MIDDLE_Y]
+    along, beside = px * way_x + py * way_y, py * way_x - px * way_y
+    to_x, to_y = table[k, BX] - table[k, AX], table[k, BY] - table[k, AY]
+    further, across = to_x * way_x + to_y * way_y, to_y * way_x - to_x * way_y
+    if smaller(along, along + further) > long or larger(along, along + further) < -long:
+        return False
+    if smaller(beside, beside + across) > wide or larger(beside, beside + across) < -wide:
+        return False
+    side = abs(along * across - beside * further)
+    reach = long * abs(across) + wide * abs(further)
+    return side <= reach + SLACK * (abs(along * across) + abs(beside * further))
 
 
 def _is_there(table: Floats, found: Ints, count: int, move: int) -> bool:
-    """Whether the move is one of the `count` found: passes one below the other are the same in
-    XY."""
+    """Whether the move is one of the `count` found: turns of a circle are the same."""
     for n in range(count):
         other, k = found[n], 0
         while k < COLUMNS and table[other, k] == table[move, k]:
@@ -373,134 +478,99 @@ def _is_there(table: Floats, found: Ints, count: int, move: int) -> bool:
     return False
 
 
-def _search(
-    first: int, last: int, z_low: float, z_high: float, search: Search
-) -> tuple[float, int]:
-    """The least distance of q, and how many moves were found: all that are no farther than that
-    and 2ρ, and some that are. Only moves first:last count whose heights overlap z_low … z_high."""
+def _compared(
+    x: Floats,
+    y: Floats,
+    own: int,
+    first: int,
+    last: int,
+    z_low: float,
+    z_high: float,
+    search: Search,
+    errors: Floats,
+) -> bool:
+    """Lower the errors of the points x, y (n,), whose own move was looked at, to those against
+    the nearest move; false where the list is too long for that."""
     table, heights, nodes, order = search.table, search.heights, search.nodes, search.order
-    found, distance, memo = search.found, search.apart, search.memo
-    spot_x, spot_y, spot_error, stack = search.x, search.y, search.error, search.stack
-    x, y, beyond = memo[QX], memo[QY], 2.0 * memo[REACH]
-    spot_x[0], spot_y[0] = x, y
+    stack, found, box = search.stack, search.found, search.box
+    _set_box(x, y, errors, box)
+    most = max(FEW, ENOUGH // len(x))
     leaves = len(nodes) // 2
-    best, limit, count = math.inf, math.inf, 0
+    found[0], count = own, 1
     height, stack[0] = 1, 1
     while height > 0:
         height -= 1
         node = stack[height]
-        memo[LOOKED] += 1.0
+        search.looked += 1
         if nodes[node, FIRST_BELOW] >= last or nodes[node, LAST_BELOW] <= first:
             continue
-        if apart_square(nodes, node, x, y) > limit * limit:
+        if not _node_near(nodes, node, box):
             continue
         if node < leaves:
-            height = wait_for_children(nodes, node, x, y, stack, height)
+            stack[height], stack[height + 1] = 2 * node + 1, 2 * node
+            height += 2
             continue
         low = (node - leaves) * LEAF
         for place in range(low, min(low + LEAF, len(order))):
             k = order[place]
-            if k < first or k >= last:
+            if not _counts(k, first, last, z_low, z_high, heights):
                 continue
-            if heights[k, 0] > z_high or heights[k, 1] < z_low:
-                continue
-            lower_errors(table, k, spot_x, spot_y, spot_error, True)
-            apart = abs(spot_error[0])
-            memo[LOOKED] += 1.0
-            if apart < best:
-                best, limit = apart, _looser(apart + beyond)
-            if apart <= limit:
-                found[count], distance[count] = k, apart
+            search.looked += 1
+            if _move_near(table, k, box) and not _is_there(table, found, count, k):
+                if count == most:
+                    return False
+                found[count] = k
                 count += 1
-    return best, count
-
-
-def _looser(limit: float) -> float:
-    return limit * (1.0 + SLACK) + SLACK_MM
-
-
-def _keep(nearest: float, count: int, search: Search) -> None:
-    """Leave in the list, of the first `count` moves, those that must be in it, each once."""
-    table, found, distance, memo = search.table, search.found, search.apart, search.memo
-    limit, least = _looser(nearest + 2.0 * memo[REACH]), _looser(nearest)
-    kept = 0
-    memo[LEAST] = 0.0
-    for k in range(count):
-        move, apart = found[k], distance[k]
-        if apart <= limit and not _is_there(table, found, kept, move):
-            found[kept] = move
-            kept += 1
-            if apart <= least:
-                memo[LEAST] += 1.0
-    memo[COUNT] = kept
-
-
-def _renew(
-    x: float, y: float, first: int, last: int, z_low: float, z_high: float, search: Search
-) -> None:
-    """Make the list around q = (x, y) anew, with a ρ from how well the last one did."""
-    memo = search.memo
-    if memo[REACH] < 0.0:
-        memo[REACH] = FIRST_REACH_MM
-    elif memo[USED] * (memo[COUNT] - memo[LEAST]) > SEARCH_COST:
-        memo[REACH] *= 0.5
-    else:
-        memo[REACH] = min(2.0 * memo[REACH], MOST_REACH_MM)
-    memo[QX], memo[QY], memo[USED], memo[LOOKED] = x, y, 0.0, 0.0
-    nearest, count = _search(first, last, z_low, z_high, search)
-    if count == 0:  # nothing at this height: any height
-        nearest, count = _search(first, last, -math.inf, math.inf, search)
-    _keep(nearest, count, search)
-
-
-def _within(memo: Floats, x: Floats, y: Floats, low: int) -> int:
-    """How many of the points x, y (n,) from the row `low` on lie within ρ of q."""
-    qx, qy, square = memo[QX], memo[QY], memo[REACH] * memo[REACH]
-    beyond = 0
-    for k in range(low, len(x)):
-        off_x, off_y = x[k] - qx, y[k] - qy
-        beyond += 1 if off_x * off_x + off_y * off_y > square else 0
-    if beyond == 0:
-        return len(x) - low
-    k = low
-    while (x[k] - qx) * (x[k] - qx) + (y[k] - qy) * (y[k] - qy) <= square:
-        k += 1
-    return k - low
+    for n in range(1, count):
+        lower_errors(table, found[n], x, y, errors, False)
+    return True
 
 
 def nearest_errors(
     x: Floats,
     y: Floats,
+    own: int,
     first: int,
     last: int,
     z_low: float,
     z_high: float,
     search: Search,
     out: Floats,
-) -> None:
-    """The error of each of the points x, y (n,) against the nearest of the moves first:last whose
-    heights overlap z_low … z_high, signed as `lower_errors` does; inf where there is none. The
-    list serves the next call too."""
-    table, memo, found = search.table, search.memo, search.found
-    same = memo[MEMO_FIRST] == first and memo[MEMO_LAST] == last
-    same = same and memo[Z_LOW] == z_low and memo[Z_HIGH] == z_high and memo[REACH] >= 0.0
-    memo[MEMO_FIRST], memo[MEMO_LAST], memo[Z_LOW], memo[Z_HIGH] = first, last, z_low, z_high
-    done = 0
-    while done < len(x):
-        run = _within(memo, x, y, done) if same else 0
-        if run == 0:
-            _renew(x[done], y[done], first, last, z_low, z_high, search)
-            run, same = max(1, _within(memo, x, y, done)), True
-        here_x, here_y = x[done : done + run], y[done : done + run]
-        here = out[done : done + run]
-        count = int(memo[COUNT])
-        if count == 0:
-            for k in range(run):
-                here[k] = math.inf
-        for k in range(count):
-            lower_errors(table, found[k], here_x, here_y, here, k == 0)
-        memo[USED] += run
-        done += run
+) -> bool:
+    """The error of each of the points x, y (n ≥ 1,) against the nearest of the moves first:last
+    whose heights overlap z_low … z_high, or of all of these where none does; signed as
+    `lower_errors` does, of equally near moves by `own` if it is one. False, and inf, where there
+    is none. `own` is the move that the points are expected to follow, or −1."""
+    table, parts, middle = search.table, search.parts, len(x) // 2
+    if not _counts(own, first, last, z_low, z_high, search.heights):
+        far = math.inf
+        own = _nearest(x[middle], y[middle], far, first, last, z_low, z_high, search)
+        if own < 0:
+            z_low, z_high = -far, far
+            own = _nearest(x[middle], y[middle], far, first, last, z_low, z_high, search)
+        if own < 0:
+            for k in range(len(x)):
+                out[k] = far
+            return False
+    lower_errors(table, own, x, y, out, True)
+    height, parts[0], parts[1] = 2, 0, len(x)
+    while height > 0:
+        height -= 2
+        low, high = parts[height], parts[height + 1]
+        here_x, here_y, here = x[low:high], y[low:high], out[low:high]
+        alone = high - low == 1
+        if not alone and _compared(here_x, here_y, own, first, last, z_low, z_high, search, here):
+            continue
+        middle = (low + high) // 2
+        within = abs(out[middle])
+        k = _nearest(x[middle], y[middle], within, first, last, z_low, z_high, search)
+        if k >= 0:
+            lower_errors(table, k, here_x, here_y, here, False)
+        if not alone:
+            parts[height], parts[height + 1] = middle, high
+            parts[height + 2], parts[height + 3] = low, middle
+            height += 4
+    return True
 
 
 # The points about a circle in bins of their angle, without an angle per point.
@@ -779,16 +849,17 @@ of squares; how many have a total, that with its sum and its place; extents; las
 ROW_COLUMNS = 19
 """How many columns."""
 
-OWN, FIRST, LAST, CIRCLE, SLOT = range(5)
+OWN, FIRST, LAST, CIRCLE, SLOT, BESIDE = range(6)
 """Columns of `Task.rows`."""
 
 
 class Task(NamedTuple):
     """What the N rows from `low` on are judged by.
 
-    own (J, 16) moves of the rows that cut (`move_errors`), the K moves that are wanted; rows
-    (N, 5): which of `own` a row is, −1 where nothing is cut, first and last of the moves that it
-    is compared with, the circle that it goes round or −1, and the bins of that; window (N, 2)
+    own (J, 16) moves of the rows that cut (`lower_errors`), the K moves that are wanted; rows
+    (N, 6): which of `own` a row is, −1 where nothing is cut, first and last of the moves that it
+    is compared with, the circle that it goes round or −1, the bins of that, and the one of the
+    moves that it is expected to follow or −1; window (N, 2)
     between which heights moves are compared; off (N,) mm: how far what was drawn lies at most from
     the moves that a row is compared with; centre (C, 2) mm of circles; directions (721, 2) of
     `circle_bins`.
@@ -807,14 +878,13 @@ class Task(NamedTuple):
 class Sums(NamedTuple):
     """What is found: rows (N, 19), those of the task; histograms (2, 4 BINS) of interpolation and
     total, every fourth sample in the same place of its four; bins (S, 720, 9); trace (T, 4) x, y,
-    error, row, and its pen; the list of near moves."""
+    error, row, and its pen."""
 
     rows: Floats
     histograms: Ints
     bins: Floats
     trace: Floats
     pen: Floats
-    near: Near
 
 
 class Judge:
@@ -828,7 +898,7 @@ class Judge:
         self.centre, self.directions = task.centre, task.directions
         self.figures, self.histograms, self.bins = sums.rows, sums.histograms, sums.bins
         self.trace, self.pen = sums.trace, sums.pen
-        self.search = Search(task.moves, sums.near)
+        self.search = Search(task.moves)
         self.x, self.y = np.empty(BLOCK), np.empty(BLOCK)
         self.slide_x, self.slide_y = np.empty(BLOCK), np.empty(BLOCK)
         size = np.empty(BLOCK)
@@ -909,8 +979,8 @@ def judge_block(row: int, count: int, judge: Judge) -> None:
         _count(places, count, judge.histograms, 0)
         first, upto = rows[row, FIRST], rows[row, LAST]
         z_low, z_high = window[row, 0], window[row, 1]
-        nearest_errors(slide_x, slide_y, first, upto, z_low, z_high, judge.search, errors)
-        if judge.search.memo[COUNT] > 0.0:
+        beside, search = rows[row, BESIDE], judge.search
+        if nearest_errors(slide_x, slide_y, beside, first, upto, z_low, z_high, search, errors):
             shown, squares, signed = _sizes(errors, judge.off[row], size, bits, places)
             figures[row, TOTAL_SQUARES] += squares
             figures[row, TOTAL_SUM] += signed

@@ -43,10 +43,6 @@ if TYPE_CHECKING:
     from camtool.kernels.judging import Sums, Task
 
 
-MANY_MOVES = 10_000
-"""Among so many moves, those of each contour stay together in the tree of moves, where every row
-is compared with the moves of one contour."""
-
 BINS_KEPT = 64
 """The bins of at most this many circles are kept for pictures, 52 kB each."""
 
@@ -103,7 +99,7 @@ class SlidePass:
         self._tasks = Tasks(paths, match, self._slot)
         self._task = self._tasks.of(0, min(ROWS_AT_ONCE, len(self._is_cut)))
         slots = int(self._slot.max(initial=-1)) + 1
-        self._sums = _sums(len(self._is_cut), slots, len(self._task.moves.table), trace)
+        self._sums = _sums(len(self._is_cut), slots, trace)
         self._start, self._most = trace.start, trace.most
 
     def add(self, chunk: Chunk) -> None:
@@ -211,8 +207,7 @@ class Tasks:
         self._slot = np.append(slot, -1)  # the last one is for none, −1
         wanted = move_table(paths.wanted)
         known = bool((match.only[paths.decoded.is_cut] != ANY_CONTOUR).all())
-        by_contour = known and len(wanted.moves) >= MANY_MOVES
-        tree = move_tree(wanted.boxes, wanted.contour if by_contour else None)
+        tree = move_tree(wanted.boxes, wanted.contour if known else None)
         self._contour, self._moves = wanted.contour, Moves(wanted.moves, wanted.heights, *tree)
         self._centre = np.array([circle.centre_mm for circle in paths.circles]).reshape(-1, 2)
         self._directions = bin_directions()
@@ -223,7 +218,8 @@ class Tasks:
 
         match, toolpath, rows = self._match, self._paths.decoded.toolpath, np.arange(low, high)
         own, of_row = _part_of_table(self._paths.decoded, low, high)
-        circle = match.circle[low:high]
+        circle, beside = match.circle[low:high], match.row[low:high]
+        beside = np.where(beside >= 0, np.searchsorted(self._paths.wanted.rows, beside), -1)
         ends = np.column_stack([toolpath.begins(rows)[:, 2], toolpath.end[low:high, 2]])
         depth_mm = self._paths.depth_mm
         return Task(
@@ -231,7 +227,7 @@ class Tasks:
             own=own.moves,
             moves=self._moves,
             rows=np.column_stack(
-                [of_row, self._ranges(match.only[low:high]), circle, self._slot[circle]]
+                [of_row, self._ranges(match.only[low:high]), circle, self._slot[circle], beside]
             ),
             window=np.sort(ends, axis=1) + np.array([-depth_mm, depth_mm]),
             off=np.ascontiguousarray(match.off_mm[low:high, 0]),
@@ -248,8 +244,8 @@ class Tasks:
         return np.column_stack([low, high])
 
 
-def _sums(rows: int, slots: int, moves: int, trace: TraceSize) -> Sums:
-    from camtool.kernels.judging import BINS, Sums, empty_bins, new_pen, no_list
+def _sums(rows: int, slots: int, trace: TraceSize) -> Sums:
+    from camtool.kernels.judging import BINS, Sums, empty_bins, new_pen
 
     room = 2 * trace.most + rows
     return Sums(
@@ -258,7 +254,6 @@ def _sums(rows: int, slots: int, moves: int, trace: TraceSize) -> Sums:
         bins=empty_bins(slots),
         trace=np.empty((room + rows + 2, 4)),
         pen=new_pen(trace.stride, room),
-        near=no_list(moves),
     )
 
 

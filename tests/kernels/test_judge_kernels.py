@@ -1,6 +1,7 @@
 """The kernels of the judge against plain loops."""
 
 import math
+import random
 from itertools import pairwise
 
 import numpy as np
@@ -11,15 +12,12 @@ from hypothesis import strategies as st
 from camtool.arrays import Floats
 from camtool.kernels.judging import (
     ANGLE_BINS,
-    COUNT,
-    LOOKED,
     WRITTEN,
     Moves,
     bin_directions,
     empty_bins,
     largest,
     new_pen,
-    no_list,
     smallest,
     square_total,
     total,
@@ -145,10 +143,9 @@ def walk(rng: np.random.Generator, count: int, size: float) -> tuple[np.ndarray,
 
 
 @pytest.mark.parametrize("size", [0.0, 1e-4, 0.01, 0.3])
-@pytest.mark.parametrize("count", [1, 2, 60])
+@pytest.mark.parametrize("count", [1, 2, 60, 400])
 def test_the_nearest_of_many_is_that_of_a_loop(size: float, count: int) -> None:
     rng = np.random.default_rng(count)
-    near = no_list(count)
     moves: list[Move] = [random_move(rng) for _ in range(count)]
     moves[-1] = moves[0]  # twice the same
     table = np.array([move.row() for move in moves], dtype=np.float64)
@@ -161,17 +158,66 @@ def test_the_nearest_of_many_is_that_of_a_loop(size: float, count: int) -> None:
         window = sorted(rng.uniform(-1.2, 0.5, 2).tolist())
         x, y = walk(rng, 40, size)
         out = np.empty(40)
+        own = int(rng.integers(-1, count))
         only = (first, last, *window)
-        nearest_errors_(x, y, only, Moves(table, heights, *tree), near, out)
+        known, _ = nearest_errors_(x, y, own, only, Moves(table, heights, *tree), out)
         high = [
             k
             for k in range(first, last)
             if heights[k, 0] <= window[1] and heights[k, 1] >= window[0]
         ]
         some = [moves[k] for k in (high or range(first, last))]
-        assert (near.memo[COUNT] == 0) == (not some)
+        assert known == bool(some)
         wanted = [nearest(some, *point) for point in zip(x.tolist(), y.tolist(), strict=True)]
         assert np.abs(out) == pytest.approx(np.abs(wanted), abs=EPS)
+
+
+ends = st.tuples(st.floats(-50.0, 50.0), st.floats(-50.0, 50.0))
+chords = st.tuples(ends, ends).filter(lambda chord: math.dist(*chord) > 1e-3)
+
+
+@given(
+    st.lists(chords, min_size=1, max_size=30),
+    st.lists(st.tuples(chords, st.integers(1, 40), st.floats(0.0, 3.0)), max_size=3),
+    st.integers(1, 200),
+    st.randoms(use_true_random=False),
+)
+def test_points_along_lines_that_cross(
+    lines: list[tuple[tuple[float, float], tuple[float, float]]],
+    others: list[tuple[tuple[tuple[float, float], tuple[float, float]], int, float]],
+    count: int,
+    chance: random.Random,
+) -> None:
+    """Points near one of the lines, in its direction or against it, with others side by side."""
+    moves = [Line(a, b) for a, b in lines]
+    for ((ax, ay), (bx, by)), many, apart in others:
+        moves += [Line((ax + n * apart, ay), (bx + n * apart, by)) for n in range(many)]
+    own = chance.randrange(len(moves))
+    (ax, ay), (bx, by) = moves[own].a, moves[own].b
+    share = np.linspace(0.0, 1.0, count)[:: chance.choice([1, -1])]
+    off = chance.choice([0.0, 1e-6, 0.1, 5.0])
+    x = np.array([ax + t * (bx - ax) + chance.uniform(-off, off) for t in share.tolist()])
+    y = np.array([ay + t * (by - ay) + chance.uniform(-off, off) for t in share.tolist()])
+    table = np.array([move.row() for move in moves], dtype=np.float64)
+    tree = move_tree(np.array([move.box() for move in moves], dtype=np.float64))
+    out = np.empty(count)
+    expected = chance.choice([own, -1, chance.randrange(len(moves))])
+    whole = (0, len(moves), 0.0, 0.0)
+    nearest_errors_(x, y, expected, whole, Moves(table, np.zeros((len(moves), 2)), *tree), out)
+    wanted = [abs(nearest(moves, *point)) for point in zip(x.tolist(), y.tolist(), strict=True)]
+    assert np.abs(out) == pytest.approx(np.array(wanted), abs=1e-9)
+
+
+def test_of_equally_near_moves_the_own_one_gives_the_side() -> None:
+    """There and back on one line: what is to the left of one is to the right of the other."""
+    moves = [Line((0.0, 0.0), (9.0, 0.0)), Line((9.0, 0.0), (0.0, 0.0))]
+    table = np.array([move.row() for move in moves], dtype=np.float64)
+    tree = move_tree(np.array([move.box() for move in moves], dtype=np.float64))
+    x, y, out = np.array([2.0, 3.0]), np.array([0.5, 0.5]), np.empty(2)
+    for own, error in ((0, 0.5), (1, -0.5)):
+        whole = (0, 2, 0.0, 0.0)
+        nearest_errors_(x, y, own, whole, Moves(table, np.zeros((2, 2)), *tree), out)
+        assert out.tolist() == [error, error]
 
 
 def test_the_curve_fills_a_square_by_steps_of_one() -> None:
@@ -216,12 +262,10 @@ def test_a_search_in_a_spiral_looks_at_few_of_its_turns() -> None:
     moves = Moves(table, heights, *move_tree(boxes))
     looked = []
     for k in range(100, 8000, 700):
-        near = no_list(len(lines))
-        at = np.array([[places[k][0]], [places[k][1]]])
-        nearest_errors_(at[0], at[1], (0, len(lines), 0.0, 0.0), moves, near, out)
+        at, whole = np.array([[places[k][0]], [places[k][1]]]), (0, len(lines), 0.0, 0.0)
+        looked.append(nearest_errors_(at[0], at[1], -1, whole, moves, out)[1])
         assert abs(out[0]) < EPS
-        looked.append(near.memo[LOOKED])
-    assert max(looked) < 300.0
+    assert max(looked) < 300
 
 
 def test_a_search_in_one_scribble_of_many_looks_at_no_others() -> None:
@@ -233,15 +277,27 @@ def test_a_search_in_one_scribble_of_many_looks_at_no_others() -> None:
     looked = []
     for group in (None, scribble):
         moves = Moves(table, heights, *move_tree(boxes, group))
-        near = no_list(len(lines))
         for k in range(0, 2000, 97):
             x, y = np.array([lines[k].a]).T.copy()
             only = (40 * int(scribble[k]), 40 * int(scribble[k]) + 40, 0.0, 0.0)
-            nearest_errors_(x, y, only, moves, near, out)
+            _, last = nearest_errors_(x, y, -1, only, moves, out)
             assert abs(out[0]) < EPS
-        looked.append(near.memo[LOOKED])
-    assert looked[0] > 300.0
-    assert looked[1] < 150.0
+        looked.append(last)
+    assert looked[0] > 300
+    assert looked[1] < 150
+
+
+def test_points_of_a_row_look_at_their_surroundings_alone() -> None:
+    """A row of a hatch with a little error: of 20,000 lines few are looked at, for all points."""
+    lines = [Line((0.0, 0.1 * k), (50.0, 0.1 * k)) for k in range(20_000)]
+    table = np.array([line.row() for line in lines], dtype=np.float64)
+    moves = Moves(
+        table, np.zeros((len(lines), 2)), *move_tree(np.array([line.box() for line in lines]))
+    )
+    x, y, out = np.linspace(0.0, 50.0, 700), np.full(700, 1000.001), np.empty(700)
+    _, looked = nearest_errors_(x, y, 10_000, (0, len(lines), 0.0, 0.0), moves, out)
+    assert out == pytest.approx(0.001, abs=1e-9)
+    assert looked < 150
 
 
 def test_the_bins_of_a_circle_are_those_of_a_loop() -> None:

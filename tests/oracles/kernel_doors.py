@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from camtool.kernels.judging import Moves, Near, Search, fill_bins, lower_errors, nearest_errors
+from camtool.kernels.judging import Moves, Search, fill_bins, lower_errors, nearest_errors
 
 
 def fill_bins_(x, y, centre, directions, bins):
@@ -17,5 +17,7 @@ def set_errors_(move, x, y, best):
     lower_errors(np.atleast_2d(move), 0, x, y, best, True)
 
 
-def nearest_errors_(x, y, only, moves: Moves, near: Near, out):
-    nearest_errors(x, y, *only, Search(moves, near), out)
+def nearest_errors_(x, y, own, only, moves: Moves, out):
+    """Whether there is a move, and how many nodes and moves were looked at."""
+    search = Search(moves)
+    return nearest_errors(x, y, own, *only, search, out), search.looked
