@@ -345,7 +345,7 @@ def _counts(k: int, first: int, last: int, z_low: float, z_high: float, heights:
     """Whether a move is one of first:last, at heights that overlap z_low … z_high."""
     if k < first or k >= last:
         return False
-    return heights[k, 0] <= z_high and heights[k, 1] >= z_low
+    return bool(heights[k, 0] <= z_high and heights[k, 1] >= z_low)
 
 
 def _nearest(
@@ -439,7 +439,7 @@ def _node_near(nodes: Floats, node: int, box: Floats) -> bool:
         return False
     beside = (low_y + high_y) * box[WAY_X] - (low_x + high_x) * box[WAY_Y]
     reach = (high_y - low_y) * abs(box[WAY_X]) + (high_x - low_x) * abs(box[WAY_Y])
-    return abs(beside) <= (reach + 2.0 * box[HALF_WIDE]) * (1.0 + SLACK)
+    return bool(abs(beside) <= (reach + 2.0 * box[HALF_WIDE]) * (1.0 + SLACK))
 
 
 def _move_near(table: Floats, k: int, box: Floats) -> bool:
@@ -453,7 +453,7 @@ def _move_near(table: Floats, k: int, box: Floats) -> bool:
         square = table[k, RADIUS] * table[k, RADIUS]
         if near_long * near_long + near_wide * near_wide > square * (1.0 + SLACK):
             return False
-        return far_long * far_long + far_wide * far_wide >= square * (1.0 - SLACK)
+        return bool(far_long * far_long + far_wide * far_wide >= square * (1.0 - SLACK))
     px, py = table[k, AX] - box[MIDDLE_X], table[k, AY] - box[MIDDLE_Y]
     along, beside = px * way_x + py * way_y, py * way_x - px * way_y
     to_x, to_y = table[k, BX] - table[k, AX], table[k, BY] - table[k, AY]
@@ -464,7 +464,7 @@ def _move_near(table: Floats, k: int, box: Floats) -> bool:
         return False
     side = abs(along * across - beside * further)
     reach = long * abs(across) + wide * abs(further)
-    return side <= reach + SLACK * (abs(along * across) + abs(beside * further))
+    return bool(side <= reach + SLACK * (abs(along * across) + abs(beside * further)))
 
 
 def _is_there(table: Floats, found: Ints, count: int, move: int) -> bool:

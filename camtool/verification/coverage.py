@@ -107,19 +107,29 @@ def cover(
     `spacing_mm` apart; `row_from` (N,) is the wanted row from which each decoded row was written,
     −1 for none, where that is known.
 
-    A wanted contour is compared with the decoded one that was written from it first, and only
-    where that does not fit with everything (docs/decisions/0037-own-rows-first.md).
+    A contour is compared with the one that it was written from, or that was written from it,
+    first, and only where that does not fit with everything
+    (docs/decisions/0037-own-rows-first.md).
     """
     cuts, wanted, limits = decoded.cuts, goal.moves, (goal.limit_mm, goal.depth_mm)
+    own, became = _contours_from(cuts, wanted.cuts, row_from)
     samples = sample_cuts(cuts, spacing_mm)
-    found, wrong_depth = nearest_at_height(samples, None, wanted, limits)
+    found, belongs = _own_found(cuts, samples, own, goal)
+    other = np.flatnonzero(belongs == ANY_CONTOUR)
+    some, wrong = nearest_at_height(samples.of(other), None, wanted, limits)
+    wrong_depth = np.zeros(len(found.distance), dtype=np.bool_)
+    found.distance[other], found.segment[other], wrong_depth[other] = (
+        some.distance,
+        some.segment,
+        wrong,
+    )
     extra = _uncovered(_Sampled(cuts, samples, found, wrong_depth, drilled.decoded), goal, _EXTRA)
-    belongs = match_contours(cuts, samples, found, goal)
+    belongs[other] = match_contours(cuts, samples.of(other), some, goal)
+    found.distance[other], found.segment[other] = some.distance, some.segment
     rounding = Figure()
     real = np.isfinite(found.distance)
     rows = cuts.segments.path[samples.segment]
     rounding.add(found.distance[real], samples.points[real], rows[real])
-    became = _contours_from(cuts, wanted.cuts, row_from)[1]
     cut = np.append(_fits(wanted.cuts, became, decoded, limits, spacing_mm), True)
     rest = next(
         samples_by_parts(wanted.cuts, spacing_mm, ~cut[wanted.cuts.contour], sys.maxsize),
@@ -146,6 +156,21 @@ def _contours_from(cuts: CutMoves, wanted: CutMoves, row_from: Ints | None) -> t
             alone = (count == 1) & (known != ANY_CONTOUR)
             found[known[alone]] = pairs[first[alone], there]
     return mine, theirs
+
+
+def _own_found(cuts: CutMoves, samples: Samples, own: Ints, goal: Goal) -> tuple[Found, Ints]:
+    """The nearest move of the `own` wanted contour (C,) to each sample (S,), and that contour;
+    ANY_CONTOUR for the samples of contours that have none, or do not lie within the limits of
+    it."""
+    count, fit = len(samples.points), np.asarray(own != ANY_CONTOUR)
+    found = Found(np.full(count, np.inf), np.full(count, -1, dtype=np.int64))
+    mine = cuts.contour[cuts.segments.path[samples.segment]]
+    some = np.flatnonzero(fit[mine])
+    limits = max(goal.limit_mm, LEAST_MM), goal.depth_mm
+    near = goal.moves.nearest(samples.points[some], samples.z[some], own[mine[some]], limits)
+    found.distance[some], found.segment[some] = near.distance, near.segment
+    fit[mine[some[near.distance > goal.limit_mm]]] = False
+    return found, np.where(fit[mine], own[mine], ANY_CONTOUR)
 
 
 def _fits(
