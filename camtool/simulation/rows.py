@@ -31,7 +31,7 @@ def placed(toolpath: Toolpath, home: Floats) -> Toolpath:
         known = np.where(toolpath.is_motion | (kind == homing), np.arange(count), -1)
         latest = np.maximum.accumulate(known)
         end[:, axis] = np.where(latest < 0, toolpath.start[axis], end[latest, axis])
-    return replace(toolpath, end=frozen(end))
+    return toolpath if (end == toolpath.end).all() else replace(toolpath, end=frozen(end))
 
 
 def check_positions(toolpath: Toolpath, machine: Machine) -> None:

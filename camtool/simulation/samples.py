@@ -20,10 +20,13 @@ from camtool.kernels.lattice import to_steps
 from camtool.machine.model import Machine
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import NO_SAMPLES, Chunk, still_ledger
-from camtool.toolpath.moves import PolarArcs, Toolpath
+from camtool.toolpath.moves import Kind, PolarArcs, Toolpath
 
 MAX_SAMPLES = 1_000_000
 """Samples are a coded step apart, or farther where a program would have more samples than this."""
+
+ROWS_AT_ONCE = 1 << 14
+"""So many rows are measured together."""
 
 SPACING_EPS = 1e-6
 """Samples may be farther apart by this part of their spacing, because of rounding."""
@@ -102,7 +105,13 @@ def move_lengths(toolpath: Toolpath) -> Floats:
     """(N,) mm: length of each row in space, 0 for events."""
     if len(toolpath) == 0:
         return np.zeros(0)
-    length = np.linalg.norm(toolpath.end - toolpath.starts, axis=1)
+    length = np.empty(len(toolpath))
+    before = toolpath.start
+    for low in range(0, len(toolpath), ROWS_AT_ONCE):
+        rows = slice(low, low + ROWS_AT_ONCE)
+        travel = np.diff(toolpath.end[rows], axis=0, prepend=before[None, :])
+        length[rows] = np.linalg.norm(travel, axis=1)
+        before = toolpath.end[rows][-1]
     arms = PolarArcs(toolpath, toolpath.is_arc)
     rise = arms.end[:, 2] - arms.begin[:, 2]
     radius = 0.5 * (arms.radius + arms.end_radius)
@@ -125,11 +134,7 @@ class PathSamples:
     def __init__(self, toolpath: Toolpath, spacing_mm: float) -> None:
         """`spacing_mm` is the largest distance between two samples along the path."""
         self._toolpath = toolpath
-        self._starts = toolpath.starts
-        self._travel = toolpath.end - self._starts
         self._arms = PolarArcs(toolpath, toolpath.is_arc)
-        self._arm_of_row = np.full(len(toolpath), -1, dtype=np.int64)
-        self._arm_of_row[self._arms.row] = np.arange(len(self._arms.row))
         length = move_lengths(toolpath)
         self._pieces = _pieces(length, self._arms)
         pieces = self._pieces
@@ -157,10 +162,12 @@ class PathSamples:
 
     def points(self, row: Ints, share: Floats) -> Floats:
         """(K, 3) mm: the points at shares (K,) of the lengths of rows (K,)."""
-        points = self._starts[row] + share[:, None] * self._travel[row]
-        arm = self._arm_of_row[row]
-        on_arc = np.flatnonzero(arm >= 0)
-        points[on_arc] = self._arms.points(arm[on_arc], share[on_arc])
+        starts = self._toolpath.starts_of(row)
+        points = starts + share[:, None] * (self._toolpath.end[row] - starts)
+        kind = self._toolpath.kind[row]
+        on_arc = np.flatnonzero((kind == Kind.ARC_CW) | (kind == Kind.ARC_CCW))
+        arm = np.searchsorted(self._arms.row, row[on_arc])
+        points[on_arc] = self._arms.points(arm, share[on_arc])
         last = np.flatnonzero(share == 1.0)
         points[last] = self._toolpath.end[row[last]]
         return points

@@ -18,6 +18,9 @@ from camtool.arrays import Floats
 from camtool.errors import MachineError
 from camtool.machine.model import Machine
 
+BLOCKS_AT_ONCE = 1 << 14
+"""The times of so many blocks are computed together."""
+
 
 @dataclass(frozen=True, eq=False)
 class SpeedPlan:
@@ -35,22 +38,32 @@ class SpeedPlan:
         buffer of `window` blocks, the current one included."""
         from camtool.kernels.motion import entry_speeds
 
-        before = np.concatenate([[0.0], self.speed_mm_s[:-1]])
-        highest = np.minimum(np.minimum(before, self.speed_mm_s), self.corner_mm_s)
+        highest = np.concatenate([[0.0], self.speed_mm_s[:-1]])[: len(self.speed_mm_s)]
+        np.minimum(highest, self.speed_mm_s, out=highest)
+        np.minimum(highest, self.corner_mm_s, out=highest)
+        np.square(highest, out=highest)
+        gain = 2.0 * self.acceleration_mm_s2
+        gain *= self.length_mm
         square = np.zeros(len(self.length_mm) + 1)
-        gain = 2.0 * self.acceleration_mm_s2 * self.length_mm
-        entry_speeds(gain, highest**2, window, square[:-1])
-        return np.sqrt(square)
+        entry_speeds(gain, highest, window, square[:-1])
+        return np.sqrt(square, out=square)
 
     def seconds(self, window: int) -> Floats:
         """(N,) s: the time of each block, for a buffer of `window` blocks."""
-        entry = self.entries(window)
-        first, last = entry[:-1], entry[1:]
-        a, d = self.acceleration_mm_s2, self.length_mm
-        peak = np.minimum(self.speed_mm_s, np.sqrt(a * d + 0.5 * (first**2 + last**2)))
-        ramps = (2.0 * peak**2 - first**2 - last**2) / (2.0 * a)
-        steady = np.maximum(d - ramps, 0.0) / peak
-        return np.asarray((2.0 * peak - first - last) / a + steady)
+        return self.seconds_between(self.entries(window))
+
+    def seconds_between(self, entry: Floats) -> Floats:
+        """(N,) s: the time of each block, with the speeds (N + 1,) that `entries` gives."""
+        seconds = np.empty(len(self.length_mm))
+        for low in range(0, len(seconds), BLOCKS_AT_ONCE):
+            at = slice(low, low + BLOCKS_AT_ONCE)
+            a, d, first = self.acceleration_mm_s2[at], self.length_mm[at], entry[:-1][at]
+            last = entry[1:][at]
+            peak = np.minimum(self.speed_mm_s[at], np.sqrt(a * d + 0.5 * (first**2 + last**2)))
+            ramps = (2.0 * peak**2 - first**2 - last**2) / (2.0 * a)
+            steady = np.maximum(d - ramps, 0.0) / peak
+            seconds[at] = (2.0 * peak - first - last) / a + steady
+        return seconds
 
 
 def allowed_along(limit: Floats, unit: Floats) -> Floats:

@@ -151,6 +151,12 @@ class Toolpath:
         """(M, 3) mm: where each of these rows (M,) begins."""
         return np.where((rows > 0)[:, None], self.end[rows - 1], self.start)
 
+    def starts_of(self, rows: Ints) -> Floats:
+        """(K, 3) mm: where these rows begin."""
+        starts = self.end[rows - 1]
+        starts[rows == 0] = self.start
+        return starts
+
     @property
     def is_arc(self) -> Bools:
         """(N,) true for ARC_CW and ARC_CCW."""
@@ -171,14 +177,7 @@ class Toolpath:
 
         CCW: sweep = (angle(end) − angle(start)) mod 2π, taken in (0, 2π];  CW: mirrored.
         """
-        begin, full = self.starts[:, :2], 2.0 * np.pi
-        from_ = np.arctan2(begin[:, 1] - self.centre[:, 1], begin[:, 0] - self.centre[:, 0])
-        to = np.arctan2(self.end[:, 1] - self.centre[:, 1], self.end[:, 0] - self.centre[:, 0])
-        sign = np.where(self.kind == Kind.ARC_CW, -1.0, 1.0)
-        turn = np.mod(sign * (to - from_), full)
-        same = (self.end[:, :2] == begin).all(axis=1)
-        turn = np.where(same | (turn == 0.0), full, turn)
-        return np.where(self.is_arc, sign * turn, 0.0)
+        return np.where(self.is_arc, _sweeps(self.kind, self.starts, self.end, self.centre), 0.0)
 
     @property
     def running(self) -> int:
@@ -229,6 +228,17 @@ class Toolpath:
             )
 
 
+def _sweeps(kind: Ints, begin: Floats, end: Floats, centre: Floats) -> Floats:
+    """(K,) rad as `Toolpath.sweeps` has them, of rows that are arcs."""
+    full = 2.0 * np.pi
+    from_ = np.arctan2(begin[:, 1] - centre[:, 1], begin[:, 0] - centre[:, 0])
+    to = np.arctan2(end[:, 1] - centre[:, 1], end[:, 0] - centre[:, 0])
+    sign = np.where(kind == Kind.ARC_CW, -1.0, 1.0)
+    turn = np.mod(sign * (to - from_), full)
+    same = (end[:, :2] == begin[:, :2]).all(axis=1)
+    return np.asarray(sign * np.where(same | (turn == 0.0), full, turn))
+
+
 def frozen(column: Column) -> Column:
     """The very array, which nobody may change any more: a Toolpath need not copy it."""
     column.flags.writeable = False
@@ -276,12 +286,12 @@ class PolarArcs:
         bad = ~np.isfinite(self.centre).all(axis=1)
         if bad.any():
             raise PostError("an arc without a centre", where=f"move {self.row[bad.argmax()]}")
-        self.begin, self.end = toolpath.starts[self.row], toolpath.end[self.row]
+        self.begin, self.end = toolpath.starts_of(self.row), toolpath.end[self.row]
         out, back = self.begin[:, :2] - self.centre, self.end[:, :2] - self.centre
         self.radius = np.hypot(out[:, 0], out[:, 1])
         self.end_radius = np.hypot(back[:, 0], back[:, 1])
         self.angle = np.arctan2(out[:, 1], out[:, 0])
-        self.sweep = toolpath.sweeps()[self.row]
+        self.sweep = _sweeps(toolpath.kind[self.row], self.begin, self.end, self.centre)
 
     def points(self, which: Ints, share: Floats) -> Floats:
         """(K, 3) mm: the points of the arcs `which` (K,) at `share` (K,) of their sweep."""

@@ -39,7 +39,7 @@ from camtool.simulation.samples import (
     sample_spacing_mm,
 )
 from camtool.simulation.speed_plan import SpeedPlan, allowed_along, axis_limits
-from camtool.toolpath.moves import Kind, PathMode, PolarArcs, Toolpath
+from camtool.toolpath.moves import Kind, PathMode, PolarArcs, Toolpath, frozen
 
 from .dialect import Dialect, LinuxcncController
 from .steps import merge_lines
@@ -69,11 +69,13 @@ class LinuxcncModel(ControllerModel[LinuxcncController, Dialect]):
         check_rows(path, rows)
         path = path.first(rows)
         modes = _modes(path, machine)
-        path, chain = merged(path, modes.merging_mm)
-        moves = moves_of(path, chain, machine, machine.controller.servo_period_s)
-        corners = corners_of(moves, _rules(modes, moves, machine))
-        samples = LinuxcncSamples(path, machine, moves, corners)
+        path, chain = merged(path, modes.merging_mm(path.mode))
+        tangents = Tangents(path)
+        moves = moves_of(tangents, chain, machine, machine.controller.servo_period_s)
+        corners = corners_of(moves, tangents, _rules(modes, machine))
         seconds = _seconds(path, machine, (moves, modes), corners)
+        samples = LinuxcncSamples(tangents, machine, moves, corners.reach)
+        del moves, corners, tangents
         mechanics = Mechanics(machine, path.start, options.effects)
         return row_chunks(samples, RowTotals(seconds), mechanics, options.chunk_steps)
 
@@ -108,14 +110,18 @@ def _corners_said(mode: PathMode) -> str:
 class LinuxcncSamples(CountedSamples):
     """Points along the moves, blends included, numbered from 0; only one window is held."""
 
-    def __init__(self, path: Toolpath, machine: _Machine, moves: Moves, corners: Corners) -> None:
+    def __init__(self, tangents: Tangents, machine: _Machine, moves: Moves, reach: Floats) -> None:
+        """`reach` (M,) mm: how far from the start of each move its blend begins and ends."""
+        path = tangents.path
         super().__init__(path, machine, sample_spacing_mm(path, machine))
-        self._moves, self._corners = moves, corners
+        self._tangents = tangents
+        self._row_of, self._row, self._reach = moves.row_of, moves.row, np.append(reach, 0.0)
+        self._blends = bool(reach.any())
+        self._length = moves.length
         self._row_length = move_lengths(path)
-        lengths = np.where(moves.row_of >= 0, self._row_length, 0.0)
-        so_far = np.cumsum(lengths) - lengths
-        begins = np.concatenate([[0.0], np.cumsum(moves.length)])
-        self._into = so_far - begins[np.maximum(moves.row_of, 0)]
+        self._into = np.cumsum(np.where(moves.row_of >= 0, self._row_length, 0.0))
+        self._into -= np.where(moves.row_of >= 0, self._row_length, 0.0)
+        self._into -= np.concatenate([[0.0], np.cumsum(moves.length)])[np.maximum(moves.row_of, 0)]
 
     def points(self, row: Ints, share: Floats) -> Floats:
         """(K, 3) mm: the points at shares (K,) of the ways of rows (K,), blended."""
@@ -130,28 +136,28 @@ class LinuxcncSamples(CountedSamples):
         B = P + h n + R (−n cos α ∓ t sin α), with α = (π/2 − θ) s / d, n inward, t onward, and
         h = d / cos θ. What lies between them, B − Q, is added to the point of the move itself.
         """
-        moves, corners = self._moves, self._corners
-        if not corners.reach.any():
+        if not self._blends:
             return
-        move = moves.row_of[row]
+        move = self._row_of[row]
         along = self._into[row] + share * self._row_length[row]
-        left = np.maximum(moves.length[move] - along, 0.0)
-        following = np.append(corners.reach, 0.0)
-        ahead = np.flatnonzero(left < following[move + 1])
-        behind = np.flatnonzero(along < corners.reach[move])
+        left = np.maximum(self._length[move] - along, 0.0)
+        ahead = np.flatnonzero(left < self._reach[move + 1])
+        behind = np.flatnonzero(along < self._reach[move])
         self._inward(points, ahead, move[ahead] + 1, left[ahead], -1.0)
         self._inward(points, behind, move[behind], along[behind], 1.0)
 
     def _inward(self, points: Floats, on: Ints, corner: Ints, s: Floats, side: float) -> None:
-        corners = self._corners
-        d, theta = corners.reach[corner], corners.theta[corner]
+        corners, of = np.unique(corner, return_inverse=True)
+        before = self._tangents.at_ends(self._row[corners - 1])
+        bends = Bends(before, self._tangents.at_starts(self._row[corners]))
+        d, theta = self._reach[corner], bends.theta[of]
         alpha = (0.5 * np.pi - theta) * s / d
         radius, height = d * np.tan(theta), d / np.cos(theta)
         # n and t parts of B − P and of Q − P = s (n cos θ ± t sin θ)
         inward = height - radius * np.cos(alpha) - s * np.cos(theta)
         onward = side * (radius * np.sin(alpha) - s * np.sin(theta))
-        points[on] += inward[:, None] * corners.inward[corner]
-        points[on] += onward[:, None] * corners.onward[corner]
+        points[on] += inward[:, None] * bends.inward[of]
+        points[on] += onward[:, None] * bends.onward[of]
 
 
 def _seconds(
@@ -165,24 +171,22 @@ def _seconds(
     """
     controller, (moves, modes) = machine.controller, planned
     seconds = np.where(path.kind == Kind.DWELL, path.value, 0.0)
-    count = len(moves.length)
-    following = np.append(corners.reach[1:], 0.0)
-    plan = np.zeros((2 * count, 4))  # at even places the blend before a move, then the move
-    plan[0::2] = np.column_stack(
-        [corners.way, corners.speed, corners.acceleration, np.full(count, np.inf)]
+    # At even places the blend before a move, then the move.
+    own = moves.length - corners.reach
+    own -= np.append(corners.reach[1:], 0.0)
+    ways = _in_turns(corners.way, np.maximum(own, 0.0, out=own))
+    lasting = ways > LEAST_WAY_MM
+    speeds = SpeedPlan(
+        ways[lasting],
+        _in_turns(corners.speed, moves.speed)[lasting],
+        _in_turns(corners.acceleration, _along_moves(moves, modes, corners))[lasting],
+        _in_turns(np.inf, np.where(corners.reach > 0.0, np.inf, corners.speed))[lasting],
     )
-    own = np.maximum(moves.length - corners.reach - following, 0.0)
-    blended = corners.reach > 0.0
-    entry = np.where(blended, np.inf, corners.speed)
-    lost = np.maximum(corners.lost, np.append(corners.lost[1:], 0.0))
-    last = np.append(moves.waits[1:], np.ones(min(count, 1), dtype=np.bool_))
-    spared = np.where(last & modes.blend[moves.row], LAST_PART, 1.0)
-    acceleration = moves.acceleration * (1.0 - lost) * spared
-    plan[1::2] = np.column_stack([own, moves.speed, acceleration, entry])
-    lasting = np.flatnonzero(plan[:, 0] > LEAST_WAY_MM)
-    taken = np.zeros(2 * count + 1)
-    speeds = SpeedPlan(*plan[lasting].T)
-    taken[lasting] = _in_periods(speeds, controller.lookahead_moves, controller.servo_period_s)
+    taken = np.zeros(len(ways) + 1)
+    taken[:-1][lasting] = _in_periods(
+        speeds, controller.lookahead_moves, controller.servo_period_s
+    )
+    del speeds, ways, lasting, own
     whole = taken[1::2] + 0.5 * (taken[0:-1:2] + taken[2::2])
     moving = np.flatnonzero(moves.row_of >= 0)
     move = moves.row_of[moving]
@@ -190,10 +194,26 @@ def _seconds(
     return seconds
 
 
+def _in_turns(blends: Floats | float, moves: Floats) -> Floats:
+    """(2 M,) of the blends before moves (M,), and of the moves."""
+    both = np.empty(2 * len(moves))
+    both[0::2], both[1::2] = blends, moves
+    return both
+
+
+def _along_moves(moves: Moves, modes: Modes, corners: Corners) -> Floats:
+    """(M,) mm/s² along the moves, less what bends at their ends and a last stop take."""
+    lost = np.maximum(corners.lost, np.append(corners.lost[1:], 0.0))
+    last = np.append(moves.waits[1:], np.ones(min(len(lost), 1), dtype=np.bool_))
+    spared = np.where(last & modes.blend(moves.mode), LAST_PART, 1.0)
+    return np.asarray(moves.acceleration * (1.0 - lost) * spared)
+
+
 def _in_periods(plan: SpeedPlan, window: int, period_s: float) -> Floats:
     """(N,) s of each block; from rest to rest it takes whole servo periods, and `REST_PERIODS`."""
-    seconds = plan.seconds(window)
-    from_rest = np.flatnonzero(plan.entries(window)[:-1] == 0.0)
+    entries = plan.entries(window)
+    seconds = plan.seconds_between(entries)
+    from_rest = np.flatnonzero(entries[:-1] == 0.0)
     if len(from_rest):
         runs = np.add.reduceat(seconds, from_rest)
         periods = np.ceil(runs / period_s - PERIOD_EPS) + REST_PERIODS
@@ -203,26 +223,41 @@ def _in_periods(plan: SpeedPlan, window: int, period_s: float) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """How N rows meet the corners behind them: `blend` (N,) and `stop` (N,), which are neither
-    where the path is kept without a stop; `tolerance_mm` (N,) of blends, inf: none; `merging_mm`
-    (N,), 0: none."""
+    """How rows of a mode (an index, as in `Toolpath.mode`) meet the corners behind them: `table`
+    has a row for each, of numbers: whether they blend, whether they stop (neither: the path is
+    kept without a stop), the tolerance of blends in mm, inf: none, and that of merging, 0: none.
+    """
 
-    blend: Bools
-    stop: Bools
-    tolerance_mm: Floats
-    merging_mm: Floats
+    table: Floats
+
+    def blend(self, mode: Ints) -> Bools:
+        """(K,) whether the corners behind moves of a mode (K,) are blended."""
+        return np.asarray(self.table[:, 0][mode] > 0.0)
+
+    def stop(self, mode: Ints) -> Bools:
+        """(K,) whether they are met with a stop."""
+        return np.asarray(self.table[:, 1][mode] > 0.0)
+
+    def tolerance_mm(self, mode: Ints) -> Floats:
+        """(K,) how far blends may leave them; inf: as far as the moves allow."""
+        return np.asarray(self.table[:, 2][mode])
+
+    def merging_mm(self, mode: Ints) -> Floats:
+        """(K,) within which lines are merged; 0: never."""
+        return np.asarray(self.table[:, 3][mode])
 
 
 def _modes(path: Toolpath, machine: _Machine) -> Modes:
     """What the program says of each row, and where it says nothing, the machine file."""
-    table = np.array(
-        [
-            (mode.corners == "blend", mode.corners == "exact-stop", mode.tolerance_mm or np.inf,
-             mode.merging_mm)
-            for mode in _asked(path, machine)
-        ]
-    )[path.mode]  # fmt: skip
-    return Modes(table[:, 0] > 0.0, table[:, 1] > 0.0, table[:, 2], table[:, 3])
+    return Modes(
+        np.array(
+            [
+                (mode.corners == "blend", mode.corners == "exact-stop",
+                 mode.tolerance_mm or np.inf, mode.merging_mm)
+                for mode in _asked(path, machine)
+            ]
+        )
+    )  # fmt: skip
 
 
 def _asked(path: Toolpath, machine: _Machine) -> tuple[PathMode, ...]:
@@ -232,12 +267,10 @@ def _asked(path: Toolpath, machine: _Machine) -> tuple[PathMode, ...]:
     return (*path.modes, _machine_mode(machine)) if silent else path.modes
 
 
-def _rules(modes: Modes, moves: Moves, machine: _Machine) -> CornerRules:
+def _rules(modes: Modes, machine: _Machine) -> CornerRules:
     controller = machine.controller
     return CornerRules(
-        blend=modes.blend[moves.row],
-        stop=modes.stop[moves.row],
-        tolerance_mm=modes.tolerance_mm[moves.row],
+        modes=modes,
         kink_ratio=controller.kink_ratio,
         period_s=controller.servo_period_s,
         rate=axis_limits(machine, "max_rate_mm_min") / 60.0,
@@ -293,86 +326,108 @@ def merged(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Ints]:
     them, are merged; any event, an MSG comment too, ends a line.
     """
     count = len(path)
-    chain, moved = np.arange(count), path.end.copy()
-    if tolerance_mm.any():
-        same_feed = np.zeros(count, dtype=np.bool_)
-        same_feed[1:] = path.feed[1:] == path.feed[:-1]
-        is_line = path.kind == Kind.LINE
-        apart = ~(is_line & same_feed) | (tolerance_mm == 0.0)
-        apart[1:] |= ~is_line[:-1] | (path.mode[1:] != path.mode[:-1])
-        points = np.concatenate([path.start[None, :], path.end])
-        merge_lines(points, apart, tolerance_mm, chain, moved)
-    return replace(path, end=moved), chain
+    chain = np.arange(count)
+    if not tolerance_mm.any():
+        return path, chain
+    same_feed = np.zeros(count, dtype=np.bool_)
+    same_feed[1:] = path.feed[1:] == path.feed[:-1]
+    is_line = path.kind == Kind.LINE
+    apart = ~(is_line & same_feed) | (tolerance_mm == 0.0)
+    apart[1:] |= ~is_line[:-1] | (path.mode[1:] != path.mode[:-1])
+    points, moved = np.concatenate([path.start[None, :], path.end]), np.empty((count, 3))
+    merge_lines(points, apart, tolerance_mm, chain, moved)
+    return replace(path, end=frozen(moved)), chain
+
+
+MOVES_AT_ONCE = 1 << 14
+"""The limits and corners of so many moves are computed together."""
 
 
 @dataclass(frozen=True, eq=False)
 class Moves:
     """M moves in order. row_of (N,): the move of each row of the program, −1 for rows that do not
-    move; row (M,): the first of each. length mm, speed mm/s (as programmed, within the limits),
-    acceleration mm/s² (along the way), each (M,); begin, end (M, 3): unit tangents; is_arc (M,);
+    move; row (M,): the first of each, and mode (M,) its mode. length mm, speed mm/s (as
+    programmed, within the limits), acceleration mm/s² (along the way), each (M,); is_arc (M,);
     waits (M,): the machine comes to rest before this move, whatever the corner; like (M,): this
     move and the one before are both rapids or both at a feed."""
 
     row_of: Ints
     row: Ints
+    mode: Ints
     length: Floats
     speed: Floats
     acceleration: Floats
-    begin: Floats
-    end: Floats
     is_arc: Bools
     waits: Bools
     like: Bools
 
 
-def moves_of(path: Toolpath, chain: Ints, machine: _Machine, period_s: float) -> Moves:
+def moves_of(tangents: Tangents, chain: Ints, machine: _Machine, period_s: float) -> Moves:
     """The moves of merged rows; MachineError for missing limits."""
+    path = tangents.path
     rate = axis_limits(machine, "max_rate_mm_min") / 60.0
     acceleration = axis_limits(machine, "acceleration_mm_s2")
     row_length = move_lengths(path)
     length: Floats = np.bincount(chain, row_length, minlength=len(path)).astype(np.float64)
-    lasting = np.flatnonzero((length > 0.0) & (np.bincount(chain, minlength=len(path)) > 0))
-    number = np.full(len(path), -1, dtype=np.int64)
-    number[lasting] = np.arange(len(lasting))
+    lasting = length > 0.0
+    number = np.cumsum(lasting) - 1
     row_of = np.where(row_length > 0.0, number[chain], -1)
-    rows, first = np.unique(row_of[row_of >= 0], return_index=True)
-    lead = np.flatnonzero(row_of >= 0)[first]  # the first row of each move
-    assert len(rows) == len(lead)
-    lengths = length[lasting]
-    begin, end = _tangents(path, lead)
-    highest, along = allowed_along(rate, begin), allowed_along(acceleration, begin)
-    arms = PolarArcs(path, path.is_arc)
-    arm_of_row = np.full(len(path), -1, dtype=np.int64)
-    arm_of_row[arms.row] = np.arange(len(arms.row))
-    arm = arm_of_row[lead]
-    on = np.flatnonzero(arm >= 0)
-    highest[on], along[on] = _arc_limits(arms, arm[on], lengths[on], (rate, acceleration))
-    highest = np.minimum(highest, lengths / (LEAST_PERIODS * period_s))
+    del row_length, number
+    moving = np.flatnonzero(row_of >= 0)
+    lead = moving[np.diff(row_of[moving], prepend=-1) > 0]  # the first row of each move
+    length = length[lasting]
+    assert len(lead) == len(length)
     feed = np.where(path.is_feed, path.feed, np.inf)[lead] / 60.0
+    is_arc = path.is_arc[lead]
+    speed, along = np.empty(len(lead)), np.empty(len(lead))
+    for low in range(0, len(lead), MOVES_AT_ONCE):
+        at = slice(low, low + MOVES_AT_ONCE)
+        begin = tangents.at_starts(lead[at])
+        highest, along[at] = allowed_along(rate, begin), allowed_along(acceleration, begin)
+        on = np.flatnonzero(is_arc[at])
+        arm = tangents.arm_of(lead[at][on])
+        limits = _arc_limits(tangents.arms, arm, length[at][on], (rate, acceleration))
+        highest[on], along[low + on] = limits
+        highest = np.minimum(highest, length[at] / (LEAST_PERIODS * period_s))
+        speed[at] = np.minimum(feed[at], highest)
     waits = np.diff(np.cumsum(np.isin(path.kind, WAITS))[lead], prepend=-1) > 0
     cuts = path.is_feed[lead]
     like = cuts == np.roll(cuts, 1)
-    speed = np.minimum(feed, highest)
-    return Moves(row_of, lead, lengths, speed, along, begin, end, arm >= 0, waits, like)
+    return Moves(row_of, lead, path.mode[lead], length, speed, along, is_arc, waits, like)
 
 
-def _tangents(path: Toolpath, lead: Ints) -> tuple[Floats, Floats]:
-    """(M, 3) unit tangents at the start and end of the rows `lead`; merged rows are straight."""
-    way = (path.end - path.starts)[lead]
-    begin, end = way.copy(), way.copy()
-    arms = PolarArcs(path, path.is_arc)
-    at = np.searchsorted(arms.row, lead)
-    on = np.flatnonzero(path.is_arc[lead])
-    for tangent, radius, share in ((begin, arms.radius, 0.0), (end, arms.end_radius, 1.0)):
-        arm = at[on]
+class Tangents:
+    """Unit tangents at the ends of rows of a path, of which merged ones are straight."""
+
+    def __init__(self, path: Toolpath) -> None:
+        self.path = path
+        self.arms = PolarArcs(path, path.is_arc)
+
+    def arm_of(self, arcs: Ints) -> Ints:
+        """(J,) the index in `arms` of rows that are arcs."""
+        return np.searchsorted(self.arms.row, arcs)
+
+    def at_starts(self, rows: Ints) -> Floats:
+        """(K, 3) where rows (K,), which move, begin."""
+        return self._at(rows, self.arms.radius, 0.0)
+
+    def at_ends(self, rows: Ints) -> Floats:
+        """(K, 3) where they end."""
+        return self._at(rows, self.arms.end_radius, 1.0)
+
+    def _at(self, rows: Ints, radius: Floats, share: float) -> Floats:
+        path, arms = self.path, self.arms
+        tangent = path.end[rows] - path.starts_of(rows)
+        kind = path.kind[rows]
+        on = np.flatnonzero((kind == Kind.ARC_CW) | (kind == Kind.ARC_CCW))
+        arm = self.arm_of(rows[on])
         sweep, grows = arms.sweep[arm], (arms.end_radius - arms.radius)[arm]
         angle, r = arms.angle[arm] + share * sweep, radius[arm]
         cos, sin = np.cos(angle), np.sin(angle)
         tangent[on, 0] = grows * cos - r * sweep * sin
         tangent[on, 1] = grows * sin + r * sweep * cos
-    begin /= np.linalg.norm(begin, axis=1)[:, None]
-    end /= np.linalg.norm(end, axis=1)[:, None]
-    return begin, end
+        tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+        return tangent
 
 
 def _arc_limits(
@@ -438,86 +493,111 @@ class Corners:
     """What happens at the start of each of M moves: `speed` (M,) mm/s, 0 for a stop; `lost` (M,):
     the part of the acceleration that a bend takes from the moves on both sides; `reach` (M,) mm:
     how far from the corner a blend begins and ends, 0 without one; `acceleration` (M,) mm/s²
-    along blends; `inward` (M, 3) and `onward` (M, 3): unit vectors to the blend's centre and
-    along it; `theta` (M,) rad."""
+    along blends; `way` (M,) mm along them."""
 
     speed: Floats
     lost: Floats
     reach: Floats
     acceleration: Floats
-    inward: Floats
-    onward: Floats
-    theta: Floats
-
-    @property
-    def way(self) -> Floats:
-        """(M,) mm along the blends."""
-        return np.asarray(self.reach * np.tan(self.theta) * (np.pi - 2.0 * self.theta))
+    way: Floats
 
 
 @dataclass(frozen=True)
 class CornerRules:
-    """`blend` (M,) and `stop` (M,): moves behind which corners are blended, and met with a stop;
-    `tolerance_mm` (M,) of each move, inf: none; `kink_ratio`; `period_s` of the servo; limits (3,)
-    of the axes, mm/s and mm/s²."""
+    """`modes`: how corners are met; `kink_ratio`; `period_s` of the servo; limits (3,) of the
+    axes, mm/s and mm/s²."""
 
-    blend: Bools
-    stop: Bools
-    tolerance_mm: Floats
+    modes: Modes
     kink_ratio: float
     period_s: float
     rate: Floats
     acceleration: Floats
 
 
-def corners_of(moves: Moves, rules: CornerRules) -> Corners:
+@dataclass(frozen=True, eq=False)
+class Bends:
+    """Unit tangents (K, 3) `before` and `after` corners."""
+
+    before: Floats
+    after: Floats
+
+    @property
+    def inward(self) -> Floats:
+        """(K, 3) unit vectors to the centre of a blend."""
+        return _unit(self.after - self.before)
+
+    @property
+    def onward(self) -> Floats:
+        """(K, 3) unit vectors along a blend, in its middle."""
+        return _unit(self.after + self.before)
+
+    @property
+    def theta(self) -> Floats:
+        """(K,) rad: half the angle between the way back and the way on."""
+        cosine = np.clip(-(self.before * self.after).sum(axis=1), -1.0, 1.0)
+        return np.asarray(0.5 * np.arccos(cosine))
+
+    def picked(self, which: Ints) -> Bends:
+        """Some of them."""
+        return Bends(self.before[which], self.after[which])
+
+
+def corners_of(moves: Moves, tangents: Tangents, rules: CornerRules) -> Corners:
     """What happens at the start of each move."""
     count = len(moves.length)
-    before, after = np.roll(moves.end, 1, axis=0), moves.begin
-    turn, both = after - before, after + before
-    back = np.linalg.norm(both, axis=1) < STRAIGHT_BACK_RAD
+    corners = Corners(*(np.zeros(count) for _ in range(5)))
+    for low in range(0, count, MOVES_AT_ONCE):
+        at = np.arange(low, min(low + MOVES_AT_ONCE, count))
+        bends = Bends(
+            tangents.at_ends(moves.row[at - 1]),  # nothing comes of that before the first
+            tangents.at_starts(moves.row[at]),
+        )
+        _meet(corners, moves, at, bends, rules)
+    return corners
+
+
+def _meet(corners: Corners, moves: Moves, at: Ints, bends: Bends, rules: CornerRules) -> None:
+    """Fill in the corners `at` (K,)."""
+    before = moves.mode[at - 1]
+    turn = bends.after - bends.before
+    back = np.linalg.norm(bends.after + bends.before, axis=1) < STRAIGHT_BACK_RAD
     # The move before a corner says how it is met; both say how far a blend may leave it.
-    free = ~moves.waits & moves.like & ~back & ~np.roll(rules.stop, 1)
+    free = ~moves.waits[at] & moves.like[at] & ~back & ~rules.modes.stop(before)
     # A kink: the change of velocity within one period, as a part of what each axis can do.
-    highest = np.minimum(np.roll(moves.speed, 1), moves.speed)
-    jolt = highest / rules.period_s + moves.acceleration
+    highest = np.minimum(moves.speed[at - 1], moves.speed[at])
+    jolt = highest / rules.period_s + moves.acceleration[at]
     part = (np.abs(turn) * jolt[:, None] / rules.acceleration).max(axis=1, initial=0.0)
-    part = np.where(moves.is_arc | np.roll(moves.is_arc, 1), part / TANGENT_RATIO, part)
+    part = np.where(moves.is_arc[at] | moves.is_arc[at - 1], part / TANGENT_RATIO, part)
     smooth = free & (part < rules.kink_ratio)
-    corners = Corners(
-        speed=np.where(smooth, np.inf, 0.0),
-        lost=np.where(smooth, part, 0.0),
-        reach=np.zeros(count),
-        acceleration=np.zeros(count),
-        inward=_unit(turn),
-        onward=_unit(both),
-        theta=0.5 * np.arccos(np.clip(-(before * after).sum(axis=1), -1.0, 1.0)),
-    )
-    on = np.flatnonzero(free & ~smooth & np.roll(rules.blend, 1))
-    _blend(corners, moves, on, rules)
+    corners.speed[at] = np.where(smooth, np.inf, 0.0)
+    corners.lost[at] = np.where(smooth, part, 0.0)
+    blended = np.flatnonzero(free & ~smooth & rules.modes.blend(before))
+    on, bends = at[blended], bends.picked(blended)
+    _blend(corners, moves, on, bends, rules)
     # A bend that passes for straight at low speed, where that is faster than the blend.
-    kink = highest[on] * rules.kink_ratio / part[on]
+    kink = highest[blended] * rules.kink_ratio / part[blended]
     faster = kink > corners.speed[on]
     corners.speed[on] = np.maximum(corners.speed[on], kink)
     corners.lost[on[faster]] = rules.kink_ratio
     corners.reach[on[faster]] = 0.0
-    return corners
+    theta = bends.theta
+    corners.way[on] = corners.reach[on] * np.tan(theta) * (np.pi - 2.0 * theta)
 
 
-def _blend(corners: Corners, moves: Moves, on: Ints, rules: CornerRules) -> None:
+def _blend(corners: Corners, moves: Moves, on: Ints, bends: Bends, rules: CornerRules) -> None:
     """Fill in speed, reach and acceleration of the blends at the corners `on`.
 
     In the plane of both tangents, with unit normal m, no axis exceeds its limit when the whole is
     limited to min(limit / √(1 − m²)).
     """
-    theta = corners.theta[on]
-    normal = _unit(np.cross(moves.end[on - 1], moves.begin[on]))
+    theta = bends.theta
+    normal = _unit(np.cross(bends.before, bends.after))
     with np.errstate(divide="ignore"):
         share = np.sqrt(np.maximum(1.0 - normal**2, 0.0))
         whole = (rules.acceleration / share).min(axis=1, initial=np.inf)
         rate = (rules.rate / share).min(axis=1, initial=np.inf)
     across = NORMAL_RATIO * whole
-    reach = _most_reach(moves, on, theta, rules.tolerance_mm)
+    reach = _most_reach(moves, on, theta, rules.modes)
     widest = reach * np.tan(theta)
     wanted = np.maximum(moves.speed[on - 1], moves.speed[on])
     planned = np.minimum(np.minimum(wanted, rate), np.sqrt(across * widest))
@@ -532,10 +612,10 @@ def _blend(corners: Corners, moves: Moves, on: Ints, rules: CornerRules) -> None
     corners.acceleration[on] = TANGENT_RATIO * whole
 
 
-def _most_reach(moves: Moves, on: Ints, theta: Floats, tolerance_mm: Floats) -> Floats:
+def _most_reach(moves: Moves, on: Ints, theta: Floats, modes: Modes) -> Floats:
     """The largest d at the corners `on`; 0 where the moves hardly bend."""
     shorter = np.minimum(moves.length[on], moves.length[on - 1])
-    asked = np.minimum(tolerance_mm[on], tolerance_mm[on - 1])
+    asked = np.minimum(modes.tolerance_mm(moves.mode[on]), modes.tolerance_mm(moves.mode[on - 1]))
     leaves = np.minimum(asked, TOLERANCE_PART * shorter)
     flat = np.pi - 2.0 * theta < LEAST_BEND_RAD
     by_tolerance = leaves * np.cos(theta) / np.where(flat, 1.0, 1.0 - np.sin(theta))
