@@ -92,9 +92,7 @@ class GrblSamples:
     def __init__(self, blocks: Blocks, rows: int, machine: _Machine) -> None:
         self._blocks = blocks
         self._step_mm = np.array([axis.coded_step_mm for axis in machine.axes])
-        self._offsets = np.concatenate([[0], np.cumsum(blocks.events)])
-        self._travelled = np.zeros((len(blocks.row) + 1, 3), dtype=np.int64)
-        self._travelled[1:] = np.cumsum(np.abs(blocks.way), axis=0)
+        self._offsets = np.concatenate([[0], np.cumsum(blocks.events, dtype=np.int64)])
         self.first = self._offsets[np.searchsorted(blocks.row, np.arange(rows + 1))]
 
     def start_mm(self, start: Floats) -> Floats:
@@ -109,18 +107,27 @@ class GrblSamples:
         begin = int(np.searchsorted(self._offsets, low, side="right")) - 1
         end = int(np.searchsorted(self._offsets, high, side="left"))
         commanded = np.empty((high - low, 3))
-        first = (begin, low - int(self._offsets[begin]))
-        step_lines_fill((blocks.start, blocks.way), first, self._step_mm, commanded)
+        lines = (
+            blocks.start[begin:end].astype(np.int64),
+            blocks.way[begin:end].astype(np.int64),
+        )
+        first = (0, low - int(self._offsets[begin]))
+        step_lines_fill(lines, first, self._step_mm, commanded)
         bounds = np.clip(self._offsets[begin : end + 1], low, high)
-        return np.repeat(blocks.row[begin:end], np.diff(bounds)), commanded
+        row = blocks.row[begin:end].astype(np.int64)
+        return np.repeat(row, np.diff(bounds)), commanded
 
     def steps(self, bounds: Ints) -> Ints:
         """Steps of each axis between events."""
         block = np.searchsorted(self._offsets, bounds, side="right") - 1
-        count = self._travelled[block]
+        begin = int(block[0])
+        way = self._blocks.way[begin : int(block[-1]) + 1].astype(np.int64)
+        travelled = np.zeros((len(way) + 1, 3), dtype=np.int64)
+        np.cumsum(np.abs(way), axis=0, out=travelled[1:])
+        count = travelled[block - begin]
         inside = np.flatnonzero(bounds > self._offsets[block])
         event = bounds[inside] - self._offsets[block[inside]]
-        count[inside] += np.abs(steps_taken(self._blocks.way[block[inside]], event))
+        count[inside] += np.abs(steps_taken(way[block[inside] - begin], event))
         return np.asarray(np.diff(count, axis=0))
 
 
@@ -170,39 +177,59 @@ WAITS = (
 """Before these the machine comes to rest (`protocol_buffer_synchronize`)."""
 
 
+ROWS_AT_ONCE = 1 << 12
+"""So many rows become blocks together."""
+
+BLOCKS_AT_ONCE = 1 << 14
+"""The speeds of so many blocks are computed together."""
+
+Shorts = npt.NDArray[np.int32]
+
+
 @dataclass(frozen=True, eq=False)
 class Blocks:
     """B blocks in order: the row (B,) that each is of, where it starts and its way, both (B, 3)
     steps."""
 
-    row: Ints
-    start: Ints
-    way: Ints
+    row: Shorts
+    start: Shorts
+    way: Shorts
 
     @property
-    def events(self) -> Ints:
+    def events(self) -> Shorts:
         """(B,) steps of the axis that has the most of them."""
         return np.asarray(np.abs(self.way).max(axis=1, initial=0))
 
 
 def blocks_of(path: Toolpath, machine: _Machine, controller: GrblController) -> Blocks:
     """The blocks of a program; ProgramError for positions beyond all that grbl can count."""
-    targets = targets_of(path, machine, controller)
     steps_per_mm = np.array([1.0 / axis.coded_step_mm for axis in machine.axes], dtype=np.float32)
-    stop = _rounded(targets.mm, steps_per_mm)
     begin = _rounded(path.start[None, :].astype(np.float32), steps_per_mm)
-    far = (np.abs(stop) > MAX_STEPS).any(axis=1)
-    if far.any():
-        row = int(targets.row[far.argmax()])
-        block = int(path.block[row])
-        raise ProgramError(
-            "a position is beyond all that the controller can count",
-            where=f"block {block + 1}" if block >= 0 else f"move {row}",
-        )
-    start = np.concatenate([begin, stop[:-1]])[: len(stop)]
-    way = stop - start
-    moves = way.any(axis=1)
-    return Blocks(targets.row[moves], start[moves], way[moves])
+    nothing = np.empty((0, 3), dtype=np.int32)
+    parts = [Blocks(np.empty(0, dtype=np.int32), nothing, nothing)]
+    for low in range(0, len(path), ROWS_AT_ONCE):
+        rows = np.arange(low, min(low + ROWS_AT_ONCE, len(path)))
+        targets = targets_of(path, rows, machine, controller)
+        stop = _rounded(targets.mm, steps_per_mm)
+        far = (np.abs(stop) > MAX_STEPS).any(axis=1)
+        if far.any():
+            row = int(targets.row[far.argmax()])
+            block = int(path.block[row])
+            raise ProgramError(
+                "a position is beyond all that the controller can count",
+                where=f"block {block + 1}" if block >= 0 else f"move {row}",
+            )
+        start = np.concatenate([begin, stop])
+        begin, start = start[-1:], start[:-1]
+        way = stop - start
+        moves = way.any(axis=1)
+        columns = targets.row[moves], start[moves], way[moves]
+        parts.append(Blocks(*(column.astype(np.int32) for column in columns)))
+    return Blocks(
+        np.concatenate([part.row for part in parts]),
+        np.concatenate([part.start for part in parts]),
+        np.concatenate([part.way for part in parts]),
+    )
 
 
 def _rounded(mm: Singles, steps_per_mm: Singles) -> Ints:
@@ -224,26 +251,38 @@ def speeds_of(blocks: Blocks, path: Toolpath, machine: _Machine) -> SpeedPlan:
     controller = machine.controller
     assert isinstance(controller, GrblController)
     step_mm = np.array([axis.coded_step_mm for axis in machine.axes])
-    way = blocks.way * step_mm
-    length = np.sqrt((way**2).sum(axis=1))
-    unit = way / length[:, None]
     rate = axis_limits(machine, "max_rate_mm_min") / 60.0
     acceleration = axis_limits(machine, "acceleration_mm_s2")
-    highest = allowed_along(rate, unit)
-    feed = np.where(path.is_feed, path.feed, np.inf)[blocks.row] / 60.0
-    speed = np.maximum(np.minimum(feed, highest), LEAST_SPEED_MM_S)
-    speed = np.maximum(speed, controller.least_step_hz * length / blocks.events)
-    turn = np.zeros_like(unit)
-    turn[1:] = unit[1:] - unit[:-1]
-    across = np.sqrt((turn**2).sum(axis=1))
-    cosine = 0.5 * across**2 - 1.0  # of the angle between the way back and the way on
-    half_sine = np.sqrt(np.clip(0.5 * (1.0 - cosine), 0.0, 1.0))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        allowed = allowed_along(acceleration, turn / np.where(across > 0.0, across, 1.0)[:, None])
-        square = allowed * controller.junction_deviation_mm * half_sine / (1.0 - half_sine)
-    corner = np.sqrt(np.where(cosine < -STRAIGHT_COS, np.inf, square))
-    corner[(cosine > STRAIGHT_COS) | _from_rest(blocks, path)] = 0.0
-    return SpeedPlan(length, speed, allowed_along(acceleration, unit), corner)
+    plan = SpeedPlan(*(np.empty(len(blocks.row)) for _ in range(4)))
+    for low in range(0, len(blocks.row), BLOCKS_AT_ONCE):
+        at = slice(low, low + BLOCKS_AT_ONCE)
+        ways = blocks.way[max(low - 1, 0) : at.stop] * step_mm
+        lengths = np.sqrt((ways**2).sum(axis=1))
+        units = ways / lengths[:, None]
+        turn = np.diff(units, axis=0, prepend=units[: 1 if low == 0 else 0])
+        before = 0 if low == 0 else 1
+        length, unit = lengths[before:], units[before:]
+        highest = allowed_along(rate, unit)
+        row = blocks.row[at]
+        cuts = (path.kind[row] >= Kind.LINE) & (path.kind[row] <= Kind.ARC_CCW)
+        feed = np.where(cuts, path.feed[row], np.inf) / 60.0
+        speed = np.maximum(np.minimum(feed, highest), LEAST_SPEED_MM_S)
+        events = np.abs(blocks.way[at]).max(axis=1, initial=0)
+        speed = np.maximum(speed, controller.least_step_hz * length / events)
+        plan.length_mm[at], plan.speed_mm_s[at] = length, speed
+        plan.acceleration_mm_s2[at] = allowed_along(acceleration, unit)
+        across = np.sqrt((turn**2).sum(axis=1))
+        cosine = 0.5 * across**2 - 1.0  # of the angle between the way back and the way on
+        half_sine = np.sqrt(np.clip(0.5 * (1.0 - cosine), 0.0, 1.0))
+        turn /= np.where(across > 0.0, across, 1.0)[:, None]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            allowed = allowed_along(acceleration, turn)
+            square = allowed * controller.junction_deviation_mm * half_sine / (1.0 - half_sine)
+        corner = np.sqrt(np.where(cosine < -STRAIGHT_COS, np.inf, square))
+        corner[cosine > STRAIGHT_COS] = 0.0
+        plan.corner_mm_s[at] = corner
+    plan.corner_mm_s[_from_rest(blocks, path)] = 0.0
+    return plan
 
 
 def stops(blocks: Blocks, path: Toolpath) -> Ints:
@@ -289,22 +328,25 @@ class Targets:
     mm: Singles
 
 
-def targets_of(path: Toolpath, machine: _Machine, controller: GrblController) -> Targets:
-    """What the rows of a program ask of the planner; rows that do not move ask nothing."""
-    ends = as_read(path.end, machine)
-    homing = np.isin(path.kind, (Kind.HOME_XY, Kind.HOME_Z))
-    arcs = np.flatnonzero(path.is_arc)
-    counts = np.where(path.is_motion | homing, 1, 0)
-    start = as_read(path.start, machine)
-    begins = np.concatenate([start[None, :], ends[:-1]]) if len(path) else ends
-    chords = _Chords(path, machine, begins[arcs], ends[arcs], arcs)
+def targets_of(
+    path: Toolpath, rows: Ints, machine: _Machine, controller: GrblController
+) -> Targets:
+    """What rows (R,), which follow one another, ask of the planner; rows that do not move ask
+    nothing."""
+    kind = path.kind[rows]
+    ends = as_read(path.end[rows], machine)
+    begins = as_read(path.starts_of(rows), machine)
+    asks = (kind <= Kind.ARC_CCW) | np.isin(kind, (Kind.HOME_XY, Kind.HOME_Z))
+    counts = np.where(asks, 1, 0)
+    arcs = np.flatnonzero((kind == Kind.ARC_CW) | (kind == Kind.ARC_CCW))
+    chords = _Chords(path, machine, begins[arcs], ends[arcs], rows[arcs])
     counts[arcs] = chords.segments(controller)
-    row = np.repeat(np.arange(len(path)), counts)
+    row = np.repeat(np.arange(len(rows)), counts)
     mm = ends[row]
     first = np.cumsum(counts) - counts
     inside, points = chords.points(counts[arcs], first[arcs], controller.arc_correction)
     mm[inside] = points
-    return Targets(row, mm)
+    return Targets(rows[row], mm)
 
 
 def as_read(values: Floats, machine: _Machine) -> Singles:
@@ -337,7 +379,7 @@ class _Chords:
         self, path: Toolpath, machine: _Machine, begin: Singles, end: Singles, arcs: Ints
     ) -> None:
         self._begin, self._end = begin, end
-        offset = as_read(path.centre[arcs] - path.starts[arcs, :2], machine)
+        offset = as_read(path.centre[arcs] - path.starts_of(arcs)[:, :2], machine)
         self._offset = offset
         self._centre = begin[:, :2] + offset
         self._radius = np.sqrt(offset[:, 0] * offset[:, 0] + offset[:, 1] * offset[:, 1])

@@ -62,7 +62,7 @@ def test_chords_are_those_of_the_loop(ccw: bool, rise: float) -> None:
             ey = y if share == 0.0 else round(cy + radius * np.sin(angle), 3)
             builder = ToolpathBuilder((x, y, z))
             path = builder.arc(ex, ey, z + rise, centre=(cx, cy), ccw=ccw, feed=100.0).finish()
-            targets = targets_of(path, machine, controller)
+            targets = targets_of(path, np.arange(len(path)), machine, controller)
             begin, end = as_read(path.start, machine), as_read(path.end[0], machine)
             offset = as_read(path.centre[0] - path.start[:2], machine)
             wanted = chord_ends(tuple(begin), tuple(end), tuple(offset), not ccw, 0.002)
