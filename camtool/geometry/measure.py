@@ -31,11 +31,12 @@ def path_lengths(lines: Polylines) -> Floats:
 def segment_lengths(segments: Segments) -> Floats:
     """(K,) length of each line and arc, mm."""
     chord = segments.end - segments.start
-    straight = np.hypot(chord[:, 0], chord[:, 1])
+    lengths = np.hypot(chord[:, 0], chord[:, 1])
     # length = radius · |sweep| = chord · (1 + b²) · atan(b)/b
-    safe = np.where(segments.is_arc, segments.bulge, 1.0)
-    ratio = np.where(segments.is_arc, (1.0 + safe**2) * np.arctan(safe) / safe, 1.0)
-    return np.asarray(straight * ratio)
+    arcs = np.flatnonzero(segments.is_arc)
+    bulge = segments.bulge[arcs]
+    lengths[arcs] *= (1.0 + bulge**2) * np.arctan(bulge) / bulge
+    return np.asarray(lengths)
 
 
 def signed_areas(lines: Polylines) -> Floats:
@@ -134,14 +135,17 @@ def point_at(segments: Segments, row_indices: Ints, t: Floats) -> Floats:
     """(J, 2) the points at the fractions t (J,) in 0..1 of the length of these rows, mm."""
     start, end = segments.start[row_indices], segments.end[row_indices]
     sweep = segments.sweep[row_indices]
-    is_arc = sweep != 0.0
-    ratio = np.sin(0.5 * t * sweep) / np.where(is_arc, np.sin(0.5 * sweep), 1.0)
-    turn = 0.5 * (t - 1.0) * sweep
-    along = np.where(is_arc, ratio * np.cos(turn), t)[:, None]
-    across = np.where(is_arc, ratio * np.sin(turn), 0.0)[:, None]
-    chord = end - start
+    arcs = np.flatnonzero(sweep)
+    sweep, share = sweep[arcs], t[arcs]
+    ratio = np.sin(0.5 * share * sweep) / np.sin(0.5 * sweep)
+    turn = 0.5 * (share - 1.0) * sweep
+    along = np.array(t, dtype=np.float64)
+    along[arcs] = ratio * np.cos(turn)
+    points = (1.0 - along[:, None]) * start + along[:, None] * end
+    chord = end[arcs] - start[arcs]
     turned = np.column_stack([-chord[:, 1], chord[:, 0]])
-    return np.asarray((1.0 - along) * start + along * end + across * turned)
+    points[arcs] += (ratio * np.sin(turn))[:, None] * turned
+    return np.asarray(points + 0.0)  # no −0
 
 
 def sample(p: Polyline, step_mm: float) -> Floats:

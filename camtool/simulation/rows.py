@@ -23,7 +23,7 @@ def placed(toolpath: Toolpath, home: Floats) -> Toolpath:
     kind, count = toolpath.kind, len(toolpath)
     events = np.flatnonzero(~toolpath.is_motion)
     homes = np.isin(kind[events], (Kind.HOME_XY, Kind.HOME_Z)).any()
-    if not homes and (toolpath.end[events] == toolpath.begins(events)).all():
+    if not homes and (toolpath.end[events] == toolpath.starts_of(events)).all():
         return toolpath
     end = toolpath.end.copy()
     for axis, homing in ((0, Kind.HOME_XY), (1, Kind.HOME_XY), (2, Kind.HOME_Z)):

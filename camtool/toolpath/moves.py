@@ -147,10 +147,6 @@ class Toolpath:
         """(N, 3) mm: where each row begins."""
         return np.concatenate([self.start[None, :], self.end[:-1]]) if len(self) else self.end
 
-    def begins(self, rows: Ints) -> Floats:
-        """(M, 3) mm: where each of these rows (M,) begins."""
-        return np.where((rows > 0)[:, None], self.end[rows - 1], self.start)
-
     def starts_of(self, rows: Ints) -> Floats:
         """(K, 3) mm: where these rows begin."""
         starts = self.end[rows - 1]
@@ -177,7 +173,10 @@ class Toolpath:
 
         CCW: sweep = (angle(end) − angle(start)) mod 2π, taken in (0, 2π];  CW: mirrored.
         """
-        return np.where(self.is_arc, _sweeps(self.kind, self.starts, self.end, self.centre), 0.0)
+        arcs, sweeps = np.flatnonzero(self.is_arc), np.zeros(len(self))
+        ends = self.starts_of(arcs), self.end[arcs], self.centre[arcs]
+        sweeps[arcs] = _sweeps(self.kind[arcs], *ends)
+        return sweeps
 
     @property
     def running(self) -> int:

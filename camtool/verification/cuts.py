@@ -91,12 +91,12 @@ class CutMoves:
 def moved_lengths(toolpath: Toolpath) -> Floats:
     """(N,) mm: length of each row in XY, 0 for events; of an arc, its start radius times its
     sweep."""
-    starts = toolpath.starts
-    straight = toolpath.end[:, :2] - starts[:, :2]
-    spoke = starts[:, :2] - toolpath.centre
-    along_arc = np.hypot(spoke[:, 0], spoke[:, 1]) * np.abs(toolpath.sweeps())
-    length = np.where(toolpath.is_arc, along_arc, np.hypot(straight[:, 0], straight[:, 1]))
-    return np.where(toolpath.is_motion, length, 0.0)
+    straight = toolpath.end[:, :2] - toolpath.starts[:, :2]
+    length = np.where(toolpath.is_motion, np.hypot(straight[:, 0], straight[:, 1]), 0.0)
+    arcs = np.flatnonzero(toolpath.is_arc)
+    spoke = toolpath.starts_of(arcs)[:, :2] - toolpath.centre[arcs]
+    length[arcs] = np.hypot(spoke[:, 0], spoke[:, 1]) * np.abs(toolpath.sweeps()[arcs])
+    return length
 
 
 def is_flat(toolpath: Toolpath) -> bool:
@@ -339,9 +339,21 @@ class _LoopSearch:
 
 def latest_before(places: Floats, run: Ints, gap_mm: float) -> Ints:
     """(P,) for each of the points (P, 2) the latest one before it in its run (P,) within `gap_mm`,
-    −1 for none.
+    −1 for none. Most are so far from all others in X alone that there is none."""
+    found, order = np.full(len(places), -1, dtype=np.int64), np.lexsort((places[:, 0], run))
+    apart = (np.diff(places[order, 0]) > gap_mm) | (np.diff(run[order]) != 0)
+    alone = np.append(apart, True) & np.append(True, apart)
+    some = np.sort(order[~alone])
+    if len(some):
+        latest = _latest_before(places[some], run[some], gap_mm)
+        found[some] = np.where(latest >= 0, some[latest], -1)
+    return found
 
-    Points lie in square cells as wide as the gap. In each of the nine cells around a point the
+
+def _latest_before(places: Floats, run: Ints, gap_mm: float) -> Ints:
+    """The same, of points that may be near others.
+
+    They lie in square cells as wide as the gap. In each of the nine cells around a point the
     latest earlier point of its run is tried first, and points before it only where it is too far
     away, so that a thousand passes over one point are not compared pair by pair.
     """

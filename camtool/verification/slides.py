@@ -220,7 +220,7 @@ class Tasks:
         own, of_row = _part_of_table(self._paths.decoded, low, high)
         circle, beside = match.circle[low:high], match.row[low:high]
         beside = np.where(beside >= 0, np.searchsorted(self._paths.wanted.rows, beside), -1)
-        ends = np.column_stack([toolpath.begins(rows)[:, 2], toolpath.end[low:high, 2]])
+        ends = np.column_stack([toolpath.starts_of(rows)[:, 2], toolpath.end[low:high, 2]])
         depth_mm = self._paths.depth_mm
         return Task(
             low=low,
@@ -337,7 +337,7 @@ def _part_of_table(cuts: CutMoves, low: int, high: int) -> tuple[MoveTable, Ints
     turn = np.where(segments.bulge[first] < 0.0, -1.0, 1.0)
     chord = end - start
     square = (chord**2).sum(axis=1)
-    closed = (toolpath.begins(rows)[:, :2] == toolpath.end[rows, :2]).all(axis=1)
+    closed = (toolpath.starts_of(rows)[:, :2] == toolpath.end[rows, :2]).all(axis=1)
     moves = np.zeros((len(rows), at.COLUMNS))
     moves[:, [at.AX, at.AY]], moves[:, [at.BX, at.BY]] = start, end
     moves[:, [at.DX, at.DY]] = chord

@@ -158,7 +158,7 @@ def test_changes_before_the_first_feed_are_made_by_hand() -> None:
 def test_each_row_begins_where_the_one_before_ended() -> None:
     path = ToolpathBuilder((1.0, 2.0, 3.0)).rapid(z=5).line(4, feed=10).line(y=7, feed=10).finish()
     rows = np.array([2, 0, 0, 1])
-    assert path.begins(rows).tolist() == path.starts[rows].tolist()
+    assert path.starts_of(rows).tolist() == path.starts[rows].tolist()
 
 
 def test_nothing_is_copied_where_nothing_changes() -> None:
