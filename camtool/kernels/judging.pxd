@@ -119,6 +119,7 @@ cdef bint _is_there(double[:, ::1] table, Int[::1] found, Int count, Int move) n
 
 @cython.locals(
     leaves=Int, height=Int, node=Int, low=Int, place=Int, k=Int, n=Int, count=Int, most=Int,
+    some=Int,
     order=Int[::1], stack=Int[::1], found=Int[::1], table=double[:, ::1], nodes=double[:, ::1],
     heights=double[:, ::1], box=double[::1]
 )

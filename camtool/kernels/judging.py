@@ -455,12 +455,12 @@ def _move_near(table: Floats, k: int, box: Floats) -> bool:
             return False
         return bool(far_long * far_long + far_wide * far_wide >= square * (1.0 - SLACK))
     px, py = table[k, AX] - box[MIDDLE_X], table[k, AY] - box[MIDDLE_Y]
-    along, beside = px * way_x + py * way_y, py * way_x - px * way_y
-    to_x, to_y = table[k, BX] - table[k, AX], table[k, BY] - table[k, AY]
-    further, across = to_x * way_x + to_y * way_y, to_y * way_x - to_x * way_y
-    if smaller(along, along + further) > long or larger(along, along + further) < -long:
-        return False
+    to_x, to_y = table[k, DX], table[k, DY]
+    beside, across = py * way_x - px * way_y, to_y * way_x - to_x * way_y
     if smaller(beside, beside + across) > wide or larger(beside, beside + across) < -wide:
+        return False
+    along, further = px * way_x + py * way_y, to_x * way_x + to_y * way_y
+    if smaller(along, along + further) > long or larger(along, along + further) < -long:
         return False
     side = abs(along * across - beside * further)
     reach = long * abs(across) + wide * abs(further)
@@ -468,7 +468,7 @@ def _move_near(table: Floats, k: int, box: Floats) -> bool:
 
 
 def _is_there(table: Floats, found: Ints, count: int, move: int) -> bool:
-    """Whether the move is one of the `count` found: turns of a circle are the same."""
+    """Whether the move is one of the first `count` found: turns of a circle are the same."""
     for n in range(count):
         other, k = found[n], 0
         while k < COLUMNS and table[other, k] == table[move, k]:
@@ -494,7 +494,8 @@ def _compared(
     table, heights, nodes, order = search.table, search.heights, search.nodes, search.order
     stack, found, box = search.stack, search.found, search.box
     _set_box(x, y, errors, box)
-    most = max(FEW, ENOUGH // len(x))
+    some = len(x)
+    most = max(FEW, ENOUGH // some)
     leaves = len(nodes) // 2
     found[0], count = own, 1
     height, stack[0] = 1, 1
@@ -516,7 +517,8 @@ def _compared(
             if not _counts(k, first, last, z_low, z_high, heights):
                 continue
             search.looked += 1
-            if _move_near(table, k, box) and not _is_there(table, found, count, k):
+            # To look for it among more than there are points takes longer than to compare it.
+            if _move_near(table, k, box) and not _is_there(table, found, min(count, some), k):
                 if count == most:
                     return False
                 found[count] = k
