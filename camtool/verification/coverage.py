@@ -130,7 +130,9 @@ def cover(
     real = np.isfinite(found.distance)
     rows = cuts.segments.path[samples.segment]
     rounding.add(found.distance[real], samples.points[real], rows[real])
-    cut = np.append(_fits(wanted.cuts, became, decoded, limits, spacing_mm), True)
+    alike = _lines_alike(cuts, wanted.cuts, limits, row_from)
+    became = np.where(alike, ANY_CONTOUR, became)
+    cut = np.append(alike | _fits(wanted.cuts, became, decoded, limits, spacing_mm), True)
     rest = next(
         samples_by_parts(wanted.cuts, spacing_mm, ~cut[wanted.cuts.contour], sys.maxsize),
         NO_SAMPLES,
@@ -171,6 +173,27 @@ def _own_found(cuts: CutMoves, samples: Samples, own: Ints, goal: Goal) -> tuple
     found.distance[some], found.segment[some] = near.distance, near.segment
     fit[mine[some[near.distance > goal.limit_mm]]] = False
     return found, np.where(fit[mine], own[mine], ANY_CONTOUR)
+
+
+def _lines_alike(cuts: CutMoves, wanted: CutMoves, limits: Limits, row_from: Ints | None) -> Bools:
+    """(C,) the wanted contours of lines alone, from each of which one line was written whose start
+    and end lie within the limits of its own: so does each point between them, for the distance of
+    two points that run along two lines at once is nowhere larger than at one of the ends."""
+    alike = np.full(wanted.contour_count, row_from is not None)
+    if row_from is None:
+        return alike
+    limit_mm, depth_mm = limits
+    rows, paths = cuts.rows[row_from[cuts.rows] >= 0], (cuts.toolpath, wanted.toolpath)
+    came = row_from[rows]
+    near = (paths[0].kind[rows] == Kind.LINE) & (paths[1].kind[came] == Kind.LINE)
+    near &= np.bincount(came, minlength=len(paths[1]))[came] == 1
+    mine, theirs = paths[0].starts_of(rows), paths[1].starts_of(came)
+    for off in (mine - theirs, paths[0].end[rows] - paths[1].end[came]):
+        near &= (np.hypot(off[:, 0], off[:, 1]) <= limit_mm) & (np.abs(off[:, 2]) <= depth_mm)
+    there = np.zeros(len(paths[1]), dtype=np.bool_)
+    there[came[near]] = True
+    alike[wanted.contour[wanted.rows[~there[wanted.rows]]]] = False
+    return alike
 
 
 def _fits(

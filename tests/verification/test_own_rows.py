@@ -21,7 +21,7 @@ LIMIT_MM, DEPTH_MM, SAMPLE_MM, GRID_MM = 0.005, 0.01, 0.2, 0.001
 
 
 def scribbles(rng: np.random.Generator, count: int) -> Toolpath:
-    """Lines and arcs that cross, at two depths, some contours in two passes."""
+    """Lines, some on a slope, and arcs that cross, at two depths, some contours in two passes."""
     path = ToolpathBuilder()
     for _ in range(count):
         path.rapid(z=1.0).rapid(*rng.uniform(0.0, 20.0, 2))
@@ -29,7 +29,8 @@ def scribbles(rng: np.random.Generator, count: int) -> Toolpath:
             path.line(z=depth, feed=100.0)
             for x, y in rng.uniform(0.0, 20.0, (int(rng.integers(1, 7)), 2)):
                 if rng.random() < 0.7:
-                    path.line(float(x), float(y), feed=200.0)
+                    rise = float(rng.uniform(-0.3, 0.3)) if rng.random() < 0.2 else 0.0
+                    path.line(float(x), float(y), path.position[2] + rise, feed=200.0)
                     continue
                 middle = 0.5 * (np.array(path.position[:2]) + np.array([x, y]))
                 path.arc(float(x), float(y), centre=tuple(middle), ccw=True, feed=200.0)
