@@ -15,7 +15,7 @@ shorter than `POSITION_EPS_MM`. Arrays are read-only.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -104,16 +104,6 @@ class Polylines:
         )
         return cls._trusted(*columns)
 
-    @classmethod
-    def joined(cls, parts: Sequence[Polylines]) -> Polylines:
-        """The paths of all parts, one part after the other."""
-        counts = [np.diff(part.offsets) for part in parts]
-        return cls._trusted(
-            np.concatenate([np.empty((0, 3)), *(part.vertices for part in parts)]),
-            np.cumsum(np.concatenate([np.zeros(1, dtype=np.int64), *counts])),
-            np.concatenate([np.empty(0, dtype=np.bool_), *(part.closed for part in parts)]),
-        )
-
     def __len__(self) -> int:
         """How many paths."""
         return len(self.closed)
@@ -129,15 +119,12 @@ class Polylines:
         return (self[index] for index in range(len(self)))
 
     def select(self, indices: Iterable[int]) -> Polylines:
-        """The paths of these indices, in this order, the very columns where these are all;
-        IndexError for one that is not there."""
+        """The paths of these indices, in this order; IndexError for one that is not there."""
         chosen = np.fromiter((int(index) for index in indices), dtype=np.int64)
         bad = (chosen < -len(self)) | (chosen >= len(self))
         if bad.any():
             raise IndexError(f"path {chosen[np.argmax(bad)]} of {len(self)}")
         chosen %= max(len(self), 1)
-        if np.array_equal(chosen, np.arange(len(self))):
-            return self
         counts = np.diff(self.offsets)[chosen]
         offsets = np.concatenate([np.zeros(1, dtype=np.int64), np.cumsum(counts)])
         rows = np.arange(offsets[-1]) + np.repeat(self.offsets[chosen] - offsets[:-1], counts)

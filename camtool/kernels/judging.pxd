@@ -5,15 +5,21 @@ from libc cimport math
 from camtool.kernels.offsets cimport apart_square, wait_for_children
 from camtool.kernels.types cimport Int
 
+cdef class Curves:
+    cdef double[:, ::1] start, end, arcs
+    cdef int[::1] arc
+
 cdef class Search:
-    cdef double[:, ::1] table, heights, nodes
+    cdef Curves curves
+    cdef double[:, ::1] heights, nodes
     cdef Int[::1] order, found, stack, parts
     cdef double[::1] box, x, y, error
     cdef readonly Int looked
 
 cdef class Judge:
     cdef Int low
-    cdef double[:, ::1] own, window, centre, directions, figures, trace
+    cdef Curves own
+    cdef double[:, ::1] window, centre, directions, figures, trace
     cdef Int[:, ::1] rows, histograms
     cdef double[:, :, ::1] bins
     cdef double[::1] off, pen
@@ -37,14 +43,15 @@ cpdef double largest(double[::1] values, Int low, Int high) noexcept
 @cython.locals(j=Int, k=Int, lane=Int, found=double, lanes="double[32]")
 cpdef double smallest(double[::1] values, Int low, Int high) noexcept
 
-@cython.locals(k=Int)
+@cython.locals(k=Int, square=double, over=double)
 cdef void _to_line(
-    double[:, ::1] moves, Int row, double[::1] x, double[::1] y, double[::1] best, bint first
+    double[:, ::1] start, double[:, ::1] end, Int row, double[::1] x, double[::1] y,
+    double[::1] best, bint first
 ) noexcept  # wide
 
 @cython.locals(k=Int, outside=Int, above_half=bint)
 cdef bint _all_in_wedge(
-    double[:, ::1] moves, Int row, double[::1] x, double[::1] y
+    double[:, ::1] arcs, Int row, double[::1] x, double[::1] y
 ) noexcept  # wide
 
 cdef double _depth(double from_start, double from_end, bint above_half) noexcept  # inline
@@ -57,16 +64,18 @@ cdef double _outside(
 
 @cython.locals(k=Int, far=Int)
 cdef void _to_circle(
-    double[:, ::1] moves, Int row, double[::1] x, double[::1] y, double[::1] best, bint first
+    double[:, ::1] arcs, Int row, double[::1] x, double[::1] y, double[::1] best, bint first
 ) noexcept  # wide
 
 @cython.locals(k=Int, above_half=bint, inside=bint)
 cdef void _to_arc(
-    double[:, ::1] moves, Int row, double[::1] x, double[::1] y, double[::1] best, bint first
+    double[:, ::1] start, double[:, ::1] end, Int row, double[:, ::1] arcs, Int at,
+    double[::1] x, double[::1] y, double[::1] best, bint first
 ) noexcept  # wide
 
+@cython.locals(at=Int)
 cpdef void lower_errors(
-    double[:, ::1] moves, Int row, double[::1] x, double[::1] y, double[::1] best, bint first
+    Curves curves, Int row, double[::1] x, double[::1] y, double[::1] best, bint first
 ) noexcept
 
 cdef double smaller(double one, double other) noexcept  # inline
@@ -82,7 +91,7 @@ cdef bint _counts(
 
 @cython.locals(
     leaves=Int, height=Int, node=Int, low=Int, place=Int, k=Int, nearest=Int, best=double,
-    order=Int[::1], stack=Int[::1], table=double[:, ::1], nodes=double[:, ::1],
+    order=Int[::1], stack=Int[::1], curves=Curves, nodes=double[:, ::1],
     heights=double[:, ::1], spot_x=double[::1], spot_y=double[::1], spot_error=double[::1]
 )
 cdef Int _nearest(
@@ -107,20 +116,26 @@ cdef void _set_box(
 cdef bint _node_near(double[:, ::1] nodes, Int node, double[::1] box) noexcept  # inline
 
 @cython.locals(
+    at=Int, start=double[:, ::1], end=double[:, ::1], arcs=double[:, ::1],
     way_x=double, way_y=double, long=double, wide=double, px=double, py=double, along=double,
     beside=double, near_long=double, near_wide=double, far_long=double, far_wide=double,
     square=double, to_x=double, to_y=double, further=double, across=double, side=double,
     reach=double
 )
-cdef bint _move_near(double[:, ::1] table, Int k, double[::1] box) noexcept  # inline
+cdef bint _move_near(Curves curves, Int k, double[::1] box) noexcept  # inline
 
-@cython.locals(other=Int, k=Int, n=Int)
-cdef bint _is_there(double[:, ::1] table, Int[::1] found, Int count, Int move) noexcept
+@cython.locals(n=Int)
+cdef bint _is_there(Curves curves, Int[::1] found, Int count, Int move) noexcept
+
+@cython.locals(
+    at=Int, there=Int, k=Int, start=double[:, ::1], end=double[:, ::1], arcs=double[:, ::1]
+)
+cdef bint _are_same(Curves curves, Int one, Int other) noexcept
 
 @cython.locals(
     leaves=Int, height=Int, node=Int, low=Int, place=Int, k=Int, n=Int, count=Int, most=Int,
     some=Int,
-    order=Int[::1], stack=Int[::1], found=Int[::1], table=double[:, ::1], nodes=double[:, ::1],
+    order=Int[::1], stack=Int[::1], found=Int[::1], curves=Curves, nodes=double[:, ::1],
     heights=double[:, ::1], box=double[::1]
 )
 cdef bint _compared(
@@ -130,7 +145,7 @@ cdef bint _compared(
 
 @cython.locals(
     height=Int, low=Int, high=Int, middle=Int, k=Int, alone=bint, far=double,
-    table=double[:, ::1], parts=Int[::1], here_x=double[::1], here_y=double[::1], here=double[::1]
+    curves=Curves, parts=Int[::1], here_x=double[::1], here_y=double[::1], here=double[::1]
 )
 cpdef bint nearest_errors(
     double[::1] x, double[::1] y, Int own, Int first, Int last, double z_low, double z_high,

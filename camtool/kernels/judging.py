@@ -147,8 +147,8 @@ def smallest(values: Floats, low: int, high: int) -> float:
 
 # How far points are from a move, with the side that they lie on: a line or an arc, many at once.
 #
-# A move is a row of numbers (see the columns below). The error of a point is its distance to the
-# move, exact to the true line or arc, and positive to the left of the move's direction:
+# The error of a point is its distance to the move, exact to the true line or arc, and positive to
+# the left of the move's direction:
 #
 #     line a→b:  |p − a − t·d|,  d = b − a,  t = clamp((p − a)·d / d², 0, 1),  sign of d × (p − a)
 #     arc:       ±(R − |p − c|) inside the wedge that the arc spans at its centre c, otherwise the
@@ -161,10 +161,9 @@ def smallest(values: Floats, low: int, high: int) -> float:
 # `best` holds the error of least size so far; each call lowers it where this move is nearer.
 
 
-COLUMNS = 16
-"""Numbers of a move: start x, y; end x, y; way x, y; 1 / way²; centre x, y; radius (0: a line);
-turn (+1 ccw, −1 cw); normals into the wedge at its start x, y and its end x, y; 1 when it is wider
-than half a turn, 2 when it is a whole turn, else 0."""
+COLUMNS = 9
+"""Numbers of an arc: centre x, y; radius; turn (+1 ccw, −1 cw); normals into the wedge at its
+start x, y and its end x, y; 1 when it is wider than half a turn, 2 for a whole turn, else 0."""
 
 NEAR = 2.0**-9
 """Up to this part of its radius from a circle the series of a root stands for it."""
@@ -172,12 +171,33 @@ NEAR = 2.0**-9
 FULL = 2.0
 """What a whole turn has in its last column."""
 
-AX, AY, BX, BY, DX, DY, OVER, CX, CY, RADIUS, TURN, UX, UY, VX, VY, WIDE = range(16)
+CX, CY, RADIUS, TURN, UX, UY, VX, VY, WIDE = range(9)
 
 
-def _to_line(moves: Floats, row: int, x: Floats, y: Floats, best: Floats, first: bool) -> None:
-    ax, ay, dx, dy = moves[row, AX], moves[row, AY], moves[row, DX], moves[row, DY]
-    over = moves[row, OVER]
+class Shapes(NamedTuple):
+    """K moves: start and end (K, 2), (K, 2) mm; which of the arcs each is (K,), −1 for a line; and
+    the arcs (A, 9)."""
+
+    start: Floats
+    end: Floats
+    arc: npt.NDArray[np.int32]
+    arcs: Floats
+
+
+class Curves:
+    """The arrays of `Shapes`."""
+
+    def __init__(self, shapes: Shapes) -> None:
+        self.start, self.end, self.arc, self.arcs = shapes
+
+
+def _to_line(
+    start: Floats, end: Floats, row: int, x: Floats, y: Floats, best: Floats, first: bool
+) -> None:
+    ax, ay = start[row, 0], start[row, 1]
+    dx, dy = end[row, 0] - ax, end[row, 1] - ay
+    square = dx * dx + dy * dy
+    over = 1.0 / square if square > 0.0 else 1.0
     for k in range(len(x)):
         px, py = x[k] - ax, y[k] - ay
         t = (px * dx + py * dy) * over
@@ -188,9 +208,9 @@ def _to_line(moves: Floats, row: int, x: Floats, y: Floats, best: Floats, first:
         best[k] = error if first or apart < abs(best[k]) else best[k]
 
 
-def _all_in_wedge(moves: Floats, row: int, x: Floats, y: Floats) -> bool:
-    cx, cy, ux, uy = moves[row, CX], moves[row, CY], moves[row, UX], moves[row, UY]
-    vx, vy, above_half = moves[row, VX], moves[row, VY], moves[row, WIDE] != 0.0
+def _all_in_wedge(arcs: Floats, row: int, x: Floats, y: Floats) -> bool:
+    cx, cy, ux, uy = arcs[row, CX], arcs[row, CY], arcs[row, UX], arcs[row, UY]
+    vx, vy, above_half = arcs[row, VX], arcs[row, VY], arcs[row, WIDE] != 0.0
     outside = 0
     for k in range(len(x)):
         px, py = x[k] - cx, y[k] - cy
@@ -227,8 +247,8 @@ def _outside(px: float, py: float, radius: float, half: float, over: float) -> f
     return _off(height, over) if abs(height) <= NEAR * radius else apart
 
 
-def _to_circle(moves: Floats, row: int, x: Floats, y: Floats, best: Floats, first: bool) -> None:
-    cx, cy, radius, turn = moves[row, CX], moves[row, CY], moves[row, RADIUS], moves[row, TURN]
+def _to_circle(arcs: Floats, row: int, x: Floats, y: Floats, best: Floats, first: bool) -> None:
+    cx, cy, radius, turn = arcs[row, CX], arcs[row, CY], arcs[row, RADIUS], arcs[row, TURN]
     square, half, over = radius * radius, 0.5 / radius, 1.0 / radius
     near, far = NEAR * radius, 0
     if first and abs((x[0] - cx) ** 2 + (y[0] - cy) ** 2 - square) * half <= near:
@@ -244,31 +264,44 @@ def _to_circle(moves: Floats, row: int, x: Floats, y: Floats, best: Floats, firs
         best[k] = error if first or abs(error) < abs(best[k]) else best[k]
 
 
-def _to_arc(moves: Floats, row: int, x: Floats, y: Floats, best: Floats, first: bool) -> None:
-    ax, ay, bx, by = moves[row, AX], moves[row, AY], moves[row, BX], moves[row, BY]
-    cx, cy, radius, turn = moves[row, CX], moves[row, CY], moves[row, RADIUS], moves[row, TURN]
-    ux, uy, vx, vy = moves[row, UX], moves[row, UY], moves[row, VX], moves[row, VY]
-    above_half, half, over = moves[row, WIDE] != 0.0, 0.5 / radius, 1.0 / radius
+def _to_arc(
+    start: Floats,
+    end: Floats,
+    row: int,
+    arcs: Floats,
+    at: int,
+    x: Floats,
+    y: Floats,
+    best: Floats,
+    first: bool,
+) -> None:
+    ax, ay, bx, by = start[row, 0], start[row, 1], end[row, 0], end[row, 1]
+    cx, cy, radius, turn = arcs[at, CX], arcs[at, CY], arcs[at, RADIUS], arcs[at, TURN]
+    ux, uy, vx, vy = arcs[at, UX], arcs[at, UY], arcs[at, VX], arcs[at, VY]
+    above_half, half, over = arcs[at, WIDE] != 0.0, 0.5 / radius, 1.0 / radius
     for k in range(len(x)):
         px, py = x[k] - cx, y[k] - cy
         inward = -turn * _outside(px, py, radius, half, over)
         to_a = (x[k] - ax) * (x[k] - ax) + (y[k] - ay) * (y[k] - ay)
         to_b = (x[k] - bx) * (x[k] - bx) + (y[k] - by) * (y[k] - by)
-        end = math.copysign(math.sqrt(smaller(to_a, to_b)), inward)
+        at_end = math.copysign(math.sqrt(smaller(to_a, to_b)), inward)
         inside = _depth(ux * py - uy * px, px * vy - py * vx, above_half) >= 0.0
-        error = inward if inside else end
+        error = inward if inside else at_end
         best[k] = error if first or abs(error) < abs(best[k]) else best[k]
 
 
-def lower_errors(moves: Floats, row: int, x: Floats, y: Floats, best: Floats, first: bool) -> None:
-    """Lower `best` (n ≥ 1,) to the errors of the points x, y (n,) against one row of `moves`
-    (K, 16); set it to them when this is the `first` move."""
-    if moves[row, RADIUS] == 0.0:
-        _to_line(moves, row, x, y, best, first)
-    elif moves[row, WIDE] == FULL or _all_in_wedge(moves, row, x, y):
-        _to_circle(moves, row, x, y, best, first)
+def lower_errors(
+    curves: Curves, row: int, x: Floats, y: Floats, best: Floats, first: bool
+) -> None:
+    """Lower `best` (n ≥ 1,) to the errors of the points x, y (n,) against one move; set it to them
+    when this is the `first` one."""
+    at = curves.arc[row]
+    if at < 0:
+        _to_line(curves.start, curves.end, row, x, y, best, first)
+    elif curves.arcs[at, WIDE] == FULL or _all_in_wedge(curves.arcs, at, x, y):
+        _to_circle(curves.arcs, at, x, y, best, first)
     else:
-        _to_arc(moves, row, x, y, best, first)
+        _to_arc(curves.start, curves.end, row, curves.arcs, at, x, y, best, first)
 
 
 def smaller(one: float, other: float) -> float:
@@ -319,10 +352,9 @@ it is along that, and along X and Y."""
 
 
 class Moves(NamedTuple):
-    """K moves: their table (K, 16) of `lower_errors`, heights (K, 2), and the nodes (2L, 6) and
-    order (K,) of `move_tree`."""
+    """K moves, their heights (K, 2), and the nodes (2L, 6) and order (K,) of `move_tree`."""
 
-    table: Floats
+    shapes: Shapes
     heights: Floats
     nodes: Floats
     order: Ints
@@ -333,7 +365,8 @@ class Search:
     were looked at."""
 
     def __init__(self, moves: Moves) -> None:
-        self.table, self.heights, self.nodes, self.order = moves
+        shapes, self.heights, self.nodes, self.order = moves
+        self.curves = Curves(shapes)
         self.found, self.box = np.empty(ENOUGH, dtype=np.int64), np.empty(8)
         self.stack = np.empty(DEPTH, dtype=np.int64)
         self.parts = np.empty(DEPTH, dtype=np.int64)
@@ -360,7 +393,7 @@ def _nearest(
 ) -> int:
     """The move nearest to a point, if it is nearer than `within` mm, else −1; of those first:last
     whose heights overlap z_low … z_high."""
-    table, heights, nodes, order = search.table, search.heights, search.nodes, search.order
+    curves, heights, nodes, order = search.curves, search.heights, search.nodes, search.order
     spot_x, spot_y, spot_error, stack = search.x, search.y, search.error, search.stack
     spot_x[0], spot_y[0] = x, y
     leaves = len(nodes) // 2
@@ -382,7 +415,7 @@ def _nearest(
             k = order[place]
             if _counts(k, first, last, z_low, z_high, heights):
                 search.looked += 1
-                lower_errors(table, k, spot_x, spot_y, spot_error, True)
+                lower_errors(curves, k, spot_x, spot_y, spot_error, True)
                 if abs(spot_error[0]) < best:
                     best, nearest = abs(spot_error[0]), k
     return nearest
@@ -442,20 +475,21 @@ def _node_near(nodes: Floats, node: int, box: Floats) -> bool:
     return bool(abs(beside) <= (reach + 2.0 * box[HALF_WIDE]) * (1.0 + SLACK))
 
 
-def _move_near(table: Floats, k: int, box: Floats) -> bool:
+def _move_near(curves: Curves, k: int, box: Floats) -> bool:
     """Whether a move may have a point in the box. Of an arc, the whole circle is looked at."""
     way_x, way_y, long, wide = box[WAY_X], box[WAY_Y], box[HALF_LONG], box[HALF_WIDE]
-    if table[k, RADIUS] > 0.0:
-        px, py = table[k, CX] - box[MIDDLE_X], table[k, CY] - box[MIDDLE_Y]
+    start, end, arcs, at = curves.start, curves.end, curves.arcs, curves.arc[k]
+    if at >= 0:
+        px, py = arcs[at, CX] - box[MIDDLE_X], arcs[at, CY] - box[MIDDLE_Y]
         along, beside = abs(px * way_x + py * way_y), abs(py * way_x - px * way_y)
         near_long, near_wide = larger(along - long, 0.0), larger(beside - wide, 0.0)
         far_long, far_wide = along + long, beside + wide
-        square = table[k, RADIUS] * table[k, RADIUS]
+        square = arcs[at, RADIUS] * arcs[at, RADIUS]
         if near_long * near_long + near_wide * near_wide > square * (1.0 + SLACK):
             return False
         return bool(far_long * far_long + far_wide * far_wide >= square * (1.0 - SLACK))
-    px, py = table[k, AX] - box[MIDDLE_X], table[k, AY] - box[MIDDLE_Y]
-    to_x, to_y = table[k, DX], table[k, DY]
+    px, py = start[k, 0] - box[MIDDLE_X], start[k, 1] - box[MIDDLE_Y]
+    to_x, to_y = end[k, 0] - start[k, 0], end[k, 1] - start[k, 1]
     beside, across = py * way_x - px * way_y, to_y * way_x - to_x * way_y
     if smaller(beside, beside + across) > wide or larger(beside, beside + across) < -wide:
         return False
@@ -467,15 +501,26 @@ def _move_near(table: Floats, k: int, box: Floats) -> bool:
     return bool(side <= reach + SLACK * (abs(along * across) + abs(beside * further)))
 
 
-def _is_there(table: Floats, found: Ints, count: int, move: int) -> bool:
+def _is_there(curves: Curves, found: Ints, count: int, move: int) -> bool:
     """Whether the move is one of the first `count` found: turns of a circle are the same."""
-    for n in range(count):
-        other, k = found[n], 0
-        while k < COLUMNS and table[other, k] == table[move, k]:
-            k += 1
-        if k == COLUMNS:
-            return True
-    return False
+    n = 0
+    while n < count and not _are_same(curves, found[n], move):
+        n += 1
+    return n < count
+
+
+def _are_same(curves: Curves, one: int, other: int) -> bool:
+    start, end, arcs = curves.start, curves.end, curves.arcs
+    if start[one, 0] != start[other, 0] or start[one, 1] != start[other, 1]:
+        return False
+    if end[one, 0] != end[other, 0] or end[one, 1] != end[other, 1]:
+        return False
+    at, there, k = int(curves.arc[one]), int(curves.arc[other]), 0
+    if at < 0 or there < 0:
+        return at == there
+    while k < COLUMNS and arcs[at, k] == arcs[there, k]:
+        k += 1
+    return k == COLUMNS
 
 
 def _compared(
@@ -491,7 +536,7 @@ def _compared(
 ) -> bool:
     """Lower the errors of the points x, y (n,), whose own move was looked at, to those against
     the nearest move; false where the list is too long for that."""
-    table, heights, nodes, order = search.table, search.heights, search.nodes, search.order
+    curves, heights, nodes, order = search.curves, search.heights, search.nodes, search.order
     stack, found, box = search.stack, search.found, search.box
     _set_box(x, y, errors, box)
     some = len(x)
@@ -518,13 +563,13 @@ def _compared(
                 continue
             search.looked += 1
             # To look for it among more than there are points takes longer than to compare it.
-            if _move_near(table, k, box) and not _is_there(table, found, min(count, some), k):
+            if _move_near(curves, k, box) and not _is_there(curves, found, min(count, some), k):
                 if count == most:
                     return False
                 found[count] = k
                 count += 1
     for n in range(1, count):
-        lower_errors(table, found[n], x, y, errors, False)
+        lower_errors(curves, found[n], x, y, errors, False)
     return True
 
 
@@ -543,7 +588,7 @@ def nearest_errors(
     whose heights overlap z_low … z_high, or of all of these where none does; signed as
     `lower_errors` does, of equally near moves by `own` if it is one. False, and inf, where there
     is none. `own` is the move that the points are expected to follow, or −1."""
-    table, parts, middle = search.table, search.parts, len(x) // 2
+    curves, parts, middle = search.curves, search.parts, len(x) // 2
     if not _counts(own, first, last, z_low, z_high, search.heights):
         far = math.inf
         own = _nearest(x[middle], y[middle], far, first, last, z_low, z_high, search)
@@ -554,7 +599,7 @@ def nearest_errors(
             for k in range(len(x)):
                 out[k] = far
             return False
-    lower_errors(table, own, x, y, out, True)
+    lower_errors(curves, own, x, y, out, True)
     height, parts[0], parts[1] = 2, 0, len(x)
     while height > 0:
         height -= 2
@@ -567,7 +612,7 @@ def nearest_errors(
         within = abs(out[middle])
         k = _nearest(x[middle], y[middle], within, first, last, z_low, z_high, search)
         if k >= 0:
-            lower_errors(table, k, here_x, here_y, here, False)
+            lower_errors(curves, k, here_x, here_y, here, False)
         if not alone:
             parts[height], parts[height + 1] = middle, high
             parts[height + 2], parts[height + 3] = low, middle
@@ -858,7 +903,7 @@ OWN, FIRST, LAST, CIRCLE, SLOT, BESIDE = range(6)
 class Task(NamedTuple):
     """What the N rows from `low` on are judged by.
 
-    own (J, 16) moves of the rows that cut (`lower_errors`), the K moves that are wanted; rows
+    own: the J moves of the rows that cut, and the K moves that are wanted; rows
     (N, 6): which of `own` a row is, −1 where nothing is cut, first and last of the moves that it
     is compared with, the circle that it goes round or −1, the bins of that, and the one of the
     moves that it is expected to follow or −1; window (N, 2)
@@ -868,7 +913,7 @@ class Task(NamedTuple):
     """
 
     low: int
-    own: Floats
+    own: Shapes
     moves: Moves
     rows: Ints
     window: Floats
@@ -895,7 +940,7 @@ class Judge:
     these."""
 
     def __init__(self, task: Task, sums: Sums) -> None:
-        self.low, self.own, self.rows = task.low, task.own, task.rows
+        self.low, self.own, self.rows = task.low, Curves(task.own), task.rows
         self.window, self.off = task.window, task.off
         self.centre, self.directions = task.centre, task.directions
         self.figures, self.histograms, self.bins = sums.rows, sums.histograms, sums.bins

@@ -22,6 +22,9 @@ Ints = npt.NDArray[np.int64]
 FIRST, LAST = 4, 5
 """Columns of a node after its box: the first row below it, and one past the last."""
 
+AT_ONCE = 4096 * LEAF
+"""So many boxes are brought into the tree at a time."""
+
 LEVELS = 16
 """Squares are halved so often: the middles are told apart to a 65,536th of the whole."""
 
@@ -36,18 +39,19 @@ def move_tree(boxes: Floats, group: Ints | None = None) -> tuple[Floats, Ints]:
     while leaves * LEAF < len(boxes):
         leaves *= 2
     # Largest numbers are the least of those with the other sign.
-    lows = np.full((leaves * LEAF, 6), np.inf)
-    lows[: len(order)] = np.column_stack(
-        [boxes[order, :2], -boxes[order, 2:], order, -1.0 - order]
-    )
-    level = lows.reshape(leaves, LEAF, 6).min(axis=1)
     tree = np.full((2 * leaves, 6), np.inf)
-    while True:
-        tree[len(level) : 2 * len(level)] = level
-        if len(level) == 1:
-            break
-        level = np.minimum(level[::2], level[1::2])
-    return tree * (1.0, 1.0, -1.0, -1.0, 1.0, -1.0), order
+    for low in range(0, len(order), AT_ONCE):
+        rows = order[low : low + AT_ONCE]
+        lows = np.column_stack([boxes[rows, :2], -boxes[rows, 2:], rows, -1.0 - rows])
+        first = leaves + low // LEAF
+        begins = np.arange(0, len(rows), LEAF)
+        tree[first : first + len(begins)] = np.minimum.reduceat(lows, begins)
+    while leaves > 1:
+        level = tree[leaves : 2 * leaves]
+        np.minimum(level[::2], level[1::2], out=tree[leaves // 2 : leaves])
+        leaves //= 2
+    tree *= (1.0, 1.0, -1.0, -1.0, 1.0, -1.0)
+    return tree, order
 
 
 def hilbert_order(points: Floats) -> Ints:
@@ -60,7 +64,16 @@ def hilbert_order(points: Floats) -> Ints:
         return np.empty(0, dtype=np.int64)
     low = points.min(axis=0)
     size = max(float((points.max(axis=0) - low).max()), np.finfo(np.float64).tiny)
-    x, y = np.minimum((points - low) / size * 2.0**LEVELS, 2.0**LEVELS - 1.0).astype(np.int64).T
+    place = np.empty(len(points), dtype=np.int64)
+    for first in range(0, len(points), AT_ONCE):
+        here = slice(first, first + AT_ONCE)
+        place[here] = _hilbert_places((points[here] - low) / size)
+    return np.argsort(place, kind="stable")
+
+
+def _hilbert_places(points: Floats) -> Ints:
+    """(K,) where Hilbert's curve comes to points (K, 2) in the square of size 1."""
+    x, y = np.minimum(points * 2.0**LEVELS, 2.0**LEVELS - 1.0).astype(np.int64).T
     place = np.zeros(len(points), dtype=np.int64)
     for level in reversed(range(LEVELS)):
         right, above = (x >> level) & 1, (y >> level) & 1
@@ -68,4 +81,4 @@ def hilbert_order(points: Floats) -> Ints:
         mirror = -(right & ~above & 1)
         x, y = x ^ mirror, y ^ mirror
         x, y = np.where(above == 1, x, y), np.where(above == 1, y, x)
-    return np.argsort(place, kind="stable")
+    return place

@@ -276,7 +276,7 @@ def _written_from_cut(
     known = np.flatnonzero((found.segment >= 0) & ~wrong_depth)
     rest, move = rest[known], found.segment[known]
     share = wanted.shares(part.points[known], move)
-    begin, end = wanted.cuts.ends_z[move].T
+    begin, end = wanted.cuts.heights(move).T
     places = point_at(wanted.cuts.segments, move, share)
     point, _, distance = decoded.within(places, begin + share * (end - begin), limits)
     np.minimum.at(back.distance, rest[point], distance)
@@ -364,7 +364,7 @@ def _repeated_cuts(mine: Side, other: Side, alike: Alike, limits: Limits) -> Ite
     segment = mine.cuts.first[rows]
     half = np.full(len(rows), 0.5)
     middle = point_at(mine.cuts.segments, segment, half)
-    z = mine.cuts.ends_z[segment].mean(axis=1)
+    z = mine.cuts.heights(segment).mean(axis=1)
     point, move, _ = other.moves.within(middle, z, limits)
     moves = np.column_stack([point, other.cuts.segments.path[move]])
     lie = np.bincount(np.unique(moves, axis=0)[:, 0], minlength=len(rows))

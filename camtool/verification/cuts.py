@@ -38,15 +38,30 @@ class CutMoves:
     Arcs run about the programmed centre with the radius of their start; above 180° they are two
     segments. `segments.path` (K,) is the toolpath row; row r owns segments
     first[r]:first[r+1] (`first` (N+1,)). `contour` (N,) is the number of the row's contour, from
-    0, and −1 for rows that do not cut. `ends_z` (K, 2) mm: heights of the segment's start and end,
-    between which its height changes evenly.
+    0, and −1 for rows that do not cut.
     """
 
     toolpath: Toolpath
     segments: Segments
     first: Ints
     contour: Ints
-    ends_z: Floats
+
+    def heights(self, which: Ints) -> Floats:
+        """(J, 2) mm: the heights of the starts and ends of these segments, between which their
+        height changes evenly: the segments of a row are equal parts of it."""
+        row = self.segments.path[which]
+        begin, end = self.toolpath.starts_of(row)[:, 2], self.toolpath.end[row, 2]
+        of = self.first[row + 1] - self.first[row]
+        part = which - self.first[row]
+        rise = (end - begin)[:, None] * np.column_stack([part, part + 1])
+        # Level moves stay level exactly.
+        level = (begin == end)[:, None]
+        return np.where(level, begin[:, None], begin[:, None] + rise / of[:, None])
+
+    @property
+    def ends_z(self) -> Floats:
+        """(K, 2) mm: heights of each segment's start and end."""
+        return self.heights(np.arange(len(self.segments)))
 
     @property
     def z(self) -> Floats:
@@ -56,7 +71,8 @@ class CutMoves:
     @property
     def slopes(self) -> Bools:
         """(K,) true where the height changes along a segment."""
-        return np.asarray(self.ends_z[:, 0] != self.ends_z[:, 1])
+        begin, end = self.ends_z.T
+        return np.asarray(begin != end)
 
     @property
     def rows(self) -> Ints:
@@ -124,19 +140,7 @@ def cut_moves(toolpath: Toolpath, *, flat_cuts: bool) -> CutMoves:
     first[rows + 1] = parts
     segments = _segments(toolpath, rows, sweep, parts)
     contour = _contours(toolpath, cutting)
-    return CutMoves(toolpath, segments, np.cumsum(first), contour, _heights(toolpath, rows, parts))
-
-
-def _heights(toolpath: Toolpath, rows: Ints, parts: Ints) -> Floats:
-    """(K, 2) mm: heights at the ends of the equal parts of each row."""
-    row = np.repeat(rows, parts)
-    part = np.arange(len(row)) - np.repeat(np.cumsum(parts) - parts, parts)
-    begin, end = toolpath.starts[row, 2], toolpath.end[row, 2]
-    of = np.repeat(parts, parts)
-    ends = (
-        begin[:, None] + (end - begin)[:, None] * np.column_stack([part, part + 1]) / of[:, None]
-    )
-    return np.asarray(np.where((begin == end)[:, None], begin[:, None], ends))
+    return CutMoves(toolpath, segments, np.cumsum(first), contour)
 
 
 def _segments(toolpath: Toolpath, rows: Ints, sweep: Floats, parts: Ints) -> Segments:
@@ -234,7 +238,7 @@ def _samples(cuts: CutMoves, which: Ints, parts: Ints) -> Samples:
     owner = np.repeat(np.arange(len(parts)), parts + 1)
     within = np.arange(len(owner)) - np.repeat(np.cumsum(parts + 1) - parts - 1, parts + 1)
     share, segment = within / parts[owner], which[owner]
-    begin, end = cuts.ends_z[segment].T
+    begin, end = cuts.heights(which)[owner].T
     # Level moves stay level exactly: rounding must not turn them into slopes.
     z = np.where(begin == end, begin, begin + share * (end - begin))
     return Samples(point_at(cuts.segments, segment, share), segment, z, share)

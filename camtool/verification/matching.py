@@ -61,7 +61,8 @@ def own_match(cuts: CutMoves, circles: list[Circle]) -> Match:
     count = len(cuts.contour)
     row = np.where(cuts.is_cut, np.arange(count), -1)
     circle = _circle_of_row(circles, count)
-    return Match(row, cuts.contour, cuts.contour, circle, np.zeros((count, 2)))
+    none_off = np.broadcast_to(np.zeros(2), (count, 2))
+    return Match(row, cuts.contour, cuts.contour, circle, none_off)
 
 
 def carried_match(match: Match, of: Ints, goal: Goal) -> Match:

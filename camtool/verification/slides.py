@@ -19,6 +19,7 @@ import numpy as np
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import ProgramError
 from camtool.geometry.measure import segment_boxes
+from camtool.geometry.polylines import Segments
 from camtool.progress import Progress
 from camtool.simulation.controller import FusedRun
 from camtool.simulation.motion import Chunk
@@ -40,7 +41,7 @@ from camtool.verification.matching import Match
 from camtool.verification.nearest import ANY_CONTOUR, run_peaks
 
 if TYPE_CHECKING:
-    from camtool.kernels.judging import Sums, Task
+    from camtool.kernels.judging import Shapes, Sums, Task
 
 
 BINS_KEPT = 64
@@ -205,10 +206,13 @@ class Tasks:
 
         self._paths, self._match = paths, match
         self._slot = np.append(slot, -1)  # the last one is for none, −1
-        wanted = move_table(paths.wanted)
+        self._rows = paths.wanted.rows
+        contour = paths.wanted.contour[self._rows]
+        self._begins = np.searchsorted(contour, np.arange(paths.wanted.contour_count + 1))
         known = bool((match.only[paths.decoded.is_cut] != ANY_CONTOUR).all())
-        tree = move_tree(wanted.boxes, wanted.contour if known else None)
-        self._contour, self._moves = wanted.contour, Moves(wanted.moves, wanted.heights, *tree)
+        tree = move_tree(move_boxes(paths.wanted), contour if known else None)
+        every = shapes(paths.wanted, 0, len(paths.wanted.contour))
+        self._moves = Moves(every, move_heights(paths.wanted), *tree)
         self._centre = np.array([circle.centre_mm for circle in paths.circles]).reshape(-1, 2)
         self._directions = bin_directions()
 
@@ -217,30 +221,30 @@ class Tasks:
         from camtool.kernels.judging import Task
 
         match, toolpath, rows = self._match, self._paths.decoded.toolpath, np.arange(low, high)
-        own, of_row = _part_of_table(self._paths.decoded, low, high)
+        cuts = self._paths.decoded.is_cut[low:high]
+        of_row = np.where(cuts, np.cumsum(cuts) - 1, -1)
         circle, beside = match.circle[low:high], match.row[low:high]
-        beside = np.where(beside >= 0, np.searchsorted(self._paths.wanted.rows, beside), -1)
+        beside = np.where(beside >= 0, np.searchsorted(self._rows, beside), -1)
         ends = np.column_stack([toolpath.starts_of(rows)[:, 2], toolpath.end[low:high, 2]])
         depth_mm = self._paths.depth_mm
         return Task(
             low=low,
-            own=own.moves,
+            own=shapes(self._paths.decoded, low, high),
             moves=self._moves,
             rows=np.column_stack(
                 [of_row, self._ranges(match.only[low:high]), circle, self._slot[circle], beside]
             ),
             window=np.sort(ends, axis=1) + np.array([-depth_mm, depth_mm]),
-            off=np.ascontiguousarray(match.off_mm[low:high, 0]),
+            off=match.off_mm[low:high, 0].copy(),
             centre=self._centre,
             directions=self._directions,
         )
 
     def _ranges(self, only: Ints) -> Ints:
         """(R, 2) begin and end (not included) of the contours `only` (R,), or of all moves."""
-        low = np.searchsorted(self._contour, only, side="left")
-        high = np.searchsorted(self._contour, only, side="right")
         every = only == ANY_CONTOUR
-        low, high = np.where(every, 0, low), np.where(every, len(self._contour), high)
+        low = np.where(every, 0, self._begins[only])
+        high = np.where(every, len(self._rows), self._begins[np.where(every, 0, only + 1)])
         return np.column_stack([low, high])
 
 
@@ -290,76 +294,68 @@ def _in_order(first: Ints, last: Ints) -> Iterator[int]:
 # Cutting moves as columns for the compiled judge: one move for each row that cuts.
 
 
-@dataclass(frozen=True, eq=False)
-class MoveTable:
-    """The J of some rows of a toolpath that cut: `moves` (J, 16) of `camtool.kernels.judging`,
-    `boxes` (J, 4), `heights` (J, 2) mm, `contour` (J,) ascending."""
-
-    moves: Floats
-    boxes: Floats
-    heights: Floats
-    contour: Ints
-
-
-def move_table(cuts: CutMoves) -> MoveTable:
-    """The columns of all moves that cut."""
-    from camtool.kernels import judging as at
-
-    count, rows = int(cuts.is_cut.sum()), len(cuts.contour)
-    table = MoveTable(
-        np.empty((count, at.COLUMNS)),
-        np.empty((count, 4)),
-        np.empty((count, 2)),
-        np.empty(count, dtype=np.int64),
-    )
+def _blocks(cuts: CutMoves) -> Iterator[tuple[slice, int, int]]:
+    """The places of the moves that cut in blocks of rows low:high, and these rows."""
     done = 0
-    for low in range(0, rows, ROWS_AT_ONCE):
-        part, _ = _part_of_table(cuts, low, min(low + ROWS_AT_ONCE, rows))
-        here = slice(done, done + len(part.moves))
-        table.moves[here], table.boxes[here] = part.moves, part.boxes
-        table.heights[here], table.contour[here] = part.heights, part.contour
-        done = here.stop
-    return table
+    for low in range(0, len(cuts.contour), ROWS_AT_ONCE):
+        high = min(low + ROWS_AT_ONCE, len(cuts.contour))
+        count = int((cuts.contour[low:high] >= 0).sum())
+        yield slice(done, done + count), low, high
+        done += count
 
 
-def _part_of_table(cuts: CutMoves, low: int, high: int) -> tuple[MoveTable, Ints]:
-    """The columns of those of the rows low:high (R,) that cut, and which of them (R,) each row
-    is, −1 for none."""
+def move_heights(cuts: CutMoves) -> Floats:
+    """(J, 2) mm: the lowest and highest points of the moves that cut."""
+    found = np.empty((int(cuts.is_cut.sum()), 2))
+    for here, low, high in _blocks(cuts):
+        _, first, last = _part(cuts, low, high)
+        z = np.sort(cuts.heights(np.arange(cuts.first[low], cuts.first[high])), axis=1)
+        found[here, 0] = np.minimum(z[first, 0], z[last, 0])
+        found[here, 1] = np.maximum(z[first, 1], z[last, 1])
+    return found
+
+
+def move_boxes(cuts: CutMoves) -> Floats:
+    """(J, 4) mm: the boxes of the moves that cut."""
+    found = np.empty((int(cuts.is_cut.sum()), 4))
+    for here, low, high in _blocks(cuts):
+        segments, first, last = _part(cuts, low, high)
+        boxes = segment_boxes(segments)
+        found[here, :2] = np.minimum(boxes[first, :2], boxes[last, :2])
+        found[here, 2:] = np.maximum(boxes[first, 2:], boxes[last, 2:])
+    return found
+
+
+def _part(cuts: CutMoves, low: int, high: int) -> tuple[Segments, Ints, Ints]:
+    """The segments of the rows low:high, and which of them are the first and the last (J,), (J,)
+    of each row that cuts."""
+    begin, end = int(cuts.first[low]), int(cuts.first[high])
+    rows = low + np.flatnonzero(cuts.contour[low:high] >= 0)
+    return cuts.segments[begin:end], cuts.first[rows] - begin, cuts.first[rows + 1] - 1 - begin
+
+
+def shapes(cuts: CutMoves, low: int, high: int) -> Shapes:
+    """Those of the rows low:high that cut, one move for each."""
     from camtool.kernels import judging as at
 
-    here = slice(int(cuts.first[low]), int(cuts.first[high]))
-    segments, ends_z, toolpath = cuts.segments[here], cuts.ends_z[here], cuts.toolpath
-    rows = low + np.flatnonzero(cuts.contour[low:high] >= 0)
-    first, last = cuts.first[rows] - here.start, cuts.first[rows + 1] - 1 - here.start
-    start, end = segments.start[first], segments.end[last]
-    is_arc, centre = segments.is_arc[first], segments.centre[first]
-    sweep = np.abs(segments.sweep[first]) * (last - first + 1)
-    turn = np.where(segments.bulge[first] < 0.0, -1.0, 1.0)
-    chord = end - start
-    square = (chord**2).sum(axis=1)
-    closed = (toolpath.starts_of(rows)[:, :2] == toolpath.end[rows, :2]).all(axis=1)
-    moves = np.zeros((len(rows), at.COLUMNS))
-    moves[:, [at.AX, at.AY]], moves[:, [at.BX, at.BY]] = start, end
-    moves[:, [at.DX, at.DY]] = chord
-    moves[:, at.OVER] = 1.0 / np.where(square > 0.0, square, 1.0)
-    moves[:, at.TURN] = turn
-    arcs = np.flatnonzero(is_arc)
-    moves[arcs, at.RADIUS] = segments.radius[first[arcs]]
-    spokes = centre, turn[:, None] * (start - centre), turn[:, None] * (end - centre)
-    for x, y, place in zip((at.CX, at.UX, at.VX), (at.CY, at.UY, at.VY), spokes, strict=True):
-        moves[arcs, x], moves[arcs, y] = place[arcs].T
-    moves[arcs, at.WIDE] = np.where(closed, at.FULL, (sweep > np.pi).astype(float))[arcs]
-    boxes = segment_boxes(segments)
-    least = np.minimum(boxes[first, :2], boxes[last, :2])
-    most = np.maximum(boxes[first, 2:], boxes[last, 2:])
-    z = np.sort(ends_z, axis=1)
-    heights = np.column_stack(
-        [np.minimum(z[first, 0], z[last, 0]), np.maximum(z[first, 1], z[last, 1])]
-    )
-    of_row = np.full(high - low, -1, dtype=np.int64)
-    of_row[rows - low] = np.arange(len(rows))
-    both = np.concatenate([least, most], axis=1)
-    return MoveTable(moves, both, heights, cuts.contour[rows]), of_row
+    segments, first, last = _part(cuts, low, high)
+    start, end = segments.start, segments.end
+    if len(first) < len(segments):
+        start, end = start[first], end[last]
+    arcs = np.flatnonzero(segments.bulge[first])
+    which, bent = np.full(len(first), -1, dtype=np.int32), segments[first[arcs]]
+    which[arcs] = np.arange(len(arcs))
+    sweep = np.abs(bent.sweep) * (last - first + 1)[arcs]
+    turn = np.where(bent.bulge < 0.0, -1.0, 1.0)
+    toolpath = cuts.toolpath
+    closed = (toolpath.starts_of(bent.path)[:, :2] == toolpath.end[bent.path, :2]).all(axis=1)
+    table = np.empty((len(arcs), at.COLUMNS))
+    table[:, [at.CX, at.CY]] = bent.centre
+    table[:, at.RADIUS], table[:, at.TURN] = bent.radius, turn
+    table[:, [at.UX, at.UY]] = turn[:, None] * (start[arcs] - bent.centre)
+    table[:, [at.VX, at.VY]] = turn[:, None] * (end[arcs] - bent.centre)
+    table[:, at.WIDE] = np.where(closed, at.FULL, (sweep > np.pi).astype(float))
+    return at.Shapes(start, end, which, table)
 
 
 # The path of the slides, thinned for pictures to a bounded number of points.

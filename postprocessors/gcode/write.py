@@ -19,7 +19,7 @@ from typing import Final
 import msgspec
 import numpy as np
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Ints
 from camtool.errors import PostError
 from camtool.findings import Finding
 from camtool.machine.model import Machine
@@ -78,8 +78,6 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
     arcs = arcs_of(toolpath, dialect)
     events = events_of(toolpath, style.event)
     sent = sent_rows(toolpath, arcs, feeds)
-    arc_counts = arcs.counts
-    del arcs
     frame = [style.frame] if style.frame else []
     first_mode, changes = _path_modes(toolpath, sent, style)
     ended = len(toolpath) > 0 and toolpath.kind[-1] == Kind.END
@@ -100,7 +98,7 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
                 f"{line}\n".encode("ascii")
                 for line in [*frame, *_header(toolpath, machine, dialect)]
             ),
-            order.text(sent, dialect, feed_decimals(machine), *comments),
+            order.text(sent, dialect, feed_decimals(machine), comments),
             *(f"{line}\n".encode("ascii") for line in frame),
         ]
     )
@@ -111,7 +109,7 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
         of_row,
         (
             *rounded_feeds,
-            *_arc_findings(toolpath, arc_counts, sent.dropped),
+            *_arc_findings(toolpath, arcs.counts, sent.dropped),
             *_rounded(toolpath, events.rounded),
         ),
     )
@@ -161,11 +159,9 @@ class Order:
         sent: Sent,
         dialect: GcodeDialect,
         feed_decimals: int,
-        commented: Ints,
-        comment_at: Callable[[int], str],
+        comments: Mapping[int, Sequence[str]],
     ) -> bytes:
-        """All blocks, with C lines of comments, the k-th before block commented[k] (from 0); these
-        ascend."""
+        """All blocks, with lines of comments before block k (from 0)."""
         others, before = self._sorted()
         at = np.array([at for at, _, _ in others], dtype=np.int64)
         number = before + np.arange(1, len(others) + 1)
@@ -174,26 +170,19 @@ class Order:
             every = np.arange(len(sent.row))
             mine = self._before[1:] + np.searchsorted(at, every, side="right")
             columns.insert(0, Words("N", mine, sent.is_motion))
+        lines = []
+        for (row, block, _), own in zip(others, number.tolist(), strict=True):
+            lines += [(row, 0, comment) for comment in comments.get(own - 1, ())]
+            lines.append((row, 0, f"N{own} {block}" if dialect.block_numbers else block))
         motions = np.flatnonzero(self._is_motion)
         blocks = self._before[motions] + np.searchsorted(at, motions, side="right")
-        # In front of a row: the other blocks, each behind its comments; then those of a motion.
-        other, motion = (np.searchsorted(each, commented) for each in (number - 1, blocks))
-        moves = np.isin(commented, blocks)
-        place, rank = np.empty(len(commented), dtype=np.int64), 2 * other
-        place[moves], place[~moves] = motions[motion[moves]], at[other[~moves]]
-        rank[moves] = 2 * len(others)
-        rows = np.append(at, place)
-        order = np.lexsort((np.append(2 * np.arange(len(others)) + 1, rank), rows))
-
-        def lines() -> Iterator[tuple[int, str]]:
-            for k, row in zip(order.tolist(), rows[order].tolist(), strict=True):
-                if k >= len(others):
-                    yield row, comment_at(k - len(others))
-                else:
-                    block = others[k][1]
-                    yield row, f"N{number[k]} {block}" if dialect.block_numbers else block
-
-        return texts_of(columns, blanks=True).with_lines(lines())
+        known = np.array(list(comments), dtype=np.int64)
+        place = np.searchsorted(blocks, known)
+        for block, k in zip(known.tolist(), place.tolist(), strict=True):
+            if k < len(blocks) and blocks[k] == block:
+                lines += [(int(motions[k]), 1, comment) for comment in comments[block]]
+        lines.sort(key=lambda line: line[:2])
+        return texts_of(columns, blanks=True).with_lines((row, text) for row, _, text in lines)
 
 
 def _footer(toolpath: Toolpath, events: Events, dialect: GcodeDialect) -> list[str]:
@@ -233,26 +222,25 @@ def _digest(machine: Machine) -> str:
     return hashlib.sha256(msgspec.json.encode(machine)).hexdigest()[:8]
 
 
-def _comments(toolpath: Toolpath, of_row: Ints, style: Style) -> tuple[Ints, Callable[[int], str]]:
-    """The lines of comments, messages and the names of contours where they begin: the block
-    (by index, from 0) that each stands before (C,), and the text of the k-th; `of_row` (B,) the
-    rows of the blocks."""
-    begins = np.empty(0, dtype=np.int64)
+def _comments(toolpath: Toolpath, of_row: Ints, style: Style) -> dict[int, list[str]]:
+    """Messages, and the name of each contour, as lines before blocks (by index, from 0); of_row
+    (B,) the rows of the blocks."""
+    wanted: dict[int, list[str]] = {}
     if style.dialect.comments == "contours":
         motions = np.flatnonzero(toolpath.is_motion)
         named = toolpath.source[motions]
-        begins = motions[(np.diff(named, prepend=-1) != 0) & (named >= 0)]
-    rows = np.sort(np.concatenate([begins, np.flatnonzero(toolpath.kind == Kind.MESSAGE)]))
+        begins = (np.diff(named, prepend=-1) != 0) & (named >= 0)
+        for row in motions[begins].tolist():
+            wanted.setdefault(row, []).append(comment(toolpath.text(row)))
+    for row in np.flatnonzero(toolpath.kind == Kind.MESSAGE).tolist():
+        wanted.setdefault(row, []).append(_message(toolpath, row, style))
+    rows = sorted(wanted)
     # The comments of a row that was left out stand before the next block that is sent.
     blocks = np.searchsorted(np.maximum.accumulate(of_row), rows)
-
-    def text(k: int) -> str:
-        row = int(rows[k])
-        if toolpath.kind[row] == Kind.MESSAGE:
-            return _message(toolpath, row, style)
-        return comment(toolpath.text(row))
-
-    return np.minimum(blocks, len(of_row) - 1), text
+    found: dict[int, list[str]] = {}
+    for row, block in zip(rows, np.minimum(blocks, len(of_row) - 1).tolist(), strict=True):
+        found.setdefault(block, []).extend(wanted[row])
+    return found
 
 
 def _message(toolpath: Toolpath, row: int, style: Style) -> str:
@@ -326,24 +314,22 @@ class Sent:
 
 def sent_rows(toolpath: Toolpath, arcs: Arcs, feeds: Ints) -> Sent:
     """All rows with pieces in place of arcs, without moves that move nothing."""
-    of, kind, end, offset = np.arange(len(toolpath)), arcs.kind, arcs.end, arcs.offset
-    if arcs.pieces:
-        many = np.ones(len(toolpath), dtype=np.int64)
-        for row, pieces in arcs.pieces.items():
-            many[row] = len(pieces)
-        of = np.repeat(of, many)
-        kind, end, offset = kind[of], end[of], offset[of]
-        first = np.cumsum(many) - many
-        for row, pieces in arcs.pieces.items():
-            sunk = int(arcs.end[row - 1, 2]) if row else 0
-            rise = int(arcs.end[row, 2]) - sunk
-            for at, piece in enumerate(pieces, int(first[row])):
-                height = sunk + round(rise * piece.share)
-                kind[at], end[at], offset[at] = piece.kind, (*piece.end, height), piece.offset
+    many = np.ones(len(toolpath), dtype=np.int64)
+    for row, pieces in arcs.pieces.items():
+        many[row] = len(pieces)
+    of = np.repeat(np.arange(len(toolpath)), many)
+    kind, end, offset = arcs.kind[of], arcs.end[of], arcs.offset[of]
+    first = np.cumsum(many) - many
+    for row, pieces in arcs.pieces.items():
+        sunk = int(arcs.end[row - 1, 2]) if row else 0
+        rise = int(arcs.end[row, 2]) - sunk
+        for at, piece in enumerate(pieces, int(first[row])):
+            height = sunk + round(rise * piece.share)
+            kind[at], end[at], offset[at] = piece.kind, (*piece.end, height), piece.offset
+    before = np.concatenate([np.zeros((1, 3), dtype=np.int64), end])[: len(end)]
     motion = kind <= Kind.ARC_CCW
     is_arc = motion & (kind >= Kind.ARC_CW)
-    written = _differ(end, np.zeros(3))
-    written[~motion] = False
+    written = (end != before) & motion[:, None]
     home_xy, home_z = kind == Kind.HOME_XY, kind == Kind.HOME_Z
     flat = written[:, :2].any(axis=1) | is_arc
     # A rapid to where X and Y should be already is not left out before they were ever written.
@@ -352,7 +338,7 @@ def sent_rows(toolpath: Toolpath, arcs: Arcs, feeds: Ints) -> Sent:
     still &= _not_yet_written(flat | still, home_xy)
     both = is_arc | still | (flat & _not_yet_written(flat | still, home_xy))
     written[both, :2] = True
-    wanted = np.asarray(_differ(toolpath.end, toolpath.start).any(axis=1))[of]
+    wanted = (toolpath.end != toolpath.starts).any(axis=1)[of]
     kept = ~motion | written.any(axis=1)
     homes = np.cumsum(home_xy | home_z)[kept]
     return Sent(
@@ -365,13 +351,6 @@ def sent_rows(toolpath: Toolpath, arcs: Arcs, feeds: Ints) -> Sent:
         np.diff(_at_motions(homes, motion[kept]), prepend=0) > 0,
         int((~kept & wanted).sum()) + arcs.counts.dropped,
     )
-
-
-def _differ(ends: Ints | Floats, start: Floats) -> Bools:
-    """(M, 3) where ends (M, 3) are not those of the row before, of the first not the start."""
-    differ = np.empty(ends.shape, dtype=np.bool_)
-    differ[:1], differ[1:] = ends[:1] != start, ends[1:] != ends[:-1]
-    return differ
 
 
 def _not_yet_written(written: Bools, home: Bools) -> Bools:

@@ -31,6 +31,7 @@ from tests.oracles.kernel_doors import (
     lower_errors_,
     nearest_errors_,
     set_errors_,
+    shapes,
 )
 from tests.oracles.near_moves import Arc, Line, Move, nearest, random_move
 
@@ -160,7 +161,7 @@ def test_the_nearest_of_many_is_that_of_a_loop(size: float, count: int) -> None:
         out = np.empty(40)
         own = int(rng.integers(-1, count))
         only = (first, last, *window)
-        known, _ = nearest_errors_(x, y, own, only, Moves(table, heights, *tree), out)
+        known, _ = nearest_errors_(x, y, own, only, Moves(shapes(table), heights, *tree), out)
         high = [
             k
             for k in range(first, last)
@@ -203,7 +204,9 @@ def test_points_along_lines_that_cross(
     out = np.empty(count)
     expected = chance.choice([own, -1, chance.randrange(len(moves))])
     whole = (0, len(moves), 0.0, 0.0)
-    nearest_errors_(x, y, expected, whole, Moves(table, np.zeros((len(moves), 2)), *tree), out)
+    nearest_errors_(
+        x, y, expected, whole, Moves(shapes(table), np.zeros((len(moves), 2)), *tree), out
+    )
     wanted = [abs(nearest(moves, *point)) for point in zip(x.tolist(), y.tolist(), strict=True)]
     assert np.abs(out) == pytest.approx(np.array(wanted), abs=1e-9)
 
@@ -216,7 +219,7 @@ def test_of_equally_near_moves_the_own_one_gives_the_side() -> None:
     x, y, out = np.array([2.0, 3.0]), np.array([0.5, 0.5]), np.empty(2)
     for own, error in ((0, 0.5), (1, -0.5)):
         whole = (0, 2, 0.0, 0.0)
-        nearest_errors_(x, y, own, whole, Moves(table, np.zeros((2, 2)), *tree), out)
+        nearest_errors_(x, y, own, whole, Moves(shapes(table), np.zeros((2, 2)), *tree), out)
         assert out.tolist() == [error, error]
 
 
@@ -259,7 +262,7 @@ def test_a_search_in_a_spiral_looks_at_few_of_its_turns() -> None:
     table = np.array([line.row() for line in lines], dtype=np.float64)
     heights, out = np.zeros((len(lines), 2)), np.empty(1)
     boxes = np.array([line.box() for line in lines])
-    moves = Moves(table, heights, *move_tree(boxes))
+    moves = Moves(shapes(table), heights, *move_tree(boxes))
     looked = []
     for k in range(100, 8000, 700):
         at, whole = np.array([[places[k][0]], [places[k][1]]]), (0, len(lines), 0.0, 0.0)
@@ -276,7 +279,7 @@ def test_a_search_in_one_scribble_of_many_looks_at_no_others() -> None:
     scribble, boxes = np.arange(2000) // 40, np.array([line.box() for line in lines])
     looked = []
     for group in (None, scribble):
-        moves = Moves(table, heights, *move_tree(boxes, group))
+        moves = Moves(shapes(table), heights, *move_tree(boxes, group))
         for k in range(0, 2000, 97):
             x, y = np.array([lines[k].a]).T.copy()
             only = (40 * int(scribble[k]), 40 * int(scribble[k]) + 40, 0.0, 0.0)
@@ -292,7 +295,9 @@ def test_points_of_a_row_look_at_their_surroundings_alone() -> None:
     lines = [Line((0.0, 0.1 * k), (50.0, 0.1 * k)) for k in range(20_000)]
     table = np.array([line.row() for line in lines], dtype=np.float64)
     moves = Moves(
-        table, np.zeros((len(lines), 2)), *move_tree(np.array([line.box() for line in lines]))
+        shapes(table),
+        np.zeros((len(lines), 2)),
+        *move_tree(np.array([line.box() for line in lines])),
     )
     x, y, out = np.linspace(0.0, 50.0, 700), np.full(700, 1000.001), np.empty(700)
     _, looked = nearest_errors_(x, y, 10_000, (0, len(lines), 0.0, 0.0), moves, out)

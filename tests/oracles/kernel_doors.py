@@ -2,19 +2,37 @@
 
 import numpy as np
 
-from camtool.kernels.judging import Moves, Search, fill_bins, lower_errors, nearest_errors
+from camtool.kernels.judging import (
+    Curves,
+    Moves,
+    Search,
+    Shapes,
+    fill_bins,
+    lower_errors,
+    nearest_errors,
+)
 
 
 def fill_bins_(x, y, centre, directions, bins):
     fill_bins(x, y, *centre, directions, bins, *np.empty((3, len(x))))
 
 
+def shapes(table):
+    """Moves (K, 16): start, end, way, 1 / way², and of arcs centre, radius, turn, the normals into
+    the wedge, and how wide it is."""
+    arc = np.flatnonzero(table[:, 9] > 0.0)
+    which = np.full(len(table), -1, dtype=np.int32)
+    which[arc] = np.arange(len(arc))
+    ends = (np.ascontiguousarray(table[:, k : k + 2], dtype=np.float64) for k in (0, 2))
+    return Shapes(*ends, which, np.ascontiguousarray(table[arc, 7:], dtype=np.float64))
+
+
 def lower_errors_(move, x, y, best):
-    lower_errors(np.atleast_2d(move), 0, x, y, best, False)
+    lower_errors(Curves(shapes(np.atleast_2d(move))), 0, x, y, best, False)
 
 
 def set_errors_(move, x, y, best):
-    lower_errors(np.atleast_2d(move), 0, x, y, best, True)
+    lower_errors(Curves(shapes(np.atleast_2d(move))), 0, x, y, best, True)
 
 
 def nearest_errors_(x, y, own, only, moves: Moves, out):

@@ -36,10 +36,10 @@ def near_moves(
     """(segment, distance) of all moves within the limits in XY and in height, in order."""
     limit_mm, window_mm = limits_mm
     found = []
-    lengths = segment_lengths(cuts.segments)
+    lengths, ends_z = segment_lengths(cuts.segments), cuts.ends_z
     for k in range(len(cuts.segments)):
         share, distance = share_and_distance(point, cuts.segments, k)
-        low, high = cuts.ends_z[k]
+        low, high = ends_z[k]
         slope = abs(high - low) / lengths[k] if lengths[k] > 0.0 else 0.0
         off = abs(low + share * (high - low) - height)
         if distance <= limit_mm and off <= window_mm * (1.0 + slope):

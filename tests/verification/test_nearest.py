@@ -20,14 +20,15 @@ DENSE = 4000
 
 
 def index_of(segments: Segments, z: np.ndarray | None = None) -> MoveIndex:
-    """The segments as moves of one row each, every one a contour of its own."""
-    count = len(segments)
-    path = ToolpathBuilder().rapid(x=0.0)
-    for _ in range(count - 1):
-        path.rapid(x=0.0)
-    own = Segments.between(segments.start, segments.end, segments.bulge, np.arange(count))
-    heights = np.full((count, 2), -1.0) if z is None else z
-    return MoveIndex(CutMoves(path.finish(), own, np.arange(count + 1), np.arange(count), heights))
+    """The segments as moves of one row each, every one a contour of its own; the rows between
+    them change the height."""
+    rows = np.arange(2 * len(segments))
+    path = ToolpathBuilder()
+    for begin, end in np.full((len(segments), 2), -1.0) if z is None else z:
+        path.rapid(z=begin).rapid(z=end)
+    own = Segments.between(segments.start, segments.end, segments.bulge, rows[1::2])
+    first = np.arange(len(rows) + 1) // 2
+    return MoveIndex(CutMoves(path.finish(), own, first, np.where(rows % 2, rows // 2, -1)))
 
 
 def distance_of(point: tuple[float, float], segments: Segments) -> float:
