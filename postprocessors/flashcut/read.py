@@ -150,7 +150,8 @@ class _Reader:
         if count == 0:
             return 0
         self.blocks += count
-        for at in np.flatnonzero(plain.has(words.F_WORD)[:count]).tolist():
+        given = plain.has(words.F_WORD)[:count]
+        for at in np.flatnonzero(given & (moves.feed[:count] > self._max_feed)).tolist():
             if exceeds(float(moves.feed[at]), self._max_feed):
                 self._fast.add(plain.first + at, float(moves.feed[at]))
         self._feed = float(moves.feed[count - 1])

@@ -21,7 +21,7 @@ from camtool import bounds
 from camtool.arrays import Bools, Floats
 from camtool.findings import Finding
 from camtool.kernels import words
-from camtool.machine.model import Machine, exceeds
+from camtool.machine.model import FEED_TOLERANCE, Machine
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, PathMode, Toolpath
 
@@ -193,12 +193,8 @@ class ModalReader:
         moves = PlainMoves(plain, self._state(), self._rules)
         count = moves.count
         rows = moves.moving[:count]
-        feeds = moves.feed[:count]
-        limit = self._findings.max_feed_mm_min
-        fast = np.flatnonzero(plain.has(words.F_WORD)[:count] & (feeds > limit)).tolist()
-        self._findings.fast += [
-            (plain.first + at, float(feeds[at])) for at in fast if exceeds(float(feeds[at]), limit)
-        ]
+        given, feeds = plain.has(words.F_WORD), moves.feed[:count]
+        self._findings.note_feeds(plain.first, np.where(given[:count], feeds, np.nan))
         if count:
             self.empty = False
             last = int(moves.motion[count - 1])
@@ -320,8 +316,7 @@ class ModalReader:
     def _set_feed(self, block: Block, feed: float) -> None:
         if feed <= 0.0:
             block.fail_at("F", "a feed that is not above 0")
-        if exceeds(feed, self._findings.max_feed_mm_min):
-            self._findings.fast.append((block.index, feed))
+        self._findings.note_feeds(block.index, np.array([feed]))
         self._feed = feed
 
     def _dwell(self, block: Block, numbers: dict[str, float]) -> None:
@@ -642,24 +637,34 @@ def turn_of(start: Point, end: Point, centre: Point) -> float:
 
 @dataclass
 class ReadFindings:
-    """Blocks (index from 0) of one run of a reader; `fast` with their feeds, mm/min."""
+    """Blocks (index from 0) of one run of a reader; `fast`: how many have a feed above the limit,
+    the first of them, and the highest feed, mm/min."""
 
     max_feed_mm_min: float
-    fast: list[tuple[int, float]] = field(default_factory=list)
+    fast: tuple[int, int, float] = (0, 0, 0.0)
     coolant: list[int] = field(default_factory=list)
     pauses: list[int] = field(default_factory=list)
     speedless: list[int] = field(default_factory=list)
     behind_end: tuple[int, int] | None = None
     """How many lines stand behind the end, and the first of them (from 1)."""
 
+    def note_feeds(self, first: int, feeds: Floats) -> None:
+        """The feeds (K,) that blocks from this one on give, NaN where they give none."""
+        fast = np.flatnonzero(feeds > self.max_feed_mm_min * (1.0 + FEED_TOLERANCE))
+        if len(fast):
+            count, begin, most = self.fast
+            begin = begin if count else first + int(fast[0])
+            self.fast = count + len(fast), begin, max(most, float(feeds[fast].max()))
+
     def findings(self) -> Iterator[Finding]:
         """One finding of each kind."""
-        if self.fast:
+        count, first, most = self.fast
+        if count:
             yield FEED_ABOVE_LIMIT_IN_WORDS(
-                where=f"block {self.fast[0][0] + 1}",
-                measured=max(feed for _, feed in self.fast),
+                where=f"block {first + 1}",
+                measured=most,
                 limit=self.max_feed_mm_min,
-                count=len(self.fast),
+                count=count,
             )
         if self.speedless:
             yield SPINDLE_SPEED_NOT_SAID(where=f"block {self.speedless[0] + 1}")

@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import ProgramError
+from camtool.findings import Code
 from camtool.target.registry import load_target
 from camtool.toolpath.moves import COLUMNS, Toolpath
 
@@ -138,3 +139,20 @@ def test_numbers_are_the_nearest_floats() -> None:
     target = load_target("linuxcnc")
     path = target.target.read(data, target.machine)
     assert path.end[1:-1, 0].tolist() == [float(text) for text in texts]
+
+
+@pytest.mark.parametrize("name", ["grbl", "linuxcnc"])
+def test_feeds_above_the_limit_are_counted_in_rows_of_moves_and_alone(name: str) -> None:
+    target = load_target(name)
+    most = target.machine.max_feed_mm_min
+    feeds = [most, *(most + 1.0 + (7 * k) % 50 for k in range(60)), 1.0, 2.0 * most]
+    rows = [f"G1 X{k} Y1 F{feed:g}" for k, feed in enumerate(feeds)]
+    end = ["M2", ""]
+    plain = target.target.read("\n".join([*rows, *end]).encode(), target.machine)
+    alone = target.target.read(
+        "\n".join([row + " (a)" for row in rows] + end).encode(), target.machine
+    )
+    assert plain.findings == alone.findings
+    (found,) = (one for one in plain.findings if one.code == Code.FEED_ABOVE_LIMIT)
+    assert (found.where, found.measured) == ("block 2", 2.0 * most)
+    assert "61" in found.message
