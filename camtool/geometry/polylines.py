@@ -15,7 +15,7 @@ shorter than `POSITION_EPS_MM`. Arrays are read-only.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -103,6 +103,16 @@ class Polylines:
             np.array([path.closed for path in items], dtype=np.bool_),
         )
         return cls._trusted(*columns)
+
+    @classmethod
+    def joined(cls, parts: Sequence[Polylines]) -> Polylines:
+        """The paths of all parts, one part after the other."""
+        counts = [np.diff(part.offsets) for part in parts]
+        return cls._trusted(
+            np.concatenate([np.empty((0, 3)), *(part.vertices for part in parts)]),
+            np.cumsum(np.concatenate([np.zeros(1, dtype=np.int64), *counts])),
+            np.concatenate([np.empty(0, dtype=np.bool_), *(part.closed for part in parts)]),
+        )
 
     def __len__(self) -> int:
         """How many paths."""

@@ -19,7 +19,7 @@ import numpy as np
 from camtool.arrays import Floats, Ints
 from camtool.findings import ENTRY_CHANGED, Finding
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines
-from camtool.planning.items import Bridge, Contour, CutRun, Feeds
+from camtool.planning.items import RAPID, Bridge, Contour, Contours, Feeds, Runs
 from camtool.planning.leads import NO_LEADS, KeepOut, Leads, leads_of
 from camtool.planning.naming import at_place
 from camtool.planning.paths import MeasuredPath, MeasuredPaths
@@ -36,6 +36,9 @@ from camtool.planning.ramps import (
 )
 from camtool.planning.tabs import Tab, bridges_of, raised, tabs_of
 
+CONTOURS_AT_ONCE = 1 << 12
+"""So many contours are Python objects at a time, some 2 KB each."""
+
 START_SNAP_MM = 1e-3
 """A start nearer than this to a vertex is moved to that vertex, so that no shorter move arises."""
 
@@ -51,7 +54,7 @@ class CutContours:
     """The runs that cut M contours, one contour after the other, and how many of each, `counts`
     (M); what did not go as the operation asks, and the bridges that their tabs leave."""
 
-    runs: tuple[CutRun, ...]
+    runs: Runs
     counts: tuple[int, ...]
     findings: tuple[Finding, ...]
     bridges: tuple[Bridge, ...]
@@ -67,13 +70,32 @@ class _Pass:
     leads: Leads
 
 
-def runs_of(contours: Sequence[Contour], paths: Polylines, keep_out: KeepOut) -> CutContours:
-    """How M contours of one operation are cut.
+def runs_of(
+    contours: Contours | Sequence[Contour], order: Ints, paths: Polylines, keep_out: KeepOut
+) -> CutContours:
+    """How contours of one operation are cut, those of the indices `order` (M,) in that order.
 
     `paths` (M) are those of the contours, from the chosen starts in the chosen directions. On its
     leads the tool keeps away from the lines of `keep_out`. A ramp slopes by the entry's angle.
     OptionError for impossible tabs.
     """
+    parts: list[Runs] = []
+    counts: list[int] = []
+    findings: list[Finding] = []
+    bridges: list[Bridge] = []
+    for begin in range(0, len(order), CONTOURS_AT_ONCE):
+        rows = range(begin, min(begin + CONTOURS_AT_ONCE, len(order)))
+        some = [contours[int(order[row])] for row in rows]
+        made = _cut_of(some, paths.select(rows), keep_out)
+        parts.append(made.runs)
+        counts += made.counts
+        findings += made.findings
+        bridges += made.bridges
+    return CutContours(Runs.joined(parts), tuple(counts), tuple(findings), tuple(bridges))
+
+
+def _cut_of(contours: Sequence[Contour], paths: Polylines, keep_out: KeepOut) -> CutContours:
+    """The same for some of the contours, as they come."""
     passes: list[_Pass] = []
     counts: list[int] = []
     findings: list[Finding] = []
@@ -89,11 +111,11 @@ def runs_of(contours: Sequence[Contour], paths: Polylines, keep_out: KeepOut) ->
     names = [
         contour.name for contour, count in zip(contours, counts, strict=True) for _ in range(count)
     ]
-    runs = _runs(passes, contours[0].setting.feeds, names) if passes else []
-    return CutContours(tuple(runs), tuple(counts), tuple(findings), tuple(bridges))
+    runs = _runs(passes, contours[0].setting.feeds, names)
+    return CutContours(runs, tuple(counts), tuple(findings), tuple(bridges))
 
 
-def _runs(passes: Sequence[_Pass], feeds: Feeds, names: Sequence[str]) -> list[CutRun]:
+def _runs(passes: Sequence[_Pass], feeds: Feeds, names: Sequence[str]) -> Runs:
     """The runs of these names, lifted all at once where their paths lie in the same columns."""
     owner = [k for k, each in enumerate(passes) for _ in each.parts]
     parts = [part for each in passes for part in each.parts]
@@ -110,7 +132,14 @@ def _runs(passes: Sequence[_Pass], feeds: Feeds, names: Sequence[str]) -> list[C
     led = [_with_leads(each, one.leads) for each, one in zip(followed, passes, strict=True)]
     table = np.concatenate(led)
     first = np.concatenate([[0], np.cumsum([len(each) for each in led])])
-    return CutRun.many(table, feeds_along(table, feeds), first, feeds.plunge_mm_min, names)
+    return Runs(
+        table,
+        np.append(feeds_along(table, feeds), RAPID),
+        first,
+        np.full(len(led), feeds.plunge_mm_min),
+        np.zeros(len(led)),
+        tuple(names),
+    )
 
 
 def _round(

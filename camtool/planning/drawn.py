@@ -29,7 +29,7 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.measure import path_extents
 from camtool.geometry.nesting import nesting
 from camtool.geometry.polylines import Polylines, Segments
-from camtool.planning.items import Contour, Fixed, Item, Step
+from camtool.planning.items import Contour, Contours, Fixed, Item, Step
 from camtool.planning.job import Operation
 from camtool.planning.sides import runs_beside
 from camtool.toolpath.moves import Toolpath
@@ -42,6 +42,9 @@ if TYPE_CHECKING:
 
 PLACES = (0.03, 0.25, 0.5, 0.75, 0.97)
 """Where on a row it is asked which lines are nearest; its ends lie beside its neighbours' too."""
+
+ROWS_AT_ONCE = 1 << 14
+"""So many rows are asked at a time which lines are nearest to them: some 10 MB."""
 
 AS_NEAR_MM = 1e-4
 """Lines whose distances differ by no more than this count as equally near."""
@@ -62,12 +65,11 @@ def drawn_of(toolpath: Toolpath, runs: Ints, steps: Sequence[Step], placed: Draw
         rows = np.flatnonzero((runs >= first) & (runs < first + len(step.runs)))
         mine = rows[toolpath.is_feed[rows]]
         off[mine] = _off(toolpath, mine, step, placed)
-        of_item: dict[int, int] = {}
-        for item, box in _edges(step, placed):
-            of_item[id(item)] = len(boxes)
+        of_item = np.full(len(step.items), -1, dtype=np.int64)
+        for index, box in _edges(step, placed):
+            of_item[index] = len(boxes)
             boxes.append(box)
-        of_run = np.array([of_item.get(id(owner), -1) for owner in step.owners], dtype=np.int64)
-        edge[rows] = of_run[runs[rows] - first]
+        edge[rows] = of_item[step.owner[runs[rows] - first]]
         first += len(step.runs)
     both = np.array(boxes, dtype=np.float64).reshape(-1, 2, 2, 2)
     return Drawn(off, edge, both[:, 0], both[:, 1])
@@ -95,12 +97,15 @@ def _off(toolpath: Toolpath, rows: Ints, step: Step, placed: Drawing) -> Floats:
     order = hilbert_order(0.5 * (segments.start + segments.end))
     curves = Curves.of(segments[order])
     of = of[segment_rows(lines)[order]]
-    points = np.ascontiguousarray(_points(toolpath, rows))
-    apart = nearest_distances(points, curves.rows, curves.tree)
-    pairs = curves_within(points, apart + AS_NEAR_MM, curves.rows, curves.tree)
-    most = np.zeros((len(rows), 2))
-    np.maximum.at(most, pairs[:, 0] // len(PLACES), of[pairs[:, 1]])
-    return found + most
+    for begin in range(0, len(rows), ROWS_AT_ONCE):
+        some = slice(begin, begin + ROWS_AT_ONCE)
+        points = np.ascontiguousarray(_points(toolpath, rows[some]))
+        apart = nearest_distances(points, curves.rows, curves.tree)
+        pairs = curves_within(points, apart + AS_NEAR_MM, curves.rows, curves.tree)
+        most = np.zeros((len(points) // len(PLACES), 2))
+        np.maximum.at(most, pairs[:, 0] // len(PLACES), of[pairs[:, 1]])
+        found[some] += most
+    return found
 
 
 def _vertex_rows(lines: Polylines, chosen: Ints) -> Ints:
@@ -114,10 +119,10 @@ def _vertex_rows(lines: Polylines, chosen: Ints) -> Ints:
 def _points(toolpath: Toolpath, rows: Ints) -> Floats:
     """(R · P, 2) mm: the places on each row, one row after the other."""
     share = np.array(PLACES)
-    begin, end = toolpath.starts[rows, None, :2], toolpath.end[rows, None, :2]
+    begin, end = toolpath.starts_of(rows)[:, None, :2], toolpath.end[rows, None, :2]
     points = begin + share[:, None] * (end - begin)
     arcs = np.flatnonzero(toolpath.is_arc[rows])
-    turn = toolpath.sweeps()[rows[arcs], None] * share
+    turn = toolpath.sweeps_of(rows[arcs])[:, None] * share
     centre = toolpath.centre[rows[arcs]]
     x, y = (begin[arcs, 0] - centre).T[:, :, None]
     round_ = np.stack([x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn)])
@@ -125,21 +130,23 @@ def _points(toolpath: Toolpath, rows: Ints) -> Floats:
     return np.asarray(points.reshape(-1, 2))
 
 
-def _edges(step: Step, placed: Drawing) -> Iterator[tuple[Item, tuple[Floats, Floats]]]:
-    """Items that cut an edge, each with its nominal and its planned box."""
-    items = list({id(owner): owner for owner in step.owners if _cuts_edge(owner)}.values())
+def _edges(step: Step, placed: Drawing) -> Iterator[tuple[int, tuple[Floats, Floats]]]:
+    """The indices of items that cut an edge, each with its nominal and its planned box."""
+    cut = step.owner[_cuts_edge(step)[step.owner]]
+    index = list(dict.fromkeys(cut.tolist()))
+    items = [step.items[k] for k in index]
     share = Counter(item.source for item in items)
     drawn = path_extents(placed.paths)
-    for item, centre in zip(items, _centre_boxes(items), strict=True):
+    for k, item, centre in zip(index, items, _centre_boxes(items), strict=True):
         nominal, planned = _boxes(item, drawn[item.source], centre)
-        yield item, (nominal if share[item.source] == 1 else planned, planned)
+        yield k, (nominal if share[item.source] == 1 else planned, planned)
 
 
-def _cuts_edge(item: Item) -> bool:
-    """Whether the item follows a closed line whose size it decides."""
-    if isinstance(item, Fixed):
-        return item.setting.operation.kind in ("pocket", "vcarve")
-    return item.path.closed
+def _cuts_edge(step: Step) -> Bools:
+    """Which items of the step follow a closed line whose size they decide."""
+    if isinstance(step.items, Contours):
+        return step.items.lines.closed
+    return np.full(len(step.items), step.operation.kind in ("pocket", "vcarve"))
 
 
 def _centre_boxes(items: Sequence[Item]) -> Floats:

@@ -7,12 +7,12 @@ are drawn and may begin anywhere. The material stays on both sides.
 from __future__ import annotations
 
 from camtool.errors import OptionError
-from camtool.planning.items import Chosen, Contour, Setting, Work
+from camtool.planning.items import Chosen, Contours, Setting, Work
 from camtool.planning.naming import key_of
 
 
 def engrave(chosen: Chosen, setting: Setting) -> Work:
-    """One Contour for each path, as it is drawn.
+    """A contour for each path, as it is drawn.
 
     Climb and conventional are sides of a wall, and a groove has two of them: OptionError for a
     direction other than "drawn".
@@ -24,9 +24,4 @@ def engrave(chosen: Chosen, setting: Setting) -> Work:
             where=key_of(operation, "direction"),
             mend='leave it out, or write "drawn"',
         )
-    return Work(
-        tuple(
-            Contour(path, setting, name, int(source), reversible=not path.closed)
-            for path, source, name in zip(chosen.lines, chosen.source, chosen.names, strict=True)
-        )
-    )
+    return Work(Contours.along(chosen.lines, setting, chosen.names, chosen.source))

@@ -30,7 +30,7 @@ from camtool.geometry.distance import approach, near_paths, nearest
 from camtool.geometry.measure import extents, path_lengths, sample
 from camtool.geometry.nesting import inside, nesting
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
-from camtool.planning.items import Chosen, Contour, Work
+from camtool.planning.items import Chosen, Contours, Work
 from camtool.planning.job import Operation
 from camtool.planning.naming import at_place, operation_name, shortened_list, tool_name
 from camtool.planning.paths import midpoints
@@ -60,9 +60,8 @@ def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> I
     """Where the tool, beside one contour, comes over another one, or into the allowance that its
     operation leaves on that."""
     radius, allowance = operation.tool.radius_mm, operation.allowance_mm
-    beside = [
-        item for item in work.items if isinstance(item, Contour) and item.material_left is not None
-    ]
+    items = Contours.of_items(work.items)
+    beside = [k for k, left in enumerate(items.material_left) if left is not None]
     seen, sided = sides.seen_by(operation), sides.sided()
     wanted = sided | seen.bounds
     # Those of one operation with the side auto are offset together.
@@ -72,9 +71,9 @@ def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> I
         wanted[chosen.source] = False
     others = np.flatnonzero(wanted)
     walls = sides.lines.select(others.tolist())
-    paths = Polylines.of(item.path for item in beside)
+    paths = items.lines.select(beside)
     for one, which in near_paths(paths, walls, radius + allowance):
-        item, other = beside[one], int(others[which])
+        item, other = items[beside[one]], int(others[which])
         wall = walls[which]
         if item.source == other:
             continue

@@ -4,14 +4,15 @@
 
 An item is cut in one go, before or after others. A `Contour` leaves its start (and perhaps its
 direction) to the order; a `Fixed` item is cut as it is. A `CutRun` is one stay of the tool in the
-stock: it goes down at its first point and comes up at its last one.
+stock: it goes down at its first point and comes up at its last one. Where there may be thousands,
+contours and runs are held in columns (`Contours`, `Runs`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
+from typing import TypeVar
 
 import numpy as np
 
@@ -19,6 +20,8 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.findings import Finding
 from camtool.geometry.polylines import Polyline, Polylines
 from camtool.planning.job import Operation
+
+T = TypeVar("T")
 
 RAPID = float("nan")
 """The feed of a part of a run that is a rapid (a drill between two pecks)."""
@@ -66,30 +69,79 @@ class CutRun:
         if not np.isfinite(self.vertices).all():
             raise ValueError("a vertex is not finite")
 
+
+@dataclass(frozen=True, eq=False)
+class Runs:
+    """R runs in columns; each of them is made when it is asked for.
+
+    Run i has the rows first[i] to first[i + 1] (R + 1,) of `vertices` (N, 4), and of `feed_mm_min`
+    (N,), whose value behind the last vertex of a run is that of no move; `plunge_mm_min`,
+    `dwell_s` (R,) and the `names` (R) as of a CutRun. ValueError for a vertex that is not finite.
+    """
+
+    vertices: Floats
+    feed_mm_min: Floats
+    first: Ints
+    plunge_mm_min: Floats
+    dwell_s: Floats
+    names: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        if not np.isfinite(self.vertices).all():
+            raise ValueError("a vertex is not finite")
+
     @classmethod
-    def many(
-        cls,
-        vertices: Floats,
-        feed_mm_min: Floats,
-        first: Ints,
-        plunge: float,
-        names: Sequence[str],
-    ) -> list[CutRun]:
-        """R runs of columns: run i has the rows first[i] to first[i + 1] (R + 1,) of `vertices`
-        (N, 4), and the feeds between them of `feed_mm_min` (N−1,); all plunge at one feed."""
-        cls(vertices, feed_mm_min, plunge, "")  # checked as a whole
-        ends = first.tolist()
-        made = []
-        for name, (begin, end) in zip(names, pairwise(ends), strict=True):
-            run = object.__new__(cls)
-            run.__dict__.update(
-                vertices=vertices[begin:end],
-                feed_mm_min=feed_mm_min[begin : end - 1],
-                plunge_mm_min=plunge,
-                name=name,
-            )
-            made.append(run)
-        return made
+    def of(cls, runs: Iterable[CutRun]) -> Runs:
+        """Columns from single runs."""
+        each = list(runs)
+        feeds = [np.append(run.feed_mm_min, RAPID) for run in each]
+        return cls(
+            np.concatenate([np.empty((0, 4)), *(run.vertices for run in each)]),
+            np.concatenate([np.empty(0), *feeds]),
+            np.concatenate([[0], np.cumsum([len(feed) for feed in feeds], dtype=np.int64)]),
+            np.array([run.plunge_mm_min for run in each], dtype=np.float64),
+            np.array([run.dwell_s for run in each], dtype=np.float64),
+            tuple(run.name for run in each),
+        )
+
+    @classmethod
+    def joined(cls, parts: Sequence[Runs]) -> Runs:
+        """The runs of all parts, one part after the other."""
+        if len(parts) == 1:
+            return parts[0]
+        before = np.cumsum([0, *(len(part.vertices) for part in parts)], dtype=np.int64)
+        firsts = [part.first[:-1] + n for part, n in zip(parts, before.tolist(), strict=False)]
+        none = cls.of([])
+        return cls(
+            np.concatenate([none.vertices, *(part.vertices for part in parts)]),
+            np.concatenate([none.feed_mm_min, *(part.feed_mm_min for part in parts)]),
+            np.concatenate([*firsts, before[-1:]]),
+            np.concatenate([none.plunge_mm_min, *(part.plunge_mm_min for part in parts)]),
+            np.concatenate([none.dwell_s, *(part.dwell_s for part in parts)]),
+            tuple(name for part in parts for name in part.names),
+        )
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def __iter__(self) -> Iterator[CutRun]:
+        return (self[index] for index in range(len(self)))
+
+    def __getitem__(self, index: int) -> CutRun:
+        row = range(len(self))[index]
+        begin, end = self.first[row : row + 2].tolist()
+        return CutRun(
+            self.vertices[begin:end],
+            self.feed_mm_min[begin : end - 1],
+            float(self.plunge_mm_min[row]),
+            self.names[row],
+            float(self.dwell_s[row]),
+        )
+
+
+NO_STARTS = np.empty(0, dtype=np.int64)
+"""A closed path may begin at any vertex that is no joint within an arc."""
+NO_STARTS.flags.writeable = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,9 +160,104 @@ class Contour:
     name: str
     source: int
     reversible: bool = False
-    starts: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    starts: Ints = field(default_factory=lambda: NO_STARTS)
     material_left: bool | None = None
     outline: Polyline | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Contours:
+    """M contours in columns, each of which is made when it is asked for: their paths, the `lines`,
+    and of each what a Contour has; `source` (M,), `reversible` (M,)."""
+
+    lines: Polylines
+    settings: tuple[Setting, ...]
+    names: tuple[str, ...]
+    source: Ints
+    reversible: Bools
+    starts: tuple[Ints, ...]
+    material_left: tuple[bool | None, ...]
+    outlines: tuple[Polyline | None, ...]
+
+    @classmethod
+    def of(cls, contours: Iterable[Contour]) -> Contours:
+        """Columns from single contours."""
+        each = list(contours)
+        return cls(
+            Polylines.of(contour.path for contour in each),
+            tuple(contour.setting for contour in each),
+            tuple(contour.name for contour in each),
+            np.array([contour.source for contour in each], dtype=np.int64),
+            np.array([contour.reversible for contour in each], dtype=np.bool_),
+            tuple(contour.starts for contour in each),
+            tuple(contour.material_left for contour in each),
+            tuple(contour.outline for contour in each),
+        )
+
+    @classmethod
+    def of_items(cls, items: Items) -> Contours:
+        """The contours among some items."""
+        if isinstance(items, Contours):
+            return items
+        return cls.of(item for item in items if isinstance(item, Contour))
+
+    @classmethod
+    def along(
+        cls, lines: Polylines, setting: Setting, names: Sequence[str], source: Ints
+    ) -> Contours:
+        """Contours on the lines of these names and sources; open ones may be cut from either
+        end."""
+        count = len(lines)
+        return cls(
+            lines,
+            (setting,) * count,
+            tuple(names),
+            source,
+            ~lines.closed,
+            (NO_STARTS,) * count,
+            (None,) * count,
+            (None,) * count,
+        )
+
+    def with_others(self, others: Contours) -> Contours:
+        """These and others, in the order of their sources."""
+        source = np.concatenate([self.source, others.source])
+        order = np.argsort(source, kind="stable")
+        rows = order.tolist()
+
+        def arranged(mine: tuple[T, ...], theirs: tuple[T, ...]) -> tuple[T, ...]:
+            both = mine + theirs
+            return tuple(both[row] for row in rows)
+
+        return Contours(
+            Polylines.joined([self.lines, others.lines]).select(rows),
+            arranged(self.settings, others.settings),
+            arranged(self.names, others.names),
+            source[order],
+            np.concatenate([self.reversible, others.reversible])[order],
+            arranged(self.starts, others.starts),
+            arranged(self.material_left, others.material_left),
+            arranged(self.outlines, others.outlines),
+        )
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def __iter__(self) -> Iterator[Contour]:
+        return (self[index] for index in range(len(self)))
+
+    def __getitem__(self, index: int) -> Contour:
+        row = range(len(self))[index]
+        return Contour(
+            self.lines[row],
+            self.settings[row],
+            self.names[row],
+            int(self.source[row]),
+            bool(self.reversible[row]),
+            self.starts[row],
+            self.material_left[row],
+            self.outlines[row],
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,13 +275,14 @@ class Fixed:
 
 
 Item = Contour | Fixed
+Items = Contours | Sequence[Item]
 
 
 @dataclass(frozen=True, eq=False)
 class Work:
     """What an operation made of its paths, and its findings."""
 
-    items: tuple[Item, ...]
+    items: Items
     findings: tuple[Finding, ...] = ()
 
 
@@ -170,15 +318,16 @@ class Bridge:
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """What became of one operation: its setting, what it took, the runs in order of cutting with
-    the item that each is of, how far rapids go in XY: as drawn, and as ordered, mm; and the
-    bridges that its tabs leave."""
+    """What became of one operation: its setting, what it took, its items, the runs in order of
+    cutting with the item that each is of, `owner` (R,), how far rapids go in XY: as drawn, and as
+    ordered, mm; and the bridges that its tabs leave."""
 
     operation: Operation
     setting: Setting
     chosen: Chosen
-    runs: tuple[CutRun, ...]
-    owners: tuple[Item, ...]
+    items: Items
+    runs: Runs
+    owner: Ints
     findings: tuple[Finding, ...]
     rapid_drawn_mm: float
     rapid_mm: float

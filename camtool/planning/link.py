@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from camtool.planning.items import CutRun
+from camtool.planning.items import CutRun, Runs
 from camtool.planning.job import Operation, Tool
 from camtool.planning.paths import cuts
 from camtool.toolpath.builder import ToolpathBuilder
@@ -16,9 +16,6 @@ from camtool.toolpath.moves import Kind, Toolpath
 ROUNDED_DECIMALS = 10
 """Positions are rounded to this many decimals of a mm: far coarser than the noise of doubles, and
 far finer than any machine or tolerance."""
-
-_NO_FEED = np.array([np.nan])
-"""Behind the last vertex of a run."""
 
 Approach = Callable[[CutRun], tuple[float, float] | None]
 """Where the tool comes from at safe height, (x, y) mm, before a run begins; None: anywhere."""
@@ -39,7 +36,7 @@ def rounded(toolpath: Toolpath) -> Toolpath:
 
 
 def link(
-    worked: Sequence[tuple[Operation, Sequence[CutRun]]],
+    worked: Sequence[tuple[Operation, Runs]],
     safe_z_mm: float,
     approaches: Callable[[], Approach] | None = None,
 ) -> ToolpathBuilder:
@@ -85,7 +82,7 @@ def _spin(builder: ToolpathBuilder, speed: float | None, wanted: float | None) -
 
 def _cut(
     builder: ToolpathBuilder,
-    runs: Sequence[CutRun],
+    runs: Runs,
     before: int,
     safe_z_mm: float,
     approach: Approach | None,
@@ -94,12 +91,8 @@ def _cut(
 
     (the approach) · across · down · the cuts · (the dwell) · up
     """
-    vertices = np.concatenate([run.vertices for run in runs])
-    counts = np.array([len(run.vertices) for run in runs])
-    first = np.concatenate([[0], np.cumsum(counts)])
-    feed = np.concatenate([each for run in runs for each in (run.feed_mm_min, _NO_FEED)])
-    cut = cuts(vertices, feed, first)
-    dwell = np.array([run.dwell_s for run in runs])
+    vertices, first, dwell = runs.vertices, runs.first, runs.dwell_s
+    cut = cuts(vertices, runs.feed_mm_min, first)
     come = [] if approach is None else [approach(run) for run in runs]
     places = [place for place in come if place is not None]
     # Where each part of a run stands among all rows.
@@ -120,7 +113,7 @@ def _cut(
     end[across, :2] = vertices[first[:-1], :2]
     down = across + 1
     kind[down], end[down] = Kind.LINE, vertices[first[:-1], :3]
-    speed[down] = [run.plunge_mm_min for run in runs]
+    speed[down] = runs.plunge_mm_min
     is_arc = np.isfinite(cut.centre[:, 0]) & np.isfinite(cut.feed)
     turning = np.where(cut.ccw, Kind.ARC_CCW, Kind.ARC_CW)
     straight = np.where(np.isnan(cut.feed), Kind.RAPID, Kind.LINE)
@@ -131,5 +124,5 @@ def _cut(
     kind[rests], value[rests], end[rests] = Kind.DWELL, dwell[dwells], end[rests - 1]
     end[up, :2] = end[up - 1, :2]
     number = np.repeat(np.arange(len(runs)), np.diff(begin))
-    source = builder.provenance(run.name for run in runs)[number]
+    source = builder.provenance(runs.names)[number]
     builder.moves(kind, end, centre, speed, value=value, source=source, run=before + number)

@@ -10,9 +10,8 @@ within it has been cut). The same input always gives the same order.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,7 +20,7 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import OptionError
 from camtool.geometry.nesting import nesting
 from camtool.geometry.polylines import Polyline, Polylines, lines_reversed, lines_rolled
-from camtool.planning.items import Contour, Item
+from camtool.planning.items import Contour, Contours, Fixed, Items
 from camtool.planning.paths import flat, joints
 
 if TYPE_CHECKING:
@@ -82,7 +81,7 @@ class Choices:
         return np.searchsorted(self.owner, np.arange(len(self) + 1))
 
 
-def choices_of(items: Sequence[Item]) -> Choices:
+def choices_of(items: Items) -> Choices:
     """The variants in which the items may be cut, by where the tool goes down and comes up.
 
     A closed contour may begin at its `starts` or at any joint, and ends there; its direction
@@ -94,26 +93,19 @@ def choices_of(items: Sequence[Item]) -> Choices:
     return Choices(owner[order], ends[order, :2], ends[order, 2:])
 
 
-def chosen_paths(items: Sequence[Item], choices: Choices, rows: Ints) -> Polylines:
+def chosen_paths(contours: Contours, choices: Choices, rows: Ints) -> Polylines:
     """The paths of the contours that own these rows (R,), in that order: begun where the row
-    says, and in that direction.
-
-    TypeError when a row is of an item that is cut as it is.
-    """
+    says, and in that direction."""
     owners = choices.owner[rows]
-    chosen: list[Contour] = []
-    for index in owners.tolist():
-        item = items[index]
-        if not isinstance(item, Contour):
-            raise TypeError(f"{item.name} is cut as it is")
-        chosen.append(item)
     rank = rows - choices.first[owners]
-    lines = Polylines.of(item.path for item in chosen)
     # The places in each closed path where it may begin, the first, the second, and so on.
-    begins = np.flatnonzero(_begins(chosen, lines))
-    place = np.searchsorted(begins, lines.offsets[:-1]) + np.where(lines.closed, rank, 0)
-    start = np.where(lines.closed, begins[place] - lines.offsets[:-1], 0)
-    return lines_reversed(lines_rolled(lines, start), ~lines.closed & (rank > 0))
+    lines = contours.lines
+    begins = np.flatnonzero(_begins(contours))
+    first = np.searchsorted(begins, lines.offsets[:-1])[owners]
+    closed = lines.closed[owners]
+    start = np.where(closed, begins[first + np.where(closed, rank, 0)] - lines.offsets[owners], 0)
+    lines = lines.select(owners.tolist())
+    return lines_reversed(lines_rolled(lines, start), ~closed & (rank > 0))
 
 
 def drawn(choices: Choices) -> Ints:
@@ -257,19 +249,32 @@ Ends = tuple[Ints, Floats]
 tool goes down and where it comes up."""
 
 
-def _fixed_ends(items: Sequence[Item]) -> Ends:
+def _fixed_ends(items: Items) -> Ends:
     """The one variant of each item that is cut as it is."""
-    fixed = [(k, item.runs) for k, item in enumerate(items) if not isinstance(item, Contour)]
+    fixed = [(k, item.runs) for k, item in _fixed(items)]
     ends = [[runs[0].vertices[0, :2], runs[-1].vertices[-1, :2]] for _, runs in fixed]
     return np.array([k for k, _ in fixed], dtype=np.int64), np.array(ends).reshape(-1, 4)
 
 
-def _contour_ends(items: Sequence[Item]) -> Iterator[Ends]:
-    """The variants of contours: of closed ones, of open ones as they run, and of those turned."""
+def _fixed(items: Items) -> Iterator[tuple[int, Fixed]]:
+    """The items that are cut as they are, with their indices."""
+    each = () if isinstance(items, Contours) else items
+    return ((k, item) for k, item in enumerate(each) if isinstance(item, Fixed))
+
+
+def _contours(items: Items) -> tuple[Contours, Ints]:
+    """The contours among the items, and their indices."""
+    if isinstance(items, Contours):
+        return items, np.arange(len(items))
     index = [k for k, item in enumerate(items) if isinstance(item, Contour)]
-    contours = [item for item in items if isinstance(item, Contour)]
-    lines, owner = Polylines.of(item.path for item in contours), np.array(index, dtype=np.int64)
-    begins = _begins(contours, lines) & np.repeat(lines.closed, np.diff(lines.offsets))
+    return Contours.of_items(items), np.array(index, dtype=np.int64)
+
+
+def _contour_ends(items: Items) -> Iterator[Ends]:
+    """The variants of contours: of closed ones, of open ones as they run, and of those turned."""
+    contours, owner = _contours(items)
+    lines = contours.lines
+    begins = _begins(contours) & np.repeat(lines.closed, np.diff(lines.offsets))
     of = np.repeat(owner, np.diff(lines.offsets))
     yield of[begins], np.tile(lines.vertices[begins, :2], 2)
     opens = np.flatnonzero(~lines.closed)
@@ -277,60 +282,72 @@ def _contour_ends(items: Sequence[Item]) -> Iterator[Ends]:
         lines.vertices[lines.offsets[opens], :2],
         lines.vertices[lines.offsets[opens + 1] - 1, :2],
     )
-    turns = np.array([contours[k].reversible for k in opens.tolist()], dtype=np.bool_)
+    turns = contours.reversible[opens]
     # Passes to and fro leave the tool where it went down when their number is even.
-    even = [len(contours[k].setting.levels_mm) % 2 == 0 for k in opens.tolist()]
+    even = [len(contours.settings[k].levels_mm) % 2 == 0 for k in opens.tolist()]
     back = (turns & np.array(even, dtype=np.bool_))[:, None]
     yield owner[opens], np.hstack([start, np.where(back, start, end)])
     yield owner[opens[turns]], np.hstack([end, np.where(back, end, start)])[turns]
 
 
-def _begins(contours: Sequence[Contour], lines: Polylines) -> Bools:
-    """(N,) the vertices of contours, whose paths are the `lines`, at which they may begin."""
-    found = joints(lines)
-    for item, (begin, end) in zip(contours, pairwise(lines.offsets.tolist()), strict=True):
-        if len(item.starts):
+def _begins(contours: Contours) -> Bools:
+    """(N,) the vertices of contours at which they may begin."""
+    found, offsets = joints(contours.lines), contours.lines.offsets
+    for k, starts in enumerate(contours.starts):
+        if len(starts):
+            begin, end = offsets[k : k + 2].tolist()
             found[begin:end] = False
-            found[begin + item.starts] = True
+            found[begin + starts] = True
     return found
 
 
-def must_precede(items: Sequence[Item]) -> Ints:
+def must_precede(items: Items) -> Ints:
     """Pairs (P, 2) of items, the first to be cut before the second, ascending.
 
     An item goes before the smallest closed Contour that holds it, or any of its runs; nothing
     else does. Contours that cross hold each other not.
     """
-    # The runs that a contour was divided into share its outline: they hold and lie as it does.
-    owners: dict[int, list[int]] = {}
-    paths: dict[int, Polyline] = {}
-    for index, item in enumerate(items):
-        for path in _shapes(item):
-            owners.setdefault(id(path), []).append(index)
-            paths[id(path)] = path
-    if not paths:
-        return np.empty((0, 2), dtype=np.int64)
-    parent = nesting(Polylines.of(paths.values())).parent.tolist()
-    of_shape = list(owners.values())
-    pairs = [
-        (one, other)
-        for held, holder in enumerate(parent)
-        if holder >= 0
-        for one in of_shape[held]
-        for other in of_shape[holder]
-        if one != other
-    ]
-    return np.unique(np.array(pairs, dtype=np.int64).reshape(-1, 2), axis=0)
+    shapes, shape, item = _shapes(items)
+    parent = nesting(shapes).parent
+    order = np.argsort(shape, kind="stable")
+    shape, item = shape[order], item[order]
+    first = np.searchsorted(shape, np.arange(len(shapes) + 1))
+    held = np.flatnonzero(parent[shape] >= 0)
+    holder = parent[shape[held]]
+    counts = first[holder + 1] - first[holder]
+    within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    one, other = np.repeat(item[held], counts), item[np.repeat(first[holder], counts) + within]
+    return np.unique(np.column_stack([one, other])[one != other], axis=0)
 
 
-def _shapes(item: Item) -> Iterator[Polyline]:
-    """Paths that say where an item lies; of them only a Contour's is closed and holds any."""
-    if isinstance(item, Contour):
-        yield item.path if item.outline is None else item.outline
-    elif item.outline is not None:
+def _shapes(items: Items) -> tuple[Polylines, Ints, Ints]:
+    """Paths that say where items lie, and pairs (J,), (J,) of a path and an item that it is of.
+
+    Only a Contour's path is closed and holds any.
+    """
+    contours, owner = _contours(items)
+    lines, shape = contours.lines, np.arange(len(contours))
+    if any(outline is not None for outline in contours.outlines):
+        # The runs that a contour was divided into share its outline: they hold and lie as it does.
+        known: dict[int, int] = {}
+        keys = [-k if path is None else id(path) for k, path in enumerate(contours.outlines, 1)]
+        shape = np.array([known.setdefault(key, len(known)) for key in keys])
+        first = np.unique(shape, return_index=True)[1].tolist()
+        lines = Polylines.of(contours.outlines[k] or contours.lines[k] for k in first)
+    others = [(k, path) for k, item in _fixed(items) for path in _places_of(item)]
+    return (
+        Polylines.joined([lines, Polylines.of(path for _, path in others)]),
+        np.concatenate([shape, len(lines) + np.arange(len(others))]),
+        np.concatenate([owner, np.array([k for k, _ in others], dtype=np.int64)]),
+    )
+
+
+def _places_of(item: Fixed) -> Iterator[Polyline]:
+    """Open paths that say where an item lies that is cut as it is."""
+    if item.outline is not None:
         yield Polyline(item.outline.vertices, closed=False)
-    else:
-        for run in item.runs:
-            x, y = run.vertices[0, :2]
-            speck = np.array([[x - SPECK_MM / 2, y, 0.0], [x + SPECK_MM / 2, y, 0.0]])
-            yield flat(run.vertices) or Polyline(speck)
+        return
+    for run in item.runs:
+        x, y = run.vertices[0, :2]
+        speck = np.array([[x - SPECK_MM / 2, y, 0.0], [x + SPECK_MM / 2, y, 0.0]])
+        yield flat(run.vertices) or Polyline(speck)

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import islice
+from itertools import chain
 from pathlib import PurePath
 
 import numpy as np
@@ -27,7 +27,6 @@ from camtool.findings import (
 )
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import path_lengths
-from camtool.geometry.polylines import Polylines
 from camtool.machine.model import Machine
 from camtool.planning.checks import checked
 from camtool.planning.contours import runs_of, with_starts
@@ -35,7 +34,7 @@ from camtool.planning.drawn import drawn_of
 from camtool.planning.drill import drill
 from camtool.planning.engrave import engrave
 from camtool.planning.gouges import side_findings
-from camtool.planning.items import Chosen, Contour, CutRun, Item, Setting, Step, Work
+from camtool.planning.items import Bridge, Chosen, Contours, Items, Runs, Setting, Step, Work
 from camtool.planning.job import Job, Operation, refuse_endless
 from camtool.planning.leads import KeepOut
 from camtool.planning.link import link, rounded
@@ -164,8 +163,9 @@ def _step(
     of its `ends` and goes to the second (None: stays)."""
     chosen = choose(placed, setting.operation, sides)
     work = _kind(setting.operation.kind)(chosen, setting)
-    items: tuple[Item, ...] = tuple(_with_starts(item) for item in work.items)
-    items, bare = with_tabs(items)
+    items, bare = work.items, list[Finding]()
+    if isinstance(items, Contours):
+        items, bare = with_tabs(_with_starts(items))
     findings = [*work.findings, *side_findings(work, chosen, sides, setting.operation), *bare]
     choices = choices_of(items)
     before = travel_mm(choices, drawn(choices), *ends)
@@ -177,30 +177,27 @@ def _step(
         choices = choices_of(items)
     _refuse_endless(items, setting)
     rows = best_order(choices, must_precede(items), *ends)
-    chosen_items = [items[k] for k in choices.owner[rows].tolist()]
-    contours = [item for item in chosen_items if isinstance(item, Contour)]
-    are_contours = np.array([isinstance(item, Contour) for item in chosen_items], dtype=np.bool_)
-    paths = chosen_paths(items, choices, rows[are_contours])
-    cut = runs_of(contours, paths, _walls(placed, job, setting.operation))
-    of_contours, counts = iter(cut.runs), iter(cut.counts)
-    runs: list[CutRun] = []
-    owners: list[Item] = []
-    for item in chosen_items:
-        if isinstance(item, Contour):
-            runs += islice(of_contours, next(counts))
-        else:
-            runs += item.runs
-        owners += [item] * (len(runs) - len(owners))
+    order = choices.owner[rows]
+    bridges: tuple[Bridge, ...] = ()
+    if isinstance(items, Contours):
+        paths = chosen_paths(items, choices, rows)
+        cut = runs_of(items, order, paths, _walls(placed, job, setting.operation))
+        runs, counts, bridges = cut.runs, cut.counts, cut.bridges
+        findings += cut.findings
+    else:
+        each = [item.runs for item in (items[k] for k in order.tolist())]
+        runs, counts = Runs.of(chain.from_iterable(each)), tuple(map(len, each))
     return Step(
         operation=setting.operation,
         setting=setting,
         chosen=chosen,
-        runs=tuple(runs),
-        owners=tuple(owners),
-        findings=(*findings, *cut.findings),
+        items=items,
+        runs=runs,
+        owner=np.repeat(order, counts),
+        findings=tuple(findings),
         rapid_drawn_mm=before,
         rapid_mm=travel_mm(choices, rows, *ends),
-        bridges=cut.bridges,
+        bridges=bridges,
     )
 
 
@@ -226,21 +223,19 @@ def _sparing(steps: list[Step]) -> list[Step]:
     return made
 
 
-def _refuse_endless(items: tuple[Item, ...], setting: Setting) -> None:
+def _refuse_endless(items: Items, setting: Setting) -> None:
     """OptionError for passes, or an overlap, that go round what is drawn too often."""
     operation, passes = setting.operation, len(setting.levels_mm)
-    paths = [item.path for item in items if isinstance(item, Contour)]
-    each = np.array([len(path.vertices) for path in paths], dtype=np.float64)
+    lines = Contours.of_items(items).lines
     if passes > 1:
         refuse_endless(
-            passes * float(each.sum()),
+            passes * float(len(lines.vertices)),
             key_of(operation, "step_down"),
             f"{passes} passes",
             "give a larger step",
         )
-    rings = [path for path in paths if path.closed]
-    if operation.overlap_mm > 0.0 and rings:
-        shortest = float(path_lengths(Polylines.of(rings)).min())
+    if operation.overlap_mm > 0.0 and lines.closed.any():
+        shortest = float(path_lengths(lines)[lines.closed].min())
         if operation.overlap_mm > MOST_OVERLAPS * shortest:
             raise OptionError(
                 f"an overlap of {operation.overlap_mm:g} mm goes"
@@ -262,22 +257,23 @@ def _walls(placed: Drawing, job: Job, operation: Operation) -> KeepOut:
     return KeepOut(placed.paths.select(rows.tolist()), own[rows])
 
 
-def _with_starts(item: Item) -> Item:
-    """A closed contour with the places where its operation lets it begin."""
-    if not isinstance(item, Contour) or not item.path.closed:
-        return item
-    operation = item.setting.operation
-    if operation.start == "nearest":
-        return item
-    path, starts = with_starts(item.path, operation.start, operation.tool.radius_mm)
-    return replace(item, path=path, starts=starts)
+def _with_starts(contours: Contours) -> Contours:
+    """Contours, the closed ones with the places where their operation lets them begin."""
+    if not len(contours) or contours.settings[0].operation.start == "nearest":
+        return contours
+    made = []
+    for contour in contours:
+        operation = contour.setting.operation
+        path, starts = with_starts(contour.path, operation.start, operation.tool.radius_mm)
+        made.append(replace(contour, path=path, starts=starts))
+    return Contours.of(made)
 
 
-def _end(runs: tuple[CutRun, ...], here: Point) -> Point:
+def _end(runs: Runs, here: Point) -> Point:
     """Where the tool comes up after the runs."""
-    if not runs:
+    if not len(runs):
         return here
-    x, y = runs[-1].vertices[-1, :2].tolist()
+    x, y = runs.vertices[-1, :2].tolist()
     return x, y
 
 

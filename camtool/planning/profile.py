@@ -39,7 +39,7 @@ from camtool.geometry.polylines import (
     Segments,
     lines_reversed,
 )
-from camtool.planning.items import Chosen, Contour, Setting, Work
+from camtool.planning.items import NO_STARTS, Chosen, Contours, Setting, Work
 from camtool.planning.naming import at_place, shortened_list, tool_name
 from camtool.planning.paths import joints, midpoints
 from camtool.planning.sides import runs_beside
@@ -92,9 +92,11 @@ def profile(chosen: Chosen, setting: Setting) -> Work:
         found.findings += shortened_list(list(_far(chosen, setting, found.lines)), CORNER_FAR_MORE)
     if operation.corners != "none":
         found.lines = [_relieved(line, chosen, setting, found.findings) for line in found.lines]
-    items = _beside(found.lines, chosen, setting)
-    items += [_on_line(chosen, k, setting) for k in opens]
-    return Work(tuple(sorted(items, key=lambda item: item.source)), tuple(found.findings))
+    on_line = Contours.along(
+        chosen.lines.select(opens), setting, [chosen.names[k] for k in opens], chosen.source[opens]
+    )
+    items = _beside(found.lines, chosen, setting).with_others(on_line)
+    return Work(items, tuple(found.findings))
 
 
 def _together(chosen: Chosen, closed: list[int], setting: Setting, found: _Found) -> None:
@@ -285,7 +287,7 @@ def _relieved(line: _Line, chosen: Chosen, setting: Setting, findings: list[Find
     return replace(line, path=path, plain=line.path)
 
 
-def _beside(lines: list[_Line], chosen: Chosen, setting: Setting) -> list[Contour]:
+def _beside(lines: list[_Line], chosen: Chosen, setting: Setting) -> Contours:
     """The lines as the operation's direction has them: climbing, what is to stay is on the
     right."""
     wanted = setting.operation.direction
@@ -299,37 +301,27 @@ def _beside(lines: list[_Line], chosen: Chosen, setting: Setting) -> list[Contou
         turn = (signed_areas(paths) > 0.0) != ccw[first]
     else:
         turn = left == (wanted == "climb")
-    return [
-        Contour(
-            path,
-            setting,
-            chosen.names[k],
-            int(chosen.source[k]),
-            starts=_starts(path, line.plain),
-            material_left=left_of,
-        )
-        for path, line, k, left_of in zip(
-            lines_reversed(paths, turn), lines, first, (left != turn).tolist(), strict=True
-        )
-    ]
+    paths = lines_reversed(paths, turn)
+    return Contours(
+        lines=paths,
+        settings=(setting,) * len(lines),
+        names=tuple(chosen.names[k] for k in first),
+        source=chosen.source[first],
+        reversible=np.zeros(len(lines), dtype=np.bool_),
+        starts=tuple(_starts(paths[row], line.plain) for row, line in enumerate(lines)),
+        material_left=tuple((left != turn).tolist()),
+        outlines=(None,) * len(lines),
+    )
 
 
 def _starts(path: Polyline, plain: Polyline | None) -> Ints:
     """The vertices at which a path with reliefs may begin: not at the tip of one."""
     if plain is None:
-        return np.empty(0, dtype=np.int64)
+        return NO_STARTS
     own = {tuple(place) for place in plain.vertices[:, :2].tolist()}
     joint = joints(Polylines.of([path]))
     places = enumerate(path.vertices[:, :2].tolist())
     return np.array([k for k, place in places if joint[k] and tuple(place) in own], dtype=np.int64)
-
-
-def _on_line(chosen: Chosen, k: int, setting: Setting) -> Contour:
-    """A path itself; an open one may be cut from either end."""
-    path = chosen.lines[k]
-    return Contour(
-        path, setting, chosen.names[k], int(chosen.source[k]), reversible=not path.closed
-    )
 
 
 def _no_side(chosen: Chosen, k: int, side: str) -> Finding:

@@ -37,7 +37,7 @@ from camtool.geometry.distance import point_to_segment
 from camtool.geometry.measure import point_at, segment_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Segments, reverse
 from camtool.machine.model import Axis, Machine, PlayCells, SlideStart
-from camtool.planning.items import Contour, CutRun, Fixed, Item
+from camtool.planning.items import Contour, Contours, CutRun, Fixed, Item, Items
 from camtool.planning.job import Operation
 from camtool.planning.paths import flat
 from camtool.units import UM_PER_MM
@@ -82,9 +82,7 @@ class _Counts:
     whole: dict[str, list[str]] = field(default_factory=dict)
 
 
-def fewer_reversals(
-    items: Sequence[Item], machine: Machine
-) -> tuple[tuple[Item, ...], tuple[Finding, ...]]:
+def fewer_reversals(items: Items, machine: Machine) -> tuple[Items, tuple[Finding, ...]]:
     """The items with contours replaced by runs that reverse no axis while cutting, in the order
     of the contours, and what that changes; items of `Fixed` runs stay.
 
@@ -94,7 +92,7 @@ def fewer_reversals(
     """
     residual = residuals(machine)
     if not any(each.matters for each in residual):
-        return tuple(items), (_no_backlash(machine),)
+        return items, (_no_backlash(machine),)
     counts = _Counts()
     found: list[Item] = []
     for item in items:
@@ -102,7 +100,8 @@ def fewer_reversals(
             found.append(item)
         else:
             found.extend(_runs_of(item, machine, residual, counts))
-    return tuple(found), tuple(_findings(counts))
+    made = Contours.of_items(found) if isinstance(items, Contours) else tuple(found)
+    return made, tuple(_findings(counts))
 
 
 def _runs_of(

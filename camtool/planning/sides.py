@@ -82,7 +82,7 @@ class Sides:
         around, lines = placed.unchosen, placed.paths
         takes = np.zeros((len(job.operations), len(lines) + len(around.paths)), dtype=np.bool_)
         if len(around.paths):
-            lines = Polylines.of([*lines, *around.paths])
+            lines = Polylines.joined([lines, around.paths])
         names = list(zip(placed.layers, placed.colours, strict=True))
         for number, operation in enumerate(job.operations):
             known = {name: operation.takes(*name) for name in set(names)}
@@ -222,7 +222,7 @@ def choose(drawing: Drawing, operation: Operation, sides: Sides) -> Chosen:
     return Chosen(
         lines=drawing.paths.select(index),
         source=np.array(index, dtype=np.int64),
-        names=tuple(path_name(drawing, i) for i in index),
+        names=tuple(sides.names[i] for i in index),
         points=np.array([mark.at_mm for mark in marks], dtype=np.float64).reshape(len(marks), 2),
         point_names=tuple(f"{mark.layer}/{mark.source}" for mark in marks),
         rim=_rim(operation, sides, index),
@@ -234,11 +234,6 @@ def _rim(operation: Operation, sides: Sides, index: list[int]) -> Bools:
     if operation.side == "auto" and runs_beside(operation):
         return sides.seen_by(operation).rim[index]
     return np.full(len(index), operation.side == "outside")
-
-
-def path_name(drawing: Drawing, index: int) -> str:
-    """Layer and source of a path, as provenance and places in messages show it."""
-    return f"{drawing.layers[index]}/{drawing.sources[index]}"
 
 
 def _nothing(drawing: Drawing, operation: Operation) -> OptionError:

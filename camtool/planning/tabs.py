@@ -41,7 +41,7 @@ from camtool.geometry.intersect import crossings
 from camtool.geometry.measure import path_lengths, point_at, segment_boxes, signed_areas
 from camtool.geometry.nesting import inside
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
-from camtool.planning.items import Bridge, Contour, CutRun, Feeds, Item
+from camtool.planning.items import Bridge, Contour, Contours, CutRun, Feeds, Runs
 from camtool.planning.job import Operation, Tool, refuse_endless
 from camtool.planning.naming import at_place, key_of, operation_name
 from camtool.planning.paths import QUARTER, MeasuredPath
@@ -99,36 +99,33 @@ class Tab:
         return self.top_mm - (self.fall * apart if apart else 0.0)
 
 
-def with_tabs(items: tuple[Item, ...]) -> tuple[tuple[Item, ...], list[Finding]]:
-    """The items of an operation, those without tabs that are to have none; and how many.
+def with_tabs(contours: Contours) -> tuple[Contours, list[Finding]]:
+    """The contours of an operation, those without tabs that are to have none; and how many.
 
     Tabs hold parts: where an operation cuts parts free, its holes and open paths get no tabs, nor
     do contours that are too short. Where it cuts none free, everything has tabs as asked. Where
     nothing is long enough, `tabs_of` raises the error.
     """
-    asked = [each for each in items if isinstance(each, Contour) and each.setting.operation.tabs]
-    if not asked:
-        return items, []
-    parts = [each for each in asked if each.path.closed and not _is_hole(each)]
-    tabbed = {id(each) for each in parts or asked if _is_long_enough(each)}
-    bare = {id(each): each for each in asked if tabbed and id(each) not in tabbed}
+    if not len(contours) or not contours.settings[0].operation.tabs:
+        return contours, []
+    asked = list(contours)
+    parts = [k for k, each in enumerate(asked) if each.path.closed and not _is_hole(each)]
+    tabbed = {k for k in parts or range(len(asked)) if _is_long_enough(asked[k])}
+    bare = [each for k, each in enumerate(asked) if tabbed and k not in tabbed]
     if not bare:
-        return items, []
-    opens = sum(not each.path.closed for each in bare.values())
-    holes = sum(each.path.closed and _is_hole(each) for each in bare.values())
+        return contours, []
+    opens = sum(not each.path.closed for each in bare)
+    holes = sum(each.path.closed and _is_hole(each) for each in bare)
     kinds = ((holes, "holes"), (opens, "open"), (len(bare) - holes - opens, "too short for them"))
     finding = TAB_LEFT_OUT_OF_ALL(
         where=operation_name(asked[0].setting.operation),
         measured=len(bare),
         kinds=", ".join(f"{count} {kind}" for count, kind in kinds if count),
     )
-    return tuple(_bare(each) if id(each) in bare else each for each in items), [finding]
-
-
-def _bare(item: Item) -> Item:
-    """The item without tabs."""
-    operation = replace(item.setting.operation, tabs=None)
-    return replace(item, setting=replace(item.setting, operation=operation))
+    setting = contours.settings[0]
+    without = replace(setting, operation=replace(setting.operation, tabs=None))
+    settings = tuple(setting if k in tabbed else without for k in range(len(asked)))
+    return replace(contours, settings=settings), [finding]
 
 
 def _is_hole(contour: Contour) -> bool:
@@ -355,12 +352,12 @@ class RaisedRuns:
     """The runs of an operation, raised where they would have cut bridges, and the
     findings of that."""
 
-    runs: tuple[CutRun, ...]
+    runs: Runs
     findings: tuple[Finding, ...]
 
 
 def raised_over_bridges(
-    runs: Sequence[CutRun], operation: Operation, feeds: Feeds, bridges: Sequence[Bridge]
+    runs: Runs, operation: Operation, feeds: Feeds, bridges: Sequence[Bridge]
 ) -> RaisedRuns:
     """The runs of an operation, kept above all bridges: no cut goes through them.
 
@@ -378,8 +375,8 @@ def raised_over_bridges(
     run is raised to the top of the bridge, as by a tab of its own; so the neighbour has a bridge
     there too, which is a finding.
     """
-    if not bridges or not runs:
-        return RaisedRuns(tuple(runs), ())
+    if not bridges or not len(runs):
+        return RaisedRuns(runs, ())
     reach = operation.tool.radius_mm
     index = BoxIndex(np.array([_box(bridge, reach) for bridge in bridges]))
     made, found = [], _Found()
@@ -387,7 +384,7 @@ def raised_over_bridges(
         _, rows = index.touching(np.concatenate(_extent(run))[None])
         near = [bridges[row] for row in rows.tolist()]
         made.append(_raised(run, near, operation.tool, feeds, found) if near else run)
-    return RaisedRuns(tuple(made), tuple(found.findings(operation)))
+    return RaisedRuns(Runs.of(made), tuple(found.findings(operation)))
 
 
 class _Found:

@@ -169,14 +169,18 @@ class Toolpath:
         return np.asarray((self.kind >= Kind.LINE) & (self.kind <= Kind.ARC_CCW))
 
     def sweeps(self) -> Floats:
-        """(N,) signed sweep in rad, CCW positive; 0 where no arc, ±2π where end is start.
+        """(N,) signed sweep in rad, CCW positive; 0 where no arc, ±2π where end is start."""
+        sweeps, arcs = np.zeros(len(self)), np.flatnonzero(self.is_arc)
+        sweeps[arcs] = self.sweeps_of(arcs)
+        return sweeps
+
+    def sweeps_of(self, arcs: Ints) -> Floats:
+        """(J,) the same of these rows, which are arcs.
 
         CCW: sweep = (angle(end) − angle(start)) mod 2π, taken in (0, 2π];  CW: mirrored.
         """
-        arcs, sweeps = np.flatnonzero(self.is_arc), np.zeros(len(self))
         ends = self.starts_of(arcs), self.end[arcs], self.centre[arcs]
-        sweeps[arcs] = _sweeps(self.kind[arcs], *ends)
-        return sweeps
+        return _sweeps(self.kind[arcs], *ends)
 
     @property
     def running(self) -> int:

@@ -20,7 +20,7 @@ from tests.oracles.arcs import FLAT, centre_of
 def runs_of(contour: Contour, path: Polyline) -> tuple[list[CutRun], list[Finding]]:
     """The runs that cut a contour that keeps away from nothing else, and what is said of them."""
     nothing = KeepOut(Polylines.of([]), np.empty(0, dtype=np.bool_))
-    cut = cut_of([contour], Polylines.of([path]), nothing)
+    cut = cut_of([contour], np.zeros(1, dtype=np.int64), Polylines.of([path]), nothing)
     return list(cut.runs), list(cut.findings)
 
 

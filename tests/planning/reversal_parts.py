@@ -11,7 +11,7 @@ import numpy as np
 
 from camtool.geometry.polylines import Polyline
 from camtool.machine.model import Machine
-from camtool.planning.items import Contour, CutRun, Feeds, Item, Setting
+from camtool.planning.items import Contour, CutRun, Feeds, Item, Runs, Setting
 from camtool.planning.job import Operation
 from camtool.planning.link import link
 from camtool.planning.paths import flat
@@ -76,7 +76,7 @@ def toolpath(paths: Sequence[Polyline], machine: Machine, *, approach: bool) -> 
     """The paths cut one after the other, each from its first point."""
     runs = [run_of(path) for path in paths]
     come = Approaches(machine) if approach else None
-    return link([(Operation(), runs)], 0.2, lambda: come).finish()
+    return link([(Operation(), Runs.of(runs))], 0.2, lambda: come).finish()
 
 
 def judged(

@@ -14,9 +14,11 @@ from hypothesis import strategies as st
 
 from camtool.findings import Code
 from camtool.geometry.measure import length, sample
-from camtool.geometry.polylines import Polyline, reverse, rolled, rotated
-from camtool.planning.items import Contour, CutRun, Feeds, Setting
+from camtool.geometry.polylines import Polyline, Polylines, reverse, rolled, rotated
+from camtool.planning import contours as module
+from camtool.planning.items import Contour, Contours, CutRun, Feeds, Runs, Setting
 from camtool.planning.job import Entry, Lead, Operation, Tabs, Tool
+from camtool.planning.leads import KeepOut
 from camtool.planning.settings import levels
 from tests.oracles.runs import cut_over, most_at_a_time, move_length, run_points, runs_of, steepest
 from tests.paths import mirrored, scaled
@@ -158,6 +160,29 @@ def test_open_contours_go_to_and_fro_or_begin_again() -> None:
     # A ramp of a later pass begins on what the pass before has left.
     sloping = cut(OPEN, entry=ramp(5.0))
     assert [float(each.vertices[0, 2]) for each in sloping] == [0.0, -0.4, -0.8]
+
+
+@given(st.lists(st.one_of(contours(), open_contours()), min_size=1, max_size=5), st.integers(1, 3))
+def test_many_contours_are_cut_as_each_by_itself(paths: list[Polyline], at_once: int) -> None:
+    items = [contour(path, entry=ramp(5.0), lead_out=Lead("line", 0.5)) for path in paths]
+    items = [replace(item, name=f"PATH {k}") for k, item in enumerate(items)]
+    order = np.arange(len(items))[::-1]
+    keep_out = KeepOut(Polylines.of([]), np.empty(0, dtype=np.bool_))
+    lines = Polylines.of(paths).select(order.tolist())
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(module, "CONTOURS_AT_ONCE", at_once)
+        made = module.runs_of(Contours.of(items), order, lines, keep_out)
+    each = [runs_of(items[k], paths[k]) for k in order.tolist()]
+    assert list(made.counts) == [len(runs) for runs, _ in each]
+    assert list(made.findings) == [finding for _, findings in each for finding in findings]
+    wanted = [run for runs, _ in each for run in runs]
+    for one, other in zip(made.runs, wanted, strict=True):
+        assert one.vertices.tolist() == other.vertices.tolist()
+        assert one.feed_mm_min.tolist() == other.feed_mm_min.tolist()
+        assert (one.plunge_mm_min, one.name) == (other.plunge_mm_min, other.name)
+    again = Runs.of(made.runs)
+    for name in ("vertices", "first", "plunge_mm_min", "dwell_s"):
+        assert getattr(again, name).tolist() == getattr(made.runs, name).tolist()
 
 
 def test_slopes_are_slow_enough_for_the_plunge_feed() -> None:

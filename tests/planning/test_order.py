@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -11,8 +12,9 @@ from hypothesis import strategies as st
 
 from camtool.arrays import Ints
 from camtool.errors import OptionError
+from camtool.geometry.nesting import nesting
 from camtool.geometry.polylines import Polyline, Polylines, reverse, rolled
-from camtool.planning.items import Contour, CutRun, Feeds, Fixed, Item, Setting
+from camtool.planning.items import Contour, Contours, CutRun, Feeds, Fixed, Item, Setting
 from camtool.planning.job import Operation
 from camtool.planning.order import (
     Choices,
@@ -122,6 +124,43 @@ def test_only_contours_wait_for_what_they_hold() -> None:
     assert must_precede([]).shape == (0, 2)
 
 
+def before_by_pairs(items: list[Item]) -> list[list[int]]:
+    """What must precede what, one item after the other."""
+    shapes = {id(shape): shape for shape in map(shape_of, items)}
+    rank = {key: k for k, key in enumerate(shapes)}
+    parent = nesting(Polylines.of(shapes.values())).parent if shapes else []
+    return sorted(
+        [one, other]
+        for one, item in enumerate(items)
+        for other, holder in enumerate(items)
+        if parent[rank[id(shape_of(item))]] == rank[id(shape_of(holder))]
+    )
+
+
+def shape_of(item: Item) -> Polyline:
+    """Where a contour lies: the path that it is a part of, or its own."""
+    assert isinstance(item, Contour)
+    return item.outline or item.path
+
+
+@given(st.lists(st.tuples(st.integers(0, 5), st.integers(1, 6), st.integers(1, 3)), max_size=9))
+def test_many_contours_wait_as_each_of_them_does(boxes: list[tuple[int, int, int]]) -> None:
+    items: list[Item] = []
+    for rank, (low, size, parts) in enumerate(boxes):
+        whole = box(low + rank / 64, low, low + size, low + size)
+        ends = pairwise(np.linspace(0, 4, parts + 1).astype(int).tolist())
+        around = np.concatenate([whole.path.vertices, whole.path.vertices[:1]])
+        divided = [
+            replace(whole, path=Polyline(around[begin : end + 1]), outline=whole.path)
+            for begin, end in ends
+        ]
+        items += divided if parts > 1 else [whole]
+    wanted = before_by_pairs(items)
+    assert must_precede(items).tolist() == wanted
+    contours = [item for item in items if isinstance(item, Contour)]
+    assert must_precede(Contours.of(contours)).tolist() == wanted
+
+
 def test_an_arc_of_a_run_is_seen_as_an_arc() -> None:
     # Down, then half round: its chord lies within the box, the arc does not.
     rows = np.array([[1.0, 5, 0, 0], [1, 5, -1, -1.0], [1, 1, -1, 0]])
@@ -134,7 +173,7 @@ def test_an_arc_of_a_run_is_seen_as_an_arc() -> None:
 def test_open_paths_are_travelled_from_the_nearer_end() -> None:
     items: list[Item] = [line(9, 0, 1, 0), line(9, 1, 1, 1)]
     choices = choices_of(items)
-    first, second = chosen_paths(items, choices, best_order(choices, NONE))
+    first, second = chosen_paths(Contours.of(items), choices, best_order(choices, NONE))
     assert (first.start.tolist(), first.end.tolist()) == ([1, 0], [9, 0])
     assert (second.start.tolist(), second.end.tolist()) == ([9, 1], [1, 1])
 
@@ -142,7 +181,7 @@ def test_open_paths_are_travelled_from_the_nearer_end() -> None:
 def test_what_may_not_be_turned_runs_as_drawn() -> None:
     items: list[Item] = [line(9, 0, 1, 0, reversible=False)]
     choices = choices_of(items)
-    (path,) = chosen_paths(items, choices, best_order(choices, NONE))
+    (path,) = chosen_paths(Contours.of(items), choices, best_order(choices, NONE))
     assert path.start.tolist() == [9, 0]
 
 
@@ -156,7 +195,7 @@ def test_closed_paths_begin_at_the_nearest_place_allowed() -> None:
     square = box(-9, -9, -1, -1)
     for item, start in ((square, [-1, -1]), (replace(square, starts=np.array([1, 3])), [-1, -9])):
         choices = choices_of([item])
-        (path,) = chosen_paths([item], choices, best_order(choices, NONE))
+        (path,) = chosen_paths(Contours.of([item]), choices, best_order(choices, NONE))
         assert path.start.tolist() == start
 
 
@@ -164,13 +203,8 @@ def test_no_path_begins_within_an_arc_that_was_split() -> None:
     # A slot whose right cap is two quarters; the vertex between them is nearest to the tool.
     slot = closed((-5, -1), (-2, -1, QUARTER), (-1, 0, QUARTER), (-2, 1), (-5, 1, 1))
     choices = choices_of([slot])
-    (path,) = chosen_paths([slot], choices, best_order(choices, NONE))
+    (path,) = chosen_paths(Contours.of([slot]), choices, best_order(choices, NONE))
     assert path.start.tolist() == [-2, -1]
-
-
-def test_what_is_cut_as_it_is_has_no_path_to_choose() -> None:
-    with pytest.raises(TypeError, match="hole is cut as it is"):
-        chosen_paths([hole(0, 0)], choices_of([hole(0, 0)]), np.array([0]))
 
 
 @given(st.lists(st.tuples(polylines(), st.booleans(), st.booleans()), max_size=6))
@@ -198,7 +232,9 @@ def test_each_variant_of_many_items_is_that_of_the_item(
             wanted += [rolled(item.path, k) for k in own.tolist()]
         else:
             wanted += [item.path, reverse(item.path)] if item.reversible else [item.path]
-    found = chosen_paths(items, choices, np.array(rows, dtype=np.int64)[::-1])
+    contours = Contours.of_items(items)
+    own = choices_of(contours)
+    found = chosen_paths(contours, own, np.arange(len(own.owner))[::-1])
     assert len(found) == len(wanted)
     for one, other in zip(found, reversed(wanted), strict=True):
         assert one.closed == other.closed

@@ -285,7 +285,7 @@ def test_an_axis_without_play_may_turn(machine: Machine) -> None:
     none = with_play(machine, backlash_mm=0.0, compensation_mm=0.0)
     item = contour(circle())
     items, findings = fewer_reversals([item], none)
-    assert items == (item,)
+    assert items == [item]
     assert [(each.code, each.severity) for each in findings] == [
         (Code.PLAY_NOT_KNOWN, Severity.WARNING)
     ]

@@ -131,7 +131,7 @@ def test_no_choice_changes_a_side(shapes: list[np.ndarray], data: st.DataObject)
 def _rims(drawing: Drawing, job: Job, machine: Machine) -> list[float]:
     """The widths of the lines of the tool's centre, in the order of the drawing's paths."""
     plan = planned(drawing, job, machine)
-    items = list({id(item): item for step in plan.steps for item in step.owners}.values())
+    items = [step.items[k] for step in plan.steps for k in np.unique(step.owner).tolist()]
     assert all(isinstance(item, Contour) for item in items)
     rows = sorted(items, key=lambda item: item.source)
     return [float(np.ptp(extents(Polylines.of([row.path]))[0])) for row in rows]
