@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from io import BytesIO
 
 import numpy as np
 
@@ -59,14 +60,14 @@ class Texts:
 
     def with_lines(self, between: Iterable[tuple[int, str]]) -> bytes:
         """The text with further lines, each before its line k; k ascends."""
-        parts, done = [], 0
+        text, out, done = memoryview(self.data), BytesIO(), 0
         for k, line in between:
             upto = int(self.ends[k - 1]) if k > 0 else 0
-            if upto > done:
-                parts.append(self.data[done:upto])
-                done = upto
-            parts.append(f"{line}\n".encode("ascii"))
-        return b"".join([*parts, self.data[done:]])
+            out.write(text[done:upto])
+            out.write(f"{line}\n".encode("ascii"))
+            done = upto
+        out.write(text[done:])
+        return out.getvalue()
 
 
 def line_lengths(data: bytes) -> Ints:

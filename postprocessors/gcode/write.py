@@ -98,7 +98,7 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
                 f"{line}\n".encode("ascii")
                 for line in [*frame, *_header(toolpath, machine, dialect)]
             ),
-            order.text(sent, dialect, feed_decimals(machine), comments),
+            order.text(sent, dialect, feed_decimals(machine), *comments),
             *(f"{line}\n".encode("ascii") for line in frame),
         ]
     )
@@ -159,9 +159,11 @@ class Order:
         sent: Sent,
         dialect: GcodeDialect,
         feed_decimals: int,
-        comments: Mapping[int, Sequence[str]],
+        commented: Ints,
+        comment_at: Callable[[int], str],
     ) -> bytes:
-        """All blocks, with lines of comments before block k (from 0)."""
+        """All blocks, with C lines of comments, the k-th before block commented[k] (from 0); these
+        ascend."""
         others, before = self._sorted()
         at = np.array([at for at, _, _ in others], dtype=np.int64)
         number = before + np.arange(1, len(others) + 1)
@@ -170,19 +172,26 @@ class Order:
             every = np.arange(len(sent.row))
             mine = self._before[1:] + np.searchsorted(at, every, side="right")
             columns.insert(0, Words("N", mine, sent.is_motion))
-        lines = []
-        for (row, block, _), own in zip(others, number.tolist(), strict=True):
-            lines += [(row, 0, comment) for comment in comments.get(own - 1, ())]
-            lines.append((row, 0, f"N{own} {block}" if dialect.block_numbers else block))
         motions = np.flatnonzero(self._is_motion)
         blocks = self._before[motions] + np.searchsorted(at, motions, side="right")
-        known = np.array(list(comments), dtype=np.int64)
-        place = np.searchsorted(blocks, known)
-        for block, k in zip(known.tolist(), place.tolist(), strict=True):
-            if k < len(blocks) and blocks[k] == block:
-                lines += [(int(motions[k]), 1, comment) for comment in comments[block]]
-        lines.sort(key=lambda line: line[:2])
-        return texts_of(columns, blanks=True).with_lines((row, text) for row, _, text in lines)
+        # In front of a row: the other blocks, each behind its comments; then those of a motion.
+        other, motion = (np.searchsorted(each, commented) for each in (number - 1, blocks))
+        moves = np.isin(commented, blocks)
+        place, rank = np.empty(len(commented), dtype=np.int64), 2 * other
+        place[moves], place[~moves] = motions[motion[moves]], at[other[~moves]]
+        rank[moves] = 2 * len(others)
+        rows = np.append(at, place)
+        order = np.lexsort((np.append(2 * np.arange(len(others)) + 1, rank), rows))
+
+        def lines() -> Iterator[tuple[int, str]]:
+            for k, row in zip(order.tolist(), rows[order].tolist(), strict=True):
+                if k >= len(others):
+                    yield row, comment_at(k - len(others))
+                else:
+                    block = others[k][1]
+                    yield row, f"N{number[k]} {block}" if dialect.block_numbers else block
+
+        return texts_of(columns, blanks=True).with_lines(lines())
 
 
 def _footer(toolpath: Toolpath, events: Events, dialect: GcodeDialect) -> list[str]:
@@ -222,25 +231,26 @@ def _digest(machine: Machine) -> str:
     return hashlib.sha256(msgspec.json.encode(machine)).hexdigest()[:8]
 
 
-def _comments(toolpath: Toolpath, of_row: Ints, style: Style) -> dict[int, list[str]]:
-    """Messages, and the name of each contour, as lines before blocks (by index, from 0); of_row
-    (B,) the rows of the blocks."""
-    wanted: dict[int, list[str]] = {}
+def _comments(toolpath: Toolpath, of_row: Ints, style: Style) -> tuple[Ints, Callable[[int], str]]:
+    """The lines of comments, messages and the names of contours where they begin: the block
+    (by index, from 0) that each stands before (C,), and the text of the k-th; `of_row` (B,) the
+    rows of the blocks."""
+    begins = np.empty(0, dtype=np.int64)
     if style.dialect.comments == "contours":
         motions = np.flatnonzero(toolpath.is_motion)
         named = toolpath.source[motions]
-        begins = (np.diff(named, prepend=-1) != 0) & (named >= 0)
-        for row in motions[begins].tolist():
-            wanted.setdefault(row, []).append(comment(toolpath.text(row)))
-    for row in np.flatnonzero(toolpath.kind == Kind.MESSAGE).tolist():
-        wanted.setdefault(row, []).append(_message(toolpath, row, style))
-    rows = sorted(wanted)
+        begins = motions[(np.diff(named, prepend=-1) != 0) & (named >= 0)]
+    rows = np.sort(np.concatenate([begins, np.flatnonzero(toolpath.kind == Kind.MESSAGE)]))
     # The comments of a row that was left out stand before the next block that is sent.
     blocks = np.searchsorted(np.maximum.accumulate(of_row), rows)
-    found: dict[int, list[str]] = {}
-    for row, block in zip(rows, np.minimum(blocks, len(of_row) - 1).tolist(), strict=True):
-        found.setdefault(block, []).extend(wanted[row])
-    return found
+
+    def text(k: int) -> str:
+        row = int(rows[k])
+        if toolpath.kind[row] == Kind.MESSAGE:
+            return _message(toolpath, row, style)
+        return comment(toolpath.text(row))
+
+    return np.minimum(blocks, len(of_row) - 1), text
 
 
 def _message(toolpath: Toolpath, row: int, style: Style) -> str:

@@ -70,7 +70,10 @@ def test_modal_blocks(rows: list[Row], strip: bool, numbered: bool, of_feed: int
     for k, block in enumerate(wanted):
         lines += comments.get(k, [])
         lines.append(f"N{k + 1} {block}" if numbered else block)
-    assert order.text(sent, dialect, of_feed, comments).decode().splitlines() == lines
+    commented = np.array([k for k, each in comments.items() for _ in each], dtype=np.int64)
+    texts = [text for each in comments.values() for text in each]
+    written_text = order.text(sent, dialect, of_feed, commented, texts.__getitem__)
+    assert written_text.decode().splitlines() == lines
     assert of_row.tolist() == their_rows
 
 
