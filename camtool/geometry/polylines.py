@@ -129,12 +129,15 @@ class Polylines:
         return (self[index] for index in range(len(self)))
 
     def select(self, indices: Iterable[int]) -> Polylines:
-        """The paths of these indices, in this order; IndexError for one that is not there."""
+        """The paths of these indices, in this order, the very columns where these are all;
+        IndexError for one that is not there."""
         chosen = np.fromiter((int(index) for index in indices), dtype=np.int64)
         bad = (chosen < -len(self)) | (chosen >= len(self))
         if bad.any():
             raise IndexError(f"path {chosen[np.argmax(bad)]} of {len(self)}")
         chosen %= max(len(self), 1)
+        if np.array_equal(chosen, np.arange(len(self))):
+            return self
         counts = np.diff(self.offsets)[chosen]
         offsets = np.concatenate([np.zeros(1, dtype=np.int64), np.cumsum(counts)])
         rows = np.arange(offsets[-1]) + np.repeat(self.offsets[chosen] - offsets[:-1], counts)

@@ -19,7 +19,7 @@ from typing import Final
 import msgspec
 import numpy as np
 
-from camtool.arrays import Bools, Ints
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import PostError
 from camtool.findings import Finding
 from camtool.machine.model import Machine
@@ -78,6 +78,8 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
     arcs = arcs_of(toolpath, dialect)
     events = events_of(toolpath, style.event)
     sent = sent_rows(toolpath, arcs, feeds)
+    arc_counts = arcs.counts
+    del arcs
     frame = [style.frame] if style.frame else []
     first_mode, changes = _path_modes(toolpath, sent, style)
     ended = len(toolpath) > 0 and toolpath.kind[-1] == Kind.END
@@ -109,7 +111,7 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
         of_row,
         (
             *rounded_feeds,
-            *_arc_findings(toolpath, arcs.counts, sent.dropped),
+            *_arc_findings(toolpath, arc_counts, sent.dropped),
             *_rounded(toolpath, events.rounded),
         ),
     )
@@ -324,22 +326,24 @@ class Sent:
 
 def sent_rows(toolpath: Toolpath, arcs: Arcs, feeds: Ints) -> Sent:
     """All rows with pieces in place of arcs, without moves that move nothing."""
-    many = np.ones(len(toolpath), dtype=np.int64)
-    for row, pieces in arcs.pieces.items():
-        many[row] = len(pieces)
-    of = np.repeat(np.arange(len(toolpath)), many)
-    kind, end, offset = arcs.kind[of], arcs.end[of], arcs.offset[of]
-    first = np.cumsum(many) - many
-    for row, pieces in arcs.pieces.items():
-        sunk = int(arcs.end[row - 1, 2]) if row else 0
-        rise = int(arcs.end[row, 2]) - sunk
-        for at, piece in enumerate(pieces, int(first[row])):
-            height = sunk + round(rise * piece.share)
-            kind[at], end[at], offset[at] = piece.kind, (*piece.end, height), piece.offset
-    before = np.concatenate([np.zeros((1, 3), dtype=np.int64), end])[: len(end)]
+    of, kind, end, offset = np.arange(len(toolpath)), arcs.kind, arcs.end, arcs.offset
+    if arcs.pieces:
+        many = np.ones(len(toolpath), dtype=np.int64)
+        for row, pieces in arcs.pieces.items():
+            many[row] = len(pieces)
+        of = np.repeat(of, many)
+        kind, end, offset = kind[of], end[of], offset[of]
+        first = np.cumsum(many) - many
+        for row, pieces in arcs.pieces.items():
+            sunk = int(arcs.end[row - 1, 2]) if row else 0
+            rise = int(arcs.end[row, 2]) - sunk
+            for at, piece in enumerate(pieces, int(first[row])):
+                height = sunk + round(rise * piece.share)
+                kind[at], end[at], offset[at] = piece.kind, (*piece.end, height), piece.offset
     motion = kind <= Kind.ARC_CCW
     is_arc = motion & (kind >= Kind.ARC_CW)
-    written = (end != before) & motion[:, None]
+    written = _differ(end, np.zeros(3))
+    written[~motion] = False
     home_xy, home_z = kind == Kind.HOME_XY, kind == Kind.HOME_Z
     flat = written[:, :2].any(axis=1) | is_arc
     # A rapid to where X and Y should be already is not left out before they were ever written.
@@ -348,7 +352,7 @@ def sent_rows(toolpath: Toolpath, arcs: Arcs, feeds: Ints) -> Sent:
     still &= _not_yet_written(flat | still, home_xy)
     both = is_arc | still | (flat & _not_yet_written(flat | still, home_xy))
     written[both, :2] = True
-    wanted = (toolpath.end != toolpath.starts).any(axis=1)[of]
+    wanted = np.asarray(_differ(toolpath.end, toolpath.start).any(axis=1))[of]
     kept = ~motion | written.any(axis=1)
     homes = np.cumsum(home_xy | home_z)[kept]
     return Sent(
@@ -361,6 +365,13 @@ def sent_rows(toolpath: Toolpath, arcs: Arcs, feeds: Ints) -> Sent:
         np.diff(_at_motions(homes, motion[kept]), prepend=0) > 0,
         int((~kept & wanted).sum()) + arcs.counts.dropped,
     )
+
+
+def _differ(ends: Ints | Floats, start: Floats) -> Bools:
+    """(M, 3) where ends (M, 3) are not those of the row before, of the first not the start."""
+    differ = np.empty(ends.shape, dtype=np.bool_)
+    differ[:1], differ[1:] = ends[:1] != start, ends[1:] != ends[:-1]
+    return differ
 
 
 def _not_yet_written(written: Bools, home: Bools) -> Bools:
