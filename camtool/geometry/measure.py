@@ -44,6 +44,8 @@ def signed_areas(lines: Polylines) -> Floats:
 
     Exact with arcs: the shoelace formula over the chords and the area between chord and arc.
     """
+    rows = np.flatnonzero(lines.closed)
+    areas, lines = np.zeros(len(lines)), lines.select(rows.tolist())
     segments = Segments.of(lines)
     # Areas are taken about the first point of each path, so that far drawings lose no digits.
     about = lines.vertices[lines.offsets[:-1], :2][segments.path]
@@ -51,7 +53,8 @@ def signed_areas(lines: Polylines) -> Floats:
     below = 0.5 * (start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0])
     chord = segments.end - segments.start
     beside = (chord**2).sum(axis=1) * _area_beside(segments.bulge)
-    return np.where(lines.closed, _per_path(segments, below + beside, lines), 0.0)
+    areas[rows] = _per_path(segments, below + beside, lines)
+    return areas
 
 
 def _per_path(segments: Segments, values: Floats, lines: Polylines) -> Floats:

@@ -106,7 +106,11 @@ class Polylines:
 
     @classmethod
     def joined(cls, parts: Sequence[Polylines]) -> Polylines:
-        """The paths of all parts, one part after the other."""
+        """The paths of all parts, one part after the other; the very columns where only one part
+        has any."""
+        parts = [part for part in parts if len(part)]
+        if len(parts) == 1:
+            return parts[0]
         counts = [np.diff(part.offsets) for part in parts]
         return cls._trusted(
             np.concatenate([np.empty((0, 3)), *(part.vertices for part in parts)]),
@@ -153,6 +157,13 @@ class Polylines:
         return lines
 
 
+def next_vertices(offsets: Ints) -> Ints:
+    """(N,) the vertex behind each one of the paths with these offsets: of the last the first."""
+    following = np.arange(1, offsets[-1] + 1)
+    following[offsets[1:] - 1] = offsets[:-1]
+    return following
+
+
 def segment_rows(lines: Polylines) -> Ints:
     """(K,) the vertex that each segment leaves, in the order of `Segments.of`."""
     keep = np.ones(len(lines.vertices), dtype=np.bool_)
@@ -186,9 +197,7 @@ class Segments:
             lines = Polylines.of([lines])
         vertices, offsets = lines.vertices, lines.offsets
         path = np.repeat(np.arange(len(lines)), np.diff(offsets))
-        following = np.arange(1, len(vertices) + 1)
-        following[offsets[1:] - 1] = offsets[:-1]
-        keep = segment_rows(lines)
+        following, keep = next_vertices(offsets), segment_rows(lines)
         return cls.between(
             vertices[keep, :2], vertices[following[keep], :2], vertices[keep, 2], path[keep]
         )
@@ -258,10 +267,8 @@ def _checked(vertices: Floats, offsets: Ints, closed: Bools | list[bool]) -> Flo
     _refuse(np.abs(array[:, 2]) > 1.0 + BULGE_EPS, "|bulge| above 1: split the arc", offsets)
     array[over, 2] = np.sign(array[over, 2])
     array[np.abs(array[:, 2]) < BULGE_EPS, 2] = 0.0
-    following = np.arange(1, len(array) + 1)
-    following[last] = offsets[:-1]
-    step = array[following, :2] - array[:, :2]
-    short = np.hypot(step[:, 0], step[:, 1]) <= POSITION_EPS_MM
+    following = next_vertices(offsets)
+    short = np.hypot(*(array[following, k] - array[:, k] for k in (0, 1))) <= POSITION_EPS_MM
     short[last[~is_closed]] = False
     _refuse(short, "a point is repeated", offsets)
     array.flags.writeable = False

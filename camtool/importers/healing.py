@@ -29,6 +29,7 @@ from camtool.geometry.polylines import (
     Polylines,
     Segments,
     encloses,
+    next_vertices,
     segment_rows,
     without_repeats,
 )
@@ -155,9 +156,8 @@ def _drawn_once(lines: Polylines, styles: Iterable[tuple[str, str]]) -> Bools:
     count = len(lines)
     if not count:
         return np.empty(0, dtype=np.bool_)
-    following = np.arange(1, len(lines.vertices) + 1)
-    following[lines.offsets[1:] - 1] = lines.offsets[:-1]
-    segment = segment_numbers(lines.vertices, lines.vertices[following])
+    every = np.arange(len(lines.vertices))
+    segment = segment_numbers(lines.vertices, every, next_vertices(lines.offsets))
     segment[lines.offsets[1:][~lines.closed] - 1] = 0
     kind = 2 * numbered(list(styles), count) + lines.closed
     key = _mixed(np.add.reduceat(segment, lines.offsets[:-1]) + _mixed(kind.view(np.uint64)))
@@ -166,18 +166,25 @@ def _drawn_once(lines: Polylines, styles: Iterable[tuple[str, str]]) -> Bools:
     return once
 
 
-def segment_numbers(begin: Floats, end: Floats) -> _Words:
+def segment_numbers(vertices: Floats, begin: Ints, end: Ints) -> _Words:
     """(K,) a number mixed from the rounded ends and the bulge of the segment between two vertices
-    (K, 3), the same in both directions."""
-    # Adding 0 makes −0 and 0 one.
-    grid = (np.round(begin / POSITION_EPS_MM) + 0.0).astype(np.int64).view(np.uint64)
-    ahead = (np.round(end[:, :2] / POSITION_EPS_MM) + 0.0).astype(np.int64).view(np.uint64)
-    bulge = grid[:, 2].view(np.int64)
-    point = _mixed(_mixed(grid[:, 0]) + grid[:, 1])
-    onward = _mixed(_mixed(ahead[:, 0]) + ahead[:, 1])
-    bend = np.where(onward < point, -bulge, bulge).view(np.uint64)
-    segment = _mixed(_mixed(np.minimum(point, onward)) + np.maximum(point, onward))
-    return _mixed(segment + bend)
+    (of N, 3), the rows (K,) of which are given; the same in both directions."""
+    found = np.empty(len(begin), dtype=np.uint64)
+    for first in range(0, len(begin), SEGMENTS_AT_ONCE):
+        some = slice(first, first + SEGMENTS_AT_ONCE)
+        # Adding 0 makes −0 and 0 one.
+        grid, ahead = (
+            (np.round(vertices[rows[some]] / POSITION_EPS_MM) + 0.0).astype(np.int64)
+            for rows in (begin, end)
+        )
+        point, onward = (
+            _mixed(_mixed(place[:, 0].view(np.uint64)) + place[:, 1].view(np.uint64))
+            for place in (grid, ahead)
+        )
+        bend = np.where(onward < point, -grid[:, 2], grid[:, 2]).view(np.uint64)
+        segment = _mixed(_mixed(np.minimum(point, onward)) + np.maximum(point, onward))
+        found[some] = _mixed(segment + bend)
+    return found
 
 
 def _mixed(words: _Words) -> _Words:
@@ -190,6 +197,9 @@ def _mixed(words: _Words) -> _Words:
 
 # Healing: overlaps taken off, ends joined, arcs recognised (if asked for), specks merged. Each
 # stage is a function of camtool.geometry; here they are put in order and counted.
+
+SEGMENTS_AT_ONCE = 1 << 16
+"""So many segments are numbered at a time: some 10 MB."""
 
 TINY_SHARE = 0.5
 """Segments up to this share of the tolerance are merged into their neighbours."""
@@ -289,48 +299,50 @@ def off_drawn(pieces: Sequence[Piece], lines: Polylines) -> Floats:
     """(N, 2) mm: the largest and the rms distance between what was drawn as `pieces` and the
     segment that leaves each vertex of the paths made of them."""
     found = np.zeros((len(lines.vertices), 2))
-    begin, end, said = _drawn(pieces)
+    vertices, begin, end, said = _drawn(pieces)
     if not len(begin) or not len(lines):
         return found
-    made = Segments.of(lines)
     rows = segment_rows(lines)
-    heads = lines.vertices[rows]
-    drawn_as, made_as = segment_numbers(begin, end), segment_numbers(heads, made.end)
-    order = np.argsort(drawn_as, kind="stable")
-    numbers, first = np.unique(drawn_as[order], return_index=True)
-    most = np.maximum.reduceat(said[order], first, axis=0)
-    at = np.minimum(np.searchsorted(numbers, made_as), len(numbers) - 1)
-    kept = numbers[at] == made_as
-    off = np.where(kept[:, None], most[at], 0.0)
-    gone = ~np.isin(drawn_as, made_as)
+    drawn_as = segment_numbers(vertices, begin, end)
+    made_as = segment_numbers(lines.vertices, rows, next_vertices(lines.offsets)[rows])
+    kept, gone = _is_among(made_as, drawn_as), ~_is_among(drawn_as, made_as)
+    if said.any():
+        order = np.argsort(drawn_as, kind="stable")
+        numbers, first = np.unique(drawn_as[order], return_index=True)
+        most = np.maximum.reduceat(said[begin[order]], first, axis=0)
+        found[rows[kept]] = most[np.searchsorted(numbers, made_as[kept])]
     if gone.any() or not kept.all():
-        drawn = Segments.between(begin[:, :2], end[:, :2], begin[:, 2])
-        np.maximum(off, _changed(drawn, said, made, gone, ~kept), out=off)
-    found[rows] = off
+        drawn = Segments.between(vertices[begin, :2], vertices[end, :2], vertices[begin, 2])
+        off = _changed(drawn, said[begin], Segments.of(lines), gone, ~kept)
+        found[rows] = np.maximum(found[rows], off)
     return found
 
 
-def _drawn(pieces: Sequence[Piece]) -> tuple[Floats, Floats, Floats]:
-    """Both vertices (K, 3), (K, 3) of all segments of the pieces, and how far off they are said to
-    be (K, 2); without those that have no length."""
+def _is_among(numbers: _Words, others: _Words) -> Bools:
+    """(K,) which numbers are among the others, of which there is at least one."""
+    ordered = np.sort(others)
+    at = np.searchsorted(ordered, numbers)
+    return np.asarray(ordered[np.minimum(at, len(ordered) - 1, out=at)] == numbers)
+
+
+def _drawn(pieces: Sequence[Piece]) -> tuple[Floats, Ints, Ints, Floats]:
+    """The vertices (N, 3) of the pieces, those at both ends of each segment that has a length
+    (K,), (K,), and how far off the segment that leaves a vertex is said to be (N, 2)."""
     lasting = [piece for piece in pieces if len(piece.vertices)]
-    if not lasting:
-        return np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 2))
-    counts = np.array([len(piece.vertices) for piece in lasting])
-    vertices = np.concatenate([piece.vertices for piece in lasting]).astype(np.float64)
-    off = np.concatenate(
-        [
-            np.zeros((len(piece.vertices), 2)) if piece.off_mm is None else piece.off_mm
-            for piece in lasting
-        ]
-    )
-    last = np.cumsum(counts) - 1
-    following = np.arange(1, len(vertices) + 1)
-    following[last] = last - counts + 1
-    there = np.hypot(*(vertices[following] - vertices)[:, :2].T) > POSITION_EPS_MM
-    there[last[[not piece.closed for piece in lasting]]] = False
+    counts = np.array([0, *(len(piece.vertices) for piece in lasting)])
+    offsets = np.cumsum(counts)
+    vertices = np.concatenate([np.empty((0, 3)), *(piece.vertices for piece in lasting)])
+    said = np.broadcast_to(0.0, (len(vertices), 2))  # one number, seen as many
+    if any(piece.off_mm is not None for piece in lasting):
+        said = np.zeros((len(vertices), 2))
+        for k, piece in enumerate(lasting):
+            if piece.off_mm is not None:
+                said[offsets[k] : offsets[k + 1]] = piece.off_mm
+    following = next_vertices(offsets)
+    there = np.hypot(*(vertices[following, k] - vertices[:, k] for k in (0, 1))) > POSITION_EPS_MM
+    there[offsets[1:][[not piece.closed for piece in lasting]] - 1] = False
     rows = np.flatnonzero(there)
-    return vertices[rows], vertices[following[rows]], off[rows]
+    return vertices, rows, following[rows], said
 
 
 def _changed(drawn: Segments, said: Floats, made: Segments, gone: Bools, new: Bools) -> Floats:

@@ -20,6 +20,7 @@ from camtool.geometry.drawing import Drawing, Mark, Skipped, Units
 from camtool.geometry.facts import drawing_facts
 from camtool.geometry.measure import path_lengths, signed_areas
 from camtool.geometry.polylines import Polyline
+from camtool.importers import healing
 from camtool.importers.assemble import MAX_PLACES, assemble
 from camtool.importers.healing import cleaned
 from camtool.importers.options import ReadOptions, Selection
@@ -301,3 +302,16 @@ def test_order_and_direction_of_drawing_decide_nothing(
         assert mine.at_mm == pytest.approx(its.at_mm, abs=1e-9)
     assert one.healing.duplicates == two.healing.duplicates
     assert one.healing.overlaps_mm == pytest.approx(two.healing.overlaps_mm)
+
+
+def test_segments_are_numbered_alike_however_many_at_a_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    vertices = np.random.default_rng(2).uniform(-9.0, 9.0, (7, 3))
+    begin, end = np.arange(7), np.roll(np.arange(7), -1)
+    numbers = healing.segment_numbers(vertices, begin, end)
+    monkeypatch.setattr(healing, "SEGMENTS_AT_ONCE", 2)
+    assert healing.segment_numbers(vertices, begin, end).tolist() == numbers.tolist()
+    turned = vertices.copy()
+    turned[end, 2] = -vertices[begin, 2]
+    assert healing.segment_numbers(turned, end, begin).tolist() == numbers.tolist()
