@@ -256,16 +256,14 @@ def cuts(vertices: Floats, feed_mm_min: Floats, first: Ints) -> Cuts:
     longest = np.flatnonzero(size == np.repeat(np.maximum.reduceat(size, heads), counts))
     best = longest[np.searchsorted(longest, heads)]
     last = heads + counts - 1
-    bulge, begin, end = segments.bulge[best], segments.start[heads], segments.end[last]
-    apart = np.hypot(end[:, 0] - begin[:, 0], end[:, 1] - begin[:, 1])
-    round_ = (bulge != 0.0) & (apart <= POSITION_EPS_MM)
-    return Cuts(
-        run=run[heads],
-        end=np.column_stack([np.where(round_[:, None], begin, end), end_z[last]]),
-        centre=segments.centre[best],
-        ccw=bulge > 0.0,
-        feed=feed[heads],
-    )
+    bulge, end = segments.bulge[best], np.column_stack([segments.end[last], end_z[last]])
+    arcs, centre = np.flatnonzero(bulge), np.full((len(heads), 2), np.nan)
+    centre[arcs] = segments[best[arcs]].centre
+    begin = segments.start[heads[arcs]]
+    apart = np.hypot(*(end[arcs, :2] - begin).T)
+    round_ = apart <= POSITION_EPS_MM
+    end[arcs[round_], :2] = begin[round_]
+    return Cuts(run=run[heads], end=end, centre=centre, ccw=bulge > 0.0, feed=feed[heads])
 
 
 def _begins(segments: Segments, goes_on: Bools) -> Bools:
@@ -295,17 +293,27 @@ def _within(segments: Segments, begin: int, last: int, swept: float) -> bool:
 
 def _goes_on(segments: Segments, rise: Floats, feed: Floats) -> Bools:
     """(n−1,) true where a segment goes on in the next: one run, circle, slope and feed."""
-    length = np.where(segments.is_arc, segments.radius, 0.0) * np.abs(segments.sweep)
-    slope = rise / np.where(segments.is_arc, length, 1.0)
-    same = _same_arc(segments[:-1], segments[1:]) & (np.abs(np.diff(slope)) <= SLOPE_EPS)
-    return np.asarray(same & (feed[:-1] == feed[1:]) & (np.diff(segments.path) == 0))
+    found = _same_arc(segments[:-1], segments[1:]) & (feed[:-1] == feed[1:])
+    found &= np.diff(segments.path) == 0
+    pairs = np.flatnonzero(found)
+    found[pairs] = np.abs(_slopes(segments, rise, pairs + 1) - _slopes(segments, rise, pairs)) <= (
+        SLOPE_EPS
+    )
+    return np.asarray(found)
+
+
+def _slopes(segments: Segments, rise: Floats, rows: Ints) -> Floats:
+    """(J,) mm per mm: how steep these rows are, all of them arcs."""
+    arcs = segments[rows]
+    return np.asarray(rise[rows] / (arcs.radius * np.abs(arcs.sweep)))
 
 
 def _same_arc(one: Segments, other: Segments) -> Bools:
     """(K,) true where two rows are arcs of one circle in the same direction."""
-    alike = one.is_arc & other.is_arc & (np.sign(one.bulge) == np.sign(other.bulge))
-    apart = np.where(alike[:, None], one.centre - other.centre, np.inf)
-    # A line has an infinite radius, and the difference of two would be no number.
-    radius, other_radius = (np.where(alike, each.radius, 0.0) for each in (one, other))
+    found = one.is_arc & (np.sign(one.bulge) == np.sign(other.bulge))
+    rows = np.flatnonzero(found)
+    one, other = one[rows], other[rows]
+    apart = one.centre - other.centre
     near = np.hypot(apart[:, 0], apart[:, 1]) <= POSITION_EPS_MM
-    return np.asarray(near & (np.abs(radius - other_radius) <= POSITION_EPS_MM))
+    found[rows] = near & (np.abs(one.radius - other.radius) <= POSITION_EPS_MM)
+    return np.asarray(found)
