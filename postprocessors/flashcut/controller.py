@@ -243,7 +243,6 @@ class MoveTable:
     """How many moves each row of a placed toolpath makes, and the moves of any window of rows."""
 
     toolpath: Toolpath
-    starts: Floats
     sweeps: Floats
     chords: Ints
     rises: Bools
@@ -263,7 +262,6 @@ class MoveTable:
         x, y, z = (axis.coded_step_mm for axis in machine.axes)
         return cls(
             toolpath,
-            starts,
             sweeps,
             parts.astype(np.int64),
             rises,
@@ -296,7 +294,7 @@ class MoveTable:
         """(J, 2) mm at these shares of the arcs' sweeps, as far from the centre as the start
         is: r = hypot(I, J) from the angle of the start on (L1378)."""
         centre = self.toolpath.centre[row]
-        spoke = self.starts[row, :2] - centre
+        spoke = self.toolpath.starts_of(row)[:, :2] - centre
         radius = np.hypot(spoke[:, 0], spoke[:, 1])
         angle = np.arctan2(spoke[:, 1], spoke[:, 0]) + share * self.sweeps[row]
         turned = np.column_stack([np.cos(angle), np.sin(angle)])

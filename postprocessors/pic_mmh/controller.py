@@ -43,7 +43,7 @@ from camtool.toolpath.moves import Kind, Toolpath
 from . import steps as loops
 from .dialect import Dialect, PicMmhController
 from .findings import ARC_END_UNSURE
-from .legs import METHODS, FusedLegs, legs_of, positions
+from .legs import METHODS, Course, FusedLegs, Periods, positions
 from .steps import (
     approach_scan,
     approach_start,
@@ -101,7 +101,7 @@ class PicMmhModel(ControllerModel[PicMmhController, Dialect]):
             return ()
 
         return arc_end_findings(
-            toolpath, machine, PicMmhRun(toolpath, machine, options).legs_as_said()
+            toolpath, machine, PicMmhRun(toolpath, machine, options).arcs_as_said()
         )
 
     def fused_run(
@@ -122,6 +122,10 @@ def _on_grid(points: Floats, coded_mm: list[float]) -> Floats:
 
 MAX_STEPS = 1 << 30
 """Positions beyond this many steps (150 m at 140 nm) are refused: squares must fit 64 bits."""
+
+
+ROWS_AT_ONCE = 1 << 14
+"""The legs of so many rows are made together."""
 
 
 @dataclass(frozen=True)
@@ -204,23 +208,17 @@ class PicMmhRun:
         places = positions(toolpath, self._position, self._ends, self._home)
         for row in np.flatnonzero(self._suspect(places)[:rows]).tolist():
             self._check(row, places[row])
-        feeds = toolpath.is_feed[:, None]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            feed_s = 60.0 * self._coded_mm[None, [0, 2]] / toolpath.feed[:, None]
-            feed_s = np.maximum(feed_s, self._least_period_s)
-        waits = toolpath.kind[:rows] == Kind.DWELL
-        legs = legs_of(toolpath, places, self._centres, self._stops)
         return FusedLegs(
-            legs=legs,
-            periods_s=np.where(feeds, feed_s, self._rapid_period_s),
-            still_s=np.where(waits, toolpath.value[:rows], 0.0),
-            how=(
+            Course(toolpath, places, self._centres, self._stops),
+            rows,
+            Periods(self._rapid_period_s, self._least_period_s, self._coded_mm[[0, 2]]),
+            (
                 self._options.interpolator or self._controller.arcs,
                 self._controller.initial_error == "rounded-radius",
                 self._controller.time_base == "event",
                 float(self._coded_mm[0]),
             ),
-            mechanics=self._mechanics,
+            self._mechanics,
         )
 
     def _stopped(self) -> Ints:
@@ -245,13 +243,17 @@ class PicMmhRun:
         self._ends[:, :2] = np.where(toolpath.is_motion[:, None], ends, self._ends[:, :2])
         return stops
 
-    def legs_as_said(self) -> Ints:
-        """(L, 14) legs of the rows up to the end of the program as if each stopped on its end."""
+    def arcs_as_said(self) -> Ints:
+        """(L, 14) legs of the arcs up to the end of the program as if each stopped on its end."""
         toolpath = self._toolpath
         places = positions(toolpath, self._position, self._said, self._home)
         unknown = np.full(len(toolpath), -1, dtype=np.int64)
-        legs = legs_of(toolpath, places, self._centres, unknown)
-        return np.asarray(legs[legs[:, 0] < toolpath.running])
+        course = Course(toolpath, places, self._centres, unknown)
+        parts = []
+        for low in range(0, toolpath.running, ROWS_AT_ONCE):
+            legs = course.legs(low, min(low + ROWS_AT_ONCE, toolpath.running))
+            parts.append(legs[legs[:, loops.KIND] == loops.ARC])
+        return np.concatenate(parts)
 
     def _suspect(self, places: Ints) -> Bools:
         """(N,) true for the rows that `_check` has to look at."""
@@ -493,12 +495,10 @@ def arc_reach(arc: Arc, fill: Filler) -> tuple[int, bool]:
 # was, stops there by all; of the others the machine's owner must know what may become of them.
 
 
-def arc_end_findings(toolpath: Toolpath, machine: _Machine, legs: Ints) -> tuple[Finding, ...]:
-    """One ARC_END_UNSURE for the arcs of `legs` (L, 14), each from the end of the row before it,
+def arc_end_findings(toolpath: Toolpath, machine: _Machine, arcs: Ints) -> tuple[Finding, ...]:
+    """One ARC_END_UNSURE for the legs `arcs` (L, 14), each from the end of the row before it,
     that do not stop on their end by every reading."""
-    arcs = legs[
-        (legs[:, loops.KIND] == loops.ARC) & (legs[:, [loops.A, loops.B]] != 0).any(axis=1)
-    ]
+    arcs = arcs[(arcs[:, [loops.A, loops.B]] != 0).any(axis=1)]
     met = [_stops(arcs, rounded, loops.EQUAL)[:, loops.MET] != 0 for rounded in (False, True)]
     unsure = ~(met[0] & met[1])
     if not unsure.any():

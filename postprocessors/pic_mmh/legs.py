@@ -6,6 +6,7 @@ every leg begins is known before any is run.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -40,34 +41,63 @@ def positions(toolpath: Toolpath, start: Ints, ends: Ints, home: Ints) -> Ints:
     return places
 
 
-def legs_of(toolpath: Toolpath, places: Ints, centres: Ints, stops: Ints) -> Ints:
-    """(L, 14) legs of `steps` of all rows; `places` (N + 1, 3) of
-    `positions`, `centres` (N, 2) steps, `stops` (N,) samples of arcs or −1."""
-    count = len(toolpath)
-    begin, way = places[:-1], np.diff(places, axis=0)
-    flat = np.zeros((count, loops.LEG_COLUMNS), dtype=np.int64)
-    flat[:, loops.ROW] = np.arange(count)
-    flat[:, [loops.FROM_X, loops.FROM_Y]] = begin[:, :2]
-    deep = flat.copy()
-    arc = toolpath.is_arc
-    flat[:, loops.KIND] = np.where(arc, loops.ARC, loops.LINE)
-    about = np.where(arc[:, None], centres, begin[:, :2])
-    flat[:, [loops.ORIGIN_X, loops.ORIGIN_Y]] = about
-    sign = np.where((way[:, :2] < 0) & ~arc[:, None], -1, 1)
-    flat[:, [loops.SIGN_X, loops.SIGN_Y]] = sign
-    spoke = begin[:, :2] - centres
-    flat[:, [loops.A, loops.B]] = np.where(arc[:, None], spoke, np.abs(way[:, :2]))
-    flat[:, [loops.END_X, loops.END_Y]] = places[1:, :2] - about
-    flat[:, loops.CW] = toolpath.kind == Kind.ARC_CW
-    flat[:, loops.STOP] = stops
-    deep[:, loops.KIND] = loops.DEPTH
-    deep[:, [loops.FROM_X, loops.FROM_Y]] = places[1:, :2]  # XY first, then Z
-    deep[:, [loops.ORIGIN_X, loops.ORIGIN_Y]] = places[1:, :2]
-    deep[:, loops.A] = np.abs(way[:, 2])
-    deep[:, loops.CW] = np.sign(way[:, 2])
-    both = np.stack([flat, deep], axis=1).reshape(-1, loops.LEG_COLUMNS)
-    moves = np.column_stack([arc | way[:, :2].any(axis=1), way[:, 2] != 0]).reshape(-1)
-    return np.ascontiguousarray(both[moves])
+@dataclass(frozen=True, eq=False)
+class Course:
+    """Where the controller is to go: `places` (N + 1, 3) of `positions`, `centres` (N, 2) steps of
+    the arcs among the rows of the toolpath, `stops` (N,) samples of arcs or −1."""
+
+    toolpath: Toolpath
+    places: Ints
+    centres: Ints
+    stops: Ints
+
+    def legs(self, low: int, high: int) -> Ints:
+        """(L, 14) legs of `steps` of the rows low:high."""
+        places, centres = self.places[low : high + 1], self.centres[low:high]
+        kind = self.toolpath.kind[low:high]
+        begin, way = places[:-1], np.diff(places, axis=0)
+        flat = np.zeros((len(kind), loops.LEG_COLUMNS), dtype=np.int64)
+        flat[:, loops.ROW] = np.arange(low, low + len(kind))
+        flat[:, [loops.FROM_X, loops.FROM_Y]] = begin[:, :2]
+        deep = flat.copy()
+        arc = (kind == Kind.ARC_CW) | (kind == Kind.ARC_CCW)
+        flat[:, loops.KIND] = np.where(arc, loops.ARC, loops.LINE)
+        about = np.where(arc[:, None], centres, begin[:, :2])
+        flat[:, [loops.ORIGIN_X, loops.ORIGIN_Y]] = about
+        sign = np.where((way[:, :2] < 0) & ~arc[:, None], -1, 1)
+        flat[:, [loops.SIGN_X, loops.SIGN_Y]] = sign
+        spoke = begin[:, :2] - centres
+        flat[:, [loops.A, loops.B]] = np.where(arc[:, None], spoke, np.abs(way[:, :2]))
+        flat[:, [loops.END_X, loops.END_Y]] = places[1:, :2] - about
+        flat[:, loops.CW] = kind == Kind.ARC_CW
+        flat[:, loops.STOP] = self.stops[low:high]
+        deep[:, loops.KIND] = loops.DEPTH
+        deep[:, [loops.FROM_X, loops.FROM_Y]] = places[1:, :2]  # XY first, then Z
+        deep[:, [loops.ORIGIN_X, loops.ORIGIN_Y]] = places[1:, :2]
+        deep[:, loops.A] = np.abs(way[:, 2])
+        deep[:, loops.CW] = np.sign(way[:, 2])
+        both = np.stack([flat, deep], axis=1).reshape(-1, loops.LEG_COLUMNS)
+        moves = np.column_stack([arc | way[:, :2].any(axis=1), way[:, 2] != 0]).reshape(-1)
+        return np.ascontiguousarray(both[moves])
+
+
+@dataclass(frozen=True, eq=False)
+class Periods:
+    """s between two outputs: `rapid_s` of rapids, at least `least_s` of all others; `step_mm` (2,)
+    in XY and in Z."""
+
+    rapid_s: float
+    least_s: float
+    step_mm: Floats
+
+    def of(self, toolpath: Toolpath, low: int, high: int) -> Floats:
+        """(high − low, 2) s of the rows low:high in XY and in Z."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            feed_s = 60.0 * self.step_mm[None, :] / toolpath.feed[low:high, None]
+            feed_s = np.maximum(feed_s, self.least_s)
+        kind = toolpath.kind[low:high]
+        feeds = (kind >= Kind.LINE) & (kind <= Kind.ARC_CCW)
+        return np.where(feeds[:, None], feed_s, self.rapid_s)
 
 
 class FusedLegs:
@@ -75,30 +105,28 @@ class FusedLegs:
 
     def __init__(
         self,
-        legs: Ints,
-        periods_s: Floats,
-        still_s: Floats,
+        course: Course,
+        rows: int,
+        periods: Periods,
         how: tuple[str, bool, bool, float],
         mechanics: Mechanics,
     ) -> None:
-        """`legs` (L, 14); periods_s (N, 2) of an output in XY and in Z of each row; still_s (N,)
-        what rows take that do not move. `how`: the method of arcs, whether their error starts as
-        that of the rounded radius, whether only outputs take time, mm of a step. `mechanics` is
-        plain."""
-        self._legs, self._periods_s, self._still_s = legs, periods_s, still_s
+        """The first `rows` rows of the course. `how`: the method of arcs, whether their error
+        starts as that of the rounded radius, whether only outputs take time, mm of a step.
+        `mechanics` is plain."""
+        self._course, self._rows, self._periods = course, rows, periods
         self._how, self._mechanics = how, mechanics
 
     @property
     def rows(self) -> int:
         """How many rows there are to run."""
-        return len(self._still_s)
+        return self._rows
 
     def judge(self, low: int, high: int, task: Task, sums: Sums) -> Ledger:
         """Run the rows low:high, which follow those run before, and judge them."""
 
         method, rounded, by_event, step_mm = self._how
-        first, last = np.searchsorted(self._legs[:, loops.ROW], [low, high])
-        legs = self._legs[first:last]
+        legs = self._course.legs(low, high)
         counts = np.zeros((len(legs), loops.COUNT_COLUMNS), dtype=np.int64)
         number = METHODS[method]
         mechanics = self._mechanics.axes, self._mechanics.states
@@ -108,13 +136,14 @@ class FusedLegs:
         reversals = counts[:, loops.REVERSALS : loops.REVERSALS + 3]
         added = reversals @ self._mechanics.compensation_steps
         outputs = counts[:, loops.SAMPLES if by_event else loops.PASSES]
-        period_s = self._periods_s[low + row, deep]
-        count = high - low
+        count, toolpath = high - low, self._course.toolpath
+        period_s = self._periods.of(toolpath, low, high)[row, deep]
+        waits = toolpath.kind[low:high] == Kind.DWELL
         missed = np.bincount(row[counts[:, loops.ENDED] == 0], minlength=count)
         steps = counts[:, loops.STEPS : loops.STEPS + 3]
         return Ledger(
             row=np.arange(low, high),
-            duration_s=self._still_s[low:high]
+            duration_s=np.where(waits, toolpath.value[low:high], 0.0)
             + np.bincount(row, (outputs + added) * period_s, minlength=count),
             compensation_s=np.asarray(np.bincount(row, added * period_s, minlength=count) * 1.0),
             iterations=_summed(row, counts[:, loops.PASSES : loops.PASSES + 1], count)[:, 0],
