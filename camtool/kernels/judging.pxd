@@ -116,8 +116,7 @@ cdef void _set_box(
 cdef bint _node_near(double[:, ::1] nodes, Int node, double[::1] box) noexcept  # inline
 
 @cython.locals(
-    at=Int, start=double[:, ::1], end=double[:, ::1], arcs=double[:, ::1],
-    way_x=double, way_y=double, long=double, wide=double, px=double, py=double, along=double,
+    at=Int, ax=double, ay=double, way_x=double, way_y=double, long=double, wide=double, px=double, py=double, along=double,
     beside=double, near_long=double, near_wide=double, far_long=double, far_wide=double,
     square=double, to_x=double, to_y=double, further=double, across=double, side=double,
     reach=double
@@ -127,10 +126,8 @@ cdef bint _move_near(Curves curves, Int k, double[::1] box) noexcept  # inline
 @cython.locals(n=Int)
 cdef bint _is_there(Curves curves, Int[::1] found, Int count, Int move) noexcept
 
-@cython.locals(
-    at=Int, there=Int, k=Int, start=double[:, ::1], end=double[:, ::1], arcs=double[:, ::1]
-)
-cdef bint _are_same(Curves curves, Int one, Int other) noexcept
+@cython.locals(at=Int, there=Int, k=Int, axis=Int)
+cdef bint _are_same(Curves curves, Int one, Int other) noexcept  # inline
 
 @cython.locals(
     leaves=Int, height=Int, node=Int, low=Int, place=Int, k=Int, n=Int, count=Int, most=Int,

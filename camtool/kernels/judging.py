@@ -478,18 +478,19 @@ def _node_near(nodes: Floats, node: int, box: Floats) -> bool:
 def _move_near(curves: Curves, k: int, box: Floats) -> bool:
     """Whether a move may have a point in the box. Of an arc, the whole circle is looked at."""
     way_x, way_y, long, wide = box[WAY_X], box[WAY_Y], box[HALF_LONG], box[HALF_WIDE]
-    start, end, arcs, at = curves.start, curves.end, curves.arcs, curves.arc[k]
+    at = curves.arc[k]
     if at >= 0:
-        px, py = arcs[at, CX] - box[MIDDLE_X], arcs[at, CY] - box[MIDDLE_Y]
+        px, py = curves.arcs[at, CX] - box[MIDDLE_X], curves.arcs[at, CY] - box[MIDDLE_Y]
         along, beside = abs(px * way_x + py * way_y), abs(py * way_x - px * way_y)
         near_long, near_wide = larger(along - long, 0.0), larger(beside - wide, 0.0)
         far_long, far_wide = along + long, beside + wide
-        square = arcs[at, RADIUS] * arcs[at, RADIUS]
+        square = curves.arcs[at, RADIUS] * curves.arcs[at, RADIUS]
         if near_long * near_long + near_wide * near_wide > square * (1.0 + SLACK):
             return False
         return bool(far_long * far_long + far_wide * far_wide >= square * (1.0 - SLACK))
-    px, py = start[k, 0] - box[MIDDLE_X], start[k, 1] - box[MIDDLE_Y]
-    to_x, to_y = end[k, 0] - start[k, 0], end[k, 1] - start[k, 1]
+    ax, ay = curves.start[k, 0], curves.start[k, 1]
+    px, py = ax - box[MIDDLE_X], ay - box[MIDDLE_Y]
+    to_x, to_y = curves.end[k, 0] - ax, curves.end[k, 1] - ay
     beside, across = py * way_x - px * way_y, to_y * way_x - to_x * way_y
     if smaller(beside, beside + across) > wide or larger(beside, beside + across) < -wide:
         return False
@@ -510,15 +511,15 @@ def _is_there(curves: Curves, found: Ints, count: int, move: int) -> bool:
 
 
 def _are_same(curves: Curves, one: int, other: int) -> bool:
-    start, end, arcs = curves.start, curves.end, curves.arcs
-    if start[one, 0] != start[other, 0] or start[one, 1] != start[other, 1]:
-        return False
-    if end[one, 0] != end[other, 0] or end[one, 1] != end[other, 1]:
-        return False
+    for axis in range(2):
+        if curves.start[one, axis] != curves.start[other, axis]:
+            return False
+        if curves.end[one, axis] != curves.end[other, axis]:
+            return False
     at, there, k = int(curves.arc[one]), int(curves.arc[other]), 0
     if at < 0 or there < 0:
         return at == there
-    while k < COLUMNS and arcs[at, k] == arcs[there, k]:
+    while k < COLUMNS and curves.arcs[at, k] == curves.arcs[there, k]:
         k += 1
     return k == COLUMNS
 
