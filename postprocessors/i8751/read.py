@@ -383,6 +383,7 @@ class ListingReader:
 
     def read(self, data: bytes) -> Decoded:
         """All records of a listing."""
+        check_count(_line_ends(data), "line")
         lines = text_lines(data)
         ended = False
         for self._line, line in enumerate(lines, 1):
@@ -468,6 +469,9 @@ class ListingReader:
 
 _LINE: Final = re.compile(r"([0-9A-Fa-f]{4,8})[ \t]+([0-9A-Fa-f][0-9A-Fa-f \t]*)(?:;(.*))?")
 
+LINES_OF_RECORD: Final = 5
+"""A dump has one for each motor and for each wait of a record."""
+
 _REPLIES: Final = re.compile(r"<-([^<]*)$")
 
 
@@ -484,6 +488,7 @@ class _Run(NamedTuple):
 
 def read_dump(data: bytes, dialect: Dialect) -> Decoded:
     """The records of a hex dump; ProgramError with record, byte, line and column."""
+    check_count(_line_ends(data) // LINES_OF_RECORD, "record")
     lines = text_lines(data)
     runs, stream = _runs(lines)
     if not runs:
@@ -587,7 +592,6 @@ def _check_replies(runs: list[_Run], expected: list[str]) -> None:
 def text_lines(data: bytes) -> list[str]:
     """The lines of a text without their ends (CR LF, LF or CR); ProgramError at the first byte
     that is no printable ASCII."""
-    check_count(max(data.count(b"\n"), data.count(b"\r")), "line")
     odd = re.search(rb"[^\x20-\x7e\t\r\n]", data)
     if odd:
         lines = re.split(rb"\r\n|\n|\r", data[: odd.start()])
@@ -597,6 +601,11 @@ def text_lines(data: bytes) -> list[str]:
             mend="for packets, use --set dialect.format=packets",
         )
     return re.split("\r\n|\n|\r", data.decode("ascii"))
+
+
+def _line_ends(data: bytes) -> int:
+    """How many lines end, whatever their ends are."""
+    return max(data.count(b"\n"), data.count(b"\r"))
 
 
 def quoted(text: str) -> str:

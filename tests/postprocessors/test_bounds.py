@@ -47,6 +47,17 @@ def test_a_program_of_too_many_moves_is_refused(
         camtool.verify(data, target)
 
 
+def test_the_lines_of_a_hex_dump_are_no_moves(monkeypatch: pytest.MonkeyPatch) -> None:
+    target = loaded("i8751", "dialect.format=hex")
+    path = ToolpathBuilder()
+    for k in range(20):
+        path.line(1.0 + k, feed=10.0)
+    data = target.target.write(path.finish(), target.machine).data
+    assert data.count(b"\n") > 5 * 20
+    monkeypatch.setattr(bounds, "MAX_MOVES", 30)
+    assert len(target.target.read(data, target.machine)) > 20
+
+
 def test_turns_of_arcs_count(monkeypatch: pytest.MonkeyPatch) -> None:
     target = loaded("linuxcnc")
     data = b"F100\nG2 X0 Y0 I1 P%d\nM2\n"
