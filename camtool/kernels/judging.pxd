@@ -12,8 +12,8 @@ cdef class Curves:
 cdef class Search:
     cdef Curves curves
     cdef double[:, ::1] heights, nodes
-    cdef Int[::1] order, found, stack, parts
-    cdef double[::1] box, x, y, error
+    cdef Int[::1] order, found, stack, parts, by
+    cdef double[::1] box, x, y, error, other
     cdef readonly Int looked
 
 cdef class Judge:
@@ -130,6 +130,18 @@ cdef bint _is_there(Curves curves, Int[::1] found, Int count, Int move) noexcept
 cdef bint _are_same(Curves curves, Int one, Int other) noexcept  # inline
 
 @cython.locals(
+    at=Int, ax=double, ay=double, bx=double, by=double, cx=double, cy=double, px=double,
+    py=double, long=double, across=double, wide=double, end_x=double, end_y=double, to_a=double,
+    to_b=double, from_start=double, from_end=double
+)
+cdef double _squareness(Curves curves, Int k, double x, double y) noexcept
+
+@cython.locals(k=Int, less=double, square=double, curves=Curves, other=double[::1])
+cdef void _lowered(
+    double[::1] x, double[::1] y, Int move, Search search, double[::1] errors, Int[::1] by
+) noexcept
+
+@cython.locals(
     leaves=Int, height=Int, node=Int, low=Int, place=Int, k=Int, n=Int, count=Int, most=Int,
     some=Int,
     order=Int[::1], stack=Int[::1], found=Int[::1], curves=Curves, nodes=double[:, ::1],
@@ -137,12 +149,12 @@ cdef bint _are_same(Curves curves, Int one, Int other) noexcept  # inline
 )
 cdef bint _compared(
     double[::1] x, double[::1] y, Int own, Int first, Int last, double z_low, double z_high,
-    Search search, double[::1] errors
+    Search search, double[::1] errors, Int[::1] by
 ) noexcept
 
 @cython.locals(
-    height=Int, low=Int, high=Int, middle=Int, k=Int, alone=bint, far=double,
-    curves=Curves, parts=Int[::1], here_x=double[::1], here_y=double[::1], here=double[::1]
+    height=Int, low=Int, high=Int, middle=Int, k=Int, far=double, curves=Curves,
+    parts=Int[::1], by=Int[::1], mine=Int[::1], here_x=double[::1], here_y=double[::1], here=double[::1]
 )
 cpdef bint nearest_errors(
     double[::1] x, double[::1] y, Int own, Int first, Int last, double z_low, double z_high,

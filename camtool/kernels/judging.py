@@ -332,13 +332,23 @@ def first_of(values: Floats, low: int, value: float) -> int:
 # A long list for many points is not looked at: the move nearest to the middle one lowers the
 # errors, and each half of the points gets a list of its own. For one point, the move nearest to it
 # is what is asked for. So what is found is exact, however far the own move is.
+#
+# On which side a point lies beside the corner of two moves, to which it is equally near, that move
+# tells which it is more square to, from whose line, or tangent at the corner, it is farther: at
+# a corner of more than a right angle the other one has the point on its wrong side.
 
+
+BLOCK = 768
+"""Samples that are judged together: their columns about fill a processor's first cache."""
 
 FEW = 8
 """A list of so many moves is looked at for any number of points."""
 
 ENOUGH = 1024
 """A longer list is looked at where that takes at most so many distances."""
+
+TIE_MM = 1e-9
+"""Moves whose distances differ by no more than this are equally near."""
 
 SLACK = 1e-12
 """Limits are taken this part wider, plus `SLACK_MM`: rounding must not lose a move."""
@@ -371,6 +381,7 @@ class Search:
         self.stack = np.empty(DEPTH, dtype=np.int64)
         self.parts = np.empty(DEPTH, dtype=np.int64)
         self.x, self.y, self.error = np.empty(1), np.empty(1), np.empty(1)
+        self.other, self.by = np.empty(BLOCK), np.empty(BLOCK, dtype=np.int64)
         self.looked = 0
 
 
@@ -454,7 +465,7 @@ def _set_box(x: Floats, y: Floats, errors: Floats, box: Floats) -> None:
         long = larger(long, abs(px * way_x + py * way_y))
         wide = larger(wide, abs(py * way_x - px * way_y))
         far = larger(far, abs(errors[j]))
-    far = _looser(far) + SLACK * (abs(middle_x) + abs(middle_y) + long)
+    far = _looser(far) + TIE_MM + SLACK * (abs(middle_x) + abs(middle_y) + long)
     long, wide = long + far, wide + far
     box[MIDDLE_X], box[MIDDLE_Y], box[WAY_X], box[WAY_Y] = middle_x, middle_y, way_x, way_y
     box[HALF_LONG], box[HALF_WIDE] = long, wide
@@ -524,6 +535,46 @@ def _are_same(curves: Curves, one: int, other: int) -> bool:
     return k == COLUMNS
 
 
+def _squareness(curves: Curves, k: int, x: float, y: float) -> float:
+    """How far a point is from a line without ends; of an arc, from the arc, or beyond its ends
+    from the tangent there."""
+    at = curves.arc[k]
+    ax, ay = curves.start[k, 0], curves.start[k, 1]
+    bx, by = curves.end[k, 0], curves.end[k, 1]
+    if at < 0:
+        long = math.sqrt((bx - ax) * (bx - ax) + (by - ay) * (by - ay))
+        across = abs((bx - ax) * (y - ay) - (by - ay) * (x - ax))
+        return float(across / long) if long > 0.0 else 0.0
+    cx, cy, radius = curves.arcs[at, CX], curves.arcs[at, CY], curves.arcs[at, RADIUS]
+    px, py = x - cx, y - cy
+    from_start = curves.arcs[at, UX] * py - curves.arcs[at, UY] * px
+    from_end = px * curves.arcs[at, VY] - py * curves.arcs[at, VX]
+    wide = curves.arcs[at, WIDE]
+    if wide == FULL or _depth(from_start, from_end, wide != 0.0) >= 0.0:
+        return float(abs(math.sqrt(px * px + py * py) - radius))
+    to_a = (x - ax) * (x - ax) + (y - ay) * (y - ay)
+    to_b = (x - bx) * (x - bx) + (y - by) * (y - by)
+    end_x, end_y = (ax - cx, ay - cy) if to_a < to_b else (bx - cx, by - cy)
+    return float(abs((px * end_x + py * end_y) / radius - radius))
+
+
+def _lowered(x: Floats, y: Floats, move: int, search: Search, errors: Floats, by: Ints) -> None:
+    """Lower the errors of the points x, y (n,), which are those against the moves `by` (n,), to
+    those against one more; of equally near moves that one counts to which a point is more
+    square."""
+    curves, other = search.curves, search.other
+    lower_errors(curves, move, x, y, other[: len(x)], True)
+    for k in range(len(x)):
+        less = abs(errors[k]) - abs(other[k])
+        if less < -TIE_MM:
+            continue
+        if less <= TIE_MM:
+            square = _squareness(curves, by[k], x[k], y[k]) + TIE_MM
+            if _squareness(curves, move, x[k], y[k]) <= square:
+                continue
+        errors[k], by[k] = other[k], move
+
+
 def _compared(
     x: Floats,
     y: Floats,
@@ -534,6 +585,7 @@ def _compared(
     z_high: float,
     search: Search,
     errors: Floats,
+    by: Ints,
 ) -> bool:
     """Lower the errors of the points x, y (n,), whose own move was looked at, to those against
     the nearest move; false where the list is too long for that."""
@@ -570,7 +622,7 @@ def _compared(
                 found[count] = k
                 count += 1
     for n in range(1, count):
-        lower_errors(curves, found[n], x, y, errors, False)
+        _lowered(x, y, found[n], search, errors, by)
     return True
 
 
@@ -585,10 +637,11 @@ def nearest_errors(
     search: Search,
     out: Floats,
 ) -> bool:
-    """The error of each of the points x, y (n ≥ 1,) against the nearest of the moves first:last
-    whose heights overlap z_low … z_high, or of all of these where none does; signed as
-    `lower_errors` does, of equally near moves by `own` if it is one. False, and inf, where there
-    is none. `own` is the move that the points are expected to follow, or −1."""
+    """The error of each of the points x, y (1 ≤ n ≤ `BLOCK`,) against the nearest of the moves
+    first:last whose heights overlap z_low … z_high, or of all of these where none does; signed as
+    `lower_errors` does, of equally near moves by that to which the point is most square, or by
+    `own`. False, and inf, where there is none. `own` is the move that the points are expected to
+    follow, or −1."""
     curves, parts, middle = search.curves, search.parts, len(x) // 2
     if not _counts(own, first, last, z_low, z_high, search.heights):
         far = math.inf
@@ -601,20 +654,22 @@ def nearest_errors(
                 out[k] = far
             return False
     lower_errors(curves, own, x, y, out, True)
+    by = search.by
+    for k in range(len(x)):
+        by[k] = own
     height, parts[0], parts[1] = 2, 0, len(x)
     while height > 0:
         height -= 2
         low, high = parts[height], parts[height + 1]
-        here_x, here_y, here = x[low:high], y[low:high], out[low:high]
-        alone = high - low == 1
-        if not alone and _compared(here_x, here_y, own, first, last, z_low, z_high, search, here):
+        here_x, here_y, here, mine = x[low:high], y[low:high], out[low:high], by[low:high]
+        if _compared(here_x, here_y, own, first, last, z_low, z_high, search, here, mine):
             continue
         middle = (low + high) // 2
         within = abs(out[middle])
         k = _nearest(x[middle], y[middle], within, first, last, z_low, z_high, search)
         if k >= 0:
-            lower_errors(curves, k, here_x, here_y, here, False)
-        if not alone:
+            _lowered(here_x, here_y, k, search, here, mine)
+        if high - low > 1:
             parts[height], parts[height + 1] = middle, high
             parts[height + 2], parts[height + 3] = low, middle
             height += 4
@@ -861,9 +916,6 @@ def trace_block(
             _end_run(pen, trace)
         low = high
 
-
-BLOCK = 768
-"""Samples that are judged together: their columns about fill a processor's first cache."""
 
 FARTHEST_MM = 1e9
 """No slide is farther from zero (a thousand kilometres): squares of such positions and their sums

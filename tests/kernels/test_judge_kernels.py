@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -209,6 +210,35 @@ def test_points_along_lines_that_cross(
     )
     wanted = [abs(nearest(moves, *point)) for point in zip(x.tolist(), y.tolist(), strict=True)]
     assert np.abs(out) == pytest.approx(np.array(wanted), abs=1e-9)
+
+
+@given(
+    st.lists(st.floats(0.2, 10.0), min_size=3, max_size=12),
+    st.booleans(),
+    st.lists(ends, min_size=1, max_size=40),
+    st.integers(-1, 11),
+)
+def test_the_side_at_a_corner_is_inside_or_outside(
+    spokes: list[float], ccw: bool, points: list[tuple[float, float]], own: int
+) -> None:
+    """Of a polygon with sharp corners: left of its moves, which go round it, is inside."""
+    turn = np.arange(len(spokes)) * (2.0 * np.pi / len(spokes)) * (1.0 if ccw else -1.0)
+    star = np.column_stack([spokes * np.cos(turn), spokes * np.sin(turn)])
+    ring = [tuple(one) for one in star.tolist()]
+    moves = [Line(a, b) for a, b in pairwise([*ring, ring[0]])]
+    # Points anywhere, and beyond each corner along the moves that meet there.
+    beyond = [
+        (bx + 0.1 * (bx - ax), by + 0.1 * (by - ay)) for (ax, ay), (bx, by) in pairwise(ring)
+    ]
+    x, y = np.array([*points, *beyond]).T.copy()
+    table = np.array([move.row() for move in moves], dtype=np.float64)
+    tree = move_tree(np.array([move.box() for move in moves], dtype=np.float64))
+    out, whole = np.empty(len(x)), (0, len(moves), 0.0, 0.0)
+    own = min(own, len(moves) - 1)
+    nearest_errors_(x, y, own, whole, Moves(shapes(table), np.zeros((len(moves), 2)), *tree), out)
+    inside = shapely.contains_xy(shapely.Polygon(star), x, y)
+    sure = np.abs(out) > 1e-6
+    assert ((out > 0.0) == (inside == ccw))[sure].all()
 
 
 def test_of_equally_near_moves_the_own_one_gives_the_side() -> None:
