@@ -46,7 +46,7 @@ cpdef double smallest(double[::1] values, Int low, Int high) noexcept
 @cython.locals(k=Int, square=double, over=double)
 cdef void _to_line(
     double[:, ::1] start, double[:, ::1] end, Int row, double[::1] x, double[::1] y,
-    double[::1] best, bint first
+    double[::1] errors
 ) noexcept  # wide
 
 @cython.locals(k=Int, outside=Int, above_half=bint)
@@ -64,18 +64,18 @@ cdef double _outside(
 
 @cython.locals(k=Int, far=Int)
 cdef void _to_circle(
-    double[:, ::1] arcs, Int row, double[::1] x, double[::1] y, double[::1] best, bint first
+    double[:, ::1] arcs, Int row, double[::1] x, double[::1] y, double[::1] errors
 ) noexcept  # wide
 
 @cython.locals(k=Int, above_half=bint, inside=bint)
 cdef void _to_arc(
     double[:, ::1] start, double[:, ::1] end, Int row, double[:, ::1] arcs, Int at,
-    double[::1] x, double[::1] y, double[::1] best, bint first
+    double[::1] x, double[::1] y, double[::1] errors
 ) noexcept  # wide
 
 @cython.locals(at=Int)
-cpdef void lower_errors(
-    Curves curves, Int row, double[::1] x, double[::1] y, double[::1] best, bint first
+cpdef void set_errors(
+    Curves curves, Int row, double[::1] x, double[::1] y, double[::1] errors
 ) noexcept
 
 cdef double smaller(double one, double other) noexcept  # inline

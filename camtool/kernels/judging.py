@@ -157,8 +157,6 @@ def smallest(values: Floats, low: int, high: int) -> float:
 # The wedge is told by the cross products with the spokes of the two ends: both, up to half a turn,
 # and either, above it. What is exact: no angle is ever taken, and no chord. Compiled, and written
 # as loops without branches over blocks of points, which the processor runs several at a time.
-#
-# `best` holds the error of least size so far; each call lowers it where this move is nearer.
 
 
 COLUMNS = 9
@@ -191,9 +189,7 @@ class Curves:
         self.start, self.end, self.arc, self.arcs = shapes
 
 
-def _to_line(
-    start: Floats, end: Floats, row: int, x: Floats, y: Floats, best: Floats, first: bool
-) -> None:
+def _to_line(start: Floats, end: Floats, row: int, x: Floats, y: Floats, errors: Floats) -> None:
     ax, ay = start[row, 0], start[row, 1]
     dx, dy = end[row, 0] - ax, end[row, 1] - ay
     square = dx * dx + dy * dy
@@ -204,8 +200,7 @@ def _to_line(
         t = smaller(larger(t, 0.0), 1.0)
         off_x, off_y = px - t * dx, py - t * dy
         apart = math.sqrt(off_x * off_x + off_y * off_y)
-        error = math.copysign(apart, dx * py - dy * px)
-        best[k] = error if first or apart < abs(best[k]) else best[k]
+        errors[k] = math.copysign(apart, dx * py - dy * px)
 
 
 def _all_in_wedge(arcs: Floats, row: int, x: Floats, y: Floats) -> bool:
@@ -247,21 +242,20 @@ def _outside(px: float, py: float, radius: float, half: float, over: float) -> f
     return _off(height, over) if abs(height) <= NEAR * radius else apart
 
 
-def _to_circle(arcs: Floats, row: int, x: Floats, y: Floats, best: Floats, first: bool) -> None:
+def _to_circle(arcs: Floats, row: int, x: Floats, y: Floats, errors: Floats) -> None:
     cx, cy, radius, turn = arcs[row, CX], arcs[row, CY], arcs[row, RADIUS], arcs[row, TURN]
     square, half, over = radius * radius, 0.5 / radius, 1.0 / radius
     near, far = NEAR * radius, 0
-    if first and abs((x[0] - cx) ** 2 + (y[0] - cy) ** 2 - square) * half <= near:
+    if abs((x[0] - cx) ** 2 + (y[0] - cy) ** 2 - square) * half <= near:
         for k in range(len(x)):
             px, py = x[k] - cx, y[k] - cy
             height = (px * px + py * py - square) * half
             far += 1 if abs(height) > near else 0
-            best[k] = -turn * _off(height, over)
+            errors[k] = -turn * _off(height, over)
         if far == 0:
             return
     for k in range(len(x)):
-        error = -turn * _outside(x[k] - cx, y[k] - cy, radius, half, over)
-        best[k] = error if first or abs(error) < abs(best[k]) else best[k]
+        errors[k] = -turn * _outside(x[k] - cx, y[k] - cy, radius, half, over)
 
 
 def _to_arc(
@@ -272,8 +266,7 @@ def _to_arc(
     at: int,
     x: Floats,
     y: Floats,
-    best: Floats,
-    first: bool,
+    errors: Floats,
 ) -> None:
     ax, ay, bx, by = start[row, 0], start[row, 1], end[row, 0], end[row, 1]
     cx, cy, radius, turn = arcs[at, CX], arcs[at, CY], arcs[at, RADIUS], arcs[at, TURN]
@@ -286,22 +279,18 @@ def _to_arc(
         to_b = (x[k] - bx) * (x[k] - bx) + (y[k] - by) * (y[k] - by)
         at_end = math.copysign(math.sqrt(smaller(to_a, to_b)), inward)
         inside = _depth(ux * py - uy * px, px * vy - py * vx, above_half) >= 0.0
-        error = inward if inside else at_end
-        best[k] = error if first or abs(error) < abs(best[k]) else best[k]
+        errors[k] = inward if inside else at_end
 
 
-def lower_errors(
-    curves: Curves, row: int, x: Floats, y: Floats, best: Floats, first: bool
-) -> None:
-    """Lower `best` (n ≥ 1,) to the errors of the points x, y (n,) against one move; set it to them
-    when this is the `first` one."""
+def set_errors(curves: Curves, row: int, x: Floats, y: Floats, errors: Floats) -> None:
+    """Set `errors` (n ≥ 1,) to those of the points x, y (n,) against one move."""
     at = curves.arc[row]
     if at < 0:
-        _to_line(curves.start, curves.end, row, x, y, best, first)
+        _to_line(curves.start, curves.end, row, x, y, errors)
     elif curves.arcs[at, WIDE] == FULL or _all_in_wedge(curves.arcs, at, x, y):
-        _to_circle(curves.arcs, at, x, y, best, first)
+        _to_circle(curves.arcs, at, x, y, errors)
     else:
-        _to_arc(curves.start, curves.end, row, curves.arcs, at, x, y, best, first)
+        _to_arc(curves.start, curves.end, row, curves.arcs, at, x, y, errors)
 
 
 def smaller(one: float, other: float) -> float:
@@ -426,7 +415,7 @@ def _nearest(
             k = order[place]
             if _counts(k, first, last, z_low, z_high, heights):
                 search.looked += 1
-                lower_errors(curves, k, spot_x, spot_y, spot_error, True)
+                set_errors(curves, k, spot_x, spot_y, spot_error)
                 if abs(spot_error[0]) < best:
                     best, nearest = abs(spot_error[0]), k
     return nearest
@@ -563,7 +552,7 @@ def _lowered(x: Floats, y: Floats, move: int, search: Search, errors: Floats, by
     those against one more; of equally near moves that one counts to which a point is more
     square."""
     curves, other = search.curves, search.other
-    lower_errors(curves, move, x, y, other[: len(x)], True)
+    set_errors(curves, move, x, y, other[: len(x)])
     for k in range(len(x)):
         less = abs(errors[k]) - abs(other[k])
         if less < -TIE_MM:
@@ -639,7 +628,7 @@ def nearest_errors(
 ) -> bool:
     """The error of each of the points x, y (1 ≤ n ≤ `BLOCK`,) against the nearest of the moves
     first:last whose heights overlap z_low … z_high, or of all of these where none does; signed as
-    `lower_errors` does, of equally near moves by that to which the point is most square, or by
+    `set_errors` does, of equally near moves by that to which the point is most square, or by
     `own`. False, and inf, where there is none. `own` is the move that the points are expected to
     follow, or −1."""
     curves, parts, middle = search.curves, search.parts, len(x) // 2
@@ -653,7 +642,7 @@ def nearest_errors(
             for k in range(len(x)):
                 out[k] = far
             return False
-    lower_errors(curves, own, x, y, out, True)
+    set_errors(curves, own, x, y, out)
     by = search.by
     for k in range(len(x)):
         by[k] = own
@@ -1072,7 +1061,7 @@ def judge_block(row: int, count: int, judge: Judge) -> None:
     if own >= 0:
         figures[row, LAG_MAX] = max(figures[row, LAG_MAX], math.sqrt(lag))
         figures[row, LAG_SQUARES] += lags
-        lower_errors(judge.own, own, x, y, errors, True)
+        set_errors(judge.own, own, x, y, errors)
         most, squares, signed = _sizes(errors, 0.0, size, bits, places)
         figures[row, INNER_MAX] = max(figures[row, INNER_MAX], most)
         figures[row, INNER_SQUARES] += squares

@@ -29,7 +29,6 @@ from camtool.kernels.move_tree import FIRST, LAST, hilbert_order, move_tree
 from camtool.kernels.offsets import LEAF
 from tests.oracles.kernel_doors import (
     fill_bins_,
-    lower_errors_,
     nearest_errors_,
     set_errors_,
     shapes,
@@ -82,7 +81,7 @@ def test_errors_are_those_of_a_loop_with_angles() -> None:
         move = random_move(rng)
         x, y = rng.uniform(-1.5, 1.5, (2, 37))
         best = np.full(37, np.inf)
-        lower_errors_(np.array(move.row(), dtype=np.float64), x, y, best)
+        set_errors_(np.array(move.row(), dtype=np.float64), x, y, best)
         wanted = [move.error(*point) for point in zip(x.tolist(), y.tolist(), strict=True)]
         assert np.abs(best) == pytest.approx(np.abs(wanted), abs=EPS)
         side = np.abs(wanted) > EPS
@@ -97,7 +96,7 @@ def test_every_place_about_an_arc_on_a_lattice(sweep: float, sense: float) -> No
     points = [(float(x), float(y)) for x in range(-4, 5) for y in range(-4, 5)]
     x, y = np.array(points).T.copy()
     best = np.full(len(points), np.inf)
-    lower_errors_(np.array(move.row()), x, y, best)
+    set_errors_(np.array(move.row()), x, y, best)
     ends = (math.dist(p, move.place(0.0)) for p in points)
     others = (math.dist(p, move.place(1.0)) for p in points)
     for point, error, one, other in zip(points, best.tolist(), ends, others, strict=True):
@@ -117,23 +116,13 @@ def test_errors_of_circles_hang_on_the_point_alone(sweep: float) -> None:
         angle = rng.uniform(0.01, sweep - 0.01, 400)
         radius = 20.0 * (1.0 + limit * rng.uniform(-1.0, 1.0, 400))
         x, y = 1.0 + radius * np.cos(angle), 2.0 + radius * np.sin(angle)
-        block, lowered, alone = np.empty(400), np.full(400, np.inf), np.empty(400)
+        block, alone = np.empty(400), np.empty(400)
         set_errors_(move, x, y, block)
-        lower_errors_(move, x, y, lowered)
         for k in range(400):
             set_errors_(move, x[k : k + 1], y[k : k + 1], alone[k : k + 1])
         assert np.array_equal(block, alone)
-        assert np.array_equal(block, lowered)
         exact = 20 - np.hypot(x.astype(np.longdouble) - 1, y.astype(np.longdouble) - 2)
         assert np.abs(block - exact).max() < 3 * 2.0**-53 * 20.0
-
-
-def test_what_is_nearer_already_stays() -> None:
-    best = np.array([0.1, -5.0])
-    lower_errors_(
-        np.array(Line((0, 0), (4, 0)).row(), float), np.ones(2), np.array([0.3, 2]), best
-    )
-    assert best.tolist() == [0.1, 2.0]
 
 
 def walk(rng: np.random.Generator, count: int, size: float) -> tuple[np.ndarray, np.ndarray]:

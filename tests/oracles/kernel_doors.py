@@ -8,8 +8,8 @@ from camtool.kernels.judging import (
     Search,
     Shapes,
     fill_bins,
-    lower_errors,
     nearest_errors,
+    set_errors,
 )
 
 
@@ -27,12 +27,8 @@ def shapes(table):
     return Shapes(*ends, which, np.ascontiguousarray(table[arc, 7:], dtype=np.float64))
 
 
-def lower_errors_(move, x, y, best):
-    lower_errors(Curves(shapes(np.atleast_2d(move))), 0, x, y, best, False)
-
-
-def set_errors_(move, x, y, best):
-    lower_errors(Curves(shapes(np.atleast_2d(move))), 0, x, y, best, True)
+def set_errors_(move, x, y, errors):
+    set_errors(Curves(shapes(np.atleast_2d(move))), 0, x, y, errors)
 
 
 def nearest_errors_(x, y, own, only, moves: Moves, out):
