@@ -92,12 +92,13 @@ def chain(
         raise GeometryError(f"a gap of {gap_mm} mm is not 0 or more")
     paths = _Paths.of(lines, kinds or Kinds(groups=groups))
     if lines.closed.all():
-        return Chained(lines, tuple((index,) for index in range(len(lines))), (), ())
+        return Chained(lines, _each_alone(np.arange(len(lines))), (), ())
     from camtool.kernels.chaining import walk
 
     found = joints(paths.ends, max(gap_mm, POSITION_EPS_MM))
-    lots = joined(lines, Chains(*walk(found.mates, ~lines.closed)))
-    result, members = _in_order(lines, lots)
+    alone = lines.closed | (found.mates.reshape(-1, 2) < 0).all(axis=1)
+    lots = joined(lines, Chains(*walk(found.mates, ~alone)))
+    result, members = _in_order(lines, np.flatnonzero(alone), lots)
     first = np.array([of[0] for of in members], dtype=np.int64)
     result_ends = Ends.of(result, paths.ends.group[first], paths.ends.style[first])
     names = [paths.layers[index] for index in first.tolist()]
@@ -118,33 +119,29 @@ def numbered(items: Sequence[Hashable] | None, count: int) -> Ints:
     return np.array([numbers.setdefault(item, len(numbers)) for item in items], dtype=np.int64)
 
 
+def _each_alone(paths: Ints) -> tuple[tuple[int, ...], ...]:
+    """The members of chains of one path."""
+    return tuple((index,) for index in paths.tolist())
+
+
 def _in_order(
-    lines: Polylines, lots: Sequence[Joined]
+    lines: Polylines, alone: Ints, lots: Sequence[Joined]
 ) -> tuple[Polylines, tuple[tuple[int, ...], ...]]:
-    """The closed paths and all chains, in the order of their first members; and the members."""
-    is_closed = np.flatnonzero(lines.closed)
-    members: list[tuple[int, ...]] = [(index,) for index in is_closed.tolist()]
-    least = [is_closed]
-    columns = [_rows_of(lines, is_closed)]
+    """The paths that are joined to none and all chains, in the order of their first members; and
+    the members."""
+    if not lots:
+        return lines, _each_alone(alone)
+    members = list(_each_alone(alone))
+    least = [alone]
     for lot in lots:
         paths = lot.chains.entries // 2
         begins = lot.chains.begins.tolist()
         flat = paths.tolist()
         members.extend(tuple(flat[a:b]) for a, b in pairwise(begins))
         least.append(np.minimum.reduceat(paths, lot.chains.begins[:-1]))
-        columns.append(_rows_of(lot.lines, np.arange(len(lot.lines))))
     order = np.argsort(np.concatenate(least), kind="stable")
-    vertices, counts, closed = (np.concatenate(part) for part in zip(*columns, strict=True))
-    offsets = np.concatenate([[0], np.cumsum(counts)])
-    whole = Polylines(vertices, offsets, closed)
+    whole = Polylines.joined([lines.select(alone), *(lot.lines for lot in lots)])
     return whole.select(order), tuple(members[index] for index in order.tolist())
-
-
-def _rows_of(lines: Polylines, chosen: Ints) -> tuple[Floats, Ints, Bools]:
-    counts = np.diff(lines.offsets)
-    rows = np.zeros(len(lines), dtype=np.bool_)
-    rows[chosen] = True
-    return lines.vertices[np.repeat(rows, counts)], counts[chosen], lines.closed[chosen]
 
 
 def _closed_gaps(lots: Sequence[Joined], layers: Sequence[str]) -> list[Gap]:

@@ -24,8 +24,10 @@ SHALLOW_BULGE = 1e-3
 
 def path_lengths(lines: Polylines) -> Floats:
     """(M,) length of each path, mm."""
-    segments = Segments.of(lines)
-    return _per_path(segments, segment_lengths(segments), lines)
+    lengths = np.zeros(len(lines))
+    for segments in Segments.lots(lines):
+        np.add.at(lengths, segments.path, segment_lengths(segments))
+    return lengths
 
 
 def segment_lengths(segments: Segments) -> Floats:
@@ -46,21 +48,17 @@ def signed_areas(lines: Polylines) -> Floats:
     """
     rows = np.flatnonzero(lines.closed)
     areas, lines = np.zeros(len(lines)), lines.select(rows.tolist())
-    segments = Segments.of(lines)
-    # Areas are taken about the first point of each path, so that far drawings lose no digits.
-    about = lines.vertices[lines.offsets[:-1], :2][segments.path]
-    start, end = segments.start - about, segments.end - about
-    below = 0.5 * (start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0])
-    chord = segments.end - segments.start
-    beside = (chord**2).sum(axis=1) * _area_beside(segments.bulge)
-    areas[rows] = _per_path(segments, below + beside, lines)
+    inside = np.zeros(len(lines))
+    for segments in Segments.lots(lines):
+        # Areas are taken about the first point of each path, so that far drawings lose no digits.
+        about = lines.vertices[lines.offsets[segments.path], :2]
+        start, end = segments.start - about, segments.end - about
+        below = 0.5 * (start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0])
+        chord = segments.end - segments.start
+        beside = (chord**2).sum(axis=1) * _area_beside(segments.bulge)
+        np.add.at(inside, segments.path, below + beside)
+    areas[rows] = inside
     return areas
-
-
-def _per_path(segments: Segments, values: Floats, lines: Polylines) -> Floats:
-    sums = np.zeros(len(lines))
-    np.add.at(sums, segments.path, values)
-    return sums
 
 
 def _area_beside(bulge: Floats) -> Floats:
@@ -105,8 +103,8 @@ def _extremes(segments: Segments) -> tuple[Ints, Floats]:
     """
     quarter = 0.5 * np.pi
     rows = np.flatnonzero(segments.is_arc)
-    chord = (segments.end - segments.start)[rows]
-    sweep = segments.sweep[rows]
+    chord = segments.end[rows] - segments.start[rows]
+    sweep = segments[rows].sweep
     first = np.arctan2(chord[:, 1], chord[:, 0]) - 0.5 * sweep
     lowest = np.ceil(np.minimum(first, first + sweep) / quarter)
     tangents = (lowest[:, None] + np.arange(3.0)) * quarter
@@ -117,12 +115,12 @@ def _extremes(segments: Segments) -> tuple[Ints, Floats]:
 
 def path_extents(lines: Polylines) -> Floats:
     """(M, 2, 2) [[xmin, xmax], [ymin, ymax]] of each path, mm, exact with arcs."""
-    segments = Segments.of(lines)
-    boxes = segment_boxes(segments)
     low = np.full((len(lines), 2), np.inf)
     high = np.full((len(lines), 2), -np.inf)
-    np.minimum.at(low, segments.path, boxes[:, :2])
-    np.maximum.at(high, segments.path, boxes[:, 2:])
+    for segments in Segments.lots(lines):
+        boxes = segment_boxes(segments)
+        np.minimum.at(low, segments.path, boxes[:, :2])
+        np.maximum.at(high, segments.path, boxes[:, 2:])
     return np.stack([low, high], axis=2)
 
 

@@ -41,24 +41,24 @@ def nesting(lines: Polylines, holds: Bools | None = None) -> Nesting:
     """
     count = len(lines)
     parent, depth = np.full(count, -1, dtype=np.int64), np.zeros(count, dtype=np.int64)
+    if not lines.closed.any():
+        return Nesting(parent, depth)
     areas = np.abs(signed_areas(lines))
     boxes = path_extents(lines)
-    segments = Segments.of(lines)
-    points, owner = _witnesses(lines, segments)
-    first_point = np.searchsorted(owner, np.arange(count + 1))
-    first_segment = np.searchsorted(segments.path, np.arange(count + 1))
     is_double = np.zeros(count, dtype=np.bool_)
     # From large to small: the last path found to hold another one is the smallest of them.
     closed = np.flatnonzero(lines.closed)
     closed = closed[np.argsort(-areas[closed], kind="stable")]
     rank = np.full(count, len(closed))
     rank[closed] = np.arange(len(closed))
+    places: _Places | None = None
     for j, within in _within(boxes, closed if holds is None else closed[holds[closed]]):
         inner = within[rank[within] > rank[j]]
         if len(inner) == 0 or is_double[j]:
             continue
-        ring = segments[first_segment[j] : first_segment[j + 1]]
-        held, on_line = _held(points, first_point, inner, ring)
+        # Most drawings of very many paths hold none within another.
+        places = places or _Places.of(lines)
+        held, on_line = places.held(inner, j)
         is_double[on_line] = True
         parent[held] = j
         depth[held] += 1
@@ -75,14 +75,42 @@ def inside(points: Floats, ring: Segments) -> Bools:
     )
 
 
-def _witnesses(lines: Polylines, segments: Segments) -> tuple[Floats, Ints]:
-    """Vertices and middles of all segments (P, 2), and the path (P,) of each, ascending."""
-    rows = np.arange(len(segments))
-    middles = point_at(segments, rows, np.full(len(rows), 0.5))
-    of_vertices = np.repeat(np.arange(len(lines)), np.diff(lines.offsets))
-    owner = np.concatenate([of_vertices, segments.path])
-    order = np.argsort(owner, kind="stable")
-    return np.concatenate([lines.vertices[:, :2], middles])[order], owner[order]
+@dataclass(frozen=True, eq=False)
+class _Places:
+    """The segments of M paths, those of path i from first_segment[i] (M + 1,) on, and `points`
+    (P, 2) mm, the vertices and the middles of all segments, those of path i from first_point[i]
+    (M + 1,) on."""
+
+    segments: Segments
+    first_segment: Ints
+    points: Floats
+    first_point: Ints
+
+    @classmethod
+    def of(cls, lines: Polylines) -> _Places:
+        segments, every = Segments.of(lines), np.arange(len(lines) + 1)
+        rows = np.arange(len(segments))
+        middles = point_at(segments, rows, np.full(len(rows), 0.5))
+        of_vertices = np.repeat(np.arange(len(lines)), np.diff(lines.offsets))
+        owner = np.concatenate([of_vertices, segments.path])
+        order = np.argsort(owner, kind="stable")
+        return cls(
+            segments,
+            np.searchsorted(segments.path, every),
+            np.concatenate([lines.vertices[:, :2], middles])[order],
+            np.searchsorted(owner[order], every),
+        )
+
+    def held(self, inner: Ints, j: int) -> tuple[Ints, Ints]:
+        """Which paths of `inner` have all their points within path j, and which have all on its
+        line."""
+        from camtool.kernels.offsets import HELD, ON_LINE, holds
+
+        ring = self.segments[self.first_segment[j] : self.first_segment[j + 1]]
+        curves = Curves.of(ring)
+        arrays = (curves.rows, ring.bulge, curves.tree)
+        said = holds(self.points, self.first_point, arrays, inner, POSITION_EPS_MM)
+        return inner[said == HELD], inner[said == ON_LINE]
 
 
 def _within(boxes: Floats, holders: Ints) -> Iterator[tuple[int, Ints]]:
@@ -102,16 +130,6 @@ def _within(boxes: Floats, holders: Ints) -> Iterator[tuple[int, Ints]]:
         ends = np.searchsorted(one, np.arange(len(some) + 1)).tolist()
         for k, j in enumerate(some.tolist()):
             yield j, other[ends[k] : ends[k + 1]]
-
-
-def _held(points: Floats, first_point: Ints, inner: Ints, ring: Segments) -> tuple[Ints, Ints]:
-    """Which paths of `inner` have all their points in the ring, and which have all on its line."""
-    from camtool.kernels.offsets import HELD, ON_LINE, holds
-
-    curves = Curves.of(ring)
-    arrays = (curves.rows, ring.bulge, curves.tree)
-    said = holds(points, first_point, arrays, inner, POSITION_EPS_MM)
-    return inner[said == HELD], inner[said == ON_LINE]
 
 
 # Regions: outer paths CCW, their holes CW.

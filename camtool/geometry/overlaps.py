@@ -47,9 +47,9 @@ def without_overlaps(lines: Polylines, groups: Ints, within_mm: float) -> Unlapp
     What is shorter than `within_mm` is left out with the overlap beside it.
     """
     whole = Unlapped(lines, np.arange(len(lines)), 0, 0.0)
-    of = _intervals(lines, groups, within_mm)
-    if not of.loose.any():
+    if not _may_be_loose(lines).any():
         return whole
+    of = _intervals(lines, groups, within_mm)
     found = covers(of, within_mm)
     if not len(found.a):
         return whole
@@ -70,6 +70,14 @@ def without_overlaps(lines: Polylines, groups: Ints, within_mm: float) -> Unlapp
     order = np.argsort(origin, kind="stable")
     gone = float(of.length[list(left)].sum()) - kept
     return Unlapped(_together(parts).select(order), origin[order], len(left), gone)
+
+
+def _may_be_loose(lines: Polylines) -> Bools:
+    """(M,) the open paths of a single line, or of arcs alone."""
+    counts = np.diff(lines.offsets) - 1
+    arcs = np.searchsorted(lines.offsets, np.flatnonzero(lines.vertices[:, 2]), side="right") - 1
+    of_arcs = np.bincount(arcs, minlength=len(lines)) == counts
+    return np.asarray(~lines.closed & ((counts == 1) | of_arcs))
 
 
 def _intervals(lines: Polylines, groups: Ints, within: float) -> Intervals:

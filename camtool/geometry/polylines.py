@@ -27,6 +27,9 @@ from camtool.errors import GeometryError
 POSITION_EPS_MM = 1e-6
 """Two positions nearer than this are equal (docs/numerics.md)."""
 
+SEGMENTS_AT_ONCE = 1 << 16
+"""So many segments are looked at a time where each stands alone: some 10 MB."""
+
 BULGE_EPS = 1e-12
 """|bulge| may exceed 1 by rounding alone, by no more than this, and is then set to ±1; a bulge
 below this is a line: the arc deviates from its chord c by |bulge|·c/2, less than an atom at 1
@@ -132,10 +135,12 @@ class Polylines:
     def __iter__(self) -> Iterator[Polyline]:
         return (self[index] for index in range(len(self)))
 
-    def select(self, indices: Iterable[int]) -> Polylines:
+    def select(self, indices: Iterable[int] | Ints) -> Polylines:
         """The paths of these indices, in this order, the very columns where these are all;
         IndexError for one that is not there."""
-        chosen = np.fromiter((int(index) for index in indices), dtype=np.int64)
+        if not isinstance(indices, np.ndarray):
+            indices = np.fromiter((int(index) for index in indices), dtype=np.int64)
+        chosen: Ints = indices.astype(np.int64)
         bad = (chosen < -len(self)) | (chosen >= len(self))
         if bad.any():
             raise IndexError(f"path {chosen[np.argmax(bad)]} of {len(self)}")
@@ -195,12 +200,24 @@ class Segments:
         """All segments of the paths, in order."""
         if isinstance(lines, Polyline):
             lines = Polylines.of([lines])
+        return cls._leaving(lines, segment_rows(lines))
+
+    @classmethod
+    def lots(cls, lines: Polylines) -> Iterator[Segments]:
+        """The same in lots of SEGMENTS_AT_ONCE."""
+        rows = segment_rows(lines)
+        for first in range(0, len(rows), SEGMENTS_AT_ONCE):
+            yield cls._leaving(lines, rows[first : first + SEGMENTS_AT_ONCE])
+
+    @classmethod
+    def _leaving(cls, lines: Polylines, rows: Ints) -> Segments:
+        """The segments that leave these vertices, which ascend."""
         vertices, offsets = lines.vertices, lines.offsets
-        path = np.repeat(np.arange(len(lines)), np.diff(offsets))
-        following, keep = next_vertices(offsets), segment_rows(lines)
-        return cls.between(
-            vertices[keep, :2], vertices[following[keep], :2], vertices[keep, 2], path[keep]
-        )
+        path = np.searchsorted(offsets, rows, side="right") - 1
+        following = rows + 1
+        last = following == offsets[path + 1]
+        following[last] = offsets[path[last]]
+        return cls.between(vertices[rows, :2], vertices[following, :2], vertices[rows, 2], path)
 
     @classmethod
     def between(
@@ -249,8 +266,12 @@ class Segments:
 
 
 def _checked(vertices: Floats, offsets: Ints, closed: Bools | list[bool]) -> Floats:
-    """A read-only, normalised copy of the vertices; GeometryError when they are no polylines."""
-    array = np.array(vertices, dtype=np.float64)
+    """The vertices, read-only and normalised, a copy unless nobody can change them any more and
+    nothing is to be normalised; GeometryError when they are no polylines."""
+    array = np.asarray(vertices, dtype=np.float64)
+    is_own = array is vertices and array.flags.owndata and not array.flags.writeable
+    if not is_own:
+        array = np.array(vertices, dtype=np.float64)
     if array.ndim != 2 or array.shape[1] != 3:
         raise GeometryError(f"vertices have shape {array.shape}, wanted (N, 3) of x, y, bulge")
     is_closed = np.asarray(closed, dtype=np.bool_)
@@ -259,20 +280,31 @@ def _checked(vertices: Floats, offsets: Ints, closed: Bools | list[bool]) -> Flo
         raise GeometryError("offsets do not divide the vertices into the paths")
     if np.any(counts < 2):
         raise GeometryError("a path needs two points", where=f"path {np.argmax(counts < 2)}")
-    last = offsets[1:] - 1
-    array[last[~is_closed], 2] = 0.0
-    finite = np.asarray(np.isfinite(array).all(axis=1))
+    bulge = array[:, 2].copy()
+    bulge[offsets[1:][~is_closed] - 1] = 0.0
+    finite = np.isfinite(array[:, :2]).all(axis=1) & np.isfinite(bulge)
     _refuse(~finite, "a number is not finite", offsets)
-    over = np.abs(array[:, 2]) > 1.0
-    _refuse(np.abs(array[:, 2]) > 1.0 + BULGE_EPS, "|bulge| above 1: split the arc", offsets)
-    array[over, 2] = np.sign(array[over, 2])
-    array[np.abs(array[:, 2]) < BULGE_EPS, 2] = 0.0
-    following = next_vertices(offsets)
-    short = np.hypot(*(array[following, k] - array[:, k] for k in (0, 1))) <= POSITION_EPS_MM
-    short[last[~is_closed]] = False
-    _refuse(short, "a point is repeated", offsets)
+    over = np.abs(bulge) > 1.0
+    _refuse(np.abs(bulge) > 1.0 + BULGE_EPS, "|bulge| above 1: split the arc", offsets)
+    bulge[over] = np.sign(bulge[over])
+    bulge[np.abs(bulge) < BULGE_EPS] = 0.0
+    if bulge.tobytes() != array[:, 2].tobytes():
+        array = array.copy() if is_own else array
+        array[:, 2] = bulge
     array.flags.writeable = False
+    lines = Polylines._trusted(array, offsets, is_closed)
+    short = np.concatenate([np.empty(0, np.bool_), *map(_is_short, Segments.lots(lines))])
+    if short.any():
+        repeated = np.zeros(len(array), dtype=np.bool_)
+        repeated[segment_rows(lines)] = short
+        _refuse(repeated, "a point is repeated", offsets)
     return array
+
+
+def _is_short(segments: Segments) -> Bools:
+    """(K,) whether both ends of a segment are one position."""
+    chord = segments.end - segments.start
+    return np.asarray(np.hypot(chord[:, 0], chord[:, 1]) <= POSITION_EPS_MM)
 
 
 def _refuse(bad: Bools, message: str, offsets: Ints) -> None:

@@ -171,16 +171,15 @@ def without_tiny(lines: Polylines, limit_mm: float) -> Merged:
 
     A path of which too little would be left stays as it is.
     """
-    segments = Segments.of(lines)
-    lengths = segment_lengths(segments)
-    short = np.bincount(segments.path[lengths <= limit_mm], minlength=len(lines)) > 0
+    short = np.zeros(len(lines), dtype=np.bool_)
+    for segments in Segments.lots(lines):
+        short[segments.path[segment_lengths(segments) <= limit_mm]] = True
     if not short.any():
         return Merged(lines, 0)
-    first = np.searchsorted(segments.path, np.arange(len(lines) + 1))
     paths, gone = list(lines), 0
     for index in np.flatnonzero(short).tolist():
         path = paths[index]
-        keep, moved = _merged(path, lengths[first[index] : first[index + 1]], limit_mm)
+        keep, moved = _merged(path, segment_lengths(Segments.of(path)), limit_mm)
         made = _made(path, keep, moved)
         if made is not None:
             gone += len(path) - len(made)

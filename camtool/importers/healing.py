@@ -26,6 +26,7 @@ from camtool.geometry.measure import path_lengths, point_at
 from camtool.geometry.overlaps import SAME_LINE_MM, without_overlaps
 from camtool.geometry.polylines import (
     POSITION_EPS_MM,
+    SEGMENTS_AT_ONCE,
     Polylines,
     Segments,
     encloses,
@@ -66,7 +67,7 @@ def cleaned(pieces: Sequence[Piece], file: str) -> Cleaned:
     closed = np.array([piece.closed for piece in pieces], dtype=np.bool_)
     keep, repeated = without_repeats(vertices, counts, closed)
     owner = np.repeat(np.arange(len(pieces)), counts)[keep]
-    vertices = vertices[keep]
+    vertices = _chosen(vertices, keep)
     left = np.bincount(owner, minlength=len(pieces))
     long_enough = left >= 2
     closed &= encloses(vertices, owner, left)
@@ -74,7 +75,9 @@ def cleaned(pieces: Sequence[Piece], file: str) -> Cleaned:
     points = _kinds(pieces, long_enough & (repeated > 0), "is repeated", repeated, "point of ")
     rows = np.flatnonzero(long_enough)
     chosen = [pieces[row] for row in rows.tolist()]
-    lines = _lines(vertices[long_enough[owner]], left[rows], closed[rows], chosen, file)
+    vertices = _chosen(vertices, long_enough[owner])
+    vertices.flags.writeable = False
+    lines = _lines(vertices, left[rows], closed[rows], chosen, file)
     once = _drawn_once(lines, [(piece.layer, piece.colour) for piece in chosen])
     twice = np.zeros(len(pieces), dtype=np.bool_)
     twice[rows[~once]] = True
@@ -86,6 +89,11 @@ def cleaned(pieces: Sequence[Piece], file: str) -> Cleaned:
         duplicates=int(np.count_nonzero(~once)),
         duplicates_mm=float(lengths[~once].sum()),
     )
+
+
+def _chosen(rows: Floats, chosen: Bools) -> Floats:
+    """The chosen rows; the very array where these are all."""
+    return rows if chosen.all() else rows[chosen]
 
 
 def is_placed(piece: Piece) -> bool:
@@ -100,7 +108,7 @@ def _columns(pieces: Sequence[Piece], file: str) -> tuple[Floats, Ints]:
     counts = np.array([len(piece.vertices) for piece in pieces], dtype=np.int64)
     if counts.sum() > MAX_POINTS:
         raise too_many_points(file)
-    vertices = np.concatenate([piece.vertices for piece in pieces]).astype(np.float64)
+    vertices = np.concatenate([piece.vertices for piece in pieces], dtype=np.float64)
     finite = np.asarray(np.isfinite(vertices).all(axis=1))
     near = (np.abs(vertices[:, :2]) <= MAX_COORDINATE_MM).all(axis=1)
     if (finite & near).all():
@@ -197,9 +205,6 @@ def _mixed(words: _Words) -> _Words:
 
 # Healing: overlaps taken off, ends joined, arcs recognised (if asked for), specks merged. Each
 # stage is a function of camtool.geometry; here they are put in order and counted.
-
-SEGMENTS_AT_ONCE = 1 << 16
-"""So many segments are numbered at a time: some 10 MB."""
 
 TINY_SHARE = 0.5
 """Segments up to this share of the tolerance are merged into their neighbours."""

@@ -47,6 +47,19 @@ def test_open_paths_have_no_area_and_nothing_has_no_extents() -> None:
         extents(Polylines.of([]))
 
 
+@given(st.lists(st.one_of(polylines(), contours()), max_size=8), st.integers(1, 5))
+def test_segments_that_are_looked_at_in_lots_measure_the_same(
+    paths: list[Polyline], at_once: int
+) -> None:
+    lines = Polylines.of(paths)
+    measured = [measure(lines) for measure in (path_lengths, signed_areas, path_extents)]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("camtool.geometry.polylines.SEGMENTS_AT_ONCE", at_once)
+        in_lots = [measure(lines) for measure in (path_lengths, signed_areas, path_extents)]
+    for one, other in zip(measured, in_lots, strict=True):
+        assert np.array_equal(one, other)
+
+
 def test_each_path_has_its_own_numbers() -> None:
     square = Polyline(np.array([[0.0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]]), closed=True)
     paths = Polylines.of([square, CIRCLE, Polyline(square.vertices)])
