@@ -130,7 +130,7 @@ def _runs(passes: Sequence[_Pass], feeds: Feeds, names: Sequence[str]) -> Runs:
         for row, vertices in zip(rows, lifts, strict=True):
             followed[owner[row]].append(vertices)
     led = [_with_leads(each, one.leads) for each, one in zip(followed, passes, strict=True)]
-    table = np.concatenate(led)
+    table = led[0] if len(led) == 1 else np.concatenate(led)
     first = np.concatenate([[0], np.cumsum([len(each) for each in led])])
     return Runs(
         table,

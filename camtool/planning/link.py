@@ -2,37 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
+from camtool.arrays import Floats
 from camtool.planning.items import CutRun, Runs
 from camtool.planning.job import Operation, Tool
 from camtool.planning.paths import cuts
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.moves import Kind
 
 ROUNDED_DECIMALS = 10
 """Positions are rounded to this many decimals of a mm: far coarser than the noise of doubles, and
 far finer than any machine or tolerance."""
 
+VERTICES_AT_ONCE = 1 << 15
+"""So many vertices of runs become moves together: some 10 MB."""
+
 Approach = Callable[[CutRun], tuple[float, float] | None]
 """Where the tool comes from at safe height, (x, y) mm, before a run begins; None: anywhere."""
 
 
-def rounded(toolpath: Toolpath) -> Toolpath:
-    """The same moves with their places rounded to ROUNDED_DECIMALS.
+def _rounded(places: Floats) -> Floats:
+    """Places rounded to ROUNDED_DECIMALS, −0 as 0.
 
     The ends of a straight wall differ by some 1e-15 of their size, as offsets, tabs and ramps come
     to them. Where a dialect's last decimal is a tie (a cutter of 1/8 inch has a radius of 1.5875)
     one end would be rounded up and the other down, and the wall written askew.
     """
-    # Adding 0 makes −0 and 0 one.
-    end, centre = (
-        np.round(each, ROUNDED_DECIMALS) + 0.0 for each in (toolpath.end, toolpath.centre)
-    )
-    return replace(toolpath, end=end, centre=centre)
+    return np.asarray(np.round(places, ROUNDED_DECIMALS) + 0.0)
 
 
 def link(
@@ -44,9 +44,9 @@ def link(
 
     `worked`: operations, each with its runs in order of cutting. Rows know their run, counted
     through all of them. `approaches` makes what gives the place from which a run is approached, a
-    new one after each tool change.
+    new one after each tool change. All places are rounded to ROUNDED_DECIMALS.
     """
-    builder = ToolpathBuilder().rapid(z=safe_z_mm)
+    builder = ToolpathBuilder().rapid(z=float(_rounded(np.array(safe_z_mm))))
     approach = approaches() if approaches is not None else None
     tool: Tool | None = None
     speed: float | None = None
@@ -61,7 +61,8 @@ def link(
             approach = approaches() if approaches is not None else None
         tool = operation.tool
         speed = _spin(builder, speed, operation.spindle_rpm)
-        _cut(builder, runs, done, safe_z_mm, approach)
+        for lot in _lots(runs):
+            _cut(builder, lot, done, safe_z_mm, approach)
         done += len(runs)
     builder.source = ""
     _spin(builder, speed, None)
@@ -80,9 +81,48 @@ def _spin(builder: ToolpathBuilder, speed: float | None, wanted: float | None) -
     return wanted
 
 
+@dataclass(frozen=True, eq=False)
+class _Lot:
+    """Some of the runs, from run `first` on; whether the first of them was `begun` in the lot
+    before; whether the last one `goes_on` in the next, from the vertex with which this one ends.
+    """
+
+    runs: Runs
+    first: int
+    begun: bool
+    goes_on: bool
+
+
+def _lots(runs: Runs) -> Iterator[_Lot]:
+    """The runs in lots of about VERTICES_AT_ONCE. One is parted only where a line leaves a vertex:
+    there no arc goes on."""
+    first, count = runs.first, len(runs.vertices)
+    may_part = runs.vertices[:, 3] == 0.0
+    may_part[first[1:] - 1] = False
+    may_part[first[:-1]] = True
+    begin = 0
+    while begin < count:
+        ahead = may_part[begin + VERTICES_AT_ONCE :]
+        end = begin + VERTICES_AT_ONCE + int(ahead.argmax()) if ahead.any() else count
+        low = int(np.searchsorted(first, begin, side="right")) - 1
+        high = int(np.searchsorted(first, end))
+        goes_on = bool(first[high] > end)
+        rows, of = slice(begin, end + goes_on), slice(low, high)
+        part = Runs(
+            runs.vertices[rows],
+            runs.feed_mm_min[rows],
+            first[low : high + 1].clip(begin, rows.stop) - begin,
+            runs.plunge_mm_min[of],
+            runs.dwell_s[of],
+            runs.names[of],
+        )
+        yield _Lot(part, low, bool(first[low] < begin), goes_on)
+        begin = end
+
+
 def _cut(
     builder: ToolpathBuilder,
-    runs: Runs,
+    lot: _Lot,
     before: int,
     safe_z_mm: float,
     approach: Approach | None,
@@ -91,38 +131,46 @@ def _cut(
 
     (the approach) · across · down · the cuts · (the dwell) · up
     """
-    vertices, first, dwell = runs.vertices, runs.first, runs.dwell_s
+    runs, count = lot.runs, len(lot.runs)
+    vertices, first = runs.vertices, runs.first
     cut = cuts(vertices, runs.feed_mm_min, first)
-    come = [] if approach is None else [approach(run) for run in runs]
+    begins, ends = np.ones(count, dtype=np.bool_), np.ones(count, dtype=np.bool_)
+    begins[0], ends[-1] = not lot.begun, not lot.goes_on
+    heads = np.flatnonzero(begins)
+    come = [] if approach is None else [approach(runs[k]) for k in heads.tolist()]
     places = [place for place in come if place is not None]
     # Where each part of a run stands among all rows.
-    approached = np.zeros(len(runs), dtype=np.bool_)
-    approached[: len(come)] = [place is not None for place in come]
-    dwells = dwell > 0.0
-    cuts_each = np.bincount(cut.run, minlength=len(runs))
-    begin = np.concatenate([[0], np.cumsum(approached + cuts_each + dwells + 3)])
-    across = begin[:-1] + approached
-    up = begin[1:] - 1
+    approached = np.zeros(count, dtype=np.bool_)
+    approached[heads[: len(come)]] = [place is not None for place in come]
+    dwells = ends & (runs.dwell_s > 0.0)
+    cuts_each = np.bincount(cut.run, minlength=count)
+    rows_each = approached + 2 * begins + cuts_each + dwells + ends
+    stop = np.cumsum(rows_each)
+    start = stop - rows_each
     rank = np.arange(len(cut.run)) - np.repeat(np.cumsum(cuts_each) - cuts_each, cuts_each)
-    cutting = across[cut.run] + 2 + rank
-    count = int(begin[-1])
-    kind = np.full(count, Kind.RAPID, dtype=np.int64)
-    end, centre = np.full((count, 3), safe_z_mm), np.full((count, 2), np.nan)
-    speed, value = np.full(count, np.nan), np.full(count, np.nan)
-    end[begin[:-1][approached], :2] = np.array(places).reshape(-1, 2)
-    end[across, :2] = vertices[first[:-1], :2]
+    cutting = (start + approached + 2 * begins)[cut.run] + rank
+    total = int(stop[-1])
+    kind = np.full(total, Kind.RAPID, dtype=np.int64)
+    end, centre = np.full((total, 3), safe_z_mm), np.full((total, 2), np.nan)
+    speed, value = np.full(total, np.nan), np.full(total, np.nan)
+    end[start[approached], :2] = np.array(places).reshape(-1, 2)
+    across = (start + approached)[heads]
+    end[across, :2] = vertices[first[heads], :2]
     down = across + 1
-    kind[down], end[down] = Kind.LINE, vertices[first[:-1], :3]
-    speed[down] = runs.plunge_mm_min
+    kind[down], end[down] = Kind.LINE, vertices[first[heads], :3]
+    speed[down] = runs.plunge_mm_min[heads]
     is_arc = np.isfinite(cut.centre[:, 0]) & np.isfinite(cut.feed)
     turning = np.where(cut.ccw, Kind.ARC_CCW, Kind.ARC_CW)
     straight = np.where(np.isnan(cut.feed), Kind.RAPID, Kind.LINE)
     kind[cutting] = np.where(is_arc, turning, straight)
     end[cutting], speed[cutting] = cut.end, cut.feed
     centre[cutting[is_arc]] = cut.centre[is_arc]
-    rests = up[dwells] - 1
-    kind[rests], value[rests], end[rests] = Kind.DWELL, dwell[dwells], end[rests - 1]
+    up = stop[ends] - 1
+    rests = stop[dwells] - 2
+    kind[rests], value[rests], end[rests] = Kind.DWELL, runs.dwell_s[dwells], end[rests - 1]
     end[up, :2] = end[up - 1, :2]
-    number = np.repeat(np.arange(len(runs)), np.diff(begin))
+    number = np.repeat(np.arange(count), rows_each)
     source = builder.provenance(runs.names)[number]
-    builder.moves(kind, end, centre, speed, value=value, source=source, run=before + number)
+    run = before + lot.first + number
+    columns = _rounded(end), _rounded(centre), speed
+    builder.moves(kind, *columns, value=value, source=source, run=run)

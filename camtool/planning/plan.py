@@ -37,7 +37,7 @@ from camtool.planning.gouges import side_findings
 from camtool.planning.items import Bridge, Chosen, Contours, Items, Runs, Setting, Step, Work
 from camtool.planning.job import Job, Operation, refuse_endless
 from camtool.planning.leads import KeepOut
-from camtool.planning.link import link, rounded
+from camtool.planning.link import link
 from camtool.planning.naming import key_of
 from camtool.planning.order import (
     Point,
@@ -107,7 +107,7 @@ def planned(drawing: Drawing, job: Job, machine: Machine, *, undivided: bool = F
 
         approaches = partial(Approaches, machine)
     builder = link(worked, safe_z_of(job, machine), approaches)
-    toolpath = rounded(builder.finish())
+    toolpath = builder.finish()
     findings = collapsed(drawing, placed, job)
     findings += [finding for step in steps for finding in step.findings]
     findings += _left_over(placed, job, any(step.runs for step in steps))

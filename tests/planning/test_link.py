@@ -9,11 +9,14 @@ from hypothesis import strategies as st
 
 from camtool.geometry.polylines import Polyline
 from camtool.pipeline import post_drawing
+from camtool.planning.items import RAPID, CutRun, Runs
 from camtool.planning.job import Tabs, job_of
-from camtool.planning.link import ROUNDED_DECIMALS
+from camtool.planning.link import ROUNDED_DECIMALS, Approach, link
 from camtool.target.registry import load_target
-from camtool.toolpath.moves import Kind
+from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.moves import COLUMNS, Kind
 from tests.drawings import drawing_of
+from tests.strategies import polylines
 
 EIGHTH = 3.175
 
@@ -61,3 +64,46 @@ def test_places_lie_on_a_grid_far_below_any_tolerance() -> None:
         known = places[np.isfinite(places)]
         assert np.array_equal(known, np.round(known, ROUNDED_DECIMALS))
         assert not np.signbit(known[known == 0.0]).any()
+
+
+@st.composite
+def _runs(draw: st.DrawFn) -> Runs:
+    """Runs along paths, some of them holes, with rapids and dwells."""
+    each = []
+    for path in draw(st.lists(polylines(), min_size=1, max_size=6)):
+        vertices = np.insert(path.vertices, 2, -draw(st.sampled_from([0.0, 1.0, 2.5])), axis=1)
+        if draw(st.booleans()):
+            vertices[-1, 2] -= 1.0
+        feed = np.full(len(vertices) - 1, draw(st.sampled_from([5.0, 7.0, RAPID])))
+        run = CutRun(vertices, feed, 3.0, draw(st.sampled_from(["", "a", "b"])))
+        hole = CutRun(vertices[:1], feed[:0], 2.0, "hole", draw(st.sampled_from([0.0, 0.5])))
+        each += draw(st.permutations([run, hole]))
+    return Runs.of(each)
+
+
+@given(_runs(), st.integers(1, 9), st.booleans())
+def test_runs_that_are_linked_in_lots_are_those_that_are_linked_together(
+    runs: Runs, at_once: int, approached: bool
+) -> None:
+    def approaches() -> Approach:
+        seen: list[str] = []
+
+        def approach(run: CutRun) -> tuple[float, float] | None:
+            seen.append(run.name)
+            return (float(len(seen)), 0.5) if len(seen) % 3 else None
+
+        return approach
+
+    def linked() -> ToolpathBuilder:
+        work = [(job_of().operations[0], runs)] * 2
+        return link(work, 4.0, approaches if approached else None)
+
+    together = linked()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("camtool.planning.link.VERTICES_AT_ONCE", at_once)
+        in_lots = linked()
+    one, other = together.finish(), in_lots.finish()
+    for name in COLUMNS:
+        assert np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True), name
+    assert one.texts == other.texts
+    assert np.array_equal(together.runs, in_lots.runs)
