@@ -10,5 +10,7 @@ import numpy.typing as npt
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
+Indices = npt.NDArray[np.int32]
+Codes = npt.NDArray[np.int8]
 Bools = npt.NDArray[np.bool_]
 Octets = npt.NDArray[np.uint8]

@@ -20,7 +20,7 @@ from camtool.kernels.lattice import to_steps
 from camtool.machine.model import Machine
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import NO_SAMPLES, Chunk, still_ledger
-from camtool.toolpath.moves import Kind, PolarArcs, Toolpath
+from camtool.toolpath.moves import PolarArcs, Toolpath, are_arcs
 
 MAX_SAMPLES = 1_000_000
 """Samples are a coded step apart, or farther where a program would have more samples than this."""
@@ -165,7 +165,7 @@ class PathSamples:
         starts = self._toolpath.starts_of(row)
         points = starts + share[:, None] * (self._toolpath.end[row] - starts)
         kind = self._toolpath.kind[row]
-        on_arc = np.flatnonzero((kind == Kind.ARC_CW) | (kind == Kind.ARC_CCW))
+        on_arc = np.flatnonzero(are_arcs(kind))
         arm = np.searchsorted(self._arms.row, row[on_arc])
         points[on_arc] = self._arms.points(arm, share[on_arc])
         last = np.flatnonzero(share == 1.0)

@@ -10,7 +10,7 @@ import numpy as np
 
 from camtool.arrays import Floats, Ints
 from camtool.findings import Finding
-from camtool.toolpath.moves import COLUMNS, WHOLE, Kind, PathMode, Toolpath
+from camtool.toolpath.moves import COLUMNS, Kind, PathMode, Toolpath, frozen
 
 Coordinate = float | None
 
@@ -175,13 +175,14 @@ class ToolpathBuilder:
 
 class _Column:
     """A column that grows where it stands: parts that are put together at the end would need twice
-    the room, and leave holes in the memory."""
+    the room, and leave holes in the memory. While all rows are the same, one of them is stored,
+    but for ends."""
 
     def __init__(self, name: str) -> None:
-        self._width = {"end": (3,), "centre": (2,)}.get(name, ())
-        dtype = np.int64 if name in (*WHOLE, "run") else np.float64
-        self._rows: Any = np.empty(self.shape_of(0), dtype=dtype)
+        self._dtype, self._width = COLUMNS.get(name, (np.int64, ()))
+        self._rows: Any = np.empty(self.shape_of(0), dtype=self._dtype)
         self._count = 0
+        self._same = name != "end"
 
     def __len__(self) -> int:
         return self._count
@@ -191,18 +192,33 @@ class _Column:
         return (rows, *self._width)
 
     def add(self, rows: Ints | Floats | float, count: int) -> None:
-        """So many further rows; a single number stands for all of them."""
+        """So many further rows, at least one; a single number stands for all of them."""
+        given = np.broadcast_to(np.asarray(rows, dtype=self._dtype), self.shape_of(count))
+        if self._same and not self._count:
+            self._rows = given[:1].copy()
+        if self._same and not _are_same(self._rows, given):
+            self._same = False
+            self._rows = np.repeat(self._rows, self._count, axis=0)
         end = self._count + count
-        if end > len(self._rows):
-            if not self._rows.flags.writeable:
-                self._rows = self._rows.copy()
-            self._rows.resize(self.shape_of(end + end // GROWTH), refcheck=False)
-        self._rows[self._count : end] = rows
+        if not self._same:
+            if end > len(self._rows):
+                if not self._rows.flags.writeable:
+                    self._rows = self._rows.copy()
+                self._rows.resize(self.shape_of(end + end // GROWTH), refcheck=False)
+            self._rows[self._count : end] = given
         self._count = end
 
     def whole(self) -> Any:
         """All rows so far, which nobody can change any more."""
+        if self._same and self._count:
+            return np.broadcast_to(frozen(self._rows), self.shape_of(self._count))
         if len(self._rows) != self._count:
             self._rows.resize(self.shape_of(self._count), refcheck=False)
-        self._rows.flags.writeable = False
-        return self._rows
+        return frozen(self._rows)
+
+
+def _are_same(one: Any, rows: Any) -> bool:
+    """Whether all rows are this one; NaN is the same as NaN, and 0 not as −0."""
+    if one.dtype == np.float64:
+        one, rows = one.view(np.int64), rows.view(np.int64)
+    return bool((rows == one).all())

@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Codes, Floats, Ints
 from camtool.errors import OptionError, PostError
 from camtool.findings import FEED_ABOVE_LIMIT_LOWERED
 from camtool.machine.model import Machine
@@ -194,7 +194,7 @@ def _repeated(counts: Ints) -> tuple[Ints, Ints]:
     return row, np.arange(len(row)) - before[row]
 
 
-def _built(toolpath: Toolpath, row: Ints, kind: Ints, end: Floats, centre: Floats) -> Lowered:
+def _built(toolpath: Toolpath, row: Ints, kind: Codes, end: Floats, centre: Floats) -> Lowered:
     """Rows of new kinds, ends and centres, arrays that are theirs alone, with all else of the rows
     that they came from."""
     kind, end, centre = frozen(kind), frozen(end), frozen(centre)

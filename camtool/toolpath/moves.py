@@ -9,25 +9,34 @@ at `start`. Planning builds it, a target writes it and reads it back, simulation
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, TypeVar, cast
 
 import numpy as np
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Codes, Floats, Indices, Ints
 from camtool.errors import PostError
 from camtool.findings import Finding
 from camtool.toolpath.wanted import Drawn
 
 Column = TypeVar("Column", bound=np.ndarray[Any, Any])
 
-COLUMNS = ("kind", "end", "centre", "feed", "value", "source", "block", "mode")
-"""The columns of a Toolpath ..."""
+COLUMNS: dict[str, tuple[type[np.generic], tuple[int, ...]]] = {
+    "kind": (np.int8, ()),
+    "end": (np.float64, (3,)),
+    "centre": (np.float64, (2,)),
+    "feed": (np.float64, ()),
+    "value": (np.float64, ()),
+    "source": (np.int32, ()),
+    "block": (np.int32, ()),
+    "mode": (np.int64, ()),
+}
+"""The columns of a Toolpath: their types, and the shape of one row."""
 
-WHOLE = ("kind", "source", "block", "mode")
-"""... and those of whole numbers."""
+ROWS_AT_ONCE = 1 << 15
+"""What is computed from a row and its start alone is computed for so many rows together."""
 
 
 class Kind(IntEnum):
@@ -86,6 +95,9 @@ class Move:
 class Toolpath:
     """N rows in columns; arrays are read-only.
 
+    Whole numbers are as narrow as `COLUMNS` says: sums and products of them overflow. A column
+    that is the same in all rows may be one row, seen as many (`np.broadcast_to`).
+
     kind (N,) of Kind; end (N, 3) mm (an event repeats the position); centre (N, 2) mm, NaN where
     no arc; feed (N,) mm/min, NaN for rapids and events; value (N,), NaN where none; source (N,)
     index into `texts` or −1 (provenance: layer and entity); block (N,) index, from 0, of the
@@ -95,13 +107,13 @@ class Toolpath:
     `drawn` what the rows stand for, None but for plans. ValueError when columns disagree.
     """
 
-    kind: Ints
+    kind: Codes
     end: Floats
     centre: Floats
     feed: Floats
     value: Floats
-    source: Ints
-    block: Ints
+    source: Indices
+    block: Indices
     start: Floats
     texts: tuple[str, ...] = ()
     findings: tuple[Finding, ...] = ()
@@ -112,28 +124,12 @@ class Toolpath:
 
     def __post_init__(self) -> None:
         count = len(self.kind)
-        if not self.modes:  # one number, seen as many
-            silent = np.broadcast_to(np.full(1, -1), count)
+        if not self.modes:
+            silent = np.broadcast_to(frozen(np.full(1, -1)), count)
             object.__setattr__(self, "mode", silent)
-        shapes = {
-            "kind": (count,),
-            "end": (count, 3),
-            "centre": (count, 2),
-            "feed": (count,),
-            "value": (count,),
-            "source": (count,),
-            "block": (count,),
-            **({"mode": (count,)} if self.modes else {}),
-            "start": (3,),
-        }
-        for name, shape in shapes.items():
-            dtype = np.int64 if name in WHOLE else np.float64
-            column = getattr(self, name)
-            if not _is_own(column, dtype):
-                column = frozen(np.array(column, dtype=dtype))
-            if column.shape != shape:
-                raise ValueError(f"column {name} has shape {column.shape}, wanted {shape}")
-            object.__setattr__(self, name, column)
+        for name, (dtype, row) in COLUMNS.items():
+            object.__setattr__(self, name, _kept(name, getattr(self, name), dtype, (count, *row)))
+        object.__setattr__(self, "start", _kept("start", self.start, np.float64, (3,)))
         if self.drawn is not None and len(self.drawn.edge) != count:
             raise ValueError(f"drawn is of {len(self.drawn.edge)} rows, not of {count}")
         if not (np.isfinite(self.end).all() and np.isfinite(self.start).all()):
@@ -156,7 +152,7 @@ class Toolpath:
     @property
     def is_arc(self) -> Bools:
         """(N,) true for ARC_CW and ARC_CCW."""
-        return np.asarray((self.kind == Kind.ARC_CW) | (self.kind == Kind.ARC_CCW))
+        return are_arcs(self.kind)
 
     @property
     def is_motion(self) -> Bools:
@@ -190,13 +186,34 @@ class Toolpath:
 
     def first(self, rows: int) -> Toolpath:
         """The first rows alone; the very toolpath where these are all."""
-        return self if rows >= len(self) else self.picked(np.arange(rows))
+        return self if rows >= len(self) else self.part(0, rows)
 
-    def picked(self, row: Ints, **others: Ints | Floats) -> Toolpath:
+    def part(self, low: int, high: int) -> Toolpath:
+        """The rows low:high, whose columns are not copied."""
+        columns = {name: getattr(self, name)[low:high] for name in COLUMNS}
+        drawn = None if self.drawn is None else self.drawn.picked(np.arange(low, high))
+        start = self.start if low == 0 else frozen(self.end[low - 1].copy())
+        return replace(self, **columns, start=start, drawn=drawn)
+
+    def by_parts(self, column: Callable[[Toolpath], Column]) -> Column:
+        """(N, …) a column in which each row follows from that row and its start alone, computed
+        for some thousand rows at a time."""
+        bare = replace(self, drawn=None)
+        if len(self) <= ROWS_AT_ONCE:
+            return column(bare)
+        found: Any = None
+        for low in range(0, len(self), ROWS_AT_ONCE):
+            part = column(bare.part(low, low + ROWS_AT_ONCE))
+            if found is None:
+                found = np.empty((len(self), *part.shape[1:]), dtype=part.dtype)
+            found[low : low + len(part)] = part
+        return cast(Column, found)
+
+    def picked(self, row: Ints, **others: Codes | Ints | Floats) -> Toolpath:
         """Rows (M,) of this one, in that order and as often as they are named; `others`: columns
         that take the place of theirs."""
         columns = {
-            name: frozen(getattr(self, name)[row]) for name in COLUMNS if name not in others
+            name: _picked(getattr(self, name), row) for name in COLUMNS if name not in others
         }
         drawn = None if self.drawn is None else self.drawn.picked(row)
         return replace(self, **{**columns, **others}, drawn=drawn)
@@ -231,7 +248,12 @@ class Toolpath:
             )
 
 
-def _sweeps(kind: Ints, begin: Floats, end: Floats, centre: Floats) -> Floats:
+def are_arcs(kind: Codes | Ints) -> Bools:
+    """(K,) true for ARC_CW and ARC_CCW among kinds (K,)."""
+    return np.asarray((kind == Kind.ARC_CW) | (kind == Kind.ARC_CCW))
+
+
+def _sweeps(kind: Codes, begin: Floats, end: Floats, centre: Floats) -> Floats:
     """(K,) rad as `Toolpath.sweeps` has them, of rows that are arcs."""
     full = 2.0 * np.pi
     from_ = np.arctan2(begin[:, 1] - centre[:, 1], begin[:, 0] - centre[:, 0])
@@ -248,11 +270,31 @@ def frozen(column: Column) -> Column:
     return column
 
 
-def _is_own(column: object, dtype: type) -> bool:
-    """Whether nobody can change this column, so that it need not be copied."""
-    if not isinstance(column, np.ndarray) or column.dtype != dtype:
-        return False
-    return bool(column.flags.owndata) and not column.flags.writeable
+def _kept(
+    name: str, given: Any, dtype: type[np.generic], shape: tuple[int, ...]
+) -> np.ndarray[Any, Any]:
+    """A column that nobody can change: the given one if that is so already, else a copy of it.
+    ValueError for another shape."""
+    column: np.ndarray[Any, Any] = given
+    if not (isinstance(given, np.ndarray) and given.dtype == dtype and _is_final(given)):
+        column = frozen(np.array(given, dtype=dtype))
+    if column.shape != shape:
+        raise ValueError(f"column {name} has shape {column.shape}, wanted {shape}")
+    return column
+
+
+def _is_final(column: np.ndarray[Any, Any]) -> bool:
+    """Whether nobody can change these numbers, be they a part of another array or not."""
+    owner = column if column.base is None else column.base
+    own = isinstance(owner, np.ndarray) and bool(owner.flags.owndata)
+    return own and not owner.flags.writeable and not column.flags.writeable
+
+
+def _picked(column: Column, row: Ints) -> Column:
+    """The rows (M,) of a column; one row that is seen as many stays one."""
+    if len(column) and column.strides[0] == 0:
+        return cast(Column, np.broadcast_to(column[:1], (len(row), *column.shape[1:])))
+    return frozen(cast(Column, column[row]))
 
 
 def _triple(row: Floats) -> tuple[float, float, float]:

@@ -14,7 +14,7 @@ from io import BytesIO
 
 import numpy as np
 
-from camtool.arrays import Bools, Ints, Octets
+from camtool.arrays import Bools, Codes, Ints, Octets
 from camtool.kernels.words import MOST_NUMBER, put_words
 
 ROWS_AT_ONCE = 1 << 14
@@ -31,7 +31,7 @@ class Words:
     """
 
     letter: str
-    units: Ints
+    units: Ints | Codes
     written: Bools
     decimals: int = 0
     kept: int | None = None

@@ -21,7 +21,7 @@ import numpy as np
 from camtool.arrays import Bools, Floats, Ints
 from camtool.kernels.judging import BEFORE_FIRST, BINS, SHIFT, leading_bits
 from camtool.simulation.motion import Ledger
-from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.moves import Kind, Toolpath, are_arcs
 from camtool.verification.cuts import CutMoves
 from camtool.verification.matching import Match
 
@@ -170,7 +170,7 @@ class RowFigures:
         self.inner.add_rows(block.low, inner, columns[:, at.INNER_SQUARES], judged)
         self.lag.add_rows(block.low, lag, columns[:, at.LAG_SQUARES], judged)
         self.whole.add_rows(block.low, total, columns[:, at.TOTAL_SQUARES], known)
-        is_arc = np.isin(self._toolpath.kind[block.rows], (Kind.ARC_CW, Kind.ARC_CCW))
+        is_arc = are_arcs(self._toolpath.kind[block.rows])
         self.lines_mm = _larger(self.lines_mm, inner[~is_arc])
         self.arcs_mm = _larger(self.arcs_mm, inner[is_arc])
         self._sum += float(columns[:, at.TOTAL_SUM].sum())

@@ -21,7 +21,7 @@ from typing import Final
 
 import numpy as np
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Codes, Floats, Ints
 from camtool.toolpath.moves import Kind, Toolpath
 
 from .dialect import GcodeDialect
@@ -72,7 +72,7 @@ class Arcs:
 
     end: Ints
     offset: Ints
-    kind: Ints
+    kind: Codes
     pieces: dict[int, list[Piece]]
     counts: ArcCounts = field(default_factory=ArcCounts)
 
@@ -110,7 +110,7 @@ def arcs_of(toolpath: Toolpath, dialect: GcodeDialect) -> Arcs:
 
 
 def arcs_accepted(
-    sweep_rad: Floats, points: tuple[Ints, Ints, Ints], kind: Ints, dialect: GcodeDialect
+    sweep_rad: Floats, points: tuple[Ints, Ints, Ints], kind: Codes, dialect: GcodeDialect
 ) -> Bools:
     """Which arcs the controller accepts, and executes as they were meant.
 

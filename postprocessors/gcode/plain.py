@@ -20,7 +20,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Codes, Floats, Ints
 from camtool.errors import PostError
 from camtool.findings import Finding, Sentence
 from camtool.machine.model import Machine
@@ -31,7 +31,7 @@ from camtool.toolpath.lower import (
     helices_to_steps,
     slope_step_mm,
 )
-from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.moves import Kind, Toolpath, are_arcs
 
 from .arcs import FLAT_UNITS, LINE_SAGITTA_UNITS, sagitta_of, turns_of
 from .checks import check
@@ -109,7 +109,7 @@ class PlainRows:
     """M rows in units: `kind` (M,), `end` (M, 3), `offset` (M, 2) of the centre from the start
     (0 where no arc), `start` (3,), and `row` (M,), the given toolpath's row of each."""
 
-    kind: Ints
+    kind: Codes
     end: Ints
     offset: Ints
     start: Ints
@@ -128,7 +128,7 @@ class PlainRows:
     @property
     def is_arc(self) -> Bools:
         """(M,) true for ARC_CW and ARC_CCW."""
-        return np.asarray((self.kind == Kind.ARC_CW) | (self.kind == Kind.ARC_CCW))
+        return are_arcs(self.kind)
 
     @property
     def moves(self) -> Bools:

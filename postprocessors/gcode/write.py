@@ -19,7 +19,7 @@ from typing import Final
 import msgspec
 import numpy as np
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Codes, Floats, Ints
 from camtool.errors import PostError
 from camtool.findings import Finding
 from camtool.machine.model import Machine
@@ -302,7 +302,7 @@ class Sent:
     feed (M,) in units of the F word, row (M,) of the toolpath; `written` (M, 3): which coordinates
     are written; `forget` (M,): homing since the last motion. `dropped` moves were too small."""
 
-    kind: Ints
+    kind: Codes
     end: Ints
     offset: Ints
     feed: Ints

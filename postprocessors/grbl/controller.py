@@ -32,7 +32,7 @@ from camtool.simulation.motion import Chunk, Options
 from camtool.simulation.rows import check_rows
 from camtool.simulation.samples import RowTotals, row_chunks
 from camtool.simulation.speed_plan import SpeedPlan, allowed_along, axis_limits
-from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.moves import Kind, Toolpath, are_arcs
 
 from .dialect import Dialect, GrblController
 from .steps import step_lines_fill, steps_taken
@@ -338,7 +338,7 @@ def targets_of(
     begins = as_read(path.starts_of(rows), machine)
     asks = (kind <= Kind.ARC_CCW) | np.isin(kind, (Kind.HOME_XY, Kind.HOME_Z))
     counts = np.where(asks, 1, 0)
-    arcs = np.flatnonzero((kind == Kind.ARC_CW) | (kind == Kind.ARC_CCW))
+    arcs = np.flatnonzero(are_arcs(kind))
     chords = _Chords(path, machine, begins[arcs], ends[arcs], rows[arcs])
     counts[arcs] = chords.segments(controller)
     row = np.repeat(np.arange(len(rows)), counts)

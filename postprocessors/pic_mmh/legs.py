@@ -14,7 +14,7 @@ import numpy as np
 from camtool.arrays import Floats, Ints
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import Ledger
-from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.moves import Kind, Toolpath, are_arcs
 
 from . import steps as loops
 
@@ -60,7 +60,7 @@ class Course:
         flat[:, loops.ROW] = np.arange(low, low + len(kind))
         flat[:, [loops.FROM_X, loops.FROM_Y]] = begin[:, :2]
         deep = flat.copy()
-        arc = (kind == Kind.ARC_CW) | (kind == Kind.ARC_CCW)
+        arc = are_arcs(kind)
         flat[:, loops.KIND] = np.where(arc, loops.ARC, loops.LINE)
         about = np.where(arc[:, None], centres, begin[:, :2])
         flat[:, [loops.ORIGIN_X, loops.ORIGIN_Y]] = about

@@ -62,6 +62,19 @@ def test_a_finished_path_stays_while_the_builder_goes_on(
     assert len(runs) == len(first)
 
 
+def test_a_column_of_equal_rows_is_one_row() -> None:
+    path = ToolpathBuilder().line(1.0, feed=7.0).line(2.0, feed=7.0)
+    first = path.finish()
+    assert [name for name in COLUMNS if getattr(first, name).strides[0] == 0] == [
+        "kind", "centre", "feed", "value", "source", "block", "mode"
+    ]  # fmt: skip
+    assert path.event(Kind.DWELL, -0.0).event(Kind.DWELL, 0.0).finish().kind.tolist() == [
+        *[Kind.LINE] * 2, *[Kind.DWELL] * 2
+    ]  # fmt: skip
+    assert np.signbit(path.finish().value[2:]).tolist() == [True, False]
+    assert first.picked(np.array([1, 0, 1])).feed.strides == (0,)
+
+
 def test_no_rows() -> None:
     path = ToolpathBuilder()
     assert len(path) == len(path.finish()) == len(path.runs) == 0

@@ -10,7 +10,14 @@ from hypothesis import strategies as st
 
 from camtool.simulation.rows import placed
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.toolpath.moves import Kind, PolarArcs, Toolpath, mounted_before, toolpath_extents
+from camtool.toolpath.moves import (
+    ROWS_AT_ONCE,
+    Kind,
+    PolarArcs,
+    Toolpath,
+    mounted_before,
+    toolpath_extents,
+)
 
 
 def test_left_out_coordinates_stay() -> None:
@@ -33,6 +40,29 @@ def test_iterator_gives_what_was_built() -> None:
     assert moves[2].value == 1.5
     assert moves[2].source == ""
     assert moves[3].end == (1.0, 0.0, 0.0)
+
+
+def test_a_part_begins_where_the_rows_before_it_end() -> None:
+    path = ToolpathBuilder((1.0, 0.0, 0.0)).line(2.0, feed=1.0).rapid(y=3.0).event(Kind.END)
+    whole = path.finish()
+    for low in range(4):
+        for high in range(low, 4):
+            part = whole.part(low, high)
+            assert part.starts.tolist() == whole.starts[low:high].tolist()
+            assert part.kind.tolist() == whole.kind[low:high].tolist()
+            assert part.end.base is whole.end.base or part.end.base is whole.end
+
+
+@pytest.mark.parametrize("count", [0, 1, ROWS_AT_ONCE, 2 * ROWS_AT_ONCE + 3])
+def test_a_column_by_parts_is_that_of_the_whole(count: int) -> None:
+    ends = np.random.default_rng(1).normal(size=(count, 3))
+    none = np.full((count, 2), np.nan)
+    path = Toolpath(
+        np.zeros(count), ends, none, none[:, 0], none[:, 0], np.zeros(count), np.arange(count),
+        start=np.ones(3),
+    )  # fmt: skip
+    ways = path.by_parts(lambda part: part.end - part.starts)
+    assert np.array_equal(ways, path.end - path.starts)
 
 
 def test_an_arc_with_z_is_a_helix() -> None:
