@@ -5,6 +5,9 @@ import os
 import pytest
 from hypothesis import HealthCheck, settings
 
+# What somebody who runs the tests keeps for camtool is no matter of theirs.
+os.environ["XDG_CONFIG_HOME"] = "/nonexistent"
+
 # No deadline: kernels compile on first use, and speed is no matter of tests here.
 settings.register_profile(
     "default",

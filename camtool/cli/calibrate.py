@@ -42,15 +42,16 @@ def calibrate(
     from camtool.calibration.machine_file import machine_file
     from camtool.calibration.measurements import read_measurements
 
-    check_places([measurements, machine], [output, report])
+    flags = MachineFlags.of(target, machine, ()) if target or machine else None
+    check_places([measurements, *(flags.files() if flags else ())], [output, report])
     measured = read_measurements(Path(measurements))
-    flags = MachineFlags(target or (None if machine else measured.target or None), machine, ())
+    flags = flags or MachineFlags.of(measured.target or None, None, ())
     known = flags.load().machine
     progress().begin("estimating")
     found = estimated(measured, known)
     files: dict[str, bytes] = {}
     if output is not None:
-        own = _own_table(machine, str(flags.name()))
+        own = _own_table(flags.machine, str(flags.name()))
         files[output] = machine_file(found, measured, known, own).encode()
     if report is not None:
         files[report] = to_json(to_data(found, known)).encode()

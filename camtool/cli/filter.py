@@ -14,7 +14,7 @@ import click
 
 from camtool.cli.files import STDOUT
 from camtool.cli.messages import say
-from camtool.cli.options import SectionedCommand, talk_options
+from camtool.cli.options import MachineFlags, SectionedCommand, talk_options
 from camtool.cli.picture_options import PictureFlags
 from camtool.cli.post import Asked, Posting, finish, posting_options
 
@@ -38,10 +38,11 @@ def filter(source: str, posting: Posting, quiet: bool, verbose: bool) -> int:
     A job file beside a drawing, part.toml for part.dxf, is its job; --job is for those without
     one. The target is linuxcnc unless --target or --machine names another one.
     """
-    if posting.machine.name() is None:
+    if posting.machine.by_default or posting.machine.name() is None:
         from camtool.target.registry import filter_target
 
-        posting = replace(posting, machine=replace(posting.machine, target=filter_target()))
+        own = MachineFlags(filter_target(), None, posting.machine.settings)
+        posting = replace(posting, machine=own)
     _progress(BEGUN)
     target = posting.load()
     posting = posting.of(source)

@@ -53,6 +53,7 @@ COMMANDS = (
     "convert",
     "coupon",
     "filter",
+    "init",
     "job",
     "post",
     "preview",
@@ -98,6 +99,7 @@ def cli() -> None:
     camtool stale   drawings/ -t pic-mmh        programs that are out of date
     camtool job new logo.dxf                    a job file to fill in, from its layers
     camtool targets                             the machines it knows
+    camtool init                                a machine file of your own, by questions
     camtool coupon  lines -o coupon.dxf         a drawing to cut and measure
     camtool calibrate lengths.toml -t pic-mmh   the machine's numbers from what was measured
 

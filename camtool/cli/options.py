@@ -138,11 +138,35 @@ _MACHINE = "Machine"
 
 @dataclass(frozen=True)
 class MachineFlags:
-    """`--target`, `--machine`, `--set`."""
+    """`--target`, `--machine` (a file), `--set`; `by_default` where a `camtool.toml` says which
+    machine, and no flag."""
 
     target: str | None
     machine: str | None
     settings: tuple[str, ...]
+    by_default: bool = False
+
+    @classmethod
+    def of(
+        cls, target: str | None, machine: str | None, settings: tuple[str, ...]
+    ) -> MachineFlags:
+        """Those of the flags: a machine that is said by its name becomes its file, and so does a
+        target of which the user has a machine with that name; without either, the project's or
+        the user's default holds."""
+        from camtool.project import project_of
+        from camtool.target.registry import target_names
+
+        project = project_of(Path.cwd())
+        if machine is not None:
+            return cls(target, str(project.machine_named(machine)), settings)
+        if target is None:
+            own = project.machine
+            by_default = own is not None or project.target is not None
+            return cls(project.target, None if own is None else str(own), settings, by_default)
+        own = project.find(target)
+        if own is not None and target not in target_names():
+            return cls(None, str(own), settings)
+        return cls(target, None, settings)
 
     def load(self) -> LoadedTarget:
         """The target with the user's file and settings over it."""
@@ -150,7 +174,10 @@ class MachineFlags:
 
         name = self.name()
         if name is None:
-            raise click.UsageError("--target is missing; `camtool targets` lists the machines")
+            raise click.UsageError(
+                "--target is missing; `camtool targets` lists the machines, `camtool init` makes "
+                "yours the default"
+            )
         file = Path(self.machine) if self.machine else None
         return load_target(name, machine_file=file, settings=self.settings)
 
@@ -169,34 +196,27 @@ class MachineFlags:
 
 def machine_options(command: Command) -> Command:
     """Adds `machine: MachineFlags`."""
-    return with_flags(
-        command,
-        "machine",
-        MachineFlags,
-        [
-            option(
-                _MACHINE,
-                "--target",
-                "-t",
-                metavar="NAME",
-                help="The machine; see camtool targets.",
-            ),
-            option(
-                _MACHINE,
-                "--machine",
-                metavar="FILE",
-                help="A TOML file that extends the target's machine.",
-            ),
-            option(
-                _MACHINE,
-                "--set",
-                "settings",
-                multiple=True,
-                metavar="KEY=VALUE",
-                help="Change one value of the machine, such as axes.x.backlash_mm=0.2.",
-            ),
-        ],
-    )
+    options = [
+        option(
+            _MACHINE, "--target", "-t", metavar="NAME", help="The machine; see camtool targets."
+        ),
+        option(
+            _MACHINE,
+            "--machine",
+            metavar="NAME",
+            help="Your own machine, by its name or its TOML file; see camtool init.",
+        ),
+        option(
+            _MACHINE,
+            "--set",
+            "settings",
+            multiple=True,
+            metavar="KEY=VALUE",
+            help="Change one value of the machine, such as axes.x.backlash_mm=0.2.",
+        ),
+    ]
+    names = ["target", "machine", "settings"]
+    return decorate(gather("machine", MachineFlags.of, names)(command), options)
 
 
 def talk_options(command: Command) -> Command:
@@ -461,8 +481,11 @@ def job_options(command: Command) -> Command:
     """Adds `job: JobFlags`."""
 
     def made(job: str | None, operation: tuple[str, ...], **keys: Any) -> JobFlags:
+        from camtool.project import project_of
+
         given = {name: value for name, value in keys.items() if value is not None}
-        return JobFlags(job, operation, given)
+        default = project_of(Path.cwd()).job if job is None else None
+        return JobFlags(job if default is None else str(default), operation, given)
 
     names = ["job", "operation", *(name for keys in FLAGS.values() for name in keys)]
     of_job = next(iter(FLAGS))

@@ -208,7 +208,7 @@ def post(
 
 # How `post` and `convert` end: all files or none, and a short summary.
 
-ANY_MACHINE = "travel, rates and backlash are placeholders: camtool targets new NAME --extends {}"
+ANY_MACHINE = "travel, rates and backlash are placeholders: camtool init makes your machine's file"
 """The note where the machine's own numbers are not known."""
 
 
@@ -260,7 +260,7 @@ def finish(run: Run, asked: Asked, *, picture: Painter, quiet: bool, verbose: bo
     if run.report is not None and not quiet:
         summary = run.report.to_text(findings=False)
         if run.target.any_machine:
-            summary += f"\n{'machine':<10} {ANY_MACHINE.format(run.target.machine.target.name)}"
+            summary += f"\n{'machine':<10} {ANY_MACHINE}"
         show_facts(summary, REPORT_NAMES, report_marks(run.findings), err=True)
     where = "stdout" if output == STDOUT else output
     say(f"written: {where} ({len(run.program.data)} bytes)", quiet=quiet)

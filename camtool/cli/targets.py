@@ -13,7 +13,7 @@ import click
 
 from camtool.cli.files import STDOUT, check_new, check_places, write_all
 from camtool.cli.messages import in_colour, say, show_text
-from camtool.cli.options import talk_options
+from camtool.cli.options import MachineFlags, talk_options
 from camtool.errors import CamtoolError
 from camtool.plain import one_line, to_json
 
@@ -45,10 +45,11 @@ class _Targets(click.Group):
 @talk_options
 @click.pass_context
 def targets(context: click.Context, as_json: bool, quiet: bool, verbose: bool) -> None:
-    """List the machines, show everything about the one called NAME, or begin a machine file.
+    """List the machines, show everything about the one called NAME, or begin a machine file;
+    camtool init makes one that has its numbers.
 
     \b
-    camtool targets                             all machines
+    camtool targets                             all machines, yours too
     camtool targets grbl                        everything about one
     camtool targets new my-mill --extends grbl  my-mill.toml, to fill in
     """
@@ -57,7 +58,7 @@ def targets(context: click.Context, as_json: bool, quiet: bool, verbose: bool) -
 
 
 @click.command(short_help="Everything about one machine.")
-@click.option("--machine", metavar="FILE", help="A TOML file that extends the target's machine.")
+@click.option("--machine", metavar="NAME", help="Your own machine, by its name or TOML file.")
 @click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change one value.")
 @click.option("--json", "as_json", is_flag=True, help="As JSON on stdout.")
 @talk_options
@@ -102,6 +103,9 @@ def target_items(incomplete: str) -> Iterator[CompletionItem]:
 
     for name, listed in each_target(list_target, prefix=incomplete):
         yield CompletionItem(name, help=listed.target.title)
+    for row in _own_machines([]):
+        if row["name"].startswith(incomplete):
+            yield CompletionItem(row["name"], help=f"yours, on {row['extends']}")
 
 
 def _list(as_json: bool) -> None:
@@ -113,23 +117,45 @@ def _list(as_json: bool) -> None:
         target = listed.target
         row = {"name": name, "title": target.title, "extension": target.extension}
         rows.append({**row, "needs": list(listed.needs)})
+    own = list(_own_machines(broken))
     for error in broken:
         say(f"camtool: warning: {error}", quiet=False)
     if as_json:
-        write_all({STDOUT: to_json({"targets": rows}).encode()})
+        write_all({STDOUT: to_json({"targets": rows, "machines": own}).encode()})
         return
     if in_colour(sys.stdout):
-        _table(rows)
+        _table(rows, own)
         return
-    width = max((len(row["name"]) for row in rows), default=0)
+    width = max((len(row["name"]) for row in [*rows, *own]), default=0)
     for row in rows:
         needs = f" (needs --machine FILE: {', '.join(row['needs'])})" if row["needs"] else ""
         show_text(
             one_line(f"{row['name']:<{width}}  {row['extension']:<6}  {row['title']}{needs}")
         )
+    for row in own:
+        default = ", the default" if row["default"] else ""
+        show_text(
+            one_line(f"{row['name']:<{width}}  yours{default}, on {row['extends']}: {row['file']}")
+        )
 
 
-def _table(rows: list[dict[str, Any]]) -> None:
+def _own_machines(broken: list[CamtoolError]) -> Iterator[dict[str, Any]]:
+    """The user's machines, as rows; errors are appended to `broken`."""
+    from camtool.project import project_of
+    from camtool.target.loader import extended_by
+
+    try:
+        project = project_of(Path.cwd())
+        default = project.machine
+    except CamtoolError as error:
+        broken.append(error)
+        return
+    for name, file in project.machines():
+        row = {"name": name, "extends": extended_by(file), "file": str(file)}
+        yield {**row, "default": file == default}
+
+
+def _table(rows: list[dict[str, Any]], own: list[dict[str, Any]]) -> None:
     """The list as a table, for terminals."""
     from rich.console import Console
     from rich.table import Table
@@ -142,13 +168,16 @@ def _table(rows: list[dict[str, Any]]) -> None:
         # Titles and keys come from files: they are text, no markup.
         name, rest = Text(row["name"], style="bold"), (row["extension"], one_line(row["title"]))
         table.add_row(name, *map(Text, (*rest, ", ".join(row["needs"]))))
+    for row in own:
+        name, default = Text(row["name"], style="bold"), ", the default" if row["default"] else ""
+        table.add_row(
+            name, "", Text(one_line(f"yours{default}, on {row['extends']}: {row['file']}"))
+        )
     Console().print(table)
 
 
 def _show(name: str, machine: str | None, settings: tuple[str, ...], as_json: bool) -> None:
-    from camtool.target.registry import load_target
-
-    loaded = load_target(name, machine_file=Path(machine) if machine else None, settings=settings)
+    loaded = MachineFlags.of(name, machine, settings).load()
     values = loaded.values()
     if as_json:
         write_all({STDOUT: to_json(values).encode()})

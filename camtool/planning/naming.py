@@ -37,8 +37,8 @@ def own_numbers(machine: Machine, settings: Sequence[str]) -> str:
     """How to give the numbers of the user's own machine, which may differ from the target's."""
     keys = " ".join(f"--set {each}" for each in settings)
     return (
-        f"if your machine can do more, use {keys}, or make its own file with camtool targets new"
-        f" NAME --extends {machine.target.dialect} and use it with --machine"
+        f"if your machine can do more, use {keys}, or make its own file with camtool init NAME "
+        f"-t {machine.target.dialect} and use it with --machine NAME"
     )
 
 

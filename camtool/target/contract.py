@@ -12,10 +12,13 @@ and its model within the methods that need them.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import msgspec
 
+from camtool.errors import MachineError
 from camtool.findings import TargetCode
 from camtool.machine.model import Axis, Machine, SlideStart
 
@@ -27,6 +30,17 @@ if TYPE_CHECKING:
 
 class NoDialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The `[dialect]` of a target without options of its own."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A value of a machine file that a controller's own settings say: its key, such as
+    "axes.x.travel_mm", what says it, such as "$130", and where that stands."""
+
+    key: str
+    value: float | int | str
+    said: str
+    where: str = ""
 
 
 class Target(ABC):
@@ -52,6 +66,8 @@ class Target(ABC):
     """Whether the machine file describes no particular machine: travel and rates are examples."""
     filter_default: ClassVar[bool] = False
     """Whether `camtool filter` uses it by default."""
+    settings_listing: ClassVar[str] = ""
+    """What `settings_from` reads, such as "what it answers to $$"; "" where it reads nothing."""
 
     @abstractmethod
     def write(self, toolpath: Toolpath, machine: Machine[Any, Any]) -> Program:
@@ -68,6 +84,18 @@ class Target(ABC):
     def model(self) -> ControllerModel[Any, Any]:
         """The model of its controllers; needed only where `controllers` names any."""
         raise NotImplementedError(f"{self.name} has no model of its controllers")
+
+    def settings_from(self, text: str) -> Sequence[Setting] | None:
+        """The values of a machine file that the controller's own settings say; None for a text
+        that is none of these settings. MachineError for what is missing or cannot be used."""
+        return None
+
+    def ask_settings(self, port: str) -> str:
+        """The text for `settings_from`, asked of the controller at a serial port; MachineError
+        where none answers."""
+        raise MachineError(
+            f"{self.name} has no settings that can be read from a port", where="--port"
+        )
 
     def listing(self, data: bytes, machine: Machine[Any, Any]) -> Listing | None:
         """The program, which `read` accepts, divided into blocks; None without such a listing."""

@@ -36,27 +36,29 @@ def resolved_table(
     target: Target,
     base: Table,
     base_name: str,
-    user_file: Path | None = None,
+    user: tuple[Table, str] | None = None,
     settings: Sequence[str] = (),
 ) -> tuple[Table, str]:
-    """A target's table with the values of a user's file and of `key.key=value` settings, and the
-    name of the last of these sources; MachineError where keys of `needs` are missing."""
-    table = base
-    name = base_name
-    if user_file is not None:
-        extra = read_table(user_file)
-        extends = extra.pop("extends", None)
+    """A target's table with the values of a `user`'s file, which has that name, and of
+    `key.key=value` settings, and the name of the last of these sources; MachineError where keys of
+    `needs` are missing."""
+    table, name = base, base_name
+    if user is not None:
+        said, name = user
+        extends = said.get("extends")
         if extends != base["target"]["name"]:
             raise MachineError(
                 f"extends {extends!r}, but the target is {base['target']['name']!r}",
-                file=str(user_file),
+                file=name,
                 where="key extends",
                 mend=f'write extends = "{base["target"]["name"]}" or change --target',
             )
-        table, name = _overlaid(target, table, extra), str(user_file)
+        extra = {key: value for key, value in said.items() if key != "extends"}
+        table = _overlaid(target, table, extra)
+    file = name
     for setting in settings:
         table, name = _overlaid(target, table, _setting(setting)), f"--set {setting}"
-    _refuse_incomplete(table, str(user_file or base_name))
+    _refuse_incomplete(table, file)
     return {key: table[key] for key in table if key != NEEDS}, name
 
 

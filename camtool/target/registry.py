@@ -151,10 +151,18 @@ def load_target(
 
     Raises UnknownTargetError (with the nearest names) and MachineError.
     """
+    user = None if machine_file is None else (read_table(machine_file), str(machine_file))
+    return loaded_target(name, user, settings)
+
+
+def loaded_target(
+    name: str, user: tuple[Table, str] | None, settings: Sequence[str] = ()
+) -> LoadedTarget:
+    """The same with the table of a user's machine file, and that file's name."""
     target, file = find_target(name)
-    table, last = resolved_table(target, read_table(file), str(file), machine_file, settings)
+    table, last = resolved_table(target, read_table(file), str(file), user, settings)
     machine = machine_of(target, table, last)
-    said = machine_file is not None or any(each.startswith("axes.") for each in settings)
+    said = user is not None or any(each.startswith("axes.") for each in settings)
     return LoadedTarget(machine, target, file, table, target.any_machine and not said)
 
 

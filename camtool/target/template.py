@@ -1,37 +1,61 @@
-"""A machine file to fill in: what `camtool targets new` writes."""
+"""The text of a user's machine file: what `camtool init` and `camtool targets new` write."""
 
 from __future__ import annotations
 
+import json
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 
 from camtool.errors import OptionError
+from camtool.project import NAME
+from camtool.target.contract import Setting
 
-_NAME = re.compile(r"[a-z0-9][a-z0-9-]*")
 _TABLE = re.compile(r"\[([\w.-]+)\]")
 _KEY = re.compile(r"([\w-]+)\s*=")
 _OWN = ("target", "needs")
 _AXES = ("axes.x", "axes.y", "axes.z")
 _BACKLASH = "# backlash_mm = 0.0         # measure yours: camtool coupon, camtool calibrate"
 
+_ABOUT = {
+    "axes.x": "What a step moves the slide, how far it can go, its highest rate and acceleration, "
+    "and what is lost\n## when it reverses.",
+    "feed": "The feed where a job says none, and the finest difference of feeds in a program.",
+    "limits": "What bounds feeds and rapids besides the rates of the axes.",
+    "defaults": "What a job takes where it says nothing: the height of rapids, the depth of cut, "
+    "how far arcs may\n## be from drawn curves, which gaps of a drawing are closed.",
+    "controller": "How the controller computes; the model that verifies programs runs on it.",
+    "dialect": "How programs are written.",
+    "link": "The line that programs come down.",
+    "mechanics": "The mechanics beyond single axes.",
+}
+"""What the keys of a table say."""
 
-def machine_template(name: str, base: str, base_text: str, needs: Iterable[str] = ()) -> str:
+
+def machine_template(
+    name: str,
+    base: str,
+    base_text: str,
+    needs: Iterable[str] = (),
+    given: Sequence[Setting] = (),
+) -> str:
     """TOML text of the machine `name`, which extends the target `base`.
 
-    Every value of the target's own file (`base_text`) is a comment in it, with its source, for the
-    user to uncomment and change; every axis has `backlash_mm`, since every machine has backlash.
-    `needs` are keys that the user must give. OptionError for a name that is not a word of small
-    letters, digits and hyphens.
+    The values that are `given` stand in it with what says them. Every other value of the target's
+    own file (`base_text`) is a comment, with its source, for the user to uncomment and change;
+    every axis has `backlash_mm`, since every machine has backlash. `needs` are keys that the user
+    must give. OptionError for a name that is not a word of small letters, digits and hyphens.
     """
-    if not _NAME.fullmatch(name):
+    if not NAME.fullmatch(name):
         raise OptionError(
             f"{name!r} is no name for a machine", mend="use small letters, digits and hyphens"
         )
-    needed = list(needs)
+    said = {each.key: each for each in given}
+    needed = [key for key in needs if key not in said]
+    known = "What is known of it stands here; every other" if given else "Every"
     lines = [
-        f"# {name}: a machine like {base}. Each value of {base} stands here as a comment;",
-        "# take the # away from what differs on your machine, and change it.",
-        f"# camtool post drawing.dxf --machine {name}.toml",
+        f"# {name}: a machine on {base}. {known} value is that of {base}, as a comment:",
+        "# take its # away, and change what differs on your machine.",
+        f"# camtool post drawing.dxf --machine {name}",
         "",
         f'extends = "{base}"',
         "",
@@ -39,35 +63,57 @@ def machine_template(name: str, base: str, base_text: str, needs: Iterable[str] 
         f'name = "{name}"',
         f'title = "{name}"',
     ]
-    table = ""
-    said: set[str] = set()
-    for line in _own_part(base_text):
-        heading, key = _TABLE.match(line), _KEY.match(line)
-        if heading:
-            if table in _AXES and "backlash_mm" not in said:
-                lines.append(_BACKLASH)
-            table, said = heading[1], set()
-            lines += ["", line]
-            given = f"{table}."
-            lines += [
-                f"# {key[len(given) :]} =     # you must say this"
-                for key in needed
-                if key.startswith(given) and "." not in key[len(given) :]
-            ]
-        elif key and f"{table}.{key[1]}" not in needed:
-            lines.append(f"# {line}")
-            said.add(key[1])
-        elif line.startswith("#") and table:
-            lines.append(line)
-            said.update(word for word in ("backlash_mm",) if word in line)
+    for table, rows in _tables(base_text):
+        lines += ["", f"[{table}]"]
+        if table in _ABOUT:
+            lines.append(f"## {_ABOUT[table]}")
+        lines += [f"# {key} =     # you must say this" for key in _within(table, needed)]
+        lines += _rows(table, rows, said, set(needs))
+    for table in dict.fromkeys(key.rpartition(".")[0] for key in said):
+        lines += ["", f"[{table}]"]
+        lines += [_line(said.pop(f"{table}.{key}"), key) for key in _within(table, said)]
     return "\n".join(lines) + "\n"
 
 
-def _own_part(text: str) -> Iterable[str]:
-    """The lines of the tables that a user's machine file may change."""
-    table = ""
-    for line in text.splitlines():
+def _rows(
+    table: str, rows: Iterable[str], said: dict[str, Setting], needs: set[str]
+) -> Iterator[str]:
+    """The lines of one table; what is said of it is taken out of `said`."""
+    backlash = table not in _AXES or f"{table}.backlash_mm" in said
+    for row in rows:
+        key = _KEY.match(row)
+        path = f"{table}.{key[1]}" if key else ""
+        backlash |= "backlash_mm" in row
+        if key and path in said:
+            yield _line(said.pop(path), key[1])
+        elif key and path not in needs:
+            yield f"# {row}"
+        elif not key and row.startswith("#"):
+            yield row
+    for name in _within(table, tuple(said)):
+        yield _line(said.pop(f"{table}.{name}"), name)
+    if not backlash:
+        yield _BACKLASH
+
+
+def _line(setting: Setting, key: str) -> str:
+    return f"{f'{key} = {json.dumps(setting.value)}':<28}# {setting.said}"
+
+
+def _within(table: str, keys: Iterable[str]) -> list[str]:
+    """The names of the keys that stand in this very table."""
+    parts = (key.rpartition(".") for key in keys)
+    return [name for head, _, name in parts if head == table]
+
+
+def _tables(text: str) -> Iterator[tuple[str, list[str]]]:
+    """The tables that a user's machine file may change, each with its lines."""
+    table, rows = "", list[str]()
+    for line in (*text.splitlines(), "[target]"):
         heading = _TABLE.match(line)
-        table = heading[1] if heading else table
-        if table and table.partition(".")[0] not in _OWN and line.strip():
-            yield line
+        if heading:
+            if table and table.partition(".")[0] not in _OWN:
+                yield table, rows
+            table, rows = heading[1], []
+        elif line.strip():
+            rows.append(line)

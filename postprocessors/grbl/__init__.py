@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from camtool.target.contract import Target
+from camtool.target.contract import Setting, Target
 
 from ..gcode.dialect import feed_decimals
 from .dialect import Dialect, GrblController, GrblMachine
@@ -26,6 +26,7 @@ class Grbl(Target):
     dialect = Dialect
     starts_spindle = True
     any_machine = True
+    settings_listing = "what it answers to $$"
 
     def check(self, machine: GrblMachine) -> None:
         """Raise MachineError where values of the dialect do not go with the machine."""
@@ -52,6 +53,18 @@ class Grbl(Target):
     def unit_mm(self, machine: GrblMachine, axis: Axis) -> float:
         """The last decimal of a coordinate."""
         return float(10.0**-machine.dialect.decimals)
+
+    def settings_from(self, text: str) -> list[Setting] | None:
+        """The values that grbl's answer to `$$` says; None for another text."""
+        from .settings import settings_of
+
+        return settings_of(text)
+
+    def ask_settings(self, port: str) -> str:
+        """Its answer to `$$`; MachineError where none comes."""
+        from .settings import asked
+
+        return asked(port)
 
     def listing(self, data: bytes, machine: GrblMachine) -> Listing:
         """The lines that are blocks."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from camtool.target.contract import Target
+from camtool.target.contract import Setting, Target
 
 from ..gcode.dialect import feed_decimals
 from .dialect import Dialect, LinuxcncController, LinuxcncMachine
@@ -26,6 +26,7 @@ class Linuxcnc(Target):
     dialect = Dialect
     starts_spindle = True
     any_machine = True
+    settings_listing = "its INI file"
     filter_default = True
 
     def check(self, machine: LinuxcncMachine) -> None:
@@ -53,6 +54,12 @@ class Linuxcnc(Target):
     def unit_mm(self, machine: LinuxcncMachine, axis: Axis) -> float:
         """The last decimal of a coordinate."""
         return float(10.0**-machine.dialect.decimals)
+
+    def settings_from(self, text: str) -> list[Setting] | None:
+        """The values that LinuxCNC's INI file says; None for another text."""
+        from .ini import settings_of
+
+        return settings_of(text)
 
     def listing(self, data: bytes, machine: LinuxcncMachine) -> Listing:
         """The lines that are blocks."""

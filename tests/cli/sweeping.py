@@ -78,6 +78,7 @@ BASES: Mapping[str, tuple[str, ...]] = {
     "job new": (),
     "job check": (),
     "targets new": ("--extends", "grbl", "-o", "mine.toml"),
+    "init": ("-t", "grbl", "-o", "mine.toml"),
     "coupon": ("-t", "linuxcnc", "-o", "out.svg"),
     "calibrate": (
         "-t",
@@ -98,6 +99,7 @@ ARGUMENTS: Mapping[str, str] = {
     "job new": DRAWING,
     "job check": "job.toml",
     "targets new": "mine",
+    "init": "mine",
     "coupon": "lines",
     "calibrate": "lengths.toml",
 }

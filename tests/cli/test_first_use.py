@@ -37,7 +37,7 @@ def test_what_is_advised_against_too_little_travel_helps(camtool: Run, tmp_path:
     assert done.returncode == 1
     assert b"--origin lower-left" not in done.stderr
     assert b"--set axes.x.travel_mm=300" in done.stderr
-    assert b"camtool targets new NAME --extends grbl" in done.stderr
+    assert b"camtool init NAME -t grbl" in done.stderr
     done = camtool("post", drawing, *GRBL, "--set", "axes.x.travel_mm=300")
     assert done.returncode == 0, done.stderr
     done = camtool("post", drawing, *GRBL, "--depth", "198", "--set", "axes.x.travel_mm=300")

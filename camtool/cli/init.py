@@ -1,0 +1,309 @@
+"""`camtool init`: a machine file of one's own, by questions, by flags, or from the controller."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from camtool.cli.files import STDOUT, check_new, check_places, read_bytes, shown, write_all
+from camtool.cli.messages import say
+from camtool.cli.options import decorate, talk_options
+from camtool.errors import MachineError, OptionError
+from camtool.units import parse_feed, parse_length
+
+if TYPE_CHECKING:
+    from camtool.target.contract import Setting
+
+PROPOSED = "my-machine"
+"""The name that is proposed for a machine."""
+
+FLAG = "--{} at camtool init"
+"""What says a value that a flag or an answer gave."""
+
+
+# Numbers of the three axes.
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise OptionError(f"{text!r} is no number") from None
+
+
+def _step(text: str) -> float:
+    steps = _number(text)
+    if not steps > 0.0:
+        raise OptionError(f"{text} steps per mm are none")
+    return 1.0 / steps
+
+
+AXES: dict[str, tuple[str, Callable[[str], float], str]] = {
+    "steps": ("coded_step_mm", _step, "Steps per mm of X, Y and Z"),
+    "travel": ("travel_mm", parse_length, "How far they go"),
+    "max-rate": ("max_rate_mm_min", parse_feed, "Their highest rates, in mm/min"),
+    "acceleration": ("acceleration_mm_s2", _number, "Their accelerations, in mm/s²"),
+    "backlash": ("backlash_mm", parse_length, "What each loses when it reverses"),
+}
+"""Flag: key of an axis, how its values are read, meaning."""
+
+
+def axis_settings(flag: str, text: str) -> list[Setting]:
+    """`300x180x45`, or one value for X, Y and Z. OptionError for other text."""
+    from camtool.target.contract import Setting
+
+    key, parse, _ = AXES[flag]
+    values = [parse(part) for part in re.split(r"[x×]", text)]
+    if len(values) not in (1, 3) or min(values) < 0.0:
+        raise OptionError(
+            f"{text!r} is neither one value nor three", mend="write 300x180x45, for X, Y and Z"
+        )
+    said = FLAG.format(flag)
+    values = values * 3 if len(values) == 1 else values
+    return [
+        Setting(f"axes.{axis}.{key}", value, said, f"--{flag} {text}")
+        for axis, value in zip("xyz", values, strict=True)
+    ]
+
+
+# The command.
+
+
+def _axis_flags(command: Callable[..., None]) -> Callable[..., None]:
+    options = [
+        click.option(f"--{flag}", flag.replace("-", "_"), metavar="XxYxZ", help=f"{meaning}.")
+        for flag, (_, _, meaning) in AXES.items()
+    ]
+    return decorate(command, options)
+
+
+@click.command(short_help="A machine file of your own.")
+@click.argument("name", required=False)
+@click.option("--target", "-t", metavar="NAME", help="The controller; see camtool targets.")
+@click.option(
+    "--settings",
+    metavar="FILE",
+    help="What the controller says of itself: grbl's answer to $$, LinuxCNC's INI file.",
+)
+@click.option("--port", metavar="PORT", help="Ask the controller at this serial port instead.")
+@_axis_flags
+@click.option("--project", is_flag=True, help="Keep it here, for this folder alone.")
+@click.option("-o", "--output", metavar="FILE", help="Only write this file; - is stdout.")
+@click.option("--ask/--no-ask", default=None, help="Ask for what is not said.  [at a terminal]")
+@talk_options
+def init(
+    name: str | None,
+    target: str | None,
+    settings: str | None,
+    port: str | None,
+    project: bool,
+    output: str | None,
+    ask: bool | None,
+    quiet: bool,
+    verbose: bool,
+    **axes: str | None,
+) -> None:
+    """Make a file for your machine NAME: --machine NAME finds it from then on.
+
+    \b
+    camtool init                                   asks
+    camtool init my-3018 --settings grbl.txt       what your grbl answers to $$
+    camtool init my-3018 -t grbl --port /dev/ttyUSB0
+    camtool init my-mill --settings my-mill.ini    LinuxCNC
+    camtool init my-3018 -t grbl --travel 300x180x45 --max-rate 1000x1000x600
+
+    Numbers are one for X, Y and Z, or three. What is not known stands in the file as a comment.
+    It is kept in your configuration folder, or with --project in this one, whose camtool.toml
+    then names it. The first machine is the one that commands without --target are for.
+    """
+    from camtool.project import FILE, names_machine, naming, user_folder
+
+    if settings is not None and port is not None:
+        raise click.UsageError("--settings and --port contradict each other")
+    if project and output is not None:
+        raise click.UsageError("--project and -o contradict each other")
+    questions = Questions(sys.stdin.isatty() and settings != STDOUT if ask is None else ask)
+    if name is None:
+        name = questions.ask("Name of the machine", PROPOSED)
+    if name is None:
+        raise click.UsageError("NAME is missing, such as my-3018")
+    target, said = _of_controller(target, settings, port, questions)
+    given = {each.key: each for each in said}
+    for flag, (key, _, meaning) in AXES.items():
+        text = axes[flag.replace("-", "_")]
+        if text is None and any(f"axes.{axis}.{key}" not in given for axis in "xyz"):
+            text = questions.ask_axes(flag, f"{meaning} (such as 300x180x45)")
+        if text is not None:
+            given |= {each.key: each for each in axis_settings(flag, text)}
+    text = machine_text(name, target, list(given.values()), settings or "")
+    place = _place(name, output, project=project)
+    files, names = {str(place): text.encode()}, Path() if project else user_folder()
+    # That of a project always names it, the user's where it names none.
+    default = output is None and (project or not names_machine(names / FILE))
+    if default:
+        files[str(names / FILE)] = naming(names / FILE, name).encode()
+    _write(files, settings)
+    say(f"written: {shown(str(place))}", quiet=quiet)
+    missing = [flag for flag, (key, *_) in AXES.items() if f"axes.x.{key}" not in given]
+    if missing:
+        say(f"not known, and a comment in it: {', '.join(missing)}", quiet=quiet)
+    if "backlash" in missing:
+        say("to measure the backlash: camtool coupon lines, then camtool calibrate", quiet=quiet)
+    if output is None:
+        which = "" if default else f" --machine {name}"
+        say(f"to use it: camtool post drawing.dxf{which}", quiet=quiet)
+
+
+class Questions:
+    """What is asked of people at a terminal; nothing where they are not `allowed`."""
+
+    def __init__(self, allowed: bool) -> None:
+        self.allowed = allowed
+
+    def ask(self, text: str, default: str = "") -> str | None:
+        """The answer; None for an empty one without a default, or where nobody is asked."""
+        if not self.allowed:
+            return None
+        answer = click.prompt(text, default, show_default=bool(default), err=True)
+        return str(answer).strip() or None
+
+    def ask_one_of(self, text: str, choices: Sequence[str]) -> str | None:
+        """One of the choices; None where nobody is asked."""
+        if not self.allowed:
+            return None
+        return str(click.prompt(text, type=click.Choice(choices), err=True))
+
+    def ask_axes(self, flag: str, text: str) -> str | None:
+        """Numbers of the axes, as `flag` takes them; asked again until they can be used."""
+        while True:
+            answer = self.ask(f"{text}; Enter: not known")
+            if answer is None:
+                return None
+            try:
+                axis_settings(flag, answer)
+            except OptionError as error:
+                say(f"camtool: {error}", quiet=False)
+                continue
+            return answer
+
+    def ask_lines(self, text: str) -> str:
+        """Lines up to an empty one; a file's name alone stands for its lines."""
+        first = self.ask(f"{text}: paste it, end with an empty line; or the name of a file")
+        if first is None:
+            return ""
+        if Path(first).is_file():
+            return settings_text(first)
+        rows = [first]
+        while row := str(click.prompt("", "", show_default=False, prompt_suffix="", err=True)):
+            rows.append(row)
+        return "\n".join(rows)
+
+
+# What the controller says of itself.
+
+
+def settings_text(name: str) -> str:
+    """A file with a controller's settings (`-` is stdin) as text."""
+    return read_bytes(name).decode("utf-8", "replace")
+
+
+def _of_controller(
+    target: str | None, settings: str | None, port: str | None, questions: Questions
+) -> tuple[str, Sequence[Setting]]:
+    """The name of the target, and what its controller says of the machine."""
+    from camtool.target.registry import each_target, find_target, target_names
+
+    if port is not None:
+        if target is None:
+            raise click.UsageError("--port needs --target: which controller is there?")
+        settings, text = f"--port {port}", find_target(target)[0].ask_settings(port)
+    elif settings is not None:
+        text = settings_text(settings)
+    else:
+        target = target or questions.ask_one_of("Which controller has it", target_names())
+        if target is None:
+            raise click.UsageError("--target or --settings is missing: which controller has it?")
+        listing = find_target(target)[0].settings_listing
+        settings, text = "what was pasted", questions.ask_lines(listing) if listing else ""
+        if not text:
+            return target, ()
+    found = each_target(find_target) if target is None else ((target, find_target(target)),)
+    known = []
+    for name, (each, _) in found:
+        known.append(f"{each.settings_listing} for {name}") if each.settings_listing else None
+        try:
+            said = each.settings_from(text)
+        except MachineError as error:
+            error.file = error.file or settings
+            raise
+        if said is not None:
+            return name, said
+    raise MachineError(
+        "says nothing of a machine",
+        file=settings,
+        mend=f"give {' or '.join(known)}" if known else f"{target} has no settings to read",
+    )
+
+
+def machine_text(name: str, target: str, given: Sequence[Setting], source: str) -> str:
+    """The text of the machine file. MachineError, which names what says it, for a value that no
+    machine has."""
+    from camtool.tables import parsed_table
+    from camtool.target.registry import list_target, loaded_target
+    from camtool.target.template import machine_template
+
+    base = list_target(target)
+    whole = base.file.read_text(encoding="utf-8")
+    text = machine_template(name, target, whole, base.needs, given)
+    try:
+        loaded_target(target, (parsed_table(text), f"{name}.toml"))
+    except MachineError as error:
+        wrong = next((each for each in given if _names(error, each.key)), None)
+        if wrong is not None:
+            raise MachineError(
+                f"{error.message} ({wrong.key})",
+                file=source or None,
+                where=wrong.where,
+                mend=error.mend,
+            ) from None
+        if not base.needs:
+            raise
+    return text
+
+
+def _names(error: MachineError, key: str) -> bool:
+    """Whether an error is about this key of a machine file."""
+    table, _, name = key.rpartition(".")
+    return error.where == f"table [{table}], key {name}"
+
+
+# Where it is kept.
+
+
+def _place(name: str, output: str | None, *, project: bool) -> Path:
+    """The file of the machine; a name that it cannot have is refused before."""
+    from camtool.project import FILE, MACHINES, NAME, user_folder
+
+    if not NAME.fullmatch(name) or name == Path(FILE).stem:
+        raise OptionError(
+            f"{name!r} is no name for a machine", mend="use small letters, digits and hyphens"
+        )
+    if output is not None:
+        return Path(output)
+    return (Path() if project else user_folder() / MACHINES) / f"{name}.toml"
+
+
+def _write(files: dict[str, bytes], settings: str | None) -> None:
+    """Write the machine file, which must be new, and the `camtool.toml` that names it."""
+    place = next(iter(files))
+    check_new(place)
+    if place != STDOUT:
+        for name in files:
+            Path(name).parent.mkdir(parents=True, exist_ok=True)
+    check_places([settings], files)
+    write_all(files)

@@ -1,0 +1,140 @@
+"""What grbl's own settings say of a machine: its answer to `$$`, as a file or as it was pasted.
+
+Each setting is a line `$110=500.000` (grbl 1.1 wiki, "Grbl v1.1 Configuration"); senders put a
+prompt before it, grbl 0.9 and some senders its meaning behind it. Other lines (`ok`, the banner,
+status reports) are passed over.
+"""
+
+from __future__ import annotations
+
+import re
+import time
+from typing import Any
+
+from camtool.errors import MachineError
+from camtool.target.contract import Setting
+
+_SETTING = re.compile(r"(?<![\w$])\$(\d{1,3})\s*=\s*([^\s(,;]*)")
+
+_AXES = {
+    "coded_step_mm": 100,  # steps/mm
+    "max_rate_mm_min": 110,
+    "acceleration_mm_s2": 120,
+    "travel_mm": 130,
+}
+"""Keys of an axis and their settings of X; Y and Z follow."""
+
+_KEYS = {
+    f"axes.{axis}.{key}": number + k
+    for k, axis in enumerate("xyz")
+    for key, number in _AXES.items()
+} | {"controller.junction_deviation_mm": 11, "controller.arc_tolerance_mm": 12}
+"""What every listing says ..."""
+
+_MORE = {"controller.idle_delay_ms": 1}
+"""... and what it may say besides."""
+
+
+def settings_of(text: str) -> list[Setting] | None:
+    """The values of a machine file that a listing says, None for a text without settings;
+    MachineError for a setting that is missing, doubled, or no number."""
+    said: dict[int, tuple[str, int]] = {}
+    for line, row in enumerate(text.splitlines(), 1):
+        found = _SETTING.search(row)
+        if found is None:
+            continue
+        number = int(found[1])
+        if number in said:
+            raise MachineError(
+                f"is given twice, first in line {said[number][1]}",
+                where=f"line {line}, ${number}",
+                mend="keep one listing, that of now",
+            )
+        said[number] = found[2], line
+    if not said:
+        return None
+    missing = [f"${number}" for number in _KEYS.values() if number not in said]
+    if missing:
+        raise MachineError(
+            f"the listing is not whole: {', '.join(missing)} {_be(missing)} missing",
+            mend="give all that grbl answers to $$",
+        )
+    return [
+        _setting(key, number, *said[number])
+        for key, number in (_KEYS | _MORE).items()
+        if number in said
+    ]
+
+
+def _setting(key: str, number: int, text: str, line: int) -> Setting:
+    where = f"line {line}, ${number}"
+    try:
+        value = float(text)
+    except ValueError:
+        raise MachineError(f"{text!r} is no number", where=where) from None
+    if key.endswith("coded_step_mm"):
+        if value <= 0.0:
+            raise MachineError(f"{text} steps/mm are none", where=where)
+        return Setting(key, 1.0 / value, f"${number} = {text} steps/mm", where)
+    return Setting(key, int(value) if value.is_integer() else value, f"${number}", where)
+
+
+# The port.
+
+BAUD = 115200
+"""grbl 1.1's rate (BAUD_RATE in its config.h)."""
+
+BANNER_S = 3.0
+"""Many boards begin anew when a port is opened, and say so within this time."""
+
+ANSWER_S = 3.0
+"""A controller that says nothing for so long does not answer."""
+
+MOST_LINES = 1000
+"""No listing has more lines."""
+
+
+def asked(port: str) -> str:
+    """The answer to `$$` at a serial port; MachineError where none comes, or no listing."""
+    import serial  # seldom needed
+
+    try:
+        with serial.Serial(port, BAUD, timeout=0.1, write_timeout=ANSWER_S) as line:
+            _lines(line, BANNER_S, "Grbl")
+            line.reset_input_buffer()
+            line.write(b"$$\n")
+            rows = _lines(line, ANSWER_S, "ok", "error")
+    except (OSError, ValueError) as error:  # serial.SerialException is an OSError
+        raise MachineError(
+            f"the port cannot be used ({error})",
+            where=f"--port {port}",
+            mend="close other programs that use it, or give the listing as a file",
+        ) from error
+    if not rows or rows[-1] != "ok":
+        raise MachineError(
+            f"the answer to $$ is {rows[-1]!r}" if rows else "nothing answers $$",
+            where=f"--port {port}",
+            mend="$$ works while the machine is idle or locked; is it a grbl at this port?",
+        )
+    return "\n".join(rows)
+
+
+def _lines(port: Any, patience_s: float, *ends: str) -> list[str]:
+    """The lines that come, up to one that begins with one of `ends`, or until nothing comes for
+    so long."""
+    rows, part, last = list[str](), b"", time.monotonic()
+    while time.monotonic() - last < patience_s and len(rows) < MOST_LINES:
+        found = port.read(256)
+        if not found:
+            continue
+        last = time.monotonic()
+        *whole, part = (part + found).split(b"\n")
+        for each in whole:
+            rows.append(each.decode("ascii", "replace").strip())
+            if rows[-1].startswith(ends):
+                return rows
+    return rows
+
+
+def _be(things: list[str]) -> str:
+    return "is" if len(things) == 1 else "are"
