@@ -14,5 +14,5 @@ cpdef void legs_fill(
 
 @cython.locals(i=Int, j=Int)
 cpdef void entry_speeds(
-    double[::1] gain, double[::1] limit, Int window, double[::1] entry
+    double[::1] gain, double[::1] limit, Int window, double reached, double[::1] entry
 ) noexcept

@@ -59,13 +59,13 @@ def legs_fill(done: int, begin: Ints, way: Ints, step_mm: Floats, out: Floats) -
 # Compiled, because every speed depends on the one before.
 
 
-def entry_speeds(gain: Floats, limit: Floats, window: int, entry: Floats) -> None:
+def entry_speeds(gain: Floats, limit: Floats, window: int, reached: float, entry: Floats) -> None:
     """Squares of the speeds at the starts of N blocks, `entry` (N,).
 
     `gain` (N,): what the square of a speed can change by within a block, 2 a d; `limit` (N,): its
-    highest value at the start of the block, 0 where the machine stands before it.
+    highest value at the start of the block, 0 where the machine stands before it. `reached`: what
+    the blocks before allow at the start of the first, 0 where there are none.
     """
-    reached = 0.0
     for i in range(len(gain)):
         planned = 0.0
         for j in range(min(i + window - 1, len(gain)) - 1, i - 1, -1):

@@ -37,8 +37,9 @@ from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import Chunk, Options
 from camtool.simulation.rows import check_positions, check_rows, placed
 from camtool.simulation.samples import (
+    ROWS_AT_ONCE,
     CountedSamples,
-    RowTotals,
+    SampledRows,
     move_lengths,
     row_chunks,
     sample_spacing_mm,
@@ -64,11 +65,9 @@ class PathModel(ControllerModel[PathController, Any]):
         path = self.quantised(toolpath, machine)
         spacing_mm = sample_spacing_mm(path, machine)
         check_rows(path, path.running)
-        path = path.first(path.running)
-        samples = CountedSamples(path, machine, spacing_mm)
-        mechanics = Mechanics(machine, path.start, options.effects)
+        blocks = _blocks(path.first(path.running), machine, spacing_mm)
         return row_chunks(
-            samples, RowTotals(_durations(path, machine)), mechanics, options.chunk_steps
+            blocks, Mechanics(machine, path.start, options.effects), options.chunk_steps
         )
 
     def quantised(self, toolpath: Toolpath, machine: _Machine) -> Toolpath:
@@ -91,6 +90,14 @@ class PathModel(ControllerModel[PathController, Any]):
             "the controller follows every line and arc exactly",
             "speeds change at once: there is no acceleration, and compensation takes no time",
         )
+
+
+def _blocks(path: Toolpath, machine: Machine, spacing_mm: float) -> Iterator[SampledRows]:
+    for low in range(0, len(path), ROWS_AT_ONCE):
+        high = min(low + ROWS_AT_ONCE, len(path))
+        part = path.part(low, high)
+        samples = CountedSamples(part, machine, spacing_mm)
+        yield SampledRows(low, high, low, samples, _durations(part, machine))
 
 
 def _durations(path: Toolpath, machine: Machine) -> Floats:

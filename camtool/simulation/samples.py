@@ -9,7 +9,7 @@ all axes are samples, so extents and reversals are exact.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -26,7 +26,7 @@ MAX_SAMPLES = 1_000_000
 """Samples are a coded step apart, or farther where a program would have more samples than this."""
 
 ROWS_AT_ONCE = 1 << 14
-"""So many rows are measured together."""
+"""So many rows are sampled together."""
 
 SPACING_EPS = 1e-6
 """Samples may be farther apart by this part of their spacing, because of rounding."""
@@ -39,7 +39,7 @@ TURNS_OF_ARC = 4
 
 
 class Samples(Protocol):
-    """All samples of a program. `first` (R+1,): row r owns samples first[r]:first[r+1]."""
+    """All samples of some rows. `first` (R+1,): row r owns samples first[r]:first[r+1]."""
 
     @property
     def first(self) -> Ints: ...
@@ -48,71 +48,85 @@ class Samples(Protocol):
         """Row (K,) and commanded position (K, 3) mm of the samples low:high."""
 
     def steps(self, bounds: Ints) -> Ints:
-        """(R, 3) steps of the axes within samples bounds[r]:bounds[r+1]."""
+        """(R, 3) steps of the axes within samples bounds[r]:bounds[r+1], which are of the last
+        window."""
 
 
 @dataclass(frozen=True, eq=False)
-class RowTotals:
-    """The time of each row, `seconds` (R,); `iterates`: each sample is a pass of the
-    interpolator."""
+class SampledRows:
+    """The rows low:high of a program, with the time of each, `seconds` (high − low,). `samples`
+    are of the rows from `base` on, which may be more; where it `iterates`, each of them is a pass
+    of the interpolator."""
 
+    low: int
+    high: int
+    base: int
+    samples: Samples
     seconds: Floats
     iterates: bool = False
 
 
 def row_chunks(
-    samples: Samples, totals: RowTotals, mechanics: Mechanics, chunk_steps: int
+    blocks: Iterable[SampledRows], mechanics: Mechanics, chunk_steps: int
 ) -> Iterator[Chunk]:
-    """The chunks of all rows, each with at most `chunk_steps` samples; the time of a row in
-    several chunks is divided in proportion to its samples."""
-    first = samples.first
-    rows, total = len(first) - 1, int(first[-1])
+    """The chunks of all rows, whose blocks follow one another, each with at most `chunk_steps`
+    samples; the time of a row in several chunks is divided in proportion to its samples."""
+    for block in blocks:
+        yield from _chunks(block, mechanics, chunk_steps)
+
+
+def _chunks(block: SampledRows, mechanics: Mechanics, chunk_steps: int) -> Iterator[Chunk]:
+    first = block.samples.first[block.low - block.base : block.high - block.base + 1]
+    rows, end = len(first) - 1, int(first[-1])
     done = 0  # rows whose ledger is complete
-    for low in range(0, total, chunk_steps):
-        high = min(low + chunk_steps, total)
-        row, commanded = samples.window(low, high)
+    for low in range(int(first[0]), end, chunk_steps):
+        high = min(low + chunk_steps, end)
+        row, commanded = block.samples.window(low, high)
+        row += block.base - block.low
         last = int(row[-1])
-        whole = rows if high == total else last + int(high == first[last + 1])
+        whole = rows if high == end else last + int(high == first[last + 1])
         listed = np.arange(done, max(whole, last + 1))
         offsets = np.concatenate([[0], np.flatnonzero(np.diff(row)) + 1, [len(row)]])
-        ledger = still_ledger(listed)
-        moved = row[offsets[:-1]] - listed[0]
+        ledger = still_ledger(block.low + listed)
+        moved = row[offsets[:-1]] - done
         slide, ledger.reversals[moved] = mechanics.follow(commanded, offsets)
-        ledger.steps[moved] = samples.steps(low + offsets)
+        ledger.steps[moved] = block.samples.steps(low + offsets)
         here = np.zeros(len(listed), dtype=np.int64)
         here[moved] = np.diff(offsets)
         own = (first[1:] - first[:-1])[listed]
-        ledger.duration_s[:] = totals.seconds[listed] * np.where(
+        ledger.duration_s[:] = block.seconds[listed] * np.where(
             own > 0, here / np.maximum(own, 1), 1.0
         )
-        if totals.iterates:
+        if block.iterates:
             ledger.iterations[:] = here
-        yield Chunk(row, commanded, slide, ledger)
+        yield Chunk(block.low + row, commanded, slide, ledger)
         done = whole
-    if total == 0 and rows:
-        ledger = still_ledger(np.arange(rows))
-        ledger.duration_s[:] = totals.seconds
+    if done < rows:
+        ledger = still_ledger(np.arange(block.low, block.high))
+        ledger.duration_s[:] = block.seconds
         yield Chunk(np.empty(0, np.int64), NO_SAMPLES, NO_SAMPLES, ledger)
 
 
 def sample_spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
     """Distance of samples, mm: the finer coded step of X and Y, or what `MAX_SAMPLES` allows."""
+    return spacing_along(move_lengths(toolpath), machine)
+
+
+def spacing_along(length_mm: Floats, machine: Machine) -> float:
+    """The same for rows of so many mm (N,)."""
     step = min(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
-    return max(step, float(move_lengths(toolpath).sum()) / MAX_SAMPLES)
+    return max(step, float(length_mm.sum()) / MAX_SAMPLES)
 
 
 def move_lengths(toolpath: Toolpath) -> Floats:
     """(N,) mm: length of each row in space, 0 for events."""
-    if len(toolpath) == 0:
-        return np.zeros(0)
-    length = np.empty(len(toolpath))
-    before = toolpath.start
-    for low in range(0, len(toolpath), ROWS_AT_ONCE):
-        rows = slice(low, low + ROWS_AT_ONCE)
-        travel = np.diff(toolpath.end[rows], axis=0, prepend=before[None, :])
-        length[rows] = np.linalg.norm(travel, axis=1)
-        before = toolpath.end[rows][-1]
-    arms = PolarArcs(toolpath, toolpath.is_arc)
+    return toolpath.by_parts(_lengths)
+
+
+def _lengths(part: Toolpath) -> Floats:
+    travel = np.diff(part.end, axis=0, prepend=part.start[None, :])
+    length = np.linalg.norm(travel, axis=1)
+    arms = PolarArcs(part, part.is_arc)
     rise = arms.end[:, 2] - arms.begin[:, 2]
     radius = 0.5 * (arms.radius + arms.end_radius)
     length[arms.row] = np.hypot(radius * arms.sweep, rise)
@@ -179,15 +193,19 @@ class CountedSamples(PathSamples):
     def __init__(self, toolpath: Toolpath, machine: Machine, spacing_mm: float) -> None:
         super().__init__(toolpath, spacing_mm)
         self._step_mm = [axis.coded_step_mm for axis in machine.axes]
-        self._at = self._in_steps(toolpath.start[None, :])
+        self._start = toolpath.start[None, :]
         self._counts = np.zeros((1, 3), dtype=np.int64)
         self._low = 0
 
     def window(self, low: int, high: int) -> tuple[Ints, Floats]:
-        """Row and position of the samples low:high, which follow those of the last call."""
-        row, points = super().window(low, high)
-        steps = np.concatenate([self._at, self._in_steps(points)])
-        self._at, self._low = steps[-1:], low
+        """Row and position of the samples low:high."""
+        row, points = super().window(max(low - 1, 0), high)
+        if low == 0:
+            steps = self._in_steps(np.concatenate([self._start, points]))
+        else:
+            steps = self._in_steps(points)
+            row, points = row[1:], points[1:]
+        self._low = low
         self._counts = np.zeros((len(steps), 3), dtype=np.int64)
         np.cumsum(np.abs(np.diff(steps, axis=0)), axis=0, out=self._counts[1:])
         return row, points

@@ -18,52 +18,64 @@ from camtool.arrays import Floats
 from camtool.errors import MachineError
 from camtool.machine.model import Machine
 
-BLOCKS_AT_ONCE = 1 << 14
-"""The times of so many blocks are computed together."""
+
+@dataclass(frozen=True)
+class Approach:
+    """What the blocks before those of a plan leave to it: the highest speed in the last of them,
+    and the square of the speed, (mm/s)², that they allow behind it; 0 and 0 before the first."""
+
+    speed_mm_s: float = 0.0
+    square: float = 0.0
+
+
+FROM_REST = Approach()
 
 
 @dataclass(frozen=True, eq=False)
 class SpeedPlan:
     """N blocks in order: `length_mm`, `speed_mm_s` (the highest in each), `acceleration_mm_s2`,
     and `corner_mm_s`, the highest speed at the start of each, 0 where it starts from rest; each
-    (N,), all above 0 except the corners."""
+    (N,), all above 0 except the corners. `before`: what came before them."""
 
     length_mm: Floats
     speed_mm_s: Floats
     acceleration_mm_s2: Floats
     corner_mm_s: Floats
+    before: Approach = FROM_REST
 
-    def entries(self, window: int) -> Floats:
-        """(N + 1,) mm/s at the start of each block, and 0 after the last, for a planner with a
-        buffer of `window` blocks, the current one included."""
+    def squares(self, window: int) -> Floats:
+        """(N + 1,) (mm/s)²: the square of the speed at the start of each block, and 0 after the
+        last, for a planner with a buffer of `window` blocks, the current one included."""
         from camtool.kernels.motion import entry_speeds
 
-        highest = np.concatenate([[0.0], self.speed_mm_s[:-1]])[: len(self.speed_mm_s)]
+        first = np.full(min(len(self.speed_mm_s), 1), self.before.speed_mm_s)
+        highest = np.concatenate([first, self.speed_mm_s[:-1]])
         np.minimum(highest, self.speed_mm_s, out=highest)
         np.minimum(highest, self.corner_mm_s, out=highest)
         np.square(highest, out=highest)
-        gain = 2.0 * self.acceleration_mm_s2
-        gain *= self.length_mm
-        square = np.zeros(len(self.length_mm) + 1)
-        entry_speeds(gain, highest, window, square[:-1])
-        return np.sqrt(square, out=square)
+        found = np.zeros(len(self.length_mm) + 1)
+        entry_speeds(self._gains(), highest, window, self.before.square, found[:-1])
+        return found
 
-    def seconds(self, window: int) -> Floats:
-        """(N,) s: the time of each block, for a buffer of `window` blocks."""
-        return self.seconds_between(self.entries(window))
+    def seconds(self, squares: Floats) -> Floats:
+        """(N,) s: the time of each block, with the `squares` (N + 1,) of its method."""
+        a, d, entry = self.acceleration_mm_s2, self.length_mm, np.sqrt(squares)
+        first, last = entry[:-1], entry[1:]
+        peak = np.minimum(self.speed_mm_s, np.sqrt(a * d + 0.5 * (first**2 + last**2)))
+        ramps = (2.0 * peak**2 - first**2 - last**2) / (2.0 * a)
+        steady = np.maximum(d - ramps, 0.0) / peak
+        return np.asarray((2.0 * peak - first - last) / a + steady)
 
-    def seconds_between(self, entry: Floats) -> Floats:
-        """(N,) s: the time of each block, with the speeds (N + 1,) that `entries` gives."""
-        seconds = np.empty(len(self.length_mm))
-        for low in range(0, len(seconds), BLOCKS_AT_ONCE):
-            at = slice(low, low + BLOCKS_AT_ONCE)
-            a, d, first = self.acceleration_mm_s2[at], self.length_mm[at], entry[:-1][at]
-            last = entry[1:][at]
-            peak = np.minimum(self.speed_mm_s[at], np.sqrt(a * d + 0.5 * (first**2 + last**2)))
-            ramps = (2.0 * peak**2 - first**2 - last**2) / (2.0 * a)
-            steady = np.maximum(d - ramps, 0.0) / peak
-            seconds[at] = (2.0 * peak - first - last) / a + steady
-        return seconds
+    def behind(self, count: int, squares: Floats) -> Approach:
+        """What the first `count` blocks leave to those behind them."""
+        if count == 0:
+            return self.before
+        reached = squares[count - 1] + self._gains()[count - 1]
+        return Approach(float(self.speed_mm_s[count - 1]), float(reached))
+
+    def _gains(self) -> Floats:
+        """(N,) (mm/s)²: what the square of the speed can change by within each block."""
+        return np.asarray(2.0 * self.acceleration_mm_s2 * self.length_mm)
 
 
 def allowed_along(limit: Floats, unit: Floats) -> Floats:

@@ -23,15 +23,22 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from camtool.arrays import Floats, Ints
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import MachineError, ProgramError
 from camtool.machine.model import Machine
 from camtool.simulation.controller import ControllerModel
+from camtool.simulation.legs import coded_steps_mm
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import Chunk, Options
 from camtool.simulation.rows import check_rows
-from camtool.simulation.samples import RowTotals, row_chunks
-from camtool.simulation.speed_plan import SpeedPlan, allowed_along, axis_limits
+from camtool.simulation.samples import SampledRows, row_chunks
+from camtool.simulation.speed_plan import (
+    FROM_REST,
+    Approach,
+    SpeedPlan,
+    allowed_along,
+    axis_limits,
+)
 from camtool.toolpath.moves import Kind, Toolpath, are_arcs
 
 from .dialect import Dialect, GrblController
@@ -56,20 +63,9 @@ class GrblModel(ControllerModel[GrblController, Dialect]):
         rows = path.running
         check_rows(path, rows)
         path = path.first(rows)
-        blocks = blocks_of(path, machine, controller)
-        samples = GrblSamples(blocks, rows, machine)
-        plan = speeds_of(blocks, path, machine)
-        seconds = np.zeros(rows)
-        np.add.at(seconds, blocks.row, plan.seconds(controller.buffer_blocks - 1))
-        if controller.idle_delay_ms != ALWAYS_ON:
-            held_s = controller.idle_delay_ms / 1000.0
-            np.add.at(seconds, blocks.row[stops(blocks, path)], held_s)
-        dwell = path.kind == Kind.DWELL
-        seconds[dwell] = [_dwell_s(value) for value in path.value[dwell].tolist()]
-        mechanics = Mechanics(machine, samples.start_mm(path.start), options.effects)
-        return row_chunks(
-            samples, RowTotals(seconds, iterates=True), mechanics, options.chunk_steps
-        )
+        start_mm = _rounded(path.start.astype(np.float32), machine) * coded_steps_mm(machine)
+        mechanics = Mechanics(machine, start_mm, options.effects)
+        return row_chunks(sampled(path, machine, controller), mechanics, options.chunk_steps)
 
     def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
         """Chords, and Bresenham lines."""
@@ -86,20 +82,48 @@ class GrblModel(ControllerModel[GrblController, Dialect]):
         )
 
 
+def sampled(
+    path: Toolpath, machine: _Machine, controller: GrblController
+) -> Iterator[SampledRows]:
+    """All rows, some thousand at a time. With the blocks of these are planned the one before
+    them, for the corner between them, and as many behind them as the ring holds."""
+    window = controller.buffer_blocks - 1
+    parts = blocks_of(path, machine, controller)
+    coming: list[Blocks] = []
+    last, before, low = NO_BLOCKS, FROM_REST, 0
+    while low < len(path):
+        while sum(len(part) for part in coming[1:]) < window:
+            part = next(parts, None)
+            if part is None:
+                break
+            coming.append(part)
+        own = coming.pop(0)
+        count, high = len(own), min(low + ROWS_AT_ONCE, len(path))
+        known = joined([last, own, *coming]).part(0, len(last) + count + window)
+        plan = speeds_of(known, path, machine, before, len(last))
+        squares = plan.squares(window)
+        seconds = np.zeros(high - low)
+        np.add.at(seconds, own.row - low, plan.seconds(squares)[:count])
+        if controller.idle_delay_ms != ALWAYS_ON:
+            stops = np.append(_from_rest(known, path), True)[len(last) + 1 :][:count]
+            np.add.at(seconds, own.row[stops] - low, controller.idle_delay_ms / 1000.0)
+        dwells = low + np.flatnonzero(path.kind[low:high] == Kind.DWELL)
+        seconds[dwells - low] = [_dwell_s(value) for value in path.value[dwells].tolist()]
+        samples = GrblSamples(own, np.arange(low, high + 1), machine)
+        yield SampledRows(low, high, low, samples, seconds, iterates=True)
+        before, low = plan.behind(count, squares), high
+        last = own.part(count - 1, count) if count else last
+
+
 class GrblSamples:
-    """All step events of a program, numbered from 0; none are held."""
+    """All step events of some rows, numbered from 0; none are held."""
 
-    def __init__(self, blocks: Blocks, rows: int, machine: _Machine) -> None:
-        self._blocks = blocks
-        self._step_mm = np.array([axis.coded_step_mm for axis in machine.axes])
+    def __init__(self, blocks: Blocks, rows: Ints, machine: _Machine) -> None:
+        """`rows` (R+1,) of which the blocks are, and the one behind them."""
+        self._blocks, self._low = blocks, int(rows[0])
+        self._step_mm = coded_steps_mm(machine)
         self._offsets = np.concatenate([[0], np.cumsum(blocks.events, dtype=np.int64)])
-        self.first = self._offsets[np.searchsorted(blocks.row, np.arange(rows + 1))]
-
-    def start_mm(self, start: Floats) -> Floats:
-        """Where the machine stands before the first block."""
-        if len(self._blocks.row) == 0:
-            return start
-        return np.asarray(self._blocks.start[0] * self._step_mm)
+        self.first = self._offsets[np.searchsorted(blocks.row, rows)]
 
     def window(self, low: int, high: int) -> tuple[Ints, Floats]:
         """Row and position of the events low:high."""
@@ -114,7 +138,7 @@ class GrblSamples:
         first = (0, low - int(self._offsets[begin]))
         step_lines_fill(lines, first, self._step_mm, commanded)
         bounds = np.clip(self._offsets[begin : end + 1], low, high)
-        row = blocks.row[begin:end].astype(np.int64)
+        row = blocks.row[begin:end].astype(np.int64) - self._low
         return np.repeat(row, np.diff(bounds)), commanded
 
     def steps(self, bounds: Ints) -> Ints:
@@ -195,22 +219,39 @@ class Blocks:
     start: Shorts
     way: Shorts
 
+    def __len__(self) -> int:
+        return len(self.row)
+
     @property
     def events(self) -> Shorts:
         """(B,) steps of the axis that has the most of them."""
         return np.asarray(np.abs(self.way).max(axis=1, initial=0))
 
+    def part(self, low: int, high: int) -> Blocks:
+        """The blocks low:high."""
+        return Blocks(self.row[low:high], self.start[low:high], self.way[low:high])
 
-def blocks_of(path: Toolpath, machine: _Machine, controller: GrblController) -> Blocks:
-    """The blocks of a program; ProgramError for positions beyond all that grbl can count."""
-    steps_per_mm = np.array([1.0 / axis.coded_step_mm for axis in machine.axes], dtype=np.float32)
-    begin = _rounded(path.start[None, :].astype(np.float32), steps_per_mm)
-    nothing = np.empty((0, 3), dtype=np.int32)
-    parts = [Blocks(np.empty(0, dtype=np.int32), nothing, nothing)]
+
+NO_BLOCKS = Blocks(np.empty(0, np.int32), np.empty((0, 3), np.int32), np.empty((0, 3), np.int32))
+
+
+def joined(parts: list[Blocks]) -> Blocks:
+    """Blocks that follow one another."""
+    return Blocks(
+        np.concatenate([part.row for part in parts]),
+        np.concatenate([part.start for part in parts]),
+        np.concatenate([part.way for part in parts]),
+    )
+
+
+def blocks_of(path: Toolpath, machine: _Machine, controller: GrblController) -> Iterator[Blocks]:
+    """The blocks of a program, `ROWS_AT_ONCE` at a time; ProgramError for positions beyond all
+    that grbl can count."""
+    begin = _rounded(path.start[None, :].astype(np.float32), machine)
     for low in range(0, len(path), ROWS_AT_ONCE):
         rows = np.arange(low, min(low + ROWS_AT_ONCE, len(path)))
         targets = targets_of(path, rows, machine, controller)
-        stop = _rounded(targets.mm, steps_per_mm)
+        stop = _rounded(targets.mm, machine)
         far = (np.abs(stop) > MAX_STEPS).any(axis=1)
         if far.any():
             row = int(targets.row[far.argmax()])
@@ -224,22 +265,20 @@ def blocks_of(path: Toolpath, machine: _Machine, controller: GrblController) -> 
         way = stop - start
         moves = way.any(axis=1)
         columns = targets.row[moves], start[moves], way[moves]
-        parts.append(Blocks(*(column.astype(np.int32) for column in columns)))
-    return Blocks(
-        np.concatenate([part.row for part in parts]),
-        np.concatenate([part.start for part in parts]),
-        np.concatenate([part.way for part in parts]),
-    )
+        yield Blocks(*(column.astype(np.int32) for column in columns))
 
 
-def _rounded(mm: Singles, steps_per_mm: Singles) -> Ints:
-    """(T, 3) steps: the 32-bit product, to the nearest whole, halves away from zero."""
+def _rounded(mm: Singles, machine: _Machine) -> Ints:
+    """(..., 3) steps: the 32-bit product, to the nearest whole, halves away from zero."""
+    steps_per_mm = np.array([1.0 / axis.coded_step_mm for axis in machine.axes], dtype=np.float32)
     product = (mm * steps_per_mm).astype(np.float64)
     return np.asarray(np.copysign(np.floor(np.abs(product) + 0.5), product).astype(np.int64))
 
 
-def speeds_of(blocks: Blocks, path: Toolpath, machine: _Machine) -> SpeedPlan:
-    """How fast each block may go, and each corner be passed.
+def speeds_of(
+    blocks: Blocks, path: Toolpath, machine: _Machine, before: Approach, first: int
+) -> SpeedPlan:
+    """How fast each block from `first` on may go, and each corner be passed.
 
     Along a unit vector u no axis exceeds its own limit, so a block is limited to min(limit / |u|).
     At a corner between u1 and u2, with θ the angle between −u1 and u2, a circle touches both at
@@ -250,18 +289,18 @@ def speeds_of(blocks: Blocks, path: Toolpath, machine: _Machine) -> SpeedPlan:
     """
     controller = machine.controller
     assert isinstance(controller, GrblController)
-    step_mm = np.array([axis.coded_step_mm for axis in machine.axes])
+    step_mm = coded_steps_mm(machine)
     rate = axis_limits(machine, "max_rate_mm_min") / 60.0
     acceleration = axis_limits(machine, "acceleration_mm_s2")
-    plan = SpeedPlan(*(np.empty(len(blocks.row)) for _ in range(4)))
-    for low in range(0, len(blocks.row), BLOCKS_AT_ONCE):
+    lengths_mm, speeds, along, corners = (np.empty(len(blocks)) for _ in range(4))
+    for low in range(0, len(blocks), BLOCKS_AT_ONCE):
         at = slice(low, low + BLOCKS_AT_ONCE)
         ways = blocks.way[max(low - 1, 0) : at.stop] * step_mm
         lengths = np.sqrt((ways**2).sum(axis=1))
         units = ways / lengths[:, None]
         turn = np.diff(units, axis=0, prepend=units[: 1 if low == 0 else 0])
-        before = 0 if low == 0 else 1
-        length, unit = lengths[before:], units[before:]
+        earlier = 0 if low == 0 else 1
+        length, unit = lengths[earlier:], units[earlier:]
         highest = allowed_along(rate, unit)
         row = blocks.row[at]
         cuts = (path.kind[row] >= Kind.LINE) & (path.kind[row] <= Kind.ARC_CCW)
@@ -269,8 +308,8 @@ def speeds_of(blocks: Blocks, path: Toolpath, machine: _Machine) -> SpeedPlan:
         speed = np.maximum(np.minimum(feed, highest), LEAST_SPEED_MM_S)
         events = np.abs(blocks.way[at]).max(axis=1, initial=0)
         speed = np.maximum(speed, controller.least_step_hz * length / events)
-        plan.length_mm[at], plan.speed_mm_s[at] = length, speed
-        plan.acceleration_mm_s2[at] = allowed_along(acceleration, unit)
+        lengths_mm[at], speeds[at] = length, speed
+        along[at] = allowed_along(acceleration, unit)
         across = np.sqrt((turn**2).sum(axis=1))
         cosine = 0.5 * across**2 - 1.0  # of the angle between the way back and the way on
         half_sine = np.sqrt(np.clip(0.5 * (1.0 - cosine), 0.0, 1.0))
@@ -280,20 +319,17 @@ def speeds_of(blocks: Blocks, path: Toolpath, machine: _Machine) -> SpeedPlan:
             square = allowed * controller.junction_deviation_mm * half_sine / (1.0 - half_sine)
         corner = np.sqrt(np.where(cosine < -STRAIGHT_COS, np.inf, square))
         corner[cosine > STRAIGHT_COS] = 0.0
-        plan.corner_mm_s[at] = corner
-    plan.corner_mm_s[_from_rest(blocks, path)] = 0.0
-    return plan
+        corners[at] = corner
+    corners[_from_rest(blocks, path)] = 0.0
+    return SpeedPlan(lengths_mm[first:], speeds[first:], along[first:], corners[first:], before)
 
 
-def stops(blocks: Blocks, path: Toolpath) -> Ints:
-    """The blocks (S,) behind which the machine comes to rest."""
-    begins = np.flatnonzero(_from_rest(blocks, path))
-    return np.append(begins[1:], len(blocks.row))[: len(begins)] - 1
-
-
-def _from_rest(blocks: Blocks, path: Toolpath) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _from_rest(blocks: Blocks, path: Toolpath) -> Bools:
     """(B,) true for blocks before which the machine stands."""
-    waits = np.cumsum(np.isin(path.kind, WAITS))[blocks.row]
+    if not len(blocks):
+        return np.zeros(0, dtype=np.bool_)
+    first, last = int(blocks.row[0]), int(blocks.row[-1])
+    waits = np.cumsum(np.isin(path.kind[first : last + 1], WAITS))[blocks.row - first]
     return np.asarray(np.diff(waits, prepend=-1) > 0)
 
 

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -32,17 +33,25 @@ from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import Chunk, Options
 from camtool.simulation.rows import check_rows
 from camtool.simulation.samples import (
+    ROWS_AT_ONCE,
     CountedSamples,
-    RowTotals,
+    SampledRows,
     move_lengths,
     row_chunks,
     sample_spacing_mm,
+    spacing_along,
 )
-from camtool.simulation.speed_plan import SpeedPlan, allowed_along, axis_limits
+from camtool.simulation.speed_plan import (
+    FROM_REST,
+    Approach,
+    SpeedPlan,
+    allowed_along,
+    axis_limits,
+)
 from camtool.toolpath.moves import Kind, PathMode, PolarArcs, Toolpath, frozen
 
 from .dialect import Dialect, LinuxcncController
-from .steps import merge_lines
+from .steps import MOST_IN_CHAIN, merge_lines
 
 _Machine = Machine[LinuxcncController, Dialect]
 
@@ -67,17 +76,9 @@ class LinuxcncModel(ControllerModel[LinuxcncController, Dialect]):
         path = self.quantised(toolpath, machine)
         rows = path.running
         check_rows(path, rows)
-        path = path.first(rows)
-        modes = _modes(path, machine)
-        path, chain = merged(path, modes.merging_mm(path.mode))
-        tangents = Tangents(path)
-        moves = moves_of(tangents, chain, machine, machine.controller.servo_period_s)
-        corners = corners_of(moves, tangents, _rules(modes, machine))
-        seconds = _seconds(path, machine, (moves, modes), corners)
-        samples = LinuxcncSamples(tangents, machine, moves, corners.reach)
-        del moves, corners, tangents
+        blocks = _Run(path.first(rows), machine).blocks()
         mechanics = Mechanics(machine, path.start, options.effects)
-        return row_chunks(samples, RowTotals(seconds), mechanics, options.chunk_steps)
+        return row_chunks(blocks, mechanics, options.chunk_steps)
 
     def spacing_mm(self, toolpath: Toolpath, machine: _Machine) -> float:
         """A coded step, or what a million samples of the whole program allow."""
@@ -107,14 +108,101 @@ def _corners_said(mode: PathMode) -> str:
     return f"corners are blended within {mode.tolerance_mm:g} mm (G64 P), as the speed needs"
 
 
-class LinuxcncSamples(CountedSamples):
-    """Points along the moves, blends included, numbered from 0; only one window is held."""
+@dataclass(frozen=True, eq=False)
+class Planned:
+    """The moves of some rows of a program, and the corners at their starts. Where more of the
+    program lies before or behind them, the first corner and the last move miss their neighbours.
+    """
 
-    def __init__(self, tangents: Tangents, machine: _Machine, moves: Moves, reach: Floats) -> None:
-        """`reach` (M,) mm: how far from the start of each move its blend begins and ends."""
-        path = tangents.path
-        super().__init__(path, machine, sample_spacing_mm(path, machine))
-        self._tangents = tangents
+    tangents: Tangents
+    moves: Moves
+    corners: Corners
+
+
+class _Run:
+    """One run of a program, some thousand rows at a time.
+
+    A block of rows begins where a move does. Planned with it are the move before it, for the
+    corner between them, and as many moves behind it as the planner knows of.
+    """
+
+    def __init__(self, path: Toolpath, machine: _Machine) -> None:
+        """MachineError for missing limits."""
+        self._path, self._machine = path, machine
+        self._rules = _rules(_modes(path, machine), machine)
+        self._begins, length = begins_of(path, self._rules.modes)
+        self._spacing_mm = spacing_along(length, machine)
+        self._before, self._since_rest_s = FROM_REST, 0.0
+
+    def blocks(self) -> Iterator[SampledRows]:
+        """All rows."""
+        wanted = np.arange(0, len(self._path), ROWS_AT_ONCE)
+        first = np.unique(np.searchsorted(self._begins, wanted))
+        inner = first[first < len(self._begins)].tolist()
+        for low, high in pairwise([*inner, len(self._begins)]):
+            yield self._block(low, high)
+
+    def _block(self, low: int, high: int) -> SampledRows:
+        """The rows of the moves low:high."""
+        base, rows = self._row(low - 1), len(self._path)
+        own = slice(min(low, 1), min(low, 1) + high - low)
+        window = known = self._machine.controller.lookahead_moves
+        while True:
+            end = self._row(high + known)
+            planned = self._planned(base, end)
+            places = slice(2 * own.start, None if end == rows else -1)
+            lasting, speeds = _speeds(planned, places, self._rules.modes, self._before)
+            done = int(lasting[: 2 * own.stop].sum())
+            if end == rows or len(speeds.length_mm) >= done + window:
+                break
+            known *= 2  # some of the moves are too short to be planned
+        taken = np.zeros(len(lasting) + 1)
+        taken[:-1][lasting] = self._in_periods(speeds, done)
+        here = slice(self._row(low), self._row(high))
+        seconds = _seconds(planned, taken)[here.start - base : here.stop - base]
+        samples = LinuxcncSamples(planned, self._machine, self._spacing_mm)
+        return SampledRows(here.start, here.stop, base, samples, seconds)
+
+    def _row(self, move: int) -> int:
+        """Where the rows of a move begin."""
+        begins = self._begins
+        return int(begins[max(move, 0)]) if move < len(begins) else len(self._path)
+
+    def _planned(self, low: int, high: int) -> Planned:
+        """The rows low:high."""
+        part, modes = self._path.part(low, high), self._rules.modes
+        part, chain = merged(part, modes.merging_mm(part.mode))
+        tangents = Tangents(part)
+        moves = moves_of(tangents, chain, self._rules)
+        return Planned(tangents, moves, corners_of(moves, tangents, self._rules))
+
+    def _in_periods(self, plan: SpeedPlan, done: int) -> Floats:
+        """(N,) s of each block; from rest to rest it takes whole servo periods, and
+        `REST_PERIODS`. The next plan begins behind the first `done` of these."""
+        controller = self._machine.controller
+        period_s = controller.servo_period_s
+        squares = plan.squares(controller.lookahead_moves)
+        seconds = plan.seconds(squares)
+        rests = np.flatnonzero(squares[1:] == 0.0)  # blocks behind which the machine stands
+        since = np.concatenate([[0], rests + 1])
+        runs = np.add.reduceat(seconds, since[:-1]) if len(rests) else np.zeros(0)
+        runs[:1] += self._since_rest_s
+        last = int(np.searchsorted(rests, done))
+        before_s = 0.0 if last else self._since_rest_s
+        self._since_rest_s = before_s + float(seconds[since[last] : done].sum())
+        self._before = plan.behind(done, squares)
+        periods = np.ceil(runs / period_s - PERIOD_EPS) + REST_PERIODS
+        seconds[rests] += periods * period_s - runs
+        return seconds
+
+
+class LinuxcncSamples(CountedSamples):
+    """Points along the moves, blends included."""
+
+    def __init__(self, planned: Planned, machine: _Machine, spacing_mm: float) -> None:
+        path, moves, reach = planned.tangents.path, planned.moves, planned.corners.reach
+        super().__init__(path, machine, spacing_mm)
+        self._tangents = planned.tangents
         self._row_of, self._row, self._reach = moves.row_of, moves.row, np.append(reach, 0.0)
         self._blends = bool(reach.any())
         self._length = moves.length
@@ -160,33 +248,38 @@ class LinuxcncSamples(CountedSamples):
         points[on] += onward[:, None] * bends.onward[of]
 
 
-def _seconds(
-    path: Toolpath, machine: _Machine, planned: tuple[Moves, Modes], corners: Corners
-) -> Floats:
-    """(N,) s of each row.
+def _speeds(
+    planned: Planned, places: slice, modes: Modes, before: Approach
+) -> tuple[Bools, SpeedPlan]:
+    """Blends and moves as blocks of their own. At even places of all (2 M,) stands the blend
+    before a move, then the move: which of them last and lie in `places`, and these.
 
-    Blends are blocks of their own, half of each belongs to the row on either side; the rows of a
-    merged line share its time by their lengths. In the mode "blend" the last move before a wait
-    accelerates by half: it was kept ready for a blend that never came (`tcGetOverallMaxAccel`).
+    In the mode "blend" the last move before a wait accelerates by half: it was kept ready for a
+    blend that never came (`tcGetOverallMaxAccel`).
     """
-    controller, (moves, modes) = machine.controller, planned
-    seconds = np.where(path.kind == Kind.DWELL, path.value, 0.0)
-    # At even places the blend before a move, then the move.
+    moves, corners = planned.moves, planned.corners
     own = moves.length - corners.reach
     own -= np.append(corners.reach[1:], 0.0)
     ways = _in_turns(corners.way, np.maximum(own, 0.0, out=own))
-    lasting = ways > LEAST_WAY_MM
-    speeds = SpeedPlan(
+    lasting = np.zeros(len(ways), dtype=np.bool_)
+    lasting[places] = ways[places] > LEAST_WAY_MM
+    return lasting, SpeedPlan(
         ways[lasting],
         _in_turns(corners.speed, moves.speed)[lasting],
         _in_turns(corners.acceleration, _along_moves(moves, modes, corners))[lasting],
         _in_turns(np.inf, np.where(corners.reach > 0.0, np.inf, corners.speed))[lasting],
+        before,
     )
-    taken = np.zeros(len(ways) + 1)
-    taken[:-1][lasting] = _in_periods(
-        speeds, controller.lookahead_moves, controller.servo_period_s
-    )
-    del speeds, ways, lasting, own
+
+
+def _seconds(planned: Planned, taken: Floats) -> Floats:
+    """(N,) s of each row, with what each blend and move takes, `taken` (2 M + 1,).
+
+    Half of a blend belongs to the row on either side; the rows of a merged line share its time by
+    their lengths.
+    """
+    path, moves = planned.tangents.path, planned.moves
+    seconds = np.where(path.kind == Kind.DWELL, path.value, 0.0)
     whole = taken[1::2] + 0.5 * (taken[0:-1:2] + taken[2::2])
     moving = np.flatnonzero(moves.row_of >= 0)
     move = moves.row_of[moving]
@@ -207,18 +300,6 @@ def _along_moves(moves: Moves, modes: Modes, corners: Corners) -> Floats:
     last = np.append(moves.waits[1:], np.ones(min(len(lost), 1), dtype=np.bool_))
     spared = np.where(last & modes.blend(moves.mode), LAST_PART, 1.0)
     return np.asarray(moves.acceleration * (1.0 - lost) * spared)
-
-
-def _in_periods(plan: SpeedPlan, window: int, period_s: float) -> Floats:
-    """(N,) s of each block; from rest to rest it takes whole servo periods, and `REST_PERIODS`."""
-    entries = plan.entries(window)
-    seconds = plan.seconds_between(entries)
-    from_rest = np.flatnonzero(entries[:-1] == 0.0)
-    if len(from_rest):
-        runs = np.add.reduceat(seconds, from_rest)
-        periods = np.ceil(runs / period_s - PERIOD_EPS) + REST_PERIODS
-        seconds[np.append(from_rest[1:], len(seconds)) - 1] += periods * period_s - runs
-    return seconds
 
 
 @dataclass(frozen=True, eq=False)
@@ -339,8 +420,25 @@ def merged(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Ints]:
     return replace(path, end=frozen(moved)), chain
 
 
-MOVES_AT_ONCE = 1 << 14
-"""The limits and corners of so many moves are computed together."""
+def begins_of(path: Toolpath, modes: Modes) -> tuple[Ints, Floats]:
+    """Where the rows of each move begin (M,), the first at row 0, and the length of each row with
+    its end where `merged` leaves it (N,)."""
+    length, begins, low = np.empty(len(path)), [np.zeros(1, dtype=np.int32)], 0
+    at_once = max(ROWS_AT_ONCE, MOST_IN_CHAIN + 2)  # more than one line has
+    while low < len(path):
+        part = path.part(low, min(low + at_once, len(path)))
+        part, chain = merged(part, modes.merging_mm(part.mode))
+        rows = len(part)
+        if low + rows < len(path):  # the last line may go on
+            rows = int(np.searchsorted(chain, chain[-1]))
+        own = move_lengths(part)[:rows]
+        lasting = np.bincount(chain[:rows], own) > 0.0
+        first = np.searchsorted(chain[:rows], np.flatnonzero(lasting))
+        begins.append((low + first).astype(np.int32))
+        length[low : low + rows] = own
+        low += rows
+    found = np.concatenate(begins)
+    return np.concatenate([found[:1], found[2:]]), length
 
 
 @dataclass(frozen=True, eq=False)
@@ -362,36 +460,28 @@ class Moves:
     like: Bools
 
 
-def moves_of(tangents: Tangents, chain: Ints, machine: _Machine, period_s: float) -> Moves:
-    """The moves of merged rows; MachineError for missing limits."""
-    path = tangents.path
-    rate = axis_limits(machine, "max_rate_mm_min") / 60.0
-    acceleration = axis_limits(machine, "acceleration_mm_s2")
+def moves_of(tangents: Tangents, chain: Ints, rules: CornerRules) -> Moves:
+    """The moves of merged rows."""
+    path, period_s = tangents.path, rules.period_s
     row_length = move_lengths(path)
     length: Floats = np.bincount(chain, row_length, minlength=len(path)).astype(np.float64)
     lasting = length > 0.0
     number = np.cumsum(lasting) - 1
     row_of = np.where(row_length > 0.0, number[chain], -1)
-    del row_length, number
     moving = np.flatnonzero(row_of >= 0)
     lead = moving[np.diff(row_of[moving], prepend=-1) > 0]  # the first row of each move
     length = length[lasting]
     assert len(lead) == len(length)
-    feed = np.where(path.is_feed, path.feed, np.inf)[lead] / 60.0
     is_arc = path.is_arc[lead]
-    speed, along = np.empty(len(lead)), np.empty(len(lead))
-    for low in range(0, len(lead), MOVES_AT_ONCE):
-        at = slice(low, low + MOVES_AT_ONCE)
-        begin = tangents.at_starts(lead[at])
-        highest, along[at] = allowed_along(rate, begin), allowed_along(acceleration, begin)
-        on = np.flatnonzero(is_arc[at])
-        arm = tangents.arm_of(lead[at][on])
-        limits = _arc_limits(tangents.arms, arm, length[at][on], (rate, acceleration))
-        highest[on], along[low + on] = limits
-        highest = np.minimum(highest, length[at] / (LEAST_PERIODS * period_s))
-        speed[at] = np.minimum(feed[at], highest)
-    waits = np.diff(np.cumsum(np.isin(path.kind, WAITS))[lead], prepend=-1) > 0
+    begin = tangents.at_starts(lead)
+    highest, along = allowed_along(rules.rate, begin), allowed_along(rules.acceleration, begin)
+    on = np.flatnonzero(is_arc)
+    arm, limits = tangents.arm_of(lead[on]), (rules.rate, rules.acceleration)
+    highest[on], along[on] = _arc_limits(tangents.arms, arm, length[on], limits)
+    highest = np.minimum(highest, length / (LEAST_PERIODS * period_s))
     cuts = path.is_feed[lead]
+    speed = np.minimum(np.where(cuts, path.feed[lead], np.inf) / 60.0, highest)
+    waits = np.diff(np.cumsum(np.isin(path.kind, WAITS))[lead], prepend=-1) > 0
     like = cuts == np.roll(cuts, 1)
     return Moves(row_of, lead, path.mode[lead], length, speed, along, is_arc, waits, like)
 
@@ -546,13 +636,11 @@ def corners_of(moves: Moves, tangents: Tangents, rules: CornerRules) -> Corners:
     """What happens at the start of each move."""
     count = len(moves.length)
     corners = Corners(*(np.zeros(count) for _ in range(5)))
-    for low in range(0, count, MOVES_AT_ONCE):
-        at = np.arange(low, min(low + MOVES_AT_ONCE, count))
-        bends = Bends(
-            tangents.at_ends(moves.row[at - 1]),  # nothing comes of that before the first
-            tangents.at_starts(moves.row[at]),
-        )
-        _meet(corners, moves, at, bends, rules)
+    bends = Bends(
+        tangents.at_ends(np.roll(moves.row, 1)),  # nothing comes of that before the first
+        tangents.at_starts(moves.row),
+    )
+    _meet(corners, moves, np.arange(count), bends, rules)
     return corners
 
 

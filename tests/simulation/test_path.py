@@ -9,9 +9,11 @@ from hypothesis import strategies as st
 
 from camtool.errors import OptionError, ProgramError
 from camtool.machine.model import Machine
+from camtool.simulation import path as path_model
 from camtool.simulation import samples
 from camtool.simulation.motion import IDEAL, Chunk, Options
 from camtool.simulation.samples import PathSamples, move_lengths, sample_spacing_mm
+from camtool.toolpath import moves
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath, toolpath_extents
 from tests.oracles.motion_rows import rows_of
@@ -366,6 +368,23 @@ def test_any_window_holds_the_same_samples(toolpath: Toolpath, size: int) -> Non
         assert np.array_equal(point, points[low : low + size])
     owner = np.repeat(np.arange(len(toolpath)), np.diff(samples.first))
     assert np.array_equal(rows, owner)
+
+
+@given(jobs(), machines(), st.integers(1, 5))
+def test_how_many_rows_are_sampled_together_changes_nothing(
+    toolpath: Toolpath, machine: Machine, at_once: int
+) -> None:
+    wanted = rows_of(simulate(toolpath, machine))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(moves, "ROWS_AT_ONCE", at_once)
+        patch.setattr(path_model, "ROWS_AT_ONCE", at_once)
+        found = rows_of(simulate(toolpath, machine))
+    for one, other in zip(found, wanted, strict=True):
+        assert np.array_equal(one.commanded, other.commanded)
+        assert np.array_equal(one.slide, other.slide)
+        assert one.duration_s == other.duration_s
+        assert one.steps.tolist() == other.steps.tolist()
+        assert one.reversals.tolist() == other.reversals.tolist()
 
 
 @given(

@@ -262,7 +262,7 @@ def test_positions_at_the_limit() -> None:
     chunk = next(iter(simulate(far, grbl_machine())))
     assert chunk.commanded[0, 0] == pytest.approx(STEP)
     with pytest.raises(ProgramError, match="count"):
-        simulate(ToolpathBuilder().rapid(2.148e6, 0.0, 0.0).finish(), grbl_machine())
+        list(simulate(ToolpathBuilder().rapid(2.148e6, 0.0, 0.0).finish(), grbl_machine()))
 
 
 def test_a_compensation_is_refused() -> None:

@@ -116,7 +116,7 @@ def test_entry_speeds_are_those_of_the_ring(seed: int, count: int, places: int) 
     limit = rng.choice([0.0, 0.5, 2.0, np.inf], count) * rng.uniform(0.5, 2.0, count)
     limit[0] = 0.0
     entry = np.empty(count)
-    entry_speeds(gain, limit, places - 1, entry)
+    entry_speeds(gain, limit, places - 1, 0.0, entry)
     assert entry.tolist() == ring_entries(gain.tolist(), limit.tolist(), places)
 
 
@@ -130,8 +130,9 @@ def test_seconds_are_the_integral(seed: int) -> None:
         rng.uniform(1.0, 10.0, count),
         rng.uniform(0.0, 3.0, count) * (np.arange(count) > 0),
     )
-    entry = plan.entries(5)
-    for k, seconds in enumerate(plan.seconds(5)):
+    squares = plan.squares(5)
+    entry = np.sqrt(squares)
+    for k, seconds in enumerate(plan.seconds(squares)):
         ends = (float(entry[k]), float(entry[k + 1]))
         columns = (plan.length_mm, plan.speed_mm_s, plan.acceleration_mm_s2)
         d, v, a = (float(column[k]) for column in columns)
