@@ -2,7 +2,7 @@
 
 cimport cython
 from libc cimport math
-from libc.stdint cimport uint8_t
+from libc.stdint cimport int32_t, uint8_t
 
 from camtool.kernels.types cimport Int
 
@@ -77,3 +77,19 @@ cdef Int _touching(
     double[:, ::1] boxes, Int[::1] same, Int[::1] differ, uint8_t[::1] asked, Int most,
     Int[::1] one, Int[::1] other
 ) noexcept
+
+@cython.locals(slots=Int, heads=int32_t[::1], before=int32_t[::1], latest=int32_t[::1])
+cpdef latest_near(double[:, ::1] places, Int[::1] begins, double reach)
+
+@cython.locals(
+    path=Int, first=Int, i=Int, j=Int, x=double, y=double, column=Int, row=Int, best=Int,
+    beside=Int, above=Int, own=Int
+)
+cdef void _latest_near(
+    double[:, ::1] places, Int[::1] begins, double reach, int32_t[::1] heads,
+    int32_t[::1] before, int32_t[::1] latest
+) noexcept
+
+cdef Int _cell(double place, double size) noexcept  # inline
+
+cdef Int _slot(Int column, Int row, Int slots) noexcept  # inline

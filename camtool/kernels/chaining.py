@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Indices, Ints
 
 # Pairs of near ends, which of them are joined, and the chains that the joints make.
 #
@@ -329,3 +329,65 @@ def _touching(
                 count += 1
             j += 1
     return count
+
+
+# Where paths come back to: of each point of a path, the latest one before it that is as near.
+#
+# The points of a square cell as wide as the reach are a chain, the latest first, and so are those
+# of all cells with the same slot in the table of chains: distances are compared as they are, so
+# such points only cost time. Around a point its own cell is asked first. What lies before the best
+# point so far is not asked for, so a thousand passes over one point are not compared pair by pair.
+
+FAR = 1e15
+"""Cells farther than this from the origin count as one."""
+
+LOW_BITS = 0xFFFFFFFF
+"""The part of a cell's number that decides its slot."""
+
+
+def latest_near(places: Floats, begins: Ints, reach: float) -> Indices:
+    """(P,) the latest point before each of the points (P, 2) on its path within `reach`, −1 for
+    none. Path k has the points begins[k]:begins[k + 1], `begins` (M + 1,)."""
+    slots = 16
+    while slots < len(places):
+        slots *= 2
+    heads = np.full(slots, -1, dtype=np.int32)
+    before = np.empty(len(places), dtype=np.int32)
+    latest = np.full(len(places), -1, dtype=np.int32)
+    _latest_near(places, begins, reach, heads, before, latest)
+    return np.asarray(latest)
+
+
+def _latest_near(
+    places: Floats, begins: Ints, reach: float, heads: Indices, before: Indices, latest: Indices
+) -> None:
+    """Fills in `latest`; `heads` are the latest points of the chains, `before` the one before
+    each point."""
+    for path in range(len(begins) - 1):
+        first = begins[path]
+        for i in range(first, begins[path + 1]):
+            x, y = places[i, 0], places[i, 1]
+            column, row = _cell(x, reach), _cell(y, reach)
+            best = first - 1
+            for beside in range(3):
+                for above in range(3):
+                    j = heads[_slot(column + (beside + 1) % 3, row + (above + 1) % 3, len(heads))]
+                    while j > best:
+                        if math.hypot(places[j, 0] - x, places[j, 1] - y) <= reach:
+                            best = j
+                        else:
+                            j = before[j]
+            if best >= first:
+                latest[i] = best
+            own = _slot(column + 1, row + 1, len(heads))
+            before[i], heads[own] = heads[own], i
+
+
+def _cell(place: float, size: float) -> int:
+    """The number of the cell of that size in which a coordinate lies."""
+    return int(math.floor(min(max(place / size, -FAR), FAR)))
+
+
+def _slot(column: int, row: int, slots: int) -> int:
+    """The slot of a cell, of a power of two of them."""
+    return ((column & LOW_BITS) * 73_856_093 ^ (row & LOW_BITS) * 19_349_663) & (slots - 1)

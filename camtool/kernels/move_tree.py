@@ -18,6 +18,7 @@ from camtool.kernels.offsets import LEAF
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
+Indices = npt.NDArray[np.int32]
 
 FIRST, LAST = 4, 5
 """Columns of a node after its box: the first row below it, and one past the last."""
@@ -29,7 +30,7 @@ LEVELS = 16
 """Squares are halved so often: the middles are told apart to a 65,536th of the whole."""
 
 
-def move_tree(boxes: Floats, group: Ints | None = None) -> tuple[Floats, Ints]:
+def move_tree(boxes: Floats, group: Ints | Indices | None = None) -> tuple[Floats, Ints]:
     """(2L, 6) nodes over `boxes` (K, 4), and the order (K,) of the rows in their L leaves. Rows of
     one `group` (K,), ascending, stay together: a search among these looks at no others."""
     order = hilbert_order(0.5 * (boxes[:, :2] + boxes[:, 2:]))

@@ -197,7 +197,7 @@ class Toolpath:
 
     def by_parts(self, column: Callable[[Toolpath], Column]) -> Column:
         """(N, …) a column in which each row follows from that row and its start alone, computed
-        for some thousand rows at a time."""
+        for some thousand rows at a time, in order."""
         bare = replace(self, drawn=None)
         if len(self) <= ROWS_AT_ONCE:
             return column(bare)
@@ -213,7 +213,7 @@ class Toolpath:
         """Rows (M,) of this one, in that order and as often as they are named; `others`: columns
         that take the place of theirs."""
         columns = {
-            name: _picked(getattr(self, name), row) for name in COLUMNS if name not in others
+            name: rows_of(getattr(self, name), row) for name in COLUMNS if name not in others
         }
         drawn = None if self.drawn is None else self.drawn.picked(row)
         return replace(self, **{**columns, **others}, drawn=drawn)
@@ -290,7 +290,7 @@ def _is_final(column: np.ndarray[Any, Any]) -> bool:
     return own and not owner.flags.writeable and not column.flags.writeable
 
 
-def _picked(column: Column, row: Ints) -> Column:
+def rows_of(column: Column, row: Ints) -> Column:
     """The rows (M,) of a column; one row that is seen as many stays one."""
     if len(column) and column.strides[0] == 0:
         return cast(Column, np.broadcast_to(column[:1], (len(row), *column.shape[1:])))
@@ -358,11 +358,16 @@ def toolpath_extents(toolpath: Toolpath, *, cuts: bool = False) -> Floats:
 
     An arc reaches centre ± radius where its sweep passes the direction of an axis.
     """
-    points = np.concatenate([toolpath.start[None, :], toolpath.end])
+    points = [toolpath.start[None, :], toolpath.end]
     if cuts and toolpath.is_feed.any():
-        rows = toolpath.is_feed
-        points = np.concatenate([toolpath.starts[rows], toolpath.end[rows]])
-    low, high = points.min(axis=0), points.max(axis=0)
+        rows = np.flatnonzero(toolpath.is_feed)
+        points = [toolpath.starts_of(rows), toolpath.end[rows]]
+    low = high = points[0][0]
+    for ends in points:
+        for first in range(0, len(ends), ROWS_AT_ONCE):
+            some = ends[first : first + ROWS_AT_ONCE]
+            low = np.concatenate([low[None, :], some]).min(axis=0)
+            high = np.concatenate([high[None, :], some]).max(axis=0)
     tops = _arc_extremes(toolpath)
     if len(tops):
         low[:2] = np.minimum(low[:2], tops.min(axis=0))
@@ -373,11 +378,11 @@ def toolpath_extents(toolpath: Toolpath, *, cuts: bool = False) -> Floats:
 def _arc_extremes(toolpath: Toolpath) -> Floats:
     """(J, 2) the points of arcs that lie straight right, above, left or below of the centre."""
     arcs = np.flatnonzero(toolpath.is_arc)
-    centre, begin = toolpath.centre[arcs], toolpath.starts[arcs, :2]
+    centre, begin = toolpath.centre[arcs], toolpath.starts_of(arcs)[:, :2]
     arm = begin - centre
     radius = np.hypot(arm[:, 0], arm[:, 1])
     sign = np.where(toolpath.kind[arcs] == Kind.ARC_CW, -1.0, 1.0)
-    sweep = np.abs(toolpath.sweeps()[arcs])
+    sweep = np.abs(toolpath.sweeps_of(arcs))
     compass = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
     from_start = np.arctan2(compass[:, 1], compass[:, 0]) - np.arctan2(arm[:, 1:], arm[:, :1])
     turn = np.mod(sign[:, None] * from_start, 2.0 * np.pi)

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from camtool.arrays import Floats, Ints
+from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.boxes import BoxIndex
 from camtool.toolpath.lower import arcs_to_lines
 from camtool.toolpath.moves import Kind, Toolpath
@@ -82,22 +82,28 @@ def rapids_through_stock(
 
 def low_rapids(toolpath: Toolpath) -> list[int]:
     """Rapids below the stock top that move in XY, or straight down to where no feed has been."""
-    start, end = toolpath.starts, toolpath.end
-    if len(toolpath) == 0:
-        return []
-    rapid = toolpath.kind == Kind.RAPID
-    low = np.minimum(start[:, 2], end[:, 2]) < STOCK_TOP_MM - HEIGHT_EPS_MM
-    flat = (start[:, :2] != end[:, :2]).any(axis=1)
-    down = ~flat & (end[:, 2] < start[:, 2])
-    chosen = rapid & low & (flat | down)
+    chosen = toolpath.by_parts(_go_low)
     if not chosen.any():
         return []
-    deep = _been(toolpath, flat)
-    fine = down & (deep <= end[:, 2] + HEIGHT_EPS_MM)
+    flat = toolpath.by_parts(_go_across)
+    fine = ~flat & (_been(toolpath, flat) <= toolpath.end[:, 2] + HEIGHT_EPS_MM)
     return np.flatnonzero(chosen & ~fine).tolist()
 
 
-def _been(toolpath: Toolpath, flat: Any) -> Floats:
+def _go_low(toolpath: Toolpath) -> Bools:
+    """(N,) true for rapids below the stock top that move in XY or down."""
+    start, end = toolpath.starts, toolpath.end
+    low = np.minimum(start[:, 2], end[:, 2]) < STOCK_TOP_MM - HEIGHT_EPS_MM
+    down = end[:, 2] < start[:, 2]
+    return np.asarray((toolpath.kind == Kind.RAPID) & low & (_go_across(toolpath) | down))
+
+
+def _go_across(toolpath: Toolpath) -> Bools:
+    """(N,) true for rows that move in XY."""
+    return np.asarray((toolpath.starts[:, :2] != toolpath.end[:, :2]).any(axis=1))
+
+
+def _been(toolpath: Toolpath, flat: Bools) -> Floats:
     """(N,) how deep feeds have been, before each row, since the tool last moved in XY."""
     deep, deepest = np.empty(len(toolpath)), math.inf
     feeds = np.where(toolpath.is_feed, toolpath.end[:, 2], math.inf)

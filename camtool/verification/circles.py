@@ -70,11 +70,11 @@ def full_circles(cuts: CutMoves, gap_mm: float) -> list[Circle]:
     missing (a writer may close an arc by a line).
     """
     toolpath = cuts.toolpath
-    level = toolpath.starts[:, 2] == toolpath.end[:, 2]
-    arcs = np.flatnonzero(toolpath.is_arc & cuts.is_cut & level)
+    arcs = np.flatnonzero(toolpath.is_arc & cuts.is_cut)
+    arcs = arcs[toolpath.starts_of(arcs)[:, 2] == toolpath.end[arcs, 2]]
     if len(arcs) == 0:
         return []
-    spoke = toolpath.starts[arcs, :2] - toolpath.centre[arcs]
+    spoke = toolpath.starts_of(arcs)[:, :2] - toolpath.centre[arcs]
     radius = np.hypot(spoke[:, 0], spoke[:, 1])
     breaks = (
         (np.diff(arcs) != 1)
@@ -85,7 +85,7 @@ def full_circles(cuts: CutMoves, gap_mm: float) -> list[Circle]:
     )
     first = np.concatenate([[0], np.flatnonzero(breaks) + 1])
     last = np.concatenate([first[1:], [len(arcs)]]) - 1
-    length = np.abs(np.add.reduceat(toolpath.sweeps()[arcs], first)) * radius[first]
+    length = np.abs(np.add.reduceat(toolpath.sweeps_of(arcs), first)) * radius[first]
     full = np.flatnonzero(length >= 2.0 * np.pi * radius[first] - gap_mm)
     return _deepest(
         [

@@ -361,7 +361,7 @@ def _repeated_cuts(mine: Side, other: Side, alike: Alike, limits: Limits) -> Ite
     )[number]
     more_often = np.flatnonzero((counts > 1) & (counts > asked))
     rows = cutting[first[more_often]]
-    segment = mine.cuts.first[rows]
+    segment = mine.cuts.first[rows].astype(np.int64)
     half = np.full(len(rows), 0.5)
     middle = point_at(mine.cuts.segments, segment, half)
     z = mine.cuts.heights(segment).mean(axis=1)

@@ -415,7 +415,7 @@ def cut_other_way(
     """
     cuts = decoded.cuts
     rows = cuts.rows
-    here, half = cuts.first[rows], np.full(len(rows), 0.5)
+    here, half = cuts.first[rows].astype(np.int64), np.full(len(rows), 0.5)
     z = cuts.heights(here).mean(axis=1)
     middles = Samples(point_at(cuts.segments, here, half), here, z, half)
     own = _contours_from(cuts, source.cuts, row_from)[0][cuts.contour[rows]]

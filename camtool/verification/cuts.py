@@ -17,10 +17,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.geometry.measure import point_at, segment_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
-from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.moves import ROWS_AT_ONCE, Kind, Toolpath
 from camtool.toolpath.rapids import STOCK_TOP_MM
 
 FEWEST_SAMPLES = 4
@@ -43,8 +43,8 @@ class CutMoves:
 
     toolpath: Toolpath
     segments: Segments
-    first: Ints
-    contour: Ints
+    first: Indices
+    contour: Indices
 
     def heights(self, which: Ints) -> Floats:
         """(J, 2) mm: the heights of the starts and ends of these segments, between which their
@@ -100,18 +100,22 @@ class CutMoves:
     def closed(self, gap_mm: float) -> Bools:
         """(C,) true where a contour ends within gap_mm of its start."""
         begin, finish = self.contour_ends()
-        gap = self.toolpath.end[finish, :2] - self.toolpath.starts[begin, :2]
+        gap = self.toolpath.end[finish, :2] - self.toolpath.starts_of(begin)[:, :2]
         return np.asarray(np.hypot(gap[:, 0], gap[:, 1]) <= gap_mm)
 
 
 def moved_lengths(toolpath: Toolpath) -> Floats:
     """(N,) mm: length of each row in XY, 0 for events; of an arc, its start radius times its
     sweep."""
+    return toolpath.by_parts(_lengths)
+
+
+def _lengths(toolpath: Toolpath) -> Floats:
     straight = toolpath.end[:, :2] - toolpath.starts[:, :2]
     length = np.where(toolpath.is_motion, np.hypot(straight[:, 0], straight[:, 1]), 0.0)
     arcs = np.flatnonzero(toolpath.is_arc)
     spoke = toolpath.starts_of(arcs)[:, :2] - toolpath.centre[arcs]
-    length[arcs] = np.hypot(spoke[:, 0], spoke[:, 1]) * np.abs(toolpath.sweeps()[arcs])
+    length[arcs] = np.hypot(spoke[:, 0], spoke[:, 1]) * np.abs(toolpath.sweeps_of(arcs))
     return length
 
 
@@ -122,38 +126,53 @@ def is_flat(toolpath: Toolpath) -> bool:
 
 def cutting_rows(toolpath: Toolpath, *, flat_cuts: bool) -> Bools:
     """(N,) true for the rows that cut, by the rule of this module; false after the END."""
-    running = np.cumsum(toolpath.kind == Kind.END) == 0
-    moves = running & toolpath.is_feed & (moved_lengths(toolpath) > POSITION_EPS_MM)
-    if flat_cuts and is_flat(toolpath):
-        return np.asarray(moves)
+    flat = flat_cuts and is_flat(toolpath)
+    cutting = toolpath.by_parts(lambda part: _cuts(part) & (flat | _is_low(part)))
+    cutting[toolpath.running :] = False
+    return cutting
+
+
+def _cuts(toolpath: Toolpath) -> Bools:
+    """(N,) true for feed moves in XY."""
+    return toolpath.is_feed & (_lengths(toolpath) > POSITION_EPS_MM)
+
+
+def _is_low(toolpath: Toolpath) -> Bools:
+    """(N,) true for rows that begin or end below the stock top."""
     lowest = np.minimum(toolpath.starts[:, 2], toolpath.end[:, 2])
-    return np.asarray(moves & (lowest < STOCK_TOP_MM - POSITION_EPS_MM))
+    return np.asarray(lowest < STOCK_TOP_MM - POSITION_EPS_MM)
 
 
 def cut_moves(toolpath: Toolpath, *, flat_cuts: bool) -> CutMoves:
     """The cutting moves of a toolpath as segments; `flat_cuts` as the module says."""
     cutting = cutting_rows(toolpath, flat_cuts=flat_cuts)
-    rows = np.flatnonzero(cutting)
-    sweep = toolpath.sweeps()[rows]
-    parts = np.where(np.abs(sweep) > np.pi, 2, 1)
-    first = np.zeros(len(toolpath) + 1, dtype=np.int64)
-    first[rows + 1] = parts
-    segments = _segments(toolpath, rows, sweep, parts)
-    contour = _contours(toolpath, cutting)
-    return CutMoves(toolpath, segments, np.cumsum(first), contour)
+    arcs = np.flatnonzero(toolpath.is_arc & cutting)
+    sweep = toolpath.sweeps_of(arcs)
+    parts = cutting.astype(np.int8)
+    parts[arcs[np.abs(sweep) > np.pi]] = 2
+    first = np.zeros(len(toolpath) + 1, dtype=np.int32)
+    np.cumsum(parts, out=first[1:])
+    segments = _segments(toolpath, first, (arcs, sweep))
+    return CutMoves(toolpath, segments, first, _contours(toolpath, cutting))
 
 
-def _segments(toolpath: Toolpath, rows: Ints, sweep: Floats, parts: Ints) -> Segments:
-    """One segment per part of each row; the points between parts lie on the start's radius."""
-    row = np.repeat(rows, parts)
-    part = np.arange(len(row)) - np.repeat(np.cumsum(parts) - parts, parts)
-    turn = np.repeat(sweep / parts, parts)
-    begin, end = toolpath.starts[row, :2], toolpath.end[row, :2]
-    centre = toolpath.centre[row]
-    is_arc = toolpath.is_arc[row]
-    here = np.where((is_arc & (part > 0))[:, None], _turned(begin, centre, part * turn), begin)
-    there = np.where(is_arc[:, None], _turned(begin, centre, (part + 1) * turn), end)
-    return Segments.between(here, there, np.tan(0.25 * turn), row)
+def _segments(toolpath: Toolpath, first: Indices, arcs: tuple[Ints, Floats]) -> Segments:
+    """One segment per part of each row, which owns segments first[r]:first[r+1]; `arcs`: the rows
+    (J,) that are arcs, and their sweeps (J,). The points between parts lie on the start's
+    radius."""
+    row = np.repeat(np.arange(len(toolpath)), np.diff(first))
+    start, end = toolpath.end[row - 1, :2], toolpath.end[row, :2]
+    start[row == 0] = toolpath.start[:2]
+    bulge = np.zeros(len(row))
+    bent = np.flatnonzero(toolpath.is_arc[row])
+    of, begin, centre = row[bent], start[bent], toolpath.centre[row[bent]]
+    turn: Floats = arcs[1][np.searchsorted(arcs[0], of)] / (first[of + 1] - first[of])
+    part = bent - first[of]
+    inner = np.flatnonzero(part)
+    start[bent[inner]] = _turned(begin, centre, part * turn)[inner]
+    end[bent] = _turned(begin, centre, (part + 1) * turn)
+    bulge[bent] = np.tan(0.25 * turn)
+    return Segments.between(start, end, bulge, row)
 
 
 def _turned(points: Floats, centre: Floats, angle: Floats) -> Floats:
@@ -165,19 +184,23 @@ def _turned(points: Floats, centre: Floats, angle: Floats) -> Floats:
     return np.column_stack([x, y])
 
 
-def _contours(toolpath: Toolpath, cutting: Bools) -> Ints:
+def _contours(toolpath: Toolpath, cutting: Bools) -> Indices:
     """(N,) contour of each row: a new one begins after the tool has left the stock."""
-    starts = toolpath.starts
-    rise = np.abs(toolpath.end[:, 2] - starts[:, 2]) if len(toolpath) else np.empty(0)
-    flat = moved_lengths(toolpath) > POSITION_EPS_MM
-    moves = toolpath.is_motion & (flat | (rise > 0.0))
-    homes = (toolpath.kind == Kind.HOME_XY) | (toolpath.kind == Kind.HOME_Z)
-    low = np.minimum(starts[:, 2], toolpath.end[:, 2]) < STOCK_TOP_MM - POSITION_EPS_MM
-    sinks = toolpath.is_feed & ~flat & low
-    breaks = np.cumsum((moves | homes) & ~cutting & ~sinks)
-    contour = np.full(len(toolpath), -1, dtype=np.int64)
-    contour[cutting] = np.unique(breaks[cutting], return_inverse=True)[1]
+    breaks = np.cumsum(toolpath.by_parts(_leaves_stock) & ~cutting, dtype=np.int32)[cutting]
+    contour = np.full(len(toolpath), -1, dtype=np.int32)
+    contour[cutting] = np.cumsum(np.diff(breaks, prepend=breaks[:1]) != 0, dtype=np.int32)
     return contour
+
+
+def _leaves_stock(toolpath: Toolpath) -> Bools:
+    """(N,) true for homing and for rows that move, but for feeds straight down or up in the
+    stock."""
+    rises = toolpath.end[:, 2] != toolpath.starts[:, 2]
+    flat = _lengths(toolpath) > POSITION_EPS_MM
+    moves = toolpath.is_motion & (flat | rises)
+    homes = (toolpath.kind == Kind.HOME_XY) | (toolpath.kind == Kind.HOME_Z)
+    sinks = toolpath.is_feed & ~flat & _is_low(toolpath)
+    return np.asarray((moves | homes) & ~sinks)
 
 
 @dataclass(frozen=True, eq=False)
@@ -261,131 +284,85 @@ NO_LOOP = -1
 def loops(cuts: CutMoves, gap_mm: float) -> Ints:
     """(C, 2) first and last row of the loop of each contour, NO_LOOP where it has none. Points
     within `gap_mm` of each other count as one."""
+    from camtool.kernels.chaining import latest_near
+
     begin, finish = cuts.contour_ends()
     found = np.full((len(begin), 2), NO_LOOP, dtype=np.int64)
     whole = cuts.closed(gap_mm) & _level(cuts)
     found[whole] = np.column_stack([begin, finish])[whole]
-    rest = np.flatnonzero(~whole)
-    rows = cuts.rows[np.isin(cuts.contour[cuts.rows], rest)]
-    if len(rows):
-        search = _LoopSearch(cuts)
-        places, run = _places(cuts.toolpath, rows, cuts.contour[rows])
-        latest = latest_before(places, run, gap_mm)
-        # Most contours without a loop are lines that come back nowhere.
-        offsets = np.searchsorted(run, np.arange(len(begin) + 1))
-        for contour in np.unique(run[latest >= 0]).tolist():
-            low, high = offsets[contour], offsets[contour + 1]
-            first = np.searchsorted(cuts.contour[rows], contour)
-            mine = rows[first : first + high - low - 1]
-            found[contour] = search.longest_loop(
-                mine, places[low:high], np.maximum(latest[low:high] - low, -1), gap_mm
-            )
+    rows = np.flatnonzero(cuts.is_cut & ~np.append(whole, True)[cuts.contour])
+    begins = np.flatnonzero(np.diff(cuts.contour[rows], prepend=-1))
+    toolpath = cuts.toolpath
+    starts = toolpath.starts_of(rows[begins])[:, :2]
+    places = np.insert(toolpath.end[rows, :2], begins, starts, axis=0)
+    offsets = np.append(begins + np.arange(len(begins)), len(places))
+    latest = latest_near(places, offsets, gap_mm)
+    # Most contours without a loop are lines that come back nowhere.
+    again = np.flatnonzero(latest >= 0)
+    if len(again) == 0:
+        return found
+    sizes = toolpath.by_parts(_lengths_and_areas)[rows]
+    for run in np.unique(np.searchsorted(offsets, again, side="right") - 1).tolist():
+        low, high = offsets[run], offsets[run + 1]
+        mine = slice(low - run, high - run - 1)
+        loop = _longest_loop(
+            sizes[mine], places[low:high], np.maximum(latest[low:high] - low, -1), gap_mm
+        )
+        if loop is not None:
+            found[cuts.contour[rows[begins[run]]]] = rows[mine][loop[0]], rows[mine][loop[1]]
     return found
-
-
-def _places(toolpath: Toolpath, rows: Ints, contour: Ints) -> tuple[Floats, Ints]:
-    """(P, 2) mm: where each contour begins, and the ends of its rows; (P,) the contour of each."""
-    begins = np.flatnonzero(np.diff(contour, prepend=-1))
-    ends, starts = toolpath.end[rows, :2], toolpath.starts[rows[begins], :2]
-    return np.insert(ends, begins, starts, axis=0), np.insert(contour, begins, contour[begins])
 
 
 def of_loops(cuts: CutMoves, found: Ints) -> Bools:
     """(N,) true for the cutting rows that belong to the loop of their contour."""
-    rows = np.arange(len(cuts.contour))
-    first, last = np.append(found, [[NO_LOOP, NO_LOOP]], axis=0)[cuts.contour].T
-    return np.asarray(cuts.is_cut & (first >= 0) & (rows >= first) & (rows <= last))
+    first, last = found[found[:, 0] != NO_LOOP].T
+    inside = np.zeros(len(cuts.contour) + 1, dtype=np.int8)
+    inside[first] += 1
+    inside[last + 1] -= 1
+    return np.asarray(cuts.is_cut & (np.cumsum(inside, dtype=np.int8)[:-1] > 0))
 
 
 def _level(cuts: CutMoves) -> Bools:
     """(C,) true for contours at one height."""
-    contour = cuts.contour[cuts.segments.path]
     low, high = np.full(cuts.contour_count, np.inf), np.full(cuts.contour_count, -np.inf)
-    np.minimum.at(low, contour, cuts.z[:, 0])
-    np.maximum.at(high, contour, cuts.z[:, 1])
+    for begin in range(0, len(cuts.segments), ROWS_AT_ONCE):
+        which = np.arange(begin, min(begin + ROWS_AT_ONCE, len(cuts.segments)))
+        contour, z = cuts.contour[cuts.segments.path[which]], cuts.heights(which)
+        np.minimum.at(low, contour, z.min(axis=1))
+        np.maximum.at(high, contour, z.max(axis=1))
     return np.asarray(low == high)
 
 
-class _LoopSearch:
-    """Finds loops by the length of each move and the signed area between it and the origin."""
+def _lengths_and_areas(toolpath: Toolpath) -> Floats:
+    """(N, 2) the length of each row in mm, and the signed area in mm² between it and the origin.
 
-    def __init__(self, cuts: CutMoves) -> None:
-        toolpath = cuts.toolpath
-        self._begin, self._end = toolpath.starts[:, :2], toolpath.end[:, :2]
-        self._length = np.where(cuts.is_cut, moved_lengths(toolpath), 0.0)
-        # Green's theorem: half the cross product of the ends of a move, and for an arc of sweep t
-        # the area (r²/2)(t − sin t) of its circular segment on top.
-        (ax, ay), (bx, by) = self._begin.T, self._end.T
-        sweep = toolpath.sweeps()
-        spoke = self._begin - toolpath.centre
-        square = np.where(toolpath.is_arc, (spoke**2).sum(axis=1), 0.0)
-        self._area = 0.5 * (ax * by - ay * bx) + 0.5 * square * (sweep - np.sin(sweep))
-
-    def longest_loop(
-        self, rows: Ints, places: Floats, latest: Ints, gap_mm: float
-    ) -> tuple[int, int]:
-        """First and last row of the loop of one contour, whose cutting rows are `rows` (R,), and
-        whose begin and ends of rows are `places` (R + 1, 2); `latest` (R + 1,) the latest of these
-        before each that is the same place, below 0 for none."""
-        length = np.concatenate([[0.0], np.cumsum(self._length[rows])]).tolist()
-        area = np.concatenate([[0.0], np.cumsum(self._area[rows])]).tolist()
-        best, most = (NO_LOOP, NO_LOOP), 0.0
-        again = np.flatnonzero(latest >= 0)
-        for low, high in zip(latest[again].tolist(), again.tolist(), strict=True):
-            long = length[high] - length[low]
-            (ax, ay), (bx, by) = places[high], places[low]
-            around = area[high] - area[low] + 0.5 * (ax * by - ay * bx)
-            if long >= AS_LONG * most and abs(around) > gap_mm * gap_mm:
-                best = (int(rows[low]), int(rows[high - 1]))
-                most = max(most, long)
-        return best
-
-
-def latest_before(places: Floats, run: Ints, gap_mm: float) -> Ints:
-    """(P,) for each of the points (P, 2) the latest one before it in its run (P,) within `gap_mm`,
-    −1 for none. Most are so far from all others in X alone that there is none."""
-    found, order = np.full(len(places), -1, dtype=np.int64), np.lexsort((places[:, 0], run))
-    apart = (np.diff(places[order, 0]) > gap_mm) | (np.diff(run[order]) != 0)
-    alone = np.append(apart, True) & np.append(True, apart)
-    some = np.sort(order[~alone])
-    if len(some):
-        latest = _latest_before(places[some], run[some], gap_mm)
-        found[some] = np.where(latest >= 0, some[latest], -1)
-    return found
-
-
-def _latest_before(places: Floats, run: Ints, gap_mm: float) -> Ints:
-    """The same, of points that may be near others.
-
-    They lie in square cells as wide as the gap. In each of the nine cells around a point the
-    latest earlier point of its run is tried first, and points before it only where it is too far
-    away, so that a thousand passes over one point are not compared pair by pair.
+    Green's theorem: half the cross product of the ends of a move, and for an arc of sweep t the
+    area (r²/2)(t − sin t) of its circular segment on top.
     """
-    count = len(places)
-    cell = np.floor(places / gap_mm).astype(np.int64)
-    cell -= cell.min(axis=0) - 1
-    wide = int(cell[:, 1].max()) + 2
-    known, code = np.unique(cell[:, 0] * wide + cell[:, 1], return_inverse=True)
-    code = code.reshape(-1)
-    # Cells of each run, and the points sorted by these, and within one by number.
-    mine, rank = np.unique(run * len(known) + code, return_inverse=True)
-    sorted_ = np.sort(rank.reshape(-1) * count + np.arange(count))
-    latest = np.full(count, -1, dtype=np.int64)
-    for beside in (-wide, 0, wide):
-        for above in (-1, 0, 1):
-            wanted = known[code] + beside + above
-            there = np.minimum(np.searchsorted(known, wanted), len(known) - 1)
-            rows = np.flatnonzero(known[there] == wanted)
-            wanted = run[rows] * len(known) + there[rows]
-            there = np.minimum(np.searchsorted(mine, wanted), len(mine) - 1)
-            rows, there = rows[mine[there] == wanted], there[mine[there] == wanted]
-            at = np.searchsorted(sorted_, there * count + rows) - 1
-            while len(rows):
-                near_cell, before = np.divmod(sorted_[at], count)
-                inside = (at >= 0) & (near_cell == there) & (before > latest[rows])
-                rows, at, before, there = rows[inside], at[inside], before[inside], there[inside]
-                off = places[before] - places[rows]
-                near = np.hypot(off[:, 0], off[:, 1]) <= gap_mm
-                latest[rows[near]] = before[near]
-                rows, at, there = rows[~near], at[~near] - 1, there[~near]
-    return latest
+    (ax, ay), (bx, by) = toolpath.starts[:, :2].T, toolpath.end[:, :2].T
+    sweep = toolpath.sweeps()
+    spoke = toolpath.starts[:, :2] - toolpath.centre
+    square = np.where(toolpath.is_arc, (spoke**2).sum(axis=1), 0.0)
+    area = 0.5 * (ax * by - ay * bx) + 0.5 * square * (sweep - np.sin(sweep))
+    return np.column_stack([_lengths(toolpath), area])
+
+
+def _longest_loop(
+    sizes: Floats, places: Floats, latest: Ints | Indices, gap_mm: float
+) -> tuple[int, int] | None:
+    """First and last row, from 0, of the loop of one contour: `sizes` (R, 2) of its cutting rows
+    as `_lengths_and_areas` has them, and where it begins and its rows end, `places` (R + 1, 2);
+    `latest` (R + 1,) the latest of these before each that is the same place, below 0 for none."""
+    sums = np.concatenate([np.zeros((1, 2)), np.cumsum(sizes, axis=0)])
+    high = np.flatnonzero(latest >= 0)
+    low = latest[high]
+    (ax, ay), (bx, by) = places[high].T, places[low].T
+    long, area = (sums[high] - sums[low]).T
+    around = np.abs(area + 0.5 * (ax * by - ay * bx)) > gap_mm * gap_mm
+    best, most = None, 0.0
+    for first, end, length in zip(
+        low[around].tolist(), high[around].tolist(), long[around].tolist(), strict=True
+    ):
+        if length >= AS_LONG * most:
+            best, most = (first, end - 1), max(most, length)
+    return best

@@ -26,7 +26,8 @@ import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.measure import segment_boxes
-from camtool.geometry.polylines import POSITION_EPS_MM, Segments
+from camtool.geometry.polylines import POSITION_EPS_MM
+from camtool.toolpath.moves import ROWS_AT_ONCE
 from camtool.verification.cuts import NO_LOOP, CutMoves, of_loops
 from camtool.verification.matching import Match
 
@@ -128,10 +129,7 @@ def sizes(slides: SlideExtents, goal: LoopedCuts, gap_mm: float) -> Iterator[Siz
     if not slides.known:
         return
     closed = goal.loops[:, 0] != NO_LOOP
-    counts = _wanted_rows(goal)
-    segments = wanted.segments[np.flatnonzero(counts[wanted.segments.path])]
-    boxes = segment_boxes(segments)
-    centre = _extents(wanted.contour[segments.path], boxes[:, :2], boxes[:, 2:], wanted)
+    centre, lowest = _extents(wanted, _wanted_rows(goal))
     slide = slides.boxes
     known = wanted.toolpath.drawn is not None
     nominal, predicted, rough = _edges(wanted, closed, centre, slide)
@@ -140,7 +138,7 @@ def sizes(slides: SlideExtents, goal: LoopedCuts, gap_mm: float) -> Iterator[Siz
     yield from _pair(
         "part", _whole(nominal), _whole(predicted[_finest(nominal, rough, seen)]), known
     )
-    final = _final(segments, boxes, wanted, gap_mm)
+    final = _final(centre, lowest, gap_mm)
     for index in np.flatnonzero(closed & final & seen):
         sizes_mm = np.diff(nominal[index])[:, 0], np.diff(predicted[index])[:, 0]
         yield from _pair(f"contour {index + 1}", *sizes_mm, known)
@@ -181,21 +179,13 @@ def _whole(boxes: Floats) -> Floats:
     return np.asarray(known[:, :, 1].max(axis=0) - known[:, :, 0].min(axis=0))
 
 
-def _final(segments: Segments, boxes: Floats, wanted: CutMoves, gap_mm: float) -> Bools:
+def _final(boxes: Floats, lowest: Floats, gap_mm: float) -> Bools:
     """(C,) true for contours below which no contour of the same box is cut: passes between which
-    the tool leaves the stock are contours of their own."""
-    contour = wanted.contour[segments.path]
-    least = np.full((wanted.contour_count, 2), np.inf)
-    most = np.full((wanted.contour_count, 2), -np.inf)
-    np.minimum.at(least, contour, boxes[:, :2])
-    np.maximum.at(most, contour, boxes[:, 2:])
-    whole = np.concatenate([least, most], axis=1)
-    lowest = np.full(wanted.contour_count, np.inf)
-    toolpath = wanted.toolpath
-    z = np.minimum(toolpath.starts[segments.path, 2], toolpath.end[segments.path, 2])
-    np.minimum.at(lowest, contour, z)
+    the tool leaves the stock are contours of their own. `boxes` (C, 2, 2) and `lowest` (C,) as
+    `_extents` gives them."""
+    whole = boxes.transpose(0, 2, 1).reshape(-1, 4)
     known = np.isfinite(whole[:, 0])
-    keys = np.full((wanted.contour_count, 4), np.iinfo(np.int64).min)
+    keys = np.full(whole.shape, np.iinfo(np.int64).min)
     keys[known] = np.rint(whole[known] / gap_mm).astype(np.int64)
     _, same = np.unique(keys, axis=0, return_inverse=True)
     deepest = np.full(same.max(initial=-1) + 1, np.inf)
@@ -223,14 +213,22 @@ def _counting(decoded: LoopedCuts, goal: LoopedCuts, match: Match) -> Ints:
     return np.flatnonzero(looped | (follow & ~with_loop[of]))
 
 
-def _extents(contour: Ints, low: Floats, high: Floats, wanted: CutMoves) -> Floats:
-    """(C, 2, 2) box [[x low, x high], [y low, y high]] of the items of each contour; infinite
-    for a contour without items."""
-    least = np.full((wanted.contour_count, 2), np.inf)
-    most = np.full((wanted.contour_count, 2), -np.inf)
-    np.minimum.at(least, contour, low)
-    np.maximum.at(most, contour, high)
-    return np.stack([least, most], axis=2)
+def _extents(cuts: CutMoves, counts: Bools) -> tuple[Floats, Floats]:
+    """(C, 2, 2) mm: box [[x low, x high], [y low, y high]] of the rows of each contour that count,
+    `counts` (N,), and (C,) mm: the lowest height of their ends; infinite for a contour without
+    any."""
+    least = np.full((cuts.contour_count, 2), np.inf)
+    most = np.full((cuts.contour_count, 2), -np.inf)
+    lowest = np.full(cuts.contour_count, np.inf)
+    for low in range(0, len(cuts.segments), ROWS_AT_ONCE):
+        segments = cuts.segments[low : low + ROWS_AT_ONCE]
+        segments = segments[np.flatnonzero(counts[segments.path])]
+        contour, boxes = cuts.contour[segments.path], segment_boxes(segments)
+        np.minimum.at(least, contour, boxes[:, :2])
+        np.maximum.at(most, contour, boxes[:, 2:])
+        begin, end = cuts.toolpath.starts_of(segments.path), cuts.toolpath.end[segments.path]
+        np.minimum.at(lowest, contour, np.minimum(begin[:, 2], end[:, 2]))
+    return np.stack([least, most], axis=2), lowest
 
 
 def _pair(name: str, nominal: Floats, predicted: Floats, of_edge: bool) -> Iterator[Size]:

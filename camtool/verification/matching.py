@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.verification.circles import Circle
 from camtool.verification.cuts import CutMoves, Samples
 from camtool.verification.nearest import ANY_CONTOUR, Found, MoveIndex, ranges, run_offsets
@@ -38,10 +38,10 @@ class Match:
     (`Drawn.off_mm`).
     """
 
-    row: Ints
-    contour: Ints
-    only: Ints
-    circle: Ints
+    row: Indices
+    contour: Indices
+    only: Indices
+    circle: Indices
     off_mm: Floats
 
 
@@ -59,7 +59,7 @@ class Goal:
 def own_match(cuts: CutMoves, circles: list[Circle]) -> Match:
     """The match of a program without wanted moves: each row belongs to itself."""
     count = len(cuts.contour)
-    row = np.where(cuts.is_cut, np.arange(count), -1)
+    row = np.where(cuts.is_cut, np.arange(count, dtype=np.int32), np.int32(-1))
     circle = _circle_of_row(circles, count)
     none_off = np.broadcast_to(np.zeros(2), (count, 2))
     return Match(row, cuts.contour, cuts.contour, circle, none_off)
@@ -78,7 +78,7 @@ def carried_match(match: Match, of: Ints, goal: Goal) -> Match:
         row=row,
         off_mm=_with_neighbours(off, contour),
         contour=contour,
-        only=np.where(match.only == ANY_CONTOUR, ANY_CONTOUR, contour),
+        only=np.where(match.only == ANY_CONTOUR, np.int32(ANY_CONTOUR), contour),
         circle=np.where(known, circle[np.maximum(row, 0)], -1),
     )
 
@@ -136,7 +136,7 @@ def match_contours(cuts: CutMoves, samples: Samples, found: Found, goal: Goal) -
     return belongs
 
 
-def _candidates(mine: Ints, nearest: Ints) -> list[Ints]:
+def _candidates(mine: Indices, nearest: Ints) -> list[Ints]:
     """For each try (C,): the wanted contour nearest to most samples, then the next, −1 for none.
 
     `mine` (S,) is the decoded contour of each sample (ascending), `nearest` (S,) the wanted one.
@@ -161,10 +161,10 @@ def match_rows(cuts: CutMoves, samples: Samples, belongs: Ints, found: Found, go
     wanted, count = goal.moves, len(cuts.contour)
     rows = cuts.segments.path[samples.segment]
     match = Match(
-        row=np.full(count, -1, dtype=np.int64),
-        contour=np.full(count, -1, dtype=np.int64),
-        only=np.full(count, ANY_CONTOUR, dtype=np.int64),
-        circle=np.full(count, -1, dtype=np.int64),
+        row=np.full(count, -1, dtype=np.int32),
+        contour=np.full(count, -1, dtype=np.int32),
+        only=np.full(count, ANY_CONTOUR, dtype=np.int32),
+        circle=np.full(count, -1, dtype=np.int32),
         off_mm=np.zeros((count, 2)),
     )
     if len(rows) == 0 or len(wanted.contour) == 0:
@@ -192,7 +192,7 @@ def _drawn_off_mm(goal: Goal) -> Floats:
     return np.zeros((len(wanted), 2)) if wanted.drawn is None else wanted.drawn.off_mm
 
 
-def _with_neighbours(off_mm: Floats, contour: Ints) -> Floats:
+def _with_neighbours(off_mm: Floats, contour: Indices) -> Floats:
     """The largest value of each row (N, 2) and of its neighbours in its contour, because slides
     lag behind."""
     rows = np.flatnonzero(contour >= 0)
@@ -204,7 +204,7 @@ def _with_neighbours(off_mm: Floats, contour: Ints) -> Floats:
     return most
 
 
-def _unanimous(values: Ints, offsets: Ints) -> Ints:
+def _unanimous(values: Ints | Indices, offsets: Ints) -> Ints:
     """(R,) the value of all inner samples of each run, −1 where they differ; at its first and last
     sample a row touches its neighbours."""
     inner = np.column_stack([offsets[:-1] + 1, offsets[1:] - 1]).ravel()
@@ -213,8 +213,8 @@ def _unanimous(values: Ints, offsets: Ints) -> Ints:
     return np.where(low == high, low, -1)
 
 
-def _circle_of_row(circles: list[Circle], count: int) -> Ints:
-    of_row = np.full(count, -1, dtype=np.int64)
+def _circle_of_row(circles: list[Circle], count: int) -> Indices:
+    of_row = np.full(count, -1, dtype=np.int32)
     for index, circle in enumerate(circles):
         of_row[circle.first_row : circle.last_row + 1] = index
     return of_row

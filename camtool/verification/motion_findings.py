@@ -121,11 +121,11 @@ def _through_stock(decoded: Toolpath, case: Case) -> list[Through]:
         radius = np.full(len(decoded), 0.5 * diameter)
         tolerance = max(CLEARED_MM, CLEARED_COVERAGES * case.coverage_mm)
         return rapids_through_stock(decoded, Reach(radius, radius), tolerance)
-    low = np.minimum(decoded.starts[:, 2], decoded.end[:, 2])
-    return [
-        Through(row, float(low[row]), (float(decoded.end[row, 0]), float(decoded.end[row, 1])))
-        for row in low_rapids(decoded)
-    ]
+    rows = np.array(low_rapids(decoded), dtype=np.int64)
+    end = decoded.end[rows]
+    low = np.minimum(decoded.starts_of(rows)[:, 2], end[:, 2])
+    columns = (rows.tolist(), low.tolist(), end[:, :2].tolist())
+    return [Through(row, z, (x, y)) for row, z, (x, y) in zip(*columns, strict=True)]
 
 
 def _many_reversals(machine: Machine, tally: Tally, cuts: CutMoves) -> Iterator[Finding]:
@@ -145,15 +145,17 @@ def _size_mm(cuts: CutMoves) -> float:
     if not len(cuts.rows):
         return 0.0
     toolpath = cuts.toolpath
-    ends = np.concatenate([toolpath.starts[cuts.rows, :2], toolpath.end[cuts.rows, :2]])
-    return float(np.ptp(ends, axis=0).max())
+    starts, ends = toolpath.starts_of(cuts.rows), toolpath.end[cuts.rows]
+    low = np.minimum(starts.min(axis=0), ends.min(axis=0))
+    high = np.maximum(starts.max(axis=0), ends.max(axis=0))
+    return float((high - low)[:2].max())
 
 
 def _nothing_moves(cuts: CutMoves) -> Iterator[Finding]:
     decoded = cuts.toolpath
     homes = np.isin(decoded.kind, (Kind.HOME_XY, Kind.HOME_Z))
-    still = np.all(decoded.end == decoded.starts) if len(decoded) else True
-    if bool(still) and not decoded.is_arc.any() and not homes.any():
+    still = bool((decoded.end == decoded.start).all())
+    if still and not decoded.is_arc.any() and not homes.any():
         yield NO_MOTION()
     elif len(cuts.rows) == 0 and len(holes_of(decoded)) == 0:
         yield NO_MOTION_BELOW()

@@ -19,7 +19,7 @@ from functools import cached_property
 
 import numpy as np
 
-from camtool.arrays import Floats, Ints
+from camtool.arrays import Floats, Indices, Ints
 from camtool.geometry.measure import segment_boxes, segment_lengths
 from camtool.verification.cuts import CutMoves
 
@@ -49,7 +49,7 @@ class MoveIndex:
     @cached_property
     def contour(self) -> Ints:
         """(K,) the contour of each segment."""
-        return self.cuts.contour[self.cuts.segments.path]
+        return self.cuts.contour[self.cuts.segments.path].astype(np.int64)
 
     @cached_property
     def boxes(self) -> Floats:
@@ -159,7 +159,7 @@ def _table(cuts: CutMoves) -> Floats:
 # Runs are given by offsets: run g is items[offsets[g]:offsets[g+1]], never empty.
 
 
-def run_offsets(labels: Ints, longest: int) -> Ints:
+def run_offsets(labels: Ints | Indices, longest: int) -> Ints:
     """Offsets (G+1,) of the runs of equal labels (J,), cut to at most `longest` items."""
     if len(labels) == 0:
         return np.zeros(1, dtype=np.int64)

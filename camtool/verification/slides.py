@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.errors import ProgramError
 from camtool.geometry.measure import segment_boxes
 from camtool.geometry.polylines import Segments
@@ -206,7 +206,7 @@ class Tasks:
 
         self._paths, self._match = paths, match
         self._slot = np.append(slot, -1)  # the last one is for none, −1
-        self._rows = paths.wanted.rows
+        self._rows = paths.wanted.rows.astype(np.int32)
         contour = paths.wanted.contour[self._rows]
         self._begins = np.searchsorted(contour, np.arange(paths.wanted.contour_count + 1))
         known = bool((match.only[paths.decoded.is_cut] != ANY_CONTOUR).all())
@@ -240,7 +240,7 @@ class Tasks:
             directions=self._directions,
         )
 
-    def _ranges(self, only: Ints) -> Ints:
+    def _ranges(self, only: Indices) -> Ints:
         """(R, 2) begin and end (not included) of the contours `only` (R,), or of all moves."""
         every = only == ANY_CONTOUR
         low = np.where(every, 0, self._begins[only])
@@ -261,7 +261,7 @@ def _sums(rows: int, slots: int, trace: TraceSize) -> Sums:
     )
 
 
-def _rows_of_circles(circle: Ints, count: int) -> tuple[Ints, Ints]:
+def _rows_of_circles(circle: Indices, count: int) -> tuple[Ints, Ints]:
     """(count,), (count,) first and last row of each circle; last is −1 for a circle without rows.
     `circle` (N,) is the circle of each row."""
     first = np.full(count, len(circle), dtype=np.int64)
@@ -326,7 +326,7 @@ def move_boxes(cuts: CutMoves) -> Floats:
     return found
 
 
-def _part(cuts: CutMoves, low: int, high: int) -> tuple[Segments, Ints, Ints]:
+def _part(cuts: CutMoves, low: int, high: int) -> tuple[Segments, Indices, Indices]:
     """The segments of the rows low:high, and which of them are the first and the last (J,), (J,)
     of each row that cuts."""
     begin, end = int(cuts.first[low]), int(cuts.first[high])
@@ -343,7 +343,8 @@ def shapes(cuts: CutMoves, low: int, high: int) -> Shapes:
     if len(first) < len(segments):
         start, end = start[first], end[last]
     arcs = np.flatnonzero(segments.bulge[first])
-    which, bent = np.full(len(first), -1, dtype=np.int32), segments[first[arcs]]
+    which = np.full(len(first), -1, dtype=np.int32)
+    bent = segments[first[arcs].astype(np.int64)]
     which[arcs] = np.arange(len(arcs))
     sweep = np.abs(bent.sweep) * (last - first + 1)[arcs]
     turn = np.where(bent.bulge < 0.0, -1.0, 1.0)
@@ -387,8 +388,9 @@ class TraceSize:
 
 def trace_size(decoded: Toolpath, spacing_mm: float, most: int) -> TraceSize:
     """A stride for samples about `spacing_mm` apart that keeps about half of `most` points."""
-    rise = np.abs(decoded.end[:, 2] - decoded.starts[:, 2]) if len(decoded) else np.zeros(0)
-    expected = float((moved_lengths(decoded) + rise).sum()) / spacing_mm
+    lengths = moved_lengths(decoded)
+    lengths += decoded.by_parts(lambda part: np.abs(part.end[:, 2] - part.starts[:, 2]))
+    expected = float(lengths.sum()) / spacing_mm
     stride = max(1, int(np.ceil(2.0 * expected / most)))
     return TraceSize(decoded.start[None, :2], stride, most)
 

@@ -476,8 +476,12 @@ def _depth_error_mm(case: Case, cuts: CutMoves) -> float:
     if not cuts.is_cut.any():
         return math.nan
     mechanics = Mechanics(case.machine, toolpath.start, case.options.effects)
-    slide, _ = mechanics.follow(toolpath.end, np.array([0, len(toolpath)]))
-    return float(np.abs(slide[:, 2] - toolpath.end[:, 2])[cuts.is_cut].max())
+
+    def off(part: Toolpath) -> Floats:
+        slide, _ = mechanics.follow(part.end, np.array([0, len(part)]))
+        return np.abs(slide[:, 2] - part.end[:, 2])
+
+    return float(toolpath.by_parts(off)[cuts.is_cut].max())
 
 
 def assumptions(case: Case) -> tuple[str, ...]:
