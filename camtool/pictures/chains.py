@@ -7,7 +7,7 @@ turn is written as two, since a nearly full circle is ill-defined by its end poi
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -17,10 +17,13 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.measure import segment_boxes
 from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, Segments
 from camtool.pictures.svg import MM_DECIMALS, PathData
-from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.moves import Kind, Toolpath, rows_of
 
 LONGEST_ARC_RAD = 1.5 * math.pi
 """A longer arc is written as two."""
+
+MOVES_AT_ONCE = 1 << 14
+"""So many moves of a chain are looked at, or written, together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,10 +37,21 @@ class Chain:
 
     def lengths(self) -> Floats:
         """(n,) mm: the true length of each move."""
-        chord = np.diff(self.points, axis=0)
-        spoke = self.points[:-1] - self.centre
-        arc = np.abs(self.sweep) * np.hypot(spoke[:, 0], spoke[:, 1])
-        return np.where(self.sweep == 0.0, np.hypot(chord[:, 0], chord[:, 1]), arc)
+        lengths = np.empty(len(self.sweep))
+        for low, part in self.parts():
+            chord = np.diff(part.points, axis=0)
+            spoke = part.points[:-1] - part.centre
+            arc = np.abs(part.sweep) * np.hypot(spoke[:, 0], spoke[:, 1])
+            straight = np.hypot(chord[:, 0], chord[:, 1])
+            lengths[low : low + len(arc)] = np.where(part.sweep == 0.0, straight, arc)
+        return lengths
+
+    def parts(self) -> Iterator[tuple[int, Chain]]:
+        """Its moves, some thousand at a time, as open chains; and the number of the first."""
+        for low in range(0, len(self.sweep), MOVES_AT_ONCE):
+            high = low + MOVES_AT_ONCE
+            points, centre = self.points[low : high + 1], self.centre[low:high]
+            yield low, Chain(points, centre, self.sweep[low:high])
 
     def at(self, index: int, share: float) -> tuple[tuple[float, float], float]:
         """The point at `share` (0 … 1) of move `index`, and the direction of travel there, rad."""
@@ -74,32 +88,43 @@ class Moves:
 
 def moves_of(toolpath: Toolpath) -> Moves:
     """The moves of a toolpath, sorted by how they are drawn."""
-    starts, ends = toolpath.starts, toolpath.end
-    step = ends - starts
-    across = np.hypot(step[:, 0], step[:, 1]) > POSITION_EPS_MM
-    cuts = toolpath.is_feed & (across | toolpath.is_arc)
-    slopes = cuts & (np.abs(step[:, 2]) > POSITION_EPS_MM)
-    rapid = (toolpath.kind == Kind.RAPID) & across
+    cuts, slopes, rapid, down = toolpath.by_parts(_how_drawn).T
     # A step straight down within a cut, as from one pass to the next, is not drawn as a plunge.
-    continues = _follows(toolpath, cuts, cuts | (toolpath.kind == Kind.RAPID))
-    down = toolpath.is_feed & ~cuts & (step[:, 2] < -POSITION_EPS_MM)
+    follows = _follows(cuts, cuts | (toolpath.kind == Kind.RAPID))
+    rapids, begins = np.flatnonzero(rapid), np.flatnonzero(cuts & ~follows)
     return Moves(
         feeds=_chains(toolpath, cuts & ~slopes),
         ramps=_chains(toolpath, slopes),
-        rapids=_once(starts[rapid, :2], ends[rapid, :2]),
-        plunges=_places(ends[down & ~continues, :2]),
-        starts=_places(starts[cuts & ~continues, :2]),
+        rapids=_once(toolpath.starts_of(rapids)[:, :2], toolpath.end[rapids, :2]),
+        plunges=_places(toolpath.end[down & ~follows, :2]),
+        starts=_places(toolpath.starts_of(begins)[:, :2]),
         begin=toolpath.start[:2],
     )
 
 
-def _follows(toolpath: Toolpath, cuts: Bools, counted: Bools) -> Bools:
+def _how_drawn(toolpath: Toolpath) -> Bools:
+    """(N, 4) which rows cut in XY, which of these change Z as well, which are rapids in XY, and
+    which go straight down at a feed."""
+    step = toolpath.end - toolpath.starts
+    across = np.hypot(step[:, 0], step[:, 1]) > POSITION_EPS_MM
+    cuts = toolpath.is_feed & (across | toolpath.is_arc)
+    slopes = cuts & (np.abs(step[:, 2]) > POSITION_EPS_MM)
+    rapid = (toolpath.kind == Kind.RAPID) & across
+    down = toolpath.is_feed & ~cuts & (step[:, 2] < -POSITION_EPS_MM)
+    return np.column_stack([cuts, slopes, rapid, down])
+
+
+def _follows(cuts: Bools, counted: Bools) -> Bools:
     """(N,) true where, of the rows that are `counted`, the last one before a row is one of the
     `cuts`."""
-    rows = np.arange(len(toolpath))
-    latest = np.maximum.accumulate(np.where(counted, rows, -1))
-    before = np.concatenate([[-1], latest])[: len(rows)]
-    return np.asarray((before >= 0) & cuts[before]) if len(rows) else cuts
+    rows = np.flatnonzero(counted)
+    behind = np.zeros(len(cuts), dtype=np.int8)
+    # What a row that is counted says holds from the next one on.
+    said = np.flatnonzero(np.diff(cuts[rows], prepend=False))
+    behind[rows[said]] = np.where(cuts[rows[said]], 1, -1)
+    follows = np.zeros(len(cuts), dtype=np.bool_)
+    follows[1:] = np.cumsum(behind[:-1], dtype=np.int8) > 0
+    return follows
 
 
 def _places(points: Floats) -> Floats:
@@ -114,26 +139,44 @@ def _chains(toolpath: Toolpath, chosen: Bools) -> tuple[Chain, ...]:
     rows = np.flatnonzero(chosen)
     if not len(rows):
         return ()
-    starts, ends, sweeps = toolpath.starts[:, :2], toolpath.end[:, :2], toolpath.sweeps()
-    rows = rows[_first_times(starts[rows], ends[rows], sweeps[rows])]
-    moves = toolpath.is_motion & ((starts != ends).any(axis=1) | toolpath.is_arc)
-    count = np.cumsum(moves | (toolpath.kind == Kind.RAPID))
+    rows = rows[_first_times(toolpath, rows)]
+    count = np.cumsum(toolpath.by_parts(_part_runs), dtype=np.int32)
     runs = np.split(rows, np.flatnonzero(np.diff(count[rows]) > 1) + 1)
+    starts = toolpath.starts_of(np.array([run[0] for run in runs]))[:, None, :2]
+    sweep = toolpath.sweeps()
     return tuple(
-        Chain(np.concatenate([starts[run[:1]], ends[run]]), toolpath.centre[run], sweeps[run])
-        for run in runs
+        Chain(
+            np.concatenate([start, toolpath.end[run, :2]]),
+            rows_of(toolpath.centre, run),
+            sweep[run],
+        )
+        for start, run in zip(starts, runs, strict=True)
     )
 
 
-def _first_times(begin: Floats, end: Floats, sweep: Floats) -> Ints:
-    """Rows, ascending, of those of J moves that are the first along their line or arc, in either
-    direction."""
+def _part_runs(toolpath: Toolpath) -> Bools:
+    """(N,) true for moves in XY and all rapids."""
+    across = (toolpath.starts[:, :2] != toolpath.end[:, :2]).any(axis=1)
+    moves = toolpath.is_motion & (across | toolpath.is_arc)
+    return np.asarray(moves | (toolpath.kind == Kind.RAPID))
+
+
+def _first_times(toolpath: Toolpath, rows: Ints) -> Ints:
+    """Indices, ascending, of those of the moves (J,) that are the first along their line or arc,
+    in either direction."""
+    begin, end = toolpath.starts_of(rows)[:, :2], toolpath.end[rows, :2]
     back = (begin[:, 0] > end[:, 0]) | ((begin[:, 0] == end[:, 0]) & (begin[:, 1] > end[:, 1]))
-    low, high = np.where(back[:, None], end, begin), np.where(back[:, None], begin, end)
-    full = (begin == end).all(axis=1)
-    turn = np.where(full, np.abs(sweep), np.where(back, -sweep, sweep))
-    _, first = np.unique(np.column_stack([low, high, turn]), axis=0, return_index=True)
-    return np.sort(first)
+    turn, arcs = np.zeros(len(rows)), np.flatnonzero(toolpath.is_arc[rows])
+    sweep, full = toolpath.sweeps_of(rows[arcs]), (begin[arcs] == end[arcs]).all(axis=1)
+    turn[arcs] = np.where(full, np.abs(sweep), np.where(back[arcs], -sweep, sweep))
+    begin[back], end[back] = end[back], begin[back]
+    columns = [*begin.T, *end.T, turn]
+    order = np.lexsort(columns[::-1])
+    first = np.zeros(len(rows), dtype=np.bool_)
+    first[:1] = True
+    for column in columns:
+        first[1:] |= np.diff(column[order]) != 0.0
+    return np.sort(order[first])
 
 
 def _once(begin: Floats, end: Floats) -> tuple[Chain, ...]:
@@ -179,14 +222,16 @@ def path_data(chains: Iterable[Chain]) -> str:
     """The `d` of a path that shows the chains, in mm, Y up (the group around it flips)."""
     data = PathData(MM_DECIMALS)
     for chain in chains:
-        points = chain.points.tolist()
-        data.move(*points[0])
-        closing_line = chain.closed and chain.sweep[-1] == 0.0
-        for index, sweep in enumerate(chain.sweep.tolist()):
-            if sweep != 0.0 and not _is_flat(chain, index, sweep):
-                _arc(data, chain, index, sweep)
-            elif not (closing_line and index == len(chain.sweep) - 1):
-                data.line(*points[index + 1])
+        data.move(*chain.points[0].tolist())
+        # What closes a path draws its last line.
+        drawn = len(chain.sweep) - int(chain.closed and chain.sweep[-1] == 0.0)
+        for low, part in chain.parts():
+            points, sweeps = part.points.tolist(), part.sweep.tolist()
+            for index, sweep in enumerate(sweeps[: drawn - low]):
+                if sweep != 0.0 and not _is_flat(part, index, sweep):
+                    _arc(data, part, index, sweep)
+                else:
+                    data.line(*points[index + 1])
         if chain.closed:
             data.close()
     return str(data)
@@ -214,8 +259,27 @@ def chains_box(chains: Sequence[Chain]) -> Floats | None:
     """[[xmin, xmax], [ymin, ymax]] mm of the true lines and arcs; None when there are none."""
     if not chains:
         return None
-    boxes = segment_boxes(_halved(chains))
-    return np.column_stack([boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)])
+    low, high = np.full(2, np.inf), np.full(2, -np.inf)
+    for some in _lots(chains):
+        boxes = segment_boxes(_halved(some))
+        low = np.minimum(low, boxes[:, :2].min(axis=0))
+        high = np.maximum(high, boxes[:, 2:].max(axis=0))
+    return np.column_stack([low, high])
+
+
+def _lots(chains: Iterable[Chain]) -> Iterator[list[Chain]]:
+    """All moves of the chains, some thousand at a time, as open chains."""
+    some: list[Chain] = []
+    count = 0
+    for chain in chains:
+        for _, part in chain.parts():
+            some.append(part)
+            count += len(part.sweep)
+            if count >= MOVES_AT_ONCE:
+                yield some
+                some, count = [], 0
+    if some:
+        yield some
 
 
 def _halved(chains: Sequence[Chain]) -> Segments:

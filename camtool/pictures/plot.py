@@ -75,10 +75,14 @@ class Plot:
         """About how many mm of a chain are in view: of each move whose box touches the window its
         length, but no more than the window's diagonal."""
         low, high = np.array([self.view.x_range, self.view.y_range]).T
-        begin, end = chain.points[:-1], chain.points[1:]
-        near = (np.minimum(begin, end) <= high) & (np.maximum(begin, end) >= low)
-        lengths = np.minimum(chain.lengths(), math.hypot(*(high - low)))
-        return float(lengths[near.all(axis=1)].sum())
+        lengths = chain.lengths()
+        near = np.empty(len(lengths), dtype=np.bool_)
+        for first, part in chain.parts():
+            begin, end = part.points[:-1], part.points[1:]
+            meets = (np.minimum(begin, end) <= high) & (np.maximum(begin, end) >= low)
+            near[first : first + len(meets)] = meets.all(axis=1)
+        np.minimum(lengths, math.hypot(*(high - low)), out=lengths)
+        return float(lengths[near].sum())
 
     def round_pen(self, width: float) -> Look:
         """A pen of a width on the page."""

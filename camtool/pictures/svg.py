@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
+from io import StringIO
 
 LENGTH_DECIMALS = 2
 """Decimals of lengths on the page (units of the viewBox, 1000 across)."""
@@ -81,13 +82,13 @@ class PathData:
 
     def __init__(self, decimals: int = LENGTH_DECIMALS) -> None:
         self._decimals = decimals
-        self._parts: list[str] = []
+        self._text = StringIO()
 
     def __str__(self) -> str:
-        return "".join(self._parts)
+        return self._text.getvalue()
 
     def __bool__(self) -> bool:
-        return bool(self._parts)
+        return self._text.tell() > 0
 
     def move(self, x: float, y: float) -> None:
         """Begin a new subpath."""
@@ -105,11 +106,11 @@ class PathData:
         size = number(radius, self._decimals)
         large, growing = int(abs(sweep_rad) > math.pi), int(sweep_rad > 0.0)
         end = f"{number(x, self._decimals)} {number(y, self._decimals)}"
-        self._parts.append(f"A{size} {size} 0 {large} {growing} {end}")
+        self._text.write(f"A{size} {size} 0 {large} {growing} {end}")
 
     def close(self) -> None:
         """A straight line to the beginning of the subpath."""
-        self._parts.append("Z")
+        self._text.write("Z")
 
     def _add(self, command: str, x: float, y: float) -> None:
-        self._parts.append(f"{command}{number(x, self._decimals)} {number(y, self._decimals)}")
+        self._text.write(f"{command}{number(x, self._decimals)} {number(y, self._decimals)}")
