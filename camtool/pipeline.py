@@ -102,12 +102,14 @@ def post_drawing(
     findings = _merged(drawing.findings, wanted.findings, tuple(doubtful))
     if worst(findings) >= Severity.ERROR:
         return replace(run, findings=findings)
+    judged = plan if check else None
+    del plan  # what is not judged needs no stages of it
     compensation = _compensated(wanted, target.machine) if compensate else None
     written = wanted if compensation is None else compensation.toolpath
     program, decoded = _written(written, target, progress)
     repeated = _repeated(program, decoded)
     findings = _merged(findings, program.findings, decoded.findings, without=repeated)
-    if not check:
+    if judged is None:
         return replace(run, program=program, decoded=decoded, findings=findings)
     from camtool.planning.drawn import kept_of
     from camtool.verification.case import TRACE_POINTS, cone_of, tool_mm
@@ -116,7 +118,7 @@ def post_drawing(
 
     plain = _plain_run(drawing, job, target, progress, compensate=compensate)
     # Contours that are divided at reversals are judged as the whole contours of the drawing.
-    whole = plan
+    whole = judged
     if _plain(job) != job and compensation is None:
         whole = planned(drawing, job, target.machine, undivided=True)
     verification = _judged(
@@ -125,7 +127,7 @@ def post_drawing(
         target,
         _Goal(
             whole.toolpath,
-            plan.placed,
+            judged.placed,
             compensation,
             written_from=written,
             row_from=_row_from(program, decoded),
@@ -143,9 +145,9 @@ def post_drawing(
     findings = _merged(findings, verification.findings, beyond, without=repeated)
     verification = verification.with_planning(
         Planned(
-            rapid_drawn_mm=certain(sum(step.rapid_drawn_mm for step in plan.steps)),
-            rapid_mm=certain(sum(step.rapid_mm for step in plan.steps)),
-            operations=tuple(_reported(step) for step in plan.steps if step.runs),
+            rapid_drawn_mm=certain(sum(step.rapid_drawn_mm for step in judged.steps)),
+            rapid_mm=certain(sum(step.rapid_mm for step in judged.steps)),
+            operations=tuple(_reported(step) for step in judged.steps if step.runs),
         ),
         _before(plain),
     )

@@ -147,7 +147,9 @@ class Drawing:
     def __post_init__(self) -> None:
         count = len(self.paths)
         if not len(self.off_mm):
-            object.__setattr__(self, "off_mm", np.zeros((len(self.paths.vertices), 2)))
+            # One number, seen as many.
+            exact = np.broadcast_to(0.0, (len(self.paths.vertices), 2))
+            object.__setattr__(self, "off_mm", exact)
         if self.off_mm.shape != (len(self.paths.vertices), 2):
             raise ValueError(
                 f"off_mm has shape {self.off_mm.shape} for {len(self.paths.vertices)} vertices"
@@ -161,6 +163,8 @@ class Drawing:
     @cached_property
     def fit(self) -> FitError:
         """How far the paths are from what was drawn."""
+        if not self.off_mm.any():
+            return FitError()
         rows = segment_rows(self.paths)
         largest, rms = self.off_mm[rows].T
         length = np.where(largest > 0.0, segment_lengths(Segments.of(self.paths)), 0.0)

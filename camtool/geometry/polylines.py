@@ -333,6 +333,8 @@ def reverse(p: Polyline) -> Polyline:
 
 def lines_reversed(lines: Polylines, which: Bools | None = None) -> Polylines:
     """Every path (or those of `which` (M,)) travelled backwards, as `reverse` does."""
+    if which is not None and not which.any():
+        return lines
     counts = np.diff(lines.offsets)
     low, count = np.repeat(lines.offsets[:-1], counts), np.repeat(counts, counts)
     place = np.arange(len(low)) - low
@@ -366,6 +368,8 @@ def lines_rolled(lines: Polylines, begins: Ints) -> Polylines:
     """Paths begun at these of their vertices (M,), as `rolled` does; 0 for open ones."""
     if not (lines.closed | (begins == 0)).all():
         raise GeometryError("an open path can only begin at an end")
+    if not begins.any():
+        return lines
     counts = np.diff(lines.offsets)
     low, count = np.repeat(lines.offsets[:-1], counts), np.repeat(counts, counts)
     place = (np.arange(len(low)) - low + np.repeat(begins, counts)) % count

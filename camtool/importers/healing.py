@@ -303,14 +303,17 @@ PLACES = (0.0, 0.25, 0.5, 0.75, 1.0)
 def off_drawn(pieces: Sequence[Piece], lines: Polylines) -> Floats:
     """(N, 2) mm: the largest and the rms distance between what was drawn as `pieces` and the
     segment that leaves each vertex of the paths made of them."""
-    found = np.zeros((len(lines.vertices), 2))
+    nothing = np.broadcast_to(0.0, (len(lines.vertices), 2))  # one number, seen as many
     vertices, begin, end, said = _drawn(pieces)
     if not len(begin) or not len(lines):
-        return found
+        return nothing
     rows = segment_rows(lines)
     drawn_as = segment_numbers(vertices, begin, end)
     made_as = segment_numbers(lines.vertices, rows, next_vertices(lines.offsets)[rows])
     kept, gone = _is_among(made_as, drawn_as), ~_is_among(drawn_as, made_as)
+    if not said.any() and not gone.any() and kept.all():
+        return nothing
+    found = np.zeros((len(lines.vertices), 2))
     if said.any():
         order = np.argsort(drawn_as, kind="stable")
         numbers, first = np.unique(drawn_as[order], return_index=True)

@@ -57,36 +57,46 @@ alone."""
 def drawn_of(toolpath: Toolpath, runs: Ints, steps: Sequence[Step], placed: Drawing) -> Drawn:
     """What is drawn for each row of a toolpath, whose rows are of the runs (N,) of these steps,
     counted through all of them; the drawing in the work frame."""
-    off = np.zeros((len(toolpath), 2))
-    edge = np.full(len(toolpath), -1, dtype=np.int64)
+    # One number, seen as many, until there is another.
+    off = np.broadcast_to(0.0, (len(toolpath), 2))
+    edge = np.broadcast_to(np.int64(-1), len(toolpath))
     boxes: list[tuple[Floats, Floats]] = []
     first = 0
     for step in steps:
         rows = np.flatnonzero((runs >= first) & (runs < first + len(step.runs)))
         mine = rows[toolpath.is_feed[rows]]
-        off[mine] = _off(toolpath, mine, step, placed)
+        for some, values in _off(toolpath, mine, step, placed):
+            off = off if off.flags.writeable else off.copy()
+            off[some] = values
         of_item = np.full(len(step.items), -1, dtype=np.int64)
         for index, box in _edges(step, placed):
             of_item[index] = len(boxes)
             boxes.append(box)
-        edge[rows] = of_item[step.owner[runs[rows] - first]]
+        if (of_item >= 0).any():
+            edge = edge if edge.flags.writeable else edge.copy()
+            edge[rows] = of_item[step.owner[runs[rows] - first]]
         first += len(step.runs)
     both = np.array(boxes, dtype=np.float64).reshape(-1, 2, 2, 2)
     return Drawn(off, edge, both[:, 0], both[:, 1])
 
 
-def _off(toolpath: Toolpath, rows: Ints, step: Step, placed: Drawing) -> Floats:
-    """(R, 2) how far what was drawn lies from the lines that the rows were planned along, mm."""
+def _off(
+    toolpath: Toolpath, rows: Ints, step: Step, placed: Drawing
+) -> Iterator[tuple[Ints, Floats]]:
+    """Some of the rows (R,) at a time, and (R, 2) how far what was drawn lies from the lines that
+    they were planned along, mm; rows that are left out lie on them."""
     made = 0.0
     if step.operation.kind == "vcarve":
         from camtool.planning.carve import CARVE_TOLERANCE_MM
 
         made = CARVE_TOLERANCE_MM
-    found = np.full((len(rows), 2), made)
-    lines = step.chosen.lines
-    of = placed.off_mm[_vertex_rows(placed.paths, step.chosen.source)]
+    lines, of = step.chosen.lines, placed.off_mm
+    if of.any():
+        of = of[_vertex_rows(placed.paths, step.chosen.source)]
     if not len(rows) or not of.any():
-        return found
+        if made:
+            yield rows, np.full((len(rows), 2), made)
+        return
     from camtool.geometry.boxes import Curves
     from camtool.geometry.polylines import segment_rows
     from camtool.kernels.move_tree import hilbert_order
@@ -104,8 +114,7 @@ def _off(toolpath: Toolpath, rows: Ints, step: Step, placed: Drawing) -> Floats:
         pairs = curves_within(points, apart + AS_NEAR_MM, curves.rows, curves.tree)
         most = np.zeros((len(points) // len(PLACES), 2))
         np.maximum.at(most, pairs[:, 0] // len(PLACES), of[pairs[:, 1]])
-        found[some] += most
-    return found
+        yield rows[some], most + made
 
 
 def _vertex_rows(lines: Polylines, chosen: Ints) -> Ints:

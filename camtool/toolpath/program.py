@@ -39,7 +39,7 @@ class Program:
             data=data,
             extension=machine.target.extension,
             target=machine.target.name,
-            row_of_block=np.array(row_of_block, dtype=np.int64),
+            row_of_block=np.asarray(row_of_block, dtype=np.int64),
             findings=tuple(findings),
         )
 

@@ -81,7 +81,6 @@ def arcs_of(toolpath: Toolpath, dialect: GcodeDialect) -> Arcs:
     """The toolpath's rows in units, arcs as this controller takes them."""
     unit = 10.0**-dialect.decimals
     end = units_of(toolpath.end, dialect.decimals)
-    start = np.concatenate([units_of(toolpath.start[None, :], dialect.decimals), end[:-1]])
     offset = np.zeros((len(toolpath), 2), dtype=np.int64)
     kind = np.array(toolpath.kind)
     arcs = Arcs(end, offset, kind, {})
@@ -98,7 +97,8 @@ def arcs_of(toolpath: Toolpath, dialect: GcodeDialect) -> Arcs:
     written = ~flat & ~huge
     centre = np.zeros((len(rows), 2), dtype=np.int64)
     centre[written] = units_of(toolpath.centre[rows[written]], dialect.decimals)
-    begin, stop = start[rows, :2], end[rows, :2]
+    begin, stop = end[rows - 1, :2], end[rows, :2]
+    begin[rows == 0] = units_of(toolpath.start[:2], dialect.decimals)
     offset[rows[written]] = (centre - begin)[written]
     holds = arcs_accepted(np.abs(sweep), (begin, stop, centre), kind[rows], dialect)
     halves = dialect.full_circles == "halves"

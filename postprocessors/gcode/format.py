@@ -24,6 +24,9 @@ from camtool.toolpath.words import Words, line_lengths
 MOST_UNITS: Final = 10**15
 """Whole units beyond this are not written: their decimals would no longer be exact in a float."""
 
+VALUES_AT_ONCE: Final = 1 << 16
+"""So many values become whole units together."""
+
 COMMENT_CHARS: Final = 60
 """Longest comment, without its parentheses."""
 
@@ -47,10 +50,15 @@ def units_of(values: Floats, decimals: int) -> Ints:
 
     ValueError for what is not finite or too large to be exact.
     """
-    scaled = np.asarray(values, dtype=np.float64) * 10.0**decimals
-    if not (np.abs(scaled) <= MOST_UNITS).all():
-        raise ValueError("a value is not finite, or too large for its decimals")
-    return np.asarray((np.sign(scaled) * np.floor(np.abs(scaled) + 0.5)).astype(np.int64))
+    units = np.empty(np.shape(values), dtype=np.int64)
+    given, found = np.ravel(values), units.reshape(-1)
+    for low in range(0, len(given), VALUES_AT_ONCE):
+        some = slice(low, low + VALUES_AT_ONCE)
+        scaled = given[some] * 10.0**decimals
+        if not (np.abs(scaled) <= MOST_UNITS).all():
+            raise ValueError("a value is not finite, or too large for its decimals")
+        found[some] = np.sign(scaled) * np.floor(np.abs(scaled) + 0.5)
+    return units
 
 
 def values_of(units: Ints, decimals: int) -> Floats:

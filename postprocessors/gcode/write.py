@@ -14,6 +14,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
+from itertools import pairwise
 from typing import Final
 
 import msgspec
@@ -79,7 +80,7 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
     events = events_of(toolpath, style.event)
     sent = sent_rows(toolpath, arcs, feeds)
     arc_counts = arcs.counts
-    del arcs
+    del arcs, feeds
     frame = [style.frame] if style.frame else []
     first_mode, changes = _path_modes(toolpath, sent, style)
     ended = len(toolpath) > 0 and toolpath.kind[-1] == Kind.END
@@ -174,13 +175,12 @@ class Order:
             every = np.arange(len(sent.row))
             mine = self._before[1:] + np.searchsorted(at, every, side="right")
             columns.insert(0, Words("N", mine, sent.is_motion))
-        motions = np.flatnonzero(self._is_motion)
-        blocks = self._before[motions] + np.searchsorted(at, motions, side="right")
         # In front of a row: the other blocks, each behind its comments; then those of a motion.
-        other, motion = (np.searchsorted(each, commented) for each in (number - 1, blocks))
-        moves = np.isin(commented, blocks)
+        other, moves = np.searchsorted(number - 1, commented), ~np.isin(commented, number - 1)
+        motion = (commented - other)[moves]
         place, rank = np.empty(len(commented), dtype=np.int64), 2 * other
-        place[moves], place[~moves] = motions[motion[moves]], at[other[~moves]]
+        place[moves] = np.searchsorted(self._before, motion, side="right") - 1
+        place[~moves] = at[other[~moves]]
         rank[moves] = 2 * len(others)
         rows = np.append(at, place)
         order = np.lexsort((np.append(2 * np.arange(len(others)) + 1, rank), rows))
@@ -352,18 +352,19 @@ def sent_rows(toolpath: Toolpath, arcs: Arcs, feeds: Ints) -> Sent:
     still &= _not_yet_written(flat | still, home_xy)
     both = is_arc | still | (flat & _not_yet_written(flat | still, home_xy))
     written[both, :2] = True
-    wanted = np.asarray(_differ(toolpath.end, toolpath.start).any(axis=1))[of]
     kept = ~motion | written.any(axis=1)
-    homes = np.cumsum(home_xy | home_z)[kept]
+    gone = of[~kept]
+    wanted = (toolpath.end[gone] != toolpath.starts_of(gone)).any(axis=1)
+    of = of[kept]
     return Sent(
         kind[kept],
         end[kept],
         offset[kept],
-        feeds[of][kept],
-        of[kept],
+        feeds[of],
+        of,
         written[kept],
-        np.diff(_at_motions(homes, motion[kept]), prepend=0) > 0,
-        int((~kept & wanted).sum()) + arcs.counts.dropped,
+        _first_after((home_xy | home_z)[kept], motion[kept]),
+        int(wanted.sum()) + arcs.counts.dropped,
     )
 
 
@@ -376,16 +377,22 @@ def _differ(ends: Ints | Floats, start: Floats) -> Bools:
 
 def _not_yet_written(written: Bools, home: Bools) -> Bools:
     """(M,) true where nothing was written before the row since the start, or since homing."""
-    rows = np.arange(len(written))
-    last_written = np.maximum.accumulate(np.where(written, rows, -1))
-    last_home = np.maximum.accumulate(np.where(home, rows, -1))
-    before = np.concatenate([[-1], last_written])[: len(written)]
-    return np.asarray(before <= last_home)
+    found = np.ones(len(written), dtype=np.bool_)
+    for begin, end in pairwise([0, *np.flatnonzero(home).tolist(), len(written)]):
+        if written[begin:end].any():
+            found[begin + int(written[begin:end].argmax()) + 1 : end] = False
+    return found
 
 
-def _at_motions(homes: Ints, motion: Bools) -> Ints:
-    """(M,) `homes` of the motion last passed: it grows only where a motion follows homing."""
-    return np.maximum.accumulate(np.where(motion, homes, 0)) if len(homes) else homes
+def _first_after(home: Bools, motion: Bools) -> Bools:
+    """(M,) true for the first motion behind each homing, of several in a row behind the last."""
+    found = np.zeros(len(home), dtype=np.bool_)
+    homes = np.flatnonzero(home)
+    if len(homes):
+        moving = np.flatnonzero(motion)
+        at = np.searchsorted(moving, homes)
+        found[moving[at[at < len(moving)]]] = True
+    return found
 
 
 def motion_words(sent: Sent, dialect: GcodeDialect, feed_decimals: int) -> list[Words]:
