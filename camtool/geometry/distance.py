@@ -84,7 +84,8 @@ def nearest(points: Floats, segments: Segments) -> Nearest:
     distance = np.empty(len(points))
     segment = np.empty(len(points), dtype=np.int64)
     for begin in range(0, len(points), POINTS_AT_A_TIME):
-        some = np.ascontiguousarray(points[begin : begin + POINTS_AT_A_TIME])
+        # A copy: the loops take no array that nobody may write to.
+        some = np.array(points[begin : begin + POINTS_AT_A_TIME])
         reach = nearest_distances(some, curves.rows, curves.tree)
         reach += NEAREST_SPARE_MM + NEAREST_SPARE * reach
         point, near = curves_within(some, reach, curves.rows, curves.tree).T

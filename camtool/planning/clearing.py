@@ -67,6 +67,9 @@ BAND_PLACES = 200
 ON_LINE_MM = 5e-6
 """A place this near to the boundary of a region is still inside it."""
 
+LINKS_AT_ONCE = 1 << 10
+"""So many links are compared with the boundary of their region together."""
+
 POLE_SHARE = 0.01
 """Tolerance for the pole of a region, over the extent of the region."""
 
@@ -224,12 +227,16 @@ def zigzag_paths(region: Polylines, scan: Scan) -> list[Floats]:
     whole, linked = ConnectedRegion(region), LinkedPath()
     margin = min(scan.radius_mm - 0.5 * scan.step_mm, MOST_MARGIN * scan.radius_mm)
     for part in parts_of(offset_shape(region, margin)):
-        inner, strokes = ConnectedRegion(part), strokes_of(part, scan)
-        around = whole
-        for index, turned in _order(strokes):
-            ends = strokes.ends[index, ::-1] if turned else strokes.ends[index]
-            linked.cut(np.column_stack([ends, np.zeros(2)]), around)
-            around = inner
+        strokes = strokes_of(part, scan)
+        order = _order(strokes)
+        if not order:
+            continue
+        ends = np.array([strokes.ends[k, :: -1 if turned else 1] for k, turned in order])
+        cut = [np.column_stack([each, np.zeros(2)]) for each in ends]
+        linked.cut(cut[0], whole)
+        links = routes(ends[:-1, 1], ends[1:, 0], ConnectedRegion(part))
+        for link, stroke in zip(links, cut[1:], strict=True):
+            linked.join(link, stroke)
     linked.cut_all(region, whole, whole, scan.forward)
     return linked.paths()
 
@@ -386,13 +393,16 @@ class LinkedPath:
 
         Where rounding hides the link (`route`) the tool comes up: another path begins.
         """
-        if self.here is not None:
-            link = route(self.here, stroke[0, :2], region)
-            if link is None:
-                self._done.append(_chained(self._parts))
-                self._parts = []
-            else:
-                self._parts.append(link)
+        here = self.here
+        self.join(None if here is None else route(here, stroke[0, :2], region), stroke)
+
+    def join(self, link: Floats | None, stroke: Floats) -> None:
+        """A stroke after its link; None where there is none."""
+        if link is not None:
+            self._parts.append(link)
+        elif self._parts:
+            self._done.append(_chained(self._parts))
+            self._parts = []
         self._parts.append(stroke)
 
     def cut_all(
@@ -503,20 +513,40 @@ def _length_to(point: Floats, segments: Segments, row: int) -> float:
 
 
 def route(start: Floats, end: Floats, region: ConnectedRegion) -> Floats | None:
-    """(k, 3) x, y, bulge from one place (2,) of a connected region to another, staying in it.
+    """(k, 3) x, y, bulge from one place (2,) of a connected region to another, staying in it, as
+    `routes` has it."""
+    return routes(start[None, :], end[None, :], region)[0]
+
+
+def routes(starts: Floats, ends: Floats, region: ConnectedRegion) -> list[Floats | None]:
+    """(k, 3) x, y, bulge each: from places (J, 2) of a connected region to others (J, 2), staying
+    in it.
 
     A straight line leaves a region through one of its paths and comes back through the same one:
     each path has the region on its left and one connected piece of what is not the region on its
     right. So the link goes straight, and where the line is outside it follows that path, in the
     shorter direction.
 
-    None when rounding hides where the straight line goes out or in, or the two places are not in
+    None where rounding hides where the straight line goes out or in, or the two places are not in
     one connected region.
     """
+    found: list[Floats | None] = []
+    for low in range(0, len(starts), LINKS_AT_ONCE):
+        some = slice(low, low + LINKS_AT_ONCE)
+        outside = _outside(starts[some], ends[some], region)
+        for start, end, parts in zip(starts[some], ends[some], outside, strict=True):
+            found.append(_linked(start, end, parts, region))
+    return found
+
+
+def _linked(
+    start: Floats, end: Floats, outside: list[tuple[float, float]], region: ConnectedRegion
+) -> Floats | None:
+    """One link, of whose straight line these parts are outside of the region."""
     if np.hypot(*(end - start)) <= POSITION_EPS_MM:
         return np.array([[*start, 0.0]])
     rows = [np.array([[*start, 0.0]])]
-    for out, back in _outside(start, end, region):
+    for out, back in outside:
         path, begin = region.place(start + out * (end - start))
         other, stop = region.place(start + back * (end - start))
         if path != other:
@@ -526,18 +556,34 @@ def route(start: Floats, end: Floats, region: ConnectedRegion) -> Floats | None:
     return tidy(np.concatenate(rows))
 
 
-def _outside(start: Floats, end: Floats, region: ConnectedRegion) -> list[tuple[float, float]]:
-    """The parts (from, to) of the straight line that are outside of the region, in order."""
-    room = points_to_segments(start[None, :], region.segments).min()
-    if np.hypot(*(end - start)) <= room + ON_LINE_MM:
-        return []
-    line = Segments.between(start[None, :], end[None, :], np.zeros(1))
-    found = crossings(line, region.segments, position_eps_mm=ON_LINE_MM)
-    marks = np.unique(np.concatenate([[0.0, 1.0], found.ta]))
-    parts = 0.5 * (marks[1:] + marks[:-1])
-    points = point_at(line, np.zeros(len(parts), dtype=np.int64), parts)
-    first, last = runs_of_true(~region.holds(points))
-    return list(zip(marks[first].tolist(), marks[last].tolist(), strict=True))
+def _outside(
+    starts: Floats, ends: Floats, region: ConnectedRegion
+) -> list[list[tuple[float, float]]]:
+    """Of each straight line between places (J, 2) and (J, 2) the parts (from, to) that are outside
+    of the region, in order."""
+    outside: list[list[tuple[float, float]]] = [[] for _ in range(len(starts))]
+    room = nearest(starts, region.segments).distance
+    far = np.flatnonzero(np.hypot(*(ends - starts).T) > room + ON_LINE_MM)
+    if not len(far):
+        return outside
+    lines = Segments.between(starts[far], ends[far], np.zeros(len(far)))
+    found = crossings(lines, region.segments, position_eps_mm=ON_LINE_MM)
+    every = np.arange(len(far))
+    rows = np.concatenate([every, every, found.row_a])
+    marks = np.concatenate([np.zeros(len(far)), np.ones(len(far)), found.ta])
+    rows, marks = np.unique(np.column_stack([rows, marks]), axis=0).T
+    of = np.flatnonzero(rows[1:] == rows[:-1])  # a part is between two marks of one line
+    line, begin, stop = rows[of].astype(np.int64), marks[of], marks[of + 1]
+    out = ~region.holds(point_at(lines, line, 0.5 * (stop + begin)))
+    # Parts in a row are one.
+    goes_on = np.concatenate([[False], out[1:] & out[:-1] & (line[1:] == line[:-1])])
+    first = np.flatnonzero(out & ~goes_on)
+    last = np.flatnonzero(out & ~np.append(goes_on[1:], False))
+    for row, low, high in zip(
+        far[line[first]].tolist(), begin[first].tolist(), stop[last].tolist(), strict=True
+    ):
+        outside[row].append((low, high))
+    return outside
 
 
 def _along(along: MeasuredPath, begin: float, end: float) -> Floats:

@@ -291,7 +291,7 @@ class Chosen:
     """The paths that an operation takes, in the work frame: `lines`; `source` (M,), the index of
     each in the placed drawing; `names` for people; `points` (K, 2) mm, the marks of its layers,
     with their `point_names`. `rim` (M,): whether a closed path is the rim of a part, what lies
-    within it staying, or of a hole."""
+    within it staying, or of a hole. `file`: that of the drawing."""
 
     lines: Polylines
     source: Ints
@@ -299,6 +299,7 @@ class Chosen:
     points: Floats
     point_names: tuple[str, ...]
     rim: Bools
+    file: str | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -217,6 +217,7 @@ def _check_step(chosen: Chosen, operation: Operation) -> None:
     if size > MOST_STEPS * step:
         raise OptionError(
             f"a step-over of {step:g} mm makes more than {MOST_STEPS} rings in {size:g} mm",
+            file=chosen.file,
             where=key_of(operation, "step_over"),
             mend="give a larger step-over, or a larger tool",
         )

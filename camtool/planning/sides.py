@@ -226,6 +226,7 @@ def choose(drawing: Drawing, operation: Operation, sides: Sides) -> Chosen:
         points=np.array([mark.at_mm for mark in marks], dtype=np.float64).reshape(len(marks), 2),
         point_names=tuple(f"{mark.layer}/{mark.source}" for mark in marks),
         rim=_rim(operation, sides, index),
+        file=drawing.file,
     )
 
 

@@ -1,5 +1,7 @@
 """What a job's numbers make together is estimated, and refused with the number that asks."""
 
+from dataclasses import replace
+
 import pytest
 
 from camtool.errors import OptionError
@@ -22,6 +24,13 @@ def test_too_much_work_is_refused(settings: dict[str, object], words: list[str])
         plan(drawing_of([rectangle(0, 0, 1, 1)]), job_of(**settings), path_machine())
     for word in words:
         assert word in str(caught.value), str(caught.value)
+
+
+def test_a_pocket_of_too_many_lines_is_refused_by_the_name_of_its_drawing() -> None:
+    drawing = replace(drawing_of([rectangle(0, 0, 90, 90)]), file="plate.svg")
+    job = job_of(kind="pocket", pattern="zigzag", tool_diameter_mm=0.01, step_over=0.4)
+    with pytest.raises(OptionError, match=r"^plate.svg: operation 'pocket', key step_over: "):
+        plan(drawing, job, path_machine())
 
 
 def test_many_passes_of_much_are_too_much_where_few_of_little_are_not() -> None:

@@ -12,11 +12,20 @@ from shapely import Point, Polygon
 
 from camtool.geometry.measure import length, point_at, sample
 from camtool.geometry.polylines import Polyline, Segments
-from camtool.planning.clearing import ConnectedRegion, closest, outside_parts, route, scanned
+from camtool.planning import clearing
+from camtool.planning.clearing import (
+    ConnectedRegion,
+    closest,
+    outside_parts,
+    route,
+    routes,
+    scanned,
+)
 from camtool.planning.paths import MeasuredPath
 from tests.oracles.contours import CIRCLE, DUMBBELL, ELL, SQUARE
 from tests.oracles.contours import opened as open_path
 from tests.oracles.offset import chords, dense, distance, inside
+from tests.oracles.routes import outside as outside_of_one
 from tests.paths import moved, scaled
 from tests.planning.pocket_cases import SHAPES, region_of, shapes
 from tests.strategies import polylines
@@ -86,6 +95,37 @@ def test_ways_stay_in_the_region(paths: list[Polyline], parts: tuple[float, floa
     clear = points[apart > 1e-3]
     assert inside(clear, [chords(path, 1e-3) for path in region]).all()
     assert found[[0, -1], :2] == pytest.approx(np.array(ends), abs=1e-5)
+
+
+@settings(max_examples=40)
+@given(
+    paths=shapes(),
+    parts=st.lists(st.tuples(st.floats(0.0, 1.0), st.floats(0.0, 1.0)), max_size=9),
+    at_once=st.integers(1, 10),
+)
+def test_ways_that_are_looked_for_together_are_those_of_one_at_a_time(
+    paths: list[Polyline], parts: list[tuple[float, float]], at_once: int
+) -> None:
+    boundary = region_of(paths)
+    region, along = ConnectedRegion(boundary), [MeasuredPath.of(path) for path in boundary]
+    ends = np.array(
+        [
+            [
+                each.at(np.array([part * each.total_mm]))[0]
+                for each, part in zip((along[-1], along[0]), of, strict=True)
+            ]
+            for of in parts
+        ]
+    ).reshape(-1, 2, 2)
+    plain = [outside_of_one(*pair, region) for pair in ends]
+    assert clearing._outside(ends[:, 0], ends[:, 1], region) == plain
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(clearing, "LINKS_AT_ONCE", at_once)
+        together = routes(ends[:, 0], ends[:, 1], region)
+    for found, (start, end) in zip(together, ends, strict=True):
+        one = route(start, end, region)
+        assert (found is None) == (one is None)
+        assert found is None or np.array_equal(found, one)
 
 
 @given(path=polylines(), place=st.tuples(st.floats(-20, 20), st.floats(-20, 20)))
