@@ -9,7 +9,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO
 
-from camtool.errors import ProgramError
+from camtool.errors import PostError, ProgramError
 
 MAX_PROGRAM_BYTES = 500_000_000
 """A larger program file is refused before it is read."""
@@ -61,6 +61,21 @@ def program_bytes(source: Path | BinaryIO, file: str) -> bytes:
         size = f"{MAX_PROGRAM_BYTES // 1_000_000} MB"
         raise ProgramError(f"is larger than {size}", file=file, mend=SPLIT_PROGRAM)
     return data
+
+
+class TooLongError(PostError):
+    """A program that no reader would take; the pipeline names the drawing, or the program, that it
+    was to be made of."""
+
+
+def refuse_too_long(count: int, unit: str) -> None:
+    """TooLongError for a program that would have more than MAX_MOVES lines, blocks or whatever its
+    `unit` is called: what writers ask before they make its text."""
+    if count > MAX_MOVES:
+        raise TooLongError(
+            f"the program would have more than {MAX_MOVES} {unit}s",
+            mend="make several programs of it",
+        )
 
 
 def check_count(count: int, unit: str) -> None:

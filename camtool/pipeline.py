@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from pathlib import PurePath
 from typing import TYPE_CHECKING
 
+from camtool.bounds import TooLongError
 from camtool.errors import ProgramError
 from camtool.findings import Finding, Severity, worst
 from camtool.progress import Progress
@@ -106,7 +107,7 @@ def post_drawing(
     del plan  # what is not judged needs no stages of it
     compensation = _compensated(wanted, target.machine) if compensate else None
     written = wanted if compensation is None else compensation.toolpath
-    program, decoded = _written(written, target, progress)
+    program, decoded = _written(written, target, drawing.file, progress)
     repeated = _repeated(program, decoded)
     findings = _merged(findings, program.findings, decoded.findings, without=repeated)
     if judged is None:
@@ -254,7 +255,7 @@ def convert_program(
     run = Run(source=file, target=target, wanted=wanted)
     if worst(wanted.findings) >= Severity.ERROR:
         return replace(run, findings=wanted.findings)
-    program, again = _written(wanted, target, progress)
+    program, again = _written(wanted, target, file, progress)
     repeated = _repeated(program, again)
     findings = _merged(wanted.findings, program.findings, again.findings, without=repeated)
     if not check:
@@ -296,11 +297,16 @@ def _decoded(data: bytes, target: LoadedTarget, file: str) -> Toolpath:
 
 
 def _written(
-    moves: Toolpath, target: LoadedTarget, progress: Progress
+    moves: Toolpath, target: LoadedTarget, file: str, progress: Progress
 ) -> tuple[Program, Toolpath]:
-    """The program of these moves, and what the target's controller decodes of it."""
+    """The program of these moves, which are of a file, and what the target's controller decodes
+    of it."""
     progress.begin("writing")
-    program = target.target.write(moves, target.machine)
+    try:
+        program = target.target.write(moves, target.machine)
+    except TooLongError as error:
+        error.file = file
+        raise
     progress.begin("reading back")
     return program, target.target.read(program.data, target.machine)
 

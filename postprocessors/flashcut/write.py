@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 
 from camtool.arrays import Floats, Ints
+from camtool.bounds import refuse_too_long
 from camtool.errors import PostError
 from camtool.findings import Finding
 from camtool.kernels.lattice import to_steps
@@ -76,6 +77,7 @@ def write_program(toolpath: Toolpath, machine: FlashcutMachine) -> Program:
         if row in words
     ]
     others.append((len(blocks.row), dialect.program_end, len(toolpath) - 1 if ended else -1))
+    refuse_too_long(len(blocks.row) + len(others), "line")
     texts = texts_of(blocks.words(dialect, feed_decimals(machine)), blanks=True)
     places, ends, their_rows = zip(*others, strict=True)
     return Program.of_text(

@@ -21,6 +21,7 @@ import msgspec
 import numpy as np
 
 from camtool.arrays import Bools, Codes, Floats, Ints
+from camtool.bounds import refuse_too_long
 from camtool.errors import PostError
 from camtool.findings import Finding
 from camtool.machine.model import Machine
@@ -95,12 +96,11 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
     order.add(len(sent.row), footer[-1:], len(toolpath) - 1 if ended else -1)
     of_row = order.rows(sent.row)
     comments = _comments(toolpath, of_row, style)
+    head = [*frame, *_header(toolpath, machine, dialect)]
+    refuse_too_long(len(head) + len(of_row) + len(comments[0]) + len(frame), "line")
     data = b"".join(
         [
-            *(
-                f"{line}\n".encode("ascii")
-                for line in [*frame, *_header(toolpath, machine, dialect)]
-            ),
+            *(f"{line}\n".encode("ascii") for line in head),
             order.text(sent, dialect, feed_decimals(machine), *comments),
             *(f"{line}\n".encode("ascii") for line in frame),
         ]

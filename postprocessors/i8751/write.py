@@ -32,6 +32,7 @@ import numpy as np
 import numpy.typing as npt
 
 from camtool.arrays import Bools, Ints
+from camtool.bounds import refuse_too_long
 from camtool.findings import Finding
 from camtool.toolpath.moves import Toolpath
 from camtool.toolpath.program import Program
@@ -98,6 +99,10 @@ def write_program(toolpath: Toolpath, machine: I8751Machine) -> Program:
     check_toolpath(toolpath, machine, dialect)
     records = records_of(toolpath, machine, dialect)
     extension = TEXT_EXTENSION
+    if dialect.format == "listing":
+        refuse_too_long(len(records) + len(records.messages) + 2, "line")  # its head, and END
+    else:
+        refuse_too_long(len(records), "record")
     if dialect.format == "listing":
         data = listing_text(records, machine).encode("ascii")
     elif dialect.format == "hex":

@@ -16,6 +16,7 @@ from typing import Final
 
 import numpy as np
 
+from camtool.bounds import refuse_too_long
 from camtool.errors import PostError
 from camtool.toolpath.moves import Toolpath
 from camtool.toolpath.program import Program
@@ -44,6 +45,7 @@ def write_program(toolpath: Toolpath, machine: MatlabRouterMachine) -> Program:
             + (f" on a grid of {dialect.grid_units * UNIT_MM:g} mm" if len(cuts.row) else ""),
             mend="scale the drawing up" if len(cuts.row) else "cut below the stock's top, Z < 0",
         )
+    refuse_too_long(len(made.lines.row) + len(made.offsets) - 1, "block")
     stream = dialect.format == "stream"
     jobs, count = _numbers_of(made), len(made.offsets) - 1
     heads = np.array(made.offsets[:-1])

@@ -19,6 +19,7 @@ from typing import Final, NoReturn
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
+from camtool.bounds import refuse_too_long
 from camtool.errors import PostError
 from camtool.findings import Finding
 from camtool.toolpath.lower import Lowered, arcs_to_lines, helices_to_steps, slope_step_mm
@@ -121,6 +122,7 @@ class _Writer:
         points = self._points()
         events = self._events(points)
         sent = points.sent
+        refuse_too_long(int(np.count_nonzero(sent)) + len(events) + 3, "block")  # G54 G90 M30
         texts = texts_of(self._words(points), end=";\n")
         rows = self._row[points.row[sent]]
         starts = [(0, "G54;", self._row[0] if self._first else -1), (0, "G90;", -1)]

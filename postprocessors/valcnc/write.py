@@ -17,6 +17,7 @@ from typing import Final
 import numpy as np
 
 from camtool.arrays import Floats
+from camtool.bounds import refuse_too_long
 from camtool.errors import PostError
 from camtool.findings import Finding
 from camtool.toolpath.lower import Lowered, arcs_to_lines, arcs_within
@@ -63,6 +64,7 @@ def write_program(toolpath: Toolpath, machine: ValcncMachine) -> Program:
     rules = ArcRules(dialect.decimals, "halves", MOST_UNITS, chord_fits=True)
     rows = plain_rows(_scaled(lowered.toolpath, scales), rules)
     of_row = lowered.row[rows.row]
+    refuse_too_long(int(np.count_nonzero(rows.moves)), "line")
     data = _text(rows, dialect)
     _check_length(data, dialect)
     first = toolpath.place(int(lowered.row[rows.first])) if rows.first >= 0 else ""

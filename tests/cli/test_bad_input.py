@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from camtool import bounds
 from tests.cli.conftest import ROOT, Run
 
 LOGO = (ROOT / "samples" / "logo.dxf").read_bytes()
@@ -167,3 +168,24 @@ def test_a_real_process_gives_the_same_codes(camtool_process: Run, tmp_path: Pat
     assert camtool_process("post", "none.csv", "-t", "pic-mmh").returncode == 2
     assert camtool_process("--version").returncode == 0
     assert [path.name for path in tmp_path.iterdir()] == ["large.csv"]
+
+
+def test_what_would_be_too_long_is_refused_before_it_is_written(
+    camtool: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "zigzag.csv").write_text("".join(f"{k % 2},{k}\n" for k in range(40)))
+    lines = "".join(f"G1 F100 X{k}\n" for k in range(27))
+    (tmp_path / "long.ngc").write_text(f"G21 G90\n{lines}M2\n")
+    (tmp_path / "a.gc").write_text("old")
+    monkeypatch.setattr(bounds, "MAX_MOVES", 30)
+    for job in (
+        ["post", "zigzag.csv", "--no-verify", "-t", "grbl"],
+        ["convert", "long.ngc", "--from", "linuxcnc", "--to", "grbl"],
+    ):
+        done = camtool(*job, "-o", "a.gc")
+        assert done.returncode == 2
+        assert (
+            f"{job[1]}: the program would have more than 30 lines; make several"
+            in done.stderr.decode()
+        )
+        assert (tmp_path / "a.gc").read_text() == "old"

@@ -1,16 +1,19 @@
 """What is too large is refused at once, by every reader and before a file is read."""
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 import camtool
 from camtool import bounds
+from camtool.bounds import TooLongError
 from camtool.cli.files import read_bytes
 from camtool.errors import ProgramError
 from camtool.target.registry import LoadedTarget, load_target, target_names
 from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.moves import Kind
 from tests.importers.test_read import Input
 from tests.postprocessors.i8751.machines import SAMPLE
 
@@ -45,6 +48,37 @@ def test_a_program_of_too_many_moves_is_refused(
     assert error.value.mend == "split the program"
     with pytest.raises(ProgramError, match=r"^<bytes>: .*more than 30"):
         camtool.verify(data, target)
+
+
+@pytest.mark.parametrize(("name", "setting"), FORMS)
+def test_a_writer_makes_just_so_many_moves_as_its_reader_takes(
+    name: str, setting: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target = loaded(name, setting)
+    path = ToolpathBuilder().rapid(1.0, 1.0).message("hello")
+    path.source = "line 1"
+    path.line(z=-1.0, feed=target.machine.feed.default_mm_min)
+    for k in range(40):
+        path.line(1.0 + k % 2, 1.0 + k // 2, feed=target.machine.feed.default_mm_min)
+    moves = path.rapid(z=1.0).event(Kind.END).finish()
+    data = target.target.write(moves, target.machine).data
+
+    def refused(call: Callable[[], object], most: int) -> bool:
+        monkeypatch.setattr(bounds, "MAX_MOVES", most)
+        try:
+            call()
+        except (TooLongError, ProgramError) as error:
+            return f"more than {most} " in str(error)
+        return False
+
+    for most in range(30, 80):
+        reading = refused(lambda: target.target.read(data, target.machine), most)
+        writing = refused(lambda: target.target.write(moves, target.machine), most)
+        # The reader of a dump counts its lines, which are about five for each record.
+        assert writing == reading or setting == "dialect.format=hex"
+    monkeypatch.setattr(bounds, "MAX_MOVES", 30)
+    with pytest.raises(TooLongError, match=r"would have more than 30 .*; make several programs"):
+        target.target.write(moves, target.machine)
 
 
 def test_the_lines_of_a_hex_dump_are_no_moves(monkeypatch: pytest.MonkeyPatch) -> None:
