@@ -144,7 +144,9 @@ def check_rows(toolpath: Toolpath, machine: Machine) -> None:
         endless = (kind == Kind.DWELL) & ~((toolpath.value >= 0.0) & np.isfinite(toolpath.value))
     for bad, message, mend in (
         (
-            (np.abs(toolpath.end) > MAX_STEPS * step_mm).any(axis=1),
+            toolpath.by_parts(
+                lambda part: np.asarray((np.abs(part.end) > MAX_STEPS * step_mm).any(axis=1))
+            ),
             "a position is beyond all that the controller can count",
             "",
         ),
@@ -160,7 +162,9 @@ def check_rows(toolpath: Toolpath, machine: Machine) -> None:
             "set it once, before any move",
         ),
         (
-            ~toolpath.is_motion & (toolpath.end != toolpath.starts).any(axis=1),
+            toolpath.by_parts(
+                lambda part: ~part.is_motion & (part.end != part.starts).any(axis=1)
+            ),
             "an event that moves the tool",
             "",
         ),
@@ -169,5 +173,8 @@ def check_rows(toolpath: Toolpath, machine: Machine) -> None:
 
 
 def waits_s(toolpath: Toolpath, rows: int) -> Floats:
-    """(rows,) s: the dwell of each row."""
-    return np.where(toolpath.kind == Kind.DWELL, toolpath.value, 0.0)[:rows]
+    """(rows,) s: the dwell of each row; one number, seen as many, where nothing dwells."""
+    dwells = toolpath.kind[:rows] == Kind.DWELL
+    if not dwells.any():
+        return np.broadcast_to(0.0, rows)
+    return np.where(dwells, toolpath.value[:rows], 0.0)

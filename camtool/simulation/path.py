@@ -29,7 +29,7 @@ from typing import Any
 
 import numpy as np
 
-from camtool.arrays import Bools, Floats
+from camtool.arrays import Bools, Floats, Ints
 from camtool.kernels.lattice import to_steps
 from camtool.machine.model import Machine, PathController
 from camtool.simulation.controller import ControllerModel
@@ -44,7 +44,7 @@ from camtool.simulation.samples import (
     row_chunks,
     sample_spacing_mm,
 )
-from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.moves import Kind, Toolpath, frozen
 
 SPREAD_STEPS = 2.0
 """Radii of the ends of an arc that differ by at most this many steps differ because of
@@ -127,18 +127,24 @@ def on_steps(toolpath: Toolpath, machine: Machine) -> Toolpath:
     home = np.array(machine.controller.machine_zero_mm, dtype=np.float64)
     exact = placed(toolpath, home)
     home = _on_grid(home, machine)
-    start, end = _on_grid(exact.start, machine), _on_grid(exact.end, machine)
-    sweeps = exact.sweeps()
-    made = _centred(replace(exact, start=start, end=end), np.abs(sweeps), machine)
+    start = _on_grid(exact.start, machine)
+    end = frozen(exact.by_parts(lambda part: _on_grid(part.end, machine)))
+    arcs = np.flatnonzero(exact.is_arc)
+    sweeps = exact.sweeps_of(arcs)
+    made = _centred(replace(exact, start=start, end=end), arcs, np.abs(sweeps), machine)
     while True:
-        inside_out = made.is_arc & (np.abs(made.sweeps() - sweeps) > np.pi)
+        bent = made.is_arc[arcs]
+        arcs, sweeps = arcs[bent], sweeps[bent]
+        inside_out = np.abs(made.sweeps_of(arcs) - sweeps) > np.pi
         if not inside_out.any():
             return made
-        made = placed(_turned_back(made, inside_out, np.abs(sweeps) < np.pi), home)
+        short = np.abs(sweeps[inside_out]) < np.pi
+        made = placed(_turned_back(made, arcs[inside_out], short), home)
 
 
-def _centred(made: Toolpath, sweep: Floats, machine: Machine) -> Toolpath:
-    """Arcs with centres at the same distance from their rounded ends and starts.
+def _centred(made: Toolpath, arcs: Ints, sweep: Floats, machine: Machine) -> Toolpath:
+    """The rows `arcs` (J,), which turn by `sweep` (J,), with centres at the same distance from
+    their rounded ends and starts.
 
     With the direction u and the midpoint m of the chord, the nearest such point to the centre c is
     c − ((c − m)·u) u. Its distance from c is the difference of the radii times radius / chord. An
@@ -146,26 +152,28 @@ def _centred(made: Toolpath, sweep: Floats, machine: Machine) -> Toolpath:
     far to one side: for more than half a turn the chord must therefore be at least the radius.
     """
     step = max(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
-    begin, end, centre = made.starts[:, :2], made.end[:, :2], made.centre
+    begin, end, centre = made.starts_of(arcs)[:, :2], made.end[arcs, :2], made.centre[arcs]
     chord, out, back = end - begin, begin - centre, end - centre
     length, radius = np.hypot(chord[:, 0], chord[:, 1]), np.hypot(out[:, 0], out[:, 1])
     spread = np.abs(radius - np.hypot(back[:, 0], back[:, 1]))
-    apt = made.is_arc & (length >= LEAST_CHORD_STEPS * step) & (spread <= SPREAD_STEPS * step)
+    apt = (length >= LEAST_CHORD_STEPS * step) & (spread <= SPREAD_STEPS * step)
     apt &= (sweep <= np.pi) | (length >= radius)
+    if not apt.any():
+        return made
     u = chord[apt] / length[apt, None]
     off = ((centre[apt] - 0.5 * (begin + end)[apt]) * u).sum(axis=1)
-    new = centre.copy()
-    new[apt] -= off[:, None] * u
-    return replace(made, centre=new)
+    new = made.centre.copy()
+    new[arcs[apt]] -= off[:, None] * u
+    return replace(made, centre=frozen(new))
 
 
-def _turned_back(made: Toolpath, inside_out: Bools, short: Bools) -> Toolpath:
-    """The arcs that rounding has turned inside out: short ones as lines, long ones as circles."""
-    lines, full = inside_out & short, inside_out & ~short
-    end = made.end.copy()
-    end[full, :2] = made.starts[full, :2]
-    kind = np.where(lines, np.int64(Kind.LINE), made.kind)
-    centre = np.where(lines[:, None], np.nan, made.centre)
+def _turned_back(made: Toolpath, inside_out: Ints, short: Bools) -> Toolpath:
+    """The arcs (J,) that rounding has turned inside out: short ones as lines, long ones as
+    circles."""
+    lines, full = inside_out[short], inside_out[~short]
+    end, kind, centre = made.end.copy(), made.kind.copy(), made.centre.copy()
+    end[full, :2] = made.starts_of(full)[:, :2]
+    kind[lines], centre[lines] = Kind.LINE, np.nan
     return replace(made, kind=kind, centre=centre, end=end)
 
 

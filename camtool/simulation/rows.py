@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from camtool.arrays import Floats
+from camtool.arrays import Bools, Floats
 from camtool.errors import ProgramError
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Kind, Toolpath, frozen
@@ -36,12 +36,19 @@ def placed(toolpath: Toolpath, home: Floats) -> Toolpath:
 
 def check_positions(toolpath: Toolpath, machine: Machine) -> None:
     """ProgramError for an arc without a centre or a position that cannot be counted."""
-    bad = toolpath.is_arc & ~np.isfinite(toolpath.centre).all(axis=1)
+    arcs = np.flatnonzero(toolpath.is_arc)
+    bad = np.zeros(len(toolpath), dtype=np.bool_)
+    bad[arcs] = ~np.isfinite(toolpath.centre[arcs]).all(axis=1)
     refuse(toolpath, bad, "an arc without a centre")
     most = MAX_PATH_STEPS * np.array([axis.coded_step_mm for axis in machine.axes])
-    centre = np.where(toolpath.is_arc[:, None], np.abs(toolpath.centre), 0.0)
-    far = np.any(np.column_stack([np.abs(toolpath.end) > most, centre > most[:2]]), axis=1)
-    refuse(toolpath, far, "a position is beyond all that the controller can count")
+
+    def far(part: Toolpath) -> Bools:
+        centre = np.where(part.is_arc[:, None], np.abs(part.centre), 0.0)
+        beyond = np.column_stack([np.abs(part.end) > most, centre > most[:2]])
+        return np.asarray(beyond.any(axis=1))
+
+    message = "a position is beyond all that the controller can count"
+    refuse(toolpath, toolpath.by_parts(far), message)
 
 
 def check_rows(path: Toolpath, rows: int) -> None:

@@ -26,7 +26,7 @@ from camtool.simulation.controller import ControllerModel
 from camtool.simulation.legs import LegRun, Legs, Standing, check_rows, coded_steps_mm, waits_s
 from camtool.simulation.motion import Chunk, Options
 from camtool.simulation.rows import refuse
-from camtool.toolpath.moves import Toolpath
+from camtool.toolpath.moves import Toolpath, frozen
 
 from .dialect import Dialect, I8751Controller
 from .pulses import PulseTimes
@@ -45,10 +45,10 @@ class I8751Model(ControllerModel[I8751Controller, Dialect]):
         _check(toolpath, machine)
         count = toolpath.running
         times = PulseTimes(machine.dialect)
-        points = np.concatenate([toolpath.start[None, :], toolpath.end[:count]])
-        at = _in_steps(points, machine)
-        standing = Standing(at[0], waits_s(toolpath, count), float(times.periods_s[0]))
-        return LegRun(standing, machine, options).run(_blocks(np.diff(at, axis=0), times))
+        at = _in_steps(toolpath.start[None, :], machine)[0]
+        standing = Standing(at, waits_s(toolpath, count), float(times.periods_s[0]))
+        blocks = _blocks(toolpath.first(count), machine, times)
+        return LegRun(standing, machine, options).run(blocks)
 
     def quantised(self, toolpath: Toolpath, machine: _Machine) -> Toolpath:
         """The same with start and ends at their nearest steps; ProgramError for arcs, homing."""
@@ -57,7 +57,7 @@ class I8751Model(ControllerModel[I8751Controller, Dialect]):
         return replace(
             toolpath,
             start=_in_steps(toolpath.start[None, :], machine)[0] * step_mm,
-            end=_in_steps(toolpath.end, machine) * step_mm,
+            end=frozen(toolpath.by_parts(lambda part: _in_steps(part.end, machine) * step_mm)),
         )
 
     def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
@@ -90,10 +90,12 @@ def _in_steps(points: Floats, machine: _Machine) -> Ints:
     return np.column_stack(columns)
 
 
-def _blocks(steps: Ints, times: PulseTimes) -> Iterator[Legs]:
-    """The legs of rows of `steps` (R, 3): X and Y together, one of them alone, Z."""
-    for low in range(0, len(steps), ROWS_AT_ONCE):
-        moved = steps[low : low + ROWS_AT_ONCE]
+def _blocks(toolpath: Toolpath, machine: _Machine, times: PulseTimes) -> Iterator[Legs]:
+    """The legs of all rows: X and Y together, one of them alone, Z."""
+    for low in range(0, len(toolpath), ROWS_AT_ONCE):
+        part = toolpath.part(low, min(low + ROWS_AT_ONCE, len(toolpath)))
+        points = np.concatenate([part.start[None, :], part.end])
+        moved = np.diff(_in_steps(points, machine), axis=0)
         xy = moved[:, :2]
         size, sense = np.abs(xy), np.sign(xy)
         together = size.min(axis=1, keepdims=True)

@@ -38,7 +38,7 @@ from camtool.simulation.controller import ControllerModel
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import NO_SAMPLES, Chunk, Options, one_row
 from camtool.simulation.rows import block_of, refuse
-from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.moves import Kind, Toolpath, frozen
 
 from . import steps as loops
 from .dialect import Dialect, PicMmhController
@@ -71,13 +71,13 @@ class PicMmhModel(ControllerModel[PicMmhController, Dialect]):
     def quantised(self, toolpath: Toolpath, machine: _Machine) -> Toolpath:
         """The same with start, ends and arc centres at their nearest steps."""
         coded_mm = [axis.coded_step_mm for axis in machine.axes]
-        centre = _on_grid(np.where(toolpath.is_arc[:, None], toolpath.centre, 0.0), coded_mm[:2])
-        return replace(
-            toolpath,
-            start=_on_grid(toolpath.start[None, :], coded_mm)[0],
-            end=_on_grid(toolpath.end, coded_mm),
-            centre=np.where(toolpath.is_arc[:, None], centre, np.nan),
-        )
+        start = _on_grid(toolpath.start[None, :], coded_mm)[0]
+        end = frozen(toolpath.by_parts(lambda part: _on_grid(part.end, coded_mm)))
+        arcs, centre = np.flatnonzero(toolpath.is_arc), toolpath.centre
+        if len(arcs):
+            centre = centre.copy()
+            centre[arcs] = _on_grid(centre[arcs], coded_mm[:2])
+        return replace(toolpath, start=start, end=end, centre=frozen(centre))
 
     def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
         """How arcs are made: dsm, dda or stairs."""
@@ -226,9 +226,9 @@ class PicMmhRun:
         where it is "equal". The ends of arcs become their stops: the controller counts steps, and
         goes on from where it is."""
         toolpath, controller = self._toolpath, self._controller
-        stops = np.full(len(toolpath), -1, dtype=np.int64)
         if controller.arc_end == "equal" or not toolpath.is_arc.any():
-            return stops
+            return np.broadcast_to(np.int64(-1), len(toolpath))
+        stops = np.full(len(toolpath), -1, dtype=np.int64)
         homes = toolpath.kind == Kind.HOME_XY
         moves = (toolpath.is_motion | homes).astype(np.int64)
         moves[toolpath.kind == Kind.ARC_CCW] = 2
@@ -389,6 +389,8 @@ class PicMmhRun:
     def _arc_centres(self) -> Ints:
         """(N, 2) steps; 0 where the row is no arc."""
         toolpath = self._toolpath
+        if not toolpath.is_arc.any():
+            return np.broadcast_to(np.int64(0), (len(toolpath), 2))
         bad = toolpath.is_arc & ~np.isfinite(toolpath.centre).all(axis=1)
         refuse(toolpath, bad, "an arc without a centre")
         return self._steps(np.where(toolpath.is_arc[:, None], toolpath.centre, 0.0), range(2))

@@ -22,7 +22,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Floats, Ints
 from camtool.errors import ProgramError
 from camtool.kernels.lattice import HALF_STEP_GUARD, to_steps
 from camtool.machine.model import Machine
@@ -39,7 +39,7 @@ from camtool.simulation.legs import (
 from camtool.simulation.motion import Chunk, Options
 from camtool.simulation.path import on_steps
 from camtool.simulation.rows import block_of
-from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.moves import Kind, Toolpath, frozen
 
 from .dialect import Dialect, ValcncController
 from .steps import arc_angles
@@ -73,16 +73,18 @@ class ValcncModel(ControllerModel[ValcncController, Dialect]):
         if machine.controller.rounding == "nearest":
             return on_steps(toolpath, machine)
         step_mm = coded_steps_mm(machine)
-        start, end = (pieces.in_steps(point) * step_mm for point in (toolpath.start, toolpath.end))
-        whole = replace(toolpath, start=start, end=end)
+        start = pieces.in_steps(toolpath.start) * step_mm
+        end = toolpath.by_parts(lambda part: pieces.in_steps(part.end) * step_mm)
+        whole = replace(toolpath, start=start, end=frozen(end))
         # Arcs of less than a step: their ends may have become one point, and they a circle.
-        closed = (whole.end == whole.starts)[:, :2].all(axis=1) & (
-            np.abs(toolpath.sweeps()) < np.pi
-        )
-        lost = toolpath.is_arc & closed
-        kind = np.where(lost, np.int64(Kind.LINE), whole.kind)
-        centre = np.where(lost[:, None], np.nan, whole.centre)
-        return on_steps(replace(whole, kind=kind, centre=centre), machine)
+        arcs = np.flatnonzero(toolpath.is_arc)
+        closed = (whole.end[arcs] == whole.starts_of(arcs))[:, :2].all(axis=1)
+        lost = arcs[closed & (np.abs(toolpath.sweeps_of(arcs)) < np.pi)]
+        if len(lost):
+            kind, centre = whole.kind.copy(), whole.centre.copy()
+            kind[lost], centre[lost] = Kind.LINE, np.nan
+            whole = replace(whole, kind=kind, centre=centre)
+        return on_steps(whole, machine)
 
     def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
         """Lines by the counter, arcs by lines."""
@@ -111,11 +113,12 @@ class _Pieces:
         self._step_mm = coded_steps_mm(machine)
         count = toolpath.running
         self._start, self._end = toolpath.start, toolpath.end[:count]
+        self._arc_rows = np.flatnonzero(toolpath.is_arc[:count])
         self._arcs = self._angles(toolpath, count)
-        self._count = np.where(toolpath.is_motion[:count], 1, 0)
-        is_arc = toolpath.is_arc[:count]
-        self._count[is_arc] = self._parts(self._arcs[is_arc])
-        self._first = np.concatenate([[0], np.cumsum(self._count)])
+        parts = np.zeros(count + 1, dtype=np.int64)
+        parts[1:] = toolpath.is_motion[:count]
+        parts[1 + self._arc_rows] = self._parts(self._arcs)
+        self._first = np.cumsum(parts, out=parts)
 
     def in_steps(self, points: Floats) -> Ints:
         """Coordinates, or differences of them, (..., 3) mm in steps."""
@@ -144,26 +147,27 @@ class _Pieces:
         """Row (J,) and end (J, 3) mm of the pieces low:high."""
         index = np.arange(low, high)
         row = np.searchsorted(self._first, index, side="right") - 1
-        part, parts = index - self._first[row] + 1, self._count[row]
+        part, parts = index - self._first[row] + 1, self._first[row + 1] - self._first[row]
         points = self._end[row]
-        curved = self._arcs[row, 2] > 0.0
+        arc = np.searchsorted(self._arc_rows, row)
+        curved = np.append(self._arc_rows, -1)[arc] == row
         if self._controller.arc_end == "programmed":
             curved &= part < parts
-        x, y, radius, theta, alpha = self._arcs[row[curved]].T
+        x, y, radius, theta, alpha = self._arcs[arc[curved]].T
         angle = theta + alpha * (part[curved] / parts[curved])
         points[curved, 0] = x + radius * np.cos(angle)
         points[curved, 1] = y + radius * np.sin(angle)
         return row, points
 
     def _angles(self, toolpath: Toolpath, count: int) -> Floats:
-        """(count, 5) of `arc_angles`; ProgramError for an arc that has none."""
+        """(J, 5) of `arc_angles` of all arcs; ProgramError for an arc that has none."""
+        if not len(self._arc_rows):
+            return np.zeros((0, 5))
         angles = np.zeros((count, 5))
         kind = toolpath.kind[:count]
         turn = (kind == Kind.ARC_CCW).astype(np.int64) - (kind == Kind.ARC_CW)
-        if not turn.any():
-            return angles
         ends = np.concatenate([toolpath.start[None, :], self._end])
-        self._check_arcs(toolpath, turn != 0)
+        self._check_arcs(toolpath)
         offset = np.where(turn[:, None] != 0, toolpath.centre[:count] - ends[:-1, :2], 0.0)
         computed = self._controller.arc_end == "computed"
         bad = int(arc_angles(turn, ends[:, :2].copy(), offset, computed, angles))
@@ -173,16 +177,16 @@ class _Pieces:
                 where=block_of(toolpath, bad),
                 mend="give I and J from the start to the centre",
             )
-        return angles
+        return angles[self._arc_rows]
 
-    def _check_arcs(self, toolpath: Toolpath, arcs: Bools) -> None:
+    def _check_arcs(self, toolpath: Toolpath) -> None:
         """ProgramError for arcs that it cannot count."""
-        rows = np.flatnonzero(arcs)
-        centre = toolpath.centre[rows]
-        reach = np.abs(centre) + np.abs(centre - toolpath.starts[rows, :2]).max(axis=1)[:, None]
+        rows = self._arc_rows
+        centre, starts = toolpath.centre[rows], toolpath.starts_of(rows)
+        reach = np.abs(centre) + np.abs(centre - starts[:, :2]).max(axis=1)[:, None]
         with np.errstate(invalid="ignore"):
             countable = (reach <= MAX_STEPS * self._step_mm[:2]).all(axis=1)
-        rises = toolpath.end[rows, 2] != toolpath.starts[rows, 2]
+        rises = toolpath.end[rows, 2] != starts[:, 2]
         unequal = np.full(len(rows), self._step_mm[0] != self._step_mm[1])
         for bad, message in (
             (~countable, "an arc without a centre, or farther than the controller can count"),
