@@ -80,7 +80,8 @@ def nearest(
     found = np.full(len(points), np.inf), np.full(len(points), -1, dtype=np.int64), count
     near = Near(table, boxes, points, limits_mm, found)
     nothing, nowhere = np.empty(0, dtype=np.int64), np.empty(0)
-    for low, high, first, last in runs.tolist():
+    for run in runs:
+        low, high, first, last = run.tolist()
         divide(low, high, first, last, near, nothing, nowhere)
     return found[:2]
 

@@ -59,6 +59,9 @@ from camtool.verification.matching import (
 )
 from camtool.verification.nearest import ANY_CONTOUR, Found, MoveIndex
 
+SAMPLES_AT_ONCE = 1 << 16
+"""So many samples are compared with the moves that they were written from in one go."""
+
 Limits = tuple[float, float]
 """What is near, in XY and in height, mm."""
 
@@ -169,9 +172,11 @@ def _own_found(cuts: CutMoves, samples: Samples, own: Ints, goal: Goal) -> tuple
     mine = cuts.contour[cuts.segments.path[samples.segment]]
     some = np.flatnonzero(fit[mine])
     limits = max(goal.limit_mm, LEAST_MM), goal.depth_mm
-    near = goal.moves.nearest(samples.points[some], samples.z[some], own[mine[some]], limits)
-    found.distance[some], found.segment[some] = near.distance, near.segment
-    fit[mine[some[near.distance > goal.limit_mm]]] = False
+    for low in range(0, len(some), SAMPLES_AT_ONCE):
+        part = some[low : low + SAMPLES_AT_ONCE]
+        near = goal.moves.nearest(samples.points[part], samples.z[part], own[mine[part]], limits)
+        found.distance[part], found.segment[part] = near.distance, near.segment
+        fit[mine[part[near.distance > goal.limit_mm]]] = False
     return found, np.where(fit[mine], own[mine], ANY_CONTOUR)
 
 

@@ -172,6 +172,9 @@ def _segments(toolpath: Toolpath, first: Indices, arcs: tuple[Ints, Floats]) -> 
     start[bent[inner]] = _turned(begin, centre, part * turn)[inner]
     end[bent] = _turned(begin, centre, (part + 1) * turn)
     bulge[bent] = np.tan(0.25 * turn)
+    if len(row) and (start[1:] == end[:-1]).all():  # one path, whose points are stored once
+        points = np.concatenate([start[:1], end])
+        start, end = points[:-1], points[1:]
     return Segments.between(start, end, bulge, row)
 
 

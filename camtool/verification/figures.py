@@ -298,6 +298,10 @@ class ContourFigures:
     fit_mm: float
 
 
+CONTOURS_AT_ONCE = 4096
+"""The figures of so many contours are Python objects at a time."""
+
+
 class ContourSums:
     """Sums and largest errors of the wanted contours to which rows with a known error belong."""
 
@@ -332,18 +336,21 @@ class ContourSums:
 
     def figures(self) -> Iterator[ContourFigures]:
         """The figures of each of these contours."""
-        here = np.flatnonzero(self._row >= 0)
-        columns = (
-            here,
-            self._row[here],
-            *self._at[here].T,
-            self._total[here],
-            np.sqrt(self._squares[here] / self._samples[here]),
-            self._sums[here] / self._samples[here],
-            *(largest[here] for largest in self._largest),
-        )
-        for contour, row, x, y, *figures in zip(*(one.tolist() for one in columns), strict=True):
-            yield ContourFigures(contour, row, (x, y), *figures)
+        every = np.flatnonzero(self._row >= 0)
+        for low in range(0, len(every), CONTOURS_AT_ONCE):
+            here = every[low : low + CONTOURS_AT_ONCE]
+            columns = (
+                here,
+                self._row[here],
+                *self._at[here].T,
+                self._total[here],
+                np.sqrt(self._squares[here] / self._samples[here]),
+                self._sums[here] / self._samples[here],
+                *(largest[here] for largest in self._largest),
+            )
+            numbers = (one.tolist() for one in columns)
+            for contour, row, x, y, *figures in zip(*numbers, strict=True):
+                yield ContourFigures(contour, row, (x, y), *figures)
 
 
 class WorstRows:

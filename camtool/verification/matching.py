@@ -214,6 +214,8 @@ def _unanimous(values: Ints | Indices, offsets: Ints) -> Ints:
 
 
 def _circle_of_row(circles: list[Circle], count: int) -> Indices:
+    if not circles:
+        return np.broadcast_to(np.int32(-1), count)
     of_row = np.full(count, -1, dtype=np.int32)
     for index, circle in enumerate(circles):
         of_row[circle.first_row : circle.last_row + 1] = index

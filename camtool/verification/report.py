@@ -175,7 +175,7 @@ class BothWaysReport(msgspec.Struct, frozen=True):
     D_um: float | None
 
 
-class ContourReport(msgspec.Struct, frozen=True):
+class ContourReport(msgspec.Struct, frozen=True, gc=False):
     """The total error of one contour, µm, with the place of its maximum, and its largest errors by
     source; `block` from 1, None when no program was read."""
 
@@ -382,12 +382,12 @@ def number(value: float | None, scale: float = 1.0) -> float | None:
     """`value` · scale, rounded for the report, never −0; None for values that are not finite."""
     if value is None or not math.isfinite(value):
         return None
-    return round(float(value) * scale, DECIMALS) + 0.0
+    return round(float(value) * scale, DECIMALS) or 0.0
 
 
 def certain(value: float) -> float:
     """A known number, rounded for the report, never −0."""
-    return round(float(value), DECIMALS) + 0.0
+    return round(float(value), DECIMALS) or 0.0
 
 
 # Limits of a pipeline: exceeding one is a finding, and exit code 1.

@@ -146,9 +146,9 @@ class SlidePass:
         self._sum_up()
         self.rows.inner.add_sizes(self._sums.histograms[0])
         self.rows.whole.add_sizes(self._sums.histograms[1])
-        trace = trace_of(self._sums, self._start, self._is_cut, self._most)
+        sums = self._sums
         del self._tasks, self._task, self._sums
-        return trace
+        return trace_of(sums, self._start, self._is_cut, self._most)
 
     def _bounds(self, low: int, high: int) -> list[int]:
         """`low`, `high` and the rows between them before which circles are evaluated or figures
