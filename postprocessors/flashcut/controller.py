@@ -20,15 +20,16 @@ Every move ends: the longer axis arrives.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.kernels.lattice import HALF_STEP_GUARD, to_steps
 from camtool.machine.model import Machine
 from camtool.simulation.controller import ControllerModel
+from camtool.simulation.legs import waits_s
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import NO_SAMPLES, Chunk, Ledger, Options
 from camtool.simulation.rows import check_positions, check_rows, placed, refuse
@@ -110,7 +111,7 @@ class FlashcutRun:
         path = followed(toolpath.first(toolpath.running), machine)
         check_rows(path, len(path))
         self._rows = len(path)
-        self._still_s = np.where(path.kind == Kind.DWELL, path.value, 0.0)
+        self._still_s = waits_s(path, len(path))
         self._table = MoveTable.of(path, machine)
         self._mechanics = Mechanics(machine, path.start, options.effects)
         self._parts = controller.half_periods_per_step
@@ -128,11 +129,10 @@ class FlashcutRun:
 
     def run(self) -> Iterator[Chunk]:
         """The chunks of all rows up to the end of the program."""
-        made = np.concatenate([[0], np.cumsum(self._table.moves_of_row)])
         low = 0
         while low < self._rows:
-            full = int(np.searchsorted(made, made[low] + MOVES_AT_ONCE, side="right")) - 1
-            high = min(max(full, low + 1), self._rows)
+            made = np.cumsum(self._table.moves_of(low, low + MOVES_AT_ONCE))
+            high = low + max(int(np.searchsorted(made, MOVES_AT_ONCE, side="right")), 1)
             yield from self._window(low, high)
             low = high
 
@@ -209,26 +209,36 @@ def followed(toolpath: Toolpath, machine: _Machine) -> Toolpath:
     """
     check_positions(toolpath, machine)
     most = 0.25 * MOST_LONG * np.array([axis.coded_step_mm for axis in machine.axes])
-    far = (np.abs(toolpath.end) > most).any(axis=1) | (np.abs(toolpath.start) > most).any()
-    spoke = np.where(toolpath.is_arc[:, None], toolpath.centre - toolpath.starts[:, :2], 0.0)
-    far |= (np.abs(spoke) > most[:2]).any(axis=1)
+    far = toolpath.by_parts(lambda part: np.asarray((np.abs(part.end) > most).any(axis=1)))
+    far |= (np.abs(toolpath.start) > most).any()
+    arcs = np.flatnonzero(toolpath.is_arc)
+    spoke = toolpath.centre[arcs] - toolpath.starts_of(arcs)[:, :2]
+    far[arcs] |= (np.abs(spoke) > most[:2]).any(axis=1)
     refuse(toolpath, far, "a position is beyond all that the controller can count")
     return placed(toolpath, np.array(machine.controller.machine_zero_mm, dtype=np.float64))
 
 
-def half_periods(toolpath: Toolpath, machine: _Machine, step_mm: float, alone: Bools) -> Ints:
+def half_periods(
+    toolpath: Toolpath, machine: _Machine, step_mm: float, alone: Callable[[Toolpath], Bools]
+) -> Indices:
     """(N,) ms of the longer axis of each row, for steps of `step_mm`; rapids have the shortest.
-    `alone` (N,): rows of one axis.
+    `alone` gives the rows of one axis.
 
     ProgramError for feeds whose half period the controller cannot count.
     """
-    feed = np.where(toolpath.is_feed, toolpath.feed, np.inf)
-    wanted = half_periods_ms(feed, step_mm, alone, machine.controller)
-    slow = wanted >= MOST_LONG
+
+    def counted(part: Toolpath) -> Indices:
+        feed = np.where(part.is_feed, part.feed, np.inf)
+        wanted = half_periods_ms(feed, step_mm, alone(part), machine.controller)
+        return np.minimum(wanted, MOST_LONG).astype(np.int32)
+
+    found = toolpath.by_parts(counted)
+    slow = found == MOST_LONG
     if slow.any():
-        message = f"a feed of {float(feed[slow][0]):g} mm/min is too slow for the timers to count"
+        feed = float(toolpath.feed[slow.argmax()])
+        message = f"a feed of {feed:g} mm/min is too slow for the timers to count"
         refuse(toolpath, slow, message, "write a higher F")
-    return wanted.astype(np.int64)
+    return found
 
 
 def _alone(toolpath: Toolpath, x_mm: float, y_mm: float) -> Bools:
@@ -238,45 +248,52 @@ def _alone(toolpath: Toolpath, x_mm: float, y_mm: float) -> Bools:
     return np.asarray(~toolpath.is_arc & (apart | (toolpath.kind >= Kind.HOME_XY)))
 
 
+def _rises(toolpath: Toolpath) -> Bools:
+    """(N,) true for rows that move Z."""
+    lifted = toolpath.end[:, 2] != toolpath.starts[:, 2]
+    return np.asarray((toolpath.kind == Kind.HOME_Z) | (toolpath.is_motion & lifted))
+
+
+def _chords(toolpath: Toolpath, per_turn: int) -> Indices:
+    """(N,) moves of X and Y that each row makes."""
+    flat = (toolpath.end[:, :2] != toolpath.starts[:, :2]).any(axis=1)
+    along = toolpath.is_motion & (flat | ~_rises(toolpath))
+    chords = np.ceil(np.abs(toolpath.sweeps()) * (per_turn / (2.0 * np.pi)) - CHORD_GUARD)
+    homes = 2.0 * (toolpath.kind == Kind.HOME_XY)
+    parts = np.where(toolpath.is_arc, np.maximum(chords, 1.0), along + homes)
+    return parts.astype(np.int32)
+
+
 @dataclass(frozen=True, eq=False)
 class MoveTable:
     """How many moves each row of a placed toolpath makes, and the moves of any window of rows."""
 
     toolpath: Toolpath
-    sweeps: Floats
-    chords: Ints
+    chords: Indices
     rises: Bools
-    half_period_xy: Ints
-    half_period_z: Ints
+    half_period_xy: Indices
+    half_period_z: Indices
 
     @classmethod
     def of(cls, toolpath: Toolpath, machine: _Machine) -> MoveTable:
         """The table of a toolpath that `followed` gave."""
-        kind, starts, sweeps = toolpath.kind, toolpath.starts, toolpath.sweeps()
         per_turn = machine.controller.chords_per_turn
-        homes_xy, homes_z = kind == Kind.HOME_XY, kind == Kind.HOME_Z
-        rises = homes_z | (toolpath.is_motion & (toolpath.end[:, 2] != starts[:, 2]))
-        along = toolpath.is_motion & ((toolpath.end[:, :2] != starts[:, :2]).any(axis=1) | ~rises)
-        chords = np.ceil(np.abs(sweeps) * (per_turn / (2.0 * np.pi)) - CHORD_GUARD)
-        parts = np.where(toolpath.is_arc, np.maximum(chords, 1.0), along + 2.0 * homes_xy)
         x, y, z = (axis.coded_step_mm for axis in machine.axes)
         return cls(
             toolpath,
-            sweeps,
-            parts.astype(np.int64),
-            rises,
-            half_periods(toolpath, machine, max(x, y), _alone(toolpath, x, y)),
-            half_periods(toolpath, machine, z, np.ones(len(toolpath), dtype=np.bool_)),
+            toolpath.by_parts(lambda part: _chords(part, per_turn)),
+            toolpath.by_parts(_rises),
+            half_periods(toolpath, machine, max(x, y), lambda part: _alone(part, x, y)),
+            half_periods(toolpath, machine, z, lambda part: np.ones(len(part), dtype=np.bool_)),
         )
 
-    @property
-    def moves_of_row(self) -> Ints:
-        """(N,) moves of each row."""
-        return self.chords + self.rises
+    def moves_of(self, low: int, high: int) -> Ints:
+        """(R,) moves of each of the rows low:high."""
+        return self.chords[low:high].astype(np.int64) + self.rises[low:high]
 
     def moves(self, low: int, high: int) -> Moves:
         """The moves of the rows low:high; `Moves.row` counts from `low`."""
-        count = self.moves_of_row[low:high]
+        count = self.moves_of(low, high)
         row = low + np.repeat(np.arange(high - low), count)
         part = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
         path, chords = self.toolpath, self.chords[row]
@@ -288,7 +305,7 @@ class MoveTable:
         inner = np.flatnonzero(path.is_arc[row] & (part < chords - 1))
         target[inner, :2] = self._on_arc(row[inner], (part[inner] + 1) / chords[inner])
         half_period = np.where(upward, self.half_period_z[row], self.half_period_xy[row])
-        return Moves(what, target, half_period, row - low)
+        return Moves(what, target, half_period.astype(np.int64), row - low)
 
     def _on_arc(self, row: Ints, share: Floats) -> Floats:
         """(J, 2) mm at these shares of the arcs' sweeps, as far from the centre as the start
@@ -296,6 +313,6 @@ class MoveTable:
         centre = self.toolpath.centre[row]
         spoke = self.toolpath.starts_of(row)[:, :2] - centre
         radius = np.hypot(spoke[:, 0], spoke[:, 1])
-        angle = np.arctan2(spoke[:, 1], spoke[:, 0]) + share * self.sweeps[row]
+        angle = np.arctan2(spoke[:, 1], spoke[:, 0]) + share * self.toolpath.sweeps_of(row)
         turned = np.column_stack([np.cos(angle), np.sin(angle)])
         return np.asarray(centre + radius[:, None] * turned)
