@@ -11,7 +11,7 @@ import hashlib
 import math
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import Annotated, Any, Generic, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, overload
 
 import msgspec
 from msgspec import Meta
@@ -30,6 +30,9 @@ from camtool.machine.ranges import (
     Step,
     Tolerance,
 )
+
+if TYPE_CHECKING:
+    from camtool.arrays import Bools, Floats
 
 
 class TargetNames(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -315,6 +318,15 @@ def controller_of(machine: Machine, kind: type[_Record]) -> _Record:
     return machine.controller
 
 
-def exceeds(feed_mm_min: float, limit_mm_min: float) -> bool:
-    """Whether a feed is above its limit by more than rounding."""
+@overload
+def exceeds(feed_mm_min: float, limit_mm_min: float) -> bool: ...
+
+
+@overload
+def exceeds(feed_mm_min: Floats, limit_mm_min: float) -> Bools: ...
+
+
+def exceeds(feed_mm_min: float | Floats, limit_mm_min: float) -> bool | Bools:
+    """Whether a feed, or each of some (K,), is above its limit by more than rounding; NaN is
+    not."""
     return feed_mm_min > limit_mm_min * (1.0 + FEED_TOLERANCE)

@@ -151,9 +151,8 @@ class _Reader:
             return 0
         self.blocks += count
         given = plain.has(words.F_WORD)[:count]
-        for at in np.flatnonzero(given & (moves.feed[:count] > self._max_feed)).tolist():
-            if exceeds(float(moves.feed[at]), self._max_feed):
-                self._fast.add(plain.first + at, float(moves.feed[at]))
+        for at in np.flatnonzero(given & exceeds(moves.feed[:count], self._max_feed)).tolist():
+            self._fast.add(plain.first + at, float(moves.feed[at]))
         self._feed = float(moves.feed[count - 1])
         rows = np.flatnonzero(moves.moving[:count])
         if len(rows):

@@ -21,7 +21,7 @@ from camtool import bounds
 from camtool.arrays import Bools, Floats
 from camtool.findings import Finding
 from camtool.kernels import words
-from camtool.machine.model import FEED_TOLERANCE, Machine
+from camtool.machine.model import Machine, exceeds
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, PathMode, Toolpath
 
@@ -650,7 +650,7 @@ class ReadFindings:
 
     def note_feeds(self, first: int, feeds: Floats) -> None:
         """The feeds (K,) that blocks from this one on give, NaN where they give none."""
-        fast = np.flatnonzero(feeds > self.max_feed_mm_min * (1.0 + FEED_TOLERANCE))
+        fast = np.flatnonzero(exceeds(feeds, self.max_feed_mm_min))
         if len(fast):
             count, begin, most = self.fast
             begin = begin if count else first + int(fast[0])

@@ -208,9 +208,8 @@ class _Reader:
         kind, deep = plain[:, blocks.CODE].copy(), plain[:, blocks.DEEP] != 0
         cut, arc = kind >= Kind.LINE, kind >= Kind.ARC_CW
         feed = np.where(cut, plain[:, blocks.FEED] / self._feeds_per_mm_min, np.nan)
-        for at in np.flatnonzero(cut & (feed > self._max_feed)).tolist():
-            if exceeds(float(feed[at]), self._max_feed):
-                self._fast.add(first + at, float(feed[at]))
+        for at in np.flatnonzero(cut & exceeds(feed, self._max_feed)).tolist():
+            self._fast.add(first + at, float(feed[at]))
         mm = plain[:, : blocks.CENTRE_Y + 1] / self._units_per_mm
         self.path.moves(
             kind=kind,
