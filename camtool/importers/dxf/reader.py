@@ -40,6 +40,8 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
         walk = Walk(loaded, file, options)
         with quiet():
             walk.space(_space(loaded.document, options.layout, file), units.mm_per_unit)
+    repairs = loaded.repairs
+    del loaded, walk.loaded  # what the file holds is in the pieces now
     return assemble(
         walk.pieces,
         marks=walk.marks,
@@ -48,7 +50,7 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
         used=dict(walk.used),
         skipped=[Skipped(kind, count, why) for (kind, why), count in walk.skipped.items()],
         findings=[
-            *_repaired(loaded.repairs),
+            *_repaired(repairs),
             *findings,
             *_not_applied(walk.lacking),
             *font_findings(walk.fonts),
