@@ -48,6 +48,9 @@ SHOWN_ITEMS = 5
 """At most this many items are named in an error message."""
 
 
+ITEMS_AT_ONCE = 1 << 14
+"""Of so many items the variants that are turned ones are found together: some 10 MB."""
+
 SPECK_MM = 1e-4
 """For the order, a run that stays at one place (a drilled hole) is a line of this length: long
 enough to be a line, far shorter than any tool is wide."""
@@ -193,14 +196,23 @@ def _turned(choices: Choices) -> Ints:
     """(S,): of each row the one of its item with entry and exit exchanged, itself when none is."""
     turned = np.arange(len(choices.owner))
     rows = np.flatnonzero((choices.entry != choices.exit).any(axis=1))
+    of = choices.owner[rows]
+    for item in range(0, len(choices), ITEMS_AT_ONCE):
+        some = rows[slice(*np.searchsorted(of, [item, item + ITEMS_AT_ONCE]).tolist())]
+        turned[some] = _turned_among(choices, some)
+    return turned
+
+
+def _turned_among(choices: Choices, rows: Ints) -> Ints:
+    """(R,): the same of these rows, which are all of their items that end elsewhere than they
+    begin."""
     if len(rows) == 0:
-        return turned
+        return rows
     owner, entry, leave = choices.owner[rows, None], choices.entry[rows], choices.exit[rows]
     both = np.concatenate([np.hstack([owner, entry, leave]), np.hstack([owner, leave, entry])])
     _, found, group = np.unique(both, axis=0, return_index=True, return_inverse=True)
     other = found[group.reshape(-1)[len(rows) :]]
-    turned[rows] = np.where(other < len(rows), rows[np.minimum(other, len(rows) - 1)], rows)
-    return turned
+    return np.where(other < len(rows), rows[np.minimum(other, len(rows) - 1)], rows)
 
 
 def _places(choices: Choices) -> tuple[Floats, Ints]:

@@ -14,6 +14,7 @@ from camtool.arrays import Ints
 from camtool.errors import OptionError
 from camtool.geometry.nesting import nesting
 from camtool.geometry.polylines import Polyline, Polylines, reverse, rolled
+from camtool.planning import order
 from camtool.planning.items import Contour, Contours, CutRun, Feeds, Fixed, Item, Setting
 from camtool.planning.job import Operation
 from camtool.planning.order import (
@@ -353,3 +354,25 @@ def test_the_bound_is_met_on_a_ring() -> None:
     choices = Choices(np.arange(23), ring[1:], ring[1:])
     rows = best_order(choices, NONE, tuple(ring[0]), tuple(ring[0]))
     assert travel_mm(choices, rows, tuple(ring[0]), tuple(ring[0])) == pytest.approx(around)
+
+
+@given(
+    st.lists(st.lists(st.tuples(*[st.integers(0, 2)] * 4), min_size=1, max_size=5), max_size=6),
+    st.integers(1, 4),
+)
+def test_turned_variants_that_are_found_some_items_at_a_time(
+    items: list[list[tuple[int, int, int, int]]], at_once: int
+) -> None:
+    owner = np.repeat(np.arange(len(items)), [len(each) for each in items]).astype(np.int64)
+    ends = np.array([row for each in items for row in each], dtype=float).reshape(-1, 4)
+    choices = Choices(owner, ends[:, :2], ends[:, 2:])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(order, "ITEMS_AT_ONCE", at_once)
+        turned = order._turned(choices)
+    first = np.searchsorted(owner, np.arange(len(items)))
+    for row, (of, each) in enumerate(zip(owner.tolist(), ends.tolist(), strict=True)):
+        others = items[of]
+        back = (*each[2:], *each[:2])
+        stays = each[:2] == each[2:]
+        wanted = row if stays or back not in others else int(first[of]) + others.index(back)
+        assert turned[row] == wanted
