@@ -133,6 +133,7 @@ class _Run:
         self._begins, length = begins_of(path, self._rules.modes)
         self._spacing_mm = spacing_along(length, machine)
         self._before, self._since_rest_s = FROM_REST, 0.0
+        self._passed_mm = 0.0, 0.0  # before the rows of a block: by rows, and by moves
 
     def blocks(self) -> Iterator[SampledRows]:
         """All rows."""
@@ -160,7 +161,8 @@ class _Run:
         taken[:-1][lasting] = self._in_periods(speeds, done)
         here = slice(self._row(low), self._row(high))
         seconds = _seconds(planned, taken)[here.start - base : here.stop - base]
-        samples = LinuxcncSamples(planned, self._machine, self._spacing_mm)
+        samples = LinuxcncSamples(planned, self._machine, self._spacing_mm, self._passed_mm)
+        self._passed_mm = samples.passed_mm(self._row(high - 1) - base, own.stop - 1)
         return SampledRows(here.start, here.stop, base, samples, seconds)
 
     def _row(self, move: int) -> int:
@@ -199,7 +201,15 @@ class _Run:
 class LinuxcncSamples(CountedSamples):
     """Points along the moves, blends included."""
 
-    def __init__(self, planned: Planned, machine: _Machine, spacing_mm: float) -> None:
+    def __init__(
+        self,
+        planned: Planned,
+        machine: _Machine,
+        spacing_mm: float,
+        passed_mm: tuple[float, float],
+    ) -> None:
+        """`passed_mm`: the lengths of all rows and of all moves before these, so that positions do
+        not depend, in their last bits, on where a block begins."""
         path, moves, reach = planned.tangents.path, planned.moves, planned.corners.reach
         super().__init__(path, machine, spacing_mm)
         self._tangents = planned.tangents
@@ -207,9 +217,14 @@ class LinuxcncSamples(CountedSamples):
         self._blends = bool(reach.any())
         self._length = moves.length
         self._row_length = move_lengths(path)
-        self._into = np.cumsum(np.where(moves.row_of >= 0, self._row_length, 0.0))
-        self._into -= np.where(moves.row_of >= 0, self._row_length, 0.0)
-        self._into -= np.concatenate([[0.0], np.cumsum(moves.length)])[np.maximum(moves.row_of, 0)]
+        lengths = np.where(moves.row_of >= 0, self._row_length, 0.0)
+        self._by_rows = np.cumsum(np.append(passed_mm[0], lengths))
+        self._by_moves = np.cumsum(np.append(passed_mm[1], moves.length))
+        self._into = self._by_rows[1:] - lengths - self._by_moves[np.maximum(moves.row_of, 0)]
+
+    def passed_mm(self, row: int, move: int) -> tuple[float, float]:
+        """The lengths of all rows before a row, and of all moves before a move."""
+        return float(self._by_rows[row]), float(self._by_moves[move])
 
     def points(self, row: Ints, share: Floats) -> Floats:
         """(K, 3) mm: the points at shares (K,) of the ways of rows (K,), blended."""
