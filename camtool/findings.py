@@ -1042,6 +1042,12 @@ SIDE_BY_UNCUT_FRAME = Sentence(
     "contours",
     INFO,
 )
+EVENT_LEFT_OUT_COOLANT = Sentence(
+    Code.EVENT_LEFT_OUT,
+    "{count:# word for coolant is|# words for coolant are} left out: the machine has none (mist "
+    "and flood of [coolant] in its file)",
+    WARNING,
+)
 CUT_DOUBTFUL = Sentence(Code.CUT_DOUBTFUL, "{reasons}")
 CUT_DOUBTFUL_SPEED = Sentence(
     Code.CUT_DOUBTFUL, "no spindle speed is given, so the spindle stays off (--spindle)"

@@ -99,7 +99,9 @@ def post_drawing(
     plan = planned(drawing, job, target.machine)
     wanted = plan.toolpath
     run = Run(source=drawing.file, target=target, drawing=drawing, job=job, wanted=wanted)
-    doubtful = doubtful_settings(plan.steps, starts_spindle=target.target.starts_spindle)
+    doubtful = doubtful_settings(
+        plan.steps, target.machine, starts_spindle=target.target.starts_spindle
+    )
     findings = _merged(drawing.findings, wanted.findings, tuple(doubtful))
     if worst(findings) >= Severity.ERROR:
         return replace(run, findings=findings)
@@ -240,7 +242,7 @@ def convert_program(
     become its highest feed; `feed_mm_min` replaces all feeds. ProgramError names file, block and
     column.
     """
-    from camtool.toolpath.lower import at_feed, carried_over, within_feeds
+    from camtool.toolpath.lower import at_feed, carried_over, within_feeds, without_coolant
     from camtool.verification.verify import VerifyOptions
 
     progress = progress or Progress()
@@ -248,6 +250,8 @@ def convert_program(
     decoded = _decoded(data, source, file)
     same = source.machine.target.dialect == target.machine.target.dialect
     wanted = decoded if same else carried_over(decoded)
+    if not target.machine.coolant.kinds:
+        wanted = without_coolant(wanted)
     if feed_mm_min is not None:
         wanted = at_feed(wanted, feed_mm_min)
     else:
@@ -328,7 +332,7 @@ def _reported(step: Step) -> PlannedOperation:
         name=operation.name,
         kind=operation.kind,
         tool_diameter_mm=operation.tool.diameter_mm,
-        spindle_rpm=operation.spindle_rpm,
+        spindle_rpm=setting.spindle_rpm,
         feed_mm_min=setting.feeds.cut_mm_min,
         plunge_mm_min=setting.feeds.plunge_mm_min,
         depth_mm=-setting.levels_mm[-1],

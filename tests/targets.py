@@ -10,7 +10,7 @@ from typing import Any
 from camtool.machine.model import Machine
 from camtool.simulation.controller import ControllerModel
 from camtool.simulation.motion import Chunk, Options
-from camtool.tables import Table
+from camtool.tables import Table, read_table
 from camtool.target.contract import Target
 from camtool.target.loader import machine_of, resolved_table
 from camtool.target.registry import LoadedTarget, find_target, target_names
@@ -42,7 +42,8 @@ def build_machine(
     """The machine of a target's table, with a user's file and settings over it."""
     name = base["target"]["dialect"]
     post = posts().get(name, posts()["made-up"])
-    return machine_of(post, *resolved_table(post, base, base_name, user_file, settings))
+    user = None if user_file is None else (read_table(user_file), str(user_file))
+    return machine_of(post, *resolved_table(post, base, base_name, user, settings))
 
 
 def on(machine: Machine) -> LoadedTarget:

@@ -71,6 +71,29 @@ def axis_settings(flag: str, text: str) -> list[Setting]:
     ]
 
 
+def spindle_setting(text: str) -> Setting:
+    """`10000`, `hand` or `none`."""
+    from camtool.target.contract import Setting
+
+    said, where = FLAG.format("spindle"), f"--spindle {text}"
+    if text in ("hand", "none"):
+        return Setting("spindle.switched", text, said, where)
+    return Setting("spindle.default_rpm", _number(text), said, where)
+
+
+def proposals(target: str) -> list[Setting]:
+    """What camtool proposes for machines that mill: their target says nothing of it."""
+    from camtool.target.contract import Setting
+    from camtool.target.registry import find_target
+
+    if not find_target(target)[0].starts_spindle:
+        return []
+    return [
+        Setting("defaults.feed_z_mm", 2.0, "ours: rapids end here, above warped stock"),
+        Setting("defaults.plunge_share", 0.3, "ours: end mills plunge slower than they cut"),
+    ]
+
+
 # The command.
 
 
@@ -92,6 +115,11 @@ def _axis_flags(command: Callable[..., None]) -> Callable[..., None]:
 )
 @click.option("--port", metavar="PORT", help="Ask the controller at this serial port instead.")
 @_axis_flags
+@click.option(
+    "--spindle",
+    metavar="SPEED",
+    help="Its speed where a job says none, in rev/min; hand (switches it); or none.",
+)
 @click.option("--project", is_flag=True, help="Keep it here, for this folder alone.")
 @click.option("-o", "--output", metavar="FILE", help="Only write this file; - is stdout.")
 @click.option("--ask/--no-ask", default=None, help="Ask for what is not said.  [at a terminal]")
@@ -103,6 +131,7 @@ def init(
     port: str | None,
     project: bool,
     output: str | None,
+    spindle: str | None,
     ask: bool | None,
     quiet: bool,
     verbose: bool,
@@ -140,6 +169,11 @@ def init(
             text = questions.ask_axes(flag, f"{meaning} (such as 300x180x45)")
         if text is not None:
             given |= {each.key: each for each in axis_settings(flag, text)}
+    if spindle is None:
+        spindle = questions.ask("Speed of the spindle, rev/min; hand; none; Enter: not known")
+    if spindle is not None:
+        given |= {each.key: each for each in (spindle_setting(spindle),)}
+    given = {each.key: each for each in proposals(target)} | given
     text = machine_text(name, target, list(given.values()), settings or "")
     place = _place(name, output, project=project)
     files, names = {str(place): text.encode()}, Path() if project else user_folder()

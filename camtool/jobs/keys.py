@@ -20,6 +20,7 @@ from typing import Any, TypeVar
 from camtool.errors import OptionError
 from camtool.patterns import guess
 from camtool.planning.job import (
+    COOLANTS,
     CORNERS,
     DIRECTIONS,
     ENTRIES,
@@ -562,8 +563,13 @@ OPERATION = {
     "feed": Key("feed_mm_min", FEED, "In mm/min.", '"90mm/min"', KINDS),
     "plunge_feed": Key("plunge_feed_mm_min", FEED, "In mm/min.", '"30mm/min"', KINDS),
     "spindle": Key(
-        "spindle_rpm", Value(plain(number), "SPEED"), "In rev/min; none: off.", "12000", KINDS
+        "spindle_rpm",
+        Value(plain(number), "SPEED"),
+        "In rev/min; 0: off.  [the machine's]",
+        "12000",
+        KINDS,
     ),
+    "coolant": Key("coolant", one_of(COOLANTS), "M7, M8 or both.", '"mist"', KINDS),
     "depth": Key("depth_mm", LENGTH, "Depth of cut below Z0.", '"1mm"', KINDS),
     "step_down": Key("step_down_mm", LENGTH, "Depth of a pass.", '"0.5mm"', _LAYERED),
     "last_pass": Key("last_pass_mm", LENGTH, "Depth of the last pass.", '"0.1mm"', _LAYERED),

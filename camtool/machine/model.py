@@ -24,9 +24,11 @@ from camtool.machine.ranges import (
     FeedRate,
     Length,
     Lost,
+    Part,
     Place,
     Rate,
     Slack,
+    Speed,
     Step,
     Tolerance,
 )
@@ -108,12 +110,54 @@ class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Defaults(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What planning takes where the job says nothing, mm."""
+    """What planning takes where the job says nothing, mm. `feed_z_mm`: the height above the stock
+    down to which the tool comes as a rapid (None: it plunges from `safe_z_mm` on).
+    `plunge_share`: the feed of a plunge as a part of that of the cut (None: the same). `park_mm`:
+    where the tool goes when all is cut, in the work frame."""
 
     safe_z_mm: Length
     cut_depth_mm: Depth
     fit_tolerance_mm: Tolerance
     gap_mm: Slack = 0.01
+    feed_z_mm: Length | None = None
+    plunge_share: Part | None = None
+    park_mm: tuple[Place, Place] = (0.0, 0.0)
+
+
+class Spindle(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The spindle, and who switches it: the program, a hand, or nobody, where there is none.
+
+    `default_rpm` is the speed of a job that says none; None: it is asked for. The range is that of
+    the drive, None where it is not known. `spin_up_s` is waited until it is at speed."""
+
+    switched: Literal["program", "hand", "none"] = "program"
+    default_rpm: Speed | None = None
+    min_rpm: Annotated[float, Meta(ge=0.0, le=1e7)] = 0.0
+    max_rpm: Speed | None = None
+    direction: Literal["cw", "ccw"] = "cw"
+    spin_up_s: Annotated[float, Meta(ge=0.0, le=600.0)] = 0.0
+
+    def __post_init__(self) -> None:
+        if self.max_rpm is not None and self.min_rpm > self.max_rpm:
+            raise ValueError("min_rpm is above max_rpm")
+        if self.default_rpm is not None and not self.reaches(self.default_rpm):
+            raise ValueError("default_rpm is outside of min_rpm and max_rpm")
+
+    def reaches(self, rpm: float) -> bool:
+        """Whether the drive has this speed, in rev/min."""
+        return self.min_rpm <= rpm and (self.max_rpm is None or rpm <= self.max_rpm)
+
+
+class Coolant(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What the machine has: mist (M7) and flood (M8)."""
+
+    mist: bool = False
+    flood: bool = False
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """What it has: "mist", "flood"."""
+        return ("mist",) * self.mist + ("flood",) * self.flood
 
 
 class SlideStart(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -233,6 +277,8 @@ class Machine(
     feed: Feed
     limits: Limits
     defaults: Defaults
+    spindle: Spindle = Spindle()
+    coolant: Coolant = Coolant()
     controller: ControllerT
     link: Link = Link()
     mechanics: MechanicsOptions = MechanicsOptions()

@@ -264,17 +264,23 @@ def _place(toolpath: Toolpath, row: int) -> str:
     return f"move {row} ({source})" if source else f"move {row}"
 
 
-def doubtful_settings(steps: Sequence[Step], *, starts_spindle: bool) -> list[Finding]:
+def doubtful_settings(
+    steps: Sequence[Step], machine: Machine, *, starts_spindle: bool
+) -> list[Finding]:
     """One finding for all settings that look forgotten or too high in the operations that cut
     something; no finding when there are none.
 
-    A missing speed, a point that follows closed contours and a plunge at the feed of the cut
-    count only where the program starts the spindle (`starts_spindle`): other machines engrave
-    with points, and their spindles are switched by hand.
+    A point that follows closed contours and a plunge at the feed of the cut count only where
+    programs of the target can start a spindle (`starts_spindle`) and the machine has one: others
+    engrave with points. A missing speed counts where the program switches it.
     """
+    starts_spindle = starts_spindle and machine.spindle.switched != "none"
+    asks_speed = starts_spindle and machine.spindle.switched == "program"
     cutting = [step for step in steps if step.runs]
     found: dict[str, list[Step]] = defaultdict(list)
     for step in cutting:
+        if asks_speed and step.setting.spindle_rpm is None and step.operation.spindle_rpm is None:
+            found[CUT_DOUBTFUL_SPEED.words()].append(step)
         for reason in _doubtful(step, starts_spindle):
             found[reason].append(step)
     if not found:
@@ -290,8 +296,6 @@ def _doubtful(step: Step, starts_spindle: bool) -> Iterator[str]:
     """What is doubtful about an operation, each with the flag that changes it."""
     operation, feeds, tool = step.operation, step.setting.feeds, step.operation.tool
     wide = tool.radius_mm + operation.allowance_mm > 0.0
-    if starts_spindle and operation.spindle_rpm is None:
-        yield CUT_DOUBTFUL_SPEED.words()
     on_line = operation.kind == "profile" and operation.side != "on" and not wide
     if starts_spindle and on_line and step.chosen.lines.closed.any():
         yield CUT_DOUBTFUL_WIDTH.words()

@@ -38,12 +38,14 @@ class Feeds:
 @dataclass(frozen=True)
 class Setting:
     """An operation with what the machine adds to it: feeds; `levels_mm`, the z of its passes,
-    downwards, the last at the full depth; `safe_z_mm` above the stock top (z = 0)."""
+    downwards, the last at the full depth; `safe_z_mm` above the stock top (z = 0); `spindle_rpm`,
+    None: off or unknown."""
 
     operation: Operation
     feeds: Feeds
     levels_mm: tuple[float, ...]
     safe_z_mm: float
+    spindle_rpm: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

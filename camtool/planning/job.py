@@ -48,6 +48,9 @@ STARTS = ("nearest", "longest-line", "corner")
 ORIGINS = ("drawing", "lower-left", "centre")
 """Where part zero lies: at the drawing's own zero, or at a place of the paths that are cut."""
 
+COOLANTS = ("off", "mist", "flood", "both")
+"""What cools a cut."""
+
 GOALS = ("rapids", "reversals")
 """What the order is chosen for: short rapids, or few reversals while cutting."""
 
@@ -285,6 +288,7 @@ class Operation:
     feed_mm_min: float | None = None
     plunge_feed_mm_min: float | None = None
     spindle_rpm: float | None = None
+    coolant: str = "off"
     depth_mm: float | None = None
     step_down_mm: float | None = None
     last_pass_mm: float | None = None
@@ -311,6 +315,7 @@ class Operation:
         one_of("pattern", self.pattern, PATTERNS)
         one_of("joins", self.joins, JOINS)
         one_of("corners", self.corners, CORNERS)
+        one_of("coolant", self.coolant, COOLANTS)
         if isinstance(self.start, str):
             one_of("start", self.start, STARTS)
         else:
@@ -319,7 +324,6 @@ class Operation:
         for name, value, unit in (
             ("feed", self.feed_mm_min, "mm/min"),
             ("plunge feed", self.plunge_feed_mm_min, "mm/min"),
-            ("spindle speed", self.spindle_rpm, "rev/min"),
             ("depth", self.depth_mm, "mm"),
             ("step down", self.step_down_mm, "mm"),
             ("last pass", self.last_pass_mm, "mm"),
@@ -328,6 +332,8 @@ class Operation:
             ("largest hole", self.max_hole_mm, "mm"),
         ):
             above_zero(name, value, unit)
+        if self.spindle_rpm:
+            above_zero("spindle speed", self.spindle_rpm, "rev/min")
         at_least_zero("allowance", self.allowance_mm, "mm", MOST_WIDE_MM)
         at_least_zero("overlap", self.overlap_mm, "mm")
         at_least_zero("dwell", self.dwell_s, "s")

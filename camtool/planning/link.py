@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from camtool.arrays import Floats
-from camtool.planning.items import CutRun, Runs
-from camtool.planning.job import Operation, Tool
+from camtool.machine.model import Machine, Spindle
+from camtool.planning.items import CutRun, Runs, Setting
+from camtool.planning.job import Tool
 from camtool.planning.paths import cuts
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind
@@ -36,37 +37,46 @@ def _rounded(places: Floats) -> Floats:
 
 
 def link(
-    worked: Sequence[tuple[Operation, Runs]],
-    safe_z_mm: float,
+    worked: Sequence[tuple[Setting, Runs]],
+    machine: Machine,
     approaches: Callable[[], Approach] | None = None,
 ) -> ToolpathBuilder:
-    """All moves of a program: the tool starts at part zero on the stock and ends above it.
+    """All moves of a program: the tool starts at part zero on the stock and ends above it,
+    where the machine parks.
 
     `worked`: operations, each with its runs in order of cutting. Rows know their run, counted
     through all of them. `approaches` makes what gives the place from which a run is approached, a
     new one after each tool change. All places are rounded to ROUNDED_DECIMALS.
     """
+    safe_z_mm = worked[0][0].safe_z_mm
+    feed_z_mm = machine.defaults.feed_z_mm
+    heights = (safe_z_mm, None if feed_z_mm is None or feed_z_mm >= safe_z_mm else feed_z_mm)
+    spindle = machine.spindle
     builder = ToolpathBuilder().rapid(z=float(_rounded(np.array(safe_z_mm))))
     approach = approaches() if approaches is not None else None
     tool: Tool | None = None
     speed: float | None = None
-    done = 0
-    for operation, runs in worked:
+    cooled, done = "off", 0
+    for setting, runs in worked:
+        operation = setting.operation
         if not runs:
             continue
         builder.source = ""
         if _changes(tool, operation.tool):
-            speed = _spin(builder, speed, None)
+            cooled = _cool(builder, cooled, "off")
+            speed = _spin(builder, speed, None, spindle)
             builder.event(Kind.TOOL_CHANGE, float(operation.tool.number or 0))
             approach = approaches() if approaches is not None else None
         tool = operation.tool
-        speed = _spin(builder, speed, operation.spindle_rpm)
+        speed = _spin(builder, speed, setting.spindle_rpm, spindle)
+        cooled = _cool(builder, cooled, operation.coolant)
         for lot in _lots(runs):
-            _cut(builder, lot, done, safe_z_mm, approach)
+            _cut(builder, lot, done, heights, approach)
         done += len(runs)
     builder.source = ""
-    _spin(builder, speed, None)
-    return builder.rapid(0.0, 0.0).event(Kind.END)
+    _cool(builder, cooled, "off")
+    _spin(builder, speed, None, spindle)
+    return builder.rapid(*machine.defaults.park_mm).event(Kind.END)
 
 
 def _changes(before: Tool | None, tool: Tool) -> bool:
@@ -74,10 +84,32 @@ def _changes(before: Tool | None, tool: Tool) -> bool:
     return tool.number is not None and (before is None or before.number != tool.number)
 
 
-def _spin(builder: ToolpathBuilder, speed: float | None, wanted: float | None) -> float | None:
-    """Bring the spindle from one speed to another, None being off; the new speed."""
-    if wanted != speed:
-        builder.event(Kind.SPINDLE_OFF if wanted is None else Kind.SPINDLE_CW, wanted)
+def _spin(
+    builder: ToolpathBuilder, speed: float | None, wanted: float | None, spindle: Spindle
+) -> float | None:
+    """Bring the spindle from one speed to another, None being off; the new speed. Nothing is done
+    where the program does not switch it."""
+    if wanted == speed or spindle.switched != "program":
+        return speed
+    if wanted is None:
+        builder.event(Kind.SPINDLE_OFF, None)
+        return None
+    builder.event(Kind.SPINDLE_CCW if spindle.direction == "ccw" else Kind.SPINDLE_CW, wanted)
+    if spindle.spin_up_s > 0.0:
+        builder.event(Kind.DWELL, spindle.spin_up_s)
+    return wanted
+
+
+def _cool(builder: ToolpathBuilder, now: str, wanted: str) -> str:
+    """Change from one way of cooling to another; the new one."""
+    if now != wanted and (wanted == "off" or (now not in ("off", wanted) and wanted != "both")):
+        builder.event(Kind.COOLANT_OFF, None)
+        now = "off"
+    if now != wanted and wanted != "off":
+        if wanted in ("mist", "both") and now != "mist":
+            builder.event(Kind.COOLANT_MIST, None)
+        if wanted in ("flood", "both") and now != "flood":
+            builder.event(Kind.COOLANT_FLOOD, None)
     return wanted
 
 
@@ -124,13 +156,16 @@ def _cut(
     builder: ToolpathBuilder,
     lot: _Lot,
     before: int,
-    safe_z_mm: float,
+    heights: tuple[float, float | None],
     approach: Approach | None,
 ) -> None:
-    """Add the moves of runs, of which there were so many before: each from safe z and back to it.
+    """Add the moves of runs, of which there were so many before: each from safe z, the first of
+    the `heights`, and back to it; down as a rapid to the second one, if there is one.
 
-    (the approach) · across · down · the cuts · (the dwell) · up
+    (the approach) · across · (as a rapid) · down · the cuts · (the dwell) · up
     """
+    safe_z_mm, feed_z_mm = heights
+    come_down = 2 + (feed_z_mm is not None)
     runs, count = lot.runs, len(lot.runs)
     vertices, first = runs.vertices, runs.first
     cut = cuts(vertices, runs.feed_mm_min, first)
@@ -144,11 +179,11 @@ def _cut(
     approached[heads[: len(come)]] = [place is not None for place in come]
     dwells = ends & (runs.dwell_s > 0.0)
     cuts_each = np.bincount(cut.run, minlength=count)
-    rows_each = approached + 2 * begins + cuts_each + dwells + ends
+    rows_each = approached + come_down * begins + cuts_each + dwells + ends
     stop = np.cumsum(rows_each)
     start = stop - rows_each
     rank = np.arange(len(cut.run)) - np.repeat(np.cumsum(cuts_each) - cuts_each, cuts_each)
-    cutting = (start + approached + 2 * begins)[cut.run] + rank
+    cutting = (start + approached + come_down * begins)[cut.run] + rank
     total = int(stop[-1])
     kind = np.full(total, Kind.RAPID, dtype=np.int64)
     end, centre = np.full((total, 3), safe_z_mm), np.full((total, 2), np.nan)
@@ -156,7 +191,9 @@ def _cut(
     end[start[approached], :2] = np.array(places).reshape(-1, 2)
     across = (start + approached)[heads]
     end[across, :2] = vertices[first[heads], :2]
-    down = across + 1
+    down = across + come_down - 1
+    if feed_z_mm is not None:
+        end[across + 1, :2], end[across + 1, 2] = vertices[first[heads], :2], feed_z_mm
     kind[down], end[down] = Kind.LINE, vertices[first[heads], :3]
     speed[down] = runs.plunge_mm_min[heads]
     is_arc = np.isfinite(cut.centre[:, 0]) & np.isfinite(cut.feed)

@@ -50,7 +50,7 @@ from camtool.planning.order import (
 )
 from camtool.planning.place import SCALE_SHARE, collapsed, place
 from camtool.planning.profile import profile
-from camtool.planning.settings import safe_z_of, setting_of
+from camtool.planning.settings import setting_of
 from camtool.planning.sides import Sides, choose
 from camtool.planning.tabs import raised_over_bridges, with_tabs
 from camtool.toolpath.moves import Toolpath
@@ -91,7 +91,7 @@ def planned(drawing: Drawing, job: Job, machine: Machine, *, undivided: bool = F
     steps: list[Step] = []
     settings = [setting_of(operation, job, machine) for operation in job.operations]
     for rank, setting in enumerate(settings, 1):
-        there = HOME if rank == len(settings) else None
+        there = machine.defaults.park_mm if rank == len(settings) else None
         step = _step(placed, job, setting, machine, (here, there), sides)
         end = _end(step.runs, here)
         if undivided and _is_divided(job, setting.operation):
@@ -100,13 +100,13 @@ def planned(drawing: Drawing, job: Job, machine: Machine, *, undivided: bool = F
         here = end
         steps.append(step)
     steps = _sparing(steps)
-    worked = [(step.operation, step.runs) for step in steps]
+    worked = [(step.setting, step.runs) for step in steps]
     approaches = None
     if not undivided and (job.approach or job.minimise == "reversals"):
         from camtool.planning.reversing import Approaches
 
         approaches = partial(Approaches, machine)
-    builder = link(worked, safe_z_of(job, machine), approaches)
+    builder = link(worked, machine, approaches)
     toolpath = builder.finish()
     findings = collapsed(drawing, placed, job)
     findings += [finding for step in steps for finding in step.findings]

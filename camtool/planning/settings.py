@@ -24,13 +24,56 @@ def setting_of(operation: Operation, job: Job, machine: Machine) -> Setting:
     """The operation with the machine's numbers where it gives none; OptionError when too fast,
     and for impossible passes."""
     depth = depth_of(operation, machine)
+    _check_coolant(operation, machine)
     try:
         made = carved_levels if operation.kind == "vcarve" else levels
         passes = made(depth, operation.step_down_mm, operation.last_pass_mm)
     except OptionError as error:
         error.where = f"{operation_name(operation)}, {error.where}"
         raise
-    return Setting(operation, feeds_of(operation, machine), passes, safe_z_of(job, machine))
+    return Setting(
+        operation,
+        feeds_of(operation, machine),
+        passes,
+        safe_z_of(job, machine),
+        speed_of(operation, machine),
+    )
+
+
+def speed_of(operation: Operation, machine: Machine) -> float | None:
+    """The operation's speed of the spindle, or the machine's, in rev/min; None where neither says
+    any, and for 0, which is off. OptionError for a speed that the spindle does not have."""
+    spindle, given = machine.spindle, operation.spindle_rpm
+    if given is None:
+        return spindle.default_rpm
+    if given == 0.0:
+        return None
+    if spindle.switched == "none":
+        raise OptionError(
+            f"{machine.target.name} has no spindle",
+            where=key_of(operation, "spindle"),
+            mend="leave the speed out",
+        )
+    if not spindle.reaches(given):
+        most = "" if spindle.max_rpm is None else f" to {spindle.max_rpm:g}"
+        raise OptionError(
+            f"{given:g} rev/min is not in the range of the spindle, {spindle.min_rpm:g}{most}",
+            where=key_of(operation, "spindle"),
+            mend="give a speed in it, or leave it out",
+        )
+    return given
+
+
+def _check_coolant(operation: Operation, machine: Machine) -> None:
+    """OptionError for coolant that the machine has not."""
+    wanted = ("mist", "flood") if operation.coolant == "both" else (operation.coolant,)
+    for each in wanted:
+        if each != "off" and each not in machine.coolant.kinds:
+            raise OptionError(
+                f"{machine.target.name} has no {each} coolant",
+                where=key_of(operation, "coolant"),
+                mend=f"write {each} = true in [coolant] of your machine file if it has",
+            )
 
 
 def safe_z_of(job: Job, machine: Machine) -> float:
@@ -46,14 +89,19 @@ def depth_of(operation: Operation, machine: Machine) -> float:
 def feeds_of(operation: Operation, machine: Machine) -> Feeds:
     """The operation's feeds, or the machine's, none above the rates of the axes.
 
-    A plunge feed that is not given is the feed of the cut, or the highest that Z can.
+    A plunge feed that is not given is the machine's share of the feed of the cut (without one,
+    that feed), or the highest that Z can.
     OptionError for feeds above what the machine takes at all, naming the highest.
     """
     given = operation.plunge_feed_mm_min
     cut = operation.feed_mm_min
     cut = machine.feed.default_mm_min if cut is None else cut
-    plunge = cut if given is None else given
-    if given is None and exceeds(cut, machine.max_plunge_mm_min):
+    plunge = given
+    if plunge is None:
+        plunge = cut
+        if machine.defaults.plunge_share is not None:
+            plunge = _programmable(machine.defaults.plunge_share * cut, machine)
+    if given is None and exceeds(plunge, machine.max_plunge_mm_min):
         plunge = _programmable(machine.max_plunge_mm_min, machine)
     lowered: dict[str, float] = {}
     for name, flag, feed, highest in (

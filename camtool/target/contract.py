@@ -62,6 +62,8 @@ class Target(ABC):
     """The codes of its own findings; their names start with the name of the target and a dot."""
     starts_spindle: ClassVar[bool] = False
     """Whether a program starts the spindle, at a speed in the program."""
+    switches_coolant: ClassVar[bool] = False
+    """Whether a program can switch coolant."""
     any_machine: ClassVar[bool] = False
     """Whether the machine file describes no particular machine: travel and rates are examples."""
     filter_default: ClassVar[bool] = False

@@ -70,6 +70,13 @@ def machine_of(target: Target, table: Table, name: str) -> Machine:
     kind: type[Machine] = generic[records, target.dialect]
     whole = table if "dialect" in table else table | {"dialect": {}}
     machine: Machine = convert(whole, kind, name)
+    if machine.coolant.kinds and not target.switches_coolant:
+        raise MachineError(
+            f"programs of {machine.target.name} cannot switch coolant",
+            file=name,
+            where="table [coolant]",
+            mend="leave it out",
+        )
     target.check(machine)
     return machine
 

@@ -11,7 +11,7 @@ from camtool.project import NAME
 from camtool.target.contract import Setting
 
 _TABLE = re.compile(r"\[([\w.-]+)\]")
-_KEY = re.compile(r"([\w-]+)\s*=")
+_KEY = re.compile(r"(#\s*)?([\w-]+)\s*=")
 _OWN = ("target", "needs")
 _AXES = ("axes.x", "axes.y", "axes.z")
 _BACKLASH = "# backlash_mm = 0.0         # measure yours: camtool coupon, camtool calibrate"
@@ -23,6 +23,8 @@ _ABOUT = {
     "limits": "What bounds feeds and rapids besides the rates of the axes.",
     "defaults": "What a job takes where it says nothing: the height of rapids, the depth of cut, "
     "how far arcs may\n## be from drawn curves, which gaps of a drawing are closed.",
+    "spindle": "Who switches it, its speeds, and how long it is waited for.",
+    "coolant": "What the machine has: programs switch it where a job asks for it.",
     "controller": "How the controller computes; the model that verifies programs runs on it.",
     "dialect": "How programs are written.",
     "link": "The line that programs come down.",
@@ -82,14 +84,14 @@ def _rows(
     backlash = table not in _AXES or f"{table}.backlash_mm" in said
     for row in rows:
         key = _KEY.match(row)
-        path = f"{table}.{key[1]}" if key else ""
+        path = f"{table}.{key[2]}" if key else ""
         backlash |= "backlash_mm" in row
         if key and path in said:
-            yield _line(said.pop(path), key[1])
+            yield _line(said.pop(path), key[2])
+        elif row.startswith("#"):
+            yield row
         elif key and path not in needs:
             yield f"# {row}"
-        elif not key and row.startswith("#"):
-            yield row
     for name in _within(table, tuple(said)):
         yield _line(said.pop(f"{table}.{name}"), name)
     if not backlash:

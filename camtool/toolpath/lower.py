@@ -24,7 +24,7 @@ import numpy as np
 
 from camtool.arrays import Bools, Codes, Floats, Ints
 from camtool.errors import OptionError, PostError
-from camtool.findings import FEED_ABOVE_LIMIT_LOWERED
+from camtool.findings import EVENT_LEFT_OUT_COOLANT, FEED_ABOVE_LIMIT_LOWERED
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Kind, PolarArcs, Toolpath, frozen
 
@@ -212,6 +212,19 @@ def carried_over(decoded: Toolpath) -> Toolpath:
     kind = np.where(homes, int(Kind.RAPID), decoded.kind)[first:]
     rows = np.arange(first, len(decoded))
     return decoded.picked(rows, kind=kind, block=np.full(len(rows), -1))
+
+
+def without_coolant(toolpath: Toolpath) -> Toolpath:
+    """The same without switching coolant, for a machine that has none; EVENT_LEFT_OUT where it was
+    switched."""
+    cools = np.isin(toolpath.kind, (Kind.COOLANT_MIST, Kind.COOLANT_FLOOD, Kind.COOLANT_OFF))
+    if not cools.any():
+        return toolpath
+    found = EVENT_LEFT_OUT_COOLANT(
+        where=toolpath.place(int(cools.argmax())), count=int(cools.sum())
+    )
+    rest = toolpath.picked(np.flatnonzero(~cools))
+    return replace(rest, findings=(*toolpath.findings, found))
 
 
 def at_feed(toolpath: Toolpath, feed_mm_min: float) -> Toolpath:

@@ -56,6 +56,9 @@ class Kind(IntEnum):
     HOME_XY = 17  # return to machine zero in X and Y
     HOME_Z = 18  # return to machine zero in Z
     END = 19  # end of program
+    COOLANT_MIST = 20
+    COOLANT_FLOOD = 21
+    COOLANT_OFF = 22
 
 
 Corners = Literal["blend", "exact-path", "exact-stop"]

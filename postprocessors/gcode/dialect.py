@@ -11,14 +11,18 @@ the end, as the numbers of the block give them). An arc is refused when
 from __future__ import annotations
 
 import math
-from typing import Annotated, Final, Literal
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import msgspec
 from msgspec import Meta
 
-from camtool.errors import MachineError
+from camtool.errors import MachineError, ProgramError
 from camtool.machine.model import Machine
 from camtool.machine.ranges import Angle, Part, Radius, Slack, Tolerance
+
+if TYPE_CHECKING:
+    from camtool.toolpath.moves import Toolpath
 
 POWER_OF_TEN_TOLERANCE: Final = 1e-9
 """`feed.unit_mm_min` must be a power of ten to this part of its logarithm."""
@@ -37,7 +41,9 @@ class GcodeDialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     takes in a line; `block_numbers` N1 N2 …; `comments`: a "header", also the name of each contour
     ("contours"), or "none"; `full_circles` "whole" (end = start) or as two "halves";
     `program_end`; `retract` to the highest Z in front of the end if the tool is left in the
-    material. `arc_most_radius_mm`: larger arcs are written as lines; `arc_full_turn_rad`: the
+    material. `start_blocks` follow the modes with which a program begins, `end_blocks` stand
+    before its end, when the spindle is off: what the machine wants, as its controller takes it.
+    `arc_most_radius_mm`: larger arcs are written as lines; `arc_full_turn_rad`: the
     controller takes an arc that turns by less for a full circle; `arc_chord_slack_mm`: by how much
     half the chord may exceed R.
     """
@@ -50,6 +56,8 @@ class GcodeDialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     full_circles: Literal["whole", "halves"] = "whole"
     program_end: Literal["M2", "M30"] = "M2"
     retract: bool = True
+    start_blocks: tuple[str, ...] = ()
+    end_blocks: tuple[str, ...] = ()
     arc_difference_mm: Tolerance
     arc_difference_part: Part
     arc_most_difference_mm: Tolerance
@@ -72,6 +80,61 @@ def feed_decimals(machine: Machine) -> int:
             mend="use 1, 0.1, 0.01 or 0.001",
         )
     return whole
+
+
+MOST_BLOCKS: Final = 100
+"""So many start blocks, and end blocks, are a mistake."""
+
+
+def check_blocks(machine: Machine[Any, Any], read: Callable[[bytes], Toolpath]) -> None:
+    """MachineError for start and end blocks that the controller would not take alone, that cut,
+    end the program, or go farther than the machine can."""
+    import numpy as np
+
+    from camtool.toolpath.moves import Kind, toolpath_extents
+
+    dialect: GcodeDialect = machine.dialect
+    for key in ("start_blocks", "end_blocks"):
+        blocks: tuple[str, ...] = getattr(dialect, key)
+        for number, block in enumerate(blocks, 1):
+            _check_block(block, f"table [dialect], key {key}, block {number}", machine)
+        if not blocks:
+            continue
+        where = f"table [dialect], key {key}"
+        try:
+            path = read("\n".join([*blocks, dialect.program_end]).encode())
+        except ProgramError as error:
+            raise MachineError(
+                f"{error.message} ({error.where})",
+                file=machine.target.name,
+                where=where,
+                mend=error.mend,
+            ) from error
+        spans = np.ptp(toolpath_extents(path), axis=1).tolist()
+        beyond = [
+            name
+            for name, span, axis in zip("XYZ", spans, machine.axes, strict=True)
+            if axis.travel_mm is not None and span > axis.travel_mm
+        ]
+        wrong = ""
+        if len(blocks) > MOST_BLOCKS:
+            wrong = f"{len(blocks)} blocks are more than {MOST_BLOCKS}"
+        elif path.is_feed.any():
+            wrong = "they cut: only rapids and switches may stand here"
+        elif path.block[path.kind == Kind.END].tolist() != [len(blocks)]:
+            wrong = "they end the program, which camtool does"
+        elif beyond:
+            wrong = f"they leave the travel of {' and '.join(beyond)}"
+        if wrong:
+            raise MachineError(wrong, file=machine.target.name, where=where)
+
+
+def _check_block(block: str, where: str, machine: Machine[Any, Any]) -> None:
+    """MachineError for a text that is not one plain block."""
+    if not block.strip() or not block.isascii() or not block.isprintable():
+        raise MachineError(
+            f"{block!r} is no block", file=machine.target.name, where=where, mend="such as M8"
+        )
 
 
 def check_unit(machine: Machine, unit_mm: float, arc_spread_mm: float) -> None:

@@ -81,6 +81,9 @@ class M(IntEnum):
     SPINDLE_CCW = 40
     SPINDLE_OFF = 50
     CHANGE = 60
+    MIST = 70
+    FLOOD = 80
+    COOLANT_OFF = 90
     END_AND_REWIND = 300
 
 
@@ -153,7 +156,9 @@ class ModalReader:
         self._moved = False
         self._codes: dict[tuple[str, str], int] = {}
         self._findings = ReadFindings(machine.max_feed_mm_min)
-        self._machine = MachineWords(self.path, rules, self._findings)
+        self._machine = MachineWords(
+            self.path, rules, self._findings, cools=bool(machine.coolant.kinds)
+        )
         self._zero = machine.controller.machine_zero_mm
 
     def block(self, block: Block) -> None:
@@ -533,15 +538,25 @@ SPINDLE: Final = {
     M.SPINDLE_OFF: Kind.SPINDLE_OFF,
 }
 
+COOLANT: Final = {
+    M.MIST: Kind.COOLANT_MIST,
+    M.FLOOD: Kind.COOLANT_FLOOD,
+    M.COOLANT_OFF: Kind.COOLANT_OFF,
+}
+
 
 class MachineWords:
     """S, T and M words in, rows out; knows the speed, the tool and whether the program ended."""
 
-    def __init__(self, path: ToolpathBuilder, rules: Rules, notes: ReadFindings) -> None:
+    def __init__(
+        self, path: ToolpathBuilder, rules: Rules, notes: ReadFindings, *, cools: bool
+    ) -> None:
+        """`cools`: the machine has coolant, so that its words are rows."""
         self.ended = False
         self._path = path
         self._rules = rules
         self._findings = notes
+        self._cools = cools
         self._speed: float | None = None
         self._spindle: Kind | None = None
         self._tool: int | None = None
@@ -563,7 +578,10 @@ class MachineWords:
         if self._changed:
             self._change(block)
         self._turn(block, codes, has_speed=speed is not None)
-        if any(M_CODES[code] == "coolant" for code in codes):
+        cooling = [COOLANT[M(code)] for code in codes if code in COOLANT]
+        if cooling and self._cools:
+            self._path.event(cooling[0])
+        elif cooling:
             self._findings.coolant.append(block.index)
 
     def stop(self, block: Block, codes: list[int]) -> None:

@@ -9,7 +9,6 @@ stand anywhere. Comment lines and `%` are lines, but no blocks.
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,7 +16,6 @@ from importlib.metadata import version
 from itertools import pairwise
 from typing import Final
 
-import msgspec
 import numpy as np
 
 from camtool.arrays import Bools, Codes, Floats, Ints
@@ -43,6 +41,9 @@ from .format import (
     word_of,
 )
 
+DIGEST: Final = 8
+"""So many hexadecimal digits of the machine's digest stand in a program."""
+
 VALUE: Final = NumberStyle(3, strip=True)
 """Spindle speeds and dwells are written to a thousandth."""
 
@@ -50,6 +51,13 @@ ROUNDING_PART: Final = 1e-9
 """A value written within this part of itself was not rounded."""
 
 SPINDLE: Final = {Kind.SPINDLE_CW: "M3", Kind.SPINDLE_CCW: "M4"}
+
+SWITCHES: Final = {
+    Kind.SPINDLE_OFF: "M5",
+    Kind.COOLANT_MIST: "M7",
+    Kind.COOLANT_FLOOD: "M8",
+    Kind.COOLANT_OFF: "M9",
+}
 
 EventWords = Callable[["Event"], str]
 
@@ -86,7 +94,7 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
     first_mode, changes = _path_modes(toolpath, sent, style)
     ended = len(toolpath) > 0 and toolpath.kind[-1] == Kind.END
     order = Order(sent.is_motion)
-    order.add(0, [*style.header, *first_mode])
+    order.add(0, [*style.header, *first_mode, *dialect.start_blocks])
     for at, row in sent.others(events):
         order.add(at, [events.blocks[row]], row)
     for at, block in changes.items():
@@ -205,6 +213,7 @@ def _footer(toolpath: Toolpath, events: Events, dialect: GcodeDialect) -> list[s
     return [
         *([f"G0 Z{format_number(float(heights.max()), style)}"] if retract else []),
         *(["M5"] if events.spindle_on else []),
+        *dialect.end_blocks,
         dialect.program_end,
     ]
 
@@ -218,7 +227,9 @@ def _header(toolpath: Toolpath, machine: Machine, dialect: GcodeDialect) -> list
         f"{axis} {' to '.join(format_column(reach, style))}"
         for axis, reach in zip("XYZ", toolpath_extents(toolpath), strict=True)
     ]
-    made = [toolpath.made_from, f"settings {_digest(machine)}"] if toolpath.made_from else []
+    made = (
+        [toolpath.made_from, f"settings {machine.digest[:DIGEST]}"] if toolpath.made_from else []
+    )
     lines = [
         f"camtool {version('camtool')} for {machine.target.name}: {machine.target.title}",
         *made,
@@ -226,11 +237,6 @@ def _header(toolpath: Toolpath, machine: Machine, dialect: GcodeDialect) -> list
         *bounds,
     ]
     return [comment(line) for line in lines]
-
-
-def _digest(machine: Machine) -> str:
-    """Eight hexadecimal digits that change with any value of the machine."""
-    return hashlib.sha256(msgspec.json.encode(machine)).hexdigest()[:8]
 
 
 def _comments(toolpath: Toolpath, of_row: Ints, style: Style) -> tuple[Ints, Callable[[int], str]]:
@@ -482,13 +488,13 @@ def events_of(toolpath: Toolpath, words: EventWords) -> Events:
 
 
 def common_words(event: Event) -> str:
-    """Dwell, spindle and homing; PostError for values that no block can say.
+    """Dwell, spindle, coolant and homing; PostError for values that no block can say.
 
     Homing is a rapid in machine coordinates, `G53 G0`: G28 would go where the operator's memory
     of it points.
     """
-    if event.kind == Kind.SPINDLE_OFF:
-        return "M5"
+    if event.kind in SWITCHES:
+        return SWITCHES[event.kind]
     if event.kind == Kind.HOME_XY:
         return "G53 G0 X0 Y0"
     if event.kind == Kind.HOME_Z:

@@ -3,11 +3,12 @@ docs/controllers/grbl.md the model of the controller."""
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from camtool.target.contract import Setting, Target
 
-from ..gcode.dialect import feed_decimals
+from ..gcode.dialect import check_blocks, feed_decimals
 from .dialect import Dialect, GrblController, GrblMachine
 
 if TYPE_CHECKING:
@@ -25,12 +26,15 @@ class Grbl(Target):
     controllers = (GrblController,)
     dialect = Dialect
     starts_spindle = True
+    switches_coolant = True
     any_machine = True
     settings_listing = "what it answers to $$"
 
     def check(self, machine: GrblMachine) -> None:
         """Raise MachineError where values of the dialect do not go with the machine."""
         feed_decimals(machine)
+        if machine.dialect.start_blocks or machine.dialect.end_blocks:
+            check_blocks(machine, partial(self.read, machine=machine))
 
     def write(self, toolpath: Toolpath, machine: GrblMachine) -> Program:
         """The program; PostError naming the move that cannot be written or done."""

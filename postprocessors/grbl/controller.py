@@ -196,6 +196,9 @@ WAITS = (
     Kind.SPINDLE_CCW,
     Kind.SPINDLE_OFF,
     Kind.TOOL_CHANGE,
+    Kind.COOLANT_MIST,
+    Kind.COOLANT_FLOOD,
+    Kind.COOLANT_OFF,
     Kind.END,
 )
 """Before these the machine comes to rest (`protocol_buffer_synchronize`)."""

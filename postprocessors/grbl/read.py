@@ -17,7 +17,7 @@ from camtool.toolpath.moves import Kind, Toolpath
 
 from ..gcode.blocks import Lexing, blocks_of
 from ..gcode.read import M_CODES, ModalReader, Rules
-from .dialect import MOST_TOOL, Dialect, GrblController, GrblMachine
+from .dialect import MOST_TOOL, GrblController, GrblMachine
 from .findings import FEED_TOO_SLOW
 
 SLOW_GUARD: Final = 1e-6
@@ -72,7 +72,7 @@ def read_program(data: bytes, machine: GrblMachine) -> Toolpath:
         line_chars=dialect.line_chars,
         counts_blanks=False,
     )
-    reader = ModalReader(machine, rules_of(dialect))
+    reader = ModalReader(machine, rules_of(machine))
     for block in blocks_of(data, lexing, reader.take):
         reader.block(block)
     if reader.empty:
@@ -122,8 +122,9 @@ def _too_slow(path: Toolpath, machine: GrblMachine) -> Iterator[Finding]:
         )
 
 
-def rules_of(dialect: Dialect) -> Rules:
-    """What grbl takes."""
+def rules_of(machine: GrblMachine) -> Rules:
+    """What grbl takes; M7 where the machine file says that it was built with it."""
+    dialect, mist = machine.dialect, machine.coolant.mist
 
     def arc_fault(r1: float, r2: float) -> str:
         """grbl's error 33; r1 is the radius that counts."""
@@ -135,7 +136,7 @@ def rules_of(dialect: Dialect) -> Rules:
 
     return Rules(
         groups=GROUPS,
-        refused=REFUSED,
+        refused={word: why for word, why in REFUSED.items() if not (mist and word == "M7")},
         first_motion=0,
         arc_fault=arc_fault,
         full_turn_rad=dialect.arc_full_turn_rad,
@@ -143,7 +144,7 @@ def rules_of(dialect: Dialect) -> Rules:
         sure_gap_mm=min(dialect.arc_difference_mm, dialect.arc_most_difference_mm),
         sure_radius_mm=dialect.arc_least_radius_mm,
         ends_in_plane=True,
-        m_codes={code: group for code, group in M_CODES.items() if code != MIST},
+        m_codes={code: group for code, group in M_CODES.items() if mist or code != MIST},
         tools="pause" if dialect.tool_change == "pause" else "none",
         most_tool=MOST_TOOL,
     )

@@ -31,7 +31,7 @@ _KEYS = {
 } | {"controller.junction_deviation_mm": 11, "controller.arc_tolerance_mm": 12}
 """What every listing says ..."""
 
-_MORE = {"controller.idle_delay_ms": 1}
+_MORE = {"controller.idle_delay_ms": 1, "spindle.max_rpm": 30, "spindle.min_rpm": 31}
 """... and what it may say besides."""
 
 

@@ -3,11 +3,12 @@ docs/controllers/linuxcnc.md the model of the controller."""
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from camtool.target.contract import Setting, Target
 
-from ..gcode.dialect import feed_decimals
+from ..gcode.dialect import check_blocks, feed_decimals
 from .dialect import Dialect, LinuxcncController, LinuxcncMachine
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ class Linuxcnc(Target):
     controllers = (LinuxcncController,)
     dialect = Dialect
     starts_spindle = True
+    switches_coolant = True
     any_machine = True
     settings_listing = "its INI file"
     filter_default = True
@@ -32,6 +34,8 @@ class Linuxcnc(Target):
     def check(self, machine: LinuxcncMachine) -> None:
         """Raise MachineError where values of the dialect do not go with the machine."""
         feed_decimals(machine)
+        if machine.dialect.start_blocks or machine.dialect.end_blocks:
+            check_blocks(machine, partial(self.read, machine=machine))
 
     def write(self, toolpath: Toolpath, machine: LinuxcncMachine) -> Program:
         """The program; PostError naming the move that cannot be written or done."""

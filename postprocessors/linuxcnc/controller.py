@@ -409,6 +409,9 @@ WAITS = (
     Kind.SPINDLE_CCW,
     Kind.SPINDLE_OFF,
     Kind.TOOL_CHANGE,
+    Kind.COOLANT_MIST,
+    Kind.COOLANT_FLOOD,
+    Kind.COOLANT_OFF,
     Kind.END,
 )
 """Before these the machine comes to rest (their preconditions in emctaskmain.cc)."""

@@ -91,6 +91,8 @@ def settings_of(text: str) -> list[Setting] | None:
         ("EMCMOT", "SERVO_PERIOD", "controller.servo_period_s", 1e-9),
         ("TRAJ", "ARC_BLEND_OPTIMIZATION_DEPTH", "controller.lookahead_moves", 1.0),
         ("TRAJ", "ARC_BLEND_KINK_RATIO", "controller.kink_ratio", 1.0),
+        ("DISPLAY", "MAX_SPINDLE_0_SPEED", "spindle.max_rpm", 1.0),
+        ("DISPLAY", "MIN_SPINDLE_0_SPEED", "spindle.min_rpm", 1.0),
     ):
         value = ini.number(section, key)
         if value is not None:

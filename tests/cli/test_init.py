@@ -26,6 +26,8 @@ $102=800.000
 $110=1000.000
 $111=1000.000
 $112=600.000
+$30=12000
+$31=0
 $120=30.000
 $121=30.000
 $122=10.000
@@ -58,6 +60,9 @@ def test_from_a_listing_to_a_program_with_three_commands(
     done = camtool("init", "my-3018", "--settings", "grbl.txt")
     assert done.returncode == 0, done.stderr
     assert b"camtool post drawing.dxf\n" in done.stderr
+    whole = tomllib.loads((config / "machines" / "my-3018.toml").read_text())
+    assert whole["spindle"] == {"max_rpm": 12000, "min_rpm": 0}
+    assert whole["defaults"] == {"feed_z_mm": 2.0, "plunge_share": 0.3}
     file = config / "machines" / "my-3018.toml"
     assert said(file) == {
         "coded_step_mm": 0.00125,
@@ -169,7 +174,7 @@ def test_wrong_use_says_what_to_do(
         ("$110=1000.000\n", "$110=1000.000\n$110=900\n", "line 12, $110: is given twice"),
         ("$110=1000.000", "$110=fast", "line 11, $110: 'fast' is no number"),
         ("$100=800.000", "$100=0", "line 8, $100: 0 steps/mm are none"),
-        ("$130=300.000", "$130=-300.000", "line 17, $130: -300 is not between"),
+        ("$130=300.000", "$130=-300.000", "line 19, $130: -300 is not between"),
         ("$", "?", "says nothing of a machine; give what it answers to $$ for grbl or its INI"),
     ],
 )
@@ -229,7 +234,23 @@ def test_a_wrong_camtool_toml_is_an_error(
     assert camtool("post", samples / "logo.dxf", "-t", "grbl").returncode in (0, 2)
 
 
-ANSWERS = "my-mill\ngrbl\n\n80\n300x180x45\nfast\n1000\n\n0.02x0.03x0\n"
+ANSWERS = "my-mill\ngrbl\n\n80\n300x180x45\nfast\n1000\n\n0.02x0.03x0\n9000\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("9000", {"default_rpm": 9000.0}),
+        ("hand", {"switched": "hand"}),
+        ("none", {"switched": "none"}),
+    ],
+)
+def test_the_spindle(camtool: Run, config: Path, text: str, values: dict[str, object]) -> None:
+    assert camtool("init", "mine", "-t", "grbl", "--spindle", text).returncode == 0
+    whole = tomllib.loads((config / "machines" / "mine.toml").read_text())
+    assert whole["spindle"] == values
+    done = camtool("init", "not", "-t", "grbl", "--spindle", "fast")
+    assert b"'fast' is no number" in done.stderr
 
 
 def test_questions(camtool: Run, config: Path) -> None:
@@ -245,7 +266,7 @@ def test_questions(camtool: Run, config: Path) -> None:
 
 
 def test_a_listing_may_be_pasted(camtool: Run, config: Path) -> None:
-    answers = f"my-mill\ngrbl\n{LISTING}\n0.02\n"
+    answers = f"my-mill\ngrbl\n{LISTING}\n0.02\n\n"
     done = camtool("init", "--ask", stdin=answers.encode())
     assert done.returncode == 0, done.stderr
     values = said(config / "machines" / "my-mill.toml")

@@ -12,10 +12,11 @@ import numpy as np
 from camtool.geometry.polylines import Polyline
 from camtool.machine.model import Machine
 from camtool.planning.items import Contour, CutRun, Feeds, Item, Runs, Setting
-from camtool.planning.job import Operation
+from camtool.planning.job import Job, Operation
 from camtool.planning.link import link
 from camtool.planning.paths import flat
 from camtool.planning.reversing import Approaches, least_reversal_mm, parts_of, reversals_along
+from camtool.planning.settings import setting_of
 from camtool.target.registry import load_target
 from camtool.toolpath.moves import Toolpath
 from camtool.verification.report import Report
@@ -76,7 +77,8 @@ def toolpath(paths: Sequence[Polyline], machine: Machine, *, approach: bool) -> 
     """The paths cut one after the other, each from its first point."""
     runs = [run_of(path) for path in paths]
     come = Approaches(machine) if approach else None
-    return link([(Operation(), Runs.of(runs))], 0.2, lambda: come).finish()
+    setting = setting_of(Operation(), Job(safe_z_mm=0.2), machine)
+    return link([(setting, Runs.of(runs))], machine, lambda: come).finish()
 
 
 def judged(

@@ -30,7 +30,6 @@ BAD = [
         for name in (
             "feed_mm_min",
             "plunge_feed_mm_min",
-            "spindle_rpm",
             "depth_mm",
             "step_down_mm",
             "last_pass_mm",
@@ -42,7 +41,7 @@ BAD = [
     ],
     *[
         (Operation, {n: v})
-        for n in ("allowance_mm", "overlap_mm", "dwell_s")
+        for n in ("allowance_mm", "overlap_mm", "dwell_s", "spindle_rpm")
         for v in AT_LEAST_ZERO
     ],
     *[(Operation, {"step_over": value}) for value in (0.0, -0.4, 1.01, *NO_NUMBERS)],

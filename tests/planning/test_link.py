@@ -12,6 +12,7 @@ from camtool.pipeline import post_drawing
 from camtool.planning.items import RAPID, CutRun, Runs
 from camtool.planning.job import Tabs, job_of
 from camtool.planning.link import ROUNDED_DECIMALS, Approach, link
+from camtool.planning.settings import setting_of
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import COLUMNS, Kind
@@ -19,6 +20,7 @@ from tests.drawings import drawing_of
 from tests.strategies import polylines
 
 EIGHTH = 3.175
+MACHINE = load_target("grbl").machine
 
 
 @pytest.mark.parametrize("target", ["grbl", "linuxcnc", "valcnc"])
@@ -95,8 +97,9 @@ def test_runs_that_are_linked_in_lots_are_those_that_are_linked_together(
         return approach
 
     def linked() -> ToolpathBuilder:
-        work = [(job_of().operations[0], runs)] * 2
-        return link(work, 4.0, approaches if approached else None)
+        job = job_of(safe_z_mm=4.0)
+        work = [(setting_of(job.operations[0], job, MACHINE), runs)] * 2
+        return link(work, MACHINE, approaches if approached else None)
 
     together = linked()
     with pytest.MonkeyPatch.context() as patch:
