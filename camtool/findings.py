@@ -1046,7 +1046,7 @@ EVENT_LEFT_OUT_COOLANT = Sentence(
     Code.EVENT_LEFT_OUT,
     "{count:# word for coolant is|# words for coolant are} left out: the machine has none (mist "
     "and flood of [coolant] in its file)",
-    WARNING,
+    severity=WARNING,
 )
 CUT_DOUBTFUL = Sentence(Code.CUT_DOUBTFUL, "{reasons}")
 CUT_DOUBTFUL_SPEED = Sentence(
