@@ -16,9 +16,11 @@ from camtool.cli.options import (
     MachineFlags,
     SectionedCommand,
     drawing_options,
+    length,
     machine_options,
     talk_options,
 )
+from camtool.cli.picture_options import PictureFlags, picture_name
 from camtool.plain import one_line, to_json
 
 MOST_GROUPS = 12
@@ -39,29 +41,39 @@ def job() -> None:
 @job.command(cls=SectionedCommand, short_help="Begin a job file.")
 @click.argument("source", metavar="DRAWING")
 @click.option("-o", "--output", metavar="FILE", help="The file; - is stdout.  [job.toml]")
+@click.option("--tool-diameter", callback=length, metavar="LENGTH", help="Of the end mill.")
+@click.option("--thickness", callback=length, metavar="LENGTH", help="Of the stock: cut through.")
 @machine_options
 @drawing_options
 @talk_options
 def new(
     source: str,
     output: str | None,
+    tool_diameter: float | None,
+    thickness: float | None,
     machine: MachineFlags,
     drawing: DrawingFlags,
     quiet: bool,
     verbose: bool,
 ) -> None:
-    """Write a job file for DRAWING (- is stdin): one operation for each of its layers.
+    """Write a job file for DRAWING (- is stdin): operations for each of its layers.
 
-    It works as it is; every other key stands there as a comment.
+    With the tool's diameter, holes, windows and outlines get operations of their own, and with
+    the thickness of the stock they go through it, and outlines keep tabs. It works as it is;
+    every other key stands there as a comment.
     """
-    from camtool.jobs.template import job_template
+    from camtool.jobs.template import Proposal, job_template
+    from camtool.planning.job import above_zero
 
+    above_zero("tool diameter", tool_diameter, "mm")
+    above_zero("thickness", thickness, "mm")
+    proposal = Proposal(tool_diameter or 0.0, thickness or 0.0)
     output = output or "job.toml"
     check_places([source, *machine.files()], [output])
     check_new(output)
     target = machine.load().machine if machine.name() is not None else None
     read = drawing.read(source, target)
-    write_all({output: job_template(read, target).encode()})
+    write_all({output: job_template(read, target, proposal).encode()})
     say_findings(read.findings, quiet=quiet, verbose=verbose)
     where = "stdout" if output == STDOUT else output
     say(f"written: {where}; look at the kinds, the tool and the depth", quiet=quiet)
@@ -71,6 +83,12 @@ def new(
 @click.argument("file", metavar="FILE")
 @click.option("--against", metavar="DRAWING", help="Say what of this drawing is taken.")
 @click.option("--json", "report", metavar="FILE", help="The same as JSON; - is stdout.")
+@click.option(
+    "--preview",
+    metavar="FILE",
+    callback=picture_name,
+    help="Picture of what it cuts of the drawing, .svg, .png or .html.",
+)
 @machine_options
 @drawing_options
 @talk_options
@@ -78,6 +96,7 @@ def check(
     file: str,
     against: str | None,
     report: str | None,
+    preview: str | None,
     machine: MachineFlags,
     drawing: DrawingFlags,
     quiet: bool,
@@ -87,13 +106,21 @@ def check(
     which side of them, and why."""
     from camtool.jobs.description import described
 
+    if preview is not None and (against is None or machine.name() is None):
+        raise click.UsageError("--preview needs --against and --target")
     reads = [*JobFlags(file).files(), against, *machine.files()]
-    check_places(reads, [report])
+    check_places(reads, [report, preview])
     job = JobFlags(file).job(drawing)
     target = machine.load().machine if machine.name() is not None else None
     read = drawing.read(against, target, job) if against is not None else None
     progress().begin("planning")
     facts, findings = described(job, read, target)
+    files: dict[str, bytes] = {}
+    if preview is not None and against is not None:
+        from camtool.cli.preview import Seen
+
+        scene, _ = Seen(machine, False, JobFlags(file), drawing, preview).scene(against)
+        files[preview] = PictureFlags().painter(lambda: [scene], quiet=quiet)(preview)
     if report is not None:
         facts["findings"] = [
             {
@@ -103,7 +130,8 @@ def check(
             }
             for each in findings
         ]
-        write_all({report: to_json(facts).encode()})
+        files[report] = to_json(facts).encode()
+    write_all(files)
     if not quiet and report != STDOUT:
         for line in _summary(facts):
             show_text(one_line(line))

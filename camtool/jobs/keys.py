@@ -11,6 +11,7 @@ says how to fix it. docs/jobs.md explains the keys; a test keeps the page and th
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -30,6 +31,7 @@ from camtool.planning.job import (
     LEADS,
     ORIGINS,
     PATTERNS,
+    SELECTED,
     SIDES,
     STARTS,
     TOOL_KINDS,
@@ -300,6 +302,34 @@ def layers(value: object) -> tuple[str, ...]:
     return patterns(value)
 
 
+def words(value: object) -> tuple[str, ...]:
+    """A list of words to select by, or one text with commas between them."""
+    return tuple(word(SELECTED)(Given(each, "")) for each in layers(value))
+
+
+def length_range(value: object) -> tuple[float, float]:
+    """["3mm", "8mm"] or "3..8mm", one end of which may be left out; a unit at the end holds for
+    both."""
+    return _range(value, length)
+
+
+def number_range(value: object) -> tuple[float, float]:
+    """[10, 200] or "10..200"."""
+    return _range(value, number)
+
+
+def _range(value: object, convert: Callable[[object], float]) -> tuple[float, float]:
+    if not isinstance(value, str):
+        return _two(value, convert, '["3mm", "8mm"]')
+    one, dots, two = (part.strip() for part in value.partition(".."))
+    if not dots or not (one or two):
+        raise OptionError(f"{value!r} is no range", mend='write it like "3..8mm"')
+    unit = _UNIT.search(two)
+    if one and unit and not _UNIT.search(one):
+        one += unit[0]
+    return convert(one) if one else 0.0, convert(two) if two else math.inf
+
+
 def colours(value: object) -> tuple[str, ...]:
     """Patterns of colours, "#rrggbb" as drawings have them; names and numbers are converted."""
     from camtool.importers.pieces import colour_named
@@ -551,6 +581,26 @@ OPERATION = {
     "kind": Key("kind", one_of(KINDS), "What is done.  [profile]", kinds=KINDS),
     "layers": Key("layers", PATTERNS_OF_NAMES, kinds=KINDS),
     "colours": Key("colours", Value(plain(colours)), kinds=KINDS),
+    "select": Key(
+        "select",
+        Value(plain(words), "WORDS"),
+        "Only closed, open, outer, inner, circle, not circle, point; several: all of it.",
+        '["inner", "circle"]',
+        KINDS,
+    ),
+    "select_size": Key(
+        "size_mm", Value(plain(length_range), "RANGE"), "And so large.", '"3..8mm"', KINDS
+    ),
+    "select_area": Key(
+        "area_mm2",
+        Value(plain(number_range), "RANGE"),
+        "And of such an area, mm².",
+        '"10..200"',
+        KINDS,
+    ),
+    "select_entities": Key(
+        "entities", Value(plain(layers), "NAMES"), "And these by handle or id.", '["2F"]', KINDS
+    ),
     "side": Key(
         "side",
         Value(word(SIDES), choices=("auto", "on", "outside", "inside")),

@@ -2,23 +2,28 @@
 
 One operation for each layer, or for each colour when there is one layer: drilled where it holds
 small circles and points alone, engraved where every path is open or its name says so, else a
-profile. What is larger comes later, so that parts are cut free last. Every other key stands there
-as a comment, with an example.
+profile; what is open, closed or a point gets an operation of its own. Where the tool is known,
+holes, inner and outer contours do, too. What is larger comes later, so that parts are cut free
+last. Every other key stands there as a comment, with an example.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from camtool.arrays import Ints
 from camtool.geometry.facts import drawing_extents
 from camtool.geometry.measure import extents
 from camtool.jobs.keys import OPERATION, PLACE, TOOL, WHOLE, Key
-from camtool.planning.drill import circle_of
+from camtool.planning.drill import HOLE_SIZE_MM, circle_of
+from camtool.planning.job import Operation, Stock
+from camtool.planning.sides import CONTINUOUS, Traits
 
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
@@ -30,6 +35,12 @@ SMALL_HOLE = 0.1
 
 ENGRAVED = ("engrav", "etch", "scribe")
 """A layer with one of these in its name is engraved."""
+
+BREAKTHROUGH_MM = 0.3
+"""Through cuts are proposed to go so far below the stock."""
+
+LEAST_TAB_MM = 0.5
+"""Lower tabs than this are not proposed."""
 
 TOOL_NAME = "tool"
 _ORDER = ("drill", "engrave", "profile")
@@ -46,16 +57,41 @@ class _Group:
     paths: tuple[int, ...]
     marks: tuple[int, ...]
 
+    @property
+    def called(self) -> str:
+        """Its name, or that it has none."""
+        return self.name or f"no {self.key[:-1]}"
 
-def job_template(drawing: Drawing, machine: Machine | None = None) -> str:
-    """TOML text of a job for the drawing; for `machine`, when it is known, with its numbers."""
+
+@dataclass(frozen=True)
+class Proposal:
+    """What is known of the cut, mm, 0 where it is not: the tool's diameter, the stock's
+    thickness."""
+
+    tool_mm: float = 0.0
+    thickness_mm: float = 0.0
+
+    @property
+    def depth_mm(self) -> float:
+        """Through the stock, and a little into what it lies on; 0 without a thickness."""
+        if not self.thickness_mm:
+            return 0.0
+        return self.thickness_mm + min(BREAKTHROUGH_MM, Stock(self.thickness_mm).through_mm)
+
+
+def job_template(
+    drawing: Drawing, machine: Machine | None = None, proposal: Proposal | None = None
+) -> str:
+    """TOML text of a job for the drawing; for `machine`, when it is known, with its numbers. With
+    a proposal of tool and stock, contours are told apart by what they are."""
+    proposal = proposal or Proposal()
     (left, right), (low, high) = drawing_extents(drawing).tolist()
     size = (right - left, high - low)
     groups = sorted(_groups(drawing), key=lambda group: _extent(drawing, group))
-    operations = sorted(
-        (_operation(drawing, group, max(size)) for group in groups),
-        key=lambda operation: _ORDER.index(operation[0]),
-    )
+    parts = [
+        (group, part) for group in groups for part in _parts(drawing, group, max(size), proposal)
+    ]
+    parts.sort(key=lambda each: _ORDER.index(each[1].kind))
     lines = [
         *_head(drawing, size, machine),
         *_comments(WHOLE),
@@ -64,19 +100,30 @@ def job_template(drawing: Drawing, machine: Machine | None = None) -> str:
         _row('origin = "lower-left"', PLACE["origin"].help),
         *_comments(PLACE),
         "",
-        "# [stock]                           # its top is Z0; the corner is its lower left one",
-        '# corner = ["0mm", "0mm"]',
-        f'# size = ["{size[0]:.6g}mm", "{size[1]:.6g}mm"]',
-        '# thickness = "1mm"',
-        '# spoilboard = "0.5mm"',
+        *_stock(size, proposal),
         "",
         f"[tools.{TOOL_NAME}]",
-        _row('diameter = "0mm"', TOOL["diameter"].help),
+        _row(f'diameter = "{proposal.tool_mm:.6g}mm"', TOOL["diameter"].help),
         *_comments(TOOL),
     ]
-    for _, text in operations:
-        lines += ["", *text]
+    names = set[str]()
+    for group, part in parts:
+        number = next(n for n in itertools.count(1) if _numbered(part.name, n) not in names)
+        part = replace(part, name=_numbered(part.name, number))
+        names.add(part.name)
+        lines += ["", *_text(drawing, group, part, proposal)]
     return "\n".join(lines) + "\n"
+
+
+def _stock(size: tuple[float, float], proposal: Proposal) -> Iterator[str]:
+    known = bool(proposal.thickness_mm)
+    thickness = f"{proposal.thickness_mm:.6g}" if known else "1"
+    remark = "its top is Z0; the corner is its lower left one"
+    yield _row("[stock]" if known else "# [stock]", remark)
+    yield '# corner = ["0mm", "0mm"]'
+    yield f'# size = ["{size[0]:.6g}mm", "{size[1]:.6g}mm"]'
+    yield f'{"" if known else "# "}thickness = "{thickness}mm"'
+    yield '# spoilboard = "0.5mm"'
 
 
 def _head(drawing: Drawing, size: tuple[float, float], machine: Machine | None) -> Iterator[str]:
@@ -122,25 +169,124 @@ def _extent(drawing: Drawing, group: _Group) -> float:
     return float(np.ptp(extents(lines), axis=1).sum()) if len(lines) else 0.0
 
 
-def _operation(drawing: Drawing, group: _Group, size_mm: float) -> tuple[str, list[str]]:
-    """Kind and lines of the operation for a group."""
-    lines = drawing.paths.select(group.paths)
-    small = all(_is_hole(path, SMALL_HOLE * size_mm) for path in lines)
-    engraved = any(word in group.name.casefold() for word in ENGRAVED)
-    on_line = engraved or not lines.closed.any()
-    kind = "drill" if small else "engrave" if on_line else "profile"
-    marks = f", {len(group.marks)} points" if group.marks else ""
+@dataclass(frozen=True)
+class _Part:
+    """What one operation cuts of a group: what it selects of it, and how."""
+
+    name: str
+    kind: str
+    rows: tuple[int, ...]
+    marks: int = 0
+    keys: tuple[tuple[str, str, str], ...] = ()
+    """Keys that it has, as TOML text, each with a remark."""
+
+
+def _parts(drawing: Drawing, group: _Group, size_mm: float, proposal: Proposal) -> list[_Part]:
+    """The operations that a group is cut by."""
+    lines, rows = drawing.paths, np.array(group.paths, dtype=np.int64)
+    marks = len(group.marks)
+    closed = lines.closed[rows]
+    small = all(_is_hole(lines[row], SMALL_HOLE * size_mm) for row in group.paths)
+    if any(word in group.name.casefold() for word in ENGRAVED) or (len(rows) and not closed.any()):
+        return [_Part(group.called, "engrave", group.paths, marks)]
+    if small and not proposal.tool_mm:
+        return [_Part(group.called, "drill", group.paths, marks)]
+    found = []
+    if marks:
+        select = (("select", '["point"]', ""),) if len(rows) else ()
+        found.append(_Part(f"{group.called} points", "drill", (), marks, select))
+    if not closed.all():
+        open_ = tuple(rows[~closed].tolist())
+        select = (("select", '["open"]', ""),)
+        found.append(_Part(f"{group.called} open", "engrave", open_, 0, select))
+    contours = rows[closed]
+    if not proposal.tool_mm:
+        select = () if closed.all() else (("select", '["closed"]', ""),)
+        found.append(_Part(group.called, "profile", tuple(contours.tolist()), 0, select))
+        return found
+    return found + _cut_parts(drawing, group, contours, proposal)
+
+
+def _cut_parts(drawing: Drawing, group: _Group, contours: Ints, proposal: Proposal) -> list[_Part]:
+    """Closed contours for a tool of known diameter: circles within parts are drilled where they
+    fit the tool and bored along a ramp where they are wider, other contours within parts are cut
+    on their inside, and the outer ones last, with tabs."""
+    lines, tool = drawing.paths, proposal.tool_mm
+    edges = np.array([kind.casefold() in CONTINUOUS for kind in drawing.line_types])
+    traits = Traits(lines, drawing.sources, edges)
+    mine = np.zeros(len(lines), dtype=np.bool_)
+    mine[contours] = True
+
+    def taken(*words: str) -> Ints:
+        return np.flatnonzero(traits.selected(Operation(select=words), mine))
+
+    found: list[_Part] = []
+    keys: tuple[tuple[str, str, str], ...]
+    round_ = {row: circle_of(lines[row]) for row in taken("inner", "circle").tolist()}
+    circles = {row: circle[1] for row, circle in round_.items() if circle}
+    fits = [row for row, wide in circles.items() if abs(wide - tool) <= HOLE_SIZE_MM]
+    wider = [row for row, wide in circles.items() if wide > tool + HOLE_SIZE_MM]
+    words = '["inner", "circle"]'
+    if fits:
+        size = f'"{tool - HOLE_SIZE_MM:.6g}..{tool + HOLE_SIZE_MM:.6g}mm"'
+        keys = (("select", words, ""), ("select_size", size, "as wide as the tool"))
+        found.append(_Part(f"{group.called} drilled", "drill", tuple(fits), 0, keys))
+    if wider:
+        keys = (
+            ("select", words, ""),
+            ("select_size", f'"{tool + HOLE_SIZE_MM:.6g}mm.."', "wider than the tool"),
+            ("entry", '"ramp:3deg"', OPERATION["entry"].help),
+        )
+        found.append(_Part(f"{group.called} holes", "profile", tuple(wider), 0, keys))
+    inner = taken("inner", "not circle")
+    if len(inner):
+        keys = (("select", '["inner", "not circle"]', ""), ("entry", '"ramp:3deg"', ""))
+        found.append(_Part(f"{group.called} inner", "profile", tuple(inner.tolist()), 0, keys))
+    outer = taken("outer")
+    if len(outer):
+        keys = (("select", '["outer"]', ""), ("entry", '"ramp:3deg"', ""))
+        if proposal.thickness_mm:
+            # Tabs are measured from the full depth of the cut, which is below the stock.
+            height = min(max(proposal.thickness_mm / 3.0, LEAST_TAB_MM), proposal.thickness_mm)
+            height += proposal.depth_mm - proposal.thickness_mm
+            tabs = f'"4:{2.0 * tool:.3g}mm:{height:.3g}mm"'
+            keys = (*keys, ("tabs", tabs, "so that it stays where it is; cut them by hand"))
+        found.append(_Part(f"{group.called} outer", "profile", tuple(outer.tolist()), 0, keys))
+    return found
+
+
+def _numbered(name: str, number: int) -> str:
+    """A name for what has been called so before."""
+    return name if number == 1 else f"{name} ({number})"
+
+
+def _text(drawing: Drawing, group: _Group, part: _Part, proposal: Proposal) -> list[str]:
+    """The lines of the operation for a part of a group."""
+    lines = drawing.paths.select(part.rows)
+    marks = f", {part.marks} points" if part.marks else ""
     text = [
         "[[operations]]",
-        f"name = {quoted(group.name or f'no {group.key[:-1]}')}",
-        f'kind = "{kind}"',
+        f"name = {quoted(part.name)}",
+        f'kind = "{part.kind}"',
         _row(f"{group.key} = [{quoted(pattern_of(group.name))}]", f"{_counted(lines)}{marks}"),
+        *(_row(f"{key} = {value}", remark) for key, value, remark in part.keys),
         f'tool = "{TOOL_NAME}"',
     ]
-    if marks and kind != "drill":
+    if part.kind == "profile" and proposal.tool_mm:
+        text.append(_row('direction = "climb"', OPERATION["direction"].help))
+    if proposal.depth_mm and part.kind != "engrave":
+        text.append(_row(f'depth = "{proposal.depth_mm:.6g}mm"', "through the stock"))
+        if part.kind == "profile" and proposal.tool_mm:
+            text.append(f'step_down = "{0.5 * proposal.tool_mm:.3g}mm"')
+    if marks and part.kind != "drill":
         text.append("# The points are not cut by this: they need an operation of the kind drill.")
-    known = {name: key for name, key in OPERATION.items() if kind in key.kinds}
-    return kind, [*text, *_comments(known)]
+    given = {key for key, _, _ in part.keys} | {line.split(" = ")[0] for line in text}
+    known = {
+        name: key
+        for name, key in OPERATION.items()
+        if part.kind in key.kinds and name not in given
+    }
+    return [*text, *_comments(known)]
 
 
 def _is_hole(path: Polyline, largest_mm: float) -> bool:

@@ -48,6 +48,18 @@ STARTS = ("nearest", "longest-line", "corner")
 ORIGINS = ("drawing", "lower-left", "centre")
 """Where part zero lies: at the drawing's own zero, or at a place of the paths that are cut."""
 
+SELECTED = ("closed", "open", "outer", "inner", "circle", "not circle", "point")
+"""What an operation may take by: closed or open paths; closed ones within no other or an even
+number of others, or within an odd number; full circles, or all but these; single points."""
+
+_APART = (
+    ("open", ("closed", "outer", "inner", "circle", "point")),
+    ("outer", ("inner",)),
+    ("circle", ("not circle",)),
+    ("point", ("closed", "open", "outer", "inner", "circle", "not circle")),
+)
+"""Words that cannot be true of one thing."""
+
 COOLANTS = ("off", "mist", "flood", "both")
 """What cools a cut."""
 
@@ -281,6 +293,10 @@ class Operation:
     name: str = ""
     layers: tuple[str, ...] = ()
     colours: tuple[str, ...] = ()
+    select: tuple[str, ...] = ()
+    size_mm: tuple[float, float] | None = None
+    area_mm2: tuple[float, float] | None = None
+    entities: tuple[str, ...] = ()
     tool: Tool = field(default_factory=Tool)
     side: str = "auto"
     direction: str = "drawn"
@@ -310,6 +326,8 @@ class Operation:
 
     def __post_init__(self) -> None:
         one_of("kind of operation", self.kind, KINDS)
+        for each in self.select:
+            one_of("word to select by", each, SELECTED)
         one_of("side", self.side, SIDES)
         one_of("direction", self.direction, DIRECTIONS)
         one_of("pattern", self.pattern, PATTERNS)
@@ -348,6 +366,21 @@ class Operation:
     def _refuse_contradictions(self) -> None:
         """Settings that are fine one by one and cannot be together."""
         named = f"operation {self.name!r}, " if self.name else ""
+        for word, others in _APART:
+            both = [other for other in others if word in self.select and other in self.select]
+            if both:
+                raise OptionError(
+                    f"nothing is {word} and {both[0]}",
+                    where=f"{named}key select",
+                    mend="leave one of them out, or make two operations",
+                )
+        for key, limits in (("select_size", self.size_mm), ("select_area", self.area_mm2)):
+            if limits is not None and not 0.0 <= limits[0] <= limits[1]:
+                raise OptionError(
+                    f"{limits[0]:g} to {limits[1]:g} is no range",
+                    where=f"{named}key {key}",
+                    mend="give the lesser one first, both 0 or more",
+                )
         depth, last = self.depth_mm, self.last_pass_mm
         if depth is not None and last is not None and last > depth:
             raise OptionError(
@@ -362,8 +395,14 @@ class Operation:
                 mend='use "ramp" or "plunge"',
             )
 
+    @property
+    def selects(self) -> bool:
+        """Whether it takes less than all that is on its layers and in its colours."""
+        return bool(self.select or self.entities or self.size_mm or self.area_mm2)
+
     def takes(self, layer: str, colour: str) -> bool:
-        """Whether the paths of this layer and colour are cut."""
+        """Whether paths of this layer and colour are cut, as far as it does not select them by
+        what they are."""
         return (not self.layers or matches(self.layers, layer)) and (
             not self.colours or matches(self.colours, colour)
         )

@@ -51,7 +51,7 @@ from camtool.planning.order import (
 from camtool.planning.place import SCALE_SHARE, collapsed, place
 from camtool.planning.profile import profile
 from camtool.planning.settings import setting_of
-from camtool.planning.sides import Sides, choose
+from camtool.planning.sides import Sides, choose, takes_mark
 from camtool.planning.tabs import raised_over_bridges, with_tabs
 from camtool.toolpath.moves import Toolpath
 
@@ -181,7 +181,7 @@ def _step(
     bridges: tuple[Bridge, ...] = ()
     if isinstance(items, Contours):
         paths = chosen_paths(items, choices, rows)
-        cut = runs_of(items, order, paths, _walls(placed, job, setting.operation))
+        cut = runs_of(items, order, paths, _walls(placed, sides, setting.operation))
         runs, counts, bridges = cut.runs, cut.counts, cut.bridges
         findings += cut.findings
     else:
@@ -246,14 +246,13 @@ def _refuse_endless(items: Items, setting: Setting) -> None:
             )
 
 
-def _walls(placed: Drawing, job: Job, operation: Operation) -> KeepOut:
+def _walls(placed: Drawing, sides: Sides, operation: Operation) -> KeepOut:
     """The closed lines that leads of a contour must keep away from: those of the operation itself,
     and those that any operation makes walls of."""
-    makers = [each for each in job.operations if each.kind in ("profile", "pocket")]
-    names = list(zip(placed.layers, placed.colours, strict=True))
-    own = np.array([operation.takes(*name) for name in names], dtype=np.bool_)
-    walls = [any(each.takes(*name) for each in makers) for name in names]
-    rows = np.flatnonzero((own | np.array(walls, dtype=np.bool_)) & placed.paths.closed)
+    count = len(placed.paths)
+    makers = [each.kind in ("profile", "pocket") for each in sides.operations]
+    own, walls = sides.taken_by(operation)[:count], sides.takes[makers, :count].any(axis=0)
+    rows = np.flatnonzero((own | walls) & placed.paths.closed)
     return KeepOut(placed.paths.select(rows.tolist()), own[rows])
 
 
@@ -285,7 +284,7 @@ def _left_over(placed: Drawing, job: Job, cuts: bool) -> list[Finding]:
         mark
         for mark in placed.marks
         if job.takes(mark.layer, mark.colour)
-        and not any(operation.takes(mark.layer, mark.colour) for operation in drills)
+        and not any(takes_mark(operation, mark) for operation in drills)
     ]
     if left:
         found.append(MARKS_NOT_CUT(measured=len(left)))

@@ -1,5 +1,9 @@
 """What an operation takes of a drawing, and its sides: what is part and what is hole.
 
+An operation takes what is on its layers and in its colours, and of that what it selects by what
+it is: closed or open, outer or inner by the nesting of all closed edges of the file, circles,
+sizes and areas in the part, names of entities.
+
 Sides follow from the nesting of the whole drawing, whatever an operation takes of it. A closed
 contour that lies in an even number of others is the rim of a part, which stays; one that lies in
 an odd number is the rim of a hole. All closed contours of the file are nested, those of other
@@ -21,12 +25,12 @@ from functools import cached_property
 
 import numpy as np
 
-from camtool.arrays import Bools, Ints
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import OptionError
 from camtool.geometry.boxes import box_pairs
 from camtool.geometry.distance import nearest
-from camtool.geometry.drawing import Drawing
-from camtool.geometry.measure import path_extents
+from camtool.geometry.drawing import Drawing, Mark
+from camtool.geometry.measure import path_extents, signed_areas
 from camtool.geometry.nesting import nesting
 from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.patterns import matches
@@ -36,6 +40,9 @@ from camtool.planning.paths import midpoints
 
 SAME_CONTOUR_MM = 0.01
 """An uncut contour that runs this near along one that is cut is the same contour drawn again."""
+
+SIZE_SHARE = 1e-6
+"""Sizes may exceed the ends of a range by this part of these, by rounding."""
 
 CONTINUOUS = ("", "continuous", "bylayer", "byblock")
 """Line types of edges that are seen."""
@@ -91,6 +98,12 @@ class Sides:
         types = (*placed.line_types, *around.line_types)
         sources = (*placed.sources, *around.sources)
         sheet = {layer for layer in set(layers) if matches(job.frames, layer)}
+        edges = np.array([kind.casefold() in CONTINUOUS for kind in types], dtype=np.bool_)
+        framed = np.array([layer in sheet for layer in layers], dtype=np.bool_)
+        if any(operation.selects for operation in job.operations):
+            traits = Traits(lines, sources, edges & ~framed)
+            for number, operation in enumerate(job.operations):
+                takes[number] = traits.selected(operation, takes[number])
         # A drill takes circles alone, whatever else is on its layers.
         makers = [operation.kind != "drill" for operation in job.operations]
         return cls(
@@ -99,8 +112,8 @@ class Sides:
             operations=job.operations,
             takes=takes,
             worked=np.asarray(takes[makers].any(axis=0)),
-            edges=np.array([kind.casefold() in CONTINUOUS for kind in types], dtype=np.bool_),
-            framed=np.array([layer in sheet for layer in layers], dtype=np.bool_),
+            edges=edges,
+            framed=framed,
             default_depth_mm=default_depth_mm,
         )
 
@@ -118,6 +131,10 @@ class Sides:
     def _idle(self) -> Bools:
         idle = np.asarray(self.lines.closed & self.edges & ~self.worked)
         return np.asarray(idle & ~_again(self.lines, self.worked, idle))
+
+    def taken_by(self, operation: Operation) -> Bools:
+        """(M,) the contours that one of the operations takes."""
+        return np.asarray(self.takes[self.operations.index(operation)])
 
     def seen_by(self, operation: Operation) -> Seen:
         """The sides for a profile of this operation."""
@@ -177,6 +194,88 @@ class Sides:
         return f"within the {what} {self.names[holder]}{uncut}{frame}"
 
 
+class Traits:
+    """What M paths are, each found out when an operation asks for it. `edges` (M,): those by
+    which outer and inner ones are told."""
+
+    def __init__(self, lines: Polylines, sources: tuple[str, ...], edges: Bools) -> None:
+        self._lines, self._sources, self._edges = lines, sources, edges
+
+    def selected(self, operation: Operation, rows: Bools) -> Bools:
+        """(M,) those of the rows that the operation selects."""
+        rows = rows.copy()
+        for word in operation.select:
+            rows &= self._are(word, rows)
+        if operation.size_mm is not None:
+            rows &= _within(
+                np.ptp(path_extents(self._lines), axis=2).max(axis=1), operation.size_mm
+            )
+        if operation.area_mm2 is not None:
+            areas = np.where(self._lines.closed, np.abs(signed_areas(self._lines)), np.nan)
+            rows &= _within(areas, operation.area_mm2)
+        if operation.entities:
+            for row in np.flatnonzero(rows).tolist():
+                rows[row] = is_named(operation, self._sources[row])
+        return rows
+
+    def _are(self, word: str, rows: Bools) -> Bools:
+        """(M,) of which of the rows a word is true."""
+        closed = self._lines.closed
+        if word in ("circle", "not circle"):
+            from camtool.planning.drill import circle_of
+
+            found = np.zeros(len(rows), dtype=np.bool_)
+            for row in np.flatnonzero(rows & closed).tolist():
+                found[row] = circle_of(self._lines[row]) is not None
+            return found if word == "circle" else ~found
+        if word == "point":
+            return np.zeros(len(rows), dtype=np.bool_)
+        if word in ("outer", "inner"):
+            return np.asarray(closed & (self._depth % 2 == (word == "inner")))
+        return np.asarray(closed if word == "closed" else ~closed)
+
+    @cached_property
+    def _depth(self) -> Ints:
+        """(M,) in how many closed edges each path lies."""
+        return nesting(self._lines, self._edges & self._lines.closed).depth
+
+
+def _within(sizes: Floats, limits: tuple[float, float]) -> Bools:
+    """(M,) which sizes are in a range, its ends included; NaN is in none."""
+    low, high = limits
+    return np.asarray((sizes >= low * (1.0 - SIZE_SHARE)) & (sizes <= high * (1.0 + SIZE_SHARE)))
+
+
+def is_named(operation: Operation, source: str) -> bool:
+    """Whether an operation takes the entity of this name, such as "CIRCLE 2F": by the whole name,
+    or by what stands behind the kind (the handle, or the id)."""
+    names = [source, source.partition(" ")[2]]
+    return not operation.entities or any(matches(operation.entities, name) for name in names)
+
+
+def takes_mark(operation: Operation, mark: Mark) -> bool:
+    """Whether an operation takes a single point: it has no size, and is a point only."""
+    if operation.size_mm is not None or operation.area_mm2 is not None:
+        return False
+    if operation.select and operation.select != ("point",):
+        return False
+    return operation.takes(mark.layer, mark.colour) and is_named(operation, mark.source)
+
+
+def _selection(operation: Operation) -> str:
+    """What an operation selects, in words."""
+    said = list(dict.fromkeys(operation.select))
+    for key, limits, unit in (
+        ("size", operation.size_mm, "mm"),
+        ("area", operation.area_mm2, "mm²"),
+    ):
+        if limits is not None:
+            said.append(f"of {key} {limits[0]:g} to {limits[1]:g} {unit}")
+    if operation.entities:
+        said.append(f"named {' or '.join(operation.entities)}")
+    return " and ".join(said)
+
+
 def runs_beside(operation: Operation) -> bool:
     """Whether an operation is a profile that runs beside its closed contours, not on them."""
     if operation.kind != "profile" or operation.side == "on":
@@ -214,9 +313,8 @@ def choose(drawing: Drawing, operation: Operation, sides: Sides) -> Chosen:
 
     OptionError, naming what there is, when the drawing has something, but nothing of that.
     """
-    paths = zip(drawing.layers, drawing.colours, strict=True)
-    index = [i for i, (layer, colour) in enumerate(paths) if operation.takes(layer, colour)]
-    marks = [mark for mark in drawing.marks if operation.takes(mark.layer, mark.colour)]
+    index = np.flatnonzero(sides.taken_by(operation)).tolist()
+    marks = [mark for mark in drawing.marks if takes_mark(operation, mark)]
     if not index and not marks and (len(drawing.paths) or drawing.marks):
         raise _nothing(drawing, operation)
     return Chosen(
@@ -243,6 +341,14 @@ def _nothing(drawing: Drawing, operation: Operation) -> OptionError:
     colours = sorted({*drawing.colours, *(mark.colour for mark in marks)} - {""})
     wanted = [f"the layers {', '.join(operation.layers)}"] if operation.layers else []
     wanted += [f"the colours {', '.join(operation.colours)}"] if operation.colours else []
+    if operation.selects:
+        where = f" on {' and '.join(wanted)}" if wanted else ""
+        return OptionError(
+            f"nothing{where} is {_selection(operation)}",
+            file=drawing.file,
+            where=f"operation {operation.name!r}" if operation.name else "",
+            mend="camtool check says what there is",
+        )
     has = f"the drawing has: {', '.join(layers)}"
     if operation.colours:
         has += f"; colours {', '.join(colours) or 'none'}"

@@ -3,11 +3,13 @@
 import json
 import os
 import pty
+import re
 import threading
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
+import ezdxf
 import pytest
 
 from camtool.cli.init import AXES
@@ -301,3 +303,53 @@ def test_a_controller_is_asked_at_its_port(camtool: Run, config: Path, board: st
     done = camtool("init", "mine", "-t", "grbl", "--port", board)
     assert done.returncode == 0, done.stderr
     assert said(config / "machines" / "mine.toml")["travel_mm"] == 300
+
+
+@pytest.mark.parametrize("format", ["dxf", "svg"])
+def test_three_commands_to_the_program_of_a_plate(
+    camtool: Run, tmp_path: Path, format: str
+) -> None:
+    """A sheet of 3 mm with outline, window, slot and four holes, all on one layer."""
+    _plate(tmp_path / f"part.{format}")
+    (tmp_path / "grbl.txt").write_text(LISTING)
+    for arguments in (
+        ("init", "my-3018", "--settings", "grbl.txt", "--spindle", "10000"),
+        ("job", "new", f"part.{format}", "--tool-diameter", "3.175", "--thickness", "3"),
+        ("post", f"part.{format}", "--job", "job.toml"),
+    ):
+        done = camtool(*arguments)
+        assert done.returncode == 0, done.stderr
+        assert b"warning" not in done.stderr, done.stderr
+    rows = (tmp_path / "part.nc").read_text().splitlines()
+    assert "M3 S10000" in rows
+    # The holes come first, then window and slot, then the outline, over its tabs.
+    assert done.stderr.decode().count("\ncut        ") == 3
+    text = "\n".join(row for row in rows if not row.startswith("("))
+    assert min(map(float, re.findall(r"Z(\S+)", text))) == -3.3
+    # A tab leaves a third of the sheet: at the fourth corner of each the tool goes down again.
+    assert len(re.findall(r"Z-2\.000 F60\n[XY].*\n(?:G1 )?Z-3\.300", text)) == 4, text
+
+
+def _plate(file: Path) -> None:
+    if file.suffix == ".svg":
+        holes = "".join(f'<circle cx="{x}" cy="{y}" r="2"/>' for x in (8, 112) for y in (8, 72))
+        file.write_text(
+            '<svg xmlns="http://www.w3.org/2000/svg" width="120mm" height="80mm" '
+            'viewBox="0 0 120 80"><g fill="none" stroke="black">'
+            '<rect width="120" height="80"/><rect x="40" y="30" width="40" height="30"/>'
+            '<path d="M50 12H70A3 3 0 0 1 70 18H50A3 3 0 0 1 50 12Z"/>'
+            f"{holes}</g></svg>"
+        )
+        return
+    document = ezdxf.new(units=4)
+    space = document.modelspace()
+    space.add_lwpolyline([(0, 0), (120, 0), (120, 80), (0, 80)], close=True)
+    space.add_lwpolyline([(40, 30), (80, 30), (80, 60), (40, 60)], close=True)
+    for x in (8, 112):
+        for y in (8, 72):
+            space.add_circle((x, y), 2.0)
+    space.add_line((50, 12), (70, 12))
+    space.add_arc((70, 15), 3, 270, 90)
+    space.add_line((70, 18), (50, 18))
+    space.add_arc((50, 15), 3, 90, 270)
+    document.saveas(file)

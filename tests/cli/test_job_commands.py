@@ -103,3 +103,16 @@ def test_layers_are_read_as_far_as_operations_need_them(
         done = camtool("job", "check", "job.toml", "--against", samples / "logo.dxf")
         rows = [row for row in done.stdout.decode().splitlines() if " closed paths" in row]
         assert [row.strip() for row in rows] == [f"{each}, 0 points" for each in taken]
+
+
+def test_check_draws_what_is_cut(camtool: Run, tmp_path: Path, samples: Path) -> None:
+    logo = samples / "logo.dxf"
+    assert camtool("job", "new", logo, "-o", "j.toml").returncode == 0
+    check = ("job", "check", "j.toml", "--against", logo)
+    done = camtool(*check, "-t", "linuxcnc", "--preview", "p.svg")
+    assert done.returncode == 0, done.stderr
+    drawn = camtool("preview", logo, "-t", "linuxcnc", "--job", "j.toml", "-o", "q.svg")
+    assert drawn.returncode == 0, drawn.stderr
+    assert (tmp_path / "p.svg").read_bytes() == (tmp_path / "q.svg").read_bytes()
+    assert b"--preview needs" in camtool(*check, "--preview", "r.svg").stderr
+    assert not (tmp_path / "r.svg").exists()

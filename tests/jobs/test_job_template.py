@@ -81,14 +81,15 @@ def test_the_kinds_and_their_order(tmp_path: Path) -> None:
     assert told(job) == [
         ("drill", "POINTS"),
         ("drill", "HOLES"),
+        ("drill", "WINDOW points"),
         ("engrave", "LINES"),
         ("engrave", "Engraving"),
+        ("engrave", "WINDOW open"),
         ("profile", "BORES"),
         ("profile", "WINDOW"),
         ("profile", "OUTLINE"),
     ]
     assert "2 closed and 0 open paths, 1 points" in text
-    assert text.count("# The points are not cut by this") == 1
     assert job.placement.origin == "lower-left"
 
 
