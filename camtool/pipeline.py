@@ -140,7 +140,7 @@ def post_drawing(
             tool_diameter_mm=tool_mm(job),
             cone=cone_of(job),
             kept=kept_of(whole.steps),
-            trace_points=trace_points or TRACE_POINTS,
+            trace_points=TRACE_POINTS if trace_points is None else trace_points,
         ),
         progress,
     )
@@ -209,7 +209,7 @@ def verify_program(
         cone=cone_of(job or Job()),
         kept=kept,
         worst=WORST_LISTED if judging.worst is None else judging.worst,
-        trace_points=judging.trace_points or TRACE_POINTS,
+        trace_points=TRACE_POINTS if judging.trace_points is None else judging.trace_points,
     )
     found = _judged(data, decoded, target, goal, options, progress)
     beyond = _beyond(found, judging.gates)

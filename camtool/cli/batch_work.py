@@ -88,6 +88,7 @@ class PostWork:
                 check=self.check,
                 compensate=self.compensate,
                 gates=self.gates,
+                trace_points=None if self.preview else 0,
             )
         made = _made(task, run)
         if made.error is not None:

@@ -93,9 +93,9 @@ class Posting:
         target: LoadedTarget,
         *,
         on_read: Callable[[], None] | None = None,
-        preview: str | None = None,
+        pictures: Sequence[str] = (),
     ) -> Run:
-        """The drawing posted, for a picture of this name; `on_read` is called when it has been
+        """The drawing posted, for pictures of these names; `on_read` is called when it has been
         read."""
         from camtool.pictures.options import points_for
         from camtool.pipeline import post_drawing
@@ -112,7 +112,7 @@ class Posting:
                 check=not self.no_verify,
                 compensate=self.compensate,
                 gates=self.gates.gates(),
-                trace_points=points_for(preview),
+                trace_points=points_for(pictures),
                 progress=progress(),
             )
 
@@ -199,7 +199,7 @@ def post(
         reads = [*posting.files(source), str(target.file)]
         asked = Asked(source, output, outputs, reads)
         asked.check(target.machine.target.extension, verified=not posting.no_verify)
-        run = posting.make(source, target, preview=preview)
+        run = posting.make(source, target, pictures=outputs.pictures)
         painter = picture.painter(lambda: scenes_of(run, before=before_after), quiet=quiet)
         return finish(run, asked, picture=painter, quiet=quiet, verbose=verbose)
 

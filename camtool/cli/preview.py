@@ -158,7 +158,7 @@ class Seen:
         data = read_bytes(source)
         if not self.simulate:
             return read_program(data, target, source=source).scene()
-        judging = Judging(trace_points=points_for(self.output))
+        judging = Judging(trace_points=points_for([self.output]))
         return verify_program(
             data, target, source=source, judging=judging, progress=progress()
         ).scene()
@@ -177,7 +177,7 @@ class Seen:
                     read,
                     job,
                     target,
-                    trace_points=points_for(self.output),
+                    trace_points=points_for([self.output]),
                     progress=progress(),
                 )
                 return run.scene(title), run.findings if run.failed else read.findings

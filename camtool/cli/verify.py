@@ -146,7 +146,7 @@ def verify(
         gates=gates.gates(),
         compensated=compensated,
         worst=worst,
-        trace_points=points_for(preview),
+        trace_points=None if compare else points_for(wishes.outputs.pictures),
     )
     target = machine.load()
     wanted = job.job(drawing)

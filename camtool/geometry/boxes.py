@@ -49,7 +49,7 @@ class BoxIndex:
         self._count = len(boxes)
         self._order = np.arange(len(boxes))
         if len(boxes) > IN_ORDER:
-            self._order = hilbert_order(0.5 * (boxes[:, :2] + boxes[:, 2:]))
+            self._order = hilbert_order(boxes[:, :2], boxes[:, 2:])
         level, self._levels = boxes[self._order], list[tuple[Floats, ...]]()
         while not self._levels or len(level) > 1:
             padded = np.full((max(-(-len(level) // FAN), 1) * FAN, 4), NOWHERE)

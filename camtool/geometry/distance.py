@@ -79,7 +79,7 @@ def nearest(points: Floats, segments: Segments) -> Nearest:
 
     if len(segments) == 0:
         raise ValueError("no segments to be near to")
-    order = hilbert_order(0.5 * (segments.start + segments.end))
+    order = hilbert_order(segments.start, segments.end)
     curves, rows = Curves.of(segments[order]), _Rows.of(segments)
     distance = np.empty(len(points))
     segment = np.empty(len(points), dtype=np.int64)

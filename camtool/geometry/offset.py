@@ -177,7 +177,7 @@ PATHS_AT_A_TIME = 64
 def _far_apart(boxes: Floats, reach_mm: float) -> Iterator[Ints]:
     """Groups of rows of boxes (M, 4) no two of which come within twice the reach of each other;
     those of a group in the order of the plane, so that neighbours are near in it."""
-    order = hilbert_order(0.5 * (boxes[:, :2] + boxes[:, 2:]))
+    order = hilbert_order(boxes[:, :2], boxes[:, 2:])
     wide = boxes + reach_mm * np.array([-1.0, -1.0, 1.0, 1.0])
     index, group = BoxIndex(wide), np.full(len(boxes), -1)
     for begin in range(0, len(order), PATHS_AT_A_TIME):

@@ -383,7 +383,7 @@ def _near(points: Floats, segments: Segments, times: float) -> tuple[Floats, Int
 
     points = np.ascontiguousarray(points)
     # Loose lines come in any order; those that follow one another in the index must be near.
-    order = hilbert_order(segments.start)
+    order = hilbert_order(segments.start, segments.start)
     curves = Curves.of(segments[order])
     apart = nearest_distances(points, curves.rows, curves.tree)
     pairs = curves_within(points, times * apart + POSITION_EPS_MM, curves.rows, curves.tree)

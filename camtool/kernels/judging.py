@@ -823,9 +823,10 @@ def _add(
     LAST_Y,
     LAST_IS_WRITTEN,
 ) = range(12)
-"""The pen, float64: samples of a run; points written, and how many may be besides the ends of
-rows; the row (−1: none yet); samples in the present run; its largest error and where; the last
-sample's error and where, and whether it is the largest of its run or written already."""
+"""The pen, float64: samples of a run, 0 where nothing is wanted; points written, and how many may
+be besides the ends of rows; the row (−1: none yet); samples in the present run; its largest error
+and where; the last sample's error and where, and whether it is the largest of its run or written
+already."""
 
 PEN = 12
 """Numbers of a pen."""
@@ -880,8 +881,10 @@ def trace_block(
 ) -> None:
     """Take points x, y (n,) of one row; `error` (n,) of them, the largest of which is `most`,
     where that is above 0; else they have none. What is full of points takes only the ends of
-    rows."""
+    rows; a pen whose runs have no samples writes nothing."""
     count = len(x)
+    if pen[STRIDE] <= 0.0:
+        return
     if pen[ROW] != row:
         end_row(pen, trace)
         pen[ROW] = row

@@ -33,7 +33,7 @@ LEVELS = 16
 def move_tree(boxes: Floats, group: Ints | Indices | None = None) -> tuple[Floats, Ints]:
     """(2L, 6) nodes over `boxes` (K, 4), and the order (K,) of the rows in their L leaves. Rows of
     one `group` (K,), ascending, stay together: a search among these looks at no others."""
-    order = hilbert_order(0.5 * (boxes[:, :2] + boxes[:, 2:]))
+    order = hilbert_order(boxes[:, :2], boxes[:, 2:])
     if group is not None:
         order = order[np.argsort(group[order], kind="stable")]
     leaves = 1
@@ -55,20 +55,24 @@ def move_tree(boxes: Floats, group: Ints | Indices | None = None) -> tuple[Float
     return tree, order
 
 
-def hilbert_order(points: Floats) -> Ints:
-    """(K,) rows of `points` (K, 2) as Hilbert's curve through their extents comes to them.
+def hilbert_order(starts: Floats, ends: Floats) -> Ints:
+    """(K,) rows as Hilbert's curve through their extents comes to the middles between `starts`
+    (K, 2) and `ends` (K, 2).
 
     The quarters of a square come in the order (0, 0), (0, 1), (1, 1), (1, 0). In the first and the
     last the curve is that of the whole with X and Y exchanged, in the last it is mirrored besides.
     """
-    if len(points) == 0:
+    if len(starts) == 0:
         return np.empty(0, dtype=np.int64)
-    low = points.min(axis=0)
-    size = max(float((points.max(axis=0) - low).max()), np.finfo(np.float64).tiny)
-    place = np.empty(len(points), dtype=np.int64)
-    for first in range(0, len(points), AT_ONCE):
-        here = slice(first, first + AT_ONCE)
-        place[here] = _hilbert_places((points[here] - low) / size)
+    lots = [slice(first, first + AT_ONCE) for first in range(0, len(starts), AT_ONCE)]
+    low, high = np.full(2, np.inf), np.full(2, -np.inf)
+    for lot in lots:
+        middles = 0.5 * (starts[lot] + ends[lot])
+        low, high = np.minimum(low, middles.min(axis=0)), np.maximum(high, middles.max(axis=0))
+    size = max(float((high - low).max()), np.finfo(np.float64).tiny)
+    place = np.empty(len(starts), dtype=np.uint32)
+    for lot in lots:
+        place[lot] = _hilbert_places((0.5 * (starts[lot] + ends[lot]) - low) / size)
     return np.argsort(place, kind="stable")
 
 

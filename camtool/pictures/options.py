@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from camtool.errors import OptionError
@@ -74,6 +75,9 @@ def check_width(width_px: int) -> None:
         )
 
 
-def points_for(picture: str | None) -> int | None:
-    """How many points of the slides' path a picture of this name needs; None: as usual."""
-    return POINTS_OF_A_PAGE if (picture or "").lower().endswith(".html") else None
+def points_for(pictures: Sequence[str]) -> int | None:
+    """How many points of the slides' path pictures of these names need: none where there are none
+    to be made; None: as usual."""
+    if any(name.lower().endswith(".html") for name in pictures):
+        return POINTS_OF_A_PAGE
+    return None if pictures else 0

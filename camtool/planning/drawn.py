@@ -104,7 +104,7 @@ def _off(
 
     segments = Segments.of(lines)
     # What is near in the drawing need not be near in the file.
-    order = hilbert_order(0.5 * (segments.start + segments.end))
+    order = hilbert_order(segments.start, segments.end)
     curves = Curves.of(segments[order])
     of = of[segment_rows(lines)[order]]
     for begin in range(0, len(rows), ROWS_AT_ONCE):

@@ -251,12 +251,12 @@ class Tasks:
 def _sums(rows: int, slots: int, trace: TraceSize) -> Sums:
     from camtool.kernels.judging import BINS, Sums, empty_bins, new_pen
 
-    room = 2 * trace.most + rows
+    room = 2 * trace.most + rows if trace.stride else 0
     return Sums(
         rows=empty_columns(min(rows, ROWS_AT_ONCE)),
         histograms=np.zeros((2, 4 * BINS), dtype=np.int64),
         bins=empty_bins(slots),
-        trace=np.empty((room + rows + 2, 4)),
+        trace=np.empty((room + rows + 2 if trace.stride else 2, 4)),
         pen=new_pen(trace.stride, room),
     )
 
@@ -378,8 +378,8 @@ class Trace:
 
 @dataclass(frozen=True, eq=False)
 class TraceSize:
-    """The start of the slides (1, 2) mm; one of every `stride` samples of a row is kept; the most
-    points of a trace."""
+    """The start of the slides (1, 2) mm; one of every `stride` samples of a row is kept (0: none
+    at all); the most points of a trace."""
 
     start: Floats
     stride: int
@@ -388,6 +388,8 @@ class TraceSize:
 
 def trace_size(decoded: Toolpath, spacing_mm: float, most: int) -> TraceSize:
     """A stride for samples about `spacing_mm` apart that keeps about half of `most` points."""
+    if most == 0:
+        return TraceSize(decoded.start[None, :2], 0, 1)
     lengths = moved_lengths(decoded)
     lengths += decoded.by_parts(lambda part: np.abs(part.end[:, 2] - part.starts[:, 2]))
     expected = float(lengths.sum()) / spacing_mm
@@ -396,9 +398,9 @@ def trace_size(decoded: Toolpath, spacing_mm: float, most: int) -> TraceSize:
 
 
 def trace_of(sums: Sums, start: Floats, cutting: Bools, most: int) -> Trace:
-    """The start (1, 2) mm and the samples that the judge kept. Where they are more than `most`
-    (more rows than points), runs of them are reduced to the sample with the largest error.
-    `cutting` (N,): the rows that cut."""
+    """The start (1, 2) mm and the samples that the judge kept, none for a stride of 0. Where they
+    are more than `most` (more rows than points), runs of them are reduced to the sample with the
+    largest error. `cutting` (N,): the rows that cut."""
     from camtool.kernels.judging import WRITTEN, unwritten
 
     written, held = int(sums.pen[WRITTEN]), unwritten(sums.pen)

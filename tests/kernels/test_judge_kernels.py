@@ -245,7 +245,7 @@ def test_of_equally_near_moves_the_own_one_gives_the_side() -> None:
 def test_the_curve_fills_a_square_by_steps_of_one() -> None:
     rng = np.random.default_rng(4)
     square = rng.permutation(np.argwhere(np.ones((16, 16))).astype(np.float64))
-    along = square[hilbert_order(square)]
+    along = square[hilbert_order(square, square)]
     assert np.abs(np.diff(along, axis=0)).sum(axis=1).tolist() == [1.0] * 255
 
 
