@@ -556,8 +556,9 @@ class Code(IntEnum):
     SETTING_DIFFERS = (
         419,
         (INFO, ERROR),
-        "moves cut with another tool than the job asks for, the tool waits less than it asks "
-        "for, or corners are rounded farther than the machine file lets them (`G64 P`)",
+        "moves cut with another tool or other coolant than the job asks for, the tool waits less "
+        "than it asks for, or corners are rounded farther than the machine file lets them "
+        "(`G64 P`)",
         "post again; give `camtool verify` the flags of the post",
     )
 
@@ -1349,6 +1350,16 @@ SETTING_DIFFERS_TOOL = Sentence(
 SETTING_DIFFERS_TOOL_UNASKED = Sentence(
     Code.SETTING_DIFFERS,
     "{moves:# move runs|# moves run} with tool {measured:g}, where no tool is asked for",
+    severity=INFO,
+)
+SETTING_DIFFERS_COOLANT = Sentence(
+    Code.SETTING_DIFFERS,
+    "{moves:# move runs|# moves run} with {coolant}, where {wanted} is asked for",
+    severity=ERROR,
+)
+SETTING_DIFFERS_COOLANT_UNASKED = Sentence(
+    Code.SETTING_DIFFERS,
+    "{moves:# move runs|# moves run} with {coolant}, where none is asked for",
     severity=INFO,
 )
 SETTING_DIFFERS_CORNERS = Sentence(

@@ -338,6 +338,7 @@ def _reported(step: Step) -> PlannedOperation:
         depth_mm=-setting.levels_mm[-1],
         passes=len(setting.levels_mm) if in_passes else None,
         deepest_pass_mm=deepest_pass(setting) if in_passes else None,
+        coolant=operation.coolant,
     )
 
 

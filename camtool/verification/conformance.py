@@ -7,8 +7,8 @@ A move that is in both with the same numbers is as asked. Every other decoded mo
 `written` or the wanted toolpath cuts, and every other written move where `decoded` cuts, within
 the resolution of the dialect. What the dialect makes of the wanted path (chords, ends on its grid,
 stairs) is in `written` already, so the tolerance does not allow for it. The order of contours and
-their starts are free. Where moves of both lie on each other, their direction, feed, spindle and
-tool must be the same.
+their starts are free. Where moves of both lie on each other, their direction, feed, spindle, tool
+and coolant must be the same.
 """
 
 from __future__ import annotations
@@ -36,6 +36,8 @@ from camtool.findings import (
     EXTRA_CUT_PLUNGE,
     FEED_DIFFERS,
     FEED_DIFFERS_OWN,
+    SETTING_DIFFERS_COOLANT,
+    SETTING_DIFFERS_COOLANT_UNASKED,
     SETTING_DIFFERS_CORNERS,
     SETTING_DIFFERS_DWELL,
     SETTING_DIFFERS_NO_CORNERS,
@@ -380,7 +382,8 @@ def _repeated_cuts(mine: Side, other: Side, alike: Alike, limits: Limits) -> Ite
         )
 
 
-# Feeds, spindle, tool, dwells, clearance and end of a program, against what the job asks for.
+# Feeds, spindle, tool, coolant, dwells, clearance and end of a program, against what the job
+# asks for.
 
 FEED_SHARE = 0.5
 """Feeds differ when they are more than this part of the dialect's unit of feed apart."""
@@ -391,17 +394,21 @@ DWELL_S = 0.0005
 OFF = 0.0
 """The value of a spindle that is off, and of no tool."""
 
+COOLANTS = ("no coolant", "mist", "flood", "mist and flood")
+"""What cools a cut: mist counts 1, flood 2."""
+
 
 def compare_settings(
     mine: Side, other: Side, alike: Alike, pairs: Ints, asked: Asked
 ) -> tuple[Finding, ...]:
-    """Compare feeds, spindle, tool, corners, dwells, clearance and end; `pairs` (P, 2) are rows of
-    both sides that lie on each other, besides those that are alike."""
+    """Compare feeds, spindle, tool, coolant, corners, dwells, clearance and end; `pairs` (P, 2)
+    are rows of both sides that lie on each other, besides those that are alike."""
     both = _Both.of(mine, other, alike, pairs)
     return (
         *_feeds(both, asked),
         *_spindle(both),
         *_tools(both),
+        *_coolant(both),
         *_corners(both),
         *_dwells(mine.toolpath, other.toolpath, asked),
         *_clearance(mine, other, alike, asked),
@@ -450,18 +457,27 @@ class _Both:
         return rows[bad], self.pairs[first[bad], 1]
 
 
-def _settings(toolpath: Toolpath) -> tuple[Floats, Floats, Floats]:
-    """(N,) each: feed, spindle speed in rev/min (CCW negative, OFF when it is off), tool."""
+def _settings(toolpath: Toolpath) -> tuple[Floats, Floats, Floats, Ints]:
+    """(N,) each: feed, spindle speed in rev/min (CCW negative, OFF when it is off), tool, and an
+    index of COOLANTS."""
     kind = toolpath.kind
     turning = np.where(kind == Kind.SPINDLE_CCW, -toolpath.value, toolpath.value)
     spindle = (kind >= Kind.SPINDLE_CW) & (kind <= Kind.SPINDLE_OFF)
     turns = _last_value(spindle, np.where(kind == Kind.SPINDLE_OFF, OFF, turning))
-    return toolpath.feed, turns, _last_value(kind == Kind.TOOL_CHANGE, toolpath.value)
+    tool = _last_value(kind == Kind.TOOL_CHANGE, toolpath.value)
+    off = _last_row(kind == Kind.COOLANT_OFF)
+    mist, flood = (_last_row(kind == one) > off for one in (Kind.COOLANT_MIST, Kind.COOLANT_FLOOD))
+    return toolpath.feed, turns, tool, mist + 2 * flood
+
+
+def _last_row(given: Bools) -> Ints:
+    """(N,) the last row up to each where it is `given`, −1 before the first."""
+    return np.asarray(np.maximum.accumulate(np.where(given, np.arange(len(given)), -1)))
 
 
 def _last_value(given: Bools, values: Floats) -> Floats:
     """(N,) the last `given` value up to each row, OFF before the first."""
-    last = np.maximum.accumulate(np.where(given, np.arange(len(given)), -1))
+    last = _last_row(given)
     return np.where(last >= 0, np.nan_to_num(values[np.maximum(last, 0)]), OFF)
 
 
@@ -538,6 +554,22 @@ def _tools(both: _Both) -> Iterator[Finding]:
                 measured=is_[row],
                 limit=wanted[of][which][0],
                 moves=int(which.sum()),
+            )
+
+
+def _coolant(both: _Both) -> Iterator[Finding]:
+    """SETTING_DIFFERS for cuts with other coolant than in the written program."""
+    is_, wanted = _settings(both.decoded)[3], _settings(both.written)[3]
+    rows, of = both.unlike(is_[both.pairs[:, 0]] == wanted[both.pairs[:, 1]])
+    asked = wanted[of] != 0
+    for is_asked, which in ((True, asked), (False, ~asked)):
+        if which.any():
+            row = int(rows[which][0])
+            yield (SETTING_DIFFERS_COOLANT if is_asked else SETTING_DIFFERS_COOLANT_UNASKED)(
+                where=block_name(both.decoded, row),
+                moves=int(which.sum()),
+                coolant=COOLANTS[int(is_[row])],
+                wanted=COOLANTS[int(wanted[of][which][0])],
             )
 
 

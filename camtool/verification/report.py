@@ -247,7 +247,8 @@ class FindingReport(msgspec.Struct, frozen=True):
 
 class PlannedOperation(msgspec.Struct, frozen=True):
     """How an operation cuts; feeds in mm/min. `spindle_rpm` is None without a speed; `passes` and
-    the depth of the deepest are None for kinds of operation without passes."""
+    the depth of the deepest are None for kinds of operation without passes. `coolant`: "off",
+    "mist", "flood" or "both"."""
 
     name: str
     kind: str
@@ -258,6 +259,7 @@ class PlannedOperation(msgspec.Struct, frozen=True):
     depth_mm: float
     passes: int | None = None
     deepest_pass_mm: float | None = None
+    coolant: str = "off"
 
 
 class Planned(msgspec.Struct, frozen=True):
@@ -432,6 +434,9 @@ def _error_gate(found_um: float | None, limit_um: float) -> Iterator[Finding]:
 MOST_OPERATIONS = 6
 """At most this many operations are listed; the others are counted."""
 
+COOLANT_WORDS = {"off": "", "mist": ", mist", "flood": ", flood", "both": ", mist and flood"}
+"""How the summary names what cools an operation."""
+
 
 def clock(seconds: float) -> str:
     """Seconds as h:mm:ss, rounded to the second.
@@ -520,9 +525,10 @@ def _operation_words(operations: Sequence[PlannedOperation]) -> Iterator[str]:
         passes = "" if each.passes is None else f" in {each.passes} pass"
         if each.passes is not None and each.passes > 1:
             passes += f"es of {each.deepest_pass_mm:.4g} at most"
+        cooled = COOLANT_WORDS[each.coolant]
         yield (
             f"{name}: {tool}, {speed}, feed {each.feed_mm_min:g} mm/min, plunge"
-            f" {each.plunge_mm_min:g} mm/min, {each.depth_mm:.4g} mm deep{passes}"
+            f" {each.plunge_mm_min:g} mm/min, {each.depth_mm:.4g} mm deep{passes}{cooled}"
         )
     if len(operations) > MOST_OPERATIONS:
         yield f"and {len(operations) - MOST_OPERATIONS} operations more"

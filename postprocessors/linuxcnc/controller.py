@@ -48,7 +48,7 @@ from camtool.simulation.speed_plan import (
     allowed_along,
     axis_limits,
 )
-from camtool.toolpath.moves import Kind, PathMode, PolarArcs, Toolpath, frozen
+from camtool.toolpath.moves import Kind, PathMode, PolarArcs, Toolpath, are_arcs, frozen
 
 from .dialect import Dialect, LinuxcncController
 from .steps import MOST_IN_CHAIN, merge_lines
@@ -527,7 +527,7 @@ class Tangents:
         path, arms = self.path, self.arms
         tangent = path.end[rows] - path.starts_of(rows)
         kind = path.kind[rows]
-        on = np.flatnonzero((kind == Kind.ARC_CW) | (kind == Kind.ARC_CCW))
+        on = np.flatnonzero(are_arcs(kind))
         arm = self.arm_of(rows[on])
         sweep, grows = arms.sweep[arm], (arms.end_radius - arms.radius)[arm]
         angle, r = arms.angle[arm] + share * sweep, radius[arm]

@@ -163,6 +163,22 @@ def test_the_tool_and_the_wait_at_the_bottom_of_a_hole() -> None:
     assert errors(held(text.replace("G4 P0.5", "G4 P0.7"), target, job)) == []
 
 
+def test_coolant_that_is_asked_for_runs() -> None:
+    cooled = load_target("linuxcnc", settings=["coolant.mist=true", "coolant.flood=true"])
+    each = [Operation(coolant=kind, depth_mm=1.0) for kind in ("flood", "both", "off")]
+    job = Job(tuple(each))
+    text = program(cooled, job)
+    assert errors(held(text, cooled, job)) == []
+    alone = Job((each[0],))
+    ours = program(cooled, alone)
+    for wrong in (ours.replace("M8\n", ""), ours.replace("M8\n", "M7\n")):
+        assert errors(held(wrong, cooled, alone)) == [Code.SETTING_DIFFERS]
+    dry = Job((each[2],))
+    wet = program(cooled, dry).replace("G0 Z5.000", "M7\nG0 Z5.000", 1)
+    assert errors(held(wet, cooled, dry)) == []
+    assert told(held(wet, cooled, dry)) == [Code.SETTING_DIFFERS]
+
+
 @both
 def test_what_nobody_asked_for_is_told(target: LoadedTarget) -> None:
     plain = job_of(depth_mm=1.0, tool_diameter_mm=1.0)
