@@ -158,17 +158,19 @@ def read_job(
     operations: Sequence[str] = (),
     drawing: Drawing | str | Path | None = None,
     target: str | LoadedTarget | None = None,
+    libraries: Sequence[str | Path] = (),
 ) -> Job:
     """The job in a TOML file: tools, operations in order, placement, stock; mm, rad, s, mm/min.
 
     `operations`: only those, by name or number. With a `drawing`, layers and colours that it lacks
-    are refused; its file is read as finely as the `target` needs. Raises OptionError, which names
+    are refused; its file is read as finely as the `target` needs. `libraries`: files of tools that
+    the job may name, the nearest first. Raises OptionError, which names
     file, table, key and the correction. Source: docs/jobs.md.
     """
     from camtool.jobs.build import job_of_file
     from camtool.jobs.drawing import refuse_unmatched
 
-    job = job_of_file(Path(file), _patterns(operations))
+    job = job_of_file(Path(file), _patterns(operations), tuple(map(Path, libraries)))
     if isinstance(drawing, Drawing):
         refuse_unmatched(drawing, job)
     elif drawing is not None:

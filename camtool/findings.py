@@ -293,7 +293,10 @@ class Code(IntEnum):
         WARNING,
         "a setting of the cut looks forgotten or too high, but is used: no spindle speed, a "
         "tool of no width on closed contours, a plunge at the feed of the cut (these "
-        "where the program starts the spindle), a pass deeper than the tool is wide",
+        "where the program starts the spindle), a pass deeper than the tool is wide, a cut "
+        "deeper than its edges are long, a plunge of a tool that does not cut at its centre, "
+        "a chip load or a surface speed beyond the tool's limits, walls and floors that a "
+        "round nose does not reach, presets without a material",
         "the flag that is named, or none if that is meant",
     )
     TAB_SHARED = (
@@ -1065,6 +1068,34 @@ CUT_DOUBTFUL_DEPTH = Sentence(
 CUT_DOUBTFUL_PLUNGE = Sentence(
     Code.CUT_DOUBTFUL,
     "the tool plunges at the feed of the cut, {feed:g} mm/min (--plunge-feed)",
+)
+CUT_DOUBTFUL_LENGTH = Sentence(
+    Code.CUT_DOUBTFUL,
+    "the cut is {depth:.4g} mm deep, and the edges of the tool are {length:g} mm long (--depth)",
+)
+CUT_DOUBTFUL_CENTRE = Sentence(
+    Code.CUT_DOUBTFUL, "the tool plunges, and does not cut at its centre (--entry ramp)"
+)
+CUT_DOUBTFUL_CHIP = Sentence(
+    Code.CUT_DOUBTFUL,
+    "a chip load of {chip:.3g} mm, where {limits} mm are meant for the tool (--feed, --spindle)",
+)
+CUT_DOUBTFUL_EDGE = Sentence(
+    Code.CUT_DOUBTFUL,
+    "a surface speed of {speed:.4g} m/min, where {limits} m/min are meant for the tool "
+    "(--spindle)",
+)
+CUT_DOUBTFUL_NOSE = Sentence(
+    Code.CUT_DOUBTFUL,
+    "the round nose of the tool leaves {nose:g} mm at the foot of walls (a deeper cut, or a flat "
+    "tool)",
+)
+CUT_DOUBTFUL_RIDGES = Sentence(
+    Code.CUT_DOUBTFUL,
+    "the round nose of the tool leaves ridges of {ridge:.3g} mm on floors (--step-over)",
+)
+CUT_DOUBTFUL_PRESET = Sentence(
+    Code.CUT_DOUBTFUL, "the tool has presets for {materials}, and none is taken (--material)"
 )
 TAB_SHARED = Sentence(
     Code.TAB_SHARED,

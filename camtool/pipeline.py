@@ -100,7 +100,7 @@ def post_drawing(
     wanted = plan.toolpath
     run = Run(source=drawing.file, target=target, drawing=drawing, job=job, wanted=wanted)
     doubtful = doubtful_settings(
-        plan.steps, target.machine, starts_spindle=target.target.starts_spindle
+        plan.steps, target.machine, job.stock, starts_spindle=target.target.starts_spindle
     )
     findings = _merged(drawing.findings, wanted.findings, tuple(doubtful))
     if worst(findings) >= Severity.ERROR:
@@ -115,7 +115,7 @@ def post_drawing(
     if judged is None:
         return replace(run, program=program, decoded=decoded, findings=findings)
     from camtool.planning.drawn import kept_of
-    from camtool.verification.case import TRACE_POINTS, cone_of, tool_mm
+    from camtool.verification.case import TRACE_POINTS, nose_of, tool_mm
     from camtool.verification.report import Planned, certain
     from camtool.verification.verify import VerifyOptions
 
@@ -138,7 +138,7 @@ def post_drawing(
         VerifyOptions(
             source=drawing.file,
             tool_diameter_mm=tool_mm(job),
-            cone=cone_of(job),
+            nose=nose_of(job),
             kept=kept_of(whole.steps),
             trace_points=TRACE_POINTS if trace_points is None else trace_points,
         ),
@@ -178,7 +178,7 @@ def verify_program(
     is given. ProgramError names file, block and column."""
     from camtool.planning.job import Job
     from camtool.simulation.motion import ALL
-    from camtool.verification.case import TRACE_POINTS, WORST_LISTED, cone_of, tool_mm
+    from camtool.verification.case import TRACE_POINTS, WORST_LISTED, nose_of, tool_mm
     from camtool.verification.verify import VerifyOptions
 
     judging, progress = judging or Judging(), progress or Progress()
@@ -206,7 +206,7 @@ def verify_program(
         effects=judging.effects or ALL,
         source=source,
         tool_diameter_mm=tool_mm(job or Job()),
-        cone=cone_of(job or Job()),
+        nose=nose_of(job or Job()),
         kept=kept,
         worst=WORST_LISTED if judging.worst is None else judging.worst,
         trace_points=TRACE_POINTS if judging.trace_points is None else judging.trace_points,
@@ -323,7 +323,12 @@ def _repeated(program: Program, decoded: Toolpath) -> set[Finding]:
 
 def _reported(step: Step) -> PlannedOperation:
     """How an operation cuts, for the report."""
-    from camtool.planning.checks import IN_PASSES, deepest_pass
+    from camtool.planning.checks import (
+        IN_PASSES,
+        chip_load_mm,
+        deepest_pass,
+        surface_speed_m_min,
+    )
     from camtool.verification.report import PlannedOperation
 
     operation, setting = step.operation, step.setting
@@ -331,7 +336,11 @@ def _reported(step: Step) -> PlannedOperation:
     return PlannedOperation(
         name=operation.name,
         kind=operation.kind,
+        tool_name=operation.tool.name,
         tool_diameter_mm=operation.tool.diameter_mm,
+        material=operation.material,
+        chip_load_mm=chip_load_mm(setting),
+        surface_speed_m_min=surface_speed_m_min(setting),
         spindle_rpm=setting.spindle_rpm,
         feed_mm_min=setting.feeds.cut_mm_min,
         plunge_mm_min=setting.feeds.plunge_mm_min,

@@ -6,9 +6,12 @@ configuration folder, holds everywhere:
     machine = "my-3018"      # a name, or a file beside this one
     target = "grbl"          # in its place, where there is no file for the machine
     job = "engraving.toml"
+    tool = "mill"            # of operations that say none
+    material = "plywood"     # whose presets tools have
 
 Machine files have names: `my-3018` is `my-3018.toml` beside the project's `camtool.toml`, or in
-`machines/` of the configuration folder.
+`machines/` of the configuration folder. `tools.toml` beside either `camtool.toml` is a library of
+tools.
 """
 
 from __future__ import annotations
@@ -17,6 +20,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
@@ -28,6 +32,9 @@ FILE = "camtool.toml"
 
 MACHINES = "machines"
 """The folder of machine files within the user's configuration folder."""
+
+TOOLS = "tools.toml"
+"""A library of tools, beside a `camtool.toml`."""
 
 NAME = re.compile(r"[a-z0-9][a-z0-9-]*")
 """What machines are called."""
@@ -42,6 +49,8 @@ class Said(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     machine: str | None = None
     target: str | None = None
     job: str | None = None
+    tool: str | int | None = None
+    material: str | None = None
 
     def __post_init__(self) -> None:
         if self.machine is not None and self.target is not None:
@@ -80,6 +89,19 @@ class Project:
             if said.job is not None:
                 return file.parent / said.job
         return None
+
+    def said(self, key: str) -> tuple[Any, Path] | None:
+        """What the nearest file that has this key says, and the file."""
+        for file, said in self.files:
+            if getattr(said, key) is not None:
+                return getattr(said, key), file
+        return None
+
+    @property
+    def libraries(self) -> tuple[Path, ...]:
+        """The libraries of tools, the nearest first: the project's and the user's."""
+        folders = dict.fromkeys([*(file.parent for file, _ in self.files), user_folder()])
+        return tuple(folder / TOOLS for folder in folders if (folder / TOOLS).is_file())
 
     def machine_named(self, said: str) -> Path:
         """The machine file of a name; a path is taken as it is. MachineError, with the names that

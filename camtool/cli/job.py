@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import click
@@ -42,6 +43,7 @@ def job() -> None:
 @click.argument("source", metavar="DRAWING")
 @click.option("-o", "--output", metavar="FILE", help="The file; - is stdout.  [job.toml]")
 @click.option("--tool-diameter", callback=length, metavar="LENGTH", help="Of the end mill.")
+@click.option("--tool", metavar="NAME", help="The end mill; see camtool tools.")
 @click.option("--thickness", callback=length, metavar="LENGTH", help="Of the stock: cut through.")
 @machine_options
 @drawing_options
@@ -50,6 +52,7 @@ def new(
     source: str,
     output: str | None,
     tool_diameter: float | None,
+    tool: str | None,
     thickness: float | None,
     machine: MachineFlags,
     drawing: DrawingFlags,
@@ -64,10 +67,18 @@ def new(
     """
     from camtool.jobs.template import Proposal, job_template
     from camtool.planning.job import above_zero
+    from camtool.project import project_of
 
     above_zero("tool diameter", tool_diameter, "mm")
     above_zero("thickness", thickness, "mm")
+    if tool is not None and tool_diameter is not None:
+        raise click.UsageError("--tool has a diameter: leave --tool-diameter out")
     proposal = Proposal(tool_diameter or 0.0, thickness or 0.0)
+    if tool is not None:
+        named = JobFlags(given={"tool": tool}, project=project_of(Path.cwd())).job(drawing)
+        known = named.operations[0].tool
+        has_presets = bool(known.materials)
+        proposal = Proposal(known.diameter_mm, proposal.thickness_mm, tool, has_presets)
     output = output or "job.toml"
     check_places([source, *machine.files()], [output])
     check_new(output)
@@ -105,12 +116,14 @@ def check(
     """Check the job FILE, and say what each operation does; with --against, to which paths, on
     which side of them, and why."""
     from camtool.jobs.description import described
+    from camtool.project import project_of
 
     if preview is not None and (against is None or machine.name() is None):
         raise click.UsageError("--preview needs --against and --target")
-    reads = [*JobFlags(file).files(), against, *machine.files()]
+    flags = JobFlags(file, project=project_of(Path.cwd()))
+    reads = [*flags.files(), against, *machine.files()]
     check_places(reads, [report, preview])
-    job = JobFlags(file).job(drawing)
+    job = flags.job(drawing)
     target = machine.load().machine if machine.name() is not None else None
     read = drawing.read(against, target, job) if against is not None else None
     progress().begin("planning")
@@ -119,7 +132,7 @@ def check(
     if preview is not None and against is not None:
         from camtool.cli.preview import Seen
 
-        scene, _ = Seen(machine, False, JobFlags(file), drawing, preview).scene(against)
+        scene, _ = Seen(machine, False, flags, drawing, preview).scene(against)
         files[preview] = PictureFlags().painter(lambda: [scene], quiet=quiet)(preview)
     if report is not None:
         facts["findings"] = [

@@ -59,6 +59,7 @@ COMMANDS = (
     "preview",
     "stale",
     "targets",
+    "tools",
     "verify",
 )
 """Each is a function of the same name in a module of the same name."""
@@ -99,6 +100,7 @@ def cli() -> None:
     camtool stale   drawings/ -t pic-mmh        programs that are out of date
     camtool job new logo.dxf                    a job file to fill in, from its layers
     camtool targets                             the machines it knows
+    camtool tools                               the tools that jobs may name
     camtool init                                a machine file of your own, by questions
     camtool coupon  lines -o coupon.dxf         a drawing to cut and measure
     camtool calibrate lengths.toml -t pic-mmh   the machine's numbers from what was measured

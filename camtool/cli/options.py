@@ -31,8 +31,10 @@ from camtool.units import parse_feed, parse_length, parse_time
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
     from camtool.importers.options import ReadOptions
+    from camtool.jobs.tools import Shop
     from camtool.machine.model import Machine
     from camtool.planning.job import Job
+    from camtool.project import Project
     from camtool.target.registry import LoadedTarget
     from camtool.verification.report import Gates
 
@@ -418,11 +420,12 @@ def _patterns(flag: str, text: str) -> Option:
 @dataclass(frozen=True)
 class JobFlags:
     """`--job`, `--operation` and the flags that say the same as keys; `given` holds the values of
-    those that were given."""
+    those that were given. `project`: what holds where they say nothing."""
 
     file: str | None = None
     operations: tuple[str, ...] = ()
     given: Mapping[str, Any] = field(default_factory=dict)
+    project: Project | None = None
 
     def job(self, drawing: DrawingFlags) -> Job:
         """The job of the file, with the given flags over it.
@@ -432,24 +435,40 @@ class JobFlags:
         from camtool.jobs.build import JobTables, build_job, read_job_file, tables_of_flags
 
         file = JobTables() if self.file is None else read_job_file(Path(self.file))
-        job = build_job(file, tables_of_flags(self.given), self.operations)
+        job = build_job(file, tables_of_flags(self.given), self.operations, self._shop())
         if drawing.layer and len(job.operations) == 1:
             return replace(job, operations=(replace(job.operations[0], layers=drawing.layer),))
         return job
 
-    def files(self) -> list[str]:
-        """The job file, and its tool table."""
-        return [file for file in (self.file, self._tool_table()) if file is not None]
+    def _shop(self) -> Shop:
+        """The tools that the job may name, and the defaults of the project and the user."""
+        from camtool.jobs.keys import Given
+        from camtool.jobs.tools import Shop
 
-    def _tool_table(self) -> str | None:
-        """The file of the tool table that the flag or the job file names; None without any, and
-        where the job file cannot be read: `job` says why."""
-        if self.file is None or "tool_table" in self.given:
-            return self.given.get("tool_table")
+        if self.project is None:
+            return Shop()
+        said = {key: self.project.said(key) for key in ("tool", "material")}
+        given = {
+            key: None if each is None else Given(each[0], f"key {key}", str(each[1]))
+            for key, each in said.items()
+        }
+        return Shop(self.project.libraries, **given)
+
+    def files(self) -> list[str]:
+        """The job file, its library of tools, and its tool table."""
+        named = (self.file, self._named("tool_library"), self._named("tool_table"))
+        found = () if self.project is None else self.project.libraries
+        return [*(file for file in named if file is not None), *map(str, found)]
+
+    def _named(self, key: str) -> str | None:
+        """The file that a flag or a key of the job file names; None without any, and where the
+        job file cannot be read: `job` says why."""
+        if self.file is None or key in self.given:
+            return self.given.get(key)
         from camtool.tables import parsed_table
 
         try:
-            name = parsed_table(Path(self.file).read_text(encoding="utf-8")).get("tool_table")
+            name = parsed_table(Path(self.file).read_text(encoding="utf-8")).get(key)
         except (OSError, ValueError):
             return None
         return str(Path(self.file).parent / name) if isinstance(name, str) else None
@@ -484,8 +503,9 @@ def job_options(command: Command) -> Command:
         from camtool.project import project_of
 
         given = {name: value for name, value in keys.items() if value is not None}
-        default = project_of(Path.cwd()).job if job is None else None
-        return JobFlags(job if default is None else str(default), operation, given)
+        project = project_of(Path.cwd())
+        default = project.job if job is None else None
+        return JobFlags(job if default is None else str(default), operation, given, project)
 
     names = ["job", "operation", *(name for keys in FLAGS.values() for name in keys)]
     of_job = next(iter(FLAGS))

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -29,7 +29,6 @@ from camtool.jobs.keys import (
     OPERATION,
     PLACE,
     STOCK,
-    TOOL,
     TOOL_KEYS,
     TOOL_NAME,
     WHOLE,
@@ -37,12 +36,11 @@ from camtool.jobs.keys import (
     Table,
     flag_name,
     record_of,
-    refuse_idle,
     table_of,
     why_idle,
 )
-from camtool.jobs.tool_table import TableTool, read_tool_table
-from camtool.planning.job import Job, Operation, Placement, Stock, Tool
+from camtool.jobs.tools import Described, Shop, Tools, tool_tables, tools_for
+from camtool.planning.job import Job, Operation, Placement, Stock
 from camtool.tables import read_table
 
 OF_OPERATIONS = (*OPERATION, TOOL_NAME, *TOOL_KEYS)
@@ -57,7 +55,9 @@ AT_THE_TOP = (*WHOLE, *OF_OPERATIONS, "origin", *TABLES)
 _OPERATION_NUMBER = re.compile(r"\d{1,6}")
 """An operation by its number."""
 
-_TABLE_KEYS = ("tool_table", "tool_table_units")
+_OF_TOOLS = ("material", "tool_library", "tool_table", "tool_table_units")
+"""Keys of the job as a whole that are for its tools."""
+
 _ANY_STOCK = {"thickness_mm": 1.0}
 
 
@@ -69,7 +69,7 @@ class JobTables:
     whole: Table = field(default_factory=Table)
     place: Table = field(default_factory=Table)
     stock: Table | None = None
-    tools: Mapping[str, Table] = field(default_factory=dict)
+    tools: Mapping[str, Described] = field(default_factory=dict)
     defaults: Table = field(default_factory=Table)
     operations: tuple[Table, ...] | None = None
     folder: Path = Path()
@@ -109,7 +109,7 @@ def tables_of(values: dict[str, Any], path: Path) -> JobTables:
         stock=table_of(values["stock"], STOCK, "table [stock]", file)
         if "stock" in values
         else None,
-        tools=_tool_tables(values, file),
+        tools=tool_tables(values, file),
         defaults=defaults,
         operations=operations,
         folder=path.parent,
@@ -146,23 +146,17 @@ def _place_table(top: Table, values: dict[str, Any], file: str) -> Table:
     return place.over(top.only(["origin"]))
 
 
-def _tool_tables(values: dict[str, Any], file: str) -> dict[str, Table]:
-    tools = values.get("tools", {})
-    if not isinstance(tools, dict):
-        raise Given(tools, "key tools", file).refused(
-            "is no table of tools", "begin each tool with [tools.NAME]"
-        )
-    return {
-        name: table_of(tool, TOOL, f"table [tools.{name}]", file) for name, tool in tools.items()
-    }
-
-
-def build_job(file: JobTables, flags: JobTables, chosen: tuple[str, ...] = ()) -> Job:
+def build_job(
+    file: JobTables,
+    flags: JobTables,
+    chosen: tuple[str, ...] = (),
+    shop: Shop = Shop(),  # noqa: B008
+) -> Job:
     """The job of a file with the flags over it, of the operations that are `chosen` by name or
-    number (none: all). OptionError names file, table and key, or the flag, and says how to
-    fix it."""
+    number (none: all). `shop`: the tools that jobs may name, and what holds where they say
+    nothing. OptionError names file, table and key, or the flag, and says how to fix it."""
     whole = flags.whole.over(file.whole)
-    tools = _tools(file, whole)
+    tools = tools_for(file.tools, whole, file.folder, shop)
     tables = file.operations or (Table(),)
     record_of(Operation, OPERATION, file.defaults.only(OPERATION))
     operations = [
@@ -170,12 +164,13 @@ def build_job(file: JobTables, flags: JobTables, chosen: tuple[str, ...] = ()) -
         for n, own in enumerate(tables, start=1)
     ]
     _refuse_equal_names(operations, tables)
+    tools.refuse_idle_material(operations)
     rows = _rows(operations, chosen)
     for layer in (file.defaults, flags.defaults):
         _refuse_unused(
             layer, operations if layer is file.defaults else [operations[n] for n in rows]
         )
-    keys = {name for name in WHOLE if name not in _TABLE_KEYS}
+    keys = {name for name in WHOLE if name not in _OF_TOOLS}
     job = record_of(Job, WHOLE, whole.only(keys))
     return replace(
         job,
@@ -185,24 +180,10 @@ def build_job(file: JobTables, flags: JobTables, chosen: tuple[str, ...] = ()) -
     )
 
 
-def job_of_file(path: Path, chosen: tuple[str, ...] = ()) -> Job:
-    """The job of a file alone; raises as `build_job` does."""
-    return build_job(read_job_file(path), JobTables(), chosen)
-
-
-def _tools(file: JobTables, whole: Table) -> Tools:
-    refuse_bad_tools(file.tools)
-    given = whole.given.get("tool_table")
-    units = whole.given.get("tool_table_units")
-    if given is None:
-        if units is not None:
-            raise units.refused("has no effect without tool_table", "give tool_table too")
-        return Tools(file.tools)
-    name = WHOLE["tool_table"].read(given)
-    # A path in a job file is relative to the file, one on the command line to where it is run.
-    path = file.folder / name if given.file is not None else Path(name)
-    unit = "mm" if units is None else WHOLE["tool_table_units"].read(units)
-    return with_table(Tools(file.tools, units=unit), path)
+def job_of_file(path: Path, chosen: tuple[str, ...] = (), libraries: tuple[Path, ...] = ()) -> Job:
+    """The job of a file alone, and of the tools of these libraries, the nearest first; raises as
+    `build_job` does."""
+    return build_job(read_job_file(path), JobTables(), chosen, Shop(libraries))
 
 
 def _operation(
@@ -220,6 +201,8 @@ def _operation(
     for name, given in own.only(OPERATION).given.items():
         if kind not in OPERATION[name].kinds:
             raise given.refused(*_unknown(name, kind))
+    used = tools.of(layers, kind)
+    merged = merged.over(used.preset)
     known = merged.only(name for name in OPERATION if kind in OPERATION[name].kinds)
     operation = record_of(Operation, OPERATION, known)
     for name, given in own.only(OPERATION).given.items():
@@ -228,7 +211,7 @@ def _operation(
             raise given.refused(why.message, why.mend)
     if not operation.name and count > 1:
         operation = replace(operation, name=f"{kind} {number}")
-    operation = replace(operation, tool=tools.of(layers, kind))
+    operation = replace(operation, tool=used.tool, material=used.material)
     _refuse_tool(operation, own)
     return operation
 
@@ -314,133 +297,3 @@ def _stock(table: Table | None) -> Stock | None:
     if "thickness" not in table.given:
         raise table.refused("key thickness is missing", "give thickness, and corner and size")
     return record_of(Stock, STOCK, table, _ANY_STOCK)
-
-
-# The tool of an operation: by name, by number, or key by key.
-
-_TOOL_NUMBER = re.compile(r"\d{1,9}")
-"""A tool by its number."""
-
-
-@dataclass(frozen=True)
-class Tools:
-    """The tools of a job: `named` in its file, and by number in a LinuxCNC `table`, whose lengths
-    have the unit `units`."""
-
-    named: Mapping[str, Table] = field(default_factory=dict)
-    table: Mapping[int, TableTool] = field(default_factory=dict)
-    table_file: str = ""
-    units: str = "mm"
-
-    def of(self, layers: Sequence[Table], kind: str) -> Tool:
-        """The tool of an operation of this kind. `layers`: the tables that apply to
-        it, the nearest last.
-
-        The nearest name or number counts, and single keys (`tool_diameter`) of that layer and
-        of nearer ones change it.
-        """
-        at = max((n for n, layer in enumerate(layers) if TOOL_NAME in layer.given), default=-1)
-        name, keys = ("", Table()) if at < 0 else self._chosen(layers[at].given[TOOL_NAME])
-        for n, layer in enumerate(layers[max(at, 0) :], start=max(at, 0)):
-            own = layer.only(TOOL_KEYS)
-            if n == at and own.given:
-                raise next(iter(own.given.values())).refused(
-                    "contradicts the tool that is named beside it", "give one of the two"
-                )
-            given = {key.removeprefix("tool_"): value for key, value in own.given.items()}
-            keys = Table(given, own.where, own.file).over(keys)
-        return _tool(name, keys, kind)
-
-    def _chosen(self, given: Given) -> tuple[str, Table]:
-        """Name and keys of the tool that a name or a number says."""
-        value = given.value
-        if isinstance(value, str) and value in self.named:
-            return value, self._completed(self.named[value])
-        if isinstance(value, str) and _TOOL_NUMBER.fullmatch(value.strip()):
-            value = int(value)
-        if type(value) is int:
-            return self._numbered(value, given)
-        if not isinstance(value, str):
-            raise given.refused(f"{value!r} is no tool", "give its name in quotes, or its number")
-        near = difflib.get_close_matches(value, self.named, n=1)
-        raise given.refused(
-            f"there is no tool {value!r}",
-            (f"did you mean {near[0]!r}? " if near else "")
-            + (f"known: {', '.join(self.named)}" if self.named else f"write [tools.{value}]"),
-        )
-
-    def _numbered(self, number: int, given: Given) -> tuple[str, Table]:
-        for name, keys in self.named.items():
-            if _number_of(keys) == number:
-                return name, self._completed(keys)
-        if number in self.table:
-            return self.table[number].remark, self._of_table(number)
-        known = [str(each) for each in self.table]
-        raise given.refused(
-            f"there is no tool {number}",
-            f"{self.table_file} has: {', '.join(known) or 'none'}"
-            if self.table_file
-            else 'give the tool table: tool_table = "tool.tbl"',
-        )
-
-    def _completed(self, keys: Table) -> Table:
-        """A named tool of a number may leave its diameter to the tool table."""
-        number = _number_of(keys)
-        if number is None or number not in self.table:
-            return keys
-        return keys.over(self._of_table(number, needed="diameter" not in keys.given))
-
-    def _of_table(self, number: int, *, needed: bool = True) -> Table:
-        """The keys of a tool of the table; refused when it lacks a diameter that is needed."""
-        tool = self.table[number]
-        table = Table({}, f"line {tool.line}", self.table_file)
-        if tool.diameter is None and needed:
-            raise table.refused(f"tool {number} has no diameter", "give it a D")
-        values = {"number": number, "diameter": f"{tool.diameter!r}{self.units}"}
-        if tool.diameter is None:
-            del values["diameter"]
-        given = {name: Given(value, table.where, table.file) for name, value in values.items()}
-        return replace(table, given=given)
-
-
-def with_table(tools: Tools, path: Path) -> Tools:
-    """The tools, and those of a LinuxCNC tool table; OptionError names file and line."""
-    try:
-        text = path.read_bytes().decode("utf-8", errors="replace")
-    except OSError as error:
-        raise OptionError(
-            f"cannot be read ({error.strerror})", file=str(path), mend="check the path"
-        ) from error
-    return replace(tools, table=read_tool_table(text, str(path)), table_file=str(path))
-
-
-def refuse_bad_tools(named: Mapping[str, Table]) -> None:
-    """Refuse tools that are wrong, used or not, and two tools with one number."""
-    seen: dict[int, str] = {}
-    for name, keys in named.items():
-        _tool(name, keys, "")
-        number = _number_of(keys)
-        if number is None:
-            continue
-        if number in seen:
-            raise keys.given["number"].refused(
-                f"tool {number} is {seen[number]!r} already", "give each tool a number of its own"
-            )
-        seen[number] = name
-
-
-def _number_of(keys: Table) -> int | None:
-    """The number of a tool of the file, if it has one."""
-    given = keys.given.get("number")
-    number: int | None = None if given is None else TOOL["number"].read(given)
-    return number
-
-
-def _tool(name: str, keys: Table, kind: str) -> Tool:
-    """The record; a tool with a tip that does not say its kind is a V bit, or drills."""
-    if "tip_angle" in keys.given and "kind" not in keys.given:
-        meant = Given("drill" if kind == "drill" else "v", keys.where, keys.file)
-        keys = Table({**keys.given, "kind": meant}, keys.where, keys.file)
-    tool = record_of(Tool, TOOL, keys)
-    refuse_idle(TOOL, keys, tool)
-    return replace(tool, name=name)

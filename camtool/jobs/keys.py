@@ -460,11 +460,13 @@ LENGTH = Value(plain(length), "LENGTH")
 ANGLE = Value(plain(angle), "ANGLE")
 FEED = Value(plain(feed), "FEED")
 TIME = Value(plain(time), "TIME")
-COUNT = Value(plain(whole))
+COUNT = Value(plain(whole), "COUNT")
 FACTOR = Value(plain(number), "FACTOR")
 TEXT = Value(plain(text))
 PATTERNS_OF_NAMES = Value(plain(patterns))
 SWITCH = Value(plain(switch))
+LENGTHS = Value(plain(length_range), "RANGE")
+NUMBERS = Value(plain(number_range), "RANGE")
 
 
 def one_of(known: tuple[str, ...]) -> Value:
@@ -513,6 +515,12 @@ WHOLE = {
         "Layers that hold no edges of parts: frames, stock.",
         '["SHEET"]',
     ),
+    "material": Key(
+        "material", Value(plain(text), "NAME"), "What is cut: whose presets tools have.", '"mdf"'
+    ),
+    "tool_library": Key(
+        "tool_library", Value(plain(text), "FILE"), "A library of tools.", '"tools.toml"'
+    ),
     "tool_table": Key(
         "tool_table", Value(plain(text), "FILE"), "LinuxCNC's tool table.", '"tool.tbl"'
     ),
@@ -558,14 +566,25 @@ TOOL = {
     "tip_diameter": Key(
         "tip_diameter_mm", LENGTH, "Of a V bit cut off.", '"0.1mm"', only=("kind", ("v",))
     ),
+    "corner_radius": Key(
+        "corner_radius_mm", LENGTH, "Of a bull nose.", '"0.5mm"', only=("kind", ("bull",))
+    ),
+    "flutes": Key("flutes", COUNT, "How many edges it has.", "2"),
+    "cutting_length": Key("cutting_length_mm", LENGTH, "How long they are.", '"12mm"'),
+    "centre_cutting": Key("centre_cutting", SWITCH),
+    "chip_load": Key("chip_load_mm", LENGTHS),
+    "surface_speed": Key("surface_speed_m_min", NUMBERS),
     "number": Key("number", COUNT, example="1"),
 }
-"""Keys of `[tools.NAME]`; with `tool_` before them, keys of an operation."""
+"""Keys of `[tools.NAME]`; with `tool_` before them, those with a help are keys of an operation."""
+
+LIMITS = {name: TOOL[name] for name in ("chip_load", "surface_speed")}
+"""Keys of a tool that its presets may have too."""
 
 TOOL_NAME = "tool"
 """Key of an operation: the name of a tool of the file, or its number."""
 
-TOOL_KEYS = {f"tool_{name}": key for name, key in TOOL.items() if name != "number"}
+TOOL_KEYS = {f"tool_{name}": key for name, key in TOOL.items() if key.help}
 """The tool of an operation that names none, key by key."""
 
 _LINES = ("profile", "pocket", "engrave")
@@ -588,12 +607,10 @@ OPERATION = {
         '["inner", "circle"]',
         KINDS,
     ),
-    "select_size": Key(
-        "size_mm", Value(plain(length_range), "RANGE"), "And so large.", '"3..8mm"', KINDS
-    ),
+    "select_size": Key("size_mm", LENGTHS, "And so large.", '"3..8mm"', KINDS),
     "select_area": Key(
         "area_mm2",
-        Value(plain(number_range), "RANGE"),
+        NUMBERS,
         "And of such an area, mm².",
         '"10..200"',
         KINDS,
@@ -684,6 +701,23 @@ OPERATION = {
     "max_hole": Key("max_hole_mm", LENGTH, "The largest circle that is drilled.", '"3mm"', _DRILL),
 }
 """Keys of an operation, but for its tool."""
+
+PRESET = {
+    **{
+        name: OPERATION[name]
+        for name in (
+            "feed",
+            "plunge_feed",
+            "spindle",
+            "coolant",
+            "step_down",
+            "step_over",
+            "peck",
+        )
+    },
+    **LIMITS,
+}
+"""Keys of `[tools.NAME.presets.MATERIAL]`."""
 
 # The same keys by other names: as flags, and as fields from Python.
 

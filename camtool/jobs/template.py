@@ -66,10 +66,12 @@ class _Group:
 @dataclass(frozen=True)
 class Proposal:
     """What is known of the cut, mm, 0 where it is not: the tool's diameter, the stock's
-    thickness."""
+    thickness. `tool`: its name in a library, whose presets may say how deep passes are."""
 
     tool_mm: float = 0.0
     thickness_mm: float = 0.0
+    tool: str = ""
+    has_presets: bool = False
 
     @property
     def depth_mm(self) -> float:
@@ -102,10 +104,13 @@ def job_template(
         "",
         *_stock(size, proposal),
         "",
-        f"[tools.{TOOL_NAME}]",
-        _row(f'diameter = "{proposal.tool_mm:.6g}mm"', TOOL["diameter"].help),
-        *_comments(TOOL),
     ]
+    if not proposal.tool:
+        lines += [
+            f"[tools.{TOOL_NAME}]",
+            _row(f'diameter = "{proposal.tool_mm:.6g}mm"', TOOL["diameter"].help),
+            *_comments(TOOL),
+        ]
     names = set[str]()
     for group, part in parts:
         number = next(n for n in itertools.count(1) if _numbered(part.name, n) not in names)
@@ -270,13 +275,13 @@ def _text(drawing: Drawing, group: _Group, part: _Part, proposal: Proposal) -> l
         f'kind = "{part.kind}"',
         _row(f"{group.key} = [{quoted(pattern_of(group.name))}]", f"{_counted(lines)}{marks}"),
         *(_row(f"{key} = {value}", remark) for key, value, remark in part.keys),
-        f'tool = "{TOOL_NAME}"',
+        f"tool = {quoted(proposal.tool or TOOL_NAME)}",
     ]
     if part.kind == "profile" and proposal.tool_mm:
         text.append(_row('direction = "climb"', OPERATION["direction"].help))
     if proposal.depth_mm and part.kind != "engrave":
         text.append(_row(f'depth = "{proposal.depth_mm:.6g}mm"', "through the stock"))
-        if part.kind == "profile" and proposal.tool_mm:
+        if part.kind == "profile" and proposal.tool_mm and not proposal.has_presets:
             text.append(f'step_down = "{0.5 * proposal.tool_mm:.3g}mm"')
     if marks and part.kind != "drill":
         text.append("# The points are not cut by this: they need an operation of the kind drill.")

@@ -195,7 +195,7 @@ def scene_of(
 
     `job` places the drawing in the work frame; `listing` gives the program's lines to the viewer.
     """
-    from camtool.verification.case import cone_of, tool_mm
+    from camtool.verification.case import nose_of, tool_mm
 
     if drawing is not None and toolpath is None:
         return scene_of_drawing(drawing, title)
@@ -206,7 +206,7 @@ def scene_of(
     trace = verification.trace if verification is not None else None
     worst = () if verification is None else verification.report.worst
     # A V bit is as wide as it is deep: its path has no single width.
-    even = job is not None and cone_of(job) is None
+    even = job is not None and nose_of(job) is None
     return Scene(
         title=title,
         drawing=drawing,

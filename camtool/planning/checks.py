@@ -17,8 +17,15 @@ import numpy as np
 from camtool.arrays import Bools, Floats
 from camtool.findings import (
     CUT_DOUBTFUL,
+    CUT_DOUBTFUL_CENTRE,
+    CUT_DOUBTFUL_CHIP,
     CUT_DOUBTFUL_DEPTH,
+    CUT_DOUBTFUL_EDGE,
+    CUT_DOUBTFUL_LENGTH,
+    CUT_DOUBTFUL_NOSE,
     CUT_DOUBTFUL_PLUNGE,
+    CUT_DOUBTFUL_PRESET,
+    CUT_DOUBTFUL_RIDGES,
     CUT_DOUBTFUL_SPEED,
     CUT_DOUBTFUL_WIDTH,
     FEED_ABOVE_LIMIT,
@@ -35,11 +42,14 @@ from camtool.findings import (
 from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.machine.model import Machine
 from camtool.planning.items import Setting, Step
-from camtool.planning.job import Job, Tool
+from camtool.planning.job import MILLS, Job, Stock, Tool
 from camtool.planning.naming import operation_name, own_numbers
 from camtool.planning.settings import lowered_feeds
 from camtool.toolpath.moves import Kind, Toolpath, toolpath_extents
 from camtool.toolpath.rapids import STOCK_TOP_MM, Reach, rapids_through_stock
+
+LIMIT_SLACK = 1e-6
+"""A chip load or surface speed may be beyond its limits by this part of them, by rounding."""
 
 FEED_TOLERANCE = 1e-6
 """A feed may exceed its limit by this part of it, by rounding alone."""
@@ -182,7 +192,8 @@ def _tools_not_said(job: Job) -> Iterator[Finding]:
 
 
 def _shape(tool: Tool) -> tuple[object, ...]:
-    return tool.kind, tool.diameter_mm, tool.tip_angle_rad, tool.tip_diameter_mm
+    sizes = (tool.diameter_mm, tool.tip_angle_rad, tool.tip_diameter_mm, tool.corner_radius_mm)
+    return tool.kind, *sizes
 
 
 def _radii(toolpath: Toolpath, job: Job) -> tuple[Floats, Floats]:
@@ -202,8 +213,8 @@ def _radii(toolpath: Toolpath, job: Job) -> tuple[Floats, Floats]:
 
 
 def _cleared_mm(tool: Tool) -> float:
-    """Only a flat tool is as wide at its tip as above; of others the tip alone counts."""
-    return tool.radius_mm if tool.kind == "flat" else 0.5 * tool.tip_diameter_mm
+    """How wide its tip is, which is nothing of a drill."""
+    return 0.0 if tool.kind == "drill" else tool.radius_at(0.0)
 
 
 def _rapids_in_stock(toolpath: Toolpath, job: Job) -> Iterator[Finding]:
@@ -265,14 +276,15 @@ def _place(toolpath: Toolpath, row: int) -> str:
 
 
 def doubtful_settings(
-    steps: Sequence[Step], machine: Machine, *, starts_spindle: bool
+    steps: Sequence[Step], machine: Machine, stock: Stock | None, *, starts_spindle: bool
 ) -> list[Finding]:
     """One finding for all settings that look forgotten or too high in the operations that cut
     something; no finding when there are none.
 
     A point that follows closed contours and a plunge at the feed of the cut count only where
     programs of the target can start a spindle (`starts_spindle`) and the machine has one: others
-    engrave with points. A missing speed counts where the program switches it.
+    engrave with points. A missing speed counts where the program switches it. A round nose leaves
+    nothing of a wall that is cut through the `stock` by as much.
     """
     starts_spindle = starts_spindle and machine.spindle.switched != "none"
     asks_speed = starts_spindle and machine.spindle.switched == "program"
@@ -281,7 +293,8 @@ def doubtful_settings(
     for step in cutting:
         if asks_speed and step.setting.spindle_rpm is None and step.operation.spindle_rpm is None:
             found[CUT_DOUBTFUL_SPEED.words()].append(step)
-        for reason in _doubtful(step, starts_spindle):
+        reasons = (*_doubtful(step, starts_spindle), *_beyond_tool(step, stock))
+        for reason in reasons:
             found[reason].append(step)
     if not found:
         return []
@@ -300,13 +313,82 @@ def _doubtful(step: Step, starts_spindle: bool) -> Iterator[str]:
     if starts_spindle and on_line and step.chosen.lines.closed.any():
         yield CUT_DOUBTFUL_WIDTH.words()
     deepest = deepest_pass(step.setting)
-    mills = operation.kind in IN_PASSES and tool.kind == "flat" and tool.radius_mm > 0.0
+    mills = operation.kind in IN_PASSES and tool.kind in MILLS and tool.radius_mm > 0.0
     if mills and deepest > tool.diameter_mm + POSITION_EPS_MM:
         yield CUT_DOUBTFUL_DEPTH.words(depth=deepest, width=tool.diameter_mm)
     plunges = operation.kind in IN_PASSES and operation.entry.kind == "plunge"
     fast = operation.plunge_feed_mm_min is None and feeds.plunge_mm_min >= feeds.cut_mm_min
     if starts_spindle and plunges and fast:
         yield CUT_DOUBTFUL_PLUNGE.words(feed=feeds.plunge_mm_min)
+
+
+def _beyond_tool(step: Step, stock: Stock | None) -> Iterator[str]:
+    """What the tool of an operation is not made for, as far as its file says it."""
+    operation, tool, setting = step.operation, step.operation.tool, step.setting
+    depth = -setting.levels_mm[-1]
+    length = tool.cutting_length_mm
+    if length is not None and depth > length + POSITION_EPS_MM:
+        yield CUT_DOUBTFUL_LENGTH.words(depth=depth, length=length)
+    straight_down = operation.kind == "drill" or (
+        operation.kind in IN_PASSES and operation.entry.kind == "plunge"
+    )
+    if straight_down and tool.centre_cutting is False:
+        yield CUT_DOUBTFUL_CENTRE.words()
+    chip, speed = chip_load_mm(setting), surface_speed_m_min(setting)
+    if chip is not None and operation.kind != "drill" and _is_beyond(chip, tool.chip_load_mm):
+        yield CUT_DOUBTFUL_CHIP.words(chip=chip, limits=_range_words(tool.chip_load_mm))
+    if speed is not None and _is_beyond(speed, tool.surface_speed_m_min):
+        yield CUT_DOUBTFUL_EDGE.words(speed=speed, limits=_range_words(tool.surface_speed_m_min))
+    beside = operation.kind == "pocket" or (operation.kind == "profile" and operation.side != "on")
+    below = depth - stock.thickness_mm if stock is not None else 0.0
+    if beside and max(below, 0.0) < tool.nose_mm - POSITION_EPS_MM:
+        yield CUT_DOUBTFUL_NOSE.words(nose=tool.nose_mm)
+    ridge = ridge_mm(tool, operation.step_over) if operation.kind == "pocket" else 0.0
+    if ridge > POSITION_EPS_MM and below <= 0.0:
+        yield CUT_DOUBTFUL_RIDGES.words(ridge=ridge)
+    if tool.materials and not operation.material:
+        yield CUT_DOUBTFUL_PRESET.words(materials=", ".join(tool.materials))
+
+
+def ridge_mm(tool: Tool, step_over: float) -> float:
+    """How high the ridges are that a nose of radius r leaves on a floor, mm.
+
+    Halfway between two paths the floor is x = ½ (step − flat) beside the flat of the tool; the
+    nose is r − √(r² − x²) above its tip there.
+    """
+    flat = tool.diameter_mm - 2.0 * tool.nose_mm
+    beside = max(0.5 * (step_over * tool.diameter_mm - flat), 0.0)
+    return tool.nose_mm - math.sqrt(max(tool.nose_mm**2 - beside**2, 0.0))
+
+
+def chip_load_mm(setting: Setting) -> float | None:
+    """How far the tool is fed while an edge of it takes the place of the one before, mm; None
+    where its flutes or its speed are not known."""
+    flutes, rpm = setting.operation.tool.flutes, setting.spindle_rpm
+    return setting.feeds.cut_mm_min / (rpm * flutes) if flutes and rpm else None
+
+
+def surface_speed_m_min(setting: Setting) -> float | None:
+    """How fast the edge of the tool moves where it is widest, m/min; None where its speed is not
+    known, and for a point."""
+    diameter, rpm = setting.operation.tool.diameter_mm, setting.spindle_rpm
+    return math.pi * diameter * rpm / 1000.0 if diameter and rpm else None
+
+
+def _is_beyond(value: float, limits: tuple[float, float] | None) -> bool:
+    """Whether a number is out of its limits, by more than rounding."""
+    if limits is None:
+        return False
+    least, most = limits
+    return value < least * (1.0 - LIMIT_SLACK) or value > most * (1.0 + LIMIT_SLACK)
+
+
+def _range_words(limits: tuple[float, float] | None) -> str:
+    """`0.02 to 0.06`, `at most 0.06` or `at least 0.02`."""
+    least, most = limits or (0.0, math.inf)
+    if math.isinf(most):
+        return f"at least {least:g}"
+    return f"{least:g} to {most:g}" if least else f"at most {most:g}"
 
 
 def deepest_pass(setting: Setting) -> float:

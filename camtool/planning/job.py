@@ -76,8 +76,12 @@ THROUGH_SHARE = 0.5
 """Cuts below the stock go no deeper than this part of its thickness either: thin stock has a thin
 board under it."""
 
-TOOL_KINDS = ("flat", "v", "drill")
-"""Shapes of tools: an end mill (or a point of no width), a V bit, a drill."""
+TOOL_KINDS = ("flat", "ball", "bull", "v", "drill")
+"""Shapes of tools: an end mill (or a point of no width), one with a ball nose, one whose edge is
+rounded by a corner radius, a V bit, a drill."""
+
+MILLS = ("flat", "ball", "bull")
+"""Those that are as wide as their shank but for their nose."""
 
 MOST = {"mm": 1e5, "mm/min": 1e7, "rev/min": 1e7, "s": 1e6, "rad": 1e6, "": 1e6}
 """The most that a number of this unit may be, as in `camtool.machine.ranges`: 100 m, 167 m/s,
@@ -165,6 +169,16 @@ def one_of(name: str, value: str, known: Sequence[str]) -> None:
         raise OptionError(f"unknown {name} {value!r}", mend=f"use one of {', '.join(known)}")
 
 
+def refuse_range(key: str, limits: tuple[float, float] | None, named: str = "") -> None:
+    """Refuse a least and a most that are no range; `named`: whose key it is."""
+    if limits is not None and not 0.0 <= limits[0] <= limits[1]:
+        raise OptionError(
+            f"{limits[0]:g} to {limits[1]:g} is no range",
+            where=f"{named}key {key}",
+            mend="give the lesser one first, both 0 or more",
+        )
+
+
 def _refuse_fit(fit_mm: tuple[float, float]) -> None:
     _refuse_beyond("fit", fit_mm, 0.0, MOST["mm"])
     if not any(fit_mm):
@@ -189,19 +203,37 @@ def _refuse_beyond(key: str, lengths: tuple[float, float], least: float, most: f
 @dataclass(frozen=True)
 class Tool:
     """A tool; diameter 0 is a point that cuts no width. A V bit and a drill have a
-    `tip_angle_rad`, the full angle of the cone, and a V bit may have a flat tip."""
+    `tip_angle_rad`, the full angle of the cone, and a V bit may have a flat tip; a bull nose has
+    a `corner_radius_mm`.
+
+    What is not known is None: how many `flutes` it has, how long they cut (`cutting_length_mm`),
+    and whether it cuts at its centre, and so plunges. Limits of the feed per tooth, mm, and of the
+    speed of the cutting edge, m/min, are (least, most). `materials`: those of its presets.
+    """
 
     diameter_mm: float = 0.0
     kind: str = "flat"
     tip_angle_rad: float | None = None
     tip_diameter_mm: float = 0.0
+    corner_radius_mm: float = 0.0
     number: int | None = None
     name: str = ""
+    flutes: int | None = None
+    cutting_length_mm: float | None = None
+    centre_cutting: bool | None = None
+    chip_load_mm: tuple[float, float] | None = None
+    surface_speed_m_min: tuple[float, float] | None = None
+    materials: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         at_least_zero("tool diameter", self.diameter_mm, "mm", MOST_WIDE_MM)
         at_least_zero("tip diameter", self.tip_diameter_mm, "mm", MOST_WIDE_MM)
+        at_least_zero("corner radius", self.corner_radius_mm, "mm", MOST_WIDE_MM)
+        above_zero("number of flutes", self.flutes, "")
+        above_zero("cutting length", self.cutting_length_mm, "mm")
         one_of("kind of tool", self.kind, TOOL_KINDS)
+        refuse_range("chip_load", self.chip_load_mm)
+        refuse_range("surface_speed", self.surface_speed_m_min)
         angle = self.tip_angle_rad
         if angle is not None and not 0.0 < angle < math.pi:
             raise OptionError(
@@ -214,11 +246,34 @@ class Tool:
                 where="key tip_diameter",
                 mend="give a smaller tip, or a wider tool",
             )
+        if 0.0 < self.diameter_mm < 2.0 * self.corner_radius_mm:
+            raise OptionError(
+                f"a corner radius of {self.corner_radius_mm:g} mm is more than half the tool",
+                where="key corner_radius",
+                mend=f"give {0.5 * self.diameter_mm:g} mm or less, or a wider tool",
+            )
 
     @property
     def radius_mm(self) -> float:
         """Half the diameter."""
         return 0.5 * self.diameter_mm
+
+    @property
+    def nose_mm(self) -> float:
+        """How far above its tip a mill is as wide as its diameter: the radius of its nose, mm."""
+        return {"ball": self.radius_mm, "bull": self.corner_radius_mm}.get(self.kind, 0.0)
+
+    def radius_at(self, above_tip_mm: float) -> float:
+        """How wide it is so far above its tip, mm: half of what it cuts at the surface with its
+        tip so deep. A drill counts as wide as it is; one of whom only the cone is known grows
+        without end."""
+        if self.kind == "v" and self.tip_angle_rad is not None:
+            wide = 0.5 * self.tip_diameter_mm + above_tip_mm * math.tan(0.5 * self.tip_angle_rad)
+            return min(wide, self.radius_mm or math.inf)
+        # A nose of radius r about a point r above the tip: x² + (r − z)² = r².
+        nose = self.nose_mm
+        below = max(nose - above_tip_mm, 0.0)
+        return self.radius_mm - nose + math.sqrt(nose * nose - below * below)
 
 
 @dataclass(frozen=True)
@@ -286,7 +341,8 @@ class Operation:
     `overlap_mm`: how far a closed contour is cut beyond its start. `start`: one of STARTS, or a
     place (x, y) mm. `peck_mm`: how deep a drill goes at a time; `dwell_s` at the bottom.
     `max_hole_mm`: circles up to this diameter are drilled (None: as wide as the drill, or any
-    for a drill of no width). Raises OptionError for what no operation can be.
+    for a drill of no width). `material`: that of the tool's preset, "" where none was taken.
+    Raises OptionError for what no operation can be.
     """
 
     kind: str = "profile"
@@ -323,6 +379,7 @@ class Operation:
     peck_mm: float | None = None
     dwell_s: float = 0.0
     max_hole_mm: float | None = None
+    material: str = ""
 
     def __post_init__(self) -> None:
         one_of("kind of operation", self.kind, KINDS)
@@ -374,13 +431,8 @@ class Operation:
                     where=f"{named}key select",
                     mend="leave one of them out, or make two operations",
                 )
-        for key, limits in (("select_size", self.size_mm), ("select_area", self.area_mm2)):
-            if limits is not None and not 0.0 <= limits[0] <= limits[1]:
-                raise OptionError(
-                    f"{limits[0]:g} to {limits[1]:g} is no range",
-                    where=f"{named}key {key}",
-                    mend="give the lesser one first, both 0 or more",
-                )
+        refuse_range("select_size", self.size_mm, named)
+        refuse_range("select_area", self.area_mm2, named)
         depth, last = self.depth_mm, self.last_pass_mm
         if depth is not None and last is not None and last > depth:
             raise OptionError(

@@ -455,7 +455,7 @@ def _over(along: MeasuredPath, low: Floats, bridge: Bridge, tool: Tool) -> Itera
     is_low = low < bridge.top_mm - POSITION_EPS_MM
     if not is_low.any():
         return
-    reach = _radius_at(tool, bridge.top_mm - float(low.min())) - BRIDGE_SLACK_MM
+    reach = tool.radius_at(bridge.top_mm - float(low.min())) - BRIDGE_SLACK_MM
     if reach <= 0.0:
         return
     zone = Segments.of(_zone(bridge, reach))
@@ -494,14 +494,6 @@ def _zone(bridge: Bridge, reach_mm: float) -> Polyline:
     ]  # fmt: skip
     rows = [[*(bridge.centre + t * bridge.ahead + n * aside), b] for t, n, b in corners]
     return Polyline(np.array(rows), closed=True)
-
-
-def _radius_at(tool: Tool, above_tip_mm: float) -> float:
-    """How wide the tool is so far above its tip."""
-    if tool.tip_angle_rad is None or tool.kind == "drill":
-        return tool.radius_mm
-    wide = 0.5 * tool.tip_diameter_mm + above_tip_mm * math.tan(0.5 * tool.tip_angle_rad)
-    return min(wide, tool.radius_mm or math.inf)
 
 
 def _box(bridge: Bridge, reach: float) -> tuple[float, float, float, float]:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from camtool.arrays import Ints
 from camtool.geometry.drawing import Drawing
 from camtool.machine.model import Machine
-from camtool.planning.job import Job
+from camtool.planning.job import Job, Tool
 from camtool.simulation.motion import ALL, Effects, Options
 from camtool.target.registry import LoadedTarget
 from camtool.toolpath.moves import Compensated, Toolpath
@@ -39,22 +38,16 @@ WORST_LISTED = 10
 """Number of moves with the largest errors in a report, unless another number is given."""
 
 
-@dataclass(frozen=True)
-class Cone:
-    """The shape of a V bit: radius of its flat tip, mm, and tangent of half its angle."""
-
-    tip_mm: float
-    slope: float
-
-
-def cone_of(job: Job) -> Cone | None:
-    """The shape of the V bit with which all operations cut; None for other or several tools."""
+def nose_of(job: Job) -> Tool | None:
+    """A tool of the shape with which all operations cut, a V bit or a mill with a nose; None for
+    one that is as wide at its tip, and for several."""
     tools = [operation.tool for operation in job.operations]
     shapes = {(tool.kind, tool.tip_angle_rad, tool.tip_diameter_mm) for tool in tools}
-    if len(shapes) != 1:
+    noses = {tool.nose_mm for tool in tools}
+    if len(shapes) != 1 or len(noses) != 1:
         return None
-    kind, angle, tip = shapes.pop()
-    return Cone(0.5 * tip, math.tan(0.5 * angle)) if kind == "v" and angle is not None else None
+    tool = tools[0]
+    return tool if tool.nose_mm or (tool.kind == "v" and tool.tip_angle_rad is not None) else None
 
 
 def tool_mm(job: Job) -> float | None:
@@ -69,7 +62,7 @@ class VerifyOptions:
 
     `interpolator` None: that of the machine. `effects`: the parts of the mechanics that act.
     `tool_diameter_mm`: the tool clears the way for rapids below the stock top; None: not known,
-    nothing is cleared. `cone`: the tool is a V bit, which has that diameter only at its top.
+    nothing is cleared. `nose`: the tool has that diameter only above its cone or nose.
     `kept`: which runs cut, and what must stay; () where that is not known. `size_bytes`: size of
     the file; `line_bytes`: what is sent over the line to the machine. `stray_mm`: how far the
     dialect may leave the wanted path on purpose. `trace_points`: points of the slides' path for
@@ -79,7 +72,7 @@ class VerifyOptions:
     interpolator: str | None = None
     effects: Effects = ALL
     tool_diameter_mm: float | None = None
-    cone: Cone | None = None
+    nose: Tool | None = None
     kept: tuple[Kept, ...] = ()
     source: str = ""
     size_bytes: int | None = None

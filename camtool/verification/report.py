@@ -248,11 +248,17 @@ class FindingReport(msgspec.Struct, frozen=True):
 class PlannedOperation(msgspec.Struct, frozen=True):
     """How an operation cuts; feeds in mm/min. `spindle_rpm` is None without a speed; `passes` and
     the depth of the deepest are None for kinds of operation without passes. `coolant`: "off",
-    "mist", "flood" or "both"."""
+    "mist", "flood" or "both". `tool_name` and `material`, that of its preset, are "" where there
+    are none; the feed per tooth and the speed of the edge are None where the flutes, or the speed,
+    are not known."""
 
     name: str
     kind: str
+    tool_name: str
     tool_diameter_mm: float
+    material: str
+    chip_load_mm: float | None
+    surface_speed_m_min: float | None
     spindle_rpm: float | None
     feed_mm_min: float
     plunge_mm_min: float
@@ -520,15 +526,23 @@ def _operation_words(operations: Sequence[PlannedOperation]) -> Iterator[str]:
     """Tool, spindle, feeds, depth and passes, one line per operation."""
     for each in operations[:MOST_OPERATIONS]:
         name = one_line(each.name or each.kind)
-        tool = f"tool {each.tool_diameter_mm:g} mm" if each.tool_diameter_mm else "no tool width"
+        called = one_line(f" {each.tool_name}") if each.tool_name else ""
+        tool = f"tool{called} {each.tool_diameter_mm:g} mm"
+        if not each.tool_diameter_mm:
+            tool = f"tool{called} of no width" if called else "no tool width"
         speed = "no spindle speed" if each.spindle_rpm is None else f"spindle {each.spindle_rpm:g}"
+        chip = ""
+        if each.chip_load_mm is not None and each.surface_speed_m_min is not None:
+            speed += f" ({each.surface_speed_m_min:.3g} m/min)"
+            chip = f" ({each.chip_load_mm:.2g} mm per tooth)"
+        preset = f", as in {one_line(each.material)}" if each.material else ""
         passes = "" if each.passes is None else f" in {each.passes} pass"
         if each.passes is not None and each.passes > 1:
             passes += f"es of {each.deepest_pass_mm:.4g} at most"
         cooled = COOLANT_WORDS[each.coolant]
         yield (
-            f"{name}: {tool}, {speed}, feed {each.feed_mm_min:g} mm/min, plunge"
-            f" {each.plunge_mm_min:g} mm/min, {each.depth_mm:.4g} mm deep{passes}{cooled}"
+            f"{name}: {tool}, {speed}, feed {each.feed_mm_min:g} mm/min{chip}, plunge"
+            f" {each.plunge_mm_min:g} mm/min{preset}, {each.depth_mm:.4g} mm deep{passes}{cooled}"
         )
     if len(operations) > MOST_OPERATIONS:
         yield f"and {len(operations) - MOST_OPERATIONS} operations more"

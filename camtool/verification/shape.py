@@ -26,10 +26,11 @@ from camtool.arrays import Floats, Ints
 from camtool.findings import OVERCUT, Code, Finding, TargetCode
 from camtool.geometry.measure import point_at
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
+from camtool.planning.job import Tool
 from camtool.toolpath.moves import Toolpath
 from camtool.toolpath.rapids import STOCK_TOP_MM
 from camtool.toolpath.wanted import Kept
-from camtool.verification.case import Cone, VerifyOptions
+from camtool.verification.case import VerifyOptions
 from camtool.verification.cuts import CutMoves, moved_lengths
 from camtool.verification.slides import Trace
 
@@ -78,10 +79,10 @@ class Shape:
 
 @dataclass(frozen=True)
 class Cutter:
-    """A tool as seen from above: its diameter, and of a V bit its cone."""
+    """A tool as seen from above: its diameter, and, where it is narrower at its tip, its shape."""
 
     diameter_mm: float
-    cone: Cone | None = None
+    nose: Tool | None = None
 
     @property
     def tolerance_mm(self) -> float:
@@ -91,10 +92,11 @@ class Cutter:
     def radius_mm(self, z: Floats) -> Floats:
         """(J,) mm: the radius of the cut at the surface, with the tip at the heights `z` (J,)."""
         most = 0.5 * self.diameter_mm
-        if self.cone is None:
+        if self.nose is None:
             return np.full(len(z), most)
-        wide = self.cone.tip_mm - np.minimum(z, 0.0) * self.cone.slope
-        return np.where(z < 0.0, np.minimum(wide, most), 0.0)
+        heights, which = np.unique(np.minimum(z, 0.0), return_inverse=True)
+        wide = np.array([self.nose.radius_at(-height) for height in heights.tolist()])
+        return np.where(z < 0.0, np.minimum(wide[which], most), 0.0)
 
     @property
     def quarter(self) -> int:
@@ -107,10 +109,9 @@ def cutter_of(options: VerifyOptions, cuts: CutMoves) -> Cutter | None:
     """The tool for these moves. A V bit of unknown diameter is as wide as the deepest cut needs.
     None without a tool, and for one without width."""
     diameter = options.tool_diameter_mm or 0.0
-    if not diameter and options.cone is not None and len(cuts.ends_z):
-        depth = max(-float(cuts.ends_z.min()), 0.0)
-        diameter = 2.0 * (options.cone.tip_mm + depth * options.cone.slope)
-    return Cutter(diameter, options.cone) if diameter else None
+    if not diameter and options.nose is not None and len(cuts.ends_z):
+        diameter = 2.0 * options.nose.radius_at(max(-float(cuts.ends_z.min()), 0.0))
+    return Cutter(diameter, options.nose) if diameter else None
 
 
 def points_wanted(decoded: CutMoves, cutter: Cutter | None) -> int | None:
@@ -245,14 +246,14 @@ def _swept(lines: _Lines, cutter: Cutter) -> Any:
     """What the tool covers at the surface along lines; None without lines.
 
     Between two neighbouring points the radius of a V bit changes evenly: it covers the convex hull
-    of the discs at both.
+    of the discs at both; a ball nose on a slope covers a little more than that.
     """
     import shapely
 
     starts = np.flatnonzero(lines.line[1:] == lines.line[:-1])
     if len(starts) == 0:
         return None
-    if cutter.cone is None:
+    if cutter.nose is None:
         every = shapely.multilinestrings(shapely.linestrings(lines.points, indices=lines.line))
         return shapely.buffer(every, 0.5 * cutter.diameter_mm, quad_segs=cutter.quarter)
     radius = np.maximum(cutter.radius_mm(lines.z), POSITION_EPS_MM)
@@ -262,13 +263,13 @@ def _swept(lines: _Lines, cutter: Cutter) -> Any:
 
 
 def _runs(trace: Trace, toolpath: Toolpath, cutter: Cutter) -> _Lines:
-    """The cutting runs of a trace as lines, simplified within the tolerance; with a V bit each row
-    is a line, because the height changes evenly along it."""
+    """The cutting runs of a trace as lines, simplified within the tolerance; with a V bit or
+    a nose each row is a line, because the height changes evenly along it."""
     import shapely
 
     which = np.flatnonzero(trace.cutting)
     ends = np.diff(which) > 1
-    if cutter.cone is not None:
+    if cutter.nose is not None:
         ends |= np.diff(trace.row[which]) != 0
     points: list[Floats] = []
     heights: list[Floats] = []
@@ -295,13 +296,14 @@ def _runs(trace: Trace, toolpath: Toolpath, cutter: Cutter) -> _Lines:
 
 def _moves(kept: Kept, cutter: Cutter) -> tuple[Segments, Floats]:
     """The cutting moves of the runs, and the heights (K, 2) of their ends. Of equal moves at
-    several heights one is enough, unless the tool is a V bit."""
+    several heights one is enough, unless the tool is narrower
+    at its tip."""
     rows = [np.hstack([run[:-1], run[1:]]) for run in kept.runs]
     moves = np.concatenate([np.empty((0, 8)), *rows])
     lowest = np.minimum(moves[:, 2], moves[:, 6])
     far = np.hypot(moves[:, 4] - moves[:, 0], moves[:, 5] - moves[:, 1]) > POSITION_EPS_MM
     moves = moves[far & (lowest < STOCK_TOP_MM)]
-    if cutter.cone is None:
+    if cutter.nose is None:
         _, first = np.unique(moves[:, [0, 1, 3, 4, 5]], axis=0, return_index=True)
         moves = moves[np.sort(first)]
     return Segments.between(moves[:, :2], moves[:, 4:6], moves[:, 3]), moves[:, [2, 6]]

@@ -79,6 +79,7 @@ BASES: Mapping[str, tuple[str, ...]] = {
     "job check": (),
     "targets new": ("--extends", "grbl", "-o", "mine.toml"),
     "init": ("-t", "grbl", "-o", "mine.toml"),
+    "tools new": (),
     "coupon": ("-t", "linuxcnc", "-o", "out.svg"),
     "calibrate": (
         "-t",
@@ -100,6 +101,7 @@ ARGUMENTS: Mapping[str, str] = {
     "job check": "job.toml",
     "targets new": "mine",
     "init": "mine",
+    "tools new": "",
     "coupon": "lines",
     "calibrate": "lengths.toml",
 }

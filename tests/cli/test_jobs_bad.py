@@ -82,7 +82,7 @@ FILES = [
     ("side = 'left'", ["key side", "use one of on, outside, inside, auto"]),
     ("minimise = 'time'", ["key minimise", "rapids, reversals"]),
     ("[place]\nmirror = 'z'", ["table [place], key mirror", "x, y"]),
-    ("[tools.a]\nkind = 'ball'", ["table [tools.a], key kind", "flat, v, drill"]),
+    ("[tools.a]\nkind = 'cone'", ["table [tools.a], key kind", "flat, ball, bull, v, drill"]),
     ("entry = 'spiral'", ["key entry", "plunge, ramp, helix"]),
     ("tool_table_units = 'inch'\ntool_table = 'tool.tbl'", ["key tool_table_units", "mm, in"]),
     # out of range
@@ -148,7 +148,7 @@ FILES = [
     ),
     # tools
     ("tool = 'mill'", ["key tool", "there is no tool 'mill'", "write [tools.mill]"]),
-    (TOOLS + "[[operations]]\ntool = 'mil'", ["table [[operations]] 1, key tool", "mean 'mill'?"]),
+    (TOOLS + "[[operations]]\ntool = 'mil'", ["table [[operations]] 1, key tool", "mean mill?"]),
     ("tool = 3", ["key tool", "there is no tool 3", 'tool_table = "tool.tbl"']),
     ("tool = 3\ntool_table = 'tool.tbl'", ["key tool", "there is no tool 3", "has: 1, 2"]),
     (

@@ -15,10 +15,10 @@ def test_every_field_of_a_job_has_a_key() -> None:
         assert isinstance(keys, dict)
         return {each.name for each in fields(record)} - {key.field for key in keys.values()}
 
-    assert missing(Operation, OPERATION) == {"tool"}
+    assert missing(Operation, OPERATION) == {"tool", "material"}
     assert missing(Placement, PLACE) == missing(Stock, STOCK) == set()
     assert missing(Entry, ENTRY) == missing(Lead, LEAD) == missing(Tabs, TABS) == set()
-    assert missing(Tool, TOOL) == {"name"}
+    assert missing(Tool, TOOL) == {"name", "materials"}
     assert missing(Job, WHOLE) == {"operations", "placement", "stock"}
 
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
 from camtool.findings import Code, Severity
 from camtool.geometry.polylines import Polyline
 from camtool.pipeline import post_drawing
-from camtool.planning.job import Job, Operation, Tool, job_of
+from camtool.planning.checks import ridge_mm
+from camtool.planning.job import Entry, Job, Operation, Stock, Tool, job_of
 from camtool.target.registry import load_target
 from tests.drawings import drawing_of
 
@@ -89,3 +92,46 @@ def test_the_summary_names_how_each_operation_cuts() -> None:
     (line,) = (row for row in report.to_text().splitlines() if row.startswith("cut "))
     for words in ("tool 0.5 mm", "spindle 9000", "feed 500", "plunge 50", "2 mm deep in 4 passes"):
         assert words in line
+
+
+TOOL_SAID = {"spindle_rpm": 5000.0, "feed_mm_min": 400.0, "plunge_feed_mm_min": 100.0}
+
+
+@pytest.mark.parametrize(
+    ("said", "words"),
+    [
+        ({"tool_flutes": 2, "tool_chip_load_mm": (0.02, 0.06)}, ""),  # 0.04 mm
+        ({"tool_flutes": 2, "tool_chip_load_mm": (0.04, 0.04)}, ""),
+        ({"tool_flutes": 1, "tool_chip_load_mm": (0.02, 0.06)}, "chip load of 0.08 mm"),
+        ({"tool_flutes": 4, "tool_chip_load_mm": (0.03, math.inf)}, "at least 0.03 mm"),
+        ({"tool_chip_load_mm": (0.02, 0.03)}, ""),  # how many flutes is not known
+        ({"tool_surface_speed_m_min": (0.0, 5.0)}, "7.854 m/min, where at most 5"),
+        ({"tool_surface_speed_m_min": (5.0, 10.0)}, ""),
+        ({"tool_cutting_length_mm": 0.4}, "edges of the tool are 0.4 mm long"),
+        ({"tool_cutting_length_mm": 0.5}, ""),
+        ({"tool_centre_cutting": False}, "--entry ramp"),
+        ({"tool_centre_cutting": False, "entry": Entry("ramp")}, ""),
+        ({"tool_centre_cutting": True}, ""),
+        ({"tool_kind": "ball"}, "leaves 0.25 mm at the foot of walls"),
+        ({"tool_kind": "ball", "side": "on"}, ""),
+        ({"tool_kind": "bull", "tool_corner_radius_mm": 0.1}, "leaves 0.1 mm"),
+        ({"tool_kind": "bull", "tool_corner_radius_mm": 0.1, "stock": Stock(0.4)}, ""),
+        ({"tool_materials": ("brass", "wood")}, "presets for brass, wood"),
+        ({"tool_materials": ("brass", "wood"), "material": "wood"}, ""),
+    ],
+)
+def test_what_a_tool_is_not_made_for(said: dict[str, object], words: str) -> None:
+    size = {"tool_diameter_mm": 0.5, "depth_mm": 0.5}
+    found = _said("grbl", job_of(**TOOL_SAID, **size, **said))
+    assert words in found
+    assert bool(found) == bool(words)
+
+
+@pytest.mark.parametrize("tool", [Tool(6.0, "ball"), Tool(6.0, "bull", corner_radius_mm=1.0)])
+@pytest.mark.parametrize("step_over", [0.1, 0.4, 0.7, 1.0])
+def test_ridges_are_as_high_as_the_nose_between_two_paths(tool: Tool, step_over: float) -> None:
+    # By search: the least height at which one of the tools at both sides reaches the middle.
+    half = 0.5 * step_over * tool.diameter_mm
+    heights = np.linspace(0.0, 3.0, 300_001)
+    reached = [height for height in heights[::100] if tool.radius_at(float(height)) >= half]
+    assert ridge_mm(tool, step_over) == pytest.approx(reached[0], abs=1.1e-3)

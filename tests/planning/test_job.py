@@ -6,6 +6,8 @@ import math
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from camtool.errors import OptionError
 from camtool.planning.job import (
@@ -58,7 +60,7 @@ BAD = [
     (Operation, {"entry": Entry("helix")}),
     *[(Tool, {name: v}) for name in ("diameter_mm", "tip_diameter_mm") for v in AT_LEAST_ZERO],
     *[(Tool, {"kind": "v", "tip_angle_rad": v}) for v in (0.0, -1.0, math.pi, *NO_NUMBERS)],
-    (Tool, {"kind": "ball"}),
+    (Tool, {"kind": "cone"}),
     (Tool, {"kind": "v", "diameter_mm": 1.0, "tip_diameter_mm": 1.0}),
     *[(Entry, {"kind": "ramp", "angle_rad": v}) for v in (*ABOVE_ZERO, 0.5 * math.pi)],
     *[(Entry, {"kind": "helix", "radius_mm": value}) for value in ABOVE_ZERO],
@@ -168,3 +170,48 @@ def test_layer_and_colour_must_both_fit(
     layers: tuple[str, ...], colours: tuple[str, ...], taken: bool
 ) -> None:
     assert Operation(layers=layers, colours=colours).takes("CUT", "#ff0000") is taken
+
+
+NOSES = [
+    Tool(6.0),
+    Tool(6.0, "ball"),
+    Tool(6.0, "bull", corner_radius_mm=1.0),
+    Tool(6.0, "v", math.radians(60.0)),
+    Tool(6.0, "v", math.radians(90.0), tip_diameter_mm=0.4),
+]
+
+
+@pytest.mark.parametrize("tool", NOSES, ids=lambda tool: tool.kind)
+@given(above=st.floats(0.0, 8.0), across=st.floats(0.0, 2.0))
+def test_a_tool_is_as_wide_as_its_outline(tool: Tool, above: float, across: float) -> None:
+    # Its outline as a solid of revolution: a point off the axis is in it, or is not.
+    within = {
+        "flat": across <= 3.0,
+        "ball": math.hypot(across, 3.0 - above) <= 3.0 or above >= 3.0,
+        "bull": across <= 2.0 or math.hypot(across - 2.0, 1.0 - above) <= 1.0 or above >= 1.0,
+        "v": (across - 0.5 * tool.tip_diameter_mm)
+        <= above * math.tan(0.5 * (tool.tip_angle_rad or 0.0)),
+    }[tool.kind]
+    radius = tool.radius_at(above)
+    assert radius <= 3.0
+    assert within == (across <= radius) or across == pytest.approx(radius, abs=1e-6)
+
+
+def test_a_bit_whose_width_is_not_known_grows_with_its_depth() -> None:
+    assert Tool(kind="v", tip_angle_rad=0.5 * math.pi).radius_at(7.0) == pytest.approx(7.0)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"kind": "bull", "diameter_mm": 3.0, "corner_radius_mm": 1.6},
+        {"flutes": 0},
+        {"cutting_length_mm": -1.0},
+        {"chip_load_mm": (0.2, 0.1)},
+        {"surface_speed_m_min": (-1.0, 10.0)},
+    ],
+)
+def test_what_no_tool_can_be_is_refused(settings: dict[str, Any]) -> None:
+    with pytest.raises(OptionError) as caught:
+        Tool(**settings)
+    assert caught.value.mend

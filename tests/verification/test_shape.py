@@ -9,13 +9,12 @@ import shapely
 from camtool.findings import Code, Severity
 from camtool.geometry.polylines import Polyline, Polylines
 from camtool.planning.drawn import kept_of
-from camtool.planning.job import job_of
+from camtool.planning.job import Tool, job_of
 from camtool.planning.plan import planned
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
 from camtool.toolpath.wanted import Kept
-from camtool.verification.case import Cone
 from camtool.verification.cuts import CutMoves, cut_moves
 from camtool.verification.shape import (
     MOST_MOVES,
@@ -142,7 +141,7 @@ def test_the_shape_of_a_long_way_of_small_arcs_is_true() -> None:
     assert max(found.overcut_um, found.undercut_um) < 1.0
 
 
-CONE = Cone(tip_mm=0.0, slope=1.0)
+CONE = Tool(kind="v", tip_angle_rad=0.5 * math.pi)
 V_BIT = Cutter(6.0, CONE)
 ROUNDED = rectangle(17.56, 16.53, 1.0)
 
@@ -162,8 +161,8 @@ def kept_of_run(path: Toolpath, *walls: Polyline, stays: bool = False) -> Kept:
     return Kept((run,), Polylines.of(walls), np.full(len(walls), stays), not stays)
 
 
-def verified(path: Toolpath, kept: Kept, cone: Cone | None) -> Verification:
-    options = VerifyOptions(tool_diameter_mm=6.0, cone=cone, kept=(kept,))
+def verified(path: Toolpath, kept: Kept, nose: Tool | None) -> Verification:
+    options = VerifyOptions(tool_diameter_mm=6.0, nose=nose, kept=(kept,))
     return verify(path, path_machine(), wanted=path, options=options)
 
 
@@ -188,7 +187,11 @@ def test_a_v_bit_is_as_wide_as_it_is_deep() -> None:
 
 def test_a_bit_of_unknown_width_is_as_wide_as_it_must_be() -> None:
     cuts = cut_moves(carved((0, 0, -1), (10, 0, -3)), flat_cuts=False)
-    assert cutter_of(VerifyOptions(cone=Cone(0.2, 0.5)), cuts) == Cutter(3.4, Cone(0.2, 0.5))
+    bit = Tool(kind="v", tip_angle_rad=2.0 * math.atan(0.5), tip_diameter_mm=0.4)
+    cutter = cutter_of(VerifyOptions(nose=bit), cuts)
+    assert cutter is not None
+    assert cutter.nose is bit
+    assert cutter.diameter_mm == pytest.approx(3.4)
     assert cutter_of(VerifyOptions(), cuts) is None
 
 

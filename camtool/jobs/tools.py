@@ -1,0 +1,328 @@
+"""The tools of a job: by name, by number, or key by key; libraries of them, and their presets.
+
+    [tools.mill]                    # in a job file, or in a library (`tools.toml`)
+    diameter = "3.175mm"
+    flutes = 2
+
+    [tools.mill.presets.plywood]    # what it is used with where `material` says so
+    feed = "800mm/min"
+    step_down = "1.5mm"
+
+    libraries ◀ tools of the job file            the nearest of a name, or number, counts
+    preset ◀ defaults of the file ◀ keys of the operation ◀ flags
+
+docs/jobs.md explains the keys.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from camtool.errors import MachineError, OptionError
+from camtool.jobs.keys import (
+    LIMITS,
+    OPERATION,
+    PRESET,
+    TOOL,
+    TOOL_KEYS,
+    TOOL_NAME,
+    WHOLE,
+    Given,
+    Table,
+    record_of,
+    refuse_idle,
+    table_of,
+)
+from camtool.jobs.tool_table import TableTool, read_tool_table
+from camtool.patterns import guess
+from camtool.planning.job import Operation, Tool
+from camtool.tables import read_table
+
+PRESETS = "presets"
+"""The key of a tool whose tables are its presets, by material."""
+
+_TOOL_NUMBER = re.compile(r"\d{1,9}")
+"""A tool by its number."""
+
+
+@dataclass(frozen=True)
+class Described:
+    """A tool as a file describes it: its keys, and what it is used with, by material."""
+
+    keys: Table
+    presets: Mapping[str, Table] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Shop:
+    """What there is besides the job: the files of `libraries`, the nearest first; the tool of
+    operations that say none, and what is cut, where the job does not say it."""
+
+    libraries: tuple[Path, ...] = ()
+    tool: Given | None = None
+    material: Given | None = None
+
+
+@dataclass(frozen=True)
+class Used:
+    """The tool of an operation, with the limits of its preset; the keys of operations that the
+    preset gives, and the material that it is for, "" without one."""
+
+    tool: Tool
+    preset: Table
+    material: str = ""
+
+
+def tool_tables(values: Mapping[str, Any], file: str) -> dict[str, Described]:
+    """The tables `[tools.NAME]` of a file, each checked; OptionError for tools that are wrong,
+    used or not, and for two tools with one number."""
+    tools = values.get("tools", {})
+    if not isinstance(tools, dict):
+        raise Given(tools, "key tools", file).refused(
+            "is no table of tools", "begin each tool with [tools.NAME]"
+        )
+    described = {name: _described(name, tool, file) for name, tool in tools.items()}
+    seen: dict[int, str] = {}
+    for name, each in described.items():
+        tool_of(name, each)
+        number = _number_of(each.keys)
+        if number is None:
+            continue
+        if number in seen:
+            raise each.keys.given["number"].refused(
+                f"tool {number} is {seen[number]!r} already", "give each tool a number of its own"
+            )
+        seen[number] = name
+    return described
+
+
+def _described(name: str, values: object, file: str) -> Described:
+    where = f"table [tools.{name}]"
+    table = table_of(values, (*TOOL, PRESETS), where, file)
+    presets = table.given.get(PRESETS)
+    if presets is None:
+        return Described(table)
+    if not isinstance(presets.value, dict):
+        raise presets.refused(
+            "is no table of presets", f"begin each with [tools.{name}.presets.MATERIAL]"
+        )
+    tables = {
+        material: table_of(preset, PRESET, f"table [tools.{name}.presets.{material}]", file)
+        for material, preset in presets.value.items()
+    }
+    for preset in tables.values():
+        record_of(Operation, OPERATION, preset.only(OPERATION))
+        record_of(Tool, TOOL, preset.only(LIMITS))
+    return Described(table.only(TOOL), tables)
+
+
+def read_library(path: Path) -> dict[str, Described]:
+    """The tools of a library; OptionError names file, table and key, and says how to fix it."""
+    try:
+        values = read_table(path)
+    except MachineError as error:
+        raise OptionError(error.message, file=error.file, mend=error.mend) from error
+    table_of(values, ("tools",), "", str(path))
+    return tool_tables(values, str(path))
+
+
+def tool_of(name: str, described: Described) -> Tool:
+    """The record of a tool that a file describes."""
+    return replace(_tool(name, described.keys, ""), materials=tuple(described.presets))
+
+
+def tools_for(named: Mapping[str, Described], whole: Table, folder: Path, shop: Shop) -> Tools:
+    """The tools of a job: those `named` in its file, which is in this folder, those of libraries,
+    and those of a tool table, which its keys for the `whole` job name."""
+    library = _path_of("tool_library", whole, folder)
+    tools = Tools(
+        named,
+        libraries=shop.libraries if library is None else (library, *shop.libraries),
+        material=whole.given.get("material", shop.material),
+        material_is_asked="material" in whole.given,
+        default=shop.tool,
+    )
+    units, table = whole.given.get("tool_table_units"), _path_of("tool_table", whole, folder)
+    if table is None:
+        if units is not None:
+            raise units.refused("has no effect without tool_table", "give tool_table too")
+        return tools
+    unit = "mm" if units is None else WHOLE["tool_table_units"].read(units)
+    return _with_table(replace(tools, units=unit), table)
+
+
+def _path_of(key: str, whole: Table, folder: Path) -> Path | None:
+    """The file that a key names: in a job file relative to it, on the command line to where it is
+    run."""
+    given = whole.given.get(key)
+    if given is None:
+        return None
+    name = WHOLE[key].read(given)
+    return folder / name if given.file is not None else Path(name)
+
+
+@dataclass(frozen=True)
+class Tools:
+    """The tools of a job: `named` in its file, those of `libraries`, the nearest first, which are
+    read when one is needed, and by number those of a LinuxCNC `table`, whose lengths have the unit
+    `units`. `material`: what is cut, if it is said, and whether the job or a flag says so;
+    `default`: the tool of operations that say none."""
+
+    named: Mapping[str, Described] = field(default_factory=dict)
+    libraries: tuple[Path, ...] = ()
+    table: Mapping[int, TableTool] = field(default_factory=dict)
+    table_file: str = ""
+    units: str = "mm"
+    material: Given | None = None
+    material_is_asked: bool = False
+    default: Given | None = None
+
+    def of(self, layers: Sequence[Table], kind: str) -> Used:
+        """What an operation of this kind cuts with. `layers`: the tables that apply to
+        it, the nearest last.
+
+        The nearest name or number counts, and single keys (`tool_diameter`) of that layer and
+        of nearer ones change it. The default tool is for operations that say nothing of a tool.
+        """
+        at = max((n for n, layer in enumerate(layers) if TOOL_NAME in layer.given), default=-1)
+        said = None if at < 0 else layers[at].given[TOOL_NAME]
+        if said is None and not any(layer.only(TOOL_KEYS).given for layer in layers):
+            said = self.default
+        name, described = ("", Described(Table())) if said is None else self._chosen(said)
+        keys = described.keys
+        for n, layer in enumerate(layers[max(at, 0) :], start=max(at, 0)):
+            own = layer.only(TOOL_KEYS)
+            if n == at and own.given:
+                raise next(iter(own.given.values())).refused(
+                    "contradicts the tool that is named beside it", "give one of the two"
+                )
+            given = {key.removeprefix("tool_"): value for key, value in own.given.items()}
+            keys = Table(given, own.where, own.file).over(keys)
+        return self._used(name, replace(described, keys=keys), kind)
+
+    def _used(self, name: str, described: Described, kind: str) -> Used:
+        """The tool, and its preset for what is cut. OptionError for a material for which it has
+        none, though it has some."""
+        tool = _tool(name, described.keys, kind)
+        if self.material is None or not described.presets:
+            return Used(replace(tool, materials=tuple(described.presets)), Table())
+        material = WHOLE["material"].read(self.material)
+        preset = described.presets.get(material)
+        if preset is None:
+            known = described.presets
+            raise self.material.refused(
+                f"tool {name!r} has no preset for {material!r}",
+                f"{guess(material, known)}it has: {', '.join(known)}",
+            )
+        limits = {
+            LIMITS[key].field: LIMITS[key].read(given)
+            for key, given in preset.only(LIMITS).given.items()
+        }
+        tool = replace(tool, materials=tuple(described.presets), **limits)
+        return Used(tool, preset.only(OPERATION), material)
+
+    def refuse_idle_material(self, operations: Iterable[Operation]) -> None:
+        """OptionError for a material that the job or a flag says, and no tool has presets."""
+        if self.material is None or not self.material_is_asked:
+            return
+        if not any(operation.material for operation in operations):
+            raise self.material.refused(
+                "has no effect: no tool of the job has presets",
+                "name a tool of a library (camtool tools), or leave the material out",
+            )
+
+    def _chosen(self, given: Given) -> tuple[str, Described]:
+        """The tool that a name or a number says, and its name."""
+        value = given.value
+        if isinstance(value, str) and value in self.named:
+            return value, self._completed(self.named[value])
+        if isinstance(value, str) and _TOOL_NUMBER.fullmatch(value.strip()):
+            value = int(value)
+        if type(value) is int:
+            return self._numbered(value, given)
+        if not isinstance(value, str):
+            raise given.refused(f"{value!r} is no tool", "give its name in quotes, or its number")
+        known = self._every
+        if value in known:
+            return value, self._completed(known[value])
+        raise given.refused(
+            f"there is no tool {value!r}",
+            guess(value, known)
+            + (f"known: {', '.join(known)}" if known else f"write [tools.{value}]"),
+        )
+
+    def _numbered(self, number: int, given: Given) -> tuple[str, Described]:
+        for tools in (self.named, self._every):
+            for name, described in tools.items():
+                if _number_of(described.keys) == number:
+                    return name, self._completed(described)
+            if number in self.table:
+                return self.table[number].remark, Described(self._of_table(number))
+        known = [str(each) for each in self.table]
+        raise given.refused(
+            f"there is no tool {number}",
+            f"{self.table_file} has: {', '.join(known) or 'none'}"
+            if self.table_file
+            else 'give the tool table: tool_table = "tool.tbl"',
+        )
+
+    @cached_property
+    def _every(self) -> Mapping[str, Described]:
+        """All tools that have a name, the nearest of each."""
+        every = dict(self.named)
+        for file in self.libraries:
+            every = {**read_library(file), **every}
+        return every
+
+    def _completed(self, described: Described) -> Described:
+        """A named tool of a number may leave its diameter to the tool table."""
+        keys, number = described.keys, _number_of(described.keys)
+        if number is None or number not in self.table:
+            return described
+        known = self._of_table(number, needed="diameter" not in keys.given)
+        return replace(described, keys=keys.over(known))
+
+    def _of_table(self, number: int, *, needed: bool = True) -> Table:
+        """The keys of a tool of the table; refused when it lacks a diameter that is needed."""
+        tool = self.table[number]
+        table = Table({}, f"line {tool.line}", self.table_file)
+        if tool.diameter is None and needed:
+            raise table.refused(f"tool {number} has no diameter", "give it a D")
+        values = {"number": number, "diameter": f"{tool.diameter!r}{self.units}"}
+        if tool.diameter is None:
+            del values["diameter"]
+        given = {name: Given(value, table.where, table.file) for name, value in values.items()}
+        return replace(table, given=given)
+
+
+def _with_table(tools: Tools, path: Path) -> Tools:
+    """The tools, and those of a LinuxCNC tool table; OptionError names file and line."""
+    try:
+        text = path.read_bytes().decode("utf-8", errors="replace")
+    except OSError as error:
+        raise OptionError(
+            f"cannot be read ({error.strerror})", file=str(path), mend="check the path"
+        ) from error
+    return replace(tools, table=read_tool_table(text, str(path)), table_file=str(path))
+
+
+def _number_of(keys: Table) -> int | None:
+    """The number of a tool of the file, if it has one."""
+    given = keys.given.get("number")
+    number: int | None = None if given is None else TOOL["number"].read(given)
+    return number
+
+
+def _tool(name: str, keys: Table, kind: str) -> Tool:
+    """The record; a tool with a tip that does not say its kind is a V bit, or drills."""
+    if "tip_angle" in keys.given and "kind" not in keys.given:
+        meant = Given("drill" if kind == "drill" else "v", keys.where, keys.file)
+        keys = Table({**keys.given, "kind": meant}, keys.where, keys.file)
+    tool = record_of(Tool, TOOL, keys)
+    refuse_idle(TOOL, keys, tool)
+    return replace(tool, name=name)
