@@ -194,4 +194,6 @@ def _does(operation: dict[str, Any]) -> str:
     depth, step = operation["depth_mm"], operation["step_down_mm"]
     deep = "" if depth is None else f", {depth:g} mm deep"
     by = "" if step is None else f" by {step:g} mm"
-    return f"{operation['kind']}, tool {tool['diameter_mm']:g} mm{called}{deep}{by}"
+    below = operation["below_stock_mm"]
+    through = "" if below is None else f", through the stock and {below:.4g} mm below"
+    return f"{operation['kind']}, tool {tool['diameter_mm']:g} mm{called}{deep}{by}{through}"

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -159,9 +159,14 @@ def build_job(
     tools = tools_for(file.tools, whole, file.folder, shop)
     tables = file.operations or (Table(),)
     record_of(Operation, OPERATION, file.defaults.only(OPERATION))
+    stock = _stock(file.stock)
     operations = [
         _operation(n, (file.defaults, own, flags.defaults), tools, len(tables))
         for n, own in enumerate(tables, start=1)
+    ]
+    operations = [
+        _through(operation, (file.defaults, own, flags.defaults), stock)
+        for operation, own in zip(operations, tables, strict=True)
     ]
     _refuse_equal_names(operations, tables)
     tools.refuse_idle_material(operations)
@@ -176,7 +181,7 @@ def build_job(
         job,
         operations=tuple(operations[n] for n in rows),
         placement=_placement(file, flags),
-        stock=_stock(file.stock),
+        stock=stock,
     )
 
 
@@ -191,7 +196,7 @@ def _operation(
 ) -> Operation:
     """Operation `number` of `count`: its own keys over the defaults, flags over both."""
     defaults, own, flags = layers
-    merged = flags.over(own.over(defaults)).only(OPERATION)
+    merged = _nearest((defaults, own, flags)).only(OPERATION)
     record_of(
         Operation, OPERATION, own.only(OPERATION)
     )  # keys that flags override must be right too
@@ -214,6 +219,29 @@ def _operation(
     operation = replace(operation, tool=used.tool, material=used.material)
     _refuse_tool(operation, own)
     return operation
+
+
+def _nearest(layers: Sequence[Table]) -> Table:
+    """The keys of all layers, the nearest of which is last; a depth in it takes the place of
+    another layer's breakthrough, and the other way round."""
+    merged = layers[0]
+    for layer in layers[1:]:
+        below = dict(merged.given)
+        for one, other in (("depth", "breakthrough"), ("breakthrough", "depth")):
+            if one in layer.given:
+                below.pop(other, None)
+        merged = layer.over(Table(below, merged.where, merged.file))
+    return merged
+
+
+def _through(operation: Operation, layers: Sequence[Table], stock: Stock | None) -> Operation:
+    """The operation with the depth that its breakthrough makes."""
+    try:
+        return operation.through(stock)
+    except OptionError as error:
+        # The last pass may be what is wrong with the depth.
+        key = "last_pass" if (error.where or "").endswith("last_pass") else "breakthrough"
+        raise _nearest(layers).given[key].refused(error.message, error.mend) from error
 
 
 def _unknown(name: str, kind: str) -> tuple[str, str]:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from camtool.findings import Finding
 from camtool.geometry.facts import drawing_extents
+from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.planning.gouges import by_uncut
 from camtool.planning.place import place
 from camtool.planning.sides import Sides, choose, runs_beside
@@ -73,8 +74,17 @@ def _operation(job: Job, index: int) -> dict[str, Any]:
         "kind": operation.kind,
         "tool": {"name": tool.name, "diameter_mm": tool.diameter_mm},
         "depth_mm": operation.depth_mm,
+        "below_stock_mm": _below(job, operation),
         "step_down_mm": operation.step_down_mm,
     }
+
+
+def _below(job: Job, operation: Operation) -> float | None:
+    """How far an operation goes below the stock, mm; None where it does not, or is not known."""
+    if job.stock is None or operation.depth_mm is None:
+        return None
+    below = operation.depth_mm - job.stock.thickness_mm
+    return below if below > POSITION_EPS_MM else None
 
 
 def _groups(

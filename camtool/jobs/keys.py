@@ -594,6 +594,7 @@ _ALONG = ("profile", "engrave")
 _PROFILE = ("profile",)
 _POCKET = ("pocket",)
 _DRILL = ("drill",)
+_THROUGH = ("profile", "pocket", "drill")
 
 OPERATION = {
     "name": Key("name", TEXT, kinds=KINDS),
@@ -638,6 +639,7 @@ OPERATION = {
     ),
     "coolant": Key("coolant", one_of(COOLANTS), "M7, M8 or both.", '"mist"', KINDS),
     "depth": Key("depth_mm", LENGTH, "Depth of cut below Z0.", '"1mm"', KINDS),
+    "breakthrough": Key("breakthrough_mm", LENGTH, "Or so far below the stock.", kinds=_THROUGH),
     "step_down": Key("step_down_mm", LENGTH, "Depth of a pass.", '"0.5mm"', _LAYERED),
     "last_pass": Key("last_pass_mm", LENGTH, "Depth of the last pass.", '"0.1mm"', _LAYERED),
     "entry": Key(

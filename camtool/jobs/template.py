@@ -74,11 +74,11 @@ class Proposal:
     has_presets: bool = False
 
     @property
-    def depth_mm(self) -> float:
-        """Through the stock, and a little into what it lies on; 0 without a thickness."""
+    def breakthrough_mm(self) -> float:
+        """A little into what the stock lies on; 0 without a thickness."""
         if not self.thickness_mm:
             return 0.0
-        return self.thickness_mm + min(BREAKTHROUGH_MM, Stock(self.thickness_mm).through_mm)
+        return min(BREAKTHROUGH_MM, Stock(self.thickness_mm).through_mm)
 
 
 def job_template(
@@ -253,7 +253,7 @@ def _cut_parts(drawing: Drawing, group: _Group, contours: Ints, proposal: Propos
         if proposal.thickness_mm:
             # Tabs are measured from the full depth of the cut, which is below the stock.
             height = min(max(proposal.thickness_mm / 3.0, LEAST_TAB_MM), proposal.thickness_mm)
-            height += proposal.depth_mm - proposal.thickness_mm
+            height += proposal.breakthrough_mm
             tabs = f'"4:{2.0 * tool:.3g}mm:{height:.3g}mm"'
             keys = (*keys, ("tabs", tabs, "so that it stays where it is; cut them by hand"))
         found.append(_Part(f"{group.called} outer", "profile", tuple(outer.tolist()), 0, keys))
@@ -279,13 +279,16 @@ def _text(drawing: Drawing, group: _Group, part: _Part, proposal: Proposal) -> l
     ]
     if part.kind == "profile" and proposal.tool_mm:
         text.append(_row('direction = "climb"', OPERATION["direction"].help))
-    if proposal.depth_mm and part.kind != "engrave":
-        text.append(_row(f'depth = "{proposal.depth_mm:.6g}mm"', "through the stock"))
+    if proposal.breakthrough_mm and part.kind in OPERATION["breakthrough"].kinds:
+        through = f'breakthrough = "{proposal.breakthrough_mm:.6g}mm"'
+        text.append(_row(through, "through the stock, and so far into the board below"))
         if part.kind == "profile" and proposal.tool_mm and not proposal.has_presets:
             text.append(f'step_down = "{0.5 * proposal.tool_mm:.3g}mm"')
     if marks and part.kind != "drill":
         text.append("# The points are not cut by this: they need an operation of the kind drill.")
     given = {key for key, _, _ in part.keys} | {line.split(" = ")[0] for line in text}
+    if "breakthrough" in given:
+        given.add("depth")
     known = {
         name: key
         for name, key in OPERATION.items()

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from camtool.errors import OptionError
@@ -75,6 +75,9 @@ THROUGH_MM = 1.0
 THROUGH_SHARE = 0.5
 """Cuts below the stock go no deeper than this part of its thickness either: thin stock has a thin
 board under it."""
+
+THROUGH_SLACK = 1e-9
+"""A breakthrough may exceed that limit by this part of it, by rounding."""
 
 TOOL_KINDS = ("flat", "ball", "bull", "v", "drill")
 """Shapes of tools: an end mill (or a point of no width), one with a ball nose, one whose edge is
@@ -275,6 +278,13 @@ class Tool:
         below = max(nose - above_tip_mm, 0.0)
         return self.radius_mm - nose + math.sqrt(nose * nose - below * below)
 
+    @property
+    def point_mm(self) -> float:
+        """How far above its tip a mill or a drill is as wide as its diameter, mm."""
+        if self.kind != "drill" or self.tip_angle_rad is None:
+            return self.nose_mm
+        return self.radius_mm / math.tan(0.5 * self.tip_angle_rad)
+
 
 @dataclass(frozen=True)
 class Entry:
@@ -337,6 +347,8 @@ class Operation:
     `layers`, `colours`: patterns of the paths that it takes, empty for all. `allowance_mm` is
     left on the wall of a profile or pocket. `depth_mm` is cut below the stock top in passes of
     `step_down_mm` at most (None: one pass), the last of `last_pass_mm` (None: like the others).
+    `breakthrough_mm` stands for it: so far below the stock (a Job, which knows that, makes it the
+    depth).
     `step_over` is the distance of neighbouring passes of a pocket over the tool's diameter.
     `overlap_mm`: how far a closed contour is cut beyond its start. `start`: one of STARTS, or a
     place (x, y) mm. `peck_mm`: how deep a drill goes at a time; `dwell_s` at the bottom.
@@ -362,6 +374,7 @@ class Operation:
     spindle_rpm: float | None = None
     coolant: str = "off"
     depth_mm: float | None = None
+    breakthrough_mm: float | None = None
     step_down_mm: float | None = None
     last_pass_mm: float | None = None
     pattern: str = "contour"
@@ -400,6 +413,7 @@ class Operation:
             ("feed", self.feed_mm_min, "mm/min"),
             ("plunge feed", self.plunge_feed_mm_min, "mm/min"),
             ("depth", self.depth_mm, "mm"),
+            ("breakthrough", self.breakthrough_mm, "mm"),
             ("step down", self.step_down_mm, "mm"),
             ("last pass", self.last_pass_mm, "mm"),
             ("mitre limit", self.mitre_limit, ""),
@@ -433,6 +447,13 @@ class Operation:
                 )
         refuse_range("select_size", self.size_mm, named)
         refuse_range("select_area", self.area_mm2, named)
+        if self.depth_mm is not None and self.breakthrough_mm is not None:
+            raise OptionError(
+                "a depth is given too",
+                where=f"{named}key breakthrough",
+                mend="give one of the two: depth below the stock top, or breakthrough below the"
+                " stock",
+            )
         depth, last = self.depth_mm, self.last_pass_mm
         if depth is not None and last is not None and last > depth:
             raise OptionError(
@@ -446,6 +467,32 @@ class Operation:
                 where=f"{named}key entry",
                 mend='use "ramp" or "plunge"',
             )
+
+    def through(self, stock: Stock | None) -> Operation:
+        """The operation with the depth that its breakthrough makes in this stock; itself without
+        one. A pointed drill, or a round nose, goes through with its whole diameter. OptionError
+        for a stock that is not known, or that lies on too thin a board."""
+        beyond = self.breakthrough_mm
+        if beyond is None:
+            return self
+        where = f"operation {self.name!r}, key breakthrough" if self.name else "key breakthrough"
+        if stock is None:
+            raise OptionError(
+                "the thickness of the stock is not known",
+                where=where,
+                mend='write [stock] with its thickness, such as thickness = "3mm", or give depth',
+            )
+        point = self.tool.point_mm
+        if beyond + point > stock.through_mm * (1.0 + THROUGH_SLACK):
+            tip = f" and the tool's point of {point:.4g} mm are" if point else " is"
+            raise OptionError(
+                f"{beyond:g} mm{tip} deeper than the {stock.through_mm:g} mm that may be cut below"
+                " the stock",
+                where=where,
+                mend="give less, or say how much the board below takes: spoilboard ="
+                f' "{beyond + point:.4g}mm" in [stock]',
+            )
+        return replace(self, depth_mm=stock.thickness_mm + beyond + point, breakthrough_mm=None)
 
     @property
     def selects(self) -> bool:
@@ -559,7 +606,8 @@ class Stock:
 class Job:
     """How a drawing is cut. `approach`: every cut starts after a move that takes up the backlash
     of both axes. `minimise`: one of GOALS. `frames`: patterns of the layers whose contours, where
-    they are not cut, are no edges of parts. Raises OptionError for what no job can be."""
+    they are not cut, are no edges of parts. Operations with a breakthrough get their depth. Raises
+    OptionError for what no job can be."""
 
     operations: tuple[Operation, ...] = (Operation(),)
     placement: Placement = Placement()
@@ -574,6 +622,8 @@ class Job:
         one_of("goal", self.minimise, GOALS)
         if not self.operations:
             raise OptionError("the job has no operations", mend="give it at least one")
+        through = tuple(operation.through(self.stock) for operation in self.operations)
+        object.__setattr__(self, "operations", through)
 
     @property
     def layers(self) -> tuple[str, ...]:

@@ -398,3 +398,28 @@ def test_help_is_instant() -> None:
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout
     for heavy in ("numpy", "shapely", "ezdxf", "msgspec"):
         assert f"'{heavy}'".encode() not in loaded
+
+
+@pytest.mark.parametrize(
+    ("text", "flags", "deep"),
+    [
+        ("breakthrough = '0.3mm'", {}, [3.3]),
+        ("breakthrough = '0.3mm'\n[[operations]]\ndepth = 1\n[[operations]]", {}, [1.0, 3.3]),
+        ("depth = 1\n[[operations]]\nbreakthrough = 0.1\n[[operations]]", {}, [3.1, 1.0]),
+        ("breakthrough = '0.3mm'", {"depth": "2mm"}, [2.0]),
+        ("depth = 2", {"breakthrough": "0.2mm"}, [3.2]),
+        ("breakthrough = 1", {}, [4.0]),
+        (
+            "kind = 'drill'\nbreakthrough = 0.1\ntool_diameter = 1\ntool_tip_angle = 90",
+            {},
+            [3.6],
+        ),
+        ("kind = 'drill'\nbreakthrough = 0.1\ntool_diameter = 1", {}, [3.1]),
+    ],
+)
+def test_a_breakthrough_is_a_depth(
+    tmp_path: Path, text: str, flags: dict[str, str], deep: list[float]
+) -> None:
+    made = job(tmp_path, f"{text}\n[stock]\nthickness = 3\n", **flags)
+    assert _each(made, "depth_mm") == pytest.approx(deep)
+    assert _each(made, "breakthrough_mm") == [None] * len(deep)

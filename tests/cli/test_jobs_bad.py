@@ -115,6 +115,28 @@ FILES = [
     ("[stock]\ncorner = [0, 0]\nthickness = 1", ["table [stock]", "both corner and size"]),
     # contradictions
     ("depth = 1\nlast_pass = 2", ["key last_pass", "deeper than the whole cut of 1 mm"]),
+    ("depth = 1\nbreakthrough = 2", ["key breakthrough", "a depth is given too", "one of"]),
+    ("breakthrough = 0.3", ["key breakthrough", "thickness of the stock is not known", "[stock]"]),
+    ("breakthrough = 0\n[stock]\nthickness = 3", ["key breakthrough", "not above 0"]),
+    ("kind = 'engrave'\nbreakthrough = 1", ["key breakthrough", "nothing to the kind engrave"]),
+    (
+        "breakthrough = 1.1\n[stock]\nthickness = 3",
+        ["key breakthrough", "1.1 mm is deeper than the 1 mm that", 'spoilboard = "1.1mm"'],
+    ),
+    (
+        "[stock]\nthickness = 3\nspoilboard = 0.2\n"
+        "[[operations]]\nname = 'a'\n[[operations]]\nname = 'b'\nbreakthrough = '0.3mm'",
+        ["[[operations]] 2 'b', key breakthrough", "0.3 mm is deeper than the 0.2 mm"],
+    ),
+    (
+        "[[operations]]\nkind = 'drill'\nbreakthrough = 0.5\n"
+        "tool_diameter = 4\ntool_tip_angle = 90\n[stock]\nthickness = 3",
+        ["key breakthrough", "the tool's point of 2 mm are deeper", 'spoilboard = "2.5mm"'],
+    ),
+    (
+        "breakthrough = 0.3\nlast_pass = 4\n[stock]\nthickness = 3",
+        ["key last_pass", "deeper than the whole cut of 3.3 mm"],
+    ),
     ("tabs = {count = 2, spacing = 3}", ["key tabs", "a count or a spacing"]),
     ("tabs = {width = 2}", ["key tabs", "a count or a spacing"]),
     ("[place]\nscale = 2\nfit = [3, 3]", ["table [place], key scale", "one of the two"]),
