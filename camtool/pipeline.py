@@ -22,18 +22,26 @@ from camtool.progress import Progress
 from camtool.run import Run
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from camtool.arrays import Bools, Ints
     from camtool.geometry.drawing import Drawing
     from camtool.machine.model import Machine
     from camtool.planning.items import Step
-    from camtool.planning.job import Job
+    from camtool.planning.job import Job, Tool
     from camtool.simulation.motion import Effects
     from camtool.target.registry import LoadedTarget
     from camtool.toolpath.moves import Compensated, Toolpath
     from camtool.toolpath.program import Program
     from camtool.toolpath.wanted import Kept
     from camtool.verification.conformance import Asked
-    from camtool.verification.report import Before, Gates, PlannedOperation
+    from camtool.verification.report import (
+        Before,
+        Gates,
+        PlannedOperation,
+        PlannedStock,
+        PlannedTool,
+    )
     from camtool.verification.verify import Verification, VerifyOptions
 
 
@@ -150,7 +158,9 @@ def post_drawing(
         Planned(
             rapid_drawn_mm=certain(sum(step.rapid_drawn_mm for step in judged.steps)),
             rapid_mm=certain(sum(step.rapid_mm for step in judged.steps)),
-            operations=tuple(_reported(step) for step in judged.steps if step.runs),
+            operations=_operations(judged.steps),
+            tools=_tools(judged.steps),
+            stock=_stock(job),
         ),
         _before(plain),
     )
@@ -321,8 +331,8 @@ def _repeated(program: Program, decoded: Toolpath) -> set[Finding]:
     return {finding for finding in decoded.findings if finding.code in codes}
 
 
-def _reported(step: Step) -> PlannedOperation:
-    """How an operation cuts, for the report."""
+def _operations(steps: Sequence[Step]) -> tuple[PlannedOperation, ...]:
+    """How the operations that cut something do it, for the report."""
     from camtool.planning.checks import (
         IN_PASSES,
         chip_load_mm,
@@ -331,24 +341,57 @@ def _reported(step: Step) -> PlannedOperation:
     )
     from camtool.verification.report import PlannedOperation
 
-    operation, setting = step.operation, step.setting
-    in_passes = operation.kind in IN_PASSES
-    return PlannedOperation(
-        name=operation.name,
-        kind=operation.kind,
-        tool_name=operation.tool.name,
-        tool_diameter_mm=operation.tool.diameter_mm,
-        material=operation.material,
-        chip_load_mm=chip_load_mm(setting),
-        surface_speed_m_min=surface_speed_m_min(setting),
-        spindle_rpm=setting.spindle_rpm,
-        feed_mm_min=setting.feeds.cut_mm_min,
-        plunge_mm_min=setting.feeds.plunge_mm_min,
-        depth_mm=-setting.levels_mm[-1],
-        passes=len(setting.levels_mm) if in_passes else None,
-        deepest_pass_mm=deepest_pass(setting) if in_passes else None,
-        coolant=operation.coolant,
+    cutting = [step for step in steps if step.runs]
+    tools = list(dict.fromkeys(step.operation.tool for step in cutting))
+    found = []
+    for step in cutting:
+        operation, setting = step.operation, step.setting
+        in_passes = operation.kind in IN_PASSES
+        found.append(
+            PlannedOperation(
+                name=operation.name,
+                kind=operation.kind,
+                tool=tools.index(operation.tool),
+                tool_name=operation.tool.name,
+                tool_diameter_mm=operation.tool.diameter_mm,
+                material=operation.material,
+                chip_load_mm=chip_load_mm(setting),
+                surface_speed_m_min=surface_speed_m_min(setting),
+                spindle_rpm=setting.spindle_rpm,
+                feed_mm_min=setting.feeds.cut_mm_min,
+                plunge_mm_min=setting.feeds.plunge_mm_min,
+                depth_mm=-setting.levels_mm[-1],
+                passes=len(setting.levels_mm) if in_passes else None,
+                deepest_pass_mm=deepest_pass(setting) if in_passes else None,
+                coolant=operation.coolant,
+            )
+        )
+    return tuple(found)
+
+
+def _tools(steps: Sequence[Step]) -> tuple[PlannedTool, ...]:
+    """The tools of the operations that cut something, in the order of first use."""
+    from camtool.planning.naming import tool_words
+    from camtool.verification.report import PlannedTool
+
+    deepest: dict[Tool, float] = {}
+    for step in steps:
+        if step.runs:
+            tool, depth = step.operation.tool, -step.setting.levels_mm[-1]
+            deepest[tool] = max(depth, deepest.get(tool, 0.0))
+    return tuple(
+        PlannedTool(tool.number, tool.name, tool_words(tool), depth, tool.cutting_length_mm)
+        for tool, depth in deepest.items()
     )
+
+
+def _stock(job: Job) -> PlannedStock | None:
+    from camtool.verification.report import PlannedStock
+
+    stock = job.stock
+    if stock is None:
+        return None
+    return PlannedStock(stock.thickness_mm, stock.corner_mm, stock.size_mm, stock.through_mm)
 
 
 def _beyond(verification: Verification, gates: Gates | None) -> tuple[Finding, ...]:

@@ -283,6 +283,14 @@ class Painter:
         for caption, options in closeups(self.scenes[-1], self.flags.options()):
             yield caption, render(self.scenes[-1], CLOSEUP, options)
 
+    def stock(self) -> bytes | None:
+        """The SVG of how the stock lies on the machine; None where there is no drawing."""
+        from camtool.pictures.draw import render
+        from camtool.pictures.picture import on_stock
+
+        found = on_stock(self.scenes[-1])
+        return None if found is None else render(found[0], CLOSEUP, found[1])
+
     def _not_shown(self, scenes: Sequence[Scene]) -> Iterator[str]:
         """Warnings about empty layers, and about errors where nothing could be judged."""
         for name in self._missing(scenes):

@@ -117,7 +117,9 @@ class Outputs:
         if name != STDOUT and suffix == ".html":
             pictures = ((_CAPTION, picture(EMBEDDED)), *picture.closeups())
             shown = tuple((caption, _held(data)) for caption, data in pictures)
-            return {name: html(_page(run, shown)).encode()}
+            stock = picture.stock()
+            page = _page(run, shown, "" if stock is None else _held(stock))
+            return {name: html(page).encode()}
         links = () if self.linked is None else ((_CAPTION, _from(name, self.linked)),)
         files = {name: markdown(_page(run, links)).encode()}
         if self.beside is None:
@@ -136,11 +138,11 @@ def _from(page_name: str, picture_name: str) -> str:
     return PurePath(os.path.relpath(picture_name, folder)).as_posix()
 
 
-def _page(run: Run, pictures: tuple[tuple[str, str], ...]) -> Page:
+def _page(run: Run, pictures: tuple[tuple[str, str], ...], stock: str = "") -> Page:
     from camtool.verification.report import Page, reported
 
     title = one_line(PurePath(run.source).name)
-    return Page(title, run.report, reported(run.findings), _setup(run), pictures)
+    return Page(title, run.report, reported(run.findings), _setup(run), pictures, stock)
 
 
 def _setup(run: Run) -> Setup:

@@ -22,15 +22,6 @@ if TYPE_CHECKING:
     from camtool.jobs.tools import Described
     from camtool.planning.job import Tool
 
-SHAPES = {
-    "flat": "end mill",
-    "ball": "ball nose",
-    "bull": "bull nose",
-    "v": "V bit",
-    "drill": "drill",
-}
-"""What people call the kinds."""
-
 
 class _Tools(click.Group):
     """`new` is a command; every other word is the name of a tool to show."""
@@ -176,21 +167,12 @@ def _derived(tool: Tool, preset: Mapping[str, Any]) -> dict[str, float]:
 
 def _summary(name: str, described: Described) -> str:
     """`tool 1, end mill 3.175 mm, 2 flutes; for plywood, mdf`."""
+    from camtool.planning.naming import tool_words
+
     tool = _tool(name, described)
     number = f"tool {tool.number}, " if tool.number is not None else ""
-    words = [f"{number}{SHAPES[tool.kind]} {tool.diameter_mm:g} mm"]
-    if tool.tip_angle_rad is not None:
-        words.append(f"{math.degrees(tool.tip_angle_rad):g}°")
-    if tool.tip_diameter_mm:
-        words.append(f"tip {tool.tip_diameter_mm:g} mm")
-    if tool.corner_radius_mm:
-        words.append(f"corner {tool.corner_radius_mm:g} mm")
-    if tool.flutes:
-        words.append(f"{tool.flutes} flute{'s' if tool.flutes > 1 else ''}")
-    if tool.cutting_length_mm:
-        words.append(f"cuts {tool.cutting_length_mm:g} mm")
     materials = f"; for {', '.join(tool.materials)}" if tool.materials else ""
-    return ", ".join(words) + materials
+    return number + tool_words(tool) + materials
 
 
 _WORDS = {

@@ -10,7 +10,7 @@ import numpy as np
 
 from camtool.arrays import Floats
 from camtool.geometry.drawing import Drawing
-from camtool.geometry.polylines import POSITION_EPS_MM
+from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines
 from camtool.pictures.chains import (
     Chain,
     Moves,
@@ -119,6 +119,15 @@ class Content:
         """The moves that cut, where the diameter of the tool is known."""
         return (*self.moves.feeds, *self.moves.ramps) if self.scene.tool_mm else ()
 
+    @property
+    def stock(self) -> tuple[Chain, ...]:
+        """The outline of the stock, where it is known."""
+        if self.scene.stock_mm is None:
+            return ()
+        left, low, right, high = self.scene.stock_mm
+        corners = [[left, low, 0.0], [right, low, 0.0], [right, high, 0.0], [left, high, 0.0]]
+        return chains_of(Polylines.of([Polyline(np.array(corners), closed=True)]))
+
     @cached_property
     def reversals(self) -> Floats:
         """(R, 2) mm: where X or Y reverses."""
@@ -151,6 +160,7 @@ def content_of(scene: Scene, options: Options = AS_USUAL) -> Content:
     shown = options.layers
     # Layers that are not shown do not change the window.
     tool_mm = scene.tool_mm if shown is None or "swept" in shown else None
+    stock = scene.stock_mm if shown is None or "stock" in shown else None
     return Content(
         scene=scene,
         groups=groups,
@@ -159,7 +169,7 @@ def content_of(scene: Scene, options: Options = AS_USUAL) -> Content:
         places=places,
         trace=trace if shown is None or "path" in shown else None,
         window=(
-            _window(outlines, places.points, moves, trace, tool_mm)
+            _window(outlines, places.points, moves, trace, tool_mm, stock)
             if options.crop_mm is None
             else cropped(*options.crop_mm)
         ),
@@ -210,8 +220,11 @@ def _window(
     moves: Moves,
     trace: Trace | None,
     tool_mm: float | None,
+    stock_mm: tuple[float, float, float, float] | None,
 ) -> Floats:
     part = [chains_box(outlines), points_box(points)]
+    if stock_mm is not None:
+        part.append(points_box(np.array(stock_mm).reshape(2, 2)))
     around = [points_box(np.zeros((1, 2)))]
     if trace is not None:
         part.append(points_box(trace.points[trace.cutting]))

@@ -28,6 +28,7 @@ from camtool.pictures.colours import (
     PLUNGE,
     RAPID,
     REVERSAL,
+    STOCK,
     SWEPT,
     TRAVEL,
     bin_colours,
@@ -50,6 +51,7 @@ TRACE_PEN, FEED_PEN, DRAWING_PEN, ALONE_PEN = 2.7, 2.8, 4.8, 2.8
 RING = 8.0
 
 RAPID_LINE: Look = {"stroke": RAPID, "stroke-width": 1.4, "stroke-dasharray": "7 5"}
+STOCK_LINE: Look = {"stroke": STOCK, "stroke-width": 2.0}
 PLUNGE_MARK: Look = {"r": 5.0, "fill": PLUNGE, "stroke": PAPER, "stroke-width": 1.6}
 START_MARK: Look = {"r": 5.0, "fill": PAPER, "stroke": FEED, "stroke-width": 2.2}
 REVERSAL_MARK: Look = {"r": 3.4, "fill": REVERSAL, "stroke": PAPER, "stroke-width": 1.0}
@@ -300,6 +302,15 @@ def _travel_legend(content: Content, view: View) -> Iterator[Entry]:
         yield Entry(line_swatch(TRAVEL, 2.0), f"travel {wide:g} × {high:g} mm")
 
 
+def _stock(content: Content) -> list[Part]:
+    """The outline of the stock, where the job says where it lies."""
+    if content.scene.stock_mm is None:
+        return []
+    left, low, right, high = content.scene.stock_mm
+    name = f"stock {right - left:g} × {high - low:g} mm"
+    return [Lines("stock", name, content.stock, STOCK_LINE)]
+
+
 def _feeds(content: Content, plot: Plot) -> str:
     """Solid lines, slopes in the colour of plunges; pale and thin below a predicted path."""
     moves, pale = content.moves, content.trace is not None
@@ -397,6 +408,15 @@ LAYERS = (
         height=2,
         place=11,
         hint="; the path does not lie within the table's travel",
+    ),
+    Layer(
+        "stock",
+        _stock,
+        in_mm=True,
+        height=2,
+        place=12,
+        needs="drawing",
+        hint="; [stock] of a job file says its corner and size",
     ),
     Layer(
         "rapids",

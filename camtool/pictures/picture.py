@@ -85,3 +85,15 @@ def closeups(scene: Scene, options: Options) -> Iterator[tuple[str, Options]]:
             f"Circle {number}, that of the largest circular error, {worst * UM_PER_MM:.2f} µm"
         )
         yield caption, replace(plain, polar=number)
+
+
+LAID = frozenset({"drawing", "stock", "zero"})
+"""The layers of a picture that shows how the stock lies on the machine."""
+
+
+def on_stock(scene: Scene) -> tuple[Scene, Options] | None:
+    """The scene of the drawing on its stock, with part zero, and its options; None without a
+    drawing."""
+    if scene.drawing is None:
+        return None
+    return Scene(drawing=scene.drawing, stock_mm=scene.stock_mm), Options(layers=LAID)

@@ -41,7 +41,8 @@ class Scene:
     The drawing is in the work frame. trace_points (T, 2) mm is the predicted path of the slides,
     trace_error_mm (T,) its distance from the wanted path, trace_cutting (T,) whether the tool cuts
     between the point before and this one (None: always); errors count only there. travel_mm is the
-    size of the table's travel from (0, 0). `wanted` are the lines and arcs with which the trace
+    size of the table's travel from (0, 0), stock_mm the stock's left, lower, right and upper edge.
+    `wanted` are the lines and arcs with which the trace
     was compared, `worst` the places of its largest errors, mm, the largest first; `tool_mm` is the
     diameter of the tool, if there is only one; `rounds` are full circles with their errors.
     `playback` gives how the toolpath runs; only the viewer calls it.
@@ -63,6 +64,7 @@ class Scene:
     tool_mm: float | None = None
     rounds: tuple[Round, ...] = ()
     playback: Callable[[], Playback] | None = None
+    stock_mm: tuple[float, float, float, float] | None = None
 
     def __post_init__(self) -> None:
         points, error = self.trace_points, self.trace_error_mm
@@ -215,6 +217,7 @@ def scene_of(
         trace_error_mm=trace.error_mm if trace is not None else None,
         trace_cutting=trace.cutting if trace is not None else None,
         travel_mm=_travel(toolpath, machine),
+        stock_mm=None if job is None or job.stock is None else job.stock.box_mm,
         notes=verification.report.notes() if verification is not None else (),
         wanted=verification.wanted.segments if verification is not None else None,
         worst=tuple(one.at_mm for one in worst),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from camtool.findings import Finding, Sentence
@@ -21,6 +22,34 @@ def tool_name(tool: Tool) -> str:
     """The tool by its diameter, and its name if it has one."""
     called = f" ({tool.name})" if tool.name else ""
     return f"a tool of {tool.diameter_mm:g} mm{called}"
+
+
+SHAPES = {
+    "flat": "end mill",
+    "ball": "ball nose",
+    "bull": "bull nose",
+    "v": "V bit",
+    "drill": "drill",
+}
+"""What people call the kinds of tools."""
+
+
+def tool_words(tool: Tool) -> str:
+    """All that is known of a tool's shape: `end mill 3.175 mm, 2 flutes, cuts 12 mm`."""
+    words = [f"{SHAPES[tool.kind]} {tool.diameter_mm:g} mm"]
+    if not tool.diameter_mm:
+        words = [SHAPES[tool.kind] if tool.kind != "flat" else "point"]
+    if tool.tip_angle_rad is not None:
+        words.append(f"{math.degrees(tool.tip_angle_rad):g}°")
+    if tool.tip_diameter_mm:
+        words.append(f"tip {tool.tip_diameter_mm:g} mm")
+    if tool.corner_radius_mm:
+        words.append(f"corner {tool.corner_radius_mm:g} mm")
+    if tool.flutes:
+        words.append(f"{tool.flutes} flute{'s' if tool.flutes > 1 else ''}")
+    if tool.cutting_length_mm:
+        words.append(f"cuts {tool.cutting_length_mm:g} mm")
+    return ", ".join(words)
 
 
 def key_of(operation: Operation, key: str) -> str:

@@ -15,6 +15,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from html import escape
+from itertools import groupby
 from typing import Any
 from urllib.parse import quote
 
@@ -248,12 +249,13 @@ class FindingReport(msgspec.Struct, frozen=True):
 class PlannedOperation(msgspec.Struct, frozen=True):
     """How an operation cuts; feeds in mm/min. `spindle_rpm` is None without a speed; `passes` and
     the depth of the deepest are None for kinds of operation without passes. `coolant`: "off",
-    "mist", "flood" or "both". `tool_name` and `material`, that of its preset, are "" where there
-    are none; the feed per tooth and the speed of the edge are None where the flutes, or the speed,
-    are not known."""
+    "mist", "flood" or "both". `tool` is the index of its tool; `tool_name` and `material`, that of
+    its preset, are "" where there are none; the feed per tooth and the speed of the edge are None
+    where the flutes, or the speed, are not known, and the predicted time where it is not."""
 
     name: str
     kind: str
+    tool: int
     tool_name: str
     tool_diameter_mm: float
     material: str
@@ -266,15 +268,39 @@ class PlannedOperation(msgspec.Struct, frozen=True):
     passes: int | None = None
     deepest_pass_mm: float | None = None
     coolant: str = "off"
+    time_s: float | None = None
+
+
+class PlannedTool(msgspec.Struct, frozen=True):
+    """A tool in the order of first use; `words` say its shape. It must stick out of its holder by
+    more than `reach_mm`, the depth of its deepest cut, and what stands above the stock."""
+
+    number: int | None
+    name: str
+    words: str
+    reach_mm: float
+    cutting_length_mm: float | None = None
+
+
+class PlannedStock(msgspec.Struct, frozen=True):
+    """The stock in the work frame, its top at Z0: its lower left corner and its size, None where
+    the job does not give them; how far below it cuts may go, mm."""
+
+    thickness_mm: float
+    corner_mm: tuple[float, float] | None
+    size_mm: tuple[float, float] | None
+    through_mm: float
 
 
 class Planned(msgspec.Struct, frozen=True):
     """The length of rapids in XY, mm, in the order and from the starts of the drawing and as
-    planned; and how the operations cut."""
+    planned; how the operations cut, their tools, and the stock, if the job says it."""
 
     rapid_drawn_mm: float
     rapid_mm: float
     operations: tuple[PlannedOperation, ...] = ()
+    tools: tuple[PlannedTool, ...] = ()
+    stock: PlannedStock | None = None
 
 
 class Before(msgspec.Struct, frozen=True):
@@ -644,13 +670,15 @@ class Setup:
 @dataclass(frozen=True)
 class Page:
     """A page: `report` is None where the program could not be judged; `findings` then say why.
-    `pictures` are (caption, address): of a file beside the page, or a data address."""
+    `pictures` are (caption, address): of a file beside the page, or a data address; `stock` is
+    that of the stock with part zero, "" without one."""
 
     title: str
     report: Report | None
     findings: tuple[FindingReport, ...]
     setup: Setup | None = None
     pictures: tuple[tuple[str, str], ...] = ()
+    stock: str = ""
 
     @property
     def verdict(self) -> str:
@@ -815,6 +843,102 @@ def _at(at_mm: tuple[float, float]) -> str:
     return f"({at_mm[0]:.3f}, {at_mm[1]:.3f})"
 
 
+# What to take to the machine: the stock and its zero, tools, operations, warnings.
+
+SETUP = "At the machine"
+"""The heading of this part of a page."""
+
+_GRAVEST_FIRST = {"error": 0, "warning": 1}
+
+SETUP_FINDINGS = 6
+"""So many warnings and errors stand there, the gravest first; below are all."""
+
+
+def mounting(report: Report) -> Iterator[tuple[str, str]]:
+    """(name, value) of where the stock lies, how far the program goes, and what it takes."""
+    planned, extents = report.planned, report.extents_mm
+    stock = None if planned is None else planned.stock
+    if stock is not None:
+        yield "stock", _stock_words(stock)
+    yield "zero", _zero_words(stock)
+    if planned is not None and len(planned.tools) > 1:
+        rows = [key for key, _ in groupby(each.tool for each in planned.operations)]
+        yield "mounted", ", then ".join(_tool_called(planned, row) for row in rows)
+    axes = zip("XYZ", (extents.x, extents.y, extents.z), strict=True)
+    yield "travel", ", ".join(f"{axis} {mm(low)} to {mm(high)}" for axis, (low, high) in axes)
+    yield "time", clock(report.time_s)
+
+
+def _stock_words(stock: PlannedStock) -> str:
+    thick = f"{stock.thickness_mm:g} mm thick"
+    if stock.size_mm is not None:
+        wide, high = stock.size_mm
+        thick = f"{wide:g} × {high:g} × {stock.thickness_mm:g} mm"
+    return f"{thick}; on a board that may be cut {stock.through_mm:g} mm deep"
+
+
+def _zero_words(stock: PlannedStock | None) -> str:
+    """Where X0 Y0 and Z0 are, as seen from the stock."""
+    if stock is None or stock.corner_mm is None:
+        return "X0 Y0 where the drawing has part zero; Z0 is the top of the stock"
+    x, y = (-place + 0.0 for place in stock.corner_mm)
+    if x == y == 0.0:
+        return "X0 Y0 is the lower left corner of the stock; Z0 is its top"
+    across = f"{abs(x):g} mm {'right' if x >= 0.0 else 'left'} of"
+    along = f"{abs(y):g} mm {'above' if y >= 0.0 else 'below'}"
+    return f"X0 Y0 is {across} and {along} the lower left corner of the stock; Z0 is its top"
+
+
+def setup_sheets(planned: Planned) -> Iterator[Sheet]:
+    """The tools in the order of use, and the operations."""
+    rows = tuple(
+        (
+            _tool_called(planned, row),
+            tool.words,
+            f"{tool.reach_mm:.4g}",
+            "–" if tool.cutting_length_mm is None else f"{tool.cutting_length_mm:g}",
+        )
+        for row, tool in enumerate(planned.tools)
+    )
+    heads = ("tool", "shape", "sticks out more than mm", "edges mm")
+    yield Sheet("tools", heads, rows, words=2)
+    yield Sheet("operations", *_setup_operations(planned), words=4)
+
+
+def _tool_called(planned: Planned, row: int) -> str:
+    """`1 mill`, or the tool's place in the order where it has neither number nor name."""
+    tool = planned.tools[row]
+    number = "" if tool.number is None else f"T{tool.number}"
+    return f"{number} {tool.name}".strip() or f"({row + 1})"
+
+
+def _setup_operations(planned: Planned) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]:
+    whole = ("operation", "kind", "tool", "coolant", "depth mm", "passes")
+    heads = (*whole, "rev/min", "feed mm/min", "plunge mm/min", "time")
+    rows = tuple(
+        (
+            each.name or each.kind,
+            each.kind,
+            _tool_called(planned, each.tool),
+            each.coolant,
+            f"{each.depth_mm:.4g}",
+            "–" if each.passes is None else str(each.passes),
+            "off" if each.spindle_rpm is None else f"{each.spindle_rpm:g}",
+            f"{each.feed_mm_min:g}",
+            f"{each.plunge_mm_min:g}",
+            "–" if each.time_s is None else clock(each.time_s),
+        )
+        for each in planned.operations
+    )
+    return heads, rows
+
+
+def gravest(page: Page) -> tuple[FindingReport, ...]:
+    """The findings that one must know at the machine, errors first."""
+    found = [each for each in page.findings if each.severity in _GRAVEST_FIRST]
+    return tuple(sorted(found, key=lambda item: _GRAVEST_FIRST[item.severity]))
+
+
 # A page as Markdown, for the summary of a pipeline's job or a comment on a pull request.
 #
 # Names come from drawings: whatever they contain, they are shown as text, never as mark-up, a
@@ -832,7 +956,6 @@ MiB, so that sixteen pages fit into it."""
 
 _MARKS = frozenset("\\`*_[]<>|#~$&!")
 _BROKEN = {"@": "@<!-- -->", "://": ":<!-- -->//", "www.": "www<!-- -->."}
-_GRAVEST_FIRST = {"error": 0, "warning": 1}
 
 
 def markdown(page: Page) -> str:
@@ -863,6 +986,7 @@ def _markdown_lines(page: Page) -> Iterator[str]:
     if page.report is not None:
         yield from (f"- **{name}:** {markdown_words(value)}" for name, value in facts(page.report))
         yield ""
+        yield from _markdown_setup(page, page.report)
     for caption, address in page.pictures:
         yield f"![{markdown_words(caption)}]({quote(address, errors='surrogateescape')})"
         yield ""
@@ -880,6 +1004,17 @@ def _markdown_lines(page: Page) -> Iterator[str]:
         yield ""
     if page.report is not None:
         yield from (f"- assumed: {markdown_words(words)}" for words in page.report.assumptions)
+
+
+def _markdown_setup(page: Page, report: Report) -> Iterator[str]:
+    if report.planned is None:
+        return
+    yield f"## {SETUP}"
+    yield ""
+    yield from (f"- **{name}:** {markdown_words(value)}" for name, value in mounting(report))
+    yield ""
+    for sheet in setup_sheets(report.planned):
+        yield from _markdown_table(sheet)
 
 
 def _markdown_findings(page: Page) -> Iterator[str]:
@@ -928,7 +1063,10 @@ figure { margin: 1rem 0; } figcaption { opacity: .7; }
 .error { color: #c5221f; } .warning { color: #a56300; } .fine { color: #2c7a32; }
 @media (prefers-color-scheme: dark) {
   .error { color: #ff8a80; } .warning { color: #ffc266; } .fine { color: #8fd694; } }
-@media print { body { margin: 0; max-width: none; } }
+@media print {
+  @page { size: A4; margin: 12mm; }
+  :root { font-size: 11px; } body { margin: 0; max-width: none; padding: 0; }
+  .setup { break-after: page; } .setup img { max-height: 85mm; } table { margin: .5rem 0; } }
 """
 
 
@@ -949,6 +1087,7 @@ def _html_lines(page: Page) -> Iterator[str]:
     yield f"<title>{title}</title>\n<style>{_STYLE}</style>\n</head>\n<body>"
     yield f'<h1>{title} <small class="{page.verdict}">{page.verdict}</small></h1>'
     if page.report is not None:
+        yield from _html_setup(page, page.report)
         yield from _html_pairs(tuple(facts(page.report)))
     for caption, address in page.pictures:
         yield f'<figure><img src="{escape(address, quote=True)}" alt="{_safe(caption)}">'
@@ -965,6 +1104,30 @@ def _html_lines(page: Page) -> Iterator[str]:
         yield from (f"<li>{_safe(words)}</li>" for words in page.report.assumptions)
         yield "</ul>"
     yield "</body>\n</html>"
+
+
+def _html_setup(page: Page, report: Report) -> Iterator[str]:
+    """What to take to the machine; printed it fills the first side."""
+    if report.planned is None:
+        return
+    yield f'<section class="setup"><h2>{SETUP}</h2>'
+    machine = () if page.setup is None else (("machine", page.setup.machine),)
+    yield from _html_pairs((*machine, *mounting(report)))
+    if page.stock:
+        yield f'<img src="{escape(page.stock, quote=True)}" alt="the stock and part zero">'
+    for sheet in setup_sheets(report.planned):
+        yield from _html_table(sheet)
+    grave = gravest(page)
+    if grave:
+        yield "<ul>"
+        for item in grave[:SETUP_FINDINGS]:
+            place = f" ({_safe(item.where)})" if item.where else ""
+            yield f'<li><span class="{item.severity}">{item.severity}</span>'
+            yield f"{place}: {_safe(item.message)}</li>"
+        if len(grave) > SETUP_FINDINGS:
+            yield f"<li>and {len(grave) - SETUP_FINDINGS} more, below</li>"
+        yield "</ul>"
+    yield "</section>"
 
 
 def _html_pairs(rows: tuple[tuple[str, str], ...]) -> Iterator[str]:

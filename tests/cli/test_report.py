@@ -71,7 +71,7 @@ def test_html_is_one_page_without_scripts(camtool: Run, drawing: Path, tmp_path:
     assert not found.tags & {"script", "iframe", "object", "link", "svg", "a", "base", "form"}
     assert not [name for name in found.attributes if name.startswith("on")]
     head = "data:image/svg+xml;base64,"
-    assert len(found.addresses) == 3  # the whole, its worst place, a circle
+    assert len(found.addresses) == 4  # the stock; the whole, its worst place, a circle
     for address in found.addresses:
         assert address.startswith(head)
         assert ElementTree.fromstring(base64.b64decode(address[len(head) :])).tag.endswith("svg")

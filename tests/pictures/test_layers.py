@@ -32,11 +32,16 @@ from tests.pictures.conftest import (
 )
 
 LAYERS = layer_names()
-MILLED = replace(scene_of_toolpath(followed(plate()), title="", drawing=plate()), tool_mm=0.5)
+MILLED = replace(
+    scene_of_toolpath(followed(plate()), title="", drawing=plate()),
+    tool_mm=0.5,
+    stock_mm=(-1.0, -1.0, 6.0, 4.0),
+)
 JUDGED = replace(SCENES["result"], worst=((4.5, 2.5), (2.5, 0.5), (4.5, 2.5)))
 GROUPS = {
     "drawing": ("drawing",),
     "swept": ("swept",),
+    "stock": ("stock",),
     "rapids": ("rapids",),
     "feeds": ("feeds",),
     "plunges": ("plunges",),
