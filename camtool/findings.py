@@ -288,6 +288,13 @@ class Code(IntEnum):
         "name the layers that are no edges of parts (`--frames`), or give the side "
         "([toolpaths.md](toolpaths.md))",
     )
+    NOT_BORED = (
+        227,
+        (WARNING, INFO),
+        "a path chosen for `bore` is not a circle, or has no room for the tool: it is left out; a "
+        "remark where it lies within another circle, with which it is bored",
+        "`drill` for circles as wide as the tool, a smaller tool for the others",
+    )
     CUT_DOUBTFUL = (
         220,
         WARNING,
@@ -752,6 +759,9 @@ NOTHING_DRAWN_TO_DRILL = Sentence(
     Code.NOTHING_DRAWN,
     "there is no hole to drill: no single point, and no circle that is small enough",
 )
+NOTHING_DRAWN_TO_BORE = Sentence(
+    Code.NOTHING_DRAWN, "there is no hole to bore: no circle that is wider than the tool"
+)
 SELF_CROSSING = Sentence(
     Code.SELF_CROSSING,
     "a closed contour crosses itself{measured:| at # places}",
@@ -1014,6 +1024,24 @@ NOT_DRILLED_TOO_LARGE = Sentence(
     Code.NOT_DRILLED,
     "circles of more than {limit:g} mm are not drilled: {count}, up to {measured:.6g} mm",
     "mm",
+)
+NOT_BORED = Sentence(
+    Code.NOT_BORED,
+    "only full circles are bored: {measured:# other path is|# other paths are} left out",
+    severity=WARNING,
+)
+NOT_BORED_TOO_SMALL = Sentence(
+    Code.NOT_BORED,
+    "{tool} bores circles wider than {limit:g} mm: {count:# circle|# circles} of {measured:.6g} "
+    "mm or more {count:is|are} left out; drill {count:it|them}, or take a smaller tool",
+    "mm",
+    WARNING,
+)
+NOT_BORED_WITHIN = Sentence(
+    Code.NOT_BORED,
+    "{measured:# circle lies|# circles lie} within another one, with which "
+    "{measured:it is|they are} bored",
+    severity=INFO,
 )
 HOLE_SIZE = Sentence(
     Code.HOLE_SIZE,

@@ -22,7 +22,11 @@ if TYPE_CHECKING:
     from camtool.planning.items import Chosen
     from camtool.planning.job import Job, Operation
 
-WITHIN = {"pocket": "it is cleared as a pocket", "vcarve": "it is carved"}
+WITHIN = {
+    "pocket": "it is cleared as a pocket",
+    "vcarve": "it is carved",
+    "bore": "it is bored, if it is a circle wider than the tool",
+}
 """Kinds of operation that take all within their contours, and why."""
 
 NOT_KNOWN_MM = math.inf

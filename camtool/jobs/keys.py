@@ -589,12 +589,14 @@ TOOL_KEYS = {f"tool_{name}": key for name, key in TOOL.items() if key.help}
 
 _LINES = ("profile", "pocket", "engrave")
 _LAYERED = ("profile", "pocket", "engrave", "vcarve")
-_CLEARING = ("profile", "pocket")
+_STEPPED = (*_LAYERED, "bore")
+_CLEARING = ("profile", "pocket", "bore")
 _ALONG = ("profile", "engrave")
 _PROFILE = ("profile",)
 _POCKET = ("pocket",)
+_RINGS = ("pocket", "bore")
 _DRILL = ("drill",)
-_THROUGH = ("profile", "pocket", "drill")
+_THROUGH = ("profile", "pocket", "bore", "drill")
 
 OPERATION = {
     "name": Key("name", TEXT, kinds=KINDS),
@@ -640,14 +642,14 @@ OPERATION = {
     "coolant": Key("coolant", one_of(COOLANTS), "M7, M8 or both.", '"mist"', KINDS),
     "depth": Key("depth_mm", LENGTH, "Depth of cut below Z0.", '"1mm"', KINDS),
     "breakthrough": Key("breakthrough_mm", LENGTH, "Or so far below the stock.", kinds=_THROUGH),
-    "step_down": Key("step_down_mm", LENGTH, "Depth of a pass.", '"0.5mm"', _LAYERED),
+    "step_down": Key("step_down_mm", LENGTH, "Depth of a pass.", '"0.5mm"', _STEPPED),
     "last_pass": Key("last_pass_mm", LENGTH, "Depth of the last pass.", '"0.1mm"', _LAYERED),
     "entry": Key(
         "entry",
         Value(entry, "ENTRY", tables=True),
         "plunge, ramp:3deg, or helix:3deg:1mm in pockets.",
         '"ramp:3deg"',
-        _LINES,
+        (*_LINES, "bore"),
     ),
     "lead_in": Key(
         "lead_in",
@@ -695,7 +697,7 @@ OPERATION = {
         "step_over",
         Value(plain(fraction), "PART"),
         "Part of the diameter (0.4, 40%).",
-        kinds=_POCKET,
+        kinds=_RINGS,
     ),
     "angle": Key("angle_rad", ANGLE, "Of a zigzag.", kinds=_POCKET, only=("pattern", ("zigzag",))),
     "peck": Key("peck_mm", LENGTH, "How deep a drill goes at a time.", '"0.2mm"', _DRILL),

@@ -43,7 +43,7 @@ LEAST_TAB_MM = 0.5
 """Lower tabs than this are not proposed."""
 
 TOOL_NAME = "tool"
-_ORDER = ("drill", "engrave", "profile")
+_ORDER = ("drill", "engrave", "bore", "profile")
 _WIDTH = 36
 _SURROGATES = range(0xD800, 0xE000)
 
@@ -214,7 +214,7 @@ def _parts(drawing: Drawing, group: _Group, size_mm: float, proposal: Proposal) 
 
 def _cut_parts(drawing: Drawing, group: _Group, contours: Ints, proposal: Proposal) -> list[_Part]:
     """Closed contours for a tool of known diameter: circles within parts are drilled where they
-    fit the tool and bored along a ramp where they are wider, other contours within parts are cut
+    fit the tool and bored where they are wider, other contours within parts are cut
     on their inside, and the outer ones last, with tabs."""
     lines, tool = drawing.paths, proposal.tool_mm
     edges = np.array([kind.casefold() in CONTINUOUS for kind in drawing.line_types])
@@ -240,9 +240,9 @@ def _cut_parts(drawing: Drawing, group: _Group, contours: Ints, proposal: Propos
         keys = (
             ("select", words, ""),
             ("select_size", f'"{tool + HOLE_SIZE_MM:.6g}mm.."', "wider than the tool"),
-            ("entry", '"ramp:3deg"', OPERATION["entry"].help),
+            ("entry", '"helix:3deg"', "how steeply it goes down"),
         )
-        found.append(_Part(f"{group.called} holes", "profile", tuple(wider), 0, keys))
+        found.append(_Part(f"{group.called} holes", "bore", tuple(wider), 0, keys))
     inner = taken("inner", "not circle")
     if len(inner):
         keys = (("select", '["inner", "not circle"]', ""), ("entry", '"ramp:3deg"', ""))
@@ -277,7 +277,7 @@ def _text(drawing: Drawing, group: _Group, part: _Part, proposal: Proposal) -> l
         *(_row(f"{key} = {value}", remark) for key, value, remark in part.keys),
         f"tool = {quoted(proposal.tool or TOOL_NAME)}",
     ]
-    if part.kind == "profile" and proposal.tool_mm:
+    if part.kind in ("profile", "bore") and proposal.tool_mm:
         text.append(_row('direction = "climb"', OPERATION["direction"].help))
     if proposal.breakthrough_mm and part.kind in OPERATION["breakthrough"].kinds:
         through = f'breakthrough = "{proposal.breakthrough_mm:.6g}mm"'

@@ -339,11 +339,12 @@ def _beyond_tool(step: Step, stock: Stock | None) -> Iterator[str]:
         yield CUT_DOUBTFUL_CHIP.words(chip=chip, limits=_range_words(tool.chip_load_mm))
     if speed is not None and _is_beyond(speed, tool.surface_speed_m_min):
         yield CUT_DOUBTFUL_EDGE.words(speed=speed, limits=_range_words(tool.surface_speed_m_min))
-    beside = operation.kind == "pocket" or (operation.kind == "profile" and operation.side != "on")
+    clears = operation.kind in ("pocket", "bore")
+    beside = clears or (operation.kind == "profile" and operation.side != "on")
     below = depth - stock.thickness_mm if stock is not None else 0.0
     if beside and max(below, 0.0) < tool.nose_mm - POSITION_EPS_MM:
         yield CUT_DOUBTFUL_NOSE.words(nose=tool.nose_mm)
-    ridge = ridge_mm(tool, operation.step_over) if operation.kind == "pocket" else 0.0
+    ridge = ridge_mm(tool, operation.step_over) if clears else 0.0
     if ridge > POSITION_EPS_MM and below <= 0.0:
         yield CUT_DOUBTFUL_RIDGES.words(ridge=ridge)
     if tool.materials and not operation.material:

@@ -155,7 +155,7 @@ def _cuts_edge(step: Step) -> Bools:
     """Which items of the step follow a closed line whose size they decide."""
     if isinstance(step.items, Contours):
         return step.items.lines.closed
-    return np.full(len(step.items), step.operation.kind in ("pocket", "vcarve"))
+    return np.full(len(step.items), step.operation.kind in ("pocket", "vcarve", "bore"))
 
 
 def _centre_boxes(items: Sequence[Item]) -> Floats:
@@ -224,10 +224,13 @@ def kept_of(steps: Sequence[Step]) -> tuple[Kept, ...]:
 def _kept(step: Step) -> Iterator[Kept]:
     operation, chosen = step.operation, step.chosen
     closed = np.flatnonzero(chosen.lines.closed)
+    if operation.kind == "bore":
+        bored = [item.source for item in step.items]
+        closed = closed[np.isin(chosen.source[closed], bored)]
     nest = nesting(chosen.lines.select(closed.tolist()))
     order = np.argsort(nest.depth, kind="stable")
     rows, depth = closed[order], nest.depth[order]
-    if operation.kind in ("pocket", "vcarve"):
+    if operation.kind in ("pocket", "vcarve", "bore"):
         lines = chosen.lines.select(rows.tolist())
         yield Kept(tuple(run.vertices for run in step.runs), lines, depth % 2 == 1, True)
         return

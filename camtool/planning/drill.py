@@ -81,7 +81,7 @@ def drill(chosen: Chosen, setting: Setting) -> Work:
     is left that is an error.
     """
     operation = setting.operation
-    circles, others = _circles(chosen)
+    circles, others = circles_of(chosen)
     limit = _largest(operation)
     small = [hole for hole in circles if (hole.diameter_mm or 0.0) <= limit + HOLE_SIZE_MM]
     large = [hole for hole in circles if hole not in small]
@@ -180,7 +180,7 @@ def _run(hole: Hole, setting: Setting) -> CutRun:
     return CutRun(vertices, np.array(feeds), feed, hole.name, operation.dwell_s)
 
 
-def _circles(chosen: Chosen) -> tuple[list[Hole], list[str]]:
+def circles_of(chosen: Chosen) -> tuple[list[Hole], list[str]]:
     """The full circles of the paths, and the names of the other paths."""
     holes, others = [], []
     for path, source, name in zip(chosen.lines, chosen.source, chosen.names, strict=True):
@@ -202,7 +202,7 @@ def _largest(operation: Operation) -> float:
 def _too_large(holes: list[Hole], limit: float) -> Iterator[Finding]:
     if holes:
         yield NOT_DRILLED_TOO_LARGE(
-            where=_named([hole.name for hole in holes]),
+            where=named([hole.name for hole in holes]),
             measured=max(hole.diameter_mm or 0.0 for hole in holes),
             limit=limit,
             count=len(holes),
@@ -211,7 +211,7 @@ def _too_large(holes: list[Hole], limit: float) -> Iterator[Finding]:
 
 def _no_circles(names: list[str]) -> Iterator[Finding]:
     if names:
-        yield NOT_DRILLED(where=_named(names), measured=len(names))
+        yield NOT_DRILLED(where=named(names), measured=len(names))
 
 
 def _other_sizes(holes: list[Hole], operation: Operation) -> Iterator[Finding]:
@@ -222,7 +222,7 @@ def _other_sizes(holes: list[Hole], operation: Operation) -> Iterator[Finding]:
         if wanted and hole.diameter_mm and abs(hole.diameter_mm - wanted) > HOLE_SIZE_MM:
             by_size.setdefault(round(hole.diameter_mm, 3), []).append(hole.name)
     for size, names in sorted(by_size.items()):
-        yield HOLE_SIZE(where=_named(names), measured=wanted, limit=size, count=len(names))
+        yield HOLE_SIZE(where=named(names), measured=wanted, limit=size, count=len(names))
 
 
 def _nothing(holes: list[Hole], operation: Operation) -> Iterator[Finding]:
@@ -230,6 +230,7 @@ def _nothing(holes: list[Hole], operation: Operation) -> Iterator[Finding]:
         yield NOTHING_DRAWN_TO_DRILL(where=operation_name(operation))
 
 
-def _named(names: list[str]) -> str:
+def named(names: list[str]) -> str:
+    """The first few names, and how many more there are."""
     more = len(names) - NAMES_SHOWN
     return ", ".join(names[:NAMES_SHOWN]) + (f" and {more} more" if more > 0 else "")

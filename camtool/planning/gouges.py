@@ -45,7 +45,7 @@ SAMPLES_ROUND = 500
 
 def side_findings(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> list[Finding]:
     """Findings on the sides of an operation: gouges, and sides that follow from uncut contours."""
-    if operation.kind == "pocket":
+    if operation.kind in ("pocket", "bore"):
         return shortened_list(list(_cleared_away(chosen, sides, operation)), GOUGE_BY_POCKET_MORE)
     if not runs_beside(operation):
         return []
@@ -154,14 +154,14 @@ def _beyond(path: Polyline, wall: Polyline, drawn: Polyline) -> float:
 
 
 def _cleared_away(chosen: Chosen, sides: Sides, pocket: Operation) -> Iterator[Finding]:
-    """Parts that another operation keeps, in what a pocket clears as deep as that, or deeper."""
+    """Parts that another operation keeps, in what a pocket (or a bore) clears as deep as that, or
+    deeper."""
     kept = sides.kept_from(pocket)
     kept[chosen.source] = False
     rows = np.flatnonzero(kept)
     if len(rows) == 0:
         return
-    holds = np.zeros(len(sides.lines), dtype=np.bool_)
-    holds[chosen.source] = True
+    holds = sides.cut_by(pocket)
     nest = nesting(sides.lines, holds & sides.lines.closed)
     for row in rows[nest.depth[rows] % 2 == 1].tolist():
         holder = sides.names[int(nest.parent[row])]

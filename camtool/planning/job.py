@@ -16,7 +16,7 @@ from typing import Any
 from camtool.errors import OptionError
 from camtool.patterns import matches
 
-KINDS = ("profile", "pocket", "engrave", "drill", "vcarve")
+KINDS = ("profile", "pocket", "bore", "engrave", "drill", "vcarve")
 """Kinds of operation."""
 
 SIDES = ("on", "outside", "inside", "auto")
@@ -37,7 +37,8 @@ CORNERS = ("none", "dogbone", "overcut")
 corner; or along one of its sides."""
 
 ENTRIES = ("plunge", "ramp", "helix")
-"""How the tool goes down: straight, sloping along the contour, or in a helix (pockets)."""
+"""How the tool goes down: straight, sloping along the contour, or in a helix (pockets; bores
+always)."""
 
 LEADS = ("none", "line", "arc")
 """How the tool comes to a contour and leaves it."""
@@ -461,11 +462,17 @@ class Operation:
                 where=f"{named}key last_pass",
                 mend="give a smaller last pass, or a larger depth",
             )
-        if self.entry.kind == "helix" and self.kind != "pocket":
+        if self.entry.kind == "helix" and self.kind not in ("pocket", "bore"):
             raise OptionError(
                 f"only pockets can be entered by a helix, not the kind {self.kind}",
                 where=f"{named}key entry",
                 mend='use "ramp" or "plunge"',
+            )
+        if self.kind == "bore" and self.entry.radius_mm is not None:
+            raise OptionError(
+                "a bore goes down in a helix as wide as the hole lets it",
+                where=f"{named}key entry",
+                mend='give its angle alone, entry = "helix:3deg"',
             )
 
     def through(self, stock: Stock | None) -> Operation:

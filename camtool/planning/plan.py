@@ -139,7 +139,7 @@ def _coarse(drawing: Drawing, placed: Drawing) -> Iterator[Finding]:
 
 
 def _kind(kind: str) -> Callable[[Chosen, Setting], Work]:
-    """What makes items of the paths; pockets and carvings need more, imported where it is used."""
+    """What makes items of the paths; what needs more is imported where it is used."""
     if kind == "pocket":
         from camtool.planning.pocket import pocket
 
@@ -148,6 +148,10 @@ def _kind(kind: str) -> Callable[[Chosen, Setting], Work]:
         from camtool.planning.carve import vcarve
 
         return vcarve
+    if kind == "bore":
+        from camtool.planning.bore import bore
+
+        return bore
     return {"profile": profile, "engrave": engrave, "drill": drill}[kind]
 
 
@@ -250,8 +254,8 @@ def _walls(placed: Drawing, sides: Sides, operation: Operation) -> KeepOut:
     """The closed lines that leads of a contour must keep away from: those of the operation itself,
     and those that any operation makes walls of."""
     count = len(placed.paths)
-    makers = [each.kind in ("profile", "pocket") for each in sides.operations]
-    own, walls = sides.taken_by(operation)[:count], sides.takes[makers, :count].any(axis=0)
+    makers = [each.kind in ("profile", "pocket", "bore") for each in sides.operations]
+    own, walls = sides.taken_by(operation)[:count], sides.cuts[makers, :count].any(axis=0)
     rows = np.flatnonzero((own | walls) & placed.paths.closed)
     return KeepOut(placed.paths.select(rows.tolist()), own[rows])
 

@@ -25,9 +25,11 @@ def setting_of(operation: Operation, job: Job, machine: Machine) -> Setting:
     and for impossible passes."""
     depth = depth_of(operation, machine)
     _check_coolant(operation, machine)
+    # The helix of a bore has turns, not passes.
+    step = None if operation.kind == "bore" else operation.step_down_mm
     try:
         made = carved_levels if operation.kind == "vcarve" else levels
-        passes = made(depth, operation.step_down_mm, operation.last_pass_mm)
+        passes = made(depth, step, operation.last_pass_mm)
     except OptionError as error:
         error.where = f"{operation_name(operation)}, {error.where}"
         raise

@@ -11,8 +11,8 @@ operations and those that are not cut too, or a window cut by itself would be ta
 Not every contour bounds material, though. These do not count:
 
 - what is only engraved or carved, for the part goes on beneath it;
-- the pocket of another operation that is less deep than the cut: what is drawn within it goes
-  through its floor (a counterbore and its bore);
+- the pocket or bore of another operation that is less deep than the cut: what is drawn within it
+  goes through its floor (a counterbore and its bore);
 - of what is not cut: what has a line type of its own, as centre lines, hidden edges and pitch
   circles have; what is on a layer of `Job.frames`; and what runs along a contour that is cut.
 """
@@ -69,14 +69,16 @@ class Seen:
 class Sides:
     """The M contours of a placed drawing, those that were not chosen after those that were, and
     their sides. `names`: layer and source of each. `takes` (K, M): what each of the `operations`
-    takes of them. (M,) each: `worked`, what any of them cuts along or clears; `edges`, what is
-    drawn as an edge that is seen; `framed`, what is on the layer of a frame.
+    takes of them; `cuts` (K, M): the same, but of a bore the circles alone. (M,) each: `worked`,
+    what any of them cuts along or clears; `edges`, what is drawn as an edge that is seen;
+    `framed`, what is on the layer of a frame.
     `default_depth_mm`: the depth of operations that give none."""
 
     lines: Polylines
     names: tuple[str, ...]
     operations: tuple[Operation, ...]
     takes: Bools
+    cuts: Bools
     worked: Bools
     edges: Bools
     framed: Bools
@@ -104,14 +106,19 @@ class Sides:
             traits = Traits(lines, sources, edges & ~framed)
             for number, operation in enumerate(job.operations):
                 takes[number] = traits.selected(operation, takes[number])
-        # A drill takes circles alone, whatever else is on its layers.
+        # Drills and bores take circles alone, whatever else is on their layers.
         makers = [operation.kind != "drill" for operation in job.operations]
+        cuts = takes.copy()
+        for number, operation in enumerate(job.operations):
+            if operation.kind == "bore":
+                cuts[number] &= circles(lines, takes[number])
         return cls(
             lines=lines,
             names=tuple(f"{layer}/{it}" for layer, it in zip(layers, sources, strict=True)),
             operations=job.operations,
             takes=takes,
-            worked=np.asarray(takes[makers].any(axis=0)),
+            cuts=cuts,
+            worked=np.asarray(cuts[makers].any(axis=0)),
             edges=edges,
             framed=framed,
             default_depth_mm=default_depth_mm,
@@ -136,11 +143,16 @@ class Sides:
         """(M,) the contours that one of the operations takes."""
         return np.asarray(self.takes[self.operations.index(operation)])
 
+    def cut_by(self, operation: Operation) -> Bools:
+        """(M,) of these those that it cuts."""
+        return np.asarray(self.cuts[self.operations.index(operation)])
+
     def seen_by(self, operation: Operation) -> Seen:
         """The sides for a profile of this operation."""
         depth = self._depth(operation)
         cut = self._taken(
-            each.kind == "profile" or (each.kind == "pocket" and self._depth(each) >= depth)
+            each.kind == "profile"
+            or (each.kind in ("pocket", "bore") and self._depth(each) >= depth)
             for each in self.operations
         )
         bounds = cut | self.uncut
@@ -171,7 +183,7 @@ class Sides:
 
     def _taken(self, chosen: Iterable[bool]) -> Bools:
         """(M,) the closed contours that any of these operations takes."""
-        return np.asarray(self.lines.closed & self.takes[list(chosen)].any(axis=0))
+        return np.asarray(self.lines.closed & self.cuts[list(chosen)].any(axis=0))
 
     def _depth(self, operation: Operation) -> float:
         return self.default_depth_mm if operation.depth_mm is None else operation.depth_mm
@@ -222,11 +234,7 @@ class Traits:
         """(M,) of which of the rows a word is true."""
         closed = self._lines.closed
         if word in ("circle", "not circle"):
-            from camtool.planning.drill import circle_of
-
-            found = np.zeros(len(rows), dtype=np.bool_)
-            for row in np.flatnonzero(rows & closed).tolist():
-                found[row] = circle_of(self._lines[row]) is not None
+            found = circles(self._lines, rows)
             return found if word == "circle" else ~found
         if word == "point":
             return np.zeros(len(rows), dtype=np.bool_)
@@ -238,6 +246,16 @@ class Traits:
     def _depth(self) -> Ints:
         """(M,) in how many closed edges each path lies."""
         return nesting(self._lines, self._edges & self._lines.closed).depth
+
+
+def circles(lines: Polylines, rows: Bools) -> Bools:
+    """(M,) which of the rows (M,) of some paths are full circles."""
+    from camtool.planning.drill import circle_of
+
+    found = np.zeros(len(rows), dtype=np.bool_)
+    for row in np.flatnonzero(rows & lines.closed).tolist():
+        found[row] = circle_of(lines[row]) is not None
+    return found
 
 
 def _within(sizes: Floats, limits: tuple[float, float]) -> Bools:

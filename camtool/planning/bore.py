@@ -1,0 +1,183 @@
+"""Boring: circles wider than the tool are cut by a helix, from the top to the bottom.
+
+    circles ──outermost, each once──▶ bores ──rings──▶ a helix each ──▶ a Fixed item per bore
+
+For a circle of radius R and a tool of radius r the tool centre runs on a circle of radius
+ρ = R − r − allowance. One helix clears the ring from ρ − r to ρ + r; where that leaves a core
+(ρ > r), which would come loose in a through cut, smaller rings are bored first, from the inside
+out, a step-over apart at most. A ring goes down evenly, no steeper than the angle of the entry and
+by no more than the step down in a turn, goes once round at the bottom, and leaves for the centre:
+
+          start ↓
+        ╭───────╮      n turns, then one at the full depth,
+        ╰─ ─ ─ ─╯      then to the centre and up
+        ╭─ ─ ─ ─╮
+        ╰───────╯
+        ╰──→·
+
+CCW the teeth of a spindle that turns CW go with the feed: inside a hole that is climb.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from camtool.arrays import Floats
+from camtool.errors import OptionError
+from camtool.findings import (
+    ENTRY_CHANGED_IN_POCKET,
+    NOT_BORED,
+    NOT_BORED_TOO_SMALL,
+    NOT_BORED_WITHIN,
+    NOTHING_DRAWN_TO_BORE,
+    Finding,
+)
+from camtool.planning.drill import HOLE_SIZE_MM, SAME_HOLE_MM, Hole, circles_of, named
+from camtool.planning.items import Chosen, CutRun, Fixed, Setting, Work
+from camtool.planning.job import Operation
+from camtool.planning.naming import at_place, key_of, operation_name, tool_name
+from camtool.planning.paths import QUARTER
+from camtool.planning.ramps import feeds_along
+
+CORE_SHARE = 0.9
+"""The innermost ring is no larger than this part of the tool's radius, so that no core stays."""
+
+MOST_TURNS = 200
+"""A helix of more turns than this is made steeper."""
+
+TURN_SLACK = 1e-9
+"""A turn may go deeper than its limit by this part of it, by rounding."""
+
+
+def bore(chosen: Chosen, setting: Setting) -> Work:
+    """One Fixed item for each circle that is wider than the tool.
+
+    Circles within another one are bored with it. What is no circle, or has no room for the tool,
+    is named in a finding. OptionError for a tool that cuts no width.
+    """
+    operation = setting.operation
+    if operation.tool.radius_mm == 0.0 and len(chosen.lines):
+        raise OptionError(
+            "a bore needs a tool that cuts a width",
+            where=key_of(operation, "tool"),
+            mend="give the tool a diameter",
+        )
+    circles, others = circles_of(chosen)
+    least = operation.tool.diameter_mm + 2.0 * operation.allowance_mm + HOLE_SIZE_MM
+    wide = [hole for hole in circles if _diameter(hole) > least]
+    small = [hole for hole in circles if _diameter(hole) <= least]
+    holes = _outermost(wide)
+    findings = [*_no_circles(others), *_too_small(small, operation), *_inner(wide, holes)]
+    if not holes:
+        findings.append(NOTHING_DRAWN_TO_BORE(where=operation_name(operation)))
+    items = []
+    for hole in holes:
+        runs, changed = _runs(hole, setting)
+        items.append(Fixed(runs, setting, hole.name, hole.source, hole.outline))
+        findings += changed
+    return Work(tuple(items), tuple(findings))
+
+
+def radii(wide_mm: float, tool_mm: float, step_mm: float) -> list[float]:
+    """The radii of the rings of the tool's centre, mm, from the inside out, the last the largest
+    one; the first leaves no core, and neighbours are no farther apart than a step.
+
+    >>> radii(1.0, 1.5, 1.2)
+    [1.0]
+    >>> radii(4.5, 1.5, 1.2)
+    [1.35, 2.4, 3.45, 4.5]
+    """
+    first = min(wide_mm, CORE_SHARE * tool_mm)
+    count = math.ceil((wide_mm - first) / step_mm * (1.0 - TURN_SLACK))
+    steps = (wide_mm - first) / max(count, 1)
+    return [*(first + k * steps for k in range(count)), wide_mm]
+
+
+def _runs(hole: Hole, setting: Setting) -> tuple[tuple[CutRun, ...], list[Finding]]:
+    """The runs of a bore, one for each ring; and what of them is steeper than it should be."""
+    operation = setting.operation
+    wide = 0.5 * _diameter(hole) - operation.tool.radius_mm - operation.allowance_mm
+    step = operation.step_over * operation.tool.diameter_mm
+    depth = -setting.levels_mm[-1]
+    runs, found = [], list[Finding]()
+    for radius in radii(wide, operation.tool.radius_mm, step):
+        wanted = _turns(radius, depth, operation)
+        turns = min(wanted, MOST_TURNS)
+        if wanted > turns and not found:
+            angle = math.degrees(math.atan2(depth / turns, 2.0 * math.pi * radius))
+            found.append(
+                ENTRY_CHANGED_IN_POCKET(
+                    where=at_place(hole.name, hole.at_mm), change=f"a helix of {angle:.3g}°"
+                )
+            )
+        vertices = helix(hole.at_mm, radius, depth, turns)
+        if operation.direction == "conventional":  # mirrored
+            vertices[:, 1] = 2.0 * hole.at_mm[1] - vertices[:, 1]
+            vertices[:, 3] *= -1.0
+        feeds = setting.feeds
+        along = feeds_along(vertices, feeds)
+        runs.append(CutRun(vertices, along, feeds.plunge_mm_min, hole.name))
+    return tuple(runs), found
+
+
+def _turns(radius_mm: float, depth_mm: float, operation: Operation) -> int:
+    """How many turns it takes down, none of which is too steep or too deep."""
+    pitch = 2.0 * math.pi * radius_mm * math.tan(operation.entry.angle_rad)
+    if operation.step_down_mm is not None:
+        pitch = min(pitch, operation.step_down_mm)
+    return max(1, math.ceil(depth_mm / pitch * (1.0 - TURN_SLACK)))
+
+
+def helix(centre: tuple[float, float], radius_mm: float, depth_mm: float, turns: int) -> Floats:
+    """(4 turns + 6, 4) x, y, z, bulge: CCW about a centre from the stock top to the depth in so
+    many turns, once round there, and to the centre."""
+    count = 4 * turns + 4
+    quarter = np.arange(count + 1)
+    x = centre[0] + radius_mm * np.array([1.0, 0.0, -1.0, 0.0])[quarter % 4]
+    y = centre[1] + radius_mm * np.array([0.0, 1.0, 0.0, -1.0])[quarter % 4]
+    z = -depth_mm * np.minimum(quarter / (4.0 * turns), 1.0)
+    bulge = np.where(quarter < count, QUARTER, 0.0)
+    return np.concatenate([np.column_stack([x, y, z, bulge]), [[*centre, -depth_mm, 0.0]]])
+
+
+def _diameter(hole: Hole) -> float:
+    return hole.diameter_mm or 0.0
+
+
+def _outermost(circles: list[Hole]) -> list[Hole]:
+    """Those that lie in no other one, each once, in their order."""
+    if not circles:
+        return []
+    places = np.array([hole.at_mm for hole in circles])
+    radius = 0.5 * np.array([_diameter(hole) for hole in circles])
+    kept: list[int] = []
+    for k in np.argsort(-radius, kind="stable").tolist():
+        away = np.hypot(*(places[kept] - places[k]).T)
+        if not (away + radius[k] <= radius[kept] + SAME_HOLE_MM).any():
+            kept.append(k)
+    return [circles[k] for k in sorted(kept)]
+
+
+def _inner(circles: list[Hole], bored: list[Hole]) -> Iterator[Finding]:
+    names = [hole.name for hole in circles if hole not in bored]
+    if names:
+        yield NOT_BORED_WITHIN(where=named(names), measured=len(names))
+
+
+def _too_small(holes: list[Hole], operation: Operation) -> Iterator[Finding]:
+    if holes:
+        yield NOT_BORED_TOO_SMALL(
+            where=named([hole.name for hole in holes]),
+            measured=min(map(_diameter, holes)),
+            limit=operation.tool.diameter_mm + 2.0 * operation.allowance_mm,
+            count=len(holes),
+            tool=tool_name(operation.tool),
+        )
+
+
+def _no_circles(names: list[str]) -> Iterator[Finding]:
+    if names:
+        yield NOT_BORED(where=named(names), measured=len(names))
