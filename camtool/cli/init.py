@@ -81,8 +81,9 @@ def spindle_setting(text: str) -> Setting:
     return Setting("spindle.default_rpm", _number(text), said, where)
 
 
-def proposals(target: str) -> list[Setting]:
-    """What camtool proposes for machines that mill: their target says nothing of it."""
+def proposals(target: str, *, switches: bool) -> list[Setting]:
+    """What camtool proposes for machines that mill, and their target does not say; `switches`: the
+    program switches the spindle."""
     from camtool.target.contract import Setting
     from camtool.target.registry import find_target
 
@@ -91,6 +92,7 @@ def proposals(target: str) -> list[Setting]:
     return [
         Setting("defaults.feed_z_mm", 2.0, "ours: rapids end here, above warped stock"),
         Setting("defaults.plunge_share", 0.3, "ours: end mills plunge slower than they cut"),
+        *([Setting("spindle.spin_up_s", 2.0, "ours: until it has its speed")] if switches else []),
     ]
 
 
@@ -173,7 +175,9 @@ def init(
         spindle = questions.ask("Speed of the spindle, rev/min; hand; none; Enter: not known")
     if spindle is not None:
         given |= {each.key: each for each in (spindle_setting(spindle),)}
-    given = {each.key: each for each in proposals(target)} | given
+    switched = given.get("spindle.switched")
+    proposed = proposals(target, switches=switched is None or switched.value == "program")
+    given = {each.key: each for each in proposed} | given
     text = machine_text(name, target, list(given.values()), settings or "")
     place = _place(name, output, project=project)
     files, names = {str(place): text.encode()}, Path() if project else user_folder()

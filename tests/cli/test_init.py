@@ -63,7 +63,7 @@ def test_from_a_listing_to_a_program_with_three_commands(
     assert done.returncode == 0, done.stderr
     assert b"camtool post drawing.dxf\n" in done.stderr
     whole = tomllib.loads((config / "machines" / "my-3018.toml").read_text())
-    assert whole["spindle"] == {"max_rpm": 12000, "min_rpm": 0}
+    assert whole["spindle"] == {"max_rpm": 12000, "min_rpm": 0, "spin_up_s": 2.0}
     assert whole["defaults"] == {"feed_z_mm": 2.0, "plunge_share": 0.3}
     file = config / "machines" / "my-3018.toml"
     assert said(file) == {
@@ -242,7 +242,7 @@ ANSWERS = "my-mill\ngrbl\n\n80\n300x180x45\nfast\n1000\n\n0.02x0.03x0\n9000\n"
 @pytest.mark.parametrize(
     ("text", "values"),
     [
-        ("9000", {"default_rpm": 9000.0}),
+        ("9000", {"default_rpm": 9000.0, "spin_up_s": 2.0}),
         ("hand", {"switched": "hand"}),
         ("none", {"switched": "none"}),
     ],
