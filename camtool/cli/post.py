@@ -208,8 +208,8 @@ def post(
 
 # How `post` and `convert` end: all files or none, and a short summary.
 
-ANY_MACHINE = "travel, rates and backlash are placeholders: camtool init makes your machine's file"
-"""The note where the machine's own numbers are not known."""
+MOST_PLACEHOLDERS = 2
+"""Of a machine file that leaves out no more than these, its own file is to be completed."""
 
 
 @dataclass(frozen=True)
@@ -259,12 +259,23 @@ def finish(run: Run, asked: Asked, *, picture: Painter, quiet: bool, verbose: bo
     write_all({output: run.program.data, **outputs.files(run, picture)})
     if run.report is not None and not quiet:
         summary = run.report.to_text(findings=False)
-        if run.target.any_machine:
-            summary += f"\n{'machine':<10} {ANY_MACHINE}"
+        if run.target.placeholders:
+            summary += f"\n{'machine':<10} {_placeholder_words(run.target.placeholders)}"
         show_facts(summary, REPORT_NAMES, report_marks(run.findings), err=True)
     where = "stdout" if output == STDOUT else output
     say(f"written: {where} ({len(run.program.data)} bytes)", quiet=quiet)
     return 0
+
+
+def _placeholder_words(names: Sequence[str]) -> str:
+    """The note where numbers of the machine are not known."""
+    *most, last = names
+    said = f"{', '.join(most)} and {last} are placeholders" if most else f"{last} is a placeholder"
+    if names == ("backlash",):
+        return f"{said}: camtool coupon lines, then camtool calibrate, give yours"
+    if len(names) <= MOST_PLACEHOLDERS:
+        return f"{said}: give them in your machine's file"
+    return f"{said}: camtool init makes your machine's file"
 
 
 def _page_alone(run: Run, outputs: Outputs, picture: Painter) -> dict[str, bytes]:

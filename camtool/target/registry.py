@@ -43,14 +43,14 @@ NOT_SAID = "not said"
 @dataclass(frozen=True)
 class LoadedTarget:
     """A machine and its target. `file` is the target's own machine file, `table` its values with
-    those of the user. `any_machine`: the numbers are examples of no particular machine, and the
-    user has given no others."""
+    those of the user. `placeholders`: which numbers are examples of no particular machine, since
+    the user has given no others."""
 
     machine: Machine
     target: Target
     file: Path
     table: Table
-    any_machine: bool = False
+    placeholders: tuple[str, ...] = ()
 
     @property
     def model(self) -> ControllerModel[Any, Any]:
@@ -162,8 +162,28 @@ def loaded_target(
     target, file = find_target(name)
     table, last = resolved_table(target, read_table(file), str(file), user, settings)
     machine = machine_of(target, table, last)
-    said = user is not None or any(each.startswith("axes.") for each in settings)
-    return LoadedTarget(machine, target, file, table, target.any_machine and not said)
+    own = {} if user is None else user[0]
+    unsaid = tuple(_placeholders(own, settings)) if target.any_machine else ()
+    return LoadedTarget(machine, target, file, table, unsaid)
+
+
+NUMBERS = {
+    "travel": "travel_mm",
+    "rates": "max_rate_mm_min",
+    "accelerations": "acceleration_mm_s2",
+    "backlash": "backlash_mm",
+}
+"""The keys of axes that are of one machine and no other, by what they are called."""
+
+
+def _placeholders(own: Table, settings: Sequence[str]) -> Iterator[str]:
+    """What a user has not said of all axes, neither in the machine's file nor by `--set`."""
+    axes = own.get("axes", {})
+    given = {f"axes.{axis}.{key}" for axis, keys in axes.items() for key in keys}
+    given |= {each.partition("=")[0].strip() for each in settings}
+    for name, key in NUMBERS.items():
+        if not all(f"axes.{axis}.{key}" in given for axis in "xyz"):
+            yield name
 
 
 def list_target(name: str) -> ListedTarget:

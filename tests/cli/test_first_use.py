@@ -52,11 +52,20 @@ def test_numbers_of_no_machine_are_called_placeholders(
 ) -> None:
     drawing = _drawn(tmp_path / "a.csv", 30, 20)
     post = ("post", drawing, "-t", target, "-o", "a.nc")
-    assert b"machine    travel, rates and backlash are placeholders" in camtool(*post).stderr
+    every = b"machine    travel, rates, accelerations and backlash are placeholders: camtool init"
+    assert every in camtool(*post).stderr
     done = camtool(*post, "--set", "axes.x.backlash_mm=0.1")
-    assert b"placeholders" not in done.stderr
-    (tmp_path / "mine.toml").write_text(f'extends = "{target}"\n')
-    assert b"placeholders" not in camtool(*post, "--machine", "mine.toml").stderr
+    assert every in done.stderr
+    axes = "".join(f"[axes.{axis}]\ntravel_mm = 300\nmax_rate_mm_min = 1000\n" for axis in "xyz")
+    (tmp_path / "mine.toml").write_text(f'extends = "{target}"\n{axes}')
+    some = b"accelerations and backlash are placeholders: give them in your machine's file"
+    assert some in camtool(*post, "--machine", "mine.toml").stderr
+    fast = [f"--set=axes.{axis}.acceleration_mm_s2=30" for axis in "xyz"]
+    one = b"backlash is a placeholder: camtool coupon lines"
+    assert one in camtool(*post, "--machine", "mine.toml", *fast).stderr
+    tight = [f"--set=axes.{axis}.backlash_mm=0.01" for axis in "xyz"]
+    done = camtool(*post, "--machine", "mine.toml", *fast, *tight)
+    assert b"placeholder" not in done.stderr
     assert (
         b"placeholders" not in camtool("post", drawing, "-t", "pic-mmh", "--fit", "3x2mm").stderr
     )
