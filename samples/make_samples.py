@@ -1,5 +1,5 @@
-"""Writes the sample drawings of camtool: logo.dxf, logo.svg, star.csv, coupon.dxf and
-plate.dxf.
+"""Writes the sample drawings of camtool: logo.dxf, logo.svg, star.csv, coupon.dxf, plate.dxf,
+mount.dxf, mount.svg, sign.svg and board.dxf.
 
     python samples/make_samples.py [FOLDER]
 
@@ -198,6 +198,55 @@ def plate() -> Sheet:
     return Sheet("front plate", (80.0, 50.0), layers, {})
 
 
+def moved(shape: Polyline, x: float, y: float) -> Polyline:
+    """The shape somewhere else."""
+    vertices = [(a + x, b + y, bulge) for a, b, bulge in shape.vertices]
+    return Polyline(vertices, shape.closed)
+
+
+def mount() -> Sheet:
+    """A mounting plate, 80 by 50 mm, all of it on one layer: outline, window, slot, four holes."""
+    outlines = [
+        rounded(0.0, 0.0, 80.0, 50.0, 5.0),
+        rounded(14.0, 15.0, 38.0, 35.0, 2.0),
+        Polyline([(50.0, 22.0, 0.0), (66.0, 22.0, 1.0), (66.0, 28.0, 0.0), (50.0, 28.0, 1.0)]),
+        *(Circle((x, y), 2.5) for x, y in ((7, 7), (73, 7), (73, 43), (7, 43))),
+    ]
+    return Sheet("mounting plate", (80.0, 50.0), [Layer("0", 7, "#000000", outlines)], {})
+
+
+def letter_a() -> list[Polyline]:
+    """An A, 14 mm high and 12 mm wide."""
+    legs = [(0.0, 0.0), (3.2, 0.0), (4.1, 3.0), (7.9, 3.0), (8.8, 0.0), (12.0, 0.0)]
+    return [straight([*legs, (7.7, 14.0), (4.3, 14.0)]), straight([(5, 6), (7, 6), (6, 9.5)])]
+
+
+def letter_d() -> list[Polyline]:
+    """A D, 14 mm high and 12 mm wide."""
+    outer = [(0.0, 0.0, 0.0), (5.0, 0.0, 1.0), (5.0, 14.0, 0.0), (0.0, 14.0, 0.0)]
+    inner = [(3.0, 3.0, 0.0), (5.0, 3.0, 1.0), (5.0, 11.0, 0.0), (3.0, 11.0, 0.0)]
+    return [Polyline(outer), Polyline(inner)]
+
+
+def sign() -> Sheet:
+    """A name plate, 60 by 24 mm: an outline, and letters as outlines."""
+    letters = [(letter_a(), 9.0), (letter_d(), 24.0), (letter_a(), 39.0)]
+    name = [moved(path, x, 5.0) for paths, x in letters for path in paths]
+    edge = rounded(0.0, 0.0, 60.0, 24.0, 3.0)
+    layers = [Layer("NAME", 7, "#000000", name), Layer("EDGE", 5, "#0000ff", [edge])]
+    return Sheet("name plate", (60.0, 24.0), layers, {})
+
+
+def board() -> Sheet:
+    """A circuit board, 40 by 30 mm, as layout programs export it: an outline and holes of 0.8 and
+    3.2 mm on one layer."""
+    pins = [Circle((11.11 + 2.54 * k, y), 0.4) for y in (10.0, 17.62) for k in range(8)]
+    screws = [Circle((x, y), 1.6) for x, y in ((4, 4), (36, 4), (36, 26), (4, 26))]
+    edge = rounded(0.0, 0.0, 40.0, 30.0, 2.0)
+    layers = [Layer("Edge_Cuts", 2, "#ffff00", [edge, *pins, *screws])]
+    return Sheet("circuit board", (40.0, 30.0), layers, {})
+
+
 def star() -> str:
     """The star as CSV."""
     rows = [
@@ -218,6 +267,10 @@ def main(folder: Path) -> None:
         "star.csv": star(),
         "coupon.dxf": dxf(coupon()),
         "plate.dxf": dxf(plate()),
+        "mount.dxf": dxf(mount()),
+        "mount.svg": svg(mount()),
+        "sign.svg": svg(sign()),
+        "board.dxf": dxf(board()),
     }
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="ascii", newline="\n")

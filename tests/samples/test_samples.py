@@ -17,7 +17,17 @@ from camtool.geometry.polylines import Polyline, Segments
 from camtool.importers.read import read_drawing
 
 SAMPLES = Path(__file__).parents[2] / "samples"
-NAMES = ("logo.dxf", "logo.svg", "star.csv", "coupon.dxf", "plate.dxf")
+NAMES = (
+    "logo.dxf",
+    "logo.svg",
+    "star.csv",
+    "coupon.dxf",
+    "plate.dxf",
+    "mount.dxf",
+    "mount.svg",
+    "sign.svg",
+    "board.dxf",
+)
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +52,7 @@ def test_the_script_writes_these_files_and_no_others(made: Path):
     assert sorted(path.name for path in made.iterdir()) == sorted(NAMES)
 
 
-@pytest.mark.parametrize("name", ["logo.dxf", "coupon.dxf", "plate.dxf"])
+@pytest.mark.parametrize("name", ["logo.dxf", "coupon.dxf", "plate.dxf", "mount.dxf", "board.dxf"])
 def test_ezdxf_finds_nothing_to_repair(name: str):
     import ezdxf
     from ezdxf import recover
