@@ -33,10 +33,11 @@ Table = dict[str, Any]
 _T = TypeVar("_T")
 
 
-def read_table(path: Path) -> Table:
-    """A TOML file as nested dicts; MachineError with line and column for a syntax error."""
+def read_table(path: Path, data: bytes | None = None) -> Table:
+    """A TOML file as nested dicts; MachineError with line and column for a syntax error. `data`:
+    what is in it, where it has been read already."""
     try:
-        data = path.read_bytes()
+        data = path.read_bytes() if data is None else data
     except (OSError, ValueError) as error:  # ValueError: a name with a null character
         reason = getattr(error, "strerror", None) or error
         raise MachineError(

@@ -17,13 +17,14 @@ import functools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, fields, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import click
 
 from camtool.cli.life_signs import progress
-from camtool.errors import OptionError
+from camtool.errors import MachineError, OptionError
 from camtool.importers.options import FORMATS, TEXTS
 from camtool.jobs.keys import FLAGS, Key, flag_name
 from camtool.units import parse_feed, parse_length, parse_time
@@ -434,7 +435,9 @@ class JobFlags:
         """
         from camtool.jobs.build import JobTables, build_job, read_job_file, tables_of_flags
 
-        file = JobTables() if self.file is None else read_job_file(Path(self.file))
+        file = JobTables()
+        if self.file is not None:
+            file = read_job_file(Path(self.file), self._piped)
         job = build_job(file, tables_of_flags(self.given), self.operations, self._shop())
         if drawing.layer and len(job.operations) == 1:
             return replace(job, operations=(replace(job.operations[0], layers=drawing.layer),))
@@ -465,13 +468,20 @@ class JobFlags:
         job file cannot be read: `job` says why."""
         if self.file is None or key in self.given:
             return self.given.get(key)
-        from camtool.tables import parsed_table
+        from camtool.tables import read_table
 
         try:
-            name = parsed_table(Path(self.file).read_text(encoding="utf-8")).get(key)
-        except (OSError, ValueError):
+            name = read_table(Path(self.file), self._piped).get(key)
+        except MachineError:
             return None
         return str(Path(self.file).parent / name) if isinstance(name, str) else None
+
+    @cached_property
+    def _piped(self) -> bytes | None:
+        """What is in a job file that can be read only once, such as `<(...)`; None for others."""
+        file = Path(str(self.file))
+        whole = not file.exists() or file.is_file() or file.is_dir()
+        return None if whole else file.read_bytes()
 
     @contextmanager
     def blamed(self) -> Iterator[None]:

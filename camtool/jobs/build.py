@@ -75,10 +75,11 @@ class JobTables:
     folder: Path = Path()
 
 
-def read_job_file(path: Path) -> JobTables:
-    """The tables of a job file; OptionError names file, table and key, and says how to fix it."""
+def read_job_file(path: Path, data: bytes | None = None) -> JobTables:
+    """The tables of a job file; OptionError names file, table and key, and says how to fix it.
+    `data`: what is in it, where it has been read already."""
     try:
-        values = read_table(path)
+        values = read_table(path, data)
     except MachineError as error:
         raise OptionError(error.message, file=error.file, mend=error.mend) from error
     return tables_of(values, path)

@@ -1,9 +1,11 @@
 """Job files and flags together: which value counts, and what the job is in the end."""
 
 import math
+import os
 import re
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
@@ -423,3 +425,21 @@ def test_a_breakthrough_is_a_depth(
     made = job(tmp_path, f"{text}\n[stock]\nthickness = 3\n", **flags)
     assert _each(made, "depth_mm") == pytest.approx(deep)
     assert _each(made, "breakthrough_mm") == [None] * len(deep)
+
+
+def test_a_job_from_a_pipe_is_read_whole(
+    camtool_process: Run, tmp_path: Path, samples: Path
+) -> None:
+    # It can be read only once, and is needed twice: for the files that it names, and itself.
+    (tmp_path / "job.toml").write_text('kind = "engrave"\nlayers = ["CUT"]\n', encoding="utf-8")
+    logo = str(samples / "logo.dxf")
+    args = (logo, "-t", "pic-mmh", "--no-verify", "-q")
+    assert camtool_process("post", *args, "--job", "job.toml", "-o", "a.pic").returncode == 0
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    text = (tmp_path / "job.toml").read_bytes()
+    writer = threading.Thread(target=pipe.write_bytes, args=(text,), daemon=True)
+    writer.start()
+    done = camtool_process("post", *args, "--job", "pipe", "-o", "b.pic")
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "a.pic").read_bytes() == (tmp_path / "b.pic").read_bytes()
