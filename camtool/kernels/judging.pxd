@@ -153,13 +153,19 @@ cdef bint _compared(
 ) noexcept
 
 @cython.locals(
-    height=Int, low=Int, high=Int, middle=Int, k=Int, far=double, curves=Curves,
+    begin=Int, end=Int, height=Int, low=Int, high=Int, middle=Int, k=Int, far=double, curves=Curves,
     parts=Int[::1], by=Int[::1], mine=Int[::1], here_x=double[::1], here_y=double[::1], here=double[::1]
 )
 cpdef bint nearest_errors(
     double[::1] x, double[::1] y, Int own, Int first, Int last, double z_low, double z_high,
     Search search, double[::1] out
 ) noexcept
+
+@cython.locals(k=Int)
+cdef Int _first_off(double[::1] errors, Int low) noexcept
+
+@cython.locals(end=Int, k=Int)
+cdef Int _end_of_off(double[::1] errors, Int low) noexcept
 
 @cython.locals(which=Int)
 cdef Int _bin_of(double x, double y, double[:, ::1] directions) noexcept

@@ -313,10 +313,11 @@ def first_of(values: Floats, low: int, value: float) -> int:
 
 # The nearest of many moves for points that follow each other, as the samples of a row do.
 #
-# All points are compared with one move first, their own, from which the row was written. With D
-# the largest error by that, no other move counts that is nowhere within D of the points: those
-# that come so near to the box about the points, which lies along their way, are listed from a tree
-# of the moves' boxes, and all points are compared with them.
+# All points are compared with one move first, their own, from which the row was written. Those on
+# it are done: none is nearer. With D the largest error of some others in a row, no other move
+# counts that is nowhere within D of these points: those that come so near to the box about the
+# points, which lies along their way, are listed from a tree of the moves' boxes, and all these
+# points are compared with them.
 #
 # A long list for many points is not looked at: the move nearest to the middle one lowers the
 # errors, and each half of the points gets a list of its own. For one point, the move nearest to it
@@ -337,7 +338,11 @@ ENOUGH = 1024
 """A longer list is looked at where that takes at most so many distances."""
 
 TIE_MM = 1e-9
-"""Moves whose distances differ by no more than this are equally near."""
+"""Moves whose distances differ by no more than this are equally near; points no farther than this
+from their own move lie on it."""
+
+ON_OWN = 4
+"""So many points in a row on their own move divide those before them from those behind them."""
 
 SLACK = 1e-12
 """Limits are taken this part wider, plus `SLACK_MM`: rounding must not lose a move."""
@@ -646,23 +651,49 @@ def nearest_errors(
     by = search.by
     for k in range(len(x)):
         by[k] = own
-    height, parts[0], parts[1] = 2, 0, len(x)
-    while height > 0:
-        height -= 2
-        low, high = parts[height], parts[height + 1]
-        here_x, here_y, here, mine = x[low:high], y[low:high], out[low:high], by[low:high]
-        if _compared(here_x, here_y, own, first, last, z_low, z_high, search, here, mine):
-            continue
-        middle = (low + high) // 2
-        within = abs(out[middle])
-        k = _nearest(x[middle], y[middle], within, first, last, z_low, z_high, search)
-        if k >= 0:
-            _lowered(here_x, here_y, k, search, here, mine)
-        if high - low > 1:
-            parts[height], parts[height + 1] = middle, high
-            parts[height + 2], parts[height + 3] = low, middle
-            height += 4
+    begin = _first_off(out, 0)
+    while begin < len(x):
+        end = _end_of_off(out, begin)
+        height, parts[0], parts[1] = 2, begin, end
+        while height > 0:
+            height -= 2
+            low, high = parts[height], parts[height + 1]
+            here_x, here_y, here, mine = x[low:high], y[low:high], out[low:high], by[low:high]
+            if _compared(here_x, here_y, own, first, last, z_low, z_high, search, here, mine):
+                continue
+            middle = (low + high) // 2
+            within = abs(out[middle])
+            k = _nearest(x[middle], y[middle], within, first, last, z_low, z_high, search)
+            if k >= 0:
+                _lowered(here_x, here_y, k, search, here, mine)
+            if high - low > 1:
+                parts[height], parts[height + 1] = middle, high
+                parts[height + 2], parts[height + 3] = low, middle
+                height += 4
+        begin = _first_off(out, end)
     return True
+
+
+def _first_off(errors: Floats, low: int) -> int:
+    """The first point from `low` on that does not lie on its own move, or the end of all."""
+    k = low
+    while k < len(errors) and abs(errors[k]) <= TIE_MM:
+        k += 1
+    return k
+
+
+def _end_of_off(errors: Floats, low: int) -> int:
+    """Where from `low` on, which is off its own move, `ON_OWN` points begin that lie on it, or the
+    end of all."""
+    end = low + 1
+    while end + ON_OWN <= len(errors):
+        k = end + ON_OWN - 1
+        while k >= end and abs(errors[k]) <= TIE_MM:
+            k -= 1
+        if k < end:
+            return end
+        end = k + 1
+    return len(errors)
 
 
 # The points about a circle in bins of their angle, without an angle per point.
