@@ -132,38 +132,33 @@ def post_drawing(
     whole = judged
     if _plain(job) != job and compensation is None:
         whole = planned(drawing, job, target.machine, undivided=True)
-    verification = _judged(
-        program.data,
-        decoded,
-        target,
-        _Goal(
-            whole.toolpath,
-            judged.placed,
-            compensation,
-            written_from=written,
-            row_from=_row_from(program, decoded),
-        ),
-        VerifyOptions(
-            source=drawing.file,
-            tool_diameter_mm=tool_mm(job),
-            nose=nose_of(job),
-            kept=kept_of(whole.steps),
-            trace_points=TRACE_POINTS if trace_points is None else trace_points,
-        ),
-        progress,
+    tool, nose = tool_mm(job), nose_of(job)
+    options = VerifyOptions(
+        source=drawing.file,
+        tool_diameter_mm=tool,
+        nose=nose,
+        kept=kept_of(whole.steps) if tool or nose else (),
+        trace_points=TRACE_POINTS if trace_points is None else trace_points,
     )
+    goal = _Goal(
+        whole.toolpath,
+        judged.placed,
+        compensation,
+        written_from=written,
+        row_from=_row_from(program, decoded),
+    )
+    figures = Planned(
+        rapid_drawn_mm=certain(sum(step.rapid_drawn_mm for step in judged.steps)),
+        rapid_mm=certain(sum(step.rapid_mm for step in judged.steps)),
+        operations=_operations(judged.steps),
+        tools=_tools(judged.steps),
+        stock=_stock(job),
+    )
+    del judged, whole  # the paths of the stages are not needed any more
+    verification = _judged(program.data, decoded, target, goal, options, progress)
     beyond = _beyond(verification, gates)
     findings = _merged(findings, verification.findings, beyond, without=repeated)
-    verification = verification.with_planning(
-        Planned(
-            rapid_drawn_mm=certain(sum(step.rapid_drawn_mm for step in judged.steps)),
-            rapid_mm=certain(sum(step.rapid_mm for step in judged.steps)),
-            operations=_operations(judged.steps),
-            tools=_tools(judged.steps),
-            stock=_stock(job),
-        ),
-        _before(plain),
-    )
+    verification = verification.with_planning(figures, _before(plain))
     return replace(
         run,
         program=program,

@@ -9,7 +9,6 @@ is found. The tolerance of heights allows for slopes that a machine makes in sma
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
@@ -39,12 +38,11 @@ from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.rapids import STOCK_TOP_MM
 from camtool.verification.cuts import (
     NO_LOOP,
-    NO_SAMPLES,
     CutMoves,
     Samples,
     cutting_rows,
     loops,
-    moved_lengths,
+    moves_across,
     sample_cuts,
     samples_by_parts,
 )
@@ -56,6 +54,8 @@ from camtool.verification.matching import (
     match_contours,
     match_rows,
     nearest_at_height,
+    no_match,
+    with_neighbours,
 )
 from camtool.verification.nearest import ANY_CONTOUR, Found, MoveIndex
 
@@ -116,35 +116,37 @@ def cover(
     """
     cuts, wanted, limits = decoded.cuts, goal.moves, (goal.limit_mm, goal.depth_mm)
     own, became = _contours_from(cuts, wanted.cuts, row_from)
-    samples = sample_cuts(cuts, spacing_mm)
-    found, belongs = _own_found(cuts, samples, own, goal)
-    other = np.flatnonzero(belongs == ANY_CONTOUR)
-    some, wrong = nearest_at_height(samples.of(other), None, wanted, limits)
-    wrong_depth = np.zeros(len(found.distance), dtype=np.bool_)
-    found.distance[other], found.segment[other], wrong_depth[other] = (
-        some.distance,
-        some.segment,
-        wrong,
-    )
-    extra = _uncovered(_Sampled(cuts, samples, found, wrong_depth, drilled.decoded), goal, _EXTRA)
-    belongs[other] = match_contours(cuts, samples.of(other), some, goal)
-    found.distance[other], found.segment[other] = some.distance, some.segment
-    rounding = Figure()
-    real = np.isfinite(found.distance)
-    rows = cuts.segments.path[samples.segment]
-    rounding.add(found.distance[real], samples.points[real], rows[real])
+    match, rounding, extra = no_match(len(cuts.contour)), Figure(), list[_Uncovered]()
+    for samples in samples_by_parts(
+        cuts, spacing_mm, cuts.is_cut, SAMPLES_AT_ONCE, whole=cuts.contour
+    ):
+        found, belongs = _own_found(cuts, samples, own, goal)
+        other = np.flatnonzero(belongs == ANY_CONTOUR)
+        some, wrong = nearest_at_height(samples.of(other), None, wanted, limits)
+        wrong_depth = np.zeros(len(found.distance), dtype=np.bool_)
+        wrong_depth[other] = wrong
+        found.distance[other], found.segment[other] = some.distance, some.segment
+        extra += _uncovered(_Sampled(cuts, samples, found, wrong_depth, drilled.decoded), goal)
+        belongs[other] = match_contours(cuts, samples.of(other), some, goal)
+        found.distance[other], found.segment[other] = some.distance, some.segment
+        real = np.isfinite(found.distance)
+        rows = cuts.segments.path[samples.segment]
+        rounding.add(found.distance[real], samples.points[real], rows[real])
+        match_rows(match, cuts, samples, belongs, found, goal)
     alike = _lines_alike(cuts, wanted.cuts, limits, row_from)
     became = np.where(alike, ANY_CONTOUR, became)
     cut = np.append(alike | _fits(wanted.cuts, became, decoded, limits, spacing_mm), True)
-    rest = next(
-        samples_by_parts(wanted.cuts, spacing_mm, ~cut[wanted.cuts.contour], sys.maxsize),
-        NO_SAMPLES,
+    missing = list[_Uncovered]()
+    for rest in samples_by_parts(
+        wanted.cuts, spacing_mm, ~cut[wanted.cuts.contour], SAMPLES_AT_ONCE, wanted.cuts.contour
+    ):
+        nearest, wrong = nearest_at_height(rest, None, decoded, limits)
+        missing += _uncovered(_Sampled(wanted.cuts, rest, nearest, wrong, drilled.wanted), goal)
+    findings = (
+        *_findings_of(missing, wanted.cuts, goal, _MISSING),
+        *_findings_of(extra, cuts, goal, _EXTRA),
     )
-    found_back, wrong_back = nearest_at_height(rest, None, decoded, limits)
-    back = _Sampled(wanted.cuts, rest, found_back, wrong_back, drilled.wanted)
-    missing = _uncovered(back, goal, _MISSING)
-    match = match_rows(cuts, samples, belongs, found, goal)
-    return Coverage(match, rounding, (*missing, *extra))
+    return Coverage(with_neighbours(match), rounding, findings)
 
 
 def _contours_from(cuts: CutMoves, wanted: CutMoves, row_from: Ints | None) -> tuple[Ints, Ints]:
@@ -155,11 +157,15 @@ def _contours_from(cuts: CutMoves, wanted: CutMoves, row_from: Ints | None) -> t
     if row_from is not None and len(theirs):
         rows = cuts.rows
         of = np.where(row_from[rows] >= 0, wanted.contour[row_from[rows]], ANY_CONTOUR)
-        pairs = np.unique(np.column_stack([cuts.contour[rows], of]), axis=0)
-        for here, there, found in ((0, 1, mine), (1, 0, theirs)):
-            known, first, count = np.unique(pairs[:, here], return_index=True, return_counts=True)
+        many = len(theirs) + 1  # contours follow one another: pairs as numbers are mostly in order
+        pair = cuts.contour[rows].astype(np.int64) * many + (of - ANY_CONTOUR)
+        changes = np.flatnonzero(np.diff(pair, prepend=-1))
+        here, there = np.divmod(np.unique(pair[changes]), many)
+        there += ANY_CONTOUR
+        for one, other, found in ((here, there, mine), (there, here, theirs)):
+            known, first, count = np.unique(one, return_index=True, return_counts=True)
             alone = (count == 1) & (known != ANY_CONTOUR)
-            found[known[alone]] = pairs[first[alone], there]
+            found[known[alone]] = other[first[alone]]
     return mine, theirs
 
 
@@ -174,31 +180,40 @@ def _own_found(cuts: CutMoves, samples: Samples, own: Ints, goal: Goal) -> tuple
     limits = max(goal.limit_mm, LEAST_MM), goal.depth_mm
     for low in range(0, len(some), SAMPLES_AT_ONCE):
         part = some[low : low + SAMPLES_AT_ONCE]
-        near = goal.moves.nearest(samples.points[part], samples.z[part], own[mine[part]], limits)
+        near = goal.moves.nearest(
+            samples.points.take(part, axis=0), samples.z[part], own[mine[part]], limits
+        )
         found.distance[part], found.segment[part] = near.distance, near.segment
         fit[mine[part[near.distance > goal.limit_mm]]] = False
     return found, np.where(fit[mine], own[mine], ANY_CONTOUR)
 
 
 def _lines_alike(cuts: CutMoves, wanted: CutMoves, limits: Limits, row_from: Ints | None) -> Bools:
-    """(C,) the wanted contours of lines alone, from each of which one line was written whose start
-    and end lie within the limits of its own: so does each point between them, for the distance of
-    two points that run along two lines at once is nowhere larger than at one of the ends."""
-    alike = np.full(wanted.contour_count, row_from is not None)
+    """(C,) the wanted contours of lines alone, from each of which one line was written that lies
+    within the limits of its own."""
     if row_from is None:
-        return alike
+        return np.zeros(wanted.contour_count, dtype=np.bool_)
+    alike = np.ones(wanted.contour_count, dtype=np.bool_)
+    there = np.zeros(len(wanted.contour), dtype=np.bool_)
+    there[row_from[_rows_alike(cuts, wanted, limits, row_from)]] = True
+    alike[wanted.contour[wanted.rows[~there[wanted.rows]]]] = False
+    return alike
+
+
+def _rows_alike(cuts: CutMoves, wanted: CutMoves, limits: Limits, row_from: Ints) -> Ints:
+    """The rows that cut along a line, and alone were written from a line whose start and end lie
+    within the limits of theirs: so does each point between them, for the distance of two points
+    that run along two lines at once is nowhere larger than at one of the ends."""
     limit_mm, depth_mm = limits
     rows, paths = cuts.rows[row_from[cuts.rows] >= 0], (cuts.toolpath, wanted.toolpath)
     came = row_from[rows]
     near = (paths[0].kind[rows] == Kind.LINE) & (paths[1].kind[came] == Kind.LINE)
     near &= np.bincount(came, minlength=len(paths[1]))[came] == 1
     mine, theirs = paths[0].starts_of(rows), paths[1].starts_of(came)
-    for off in (mine - theirs, paths[0].end[rows] - paths[1].end[came]):
+    ends = paths[0].end.take(rows, axis=0) - paths[1].end.take(came, axis=0)
+    for off in (mine - theirs, ends):
         near &= (np.hypot(off[:, 0], off[:, 1]) <= limit_mm) & (np.abs(off[:, 2]) <= depth_mm)
-    there = np.zeros(len(paths[1]), dtype=np.bool_)
-    there[came[near]] = True
-    alike[wanted.contour[wanted.rows[~there[wanted.rows]]]] = False
-    return alike
+    return np.asarray(rows[near])
 
 
 def _fits(
@@ -220,42 +235,63 @@ _MISSING = CONTOUR_MISSING, CONTOUR_MISSING_AT_DEPTH, CONTOUR_MISSING_NO_CUTS
 _EXTRA = EXTRA_CUT, EXTRA_CUT_AT_DEPTH, EXTRA_CUT_NONE_WANTED
 
 
-def _uncovered(
-    sampled: _Sampled, goal: Goal, sentences: tuple[Sentence, Sentence, Sentence]
-) -> Iterator[Finding]:
-    """A finding for each contour of which a part is not cut by the other side, at its sample with
-    the largest distance. Extra cuts are named by their block, missing ones by their contour."""
+@dataclass(frozen=True)
+class _Uncovered:
+    """The sample of a contour with the largest distance from the other side, mm, where that does
+    not cut a `share` of its samples."""
+
+    contour: int
+    row: int
+    at_mm: Floats
+    distance: float
+    wrong_depth: bool
+    share: float
+
+
+def _uncovered(sampled: _Sampled, goal: Goal) -> Iterator[_Uncovered]:
+    """The contours of which a part is not cut by the other side; all samples of each are there."""
     cuts, samples, distance = sampled.cuts, sampled.samples, sampled.found.distance
-    contours = list(_by_contour(cuts, samples, distance, sampled.bad(goal)))
-    for (contour, worst, share), more in listed(contours):
-        row = int(cuts.segments.path[samples.segment[worst]])
-        source = cuts.toolpath.text(row)
-        name = f"contour {contour + 1}" + (f" ({source})" if source else "")
-        place = block_name(cuts.toolpath, row) if sentences is _EXTRA else name
-        yield _away(distance[worst], bool(sampled.wrong_depth[worst]), sentences)(
-            where=f"{place} near {at_point(samples.points[worst])}",
-            measured=_finite(distance[worst]),
-            limit=goal.limit_mm,
-            share=share,
-            contour=name,
-            more=more,
+    bad = np.flatnonzero(sampled.bad(goal))
+    if len(bad) == 0:
+        return
+    rows = cuts.segments.path[samples.segment]
+    contour = cuts.contour[rows]
+    all_of = np.bincount(contour)
+    order = bad[np.lexsort((bad, -distance[bad], contour[bad]))]
+    first = np.flatnonzero(np.diff(contour[order], prepend=-1))
+    counts = np.diff(np.append(first, len(order)))
+    for worst, count in zip(order[first].tolist(), counts.tolist(), strict=True):
+        which = int(contour[worst])
+        yield _Uncovered(
+            which,
+            int(rows[worst]),
+            samples.points[worst],
+            float(distance[worst]),
+            bool(sampled.wrong_depth[worst]),
+            float(count / all_of[which]),
         )
 
 
-def _by_contour(
-    cuts: CutMoves, samples: Samples, distance: Floats, bad: Bools
-) -> Iterator[tuple[int, int, float]]:
-    """(contour, its sample with the largest distance, share of its samples that are bad) of each
-    contour with bad samples."""
-    contour = cuts.contour[cuts.segments.path[samples.segment]]
-    all_of = np.bincount(contour, minlength=cuts.contour_count)
-    rows = np.flatnonzero(bad)
-    order = rows[np.lexsort((rows, -distance[rows], contour[rows]))]
-    first = np.flatnonzero(np.diff(contour[order], prepend=-1))
-    counts = np.diff(np.append(first, len(order)))
-    for worst, count in zip(order[first], counts, strict=True):
-        which = int(contour[worst])
-        yield which, int(worst), float(count / all_of[which])
+def _findings_of(
+    contours: list[_Uncovered],
+    cuts: CutMoves,
+    goal: Goal,
+    sentences: tuple[Sentence, Sentence, Sentence],
+) -> Iterator[Finding]:
+    """A finding for each of these contours. Extra cuts are named by their block, missing ones by
+    their contour."""
+    for one, more in listed(contours):
+        source = cuts.toolpath.text(one.row)
+        name = f"contour {one.contour + 1}" + (f" ({source})" if source else "")
+        place = block_name(cuts.toolpath, one.row) if sentences is _EXTRA else name
+        yield _away(one.distance, one.wrong_depth, sentences)(
+            where=f"{place} near {at_point(one.at_mm)}",
+            measured=_finite(one.distance),
+            limit=goal.limit_mm,
+            share=one.share,
+            contour=name,
+            more=more,
+        )
 
 
 def _away(
@@ -294,9 +330,9 @@ class Holes:
 
 def holes_of(toolpath: Toolpath) -> Holes:
     """The holes that a toolpath drills, in order."""
-    flat = toolpath.is_motion & (moved_lengths(toolpath) > POSITION_EPS_MM)
-    flat |= toolpath.kind == Kind.HOME_XY
-    cutting = cutting_rows(toolpath, flat_cuts=False)
+    across = moves_across(toolpath)
+    flat = across | (toolpath.kind == Kind.HOME_XY)
+    cutting = cutting_rows(toolpath, flat_cuts=False, across=across)
     # Rows at one position lie between two moves in XY, neither of which may cut.
     stay = np.cumsum(flat)
     movers = np.flatnonzero(flat)
@@ -415,11 +451,17 @@ def cut_other_way(
     """CUT_OTHER_WAY for contours of a program that are cut in the direction opposite to that of
     the moves from which it was written, `source`; `row_from` as in `cover`.
 
-    A row whose middle lies on the contour that it came from, in the same direction, is not turned;
-    the others are compared with everything.
+    A line beside the one that it was written from, in the same direction, is not turned, nor is a
+    row whose middle lies on the contour that it came from, in the same direction; the others are
+    compared with everything.
     """
     cuts = decoded.cuts
     rows = cuts.rows
+    if row_from is not None:
+        alike = _rows_alike(cuts, source.cuts, limits, row_from)
+        rows = np.setdiff1d(rows, alike[_same_way(cuts, source.cuts, alike, row_from)])
+    if len(rows) == 0:
+        return
     here, half = cuts.first[rows].astype(np.int64), np.full(len(rows), 0.5)
     z = cuts.heights(here).mean(axis=1)
     middles = Samples(point_at(cuts.segments, here, half), here, z, half)
@@ -436,6 +478,17 @@ def cut_other_way(
         found = compared(cuts, suspect, source, limits, sample_mm)
         trips = round_trips(source.cuts, limits[0])[source.contour[found.move]]
         yield from other_way(found, turned(found, trips, limits))
+
+
+def _same_way(cuts: CutMoves, source: CutMoves, rows: Ints, row_from: Ints) -> Bools:
+    """(J,) whether these rows, which are lines, have the direction of those they came from."""
+    came = row_from[rows]
+    way, other = (
+        (path.end.take(of, axis=0) - path.starts_of(of))[:, :2]
+        for path, of in ((cuts.toolpath, rows), (source.toolpath, came))
+    )
+    lengths = np.hypot(*way.T) * np.hypot(*other.T)
+    return np.asarray((way * other).sum(axis=1) > ALONG * lengths)
 
 
 def _cosines(cuts: CutMoves, samples: Samples, others: MoveIndex, found: Found) -> Floats:

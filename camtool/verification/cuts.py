@@ -124,17 +124,20 @@ def is_flat(toolpath: Toolpath) -> bool:
     return bool(np.all(toolpath.end[:, 2] == toolpath.start[2]))
 
 
-def cutting_rows(toolpath: Toolpath, *, flat_cuts: bool) -> Bools:
-    """(N,) true for the rows that cut, by the rule of this module; false after the END."""
-    flat = flat_cuts and is_flat(toolpath)
-    cutting = toolpath.by_parts(lambda part: _cuts(part) & (flat | _is_low(part)))
+def cutting_rows(toolpath: Toolpath, *, flat_cuts: bool, across: Bools | None = None) -> Bools:
+    """(N,) true for the rows that cut, by the rule of this module; false after the END. `across`
+    (N,): the rows that move in XY, where these are known."""
+    across = moves_across(toolpath) if across is None else across
+    cutting = toolpath.is_feed & across
+    if not (flat_cuts and is_flat(toolpath)):
+        cutting &= toolpath.by_parts(_is_low)
     cutting[toolpath.running :] = False
     return cutting
 
 
-def _cuts(toolpath: Toolpath) -> Bools:
-    """(N,) true for feed moves in XY."""
-    return toolpath.is_feed & (_lengths(toolpath) > POSITION_EPS_MM)
+def moves_across(toolpath: Toolpath) -> Bools:
+    """(N,) true for the rows that move in XY."""
+    return toolpath.by_parts(lambda part: _lengths(part) > POSITION_EPS_MM)
 
 
 def _is_low(toolpath: Toolpath) -> Bools:
@@ -221,10 +224,6 @@ class Samples:
         return Samples(self.points[which], self.segment[which], self.z[which], self.share[which])
 
 
-NO_SAMPLES = Samples(np.empty((0, 2)), np.empty(0, np.int64), np.empty(0), np.empty(0))
-"""No points at all."""
-
-
 def sample_cuts(cuts: CutMoves, spacing_mm: float, only: Ints | None = None) -> Samples:
     """Points on the true lines and arcs, about `spacing_mm` apart; with `only`, on those segments
     alone. The spacing is wider where there would be more than `MOST_SAMPLES` points, but each
@@ -236,19 +235,24 @@ def sample_cuts(cuts: CutMoves, spacing_mm: float, only: Ints | None = None) -> 
 
 
 def samples_by_parts(
-    cuts: CutMoves, spacing_mm: float, rows: Bools, at_once: int = MOST_SAMPLES
+    cuts: CutMoves,
+    spacing_mm: float,
+    rows: Bools,
+    at_once: int = MOST_SAMPLES,
+    whole: Indices | None = None,
 ) -> Iterator[Samples]:
-    """The samples of `sample_cuts` on the rows (N,) that are true, in parts of whole rows with
-    about `at_once` samples each, so that memory does not grow with the program. The spacing is
-    that of all cuts."""
+    """The samples of `sample_cuts` on the rows (N,) that are true, in parts of whole rows, or of
+    rows (N,) with one number `whole`, with about `at_once` samples each, so that memory does not
+    grow with the program. The spacing is that of all cuts."""
     lengths = segment_lengths(cuts.segments)
     parts = _parts(lengths, max(spacing_mm, float(lengths.sum()) / MOST_SAMPLES))
     taken = np.flatnonzero(rows[cuts.segments.path])
     many = np.cumsum(parts[taken] + 1) // at_once
-    # A row ends where its last segment does.
-    path = cuts.segments.path[taken]
-    last_of_row = np.append(np.diff(path) != 0, True)[: len(path)]
-    part = many[np.flatnonzero(last_of_row)][np.cumsum(last_of_row) - last_of_row]
+    # What is whole ends where its last segment does.
+    row = cuts.segments.path[taken]
+    of = row if whole is None else whole[row].astype(np.int64)
+    last = np.append(np.diff(of) != 0, True)[: len(of)]
+    part = many[np.flatnonzero(last)][np.cumsum(last) - last]
     for which in np.split(taken, np.flatnonzero(np.diff(part)) + 1):
         if len(which):
             yield _samples(cuts, which, parts[which])

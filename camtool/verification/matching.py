@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -55,6 +56,11 @@ class Goal:
     limit_mm: float
     depth_mm: float
 
+    @cached_property
+    def circle_of_row(self) -> Indices:
+        """(W,) the circle of each wanted row, −1 for none."""
+        return _circle_of_row(self.circles, len(self.moves.cuts.contour))
+
 
 def own_match(cuts: CutMoves, circles: list[Circle]) -> Match:
     """The match of a program without wanted moves: each row belongs to itself."""
@@ -71,7 +77,7 @@ def carried_match(match: Match, of: Ints, goal: Goal) -> Match:
     known = match.row >= 0
     row = np.where(known, of[np.maximum(match.row, 0)], -1) if len(of) else match.row
     contour = np.where(known, goal.moves.cuts.contour[np.maximum(row, 0)], -1)
-    circle = _circle_of_row(goal.circles, len(goal.moves.cuts.contour))
+    circle = goal.circle_of_row
     off = np.where(known[:, None], _drawn_off_mm(goal)[np.maximum(row, 0)], 0.0)
     return replace(
         match,
@@ -155,41 +161,51 @@ def _candidates(mine: Indices, nearest: Ints) -> list[Ints]:
     return tries
 
 
-def match_rows(cuts: CutMoves, samples: Samples, belongs: Ints, found: Found, goal: Goal) -> Match:
-    """The match of each row of `cuts`, from all of its samples; `belongs` (S,) and `found` are the
-    result of `match_contours`."""
-    wanted, count = goal.moves, len(cuts.contour)
-    rows = cuts.segments.path[samples.segment]
-    match = Match(
+def no_match(count: int) -> Match:
+    """That of so many rows that cut nothing; `match_rows` fills it."""
+    return Match(
         row=np.full(count, -1, dtype=np.int32),
         contour=np.full(count, -1, dtype=np.int32),
         only=np.full(count, ANY_CONTOUR, dtype=np.int32),
         circle=np.full(count, -1, dtype=np.int32),
         off_mm=np.zeros((count, 2)),
     )
+
+
+def match_rows(
+    match: Match, cuts: CutMoves, samples: Samples, belongs: Ints, found: Found, goal: Goal
+) -> None:
+    """Fill in the match of each row of `cuts` that has samples, which are all of its own;
+    `belongs` (S,) and `found` are the result of `match_contours`."""
+    wanted = goal.moves
+    rows = cuts.segments.path[samples.segment]
     if len(rows) == 0 or len(wanted.contour) == 0:
-        return match
+        return
     offsets = run_offsets(rows, len(rows))
     begin, row = offsets[:-1], rows[offsets[:-1]]
     middle = begin + np.diff(offsets) // 2
     nearest = wanted.contour[found.segment]
-    circle = _circle_of_row(goal.circles, len(wanted.cuts.contour))[
-        wanted.cuts.segments.path[found.segment]
-    ]
-    match.row[row] = wanted.cuts.segments.path[found.segment[middle]]
+    followed = wanted.cuts.segments.path[found.segment]
+    match.row[row] = followed[middle]
     known = belongs[begin] != ANY_CONTOUR
     match.contour[row] = np.where(known, belongs[begin], nearest[middle])
     match.only[row] = np.where(known, belongs[begin], _unanimous(nearest, offsets))
-    match.circle[row] = _unanimous(circle, offsets)
-    followed = wanted.cuts.segments.path[found.segment]
-    match.off_mm[row] = np.maximum.reduceat(_drawn_off_mm(goal)[followed], begin, axis=0)
+    match.circle[row] = _unanimous(goal.circle_of_row[followed], offsets)
+    off = _drawn_off_mm(goal).T
+    match.off_mm[row] = np.column_stack([np.maximum.reduceat(one[followed], begin) for one in off])
+
+
+def with_neighbours(match: Match) -> Match:
+    """The match, with the largest distance of the drawing from each row and its neighbours."""
     return replace(match, off_mm=_with_neighbours(match.off_mm, match.contour))
 
 
 def _drawn_off_mm(goal: Goal) -> Floats:
     """(W, 2) mm: distances of the drawing from the wanted rows; 0 where they are not known."""
     wanted = goal.moves.cuts.toolpath
-    return np.zeros((len(wanted), 2)) if wanted.drawn is None else wanted.drawn.off_mm
+    if wanted.drawn is None:
+        return np.broadcast_to(np.zeros(2), (len(wanted), 2))
+    return wanted.drawn.off_mm
 
 
 def _with_neighbours(off_mm: Floats, contour: Indices) -> Floats:

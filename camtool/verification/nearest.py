@@ -73,6 +73,8 @@ class MoveIndex:
         whose moves are found, neighbours of one contour together; None: those of all."""
         from camtool.kernels.near import nearest
 
+        if len(points) == 0:  # the tables need not be made
+            return Found(np.empty(0), np.empty(0, dtype=np.int64))
         places = np.column_stack([points, height])
         return Found(
             *nearest(self._table, self.boxes, places, self._runs(choice, len(points)), limits_mm)

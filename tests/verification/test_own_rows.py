@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
+from camtool.verification import coverage
 from camtool.verification.circles import full_circles
 from camtool.verification.coverage import Coverage, Drilled, cover, cut_other_way
 from camtool.verification.cuts import cut_moves
@@ -109,6 +110,31 @@ def test_own_rows_first_finds_what_a_search_over_all_finds(
     assert np.array_equal(own.match.off_mm, every.match.off_mm)
     assert own.rounding.max == pytest.approx(every.rounding.max, rel=1e-9, nan_ok=True)
     assert own.rounding.rms == pytest.approx(every.rounding.rms, rel=1e-9, nan_ok=True)
+
+
+@given(
+    st.integers(0, 10_000),
+    st.integers(1, 8),
+    st.sampled_from(DAMAGES),
+    st.integers(1, 300),
+    st.booleans(),
+)
+def test_the_size_of_lots_changes_nothing(
+    seed: int, count: int, kind: str, size: int, known: bool
+) -> None:
+    rng = np.random.default_rng(seed)
+    wanted = scribbles(rng, count)
+    decoded, row_from = damaged(rng, on_grid(wanted), kind)
+    came = row_from if known else None
+    whole, turned = compared(decoded, wanted, came)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(coverage, "SAMPLES_AT_ONCE", size)
+        parts, turned_too = compared(decoded, wanted, came)
+    assert (parts.findings, turned_too) == (whole.findings, turned)
+    for name in ("contour", "only", "row", "circle", "off_mm"):
+        assert np.array_equal(getattr(parts.match, name), getattr(whole.match, name))
+    assert parts.rounding.max == pytest.approx(whole.rounding.max, rel=1e-12, nan_ok=True)
+    assert parts.rounding.rms == pytest.approx(whole.rounding.rms, rel=1e-12, nan_ok=True)
 
 
 @given(st.integers(0, 10_000), st.integers(1, 6))
