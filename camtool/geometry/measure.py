@@ -134,7 +134,7 @@ def extents(lines: Polylines) -> Floats:
 
 def point_at(segments: Segments, row_indices: Ints, t: Floats) -> Floats:
     """(J, 2) the points at the fractions t (J,) in 0..1 of the length of these rows, mm."""
-    start, end = segments.start[row_indices], segments.end[row_indices]
+    start, end = segments.start.take(row_indices, axis=0), segments.end.take(row_indices, axis=0)
     sweep = segments.sweep[row_indices]
     arcs = np.flatnonzero(sweep)
     sweep, share = sweep[arcs], t[arcs]

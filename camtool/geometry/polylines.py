@@ -217,7 +217,9 @@ class Segments:
         following = rows + 1
         last = following == offsets[path + 1]
         following[last] = offsets[path[last]]
-        return cls.between(vertices[rows, :2], vertices[following, :2], vertices[rows, 2], path)
+        # Rows are taken several times as fast as they are indexed.
+        start, end = (vertices.take(which, axis=0)[:, :2].copy() for which in (rows, following))
+        return cls.between(start, end, vertices[rows, 2], path)
 
     @classmethod
     def between(

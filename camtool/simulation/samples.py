@@ -11,11 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 
-from camtool.arrays import Floats, Ints
+from camtool.arrays import Bools, Floats, Ints
 from camtool.kernels.lattice import to_steps
 from camtool.machine.model import Machine
 from camtool.simulation.mechanics import Mechanics
@@ -141,6 +142,11 @@ class _Pieces:
     begin: Floats
     end: Floats
 
+    @cached_property
+    def divide(self) -> Bools:
+        """(P,) true for pieces that are not all of their row."""
+        return np.asarray((self.begin != 0.0) | (self.end != 1.0))
+
 
 class PathSamples:
     """The samples of all rows of a toolpath, numbered from 0 in order; none are stored."""
@@ -167,23 +173,30 @@ class PathSamples:
 
     def places(self, low: int, high: int) -> tuple[Ints, Floats]:
         """Row (K,) and share (K,) of its length, in (0, 1], of the samples low:high."""
-        index = np.arange(low, high)
-        piece = np.searchsorted(self._offsets, index, side="right") - 1
-        part, parts = index - self._offsets[piece] + 1, self._parts[piece]
-        begin, end = self._pieces.begin[piece], self._pieces.end[piece]
-        share = np.where(part == parts, end, begin + (end - begin) * (part / parts))
-        return self._pieces.row[piece], share
+        first = int(np.searchsorted(self._offsets, low, side="right")) - 1
+        here = slice(first, int(np.searchsorted(self._offsets, high)))
+        many = np.diff(np.clip(self._offsets[here.start : here.stop + 1], low, high))
+        parts = np.repeat(self._parts[here], many)
+        part = np.arange(low + 1, high + 1) - np.repeat(self._offsets[here], many)
+        share = part / parts
+        of_arc = np.flatnonzero(np.repeat(self._pieces.divide[here], many))
+        if len(of_arc):
+            piece = np.repeat(np.arange(here.start, here.stop), many)[of_arc]
+            begin, end = self._pieces.begin[piece], self._pieces.end[piece]
+            last = part[of_arc] == parts[of_arc]
+            share[of_arc] = np.where(last, end, begin + (end - begin) * share[of_arc])
+        return np.repeat(self._pieces.row[here], many), share
 
     def points(self, row: Ints, share: Floats) -> Floats:
         """(K, 3) mm: the points at shares (K,) of the lengths of rows (K,)."""
-        starts = self._toolpath.starts_of(row)
-        points = starts + share[:, None] * (self._toolpath.end[row] - starts)
+        starts, ends = self._toolpath.starts_of(row), self._toolpath.end.take(row, axis=0)
+        points = starts + share[:, None] * (ends - starts)
         kind = self._toolpath.kind[row]
         on_arc = np.flatnonzero(are_arcs(kind))
         arm = np.searchsorted(self._arms.row, row[on_arc])
         points[on_arc] = self._arms.points(arm, share[on_arc])
         last = np.flatnonzero(share == 1.0)
-        points[last] = self._toolpath.end[row[last]]
+        points[last] = ends.take(last, axis=0)
         return points
 
 

@@ -148,7 +148,7 @@ class Toolpath:
 
     def starts_of(self, rows: Ints) -> Floats:
         """(K, 3) mm: where these rows begin."""
-        starts = self.end[rows - 1]
+        starts = self.end.take(rows - 1, axis=0)  # several times as fast as an index
         starts[rows == 0] = self.start
         return starts
 

@@ -525,7 +525,7 @@ class Tangents:
 
     def _at(self, rows: Ints, radius: Floats, share: float) -> Floats:
         path, arms = self.path, self.arms
-        tangent = path.end[rows] - path.starts_of(rows)
+        tangent = path.end.take(rows, axis=0) - path.starts_of(rows)
         kind = path.kind[rows]
         on = np.flatnonzero(are_arcs(kind))
         arm = self.arm_of(rows[on])
