@@ -288,6 +288,14 @@ class Code(IntEnum):
         "name the layers that are no edges of parts (`--frames`), or give the side "
         "([toolpaths.md](toolpaths.md))",
     )
+    FINISH_IN_PASSES = (
+        228,
+        INFO,
+        "a finishing pass meets more at some places than is left on the wall, because the tool "
+        "that roughs does not get so far: it is cut in passes of `step_down` there, not at the "
+        "full depth at once",
+        "none, or a smaller tool for the roughing",
+    )
     NOT_BORED = (
         227,
         (WARNING, INFO),
@@ -1024,6 +1032,16 @@ NOT_DRILLED_TOO_LARGE = Sentence(
     Code.NOT_DRILLED,
     "circles of more than {limit:g} mm are not drilled: {count}, up to {measured:.6g} mm",
     "mm",
+)
+FINISH_IN_PASSES = Sentence(
+    Code.FINISH_IN_PASSES,
+    "up to {measured:.4g} mm are left beside the wall where the tool that roughs does not get: "
+    "the wall is finished in {passes} passes",
+    "mm",
+)
+FINISH_IN_PASSES_WHOLE = Sentence(
+    Code.FINISH_IN_PASSES,
+    "nothing is roughed: the wall is cut in {passes} passes",
 )
 NOT_BORED = Sentence(
     Code.NOT_BORED,

@@ -196,4 +196,10 @@ def _does(operation: dict[str, Any]) -> str:
     by = "" if step is None else f" by {step:g} mm"
     below = operation["below_stock_mm"]
     through = "" if below is None else f", through the stock and {below:.4g} mm below"
-    return f"{operation['kind']}, tool {tool['diameter_mm']:g} mm{called}{deep}{by}{through}"
+    left = operation["allowance_mm"]
+    left_on = f", leaves {left:g} mm on the wall" if left else ""
+    if operation["stage"] == "finish":
+        left_on += ", along the wall at the full depth"
+    return (
+        f"{operation['kind']}, tool {tool['diameter_mm']:g} mm{called}{deep}{by}{through}{left_on}"
+    )

@@ -26,6 +26,7 @@ from typing import Any
 
 from camtool.errors import MachineError, OptionError
 from camtool.jobs.keys import (
+    FINISH_TOOL,
     OPERATION,
     PLACE,
     STOCK,
@@ -39,12 +40,18 @@ from camtool.jobs.keys import (
     table_of,
     why_idle,
 )
-from camtool.jobs.tools import Described, Shop, Tools, tool_tables, tools_for
+from camtool.jobs.tools import Described, Shop, Tools, Used, tool_tables, tools_for
 from camtool.planning.job import Job, Operation, Placement, Stock
 from camtool.tables import read_table
 
 OF_OPERATIONS = (*OPERATION, TOOL_NAME, *TOOL_KEYS)
 """Keys of `[[operations]]`."""
+
+_RECORDED = tuple(name for name in OPERATION if name != FINISH_TOOL)
+"""Keys of operations that say a field of theirs by themselves."""
+
+_OF_FINISH = ("finish", "finish_feed", FINISH_TOOL)
+"""Keys whose fields depend on tools."""
 
 TABLES = ("place", "stock", "tools", "operations")
 """Tables of a job file."""
@@ -159,7 +166,7 @@ def build_job(
     whole = flags.whole.over(file.whole)
     tools = tools_for(file.tools, whole, file.folder, shop)
     tables = file.operations or (Table(),)
-    record_of(Operation, OPERATION, file.defaults.only(OPERATION))
+    record_of(Operation, OPERATION, file.defaults.only(_RECORDED))
     stock = _stock(file.stock)
     operations = [
         _operation(n, (file.defaults, own, flags.defaults), tools, len(tables))
@@ -199,7 +206,7 @@ def _operation(
     defaults, own, flags = layers
     merged = _nearest((defaults, own, flags)).only(OPERATION)
     record_of(
-        Operation, OPERATION, own.only(OPERATION)
+        Operation, OPERATION, own.only(_RECORDED)
     )  # keys that flags override must be right too
     kind = Operation.kind
     if "kind" in merged.given:
@@ -210,16 +217,37 @@ def _operation(
     used = tools.of(layers, kind)
     merged = merged.over(used.preset)
     known = merged.only(name for name in OPERATION if kind in OPERATION[name].kinds)
-    operation = record_of(Operation, OPERATION, known)
+    operation = record_of(Operation, OPERATION, known.only(_RECORDED))
     for name, given in own.only(OPERATION).given.items():
         why = why_idle(OPERATION, name, operation)
         if why is not None and merged.given[name] is given:
             raise given.refused(why.message, why.mend)
     if not operation.name and count > 1:
         operation = replace(operation, name=f"{kind} {number}")
-    operation = replace(operation, tool=used.tool, material=used.material)
+    operation = _tooled(operation, known, used, tools)
     _refuse_tool(operation, own)
     return operation
+
+
+def _tooled(operation: Operation, known: Table, used: Used, tools: Tools) -> Operation:
+    """The operation with its tool, and that of its finishing pass with the feed that a preset of
+    that gives it."""
+    fields: dict[str, Any] = {"tool": used.tool, "material": used.material}
+    keys = {key: known.given[key] for key in _OF_FINISH if key in known.given}
+    if FINISH_TOOL in keys:
+        last = tools.of([Table({TOOL_NAME: keys[FINISH_TOOL]})], operation.kind)
+        fields["finish_tool"] = last.tool
+        if "feed" in last.preset.given and operation.finish_feed_mm_min is None:
+            fields["finish_feed_mm_min"] = OPERATION["feed"].read(last.preset.given["feed"])
+    try:
+        operation = replace(operation, **fields)
+        operation.stages()
+        return operation
+    except OptionError as error:
+        named = re.search(r"key (\w+)$", error.where or "")
+        if named is None or named[1] not in keys:
+            raise
+        raise keys[named[1]].refused(error.message, error.mend) from error
 
 
 def _nearest(layers: Sequence[Table]) -> Table:

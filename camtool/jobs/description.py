@@ -73,14 +73,21 @@ def _operation(job: Job, index: int) -> dict[str, Any]:
     operation = job.operations[index]
     tool = operation.tool
     return {
-        "number": index + 1,
+        "number": index + 1 - _stages_before(job, index),
         "name": operation.name,
         "kind": operation.kind,
         "tool": {"name": tool.name, "diameter_mm": tool.diameter_mm},
         "depth_mm": operation.depth_mm,
         "below_stock_mm": _below(job, operation),
+        "stage": operation.stage,
+        "allowance_mm": operation.allowance_mm,
         "step_down_mm": operation.step_down_mm,
     }
+
+
+def _stages_before(job: Job, index: int) -> int:
+    """How many operations up to this one are the second stage of the one before them."""
+    return sum(each.stage == "finish" for each in job.operations[: index + 1])
 
 
 def _below(job: Job, operation: Operation) -> float | None:

@@ -584,8 +584,17 @@ LIMITS = {name: TOOL[name] for name in ("chip_load", "surface_speed")}
 TOOL_NAME = "tool"
 """Key of an operation: the name of a tool of the file, or its number."""
 
+FINISH_TOOL = "finish_tool"
+"""Key of an operation: the tool of its finishing pass, by name or number."""
+
 TOOL_KEYS = {f"tool_{name}": key for name, key in TOOL.items() if key.help}
 """The tool of an operation that names none, key by key."""
+
+
+def _as_given(given: Given) -> Any:
+    """The value itself: which tool it names is for the tools of the job to say."""
+    return given.value
+
 
 _LINES = ("profile", "pocket", "engrave")
 _LAYERED = ("profile", "pocket", "engrave", "vcarve")
@@ -630,6 +639,9 @@ OPERATION = {
     ),
     "direction": Key("direction", one_of(DIRECTIONS), "Which way round.", '"climb"', _CLEARING),
     "allowance": Key("allowance_mm", LENGTH, "Left on the wall.", '"0.1mm"', _CLEARING),
+    "finish": Key("finish_mm", LENGTH, "Left for a last pass.", '"0.1mm"', _CLEARING),
+    "finish_feed": Key("finish_feed_mm_min", FEED, "Of that pass.", kinds=_CLEARING),
+    FINISH_TOOL: Key("finish_tool", Value(_as_given, "NAME"), "Of that pass.", kinds=_CLEARING),
     "feed": Key("feed_mm_min", FEED, "In mm/min.", '"90mm/min"', KINDS),
     "plunge_feed": Key("plunge_feed_mm_min", FEED, "In mm/min.", '"30mm/min"', KINDS),
     "spindle": Key(

@@ -35,8 +35,10 @@ from camtool.findings import (
     NOTHING_DRAWN_TO_BORE,
     Finding,
 )
+from camtool.geometry.polylines import Polyline, Polylines
 from camtool.planning.drill import HOLE_SIZE_MM, SAME_HOLE_MM, Hole, circles_of, named
-from camtool.planning.items import Chosen, CutRun, Fixed, Setting, Work
+from camtool.planning.finish import along_walls
+from camtool.planning.items import Chosen, Contours, CutRun, Fixed, Setting, Work
 from camtool.planning.job import Operation
 from camtool.planning.naming import at_place, key_of, operation_name, tool_name
 from camtool.planning.paths import QUARTER
@@ -73,12 +75,25 @@ def bore(chosen: Chosen, setting: Setting) -> Work:
     findings = [*_no_circles(others), *_too_small(small, operation), *_inner(wide, holes)]
     if not holes:
         findings.append(NOTHING_DRAWN_TO_BORE(where=operation_name(operation)))
+    if operation.stage == "finish":
+        return Work(_walls(holes, setting), tuple(findings))
     items = []
     for hole in holes:
         runs, changed = _runs(hole, setting)
         items.append(Fixed(runs, setting, hole.name, hole.source, hole.outline))
         findings += changed
     return Work(tuple(items), tuple(findings))
+
+
+def _walls(holes: list[Hole], setting: Setting) -> Contours:
+    """The contours along the walls of the bores."""
+    away = setting.operation.tool.radius_mm + setting.operation.allowance_mm
+    rings = [
+        helix(hole.at_mm, 0.5 * _diameter(hole) - away, 0.0, 0)[:4, [0, 1, 3]] for hole in holes
+    ]
+    paths = Polylines.of(Polyline(ring, closed=True) for ring in rings)
+    names, sources = [hole.name for hole in holes], [hole.source for hole in holes]
+    return along_walls(paths, setting, names, sources)
 
 
 def radii(wide_mm: float, tool_mm: float, step_mm: float) -> list[float]:
@@ -138,7 +153,7 @@ def helix(centre: tuple[float, float], radius_mm: float, depth_mm: float, turns:
     quarter = np.arange(count + 1)
     x = centre[0] + radius_mm * np.array([1.0, 0.0, -1.0, 0.0])[quarter % 4]
     y = centre[1] + radius_mm * np.array([0.0, 1.0, 0.0, -1.0])[quarter % 4]
-    z = -depth_mm * np.minimum(quarter / (4.0 * turns), 1.0)
+    z = -depth_mm * np.minimum(quarter / (4.0 * max(turns, 1)), 1.0)
     bulge = np.where(quarter < count, QUARTER, 0.0)
     return np.concatenate([np.column_stack([x, y, z, bulge]), [[*centre, -depth_mm, 0.0]]])
 

@@ -313,10 +313,12 @@ def _doubtful(step: Step, starts_spindle: bool) -> Iterator[str]:
     if starts_spindle and on_line and step.chosen.lines.closed.any():
         yield CUT_DOUBTFUL_WIDTH.words()
     deepest = deepest_pass(step.setting)
+    finishes = operation.stage == "finish"  # beside the wall, in what is roughed
     mills = operation.kind in IN_PASSES and tool.kind in MILLS and tool.radius_mm > 0.0
+    mills = mills and not finishes
     if mills and deepest > tool.diameter_mm + POSITION_EPS_MM:
         yield CUT_DOUBTFUL_DEPTH.words(depth=deepest, width=tool.diameter_mm)
-    plunges = operation.kind in IN_PASSES and operation.entry.kind == "plunge"
+    plunges = operation.kind in IN_PASSES and operation.entry.kind == "plunge" and not finishes
     fast = operation.plunge_feed_mm_min is None and feeds.plunge_mm_min >= feeds.cut_mm_min
     if starts_spindle and plunges and fast:
         yield CUT_DOUBTFUL_PLUNGE.words(feed=feeds.plunge_mm_min)
@@ -330,7 +332,9 @@ def _beyond_tool(step: Step, stock: Stock | None) -> Iterator[str]:
     if length is not None and depth > length + POSITION_EPS_MM:
         yield CUT_DOUBTFUL_LENGTH.words(depth=depth, length=length)
     straight_down = operation.kind == "drill" or (
-        operation.kind in IN_PASSES and operation.entry.kind == "plunge"
+        operation.kind in IN_PASSES
+        and operation.entry.kind == "plunge"
+        and operation.stage != "finish"
     )
     if straight_down and tool.centre_cutting is False:
         yield CUT_DOUBTFUL_CENTRE.words()

@@ -61,6 +61,13 @@ _APART = (
 )
 """Words that cannot be true of one thing."""
 
+STAGES = ("", "rough", "finish")
+"""What an operation does of one with a finishing pass: all of it (it has none), all but the last
+pass, or that."""
+
+FINISH_MOST = 0.25
+"""A finishing pass takes no more than this part of its tool's diameter."""
+
 COOLANTS = ("off", "mist", "flood", "both")
 """What cools a cut."""
 
@@ -349,7 +356,8 @@ class Operation:
     left on the wall of a profile or pocket. `depth_mm` is cut below the stock top in passes of
     `step_down_mm` at most (None: one pass), the last of `last_pass_mm` (None: like the others).
     `breakthrough_mm` stands for it: so far below the stock (a Job, which knows that, makes it the
-    depth).
+    depth). `finish_mm` is left on the wall for one more pass at the full depth, with a feed and a
+    tool of its own where these are given (a Job makes two operations of it, the stages).
     `step_over` is the distance of neighbouring passes of a pocket over the tool's diameter.
     `overlap_mm`: how far a closed contour is cut beyond its start. `start`: one of STARTS, or a
     place (x, y) mm. `peck_mm`: how deep a drill goes at a time; `dwell_s` at the bottom.
@@ -370,6 +378,10 @@ class Operation:
     side: str = "auto"
     direction: str = "drawn"
     allowance_mm: float = 0.0
+    finish_mm: float | None = None
+    finish_feed_mm_min: float | None = None
+    finish_tool: Tool | None = None
+    stage: str = ""
     feed_mm_min: float | None = None
     plunge_feed_mm_min: float | None = None
     spindle_rpm: float | None = None
@@ -405,6 +417,7 @@ class Operation:
         one_of("joins", self.joins, JOINS)
         one_of("corners", self.corners, CORNERS)
         one_of("coolant", self.coolant, COOLANTS)
+        one_of("stage", self.stage, STAGES)
         if isinstance(self.start, str):
             one_of("start", self.start, STARTS)
         else:
@@ -415,6 +428,8 @@ class Operation:
             ("plunge feed", self.plunge_feed_mm_min, "mm/min"),
             ("depth", self.depth_mm, "mm"),
             ("breakthrough", self.breakthrough_mm, "mm"),
+            ("finish", self.finish_mm, "mm"),
+            ("finish feed", self.finish_feed_mm_min, "mm/min"),
             ("step down", self.step_down_mm, "mm"),
             ("last pass", self.last_pass_mm, "mm"),
             ("mitre limit", self.mitre_limit, ""),
@@ -462,6 +477,7 @@ class Operation:
                 where=f"{named}key last_pass",
                 mend="give a smaller last pass, or a larger depth",
             )
+        self._refuse_finish(named)
         if self.entry.kind == "helix" and self.kind not in ("pocket", "bore"):
             raise OptionError(
                 f"only pockets can be entered by a helix, not the kind {self.kind}",
@@ -474,6 +490,68 @@ class Operation:
                 where=f"{named}key entry",
                 mend='give its angle alone, entry = "helix:3deg"',
             )
+
+    def _refuse_finish(self, named: str) -> None:
+        """A finishing pass without a wall, or with a tool that is not for it."""
+        if self.finish_mm is None:
+            return
+        if self.kind == "profile" and self.side == "on":
+            raise OptionError(
+                "a tool on the line leaves nothing on a wall",
+                where=f"{named}key finish",
+                mend='leave finish out, or give side = "auto"',
+            )
+        rough, last = self.tool, self.finish_tool or self.tool
+        if last.diameter_mm > rough.diameter_mm > 0.0:
+            raise OptionError(
+                f"a tool of {last.diameter_mm:g} mm does not fit where one of"
+                f" {rough.diameter_mm:g} mm cleared",
+                where=f"{named}key finish_tool",
+                mend="give one that is no wider",
+            )
+        if rough.diameter_mm > 0.0 and self.finish_mm > FINISH_MOST * last.diameter_mm:
+            raise OptionError(
+                f"{self.finish_mm:g} mm is more than a quarter of the tool of"
+                f" {last.diameter_mm:g} mm, which takes it at the full depth",
+                where=f"{named}key finish",
+                mend=f"give {FINISH_MOST * last.diameter_mm:.4g} mm or less",
+            )
+
+    def stages(self) -> tuple[Operation, ...]:
+        """The operation, or the two that its finishing pass makes of it: one that leaves this on
+        the wall, and one along the wall, which comes in and leaves on quarter arcs as large as
+        what was left: from where the tool of the first ran. OptionError for a feed or a tool of
+        a pass that there is not."""
+        if self.finish_mm is None:
+            for key, value in (
+                ("finish_feed", self.finish_feed_mm_min),
+                ("finish_tool", self.finish_tool),
+            ):
+                if value is not None:
+                    raise OptionError(
+                        "has no effect without finish",
+                        where=f"operation {self.name or self.kind!r}, key {key}",
+                        mend=f'give what is left for it, finish = "0.2mm", or leave {key} out',
+                    )
+            return (self,)
+        plain = replace(self, finish_mm=None, finish_feed_mm_min=None, finish_tool=None)
+        lead = Lead("arc", self.finish_mm)
+        feed = self.finish_feed_mm_min
+        return (
+            replace(plain, stage="rough", allowance_mm=self.allowance_mm + self.finish_mm),
+            replace(
+                plain,
+                stage="finish",
+                name=f"{self.name or self.kind} finish",
+                tool=self.finish_tool or self.tool,
+                feed_mm_min=self.feed_mm_min if feed is None else feed,
+                entry=Entry(),
+                lead_in=lead,
+                lead_out=lead,
+                start="longest-line" if self.start == "nearest" else self.start,
+                tabs=None,
+            ),
+        )
 
     def through(self, stock: Stock | None) -> Operation:
         """The operation with the depth that its breakthrough makes in this stock; itself without
@@ -613,8 +691,8 @@ class Stock:
 class Job:
     """How a drawing is cut. `approach`: every cut starts after a move that takes up the backlash
     of both axes. `minimise`: one of GOALS. `frames`: patterns of the layers whose contours, where
-    they are not cut, are no edges of parts. Operations with a breakthrough get their depth. Raises
-    OptionError for what no job can be."""
+    they are not cut, are no edges of parts. Operations with a breakthrough get their depth,
+    those with a finishing pass become two. Raises OptionError for what no job can be."""
 
     operations: tuple[Operation, ...] = (Operation(),)
     placement: Placement = Placement()
@@ -629,8 +707,8 @@ class Job:
         one_of("goal", self.minimise, GOALS)
         if not self.operations:
             raise OptionError("the job has no operations", mend="give it at least one")
-        through = tuple(operation.through(self.stock) for operation in self.operations)
-        object.__setattr__(self, "operations", through)
+        made = [stage for each in self.operations for stage in each.through(self.stock).stages()]
+        object.__setattr__(self, "operations", tuple(made))
 
     @property
     def layers(self) -> tuple[str, ...]:

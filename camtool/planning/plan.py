@@ -33,6 +33,7 @@ from camtool.planning.contours import runs_of, with_starts
 from camtool.planning.drawn import drawn_of
 from camtool.planning.drill import drill
 from camtool.planning.engrave import engrave
+from camtool.planning.finish import in_passes, of_stage
 from camtool.planning.gouges import side_findings
 from camtool.planning.items import Bridge, Chosen, Contours, Items, Runs, Setting, Step, Work
 from camtool.planning.job import Job, Operation, refuse_endless
@@ -92,11 +93,12 @@ def planned(drawing: Drawing, job: Job, machine: Machine, *, undivided: bool = F
     settings = [setting_of(operation, job, machine) for operation in job.operations]
     for rank, setting in enumerate(settings, 1):
         there = machine.defaults.park_mm if rank == len(settings) else None
-        step = _step(placed, job, setting, machine, (here, there), sides)
+        before = steps[-1] if setting.operation.stage == "finish" else None
+        step = _step(placed, job, setting, machine, (here, there), sides, before)
         end = _end(step.runs, here)
         if undivided and _is_divided(job, setting.operation):
             plain = replace(job, minimise="rapids")
-            step = _step(placed, plain, setting, machine, (here, there), sides)
+            step = _step(placed, plain, setting, machine, (here, there), sides, before)
         here = end
         steps.append(step)
     steps = _sparing(steps)
@@ -162,15 +164,23 @@ def _step(
     machine: Machine,
     ends: tuple[Point, Point | None],
     sides: Sides,
+    rough: Step | None = None,
 ) -> Step:
     """One operation from what it takes to its runs, for a tool that comes from the first point
-    of its `ends` and goes to the second (None: stays)."""
+    of its `ends` and goes to the second (None: stays). `rough`: what has cleared the way, where
+    it is a finishing pass."""
     chosen = choose(placed, setting.operation, sides)
     work = _kind(setting.operation.kind)(chosen, setting)
     items, bare = work.items, list[Finding]()
     if isinstance(items, Contours):
         items, bare = with_tabs(_with_starts(items))
-    findings = [*work.findings, *side_findings(work, chosen, sides, setting.operation), *bare]
+        if rough is not None:
+            items, more = in_passes(items, setting, rough)
+            bare += more
+    findings = of_stage(
+        setting.operation,
+        [*work.findings, *side_findings(work, chosen, sides, setting.operation), *bare],
+    )
     choices = choices_of(items)
     before = travel_mm(choices, drawn(choices), *ends)
     if job.minimise == "reversals":
@@ -187,7 +197,7 @@ def _step(
         paths = chosen_paths(items, choices, rows)
         cut = runs_of(items, order, paths, _walls(placed, sides, setting.operation))
         runs, counts, bridges = cut.runs, cut.counts, cut.bridges
-        findings += cut.findings
+        findings += of_stage(setting.operation, cut.findings)
     else:
         each = [item.runs for item in (items[k] for k in order.tolist())]
         runs, counts = Runs.of(chain.from_iterable(each)), tuple(map(len, each))
@@ -222,7 +232,7 @@ def _sparing(steps: list[Step]) -> list[Step]:
     made = []
     for step in steps:
         kept = raised_over_bridges(step.runs, step.operation, step.setting.feeds, bridges)
-        findings = (*step.findings, *kept.findings)
+        findings = (*step.findings, *of_stage(step.operation, kept.findings))
         made.append(replace(step, runs=kept.runs, findings=findings))
     return made
 

@@ -49,6 +49,7 @@ from camtool.planning.clearing import (
     slot_paths,
     zigzag_paths,
 )
+from camtool.planning.finish import along_walls
 from camtool.planning.items import Chosen, CutRun, Fixed, Setting, Work
 from camtool.planning.job import Operation
 from camtool.planning.naming import at_place, key_of, operation_name, tool_name
@@ -100,6 +101,8 @@ def pocket(chosen: Chosen, setting: Setting) -> Work:
     OptionError for an open path, for paths that cross, and for a tool that cuts no width.
     """
     _check(chosen, setting.operation)
+    if setting.operation.stage == "finish":
+        return _walls(chosen, setting)
     _check_step(chosen, setting.operation)
     items: list[Fixed] = []
     findings: list[Finding] = []
@@ -118,6 +121,21 @@ def pocket(chosen: Chosen, setting: Setting) -> Work:
         hair_mm = 2.0 * SLOT_TOLERANCE * setting.operation.tool.diameter_mm if slots else 0.0
         findings += unreached_findings(wanted, setting, hair_mm=hair_mm)
     return Work(tuple(items), tuple(findings))
+
+
+def _walls(chosen: Chosen, setting: Setting) -> Work:
+    """The contours along the walls of all regions, and what they do not reach."""
+    operation = setting.operation
+    paths, names, sources = list[Polyline](), list[str](), list[int]()
+    findings: list[Finding] = []
+    for each in pockets(chosen):
+        wanted = offset_shape(each.region, operation.allowance_mm)
+        walls = offset_shape(wanted, operation.tool.radius_mm)
+        paths += walls
+        names += [each.name] * len(walls)
+        sources += [each.source] * len(walls)
+        findings += unreached_findings(wanted, setting)
+    return Work(along_walls(Polylines.of(paths), setting, names, sources), tuple(findings))
 
 
 def pockets(chosen: Chosen) -> list[Pocket]:

@@ -81,6 +81,8 @@ def profile(chosen: Chosen, setting: Setting) -> Work:
     closed = np.flatnonzero(chosen.lines.closed).tolist()
     opens = np.flatnonzero(~chosen.lines.closed).tolist()
     found = _Found()
+    if operation.stage == "finish":  # open ones have no wall
+        opens = []
     if not runs_beside(operation):
         opens = list(range(len(chosen.lines)))
     elif operation.side == "auto":

@@ -25,11 +25,12 @@ def setting_of(operation: Operation, job: Job, machine: Machine) -> Setting:
     and for impossible passes."""
     depth = depth_of(operation, machine)
     _check_coolant(operation, machine)
-    # The helix of a bore has turns, not passes.
-    step = None if operation.kind == "bore" else operation.step_down_mm
+    # The helix of a bore has turns, not passes; along the wall one pass takes it all.
+    in_one = operation.kind == "bore" or operation.stage == "finish"
     try:
         made = carved_levels if operation.kind == "vcarve" else levels
-        passes = made(depth, step, operation.last_pass_mm)
+        step, last = operation.step_down_mm, operation.last_pass_mm
+        passes = (-depth,) if in_one else made(depth, step, last)
     except OptionError as error:
         error.where = f"{operation_name(operation)}, {error.where}"
         raise

@@ -116,6 +116,13 @@ FILES = [
     # contradictions
     ("depth = 1\nlast_pass = 2", ["key last_pass", "deeper than the whole cut of 1 mm"]),
     ("depth = 1\nbreakthrough = 2", ["key breakthrough", "a depth is given too", "one of"]),
+    ("finish_feed = 9", ["key finish_feed", "no effect without finish"]),
+    ("finish_tool = 'fine'\nfinish = 0.1", ["key finish_tool", "there is no tool 'fine'"]),
+    ("finish = 0.3\ntool_diameter = 1", ["key finish", "more than a quarter", "0.25 mm or less"]),
+    (
+        "finish = 0.1\ntool_diameter = 1\nfinish_tool = 'wide'\n[tools.wide]\ndiameter = 2",
+        ["key finish_tool", "does not fit where one of 1 mm cleared", "no wider"],
+    ),
     ("breakthrough = 0.3", ["key breakthrough", "thickness of the stock is not known", "[stock]"]),
     ("breakthrough = 0\n[stock]\nthickness = 3", ["key breakthrough", "not above 0"]),
     ("kind = 'engrave'\nbreakthrough = 1", ["key breakthrough", "nothing to the kind engrave"]),

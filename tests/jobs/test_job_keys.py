@@ -15,7 +15,7 @@ def test_every_field_of_a_job_has_a_key() -> None:
         assert isinstance(keys, dict)
         return {each.name for each in fields(record)} - {key.field for key in keys.values()}
 
-    assert missing(Operation, OPERATION) == {"tool", "material"}
+    assert missing(Operation, OPERATION) == {"tool", "material", "stage"}
     assert missing(Placement, PLACE) == missing(Stock, STOCK) == set()
     assert missing(Entry, ENTRY) == missing(Lead, LEAD) == missing(Tabs, TABS) == set()
     assert missing(Tool, TOOL) == {"name", "materials"}
@@ -35,5 +35,5 @@ def test_the_page_has_every_key_and_no_other() -> None:
         for name in re.findall(r"`(\w+)`", names):
             if name != "tool":
                 known = set(OPERATION[name].kinds)
-                told = set(re.findall(r"profile|pocket|engrave|drill|vcarve", kinds))
+                told = set(re.findall(r"profile|pocket|bore|engrave|drill|vcarve|chamfer", kinds))
                 assert (told or set(OPERATION["kind"].kinds)) == known, name

@@ -17,6 +17,7 @@ from camtool.planning.bore import CORE_SHARE, MOST_TURNS, bore, radii
 from camtool.planning.drill import HOLE_SIZE_MM
 from camtool.planning.items import CutRun, Feeds, Fixed, Setting, Work
 from camtool.planning.job import Entry, Operation, Tool
+from tests.oracles.run_sweep import swept
 from tests.planning.test_drill import chosen_of, circle
 
 FEEDS = Feeds(400.0, 100.0)
@@ -30,37 +31,6 @@ def setting_of(depth: float = 3.0, **settings: object) -> Setting:
 
 def runs_of(work: Work) -> list[CutRun]:
     return [run for item in work.items if isinstance(item, Fixed) for run in item.runs]
-
-
-def dense(run: CutRun, per_arc: int = 48) -> np.ndarray:
-    """(N, 3) places on the run, arcs taken to pieces by their bulges."""
-    found = []
-    for (x, y, z, bulge), (u, v, w, _) in zip(run.vertices, run.vertices[1:], strict=False):
-        part = np.linspace(0.0, 1.0, per_arc)
-        start, end = np.array([x, y]), np.array([u, v])
-        if bulge == 0.0:
-            points = start + part[:, None] * (end - start)
-        else:
-            # The centre lies h beside the chord, h = c (1 − b²) / 4 b.
-            chord = end - start
-            left = np.array([-chord[1], chord[0]])
-            centre = 0.5 * (start + end) + left * (1.0 - bulge**2) / (4.0 * bulge)
-            arm, turn = start - centre, 4.0 * math.atan(bulge) * part
-            points = centre + np.column_stack(
-                [
-                    arm[0] * np.cos(turn) - arm[1] * np.sin(turn),
-                    arm[0] * np.sin(turn) + arm[1] * np.cos(turn),
-                ]
-            )
-        found.append(np.column_stack([points, z + part * (w - z)]))
-    return np.concatenate(found)
-
-
-def swept(runs: list[CutRun], radius: float, below: float = math.inf) -> shapely.Geometry:
-    """What discs of the tool on the runs cover, seen from above; where they are that deep."""
-    places = np.concatenate([dense(run) for run in runs])
-    places = places[places[:, 2] <= -below] if below < math.inf else places
-    return shapely.union_all(shapely.buffer(shapely.points(places[:, :2]), radius, quad_segs=32))
 
 
 @given(

@@ -1,0 +1,131 @@
+"""Finishing passes: along the wall, once round at the full depth, in what was roughed.
+
+The tool that roughs leaves f on the wall; the finishing tool takes it. Where the centre of the one
+with radius r ran, the other, of radius q, stands beside the wall nearer by f + r − q; its disc
+reaches as much into what is left as
+
+    e = distance to the path of the first + q − r,
+
+which is f along a straight wall, and more in corners, and where the first does not get at all. If
+e is more than a part of its diameter anywhere, the wall is finished in passes, as it was roughed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from camtool.errors import OptionError
+from camtool.findings import FINISH_IN_PASSES, FINISH_IN_PASSES_WHOLE, Code, Finding
+from camtool.geometry.distance import nearest
+from camtool.geometry.measure import sample
+from camtool.geometry.polylines import (
+    POSITION_EPS_MM,
+    Polyline,
+    Polylines,
+    Segments,
+    lines_reversed,
+)
+from camtool.planning.items import NO_STARTS, Contours, Setting, Step
+from camtool.planning.job import Operation
+from camtool.planning.naming import at_place, key_of
+from camtool.planning.settings import levels
+
+ENGAGED_MOST = 0.5
+"""What a finishing pass meets, in a corner too, is no more than this part of its diameter: all
+that may be left on the wall is twice as much in a corner of 60 degrees."""
+
+SAMPLES_PER_TOOL = 8.0
+"""So many places of a finishing pass are looked at in a length of its tool's diameter."""
+
+OF_WALLS = (
+    Code.UNREACHED,
+    Code.SLOT_AS_WIDE,
+    Code.CONTOUR_TOO_SMALL,
+    Code.GOUGE,
+    Code.NOT_RELIEVED,
+    Code.CORNER_FAR,
+    Code.FINISH_IN_PASSES,
+)
+"""What is said of the wall: by the stage that cuts it. All else is said by the first one."""
+
+
+def of_stage(operation: Operation, findings: Iterable[Finding]) -> list[Finding]:
+    """Those of the findings that this stage of an operation has to say."""
+    if not operation.stage:
+        return list(findings)
+    if operation.stage == "rough":
+        return [each for each in findings if each.code not in OF_WALLS]
+    return [each for each in findings if each.code in (*OF_WALLS, Code.LEAD_LEFT_OUT)]
+
+
+def along_walls(
+    paths: Polylines, setting: Setting, names: Sequence[str], sources: Sequence[int]
+) -> Contours:
+    """Contours on the boundary of tool centre regions, which are on the left of their paths."""
+    conventional = setting.operation.direction == "conventional"
+    count = len(paths)
+    return Contours(
+        lines=lines_reversed(paths) if conventional else paths,
+        settings=(setting,) * count,
+        names=tuple(names),
+        source=np.array(sources, dtype=np.int64),
+        reversible=np.zeros(count, dtype=np.bool_),
+        starts=(NO_STARTS,) * count,
+        material_left=(conventional,) * count,
+        outlines=(None,) * count,
+    )
+
+
+def in_passes(contours: Contours, setting: Setting, rough: Step) -> tuple[Contours, list[Finding]]:
+    """The contours of a finishing pass; at the levels of the roughing where that has left more
+    than the tool takes at once."""
+    operation = setting.operation
+    if not len(contours):
+        return contours, []
+    most, where = _engaged(contours, operation, rough)
+    if most <= ENGAGED_MOST * operation.tool.diameter_mm + POSITION_EPS_MM:
+        return contours, []
+    depth = -setting.levels_mm[-1]
+    try:
+        passes = levels(depth, operation.step_down_mm, operation.last_pass_mm)
+    except OptionError as error:
+        raise OptionError(
+            error.message, where=key_of(operation, "step_down"), mend=error.mend
+        ) from error
+    stepped = replace(setting, levels_mm=passes)
+    contours = replace(contours, settings=(stepped,) * len(contours))
+    if math.isinf(most):
+        return contours, [FINISH_IN_PASSES_WHOLE(where=where, passes=len(passes))]
+    return contours, [FINISH_IN_PASSES(where=where, measured=most, passes=len(passes))]
+
+
+def _engaged(contours: Contours, operation: Operation, rough: Step) -> tuple[float, str]:
+    """How much there is left beside the wall at most, mm, and where; infinite where nothing was
+    roughed."""
+    if not len(rough.runs):
+        return math.inf, at_place(contours.names[0], contours.lines[0].start.tolist())
+    cleared = _paths(rough)
+    most, where = -math.inf, ""
+    wide = operation.tool.diameter_mm
+    for path, name in zip(contours.lines, contours.names, strict=True):
+        points = sample(path, wide / SAMPLES_PER_TOOL) if wide else path.vertices[:, :2]
+        apart = nearest(points, cleared).distance
+        worst = int(apart.argmax())
+        if apart[worst] > most:
+            most, where = float(apart[worst]), at_place(name, points[worst].tolist())
+    return most + operation.tool.radius_mm - rough.operation.tool.radius_mm, where
+
+
+def _paths(step: Step) -> Segments:
+    """Where the tool of a step ran, seen from above."""
+    vertices, first = step.runs.vertices, step.runs.first
+    start, end = vertices[:-1], vertices[1:]
+    goes = np.hypot(*(end - start)[:, :2].T) > 0.0
+    goes[first[1:-1] - 1] = False
+    if not goes.any():
+        return Segments.of(Polyline(vertices[:1, [0, 1, 3]]))
+    return Segments.between(start[goes, :2], end[goes, :2], start[goes, 3])
