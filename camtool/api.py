@@ -71,6 +71,7 @@ __all__ = [
     "load_target",
     "plan",
     "post",
+    "post_by_tool",
     "preview",
     "read_drawing",
     "read_job",
@@ -304,6 +305,27 @@ def post(
     loaded, wanted = as_target(target), job or Job()
     read = as_drawing(drawing, loaded, wanted)
     return post_drawing(read, wanted, loaded, check=check, compensate=compensate, gates=gates)
+
+
+def post_by_tool(
+    drawing: Drawing | str | Path,
+    target: str | LoadedTarget,
+    job: Job | None = None,
+    *,
+    check: bool = True,
+    compensate: bool = False,
+    gates: Gates | None = None,
+) -> tuple[Run, ...]:
+    """As `post`, a program for each turn of a tool, for machines that change none.
+
+    All of them are planned together, in one work frame; each is complete, and judged alone against
+    what its operations ask for. Raises as `post` does. Source: docs/verifying.md.
+    """
+    from camtool.pipeline import post_by_tool as by_tool
+
+    loaded, wanted = as_target(target), job or Job()
+    read = as_drawing(drawing, loaded, wanted)
+    return by_tool(read, wanted, loaded, check=check, compensate=compensate, gates=gates)
 
 
 def convert(

@@ -460,6 +460,15 @@ class Code(IntEnum):
         "which is right",
     )
 
+    TOOL_BY_HAND = (
+        324,
+        WARNING,
+        "the program stops for tools that the operator changes, where the controller has no tool "
+        "change; what is to be mounted stands in front of each stop",
+        "mount each with its tip where that of the last one was, or set Z zero again; or write a "
+        "program for each tool with `--split tool`",
+    )
+
     ARC_MISSES_END = (
         401,
         (ERROR, WARNING),

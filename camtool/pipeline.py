@@ -1,6 +1,7 @@
 """The steps from a drawing or a program to a Run.
 
     post_drawing     Drawing + Job + target → program, read back, simulated and judged
+    post_by_tool     the same as a program for each turn of a tool
     verify_program   bytes of any program → judged, against a drawing if there is one
     convert_program  bytes of a program of one target → the program of another, judged as above
     read_program     bytes of a program → decoded, not judged
@@ -11,7 +12,8 @@ Nothing here reads or writes a file.
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import PurePath
 from typing import TYPE_CHECKING
 
@@ -22,13 +24,14 @@ from camtool.progress import Progress
 from camtool.run import Run
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from camtool.arrays import Bools, Ints
     from camtool.geometry.drawing import Drawing
     from camtool.machine.model import Machine
     from camtool.planning.items import Step
     from camtool.planning.job import Job, Tool
+    from camtool.planning.plan import Plan
     from camtool.simulation.motion import Effects
     from camtool.target.registry import LoadedTarget
     from camtool.toolpath.moves import Compensated, Toolpath
@@ -81,6 +84,17 @@ class _Goal:
     row_from: Ints | None = None
 
 
+@dataclass(frozen=True)
+class _Posting:
+    """How drawings are posted, as `post_drawing` says."""
+
+    check: bool = True
+    compensate: bool = False
+    gates: Gates | None = None
+    trace_points: int | None = None
+    progress: Progress = field(default_factory=Progress)
+
+
 def post_drawing(
     drawing: Drawing,
     job: Job,
@@ -99,12 +113,87 @@ def post_drawing(
     `progress` is told of each stage. Raises OptionError, MachineError, and PostError for what the
     target cannot write.
     """
-    from camtool.planning.checks import doubtful_settings
     from camtool.planning.plan import planned
 
-    progress = progress or Progress()
-    progress.begin(PLANNING)
-    plan = planned(drawing, job, target.machine)
+    how = _Posting(check, compensate, gates, trace_points, progress or Progress())
+
+    def plain() -> Run | None:
+        other = _plain(job)
+        if other == job and not compensate:
+            return None
+        return post_drawing(drawing, other, target, progress=progress)
+
+    def whole() -> Plan:
+        return planned(drawing, job, target.machine, undivided=True)
+
+    how.progress.begin(PLANNING)
+    return _posted(drawing, planned(drawing, job, target.machine), target, how, plain, whole)
+
+
+def post_by_tool(
+    drawing: Drawing,
+    job: Job,
+    target: LoadedTarget,
+    *,
+    check: bool = True,
+    compensate: bool = False,
+    gates: Gates | None = None,
+    trace_points: int | None = None,
+    progress: Progress | None = None,
+) -> tuple[Run, ...]:
+    """As `post_drawing`, a program for each turn of a tool: for machines that change none.
+
+    All are planned together, in one frame, so that they cut what the one program would; each is
+    complete and judged alone, against what its operations ask for.
+    """
+    from camtool.planning.plan import parted, planned, turns_of_tools
+
+    how = _Posting(check, compensate, gates, trace_points, progress or Progress())
+    machine = target.machine
+    how.progress.begin(PLANNING)
+    every = planned(drawing, job, machine)
+    turns = turns_of_tools(every)
+    plans = parted(every, turns, drawing, machine)
+
+    @cache
+    def plains() -> tuple[Run | None, ...]:
+        other = _plain(job)
+        if other == job and not compensate:
+            return (None,) * len(turns)
+        runs = post_by_tool(drawing, other, target, progress=progress)
+        return runs if len(runs) == len(turns) else (None,) * len(turns)
+
+    @cache
+    def wholes() -> tuple[Plan, ...]:
+        undivided = planned(drawing, job, machine, undivided=True)
+        return parted(undivided, turns, drawing, machine, undivided=True)
+
+    return tuple(
+        _posted(
+            drawing,
+            plan,
+            target,
+            how,
+            lambda k=k: plains()[k],  # type: ignore[misc]
+            lambda k=k: wholes()[k],  # type: ignore[misc]
+        )
+        for k, plan in enumerate(plans)
+    )
+
+
+def _posted(
+    drawing: Drawing,
+    plan: Plan,
+    target: LoadedTarget,
+    how: _Posting,
+    plain_run: Callable[[], Run | None],
+    whole_plan: Callable[[], Plan],
+) -> Run:
+    """The program of a plan, judged; `plain_run` gives the run of its job without measures against
+    reversals and backlash, None where it takes none, `whole_plan` the plan undivided."""
+    from camtool.planning.checks import doubtful_settings
+
+    job, progress = plan.job, how.progress
     wanted = plan.toolpath
     run = Run(source=drawing.file, target=target, drawing=drawing, job=job, wanted=wanted)
     doubtful = doubtful_settings(
@@ -113,9 +202,9 @@ def post_drawing(
     findings = _merged(drawing.findings, wanted.findings, tuple(doubtful))
     if worst(findings) >= Severity.ERROR:
         return replace(run, findings=findings)
-    judged = plan if check else None
+    judged = plan if how.check else None
     del plan  # what is not judged needs no stages of it
-    compensation = _compensated(wanted, target.machine) if compensate else None
+    compensation = _compensated(wanted, target.machine) if how.compensate else None
     written = wanted if compensation is None else compensation.toolpath
     program, decoded = _written(written, target, drawing.file, progress)
     repeated = _repeated(program, decoded)
@@ -127,18 +216,18 @@ def post_drawing(
     from camtool.verification.report import Planned, certain
     from camtool.verification.verify import VerifyOptions
 
-    plain = _plain_run(drawing, job, target, progress, compensate=compensate)
+    plain = plain_run()
     # Contours that are divided at reversals are judged as the whole contours of the drawing.
     whole = judged
     if _plain(job) != job and compensation is None:
-        whole = planned(drawing, job, target.machine, undivided=True)
+        whole = whole_plan()
     tool, nose = tool_mm(job), nose_of(job)
     options = VerifyOptions(
         source=drawing.file,
         tool_diameter_mm=tool,
         nose=nose,
         kept=kept_of(whole.steps) if tool or nose else (),
-        trace_points=TRACE_POINTS if trace_points is None else trace_points,
+        trace_points=TRACE_POINTS if how.trace_points is None else how.trace_points,
     )
     goal = _Goal(
         whole.toolpath,
@@ -156,7 +245,7 @@ def post_drawing(
     )
     del judged, whole  # the paths of the stages are not needed any more
     verification = _judged(program.data, decoded, target, goal, options, progress)
-    beyond = _beyond(verification, gates)
+    beyond = _beyond(verification, how.gates)
     findings = _merged(findings, verification.findings, beyond, without=repeated)
     verification = verification.with_planning(figures, _before(plain))
     return replace(
@@ -408,16 +497,6 @@ def _compensated(wanted: Toolpath, machine: Machine) -> Compensated:
 def _plain(job: Job) -> Job:
     """The job without its measures against reversals."""
     return replace(job, minimise="rapids", approach=False)
-
-
-def _plain_run(
-    drawing: Drawing, job: Job, target: LoadedTarget, progress: Progress, *, compensate: bool
-) -> Run | None:
-    """The run of the job without measures against reversals and backlash; None without any."""
-    plain = _plain(job)
-    if plain == job and not compensate:
-        return None
-    return post_drawing(drawing, plain, target, progress=progress)
 
 
 def _before(plain: Run | None) -> Before | None:

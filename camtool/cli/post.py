@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import hashlib
+import json
+import re
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
-from typing import TYPE_CHECKING
+from pathlib import Path, PurePath
+from typing import TYPE_CHECKING, TypeVar
 
 import click
 
-from camtool.cli.files import STDOUT, write_all
+from camtool.cli.files import STDOUT, check_places, write_all
 from camtool.cli.life_signs import progress, signs_of_command
 from camtool.cli.messages import (
     REPORT_NAMES,
@@ -53,6 +55,7 @@ if TYPE_CHECKING:
     from camtool.pictures.scene import Scene
     from camtool.run import Run
     from camtool.target.registry import LoadedTarget
+    from camtool.toolpath.wanted import ToolNote
 
 
 def scenes_of(run: Run, *, before: bool) -> list[Scene]:
@@ -68,6 +71,9 @@ def scenes_of(run: Run, *, before: bool) -> list[Scene]:
         )
     name = Path(run.source).name
     return [run.before.scene(f"{name}, before"), run.scene(f"{name}, after")]
+
+
+Made = TypeVar("Made")
 
 
 @dataclass(frozen=True)
@@ -97,15 +103,35 @@ class Posting:
     ) -> Run:
         """The drawing posted, for pictures of these names; `on_read` is called when it has been
         read."""
-        from camtool.pictures.options import points_for
         from camtool.pipeline import post_drawing
+
+        return self._made(post_drawing, source, target, on_read=on_read, pictures=pictures)
+
+    def make_by_tool(
+        self, source: str, target: LoadedTarget, *, pictures: Sequence[str] = ()
+    ) -> tuple[Run, ...]:
+        """The same as a program for each turn of a tool."""
+        from camtool.pipeline import post_by_tool
+
+        return self._made(post_by_tool, source, target, pictures=pictures)
+
+    def _made(
+        self,
+        post: Callable[..., Made],
+        source: str,
+        target: LoadedTarget,
+        *,
+        on_read: Callable[[], None] | None = None,
+        pictures: Sequence[str] = (),
+    ) -> Made:
+        from camtool.pictures.options import points_for
 
         wanted = self.job.job(self.drawing)
         read = self.drawing.read(source, target.machine, wanted)
         if on_read is not None:
             on_read()
         with self.job.blamed():
-            return post_drawing(
+            return post(
                 read,
                 wanted,
                 target,
@@ -163,6 +189,11 @@ def posting_options(command: Command) -> Command:
     is_flag=True,
     help="The picture without and with --compensate, --minimise reversals and --approach.",
 )
+@click.option(
+    "--split",
+    type=click.Choice(["tool"]),
+    help="A program for each tool in turn: DRAWING-1-mill.ext, DRAWING-2-drill.ext ...",
+)
 @posting_options
 @picture_options
 @talk_options
@@ -174,6 +205,7 @@ def post(
     page: str | None,
     watching: bool,
     before_after: bool,
+    split: str | None,
     picture: PictureFlags,
     posting: Posting,
     quiet: bool,
@@ -189,6 +221,8 @@ def post(
         raise click.UsageError("--watch works on files: neither reads stdin nor writes stdout")
     outputs = Outputs(preview, report, page)
     picture.check(outputs.pictures, UNVERIFIED if posting.no_verify else RESULT)
+    if split is not None and STDOUT in (output or source, preview, page):
+        raise click.UsageError("--split writes several files; name the one that they begin with")
     if before_after:
         if posting.no_verify:
             raise click.UsageError("--before-after needs the predicted path; drop --no-verify")
@@ -199,6 +233,13 @@ def post(
         reads = [*posting.files(source), str(target.file)]
         asked = Asked(source, output, outputs, reads)
         asked.check(target.machine.target.extension, verified=not posting.no_verify)
+        if split is not None:
+            runs = posting.make_by_tool(source, target, pictures=outputs.pictures)
+            painters = [
+                picture.painter(lambda run=run: scenes_of(run, before=before_after), quiet=quiet)  # type: ignore[misc]
+                for run in runs
+            ]
+            return finish_parts(runs, asked, painters, quiet=quiet, verbose=verbose)
         run = posting.make(source, target, pictures=outputs.pictures)
         painter = picture.painter(lambda: scenes_of(run, before=before_after), quiet=quiet)
         return finish(run, asked, picture=painter, quiet=quiet, verbose=verbose)
@@ -210,6 +251,12 @@ def post(
 
 MOST_PLACEHOLDERS = 2
 """Of a machine file that leaves out no more than these, its own file is to be completed."""
+
+SHORT = {"flat": "mill", "v": "bit"}
+"""What kinds of tools are called in names of files, where not as jobs call them."""
+
+MOST_OF_NAME = 40
+"""So many characters of a tool's name go into the name of a file."""
 
 
 @dataclass(frozen=True)
@@ -230,6 +277,11 @@ class Asked:
                     f"{flag} is the report of the verification that --no-verify leaves out"
                 )
         self.outputs.check(self.reads, self.program(extension))
+
+    def places(self) -> list[str | None]:
+        """The files of a program whose name is known."""
+        made = self.outputs
+        return [self.output, made.preview, made.report, made.page, made.beside]
 
     def program(self, extension: str) -> str:
         """The program's name; when none is given the source's, here; stdin goes to stdout."""
@@ -257,6 +309,13 @@ def finish(run: Run, asked: Asked, *, picture: Painter, quiet: bool, verbose: bo
     asked.check(run.program.extension, verified=True)
     output = asked.program(run.program.extension)
     write_all({output: run.program.data, **outputs.files(run, picture)})
+    _say_written(run, output, quiet=quiet)
+    return 0
+
+
+def _say_written(run: Run, output: str, *, quiet: bool) -> None:
+    """The summary of a program that was written there."""
+    assert run.program is not None
     if run.report is not None and not quiet:
         summary = run.report.to_text(findings=False)
         if run.target.placeholders:
@@ -264,6 +323,45 @@ def finish(run: Run, asked: Asked, *, picture: Painter, quiet: bool, verbose: bo
         show_facts(summary, REPORT_NAMES, report_marks(run.findings), err=True)
     where = "stdout" if output == STDOUT else output
     say(f"written: {where} ({len(run.program.data)} bytes)", quiet=quiet)
+
+
+def finish_parts(
+    runs: Sequence[Run],
+    asked: Asked,
+    pictures: Sequence[Painter],
+    *,
+    quiet: bool,
+    verbose: bool,
+) -> int:
+    """As `finish`, for the programs of one drawing, each with its own picture and page: all files
+    or none. The JSON is one, and lists the programs."""
+    findings = dict.fromkeys(finding for run in runs for finding in run.findings)
+    say_findings(findings, quiet=quiet, verbose=verbose)
+    parts = [_part(run, asked, number, len(runs)) for number, run in enumerate(runs, 1)]
+    report, names = asked.outputs.report, [str(part.output) for part in parts]
+    every = [name for part in parts for name in part.places()]
+    check_places(asked.reads, [*every, report])
+    for part in parts:
+        part.outputs.check(())
+    files: dict[str, bytes] = {}
+    if any(run.failed or run.program is None for run in runs):
+        for run, part, picture in zip(runs, parts, pictures, strict=True):
+            files |= _page_alone(run, part.outputs, picture)
+        write_all(files)
+        no = "no program" if files else "nothing"
+        say(
+            f"camtool: error: {asked.source}: {no} was written; fix the errors above",
+            quiet=False,
+        )
+        return 1
+    for run, part, name, picture in zip(runs, parts, names, pictures, strict=True):
+        assert run.program is not None
+        files |= {name: run.program.data, **part.outputs.files(run, picture)}
+    if report is not None:
+        files[report] = _listed(runs, parts)
+    write_all(files)
+    for run, name in zip(runs, names, strict=True):
+        _say_written(run, name, quiet=quiet)
     return 0
 
 
@@ -276,6 +374,50 @@ def _placeholder_words(names: Sequence[str]) -> str:
     if len(names) <= MOST_PLACEHOLDERS:
         return f"{said}: give them in your machine's file"
     return f"{said}: camtool init makes your machine's file"
+
+
+def _part(run: Run, asked: Asked, number: int, count: int) -> Asked:
+    """What is written of one program of `count`: all names with its number and its tool, which
+    sort as the programs run."""
+    tool = _tool(run)
+    kind = "tool" if tool is None else tool.name or SHORT.get(tool.kind, tool.kind)
+    plain = re.sub(r"[^A-Za-z0-9_]+", "-", kind).strip("-")[:MOST_OF_NAME] or "tool"
+    mark = f"-{number:0{len(str(count))}}-{plain}"
+
+    def marked(name: str | None) -> str | None:
+        path = None if name is None else PurePath(name)
+        return None if path is None else str(path.with_name(f"{path.stem}{mark}{path.suffix}"))
+
+    machine = run.target.machine.target
+    program = asked.program(machine.extension if run.program is None else run.program.extension)
+    outputs = asked.outputs
+    made = replace(
+        outputs, preview=marked(outputs.preview), page=marked(outputs.page), report=None
+    )
+    return Asked(asked.source, marked(program), made, asked.reads)
+
+
+def _tool(run: Run) -> ToolNote | None:
+    """The tool of a program that has one."""
+    operations = None if run.wanted is None else run.wanted.operations
+    return None if operations is None else operations.notes[0].tool
+
+
+def _listed(runs: Sequence[Run], parts: Sequence[Asked]) -> bytes:
+    """JSON: of each program its file, its tool, its picture and page, and its report."""
+    programs = []
+    for run, part in zip(runs, parts, strict=True):
+        tool = _tool(run)
+        programs.append(
+            {
+                "program": part.output,
+                "tool": None if tool is None else {"number": tool.number, "name": tool.name},
+                "preview": part.outputs.preview,
+                "page": part.outputs.page,
+                "report": None if run.report is None else json.loads(run.report.to_json()),
+            }
+        )
+    return f"{json.dumps({'programs': programs}, indent=2, ensure_ascii=False)}\n".encode()
 
 
 def _page_alone(run: Run, outputs: Outputs, picture: Painter) -> dict[str, bytes]:

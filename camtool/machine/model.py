@@ -113,7 +113,8 @@ class Defaults(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What planning takes where the job says nothing, mm. `feed_z_mm`: the height above the stock
     down to which the tool comes as a rapid (None: it plunges from `safe_z_mm` on).
     `plunge_share`: the feed of a plunge as a part of that of the cut (None: the same). `park_mm`:
-    where the tool goes when all is cut, in the work frame."""
+    where the tool goes when all is cut, in the work frame; `change_mm` and `change_z_mm`: where
+    it goes between two operations to be changed (None: it stays, at `safe_z_mm`)."""
 
     safe_z_mm: Length
     cut_depth_mm: Depth
@@ -122,6 +123,8 @@ class Defaults(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     feed_z_mm: Length | None = None
     plunge_share: Part | None = None
     park_mm: tuple[Place, Place] = (0.0, 0.0)
+    change_mm: tuple[Place, Place] | None = None
+    change_z_mm: Length | None = None
 
 
 class Spindle(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import msgspec
@@ -55,7 +55,11 @@ def compensated(toolpath: Toolpath, machine: Machine) -> Compensated:
     """
     motors = motor_path(toolpath, machine)
     bent = _taken_up(motors.toolpath, machine)
-    return Compensated(bent.toolpath, motors.row[bent.row])
+    row = motors.row[bent.row]
+    if toolpath.operations is None or bent.toolpath is toolpath:
+        return Compensated(bent.toolpath, row)
+    operations = toolpath.operations.picked(row)
+    return Compensated(replace(bent.toolpath, operations=operations), row)
 
 
 def motor_path(toolpath: Toolpath, machine: Machine) -> Compensated:

@@ -9,11 +9,13 @@ import numpy as np
 
 from camtool.arrays import Floats
 from camtool.machine.model import Machine, Spindle
+from camtool.planning.checks import IN_PASSES
 from camtool.planning.items import CutRun, Runs, Setting
 from camtool.planning.job import Tool
 from camtool.planning.paths import cuts
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind
+from camtool.toolpath.wanted import OperationNote, ToolNote
 
 ROUNDED_DECIMALS = 10
 """Positions are rounded to this many decimals of a mm: far coarser than the noise of doubles, and
@@ -62,14 +64,21 @@ def link(
         if not runs:
             continue
         builder.source = ""
-        if _changes(tool, operation.tool):
+        changes = _changes(tool, operation.tool)
+        if changes:
             cooled = _cool(builder, cooled, "off")
             speed = _spin(builder, speed, None, spindle)
+            if tool is not None:
+                _to_change(builder, machine)
+        builder.operation(_note(setting))
+        if changes:
             builder.event(Kind.TOOL_CHANGE, float(operation.tool.number or 0))
             approach = approaches() if approaches is not None else None
         tool = operation.tool
         speed = _spin(builder, speed, setting.spindle_rpm, spindle)
         cooled = _cool(builder, cooled, operation.coolant)
+        if builder.position[2] > heights[0]:  # from where tools are changed, not down aslant
+            builder.rapid(*_rounded(runs.vertices[0, :2]).tolist())
         for lot in _lots(runs):
             _cut(builder, lot, done, heights, approach)
         done += len(runs)
@@ -82,6 +91,32 @@ def link(
 def _changes(before: Tool | None, tool: Tool) -> bool:
     """Whether the program must ask for this tool: it has a number, and another was in."""
     return tool.number is not None and (before is None or before.number != tool.number)
+
+
+def _to_change(builder: ToolpathBuilder, machine: Machine) -> None:
+    """To where the machine changes tools, up first, if it has such a place."""
+    x, y, z = builder.position
+    height, place = machine.defaults.change_z_mm, machine.defaults.change_mm
+    if height is not None and height > z:
+        builder.rapid(z=height)
+    if place is not None and place != (x, y):
+        builder.rapid(*place)
+
+
+def _note(setting: Setting) -> OperationNote:
+    """What the program may say of an operation."""
+    operation, tool = setting.operation, setting.operation.tool
+    return OperationNote(
+        kind=operation.kind,
+        name=operation.name,
+        tool=ToolNote(tool.number, tool.name, tool.kind, tool.diameter_mm, tool.tip_angle_rad),
+        feed_mm_min=setting.feeds.cut_mm_min,
+        plunge_mm_min=setting.feeds.plunge_mm_min,
+        depth_mm=-setting.levels_mm[-1],
+        spindle_rpm=setting.spindle_rpm,
+        passes=len(setting.levels_mm) if operation.kind in IN_PASSES else None,
+        peck_mm=operation.peck_mm,
+    )
 
 
 def _spin(

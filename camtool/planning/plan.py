@@ -9,7 +9,7 @@ Operations follow each other as the job lists them; each is put into order on it
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
@@ -36,7 +36,7 @@ from camtool.planning.engrave import engrave
 from camtool.planning.finish import in_passes, of_stage
 from camtool.planning.gouges import side_findings
 from camtool.planning.items import Bridge, Chosen, Contours, Items, Runs, Setting, Step, Work
-from camtool.planning.job import Job, Operation, refuse_endless
+from camtool.planning.job import Job, Operation, Tool, refuse_endless
 from camtool.planning.leads import KeepOut
 from camtool.planning.link import link
 from camtool.planning.naming import key_of
@@ -54,6 +54,7 @@ from camtool.planning.profile import profile
 from camtool.planning.settings import setting_of
 from camtool.planning.sides import Sides, choose, takes_mark
 from camtool.planning.tabs import raised_over_bridges, with_tabs
+from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
 
 HOME: Point = (0.0, 0.0)
@@ -64,8 +65,10 @@ MOST_OVERLAPS = 20
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Every stage of a plan: the drawing in the work frame, the operations, the toolpath."""
+    """Every stage of a plan: the job, the drawing in the work frame, the operations, the
+    toolpath."""
 
+    job: Job
     placed: Drawing
     steps: tuple[Step, ...]
     toolpath: Toolpath
@@ -101,7 +104,15 @@ def planned(drawing: Drawing, job: Job, machine: Machine, *, undivided: bool = F
             step = _step(placed, plain, setting, machine, (here, there), sides, before)
         here = end
         steps.append(step)
-    steps = _sparing(steps)
+    found = Plan(job, placed, tuple(_sparing(steps)), ToolpathBuilder().finish())
+    return _linked(found, drawing, job, machine, undivided=undivided)
+
+
+def _linked(
+    plan: Plan, drawing: Drawing, whole: Job, machine: Machine, *, undivided: bool
+) -> Plan:
+    """The plan with the toolpath of its steps; its job may be a part of the `whole` one."""
+    job, placed, steps = plan.job, plan.placed, plan.steps
     worked = [(step.setting, step.runs) for step in steps]
     approaches = None
     if not undivided and (job.approach or job.minimise == "reversals"):
@@ -112,7 +123,7 @@ def planned(drawing: Drawing, job: Job, machine: Machine, *, undivided: bool = F
     toolpath = builder.finish()
     findings = collapsed(drawing, placed, job)
     findings += [finding for step in steps for finding in step.findings]
-    findings += _left_over(placed, job, any(step.runs for step in steps))
+    findings += _left_over(placed, whole, any(step.runs for step in steps))
     findings += _coarse(drawing, placed)
     findings += checked(toolpath, job, machine)
     made_from = PurePath(drawing.file).name
@@ -122,7 +133,42 @@ def planned(drawing: Drawing, job: Job, machine: Machine, *, undivided: bool = F
         made_from=made_from,
         drawn=drawn_of(toolpath, builder.runs, steps, placed),
     )
-    return Plan(placed, tuple(steps), toolpath)
+    return replace(plan, toolpath=toolpath)
+
+
+def turns_of_tools(plan: Plan) -> list[list[int]]:
+    """The steps of the plan, by their index, parted where another tool has its turn; what cuts
+    nothing has no turn of its own."""
+    turns: list[list[int]] = [[]]
+    tool: Tool | None = None
+    for index, step in enumerate(plan.steps):
+        if step.runs:
+            mine = step.operation.tool
+            same = tool is None or tool == mine
+            if not (same or (tool and tool.number is not None and tool.number == mine.number)):
+                turns.append([])
+            tool = mine
+        turns[-1].append(index)
+    return turns
+
+
+def parted(
+    plan: Plan,
+    turns: Sequence[Sequence[int]],
+    drawing: Drawing,
+    machine: Machine,
+    *,
+    undivided: bool = False,
+) -> tuple[Plan, ...]:
+    """A plan for each of the `turns`, in the frame of the whole one, with its cuts: what its steps
+    leave standing for each other, and on which side they cut, they know from it."""
+    parts = []
+    for turn in turns:
+        steps = tuple(plan.steps[index] for index in turn)
+        job = replace(plan.job, operations=tuple(step.operation for step in steps))
+        part = replace(plan, job=job, steps=steps)
+        parts.append(_linked(part, drawing, plan.job, machine, undivided=undivided))
+    return tuple(parts)
 
 
 def _coarse(drawing: Drawing, placed: Drawing) -> Iterator[Finding]:

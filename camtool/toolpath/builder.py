@@ -11,6 +11,7 @@ import numpy as np
 from camtool.arrays import Floats, Ints
 from camtool.findings import Finding
 from camtool.toolpath.moves import COLUMNS, Kind, PathMode, Toolpath, frozen
+from camtool.toolpath.wanted import OperationNote, Operations
 
 Coordinate = float | None
 
@@ -45,6 +46,8 @@ class ToolpathBuilder:
         self._columns = {name: _Column(name) for name in (*COLUMNS, "run")}
         self._texts: dict[str, int] = {}
         self._modes: dict[PathMode, int] = {}
+        self._notes: list[OperationNote] = []
+        self._begin: list[int] = []
 
     def __len__(self) -> int:
         return len(self._columns["kind"]) + len(self._rows)
@@ -84,6 +87,11 @@ class ToolpathBuilder:
         """A message to the operator."""
         return self.event(Kind.MESSAGE, float(self._index(text)))
 
+    def operation(self, note: OperationNote) -> None:
+        """From here on rows are of this operation."""
+        self._notes.append(note)
+        self._begin.append(len(self))
+
     def moved_to(self, x: float, y: float, z: float) -> ToolpathBuilder:
         """An event before this one left the tool here (homing)."""
         self.position = (x, y, z)
@@ -118,12 +126,14 @@ class ToolpathBuilder:
     def finish(self, findings: Iterable[Finding] = ()) -> Toolpath:
         """The rows so far as a Toolpath."""
         self._gather()
+        begin = np.array(self._begin, dtype=np.int64)
         return Toolpath(
             **{name: self._columns[name].whole() for name in COLUMNS},
             modes=tuple(self._modes),
             start=np.array(self._start, dtype=np.float64),
             texts=tuple(self._texts),
             findings=tuple(findings),
+            operations=Operations(tuple(self._notes), begin) if self._notes else None,
         )
 
     def _move(

@@ -19,7 +19,7 @@ import numpy as np
 from camtool.arrays import Bools, Codes, Floats, Indices, Ints
 from camtool.errors import PostError
 from camtool.findings import Finding
-from camtool.toolpath.wanted import Drawn
+from camtool.toolpath.wanted import Drawn, Operations
 
 Column = TypeVar("Column", bound=np.ndarray[Any, Any])
 
@@ -107,7 +107,8 @@ class Toolpath:
     program block that the row was read from, −1 when planned; start (3,) mm; `made_from` the name
     of the drawing, "" when it is not known; mode (N,) index into `modes` or −1, where the program
     leaves to the machine how it meets the corner behind the row; without modes all of them are;
-    `drawn` what the rows stand for, None but for plans. ValueError when columns disagree.
+    `drawn` what the rows stand for, and `operations` which of them each operation cuts, None but
+    for plans. ValueError when columns disagree.
     """
 
     kind: Codes
@@ -124,6 +125,7 @@ class Toolpath:
     mode: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     modes: tuple[PathMode, ...] = ()
     drawn: Drawn | None = None
+    operations: Operations | None = None
 
     def __post_init__(self) -> None:
         count = len(self.kind)
@@ -196,12 +198,13 @@ class Toolpath:
         columns = {name: getattr(self, name)[low:high] for name in COLUMNS}
         drawn = None if self.drawn is None else self.drawn.picked(np.arange(low, high))
         start = self.start if low == 0 else frozen(self.end[low - 1].copy())
-        return replace(self, **columns, start=start, drawn=drawn)
+        operations = None if self.operations is None else self.operations.of_part(low, high)
+        return replace(self, **columns, start=start, drawn=drawn, operations=operations)
 
     def by_parts(self, column: Callable[[Toolpath], Column]) -> Column:
         """(N, …) a column in which each row follows from that row and its start alone, computed
         for some thousand rows at a time, in order."""
-        bare = replace(self, drawn=None)
+        bare = replace(self, drawn=None, operations=None)
         if len(self) <= ROWS_AT_ONCE:
             return column(bare)
         found: Any = None
@@ -219,7 +222,8 @@ class Toolpath:
             name: rows_of(getattr(self, name), row) for name in COLUMNS if name not in others
         }
         drawn = None if self.drawn is None else self.drawn.picked(row)
-        return replace(self, **{**columns, **others}, drawn=drawn)
+        operations = None if self.operations is None else self.operations.picked(row)
+        return replace(self, **{**columns, **others}, drawn=drawn, operations=operations)
 
     def text(self, row: int) -> str:
         """Provenance of a row ("" when it has none)."""

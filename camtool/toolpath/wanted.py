@@ -1,8 +1,11 @@
-"""What a planned toolpath is wanted for: what was drawn, and what it must leave standing."""
+"""What a planned toolpath is wanted for: what was drawn, by which operations it is cut, and what
+it must leave standing."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+
+import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.polylines import Polylines
@@ -27,6 +30,53 @@ class Drawn:
     def picked(self, row: Ints) -> Drawn:
         """Rows (M,) of this one, in that order and as often as they are named."""
         return replace(self, off_mm=self.off_mm[row], edge=self.edge[row])
+
+
+@dataclass(frozen=True)
+class ToolNote:
+    """A tool as a program names it: its shape as in jobs ("flat", "v", "drill", ...), its diameter
+    (0: no width) and the full angle of its tip, None where it has none."""
+
+    number: int | None = None
+    name: str = ""
+    kind: str = "flat"
+    diameter_mm: float = 0.0
+    tip_angle_rad: float | None = None
+
+
+@dataclass(frozen=True)
+class OperationNote:
+    """What a program says of an operation. `spindle_rpm`: None without a speed; `passes`: None for
+    kinds of operation without passes; `peck_mm`: how deep a drill goes at a time."""
+
+    kind: str
+    name: str
+    tool: ToolNote
+    feed_mm_min: float
+    plunge_mm_min: float
+    depth_mm: float
+    spindle_rpm: float | None = None
+    passes: int | None = None
+    peck_mm: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Operations:
+    """The K operations that a planned toolpath is cut by, in order: the `notes` on them, and the
+    row `begin` (K,) from which on each has its turn; rows before the first are its own too."""
+
+    notes: tuple[OperationNote, ...]
+    begin: Ints
+
+    def of_part(self, low: int, high: int) -> Operations:
+        """For the rows low:high alone."""
+        return replace(self, begin=self.begin.clip(low, high) - low)
+
+    def picked(self, row: Ints) -> Operations:
+        """For rows (M,) of the toolpath, which ascend; ValueError where they do not."""
+        if (np.diff(row) < 0).any():
+            raise ValueError("rows out of order belong to no order of operations")
+        return replace(self, begin=np.searchsorted(row, self.begin))
 
 
 @dataclass(frozen=True, eq=False)

@@ -38,11 +38,12 @@ class GcodeDialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     """What both dialects let a user choose, and their controller's rule for arcs.
 
     `decimals` of coordinates; `strip_zeros` says 1.5 for 1.500; `line_chars` that the controller
-    takes in a line; `block_numbers` N1 N2 …; `comments`: a "header", also the name of each contour
-    ("contours"), or "none"; `full_circles` "whole" (end = start) or as two "halves";
-    `program_end`; `retract` to the highest Z in front of the end if the tool is left in the
-    material. `start_blocks` follow the modes with which a program begins, `end_blocks` stand
-    before its end, when the spindle is off: what the machine wants, as its controller takes it.
+    takes in a line; `block_numbers` N1 N2 …; `comments`: a "header", also what each operation does
+    ("operations"), also the name of each contour ("contours"), or "none"; `full_circles` "whole"
+    (end = start) or as two "halves"; `program_end`; `retract` to the highest Z in front of the end
+    if the tool is left in the material. `start_blocks` follow the modes with which a program
+    begins, `end_blocks` stand before its end, when the spindle is off: what the machine wants, as
+    its controller takes it.
     `arc_most_radius_mm`: larger arcs are written as lines; `arc_full_turn_rad`: the
     controller takes an arc that turns by less for a full circle; `arc_chord_slack_mm`: by how much
     half the chord may exceed R.
@@ -52,7 +53,7 @@ class GcodeDialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     strip_zeros: bool = False
     line_chars: Annotated[int, Meta(ge=64, le=1_000_000)]
     block_numbers: bool = False
-    comments: Literal["contours", "header", "none"] = "contours"
+    comments: Literal["contours", "operations", "header", "none"] = "contours"
     full_circles: Literal["whole", "halves"] = "whole"
     program_end: Literal["M2", "M30"] = "M2"
     retract: bool = True

@@ -71,6 +71,11 @@ SPINDLE_SPEED_NOT_SAID = Sentence(
     "the spindle is started before any S word: a controller that sets the speed turns it at 0; "
     "write S",
 )
+EVENT_LEFT_OUT_TOOL = Sentence(
+    Code.EVENT_LEFT_OUT,
+    "the program names no tool, because the machine changes none: mount it before the program",
+    severity=INFO,
+)
 NEVER_READ = Sentence(
     Code.NEVER_READ,
     "{measured:# line stands|# lines stand} behind the end of the program, which the controller "

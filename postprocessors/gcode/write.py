@@ -3,8 +3,9 @@
     rows ──checked──▶ units, arcs repaired ──▶ rows to send ──modal──▶ blocks and comments
 
 Coordinates, feeds and motion words are written when they change; an arc always has X Y I J. The
-first move in XY has both coordinates, and so has the first after homing: the real tool may then
-stand anywhere. Comment lines and `%` are lines, but no blocks.
+first move in XY has both coordinates, and so has the first after homing and after a tool change:
+the real tool may then stand anywhere. After a change it goes to its height again before it moves
+in XY. Comment lines and `%` are lines, but no blocks.
 """
 
 from __future__ import annotations
@@ -12,7 +13,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from importlib.metadata import version
 from itertools import pairwise
 from typing import Final
 
@@ -23,26 +23,22 @@ from camtool.bounds import refuse_too_long
 from camtool.errors import PostError
 from camtool.findings import Finding
 from camtool.machine.model import Machine
-from camtool.toolpath.moves import Kind, PathMode, Toolpath, mounted_before, toolpath_extents
+from camtool.toolpath.moves import Kind, PathMode, Toolpath, mounted_before
 from camtool.toolpath.program import Program
 from camtool.toolpath.words import Words, texts_of
 
 from .arcs import ArcCounts, Arcs, arcs_of
 from .checks import check, feed_units
+from .comments import comments, header
 from .dialect import GcodeDialect, feed_decimals
 from .findings import ARC_MENDED, MOVE_COLLAPSED, VALUE_ROUNDED
 from .format import (
     NumberStyle,
-    comment,
     first_too_long,
-    format_column,
     format_number,
     values_of,
     word_of,
 )
-
-DIGEST: Final = 8
-"""So many hexadecimal digits of the machine's digest stand in a program."""
 
 VALUE: Final = NumberStyle(3, strip=True)
 """Spindle speeds and dwells are written to a thousandth."""
@@ -52,29 +48,37 @@ ROUNDING_PART: Final = 1e-9
 
 SPINDLE: Final = {Kind.SPINDLE_CW: "M3", Kind.SPINDLE_CCW: "M4"}
 
+SPINDLE_OFF: Final = "M5"
+COOLANT_OFF: Final = "M9"
+
+COOLS: Final = (Kind.COOLANT_MIST, Kind.COOLANT_FLOOD)
+
 SWITCHES: Final = {
-    Kind.SPINDLE_OFF: "M5",
+    Kind.SPINDLE_OFF: SPINDLE_OFF,
     Kind.COOLANT_MIST: "M7",
     Kind.COOLANT_FLOOD: "M8",
-    Kind.COOLANT_OFF: "M9",
+    Kind.COOLANT_OFF: COOLANT_OFF,
 }
 
-EventWords = Callable[["Event"], str]
+EventWords = Callable[["Event"], Sequence[str]]
 
 
 @dataclass(frozen=True, eq=False)
 class Style:
     """A dialect's own part of a program.
 
-    `header`: its first blocks; `event`: the block of an event; `message`: what a comment for the
-    operator begins with; `frame`: the line around the program that is no block (%), or "";
-    `path_mode`: the block that asks for a path mode, `own_mode`: that of rows that ask for none.
+    `header`: its first blocks; `event`: the blocks of an event; `message`: what a comment for the
+    operator begins with; `mounted`: what the operator is told at a tool change, by the event and
+    the row, None where the machine changes tools; `frame`: the line around the program that is no
+    block (%), or ""; `path_mode`: the block that asks for a path mode, `own_mode`: that of rows
+    that ask for none.
     """
 
     dialect: GcodeDialect
     header: tuple[str, ...]
     event: EventWords
     message: str = ""
+    mounted: Callable[[Toolpath, int], Sequence[str]] | None = None
     frame: str = ""
     path_mode: Callable[[PathMode], str] | None = None
     own_mode: PathMode | None = None
@@ -87,7 +91,7 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
     feeds, rounded_feeds = feed_units(toolpath, machine)
     arcs = arcs_of(toolpath, dialect)
     events = events_of(toolpath, style.event)
-    sent = sent_rows(toolpath, arcs, feeds)
+    sent = sent_rows(toolpath, arcs, feeds, events.changes)
     arc_counts = arcs.counts
     del arcs, feeds
     frame = [style.frame] if style.frame else []
@@ -96,20 +100,22 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
     order = Order(sent.is_motion)
     order.add(0, [*style.header, *first_mode, *dialect.start_blocks])
     for at, row in sent.others(events):
-        order.add(at, [events.blocks[row]], row)
+        order.add(at, events.blocks[row], row)
     for at, block in changes.items():
         order.add(at, [block])
     footer = _footer(toolpath, events, dialect)
     order.add(len(sent.row), footer[:-1])
     order.add(len(sent.row), footer[-1:], len(toolpath) - 1 if ended else -1)
     of_row = order.rows(sent.row)
-    comments = _comments(toolpath, of_row, style)
-    head = [*frame, *_header(toolpath, machine, dialect)]
-    refuse_too_long(len(head) + len(of_row) + len(comments[0]) + len(frame), "line")
+    tell = style.mounted
+    mounted = {} if tell is None else {row: tell(toolpath, row) for row in events.changes}
+    said = comments(toolpath, of_row, dialect, style.message, mounted)
+    head = [*frame, *header(toolpath, machine, dialect)]
+    refuse_too_long(len(head) + len(of_row) + len(said[0]) + len(frame), "line")
     data = b"".join(
         [
             *(f"{line}\n".encode("ascii") for line in head),
-            order.text(sent, dialect, feed_decimals(machine), *comments),
+            order.text(sent, dialect, feed_decimals(machine), *said),
             *(f"{line}\n".encode("ascii") for line in frame),
         ]
     )
@@ -212,62 +218,10 @@ def _footer(toolpath: Toolpath, events: Events, dialect: GcodeDialect) -> list[s
     style = NumberStyle(dialect.decimals, strip=dialect.strip_zeros)
     return [
         *([f"G0 Z{format_number(float(heights.max()), style)}"] if retract else []),
-        *(["M5"] if events.spindle_on else []),
+        *([SPINDLE_OFF] if events.spindle_on else []),
         *dialect.end_blocks,
         dialect.program_end,
     ]
-
-
-def _header(toolpath: Toolpath, machine: Machine, dialect: GcodeDialect) -> list[str]:
-    """Comment lines: the tool, machine, drawing and units, and how far the program reaches."""
-    if dialect.comments == "none":
-        return []
-    style = NumberStyle(dialect.decimals)
-    bounds = [
-        f"{axis} {' to '.join(format_column(reach, style))}"
-        for axis, reach in zip("XYZ", toolpath_extents(toolpath), strict=True)
-    ]
-    made = (
-        [toolpath.made_from, f"settings {machine.digest[:DIGEST]}"] if toolpath.made_from else []
-    )
-    lines = [
-        f"camtool {version('camtool')} for {machine.target.name}: {machine.target.title}",
-        *made,
-        "mm and mm/min - part zero at X0 Y0 Z0",
-        *bounds,
-    ]
-    return [comment(line) for line in lines]
-
-
-def _comments(toolpath: Toolpath, of_row: Ints, style: Style) -> tuple[Ints, Callable[[int], str]]:
-    """The lines of comments, messages and the names of contours where they begin: the block
-    (by index, from 0) that each stands before (C,), and the text of the k-th; `of_row` (B,) the
-    rows of the blocks."""
-    begins = np.empty(0, dtype=np.int64)
-    if style.dialect.comments == "contours":
-        motions = np.flatnonzero(toolpath.is_motion)
-        named = toolpath.source[motions]
-        begins = motions[(np.diff(named, prepend=-1) != 0) & (named >= 0)]
-    rows = np.sort(np.concatenate([begins, np.flatnonzero(toolpath.kind == Kind.MESSAGE)]))
-    # The comments of a row that was left out stand before the next block that is sent.
-    blocks = np.searchsorted(np.maximum.accumulate(of_row), rows)
-
-    def text(k: int) -> str:
-        row = int(rows[k])
-        if toolpath.kind[row] == Kind.MESSAGE:
-            return _message(toolpath, row, style)
-        return comment(toolpath.text(row))
-
-    return np.minimum(blocks, len(of_row) - 1), text
-
-
-def _message(toolpath: Toolpath, row: int, style: Style) -> str:
-    """A message to the operator as a comment."""
-    index = toolpath.value[row]
-    if not (0 <= index < len(toolpath.texts)):
-        raise PostError("a message without its text", where=toolpath.place(row))
-    text = comment(toolpath.texts[int(index)])
-    return f"({style.message}{text[1:]}"
 
 
 def _check_length(data: bytes, dialect: GcodeDialect) -> None:
@@ -306,7 +260,8 @@ def _rounded(toolpath: Toolpath, rows: tuple[int, ...]) -> Iterator[Finding]:
 class Sent:
     """The rows to send, events among them: kind (M,), end (M, 3) and offset (M, 2) in units,
     feed (M,) in units of the F word, row (M,) of the toolpath; `written` (M, 3): which coordinates
-    are written; `forget` (M,): homing since the last motion. `dropped` moves were too small."""
+    are written; `forget` (M,): homing or a tool change since the last motion. `dropped` moves were
+    too small."""
 
     kind: Codes
     end: Ints
@@ -330,8 +285,9 @@ class Sent:
                 yield at, row
 
 
-def sent_rows(toolpath: Toolpath, arcs: Arcs, feeds: Ints) -> Sent:
-    """All rows with pieces in place of arcs, without moves that move nothing."""
+def sent_rows(toolpath: Toolpath, arcs: Arcs, feeds: Ints, changes: Sequence[int] = ()) -> Sent:
+    """All rows with pieces in place of arcs, without moves that move nothing. `changes`: the rows
+    of tool changes that have a block."""
     of, kind, end, offset = np.arange(len(toolpath)), arcs.kind, arcs.end, arcs.offset
     if arcs.pieces:
         many = np.ones(len(toolpath), dtype=np.int64)
@@ -346,11 +302,21 @@ def sent_rows(toolpath: Toolpath, arcs: Arcs, feeds: Ints) -> Sent:
             for at, piece in enumerate(pieces, int(first[row])):
                 height = sunk + round(rise * piece.share)
                 kind[at], end[at], offset[at] = piece.kind, (*piece.end, height), piece.offset
+    raised = np.zeros(len(of), dtype=np.bool_)
+    changed = (kind == Kind.TOOL_CHANGE) & np.isin(of, changes)
+    if again := _raised_again(kind, end, changed):
+        before = np.array(again) - 1
+        of, kind = np.insert(of, again, of[before]), np.insert(kind, again, kind[before])
+        end = np.insert(end, again, end[before], axis=0)
+        offset = np.insert(offset, again, 0, axis=0)
+        raised, changed = np.insert(raised, again, True), np.insert(changed, again, False)
+        kind[raised] = Kind.RAPID
     motion = kind <= Kind.ARC_CCW
     is_arc = motion & (kind >= Kind.ARC_CW)
     written = _differ(end, np.zeros(3))
     written[~motion] = False
-    home_xy, home_z = kind == Kind.HOME_XY, kind == Kind.HOME_Z
+    written[raised, 2] = True
+    home_xy, home_z = changed | (kind == Kind.HOME_XY), changed | (kind == Kind.HOME_Z)
     flat = written[:, :2].any(axis=1) | is_arc
     # A rapid to where X and Y should be already is not left out before they were ever written.
     still = (kind == Kind.RAPID) & ~written.any(axis=1)
@@ -372,6 +338,20 @@ def sent_rows(toolpath: Toolpath, arcs: Arcs, feeds: Ints) -> Sent:
         _first_after((home_xy | home_z)[kept], motion[kept]),
         int(wanted.sum()) + arcs.counts.dropped,
     )
+
+
+def _raised_again(kind: Codes, end: Ints, changed: Bools) -> list[int]:
+    """The rows before which the tool must be sent to its height once more: those behind a change
+    of tools that stands between moves, unless the next move is a rapid in Z anyway."""
+    motions = np.flatnonzero(kind <= Kind.ARC_CCW)
+    found = []
+    for at in np.flatnonzero(changed).tolist():
+        k = int(np.searchsorted(motions, at))
+        if 0 < k < len(motions):
+            goes = end[motions[k]] != end[at]
+            if kind[motions[k]] != Kind.RAPID or goes[:2].any() or not goes[2]:
+                found.append(at + 1)
+    return found
 
 
 def _differ(ends: Ints | Floats, start: Floats) -> Bools:
@@ -435,12 +415,14 @@ def _changes(values: Ints, counts: Bools) -> Bools:
 @dataclass(frozen=True)
 class Event:
     """A row that is no motion; `where` names it in errors. `mounted_before`: a tool change before
-    the first move at a feed."""
+    the first move at a feed. `spindle_on`, `cools`: what the program has switched on so far."""
 
     kind: Kind
     value: float
     where: str
     mounted_before: bool = False
+    spindle_on: bool = False
+    cools: bool = False
 
     def refuse(self, message: str, mend: str = "") -> PostError:
         """The error for an event that cannot be sent."""
@@ -449,19 +431,20 @@ class Event:
 
 @dataclass(frozen=True)
 class Events:
-    """`blocks` of the rows that have one; rows whose value was `rounded`; `spindle_on` at the
-    end of the program."""
+    """`blocks` of the rows that have some; rows whose value was `rounded`; `spindle_on` at the
+    end of the program; the rows of tool `changes` that have blocks."""
 
-    blocks: Mapping[int, str]
+    blocks: Mapping[int, Sequence[str]]
     rounded: tuple[int, ...]
     spindle_on: bool
+    changes: tuple[int, ...]
 
 
 def events_of(toolpath: Toolpath, words: EventWords) -> Events:
     """The blocks of all events but END and messages."""
-    blocks: dict[int, str] = {}
+    blocks: dict[int, Sequence[str]] = {}
     rounded: list[int] = []
-    spindle_on = False
+    spindle_on = cools = False
     mounted = mounted_before(toolpath)
     for row in (~toolpath.is_motion).nonzero()[0].tolist():
         event = Event(
@@ -469,6 +452,8 @@ def events_of(toolpath: Toolpath, words: EventWords) -> Events:
             float(toolpath.value[row]),
             toolpath.place(row),
             bool(mounted[row]),
+            spindle_on,
+            cools,
         )
         if event.kind == Kind.END:
             if row != len(toolpath) - 1:
@@ -481,32 +466,36 @@ def events_of(toolpath: Toolpath, words: EventWords) -> Events:
         elif event.kind != Kind.MESSAGE:
             if block := words(event):
                 blocks[row] = block
-            spindle_on = (spindle_on or event.kind in SPINDLE) and event.kind != Kind.SPINDLE_OFF
+            spindle_on = (spindle_on or event.kind in SPINDLE) and SPINDLE_OFF not in block
+            cools = (cools or event.kind in COOLS) and COOLANT_OFF not in block
             if _is_rounded(event):
                 rounded.append(row)
-    return Events(blocks, tuple(rounded), spindle_on)
+    changes = tuple(row for row in blocks if toolpath.kind[row] == Kind.TOOL_CHANGE)
+    return Events(blocks, tuple(rounded), spindle_on, changes)
 
 
-def common_words(event: Event) -> str:
-    """Dwell, spindle, coolant and homing; PostError for values that no block can say.
+def common_words(event: Event) -> tuple[str, ...]:
+    """The block of a dwell, spindle, coolant or homing; PostError for values that none can say.
 
     Homing is a rapid in machine coordinates, `G53 G0`: G28 would go where the operator's memory
     of it points.
     """
     if event.kind in SWITCHES:
-        return SWITCHES[event.kind]
+        return (SWITCHES[event.kind],)
     if event.kind == Kind.HOME_XY:
-        return "G53 G0 X0 Y0"
+        return ("G53 G0 X0 Y0",)
     if event.kind == Kind.HOME_Z:
-        return "G53 G0 Z0"
+        return ("G53 G0 Z0",)
     if event.kind not in (*SPINDLE, Kind.DWELL):
         raise event.refuse(f"a {event.kind.name} has no block in this dialect")
     if event.kind in SPINDLE and math.isnan(event.value):
-        return SPINDLE[event.kind]  # its speed is not known
+        return (SPINDLE[event.kind],)  # its speed is not known
     if not (math.isfinite(event.value) and event.value >= 0.0):
         raise event.refuse(f"a {event.kind.name} without a value of 0 or more")
     written = format_number(event.value, VALUE)
-    return f"G4 P{written}" if event.kind == Kind.DWELL else f"{SPINDLE[event.kind]} S{written}"
+    if event.kind == Kind.DWELL:
+        return (f"G4 P{written}",)
+    return (f"{SPINDLE[event.kind]} S{written}",)
 
 
 def tool_number(event: Event) -> int:

@@ -16,11 +16,11 @@ MOST_TOOL: Final = 255
 
 
 class Dialect(GcodeDialect, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """`tool_change`: grbl knows no M6, so a change is refused ("refuse"), or the program says the
-    tool and stops until the operator goes on ("pause": `T2 M0`). `most_dwell_s`: grbl counts
-    longer dwells wrong."""
+    """`tool_change`: grbl knows no M6, so between cuts the program says the tool and stops until
+    the operator goes on ("stop": `T2 M0`), stops so for the first tool too ("pause"), or is
+    refused ("refuse"). `most_dwell_s`: grbl counts longer dwells wrong."""
 
-    tool_change: Literal["refuse", "pause"] = "refuse"
+    tool_change: Literal["stop", "pause", "refuse"] = "stop"
     most_dwell_s: Seconds
 
 

@@ -145,6 +145,6 @@ def rules_of(machine: GrblMachine) -> Rules:
         sure_radius_mm=dialect.arc_least_radius_mm,
         ends_in_plane=True,
         m_codes={code: group for code, group in M_CODES.items() if mist or code != MIST},
-        tools="pause" if dialect.tool_change == "pause" else "none",
+        tools="none" if dialect.tool_change == "refuse" else "pause",
         most_tool=MOST_TOOL,
     )

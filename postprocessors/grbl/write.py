@@ -2,48 +2,87 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
+from camtool.findings import Finding
 from camtool.toolpath.moves import Kind, Toolpath, mounted_before
 from camtool.toolpath.program import Program
 
-from ..gcode.write import Event, Style, common_words, tool_number, write_modal
+from ..gcode.comments import mounting
+from ..gcode.write import (
+    COOLANT_OFF,
+    SPINDLE_OFF,
+    Event,
+    Style,
+    common_words,
+    tool_number,
+    write_modal,
+)
 from .dialect import MOST_TOOL, Dialect, GrblMachine
-from .findings import EVENT_LEFT_OUT
+from .findings import EVENT_LEFT_OUT, TOOL_BY_HAND
 
 HEADER = ("G17 G21 G90 G94", "G54")
 """XY plane, mm, absolute, feeds a minute; the first work frame. In grbl I and J are always
 offsets, so G91.1 is not written."""
 
+BY_HAND = ("the spindle does not stop by itself: stop it",)
+"""What the operator is told where a hand switches the spindle."""
+
 
 def write_program(toolpath: Toolpath, machine: GrblMachine) -> Program:
     """The program; PostError names the move that cannot be written or done."""
     dialect = machine.dialect
-    style = Style(dialect, HEADER, lambda event: _words(event, dialect))
+    before = BY_HAND if machine.spindle.switched == "hand" else ()
+
+    def mounted(path: Toolpath, row: int) -> list[str]:
+        return [*before, *mounting(path, row)]
+
+    style = Style(dialect, HEADER, lambda event: _words(event, dialect), mounted=mounted)
     program = write_modal(toolpath, machine, style)
-    if dialect.tool_change == "pause" or not mounted_before(toolpath).any():
-        return program
-    return replace(program, findings=(*program.findings, EVENT_LEFT_OUT()))
+    return replace(program, findings=(*program.findings, *_by_hand(toolpath, dialect)))
 
 
-def _words(event: Event, dialect: Dialect) -> str:
-    """The block of an event."""
+def _by_hand(toolpath: Toolpath, dialect: Dialect) -> Iterator[Finding]:
+    """What the operator has to do about tools: mount one before the program, and some in it."""
+    first = mounted_before(toolpath)
+    if dialect.tool_change != "pause" and first.any():
+        yield EVENT_LEFT_OUT()
+    changes = (toolpath.kind == Kind.TOOL_CHANGE) & ~first
+    if changes.any():
+        tools = ", ".join(f"{number:g}" for number in toolpath.value[changes].tolist())
+        yield TOOL_BY_HAND(
+            where=toolpath.place(int(changes.argmax())), measured=changes.sum(), tools=tools
+        )
+
+
+def _words(event: Event, dialect: Dialect) -> tuple[str, ...]:
+    """The blocks of an event."""
     if event.kind == Kind.TOOL_CHANGE:
-        if dialect.tool_change == "refuse" and event.mounted_before:
-            return ""
-        if dialect.tool_change == "refuse":
-            raise event.refuse(
-                "grbl knows no tool change",
-                "write one program for each tool, or use --set dialect.tool_change=pause",
-            )
-        if tool_number(event) > MOST_TOOL:
-            raise event.refuse(f"grbl's highest tool number is {MOST_TOOL}")
-        return f"T{tool_number(event)} M0"
-    block = common_words(event)
+        return _change(event, dialect)
+    blocks = common_words(event)
     if event.kind == Kind.DWELL and event.value > dialect.most_dwell_s:
         raise event.refuse(
             f"a dwell of {event.value:g} s is too long: grbl counts at most"
             f" {dialect.most_dwell_s:g} s",
             "use several dwells",
         )
-    return block
+    return blocks
+
+
+def _change(event: Event, dialect: Dialect) -> tuple[str, ...]:
+    """A stop for another tool, spindle and coolant off; nothing for the tool that is mounted
+    before the program."""
+    if event.mounted_before and dialect.tool_change != "pause":
+        return ()
+    if dialect.tool_change == "refuse":
+        raise event.refuse(
+            "grbl knows no tool change",
+            "write one program for each tool (--split tool), or stop for it with --set"
+            " dialect.tool_change=stop",
+        )
+    if tool_number(event) > MOST_TOOL:
+        raise event.refuse(f"grbl's highest tool number is {MOST_TOOL}")
+    coolant = (COOLANT_OFF,) if event.cools else ()
+    spindle = (SPINDLE_OFF,) if event.spindle_on else ()
+    return (*coolant, *spindle, f"T{tool_number(event)} M0")

@@ -15,11 +15,15 @@ from ..gcode.dialect import GcodeDialect
 class Dialect(GcodeDialect, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """`path`: corners are rounded within `blend_tolerance_mm` ("blend": G64 P), met without a stop
     where that is possible ("exact-path": G61), or met with a stop ("exact-stop": G61.1).
-    `percent`: a line of % before and after the program."""
+    `percent`: a line of % before and after the program. `tool_change`: by "m6", or a second tool
+    is refused ("refuse"); `tool_lengths`: each change takes the length of its tool from the tool
+    table (G43 H)."""
 
     path: Literal["blend", "exact-path", "exact-stop"] = "blend"
     blend_tolerance_mm: Tolerance = 0.01
     percent: bool = False
+    tool_change: Literal["m6", "refuse"] = "m6"
+    tool_lengths: bool = False
 
 
 class LinuxcncController(SlideStart, frozen=True, tag_field="model", tag="linuxcnc"):

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final
 
-from camtool.toolpath.moves import Kind, PathMode, Toolpath
+from camtool.toolpath.moves import Kind, PathMode, Toolpath, mounted_before
 from camtool.toolpath.program import Program
 
+from ..gcode.findings import EVENT_LEFT_OUT_TOOL
 from ..gcode.format import NumberStyle, format_number
 from ..gcode.write import Event, Style, common_words, tool_number, write_modal
-from .dialect import LinuxcncMachine
+from .dialect import Dialect, LinuxcncMachine
 
 MODES: Final = "G17 G21 G40 G49 G54 G80 G90 G91.1 G94"
 """XY plane, mm, no cutter radius, no tool length, the first work frame, no cycle, absolute, I J as
@@ -27,13 +29,16 @@ def write_program(toolpath: Toolpath, machine: LinuxcncMachine) -> Program:
     style = Style(
         dialect,
         (MODES,),
-        _words,
+        lambda event: _words(event, dialect),
         message="MSG,",
         frame="%" if dialect.percent else "",
         path_mode=_path_mode,
         own_mode=PathMode(dialect.path, dialect.blend_tolerance_mm, dialect.blend_tolerance_mm),
     )
-    return write_modal(toolpath, machine, style)
+    program = write_modal(toolpath, machine, style)
+    if dialect.tool_change == "m6" or not mounted_before(toolpath).any():
+        return program
+    return replace(program, findings=(*program.findings, EVENT_LEFT_OUT_TOOL()))
 
 
 def _path_mode(mode: PathMode) -> str:
@@ -47,10 +52,19 @@ def _path_mode(mode: PathMode) -> str:
     return f"G64{corner}" + (f" Q{format_number(mode.merging_mm, TOLERANCE)}" if apart else "")
 
 
-def _words(event: Event) -> str:
-    """The block of an event."""
-    if event.kind == Kind.TOOL_CHANGE:
-        if tool_number(event) > MOST_TOOL:
-            raise event.refuse(f"the highest tool number is {MOST_TOOL}")
-        return f"T{tool_number(event)} M6"
-    return common_words(event)
+def _words(event: Event, dialect: Dialect) -> tuple[str, ...]:
+    """The blocks of an event."""
+    if event.kind != Kind.TOOL_CHANGE:
+        return common_words(event)
+    number = tool_number(event)
+    if dialect.tool_change == "refuse":
+        if event.mounted_before:
+            return ()
+        raise event.refuse(
+            "the machine changes no tools",
+            "write one program for each tool (--split tool), or use --set dialect.tool_change=m6",
+        )
+    if number > MOST_TOOL:
+        raise event.refuse(f"the highest tool number is {MOST_TOOL}")
+    length = (f"G43 H{number}",) if dialect.tool_lengths else ()
+    return (f"T{number} M6", *length)

@@ -44,11 +44,11 @@ def test_modal_blocks(rows: list[Row], strip: bool, numbered: bool, of_feed: int
         forget=np.array([row.forget for row in rows], dtype=bool),
         dropped=0,
     )
-    events = Events({k + 5: f"M{k}" for k in range(0, count, 2)}, (), spindle_on=False)
+    events = Events({k + 5: [f"M{k}"] for k in range(0, count, 2)}, (), False, ())
     order = Order(sent.is_motion)
     order.add(0, ["G90"])
     for at, row in sent.others(events):
-        order.add(at, [events.blocks[row]], row)
+        order.add(at, events.blocks[row], row)
     order.add(count, ["M2"])
     of_row = order.rows(sent.row)
 

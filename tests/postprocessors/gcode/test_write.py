@@ -110,8 +110,13 @@ def test_tools() -> None:
     second = (
         ToolpathBuilder().event(Kind.TOOL_CHANGE, 3).line(1, feed=9).event(Kind.TOOL_CHANGE, 4)
     )
-    with pytest.raises(PostError, match=r"move 2: grbl knows no tool change; .*pause"):
-        blocks(second.finish(), "grbl")
+    assert blocks(second.finish(), "grbl") == ["G1 X1.000 Y0.000 F9", "T4 M0", "M2"]
+    for name, words in (("grbl", "grbl knows no tool change"), ("linuxcnc", "changes no tools")):
+        setting = "dialect.tool_change=refuse"
+        with pytest.raises(PostError, match=rf"move 2: .*{words}; .*--split tool"):
+            blocks(second.finish(), name, setting)
+        assert blocks(path, name, setting) == ["M2"]
+        assert Code.EVENT_LEFT_OUT in [each.code for each in write(path, name, setting).findings]
 
 
 EVIL = [
@@ -295,4 +300,6 @@ def test_each_dialect_has_its_own_options() -> None:
     with pytest.raises(MachineError, match="unknown key"):
         load_target("grbl", settings=["dialect.percent=true"])
     with pytest.raises(MachineError, match="unknown key"):
+        load_target("grbl", settings=["dialect.tool_lengths=true"])
+    with pytest.raises(MachineError, match="use one of m6, refuse"):
         load_target("linuxcnc", settings=["dialect.tool_change=pause"])

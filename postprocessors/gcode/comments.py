@@ -1,0 +1,209 @@
+"""The comments of grbl and linuxcnc programs: header, operations, tools to mount, contours,
+messages.
+
+Every line is made by `comment`, so that no name from a drawing or a job can end a comment or be
+obeyed in one. Lines of several parts are broken between these where they would become too long.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from importlib.metadata import version
+from typing import Final
+
+import numpy as np
+
+from camtool.arrays import Floats, Ints
+from camtool.errors import PostError
+from camtool.machine.model import Machine
+from camtool.toolpath.moves import Kind, Toolpath, toolpath_extents
+from camtool.toolpath.wanted import OperationNote, Operations, ToolNote
+
+from .dialect import GcodeDialect
+from .format import COMMENT_CHARS, NumberStyle, comment, format_column
+
+DIGEST: Final = 8
+"""So many hexadecimal digits of the machine's digest stand in a program."""
+
+SHAPES: Final = {
+    "flat": "end mill",
+    "ball": "ball nose",
+    "bull": "bull nose",
+    "v": "V bit",
+    "drill": "drill",
+}
+"""What a shape of tools is called; one that is not here is called as jobs call it."""
+
+Lines = Callable[[int], str]
+"""The text of the k-th line."""
+
+
+def header(toolpath: Toolpath, machine: Machine, dialect: GcodeDialect) -> list[str]:
+    """The program's maker, machine, drawing and units, and how far it reaches."""
+    if dialect.comments == "none":
+        return []
+    style = NumberStyle(dialect.decimals)
+    bounds = [
+        f"{axis} {' to '.join(format_column(reach, style))}"
+        for axis, reach in zip("XYZ", toolpath_extents(toolpath), strict=True)
+    ]
+    made = (
+        [toolpath.made_from, f"settings {machine.digest[:DIGEST]}"] if toolpath.made_from else []
+    )
+    lines = [
+        f"camtool {version('camtool')} for {machine.target.name}: {machine.target.title}",
+        *made,
+        "mm and mm/min - part zero at X0 Y0 Z0",
+        *bounds,
+    ]
+    return [comment(line) for line in lines]
+
+
+def comments(
+    toolpath: Toolpath,
+    of_row: Ints,
+    dialect: GcodeDialect,
+    message: str,
+    mounted: Mapping[int, Sequence[str]],
+) -> tuple[Ints, Lines]:
+    """All other lines: the block (by index, from 0) that each stands before (C,), ascending, and
+    the text of the k-th.
+
+    `of_row` (B,): the rows of the blocks; `message`: what a comment for the operator begins with;
+    `mounted`: what the operator is told at the rows where a tool is changed by hand.
+    """
+    none = np.empty(0, dtype=np.int64)
+    begins, tells = none, np.flatnonzero(toolpath.kind == Kind.MESSAGE)
+    if dialect.comments == "contours":
+        motions = np.flatnonzero(toolpath.is_motion)
+        named = toolpath.source[motions]
+        begins = motions[(np.diff(named, prepend=-1) != 0) & (named >= 0)]
+    own: list[tuple[int, str]] = []
+    if dialect.comments in ("contours", "operations") and toolpath.operations is not None:
+        own += _of_operations(toolpath, toolpath.operations)
+    own += [
+        (row, f"({message}{comment(line)[1:]}") for row, lines in mounted.items() for line in lines
+    ]
+    own.sort(key=lambda one: one[0])
+    rows = np.concatenate([np.array([row for row, _ in own], dtype=np.int64), begins, tells])
+    order = np.argsort(rows, kind="stable")
+    # The comments of a row that was left out stand before the next block that is sent.
+    blocks = np.searchsorted(np.maximum.accumulate(of_row), rows[order])
+
+    def text(k: int) -> str:
+        which = int(order[k])
+        if which < len(own):
+            return own[which][1]
+        row = int(rows[which])
+        if toolpath.kind[row] == Kind.MESSAGE:
+            return _message(toolpath, row, message)
+        return comment(toolpath.text(row))
+
+    return np.minimum(blocks, len(of_row) - 1), text
+
+
+def _message(toolpath: Toolpath, row: int, message: str) -> str:
+    """A message to the operator as a comment."""
+    index = toolpath.value[row]
+    if not (0 <= index < len(toolpath.texts)):
+        raise PostError("a message without its text", where=toolpath.place(row))
+    return f"({message}{comment(toolpath.texts[int(index)])[1:]}"
+
+
+def _of_operations(toolpath: Toolpath, operations: Operations) -> Iterator[tuple[int, str]]:
+    """(row, comment): what each operation does, where it begins."""
+    count, ends = len(operations.notes), [*operations.begin[1:].tolist(), len(toolpath)]
+    begins = operations.begin.tolist()
+    for number, (note, low, high) in enumerate(
+        zip(operations.notes, begins, ends, strict=True), 1
+    ):
+        if low == high:
+            continue
+        of = f"operation {number} of {count}" if count > 1 else "operation"
+        speed = [] if note.spindle_rpm is None else [f"{note.spindle_rpm:g} rev/min"]
+        seconds = float(_cutting_s(toolpath.part(low, high)).sum())
+        for line in (
+            f"{of}: {note.name or note.kind}",
+            *packed([tool_words(note.tool), *speed]),
+            *packed([*_depth_words(note), f"cuts {duration(seconds)} at these feeds"]),
+        ):
+            yield low, comment(line)
+
+
+def _depth_words(note: OperationNote) -> Iterator[str]:
+    deep = f"{note.depth_mm:.4g} mm deep"
+    if note.passes is not None and note.passes > 1:
+        deep += f" in {note.passes} passes"
+    yield deep if note.peck_mm is None else f"{deep} by {note.peck_mm:.4g} mm"
+    if note.kind != "drill":
+        yield f"feed {note.feed_mm_min:g}"
+    yield f"plunge {note.plunge_mm_min:g} mm/min"
+
+
+def tool_words(tool: ToolNote) -> str:
+    """Number, name, shape and diameter, as far as they are known."""
+    number = "" if tool.number is None else f" {tool.number}"
+    shape = SHAPES.get(tool.kind, tool.kind)
+    name = "" if tool.name.casefold() in shape.casefold() else f" {tool.name}:"
+    size = f"{shape} {tool.diameter_mm:.4g} mm" if tool.diameter_mm else "of no width"
+    tip = "" if tool.tip_angle_rad is None else f" {math.degrees(tool.tip_angle_rad):.4g} deg"
+    return f"tool{number}{name} {size}{tip}" if number or name else f"tool: {size}{tip}"
+
+
+def mounting(toolpath: Toolpath, row: int) -> list[str]:
+    """What the operator is told where a tool is changed by hand."""
+    tool = ToolNote(int(toolpath.value[row]))
+    operations = toolpath.operations
+    if operations is not None:
+        later = int(np.searchsorted(operations.begin, row, side="right")) - 1
+        note = operations.notes[max(later, 0)].tool
+        tool = note if note.number == tool.number else tool
+    what = tool_words(tool) if tool.diameter_mm else f"tool {tool.number}"
+    z_mm = toolpath.end[row, 2]
+    return [
+        f"stop: mount {what}",
+        f"set its tip to Z {z_mm:.4g} mm or zero Z again - then start",
+    ]
+
+
+def packed(parts: Sequence[str]) -> Iterator[str]:
+    """Parts with a dash between them, as many on a line as a comment takes."""
+    line = ""
+    for part in parts:
+        longer = f"{line} - {part}" if line else part
+        if line and len(longer) > COMMENT_CHARS:
+            yield line
+            longer = part
+        line = longer
+    yield line
+
+
+def duration(seconds: float) -> str:
+    """Seconds in words, rounded to the second.
+
+    >>> duration(3725.4)
+    '1 h 2 min 5 s'
+    >>> duration(0.3)
+    'less than 1 s'
+    """
+    whole = round(seconds)
+    if whole == 0:
+        return "less than 1 s"
+    parts = ((whole // 3600, "h"), (whole // 60 % 60, "min"), (whole % 60, "s"))
+    return " ".join(f"{count} {unit}" for count, unit in parts if count)
+
+
+def _cutting_s(toolpath: Toolpath) -> Floats:
+    """(N,) s that each row cuts if it has its feed from end to end; 0 for rapids and events."""
+
+    def seconds(some: Toolpath) -> Floats:
+        begin = some.starts
+        flat = np.hypot(*(some.end - begin)[:, :2].T)
+        arcs = np.flatnonzero(some.is_arc)
+        radius = np.hypot(*(begin[arcs, :2] - some.centre[arcs]).T)
+        flat[arcs] = radius * np.abs(some.sweeps_of(arcs))
+        length = np.hypot(flat, some.end[:, 2] - begin[:, 2])
+        return np.where(some.is_feed, 60.0 * length / np.where(some.is_feed, some.feed, 1.0), 0.0)
+
+    return toolpath.by_parts(seconds)
