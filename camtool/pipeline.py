@@ -17,6 +17,8 @@ from functools import cache
 from pathlib import PurePath
 from typing import TYPE_CHECKING
 
+import msgspec
+
 from camtool.bounds import TooLongError
 from camtool.errors import ProgramError
 from camtool.findings import Finding, Severity, worst
@@ -41,6 +43,7 @@ if TYPE_CHECKING:
     from camtool.verification.report import (
         Before,
         Gates,
+        Planned,
         PlannedOperation,
         PlannedStock,
         PlannedTool,
@@ -245,6 +248,7 @@ def _posted(
     )
     del judged, whole  # the paths of the stages are not needed any more
     verification = _judged(program.data, decoded, target, goal, options, progress)
+    figures = _timed(figures, written, goal, verification)
     beyond = _beyond(verification, how.gates)
     findings = _merged(findings, verification.findings, beyond, without=repeated)
     verification = verification.with_planning(figures, _before(plain))
@@ -467,6 +471,29 @@ def _tools(steps: Sequence[Step]) -> tuple[PlannedTool, ...]:
         PlannedTool(tool.number, tool.name, tool_words(tool), depth, tool.cutting_length_mm)
         for tool, depth in deepest.items()
     )
+
+
+def _timed(
+    planned: Planned, written: Toolpath, goal: _Goal, verification: Verification
+) -> Planned:
+    """The operations with the time that each takes, from where it has its turn: a change of tools
+    and the way to its first cut are its own."""
+    import numpy as np
+
+    from camtool.verification.report import certain
+
+    if written.operations is None or goal.row_from is None:
+        return planned
+    # Blocks that no row stands for (a header's, the end's) take their turn with the one before.
+    row = np.maximum.accumulate(goal.row_from.clip(min=0))
+    turn = np.searchsorted(written.operations.begin, row, side="right") - 1
+    count = len(planned.operations)
+    seconds = np.bincount(turn.clip(min=0), verification.rows.seconds, minlength=count)
+    operations = [
+        msgspec.structs.replace(each, time_s=certain(float(seconds[k])))
+        for k, each in enumerate(planned.operations)
+    ]
+    return msgspec.structs.replace(planned, operations=tuple(operations))
 
 
 def _stock(job: Job) -> PlannedStock | None:

@@ -69,9 +69,9 @@ def cut_below(moves: list[Move], z: float, radius: float) -> shapely.Geometry:
     return shapely.union_all(shapely.buffer(swept, radius, quad_segs=QUARTER))
 
 
-def by_tool(program: str) -> dict[int, list[Move]]:
-    """The moves at a feed of each tool."""
-    lines, tools, tool = moves_of(program), dict[int, list[Move]](), 0
+def by_tool(program: str, tool: int) -> dict[int, list[Move]]:
+    """The moves at a feed of each tool; `tool` is mounted where the program asks for none."""
+    lines, tools = moves_of(program), dict[int, list[Move]]()
     asked = {}
     for number, text in enumerate(program.splitlines(), 1):
         if text.startswith("T") or " T" in text:
@@ -112,7 +112,7 @@ def test_the_mounting_plate_is_what_was_drawn(
     assert sheet.contains(part.buffer(-TOLERANCE_MM))
 
 
-@pytest.mark.parametrize("target", ["linuxcnc"])
+@pytest.mark.parametrize("target", ["grbl", "linuxcnc"])
 def test_the_circuit_board_is_what_was_drawn(
     camtool: Run, tmp_path: Path, samples: Path, target: str
 ) -> None:
@@ -120,7 +120,7 @@ def test_the_circuit_board_is_what_was_drawn(
     drawing = str(samples / "board.dxf")
     done = camtool("post", drawing, "--job", job, "-t", target, "-o", "board.nc")
     assert done.returncode == 0, done.stderr
-    tools = by_tool((tmp_path / "board.nc").read_text(encoding="ascii"))
+    tools = by_tool((tmp_path / "board.nc").read_text(encoding="ascii"), 6)
     assert sorted(tools) == [2, 6]
     part = board()
     # A drill is as wide as it is only above its cone, which goes through.

@@ -72,6 +72,25 @@ def test_the_sample_plate(camtool: Run, samples: Path, tmp_path: Path) -> None:
     planned = report["planned"]
     assert planned["stock"]["corner_mm"] == [-8.0, -8.0]
     assert [each["reach_mm"] for each in planned["tools"]] == [6.0, 6.0, 2.5]
+    times = [each["time_s"] for each in planned["operations"]]
+    assert min(times) > 0.0
+    assert sum(times) == pytest.approx(report["time_s"], abs=1e-3)
+
+
+@pytest.mark.parametrize("flags", [(), ("--compensate",), ("--minimise", "reversals")])
+def test_all_of_the_time_belongs_to_an_operation(
+    camtool: Run, samples: Path, flags: tuple[str, ...]
+) -> None:
+    job = str(samples / "logo.toml")
+    args = (str(samples / "logo.dxf"), "--job", job, "-t", "pic-mmh", "-o", "a.pic", "-q")
+    done = camtool("post", *args, *flags, "--json", "-")
+    assert done.returncode == 0, done.stderr
+    report = json.loads(done.stdout)
+    times = [each["time_s"] for each in report["planned"]["operations"]]
+    assert len(times) > 1
+    assert min(times) > 0.0
+    assert sum(times) <= report["time_s"] + 1e-3
+    assert sum(times) > 0.9 * report["time_s"]
 
 
 def test_markdown_has_the_same(camtool: Run, samples: Path) -> None:
