@@ -25,6 +25,7 @@ from camtool.pictures.scene import Scene
 ROOT = Path(__file__).parents[2]
 PAGES = (
     "docs/tutorial.md",
+    "docs/recipes.md",
     "docs/toolpaths.md",
     "docs/reversals.md",
     "docs/verifying.md",
