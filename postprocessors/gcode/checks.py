@@ -12,7 +12,7 @@ from camtool.machine.model import Machine
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.refusals import radius_spread, refuse, refuse_start
 
-from .dialect import feed_decimals
+from .dialect import MM, Unit, feed_decimals
 from .findings import FEED_ROUNDED
 
 MOST_MM: Final = 99_999.0
@@ -35,10 +35,12 @@ def check(toolpath: Toolpath, machine: Machine) -> None:
     _check_feeds(toolpath, machine)
 
 
-def feed_units(toolpath: Toolpath, machine: Machine) -> tuple[Ints, list[Finding]]:
+def feed_units(
+    toolpath: Toolpath, machine: Machine, unit: Unit = MM
+) -> tuple[Ints, list[Finding]]:
     """(N,) feeds as whole units of the F word, rounded down, 0 where none; and FEED_ROUNDED when
     one had to be."""
-    scale = 10.0 ** feed_decimals(machine)
+    scale = 10.0 ** (feed_decimals(machine) + unit.more_decimals) / unit.mm
     wanted = np.where(toolpath.is_feed, toolpath.feed, 0.0) * scale
     nearest = np.rint(wanted)
     exact = np.abs(wanted - nearest) <= FEED_TOLERANCE

@@ -20,7 +20,7 @@ from camtool.machine.model import Machine
 from camtool.toolpath.moves import Kind, Toolpath, toolpath_extents
 from camtool.toolpath.wanted import OperationNote, Operations, ToolNote
 
-from .dialect import GcodeDialect
+from .dialect import UNITS, GcodeDialect, Unit
 from .format import COMMENT_CHARS, NumberStyle, comment, format_column
 
 DIGEST: Final = 8
@@ -40,10 +40,11 @@ Lines = Callable[[int], str]
 
 
 def header(toolpath: Toolpath, machine: Machine, dialect: GcodeDialect) -> list[str]:
-    """The program's maker, machine, drawing and units, and how far it reaches."""
+    """The program's maker, machine, drawing and units, and how far it reaches. Toolpath and
+    dialect are in the program's own units."""
     if dialect.comments == "none":
         return []
-    style = NumberStyle(dialect.decimals)
+    style, unit = NumberStyle(dialect.decimals), UNITS[dialect.units].name
     bounds = [
         f"{axis} {' to '.join(format_column(reach, style))}"
         for axis, reach in zip("XYZ", toolpath_extents(toolpath), strict=True)
@@ -54,7 +55,7 @@ def header(toolpath: Toolpath, machine: Machine, dialect: GcodeDialect) -> list[
     lines = [
         f"camtool {version('camtool')} for {machine.target.name}: {machine.target.title}",
         *made,
-        "mm and mm/min - part zero at X0 Y0 Z0",
+        f"{unit} and {unit}/min - part zero at X0 Y0 Z0",
         *bounds,
     ]
     return [comment(line) for line in lines]
@@ -81,7 +82,7 @@ def comments(
         begins = motions[(np.diff(named, prepend=-1) != 0) & (named >= 0)]
     own: list[tuple[int, str]] = []
     if dialect.comments in ("contours", "operations") and toolpath.operations is not None:
-        own += _of_operations(toolpath, toolpath.operations)
+        own += _of_operations(toolpath, toolpath.operations, UNITS[dialect.units])
     own += [
         (row, f"({message}{comment(line)[1:]}") for row, lines in mounted.items() for line in lines
     ]
@@ -111,7 +112,9 @@ def _message(toolpath: Toolpath, row: int, message: str) -> str:
     return f"({message}{comment(toolpath.texts[int(index)])[1:]}"
 
 
-def _of_operations(toolpath: Toolpath, operations: Operations) -> Iterator[tuple[int, str]]:
+def _of_operations(
+    toolpath: Toolpath, operations: Operations, unit: Unit
+) -> Iterator[tuple[int, str]]:
     """(row, comment): what each operation does, where it begins."""
     count, ends = len(operations.notes), [*operations.begin[1:].tolist(), len(toolpath)]
     begins = operations.begin.tolist()
@@ -122,48 +125,50 @@ def _of_operations(toolpath: Toolpath, operations: Operations) -> Iterator[tuple
             continue
         of = f"operation {number} of {count}" if count > 1 else "operation"
         speed = [] if note.spindle_rpm is None else [f"{note.spindle_rpm:g} rev/min"]
-        seconds = float(_cutting_s(toolpath.part(low, high)).sum())
+        seconds = float(_cutting_s(toolpath.part(low, high)).sum()) * unit.mm
         for line in (
             f"{of}: {note.name or note.kind}",
-            *packed([tool_words(note.tool), *speed]),
-            *packed([*_depth_words(note), f"cuts {duration(seconds)} at these feeds"]),
+            *packed([tool_words(note.tool, unit), *speed]),
+            *packed([*_depth_words(note, unit), f"cuts {duration(seconds)} at these feeds"]),
         ):
             yield low, comment(line)
 
 
-def _depth_words(note: OperationNote) -> Iterator[str]:
-    deep = f"{note.depth_mm:.4g} mm deep"
+def _depth_words(note: OperationNote, unit: Unit) -> Iterator[str]:
+    deep = f"{_length(note.depth_mm, unit)} deep"
     if note.passes is not None and note.passes > 1:
         deep += f" in {note.passes} passes"
-    yield deep if note.peck_mm is None else f"{deep} by {note.peck_mm:.4g} mm"
-    if note.kind != "drill":
-        yield f"feed {note.feed_mm_min:g}"
-    yield f"plunge {note.plunge_mm_min:g} mm/min"
+    yield deep if note.peck_mm is None else f"{deep} by {_length(note.peck_mm, unit)}"
+    feed = "" if note.kind == "drill" else f"feed {note.feed_mm_min / unit.mm:.5g} "
+    yield f"{feed}plunge {note.plunge_mm_min / unit.mm:.5g} {unit.name}/min"
 
 
-def tool_words(tool: ToolNote) -> str:
+def _length(length_mm: float, unit: Unit) -> str:
+    return f"{length_mm / unit.mm:.4g} {unit.name}"
+
+
+def tool_words(tool: ToolNote, unit: Unit) -> str:
     """Number, name, shape and diameter, as far as they are known."""
     number = "" if tool.number is None else f" {tool.number}"
     shape = SHAPES.get(tool.kind, tool.kind)
     name = "" if tool.name.casefold() in shape.casefold() else f" {tool.name}:"
-    size = f"{shape} {tool.diameter_mm:.4g} mm" if tool.diameter_mm else "of no width"
+    size = f"{shape} {_length(tool.diameter_mm, unit)}" if tool.diameter_mm else "of no width"
     tip = "" if tool.tip_angle_rad is None else f" {math.degrees(tool.tip_angle_rad):.4g} deg"
     return f"tool{number}{name} {size}{tip}" if number or name else f"tool: {size}{tip}"
 
 
-def mounting(toolpath: Toolpath, row: int) -> list[str]:
-    """What the operator is told where a tool is changed by hand."""
+def mounting(toolpath: Toolpath, row: int, unit: Unit) -> list[str]:
+    """What the operator is told where a tool is changed by hand; the toolpath is in the unit."""
     tool = ToolNote(int(toolpath.value[row]))
     operations = toolpath.operations
     if operations is not None:
         later = int(np.searchsorted(operations.begin, row, side="right")) - 1
         note = operations.notes[max(later, 0)].tool
         tool = note if note.number == tool.number else tool
-    what = tool_words(tool) if tool.diameter_mm else f"tool {tool.number}"
-    z_mm = toolpath.end[row, 2]
+    what = tool_words(tool, unit) if tool.diameter_mm else f"tool {tool.number}"
     return [
         f"stop: mount {what}",
-        f"set its tip to Z {z_mm:.4g} mm or zero Z again - then start",
+        f"set its tip to Z {toolpath.end[row, 2]:.4g} {unit.name} or zero Z again - then start",
     ]
 
 
@@ -195,7 +200,8 @@ def duration(seconds: float) -> str:
 
 
 def _cutting_s(toolpath: Toolpath) -> Floats:
-    """(N,) s that each row cuts if it has its feed from end to end; 0 for rapids and events."""
+    """(N,) s that each row cuts if it has its feed from end to end, 0 for rapids and events, where
+    places are in mm."""
 
     def seconds(some: Toolpath) -> Floats:
         begin = some.starts

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import msgspec
@@ -37,18 +38,20 @@ UNIT_GUARD: Final = 1e-9
 class GcodeDialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """What both dialects let a user choose, and their controller's rule for arcs.
 
-    `decimals` of coordinates; `strip_zeros` says 1.5 for 1.500; `line_chars` that the controller
-    takes in a line; `block_numbers` N1 N2 …; `comments`: a "header", also what each operation does
-    ("operations"), also the name of each contour ("contours"), or "none"; `full_circles` "whole"
-    (end = start) or as two "halves"; `program_end`; `retract` to the highest Z in front of the end
-    if the tool is left in the material. `start_blocks` follow the modes with which a program
-    begins, `end_blocks` stand before its end, when the spindle is off: what the machine wants, as
-    its controller takes it.
+    `units` of lengths and feeds: millimetres (G21) or inches (G20); `decimals` of coordinates in
+    mm, inches have INCH_DECIMALS more; `strip_zeros` says 1.5 for 1.500; `line_chars` that the
+    controller takes in a line; `block_numbers` N1 N2 …; `comments`: a "header", also what each
+    operation does ("operations"), also the name of each contour ("contours"), or "none";
+    `full_circles` "whole" (end = start) or as two "halves"; `program_end`; `retract` to the
+    highest Z in front of the end if the tool is left in the material. `start_blocks` follow the
+    modes with which a program begins, `end_blocks` stand before its end, when the spindle is off:
+    what the machine wants, as its controller takes it.
     `arc_most_radius_mm`: larger arcs are written as lines; `arc_full_turn_rad`: the
     controller takes an arc that turns by less for a full circle; `arc_chord_slack_mm`: by how much
     half the chord may exceed R.
     """
 
+    units: Literal["mm", "in"] = "mm"
     decimals: Annotated[int, Meta(ge=3, le=6)] = 3
     strip_zeros: bool = False
     line_chars: Annotated[int, Meta(ge=64, le=1_000_000)]
@@ -68,9 +71,36 @@ class GcodeDialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     arc_chord_slack_mm: Slack = 0.0
 
 
+@dataclass(frozen=True)
+class Unit:
+    """A unit of lengths: its `name`, its length in mm, its G word, and how many decimals more than
+    mm it is written with."""
+
+    name: str
+    mm: float
+    word: str
+    more_decimals: int
+
+
+INCH_DECIMALS: Final = 2
+"""Coordinates and feeds in inches have so many decimals more than in mm, which makes the last one
+worth about a quarter of what it is worth in mm."""
+
+MM: Final = Unit("mm", 1.0, "G21", 0)
+
+UNITS: Final = {"mm": MM, "in": Unit("inch", 25.4, "G20", INCH_DECIMALS)}
+"""The values of `units`."""
+
+
+def last_decimal_mm(dialect: GcodeDialect) -> float:
+    """What the last decimal of a coordinate is worth, mm."""
+    unit = UNITS[dialect.units]
+    return float(unit.mm * 10.0 ** -(dialect.decimals + unit.more_decimals))
+
+
 def feed_decimals(machine: Machine) -> int:
-    """Digits behind the point of an F word, from `feed.unit_mm_min`; MachineError when that is
-    no power of ten between 1 and 10^−6."""
+    """Digits behind the point of an F word in mm/min, from `feed.unit_mm_min`; MachineError when
+    that is no power of ten between 1 and 10^−6."""
     digits = -math.log10(machine.feed.unit_mm_min)
     whole = round(digits)
     if abs(digits - whole) > POWER_OF_TEN_TOLERANCE or not 0 <= whole <= MOST_FEED_DECIMALS:
@@ -103,7 +133,9 @@ def check_blocks(machine: Machine[Any, Any], read: Callable[[bytes], Toolpath]) 
             continue
         where = f"table [dialect], key {key}"
         try:
-            path = read("\n".join([*blocks, dialect.program_end]).encode())
+            # Behind the modes of the beginning, which say the unit.
+            units = UNITS[dialect.units].word
+            path = read("\n".join([units, *blocks, dialect.program_end]).encode())
         except ProgramError as error:
             raise MachineError(
                 f"{error.message} ({error.where})",
@@ -122,7 +154,7 @@ def check_blocks(machine: Machine[Any, Any], read: Callable[[bytes], Toolpath]) 
             wrong = f"{len(blocks)} blocks are more than {MOST_BLOCKS}"
         elif path.is_feed.any():
             wrong = "they cut: only rapids and switches may stand here"
-        elif path.block[path.kind == Kind.END].tolist() != [len(blocks)]:
+        elif path.block[path.kind == Kind.END].tolist() != [len(blocks) + 1]:
             wrong = "they end the program, which camtool does"
         elif beyond:
             wrong = f"they leave the travel of {' and '.join(beyond)}"

@@ -12,10 +12,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
 
+import msgspec
 import numpy as np
 
 from camtool.arrays import Bools, Codes, Floats, Ints
@@ -30,7 +31,7 @@ from camtool.toolpath.words import Words, texts_of
 from .arcs import ArcCounts, Arcs, arcs_of
 from .checks import check, feed_units
 from .comments import comments, header
-from .dialect import GcodeDialect, feed_decimals
+from .dialect import UNITS, GcodeDialect, Unit, feed_decimals
 from .findings import ARC_MENDED, MOVE_COLLAPSED, VALUE_ROUNDED
 from .format import (
     NumberStyle,
@@ -42,6 +43,15 @@ from .format import (
 
 VALUE: Final = NumberStyle(3, strip=True)
 """Spindle speeds and dwells are written to a thousandth."""
+
+ARC_LENGTHS: Final = (
+    "arc_difference_mm",
+    "arc_most_difference_mm",
+    "arc_least_radius_mm",
+    "arc_most_radius_mm",
+    "arc_chord_slack_mm",
+)
+"""The lengths of a dialect's rule for arcs."""
 
 ROUNDING_PART: Final = 1e-9
 """A value written within this part of itself was not rounded."""
@@ -67,11 +77,11 @@ EventWords = Callable[["Event"], Sequence[str]]
 class Style:
     """A dialect's own part of a program.
 
-    `header`: its first blocks; `event`: the blocks of an event; `message`: what a comment for the
-    operator begins with; `mounted`: what the operator is told at a tool change, by the event and
-    the row, None where the machine changes tools; `frame`: the line around the program that is no
-    block (%), or ""; `path_mode`: the block that asks for a path mode, `own_mode`: that of rows
-    that ask for none.
+    `header`: its first blocks, which say the unit; `event`: the blocks of an event; `message`:
+    what a comment for the operator begins with; `mounted`: what the operator is told at a tool
+    change, by the toolpath and its row, None where the machine changes tools; `frame`: the line
+    around the program that is no block (%), or ""; `path_mode`: the block that asks for a path
+    mode, `own_mode`: that of rows that ask for none.
     """
 
     dialect: GcodeDialect
@@ -86,9 +96,10 @@ class Style:
 
 def write_modal(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
     """The program of a toolpath; PostError names the move that cannot be written or done."""
-    dialect = style.dialect
     check(toolpath, machine)
-    feeds, rounded_feeds = feed_units(toolpath, machine)
+    unit = UNITS[style.dialect.units]
+    feeds, rounded_feeds = feed_units(toolpath, machine, unit)
+    toolpath, dialect = in_units(toolpath, style.dialect, unit)
     arcs = arcs_of(toolpath, dialect)
     events = events_of(toolpath, style.event)
     sent = sent_rows(toolpath, arcs, feeds, events.changes)
@@ -111,11 +122,12 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
     mounted = {} if tell is None else {row: tell(toolpath, row) for row in events.changes}
     said = comments(toolpath, of_row, dialect, style.message, mounted)
     head = [*frame, *header(toolpath, machine, dialect)]
+    decimals = feed_decimals(machine) + unit.more_decimals
     refuse_too_long(len(head) + len(of_row) + len(said[0]) + len(frame), "line")
     data = b"".join(
         [
             *(f"{line}\n".encode("ascii") for line in head),
-            order.text(sent, dialect, feed_decimals(machine), *said),
+            order.text(sent, dialect, decimals, *said),
             *(f"{line}\n".encode("ascii") for line in frame),
         ]
     )
@@ -129,6 +141,21 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
             *_arc_findings(toolpath, arc_counts, sent.dropped),
             *_rounded(toolpath, events.rounded),
         ),
+    )
+
+
+def in_units(
+    toolpath: Toolpath, dialect: GcodeDialect, unit: Unit
+) -> tuple[Toolpath, GcodeDialect]:
+    """The places of a toolpath, and the lengths and decimals of its dialect, in a unit."""
+    if unit.mm == 1.0:
+        return toolpath, dialect
+    places = {name: getattr(toolpath, name) / unit.mm for name in ("end", "centre", "start")}
+    lengths = {name: getattr(dialect, name) / unit.mm for name in ARC_LENGTHS}
+    decimals = dialect.decimals + unit.more_decimals
+    return (
+        replace(toolpath, **places),
+        msgspec.structs.replace(dialect, decimals=decimals, **lengths),
     )
 
 

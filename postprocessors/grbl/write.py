@@ -10,6 +10,7 @@ from camtool.toolpath.moves import Kind, Toolpath, mounted_before
 from camtool.toolpath.program import Program
 
 from ..gcode.comments import mounting
+from ..gcode.dialect import UNITS
 from ..gcode.write import (
     COOLANT_OFF,
     SPINDLE_OFF,
@@ -22,9 +23,9 @@ from ..gcode.write import (
 from .dialect import MOST_TOOL, Dialect, GrblMachine
 from .findings import EVENT_LEFT_OUT, TOOL_BY_HAND
 
-HEADER = ("G17 G21 G90 G94", "G54")
-"""XY plane, mm, absolute, feeds a minute; the first work frame. In grbl I and J are always
-offsets, so G91.1 is not written."""
+HEADER = ("G17 {unit} G90 G94", "G54")
+"""XY plane, mm or inches, absolute, feeds a minute; the first work frame. In grbl I and J are
+always offsets, so G91.1 is not written."""
 
 BY_HAND = ("the spindle does not stop by itself: stop it",)
 """What the operator is told where a hand switches the spindle."""
@@ -35,10 +36,13 @@ def write_program(toolpath: Toolpath, machine: GrblMachine) -> Program:
     dialect = machine.dialect
     before = BY_HAND if machine.spindle.switched == "hand" else ()
 
-    def mounted(path: Toolpath, row: int) -> list[str]:
-        return [*before, *mounting(path, row)]
+    unit = UNITS[dialect.units]
 
-    style = Style(dialect, HEADER, lambda event: _words(event, dialect), mounted=mounted)
+    def mounted(path: Toolpath, row: int) -> list[str]:
+        return [*before, *mounting(path, row, unit)]
+
+    header = tuple(block.format(unit=unit.word) for block in HEADER)
+    style = Style(dialect, header, lambda event: _words(event, dialect), mounted=mounted)
     program = write_modal(toolpath, machine, style)
     return replace(program, findings=(*program.findings, *_by_hand(toolpath, dialect)))
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from camtool.target.contract import Setting, Target
 
-from ..gcode.dialect import check_blocks, feed_decimals
+from ..gcode.dialect import check_blocks, feed_decimals, last_decimal_mm
 from .dialect import Dialect, LinuxcncController, LinuxcncMachine
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ class Linuxcnc(Target):
 
     def unit_mm(self, machine: LinuxcncMachine, axis: Axis) -> float:
         """The last decimal of a coordinate."""
-        return float(10.0**-machine.dialect.decimals)
+        return last_decimal_mm(machine.dialect)
 
     def settings_from(self, text: str) -> list[Setting] | None:
         """The values that LinuxCNC's INI file says; None for another text."""

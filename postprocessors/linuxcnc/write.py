@@ -8,31 +8,33 @@ from typing import Final
 from camtool.toolpath.moves import Kind, PathMode, Toolpath, mounted_before
 from camtool.toolpath.program import Program
 
+from ..gcode.dialect import UNITS, Unit
 from ..gcode.findings import EVENT_LEFT_OUT_TOOL
 from ..gcode.format import NumberStyle, format_number
 from ..gcode.write import Event, Style, common_words, tool_number, write_modal
 from .dialect import Dialect, LinuxcncMachine
 
-MODES: Final = "G17 G21 G40 G49 G54 G80 G90 G91.1 G94"
-"""XY plane, mm, no cutter radius, no tool length, the first work frame, no cycle, absolute, I J as
-offsets, feeds a minute: whatever the last program left."""
+MODES: Final = "G17 {unit} G40 G49 G54 G80 G90 G91.1 G94"
+"""XY plane, mm or inches, no cutter radius, no tool length, the first work frame, no cycle,
+absolute, I J as offsets, feeds a minute: whatever the last program left."""
 
 MOST_TOOL: Final = 99_999
 """Our choice: LinuxCNC's tool tables hold far fewer."""
 
 TOLERANCE: Final = NumberStyle(6, strip=True)
+"""Tolerances of corners in mm; in inches they have as many decimals more as coordinates."""
 
 
 def write_program(toolpath: Toolpath, machine: LinuxcncMachine) -> Program:
     """The program; PostError names the move that cannot be written or done."""
-    dialect = machine.dialect
+    dialect, unit = machine.dialect, UNITS[machine.dialect.units]
     style = Style(
         dialect,
-        (MODES,),
+        (MODES.format(unit=unit.word),),
         lambda event: _words(event, dialect),
         message="MSG,",
         frame="%" if dialect.percent else "",
-        path_mode=_path_mode,
+        path_mode=lambda mode: _path_mode(mode, unit),
         own_mode=PathMode(dialect.path, dialect.blend_tolerance_mm, dialect.blend_tolerance_mm),
     )
     program = write_modal(toolpath, machine, style)
@@ -41,15 +43,18 @@ def write_program(toolpath: Toolpath, machine: LinuxcncMachine) -> Program:
     return replace(program, findings=(*program.findings, EVENT_LEFT_OUT_TOOL()))
 
 
-def _path_mode(mode: PathMode) -> str:
-    """The block that asks for it."""
+def _path_mode(mode: PathMode, unit: Unit) -> str:
+    """The block that asks for it, in a program of that unit."""
     if mode.corners == "exact-path":
         return "G61"
     if mode.corners == "exact-stop":
         return "G61.1"
-    corner = f" P{format_number(mode.tolerance_mm, TOLERANCE)}" if mode.tolerance_mm else ""
+    style = replace(TOLERANCE, decimals=TOLERANCE.decimals + unit.more_decimals)
+    corner, merging = (
+        format_number(length / unit.mm, style) for length in (mode.tolerance_mm, mode.merging_mm)
+    )
     apart = mode.merging_mm != mode.tolerance_mm
-    return f"G64{corner}" + (f" Q{format_number(mode.merging_mm, TOLERANCE)}" if apart else "")
+    return "G64" + (f" P{corner}" if mode.tolerance_mm else "") + (f" Q{merging}" if apart else "")
 
 
 def _words(event: Event, dialect: Dialect) -> tuple[str, ...]:

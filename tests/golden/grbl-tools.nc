@@ -29,7 +29,7 @@ Z30.000
 X0.000 Y60.000
 (operation 2 of 3: window)
 (tool 1 end mill 3.175 mm - 12000 rev/min)
-(3.2 mm deep in 3 passes - feed 300 - plunge 90 mm/min)
+(3.2 mm deep in 3 passes - feed 300 plunge 90 mm/min)
 (cuts 20 s at these feeds)
 (stop: mount tool 1 end mill 3.175 mm)
 (set its tip to Z 30 mm or zero Z again - then start)
@@ -57,7 +57,7 @@ G3 X32.413 Y10.000 I-2.413 J0.000
 G0 Z5.000
 (operation 3 of 3: profile)
 (tool 1 end mill 3.175 mm - 12000 rev/min)
-(4 mm deep in 3 passes - feed 300 - plunge 90 mm/min)
+(4 mm deep in 3 passes - feed 300 plunge 90 mm/min)
 (cuts 1 min 24 s at these feeds)
 (0/PATH 0)
 X0.000 Y-1.588
