@@ -373,6 +373,13 @@ def start(value: object) -> str | tuple[float, float]:
     return _word_or_place(value, STARTS)
 
 
+def places(value: object) -> tuple[tuple[float, float], ...]:
+    """A list of places [x, y]."""
+    if not isinstance(value, list | tuple):
+        raise OptionError(f"{value!r} is no list of places", mend="write it like [[10, 5]]")
+    return tuple(_two(each, length, '["10mm", "5mm"]') for each in value)
+
+
 def entry(given: Given) -> Entry:
     """A table, or "ramp", "ramp:3deg", "helix:3deg:1mm"."""
     return _record(Entry, ENTRY, _parts(given, ENTRY, ("kind", "angle", "radius")))
@@ -389,7 +396,11 @@ def tabs(given: Given) -> Tabs:
     counted = type(value) is int or (isinstance(value, str) and _COUNT.match(value))
     first = "count" if counted else "spacing"
     table = _parts(given, TABS, (first, "width", "height"))
-    base = {"spacing_mm": 1.0} if "spacing" in table.given else {"count": 1}
+    base: dict[str, Any] = {"count": 1}
+    if "spacing" in table.given:
+        base = {"spacing_mm": 1.0}
+    elif "at" in table.given:
+        base = {"at_mm": ((0.0, 0.0),)}
     return record_of(Tabs, TABS, table, base)
 
 
@@ -488,6 +499,7 @@ LEAD = {
 TABS = {
     "count": Key("count", COUNT),
     "spacing": Key("spacing_mm", LENGTH),
+    "at": Key("at_mm", Value(plain(places))),
     "width": Key("width_mm", LENGTH),
     "height": Key("height_mm", LENGTH),
     "ramped": Key("ramped", SWITCH),

@@ -329,12 +329,14 @@ class Lead:
 
 @dataclass(frozen=True)
 class Tabs:
-    """Bridges that hold a part: so many (`count`) or one each `spacing_mm`; `width_mm` of
+    """Bridges that hold a part: so many (`count`), one each `spacing_mm`, or next to these places
+    (x, y) mm of the work frame (`at_mm`); `width_mm` of
     material at the top of a tab, `height_mm` above the bottom of the cut; `ramped` or straight
     sides."""
 
     count: int | None = None
     spacing_mm: float | None = None
+    at_mm: tuple[tuple[float, float], ...] | None = None
     width_mm: float = 2.0
     height_mm: float = 0.5
     ramped: bool = False
@@ -344,8 +346,16 @@ class Tabs:
         above_zero("tab spacing", self.spacing_mm, "mm")
         above_zero("tab width", self.width_mm, "mm")
         above_zero("tab height", self.height_mm, "mm")
-        if (self.count is None) == (self.spacing_mm is None):
-            raise OptionError("tabs need a count or a spacing", mend="give one of the two")
+        for place in self.at_mm or ():
+            for coordinate in place:
+                finite("place of a tab", coordinate, "mm", FARTHEST_MM)
+        if self.at_mm == ():
+            raise OptionError("an empty list gives no tab", mend="leave tabs out")
+        given = [each for each in (self.count, self.spacing_mm, self.at_mm) if each is not None]
+        if len(given) != 1:
+            raise OptionError(
+                "tabs need a count or a spacing, or places", mend="give one of the three"
+            )
 
 
 @dataclass(frozen=True)

@@ -53,7 +53,7 @@ from camtool.planning.place import SCALE_SHARE, collapsed, place
 from camtool.planning.profile import profile
 from camtool.planning.settings import setting_of
 from camtool.planning.sides import Sides, choose, takes_mark
-from camtool.planning.tabs import raised_over_bridges, with_tabs
+from camtool.planning.tabs import between, raised_over_bridges, with_tabs
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
 
@@ -220,6 +220,7 @@ def _step(
     items, bare = work.items, list[Finding]()
     if isinstance(items, Contours):
         items, bare = with_tabs(_with_starts(items))
+        items = _begun_between_tabs(items)
         if rough is not None:
             items, more = in_passes(items, setting, rough)
             bare += more
@@ -325,6 +326,21 @@ def _with_starts(contours: Contours) -> Contours:
         operation = contour.setting.operation
         path, starts = with_starts(contour.path, operation.start, operation.tool.radius_mm)
         made.append(replace(contour, path=path, starts=starts))
+    return Contours.of(made)
+
+
+def _begun_between_tabs(contours: Contours) -> Contours:
+    """The contours, those with tabs by hand beginning farthest from these, if nothing says where:
+    no tab can stand where a contour begins."""
+    if not any(each.operation.tabs and each.operation.tabs.at_mm for each in contours.settings):
+        return contours
+    made = []
+    for contour in contours:
+        tabs = contour.setting.operation.tabs
+        if tabs and tabs.at_mm and contour.path.closed and not len(contour.starts):
+            path, starts = with_starts(contour.path, between(contour.path, tabs.at_mm), 0.0)
+            contour = replace(contour, path=path, starts=starts)
+        made.append(contour)
     return Contours.of(made)
 
 

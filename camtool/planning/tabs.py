@@ -11,9 +11,11 @@ bridge (as in a slot hardly wider than the tool, where there is nothing to hold 
 of a tab are straight up and down, or slope; the bridge is w wide at its top. Slopes keep to the
 angle of the entry when that is a ramp, so that the tool never goes down more steeply.
 
-Tabs stand at the centre of equal shares of the path. One that would stand on a corner moves
-within its share to the nearest place where it does not, if there is one. The start of a closed
-path is where two shares meet, so that no tab stands on the seam.
+Tabs stand at the centre of equal shares of the path, or where they are wanted by hand. None lies
+across a corner, its slopes included: not at a vertex where the path turns, and not on the arc on
+which the tool goes round a corner of the drawing. One that would moves to the nearest place where
+it does not, if there is one: within its share first, on a gentle bend if nothing is straight. The
+start of a closed path is where two shares meet, so that no tab stands on the seam.
 """
 
 from __future__ import annotations
@@ -25,7 +27,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from camtool.arrays import Floats
+from camtool.arrays import Bools, Floats
 from camtool.errors import OptionError
 from camtool.findings import (
     TAB_LEFT_OUT,
@@ -36,7 +38,7 @@ from camtool.findings import (
     Finding,
 )
 from camtool.geometry.boxes import BoxIndex
-from camtool.geometry.distance import points_to_segments
+from camtool.geometry.distance import nearest, points_to_segments
 from camtool.geometry.intersect import crossings
 from camtool.geometry.measure import path_lengths, point_at, segment_boxes, signed_areas
 from camtool.geometry.nesting import inside
@@ -56,9 +58,29 @@ COUNT_SLACK = 1e-9
 TAB_CORNER_RAD = 0.1
 """A path that turns by more than this at a vertex has a corner, where no tab is put."""
 
+GENTLE_RAD = 0.35
+"""Where the path turns by more than this over a tab, a straighter place is better."""
+
+ROUND_CORNER = 1.001
+"""An arc whose radius is no larger than this times the distance of the tool's centre from the wall
+goes round a corner of the drawing."""
+
 PLACES_PER_SIDE = 32
 """Number of places on either side of the centre of its share that are tried for a tab on a
 corner."""
+
+PLACES_PER_TAB = 16.0
+"""So many places are tried in the length of a tab."""
+
+MOST_PLACES_ROUND = 2048
+"""No more places than this are tried round a whole contour."""
+
+PLACE_DECIMALS = 9
+"""Two places are as near when their distances differ in no such decimal of the whole path."""
+
+FAR_FROM_PLACE = 2.0
+"""A place by hand is of no contour that is farther from it than this many times its tool is wide,
+or (of a narrow tool) than this many times the tab is."""
 
 TAB_SLACK_MM = 1e-5
 """A bridge may be narrower than requested by this much."""
@@ -108,6 +130,8 @@ def with_tabs(contours: Contours) -> tuple[Contours, list[Finding]]:
     """
     if not len(contours) or not contours.settings[0].operation.tabs:
         return contours, []
+    if contours.settings[0].operation.tabs.at_mm is not None:
+        return _by_hand(contours), []
     asked = list(contours)
     parts = [k for k, each in enumerate(asked) if each.path.closed and not _is_hole(each)]
     tabbed = {k for k in parts or range(len(asked)) if _is_long_enough(asked[k])}
@@ -126,6 +150,46 @@ def with_tabs(contours: Contours) -> tuple[Contours, list[Finding]]:
     without = replace(setting, operation=replace(setting.operation, tabs=None))
     settings = tuple(setting if k in tabbed else without for k in range(len(asked)))
     return replace(contours, settings=settings), [finding]
+
+
+def _by_hand(contours: Contours) -> Contours:
+    """The contours, each with the places of the tabs that are nearest to it; OptionError for a
+    place that is near to none."""
+    setting = contours.settings[0]
+    operation = setting.operation
+    tabs = operation.tabs
+    assert tabs is not None
+    assert tabs.at_mm is not None
+    limit = FAR_FROM_PLACE * max(operation.tool.diameter_mm, tabs.width_mm)
+    lines = Segments.of(contours.lines)
+    near = nearest(np.array(tabs.at_mm), lines)
+    places: dict[int, list[tuple[float, float]]] = {}
+    for place, apart, row in zip(
+        tabs.at_mm, near.distance.tolist(), near.segment.tolist(), strict=True
+    ):
+        if apart > limit:
+            raise OptionError(
+                f"the tab at X {place[0]:g} Y {place[1]:g} is {apart:.4g} mm from the nearest"
+                f" contour that is cut, more than {limit:g} mm",
+                where=key_of(operation, "tabs"),
+                mend="give a place on a contour, in the work frame (after [place])",
+            )
+        places.setdefault(int(lines.path[row]), []).append(place)
+    settings = []
+    for row in range(len(contours)):
+        mine = replace(tabs, at_mm=tuple(places[row])) if row in places else None
+        settings.append(replace(setting, operation=replace(operation, tabs=mine)))
+    return replace(contours, settings=tuple(settings))
+
+
+def between(path: Polyline, places: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    """The place (x, y) mm of a closed path in the middle of the longest piece between these."""
+    along = MeasuredPath.of(path)
+    lengths = np.sort([along.nearest_to(place) for place in places])
+    gaps = np.diff(np.append(lengths, lengths[0] + along.total_mm))
+    row = int(gaps.argmax())
+    x, y = along.at(lengths[row : row + 1] + 0.5 * gaps[row])[0].tolist()
+    return x, y
 
 
 def _is_hole(contour: Contour) -> bool:
@@ -162,14 +226,26 @@ def tabs_of(contour: Contour, along: MeasuredPath) -> tuple[list[Tab], list[Find
             mend="lower the tabs, or cut deeper",
         )
     model, foot = _model(operation, bottom)
-    count = _count(along.total_mm, operation, model.end + 2.0 * foot)
-    found = [_fitted(along, model, foot, (which, count)) for which in range(count)]
-    findings = [
-        _left_out(contour, along, (which + 0.5) / count * along.total_mm)
-        for which, tab in enumerate(found)
-        if tab is None
-    ]
-    return [tab for tab in found if tab is not None], findings
+    if tabs.at_mm is not None:
+        wanted = [along.nearest_to(place) for place in tabs.at_mm]
+        half = 0.5 * along.total_mm
+        ranges = [(length - half, length + half) for length in wanted]
+    else:
+        count = _count(along.total_mm, operation, model.end + 2.0 * foot)
+        size = along.total_mm / count
+        wanted = [(which + 0.5) * size for which in range(count)]
+        ranges = [(which * size, (which + 1) * size) for which in range(count)]
+    half_width = 0.5 * tabs.width_mm
+    fitting = _Fitting(along, model, foot, half_width, _corners(along, operation))
+    found: list[Tab] = []
+    findings = []
+    for centre, near in zip(wanted, ranges, strict=True):
+        tab = fitting.nearest(centre, near, found)
+        if tab is None:
+            findings.append(_left_out(contour, along, centre))
+        else:
+            found.append(tab)
+    return sorted(found, key=lambda tab: tab.begin), findings
 
 
 def _model(operation: Operation, bottom_mm: float) -> tuple[Tab, float]:
@@ -271,26 +347,125 @@ def _wanted(total_mm: float, operation: Operation) -> int:
     return tabs.count
 
 
-def _fitted(along: MeasuredPath, model: Tab, foot: float, share: tuple[int, int]) -> Tab | None:
-    """The tab in this one of so many shares of the path; None when it has no room there."""
-    which, count = share
-    size = along.total_mm / count
-    low, high = which * size, (which + 1) * size
-    corners = along.reach[: len(along.turns)][np.abs(along.turns) > TAB_CORNER_RAD]
-    # The centre, then alternately to both sides of it.
-    steps = np.arange(2 * PLACES_PER_SIDE)
-    offs = (steps + 1) // 2 * np.where(steps % 2 == 1, 1.0, -1.0) / PLACES_PER_SIDE
-    centres = low + size * (0.5 + 0.5 * offs)
-    away = np.abs(centres[:, None] - corners).min(axis=1, initial=math.inf)
-    clear = away >= 0.5 * model.end + foot
-    for centre in [*centres[clear].tolist(), *centres.tolist()]:
-        half = _half(along, centre, model.end, min(centre - low, high - centre) - foot)
+@dataclass(frozen=True, eq=False)
+class _Corners:
+    """Where a path is a corner, (C, 2) mm each, from and to: `vertices` where it turns at all,
+    those where it turns `sharply`, and `arcs` on which it goes round corners of the drawing."""
+
+    vertices: Floats
+    sharply: Floats
+    arcs: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class _Fitting:
+    """What decides where tabs like the `model`, with slopes of `foot_mm`, fit on a path; half the
+    width of the bridge under them, mm."""
+
+    along: MeasuredPath
+    model: Tab
+    foot_mm: float
+    half_width_mm: float
+    corners: _Corners
+
+    def nearest(
+        self, centre: float, share: tuple[float, float], others: Sequence[Tab]
+    ) -> Tab | None:
+        """The tab that is nearest to a length: on what is hardly bent before what is, within its
+        share before elsewhere; and only where there is no such place where the bridge alone lies
+        off the corners, and the tool is up on the arcs round them. None where it fits nowhere."""
+        within = self._places(centre, share)
+        anywhere = self._places(centre, (0.0, self.along.total_mm))
+        for clear in (self._straight, self._off_corners, self._bridge_off_corners):
+            for places in (within, anywhere):
+                for place in places[clear(places)].tolist():
+                    tab = self._at(place, others)
+                    if tab is not None:
+                        return tab
+        return None
+
+    def _places(self, centre: float, span: tuple[float, float]) -> Floats:
+        """Lengths of a span, the nearest to a place first; those beyond the seam of a closed path
+        are further round."""
+        low, high = span
+        count = math.ceil(PLACES_PER_TAB * (high - low) / self.model.end)
+        count = min(max(count, 2 * PLACES_PER_SIDE), MOST_PLACES_ROUND)
+        places = np.concatenate([[centre], np.linspace(low, high, count + 1)])
+        total = self.along.total_mm
+        if self.along.path.closed:
+            places = np.where(places == total, total, places % total)
+        ahead = places - centre
+        if self.along.path.closed:
+            ahead = (ahead + 0.5 * total) % total - 0.5 * total
+        # Of two that are as near the one ahead, whatever rounding says.
+        apart = np.round(np.abs(ahead) / total, PLACE_DECIMALS)
+        return np.asarray(places[np.lexsort([ahead < 0.0, apart])])
+
+    def _straight(self, places: Floats) -> Bools:
+        """(P,) at which lengths a tab, its slopes included, lies across no corner and no bend."""
+        low, high = places - self._reach, places + self._reach
+        bend = np.abs(self._heading(high) - self._heading(low))
+        return np.asarray(self._off_corners(places) & (bend <= GENTLE_RAD))
+
+    def _off_corners(self, places: Floats) -> Bools:
+        """(P,) at which lengths it lies across no corner."""
+        corners = np.concatenate([self.corners.vertices, self.corners.arcs])
+        return self._clear(places, self._reach, corners)
+
+    def _bridge_off_corners(self, places: Floats) -> Bools:
+        """(P,) at which lengths it lies across no sharp corner, and its bridge not round one."""
+        clear = self._clear(places, self._reach, self.corners.sharply)
+        return np.asarray(clear & self._clear(places, self.half_width_mm, self.corners.arcs))
+
+    @property
+    def _reach(self) -> float:
+        return 0.5 * self.model.end + self.foot_mm
+
+    def _clear(self, places: Floats, reach: float, corners: Floats) -> Bools:
+        low, high = places - reach, places + reach
+        begin, end = corners[:, 0] + TAB_SLACK_MM, corners[:, 1] - TAB_SLACK_MM
+        touches = (low[:, None] < end) & (high[:, None] > begin)
+        return np.asarray(~touches.any(axis=1))
+
+    def _heading(self, lengths: Floats) -> Floats:
+        """(P,) rad: the direction of the path there, counted through all its turns."""
+        reach, segments = self.along.reach, self.along.segments
+        heading = np.cumsum(segments.sweep + self.along.turns) - segments.sweep
+        row = np.clip(np.searchsorted(reach, lengths, side="right") - 1, 0, len(segments) - 1)
+        part = (lengths - reach[row]) / np.diff(reach)[row]
+        return np.asarray(heading[row] + segments.sweep[row] * np.clip(part, 0.0, 1.0))
+
+    def _at(self, centre: float, others: Sequence[Tab]) -> Tab | None:
+        """The tab at a length, where it has room there beside others."""
+        foot, total = self.foot_mm, self.along.total_mm
+        half = _half(self.along, centre, self.model.end, min(centre, total - centre) - foot)
         if half is None:
-            continue
-        tab = Tab(centre - half, centre + half, model.top_mm, model.fall)
-        if _stays(along, tab):
-            return tab
-    return None
+            return None
+        tab = Tab(centre - half, centre + half, self.model.top_mm, self.model.fall)
+        room = 2.0 * foot - TAB_SLACK_MM
+        if any(tab.begin < each.end + room and each.begin < tab.end + room for each in others):
+            return None
+        return tab if _stays(self.along, tab) else None
+
+
+def _corners(along: MeasuredPath, operation: Operation) -> _Corners:
+    """The corners of a path of this operation."""
+    reach, total = along.reach, along.total_mm
+    bend = np.abs(along.turns)
+
+    def turning(least: float) -> Floats:
+        at = reach[: len(bend)][bend > least]
+        if along.path.closed and len(at) and at[0] == 0.0:
+            at = np.append(at, total)
+        return np.column_stack([at, at])
+
+    away = operation.tool.radius_mm + operation.allowance_mm
+    segments = along.segments
+    tight = segments.is_arc & (segments.radius <= ROUND_CORNER * away)
+    if tight.all():  # a round path is no corner
+        tight = np.zeros(len(segments), dtype=np.bool_)
+    arcs = np.column_stack([reach[:-1], reach[1:]])[tight]
+    return _Corners(turning(TAB_CORNER_RAD), turning(GENTLE_RAD), arcs)
 
 
 def _half(along: MeasuredPath, centre: float, chord: float, room: float) -> float | None:

@@ -76,3 +76,68 @@ def test_open_paths_on_their_own_have_tabs() -> None:
 def test_tabs_that_no_contour_carries_are_an_error() -> None:
     with pytest.raises(OptionError, match="longer than the contour"):
         _tabbed(_job(), _box(0, 0, 1, 1), _circle(9, 9, 1))
+
+
+def _places(job: Job, *paths: Polyline) -> list[tuple[str, float, float]]:
+    plan = planned(drawing_of(paths), job, load_target("grbl").machine)
+    found = [bridge for step in plan.steps for bridge in step.bridges]
+    return sorted((each.name, *each.centre.round(6).tolist()) for each in found)
+
+
+def test_tabs_by_hand_stand_next_to_their_places() -> None:
+    tabs = Tabs(at_mm=((40.0, 3.0), (80.0, 30.0), (100.0, 22.0), (20.0, 30.5)), width_mm=2.0)
+    found = _places(_job(tabs=tabs), PLATE, WINDOW, SMALL)
+    half = 1.5875
+    assert found == [
+        ("0/PATH 0", 40.0, -half),
+        ("0/PATH 0", 80.0 + half, 30.0),
+        ("0/PATH 1", 20.0 + half, 30.5),
+        ("0/PATH 2", 100.0 - half, 22.0),
+    ]
+
+
+def test_a_tab_by_hand_at_a_corner_moves_to_where_it_fits() -> None:
+    tabs = Tabs(at_mm=((0.0, 0.5),), width_mm=2.0)
+    ((_, x, y),) = _places(_job(tabs=tabs), PLATE)
+    # The bridge and the slot beside it end where the corner begins, or a bit farther.
+    assert x == pytest.approx(-1.5875)
+    assert 1.0 + 1.5875 <= y < 4.5
+
+
+def test_a_tab_by_hand_that_is_near_to_nothing_is_an_error() -> None:
+    tabs = Tabs(at_mm=((40.0, 0.0), (40.0, -9.0)))
+    with pytest.raises(OptionError, match=r"the tab at X 40 Y -9 is 7\.412 mm from the nearest"):
+        _places(_job(tabs=tabs), PLATE)
+
+
+@pytest.mark.parametrize("side", ["outside", "inside"])
+@pytest.mark.parametrize("ramped", [False, True])
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 7])
+@pytest.mark.parametrize("angle", [0.0, 0.7])
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_no_tab_of_a_polygon_lies_across_a_corner(
+    side: str, ramped: bool, count: int, angle: float, mirrored: bool
+) -> None:
+    corners = np.array([[0, 0], [50, 0], [50, 8], [70, 8], [70, 40], [30, 55], [0, 40.0]])
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    corners = corners @ turn * [-1.0 if mirrored else 1.0, 1.0]
+    path = Polyline(np.column_stack([corners, np.zeros(len(corners))]), True)
+    tabs = Tabs(count=count, width_mm=3.0, height_mm=1.0, ramped=ramped)
+    job = _job(tabs=tabs, side=side)
+    plan = planned(drawing_of([path]), job, load_target("grbl").machine)
+    bridges = [bridge for step in plan.steps for bridge in step.bridges]
+    assert len(bridges) == count
+    assert not [each for each in plan.toolpath.findings if each.code == Code.TAB_LEFT_OUT]
+    reach = 1.5 + 1.5875 + (1.0 if ramped else 0.0)
+    for bridge in bridges:
+        # Seen along its wall, no corner is as near as the tab and its slopes are long.
+        ends = np.roll(corners, -1, axis=0) - corners
+        for corner, side_of in zip(corners, ends, strict=True):
+            along = side_of / np.hypot(*side_of)
+            if abs(along @ bridge.ahead) < 1.0 - 1e-9:
+                continue
+            across = (bridge.centre - corner) @ np.array([-along[1], along[0]])
+            if abs(abs(across) - 1.5875) > 1e-6:
+                continue
+            at, size = (bridge.centre - corner) @ along, np.hypot(*side_of)
+            assert reach - 1e-6 <= at <= size - reach + 1e-6
