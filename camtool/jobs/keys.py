@@ -578,9 +578,7 @@ TOOL = {
     "tip_diameter": Key(
         "tip_diameter_mm", LENGTH, "Of a V bit cut off.", '"0.1mm"', only=("kind", ("v",))
     ),
-    "corner_radius": Key(
-        "corner_radius_mm", LENGTH, "Of a bull nose.", '"0.5mm"', only=("kind", ("bull",))
-    ),
+    "corner_radius": Key("corner_radius_mm", LENGTH, "Of a bull nose.", only=("kind", ("bull",))),
     "flutes": Key("flutes", COUNT, "How many edges it has.", "2"),
     "cutting_length": Key("cutting_length_mm", LENGTH, "How long they are.", '"12mm"'),
     "centre_cutting": Key("centre_cutting", SWITCH),

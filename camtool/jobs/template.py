@@ -10,6 +10,7 @@ last. Every other key stands there as a comment, with an example.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import PurePath
@@ -19,7 +20,7 @@ import numpy as np
 
 from camtool.arrays import Ints
 from camtool.geometry.facts import drawing_extents
-from camtool.geometry.measure import extents
+from camtool.geometry.measure import extents, path_lengths
 from camtool.jobs.keys import OPERATION, PLACE, TOOL, WHOLE, Key
 from camtool.planning.drill import HOLE_SIZE_MM, circle_of
 from camtool.planning.job import Operation, Stock
@@ -38,6 +39,9 @@ ENGRAVED = ("engrav", "etch", "scribe")
 
 BREAKTHROUGH_MM = 0.3
 """Through cuts are proposed to go so far below the stock."""
+
+MOST_TABS = 4
+"""So many tabs are proposed for an outline."""
 
 LEAST_TAB_MM = 0.5
 """Lower tabs than this are not proposed."""
@@ -217,7 +221,8 @@ def _cut_parts(drawing: Drawing, group: _Group, contours: Ints, proposal: Propos
     fit the tool and bored where they are wider, other contours within parts are cut
     on their inside, and the outer ones last, with tabs."""
     lines, tool = drawing.paths, proposal.tool_mm
-    edges = np.array([kind.casefold() in CONTINUOUS for kind in drawing.line_types])
+    continuous = [kind.casefold() in CONTINUOUS for kind in drawing.line_types]
+    edges = np.array(continuous, dtype=np.bool_)
     traits = Traits(lines, drawing.sources, edges)
     mine = np.zeros(len(lines), dtype=np.bool_)
     mine[contours] = True
@@ -254,10 +259,19 @@ def _cut_parts(drawing: Drawing, group: _Group, contours: Ints, proposal: Propos
             # Tabs are measured from the full depth of the cut, which is below the stock.
             height = min(max(proposal.thickness_mm / 3.0, LEAST_TAB_MM), proposal.thickness_mm)
             height += proposal.breakthrough_mm
-            tabs = f'"4:{2.0 * tool:.3g}mm:{height:.3g}mm"'
-            keys = (*keys, ("tabs", tabs, "so that it stays where it is; cut them by hand"))
+            count = _tabs_for(lines.select(outer.tolist()), tool)
+            tabs = f'"{count}:{2.0 * tool:.3g}mm:{height:.3g}mm"'
+            if count:
+                keys = (*keys, ("tabs", tabs, "so that it stays where it is; cut them by hand"))
         found.append(_Part(f"{group.called} outer", "profile", tuple(outer.tolist()), 0, keys))
     return found
+
+
+def _tabs_for(outlines: Polylines, tool_mm: float) -> int:
+    """How many tabs of twice the tool's diameter each of these outlines has room for, at most
+    MOST_TABS: they leave it at least as much as they take."""
+    shortest = float(path_lengths(outlines).min()) + math.pi * tool_mm
+    return min(MOST_TABS, int(0.5 * shortest / (3.0 * tool_mm)))
 
 
 def _numbered(name: str, number: int) -> str:

@@ -463,7 +463,7 @@ def _error_gate(found_um: float | None, limit_um: float) -> Iterator[Finding]:
 
 # The report as lines of text.
 
-MOST_OPERATIONS = 6
+MOST_OPERATIONS = 24
 """At most this many operations are listed; the others are counted."""
 
 COOLANT_WORDS = {"off": "", "mist": ", mist", "flood": ", flood", "both": ", mist and flood"}

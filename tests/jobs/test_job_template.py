@@ -10,9 +10,11 @@ from hypothesis import strategies as st
 from camtool.geometry.drawing import Drawing, Mark, Units
 from camtool.geometry.polylines import Polyline, Polylines
 from camtool.jobs.build import job_of_file
-from camtool.jobs.template import job_template, pattern_of, quoted
+from camtool.jobs.template import Proposal, job_template, pattern_of, quoted
 from camtool.patterns import matches
 from camtool.planning.job import Job
+from camtool.planning.plan import plan
+from camtool.target.registry import load_target
 
 NASTY = (
     '"]\nkind = "drill"\n[[operations]]',
@@ -139,3 +141,20 @@ def test_a_pattern_of_a_name_matches_that_name_alone(name: str, other: str) -> N
     for one in (name, other):
         assert matches((pattern_of(one),), one)
     assert matches((pattern_of(other),), name) == (name.casefold() == other.casefold())
+
+
+def test_small_outlines_get_as_many_tabs_as_they_have_room_for(tmp_path: Path) -> None:
+    # Tabs of 6 mm with a tool of 3 mm, 9 mm of its path each: half of the path is left.
+    machine = load_target("grbl").machine
+    for side, tabs in ((60.0, 4), (20.0, 4), (12.0, 3), (4.0, 1), (1.0, 0)):
+        drawing = drawn((square(side), "0", "#000000"))
+        job = loaded(job_template(drawing, None, Proposal(3.0, 3.0)), tmp_path)
+        (operation,) = job.operations
+        assert (operation.tabs.count if operation.tabs is not None else 0) == tabs
+        plan(drawing, job, machine)
+
+
+def test_a_drawing_of_points_alone_has_a_proposal(tmp_path: Path) -> None:
+    text = job_template(drawn(marks=("0",)), None, Proposal(3.0, 3.0))
+    (operation,) = loaded(text, tmp_path).operations
+    assert operation.kind == "drill"
