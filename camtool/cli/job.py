@@ -77,8 +77,7 @@ def new(
     if tool is not None:
         named = JobFlags(given={"tool": tool}, project=project_of(Path.cwd())).job(drawing)
         known = named.operations[0].tool
-        has_presets = bool(known.materials)
-        proposal = Proposal(known.diameter_mm, proposal.thickness_mm, tool, has_presets)
+        proposal = Proposal(known.diameter_mm, proposal.thickness_mm, tool, known.materials)
     output = output or "job.toml"
     check_places([source, *machine.files()], [output])
     check_new(output)

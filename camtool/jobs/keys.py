@@ -528,7 +528,7 @@ WHOLE = {
         '["SHEET"]',
     ),
     "material": Key(
-        "material", Value(plain(text), "NAME"), "What is cut: whose presets tools have.", '"mdf"'
+        "material", Value(plain(text), "NAME"), "What is cut: whose presets tools have."
     ),
     "tool_library": Key(
         "tool_library", Value(plain(text), "FILE"), "A library of tools.", '"tools.toml"'

@@ -70,12 +70,13 @@ class _Group:
 @dataclass(frozen=True)
 class Proposal:
     """What is known of the cut, mm, 0 where it is not: the tool's diameter, the stock's
-    thickness. `tool`: its name in a library, whose presets may say how deep passes are."""
+    thickness. `tool`: its name in a library, and the materials that it has presets for, which say
+    how deep passes are."""
 
     tool_mm: float = 0.0
     thickness_mm: float = 0.0
     tool: str = ""
-    has_presets: bool = False
+    materials: tuple[str, ...] = ()
 
     @property
     def breakthrough_mm(self) -> float:
@@ -101,6 +102,7 @@ def job_template(
     lines = [
         *_head(drawing, size, machine),
         *_comments(WHOLE),
+        *(_row(f"# material = {quoted(name)}", "as --material") for name in proposal.materials),
         "",
         "[place]",
         _row('origin = "lower-left"', PLACE["origin"].help),
@@ -296,7 +298,7 @@ def _text(drawing: Drawing, group: _Group, part: _Part, proposal: Proposal) -> l
     if proposal.breakthrough_mm and part.kind in OPERATION["breakthrough"].kinds:
         through = f'breakthrough = "{proposal.breakthrough_mm:.6g}mm"'
         text.append(_row(through, "through the stock, and so far into the board below"))
-        if part.kind == "profile" and proposal.tool_mm and not proposal.has_presets:
+        if part.kind == "profile" and proposal.tool_mm and not proposal.materials:
             text.append(f'step_down = "{0.5 * proposal.tool_mm:.3g}mm"')
     if marks and part.kind != "drill":
         text.append("# The points are not cut by this: they need an operation of the kind drill.")
