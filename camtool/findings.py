@@ -1079,12 +1079,12 @@ HOLE_SIZE = Sentence(
 TOOL_NOT_SAID = Sentence(
     Code.TOOL_NOT_SAID,
     "the operation has another tool than the one before it and no number, so the program cannot "
-    "ask for it: number the tools, or write a program for each",
+    "ask for it: number the tools, or write a program for each (--split tool)",
 )
 TOOL_NOT_SAID_APART = Sentence(
     Code.TOOL_NOT_SAID,
     "the operation has another tool than the one before it and the same number {number}, so the "
-    "program cannot ask for it: number the tools, or write a program for each",
+    "program cannot ask for it: number the tools, or write a program for each (--split tool)",
 )
 SIDE_BY_UNCUT = Sentence(
     Code.SIDE_BY_UNCUT,

@@ -42,6 +42,8 @@ MM_PER_INCH: Final = 25.4
 
 MOTION_GROUP: Final = "motion"
 
+EXACT_PATH: Final = PathMode("exact-path")
+
 NO_FEED: Final = "a feed move, and no feed yet"
 
 TURNS_TOLERANCE: Final = 1e-3
@@ -68,8 +70,12 @@ class G(IntEnum):
     EXACT_PATH = 610
     BLEND = 640
     NO_MOTION = 800
+    DRILL = 810
+    DRILL_DWELL = 820
+    DRILL_PECK = 830
     ABSOLUTE = 900
     ABSOLUTE_CENTRES = 901
+    TO_R = 990
 
 
 class M(IntEnum):
@@ -85,6 +91,20 @@ class M(IntEnum):
     FLOOD = 80
     COOLANT_OFF = 90
     END_AND_REWIND = 300
+
+
+CYCLES: Final = (G.DRILL, G.DRILL_DWELL, G.DRILL_PECK)
+"""Motions that drill a hole."""
+
+
+@dataclass
+class Cycle:
+    """What cycles keep from block to block: the height at which the first of them began (None:
+    none has), and the words Z, R, P and Q in the units of the program, which forgets them when it
+    changes these."""
+
+    begun_mm: float | None = None
+    words: dict[str, float] = field(default_factory=dict)
 
 
 M_CODES: Final = {
@@ -114,6 +134,7 @@ class Rules:
     `sure_gap_mm`, `sure_radius_mm`: radii that are larger and differ by no more are an arc.
     `circle_without_end`: an arc that has only its centre is a full circle. `path_modes`: the
     group "path" sets how corners are met. `turns`: P is how many turns an arc begins.
+    `pecked_mm`: how far above the hole that it has made a cycle of pecks comes back as a rapid.
     `forgets_feed`: G94 does, and G1 to G3 want a feed even where nothing moves.
     `ends_in_plane`: an arc must have X or Y. `feed_first`: a feed beside a change of units is in
     the units before. `m_codes`: the M codes it takes and the group of each.
@@ -134,6 +155,7 @@ class Rules:
     ends_in_plane: bool = False
     feed_first: bool = False
     forgets_feed: bool = False
+    pecked_mm: float = 0.0
     m_codes: Mapping[int, str] = field(default_factory=lambda: M_CODES)
     tools: str = "none"
     most_tool: int = 99_999
@@ -148,6 +170,8 @@ class ModalReader:
         """Whether there has been no block yet."""
         self._rules = rules
         self._motion = rules.first_motion
+        self._cycle = Cycle()
+        self._to_r = True
         self._mm = 1.0
         self._absolute = True
         self._absolute_centres = False
@@ -280,7 +304,13 @@ class ModalReader:
 
     def _set_modes(self, block: Block, modes: dict[str, int], numbers: dict[str, float]) -> None:
         """Motion, units, distance and arc modes."""
+        if modes.get(MOTION_GROUP, self._motion) != self._motion:
+            self._cycle = Cycle(self._cycle.begun_mm if self._motion in CYCLES else None)
         self._motion = modes.get(MOTION_GROUP, self._motion)
+        if "return mode" in modes:
+            self._to_r = modes["return mode"] == G.TO_R
+        if "units" in modes and self._mm != (MM_PER_INCH if modes["units"] == G.INCHES else 1.0):
+            self._cycle.words.clear()
         if "units" in modes:
             self._mm = MM_PER_INCH if modes["units"] == G.INCHES else 1.0
         if "distance" in modes:
@@ -352,6 +382,9 @@ class ModalReader:
 
     def _move(self, block: Block, numbers: dict[str, float], *, has_word: bool) -> None:
         """Rapid, line or arc to the block's coordinates; `has_word`: it has a motion word."""
+        if self._motion in CYCLES:
+            self._drill(block, numbers, has_word=has_word)
+            return
         x, y, z = self.path.position
         to = [x, y, z]
         axes = False
@@ -381,6 +414,65 @@ class ModalReader:
             block.fail("an arc without X or Y: grbl's error 32", mend="write X or Y of its end")
         else:
             self._arc(block, motion == G.ARC_CCW, to, numbers)
+
+    def _drill(self, block: Block, numbers: dict[str, float], *, has_word: bool) -> None:
+        """G81, G82 and G83: the moves that LinuxCNC makes of them.
+
+        Over the hole at the height of the block, down to R as a rapid, to Z at the feed (by Q with
+        G83, out to R and back between; G82 waits), out to R or with G98 to where the cycles
+        began. Z, R, P and Q hold until another motion word. Corners are met exactly.
+        """
+        if not any(axis in numbers for axis in "XYZ"):
+            if has_word:
+                block.fail("a cycle without X, Y or Z", mend="write the place of the hole")
+            return
+        if not self._absolute:
+            block.fail("a cycle with G91, which is not read", mend="write G90")
+        words = self._cycle.words
+        asked = {"R": "the height R", "Z": "the depth Z"}
+        asked |= {"P": "the dwell P"} if self._motion == G.DRILL_DWELL else {}
+        asked |= {"Q": "the depth of a peck, Q"} if self._motion == G.DRILL_PECK else {}
+        for letter, name in asked.items():
+            if letter in numbers:
+                words[letter] = numbers.pop(letter)
+            if letter not in words:
+                block.fail_at("G", f"a cycle without {name}", mend=f"write {letter}")
+        x, y, z = self.path.position
+        x = numbers.pop("X") * self._mm if "X" in numbers else x
+        y = numbers.pop("Y") * self._mm if "Y" in numbers else y
+        r, bottom = words["R"] * self._mm, words["Z"] * self._mm
+        if r < bottom:
+            block.fail(f"R {words['R']:g} lies below Z {words['Z']:g}", mend="write a higher R")
+        if words.get("P", 0.0) < 0.0 or words.get("Q", 1.0) <= 0.0:
+            block.fail("a dwell below 0 s, or a peck that is not above 0 mm")
+        if self._feed == 0.0:
+            block.fail(NO_FEED, mend="write F first")
+        begun = self._cycle.begun_mm = z if self._cycle.begun_mm is None else self._cycle.begun_mm
+        self._moved = True
+        mode, self.path.mode = self.path.mode, EXACT_PATH
+        if begun < r:
+            self.path.rapid(z=r)
+        over = r if begun < r else max(z, r if self._to_r else begun)
+        self.path.rapid(x, y, over)
+        if over != r:
+            self.path.rapid(z=r)
+        at = words["R"]  # in the program's units, as LinuxCNC counts
+        while self._motion == G.DRILL_PECK and at - words["Q"] > words["Z"]:
+            self._refuse_pecks(block)
+            at -= words["Q"]
+            self.path.line(z=at * self._mm, feed=self._feed).rapid(z=r)
+            self.path.rapid(z=at * self._mm + self._rules.pecked_mm)
+        self.path.line(z=bottom, feed=self._feed)
+        if self._motion == G.DRILL_DWELL:
+            self.path.event(Kind.DWELL, words["P"])
+        self.path.rapid(z=r if self._to_r else max(begun, r))
+        self.path.mode = mode
+
+    def _refuse_pecks(self, block: Block) -> None:
+        """ProgramError where the pecks of a cycle would be more moves than a program may have."""
+        if len(self.path) >= bounds.MAX_MOVES:
+            message = f"with its pecks the program has more than {bounds.MAX_MOVES} moves"
+            block.fail_at("Q", message, mend="write a larger Q")
 
     def _is_circle(self, motion: int, numbers: dict[str, float], *, has_word: bool) -> bool:
         """Whether a block without X, Y and Z is a full circle about its I and J."""

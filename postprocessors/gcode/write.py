@@ -31,11 +31,13 @@ from camtool.toolpath.words import Words, texts_of
 from .arcs import ArcCounts, Arcs, arcs_of
 from .checks import check, feed_units
 from .comments import comments, header
+from .cycles import CYCLE, Hole, cycle_blocks, holes_of, rows_kept
 from .dialect import UNITS, GcodeDialect, Unit, feed_decimals
 from .findings import ARC_MENDED, MOVE_COLLAPSED, VALUE_ROUNDED
 from .format import (
     NumberStyle,
     first_too_long,
+    format_column,
     format_number,
     values_of,
     word_of,
@@ -81,7 +83,7 @@ class Style:
     what a comment for the operator begins with; `mounted`: what the operator is told at a tool
     change, by the toolpath and its row, None where the machine changes tools; `frame`: the line
     around the program that is no block (%), or ""; `path_mode`: the block that asks for a path
-    mode, `own_mode`: that of rows that ask for none.
+    mode, `own_mode`: that of rows that ask for none; `cycles`: holes are written as cycles.
     """
 
     dialect: GcodeDialect
@@ -92,6 +94,7 @@ class Style:
     frame: str = ""
     path_mode: Callable[[PathMode], str] | None = None
     own_mode: PathMode | None = None
+    cycles: bool = False
 
 
 def write_modal(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
@@ -102,7 +105,14 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
     toolpath, dialect = in_units(toolpath, style.dialect, unit)
     arcs = arcs_of(toolpath, dialect)
     events = events_of(toolpath, style.event)
-    sent = sent_rows(toolpath, arcs, feeds, events.changes)
+    decimals = feed_decimals(machine) + unit.more_decimals
+    holes = holes_of(toolpath) if style.cycles else []
+    if holes:
+        feed_words = [f"F{word}" for word in _feed_texts(feeds, holes, decimals)]
+        number = NumberStyle(dialect.decimals, strip=dialect.strip_zeros)
+        blocks = {**events.blocks, **cycle_blocks(holes, feed_words, number)}
+        events = replace(events, blocks=blocks)
+    sent = sent_rows(toolpath, arcs, feeds, events.changes, holes)
     arc_counts = arcs.counts
     del arcs, feeds
     frame = [style.frame] if style.frame else []
@@ -122,7 +132,6 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
     mounted = {} if tell is None else {row: tell(toolpath, row) for row in events.changes}
     said = comments(toolpath, of_row, dialect, style.message, mounted)
     head = [*frame, *header(toolpath, machine, dialect)]
-    decimals = feed_decimals(machine) + unit.more_decimals
     refuse_too_long(len(head) + len(of_row) + len(said[0]) + len(frame), "line")
     data = b"".join(
         [
@@ -142,6 +151,12 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
             *_rounded(toolpath, events.rounded),
         ),
     )
+
+
+def _feed_texts(feeds: Ints, holes: Sequence[Hole], decimals: int) -> list[str]:
+    """The number of the F word of each hole."""
+    cut = feeds[[hole.cut for hole in holes]]
+    return format_column(values_of(cut, decimals), NumberStyle(decimals, strip=True))
 
 
 def in_units(
@@ -312,9 +327,15 @@ class Sent:
                 yield at, row
 
 
-def sent_rows(toolpath: Toolpath, arcs: Arcs, feeds: Ints, changes: Sequence[int] = ()) -> Sent:
+def sent_rows(
+    toolpath: Toolpath,
+    arcs: Arcs,
+    feeds: Ints,
+    changes: Sequence[int] = (),
+    holes: Sequence[Hole] = (),
+) -> Sent:
     """All rows with pieces in place of arcs, without moves that move nothing. `changes`: the rows
-    of tool changes that have a block."""
+    of tool changes that have a block; of `holes`, which are written as cycles, there is one."""
     of, kind, end, offset = np.arange(len(toolpath)), arcs.kind, arcs.end, arcs.offset
     if arcs.pieces:
         many = np.ones(len(toolpath), dtype=np.int64)
@@ -329,6 +350,11 @@ def sent_rows(toolpath: Toolpath, arcs: Arcs, feeds: Ints, changes: Sequence[int
             for at, piece in enumerate(pieces, int(first[row])):
                 height = sunk + round(rise * piece.share)
                 kind[at], end[at], offset[at] = piece.kind, (*piece.end, height), piece.offset
+    if holes:
+        rows = np.flatnonzero(np.isin(of, rows_kept(len(toolpath), holes)))
+        of, kind, end, offset = of[rows], kind[rows], end[rows], offset[rows]
+        drilled = np.searchsorted(of, [hole.cut for hole in holes])
+        kind[drilled], end[drilled] = CYCLE, arcs.end[[hole.last for hole in holes]]
     raised = np.zeros(len(of), dtype=np.bool_)
     changed = (kind == Kind.TOOL_CHANGE) & np.isin(of, changes)
     if again := _raised_again(kind, end, changed):
@@ -343,7 +369,8 @@ def sent_rows(toolpath: Toolpath, arcs: Arcs, feeds: Ints, changes: Sequence[int
     written = _differ(end, np.zeros(3))
     written[~motion] = False
     written[raised, 2] = True
-    home_xy, home_z = changed | (kind == Kind.HOME_XY), changed | (kind == Kind.HOME_Z)
+    elsewhere = changed | (kind == CYCLE)
+    home_xy, home_z = elsewhere | (kind == Kind.HOME_XY), elsewhere | (kind == Kind.HOME_Z)
     flat = written[:, :2].any(axis=1) | is_arc
     # A rapid to where X and Y should be already is not left out before they were ever written.
     still = (kind == Kind.RAPID) & ~written.any(axis=1)
@@ -416,7 +443,8 @@ def motion_words(sent: Sent, dialect: GcodeDialect, feed_decimals: int) -> list[
     turns = np.zeros(len(motion), dtype=bool)
     turns[rows] = np.diff(sent.kind[rows], prepend=-1) != 0
     is_arc = motion & (sent.kind >= Kind.ARC_CW)
-    feed = _changes(sent.feed, motion & (sent.kind >= Kind.LINE))
+    fed = (motion & (sent.kind >= Kind.LINE)) | (sent.kind == CYCLE)
+    feed = motion & _changes(sent.feed, fed)
     return [
         Words("G", sent.kind, turns | (sent.forget & motion)),
         *(

@@ -62,7 +62,7 @@ def _check_events(toolpath: Toolpath) -> None:
         toolpath,
         (kind == Kind.TOOL_CHANGE) & ~mounted_before(toolpath),
         "this machine has no stop for a tool change",
-        "write a program for each tool",
+        "write a program for each tool (--split tool)",
     )
     for refused, message in REFUSED.items():
         refuse(

@@ -17,13 +17,14 @@ class Dialect(GcodeDialect, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     where that is possible ("exact-path": G61), or met with a stop ("exact-stop": G61.1).
     `percent`: a line of % before and after the program. `tool_change`: by "m6", or a second tool
     is refused ("refuse"); `tool_lengths`: each change takes the length of its tool from the tool
-    table (G43 H)."""
+    table (G43 H). `canned_cycles`: holes are drilled by G81, G82 and G83."""
 
     path: Literal["blend", "exact-path", "exact-stop"] = "blend"
     blend_tolerance_mm: Tolerance = 0.01
     percent: bool = False
     tool_change: Literal["m6", "refuse"] = "m6"
     tool_lengths: bool = False
+    canned_cycles: bool = False
 
 
 class LinuxcncController(SlideStart, frozen=True, tag_field="model", tag="linuxcnc"):

@@ -17,7 +17,7 @@ from ..gcode.read import ModalReader, Rules
 from .dialect import Dialect, LinuxcncMachine
 
 GROUPS: Final = {
-    **dict.fromkeys((0, 10, 20, 30, 800), "motion"),
+    **dict.fromkeys((0, 10, 20, 30, 800, 810, 820, 830), "motion"),
     80: "lathe diameter",
     **dict.fromkeys((40, 530), "one block"),
     170: "plane",
@@ -45,12 +45,15 @@ REFUSED: Final = {
     **dict.fromkeys(("G33", "G33.1", "G95", "G96"), "follows the spindle, not simulated"),
     **dict.fromkeys(("G38.2", "G38.3", "G38.4", "G38.5"), "probes, which cannot be simulated"),
     **dict.fromkeys(("G41", "G41.1", "G42", "G42.1", "G43.1", "G43.2"), _COMPENSATES),
-    **dict.fromkeys(("G73", "G76", "G81", "G82", "G83", "G84", "G85", "G86", "G89"), _CYCLE),
+    **dict.fromkeys(("G73", "G76", "G84", "G85", "G86", "G89"), _CYCLE),
     **dict.fromkeys(("G5", "G5.1", "G5.2", "G5.3"), "is a spline; write it as arcs"),
     "G7": "counts X as a diameter, as lathes do",
     "G93": "says feeds as inverse time, which is not read",
 }
 
+
+PECKED_MM: Final = 0.254
+"""Between two pecks of G83 the drill comes back to this above where it was (0.010 inch)."""
 
 LINE_END: Final = re.compile(rb"\r\n|\n|\r")
 
@@ -154,5 +157,6 @@ def rules_of(dialect: Dialect) -> Rules:
         turns=True,
         feed_first=True,
         forgets_feed=True,
+        pecked_mm=PECKED_MM,
         tools="change",
     )

@@ -35,6 +35,7 @@ def write_program(toolpath: Toolpath, machine: LinuxcncMachine) -> Program:
         message="MSG,",
         frame="%" if dialect.percent else "",
         path_mode=lambda mode: _path_mode(mode, unit),
+        cycles=dialect.canned_cycles,
         own_mode=PathMode(dialect.path, dialect.blend_tolerance_mm, dialect.blend_tolerance_mm),
     )
     program = write_modal(toolpath, machine, style)

@@ -154,7 +154,7 @@ def _events(toolpath: Toolpath) -> list[Finding]:
         toolpath,
         (kind == Kind.TOOL_CHANGE) & cutting,
         "a tool change between cuts",
-        "post a program for each tool",
+        "post a program for each tool (--split tool)",
     )
     return [
         *_left_out(toolpath, kind == Kind.DWELL, EVENT_LEFT_OUT_DWELL),

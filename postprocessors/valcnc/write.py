@@ -89,7 +89,7 @@ def _check_tools(toolpath: Toolpath) -> None:
         toolpath,
         (toolpath.kind == Kind.TOOL_CHANGE) & ~mounted_before(toolpath),
         "this machine has no code that stops it for a tool change",
-        "write a program for each tool",
+        "write a program for each tool (--split tool)",
     )
 
 

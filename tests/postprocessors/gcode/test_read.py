@@ -252,7 +252,7 @@ def test_refused(name: str, text: str, line: int, column: int, message: str) -> 
         ("G41 D1", "compensates for a tool"),
         ("G43.1 Z1", "compensates for a tool"),
         ("H1", "nothing in the block uses the H word"),
-        ("G81 X1 Z-1 R1", "is a cycle"),
+        ("G84 X1 Z-1 R1", "is a cycle"),
         ("G33 Z-1 K1", "follows the spindle"),
         ("G5 X1", "a spline"),
         ("O100 CALL", "the letter O is no word"),
