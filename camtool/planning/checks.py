@@ -43,7 +43,7 @@ from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.machine.model import Machine
 from camtool.planning.items import Setting, Step
 from camtool.planning.job import MILLS, Job, Stock, Tool
-from camtool.planning.naming import operation_name, own_numbers
+from camtool.planning.naming import operation_name, own_numbers, range_words
 from camtool.planning.settings import lowered_feeds
 from camtool.toolpath.moves import Kind, Toolpath, toolpath_extents
 from camtool.toolpath.rapids import STOCK_TOP_MM, Reach, rapids_through_stock
@@ -340,9 +340,9 @@ def _beyond_tool(step: Step, stock: Stock | None) -> Iterator[str]:
         yield CUT_DOUBTFUL_CENTRE.words()
     chip, speed = chip_load_mm(setting), surface_speed_m_min(setting)
     if chip is not None and operation.kind != "drill" and _is_beyond(chip, tool.chip_load_mm):
-        yield CUT_DOUBTFUL_CHIP.words(chip=chip, limits=_range_words(tool.chip_load_mm))
+        yield CUT_DOUBTFUL_CHIP.words(chip=chip, limits=range_words(tool.chip_load_mm))
     if speed is not None and _is_beyond(speed, tool.surface_speed_m_min):
-        yield CUT_DOUBTFUL_EDGE.words(speed=speed, limits=_range_words(tool.surface_speed_m_min))
+        yield CUT_DOUBTFUL_EDGE.words(speed=speed, limits=range_words(tool.surface_speed_m_min))
     clears = operation.kind in ("pocket", "bore")
     beside = clears or (operation.kind == "profile" and operation.side != "on")
     below = depth - stock.thickness_mm if stock is not None else 0.0
@@ -386,14 +386,6 @@ def _is_beyond(value: float, limits: tuple[float, float] | None) -> bool:
         return False
     least, most = limits
     return value < least * (1.0 - LIMIT_SLACK) or value > most * (1.0 + LIMIT_SLACK)
-
-
-def _range_words(limits: tuple[float, float] | None) -> str:
-    """`0.02 to 0.06`, `at most 0.06` or `at least 0.02`."""
-    least, most = limits or (0.0, math.inf)
-    if math.isinf(most):
-        return f"at least {least:g}"
-    return f"{least:g} to {most:g}" if least else f"at most {most:g}"
 
 
 def deepest_pass(setting: Setting) -> float:

@@ -62,6 +62,14 @@ def operation_name(operation: Operation) -> str:
     return f"operation {operation.name or operation.kind!r}"
 
 
+def range_words(limits: tuple[float, float] | None) -> str:
+    """`0.02 to 0.06`, `at most 0.06` or `at least 0.02`."""
+    least, most = limits or (0.0, math.inf)
+    if math.isinf(most):
+        return f"at least {least:g}"
+    return f"{least:g} to {most:g}" if least else f"at most {most:g}"
+
+
 def own_numbers(machine: Machine, settings: Sequence[str]) -> str:
     """How to give the numbers of the user's own machine, which may differ from the target's."""
     keys = " ".join(f"--set {each}" for each in settings)

@@ -36,6 +36,7 @@ from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.patterns import matches
 from camtool.planning.items import Chosen
 from camtool.planning.job import Job, Operation
+from camtool.planning.naming import range_words
 from camtool.planning.paths import midpoints
 
 SAME_CONTOUR_MM = 0.01
@@ -288,7 +289,7 @@ def _selection(operation: Operation) -> str:
         ("area", operation.area_mm2, "mm²"),
     ):
         if limits is not None:
-            said.append(f"of {key} {limits[0]:g} to {limits[1]:g} {unit}")
+            said.append(f"of {key} {range_words(limits)} {unit}")
     if operation.entities:
         said.append(f"named {' or '.join(operation.entities)}")
     return " and ".join(said)

@@ -77,7 +77,11 @@ def machine_of(target: Target, table: Table, name: str) -> Machine:
             where="table [coolant]",
             mend="leave it out",
         )
-    target.check(machine)
+    try:
+        target.check(machine)
+    except MachineError as error:
+        error.file = name
+        raise
     return machine
 
 
