@@ -288,6 +288,13 @@ class Code(IntEnum):
         "name the layers that are no edges of parts (`--frames`), or give the side "
         "([toolpaths.md](toolpaths.md))",
     )
+    NO_REST = (
+        229,
+        INFO,
+        "there is nothing in a region that the tool of a `rest` reaches and what was cut before "
+        "it has left",
+        "none",
+    )
     FINISH_IN_PASSES = (
         228,
         INFO,
@@ -1042,6 +1049,7 @@ NOT_DRILLED_TOO_LARGE = Sentence(
     "circles of more than {limit:g} mm are not drilled: {count}, up to {measured:.6g} mm",
     "mm",
 )
+NO_REST = Sentence(Code.NO_REST, "{other} leaves nothing that {tool} can clear")
 FINISH_IN_PASSES = Sentence(
     Code.FINISH_IN_PASSES,
     "up to {measured:.4g} mm are left beside the wall where the tool that roughs does not get: "

@@ -199,6 +199,8 @@ def _does(operation: dict[str, Any]) -> str:
     left_on = f", leaves {left:g} mm on the wall" if left else ""
     if operation["stage"] == "finish":
         left_on += ", along the wall at the full depth"
+    if operation["rest"]:
+        left_on += f", what {operation['rest']!r} leaves"
     return (
         f"{operation['kind']}, tool {tool['diameter_mm']:g} mm{called}{deep}{by}{through}{left_on}"
     )

@@ -41,7 +41,7 @@ from camtool.jobs.keys import (
     why_idle,
 )
 from camtool.jobs.tools import Described, Shop, Tools, Used, tool_tables, tools_for
-from camtool.planning.job import Job, Operation, Placement, Stock
+from camtool.planning.job import Job, Operation, Placement, Stock, rested
 from camtool.tables import read_table
 
 OF_OPERATIONS = (*OPERATION, TOOL_NAME, *TOOL_KEYS)
@@ -177,6 +177,7 @@ def build_job(
         for operation, own in zip(operations, tables, strict=True)
     ]
     _refuse_equal_names(operations, tables)
+    operations = _rested(operations, tables)
     tools.refuse_idle_material(operations)
     rows = _rows(operations, chosen)
     for layer in (file.defaults, flags.defaults):
@@ -271,6 +272,25 @@ def _through(operation: Operation, layers: Sequence[Table], stock: Stock | None)
         # The last pass may be what is wrong with the depth.
         key = "last_pass" if (error.where or "").endswith("last_pass") else "breakthrough"
         raise _nearest(layers).given[key].refused(error.message, error.mend) from error
+
+
+def _rested(operations: list[Operation], tables: Sequence[Table]) -> list[Operation]:
+    """The operations with what they clear the rest of."""
+    carvings = {each.name for each in operations if each.kind == "vcarve"}
+    for operation, own in zip(operations, tables, strict=True):
+        for key in ("depth", "breakthrough"):
+            if operation.rest in carvings and key in own.given:
+                raise own.given[key].refused(
+                    f"the floor of {operation.rest!r} has a depth already",
+                    f"leave {key} out, it is that of the carving",
+                )
+    try:
+        return rested(operations)
+    except OptionError as error:
+        for operation, own in zip(operations, tables, strict=True):
+            if operation.rest and repr(operation.name or operation.kind) in (error.where or ""):
+                raise own.given["rest"].refused(error.message, error.mend) from error
+        raise
 
 
 def _unknown(name: str, kind: str) -> tuple[str, str]:

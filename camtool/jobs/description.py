@@ -80,6 +80,7 @@ def _operation(job: Job, index: int) -> dict[str, Any]:
         "depth_mm": operation.depth_mm,
         "below_stock_mm": _below(job, operation),
         "stage": operation.stage,
+        "rest": operation.rest,
         "allowance_mm": operation.allowance_mm,
         "step_down_mm": operation.step_down_mm,
     }

@@ -715,6 +715,7 @@ OPERATION = {
         only=("joins", ("mitre",)),
     ),
     "pattern": Key("pattern", one_of(PATTERNS), "How a pocket is cleared.", kinds=_POCKET),
+    "rest": Key("rest", TEXT, kinds=_POCKET),
     "step_over": Key(
         "step_over",
         Value(plain(fraction), "PART"),

@@ -146,7 +146,8 @@ def _edges(step: Step, placed: Drawing) -> Iterator[tuple[int, tuple[Floats, Flo
     items = [step.items[k] for k in index]
     share = Counter(item.source for item in items)
     drawn = path_extents(placed.paths)
-    if step.operation.stage == "rough":  # the other stage makes the edge what it is
+    # Another stage, or what it clears the rest of, makes the edge what it is.
+    if step.operation.stage == "rough" or step.operation.rest_of is not None:
         yield from ((k, (drawn[it.source],) * 2) for k, it in zip(index, items, strict=True))
         return
     for k, item, centre in zip(index, items, _centre_boxes(items), strict=True):

@@ -336,10 +336,10 @@ class Tabs:
 
     count: int | None = None
     spacing_mm: float | None = None
-    at_mm: tuple[tuple[float, float], ...] | None = None
     width_mm: float = 2.0
     height_mm: float = 0.5
     ramped: bool = False
+    at_mm: tuple[tuple[float, float], ...] | None = None
 
     def __post_init__(self) -> None:
         above_zero("number of tabs", self.count, "")
@@ -367,7 +367,8 @@ class Operation:
     `step_down_mm` at most (None: one pass), the last of `last_pass_mm` (None: like the others).
     `breakthrough_mm` stands for it: so far below the stock (a Job, which knows that, makes it the
     depth). `finish_mm` is left on the wall for one more pass at the full depth, with a feed and a
-    tool of its own where these are given (a Job makes two operations of it, the stages).
+    tool of its own where these are given (a Job makes two operations of it, the stages). `rest`
+    names the operation that has left something, `rest_of`, whose paths it takes (a Job finds it).
     `step_over` is the distance of neighbouring passes of a pocket over the tool's diameter.
     `overlap_mm`: how far a closed contour is cut beyond its start. `start`: one of STARTS, or a
     place (x, y) mm. `peck_mm`: how deep a drill goes at a time; `dwell_s` at the bottom.
@@ -392,6 +393,8 @@ class Operation:
     finish_feed_mm_min: float | None = None
     finish_tool: Tool | None = None
     stage: str = ""
+    rest: str = ""
+    rest_of: Operation | None = None
     feed_mm_min: float | None = None
     plunge_feed_mm_min: float | None = None
     spindle_rpm: float | None = None
@@ -527,6 +530,76 @@ class Operation:
                 mend=f"give {FINISH_MOST * last.diameter_mm:.4g} mm or less",
             )
 
+    def after(self, others: Sequence[Operation]) -> Operation:
+        """The operation with what it clears the rest of, found by its name among others, those
+        before it and then those behind it; itself where it names none.
+
+        It takes the paths of that one, and is as deep. OptionError for what leaves no rest.
+        """
+        if not self.rest:
+            return self
+        if self.rest_of is not None:
+            return self
+        where = f"operation {self.name or self.kind!r}, key rest"
+        found = [each for each in others if each.name == self.rest]
+        if not found:
+            names = ", ".join(each.name for each in others if each.name and each.name != self.name)
+            raise OptionError(
+                f"there is no operation {self.rest!r}",
+                where=where,
+                mend=f"name one of: {names}" if names else "name another operation",
+            )
+        other = found[0]
+        mine, its = _selection_of(self), _selection_of(other)
+        if any(mine.values()) and mine != its:
+            raise OptionError(
+                f"it takes the paths of {self.rest!r}, and gives layers, colours or a selection"
+                " of its own too",
+                where=where,
+                mend="leave these out",
+            )
+        self._refuse_rest(other, where)
+        depth = self.depth_mm if other.kind == "pocket" and self.depth_mm else other.depth_mm
+        return replace(self, rest_of=other, depth_mm=depth, **its)
+
+    def _refuse_rest(self, other: Operation, where: str) -> None:
+        """An operation that leaves this one nothing, or what it cannot clear."""
+
+        def refuse(message: str, mend: str) -> OptionError:
+            return OptionError(message, where=where, mend=mend)
+
+        if other.kind not in ("pocket", "vcarve") or other.rest:
+            raise refuse(
+                f"{other.name!r} is no pocket and no vcarve of its own",
+                "name a pocket that a wider tool clears, or a vcarve whose floor is flat",
+            )
+        if self.finish_mm is not None:
+            raise refuse("a rest has no finishing pass", "give finish to the other operation")
+        if other.kind == "vcarve":
+            if self.tool.kind not in MILLS:
+                raise refuse(
+                    f"a flat floor is for an end mill, not for a tool of kind {self.tool.kind!r}",
+                    "give it a flat tool",
+                )
+            return
+        if not 0.0 < self.tool.diameter_mm < other.tool.diameter_mm:
+            raise refuse(
+                f"a tool of {self.tool.diameter_mm:g} mm reaches no more than that of"
+                f" {other.tool.diameter_mm:g} mm",
+                "give a smaller tool",
+            )
+        if (self.depth_mm or 0.0) > (other.depth_mm or math.inf):
+            raise refuse(
+                f"it is {self.depth_mm:g} mm deep, and {other.name!r} {other.depth_mm:g} mm: below"
+                " that all is left",
+                "leave depth out",
+            )
+        if self.allowance_mm < other.allowance_mm:
+            raise refuse(
+                f"{other.name!r} leaves {other.allowance_mm:g} mm on all walls",
+                "give the same allowance, or more",
+            )
+
     def stages(self) -> tuple[Operation, ...]:
         """The operation, or the two that its finishing pass makes of it: one that leaves this on
         the wall, and one along the wall, which comes in and leaves on quarter arcs as large as
@@ -600,6 +673,22 @@ class Operation:
         return (not self.layers or matches(self.layers, layer)) and (
             not self.colours or matches(self.colours, colour)
         )
+
+
+def _selection_of(operation: Operation) -> dict[str, Any]:
+    """By what an operation takes paths."""
+    keys = ("layers", "colours", "select", "size_mm", "area_mm2", "entities")
+    return {key: getattr(operation, key) for key in keys}
+
+
+def rested(operations: Sequence[Operation]) -> list[Operation]:
+    """The operations with what they clear the rest of. That of a pocket comes after it; a carved
+    floor may be cleared before or after its walls."""
+    made = []
+    for row, each in enumerate(operations):
+        later = [other for other in operations[row + 1 :] if other.kind == "vcarve"]
+        made.append(each.after([*operations[:row], *later]))
+    return made
 
 
 @dataclass(frozen=True)
@@ -717,7 +806,8 @@ class Job:
         one_of("goal", self.minimise, GOALS)
         if not self.operations:
             raise OptionError("the job has no operations", mend="give it at least one")
-        made = [stage for each in self.operations for stage in each.through(self.stock).stages()]
+        deep = [operation.through(self.stock) for operation in self.operations]
+        made = [stage for each in rested(deep) for stage in each.stages()]
         object.__setattr__(self, "operations", tuple(made))
 
     @property

@@ -23,6 +23,7 @@ from camtool.findings import (
     MARKS_NOT_CUT,
     NOTHING_DRAWN,
     NOTHING_DRAWN_BUT_PATHS,
+    Code,
     Finding,
 )
 from camtool.geometry.drawing import Drawing
@@ -104,7 +105,7 @@ def planned(drawing: Drawing, job: Job, machine: Machine, *, undivided: bool = F
             step = _step(placed, plain, setting, machine, (here, there), sides, before)
         here = end
         steps.append(step)
-    found = Plan(job, placed, tuple(_sparing(steps)), ToolpathBuilder().finish())
+    found = Plan(job, placed, tuple(_rested(_sparing(steps))), ToolpathBuilder().finish())
     return _linked(found, drawing, job, machine, undivided=undivided)
 
 
@@ -282,6 +283,18 @@ def _sparing(steps: list[Step]) -> list[Step]:
         findings = (*step.findings, *of_stage(step.operation, kept.findings))
         made.append(replace(step, runs=kept.runs, findings=findings))
     return made
+
+
+def _rested(steps: list[Step]) -> list[Step]:
+    """The steps; what one of them leaves for another to clear is said by that one alone."""
+    left = [step.operation.rest for step in steps if step.operation.rest_of is not None]
+    codes = (Code.UNREACHED, Code.DEPTH_LIMITED)
+    return [
+        replace(step, findings=tuple(each for each in step.findings if each.code not in codes))
+        if step.operation.name and step.operation.name in left
+        else step
+        for step in steps
+    ]
 
 
 def _refuse_endless(items: Items, setting: Setting) -> None:

@@ -27,6 +27,7 @@ from camtool.errors import OptionError
 from camtool.findings import (
     CONTOUR_TOO_SMALL_POCKET,
     ENTRY_CHANGED_IN_POCKET,
+    NO_REST,
     SLOT_AS_WIDE_IN_POCKET,
     Finding,
 )
@@ -55,7 +56,7 @@ from camtool.planning.job import Operation
 from camtool.planning.naming import at_place, key_of, operation_name, tool_name
 from camtool.planning.paths import MeasuredPath, joined
 from camtool.planning.ramps import feeds_along
-from camtool.planning.reach import unreached_findings
+from camtool.planning.reach import unreached, unreached_findings
 
 MOST_STEPS = 10_000
 """More steps than this across a pocket are taken as a mistake."""
@@ -68,6 +69,9 @@ HELIX_LEAST = 0.1
 
 HELIX_MOST_TURNS = 200
 """A helix of more turns than this at one level is not made."""
+
+REST_OVERLAP = 0.02
+"""The tool that cleared before counts as wider by this part, so that its cut is overlapped."""
 
 RAMP_MOST_LAPS = 20
 """A ramp that would go back and forth on the whole path more often than this becomes a plunge."""
@@ -108,11 +112,12 @@ def pocket(chosen: Chosen, setting: Setting) -> Work:
     findings: list[Finding] = []
     for each in pockets(chosen):
         radius = setting.operation.tool.radius_mm
-        wanted = offset_shape(each.region, setting.operation.allowance_mm)
+        wanted = offset_shape(each.region, _left_mm(setting))
         slots = slot_paths(wanted, radius)
         cleared = _cleared(wanted, slots, each, setting)
         if not cleared.runs:
-            findings.append(_too_small(each, setting.operation))
+            nothing = _too_small if setting.operation.rest_of is None else _no_rest
+            findings.append(nothing(each, setting.operation))
             continue
         outline = each.region[0]
         items.append(Fixed(tuple(cleared.runs), setting, each.name, each.source, outline))
@@ -154,8 +159,7 @@ def _cleared(wanted: Polylines, slots: list[Floats], each: Pocket, setting: Sett
     """The runs of one region: each connected tool centre region, then the slots."""
     groups: list[list[CutRun]] = []
     changed: dict[str, CutRun] = {}
-    tool_region = offset_shape(wanted, setting.operation.tool.radius_mm)
-    for part in parts_of(tool_region):
+    for part in _tool_regions(wanted, setting.operation):
         whole, runs = ConnectedRegion(part), list[CutRun]()
         for path, around in _paths(part, setting.operation):
             down = down_for(path, around, whole, setting)
@@ -168,6 +172,33 @@ def _cleared(wanted: Polylines, slots: list[Floats], each: Pocket, setting: Sett
         changed.setdefault(down.changed, groups[-1][0])
     changed.pop("", None)
     return Cleared(_nearest_next(groups), changed)
+
+
+def _left_mm(setting: Setting) -> float:
+    """What is left beside the edge: the allowance, and of a carving its slopes. The wall of a V
+    bit of half the angle α is z tan α from the edge where it is z deep."""
+    operation, carved = setting.operation, setting.operation.rest_of
+    if carved is None or carved.kind != "vcarve" or carved.tool.tip_angle_rad is None:
+        return operation.allowance_mm
+    slope = math.tan(0.5 * carved.tool.tip_angle_rad)
+    return operation.allowance_mm - setting.levels_mm[-1] * slope
+
+
+def _tool_regions(wanted: Polylines, operation: Operation) -> list[Polylines]:
+    """The connected tool centre regions that clear a region; where a wider tool has cleared what
+    it reached, those that clear the rest.
+
+    A disc of radius r reaches into what one of radius R does not cover where its centre is in the
+    region shrunk by r, and not in what a disc of radius R − r covers of that: for what R covers,
+    shrunk by r, is what R − r covers of the region shrunk by r.
+    """
+    tool_region = offset_shape(wanted, operation.tool.radius_mm)
+    wider = operation.rest_of
+    if wider is None or wider.kind == "vcarve":
+        return parts_of(tool_region)
+    reached_mm = (1.0 + REST_OVERLAP) * wider.tool.radius_mm
+    pieces = unreached(tool_region, reached_mm - operation.tool.radius_mm)
+    return [piece.outline for piece in pieces]
 
 
 def _nearest_next(groups: list[list[CutRun]]) -> list[CutRun]:
@@ -246,6 +277,14 @@ def _too_small(each: Pocket, operation: Operation) -> Finding:
         where=at_place(each.name, extents(each.region).mean(axis=1).tolist()),
         measured=float(signed_areas(each.region).sum()),
         tool=tool_name(operation.tool),
+    )
+
+
+def _no_rest(each: Pocket, operation: Operation) -> Finding:
+    return NO_REST(
+        where=at_place(each.name, extents(each.region).mean(axis=1).tolist()),
+        tool=tool_name(operation.tool),
+        other=operation.rest,
     )
 
 

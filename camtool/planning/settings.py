@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterator
 from itertools import pairwise
 
+import numpy as np
+
 from camtool.errors import OptionError
 from camtool.findings import FEED_ABOVE_LIMIT_IN_JOB, Finding
 from camtool.machine.model import FEED_TOLERANCE, Machine, exceeds
@@ -85,7 +87,15 @@ def safe_z_of(job: Job, machine: Machine) -> float:
 
 
 def depth_of(operation: Operation, machine: Machine) -> float:
-    """The operation's depth of cut below the stock top, or the machine's, mm."""
+    """The operation's depth of cut below the stock top, or the machine's, mm; of a carved floor no
+    more than the bit is deep where it is widest."""
+    carved = operation.rest_of
+    if carved is not None and carved.kind == "vcarve":
+        from camtool.planning.carve import Cone
+
+        cone = Cone.of(carved)
+        wanted = machine.defaults.cut_depth_mm if carved.depth_mm is None else carved.depth_mm
+        return min(wanted, float(cone.depth_of(np.array(cone.widest_mm))))
     return machine.defaults.cut_depth_mm if operation.depth_mm is None else operation.depth_mm
 
 

@@ -116,6 +116,13 @@ FILES = [
     # contradictions
     ("depth = 1\nlast_pass = 2", ["key last_pass", "deeper than the whole cut of 1 mm"]),
     ("depth = 1\nbreakthrough = 2", ["key breakthrough", "a depth is given too", "one of"]),
+    ("kind = 'pocket'\nrest = 'a'", ["key rest", "there is no operation 'a'"]),
+    ("rest = 'a'", ["key rest", "means nothing to the kind profile"]),
+    (
+        f"{TOOLS}[[operations]]\nname = 'a'\nkind = 'vcarve'\ntool = 'vee'\n[[operations]]\n"
+        "kind = 'pocket'\nrest = 'a'\ndepth = 1",
+        ["[[operations]] 2, key depth", "the floor of 'a' has a depth already"],
+    ),
     ("finish_feed = 9", ["key finish_feed", "no effect without finish"]),
     ("finish_tool = 'fine'\nfinish = 0.1", ["key finish_tool", "there is no tool 'fine'"]),
     ("finish = 0.3\ntool_diameter = 1", ["key finish", "more than a quarter", "0.25 mm or less"]),

@@ -39,6 +39,13 @@ def dense(run: CutRun, per_move: int = 48) -> Floats:
 
 def swept(runs: Iterable[CutRun], radius: float, below: float = math.inf) -> shapely.Geometry:
     """What discs of the tool on the runs cover, seen from above; where they are that deep."""
-    places = np.concatenate([dense(run) for run in runs])
-    places = places[places[:, 2] <= -below] if below < math.inf else places
-    return shapely.union_all(shapely.buffer(shapely.points(places[:, :2]), radius, quad_segs=32))
+    found = []
+    for run in runs:
+        places = dense(run)
+        deep = places[:, 2] <= -below if below < math.inf else np.ones(len(places), dtype=bool)
+        for piece in np.split(places, np.flatnonzero(np.diff(deep)) + 1):
+            if below < math.inf and piece[0, 2] > -below:
+                continue
+            line = piece[:, :2] if len(piece) > 1 else np.repeat(piece[:, :2], 2, axis=0)
+            found.append(shapely.LineString(line).buffer(radius, quad_segs=32))
+    return shapely.union_all(found)
