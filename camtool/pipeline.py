@@ -13,9 +13,9 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import PurePath
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import msgspec
 
@@ -50,6 +50,8 @@ if TYPE_CHECKING:
     )
     from camtool.verification.verify import Verification, VerifyOptions
 
+
+T = TypeVar("T")
 
 PLANNING = "planning"
 """The stage in which a job becomes moves."""
@@ -171,17 +173,16 @@ def post_by_tool(
         undivided = planned(drawing, job, machine, undivided=True)
         return parted(undivided, turns, drawing, machine, undivided=True)
 
-    return tuple(
-        _posted(
-            drawing,
-            plan,
-            target,
-            how,
-            lambda k=k: plains()[k],  # type: ignore[misc]
-            lambda k=k: wholes()[k],  # type: ignore[misc]
-        )
-        for k, plan in enumerate(plans)
-    )
+    runs = []
+    for k, plan in enumerate(plans):
+        plain, whole = partial(_kth, plains, k), partial(_kth, wholes, k)
+        part = f"program {k + 1} of {len(plans)}" if len(plans) > 1 else ""
+        runs.append(replace(_posted(drawing, plan, target, how, plain, whole), part=part))
+    return tuple(runs)
+
+
+def _kth(several: Callable[[], tuple[T, ...]], k: int) -> T:
+    return several()[k]
 
 
 def _posted(

@@ -49,7 +49,8 @@ class Run(Shown):
     the controller reads from them, `verification` the figures of the slides' path. `program` is
     None when planning found an error; `verification` is None then, and when none was asked for.
     `findings` are those of all stages. `before` is the run of the same job without its measures
-    against reversals and backlash, if it takes any.
+    against reversals and backlash, if it takes any; `part` says which of several programs of a
+    drawing it is.
     """
 
     source: str
@@ -62,6 +63,13 @@ class Run(Shown):
     verification: Verification | None = None
     findings: tuple[Finding, ...] = ()
     before: Run | None = None
+    part: str = ""
+
+    @property
+    def title(self) -> str:
+        """The name of the source, and which of its programs this is."""
+        name = PurePath(self.source).name
+        return f"{name}, {self.part}" if self.part else name
 
     @property
     def failed(self) -> bool:
@@ -105,7 +113,7 @@ class Run(Shown):
         from camtool.pictures.scene import scene_of
 
         return scene_of(
-            title=PurePath(self.source).name if title is None else title,
+            title=self.title if title is None else title,
             drawing=self.drawing,
             job=self.job,
             toolpath=self.wanted if self.decoded is None else self.decoded,

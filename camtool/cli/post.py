@@ -69,7 +69,7 @@ def scenes_of(run: Run, *, before: bool) -> list[Scene]:
             where="--before-after",
             mend="add --compensate, --minimise reversals or --approach, or drop it",
         )
-    name = Path(run.source).name
+    name = run.title
     return [run.before.scene(f"{name}, before"), run.scene(f"{name}, after")]
 
 

@@ -141,7 +141,7 @@ def _from(page_name: str, picture_name: str) -> str:
 def _page(run: Run, pictures: tuple[tuple[str, str], ...], stock: str = "") -> Page:
     from camtool.verification.report import Page, reported
 
-    title = one_line(PurePath(run.source).name)
+    title = one_line(run.title)
     return Page(title, run.report, reported(run.findings), _setup(run), pictures, stock)
 
 

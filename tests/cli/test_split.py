@@ -36,8 +36,9 @@ def test_each_program_is_complete_and_verified(camtool: Run, tmp_path: Path) -> 
     listed = json.loads((tmp_path / "r.json").read_text())["programs"]
     assert [each["program"] for each in listed] == PROGRAMS
     assert [each["tool"]["number"] for each in listed] == [1, 2, 3, 1]
-    for each in listed:
-        assert (tmp_path / each["preview"]).exists()
+    for number, each in enumerate(listed, 1):
+        picture = (tmp_path / each["preview"]).read_text()
+        assert f"plate.dxf, program {number} of 4" in picture
         lines = (tmp_path / each["program"]).read_text().splitlines()
         blocks = [line for line in lines if not line.startswith("(")]
         assert blocks[:4] == ["G17 G21 G90 G94", "G54", "G0 Z5.000", "M3 S12000"]
@@ -169,6 +170,7 @@ def test_from_python() -> None:
     job = Job(tuple(Operation(tool=tool) for tool in TOOLS[:2]), safe_z_mm=4.0)
     runs = library.post_by_tool(DRAWING, "grbl", job, compensate=True)
     assert len(runs) == 2
+    assert [run.title for run in runs] == [f"test.dxf, program {k} of 2" for k in (1, 2)]
     for run in runs:
         assert run.report is not None
         assert run.before is not None
