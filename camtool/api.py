@@ -104,6 +104,13 @@ class Reading(TypedDict, total=False):
     dimensions: bool
     section_z_mm: float | None
     allow_scripts: bool
+    width_mm: float | None
+    own_dpi: bool
+    threshold: float
+    speckle_px: float
+    smooth_px: float
+    invert: bool
+    trace: str
     layers: Sequence[str]
     exclude_layers: Sequence[str]
     colours: Sequence[str]
@@ -111,7 +118,7 @@ class Reading(TypedDict, total=False):
 
 
 _SELECTION = ("layers", "exclude_layers", "colours", "line_types")
-_LENGTHS = ("tolerance_mm", "gap_mm", "section_z_mm")
+_LENGTHS = ("tolerance_mm", "gap_mm", "section_z_mm", "width_mm")
 
 
 def _patterns(given: str | Sequence[str]) -> tuple[str, ...]:
@@ -122,7 +129,7 @@ def _patterns(given: str | Sequence[str]) -> tuple[str, ...]:
 def read_drawing(
     file: str | Path, *, target: str | LoadedTarget | None = None, **reading: Unpack[Reading]
 ) -> ShownDrawing:
-    """The drawing in a DXF, SVG, point list, STEP file or build123d script; mm, Y up.
+    """The drawing in a DXF, SVG, point list, STEP file, build123d script, PNG or JPEG; mm, Y up.
 
     `paths` holds M contours of lines and arcs in columns: `vertices` (N, 3) of x, y mm and bulge,
     `offsets` (M+1,), `closed` (M,); `layers`, `colours` and `sources` have M items each. Lines

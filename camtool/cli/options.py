@@ -25,7 +25,7 @@ import click
 
 from camtool.cli.life_signs import progress
 from camtool.errors import MachineError, OptionError
-from camtool.importers.options import FORMATS, TEXTS
+from camtool.importers.options import FORMATS, TEXTS, TRACES
 from camtool.jobs.keys import FLAGS, Key, flag_name
 from camtool.units import parse_feed, parse_length, parse_time
 
@@ -321,6 +321,13 @@ class DrawingFlags:
     layout: str | None = None
     section_z_mm: float | None = None
     allow_scripts: bool | None = None
+    width_mm: float | None = None
+    own_dpi: bool | None = None
+    threshold: float | None = None
+    speckle_px: float | None = None
+    smooth_px: float | None = None
+    invert: bool | None = None
+    trace: str | None = None
 
     def read(
         self,
@@ -378,7 +385,7 @@ def drawing_options(command: Command) -> Command:
             _READ,
             "--dpi",
             type=float,
-            help="Pixels per inch of an SVG.  [96, or that of the program that drew it]",
+            help="Pixels per inch of an SVG [96, or that of the program that drew it] or a PNG.",
         ),
         _length(
             "--tolerance",
@@ -394,6 +401,24 @@ def drawing_options(command: Command) -> Command:
         option(_READ, "--layout", metavar="NAME", help="A layout of a DXF, not model space."),
         _length("--section-z", "section_z_mm", "HEIGHT", "Cut a solid at this height."),
         _switch("--allow-scripts", "Run a build123d script, with your rights."),
+        _length("--width", "width_mm", "LENGTH", "How wide a PNG or JPEG is."),
+        _switch("--own-dpi", "A PNG or JPEG has the pixels per inch that it says."),
+        option(
+            _READ,
+            "--threshold",
+            type=float,
+            metavar="DARKNESS",
+            help="From which darkness of a PNG or JPEG on it is drawn: 0 to 1.  [0.5]",
+        ),
+        _switch("--invert", "What is light in a PNG or JPEG is drawn."),
+        _pixels("--speckle", "speckle_px", "Shapes of fewer pixels are left out.  [4]"),
+        _pixels("--smooth", "smooth_px", "How far contours may leave the pixels' edges.  [0.75]"),
+        option(
+            _READ,
+            "--trace",
+            type=click.Choice(TRACES),
+            help="What of dark shapes in a PNG or JPEG is drawn.  [outline]",
+        ),
         _patterns("--layer", "Only these layers (CUT, ENG*)."),
         _patterns("--exclude-layer", "Not these layers."),
         _patterns("--colour", "Only this colour (#ff0000, red, or 1 to 255)."),
@@ -409,6 +434,10 @@ def _switch(flag: str, text: str) -> Option:
 
 def _length(flag: str, name: str, metavar: str, text: str) -> Option:
     return option(_READ, flag, name, callback=length, metavar=metavar, help=text)
+
+
+def _pixels(flag: str, name: str, text: str) -> Option:
+    return option(_READ, flag, name, type=float, metavar="PIXELS", help=text)
 
 
 def _patterns(flag: str, text: str) -> Option:

@@ -4,11 +4,12 @@
     ASCII DXF    the first line is a group code alone: 0 or 999
     SVG          XML whose first element is `svg`, plain or packed by gzip
     solid        STEP (ISO-10303-21), BREP of OpenCASCADE; a script by its extension .py
+    bitmap       PNG, JPEG
     points       NumPy's .npy and .npz, JSON (`[` or `{`), the router's arrays (`xy = `), or a
                  first line of two numbers
 
-What is known to be something else (G-code, a mesh, PDF, DWG, pictures of pixels, other XML and
-other archives) is refused with what to do about it.
+What is known to be something else (G-code, a mesh, PDF, DWG, other pictures of pixels, other XML
+and other archives) is refused with what to do about it.
 """
 
 from __future__ import annotations
@@ -46,22 +47,26 @@ _EXTENSIONS = {
     ".brep": "solid",
     ".brp": "solid",
     ".py": "solid",
+    ".png": "bitmap",
+    ".jpg": "bitmap",
+    ".jpeg": "bitmap",
 }
 
+_PICTURES = (b"\x89PNG", b"\xff\xd8\xff")
 _GZIP = b"\x1f\x8b"
 _ZIP = b"PK\x03\x04"
 _EXPORT = "export SVG or DXF from the program that made it"
-_TRACE = "trace it and save SVG or DXF"
+_AS_PNG = "save it as PNG"
 
 _OTHERS = {
     rb"PK[\x05\x07]": ("is an empty or split ZIP archive", "unpack it first"),
     rb"%PDF-": ("is a PDF", _EXPORT),
     rb"AC10\d\d": ("is a DWG", "save it as DXF"),
-    rb"\x89PNG|\xff\xd8\xff|GIF8|II\*\x00|MM\x00\*|BM.{4}\x00\x00\x00\x00": (
-        "is a picture of pixels",
-        _TRACE,
+    rb"GIF8|II\*\x00|MM\x00\*|BM.{4}\x00\x00\x00\x00": (
+        "is a picture of pixels of another kind than PNG and JPEG",
+        _AS_PNG,
     ),
-    rb"RIFF.{4}WEBP": ("is a picture of pixels", _TRACE),
+    rb"RIFF.{4}WEBP": ("is a picture of pixels of another kind than PNG and JPEG", _AS_PNG),
     rb"%!PS": ("is PostScript", _EXPORT),
     rb"\xd0\xcf\x11\xe0": (
         "is a file of a CAD or office program's own",
@@ -107,7 +112,7 @@ def find_format(data: bytes, suffix: str, file: str) -> str:
         raise NoDrawingError(
             "is no drawing that camtool knows",
             file=file,
-            mend="give DXF, SVG, points, STEP or BREP, "
+            mend="give DXF, SVG, points, STEP, BREP, PNG or JPEG, "
             f"or name the format: --format ({', '.join(FORMATS)})",
         )
     return name
@@ -121,6 +126,8 @@ def _by_bytes(data: bytes, file: str) -> str | None:
         return "dxf"
     if data.startswith(NPY_START) or is_npz(data):
         return "points"
+    if data.startswith(_PICTURES):
+        return "bitmap"
     if data.startswith(_GZIP):
         if _xml_root(text_head(_unpacked_head(data))) == "svg":
             return "svg"

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from camtool.errors import OptionError
 from camtool.units import MM_PER_UNIT
 
-FORMATS = ("dxf", "svg", "points", "solid")
+FORMATS = ("dxf", "svg", "points", "solid", "bitmap")
 """Names of the formats, each with a package of that name beside this file."""
 
 SUFFIXES = (".dxf", ".svg", ".svgz", ".step", ".stp", ".brep", ".brp")
@@ -17,6 +17,20 @@ theirs with other files, so that they must be named or matched by a pattern."""
 
 TEXTS = ("skip", "outline", "stroke")
 """What becomes of text: left out, the outlines of its font, or the lines of an engraving font."""
+
+TRACES = ("outline", "centre")
+"""What becomes of dark shapes in a picture of pixels: their outlines, or their centre lines."""
+
+OF_PICTURES = {
+    "width_mm": "--width",
+    "own_dpi": "--own-dpi",
+    "threshold": "--threshold",
+    "speckle_px": "--speckle",
+    "smooth_px": "--smooth",
+    "invert": "--invert",
+    "trace": "--trace",
+}
+"""The fields of `ReadOptions` that are for pictures of pixels alone, and their flags."""
 
 TEXT_SKIPPED = "is text: read it with --text outline, or --text stroke for engraving"
 """Why text is left out."""
@@ -62,6 +76,11 @@ class ReadOptions:
     `text`: one of TEXTS. `recognise_arcs`: chords on one circle become arcs again. `layout`: a
     layout of a DXF by name instead of model space; `dimensions`: read the lines of dimensions.
     `section_z_mm`: where a solid is cut; `allow_scripts`: run a build123d script to get a solid.
+
+    Of pictures of pixels, whose size must be given by `width_mm`, `dpi`, or `own_dpi` (what the
+    file claims): pixels at least as dark as `threshold` (0 white … 1 black) are drawn, or with
+    `invert` those as light; shapes of less than `speckle_px` pixels are not; contours are smoothed
+    within `smooth_px` pixels; `trace`: one of TRACES.
     Raises OptionError.
     """
 
@@ -80,6 +99,13 @@ class ReadOptions:
     dimensions: bool = False
     section_z_mm: float | None = None
     allow_scripts: bool = False
+    width_mm: float | None = None
+    own_dpi: bool = False
+    threshold: float = 0.5
+    speckle_px: float = 4.0
+    smooth_px: float = 0.75
+    invert: bool = False
+    trace: str = "outline"
 
     def __post_init__(self) -> None:
         if self.units is not None and self.units.lower() not in MM_PER_UNIT:
@@ -100,8 +126,20 @@ class ReadOptions:
             value = self.px_an_inch if name == "dpi" else getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
                 raise OptionError(f"{name} is {value}, it must be above 0")
-        if not (math.isfinite(self.gap_mm) and self.gap_mm >= 0.0):
-            raise OptionError(f"gap_mm is {self.gap_mm}, it must be 0 or more")
+        for name in ("gap_mm", "speckle_px", "smooth_px"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise OptionError(f"{name} is {value}, it must be 0 or more")
+        if self.width_mm is not None and not 0.0 < self.width_mm < math.inf:
+            raise OptionError(f"width_mm is {self.width_mm}, it must be above 0")
+        if not 0.0 < self.threshold < 1.0:
+            raise OptionError(
+                f"threshold is {self.threshold}, it must be between 0 (white) and 1 (black)"
+            )
+        if self.trace not in TRACES:
+            raise OptionError(
+                f"trace {self.trace!r} is not known", mend=f"use one of {', '.join(TRACES)}"
+            )
 
     @property
     def px_an_inch(self) -> float:

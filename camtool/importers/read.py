@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Protocol, cast
 
 from camtool.bounds import file_bytes as bytes_of
 from camtool.bounds import stream_bytes
-from camtool.errors import DrawingError
+from camtool.errors import DrawingError, OptionError
 from camtool.importers.formats import find_format
-from camtool.importers.options import DEFAULTS, ReadOptions
+from camtool.importers.options import DEFAULTS, OF_PICTURES, ReadOptions
 
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
@@ -46,13 +46,24 @@ def content(path: Path) -> tuple[bytes, str]:
 def read_bytes(data: bytes, file: str, options: ReadOptions = DEFAULTS) -> Drawing:
     """The Drawing in the content of a file; `file` names it in messages, and its extension hints.
 
-    DrawingError when there is none.
+    DrawingError when there is none, OptionError for an option that it cannot have.
     """
     if not data.strip():
         raise DrawingError("is empty", file=file, mend=_EXPORT_AGAIN)
     name = options.format or find_format(data, Path(file).suffix, file)
+    if name != "bitmap":
+        _refuse_flags_of_pictures(options, file)
     module = importlib.import_module(f"camtool.importers.{name}.reader")
     return cast(_Reader, module).read(data, file, options.as_drawn())
+
+
+def _refuse_flags_of_pictures(options: ReadOptions, file: str) -> None:
+    """OptionError for an option that has no effect on drawings of lines."""
+    for name, flag in OF_PICTURES.items():
+        if getattr(options, name) != getattr(DEFAULTS, name):
+            raise OptionError(
+                f"{flag} is for pictures of pixels", file=file, mend=f"leave {flag} out"
+            )
 
 
 def _standard_input() -> bytes:

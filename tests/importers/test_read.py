@@ -104,8 +104,8 @@ def test_the_content_decides_and_the_name_hints(content: bytes, suffix: str, wan
         (b"PK\x03\x04", "unpack"),
         (b"%PDF-1.4", "export SVG or DXF"),
         (b"AC1027", "save it as DXF"),
-        (b"\x89PNG\r\n", "trace it"),
-        (b"\xff\xd8\xff\xe0", "trace it"),
+        (b"\x89PNG\r\n", "save it again"),
+        (b"\xff\xd8\xff\xe0", "save it again"),
         (b"words, and more words", "--format"),
         (gzip.compress(b"0\nSECTION\n", mtime=0), "gunzip"),
         (zipped("a.dxf"), "unpack"),
@@ -113,7 +113,7 @@ def test_the_content_decides_and_the_name_hints(content: bytes, suffix: str, wan
         (zipped("Document.xml"), "from FreeCAD"),
         (b"<html><body/></html>", "export SVG or DXF"),
         (b"<?xml version='1.0'?><gpx/>", "export SVG or DXF"),
-        (b"GIF89a", "trace it"),
+        (b"GIF89a", "save it as PNG"),
         (b"\xd0\xcf\x11\xe0", "export STEP or DXF"),
         (b"solid cube\n facet normal 0 0 1\n", "export STEP"),
         (b"IN;SP1;PU0,0;PD10,10;", "export SVG or DXF"),
@@ -284,4 +284,4 @@ def test_any_bytes_have_a_format_or_a_clean_error(data: bytes, suffix: str) -> N
         name = find_format(data, suffix, "f")
     except DrawingError as error:
         name = str(error).partition(":")[0]
-    assert name in ("dxf", "svg", "points", "solid", "f")
+    assert name in ("dxf", "svg", "points", "solid", "bitmap", "f")

@@ -1,0 +1,1 @@
+"""Pictures of pixels (PNG, JPEG), traced to contours or centre lines: `reader` reads them."""

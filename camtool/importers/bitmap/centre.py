@@ -1,0 +1,335 @@
+"""The centre lines of what is dark in a picture: thinned to a pixel's width, then followed.
+
+    dark ──thinned (Guo and Hall 1989)──▶ pixels ──links──▶ junctions, chains between them
+         ──without spurs shorter than the stroke is wide──▶ chains
+         ──straight on through junctions──▶ paths
+
+Thinning takes pixels away from all sides alike, so that what remains lies in the middle, within a
+pixel, and hangs together as the picture does. At the end of a stroke the line ends up to half the
+width of the stroke before it: a tool as wide as the stroke covers it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Sequence
+
+import numpy as np
+
+from camtool.arrays import Bools, Floats, Ints
+
+SPUR_SHARE = 1.5
+"""A branch that ends within this many half widths of the stroke at its junction is a spur: it
+leads into a corner, which is √2 of them away at a square end, or a bump of the stroke's edge."""
+
+STRAIGHT_ON_RAD = math.radians(60.0)
+"""A path goes on through a junction into the branch that bends least, if by less than this."""
+
+HOOK_SHARE = 0.6
+"""A line that has come to the middle of a stroke is less than this part of its way from the
+stroke's edges; on its way out of a corner it is more."""
+
+MIDDLE_SHARE = 0.93
+"""What lies before the place where a line has this part of the half width there leads into a
+corner."""
+
+ROUGH_PX = 1.0
+"""Half widths that are counted in pixels differ by so much."""
+
+LOOK_BACK = 1.5
+"""The direction of a branch is that from its junction to so many half widths away."""
+
+LEAST_LOOK_PX = 4
+"""And at least so many pixels away."""
+
+MOST_ROUNDS = 8
+"""Spurs are looked for again, once others are gone, no more often than this."""
+
+Pixel = tuple[int, int]
+"""Row and column."""
+
+
+def thinned(dark: Bools) -> Bools:
+    """(H, W) the pixels that remain of the dark ones."""
+    height, width = dark.shape
+    wide = width + 2
+    on = np.zeros((height + 2) * wide, dtype=np.bool_)
+    on.reshape(height + 2, wide)[1:-1, 1:-1] = dark
+    around = np.array([-wide, 1 - wide, 1, wide + 1, wide, wide - 1, -1, -wide - 1])
+    edge, changed = _edge(np.flatnonzero(on), on, around), True
+    while changed:
+        changed = False
+        for turn in range(2):
+            gone = edge[_removable(on[edge[:, None] + around], turn)]
+            on[gone] = False
+            changed |= len(gone) > 0
+            beside = (gone[:, None] + around).ravel()
+            edge = np.concatenate([edge, beside])
+            edge = np.unique(edge[on[edge]])
+    return on.reshape(height + 2, wide)[1:-1, 1:-1]
+
+
+def _edge(pixels: Ints, on: Bools, around: Ints) -> Ints:
+    """Those with a light pixel beside them."""
+    inner = np.ones(len(pixels), dtype=np.bool_)
+    for step in around:
+        inner &= on[pixels + step]
+    return pixels[~inner]
+
+
+def _removable(beside: Bools, turn: int) -> Bools:
+    """(N,) which pixels may go at once, by their neighbours (N, 8): clockwise from above. In one
+    turn those on the lower right, in the other those on the upper left."""
+    p2, p3, p4, p5, p6, p7, p8, p9 = beside.T
+    pairs = ((p2, p3, p4), (p4, p5, p6), (p6, p7, p8), (p8, p9, p2))
+    runs = sum((~one & (two | three)).astype(np.int8) for one, two, three in pairs)
+    first = sum(
+        (one | two).astype(np.int8) for one, two in ((p9, p2), (p3, p4), (p5, p6), (p7, p8))
+    )
+    second = sum(
+        (one | two).astype(np.int8) for one, two in ((p2, p3), (p4, p5), (p6, p7), (p8, p9))
+    )
+    count = np.minimum(first, second)
+    side = (p2 | p3 | ~p5) & p4 if turn else (p6 | p7 | ~p9) & p8
+    return np.asarray((runs == 1) & (count >= 2) & (count <= 3) & ~side)
+
+
+class _Graph:
+    """The pixels of thin lines and their links: to neighbours in rows and columns, and to diagonal
+    ones where no such neighbour leads there."""
+
+    def __init__(self, thin: Bools, dark: Bools) -> None:
+        self.dark = np.pad(dark, 1)
+        rows, columns = np.nonzero(thin)
+        pixels = list(zip(rows.tolist(), columns.tolist(), strict=True))
+        known = set(pixels)
+        self.links: dict[Pixel, list[Pixel]] = {}
+        for row, column in pixels:
+            near = [
+                (row + dy, column + dx)
+                for dy, dx in ((-1, 0), (0, 1), (1, 0), (0, -1))
+                if (row + dy, column + dx) in known
+            ]
+            far = [
+                (row + dy, column + dx)
+                for dy, dx in ((-1, 1), (1, 1), (1, -1), (-1, -1))
+                if (row + dy, column + dx) in known
+                and (row + dy, column) not in known
+                and (row, column + dx) not in known
+            ]
+            self.links[row, column] = near + far
+
+    def chains(self) -> list[list[Pixel]]:
+        """Between ends and junctions, these included; last the closed ones, which begin and end at
+        one pixel."""
+        found, used = [], set[tuple[Pixel, Pixel]]()
+        seen = set[Pixel]()
+        for begin, links in self.links.items():
+            if len(links) == 2:
+                continue
+            for link in links:
+                if (begin, link) in used:
+                    continue
+                chain = self._follow(begin, link)
+                used |= {(chain[0], chain[1]), (chain[-1], chain[-2])}
+                seen.update(chain)
+                found.append(chain)
+        for begin, links in self.links.items():
+            if len(links) == 2 and begin not in seen:
+                chain = self._follow(begin, links[0])
+                seen.update(chain)
+                found.append(chain)
+        return found
+
+    def _follow(self, begin: Pixel, link: Pixel) -> list[Pixel]:
+        chain = [begin, link]
+        while len(self.links[link]) == 2 and link != begin:
+            one, other = self.links[link]
+            link = other if one == chain[-2] else one
+            chain.append(link)
+        return chain
+
+    def without(self, pixels: Sequence[Pixel]) -> None:
+        """Take pixels out."""
+        for pixel in pixels:
+            for link in self.links.pop(pixel):
+                if link in self.links:
+                    self.links[link].remove(pixel)
+
+    def half_width(self, pixel: Pixel) -> float:
+        """From a pixel to the nearest light one, less half a pixel."""
+        row, column = pixel[0] + 1, pixel[1] + 1
+        reach = 4
+        while True:
+            low = max(row - reach, 0), max(column - reach, 0)
+            light = np.argwhere(~self.dark[low[0] : row + reach + 1, low[1] : column + reach + 1])
+            if len(light):
+                off = np.hypot(*(light + np.array(low) - [row, column]).T)
+                if off.min() <= reach:
+                    return float(off.min()) - 0.5
+            reach *= 2
+
+
+def centre_lines(dark: Bools) -> tuple[list[tuple[Floats, bool]], int]:
+    """The centre lines: points (n, 2) in pixels as in `outline`, and whether they are closed; and
+    how many dots are left out, which have no length."""
+    graph = _Graph(thinned(dark), dark)
+    _prune(graph)
+    dots = sum(1 for links in graph.links.values() if not links)
+    nodes = _junctions(graph)
+    ends: dict[int, list[tuple[int, bool]]] = defaultdict(list)
+    chains: list[list[Pixel]] = []
+    for chain in graph.chains():
+        if chain[0] != chain[-1] and nodes.get(chain[0], -1) == nodes.get(chain[-1], -2):
+            continue  # within one junction
+        for last in (False, True):
+            if (node := nodes.get(chain[-1 if last else 0])) is not None:
+                ends[node].append((len(chains), last))
+        for _ in range(2):
+            chain = chain[::-1]
+            if chain[0] not in nodes and chain[0] != chain[-1]:
+                chain = _without_hook(chain, graph)
+        chains.append(chain)
+    middles = _middles(nodes)
+    height = dark.shape[0]
+    through: dict[tuple[int, bool], tuple[int, bool]] = {}
+    for node, arms in ends.items():
+        width = max(graph.half_width(pixel) for pixel, of in nodes.items() if of == node)
+        look = max(LEAST_LOOK_PX, int(LOOK_BACK * width))
+        through |= _straight_on(chains, arms, middles[node], look)
+    return [
+        (_points(path, chains, nodes, middles, height), closed)
+        for path, closed in _paths(len(chains), chains, through)
+    ], dots
+
+
+def _prune(graph: _Graph) -> None:
+    """Take out spurs until none is left."""
+    for _ in range(MOST_ROUNDS):
+        gone: list[Pixel] = []
+        for chain in graph.chains():
+            first, last = (len(graph.links[end]) for end in (chain[0], chain[-1]))
+            if last == 1 and first > 2:
+                chain, first, last = chain[::-1], last, first
+            if first != 1 or last < 3:
+                continue
+            reach = math.dist(chain[0], chain[-1])
+            if reach <= SPUR_SHARE * graph.half_width(chain[-1]) + 1.0:
+                gone += chain[:-1]
+        if not gone:
+            return
+        graph.without(gone)
+
+
+def _without_hook(chain: list[Pixel], graph: _Graph) -> list[Pixel]:
+    """A chain without what leads at its begin into a corner of the stroke."""
+    widths = [graph.half_width(chain[0])]
+    for pixel in chain[1:]:
+        widths.append(graph.half_width(pixel))
+        if widths[-1] + ROUGH_PX < HOOK_SHARE * math.dist(chain[0], pixel):
+            break
+    if len(widths) == len(chain):
+        return chain
+    middle = MIDDLE_SHARE * widths[-1] - 0.5 * ROUGH_PX
+    return chain[next(k for k, width in enumerate(widths) if width >= middle) :]
+
+
+def _junctions(graph: _Graph) -> dict[Pixel, int]:
+    """Which junction each pixel with three links or more belongs to; linked ones are one."""
+    many = {pixel for pixel, links in graph.links.items() if len(links) > 2}
+    found: dict[Pixel, int] = {}
+    for begin in graph.links:
+        if begin not in many or begin in found:
+            continue
+        number, waiting = len(set(found.values())), [begin]
+        while waiting:
+            pixel = waiting.pop()
+            if pixel not in found:
+                found[pixel] = number
+                waiting += [link for link in graph.links[pixel] if link in many]
+    return found
+
+
+def _middles(nodes: dict[Pixel, int]) -> dict[int, tuple[float, float]]:
+    members: dict[int, list[Pixel]] = defaultdict(list)
+    for pixel, node in nodes.items():
+        members[node].append(pixel)
+    return {
+        node: (sum(p[0] for p in of) / len(of), sum(p[1] for p in of) / len(of))
+        for node, of in members.items()
+    }
+
+
+def _straight_on(
+    chains: list[list[Pixel]],
+    arms: list[tuple[int, bool]],
+    middle: tuple[float, float],
+    look: int,
+) -> dict[tuple[int, bool], tuple[int, bool]]:
+    """Which of the ends of chains that meet at a junction go on into each other: the straightest
+    first."""
+    headings = []
+    for chain, last in arms:
+        path = chains[chain][::-1] if last else chains[chain]
+        away = path[min(look, len(path) - 1)]
+        headings.append(math.atan2(away[0] - middle[0], away[1] - middle[1]))
+    pairs = sorted(
+        (abs(math.remainder(headings[i] - headings[j] - math.pi, 2.0 * math.pi)), i, j)
+        for i in range(len(arms))
+        for j in range(i)
+    )
+    found: dict[tuple[int, bool], tuple[int, bool]] = {}
+    for bend, i, j in pairs:
+        if bend < STRAIGHT_ON_RAD and arms[i] not in found and arms[j] not in found:
+            found[arms[i]], found[arms[j]] = arms[j], arms[i]
+    return found
+
+
+def _paths(
+    count: int,
+    chains: list[list[Pixel]],
+    through: dict[tuple[int, bool], tuple[int, bool]],
+) -> list[tuple[list[tuple[int, bool]], bool]]:
+    """Chains that go on into each other, each with whether it runs backwards; and whether the path
+    is closed."""
+    found, used = [], [False] * count
+    # Paths that begin somewhere first; the rest are rings.
+    ends = ((k, back) for k in range(count) for back in (False, True))
+    begins = [end for end in ends if end not in through]
+    for chain, back in [*begins, *((k, False) for k in range(count))]:
+        path: list[tuple[int, bool]] = []
+        while not used[chain]:
+            used[chain] = True
+            path.append((chain, back))
+            following = through.get((chain, not back))
+            if following is None:
+                break
+            chain, back = following
+        if path:
+            first, last = path[0], path[-1]
+            ring = through.get((last[0], not last[1])) == first
+            ring |= len(path) == 1 and chains[first[0]][0] == chains[first[0]][-1]
+            found.append((path, ring))
+    return found
+
+
+def _points(
+    path: list[tuple[int, bool]],
+    chains: list[list[Pixel]],
+    nodes: dict[Pixel, int],
+    middles: dict[int, tuple[float, float]],
+    height: int,
+) -> Floats:
+    """The centres of the pixels of a path, (n, 2), and the middles of its junctions."""
+    places: list[tuple[float, float]] = []
+    for chain, back in path:
+        pixels = chains[chain][::-1] if back else chains[chain]
+        for pixel in pixels:
+            place = middles[nodes[pixel]] if pixel in nodes else pixel
+            if not places or places[-1] != place:
+                places.append(place)
+    rows, columns = np.array(places, dtype=np.float64).T
+    points = np.column_stack([columns + 0.5, height - rows - 0.5])
+    closed = len(points) > 3 and bool((points[0] == points[-1]).all())
+    return points[:-1] if closed else points

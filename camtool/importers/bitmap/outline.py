@@ -1,0 +1,129 @@
+"""The lines along which a picture is as dark as a threshold: marching squares.
+
+Between two neighbouring pixels of which one is dark and one is light, the line crosses where the
+darkness, which changes evenly between their centres, is that of the threshold: an edge that was
+drawn with smooth edges, or photographed, is found to a small part of a pixel, one of black and
+white alone in the middle between two pixels. Where four pixels meet crosswise their mean decides.
+
+Lines are closed, do not cross, and have what is dark on their left. Beyond the picture it is
+light. Units are pixels, x to the right from its left edge, y upwards from its lower edge.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from camtool.arrays import Bools, Floats, Ints
+from camtool.importers.bitmap.pixels import Ink
+
+INWARD = 1e-3
+"""A line stays this far from the centres of pixels: at a centre up to four lines would meet."""
+
+TOP, RIGHT, BOTTOM, LEFT = range(4)
+
+_LINES: dict[int, tuple[tuple[int, int], ...]] = {
+    1: ((LEFT, TOP),),
+    2: ((TOP, RIGHT),),
+    3: ((LEFT, RIGHT),),
+    4: ((RIGHT, BOTTOM),),
+    6: ((TOP, BOTTOM),),
+    7: ((LEFT, BOTTOM),),
+    8: ((BOTTOM, LEFT),),
+    9: ((BOTTOM, TOP),),
+    11: ((BOTTOM, RIGHT),),
+    12: ((RIGHT, LEFT),),
+    13: ((RIGHT, TOP),),
+    14: ((TOP, LEFT),),
+}
+"""From which side to which side of a square of four pixels the line runs, by which of these are
+dark: 1 upper left, 2 upper right, 4 lower right, 8 lower left."""
+
+_SADDLES = {
+    (5, True): ((RIGHT, TOP), (LEFT, BOTTOM)),
+    (5, False): ((LEFT, TOP), (RIGHT, BOTTOM)),
+    (10, True): ((TOP, LEFT), (BOTTOM, RIGHT)),
+    (10, False): ((TOP, RIGHT), (BOTTOM, LEFT)),
+}
+"""The same of two dark pixels that meet at a corner, by whether it is dark in their middle."""
+
+
+def crossings(ink: Ink, level: float) -> int:
+    """How many points the lines have: each lies between a dark and a light pixel."""
+    dark = ink >= level
+    across = int((dark[:, 1:] != dark[:, :-1]).sum()) + int((dark[1:] != dark[:-1]).sum())
+    return across + sum(int(edge.sum()) for edge in (dark[0], dark[-1], dark[:, 0], dark[:, -1]))
+
+
+def outlines(ink: Ink, level: float) -> list[Floats]:
+    """The lines, closed, points (n, 2) each; n ≥ 4."""
+    height, width = ink.shape
+    field = np.zeros((height + 2, width + 2), dtype=np.float32)
+    field[1:-1, 1:-1] = ink
+    begin, end = _directed(field, field >= level, level)
+    order = np.argsort(begin)
+    begin, end = begin[order], end[order]
+    behind = np.searchsorted(begin, end).tolist()
+    points = _places(field, begin, level)
+    points -= 0.5
+    points[:, 1] = height - points[:, 1]
+    np.clip(points, 0.0, [width, height], out=points)
+    found: list[Floats] = []
+    seen = np.zeros(len(begin), dtype=np.bool_).tolist()
+    for first in range(len(seen)):
+        if seen[first]:
+            continue
+        row, run = first, []
+        while not seen[row]:
+            seen[row] = True
+            run.append(row)
+            row = behind[row]
+        found.append(points[run])
+    return found
+
+
+def _directed(field: Ink, dark: Bools, level: float) -> tuple[Ints, Ints]:
+    """(K,), (K,) the sides of squares at which lines enter and leave them: numbers of the sides
+    between neighbours in a row, then of those between neighbours in a column."""
+    width = field.shape[1]
+    corners = [dark[:-1, :-1], dark[:-1, 1:], dark[1:, 1:], dark[1:, :-1]]
+    code = np.zeros(corners[0].shape, dtype=np.uint8)
+    for bit, corner in enumerate(corners):
+        code += corner.astype(np.uint8) << np.uint8(bit)
+    row, column = np.nonzero((code > 0) & (code < 15))
+    code = code[row, column]
+    at = row * width + column
+    sides = np.column_stack([at, field.size + at + 1, at + width, field.size + at])
+    middle = 0.25 * (
+        field[row, column].astype(np.float64)
+        + field[row, column + 1]
+        + field[row + 1, column]
+        + field[row + 1, column + 1]
+    )
+    pairs = [(code == of, lines) for of, lines in _LINES.items()]
+    pairs += [
+        ((code == of) & ((middle >= level) == joined), lines)
+        for (of, joined), lines in _SADDLES.items()
+    ]
+    begin, end = [], []
+    for which, lines in pairs:
+        for enters, leaves in lines:
+            begin.append(sides[which, enters])
+            end.append(sides[which, leaves])
+    return np.concatenate(begin), np.concatenate(end)
+
+
+def _places(field: Ink, side: Ints, level: float) -> Floats:
+    """(K, 2) where lines cross these sides: column and row, between the centres of pixels."""
+    down = side >= field.size
+    at = np.where(down, side - field.size, side)
+    row, column = np.divmod(at, field.shape[1])
+    here = field[row, column].astype(np.float64)
+    there = field[row + down, column + ~down].astype(np.float64)
+    share = np.clip((level - here) / (there - here), INWARD, 1.0 - INWARD)
+    return np.column_stack([column + ~down * share, row + down * share])
+
+
+def enclosed(points: Floats) -> float:
+    """The area inside a closed line, positive where that is dark."""
+    x, y = (points - points[0]).T
+    return float(0.5 * (x * np.roll(y, -1) - np.roll(x, -1) * y).sum())

@@ -1,0 +1,186 @@
+"""Pictures of pixels: their dark shapes as contours, or the centre lines of these.
+
+    file ──pixels──▶ darkness ──outline──▶ lines at the threshold, without specks
+                                             ├──strokes──▶ contours
+                              dark ──centre──┴──strokes──▶ centre lines
+
+How large a picture is must be said: its pixels have no size of their own, and what the file claims
+of it counts only where that is asked for.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from camtool.arrays import Bools, Floats
+from camtool.errors import DrawingError
+from camtool.geometry.drawing import Drawing, Skipped, Units
+from camtool.importers.assemble import assemble
+from camtool.importers.bitmap.centre import centre_lines
+from camtool.importers.bitmap.outline import crossings, enclosed, outlines
+from camtool.importers.bitmap.pixels import Ink, Picture, is_square, picture
+from camtool.importers.bitmap.strokes import Strokes, strokes
+from camtool.importers.options import ReadOptions
+from camtool.importers.pieces import Piece
+from camtool.units import MM_PER_UNIT
+
+MOST_POINTS = 200_000
+"""Lines of more points than this, one at each edge of a pixel, are no drawing but noise."""
+
+CENTRE_PX = 0.5
+"""Pixels that thinning leaves may lie this much farther from a centre line than those of an edge
+from their contour."""
+
+LEAST_RANGE = 0.05
+"""A picture whose pixels differ by less in darkness is of one tone."""
+
+BINS = 256
+"""Darknesses that `_between` tells apart."""
+
+
+def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
+    """The Drawing of a PNG or JPEG; DrawingError for one that is broken or shows nothing, and for
+    one whose size nothing says."""
+    found = picture(data, file)
+    units = _units(found, file, options)
+    ink = np.float32(1.0) - found.ink if options.invert else found.ink
+    _check_tones(ink, options, file)
+    if crossings(ink, options.threshold) > 10 * MOST_POINTS:
+        raise _too_noisy(file)
+    lines = outlines(ink, options.threshold)
+    areas = np.array([enclosed(line) for line in lines])
+    shapes = [line for line, area in zip(lines, areas, strict=True) if _counts(area, options)]
+    if sum(map(len, shapes)) > MOST_POINTS:
+        raise _too_noisy(file)
+    skipped = _skipped("speck", len(lines) - len(shapes), f"under {options.speckle_px:g} pixels")
+    limit = max(options.smooth_px, options.tolerance_mm / units.mm_per_unit)
+    if options.trace == "outline":
+        made = [(strokes(line, limit, closed=True), True) for line in shapes]
+    else:
+        specks = [
+            (abs(area), area < 0.0, line)
+            for line, area in zip(lines, areas.tolist(), strict=True)
+            if not _counts(area, options)
+        ]
+        specks.sort(key=lambda speck: speck[0])
+        dark = ink >= options.threshold
+        for _, hole, line in specks:
+            _fill(dark, line, hole)
+        paths, dots = centre_lines(dark)
+        made = [(strokes(path, limit + CENTRE_PX, closed=ring), ring) for path, ring in paths]
+        skipped += _skipped("dot", dots, "has no centre line: read it with --trace outline")
+    return assemble(
+        [
+            _piece(each, closed, number, options.trace, units.mm_per_unit)
+            for number, (each, closed) in enumerate(made, start=1)
+        ],
+        file=file,
+        units=units,
+        used={options.trace: len(made)},
+        skipped=skipped,
+        findings=[],
+        options=options,
+    )
+
+
+def _units(found: Picture, file: str, options: ReadOptions) -> Units:
+    """How large a pixel is; DrawingError where nothing, or more than one thing, says it."""
+    width = found.ink.shape[1]
+    if options.units is not None:
+        raise DrawingError(
+            "has no numbers that --units could be of",
+            file=file,
+            mend="give its width, --width 60mm, or --dpi 300",
+        )
+    said = [options.width_mm is not None, options.dpi is not None, options.own_dpi]
+    if sum(said) > 1:
+        raise DrawingError(
+            "is given more than one size", file=file, mend="give --width, --dpi or --own-dpi alone"
+        )
+    if options.width_mm is not None:
+        size = options.width_mm / width
+        return Units("px", size, f"{width} pixels are {options.width_mm:g} mm wide, as asked")
+    if options.dpi is not None:
+        return Units("px", options.mm_per("px"), f"{options.dpi:g} pixels an inch, as asked")
+    claim = ""
+    if found.dpi is not None:
+        claim = f"; the file itself says {found.dpi[0]:.6g} dpi: --own-dpi"
+    if not options.own_dpi:
+        raise DrawingError(
+            f"is a picture of {width} x {found.ink.shape[0]} pixels, which have no size",
+            file=file,
+            mend=f"say how wide it is, --width 60mm, or --dpi 300{claim}",
+        )
+    if found.dpi is None or not is_square(found.dpi):
+        what = "says no" if found.dpi is None else "says two different"
+        raise DrawingError(
+            f"{what} pixels an inch", file=file, mend="give --width 60mm or --dpi 300"
+        )
+    return Units("px", MM_PER_UNIT["in"] / found.dpi[0], f"{found.dpi[0]:.6g} pixels an inch")
+
+
+def _check_tones(ink: Ink, options: ReadOptions, file: str) -> None:
+    """DrawingError where no pixel, or every one, is dark."""
+    least, most = float(ink.min()), float(ink.max())
+    if least < options.threshold <= most:
+        return
+    tone = "darker" if least >= options.threshold else "lighter"
+    if most - least < LEAST_RANGE:
+        mend = "it is of one tone: nothing in it can be told from the rest"
+    else:
+        other = "" if options.invert else ", or --invert where light lines are on dark"
+        mend = f"--threshold {_between(ink):.2f} lies between its tones{other}"
+    raise DrawingError(
+        f"is {tone} than the threshold {options.threshold:g} everywhere "
+        f"(it is between {least:.2f} and {most:.2f} dark)",
+        file=file,
+        mend=mend,
+    )
+
+
+def _between(ink: Ink) -> float:
+    """The darkness that divides pixels into two kinds whose means differ most (Otsu 1979)."""
+    counts, edges = np.histogram(ink, BINS, (0.0, 1.0))
+    tones = 0.5 * (edges[1:] + edges[:-1])
+    below, sums = np.cumsum(counts), np.cumsum(counts * tones)
+    above = below[-1] - below
+    known = (below > 0) & (above > 0)
+    apart = sums[known] / below[known] - (sums[-1] - sums[known]) / above[known]
+    spread = below[known] * above[known] * apart**2
+    best = edges[1:][known][spread >= spread.max() * (1.0 - 1e-9)]
+    return float(best.mean())
+
+
+def _counts(area: float, options: ReadOptions) -> bool:
+    """Whether what encloses this area, pixels, is no speck."""
+    return abs(area) >= options.speckle_px
+
+
+def _fill(dark: Bools, line: Floats, hole: bool) -> None:
+    """Make the pixels within a small line dark or light."""
+    height = len(dark)
+    low, high = np.floor(line.min(axis=0)).astype(int), np.ceil(line.max(axis=0)).astype(int)
+    x, y = np.meshgrid(np.arange(low[0], high[0]) + 0.5, np.arange(low[1], high[1]) + 0.5)
+    inside = np.zeros(x.shape, dtype=np.bool_)
+    for (ax, ay), (bx, by) in zip(line, np.roll(line, -1, axis=0), strict=True):
+        if ay != by:
+            inside ^= ((ay > y) != (by > y)) & (x < ax + (y - ay) * (bx - ax) / (by - ay))
+    rows, columns = height - 1 - np.floor(y[inside]).astype(int), np.floor(x[inside]).astype(int)
+    dark[rows, columns] = hole
+
+
+def _piece(made: Strokes, closed: bool, number: int, trace: str, mm_per_px: float) -> Piece:
+    vertices = made.vertices * [mm_per_px, mm_per_px, 1.0]
+    return Piece(vertices, closed, trace, "", f"{trace} {number}", off_mm=made.off * mm_per_px)
+
+
+def _skipped(kind: str, count: int, why: str) -> list[Skipped]:
+    return [Skipped(kind, count, why)] if count else []
+
+
+def _too_noisy(file: str) -> DrawingError:
+    return DrawingError(
+        f"has more than {MOST_POINTS} pixels on edges: it is too rough to trace",
+        file=file,
+        mend="scale it down or blur it, give another --threshold, or a larger --speckle",
+    )
