@@ -120,6 +120,7 @@ class Run(Shown):
             verification=self.verification,
             machine=self.target.machine,
             listing=self.listing,
+            tabs=() if self.wanted is None else self.wanted.tabs_mm,
         )
 
     def __str__(self) -> str:
@@ -184,6 +185,7 @@ class ShownToolpath(Shown, Toolpath):
             job=self.job,
             toolpath=self,
             machine=None if self.target is None else self.target.machine,
+            tabs=self.tabs_mm,
         )
 
     def __repr__(self) -> str:

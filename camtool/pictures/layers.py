@@ -58,6 +58,7 @@ REVERSAL_MARK: Look = {"r": 3.4, "fill": REVERSAL, "stroke": PAPER, "stroke-widt
 WORST_MARK: Look = {"r": RING, "fill": "none", "stroke": GAP, "stroke-width": 2.0}
 GAP_MARK: Look = {"r": RING, "fill": "none", "stroke": GAP, "stroke-width": 2.4}
 POINT_MARK: Look = {"r": 4.0, "fill": INK, "stroke": PAPER, "stroke-width": 1.2}
+TAB_MARK: Look = {"r": 6.5, "fill": "none", "stroke": PLUNGE, "stroke-width": 3.0}
 CROSSING_MARK: Look = {"r": 5.0, "fill": GAP, "stroke": PAPER, "stroke-width": 1.2}
 
 
@@ -500,6 +501,13 @@ LAYERS = (
         height=5,
         place=10,
         needs="drawing",
+    ),
+    Layer(
+        "tabs",
+        lambda content: [Dots("tabs", "tab", content.scene.tabs, TAB_MARK)],
+        height=9,
+        place=13,
+        hint="; tabs of a job, or --tabs, make some",
     ),
     Layer("doubts", _noted, height=6, place=9, needs="drawing"),
 )

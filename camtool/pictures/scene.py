@@ -45,7 +45,8 @@ class Scene:
     `wanted` are the lines and arcs with which the trace
     was compared, `worst` the places of its largest errors, mm, the largest first; `tool_mm` is the
     diameter of the tool, if there is only one; `rounds` are full circles with their errors.
-    `playback` gives how the toolpath runs; only the viewer calls it.
+    `tabs` are the places of tabs, mm. `playback` gives how the toolpath runs; only the viewer
+    calls it.
 
     With a trace the picture leaves out rapids and plunges, and feeds are pale. ValueError when the
     trace is incomplete or not finite.
@@ -65,6 +66,7 @@ class Scene:
     rounds: tuple[Round, ...] = ()
     playback: Callable[[], Playback] | None = None
     stock_mm: tuple[float, float, float, float] | None = None
+    tabs: tuple[tuple[float, float], ...] = ()
 
     def __post_init__(self) -> None:
         points, error = self.trace_points, self.trace_error_mm
@@ -192,10 +194,12 @@ def scene_of(
     verification: Verification | None = None,
     machine: Machine | None = None,
     listing: Callable[[], Listing | None] | None = None,
+    tabs: tuple[tuple[float, float], ...] = (),
 ) -> Scene:
     """The scene of what is given; with a verification, of the predicted path as well.
 
-    `job` places the drawing in the work frame; `listing` gives the program's lines to the viewer.
+    `job` places the drawing in the work frame; `listing` gives the program's lines to the viewer;
+    `tabs` are the places (x, y) mm of tabs.
     """
     from camtool.verification.case import nose_of, tool_mm
 
@@ -223,6 +227,7 @@ def scene_of(
         worst=tuple(one.at_mm for one in worst),
         tool_mm=tool_mm(job) if job is not None and even else None,
         rounds=() if verification is None else rounds_of(verification),
+        tabs=tabs,
         playback=_playback(toolpath, verification, machine, listing),
     )
 

@@ -132,9 +132,16 @@ def _linked(
         toolpath,
         findings=tuple(findings),
         made_from=made_from,
+        tabs_mm=_tabs(steps),
         drawn=drawn_of(toolpath, builder.runs, steps, placed),
     )
     return replace(plan, toolpath=toolpath)
+
+
+def _tabs(steps: Sequence[Step]) -> tuple[tuple[float, float], ...]:
+    """The places of all tabs, each once."""
+    places = [tuple(bridge.centre.tolist()) for step in steps for bridge in step.bridges]
+    return tuple(dict.fromkeys((float(x), float(y)) for x, y in places))
 
 
 def turns_of_tools(plan: Plan) -> list[list[int]]:

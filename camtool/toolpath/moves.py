@@ -104,7 +104,8 @@ class Toolpath:
     kind (N,) of Kind; end (N, 3) mm (an event repeats the position); centre (N, 2) mm, NaN where
     no arc; feed (N,) mm/min, NaN for rapids and events; value (N,), NaN where none; source (N,)
     index into `texts` or −1 (provenance: layer and entity); block (N,) index, from 0, of the
-    program block that the row was read from, −1 when planned; start (3,) mm; `made_from` the name
+    program block that the row was read from, −1 when planned; start (3,) mm; `tabs_mm` where
+    tabs (x, y) were planned; `made_from` the name
     of the drawing, "" when it is not known; mode (N,) index into `modes` or −1, where the program
     leaves to the machine how it meets the corner behind the row; without modes all of them are;
     `drawn` what the rows stand for, and `operations` which of them each operation cuts, None but
@@ -122,6 +123,7 @@ class Toolpath:
     texts: tuple[str, ...] = ()
     findings: tuple[Finding, ...] = ()
     made_from: str = ""
+    tabs_mm: tuple[tuple[float, float], ...] = ()
     mode: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     modes: tuple[PathMode, ...] = ()
     drawn: Drawn | None = None

@@ -36,6 +36,7 @@ MILLED = replace(
     scene_of_toolpath(followed(plate()), title="", drawing=plate()),
     tool_mm=0.5,
     stock_mm=(-1.0, -1.0, 6.0, 4.0),
+    tabs=((1.0, 0.5),),
 )
 JUDGED = replace(SCENES["result"], worst=((4.5, 2.5), (2.5, 0.5), (4.5, 2.5)))
 GROUPS = {
@@ -48,6 +49,7 @@ GROUPS = {
     "order": ("order",),
     "arrows": ("arrows",),
     "reversals": ("reversals",),
+    "tabs": ("tabs",),
     "zero": ("part-zero",),
 }
 
