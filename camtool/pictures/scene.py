@@ -16,7 +16,7 @@ import numpy as np
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import extents
-from camtool.geometry.polylines import Segments
+from camtool.geometry.polylines import POSITION_EPS_MM, Segments
 from camtool.toolpath.moves import Kind, Toolpath, toolpath_extents
 
 if TYPE_CHECKING:
@@ -201,8 +201,6 @@ def scene_of(
     `job` places the drawing in the work frame; `listing` gives the program's lines to the viewer;
     `tabs` are the places (x, y) mm of tabs.
     """
-    from camtool.verification.case import nose_of, tool_mm
-
     if drawing is not None and toolpath is None:
         return scene_of_drawing(drawing, title)
     if drawing is not None and job is not None:
@@ -211,8 +209,6 @@ def scene_of(
         drawing = place(drawing, job)
     trace = verification.trace if verification is not None else None
     worst = () if verification is None else verification.report.worst
-    # A V bit is as wide as it is deep: its path has no single width.
-    even = job is not None and nose_of(job) is None
     return Scene(
         title=title,
         drawing=drawing,
@@ -225,7 +221,7 @@ def scene_of(
         notes=verification.report.notes() if verification is not None else (),
         wanted=verification.wanted.segments if verification is not None else None,
         worst=tuple(one.at_mm for one in worst),
-        tool_mm=tool_mm(job) if job is not None and even else None,
+        tool_mm=None if job is None else _width_mm(job, toolpath),
         rounds=() if verification is None else rounds_of(verification),
         tabs=tabs,
         playback=_playback(toolpath, verification, machine, listing),
@@ -260,6 +256,27 @@ def rounds_of(verification: Verification) -> tuple[Round, ...]:
             )
         )
     return tuple(found)
+
+
+def _width_mm(job: Job, toolpath: Toolpath | None) -> float | None:
+    """How wide the tool cuts at the surface, mm; None where that changes along the path.
+
+    A V bit, or a round nose, is as wide as it is deep: it has one width where one operation cuts
+    level, that of its deepest pass.
+    """
+    from camtool.verification.case import nose_of, tool_mm
+
+    tool = nose_of(job)
+    if tool is None:
+        return tool_mm(job)
+    if toolpath is None or len(job.operations) > 1:
+        return None
+    across = np.hypot(*(toolpath.end - toolpath.starts)[:, :2].T) > POSITION_EPS_MM
+    rows = np.flatnonzero(toolpath.is_feed & (across | toolpath.is_arc))
+    z = toolpath.end[rows, 2]
+    if not len(rows) or (toolpath.starts_of(rows)[:, 2] != z).any() or z.min() >= 0.0:
+        return None
+    return 2.0 * tool.radius_at(-float(z.min()))
 
 
 def _travel(toolpath: Toolpath | None, machine: Machine | None) -> tuple[float, float] | None:
