@@ -31,7 +31,7 @@ from camtool.target.registry import LoadedTarget
 from camtool.toolpath.moves import Compensated, Toolpath, toolpath_extents
 from camtool.units import UM_PER_MM
 from camtool.verification import report as record
-from camtool.verification.case import SAMPLE_MM, Case, VerifyOptions
+from camtool.verification.case import SAMPLE_MM, TRACE_POINTS, Case, VerifyOptions
 from camtool.verification.circles import UNSEEN, full_circles
 from camtool.verification.conformance import Asked, Conformance, conformance_of
 from camtool.verification.coverage import (
@@ -132,7 +132,10 @@ def judge(
     cuts, wanted = paths.decoded, paths.wanted
     cutter = cutter_of(case.options, cuts)
     shape_points = points_wanted(cuts, cutter)
-    points = max(case.options.trace_points, shape_points or 0)
+    # Slides may curve where their program does not: the shape needs no fewer points than pictures,
+    # and is the same whether there are any.
+    least = max(shape_points, TRACE_POINTS) if shape_points else 0
+    points = max(case.options.trace_points, least)
     own, looped = _looped(case, paths)
     sizes_of = SlideExtents(case.decoded.start, own, looped, coverage.match)
     steps_mm = case.machine.axes.x.coded_step_mm, case.machine.axes.y.coded_step_mm

@@ -192,3 +192,20 @@ def test_compensation_makes_the_part_better(camtool: Run, tmp_path: Path) -> Non
     assert again.returncode == 0, again.stderr
     assert json.loads(again.stdout)["error_um"]["total"] == report["error_um"]["total"]
     assert camtool(*verify).returncode == 1  # taken as it stands, it cuts beside the drawing
+
+
+@pytest.mark.parametrize("target", ["matlab-router", "pic-mmh", "grbl"])
+def test_no_figure_depends_on_a_picture(
+    camtool: Run, tmp_path: Path, samples: Path, target: str
+) -> None:
+    # The slides of the router curve where their program does not: few points of their path would
+    # give another shape of the part.
+    flags = ("-t", target, "--tool-diameter", "0.2mm", "--side", "auto", "-o", "a.out")
+    reports = []
+    for more in ((), ("--preview", "a.svg"), ("--report", "b.md")):
+        args = ("post", str(samples / "logo.dxf"), *flags, "--json", "a.json", *more)
+        done = camtool(*args)
+        assert done.returncode == 0, done.stderr
+        reports.append(json.loads((tmp_path / "a.json").read_text(encoding="utf-8")))
+    assert reports[0]["shape"] is not None
+    assert reports[0] == reports[1] == reports[2]
