@@ -422,12 +422,7 @@ def _repeated(program: Program, decoded: Toolpath) -> set[Finding]:
 
 def _operations(steps: Sequence[Step]) -> tuple[PlannedOperation, ...]:
     """How the operations that cut something do it, for the report."""
-    from camtool.planning.checks import (
-        IN_PASSES,
-        chip_load_mm,
-        deepest_pass,
-        surface_speed_m_min,
-    )
+    from camtool.planning.checks import IN_PASSES, deepest_pass
     from camtool.verification.report import PlannedOperation
 
     cutting = [step for step in steps if step.runs]
@@ -444,8 +439,10 @@ def _operations(steps: Sequence[Step]) -> tuple[PlannedOperation, ...]:
                 tool_name=operation.tool.name,
                 tool_diameter_mm=operation.tool.diameter_mm,
                 material=operation.material,
-                chip_load_mm=chip_load_mm(setting),
-                surface_speed_m_min=surface_speed_m_min(setting),
+                chip_load_mm=operation.tool.feed_per_tooth_mm(
+                    setting.feeds.cut_mm_min, setting.spindle_rpm
+                ),
+                surface_speed_m_min=operation.tool.edge_speed_m_min(setting.spindle_rpm),
                 spindle_rpm=setting.spindle_rpm,
                 feed_mm_min=setting.feeds.cut_mm_min,
                 plunge_mm_min=setting.feeds.plunge_mm_min,

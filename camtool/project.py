@@ -85,10 +85,8 @@ class Project:
     @property
     def job(self) -> Path | None:
         """The job file by default."""
-        for file, said in self.files:
-            if said.job is not None:
-                return file.parent / said.job
-        return None
+        found = self.said("job")
+        return None if found is None else found[1].parent / found[0]
 
     def said(self, key: str) -> tuple[Any, Path] | None:
         """What the nearest file that has this key says, and the file."""

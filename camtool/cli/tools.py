@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -157,12 +156,11 @@ def _tool(name: str, described: Described) -> Tool:
 def _derived(tool: Tool, preset: Mapping[str, Any]) -> dict[str, float]:
     """The feed per tooth, mm, and the speed of the edge, m/min, that follow from a preset."""
     feed, rpm = preset.get("feed_mm_min"), preset.get("spindle_rpm")
-    found = {}
-    if feed and rpm and tool.flutes:
-        found["feed_per_tooth_mm"] = feed / (rpm * tool.flutes)
-    if rpm and tool.diameter_mm:
-        found["edge_m_min"] = math.pi * tool.diameter_mm * rpm / 1000.0
-    return found
+    found = {
+        "feed_per_tooth_mm": None if feed is None else tool.feed_per_tooth_mm(feed, rpm),
+        "edge_m_min": tool.edge_speed_m_min(rpm),
+    }
+    return {key: value for key, value in found.items() if value is not None}
 
 
 def _summary(name: str, described: Described) -> str:

@@ -338,7 +338,8 @@ def _beyond_tool(step: Step, stock: Stock | None) -> Iterator[str]:
     )
     if straight_down and tool.centre_cutting is False:
         yield CUT_DOUBTFUL_CENTRE.words()
-    chip, speed = chip_load_mm(setting), surface_speed_m_min(setting)
+    chip = tool.feed_per_tooth_mm(setting.feeds.cut_mm_min, setting.spindle_rpm)
+    speed = tool.edge_speed_m_min(setting.spindle_rpm)
     if chip is not None and operation.kind != "drill" and _is_beyond(chip, tool.chip_load_mm):
         yield CUT_DOUBTFUL_CHIP.words(chip=chip, limits=range_words(tool.chip_load_mm))
     if speed is not None and _is_beyond(speed, tool.surface_speed_m_min):
@@ -364,20 +365,6 @@ def ridge_mm(tool: Tool, step_over: float) -> float:
     flat = tool.diameter_mm - 2.0 * tool.nose_mm
     beside = max(0.5 * (step_over * tool.diameter_mm - flat), 0.0)
     return tool.nose_mm - math.sqrt(max(tool.nose_mm**2 - beside**2, 0.0))
-
-
-def chip_load_mm(setting: Setting) -> float | None:
-    """How far the tool is fed while an edge of it takes the place of the one before, mm; None
-    where its flutes or its speed are not known."""
-    flutes, rpm = setting.operation.tool.flutes, setting.spindle_rpm
-    return setting.feeds.cut_mm_min / (rpm * flutes) if flutes and rpm else None
-
-
-def surface_speed_m_min(setting: Setting) -> float | None:
-    """How fast the edge of the tool moves where it is widest, m/min; None where its speed is not
-    known, and for a point."""
-    diameter, rpm = setting.operation.tool.diameter_mm, setting.spindle_rpm
-    return math.pi * diameter * rpm / 1000.0 if diameter and rpm else None
 
 
 def _is_beyond(value: float, limits: tuple[float, float] | None) -> bool:

@@ -286,6 +286,15 @@ class Tool:
         below = max(nose - above_tip_mm, 0.0)
         return self.radius_mm - nose + math.sqrt(nose * nose - below * below)
 
+    def feed_per_tooth_mm(self, feed_mm_min: float, rpm: float | None) -> float | None:
+        """How far it is fed while an edge takes the place of the one before; None where its flutes
+        or the speed are not known."""
+        return feed_mm_min / (rpm * self.flutes) if rpm and self.flutes else None
+
+    def edge_speed_m_min(self, rpm: float | None) -> float | None:
+        """How fast its edge moves where it is widest; None without a speed, and for a point."""
+        return math.pi * self.diameter_mm * rpm / 1000.0 if rpm and self.diameter_mm else None
+
     @property
     def point_mm(self) -> float:
         """How far above its tip a mill or a drill is as wide as its diameter, mm."""

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from camtool.findings import Finding, Sentence
 from camtool.machine.model import Machine
 from camtool.planning.job import Operation, Tool
+from camtool.toolpath.wanted import TOOL_SHAPES
 
 MOST_PLACES = 12
 """At most this many findings of a kind are listed one by one, the others are counted."""
@@ -24,21 +25,11 @@ def tool_name(tool: Tool) -> str:
     return f"a tool of {tool.diameter_mm:g} mm{called}"
 
 
-SHAPES = {
-    "flat": "end mill",
-    "ball": "ball nose",
-    "bull": "bull nose",
-    "v": "V bit",
-    "drill": "drill",
-}
-"""What people call the kinds of tools."""
-
-
 def tool_words(tool: Tool) -> str:
     """All that is known of a tool's shape: `end mill 3.175 mm, 2 flutes, cuts 12 mm`."""
-    words = [f"{SHAPES[tool.kind]} {tool.diameter_mm:g} mm"]
+    words = [f"{TOOL_SHAPES[tool.kind]} {tool.diameter_mm:g} mm"]
     if not tool.diameter_mm:
-        words = [SHAPES[tool.kind] if tool.kind != "flat" else "point"]
+        words = [TOOL_SHAPES[tool.kind] if tool.kind != "flat" else "point"]
     if tool.tip_angle_rad is not None:
         words.append(f"{math.degrees(tool.tip_angle_rad):g}°")
     if tool.tip_diameter_mm:

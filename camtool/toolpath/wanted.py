@@ -32,6 +32,16 @@ class Drawn:
         return replace(self, off_mm=self.off_mm[row], edge=self.edge[row])
 
 
+TOOL_SHAPES = {
+    "flat": "end mill",
+    "ball": "ball nose",
+    "bull": "bull nose",
+    "v": "V bit",
+    "drill": "drill",
+}
+"""What people call the shapes of tools that jobs know; any other is called as it is."""
+
+
 @dataclass(frozen=True)
 class ToolNote:
     """A tool as a program names it: its shape as in jobs ("flat", "v", "drill", ...), its diameter

@@ -18,22 +18,13 @@ from camtool.arrays import Floats, Ints
 from camtool.errors import PostError
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Kind, Toolpath, toolpath_extents
-from camtool.toolpath.wanted import OperationNote, Operations, ToolNote
+from camtool.toolpath.wanted import TOOL_SHAPES, OperationNote, Operations, ToolNote
 
 from .dialect import UNITS, GcodeDialect, Unit
 from .format import COMMENT_CHARS, NumberStyle, comment, format_column
 
 DIGEST: Final = 8
 """So many hexadecimal digits of the machine's digest stand in a program."""
-
-SHAPES: Final = {
-    "flat": "end mill",
-    "ball": "ball nose",
-    "bull": "bull nose",
-    "v": "V bit",
-    "drill": "drill",
-}
-"""What a shape of tools is called; one that is not here is called as jobs call it."""
 
 Lines = Callable[[int], str]
 """The text of the k-th line."""
@@ -150,7 +141,7 @@ def _length(length_mm: float, unit: Unit) -> str:
 def tool_words(tool: ToolNote, unit: Unit) -> str:
     """Number, name, shape and diameter, as far as they are known."""
     number = "" if tool.number is None else f" {tool.number}"
-    shape = SHAPES.get(tool.kind, tool.kind)
+    shape = TOOL_SHAPES.get(tool.kind, tool.kind)
     name = "" if tool.name.casefold() in shape.casefold() else f" {tool.name}:"
     size = f"{shape} {_length(tool.diameter_mm, unit)}" if tool.diameter_mm else "of no width"
     tip = "" if tool.tip_angle_rad is None else f" {math.degrees(tool.tip_angle_rad):.4g} deg"
