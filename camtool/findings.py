@@ -310,6 +310,13 @@ class Code(IntEnum):
         "remark where it lies within another circle, with which it is bored",
         "`drill` for circles as wide as the tool, a smaller tool for the others",
     )
+    NOT_CHAMFERED = (
+        230,
+        WARNING,
+        "a path chosen for `chamfer` is open: it has no side on which an edge would be, and is "
+        "left out",
+        'choose closed contours (`select = ["closed"]`), or close the path',
+    )
     CUT_DOUBTFUL = (
         220,
         WARNING,
@@ -783,6 +790,9 @@ NOTHING_DRAWN_TO_DRILL = Sentence(
     Code.NOTHING_DRAWN,
     "there is no hole to drill: no single point, and no circle that is small enough",
 )
+NOTHING_DRAWN_TO_CHAMFER = Sentence(
+    Code.NOTHING_DRAWN, "there is no edge to chamfer: no closed contour"
+)
 NOTHING_DRAWN_TO_BORE = Sentence(
     Code.NOTHING_DRAWN, "there is no hole to bore: no circle that is wider than the tool"
 )
@@ -1064,6 +1074,11 @@ NOT_BORED = Sentence(
     Code.NOT_BORED,
     "only full circles are bored: {measured:# other path is|# other paths are} left out",
     severity=WARNING,
+)
+NOT_CHAMFERED = Sentence(
+    Code.NOT_CHAMFERED,
+    "only edges of closed contours are chamfered: {measured:# open path is|# open paths are} left "
+    "out",
 )
 NOT_BORED_TOO_SMALL = Sentence(
     Code.NOT_BORED,

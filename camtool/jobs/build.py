@@ -173,7 +173,7 @@ def build_job(
         for n, own in enumerate(tables, start=1)
     ]
     operations = [
-        _through(operation, (file.defaults, own, flags.defaults), stock)
+        _deep(operation, (file.defaults, own, flags.defaults), stock)
         for operation, own in zip(operations, tables, strict=True)
     ]
     _refuse_equal_names(operations, tables)
@@ -264,14 +264,19 @@ def _nearest(layers: Sequence[Table]) -> Table:
     return merged
 
 
-def _through(operation: Operation, layers: Sequence[Table], stock: Stock | None) -> Operation:
-    """The operation with the depth that its breakthrough makes."""
+def _deep(operation: Operation, layers: Sequence[Table], stock: Stock | None) -> Operation:
+    """The operation with the depth that its breakthrough, or its chamfer, makes."""
     try:
-        return operation.through(stock)
+        return operation.chamfered().through(stock)
     except OptionError as error:
         # The last pass may be what is wrong with the depth.
-        key = "last_pass" if (error.where or "").endswith("last_pass") else "breakthrough"
-        raise _nearest(layers).given[key].refused(error.message, error.mend) from error
+        known = _nearest(layers).given
+        key = "chamfer" if operation.kind == "chamfer" else "breakthrough"
+        key = "last_pass" if (error.where or "").endswith("last_pass") else key
+        place = known.get(key) or known.get("kind")
+        if place is None:
+            raise
+        raise place.refused(error.message, error.mend) from error
 
 
 def _rested(operations: list[Operation], tables: Sequence[Table]) -> list[Operation]:
@@ -300,14 +305,14 @@ def _unknown(name: str, kind: str) -> tuple[str, str]:
 
 
 def _refuse_tool(operation: Operation, own: Table) -> None:
-    """A V bit is needed to carve, and its angle to know how deep."""
-    tool = operation.tool
-    if operation.kind == "vcarve" and (tool.kind != "v" or tool.tip_angle_rad is None):
+    """A V bit is needed to carve and to chamfer, and its angle to know how deep."""
+    tool, kind = operation.tool, operation.kind
+    if kind in ("vcarve", "chamfer") and (tool.kind != "v" or tool.tip_angle_rad is None):
         place = own.given.get("tool", own)
         raise place.refused(
-            f"vcarve needs a V bit, not a tool of kind {tool.kind!r}"
+            f"{kind} needs a V bit, not a tool of kind {tool.kind!r}"
             if tool.kind != "v"
-            else "vcarve needs the angle of its V bit",
+            else f"{kind} needs the angle of its V bit",
             'give a tool with kind = "v" and its tip_angle',
         )
 

@@ -606,12 +606,15 @@ def _as_given(given: Given) -> Any:
     return given.value
 
 
-_LINES = ("profile", "pocket", "engrave")
-_LAYERED = ("profile", "pocket", "engrave", "vcarve")
+_LINES = ("profile", "pocket", "engrave", "chamfer")
+_LAYERED = ("profile", "pocket", "engrave", "chamfer", "vcarve")
 _STEPPED = (*_LAYERED, "bore")
 _CLEARING = ("profile", "pocket", "bore")
-_ALONG = ("profile", "engrave")
+_ALONG = ("profile", "engrave", "chamfer")
 _PROFILE = ("profile",)
+_BESIDE = ("profile", "chamfer")
+_CHAMFER = ("chamfer",)
+_NOT_CHAMFER = tuple(kind for kind in KINDS if kind != "chamfer")
 _POCKET = ("pocket",)
 _RINGS = ("pocket", "bore")
 _DRILL = ("drill",)
@@ -645,9 +648,13 @@ OPERATION = {
         Value(word(SIDES), choices=("auto", "on", "outside", "inside")),
         "Where the tool runs; auto: outside of parts, inside of holes.",
         '"auto"',
-        _PROFILE,
+        _BESIDE,
     ),
-    "direction": Key("direction", one_of(DIRECTIONS), "Which way round.", '"climb"', _CLEARING),
+    "direction": Key(
+        "direction", one_of(DIRECTIONS), "Which way round.", '"climb"', (*_CLEARING, "chamfer")
+    ),
+    "chamfer": Key("chamfer_mm", LENGTH, "Its width from above.", '"0.5mm"', _CHAMFER),
+    "tip_offset": Key("tip_offset_mm", LENGTH, "Its bit's tip below it.", '"0.1mm"', _CHAMFER),
     "allowance": Key("allowance_mm", LENGTH, "Left on the wall.", '"0.1mm"', _CLEARING),
     "finish": Key("finish_mm", LENGTH, "Left for a last pass.", '"0.1mm"', _CLEARING),
     "finish_feed": Key("finish_feed_mm_min", FEED, "Of that pass.", kinds=_CLEARING),
@@ -662,7 +669,7 @@ OPERATION = {
         KINDS,
     ),
     "coolant": Key("coolant", one_of(COOLANTS), "M7, M8 or both.", '"mist"', KINDS),
-    "depth": Key("depth_mm", LENGTH, "Depth of cut below Z0.", '"1mm"', KINDS),
+    "depth": Key("depth_mm", LENGTH, "Depth of cut below Z0.", '"1mm"', _NOT_CHAMFER),
     "breakthrough": Key("breakthrough_mm", LENGTH, "Or so far below the stock.", kinds=_THROUGH),
     "step_down": Key("step_down_mm", LENGTH, "Depth of a pass.", '"0.5mm"', _STEPPED),
     "last_pass": Key("last_pass_mm", LENGTH, "Depth of the last pass.", '"0.1mm"', _LAYERED),
@@ -678,14 +685,14 @@ OPERATION = {
         Value(lead, "LEAD", tables=True),
         "none, line:1mm or arc:1mm.",
         '"arc:1mm"',
-        _PROFILE,
+        _BESIDE,
     ),
     "lead_out": Key(
         "lead_out",
         Value(lead, "LEAD", tables=True),
         "The same at the end.",
         '"arc:1mm"',
-        _PROFILE,
+        _BESIDE,
     ),
     "overlap": Key("overlap_mm", LENGTH, "Cut beyond the start.", '"0.2mm"', _ALONG),
     "start": Key(

@@ -57,7 +57,7 @@ FEED_TOLERANCE = 1e-6
 MOST_LISTED = 10
 """At most this many rapids are listed; the last finding counts the others."""
 
-IN_PASSES = ("profile", "pocket", "engrave")
+IN_PASSES = ("profile", "pocket", "engrave", "chamfer")
 """Kinds of operation that go down in passes, each of one depth."""
 
 AXES = "XYZ"

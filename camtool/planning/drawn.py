@@ -156,7 +156,9 @@ def _edges(step: Step, placed: Drawing) -> Iterator[tuple[int, tuple[Floats, Flo
 
 
 def _cuts_edge(step: Step) -> Bools:
-    """Which items of the step follow a closed line whose size they decide."""
+    """Which items of the step follow a closed line whose size they decide: chamfers none."""
+    if step.operation.kind == "chamfer":
+        return np.zeros(len(step.items), dtype=np.bool_)
     if isinstance(step.items, Contours):
         return step.items.lines.closed
     return np.full(len(step.items), step.operation.kind in ("pocket", "vcarve", "bore"))
@@ -218,9 +220,9 @@ def _carved(points: Floats, cone: Cone) -> Floats:
 def kept_of(steps: Sequence[Step]) -> tuple[Kept, ...]:
     """All runs of a plan, with what they must leave of the material, as the drawing has it.
 
-    A profile leaves the part, a pocket and a carving what is outside of their region; engraving
-    and drilling leave nothing in particular. Where reliefs go into the corners of the part, they
-    are meant to, and such an operation leaves nothing in particular.
+    A profile leaves the part, a pocket and a carving what is outside of their region; engraving,
+    drilling and chamfers leave nothing in particular. Where reliefs go into the corners of the
+    part, they are meant to, and such an operation leaves nothing in particular.
     """
     return tuple(each for step in steps for each in _kept(step))
 
@@ -238,7 +240,8 @@ def _kept(step: Step) -> Iterator[Kept]:
         lines = chosen.lines.select(rows.tolist())
         yield Kept(tuple(run.vertices for run in step.runs), lines, depth % 2 == 1, True)
         return
-    beside = runs_beside(operation) and operation.corners == "none"
+    beside = operation.kind == "profile" and runs_beside(operation)
+    beside = beside and operation.corners == "none"
     for level in _levels(operation, depth) if beside else ():
         mine = rows[level]
         lines, stays = chosen.lines.select(mine.tolist()), chosen.rim[mine]

@@ -59,7 +59,8 @@ def side_findings(work: Work, chosen: Chosen, sides: Sides, operation: Operation
 def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> Iterator[Finding]:
     """Where the tool, beside one contour, comes over another one, or into the allowance that its
     operation leaves on that."""
-    radius, allowance = operation.tool.radius_mm, operation.allowance_mm
+    radius, allowance = operation.wall_radius_mm, operation.allowance_mm
+    bevel = operation.chamfer_mm or 0.0  # edges of others are not to be broken
     items = Contours.of_items(work.items)
     beside = [k for k, left in enumerate(items.material_left) if left is not None]
     seen, sided = sides.seen_by(operation), sides.sided()
@@ -72,13 +73,14 @@ def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> I
     others = np.flatnonzero(wanted)
     walls = sides.lines.select(others.tolist())
     paths = items.lines.select(beside)
-    for one, which in near_paths(paths, walls, radius + allowance):
+    for one, which in near_paths(paths, walls, radius + bevel + allowance):
         item, other = items[beside[one]], int(others[which])
         wall = walls[which]
         if item.source == other:
             continue
         near = approach(item.path, wall)
-        if near.distance >= radius - GOUGE_TOLERANCE_MM:
+        reach = radius if other in own else radius + bevel
+        if near.distance >= reach - GOUGE_TOLERANCE_MM:
             if other in own and near.distance < radius + allowance - GOUGE_TOLERANCE_MM:
                 yield GOUGE_OF_ALLOWANCE(
                     where=at_place(item.name, near.point),
@@ -96,13 +98,13 @@ def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> I
         if not kept and _lies_in(drawn, wall):
             continue  # the edge of the stock, or of a sheet: nothing says that it stays
         is_asked = operation.side != "auto" and (other in own or _cross(drawn, wall))
-        amount = radius - near.distance
+        amount = reach - near.distance
         if near.distance <= POSITION_EPS_MM:
-            amount = radius + _beyond(item.path, wall, drawn)
+            amount = reach + _beyond(item.path, wall, drawn)
         yield (GOUGE if kept else GOUGE_OF_UNCUT)(
             where=at_place(item.name, near.point),
             measured=near.distance,
-            limit=radius,
+            limit=reach,
             severity=Severity.ERROR if kept and not is_asked else Severity.WARNING,
             tool=tool_name(operation.tool),
             contour=item.name,

@@ -16,11 +16,12 @@ from typing import Any
 from camtool.errors import OptionError
 from camtool.patterns import matches
 
-KINDS = ("profile", "pocket", "bore", "engrave", "drill", "vcarve")
+KINDS = ("profile", "pocket", "bore", "engrave", "drill", "vcarve", "chamfer")
 """Kinds of operation."""
 
 SIDES = ("on", "outside", "inside", "auto")
-"""Where the tool of a profile runs: on the line, around it, within it, or as the nesting says."""
+"""Where the tool of a profile or a chamfer runs: on the line, around it, within it, or as the
+nesting says."""
 
 DIRECTIONS = ("drawn", "climb", "conventional")
 """The direction of the cut: as drawn, or with the tool's teeth going with or against the feed."""
@@ -381,6 +382,8 @@ class Operation:
     `step_over` is the distance of neighbouring passes of a pocket over the tool's diameter.
     `overlap_mm`: how far a closed contour is cut beyond its start. `start`: one of STARTS, or a
     place (x, y) mm. `peck_mm`: how deep a drill goes at a time; `dwell_s` at the bottom.
+    `chamfer_mm`: how wide a chamfer is, seen from above (a Job makes the depth of it), and
+    `tip_offset_mm`: how far below it the tip of its bit runs.
     `max_hole_mm`: circles up to this diameter are drilled (None: as wide as the drill, or any
     for a drill of no width). `material`: that of the tool's preset, "" where none was taken.
     Raises OptionError for what no operation can be.
@@ -427,6 +430,8 @@ class Operation:
     peck_mm: float | None = None
     dwell_s: float = 0.0
     max_hole_mm: float | None = None
+    chamfer_mm: float | None = None
+    tip_offset_mm: float = 0.1
     material: str = ""
 
     def __post_init__(self) -> None:
@@ -457,6 +462,8 @@ class Operation:
             ("mitre limit", self.mitre_limit, ""),
             ("peck", self.peck_mm, "mm"),
             ("largest hole", self.max_hole_mm, "mm"),
+            ("chamfer", self.chamfer_mm, "mm"),
+            ("tip offset", self.tip_offset_mm, "mm"),
         ):
             above_zero(name, value, unit)
         if self.spindle_rpm:
@@ -671,6 +678,57 @@ class Operation:
             )
         return replace(self, depth_mm=stock.thickness_mm + beyond + point, breakthrough_mm=None)
 
+    def chamfered(self) -> Operation:
+        """The operation with the depth that its chamfer makes; itself where it is none.
+
+        A cone of half angle α and tip radius t is r(h) = t + h·tan α wide, h above its tip. Its
+        tip runs an offset o below the bevel, whose lower edge is the drawn line: the axis runs
+        r(o) beside that line, and the bevel is w = r(D) − r(o) wide at the stock top for a tip
+        D = o + w / tan α deep.
+        OptionError without a width, for a tool that is no V bit, and for one too narrow.
+        """
+        if self.kind != "chamfer":
+            return self
+        where = f"operation {self.name or self.kind!r}, key chamfer"
+        if self.chamfer_mm is None:
+            raise OptionError(
+                "a chamfer has no width",
+                where=where,
+                mend='say how wide it is, seen from above: chamfer = "0.5mm"',
+            )
+        tool = self.tool
+        if tool.kind != "v" or tool.tip_angle_rad is None:
+            raise OptionError(
+                "a chamfer needs a V bit, and its angle",
+                where=f"operation {self.name or self.kind!r}, key tool",
+                mend='give a tool with kind = "v" and its tip_angle',
+            )
+        depth = self.tip_offset_mm + self.chamfer_mm / math.tan(0.5 * tool.tip_angle_rad)
+        needed = 2.0 * (self.wall_radius_mm + self.chamfer_mm)
+        if 0.0 < tool.diameter_mm < needed * (1.0 - THROUGH_SLACK):
+            raise OptionError(
+                f"a chamfer of {self.chamfer_mm:g} mm, the tip {self.tip_offset_mm:g} mm below it,"
+                f" needs a bit of {needed:.4g} mm, and this one has {tool.diameter_mm:g} mm",
+                where=where,
+                mend="give a smaller chamfer or tip_offset, or a wider bit",
+            )
+        if self.depth_mm is not None and abs(self.depth_mm - depth) > LEAST:
+            raise OptionError(
+                f"a depth of {self.depth_mm:g} mm is given too, but the chamfer makes it"
+                f" {depth:.4g} mm",
+                where=where,
+                mend="leave the depth out",
+            )
+        return replace(self, depth_mm=depth)
+
+    @property
+    def wall_radius_mm(self) -> float:
+        """The tool's radius where it passes the line beside which it runs, mm: half its diameter,
+        and for a chamfer how wide its bit is where the bevel ends."""
+        if self.kind == "chamfer":
+            return self.tool.radius_at(self.tip_offset_mm)
+        return self.tool.radius_mm
+
     @property
     def selects(self) -> bool:
         """Whether it takes less than all that is on its layers and in its colours."""
@@ -815,7 +873,7 @@ class Job:
         one_of("goal", self.minimise, GOALS)
         if not self.operations:
             raise OptionError("the job has no operations", mend="give it at least one")
-        deep = [operation.through(self.stock) for operation in self.operations]
+        deep = [each.chamfered().through(self.stock) for each in self.operations]
         made = [stage for each in rested(deep) for stage in each.stages()]
         object.__setattr__(self, "operations", tuple(made))
 

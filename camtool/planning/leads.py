@@ -71,7 +71,7 @@ class Border:
             line,
             None if left is None else not left,
             keep_out,
-            operation.tool.radius_mm,
+            operation.wall_radius_mm,
             operation.allowance_mm,
         )
 

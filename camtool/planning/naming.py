@@ -25,6 +25,13 @@ def tool_name(tool: Tool) -> str:
     return f"a tool of {tool.diameter_mm:g} mm{called}"
 
 
+def width_name(operation: Operation) -> str:
+    """The tool of an operation by how wide it is beside the line that it follows."""
+    if operation.kind == "chamfer":
+        return f"a V bit, {2.0 * operation.wall_radius_mm:.3g} mm wide where its bevel ends,"
+    return tool_name(operation.tool)
+
+
 def tool_words(tool: Tool) -> str:
     """All that is known of a tool's shape: `end mill 3.175 mm, 2 flutes, cuts 12 mm`."""
     words = [f"{TOOL_SHAPES[tool.kind]} {tool.diameter_mm:g} mm"]

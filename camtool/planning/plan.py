@@ -208,6 +208,10 @@ def _kind(kind: str) -> Callable[[Chosen, Setting], Work]:
         from camtool.planning.bore import bore
 
         return bore
+    if kind == "chamfer":
+        from camtool.planning.chamfer import chamfer
+
+        return chamfer
     return {"profile": profile, "engrave": engrave, "drill": drill}[kind]
 
 

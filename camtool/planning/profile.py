@@ -40,7 +40,7 @@ from camtool.geometry.polylines import (
     lines_reversed,
 )
 from camtool.planning.items import NO_STARTS, Chosen, Contours, Setting, Work
-from camtool.planning.naming import at_place, shortened_list, tool_name
+from camtool.planning.naming import at_place, shortened_list, tool_name, width_name
 from camtool.planning.paths import joints, midpoints
 from camtool.planning.sides import runs_beside
 
@@ -203,7 +203,7 @@ def _offset(shape: Polylines, away_mm: float, setting: Setting) -> Polylines:
 
 def _away(setting: Setting) -> float:
     """How far the tool centre is from the drawn line, mm."""
-    return setting.operation.tool.radius_mm + setting.operation.allowance_mm
+    return setting.operation.wall_radius_mm + setting.operation.allowance_mm
 
 
 def _sources(paths: Polylines, shape: Polylines) -> list[tuple[int, ...]]:
@@ -233,14 +233,14 @@ def _is_double(shape: Polylines, place: int) -> bool:
 
 
 def _as_wide(chosen: Chosen, k: int, setting: Setting) -> Finding:
-    return SLOT_AS_WIDE(where=_box_centre(chosen, k), tool=tool_name(setting.operation.tool))
+    return SLOT_AS_WIDE(where=_box_centre(chosen, k), tool=width_name(setting.operation))
 
 
 def _no_room(chosen: Chosen, k: int, outer: bool, setting: Setting) -> Finding:
     return (CONTOUR_TOO_SMALL_ROUND if outer else CONTOUR_TOO_SMALL)(
         where=_box_centre(chosen, k),
         measured=abs(float(signed_areas(chosen.lines.select([k]))[0])),
-        tool=tool_name(setting.operation.tool),
+        tool=width_name(setting.operation),
     )
 
 
@@ -265,7 +265,7 @@ def _joined(chosen: Chosen, of: tuple[int, ...], setting: Setting) -> Iterator[F
             where=at_place(chosen.names[of[one]], near.point),
             measured=near.distance,
             limit=room,
-            tool=tool_name(setting.operation.tool),
+            tool=width_name(setting.operation),
             one=chosen.names[of[one]],
             other=chosen.names[of[other]],
         )

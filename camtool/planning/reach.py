@@ -26,7 +26,7 @@ from camtool.geometry.nesting import regions
 from camtool.geometry.offset import merge_points, offset_shape
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments, reverse
 from camtool.planning.items import Setting
-from camtool.planning.naming import MOST_PLACES, tool_name
+from camtool.planning.naming import MOST_PLACES, width_name
 from camtool.planning.paths import MeasuredPath, runs_of_true
 
 TOGETHER_MM = 5e-6
@@ -260,17 +260,19 @@ def unreached_findings(
 ) -> list[Finding]:
     """What a tool within the region (on the left of its closed paths) cannot touch.
 
-    Feet of corners are not reported where the operation makes reliefs. Slots narrower than the
+    Feet of corners are not reported where the operation makes reliefs, nor for chamfers, whose
+    bevels are round there. Slots narrower than the
     tool by `hair_mm` count as reached.
     """
-    tool = setting.operation.tool
-    pieces = unreached(region, tool.radius_mm - 0.5 * hair_mm)
-    largest_foot = CORNER_SHARE * np.pi * tool.radius_mm**2
+    radius = setting.operation.wall_radius_mm
+    pieces = unreached(region, radius - 0.5 * hair_mm)
+    largest_foot = CORNER_SHARE * np.pi * radius**2
     wide = [piece for piece in pieces if piece.area_mm2 > largest_foot]
     feet = [piece for piece in pieces if piece.area_mm2 <= largest_foot]
-    if setting.operation.corners != "none":
+    if setting.operation.corners != "none" or setting.operation.kind == "chamfer":
         feet = []
-    return [*_places(wide, tool_name(tool)), *_corners(feet, tool_name(tool))]
+    called = width_name(setting.operation)
+    return [*_places(wide, called), *_corners(feet, called)]
 
 
 def _places(pieces: Sequence[Unreached], called: str) -> Iterator[Finding]:

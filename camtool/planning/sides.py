@@ -152,7 +152,7 @@ class Sides:
         """The sides for a profile of this operation."""
         depth = self._depth(operation)
         cut = self._taken(
-            each.kind == "profile"
+            each.kind in ("profile", "chamfer")
             or (each.kind in ("pocket", "bore") and self._depth(each) >= depth)
             for each in self.operations
         )
@@ -296,10 +296,11 @@ def _selection(operation: Operation) -> str:
 
 
 def runs_beside(operation: Operation) -> bool:
-    """Whether an operation is a profile that runs beside its closed contours, not on them."""
-    if operation.kind != "profile" or operation.side == "on":
+    """Whether an operation is a profile, or a chamfer, that runs beside its closed contours, not
+    on them."""
+    if operation.kind not in ("profile", "chamfer") or operation.side == "on":
         return False
-    return operation.tool.radius_mm + operation.allowance_mm > 0.0
+    return operation.wall_radius_mm + operation.allowance_mm > 0.0
 
 
 def _again(lines: Polylines, cut: Bools, idle: Bools) -> Bools:
