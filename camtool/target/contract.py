@@ -24,12 +24,17 @@ from camtool.machine.model import Axis, Machine, SlideStart
 
 if TYPE_CHECKING:
     from camtool.simulation.controller import ControllerModel
+    from camtool.target.twin import Twin
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
 
 
 class NoDialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The `[dialect]` of a target without options of its own."""
+
+
+class NoChoices(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The choices of a twin whose wire is known completely."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +73,8 @@ class Target(ABC):
     """Whether the machine file describes no particular machine: travel and rates are examples."""
     filter_default: ClassVar[bool] = False
     """Whether `camtool filter` uses it by default."""
+    no_twin: ClassVar[str] = "its wire is not modelled"
+    """Why there is no virtual controller, where there is none."""
     settings_listing: ClassVar[str] = ""
     """What `settings_from` reads, such as "what it answers to $$"; "" where it reads nothing."""
 
@@ -115,3 +122,12 @@ class Target(ABC):
     def unit_mm(self, machine: Machine[Any, Any], axis: Axis) -> float:
         """The resolution of positions in a program along an axis, mm."""
         return max(axis.coded_step_mm, axis.resolution_mm or 0.0)
+
+    def twin_choices(self) -> type[msgspec.Struct]:
+        """What the sources of its wire leave open, as a record whose defaults are ours."""
+        return NoChoices
+
+    def twin(self, machine: Machine[Any, Any], choices: msgspec.Struct | None = None) -> Twin:
+        """The virtual controller, with `choices` of `twin_choices`; MachineError, which says why,
+        for a target that has none."""
+        raise MachineError(f"{self.name} has no virtual controller: {self.no_twin}")

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast, get_args
 
 import msgspec
 
@@ -28,6 +28,7 @@ from camtool.target.loader import machine_of, missing_keys, names_of, resolved_t
 if TYPE_CHECKING:
     from camtool.simulation.controller import ControllerModel
     from camtool.simulation.motion import Chunk, Options
+    from camtool.target.twin import Twin
     from camtool.toolpath.moves import Toolpath
 
 GROUP = "camtool.postprocessors"
@@ -38,6 +39,14 @@ OURS = "camtool_postprocessors."
 """The prefix of camtool's own modules: exceptions in them are faults of camtool itself."""
 
 NOT_SAID = "not said"
+
+
+def choices_of(record: type[msgspec.Struct]) -> Iterator[tuple[str, str]]:
+    """The name of each choice of a twin and its values, that of the default first."""
+    for each in msgspec.structs.fields(record):
+        values = [str(value) for value in get_args(each.type) if isinstance(value, str)]
+        default = str(each.default)
+        yield each.name, "|".join([default, *(value for value in values if value != default)])
 
 
 @dataclass(frozen=True)
@@ -97,6 +106,28 @@ class LoadedTarget:
             f"unknown interpolator {options.interpolator!r}",
             mend=f"{', '.join(known[:-1])} or {known[-1]}",
         )
+
+    def twin(self, choices: Sequence[str] = ()) -> Twin:
+        """The virtual controller of this machine, with `key=value` of what its sources leave open.
+        MachineError where there is none, OptionError, which lists what can be chosen, for a choice
+        that there is not."""
+        if isinstance(self.machine.controller, PathController):
+            raise MachineError(
+                "a virtual controller needs the model of the real one",
+                where="table [controller], key model",
+                mend=f'leave model = "path" out: its own is {self.target.name}',
+            )
+        record = self.target.twin_choices()
+        given = dict(choice.partition("=")[::2] for choice in choices)
+        try:
+            chosen = msgspec.convert(given, record, strict=False)
+        except msgspec.ValidationError as error:
+            known = "; ".join(f"{name}={value}" for name, value in choices_of(record))
+            raise OptionError(
+                f"{', '.join(choices)}: {error}",
+                mend=f"there are (the first is ours): {known}" if known else "there is no choice",
+            ) from None
+        return self.target.twin(self.machine, chosen)
 
     def with_settings(self, settings: Sequence[str]) -> LoadedTarget:
         """The target with further `key.key=value` settings; MachineError names a wrong one."""

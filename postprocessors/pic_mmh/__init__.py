@@ -8,16 +8,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, get_args
 
+import msgspec
+
 from camtool.target.contract import Target
 
 from .dialect import Dialect, Interpolator, PicMmhController, PicMmhMachine
 
 if TYPE_CHECKING:
-    from camtool.machine.model import Axis
+    from camtool.machine.model import Axis, Machine
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
 
     from .controller import PicMmhModel
+    from .twin import Choices, PicMmhTwin
 
 
 class PicMmh(Target):
@@ -61,6 +64,22 @@ class PicMmh(Target):
 
         *blocks, _ = data.decode("ascii").split(";")
         return Listing(tuple(block.strip(BLANKS) + ";" for block in blocks))
+
+    def twin_choices(self) -> type[Choices]:
+        """What its thesis leaves open of the wire."""
+        from .twin import Choices
+
+        return Choices
+
+    def twin(
+        self,
+        machine: Machine[PicMmhController, Dialect],
+        choices: msgspec.Struct | None = None,
+    ) -> PicMmhTwin:
+        """The virtual controller; docs/wires/pic-mmh.md."""
+        from .twin import Choices, PicMmhTwin
+
+        return PicMmhTwin(machine, choices if isinstance(choices, Choices) else Choices())
 
 
 POST = PicMmh()

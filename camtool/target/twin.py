@@ -1,0 +1,269 @@
+"""A virtual controller: a machine at the other end of a wire, without input and output of its own.
+
+A `Twin` is a value with a clock that its caller moves. Bytes come in and go out with the time at
+which they do; nothing waits, opens ports or reads a clock, so that thousands of runs can be tested
+in memory and `camtool twin` is a thin host around it.
+
+    out = twin.connected(0.0)
+    out += twin.receive(b"G0X1\\n", 0.1)
+    while (at := twin.next_s()) is not None:
+        out += twin.advance(at)
+
+Time is in seconds of the machine and never goes back. What the machine executed stands in
+`decoded`, what its slides did in `slides.trace`, both comparable with what its target reads and
+simulates; `moves` says whether anything moves now.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Final
+
+import numpy as np
+
+from camtool.arrays import Floats, Ints
+from camtool.machine.model import Machine
+from camtool.simulation.mechanics import Mechanics
+from camtool.simulation.motion import ALL, Chunk, Effects, Options
+
+COMMANDED: Final = Options(effects=Effects(False, False, False, False, False))
+"""A model run with this says what the controller commands; the mechanics are those of `Slides`,
+which outlive a block."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """What the slides did, K outputs in order: `time_s` (K,), the index (K,) in `Twin.decoded` of
+    the block that asked for it (−1: a command), the position (K, 3) mm that the controller
+    commanded and that of the slides (K, 3) mm, both in the work frame of when the power came
+    on."""
+
+    time_s: Floats
+    block: Ints
+    commanded: Floats
+    slide: Floats
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+
+@dataclass(frozen=True, eq=False)
+class Travel:
+    """Outputs to come, K positions (K, 3) mm in order: `seconds` (K,), ascending, from its
+    begin until each; `added_s` (K,), what one step of compensation in front of it would take;
+    `total_s` with what is waited behind the last; `left_at` (3,): where the controller then takes
+    itself to stand, where that is not the last of them."""
+
+    commanded: Floats
+    seconds: Floats
+    added_s: Floats
+    total_s: float
+    left_at: Floats | None = None
+
+    def __len__(self) -> int:
+        return len(self.seconds)
+
+    def moved(self, by_mm: Floats) -> Travel:
+        """The same elsewhere; `by_mm` (3,)."""
+        left_at = None if self.left_at is None else self.left_at + by_mm
+        return replace(self, commanded=self.commanded + by_mm, left_at=left_at)
+
+
+def travel_of(chunks: Iterable[Chunk], *, by_passes: bool = False) -> Travel:
+    """The motion of a model that was run with `COMMANDED`. The outputs of a row are evenly spread
+    over its time, and a step of compensation takes as long as an output, or as a pass of the
+    interpolator (`by_passes`)."""
+    commanded, seconds, added, begin = [np.empty((0, 3))], [np.empty(0)], [np.empty(0)], 0.0
+    for chunk in chunks:
+        ledger = chunk.ledger
+        ends = begin + np.cumsum(ledger.duration_s)
+        at = np.searchsorted(ledger.row, chunk.row)
+        first = np.searchsorted(chunk.row, ledger.row)
+        count = np.bincount(at, minlength=len(ledger.row))
+        share = (np.arange(len(chunk.row)) - first[at] + 1) / count[at]
+        passes = np.maximum(ledger.iterations if by_passes else count, 1)
+        commanded.append(chunk.commanded)
+        seconds.append(ends[at] - ledger.duration_s[at] * (1.0 - share))
+        added.append((ledger.duration_s / passes)[at])
+        begin = float(ends[-1]) if len(ends) else begin
+    return Travel(np.concatenate(commanded), np.concatenate(seconds), np.concatenate(added), begin)
+
+
+class Slides:
+    """The slides of a machine: what they are to do next, and what they have done."""
+
+    def __init__(self, machine: Machine[Any, Any], start_mm: Floats | None = None) -> None:
+        self.commanded_mm: Floats = np.zeros(3) if start_mm is None else start_mm
+        """(3,) where the controller believes them to be."""
+        self.ends_s: float | None = None
+        """When the travel that is under way will be over; None: nothing is."""
+        self._mechanics = Mechanics(machine, self.commanded_mm, ALL)
+        self._step_mm = np.array([axis.coded_step_mm for axis in machine.axes])
+        self._travel = Travel(np.empty((0, 3)), np.empty(0), np.empty(0), 0.0)
+        self._times: Floats = np.empty(0)
+        self._slide: Floats = np.empty((0, 3))
+        self._before = self._mechanics.states.copy()
+        self._added: Ints = np.empty((0, 3), dtype=np.int64)
+        self._block, self._done = -1, 0
+        self._pieces: list[Trace] = []
+
+    def begin(self, travel: Travel, now: float, block: int) -> None:
+        """Set out on a travel, which is that of the block of this index; whatever was under way is
+        left. Compensation steps at reversals delay what follows them."""
+        self.stop(now)
+        self._before = self._mechanics.states.copy()
+        count = len(travel)
+        slide, reversals = self._mechanics.follow(travel.commanded, np.arange(count + 1))
+        steps = reversals @ self._mechanics.compensation_steps
+        late = np.cumsum(steps * travel.added_s)
+        self._travel, self._slide = travel, slide
+        self._times = now + travel.seconds + late
+        self._block, self._done = block, 0
+        self._added = reversals * self._mechanics.compensation_steps
+        self.ends_s = now + travel.total_s + (float(late[-1]) if count else 0.0)
+
+    def next_s(self) -> float | None:
+        """When the next output is due, or the end; None where nothing is under way."""
+        if self.ends_s is None:
+            return None
+        left = self._times[self._done : self._done + 1]
+        return float(left[0]) if len(left) else self.ends_s
+
+    def until(self, now: float) -> tuple[Ints, Ints]:
+        """Do what is due. The steps (K, 3) of the axes in the outputs since the last call, and
+        those of compensation (K, 3) in front of them."""
+        low = self._done
+        high = int(np.searchsorted(self._times, now, side="right"))
+        high = max(high, low) if self.ends_s is not None else low
+        before = self.commanded_mm
+        made = self._travel.commanded[low:high]
+        if high > low:
+            self._done, self.commanded_mm = high, made[-1]
+            owner = np.full(high - low, self._block, dtype=np.int64)
+            self._pieces.append(Trace(self._times[low:high], owner, made, self._slide[low:high]))
+        if self.ends_s is not None and now >= self.ends_s:
+            self.ends_s = None
+            if self._travel.left_at is not None:
+                self.place(self._travel.left_at)
+        way = np.diff(made, axis=0, prepend=before[None, :]) / self._step_mm
+        return np.rint(way).astype(np.int64), self._added[low:high]
+
+    def stop(self, now: float) -> None:
+        """Stop where the slides are now; the rest of the travel is never done."""
+        self.until(now)
+        if self.ends_s is not None:
+            self._mechanics.states[:] = self._before
+            made = self._travel.commanded[: self._done]
+            self._mechanics.follow(made, np.array([0, len(made)]))
+        self.ends_s = None
+
+    def place(self, position_mm: Floats) -> None:
+        """The controller takes this (3,) mm for where it stands; nothing moves."""
+        self.commanded_mm = np.array(position_mm, dtype=np.float64)
+        self._mechanics.place(self.commanded_mm)
+
+    def compensate(self, axis: int, added_mm: float) -> None:
+        """From now on the controller adds so much at each reversal of an axis, in whole steps."""
+        steps = round(added_mm / self._step_mm[axis])
+        self._mechanics.compensation_steps[axis] = steps
+        self._mechanics.axes[axis, 3] = steps * self._step_mm[axis]
+
+    @property
+    def trace(self) -> Trace:
+        """All that they have done, or since `drained`."""
+        if len(self._pieces) != 1:
+            self._pieces = [_joined(self._pieces)]
+        return self._pieces[0]
+
+    def drained(self) -> Trace:
+        """What they have done since the last call, which they then forget."""
+        trace, self._pieces = self.trace, []
+        return trace
+
+
+def _joined(pieces: Sequence[Trace]) -> Trace:
+    empty = Trace(np.empty(0), np.empty(0, dtype=np.int64), np.empty((0, 3)), np.empty((0, 3)))
+    pieces = [empty, *pieces]
+    return Trace(
+        np.concatenate([piece.time_s for piece in pieces]),
+        np.concatenate([piece.block for piece in pieces]),
+        np.concatenate([piece.commanded for piece in pieces]),
+        np.concatenate([piece.slide for piece in pieces]),
+    )
+
+
+class Twin(ABC):
+    """A virtual controller. A target's own overrides `_take`, what it does with a byte, and where
+    it does more by itself than move: `_turn_s`, when that is, and `_due`, what."""
+
+    wire: ClassVar[str]
+    """The line as its terminal programs are told it, such as "115200 8N1"."""
+    byte_s: ClassVar[float] = 0.0
+    """What a byte takes on the line, s; 0 where that is not known."""
+
+    def __init__(self, slides: Slides) -> None:
+        self.slides = slides
+        self.decoded: list[bytes] = []
+        """The blocks of programs that the controller has accepted, in order, as it has them."""
+        self.commands: list[bytes] = []
+        """What else it was told and has accepted: jogging, settings."""
+        self.now = 0.0
+        """The time up to which it has run, s."""
+        self._out = bytearray()
+
+    def connected(self, now: float) -> bytes:
+        """Somebody opens the line; what the controller says to that."""
+        return self.advance(now)
+
+    def receive(self, data: bytes, now: float) -> bytes:
+        """Bytes come in; what the controller has sent until then and at once."""
+        self._run(now)
+        for octet in data:
+            self._take(octet)
+            self._run(now)
+        return self._sent()
+
+    def advance(self, now: float) -> bytes:
+        """Let time pass; what the controller sends meanwhile."""
+        self._run(now)
+        return self._sent()
+
+    def next_s(self) -> float | None:
+        """When it does something next if nothing comes in, each output counted; None: never."""
+        times = [at for at in (self._turn_s(), self.slides.next_s()) if at is not None]
+        return min(times, default=None)
+
+    @property
+    def moves(self) -> bool:
+        """Whether slides move now, or a dwell runs."""
+        return self.slides.ends_s is not None
+
+    @abstractmethod
+    def _take(self, octet: int) -> None:
+        """A byte has come in at `self.now`."""
+
+    def _turn_s(self) -> float | None:
+        """When it does something by itself, besides the outputs of a travel; None: never."""
+        return self.slides.ends_s
+
+    def _due(self) -> None:  # noqa: B027 - not all do more than move
+        """It is `self.now`, which `_turn_s` had said."""
+
+    def _pass(self) -> None:
+        """Outputs became due meanwhile."""
+        self.slides.until(self.now)
+
+    def _run(self, now: float) -> None:
+        while (at := self._turn_s()) is not None and at <= now:
+            self.now = max(at, self.now)
+            self._pass()
+            self._due()
+        self.now = max(now, self.now)
+        self._pass()
+
+    def _sent(self) -> bytes:
+        sent = bytes(self._out)
+        self._out.clear()
+        return sent
