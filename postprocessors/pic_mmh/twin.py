@@ -38,6 +38,7 @@ JOYSTICK_STEPS: Final = 1 << 12
 """So many steps of the joystick are made at a time."""
 
 END: Final = ord(";")
+"""The character that ends a string (L1742-1744)."""
 
 STEPS: Final = re.compile(rb"P([XYZ])([+-])(\d{4})")
 RATE: Final = re.compile(rb"F([XYZ])([+-])(\d{3})")
