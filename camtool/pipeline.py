@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
-from pathlib import PurePath
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, TypeVar
 
 import msgspec
@@ -392,11 +392,20 @@ def read_program(data: bytes, target: LoadedTarget, *, source: str) -> Run:
 
 def _decoded(data: bytes, target: LoadedTarget, file: str) -> Toolpath:
     try:
-        toolpath = target.target.read(data, target.machine)
+        toolpath = target.target.read_in(data, target.machine, _folder_of(file))
     except ProgramError as error:
         error.file = error.file or file
         raise
     return toolpath
+
+
+def _folder_of(file: str) -> Path | None:
+    """The folder of a program, None where it came from elsewhere than a file."""
+    path = Path(file)
+    try:
+        return path.parent if path.is_file() else None
+    except (OSError, ValueError):
+        return None
 
 
 def _written(

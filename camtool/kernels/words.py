@@ -101,8 +101,8 @@ FACT_COLUMNS = 6
 MOST_DIGITS, MOST_EXACT_DIGITS = 22, 15
 """Digits of a number, and of these without zeros in front; longer ones are not plain."""
 
-_CR, _LF, _TAB, _OPEN, _CLOSE, _SEMICOLON = 13, 10, 9, 40, 41, 59
-_BIG_M, _BIG_N, _SMALL_M, _SMALL_A, _SMALL_Z = 77, 78, 109, 97, 122
+_CR, _LF, _OPEN, _CLOSE, _COMMA, _SEMICOLON = 13, 10, 40, 41, 44, 59
+_BIG_N, _SMALL_A, _SMALL_Z = 78, 97, 122
 
 
 def _column_of(sign: int) -> int:
@@ -146,19 +146,17 @@ def _number(data: Octets, at: int, end: int, numbers: Floats, column: int) -> in
 
 
 def _is_comment(data: Octets, at: int, end: int, parentheses: bool, semicolon: bool) -> bool:
-    """Whether a line that begins so is a comment alone, and not one that begins with an M: that
-    may be a message."""
+    """Whether a line that begins so is a comment alone, and not one in parentheses with a comma:
+    that may be obeyed, or shown to the operator."""
     first = data[at]
-    if not ((first == _OPEN and parentheses) or (first == _SEMICOLON and semicolon)):
+    if first == _SEMICOLON:
+        return semicolon
+    if first != _OPEN or not parentheses:
         return False
     at += 1
-    while at < end and (data[at] == _BLANK or data[at] == _TAB):
-        at += 1
-    if at < end and (data[at] == _BIG_M or data[at] == _SMALL_M):
-        return False
-    if first == _SEMICOLON:
-        return True
     while at < end and data[at] != _OPEN and data[at] != _CLOSE:
+        if data[at] == _COMMA:
+            return False
         at += 1
     if at == end or data[at] == _OPEN:
         return False

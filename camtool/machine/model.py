@@ -348,7 +348,8 @@ def _given(record: msgspec.Struct) -> dict[str, Any]:
         given[config.tag_field] = config.tag
     for field in msgspec.structs.fields(record):
         value = getattr(record, field.name)
-        if value != field.default:
+        made = field.default_factory
+        if value != (field.default if made is msgspec.NODEFAULT else made()):
             given[field.encode_name] = (
                 _given(value) if isinstance(value, msgspec.Struct) else value
             )

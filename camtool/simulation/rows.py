@@ -75,6 +75,9 @@ def refuse(toolpath: Toolpath, bad: npt.ArrayLike, message: str, mend: str = "")
 
 
 def block_of(toolpath: Toolpath, row: int) -> str:
-    """The block (from 1) from which a row was read, or the row where none was read."""
-    block = int(toolpath.block[row])
-    return f"block {block + 1}" if block >= 0 else f"move {row}"
+    """The block (from 1) from which a row was read, and what called it; the row where none was
+    read."""
+    block, called = int(toolpath.block[row]), toolpath.text(row)
+    if block < 0:
+        return f"move {row}"
+    return f"block {block + 1} ({called})" if called else f"block {block + 1}"

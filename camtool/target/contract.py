@@ -23,6 +23,8 @@ from camtool.findings import TargetCode
 from camtool.machine.model import Axis, Machine, SlideStart
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from camtool.simulation.controller import ControllerModel
     from camtool.target.twin import Twin
     from camtool.toolpath.moves import Toolpath
@@ -86,6 +88,11 @@ class Target(ABC):
     @abstractmethod
     def read(self, data: bytes, machine: Machine[Any, Any]) -> Toolpath:
         """The moves as the controller decodes them; ProgramError, which names block and column."""
+
+    def read_in(self, data: bytes, machine: Machine[Any, Any], folder: Path | None) -> Toolpath:
+        """The same for a program whose file lies in a folder (None: it has none), where the
+        controller looks for others that it calls."""
+        return self.read(data, machine)
 
     def check(self, machine: Machine[Any, Any]) -> None:  # noqa: B027 - most need not
         """MachineError for values of a machine that contradict each other."""

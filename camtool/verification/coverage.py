@@ -34,6 +34,7 @@ from camtool.findings import (
 from camtool.geometry.boxes import near_points
 from camtool.geometry.measure import point_at, segment_boxes, segment_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
+from camtool.simulation.rows import block_of
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.rapids import STOCK_TOP_MM
 from camtool.verification.cuts import (
@@ -612,8 +613,7 @@ def at_point(point: Floats | tuple[float, float]) -> str:
 
 def block_name(toolpath: Toolpath, row: int) -> str:
     """`block 12` (from 1, as people count), or `move 12` when no program was read."""
-    block = int(toolpath.block[row])
-    return f"block {block + 1}" if block >= 0 else f"move {row + 1}"
+    return block_of(toolpath, row) if toolpath.block[row] >= 0 else f"move {row + 1}"
 
 
 Item = TypeVar("Item")

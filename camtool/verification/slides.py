@@ -23,6 +23,7 @@ from camtool.geometry.polylines import Segments
 from camtool.progress import Progress
 from camtool.simulation.controller import FusedRun
 from camtool.simulation.motion import Chunk
+from camtool.simulation.rows import block_of
 from camtool.toolpath.moves import Toolpath
 from camtool.verification.circles import (
     UNSEEN,
@@ -125,10 +126,9 @@ class SlidePass:
                 raise self._lost(int(chunk.row[low + lost]))
 
     def _lost(self, row: int) -> ProgramError:
-        block = int(self._cuts.toolpath.block[row])
         return ProgramError(
             "the slides would leave every machine",
-            where=f"move {row}" if block < 0 else f"block {block + 1}",
+            where=block_of(self._cuts.toolpath, row),
             mend="check its numbers, and the coded and real steps of the axes",
         )
 

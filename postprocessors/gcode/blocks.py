@@ -389,9 +389,10 @@ def listing(data: bytes) -> Listing:
     """The blocks of a program that its reader takes, each as its line stands in the file: the
     lines with a word besides their number."""
     lines = (line.decode("latin-1") for line in _LINE_END.split(data))
-    return Listing(tuple(line.strip() for line in lines if _has_words(line)))
+    return Listing(tuple(line.strip() for line in lines if has_words(line)))
 
 
-def _has_words(line: str) -> bool:
+def has_words(line: str) -> bool:
+    """Whether a line is a block."""
     words = _NO_WORDS.sub("", line)
     return bool(_BLOCK_NUMBER.sub("", words, count=1) if words[:1] in "Nn" else words)

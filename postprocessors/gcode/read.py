@@ -18,21 +18,20 @@ from typing import Final
 import numpy as np
 
 from camtool import bounds
-from camtool.arrays import Bools, Floats
 from camtool.findings import Finding
 from camtool.kernels import words
-from camtool.machine.model import Machine, exceeds
+from camtool.machine.model import Machine
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, PathMode, Toolpath
 
-from .blocks import SURE_PART, Block, PlainBlocks, filled
+from .blocks import Block, PlainBlocks
 from .findings import (
-    FEED_ABOVE_LIMIT_IN_WORDS,
     NEVER_READ,
     SPINDLE_SPEED_NOT_SAID,
     WORDS_PASSED_OVER_COOLANT,
     WORDS_PASSED_OVER_PAUSE,
 )
+from .plain_moves import KINDS, ArcRule, FastFeeds, PlainMoves, PlainState
 
 Point = tuple[float, float]
 
@@ -160,6 +159,13 @@ class Rules:
     tools: str = "none"
     most_tool: int = 99_999
 
+    @property
+    def arc_rule(self) -> ArcRule:
+        """Which arcs of plain blocks are surely taken."""
+        return ArcRule(
+            self.sure_gap_mm, self.sure_radius_mm, self.full_turn_rad, self.ends_in_plane
+        )
+
 
 class ModalReader:
     """Blocks in, rows out; knows the modes, the tool's position and whether the program ended."""
@@ -179,7 +185,7 @@ class ModalReader:
         self._frame: int = G.FIRST_FRAME
         self._moved = False
         self._codes: dict[tuple[str, str], int] = {}
-        self._findings = ReadFindings(machine.max_feed_mm_min)
+        self._findings = ReadFindings(FastFeeds(machine.max_feed_mm_min))
         self._machine = MachineWords(
             self.path, rules, self._findings, cools=bool(machine.coolant.kinds)
         )
@@ -219,11 +225,11 @@ class ModalReader:
         surely does, from any state: `block` decodes that one. How many were decoded."""
         if self._machine.ended or not self._absolute or self._absolute_centres:
             return 0
-        moves = PlainMoves(plain, self._state(), self._rules)
+        moves = PlainMoves(plain, self._state(), self._rules.arc_rule)
         count = moves.count
         rows = moves.moving[:count]
         given, feeds = plain.has(words.F_WORD), moves.feed[:count]
-        self._findings.note_feeds(plain.first, np.where(given[:count], feeds, np.nan))
+        self._findings.fast.note(plain.first, np.where(given[:count], feeds, np.nan))
         if count:
             self.empty = False
             last = int(moves.motion[count - 1])
@@ -351,7 +357,7 @@ class ModalReader:
     def _set_feed(self, block: Block, feed: float) -> None:
         if feed <= 0.0:
             block.fail_at("F", "a feed that is not above 0")
-        self._findings.note_feeds(block.index, np.array([feed]))
+        self._findings.fast.note(block.index, np.array([feed]))
         self._feed = feed
 
     def _dwell(self, block: Block, numbers: dict[str, float]) -> None:
@@ -547,83 +553,6 @@ class ModalReader:
         return numbers.pop("I") * self._mm, numbers.pop("J") * self._mm
 
 
-# Plain blocks by columns.
-
-
-KINDS: Final = np.full(G.ARC_CCW + 1, -1)
-"""The kind of a move, by its G word tenfold."""
-KINDS[[0, 10, 20, 30]] = [Kind.RAPID, Kind.LINE, Kind.ARC_CW, Kind.ARC_CCW]
-
-
-@dataclass(frozen=True)
-class PlainState:
-    """What is in force before plain blocks: the motion (a G word tenfold, −1: none), the feed
-    (0: none), mm of a unit, and where the tool stands."""
-
-    motion: int
-    feed: float
-    mm: float
-    position: tuple[float, float, float]
-
-
-class PlainMoves:
-    """N plain blocks with absolute coordinates: for each the motion in force, the feed in force
-    (N,) mm/min, where the tool stands behind it (N, 3) mm, the centre of an arc (N, 2) mm, and
-    whether it moves. `count`: so many, from the first on, are surely what `ModalReader.block`
-    would make of them too; the others are not to be used."""
-
-    def __init__(self, plain: PlainBlocks, state: PlainState, rules: Rules) -> None:
-        has_g, has_feed = plain.has(words.G_WORD), plain.has(words.F_WORD)
-        has = [plain.has(column) for column in (words.X_WORD, words.Y_WORD, words.Z_WORD)]
-        has_i, has_j = plain.has(words.I_WORD), plain.has(words.J_WORD)
-        numbers = plain.numbers
-        self.motion = filled(
-            has_g, np.where(has_g, numbers[:, words.G_WORD] * 10.0, 0.0), state.motion
-        ).astype(np.int64)
-        self.feed = filled(has_feed, numbers[:, words.F_WORD] * state.mm, state.feed)
-        self.end = np.column_stack(
-            [
-                filled(has[axis], numbers[:, words.X_WORD + axis] * state.mm, state.position[axis])
-                for axis in range(3)
-            ]
-        )
-        start = np.concatenate([[state.position], self.end[:-1]])
-        self.moving = has[0] | has[1] | has[2]
-        centred = has_i | has_j
-        offset = np.column_stack(
-            [
-                np.where(has_i, numbers[:, words.I_WORD] * state.mm, 0.0),
-                np.where(has_j, numbers[:, words.J_WORD] * state.mm, 0.0),
-            ]
-        )
-        self.centre = start[:, :2] + offset
-        arc = self.motion > G.LINE
-        sure = ~(has_feed & ~(self.feed > 0.0))
-        sure &= self.moving | ~centred
-        sure &= ~self.moving | (self.motion >= 0)
-        sure &= ~(has_g | self.moving) | (self.motion == G.RAPID) | (self.feed > 0.0)
-        sure &= ~(has_g & arc) | self.moving
-        sure &= ~self.moving | (arc == centred)
-        arcs = np.flatnonzero(arc & self.moving & sure)
-        if rules.ends_in_plane:
-            sure[arcs] &= (has[0] | has[1])[arcs]
-        sure[arcs] &= sure_arcs(start[arcs, :2], self.end[arcs, :2], self.centre[arcs], rules)
-        self.count = len(sure) if sure.all() else int(sure.argmin())
-
-
-def sure_arcs(start: Floats, end: Floats, centre: Floats, rules: Rules) -> Bools:
-    """(K,) which arcs surely have one radius, and turn by more than what is taken for a full
-    circle or end where they start."""
-    out, back = start - centre, end - centre
-    r1, r2 = np.hypot(out[:, 0], out[:, 1]), np.hypot(back[:, 0], back[:, 1])
-    cross = out[:, 0] * back[:, 1] - out[:, 1] * back[:, 0]
-    turn = np.abs(np.arctan2(cross, (out * back).sum(axis=1)))
-    same = (start == end).all(axis=1)
-    sure = np.abs(r1 - r2) <= SURE_PART * rules.sure_gap_mm
-    sure &= SURE_PART * np.minimum(r1, r2) > rules.sure_radius_mm
-    return np.asarray(sure & (same | (SURE_PART * turn > rules.full_turn_rad)))
-
-
 SPINDLE: Final = {
     M.SPINDLE_CW: Kind.SPINDLE_CW,
     M.SPINDLE_CCW: Kind.SPINDLE_CCW,
@@ -747,35 +676,18 @@ def turn_of(start: Point, end: Point, centre: Point) -> float:
 
 @dataclass
 class ReadFindings:
-    """Blocks (index from 0) of one run of a reader; `fast`: how many have a feed above the limit,
-    the first of them, and the highest feed, mm/min."""
+    """Blocks (index from 0) of one run of a reader; `fast`: those with a feed above the limit."""
 
-    max_feed_mm_min: float
-    fast: tuple[int, int, float] = (0, 0, 0.0)
+    fast: FastFeeds
     coolant: list[int] = field(default_factory=list)
     pauses: list[int] = field(default_factory=list)
     speedless: list[int] = field(default_factory=list)
     behind_end: tuple[int, int] | None = None
     """How many lines stand behind the end, and the first of them (from 1)."""
 
-    def note_feeds(self, first: int, feeds: Floats) -> None:
-        """The feeds (K,) that blocks from this one on give, NaN where they give none."""
-        fast = np.flatnonzero(exceeds(feeds, self.max_feed_mm_min))
-        if len(fast):
-            count, begin, most = self.fast
-            begin = begin if count else first + int(fast[0])
-            self.fast = count + len(fast), begin, max(most, float(feeds[fast].max()))
-
     def findings(self) -> Iterator[Finding]:
         """One finding of each kind."""
-        count, first, most = self.fast
-        if count:
-            yield FEED_ABOVE_LIMIT_IN_WORDS(
-                where=f"block {first + 1}",
-                measured=most,
-                limit=self.max_feed_mm_min,
-                count=count,
-            )
+        yield from self.fast.findings()
         if self.speedless:
             yield SPINDLE_SPEED_NOT_SAID(where=f"block {self.speedless[0] + 1}")
         if self.behind_end:

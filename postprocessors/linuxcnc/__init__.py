@@ -10,8 +10,11 @@ from camtool.target.contract import Setting, Target
 
 from ..gcode.dialect import check_blocks, feed_decimals, last_decimal_mm
 from .dialect import Dialect, LinuxcncController, LinuxcncMachine
+from .findings import CODES
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from camtool.machine.model import Axis
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
@@ -30,6 +33,7 @@ class Linuxcnc(Target):
     any_machine = True
     settings_listing = "its INI file"
     filter_default = True
+    codes = CODES
 
     def check(self, machine: LinuxcncMachine) -> None:
         """Raise MachineError where values of the dialect do not go with the machine."""
@@ -45,9 +49,13 @@ class Linuxcnc(Target):
 
     def read(self, data: bytes, machine: LinuxcncMachine) -> Toolpath:
         """The moves as the controller decodes them; ProgramError with block, line and column."""
+        return self.read_in(data, machine, None)
+
+    def read_in(self, data: bytes, machine: LinuxcncMachine, folder: Path | None) -> Toolpath:
+        """The same, with subs from files in a folder."""
         from .read import read_program
 
-        return read_program(data, machine)
+        return read_program(data, machine, folder)
 
     def model(self) -> LinuxcncModel:
         """The model of its controller."""

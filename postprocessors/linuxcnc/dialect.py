@@ -4,12 +4,39 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
+import msgspec
 from msgspec import Meta
 
 from camtool.machine.model import Machine, SlideStart
-from camtool.machine.ranges import Tolerance
+from camtool.machine.ranges import Place, Tolerance
 
 from ..gcode.dialect import GcodeDialect
+
+Frame = Literal["G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3"]
+
+
+Home = Literal["G28", "G30"]
+
+WorkOffset = Annotated[tuple[Place, ...], Meta(min_length=3, max_length=4)]
+
+
+ToolNumber = Annotated[str, Meta(pattern=r"^[0-9]{1,5}$")]
+
+
+class Tool(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A line of the tool table, in mm: its offsets (`length_mm` along Z), its diameter (None: not
+    known), and the orientation of a lathe tool."""
+
+    length_mm: Place = 0.0
+    x_mm: Place = 0.0
+    y_mm: Place = 0.0
+    diameter_mm: Annotated[float, Meta(ge=-1000.0, le=1000.0)] | None = None
+    orientation: Annotated[int, Meta(ge=0, le=9)] = 0
+
+    @property
+    def offset_mm(self) -> tuple[float, float, float]:
+        """How far its tip lies from the point that carries it."""
+        return self.x_mm, self.y_mm, self.length_mm
 
 
 class Dialect(GcodeDialect, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -17,7 +44,14 @@ class Dialect(GcodeDialect, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     where that is possible ("exact-path": G61), or met with a stop ("exact-stop": G61.1).
     `percent`: a line of % before and after the program. `tool_change`: by "m6", or a second tool
     is refused ("refuse"); `tool_lengths`: each change takes the length of its tool from the tool
-    table (G43 H). `canned_cycles`: holes are drilled by G81, G82 and G83."""
+    table (G43 H). `canned_cycles`: holes are drilled by G81, G82 and G83.
+
+    What programs that are read may ask of the machine: `tools`, its tool table by number (empty:
+    any tool, of which nothing is known); `work_offsets_mm`: where G54 to G59.3 have their zero on
+    the machine, X, Y, Z and the rotation in degrees, if any; `homes_mm`: where G28 and G30 go;
+    `linear_units` of parameters such as #5221: LINEAR_UNITS of its INI file; `block_delete`: lines
+    that begin with / are left out. `most_lines`: so many lines a program may execute that are read
+    one by one."""
 
     path: Literal["blend", "exact-path", "exact-stop"] = "blend"
     blend_tolerance_mm: Tolerance = 0.01
@@ -25,6 +59,12 @@ class Dialect(GcodeDialect, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     tool_change: Literal["m6", "refuse"] = "m6"
     tool_lengths: bool = False
     canned_cycles: bool = False
+    tools: dict[ToolNumber, Tool] = msgspec.field(default_factory=dict)
+    work_offsets_mm: dict[Frame, WorkOffset] = msgspec.field(default_factory=dict)
+    homes_mm: dict[Home, tuple[Place, Place, Place]] = msgspec.field(default_factory=dict)
+    linear_units: Literal["mm", "in"] = "mm"
+    block_delete: bool = False
+    most_lines: Annotated[int, Meta(ge=1, le=100_000_000)] = 500_000
 
 
 class LinuxcncController(SlideStart, frozen=True, tag_field="model", tag="linuxcnc"):

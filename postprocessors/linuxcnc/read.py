@@ -1,162 +1,292 @@
-"""Reading LinuxCNC's plain programs: its words, its groups, its rule for arcs.
+"""Reading LinuxCNC's programs as its interpreter does.
 
-Parameters (#1), expressions ([…]), O words and everything else that computes cannot be read: run
-the program through LinuxCNC for that.
+    texts        the program's lines, and the files of the subs that it calls
+    flow         the order of lines: O words
+    lines        a line's words; expressions, parameters: the numbers in them
+    interpreter  what a block does: state, frames, moves; cycles, compensation, splines
+    canon        moves in the frame of the part
+
+Where hundreds of lines in a row are plain moves, they are read by columns, without any of these.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from pathlib import Path
 from typing import Final
 
+import numpy as np
+
+from camtool import bounds
 from camtool.errors import ProgramError
+from camtool.findings import Finding
+from camtool.kernels import words
+from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
 
-from ..gcode.blocks import Lexing, blocks_of
-from ..gcode.read import ModalReader, Rules
+from ..gcode.blocks import ROWS_AT_ONCE, PlainBlocks
+from ..gcode.findings import (
+    NEVER_READ,
+    SPINDLE_SPEED_NOT_SAID,
+    WORDS_PASSED_OVER_COOLANT,
+    WORDS_PASSED_OVER_PAUSE,
+)
+from ..gcode.plain_moves import KINDS, ArcRule, FastFeeds, PlainMoves, PlainState
 from .dialect import Dialect, LinuxcncMachine
+from .faults import Fault
+from .findings import (
+    NOT_SIMULATED_AGAIN,
+    NOT_SIMULATED_AXES,
+    NOT_SIMULATED_CHORDS,
+    NOT_SIMULATED_DELETED,
+    NOT_SIMULATED_SPINDLE,
+    NOT_SIMULATED_TAP,
+    PLACE_UNKNOWN_FRAME,
+    PLACE_UNKNOWN_HOME,
+    VALUE_UNKNOWN_PARAMETER,
+    WORDS_PASSED_OVER_OUTPUT,
+)
+from .flow import EndOfFile, Flow
+from .interpreter import Interpreter
+from .lines import Line
+from .state import Notes
+from .texts import Folder, ProgramText
 
-GROUPS: Final = {
-    **dict.fromkeys((0, 10, 20, 30, 800, 810, 820, 830), "motion"),
-    80: "lathe diameter",
-    **dict.fromkeys((40, 530), "one block"),
-    170: "plane",
-    **dict.fromkeys((200, 210), "units"),
-    **dict.fromkeys((900, 910), "distance"),
-    **dict.fromkeys((901, 911), "arc distance"),
-    940: "feed mode",
-    400: "cutter radius",
-    **dict.fromkeys((430, 490), "tool length"),
-    **dict.fromkeys(range(540, 600, 10), "work frame"),
-    **dict.fromkeys((610, 611, 640), "path"),
-    970: "spindle mode",
-    **dict.fromkeys((980, 990), "return mode"),
-}
+FEWEST: Final = 24
+"""Fewer plain lines in a row than these are read one by one."""
 
-_FRAME: Final = "moves part zero by what only the controller knows"
-_COMPENSATES: Final = "compensates for a tool, which is not simulated"
-_CYCLE: Final = "is a cycle; write its moves"
-REFUSED: Final = {
-    **dict.fromkeys(("G10", "G52", "G92", "G92.1", "G92.2", "G92.3"), _FRAME),
-    **dict.fromkeys(("G59.1", "G59.2", "G59.3"), _FRAME),
-    **dict.fromkeys(("G28", "G30"), "goes to a place that only the controller remembers"),
-    **dict.fromkeys(("G28.1", "G30.1"), "remembers a place, which is not simulated"),
-    **dict.fromkeys(("G17.1", "G18", "G18.1", "G19", "G19.1"), "is another plane than XY"),
-    **dict.fromkeys(("G33", "G33.1", "G95", "G96"), "follows the spindle, not simulated"),
-    **dict.fromkeys(("G38.2", "G38.3", "G38.4", "G38.5"), "probes, which cannot be simulated"),
-    **dict.fromkeys(("G41", "G41.1", "G42", "G42.1", "G43.1", "G43.2"), _COMPENSATES),
-    **dict.fromkeys(("G73", "G76", "G84", "G85", "G86", "G89"), _CYCLE),
-    **dict.fromkeys(("G5", "G5.1", "G5.2", "G5.3"), "is a spline; write it as arcs"),
-    "G7": "counts X as a diameter, as lathes do",
-    "G93": "says feeds as inverse time, which is not read",
-}
+LONGEST_WAIT: Final = 256
+"""Where no lines are plain, it is asked again after so many of them at most."""
+
+BRANCHES: Final = re.compile(rb"(?im)^[ \t]*/?[ \t]*(?:n[\d. \t]*)?(?:o|m[ \t]*9[ \t]*[89])")
+"""A line that may send the reading elsewhere."""
 
 
-PECKED_MM: Final = 0.254
-"""Between two pecks of G83 the drill comes back to this above where it was (0.010 inch)."""
-
-LINE_END: Final = re.compile(rb"\r\n|\n|\r")
-
-FRAME: Final = re.compile(rb"\s*%[ \t\v\f]*(?=[\r\n]|\Z)")
-"""All up to a lone % on the first line that is not blank."""
-
-FRAME_END: Final = re.compile(rb"[\r\n][ \t\v\f]*%[ \t\v\f]*(?=[\r\n]|\Z)")
-"""A line of a lone %, and the end of the line before it."""
-
-SAYS_SOMETHING: Final = re.compile(rb"\s*[^\s%(;]")
-"""A line that is not blank, a % or a comment."""
+def read_program(data: bytes, machine: LinuxcncMachine, folder: Path | None = None) -> Toolpath:
+    """The moves of a program, whose subs lie in `folder`; ProgramError with block, line, column,
+    and the call that led there."""
+    count = data.count(b"\n")
+    bounds.check_count(count, "line")
+    return _Reader(data, machine, folder).read()
 
 
-def read_program(data: bytes, machine: LinuxcncMachine) -> Toolpath:
-    """The moves of a program; ProgramError with block, line and column."""
-    dialect = machine.dialect
-    lexing = Lexing(
-        letters="GMXYZIJKFSTPRLDHQABCUVW",
-        lower_case=True,
-        blanks="anywhere",
-        parentheses=True,
-        semicolon=True,
-        block_numbers=True,
-        line_chars=dialect.line_chars,
-        comment_lines=True,
-        foreign_comments=True,
-    )
-    reader = ModalReader(machine, rules_of(dialect))
-    body, framed = _unframed(data)
-    at, line = len(body), 0
-    for block in blocks_of(body, lexing, reader.take):
-        for text in block.comments:
-            if text.lstrip()[:4].upper() == "MSG,":
-                reader.message(text.lstrip()[4:].strip())
-        if block.words:
-            reader.block(block)
-        if reader.ended:
-            at, line = block.behind, block.line
-            break
-    if reader.empty and not framed:
-        raise ProgramError("the program is empty", mend="a program has blocks such as G0 X1")
-    if not (reader.ended or framed):
-        raise ProgramError(
-            "the file ends without an end of the program, which LinuxCNC reports as an error",
-            where=f"line {max(_lines_of(data), 1)}",
-            mend="end with M2, or put a line of % before and behind the program",
+class _Reader:
+    """One reading of one program."""
+
+    def __init__(self, data: bytes, machine: LinuxcncMachine, folder: Path | None) -> None:
+        dialect: Dialect = machine.dialect
+        self.path = ToolpathBuilder()
+        self.notes = Notes()
+        self._fast = FastFeeds(machine.max_feed_mm_min)
+        self.notes.feeds = lambda block, feed: self._fast.note(block, np.array([feed]))
+        self.machine = Interpreter(machine, self.path, self.notes)
+        self.text = ProgramText(data, "", dialect.line_chars)
+        self.flow = Flow(
+            self.text,
+            self.machine.given,
+            Folder(folder, dialect.line_chars),
+            dialect.most_lines,
+            dialect.block_delete,
+            restore=self._restore,
         )
-    if not reader.ended:
-        line = _lines_of(body)
-    behind = LINE_END.split(data[at:])
-    reader.unread([k for k, text in enumerate(behind, line + 1) if SAYS_SOMETHING.match(text)])
-    return reader.finish()
+        self.machine.calls = self.flow.calls
+        self.flow.keep = self._branches = BRANCHES.search(self.text.data) is not None
+        self._rule = ArcRule(
+            gap_mm=min(dialect.arc_difference_mm, dialect.arc_most_difference_mm),
+            radius_mm=dialect.arc_least_radius_mm,
+            full_turn_rad=dialect.arc_full_turn_rad,
+        )
+        self._rules = (dialect.line_chars, True, True, True, True)
+        self._octets = np.frombuffer(self.text.data, dtype=np.uint8)
+        self._numbers = np.zeros((0, 7))
+        self._facts = np.empty((0, words.FACT_COLUMNS), dtype=np.int64)
+        self._wait, self._waited = 1, 0
+        self._blocks = 0
+        """Blocks so far, of a program whose lines are read once and in order."""
+        self._empty = True
+
+    def read(self) -> Toolpath:
+        """The moves, with the findings."""
+        flow = self.flow
+        try:
+            self._begin()
+            while not self.machine.ended:
+                if self._plain():
+                    continue
+                line = flow.step()
+                if line is None:
+                    break
+                self._execute(line)
+        except Fault as fault:
+            if isinstance(fault, EndOfFile) and self._empty:
+                raise _nothing() from None
+            flow.fail(fault)
+        if self._empty and not flow.percent:
+            raise _nothing()
+        if flow.percent and not self.machine.ended:
+            self.machine.end_of_file()
+        return self.path.finish(self._findings())
+
+    def _begin(self) -> None:
+        """A % alone on the first line that is not blank: another one ends the program."""
+        for number in range(self.text.count):
+            text = self.text.raw(number).strip()
+            if text:
+                self.flow.percent = text == "%"
+                self.flow.at = number + 1 if self.flow.percent else 0
+                return
+
+    def _execute(self, line: Line) -> None:
+        machine, flow = self.machine, self.flow
+        if self._branches:
+            index = self.text.blocks_before(flow.block_line)
+        else:
+            index = self._blocks
+            self._blocks += line.is_block
+        self._empty = self._empty and not line.is_block
+        machine.block_index = self.path.block = index
+        if flow.level:
+            here = flow.here.text.name
+            self.path.source = f"{here}: {flow.caller}" if here else flow.caller
+        elif self.path.source:
+            self.path.source = ""
+        machine.execute(line.block(machine.given))
+
+    def _restore(self, saved: object) -> None:
+        from .modes import Modes, restore
+
+        assert isinstance(saved, Modes)
+        restore(self.machine, saved, self.machine.execute)
+
+    # By columns
+
+    def _plain(self) -> bool:
+        """Read plain lines from here on by columns; whether there were any."""
+        flow, machine = self.flow, self.machine
+        self._waited += 1
+        if self._waited < self._wait or flow.seeks or flow.here.text is not self.text:
+            return False
+        if flow.text is not self.text or flow.at >= self.text.count or not machine.plain:
+            return False
+        self._waited = 0
+        if not len(self._facts):
+            self._numbers = np.zeros((ROWS_AT_ONCE, 7))
+            self._facts = np.empty((ROWS_AT_ONCE, words.FACT_COLUMNS), dtype=np.int64)
+        begin = int(self.text.begins[flow.at])
+        rows, _, behind = words.plain_lines(
+            self._octets, begin, flow.at + 1, self._rules, self._numbers, self._facts
+        )
+        count = 0
+        if rows >= FEWEST:
+            if self._branches:
+                first = self.text.blocks_before(int(self._facts[0, words.LINE]) - 1)
+            else:
+                first = self._blocks
+            plain = PlainBlocks(self._numbers[:rows], self._facts[:rows], first)
+            count = self._take(plain)
+        self._wait = 1 if count else min(2 * self._wait, LONGEST_WAIT)
+        if not count:
+            return False
+        self._blocks += count
+        self._empty = False
+        flow.at = behind - 1 if count == rows else int(self._facts[count, words.LINE]) - 1
+        return True
+
+    def _take(self, plain: PlainBlocks) -> int:
+        """Rows of plain blocks, up to the first that is no move which LinuxCNC surely does."""
+        machine, path = self.machine, self.path
+        motion = -1 if machine.motion in (None, 800) else int(machine.motion or 0)
+        mm = machine.canon.mm
+        position = machine.canon.near(machine.canon.part(*machine.position))
+        state = PlainState(motion, machine.feed_mm, mm, position)
+        moves = PlainMoves(plain, state, self._rule)
+        count = moves.count
+        if not count:
+            return 0
+        rows = moves.moving[:count]
+        given, feeds = plain.has(words.F_WORD)[:count], moves.feed[:count]
+        self._fast.note(plain.first, np.where(given, feeds, np.nan))
+        path.source = self.flow.caller if self.flow.level else ""
+        if rows.any():
+            kind = moves.motion[:count][rows]
+            path.moves(
+                kind=KINDS[kind],
+                end=moves.end[:count][rows],
+                centre=np.where(kind[:, None] > 10, moves.centre[:count][rows], np.nan),
+                feed=np.where(kind >= 10, feeds[rows], np.nan),
+                block=plain.first + np.flatnonzero(rows),
+            )
+        last = int(moves.motion[count - 1])
+        machine.went_on(
+            last if last >= 0 else None, float(feeds[-1]), path.position, moved=bool(rows.any())
+        )
+        return count
+
+    # What is said of the program
+
+    def _behind_end(self) -> list[int]:
+        """Lines (from 1) behind the end, which no controller reads; where there are branches, the
+        end that was met need not be the last."""
+        if self._branches:
+            return []
+        behind = range(self.flow.at, self.text.count)
+        return [number + 1 for number in behind if _says(self._raw(number))]
+
+    def _raw(self, number: int) -> str:
+        try:
+            return self.text.raw(number)
+        except Fault:
+            return "longer than a line may be"
+
+    def _findings(self) -> Iterator[Finding]:
+        notes, flow = self.notes, self.flow
+
+        def block(index: int) -> str:
+            return f"block {index + 1}"
+
+        yield from self._fast.findings()
+        if notes.speedless:
+            yield SPINDLE_SPEED_NOT_SAID(where=block(notes.speedless[0]))
+        behind = self._behind_end()
+        if behind:
+            yield NEVER_READ(where=f"line {behind[0]}", measured=len(behind))
+        for sentence, blocks in (
+            (WORDS_PASSED_OVER_COOLANT, notes.coolant),
+            (WORDS_PASSED_OVER_PAUSE, notes.pauses),
+            (WORDS_PASSED_OVER_OUTPUT, notes.outputs),
+            (NOT_SIMULATED_SPINDLE, notes.tapping),
+            (NOT_SIMULATED_TAP, notes.swapped),
+        ):
+            if blocks:
+                yield sentence(where=block(blocks[0]), count=len(blocks))
+        if notes.begins_again:
+            yield NOT_SIMULATED_AGAIN()
+        if notes.axes:
+            first = min(notes.axes.values())
+            yield NOT_SIMULATED_AXES(where=block(first), axes=", ".join(sorted(notes.axes)))
+        for name, index in notes.frames.items():
+            yield PLACE_UNKNOWN_FRAME(where=block(index), frame=name)
+        for name, index in notes.homes.items():
+            yield PLACE_UNKNOWN_HOME(where=block(index), home=name)
+        if self.machine.canon.chords:
+            yield NOT_SIMULATED_CHORDS(measured=self.machine.canon.chords)
+        if flow.deleted:
+            how = "left out" if flow.block_delete else "read"
+            line = next(iter(flow.deleted))
+            yield NOT_SIMULATED_DELETED(where=f"line {line}", count=len(flow.deleted), how=how)
+        unset = self.machine.given.unset
+        if unset:
+            index, line = next(iter(unset.items()))
+            yield VALUE_UNKNOWN_PARAMETER(
+                where=f"line {line}", count=len(unset), first=float(index)
+            )
 
 
-def _lines_of(data: bytes) -> int:
-    """How many lines these are."""
-    ended = sum(1 for _ in LINE_END.finditer(data))
-    return ended + (not data.endswith((b"\r", b"\n")) and len(data) > 0)
+def _says(text: str) -> bool:
+    """Whether a line is more than blanks, a % and comments."""
+    return text.strip()[:1] not in ("", "%", "(", ";")
 
 
-def _unframed(data: bytes) -> tuple[bytes, bool]:
-    """The file up to the end that a % makes, and whether one does.
-
-    Where the first line that is not blank is a lone % (it becomes blank), the next such line ends
-    the program; elsewhere % is no word.
-    """
-    first = FRAME.match(data)
-    if first is None:
-        return data, False
-    found = FRAME_END.search(data, first.end())
-    end = found.start() + 1 if found else len(data)
-    begin = max(data.rfind(b"\n", 0, first.end()), data.rfind(b"\r", 0, first.end())) + 1
-    return data[:begin] + b" " * (first.end() - begin) + data[first.end() : end], found is not None
-
-
-def rules_of(dialect: Dialect) -> Rules:
-    """What LinuxCNC takes."""
-
-    def arc_fault(r1: float, r2: float) -> str:
-        """Its three regions of a radius difference, and the least radius."""
-        if min(r1, r2) < dialect.arc_least_radius_mm:
-            return f"an arc of radius {min(r1, r2):.5f} mm is none for LinuxCNC"
-        gap = abs(r1 - r2)
-        part = gap / max(r1, r2)
-        wide = gap > dialect.arc_difference_mm and part > dialect.arc_difference_part
-        if gap > dialect.arc_most_difference_mm or wide:
-            return f"the radius is {r1:.4f} mm at the start and {r2:.4f} mm at the end of the arc"
-        return ""
-
-    return Rules(
-        groups=GROUPS,
-        refused=REFUSED,
-        first_motion=None,
-        arc_fault=arc_fault,
-        full_turn_rad=dialect.arc_full_turn_rad,
-        chord_slack_mm=dialect.arc_chord_slack_mm,
-        sure_gap_mm=min(dialect.arc_difference_mm, dialect.arc_most_difference_mm),
-        sure_radius_mm=dialect.arc_least_radius_mm,
-        circle_without_end=True,
-        path_modes=True,
-        turns=True,
-        feed_first=True,
-        forgets_feed=True,
-        pecked_mm=PECKED_MM,
-        tools="change",
-    )
+def _nothing() -> ProgramError:
+    return ProgramError("the program is empty", mend="a program has blocks such as G0 X1")

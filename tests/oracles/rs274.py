@@ -9,6 +9,7 @@ from __future__ import annotations
 import fcntl
 import os
 import re
+import resource
 import shutil
 import subprocess
 from pathlib import Path
@@ -22,6 +23,9 @@ from camtool.errors import ProgramError
 from camtool.toolpath.moves import Kind, Toolpath
 
 RS274 = shutil.which("rs274")
+MOST_SECONDS, MOST_BYTES = 10, 30_000_000
+"""Of one run of it."""
+
 PRINTED_MM = 1.1e-4
 """rs274 prints four decimals."""
 
@@ -51,19 +55,28 @@ def run_rs274(*arguments: str, **more: Any) -> subprocess.CompletedProcess[str]:
         )
 
 
+def _bound() -> None:
+    resource.setrlimit(resource.RLIMIT_CPU, (MOST_SECONDS, MOST_SECONDS))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (MOST_BYTES, MOST_BYTES))
+
+
 def interpreted(data: bytes, folder: Path) -> list[Call]:
     """The canonical calls of a program; ProgramError with LinuxCNC's words when it refuses."""
     file = folder / "program.ngc"
     file.write_bytes(data)
-    run = run_rs274("-g", str(file), cwd=folder)
-    found = [_CALL.search(line) for line in run.stdout.splitlines()]
+    said = folder / "calls.txt"
+    # Some faulty programs make it loop without end, and say the same without end.
+    run = run_rs274("-g", str(file), str(said), cwd=folder, preexec_fn=_bound)
+    lines = said.read_text(encoding="latin-1").splitlines() if said.exists() else []
+    found = [_CALL.search(line) for line in [*run.stdout.splitlines(), *lines]]
+    said.unlink(missing_ok=True)
     calls = [
         (call[1], call[2], [float(number) for number in _NUMBER.findall(call[2])])
         for call in found
         if call
     ]
     if run.returncode != 0:
-        raise ProgramError(run.stderr.strip())
+        raise ProgramError(run.stderr.strip() or "it does not end")
     return calls
 
 

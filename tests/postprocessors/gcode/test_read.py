@@ -197,43 +197,26 @@ BAD = [
     ("G0 X1 X2\n", 1, 7, "two X words"),
     ("G0 G1 X1 F1\n", 1, 4, "two G words of one group"),
     ("G1 X1\n", 1, 1, "no feed yet"),
-    ("G1 X1 F0\n", 1, 7, "a feed that is not above 0"),
-    ("G1 X1 F-5\n", 1, 7, "a feed that is not above 0"),
     ("F9 G2 X1 Y1\n", 1, 1, "without I, J or R"),
-    ("F9 G2\n", 1, 1, "without X or Y"),
     ("F9 G2 X0 Y0 R1\n", 1, 13, "has no centre"),
     ("F9 G2 X5 Y0 R1\n", 1, 13, "more than the radius"),
     ("F9 G2 X5 Y0 R5 I2\n", 1, 13, "both R and a centre"),
     ("F9 G2 X5 I1 J0\n", 1, 10, "radius"),
-    ("F9 G2 X5 I2.5 K1\n", 1, 15, "nothing in the block uses the K word"),
     ("G0 X1 I1\n", 1, 7, "nothing in the block uses the I word"),
     ("P1\n", 1, 1, "nothing in the block uses the P word"),
     ("G4\n", 1, 1, "a dwell without P"),
-    ("G4 P-1\n", 1, 4, "a dwell below 0"),
-    ("G4 P1 X1\n", 1, 7, "uses the X word"),
+    ("G4 P-0.5\n", 1, 4, "a dwell below 0"),
     ("S-5\n", 1, 1, "a speed below 0"),
     ("M3 M4 S1\n", 1, 4, "two M words of one group"),
     ("M8 M9\n", 1, 4, "two M words of one group"),
-    ("G0 X1\nG17 G55\n", 2, 5, "to a work frame whose place"),
-    ("G55\nG0 X1\nX0\nG54\n", 4, 1, "to a work frame whose place"),
-    ("G92 X0\n", 1, 1, "moves part zero"),
-    ("G28\n", 1, 1, "only the controller remembers"),
-    ("G18\n", 1, 1, "another plane"),
     ("G38.2 Z-5\n", 1, 1, "probes"),
-    ("G93\n", 1, 1, "inverse time"),
-    ("G43.1 Z1\n", 1, 1, "tool"),
     ("G77 X1\n", 1, 1, "does not know G77"),
     ("G1.5 X1\n", 1, 1, "does not know G1.5"),
     ("M77\n", 1, 1, "does not know M77"),
     ("M3.5 S1\n", 1, 1, "does not know M3.5"),
-    ("G99999999999999999999\n", 1, 1, "does not know G9999"),
-    ("T1.5\n", 1, 1, "a whole number"),
-    ("G53 G0 X1 Y0\n", 1, 1, "another place than machine zero"),
-    ("F1 G53 G1 X0 Y0\n", 1, 1, "another place than machine zero"),
-    ("G53 G0 X0\n", 1, 1, "another place than machine zero"),
+    ("G99999999999999999999\n", 1, 1, "does not know G"),
+    ("T1.5\n", 1, 1, "whole number"),
     ("$H\n", 1, 1, "a command of the controller"),
-    ("/G0 X1\n", 1, 1, "switch"),
-    ("#1=5\n", 1, 1, "a parameter"),
     ("G0 (a (b)) X1\n", 1, 4, "nested"),
 ]
 
@@ -241,27 +224,99 @@ BAD = [
 @pytest.mark.parametrize(("text", "line", "column", "message"), BAD)
 @pytest.mark.parametrize("name", TARGETS)
 def test_refused(name: str, text: str, line: int, column: int, message: str) -> None:
+    refused(name, text, line, column, message)
+
+
+def refused(name: str, text: str, line: int, column: int, message: str) -> None:
     with pytest.raises(ProgramError, match=message) as caught:
         read(text, name)
     assert caught.value.where == f"block {line}, line {line}, column {column}"
 
 
 @pytest.mark.parametrize(
+    ("text", "line", "column", "message"),
+    [
+        ("G1 X1 F0\n", 1, 7, "a feed that is not above 0"),
+        ("G1 X1 F-5\n", 1, 7, "a feed that is not above 0"),
+        ("F9 G2\n", 1, 1, "without X or Y"),
+        ("F9 G2 X5 I2.5 K1\n", 1, 15, "nothing in the block uses the K word"),
+        ("G4 P1 X1\n", 1, 7, "uses the X word"),
+        ("G0 X1\nG17 G55\n", 2, 5, "to a work frame whose place"),
+        ("G55\nG0 X1\nX0\nG54\n", 4, 1, "to a work frame whose place"),
+        ("G92 X0\n", 1, 1, "moves part zero"),
+        ("G28\n", 1, 1, "only the controller remembers"),
+        ("G18\n", 1, 1, "another plane"),
+        ("G93\n", 1, 1, "inverse time"),
+        ("G43.1 Z1\n", 1, 1, "tool"),
+        ("G53 G0 X1 Y0\n", 1, 1, "another place than machine zero"),
+        ("F1 G53 G1 X0 Y0\n", 1, 1, "another place than machine zero"),
+        ("G53 G0 X0\n", 1, 1, "another place than machine zero"),
+        ("/G0 X1\n", 1, 1, "switch"),
+        ("#1=5\n", 1, 1, "a parameter"),
+    ],
+)
+def test_refused_by_grbl(text: str, line: int, column: int, message: str) -> None:
+    refused("grbl", text, line, column, message)
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "column", "message"),
+    [
+        ("G1 X1 F0\n", 1, 1, "no feed yet"),
+        ("G1 X1 F-5\n", 1, 7, "a feed below 0"),
+        ("F9 G2\n", 1, 1, "without I, J or R"),
+        ("F9 G2 R5\n", 1, 1, "by its radius without X or Y"),
+        ("F9 G2 X5 I2.5 K1\n", 1, 15, "K of an arc in the plane"),
+        ("G4 P1 X1\n", 1, 1, "no motion word in force"),
+        ("G28 G0 X1\n", 1, 5, "two G words that both use the coordinates"),
+        ("G53 G2 X1 I1 F1\n", 1, 5, "G53 without G0 or G1"),
+        ("G91 G53 G0 X1\n", 1, 9, "G53 with G91"),
+        ("G92\n", 1, 1, "G92 without an axis"),
+        ("G10 L3 P1\n", 1, 1, "G10 wants L0"),
+        ("G10 L2 P10\n", 1, 8, "from 0 to 9"),
+        ("M66 P0\n", 1, 1, "waits for an input"),
+        ("M101\n", 1, 1, "runs a program of the machine"),
+        ("G0 U1\n", 1, 4, "the letter U is no word"),
+        ("G71 X1\n", 1, 1, "does not know|lathe's cycle"),
+        ("G41 D5\n", 1, 1, "whose diameter only the tool table knows"),
+        ("G41.1 G0 X5\n", 1, 7, "G41.1 without D"),
+        ("G95 G1 X1 F1\n", 1, 1, "of a spindle at speed 0"),
+        ("G93 G1 X1\n", 1, 1, "inverse time"),
+        ("G18 F1 G2 X1 I1 J1\n", 1, 17, "J of an arc"),
+        ("G17.1\n", 1, 1, "a plane of U, V and W"),
+        ("F9 G5 X1 Y1 I1\n", 1, 4, "both I and J"),
+        ("G5.3\n", 1, 1, "G5.3 without G5.2"),
+        ("G0 X[1/0]\n", 1, 7, "a division by zero"),
+        ("G0 X[1+\n", 1, 8, "no number"),
+        ("G0 X#<a>\n", 1, 5, "nobody has set #<a>"),
+        ("#5420=1\n", 1, 1, "cannot be set"),
+        ("#1\n", 1, 3, "a parameter without ="),
+        ("G0 X#<_ini[a]b>\n", 1, 5, "INI file, which only the machine knows"),
+        ("G0 X#5061\n", 1, 5, "a result of probing"),
+        ("o1 if [1\n", 1, 9, "closing bracket"),
+        ("o1 jump\n", 1, 4, "no word of O lines"),
+        ("o1 endif\n", 1, 1, "no word with the label"),
+        ("o1 call\n", 1, 1, "there is no sub o<1>"),
+        ("(abort, stop here)\n", 1, 1, "stops itself: stop here"),
+        ("(py,print(1)\n", 1, 1, "nested"),
+        ("(py,x=1)\n", 1, 1, "Python of the machine"),
+    ],
+)
+def test_refused_by_linuxcnc(text: str, line: int, column: int, message: str) -> None:
+    refused("linuxcnc", text, line, column, message)
+
+
+@pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("G41 D1", "compensates for a tool"),
-        ("G43.1 Z1", "compensates for a tool"),
         ("H1", "nothing in the block uses the H word"),
-        ("G84 X1 Z-1 R1", "is a cycle"),
-        ("G33 Z-1 K1", "follows the spindle"),
-        ("G5 X1", "a spline"),
-        ("O100 CALL", "the letter O is no word"),
-        ("G0 X[1+1]", "no number after X"),
+        ("G84 X1 Z-1 R1", "and no feed yet"),
+        ("F9 G84 X1 Z-1 R1", "while the spindle stands"),
+        ("G33 Z-1 K1", "while the spindle stands"),
         ("M6", "before any T word"),
         ("G90.1 F9\nG2 X1 Y1 I1", "needs both I and J"),
         ("F9 G2 X.001 I.0005", "an arc of radius 0.00050 mm is none"),
         ("G0 X1 (" + "a" * 250 + ")", "more than 252 characters"),
-        ("G7 X1", "counts X as a diameter"),
         ("F9 G2 X1 I1 P0", "a whole number from 1"),
         ("F9 G2 X1 I1 P1.5", "a whole number from 1"),
         ("F9 G2 X2 I1 P99999", "an arc of more than 10000 turns"),
@@ -515,7 +570,7 @@ def test_p_tells_the_turns_of_an_arc(
         ("%\nG0 X1\nM2\n%\n", None),
         ("G0 X1\nM2\n%\n(end)\n", None),
         ("G0 X1\nM2\nG0 X2\n\nwhatever [#1\n", ("line 3", 2.0)),
-        ("N1.5 G8 G0 X1\nN2. M30\n", None),
+        ("N1.5 G8 G0 X1\nN2 M30\n", None),
     ],
 )
 def test_where_a_program_of_linuxcnc_ends(text: str, behind: tuple[str, float] | None) -> None:

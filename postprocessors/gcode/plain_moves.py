@@ -1,0 +1,138 @@
+"""Reading blocks of plain moves by columns: thousands of lines with G0 to G3, X Y Z I J and F.
+
+A column knows no fault: `PlainMoves` says of how many blocks it is sure, and a reader takes the
+next one as a block of words.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from camtool.arrays import Bools, Floats
+from camtool.findings import Finding
+from camtool.kernels import words
+from camtool.machine.model import exceeds
+from camtool.toolpath.moves import Kind
+
+from .blocks import SURE_PART, PlainBlocks, filled
+from .findings import FEED_ABOVE_LIMIT_IN_WORDS
+
+RAPID, LINE, ARC_CCW = 0, 10, 30
+"""G words, tenfold; arcs are above LINE."""
+
+
+@dataclass(frozen=True)
+class ArcRule:
+    """Which arcs a controller surely takes: radii at both ends above `radius_mm` that differ by no
+    more than `gap_mm`; what turns by less than `full_turn_rad` it may take for a full circle.
+    `ends_in_plane`: an arc must have X or Y."""
+
+    gap_mm: float
+    radius_mm: float
+    full_turn_rad: float
+    ends_in_plane: bool = False
+
+
+KINDS: Final = np.full(ARC_CCW + 1, -1)
+"""The kind of a move, by its G word tenfold."""
+KINDS[[0, 10, 20, 30]] = [Kind.RAPID, Kind.LINE, Kind.ARC_CW, Kind.ARC_CCW]
+
+
+@dataclass(frozen=True)
+class PlainState:
+    """What is in force before plain blocks: the motion (a G word tenfold, −1: none), the feed
+    (0: none), mm of a unit, and where the tool stands."""
+
+    motion: int
+    feed: float
+    mm: float
+    position: tuple[float, float, float]
+
+
+class PlainMoves:
+    """N plain blocks with absolute coordinates: for each the motion in force, the feed in force
+    (N,) mm/min, where the tool stands behind it (N, 3) mm, the centre of an arc (N, 2) mm, and
+    whether it moves. `count`: so many, from the first on, are surely what a reader makes of them
+    one by one too; the others are not to be used."""
+
+    def __init__(self, plain: PlainBlocks, state: PlainState, rule: ArcRule) -> None:
+        has_g, has_feed = plain.has(words.G_WORD), plain.has(words.F_WORD)
+        has = [plain.has(column) for column in (words.X_WORD, words.Y_WORD, words.Z_WORD)]
+        has_i, has_j = plain.has(words.I_WORD), plain.has(words.J_WORD)
+        numbers = plain.numbers
+        self.motion = filled(
+            has_g, np.where(has_g, numbers[:, words.G_WORD] * 10.0, 0.0), state.motion
+        ).astype(np.int64)
+        self.feed = filled(has_feed, numbers[:, words.F_WORD] * state.mm, state.feed)
+        self.end = np.column_stack(
+            [
+                filled(has[axis], numbers[:, words.X_WORD + axis] * state.mm, state.position[axis])
+                for axis in range(3)
+            ]
+        )
+        start = np.concatenate([[state.position], self.end[:-1]])
+        self.moving = has[0] | has[1] | has[2]
+        centred = has_i | has_j
+        offset = np.column_stack(
+            [
+                np.where(has_i, numbers[:, words.I_WORD] * state.mm, 0.0),
+                np.where(has_j, numbers[:, words.J_WORD] * state.mm, 0.0),
+            ]
+        )
+        self.centre = start[:, :2] + offset
+        arc = self.motion > LINE
+        sure = ~(has_feed & ~(self.feed > 0.0))
+        sure &= self.moving | ~centred
+        sure &= ~self.moving | (self.motion >= 0)
+        sure &= ~(has_g | self.moving) | (self.motion == RAPID) | (self.feed > 0.0)
+        sure &= ~(has_g & arc) | self.moving
+        sure &= ~self.moving | (arc == centred)
+        arcs = np.flatnonzero(arc & self.moving & sure)
+        if rule.ends_in_plane:
+            sure[arcs] &= (has[0] | has[1])[arcs]
+        sure[arcs] &= sure_arcs(start[arcs, :2], self.end[arcs, :2], self.centre[arcs], rule)
+        self.count = len(sure) if sure.all() else int(sure.argmin())
+
+
+def sure_arcs(start: Floats, end: Floats, centre: Floats, rule: ArcRule) -> Bools:
+    """(K,) which arcs surely have one radius, and turn by more than what is taken for a full
+    circle or end where they start."""
+    out, back = start - centre, end - centre
+    r1, r2 = np.hypot(out[:, 0], out[:, 1]), np.hypot(back[:, 0], back[:, 1])
+    cross = out[:, 0] * back[:, 1] - out[:, 1] * back[:, 0]
+    turn = np.abs(np.arctan2(cross, (out * back).sum(axis=1)))
+    same = (start == end).all(axis=1)
+    sure = np.abs(r1 - r2) <= SURE_PART * rule.gap_mm
+    sure &= SURE_PART * np.minimum(r1, r2) > rule.radius_mm
+    return np.asarray(sure & (same | (SURE_PART * turn > rule.full_turn_rad)))
+
+
+class FastFeeds:
+    """The F words above the machine's highest feed: how many, the first of them, the highest."""
+
+    def __init__(self, limit_mm_min: float) -> None:
+        self._limit = limit_mm_min
+        self._count, self._first, self._most = 0, 0, 0.0
+
+    def note(self, first: int, feeds: Floats) -> None:
+        """The feeds (K,) that blocks from this one on give, NaN where they give none."""
+        fast = np.flatnonzero(exceeds(feeds, self._limit))
+        if len(fast):
+            if not self._count:
+                self._first = first + int(fast[0])
+            self._count += len(fast)
+            self._most = max(self._most, float(feeds[fast].max()))
+
+    def findings(self) -> Iterator[Finding]:
+        """One finding, if there was one."""
+        if self._count:
+            yield FEED_ABOVE_LIMIT_IN_WORDS(
+                where=f"block {self._first + 1}",
+                measured=self._most,
+                limit=self._limit,
+                count=self._count,
+            )

@@ -1,0 +1,61 @@
+"""Comments that LinuxCNC obeys: `(debug,…)`, and others that show, log or stop.
+
+`#5` and `#<name>` in them are shown as numbers: with six decimals, or as `%d`, `%f` (four
+decimals) and `%.2f` ask from there on.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Final
+
+from .faults import Fault
+from .parameters import DEBUG, MOST_PARAMETERS, Parameters
+
+NEAR_ZERO: Final = 1e-4
+"""A number nearer to 0 is shown as 0."""
+
+UNKNOWN_SHOWN: Final = "######"
+
+_PARTS: Final = re.compile(r"%d|%f|%\.(\d)f|#(\d+)|#<([^>]*)>")
+
+
+def obeyed(text: str, given: Parameters) -> str | None:
+    """What the operator is shown; None for nothing. Fault for a comment that stops the program."""
+    word, _, rest = text.partition(",")
+    word = word.lower()
+    if word == "debug":
+        return expanded(rest, given) if given.stored(DEBUG) > 0.0 else None
+    if word == "abort":
+        raise Fault(f"the program stops itself: {expanded(rest, given)}")
+    if word in ("py", "pyrun"):
+        raise Fault("Python of the machine's own, which only it can run")
+    return None
+
+
+def expanded(text: str, given: Parameters) -> str:
+    """The text with numbers in place of parameters."""
+    decimals = 6
+
+    def shown(found: re.Match[str]) -> str:
+        nonlocal decimals
+        part = found[0]
+        if part[0] == "%":
+            decimals = {"%d": 0, "%f": 4}.get(part, int(found[1] or 0))
+            return ""
+        value = _value(found, given)
+        if value is None:
+            return UNKNOWN_SHOWN
+        return f"{0.0 if abs(value) < NEAR_ZERO else value:.{decimals}f}"
+
+    return _PARTS.sub(shown, text)
+
+
+def _value(found: re.Match[str], given: Parameters) -> float | None:
+    try:
+        if found[2] is not None:
+            index = int(found[2])
+            return given.numbered(index, 0) if 0 < index < MOST_PARAMETERS else None
+        return given.named("".join(found[3].split()).lower(), 0)
+    except Fault:
+        return None

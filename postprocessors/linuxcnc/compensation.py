@@ -1,0 +1,319 @@
+"""Cutter compensation (G41, G42): the path of the cutter's centre beside the programmed path.
+
+The end of a move is known only with the next one, so that one move waits (`Canon.wait`). At a
+corner that turns away from the cutter an arc about the corner joins the two moves, as exact as the
+program; at one that turns towards it the waiting move ends where both offsets meet
+(interp_convert.cc, interp_queue.cc). All points are (first, second, normal) of the plane: XY, ZX.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from camtool.toolpath.moves import Kind
+
+from .canon import Canon, Queued
+from .faults import Fault
+
+CORNER_RAD: Final = 0.05
+"""A corner that turns by less is met without an arc (TOLERANCE_CONCAVE_CORNER)."""
+
+SPREAD: Final = 0.01
+"""Radii of an arc that compensation has cut off may differ by so much, in the program's units."""
+
+LONGER_MM: Final = 0.0254
+"""An arc may become longer by this much turn before the corner counts as unreachable; 0.001 in
+inches."""
+
+LEFT, RIGHT = 1, -1
+
+_HALF: Final = 0.5 * math.pi
+_GOUGES: Final = "the tool does not reach a corner without cutting into the part beside it"
+
+Flat = tuple[float, float]
+
+
+@dataclass
+class Arc:
+    """An arc as it is programmed: end, centre, and turns begun, above 0 counter-clockwise."""
+
+    end: list[float]
+    centre: Flat
+    turn: int
+
+
+class Compensation:
+    """The side and the radius, and what it must remember of the last move."""
+
+    def __init__(self, canon: Canon) -> None:
+        self.side = 0
+        self.radius = 0.0
+        self.first = True
+        """Whether the next move is the first one beside the path."""
+        self.programmed = [0.0, 0.0, 0.0]
+        self._canon = canon
+        self._from: Flat | None = None
+        """Where the waiting move begins."""
+
+    @property
+    def active(self) -> bool:
+        """Whether moves are offset."""
+        return self.side != 0 and self.radius > 0.0
+
+    def scale(self, factor: float) -> None:
+        """Another unit of length."""
+        self.radius *= factor
+        self.programmed = [value * factor for value in self.programmed]
+        if self._from is not None:
+            self._from = self._from[0] * factor, self._from[1] * factor
+        for move in self._canon.queue:
+            if isinstance(move, Queued):
+                move.end = [value * factor for value in move.end]
+                move.centre = move.centre[0] * factor, move.centre[1] * factor
+
+    def off(self, at: list[float]) -> bool:
+        """G40: the last move ends beside its end. Whether the cutter was beside the path."""
+        beside = self.active and not self.first
+        if beside:
+            self._end_at(at[0], at[1])
+        self.side, self.first = 0, True
+        return beside
+
+    def settle(self, at: list[float]) -> None:
+        """A stop: what waits ends where it is."""
+        self._end_at(at[0], at[1])
+
+    # Moves; each gives where the cutter's centre comes to stand
+
+    def straight(self, kind: Kind, to: list[float], at: list[float]) -> list[float]:
+        """A straight move to a programmed point, from where the centre stands."""
+        return (self._entry_line if self.first else self._line)(kind, to, at)
+
+    def _entry_line(self, kind: Kind, to: list[float], at: list[float]) -> list[float]:
+        way = to[0] - at[0], to[1] - at[1]
+        if math.hypot(*way) <= self.radius:
+            raise Fault("the move onto the compensated path is no longer than the tool's radius")
+        normal = math.atan2(way[1], way[0]) + self.side * _HALF
+        aside = math.cos(normal), math.sin(normal)
+        end = [to[0] + self.radius * aside[0], to[1] + self.radius * aside[1], to[2]]
+        self._from = at[0], at[1]
+        self._canon.wait(Queued(kind, end, direction=aside))
+        self.first, self.programmed = False, list(to)
+        return list(end)
+
+    def _line(self, kind: Kind, to: list[float], at: list[float]) -> list[float]:
+        op, radius, side = self.programmed, self.radius, self.side
+        way = to[0] - op[0], to[1] - op[1]
+        if way == (0.0, 0.0):
+            end = [at[0], at[1], to[2]]
+            self._canon.wait(Queued(kind, list(end), direction=way))
+            self.programmed = list(to)
+            return end
+        theta, alpha = math.atan2(at[1] - op[1], at[0] - op[0]), math.atan2(way[1], way[0])
+        swing = (theta - alpha) * side
+        beta = (swing + 2.0 * math.pi if swing < 0.0 else swing) - _HALF
+        normal = alpha + side * _HALF
+        end = [to[0] + radius * math.cos(normal), to[1] + radius * math.sin(normal), to[2]]
+        before = self._waiting()
+        concave = beta < -CORNER_RAD or beta > math.pi + CORNER_RAD
+        if before is not None and before.turn * side < 0 and beta > math.pi - CORNER_RAD:
+            concave = True
+        if concave and before is not None and before.turn:
+            self._end_at(*self._arc_then_line(before, way))
+        elif concave:
+            half = (beta + math.pi) / 2.0
+            if half == 0.0:
+                raise Fault("a corner inside of which the path turns straight back")
+            back = radius / math.tan(half)
+            angle = theta + side * _HALF
+            self._end_at(at[0] + back * math.cos(angle), at[1] + back * math.sin(angle))
+        elif beta > CORNER_RAD:
+            self._round(kind, (op[0], op[1]), normal, at)
+        else:
+            self._canon.flush()
+            self._from = at[0], at[1]
+        self._canon.wait(Queued(kind, list(end), direction=way))
+        self.programmed = list(to)
+        return end
+
+    def _round(self, kind: Kind, corner: Flat, angle: float, at: list[float]) -> None:
+        """About a corner, to where the next move begins."""
+        x = corner[0] + self.radius * math.cos(angle)
+        y = corner[1] + self.radius * math.sin(angle)
+        self._end_at(at[0], at[1])
+        if kind == Kind.RAPID:
+            self._canon.wait(Queued(kind, [x, y, at[2]]))
+        else:
+            self._canon.wait(Queued(Kind.ARC_CW, [x, y, at[2]], corner, -self.side))
+        self._canon.flush()
+        self._from = x, y
+
+    def _arc_then_line(self, arc: Queued, way: Flat) -> Flat:
+        """Where the offset of an arc meets the offset of the line that follows it.
+
+        With the arc's centre c, the offset line lies d2 from it along its normal theta; the
+        offset arc has the radius `old`: they meet at an angle acos(d2 / old) beside the normal.
+        """
+        op, (cx, cy) = self.programmed, arc.centre
+        old = math.hypot(cy - arc.end[1], cx - arc.end[0])
+        theta = math.atan2(way[1], way[0]) + (_HALF if arc.turn > 0 else -_HALF)
+        phi = math.atan2(cy - op[1], cx - op[0])
+        inside = arc.turn * self.side > 0
+        own = old + self.radius if inside else old - self.radius
+        d = own * math.cos(theta - phi)
+        part = (d - self.radius if inside else d + self.radius) / old if old else 2.0
+        if not -1.0 <= part <= 1.0:
+            raise Fault(_GOUGES)
+        beside = math.acos(part)
+        angle = theta + math.pi + (-beside if (arc.turn > 0) == inside else beside)
+        return cx + old * math.cos(angle), cy + old * math.sin(angle)
+
+    def arc(self, arc: Arc, at: list[float], spread: float) -> list[float]:
+        """An arc, from where the centre stands."""
+        return self._entry_arc(arc, at, spread) if self.first else self._arc(arc, at)
+
+    def _entry_arc(self, arc: Arc, at: list[float], spread: float) -> list[float]:
+        """Onto the path along another arc, which ends beside the end."""
+        if math.hypot(arc.end[0] - at[0], arc.end[1] - at[1]) <= self.radius:
+            raise Fault("the arc onto the compensated path is no larger than the tool's radius")
+        inside = arc.turn * self.side > 0
+        sign = 1.0 if inside else -1.0
+        out = sign * (arc.centre[1] - arc.end[1]), sign * (arc.centre[0] - arc.end[0])
+        gamma = math.atan2(*out)
+        self.first, self.programmed = False, list(arc.end)
+        x = arc.end[0] + self.radius * math.cos(gamma)
+        y = arc.end[1] + self.radius * math.sin(gamma)
+        to_centre = math.atan2(arc.centre[1] - y, arc.centre[0] - x)
+        angle = math.atan2(at[1] - y, at[0] - x) - to_centre
+        if abs(math.cos(angle)) < 1e-4:
+            raise Fault("the arc onto the compensated path is smaller than the tool")
+        reach = math.hypot(at[1] - y, at[0] - x) / 2.0 / math.cos(angle)
+        cx, cy = x + reach * math.cos(to_centre), y + reach * math.sin(to_centre)
+        if abs(math.hypot(cx - x, cy - y) - math.hypot(cx - at[0], cy - at[1])) > spread:
+            raise Fault("no arc leads onto the compensated path here")
+        self._canon.flush()
+        end = [x, y, arc.end[2]]
+        sweep = swept((at[0], at[1]), (cx, cy), arc.turn, (x, y))
+        self._canon.wait(Queued(Kind.ARC_CW, list(end), (cx, cy), arc.turn, sweep=sweep))
+        return end
+
+    def _arc(self, arc: Arc, at: list[float]) -> list[float]:
+        op, radius, side, (cx, cy) = self.programmed, self.radius, self.side, arc.centre
+        own = math.hypot(cx - arc.end[0], cy - arc.end[1])
+        inside = arc.turn * side > 0
+        theta = math.atan2(at[1] - op[1], at[0] - op[0]) - side * _HALF
+        delta = math.atan2(cy - op[1], cx - op[0])
+        alpha = delta - _HALF if arc.turn > 0 else delta + _HALF
+        beta = (theta - alpha) * side
+        if beta > 1.5 * math.pi:
+            beta -= 2.0 * math.pi
+        elif beta < -_HALF:
+            beta += 2.0 * math.pi
+        if inside and own <= radius:
+            raise Fault("an arc whose radius is no larger than the tool's")
+        sign = 1.0 if inside else -1.0
+        gamma = math.atan2(sign * (cy - arc.end[1]), sign * (cx - arc.end[0]))
+        end = [
+            arc.end[0] + radius * math.cos(gamma),
+            arc.end[1] + radius * math.sin(gamma),
+            arc.end[2],
+        ]
+        before = self._waiting()
+        flat = abs(beta - math.pi) < CORNER_RAD
+        if beta < -CORNER_RAD or beta > math.pi + CORNER_RAD or (flat and not inside):
+            new = own - radius if inside else own + radius
+            if before is not None and before.turn:
+                meeting = self._arc_then_arc(before, arc, new)
+            else:
+                meeting = self._line_then_arc(arc, theta, own * math.sin(beta - _HALF), new)
+            self._end_at(*meeting)
+        elif beta > CORNER_RAD:
+            self._canon.flush()
+            angle = delta if inside else delta + math.pi
+            x, y = op[0] + radius * math.cos(angle), op[1] + radius * math.sin(angle)
+            self._canon.wait(Queued(Kind.ARC_CW, [x, y, at[2]], (op[0], op[1]), -side))
+            self._canon.flush()
+            self._from = x, y
+        else:
+            self._canon.flush()
+            self._from = at[0], at[1]
+        sweep = swept((op[0], op[1]), arc.centre, arc.turn, (arc.end[0], arc.end[1]))
+        self._canon.wait(Queued(Kind.ARC_CW, list(end), arc.centre, arc.turn, sweep=sweep))
+        self.programmed = list(arc.end)
+        return end
+
+    def _line_then_arc(self, arc: Arc, theta: float, across: float, new: float) -> Flat:
+        """Where the offset of a line meets the offset, of radius `new`, of the arc behind it."""
+        inside = arc.turn * self.side > 0
+        part = (across + self.radius if inside else across - self.radius) / new if new else 2.0
+        if not -1.0 <= part <= 1.0:
+            raise Fault(_GOUGES)
+        beside = math.asin(part)
+        angle = theta + (0.0 if inside else math.pi)
+        angle += beside if (arc.turn > 0) == inside else -beside
+        return arc.centre[0] + new * math.cos(angle), arc.centre[1] + new * math.sin(angle)
+
+    def _arc_then_arc(self, before: Queued, arc: Arc, new: float) -> Flat:
+        """Where two offset arcs meet: a triangle of both radii and the distance of the centres."""
+        (px, py), (cx, cy) = before.centre, arc.centre
+        old = math.hypot(py - before.end[1], px - before.end[0])
+        apart = math.hypot(py - cy, px - cx)
+        if old == 0.0 or apart == 0.0:
+            raise Fault("two arcs about one centre cannot be compensated")
+        part = (old * old + apart * apart - new * new) / (2.0 * old * apart)
+        if not -1.0 <= part <= 1.0:
+            raise Fault(_GOUGES)
+        inside = before.turn * self.side > 0
+        back = math.acos(part)
+        angle = math.atan2(cy - py, cx - px)
+        angle += back if (arc.turn > 0) == inside else -back
+        return px + old * math.cos(angle), py + old * math.sin(angle)
+
+    # The waiting move
+
+    def _waiting(self) -> Queued | None:
+        queue = self._canon.queue
+        return queue[0] if queue and isinstance(queue[0], Queued) else None
+
+    def _end_at(self, x: float, y: float) -> None:
+        """The waiting moves end here, and are made; Fault where one would turn round for it."""
+        moves = [move for move in self._canon.queue if isinstance(move, Queued)]
+        if not moves:
+            self._canon.flush()
+            return
+        for move in moves:
+            self._cut(move, x, y)
+        self._canon.flush()
+        self._from = x, y
+
+    def _cut(self, move: Queued, x: float, y: float) -> None:
+        start = self._from
+        if not move.turn:
+            if start is not None:
+                way = x - start[0], y - start[1]
+                if way[0] * move.direction[0] + way[1] * move.direction[1] < 0.0:
+                    raise Fault(_GOUGES)
+            move.end[:2] = x, y
+            return
+        cx, cy = move.centre
+        before, after = math.hypot(move.end[0] - cx, move.end[1] - cy), math.hypot(x - cx, y - cy)
+        move.end[:2] = x, y
+        if abs(before - after) > SPREAD:
+            raise Fault("compensation makes an arc of two radii here")
+        if move.sweep and start is not None:
+            longer = LONGER_MM if self._canon.mm == 1.0 else LONGER_MM / 25.4
+            if abs(swept(start, move.centre, move.turn, (x, y))) > abs(move.sweep) + longer:
+                raise Fault(_GOUGES)
+
+
+def swept(start: Flat, centre: Flat, turn: int, end: Flat) -> float:
+    """How far an arc turns, rad, with whole turns; counter-clockwise above 0."""
+    alpha = math.atan2(start[1] - centre[1], start[0] - centre[0])
+    beta = math.atan2(end[1] - centre[1], end[0] - centre[0])
+    if turn > 0:
+        beta += 2.0 * math.pi if beta <= alpha else 0.0
+        return beta - alpha + (turn - 1) * 2.0 * math.pi
+    alpha += 2.0 * math.pi if alpha <= beta else 0.0
+    return beta - alpha + (turn + 1) * 2.0 * math.pi

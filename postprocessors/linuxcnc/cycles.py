@@ -1,0 +1,369 @@
+"""Canned cycles (G73, G74, G76, G81 to G89) and thread cutting: the moves that LinuxCNC makes of
+them (interp_cycles.cc, interp_convert.cc).
+
+A cycle goes over its hole at the height at which the series of cycles began, or at R; down to R as
+a rapid; drills; and comes back to R, or with G98 to the height. All of that stands in the plane of
+G17, G18 or G19, whose normal is the axis of the hole. Corners are met exactly.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+from camtool import bounds
+from camtool.toolpath.moves import Kind, PathMode
+
+from .canon import PLANES, too_many
+from .faults import Fault
+from .lines import AXES, Block
+from .state import Series, State
+
+BACK_MM: Final = 0.254
+"""Between two pecks of G73 and G83 the drill comes back to this above where it was: 0.010 inch."""
+
+EXACT_PATH: Final = PathMode("exact-path")
+
+WANTS_DWELL: Final = (820, 860, 880, 890)
+WANTS_PECK: Final = (730, 830)
+TAPS: Final = (740, 840)
+WANTS_SPINDLE: Final = (860, 870, 880)
+
+MOST_PASSES: Final = 100_000
+"""Passes of one thread."""
+
+
+def is_cycle(motion: int | None) -> bool:
+    """Whether a motion is a cycle (tenfold)."""
+    return motion in (730, 740) or (motion is not None and 800 < motion < 900)
+
+
+@dataclass
+class _Hole:
+    """One hole, in (first, second, normal) of the plane."""
+
+    at: list[float]
+    r: float
+    clear: float
+    bottom: float
+
+
+def drill(machine: State, block: Block, motion: int) -> None:
+    """Carry out a cycle."""
+    words = block.words
+    if machine.feed_mm == 0.0:
+        raise Fault("a cycle, and no feed yet", mend="write F first")
+    if machine.feed_mode == 930:
+        raise Fault("a cycle with feeds of inverse time (G93)")
+    if machine.compensation.side:
+        raise Fault("a cycle while the cutter's radius is compensated")
+    again = machine.motion == motion
+    if machine.series is None:
+        machine.series = Series()
+    series = machine.series
+    kept = series.words if again else {}
+    axes = PLANES[machine.plane]
+    names = [AXES[axis] for axis in axes]
+    r = _word(words, kept, "r", "the height R")
+    depth = _word(words, kept, names[2], f"the depth {names[2].upper()}", key="depth")
+    times = int(words.get("l", 1.0))
+    if times == 0:
+        raise Fault("a cycle repeated 0 times", "l")
+    here = [machine.position[axis] for axis in axes]
+    height = series.height if series.height is not None else here[2]
+    series.height = height
+    at, step = list(here), [0.0, 0.0]
+    radius = angle = 0.0
+    if machine.absolute:
+        at = _place(machine, words, names, here)
+        top, bottom = r, depth
+    else:
+        step = [words.get(name, 0.0) for name in names[:2]]
+        radius, angle = words.get("@", 0.0), math.radians(words.get("^", 0.0))
+        top = r + height
+        bottom = top + depth
+    if top < bottom:
+        raise Fault(f"R {r:g} lies below {names[2].upper()} {depth:g}", "r", "write a higher R")
+    hole = _Hole(at, top, top if machine.to_r else max(height, top), bottom)
+    run, kept_now = _motion_of(machine, block, motion, again, hole)
+    _bound(machine, times, hole, motion, kept_now)
+    kept_now |= {"r": r, "depth": depth}
+    mode, canon = machine.canon.path.mode, machine.canon
+    level = here[2]
+    if height < top:
+        machine.go(Kind.RAPID, axes, [here[0], here[1], top])
+        level = top
+    canon.path.mode = EXACT_PATH
+    for time in range(times):
+        hole.at[0] += step[0]
+        hole.at[1] += step[1]
+        if radius or angle:
+            _turned(hole.at, radius, angle)
+        over = level if time == 0 and level > top else hole.clear
+        machine.go(Kind.RAPID, axes, [*hole.at[:2], over])
+        if over > top:
+            machine.go(Kind.RAPID, axes, [*hole.at[:2], top])
+        run(hole)
+    canon.path.mode = mode
+    end = [*hole.at[:2], hole.clear]
+    for axis, value in zip(axes, end, strict=True):
+        machine.position[axis] = value
+    series.words = {**series.words, **kept_now}
+    machine.motion = motion
+
+
+def _kept(machine: State) -> dict[str, float]:
+    return machine.series.words if machine.series is not None else {}
+
+
+def _word(
+    words: dict[str, float], kept: dict[str, float], letter: str, name: str, key: str = ""
+) -> float:
+    """The number of a word, or of the last block that had it."""
+    value = words.get(letter, kept.get(key or letter))
+    if value is None:
+        raise Fault(f"a cycle without {name}", "g", f"write {letter.upper()}")
+    return value
+
+
+def _place(
+    machine: State, words: dict[str, float], names: list[str], here: list[float]
+) -> list[float]:
+    """Where an absolute cycle has its (first) hole."""
+    if "@" in words or "^" in words:
+        x, y = machine.position[:2]
+        radius = words.get("@", math.hypot(y, x))
+        angle = math.radians(words["^"]) if "^" in words else math.atan2(y, x)
+        return [radius * math.cos(angle), radius * math.sin(angle), here[2]]
+    return [words.get(name, value) for name, value in zip(names, here, strict=True)]
+
+
+def _turned(at: list[float], radius: float, angle: float) -> None:
+    """A step in polar coordinates."""
+    if at[0] == 0.0 and at[1] == 0.0:
+        raise Fault("a polar step from zero, which has no direction", "@")
+    length = math.hypot(at[1], at[0]) + radius
+    angle += math.atan2(at[1], at[0])
+    at[:2] = length * math.cos(angle), length * math.sin(angle)
+
+
+def _bound(machine: State, times: int, hole: _Hole, motion: int, kept: dict[str, float]) -> None:
+    """Fault where the holes would be more moves than a program may have."""
+    pecks = 1.0
+    if motion in WANTS_PECK:
+        pecks = max((hole.r - hole.bottom) / kept["q"], 1.0)
+    if len(machine.canon.path) + times * (3.0 * pecks + 3.0) > bounds.MAX_MOVES:
+        by_pecks = pecks > times
+        what = "its pecks" if by_pecks else "the repeats of this cycle"
+        mend = "write a larger Q" if by_pecks else bounds.SPLIT_PROGRAM
+        raise Fault(too_many(what), "q" if by_pecks else "l", mend)
+
+
+def _motion_of(
+    machine: State, block: Block, motion: int, again: bool, hole: _Hole
+) -> tuple[Callable[[_Hole], None], dict[str, float]]:
+    """What makes a hole, from R to where the tool comes out, and what is kept for the next."""
+    words, series = block.words, _kept(machine)
+    axes = PLANES[machine.plane]
+    kept: dict[str, float] = {}
+
+    def feed(hole: _Hole, level: float) -> None:
+        machine.go(Kind.LINE, axes, [*hole.at[:2], level])
+
+    def rapid(hole: _Hole, level: float) -> None:
+        machine.go(Kind.RAPID, axes, [*hole.at[:2], level])
+
+    dwell = 0.0
+    if motion in WANTS_DWELL:
+        dwell = kept["p"] = _word(words, series if again else {}, "p", "the dwell P")
+    elif motion in TAPS:
+        dwell = kept["p"] = words.get("p", series.get("p", 0.0))
+    if dwell < 0.0:
+        raise Fault("a dwell below 0 s", "p")
+    if motion in WANTS_PECK:
+        peck = kept["q"] = _word(words, series if again else {}, "q", "the depth of a peck, Q")
+        if peck <= 0.0:
+            raise Fault("a peck that is not above 0", "q")
+    spindle = machine.spindle
+    if motion in (*WANTS_SPINDLE, *TAPS) and spindle is None:
+        raise Fault(f"G{motion // 10} while the spindle stands", "g", "start it with M3 or M4")
+    if motion in TAPS:
+        wanted = Kind.SPINDLE_CCW if motion == 740 else Kind.SPINDLE_CW
+        if spindle != wanted:
+            raise Fault(f"the spindle turns the wrong way for G{motion // 10}", "g")
+        machine.notes.tapping.append(machine.block_index)
+
+    def simple(hole: _Hole) -> None:
+        feed(hole, hole.bottom)
+        if motion in (820, 890):
+            machine.dwell(dwell)
+        if motion == 850:
+            feed(hole, hole.r)
+        (feed if motion == 890 else rapid)(hole, hole.clear)
+
+    def pecked(hole: _Hole) -> None:
+        back, level = BACK_MM / machine.canon.mm, hole.r - kept["q"]
+        while level > hole.bottom:
+            feed(hole, level)
+            if motion == 830:
+                rapid(hole, hole.r)
+            rapid(hole, level + back)
+            level -= kept["q"]
+        feed(hole, hole.bottom)
+        rapid(hole, hole.clear)
+
+    def tap(hole: _Hole, level: float) -> None:
+        # LinuxCNC 2.9 turns the coordinates of these two cycles once too often in G18 and G19.
+        place = [*hole.at[:2], level]
+        if machine.plane != 170:
+            machine.notes.swapped.append(machine.block_index)
+            first, second, depth = place
+            place = [depth, first, second] if machine.plane == 190 else [second, depth, first]
+        machine.go(Kind.LINE, axes, place)
+
+    def tapped(hole: _Hole) -> None:
+        tap(hole, hole.bottom)
+        machine.turn(Kind.SPINDLE_CCW if motion == 840 else Kind.SPINDLE_CW)
+        machine.dwell(dwell)
+        tap(hole, hole.clear)
+        machine.turn(Kind.SPINDLE_CW if motion == 840 else Kind.SPINDLE_CCW)
+
+    def bored(hole: _Hole) -> None:
+        feed(hole, hole.bottom)
+        machine.dwell(dwell)
+        machine.turn(Kind.SPINDLE_OFF)
+        if motion == 880:
+            machine.notes.pauses.append(machine.block_index)
+        else:
+            rapid(hole, hole.clear)
+        machine.turn(spindle or Kind.SPINDLE_CW)
+
+    if motion == 870:
+        return _back_bore(machine, words, again, kept), kept
+    if motion in WANTS_PECK:
+        return pecked, kept
+    if motion in TAPS:
+        return tapped, kept
+    return (bored if motion in (860, 880) else simple), kept
+
+
+def _back_bore(
+    machine: State, words: dict[str, float], again: bool, kept: dict[str, float]
+) -> Callable[[_Hole], None]:
+    """G87: beside the hole down through it, over, and up with the spindle turning."""
+    series = _kept(machine) if again else {}
+    for letter in "ijk":
+        kept[letter] = _word(words, series, letter, letter.upper())
+    axes, spindle = PLANES[machine.plane], machine.spindle or Kind.SPINDLE_CW
+
+    def bored(hole: _Hole) -> None:
+        x, y = hole.at[:2]
+        aside = [x + kept["i"], y + kept["j"]]
+        top = kept["k"] if machine.absolute else hole.bottom + kept["k"]
+        machine.go(Kind.RAPID, axes, [*aside, hole.r])
+        machine.turn(Kind.SPINDLE_OFF)
+        machine.go(Kind.RAPID, axes, [*aside, hole.bottom])
+        machine.go(Kind.RAPID, axes, [x, y, hole.bottom])
+        machine.turn(spindle)
+        machine.go(Kind.LINE, axes, [x, y, top])
+        machine.go(Kind.LINE, axes, [x, y, hole.bottom])
+        machine.turn(Kind.SPINDLE_OFF)
+        machine.go(Kind.RAPID, axes, [*aside, hole.bottom])
+        machine.go(Kind.RAPID, axes, [*aside, hole.clear])
+        machine.go(Kind.RAPID, axes, [x, y, hole.clear])
+        machine.turn(spindle)
+
+    return bored
+
+
+# Threads
+
+
+def follow_spindle(machine: State, block: Block, end: list[float], motion: int) -> None:
+    """G33, and G33.1 there and back: a move whose feed is K for each turn of the spindle."""
+    canon = machine.canon
+    _need_spindle(machine, motion)
+    feed, canon.feed = canon.feed, block.words["k"] * machine.speed * canon.mm
+    _need_feed(machine, motion)
+    canon.line(*end)
+    if motion == 331:
+        canon.line(*machine.position)
+    else:
+        machine.position[:] = end
+    canon.feed = feed
+
+
+def thread(machine: State, block: Block, end: list[float]) -> None:
+    """G76: passes along Z, each deeper in X, at the angle Q and with the tapers E of L."""
+    words, canon, mm = block.words, machine.canon, machine.canon.mm
+    _need_spindle(machine, 760)
+    if machine.compensation.side:
+        raise Fault("G76 while the cutter's radius is compensated", "g")
+    peak, first, full = words["i"], words["j"], words["k"]
+    if peak == 0.0 or first <= 0.0 or full <= first:
+        raise Fault("G76 wants an I that is not 0, J above 0, and K above J", "g")
+    if machine.diameters:
+        peak, first, full = peak / 2.0, first / 2.0, full / 2.0
+    start = list(machine.position)
+    pitch = words["p"]
+    way = -1.0 if end[2] > start[2] else 1.0
+    slope = math.tan(way * math.radians(words.get("q", 0.0)))
+    degression = max(words.get("r", 1.0), 1.0)
+    taper = max(words.get("e", 0.0), 0.0)
+    tapered = pitch * math.hypot(taper, full) / taper if taper else pitch
+    taper *= way
+    ends = int(words.get("l", 0.0))
+    side = 1.0 if peak > 0.0 else -1.0
+    offset, deepest = abs(peak), full + abs(peak)
+    target = end[2] + full * slope
+    feed = canon.feed
+
+    def cut(x: float, z: float, lead: float) -> None:
+        canon.feed = lead * machine.speed * mm
+        _need_feed(machine, 760)
+        canon.line(x, start[1], z)
+
+    def one(depth: float) -> None:
+        shift = (depth - offset) * slope
+        out, bottom = start[0] + side * (depth - deepest), start[0] + side * depth
+        raised = start[0] + side * (depth - full)
+        canon.rapid(out, start[1], start[2] - shift)
+        if taper and ends & 1:
+            cut(raised, start[2] - shift, tapered)
+            cut(bottom, start[2] - shift - taper, tapered)
+        else:
+            canon.rapid(bottom, start[1], start[2] - shift)
+        if taper and ends & 2:
+            cut(bottom, target - shift + taper, pitch)
+            cut(raised, target - shift, tapered)
+        else:
+            cut(bottom, target - shift, pitch)
+        canon.rapid(out, start[1], target - shift)
+
+    depth, number = offset + first, 1
+    while depth < deepest:
+        one(depth)
+        number += 1
+        if number > MOST_PASSES:
+            raise Fault(f"a thread of more than {MOST_PASSES} passes", "j", "write a larger J")
+        depth = offset + first * number ** (1.0 / degression)
+    for _ in range(min(max(int(words.get("h", 0.0)), 0), MOST_PASSES) + 1):
+        one(deepest)
+    canon.rapid(*end)
+    canon.feed = feed
+    machine.position[:] = end
+
+
+def _need_spindle(machine: State, motion: int) -> None:
+    machine.notes.tapping.append(machine.block_index)
+    if machine.spindle is None:
+        name = f"G{motion / 10:g}"
+        raise Fault(f"{name} while the spindle stands", "g", "start it with M3 or M4")
+
+
+def _need_feed(machine: State, motion: int) -> None:
+    if machine.canon.feed <= 0.0:
+        name = f"G{motion / 10:g}"
+        raise Fault(f"{name} at a speed of the spindle of 0, which never ends", "g", "write S")

@@ -1,0 +1,364 @@
+"""Expressions of RS274/NGC: `[…]`, functions, parameters (`#1`, `#<name>`).
+
+A value is compiled once and evaluated as often as its line is executed: a plain number is a float,
+all else a function of the parameters. Text is that of `lines.closed`: small letters, no blanks.
+Operators of one rank go from left to right, `**` too; the ranks are those of LinuxCNC
+(`precedence` in interp_internal.cc): `**`, then `* / mod`, `+ -`, comparisons, `and or xor`.
+Angles are in degrees; two numbers are `eq` when they differ by less than 0.0001.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+
+from .faults import Fault
+from .parameters import MOST_PARAMETERS, Parameters
+
+Function = Callable[[Parameters], float]
+Value = float | Function
+
+EQUAL: Final = 1e-4
+"""Two numbers are equal to EQ and NE when they differ by less (TOLERANCE_EQUAL)."""
+
+WHOLE: Final = 1e-4
+"""A number that differs from a whole one by no more counts as it, where a whole one is wanted."""
+
+MOST_ROUNDED: Final = 2.0**31
+"""ROUND of LinuxCNC goes through a 32-bit integer."""
+
+MOST_NESTED: Final = 60
+"""Brackets within brackets, deeper than a line has room for."""
+
+NUMBER: Final = re.compile(r"[+-]*[0-9.]*")
+_PLAIN: Final = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
+
+
+class Scanner:
+    """Reads values from a text, from `at` on."""
+
+    def __init__(self, text: str, at: int = 0) -> None:
+        self.text, self.at = text, at
+        self._depth = 0
+
+    def value(self) -> Value:
+        """A number, an expression, a parameter or a function."""
+        text, at = self.text, self.at
+        sign, after = text[at : at + 1], text[at + 1 : at + 2]
+        if sign == "[":
+            return self.expression()
+        if sign == "#":
+            return self.parameter()
+        if sign in ("+", "-") and after and not after.isdigit() and after != ".":
+            self.at += 1
+            inner = self.value()
+            if sign == "+":
+                return inner
+            if isinstance(inner, float):
+                return -inner
+            function = inner
+            return lambda given: -function(given)
+        if "a" <= sign <= "z":
+            return self._function()
+        return self.number()
+
+    def number(self) -> float:
+        """A plain number."""
+        found = NUMBER.match(self.text, self.at)
+        assert found is not None  # it matches nothing too
+        text = found[0]
+        if _PLAIN.fullmatch(text) is None:
+            raise Fault(f"{text!r} is no number" if text else "no number", self.at)
+        self.at = found.end()
+        return float(text)
+
+    def whole(self) -> Callable[[Parameters], int] | int:
+        """A value that must be a whole number."""
+        begin = self.at
+        value = self.value()
+        if isinstance(value, float):
+            return whole(value, begin)
+        function = value
+        return lambda given: whole(function(given), begin)
+
+    def expression(self) -> Value:
+        """[value operator value …]"""
+        begin = self.at
+        self.at += 1
+        self._depth += 1
+        if self._depth > MOST_NESTED:
+            raise Fault("brackets are nested too deeply", begin)
+        found = self._ranked(self.value(), 1)
+        self._operator_at(self.at)  # the bracket
+        self.at += 1
+        self._depth -= 1
+        if isinstance(found, float):
+            return finite(found, begin)
+        function = found
+        return lambda given: finite(function(given), begin)
+
+    def _ranked(self, left: Value, rank: int) -> Value:
+        """What stands before the bracket, of operators of this rank and above."""
+        while True:
+            name = self._operator_at(self.at)
+            if name == "]" or RANKS[name] < rank:
+                return left
+            begin = self.at
+            self.at += len(name)
+            right = self._ranked(self.value(), RANKS[name] + 1)
+            left = _joined(OPERATORS[name], left, right, begin)
+
+    def _operator_at(self, at: int) -> str:
+        for name in _BY_LENGTH:
+            if self.text.startswith(name, at):
+                return name
+        if at >= len(self.text):
+            raise Fault("an expression without its closing bracket", at)
+        raise Fault(f"{self.text[at]!r} is no operator", at)
+
+    def parameter(self) -> Value:
+        """#5, #[…], ##5 or #<name>."""
+        begin = self.at
+        self.at += 1
+        if self.text[self.at : self.at + 1] == "<":
+            name = self.name()
+            return lambda given: given.named(name, begin)
+        index = self.whole()
+        if isinstance(index, int):
+            fixed = check_index(index, begin)
+            return lambda given: given.numbered(fixed, begin)
+        computed = index
+        return lambda given: given.numbered(check_index(computed(given), begin), begin)
+
+    def name(self) -> str:
+        """What stands between < and >."""
+        end = self.text.find(">", self.at)
+        if end < 0:
+            raise Fault("a name without its closing >", self.at)
+        name = self.text[self.at + 1 : end]
+        self.at = end + 1
+        return name
+
+    def _function(self) -> Value:
+        begin = self.at
+        for name in FUNCTIONS:
+            if self.text.startswith(name, begin):
+                break
+        else:
+            raise Fault(f"no function begins with {self.text[begin]!r}", begin)
+        self.at += len(name)
+        if self.text[self.at : self.at + 1] != "[":
+            raise Fault(f"{name} without its [", self.at)
+        if name == "exists":
+            return self._exists()
+        first = self.expression()
+        if name == "atan":
+            if self.text[self.at : self.at + 2] != "/[":
+                raise Fault("atan wants two expressions: atan[y]/[x]", self.at)
+            self.at += 1
+            return _joined(_atan, first, self.expression(), begin)
+        return _applied(FUNCTIONS[name], first, begin)
+
+    def _exists(self) -> Value:
+        """exists[#<name>]"""
+        self.at += 1
+        if self.text[self.at : self.at + 1] != "#":
+            raise Fault("exists wants a parameter", self.at)
+        begin = self.at
+        self.at += 1
+        if self.text[self.at : self.at + 1] == "<":
+            name = self.name()
+            found: Value = lambda given: given.has(name, begin)  # noqa: E731 - it is a value
+        else:
+            index = self.whole()
+            computed = index if callable(index) else lambda given, fixed=index: fixed
+            found = lambda given: float(1 <= computed(given) < MOST_PARAMETERS)  # noqa: E731
+        if self.text[self.at : self.at + 1] != "]":
+            raise Fault("exists wants a closing bracket behind its parameter", self.at)
+        self.at += 1
+        return found
+
+
+def evaluated(value: Value, given: Parameters) -> float:
+    """The number."""
+    return value if isinstance(value, float) else value(given)
+
+
+def finite(value: float, at: int) -> float:
+    """The number; Fault for one that is none."""
+    if value - value != 0.0:
+        raise Fault("the result of a calculation is no number", at)
+    return value
+
+
+def whole(value: float, at: int) -> int:
+    """The whole number that is meant; Fault for another one."""
+    low = math.floor(value)
+    if value - low > 1.0 - WHOLE:
+        return low + 1
+    if value - low > WHOLE:
+        raise Fault(f"{value:g} is no whole number", at)
+    return low
+
+
+def check_index(index: int, at: int) -> int:
+    """The number of a parameter; Fault where there is none of it."""
+    if not 1 <= index < MOST_PARAMETERS:
+        raise Fault(f"there is no parameter #{index} (1 to {MOST_PARAMETERS - 1})", at)
+    return index
+
+
+Binary = Callable[[float, float, int], float]
+
+
+def _joined(operator: Binary, left: Value, right: Value, at: int) -> Value:
+    """An operator applied now where both sides are numbers, else when the line is executed."""
+    if isinstance(left, float):
+        if isinstance(right, float):
+            return operator(left, right, at)
+        one, second = left, right
+        return lambda given: operator(one, second(given), at)
+    first = left
+    if isinstance(right, float):
+        two = right
+        return lambda given: operator(first(given), two, at)
+    other = right
+    return lambda given: operator(first(given), other(given), at)
+
+
+def _applied(function: Callable[[float, int], float], inner: Value, at: int) -> Value:
+    if isinstance(inner, float):
+        return finite(function(inner, at), at)
+    argument = inner
+    return lambda given: finite(function(argument(given), at), at)
+
+
+def _divided(left: float, right: float, at: int) -> float:
+    if right == 0.0:
+        raise Fault("a division by zero", at)
+    return left / right
+
+
+def _modulo(left: float, right: float, _: int) -> float:
+    if right == 0.0:  # only a result that is no number is an error, at the closing bracket
+        return math.nan
+    rest = math.fmod(left, right)
+    return rest + abs(right) if rest < 0.0 else rest
+
+
+def _power(left: float, right: float, at: int) -> float:
+    if left < 0.0 and math.floor(right) != right:
+        raise Fault("a negative number to a power that is not whole", at)
+    try:
+        return math.pow(left, right)
+    except (OverflowError, ValueError):
+        return math.inf
+
+
+def _atan(y: float, x: float, _: int) -> float:
+    return _degrees(math.atan2(y, x))
+
+
+_HALF_TURN: Final = np.longdouble(180.0)
+_PI: Final = np.longdouble("3.14159265358979323846264338327950288")
+"""LinuxCNC computes angles in C's long double, whose 64 bits of mantissa make sin[30] exactly 0.5
+(fix[2 * sin[30]] is 1) and sin[180] no number above 0."""
+
+
+def _degrees(angle_rad: float) -> float:
+    return float(np.longdouble(angle_rad) * _HALF_TURN / _PI)
+
+
+def _of_degrees(
+    function: Callable[[np.longdouble], np.longdouble],
+) -> Callable[[float, int], float]:
+    return lambda value, _: float(function(np.longdouble(value) * _PI / _HALF_TURN))
+
+
+def _arc(name: str, function: Callable[[float], float]) -> Callable[[float, int], float]:
+    def applied(value: float, at: int) -> float:
+        if not -1.0 <= value <= 1.0:
+            raise Fault(f"{name} of {value:g}, which is not from -1 to 1", at)
+        return _degrees(function(value))
+
+    return applied
+
+
+def _ln(value: float, at: int) -> float:
+    if value <= 0.0:
+        raise Fault(f"ln of {value:g}, which is not above 0", at)
+    return math.log(value)
+
+
+def _sqrt(value: float, at: int) -> float:
+    if value < 0.0:
+        raise Fault(f"sqrt of {value:g}, which is below 0", at)
+    return math.sqrt(value)
+
+
+def _exp(value: float, at: int) -> float:
+    try:
+        return math.exp(value)
+    except OverflowError:
+        raise Fault("the result of a calculation is no number", at) from None
+
+
+def _round(value: float, at: int) -> float:
+    """To the nearest whole number, halves away from zero."""
+    if abs(value) >= MOST_ROUNDED:
+        raise Fault(f"round of {value:g}, which is too large", at)
+    return float(math.trunc(value + (-0.5 if value < 0.0 else 0.5)))
+
+
+_TRUTH: Final = {False: 0.0, True: 1.0}
+
+OPERATORS: Final[dict[str, Binary]] = {
+    "**": _power,
+    "*": lambda a, b, _: a * b,
+    "/": _divided,
+    "mod": _modulo,
+    "+": lambda a, b, _: a + b,
+    "-": lambda a, b, _: a - b,
+    "eq": lambda a, b, _: _TRUTH[abs(a - b) < EQUAL],
+    "ne": lambda a, b, _: _TRUTH[abs(a - b) >= EQUAL],
+    "lt": lambda a, b, _: _TRUTH[a < b],
+    "le": lambda a, b, _: _TRUTH[a <= b],
+    "gt": lambda a, b, _: _TRUTH[a > b],
+    "ge": lambda a, b, _: _TRUTH[a >= b],
+    "and": lambda a, b, _: _TRUTH[a != 0.0 and b != 0.0],
+    "or": lambda a, b, _: _TRUTH[a != 0.0 or b != 0.0],
+    "xor": lambda a, b, _: _TRUTH[(a == 0.0) != (b == 0.0)],
+}
+
+RANKS: Final = {
+    "**": 6,
+    **dict.fromkeys(("*", "/", "mod"), 5),
+    **dict.fromkeys(("+", "-"), 4),
+    **dict.fromkeys(("eq", "ne", "lt", "le", "gt", "ge"), 3),
+    **dict.fromkeys(("and", "or", "xor"), 2),
+    "]": 1,
+}
+"""What binds more tightly has the higher number."""
+
+_BY_LENGTH: Final = sorted(RANKS, key=len, reverse=True)
+
+FUNCTIONS: Final[dict[str, Callable[[float, int], float]]] = {
+    "abs": lambda value, _: abs(value),
+    "acos": _arc("acos", math.acos),
+    "asin": _arc("asin", math.asin),
+    "atan": lambda value, _: value,  # `Scanner._function` reads its second expression
+    "cos": _of_degrees(np.cos),
+    "exists": lambda value, _: value,  # ... and its parameter
+    "exp": _exp,
+    "fix": lambda value, _: float(math.floor(value)),
+    "fup": lambda value, _: float(math.ceil(value)),
+    "ln": _ln,
+    "round": _round,
+    "sin": _of_degrees(np.sin),
+    "sqrt": _sqrt,
+    "tan": _of_degrees(np.tan),
+}

@@ -1,0 +1,13 @@
+"""A fault in a line of a program, raised where its place is not known yet."""
+
+from __future__ import annotations
+
+
+class Fault(Exception):
+    """Why LinuxCNC stops at a line; `at`: where in its closed text (`lines.closed`), or the letter
+    of the word, None for the line as a whole. The interpreter makes a ProgramError of it, which
+    has the place."""
+
+    def __init__(self, message: str, at: int | str | None = None, mend: str = "") -> None:
+        super().__init__(message)
+        self.message, self.at, self.mend = message, at, mend

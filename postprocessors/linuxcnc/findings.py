@@ -1,0 +1,87 @@
+"""The findings that only programs for LinuxCNC have."""
+
+from __future__ import annotations
+
+from camtool.findings import ERROR, INFO, WARNING, Code, Sentence, TargetCode
+
+NOT_SIMULATED = TargetCode(
+    "linuxcnc.NOT_SIMULATED",
+    (WARNING, INFO),
+    "the program asks for something that is not simulated, or not as the machine does it: other "
+    "axes than X, Y and Z, moves that follow the spindle, blocks that a switch may leave out",
+    "none, if that is meant",
+)
+PLACE_UNKNOWN = TargetCode(
+    "linuxcnc.PLACE_UNKNOWN",
+    (WARNING, ERROR),
+    "the program goes to a place that only the machine remembers: a second work frame (error), or "
+    "that of G28 and G30 (warning); it is simulated as if that were machine zero",
+    "give its place: `dialect.work_offsets_mm`, `dialect.homes_mm`",
+)
+VALUE_UNKNOWN = TargetCode(
+    "linuxcnc.VALUE_UNKNOWN",
+    (WARNING,),
+    "the program reads a numbered parameter that it has not set: it is taken as 0, and LinuxCNC "
+    "takes what its parameter file has, if it is one of those",
+    "set it in the program",
+)
+CODES = (NOT_SIMULATED, PLACE_UNKNOWN, VALUE_UNKNOWN)
+
+WORDS_PASSED_OVER_OUTPUT = Sentence(
+    Code.WORDS_PASSED_OVER,
+    "{count:# block switches|# blocks switch} an output of the machine (M62 to M68), which moves "
+    "nothing and is skipped",
+)
+NOT_SIMULATED_SPINDLE = Sentence(
+    NOT_SIMULATED,
+    "{count:# block follows|# blocks follow} the spindle (G33, G74, G76, G84): its moves are "
+    "simulated at the feed that the programmed speed makes of them, or at the F in force",
+    severity=WARNING,
+)
+NOT_SIMULATED_AGAIN = Sentence(
+    NOT_SIMULATED,
+    "M99 begins the program again and again: it is simulated once",
+    severity=WARNING,
+)
+NOT_SIMULATED_TAP = Sentence(
+    NOT_SIMULATED,
+    "{count:# move|# moves} of G74 or G84 in the plane of G18 or G19: LinuxCNC 2.9 takes the axes "
+    "there for each other, and goes where nobody wants it to; write G17",
+    severity=WARNING,
+)
+NOT_SIMULATED_AXES = Sentence(
+    NOT_SIMULATED,
+    "the program moves {axes}, which a machine of X, Y and Z refuses; only X, Y and Z are read",
+    severity=WARNING,
+)
+NOT_SIMULATED_DELETED = Sentence(
+    NOT_SIMULATED,
+    "{count:# line begins|# lines begin} with /, which a switch of the operator's leaves out; "
+    "{count:it is|they are} {how} here (dialect.block_delete)",
+    severity=WARNING,
+)
+NOT_SIMULATED_CHORDS = Sentence(
+    NOT_SIMULATED,
+    "{measured:# arc|# arcs} in XZ or YZ {measured:is|are} simulated as chords that stray by no "
+    "more than 0.0001 mm",
+    "arcs",
+    INFO,
+)
+PLACE_UNKNOWN_FRAME = Sentence(
+    PLACE_UNKNOWN,
+    "the program changes to the work frame {frame}, whose place only the machine knows: what it "
+    "cuts there is simulated as if both frames were one; give it: --set "
+    "'dialect.work_offsets_mm={{G54=[0,0,0], \"{frame}\"=[…]}}'",
+    severity=ERROR,
+)
+PLACE_UNKNOWN_HOME = Sentence(
+    PLACE_UNKNOWN,
+    "{home} goes to a place that only the machine remembers, and is simulated as machine zero; "
+    "give it: --set 'dialect.homes_mm={{{home}=[…]}}'",
+    severity=WARNING,
+)
+VALUE_UNKNOWN_PARAMETER = Sentence(
+    VALUE_UNKNOWN,
+    "{count:# parameter is|# parameters are} read before the program sets {count:it|them}, first "
+    "#{first:g}: taken as 0",
+)

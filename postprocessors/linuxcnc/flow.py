@@ -1,0 +1,607 @@
+"""The order in which lines are read: O words (sub, call, if, while, do, repeat) and M98, M99.
+
+`Flow.step` gives the next line of words, and None at the % that ends a program. As LinuxCNC it
+knows no structure of the program, only labels and a place to seek: a condition that does not hold
+skips lines up to a word with the same label (interp_o_word.cc). Labels of branches and loops
+belong to the sub in which they stand; those of subs to the program.
+
+What is executed is bounded: `MOST_LEVELS` calls within calls, and `most_lines` lines in all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final, NoReturn
+
+from camtool.errors import ProgramError
+
+from .faults import Fault
+from .lines import Line, column_of
+from .parameters import ARGUMENTS, Parameters
+from .texts import Folder, ProgramText
+
+if TYPE_CHECKING:
+    from .expressions import Value
+
+MOST_LEVELS: Final = 10
+"""Calls within calls are fewer than this (INTERP_SUB_ROUTINE_LEVELS)."""
+
+MOST_CALLERS_SHOWN: Final = 3
+"""So many of the calls that led to a line are named in a message."""
+
+KINDS: Final = (
+    *("sub", "endsub", "call", "do", "while", "repeat", "if", "elseif", "else", "endif"),
+    *("break", "continue", "endwhile", "endrepeat", "return"),
+)
+
+OF_THE_PROGRAM: Final = ("sub", "program", "endsub", "call", "M98", "return", "M99")
+"""Words whose labels are the program's, not those of the sub in which they stand."""
+
+CONDITIONS: Final = ("while", "repeat", "if", "elseif")
+"""Words that are followed by an expression."""
+
+
+class EndOfFile(Fault):
+    """The file ends, and the program has not."""
+
+
+@dataclass
+class Place:
+    """A line of a text, counted from 0."""
+
+    text: ProgramText
+    line: int
+
+
+@dataclass
+class Label:
+    """Where a label was seen first, by which word; and how often a `repeat` is still to run, −1:
+    it has not begun."""
+
+    kind: str
+    place: Place
+    left: int = -1
+
+
+@dataclass
+class Call:
+    """A call that is under way: of which sub, how ("call", "M98"), the place to come back to, the
+    parameters before it, and the modes that M70 and M73 have saved for it (None: none).
+
+    `again`: how often M98 L is still to call. The first of them stands for the program itself."""
+
+    sub: str = ""
+    kind: str = ""
+    back: Place | None = None
+    called: Place | None = None
+    before: dict[int, float | None] | None = None
+    saved: Any = None
+    restores: bool = False
+    again: int = -1
+
+
+@dataclass
+class _Word:
+    """An O word: what it is, its label, and where its text goes on."""
+
+    kind: str
+    label: Any
+    rest: int
+    condition: Any = None
+    words: Line | None = None
+
+
+@dataclass
+class Flow:
+    """The reading of one program. `restore` brings back modes that a call has saved."""
+
+    text: ProgramText
+    given: Parameters
+    folder: Folder
+    most_lines: int
+    block_delete: bool
+    restore: Callable[[Any], None] = lambda saved: None
+    at: int = 0
+    lines_read: int = 0
+    percent: bool = False
+    calls: list[Call] = field(default_factory=lambda: [Call()])
+    returned: float | None = None
+    current: Line | None = None
+    """The line that was read last, at `here`."""
+    here: Place = field(init=False)
+    deleted: dict[int, None] = field(default_factory=dict)
+    """Lines of the program that begin with /, counted from 1."""
+    branches: bool = False
+    """Whether there has been an O word."""
+    keep: bool = True
+    """Whether lines may be read again."""
+    _labels: dict[str, Label] = field(default_factory=dict)
+    _seeking: str | None = None
+    _seeking_sub: str | None = None
+    _defining: str | None = None
+    _executed_if: bool = False
+    _breaking: bool = False
+    _continuing: bool = False
+
+    def __post_init__(self) -> None:
+        self.here = Place(self.text, 0)
+        self.given.show(
+            {
+                "_value": lambda: self.returned or 0.0,
+                "_value_returned": lambda: float(self.returned is not None),
+                "_call_level": lambda: float(self.level),
+            }
+        )
+
+    # Reading
+
+    def step(self) -> Line | None:
+        """The next line of words; None at the % that ends the program."""
+        while True:
+            if self.at >= self.text.count:
+                self._end_of_file()
+            self.here = Place(self.text, self.at)
+            self.current = None
+            self.lines_read += 1
+            if self.lines_read > self.most_lines:
+                raise Fault(
+                    f"the program executes more than {self.most_lines} lines that are read one by "
+                    "one: it may loop without end",
+                    mend="if it ends, raise --set dialect.most_lines=…",
+                )
+            line = self.current = self.text.line(self.at, keep=self.keep)
+            self.at += 1
+            self.given.line = self.at
+            text = line.text
+            if text == "%" and self.percent:
+                if self._seeking is not None:
+                    raise Fault(f"the program ends, and o<{_own(self._seeking)}> was not found")
+                return None
+            if line.delete:
+                self.deleted[self.block_line + 1] = None
+                if self.block_delete:
+                    continue
+            if not text:
+                continue
+            if line.flow is not None and self._is_of_flow(line):
+                self._obey(line)
+                continue
+            if self._seeking is None:
+                return line
+
+    @property
+    def level(self) -> int:
+        """How many calls are under way."""
+        return len(self.calls) - 1
+
+    @property
+    def seeks(self) -> bool:
+        """Whether lines are skipped."""
+        return self._seeking is not None
+
+    @property
+    def caller(self) -> str:
+        """The call that is under way, for messages: `o<slot> called in line 7`; "" for none."""
+        names = [
+            f"o<{call.sub}> called in {_of_place(call.called)}"
+            for call in reversed(self.calls[1:])
+            if call.called is not None
+        ]
+        return ", ".join(names[:MOST_CALLERS_SHOWN])
+
+    @property
+    def block_line(self) -> int:
+        """The line of the program itself that is executed: in the file of a sub, that of its
+        call."""
+        if not self.here.text.name:
+            return self.here.line
+        own = [call.called for call in self.calls if call.called and not call.called.text.name]
+        return own[-1].line if own else 0
+
+    def fail(self, fault: Fault) -> NoReturn:
+        """ProgramError with the place of the line that was read last."""
+        text, number = self.here.text, min(self.here.line, max(self.here.text.count - 1, 0))
+        begin, end = int(text.begins[number]), None
+        if number + 1 < len(text.begins):
+            end = int(text.begins[number + 1]) - 1
+        raw = text.data[begin:end].decode("latin-1").rstrip("\r")
+        at = fault.at
+        if isinstance(at, str):
+            at = self.current.place(at) if self.current is not None else None
+        if at is None:
+            at = self.current.begin if self.current is not None else 0
+        column = column_of(raw, at)
+        if text.name:
+            where = f"file {text.name}, line {number + 1}, column {column}"
+        else:
+            block = text.blocks_before(number)
+            where = f"block {block + 1}, line {number + 1}, column {column}"
+        caller = f", in {self.caller}" if self.caller else ""
+        raise ProgramError(fault.message, where=where + caller, mend=fault.mend) from None
+
+    def _end_of_file(self) -> NoReturn:
+        self.here = Place(self.text, max(self.text.count - 1, 0))
+        self.current = None
+        if self._seeking_sub is not None:
+            call = self.calls.pop()
+            self.here = call.called or self.here
+            raise Fault(f"there is no sub o<{self._seeking_sub}>", mend=self.folder.mend)
+        if self._seeking is not None:
+            raise Fault(f"the file ends, and o<{_own(self._seeking)}> was not found")
+        if self.level:
+            raise Fault(f"the file ends within o<{self.calls[-1].sub}>", mend="end it with endsub")
+        raise EndOfFile(
+            "the file ends without an end of the program, which LinuxCNC reports as an error",
+            mend="end with M2, or put a line of % before and behind the program",
+        )
+
+    # O words
+
+    def _is_of_flow(self, line: Line) -> bool:
+        """Whether the O word, M98 or M99 in front is of the flow: M99 of the program itself is
+        not, it ends the program."""
+        assert line.flow is not None
+        return not line.text.startswith("m99", line.flow) or self.level > 0
+
+    def _obey(self, line: Line) -> None:
+        if line.word is None:
+            line.word = _word_of(line)
+        word: _Word = line.word
+        self.branches = True
+        own = self._label(word)
+        label = own if word.kind in OF_THE_PROGRAM else f"{self._scope()}#{own}"
+        if word.kind in ("sub", "program") and self._defining is not None:
+            raise Fault("a sub within a sub", line.flow)
+        skips = self._seeking is not None and self._seeking != label
+        value = 0.0
+        if word.kind in ("endsub", "return", "M99"):
+            if skips:
+                return
+            self._take_result(line, word)
+        elif self._defining is not None:
+            return
+        elif word.kind == "":
+            raise Fault("no word of O lines", word.rest)
+        elif word.kind == "call" and self._seeking is not None:
+            return
+        elif word.kind in CONDITIONS:
+            if skips:
+                return
+            value = self._condition(line, word)
+        if not skips and self._seeking is None and word.kind not in ("call", "M98"):
+            _check_rest(line, word)
+        if skips or (self._seeking_sub is not None and word.kind not in ("sub", "program")):
+            return
+        self._carry_out(word, label, value)
+
+    def _carry_out(self, word: _Word, label: str, value: float) -> None:
+        kind = word.kind
+        if kind in ("sub", "program"):
+            self._begin_sub(kind, label)
+        elif kind in ("endsub", "return", "M99"):
+            self._end_sub(kind)
+        elif kind in ("call", "M98"):
+            self._call(word, label)
+        elif kind == "do":
+            self._seeking = None
+            if label not in self._labels:
+                self._save(kind, label)
+        elif kind == "repeat":
+            self._repeat(label, value)
+        elif kind == "while":
+            self._while(label, value)
+        elif kind in ("if", "elseif", "else", "endif"):
+            self._branch(kind, label, value)
+        elif kind in ("break", "continue"):
+            self._leave_loop(kind, label)
+        else:
+            self._end_loop(kind, label)
+
+    def _scope(self) -> str:
+        if self.level:
+            return self.calls[-1].sub
+        return self._defining or ""
+
+    def _label(self, word: _Word) -> str:
+        label = word.label
+        if word.kind == "M99":
+            return self.calls[-1].sub
+        if word.kind == "M98":
+            return self._m98_label(word)
+        return label if isinstance(label, str) else str(label(self.given))
+
+    def _save(self, kind: str, label: str) -> Label:
+        if label in self._labels:
+            before = self._labels[label].place
+            raise Fault(f"o<{_own(label)}> is defined a second time: {_of_place(before)} has it")
+        self._labels[label] = Label(kind, Place(self.here.text, self.here.line))
+        return self._labels[label]
+
+    def _known(self, label: str) -> Label:
+        found = self._labels.get(label)
+        if found is None:
+            raise Fault(f"no word with the label o<{_own(label)}> has come before")
+        return found
+
+    def _once(self, kind: str, label: str, *, after_do: bool = False) -> Label:
+        """The label of a word that stands in one place only."""
+        found = self._labels.get(label)
+        if found is None:
+            return self._save(kind, label)
+        other = found.place.line != self.here.line
+        if other and not (after_do and found.kind == "do"):
+            raise Fault(f"the label o<{_own(label)}> is also that of {_of_place(found.place)}")
+        return found
+
+    def _go_to(self, label: str) -> None:
+        place = self._labels[label].place
+        self.text, self.at = place.text, place.line
+
+    def _condition(self, line: Line, word: _Word) -> float:
+        from .expressions import Scanner, evaluated
+
+        if word.condition is None:
+            if line.text[word.rest : word.rest + 1] != "[":
+                raise Fault(f"{word.kind} without its [condition]", word.rest)
+            scanner = Scanner(line.text, word.rest)
+            word.condition = scanner.expression()
+            word.rest = scanner.at
+        return evaluated(word.condition, self.given)
+
+    # Subs
+
+    def _begin_sub(self, kind: str, label: str) -> None:
+        how = self.calls[-1].kind
+        if kind == "program" and how == "call":
+            raise Fault("a sub of O and a number alone is called by M98")
+        if kind == "sub" and how == "M98":
+            raise Fault("a sub is called by o… call, not by M98")
+        if self._seeking is not None:
+            self._save(kind, label)
+            self._seeking = None
+        self._seeking_sub = None
+        if kind == "program" or self.level:
+            return
+        self._save(kind, label)
+        self._seeking = self._defining = label
+
+    def _end_sub(self, kind: str) -> None:
+        call = self.calls[-1]
+        if not self.level and self._defining is None:
+            raise Fault(f"{kind} outside of a sub")
+        if call.kind == "M98" and kind != "M99":
+            raise Fault("a sub that M98 has called ends with M99")
+        if call.kind == "call" and kind == "M99":
+            raise Fault("a sub that o… call has called ends with endsub")
+        if kind == "endsub":
+            self._seeking = None
+        if not self.level:
+            if kind == "endsub":
+                self._defining = None
+            return
+        self._return(call)
+
+    def _return(self, call: Call) -> None:
+        self.calls.pop()
+        self.given.leave(call.before)
+        assert call.back is not None  # the first call alone has none
+        self.text, self.at = call.back.text, call.back.line
+        if call.restores and call.saved is not None:
+            self.restore(call.saved)
+
+    def _call(self, word: _Word, label: str) -> None:
+        if len(self.calls) >= MOST_LEVELS:
+            raise Fault(
+                f"{MOST_LEVELS} calls within calls, more than LinuxCNC takes: "
+                f"o<{label}> may call itself without end"
+            )
+        caller = self.calls[-1]
+        back = Place(self.text, self.at)
+        go_on = self._way_to(label)
+        if word.kind == "M98":
+            self.calls.append(Call(label, "M98", back, self.here))
+            self.given.enter(None)
+            times = self._times(word)
+            if times == 0:
+                return
+            if times is not None:
+                caller.again = (times if caller.again == -1 else caller.again) - 1
+                if caller.again > 0:
+                    back.line -= 1
+                else:
+                    caller.again = -1
+        else:
+            arguments = self._arguments(word)
+            before = self.given.enter(arguments)
+            self.calls.append(Call(label, "call", back, self.here, before))
+        go_on()
+
+    def _way_to(self, label: str) -> Callable[[], None]:
+        """What goes to a sub: to where it was seen, or it is looked for from the beginning of its
+        file, or from here on."""
+        own = label.rsplit("/", 1)[-1]
+        if own in self._labels:
+            return lambda: self._go_to(own)
+        found = self.folder.find(label)
+
+        def seek() -> None:
+            if found is not None:
+                self.text, self.at = found, 0
+            self._seeking = self._seeking_sub = own
+
+        return seek
+
+    def _arguments(self, word: _Word) -> list[float]:
+        from .expressions import Scanner, evaluated
+
+        line = self.current
+        assert line is not None  # it has the call
+        if word.condition is None:
+            values: list[Value] = []
+            scanner = Scanner(line.text, word.rest)
+            while line.text[scanner.at : scanner.at + 1] in ("[", "("):
+                if line.text[scanner.at] == "(":
+                    scanner.at = line.text.find(")", scanner.at) + 1
+                    continue
+                if len(values) >= len(ARGUMENTS):
+                    raise Fault(f"a call with more than {len(ARGUMENTS)} arguments", scanner.at)
+                values.append(scanner.expression())
+            word.rest = scanner.at
+            _check_rest(line, word)
+            word.condition = values
+        return [evaluated(value, self.given) for value in word.condition]
+
+    def _take_result(self, line: Line, word: _Word) -> None:
+        """The value of `endsub [value]` and `return [value]`."""
+        if self._defining is not None:
+            return
+        if word.kind != "M99" and line.text[word.rest : word.rest + 1] == "[":
+            from .expressions import Scanner, evaluated
+
+            if word.condition is None:
+                scanner = Scanner(line.text, word.rest)
+                word.condition = scanner.expression()
+                word.rest = scanner.at
+            self.returned = evaluated(word.condition, self.given)
+        elif word.condition is not None:
+            from .expressions import evaluated
+
+            self.returned = evaluated(word.condition, self.given)
+        else:
+            self.returned = None
+
+    def _m98_label(self, word: _Word) -> str:
+        from .expressions import whole
+
+        assert word.words is not None
+        words = word.words.block(self.given).words
+        if "p" not in words:
+            raise Fault("M98 without the P of its sub", None)
+        return str(whole(words["p"], 0))
+
+    def _times(self, word: _Word) -> int | None:
+        assert word.words is not None
+        count = word.words.block(self.given).words.get("l")
+        return None if count is None else int(count)
+
+    # Branches and loops
+
+    def _branch(self, kind: str, label: str, value: float) -> None:
+        if kind == "if":
+            self._once(kind, label)
+            self._executed_if = value != 0.0
+            self._seeking = None if self._executed_if else label
+            return
+        if self._known(label).kind != "if":
+            raise Fault(f"{kind} without its if: o<{_own(label)}> is another word")
+        if kind == "endif":
+            self._seeking = None
+            self._executed_if = True
+        elif self._executed_if:
+            self._seeking = label
+        elif (kind == "elseif" and value != 0.0) or (kind == "else" and self._seeking == label):
+            self._seeking = None
+            self._executed_if = True
+
+    def _while(self, label: str, value: float) -> None:
+        found = self._once("while", label, after_do=True)
+        self._seeking = None
+        if found.kind == "while":
+            if value == 0.0:
+                self._seeking = label
+        elif value != 0.0 and not self._breaking:
+            self._go_to(label)
+        else:
+            self._breaking = False
+
+    def _repeat(self, label: str, value: float) -> None:
+        found = self._once("repeat", label)
+        self._seeking = None
+        if found.kind != "repeat":
+            return
+        if found.left == -1:
+            found.left = round(value)
+        if found.left > 0:
+            found.left -= 1
+        else:
+            self._seeking = label
+            found.left = -1
+
+    def _leave_loop(self, kind: str, label: str) -> None:
+        if self._known(label).kind not in ("while", "do"):
+            raise Fault(f"{kind} without its while or do: o<{_own(label)}> is another word")
+        if kind == "continue" and self._seeking == label:
+            return
+        self._seeking = label
+        if kind == "break":
+            self._breaking = True
+        else:
+            self._continuing = True
+
+    def _end_loop(self, kind: str, label: str) -> None:
+        begun = "repeat" if kind == "endrepeat" else "while"
+        if self._known(label).kind != begun:
+            raise Fault(f"{kind} without its {begun}: o<{_own(label)}> is another word")
+        if self._seeking == label:
+            self._seeking = None
+            if not self._continuing:
+                return
+            self._continuing = False
+        self._go_to(label)
+
+
+def _word_of(line: Line) -> _Word:
+    """The O word, M98 or M99 with which a line begins."""
+    text, at = line.text, line.flow
+    assert at is not None
+    if text[at] == "m":
+        if text.startswith("m99", at):
+            return _Word("M99", None, at + 3)
+        rest = Line(text[at + 3 :])
+        return _Word("M98", None, len(text), words=rest)
+    at += 1
+    label: Any
+    if text[at : at + 1] == "<":
+        end = text.find(">", at)
+        if end < 0:
+            raise Fault("a name without its closing >", at)
+        label, at = text[at + 1 : end], end + 1
+    else:
+        digits = at
+        while text[digits : digits + 1].isdigit():
+            digits += 1
+        if digits > at and text[digits : digits + 1] != ".":
+            label, at = str(int(text[at:digits])), digits
+        else:
+            from .expressions import Scanner
+
+            scanner = Scanner(text, at)
+            label = scanner.whole()
+            label = str(label) if isinstance(label, int) else label
+            at = scanner.at
+    for kind in KINDS:
+        if text.startswith(kind, at):
+            return _Word(kind, label, at + len(kind))
+    if text[at : at + 1] in ("", "(", ";"):
+        return _Word("program", label, at)
+    return _Word("", label, at)
+
+
+def _check_rest(line: Line, word: _Word) -> None:
+    """Fault where more than comments stands behind an O word."""
+    at = word.rest
+    while at < len(line.text) and line.text[at] != ";":
+        if line.text[at] != "(":
+            raise Fault("more than comments behind an O word", at)
+        at = line.text.find(")", at) + 1
+
+
+def _own(label: str) -> str:
+    """A label without its sub."""
+    return label.rsplit("#", 1)[-1]
+
+
+def _of_place(place: Place) -> str:
+    line = f"line {place.line + 1}"
+    return f"{line} of {place.text.name}" if place.text.name else line

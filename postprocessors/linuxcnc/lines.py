@@ -1,0 +1,369 @@
+"""The lines of RS274/NGC: text to words, which are compiled once and read as often as their line
+is executed.
+
+    line = Line(text)             closed: small letters, no blanks, comments as they stand
+    block = line.block(given)     its words with their numbers, in modal groups
+
+The expressions of a line are compiled by `expressions`, which plain programs never load. A line
+that begins with an O word (or M98, M99) is flow's own, and none of these words.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+from .faults import Fault
+
+if TYPE_CHECKING:
+    from .expressions import Value
+    from .parameters import Parameters
+
+# Modal groups of G words (interp_array.cc), by the tenfold code; the names are ours.
+
+G_GROUPS: Final[Mapping[int, str]] = {
+    **dict.fromkeys((0, 10, 20, 30, 50, 51, 52, 330, 331, 382, 383, 384, 385), "motion"),
+    **dict.fromkeys((700, 710, 711, 712, 720, 721, 722, 730, 740, 760, 800), "motion"),
+    **dict.fromkeys(range(810, 900, 10), "motion"),
+    **dict.fromkeys((40, 53, 100, 280, 281, 300, 301, 520, 530, 920), "one block"),
+    **dict.fromkeys((170, 171, 180, 181, 190, 191), "plane"),
+    **dict.fromkeys((900, 910), "distance"),
+    **dict.fromkeys((901, 911), "arc distance"),
+    **dict.fromkeys((930, 940, 950), "feed mode"),
+    **dict.fromkeys((200, 210), "units"),
+    **dict.fromkeys((400, 410, 411, 420, 421), "cutter radius"),
+    **dict.fromkeys((430, 431, 432, 490), "tool length"),
+    **dict.fromkeys((980, 990), "return mode"),
+    **dict.fromkeys((*range(540, 600, 10), 591, 592, 593), "work frame"),
+    **dict.fromkeys((610, 611, 640), "path"),
+    **dict.fromkeys((960, 970), "spindle mode"),
+    **dict.fromkeys((70, 80), "lathe diameter"),
+    **dict.fromkeys((921, 922, 923), "axis offsets"),
+}
+
+M_GROUPS: Final[Mapping[int, str]] = {
+    **dict.fromkeys((0, 1, 2, 30, 60, 99), "stop"),
+    **dict.fromkeys(range(62, 69), "input and output"),
+    **dict.fromkeys((6, 61), "tool"),
+    **dict.fromkeys((3, 4, 5, 19, 70, 71, 72, 73), "spindle"),
+    **dict.fromkeys((7, 8, 9), "coolant"),
+    **dict.fromkeys((48, 49, 50, 51, 52, 53), "override"),
+    **dict.fromkeys(range(100, 200), "user"),
+}
+
+MOST_M_WORDS: Final = 4
+"""M words of one block (MAX_EMS)."""
+
+TENTHS: Final = 1e-3
+"""A G word may differ from its code by so many tenths of a tenth: G5.10001 is G5.1."""
+
+AXES: Final = "xyzabc"
+"""U, V and W are unknown to a machine that does not have them."""
+
+WHOLE_WORDS: Final = "hlt"
+"""Words whose numbers are whole."""
+
+NEVER_NEGATIVE: Final = {"f": "a feed", "s": "a speed", "t": "a tool", "l": "a count"}
+
+_WORDS: Final = frozenset("abcdefghijklmpqrstxyz$@^")
+_NUMBER: Final = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?![0-9.])")
+_BLOCK_NUMBER: Final = re.compile(r"n[0-9]+(?:\.[0-9]+)?")
+_BLANKS: Final = str.maketrans("", "", " \t\r")
+_FLOW: Final = re.compile(r"o|m9[89](?![0-9.])")
+_MESSAGES: Final = {
+    "$": "a command of the controller itself",
+    ",": "a decimal comma",
+    "%": "a %, which is no word and frames no program here",
+    "=": "an assignment without its parameter",
+}
+
+
+def closed(text: str) -> str:
+    """The line as LinuxCNC reads it: without blanks and in small letters, but for comments."""
+    if "(" not in text and ";" not in text:
+        return text.translate(_BLANKS).lower()
+    parts: list[str] = []
+    at = 0
+    while at < len(text):
+        begin = next((k for k in range(at, len(text)) if text[k] in "(;"), len(text))
+        parts.append(text[at:begin].translate(_BLANKS).lower())
+        if begin == len(text):
+            break
+        if text[begin] == ";":
+            parts.append(text[begin:])
+            break
+        end = text.find(")", begin)
+        inner = text.find("(", begin + 1)
+        if 0 <= inner < (end if end >= 0 else len(text)) or end < 0:
+            raise Fault(
+                "a comment that is nested or not closed",
+                len("".join(parts)),
+                "write one ( and one ) for each comment",
+            )
+        parts.append(text[begin : end + 1])
+        at = end + 1
+    return "".join(parts)
+
+
+def column_of(text: str, at: int) -> int:
+    """The column, from 1, of a place in the closed text of a line."""
+    seen, column, comment = 0, 1, ""
+    for column, sign in enumerate(text, 1):
+        blank = not comment and sign in " \t\r"
+        if seen == at and not blank:
+            return column
+        if not comment and sign in "(;":
+            comment = ")" if sign == "(" else "end"
+        elif sign == comment:
+            comment = ""
+        seen += not blank
+    return column + (seen <= at and bool(text))
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """What a line asks for: numbers by letter, G codes (tenfold) and M codes by group, the last
+    comment, and the parameters that it sets."""
+
+    words: dict[str, float]
+    g: dict[str, int]
+    m: dict[str, int]
+    comment: str | None
+    settings: tuple[tuple[int | str, float], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Item:
+    """A word or a setting of a line: `letter` ("#" for a setting), its number, and where it
+    stands; `name`: the parameter that is set."""
+
+    letter: str
+    value: Any
+    at: int
+    name: Any = None
+
+
+class Line:
+    """One line. `delete`: it begins with /; `flow`: where its O word begins, None for a line of
+    words; `begin`: where it begins behind / and N."""
+
+    __slots__ = (
+        *("_block", "_compiled", "_items", "begin", "comment", "delete", "flow", "text"),
+        "word",
+    )
+
+    def __init__(self, raw: str) -> None:
+        self.text = text = closed(raw)
+        self.delete = text[:1] == "/"
+        at = 1 if self.delete else 0
+        if text[at : at + 1] == "n":
+            found = _BLOCK_NUMBER.match(text, at)
+            if found is None:
+                raise Fault("no number after N", at + 1)
+            at = found.end()
+        self.begin = at
+        self.flow = at if text[at : at + 1] in ("o", "m") and _FLOW.match(text, at) else None
+        self.word: Any = None
+        """Its O word, which flow has read."""
+        self.comment: str | None = None
+        self._items: list[Item] = []
+        self._block: Block | None = None
+        self._compiled = False
+
+    @property
+    def is_block(self) -> bool:
+        """Whether it says anything but comments."""
+        rest = self.text[self.begin :]
+        while rest[:1] == "(":
+            rest = rest[rest.find(")") + 1 :]
+        return bool(rest) and rest[0] != ";"
+
+    def block(self, given: Parameters) -> Block:
+        """Its words; Fault where LinuxCNC would stop while it reads them."""
+        if self._block is not None:
+            return self._block
+        if not self._compiled:
+            self._compile()
+            if all(isinstance(item.value, float) and item.letter != "#" for item in self._items):
+                self._block = grouped(self._items, self.comment)
+                return self._block
+        return self._evaluated(given)
+
+    def place(self, letter: str) -> int | None:
+        """Where the last word of a letter stands."""
+        found = [item.at for item in self._items if item.letter == letter]
+        return found[-1] if found else None
+
+    def _evaluated(self, given: Parameters) -> Block:
+        words: list[Item] = []
+        settings: list[tuple[int | str, float]] = []
+        for item in self._items:
+            if item.letter != "#":
+                value = item.value
+                number = value if isinstance(value, float) else value(given)
+                words.append(Item(item.letter, number, item.at))
+                continue
+            if isinstance(item.name, str):
+                given.declare(item.name, item.at)
+                name: int | str = item.name
+            else:
+                name = item.name(given)
+            value = item.value
+            settings.append((name, value if isinstance(value, float) else value(given)))
+        block = grouped(words, self.comment)
+        return Block(block.words, block.g, block.m, block.comment, tuple(settings))
+
+    def _compile(self) -> None:
+        """Find its words."""
+        text, at = self.text, self.begin
+        while at < len(text):
+            letter = text[at]
+            if letter in _WORDS:
+                found = _NUMBER.match(text, at + 1)
+                if found is not None:
+                    self._items.append(Item(letter, float(found[0]), at))
+                    at = found.end()
+                    continue
+                value, end = _compiled(text, at + 1, letter)
+                self._items.append(Item(letter, value, at))
+                at = end
+            elif letter == "#":
+                item, at = _setting(text, at)
+                self._items.append(item)
+            elif letter == "(":
+                end = text.find(")", at)
+                self.comment = text[at + 1 : end]
+                at = end + 1
+            elif letter == ";":
+                break
+            elif letter == "[":
+                raise Fault("an expression without the letter of its word", at)
+            elif letter == "/":
+                raise Fault("a / that does not begin its line", at)
+            elif letter.isascii() and letter.isalpha():
+                raise Fault(f"the letter {letter.upper()} is no word here", at)
+            else:
+                message = _MESSAGES.get(letter, f"the sign {letter!r} belongs to no word")
+                raise Fault(message, at)
+        self._compiled = True
+
+
+def _compiled(text: str, at: int, letter: str) -> tuple[Value, int]:
+    """A value that is no plain number, and where it ends."""
+    sign = text[at : at + 1]
+    if not (sign.isalpha() or (sign and sign in "[#+-")):
+        raise Fault(f"no number after {letter.upper()}", at - 1)
+    if letter == "$" and sign.isalpha():
+        raise Fault(_MESSAGES["$"], at - 1)
+    from .expressions import Scanner
+
+    scanner = Scanner(text, at)
+    try:
+        return scanner.value(), scanner.at
+    except Fault as fault:
+        if fault.message == "no number" and fault.at == at:
+            raise Fault(f"no number after {letter.upper()}", at - 1) from None
+        raise
+
+
+def _setting(text: str, at: int) -> tuple[Item, int]:
+    """#index=value or #<name>=value, and where it ends."""
+    from .expressions import Scanner, check_index
+    from .parameters import READ_ONLY
+
+    scanner = Scanner(text, at + 1)
+
+    def settable(index: int) -> int:
+        check_index(index, at)
+        if index in READ_ONLY:
+            raise Fault(f"#{index} cannot be set", at)
+        return index
+
+    name: str | Callable[[Parameters], int]
+    if text[at + 1 : at + 2] == "<":
+        name = scanner.name()
+    else:
+        index = scanner.whole()
+        if isinstance(index, int):
+            fixed = settable(index)
+            name = lambda given: fixed  # noqa: E731 - it is a value
+        else:
+            computed = index
+            name = lambda given: settable(computed(given))  # noqa: E731
+    if text[scanner.at : scanner.at + 1] != "=":
+        raise Fault("a parameter without =: only a word's number may be one", scanner.at)
+    scanner.at += 1
+    value = scanner.value()
+    return Item("#", value, at, name), scanner.at
+
+
+def grouped(items: list[Item], comment: str | None) -> Block:
+    """Words by letter, codes by group; Fault where LinuxCNC refuses them together."""
+    words: dict[str, float] = {}
+    g: dict[str, int] = {}
+    m: dict[str, int] = {}
+    for item in items:
+        letter, value = item.letter, item.value
+        if letter == "g":
+            code = g_code(value, item.at)
+            group = G_GROUPS[code]
+            before = g.get(group)
+            if before is not None and code == 800:
+                continue  # G80 beside another motion word counts for nothing
+            if before not in (None, 800):
+                raise Fault(f"two G words of one group ({group})", item.at)
+            g[group] = code
+        elif letter == "m":
+            code = m_code(value, item.at)
+            group = M_GROUPS[code]
+            if group in m:
+                raise Fault(f"two M words of one group ({group})", item.at)
+            m[group] = code
+        else:
+            if letter in words:
+                raise Fault(f"two {letter.upper()} words in one block", item.at)
+            if letter in NEVER_NEGATIVE and value < 0.0:
+                raise Fault(f"{NEVER_NEGATIVE[letter]} below 0", item.at)
+            if letter in WHOLE_WORDS:
+                value = float(_whole(value, item.at))
+                if letter == "h" and value < -1:
+                    raise Fault("a tool below 0", item.at)
+            words[letter] = value
+    if len(m) > MOST_M_WORDS:
+        raise Fault(f"more than {MOST_M_WORDS} M words", "m")
+    return Block(words, g, m, comment)
+
+
+def g_code(value: float, at: int) -> int:
+    """The tenfold code of a G word."""
+    tenfold = 10.0 * value
+    code = int(tenfold // 1)
+    rest = tenfold - code
+    if rest > 1.0 - TENTHS:
+        code += 1
+    elif rest > TENTHS:
+        raise Fault(f"the controller does not know G{value:g}", at)
+    if code not in G_GROUPS:
+        raise Fault(f"the controller does not know G{value:g}", at)
+    return code
+
+
+def m_code(value: float, at: int) -> int:
+    """The code of an M word."""
+    try:
+        code = _whole(value, at)
+    except Fault:
+        code = -1
+    if code not in M_GROUPS:
+        raise Fault(f"the controller does not know M{value:g}", at)
+    return code
+
+
+def _whole(value: float, at: int) -> int:
+    if value == value // 1:
+        return int(value)
+    from .expressions import whole
+
+    return whole(value, at)

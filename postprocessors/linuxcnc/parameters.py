@@ -1,0 +1,145 @@
+"""Parameters of a program: numbered (`#1`), named (`#<name>`, `#<_global>`), and those that show
+the state of the interpreter.
+
+A numbered parameter that nobody has set is 0 (those of 31 to 5000 may be stored on the machine); a
+named one is an error. What only the machine knows has no value here: results of probing, inputs,
+values of the INI file and of HAL.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from functools import cached_property
+from typing import Final
+
+from .faults import Fault
+
+MOST_PARAMETERS: Final = 5602
+"""Numbers of parameters are below this (RS274NGC_MAX_PARAMETERS)."""
+
+ARGUMENTS: Final = range(1, 31)
+"""Numbers of the parameters that a call gives and a return gives back."""
+
+CURRENT: Final = range(5420, 5429)
+"""The position, X Y Z A B C U V W in the units and the frame of the program."""
+
+READ_ONLY: Final = frozenset((*range(5400, 5414), *CURRENT))
+
+UNKNOWN: Final = {
+    **dict.fromkeys(range(5061, 5071), "a result of probing"),
+    5399: "the result of M66",
+}
+"""What only the machine knows."""
+
+DEBUG: Final = 5599
+"""1 at first: `(debug,…)` is shown where it is above 0."""
+
+
+class Parameters:
+    """Values by number and by name; `state` gives the names that show the
+    interpreter's state.
+
+    `unset`: the numbers that were read before anybody set them, and where; `known`: numbers with
+    a value from the beginning on.
+    """
+
+    def __init__(
+        self,
+        known: Mapping[int, float],
+        state: Callable[[], Mapping[str, Callable[[], float]]],
+        position: Callable[[], Iterable[float]],
+    ) -> None:
+        self.unset: dict[int, int] = {}
+        self.compensating = False
+        """Whether the cutter's radius is compensated, when the position cannot be read."""
+        self.line = 0
+        """Number of the line that is executed."""
+        self._values = {DEBUG: 1.0, 5600: 0.0, 5601: 0.0, **known}
+        self._names_of = state
+        self._more: dict[str, Callable[[], float]] = {}
+        self._position = position
+        self._globals: dict[str, float] = {}
+        self._locals: list[dict[str, float]] = [{}]
+
+    def show(self, names: Mapping[str, Callable[[], float]]) -> None:
+        """Further names that show a state."""
+        self._more |= names
+
+    @cached_property
+    def _state(self) -> dict[str, Callable[[], float]]:
+        return {**self._names_of(), **self._more}
+
+    def numbered(self, index: int, at: int) -> float:
+        """The value of a number, 0 where it has none yet."""
+        value = self._values.get(index)
+        if value is not None:
+            return value
+        if index in CURRENT:
+            if self.compensating:
+                message = "the position cannot be read while the cutter's radius is compensated"
+                raise Fault(message, at)
+            return list(self._position())[index - CURRENT.start]
+        if index in UNKNOWN:
+            raise Fault(f"#{index} is {UNKNOWN[index]}, which only the machine knows", at)
+        self.unset.setdefault(index, self.line)
+        return 0.0
+
+    def stored(self, index: int) -> float:
+        """The same for the interpreter itself."""
+        return self._values.get(index, 0.0)
+
+    def named(self, name: str, at: int) -> float:
+        """The value of a name."""
+        if name in self._state:
+            return self._state[name]()
+        value = self._of(name).get(name)
+        if value is None:
+            if name.startswith(("_ini[", "_hal[")):
+                where = "the machine's INI file" if name[1] == "i" else "HAL"
+                raise Fault(f"#<{name}> is a value of {where}, which only the machine knows", at)
+            mend = "set it first" if name[:1] == "_" else "names without _ are known in one sub"
+            raise Fault(f"nobody has set #<{name}>", at, mend)
+        return value
+
+    def has(self, name: str, at: int) -> float:
+        """1 where a name has a value."""
+        if name.startswith(("_ini[", "_hal[")):
+            return float(bool(self.named(name, at)))
+        return float(name in self._state or name in self._of(name))
+
+    def declare(self, name: str, at: int) -> None:
+        """A line that sets a name makes it exist while the line is still read."""
+        if name in self._state:
+            raise Fault(f"#<{name}> cannot be set", at)
+        self._of(name).setdefault(name, 0.0)
+
+    def set_named(self, name: str, value: float) -> None:
+        """Give a name a value."""
+        self._of(name)[name] = value
+
+    def set_numbered(self, index: int, value: float) -> None:
+        """Give a number a value."""
+        self._values[index] = value
+
+    def enter(self, arguments: Iterable[float] | None) -> dict[int, float | None] | None:
+        """A call begins: names of its own, and its arguments in #1 to #30, where it has some (M98
+        has none). What they were before is given."""
+        self._locals.append({})
+        if arguments is None:
+            return None
+        before = {index: self._values.get(index) for index in ARGUMENTS}
+        self._values.update(dict.fromkeys(ARGUMENTS, 0.0))
+        self._values.update(zip(ARGUMENTS, arguments, strict=False))
+        return before
+
+    def leave(self, before: dict[int, float | None] | None) -> None:
+        """A call ends."""
+        self._locals.pop()
+        for index, value in (before or {}).items():
+            if value is None:
+                self._values.pop(index, None)
+            else:
+                self._values[index] = value
+
+    def _of(self, name: str) -> dict[str, float]:
+        return self._globals if name[:1] == "_" else self._locals[-1]

@@ -1,0 +1,229 @@
+"""The state of the interpreter: the modes in force, the position, the tools, and what was noted.
+
+Numbers are in the units of the program, as LinuxCNC has them; `Canon` makes rows in mm of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final
+
+from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.moves import Kind
+
+from .canon import PLANES, Canon
+from .dialect import Dialect, LinuxcncMachine, Tool
+from .faults import Fault
+from .flow import Call
+from .parameters import Parameters
+
+if TYPE_CHECKING:
+    from .compensation import Compensation
+
+MM_PER_INCH: Final = 25.4
+"""Length of an inch, mm."""
+
+
+@dataclass
+class Notes:
+    """Blocks (index from 0) at which something was passed over or taken for granted."""
+
+    coolant: list[int] = field(default_factory=list)
+    pauses: list[int] = field(default_factory=list)
+    outputs: list[int] = field(default_factory=list)
+    speedless: list[int] = field(default_factory=list)
+    tapping: list[int] = field(default_factory=list)
+    swapped: list[int] = field(default_factory=list)
+    begins_again: bool = False
+    axes: dict[str, int] = field(default_factory=dict)
+    frames: dict[str, int] = field(default_factory=dict)
+    homes: dict[str, int] = field(default_factory=dict)
+    feeds: Callable[[int, float], None] = lambda block, feed: None
+
+
+@dataclass
+class Series:
+    """What cycles keep from block to block: the height at which the first of them began (None:
+    none has), and the words R, P, Q, I, J, K and that of the depth."""
+
+    height: float | None = None
+    words: dict[str, float] = field(default_factory=dict)
+
+
+class State:
+    """The modes, the position, and the moves and events that follow from them."""
+
+    given: Parameters
+
+    def __init__(self, machine: LinuxcncMachine, path: ToolpathBuilder, notes: Notes) -> None:
+        dialect: Dialect = machine.dialect
+        self.notes = notes
+        self.block_index = 0
+        self.ended = False
+        self.motion: int | None = None
+        """The motion in force, tenfold; None: none yet."""
+        self.position = [0.0, 0.0, 0.0]
+        """X, Y, Z of the controlled point."""
+        self.others = dict.fromkeys("abc", 0.0)
+        self.plane = 170
+        self.absolute = True
+        self.absolute_centres = False
+        self.feed_mm = 0.0
+        """The F word in force, mm a minute (G95: a turn)."""
+        self.feed_mode = 940
+        self.to_r = True
+        self.diameters = False
+        self.spindle: Kind | None = None
+        self.speed = 0.0
+        self.canon = Canon(path, dialect.arc_full_turn_rad)
+        self.calls: list[Call] = [Call()]
+        """The calls that are under way, the program itself first: flow's own."""
+        self._dialect = dialect
+        self._machine = machine
+        self._cools = bool(machine.coolant.kinds)
+        self._user_mm = MM_PER_INCH if dialect.linear_units == "in" else 1.0
+        """Length of the unit of parameters, mm."""
+        self._said_speed = False
+        self._tools = {int(number): tool for number, tool in dialect.tools.items()}
+        self._tool: int | None = None
+        self._loaded = 0
+        self._changed = False
+        self._tool_offset = [0.0, 0.0, 0.0]
+        self._frame = 1
+        self._origin = [0.0, 0.0, 0.0]
+        self._rotation = 0.0
+        self._axis_offset = [0.0, 0.0, 0.0]
+        self._arc_refused = False
+        self._tolerances = (0.0, 0.0)
+        self._control = 640
+        self._mist = self._flood = False
+        self._spindle_mode = 970
+        self._spline: list[tuple[float, float, float]] = []
+        self._order = 3
+        self._leaving = (0.0, 0.0)
+        self.series: Series | None = None
+        """What cycles keep, where there have been any."""
+        self._compensation: Compensation | None = None
+        self._first_frame: int | None = None
+        self._placed: set[int] = set()
+        """Frames whose place on the machine is known."""
+        self._set_here: set[int] = set()
+        """Frames that the program has placed from where it stood."""
+        self._homed: set[int] = set()
+
+    # Parts that only some programs need
+
+    @property
+    def compensation(self) -> Compensation:
+        """Cutter compensation."""
+        if self._compensation is None:
+            from .compensation import Compensation
+
+            self._compensation = Compensation(self.canon)
+        return self._compensation
+
+    @property
+    def _compensates(self) -> bool:
+        return self._compensation is not None and self._compensation.side != 0
+
+    @property
+    def plain(self) -> bool:
+        """Whether blocks of plain moves may be read by columns now."""
+        return (
+            self.motion in (None, 0, 10, 20, 30, 800)
+            and self.plane == 170
+            and self.absolute
+            and not self.absolute_centres
+            and self.feed_mode == 940
+            and not self.diameters
+            and not self._compensates
+            and not self._arc_refused
+            and self.canon.same
+        )
+
+    def went_on(
+        self, motion: int | None, feed: float, at: tuple[float, float, float], *, moved: bool
+    ) -> None:
+        """Blocks of plain moves were read: the motion and the feed (mm/min) in force behind them,
+        and the place (mm)."""
+        mm = self.canon.mm
+        self.motion = self.motion if motion is None else motion
+        self.feed_mm = feed
+        x, y, z = at
+        self.position[:] = x / mm, y / mm, z / mm
+        if moved:
+            self.canon.moved = True
+            if self._first_frame is None:
+                self._first_frame = self._frame
+        if self.series is not None:
+            self.series.height = None
+
+    def end_of_file(self) -> None:
+        """The % that ends a program: a move that waits is never made."""
+        self.canon.queue.clear()
+
+    def turn(self, kind: Kind) -> None:
+        """Start or stop the spindle."""
+        if kind == Kind.SPINDLE_OFF:
+            self.spindle = None
+            self.canon.event(kind)
+            return
+        if not self._said_speed:
+            self.notes.speedless.append(self.block_index)
+        self.spindle = kind
+        self.canon.event(kind, self.speed if self._said_speed else None)
+
+    def dwell(self, seconds: float) -> None:
+        """Wait."""
+        self.canon.event(Kind.DWELL, seconds)
+
+    def _tool_of(self, number: int, letter: str) -> Tool:
+        """A tool of the table; where there is no table, any tool, of which nothing is known."""
+        if number == 0:
+            return Tool()
+        tool = self._tools.get(number)
+        if tool is None:
+            if self._dialect.tools:
+                mend = f"add it: [dialect.tools.{number}]"
+                raise Fault(f"tool {number} is not in the tool table", letter, mend)
+            return Tool()
+        return tool
+
+    def _load(self, number: int) -> None:
+        self._loaded, self._changed = number, True
+        tool = self._tool_of(number, "t")
+        values = [float(number), *tool.offset_mm, *(0.0,) * 6, tool.diameter_mm or 0.0]
+        lengths = [values[0], *(value / self._user_mm for value in values[1:])]
+        for index, value in enumerate(lengths, 5400):
+            self.given.set_numbered(index, value)
+
+    def _not_while_compensating(self, what: str) -> None:
+        if self._compensates:
+            raise Fault(f"{what} while the cutter's radius is compensated")
+
+    def go(self, kind: Kind, axes: tuple[int, int, int], place: list[float]) -> None:
+        """A straight move to a place in the order of a plane."""
+        to = [0.0, 0.0, 0.0]
+        for axis, value in zip(axes, place, strict=True):
+            to[axis] = value
+        (self.canon.rapid if kind == Kind.RAPID else self.canon.line)(*to)
+
+    def _begin(self) -> list[float]:
+        """Where the programmed move begins: beside it the cutter may stand, compensated."""
+        compensation = self._compensation
+        if compensation is not None and compensation.active and not compensation.first:
+            to = [0.0, 0.0, 0.0]
+            for axis, value in zip(PLANES[self.plane], compensation.programmed, strict=True):
+                to[axis] = value
+            return to
+        return list(self.position)
+
+    def _flat(self, place: list[float] | None = None) -> list[float]:
+        """A place, or the position, in the order of the plane."""
+        of = self.position if place is None else place
+        return [of[axis] for axis in PLANES[self.plane]]
+
+    def _put(self, flat: list[float]) -> None:
+        for axis, value in zip(PLANES[self.plane], flat, strict=True):
+            self.position[axis] = value

@@ -1,0 +1,133 @@
+"""The texts of a program: its own file, and those of the subs that it calls, by lines.
+
+LinuxCNC looks for `o<name> call` in the folder of the program: `name.ngc`. Nothing outside of that
+folder is opened.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path, PurePosixPath
+from typing import Final
+
+import numpy as np
+
+from camtool import bounds
+from camtool.arrays import Ints
+from camtool.errors import ProgramError
+
+from ..gcode.blocks import has_words
+from .faults import Fault
+from .lines import Line
+
+MOST_FILES: Final = 100
+"""Files of subs that one program may call."""
+
+MOST_FILE_BYTES: Final = 10_000_000
+"""A larger file of a sub is refused."""
+
+SUFFIX: Final = ".ngc"
+
+_CONTROL: Final = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")
+_BARE_RETURN: Final = re.compile(rb"\r(?!\n)")
+
+
+class ProgramText:
+    """The lines of one file, counted from 0; `name` "" is the program itself."""
+
+    def __init__(self, data: bytes, name: str, line_chars: int) -> None:
+        _check_bytes(data, name)
+        self.name = name
+        self.data = _BARE_RETURN.sub(b"\n", data) if b"\r" in data else data
+        octets = np.frombuffer(self.data, dtype=np.uint8)
+        ends = np.flatnonzero(octets == ord("\n"))
+        self.begins: Ints = np.concatenate([[0], ends + 1])
+        self.count = len(self.begins) - (self.begins[-1] == len(self.data))
+        """How many lines."""
+        self._line_chars = line_chars
+        self._lines: dict[int, Line] = {}
+        self._before: Ints | None = None
+
+    def raw(self, number: int) -> str:
+        """The text of a line, without the blanks at its end."""
+        begin = int(self.begins[number])
+        last = number + 1 == len(self.begins)
+        end = len(self.data) if last else int(self.begins[number + 1]) - 1
+        if end - begin - (self.data[end - 1 : end] == b"\r") > self._line_chars:
+            message = f"the line has more than {self._line_chars} characters"
+            raise Fault(message, self._line_chars, "shorten it")
+        return self.data[begin:end].decode("latin-1").rstrip(" \t\r\v\f")
+
+    def line(self, number: int, *, keep: bool) -> Line:
+        """A line, compiled once where it may be read again (`keep`)."""
+        line = self._lines.get(number)
+        if line is None:
+            line = Line(self.raw(number))
+            if keep:
+                self._lines[number] = line
+        return line
+
+    def blocks_before(self, number: int) -> int:
+        """How many lines before this one are blocks, as the program's listing has them."""
+        if self._before is None:
+            lines = self.data.decode("latin-1").split("\n")
+            flags = np.array([has_words(line) for line in lines], dtype=np.int64)
+            self._before = np.concatenate([[0], np.cumsum(flags)])
+        return int(self._before[number])
+
+
+class Folder:
+    """Where the files of subs are looked for; None: the program has no place of its own."""
+
+    def __init__(self, folder: Path | None, line_chars: int) -> None:
+        self._folder = folder
+        self._line_chars = line_chars
+        self._found: dict[str, ProgramText | None] = {}
+
+    def find(self, label: str) -> ProgramText | None:
+        """The file of a sub, None where there is none; Fault for a place that is not opened."""
+        if label in self._found:
+            return self._found[label]
+        if len(self._found) >= MOST_FILES:
+            raise Fault(f"the program calls more than {MOST_FILES} files")
+        self._found[label] = found = self._opened(label)
+        return found
+
+    @property
+    def mend(self) -> str:
+        """What helps where a file is missing."""
+        if self._folder is None:
+            return "give the program as a file: its folder is where subs are looked for"
+        return f"put the sub into the program or its file into {self._folder}"
+
+    def _opened(self, label: str) -> ProgramText | None:
+        name = f"{label}{SUFFIX}"
+        parts = PurePosixPath(name)
+        if parts.is_absolute() or ".." in parts.parts:
+            raise Fault(f"{name} lies outside of the program's folder", mend=self.mend)
+        if self._folder is None:
+            return None
+        try:
+            root = self._folder.resolve()
+            file = (root / parts).resolve()
+            if not file.is_relative_to(root):
+                raise Fault(f"{name} lies outside of the program's folder", mend=self.mend)
+            data = bounds.file_bytes(file, MOST_FILE_BYTES)
+        except (OSError, ValueError):
+            return None
+        if data is None:
+            raise Fault(f"{name} is larger than {MOST_FILE_BYTES // 1_000_000} MB")
+        return ProgramText(data, name, self._line_chars)
+
+
+def _check_bytes(data: bytes, name: str) -> None:
+    """ProgramError at the first byte that no program has."""
+    odd = _CONTROL.search(data)
+    if odd is not None:
+        before = data[: odd.start()].split(b"\n")
+        where = f"line {len(before)}, column {len(before[-1]) + 1}"
+        raise ProgramError(
+            f"the byte 0x{data[odd.start()]:02x} belongs to no program",
+            where=f"file {name}, {where}" if name else where,
+            mend="give a program of plain text",
+        )
