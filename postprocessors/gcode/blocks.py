@@ -44,6 +44,9 @@ LINE_CHARS: Final = 4096
 LEAST_RUN: Final = 24
 """Fewer plain blocks in a row than these are read one by one."""
 
+LONGEST_WAIT: Final = 256
+"""Where no lines are plain, it is asked again after so many of them at most."""
+
 ROWS_AT_ONCE: Final = 1 << 12
 """So many plain blocks are read in one go."""
 
@@ -58,6 +61,7 @@ _NUMBER: Final = r"[+-]?+(?:\d++(?:\.\d*+)?|\.\d++)"
 _COMMENT: Final = re.compile(r"\(([^()]*)\)|;(.*)")
 _ODD: Final = re.compile(rb"[^\x20-\x7e\t\r\n]")
 _CONTROL: Final = re.compile(rb"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
+_BARE_RETURN: Final = re.compile(rb"\r(?!\n)")
 _LINE_END: Final = re.compile(rb"\r\n|\n|\r")
 _NO_WORDS: Final = re.compile(r"\([^()]*\)|;.*|[ \t%]")
 _BLOCK_NUMBER: Final = re.compile(r"[Nn]\d+(?:\.\d*)?")
@@ -383,6 +387,58 @@ def _explained(rest: str, before: str, lexing: Lexing) -> tuple[str, str, int]:
     if sign.isdigit() or sign in ".+-":
         return f"a number without its letter, {shown}", "each number has one letter before it", 0
     return f"{sign!r} begins no word", "remove it", 0
+
+
+class Lines:
+    """The lines of a program, counted from 0; CR alone ends one too."""
+
+    def __init__(self, data: bytes) -> None:
+        self.data = _BARE_RETURN.sub(b"\n", data) if b"\r" in data else data
+        self.octets = np.frombuffer(self.data, dtype=np.uint8)
+        ends = np.flatnonzero(self.octets == ord("\n"))
+        self.begins: Ints = np.concatenate([[0], ends + 1])
+        self.count = len(self.begins) - int(self.begins[-1] == len(self.data))
+        """How many lines."""
+
+    def text(self, number: int) -> str:
+        """A line, each byte a character."""
+        begin = int(self.begins[number])
+        last = number + 1 == len(self.begins)
+        end = len(self.data) if last else int(self.begins[number + 1]) - 1
+        return self.data[begin:end].decode("latin-1").removesuffix("\r")
+
+
+class PlainRuns:
+    """Runs of plain lines, as they are met: where lines are not plain, it is asked less and less
+    often. `rules` are those of `words.plain_lines`."""
+
+    def __init__(self, lines: Lines, rules: tuple[int, bool, bool, bool, bool]) -> None:
+        self._lines, self._rules = lines, rules
+        self._numbers = np.zeros((0, 7))
+        self._facts = np.empty((0, words.FACT_COLUMNS), dtype=np.int64)
+        self._wait, self._waited = 1, 0
+
+    def run(self, number: int, index: int, take: Take) -> tuple[int, int]:
+        """Have plain lines from this one on taken, the first of which is the block of this index:
+        how many blocks, and the line behind them."""
+        self._waited += 1
+        if self._waited < self._wait or number >= self._lines.count:
+            return 0, number
+        self._waited = 0
+        if not len(self._facts):
+            self._numbers = np.zeros((ROWS_AT_ONCE, 7))
+            self._facts = np.empty((ROWS_AT_ONCE, words.FACT_COLUMNS), dtype=np.int64)
+        begin = int(self._lines.begins[number])
+        rows, _, behind = words.plain_lines(
+            self._lines.octets, begin, number + 1, self._rules, self._numbers, self._facts
+        )
+        count = 0
+        if rows >= LEAST_RUN:
+            count = take(PlainBlocks(self._numbers[:rows], self._facts[:rows], index))
+        self._wait = 1 if count else min(2 * self._wait, LONGEST_WAIT)
+        if not count:
+            return 0, number
+        return count, behind - 1 if count == rows else int(self._facts[count, words.LINE]) - 1
 
 
 def listing(data: bytes) -> Listing:

@@ -10,6 +10,7 @@ from camtool.target.contract import Setting, Target
 
 from ..gcode.dialect import check_blocks, feed_decimals, last_decimal_mm
 from .dialect import Dialect, GrblController, GrblMachine
+from .findings import CODES
 
 if TYPE_CHECKING:
     from camtool.machine.model import Axis
@@ -29,6 +30,7 @@ class Grbl(Target):
     switches_coolant = True
     any_machine = True
     settings_listing = "what it answers to $$"
+    codes = CODES
 
     def check(self, machine: GrblMachine) -> None:
         """Raise MachineError where values of the dialect do not go with the machine."""

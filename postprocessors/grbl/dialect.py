@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Final, Literal
 
+import msgspec
 from msgspec import Meta
 
 from camtool.machine.model import Machine, SlideStart
-from camtool.machine.ranges import Seconds, Slack, Tolerance
+from camtool.machine.ranges import Place, Seconds, Slack, Tolerance
 
 from ..gcode.dialect import GcodeDialect
 
@@ -15,13 +16,24 @@ MOST_TOOL: Final = 255
 """Tools beyond it are grbl's error 38 (`MAX_TOOL_NUMBER`, gcode.c)."""
 
 
+Frame = Literal["G54", "G55", "G56", "G57", "G58", "G59"]
+
+Home = Literal["G28", "G30"]
+
+Spot = tuple[Place, Place, Place]
+
+
 class Dialect(GcodeDialect, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """`tool_change`: grbl knows no M6, so between cuts the program says the tool and stops until
     the operator goes on ("stop": `T2 M0`), stops so for the first tool too ("pause"), or is
-    refused ("refuse"). `most_dwell_s`: grbl counts longer dwells wrong."""
+    refused ("refuse"). `most_dwell_s`: grbl counts longer dwells wrong. What a program that is
+    read may ask of the machine: `work_offsets_mm`, where G54 to G59 have their zero on it, and
+    `homes_mm`, where G28 and G30 go."""
 
     tool_change: Literal["stop", "pause", "refuse"] = "stop"
     most_dwell_s: Seconds
+    work_offsets_mm: dict[Frame, Spot] = msgspec.field(default_factory=dict)
+    homes_mm: dict[Home, Spot] = msgspec.field(default_factory=dict)
 
 
 class GrblController(SlideStart, frozen=True, tag_field="model", tag="grbl"):

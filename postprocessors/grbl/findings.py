@@ -2,7 +2,60 @@
 
 from __future__ import annotations
 
-from camtool.findings import INFO, WARNING, Code, Sentence
+from camtool.findings import ERROR, INFO, WARNING, Code, Sentence, TargetCode
+
+NOT_SIMULATED = TargetCode(
+    "grbl.NOT_SIMULATED",
+    (WARNING, INFO),
+    "the program asks for something that is not simulated, or that grbl does otherwise than it "
+    "looks: jogs, lines with /, signs that grbl obeys within comments, arcs in XZ and YZ",
+    "none, if that is meant",
+)
+PLACE_UNKNOWN = TargetCode(
+    "grbl.PLACE_UNKNOWN",
+    (WARNING, ERROR),
+    "the program goes to a place that only the controller remembers: a second work frame (error), "
+    "or that of G28 and G30 (warning); it is simulated as if that were machine zero",
+    "give its place: `dialect.work_offsets_mm`, `dialect.homes_mm`",
+)
+CODES = (NOT_SIMULATED, PLACE_UNKNOWN)
+
+NOT_SIMULATED_JOG = Sentence(
+    NOT_SIMULATED,
+    "{count:# line jogs|# lines jog} ($J=), which grbl refuses while a program moves (error:8)",
+    severity=WARNING,
+)
+NOT_SIMULATED_SLASH = Sentence(
+    NOT_SIMULATED,
+    "{count:# line has|# lines have} a /, for which grbl has no switch: it is always executed",
+    severity=WARNING,
+)
+NOT_SIMULATED_REALTIME = Sentence(
+    NOT_SIMULATED,
+    "{count:# line has|# lines have} one of the signs ! ? ~ in a comment, which grbl obeys there "
+    "too: ! stops the machine",
+    severity=WARNING,
+)
+NOT_SIMULATED_CHORDS = Sentence(
+    NOT_SIMULATED,
+    "{measured:# arc|# arcs} in XZ or YZ {measured:is|are} simulated as chords that stray by no "
+    "more than 0.0001 mm",
+    "arcs",
+    INFO,
+)
+PLACE_UNKNOWN_FRAME = Sentence(
+    PLACE_UNKNOWN,
+    "the program changes to the work frame {frame}, whose place only the controller knows: what "
+    "it cuts there is simulated as if both frames were one; give it: --set "
+    "'dialect.work_offsets_mm={{G54=[0,0,0], {frame}=[…]}}'",
+    severity=ERROR,
+)
+PLACE_UNKNOWN_HOME = Sentence(
+    PLACE_UNKNOWN,
+    "{home} goes to a place that only the controller remembers, and is simulated as machine zero; "
+    "give it: --set 'dialect.homes_mm={{{home}=[…]}}'",
+    severity=WARNING,
+)
 
 EVENT_LEFT_OUT = Sentence(
     Code.EVENT_LEFT_OUT,

@@ -1,24 +1,46 @@
-"""Reading grbl 1.1 as it takes programs: its words, its groups, its rule for arcs (gcode.c).
+"""Reading grbl 1.1's programs: lines as they come in over the serial port (protocol.c), then its
+parser.
 
-Commands of grbl itself (`$H`, `$J=…`) and its realtime characters are the sender's, no program's.
+    parser   what a line does, with grbl's own errors
+
+Where hundreds of lines in a row are plain moves, they are read by columns, past the parser.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Final
+from typing import Final, NoReturn
 
 import numpy as np
 
+from camtool import bounds
 from camtool.errors import ProgramError
 from camtool.findings import Finding
+from camtool.kernels import words
+from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 
-from ..gcode.blocks import Lexing, blocks_of
-from ..gcode.read import M_CODES, ModalReader, Rules
-from .dialect import MOST_TOOL, GrblController, GrblMachine
-from .findings import FEED_TOO_SLOW
+from ..gcode.blocks import Lines, PlainBlocks, PlainRuns, has_words
+from ..gcode.faults import Fault
+from ..gcode.findings import (
+    SPINDLE_SPEED_NOT_SAID,
+    WORDS_PASSED_OVER_COOLANT,
+    WORDS_PASSED_OVER_PAUSE,
+)
+from ..gcode.plain_moves import KINDS, ArcRule, FastFeeds, PlainMoves, PlainState
+from .dialect import Dialect, GrblController, GrblMachine
+from .findings import (
+    FEED_TOO_SLOW,
+    NOT_SIMULATED_CHORDS,
+    NOT_SIMULATED_JOG,
+    NOT_SIMULATED_REALTIME,
+    NOT_SIMULATED_SLASH,
+    PLACE_UNKNOWN_FRAME,
+    PLACE_UNKNOWN_HOME,
+)
+from .parser import Notes, Parser
 
 SLOW_GUARD: Final = 1e-6
 """Part of a feed: one below the slowest by less counts as the slowest."""
@@ -26,59 +48,162 @@ SLOW_GUARD: Final = 1e-6
 ROWS_AT_ONCE: Final = 1 << 14
 """So many moves are compared with the slowest feed at a time."""
 
-MIST: Final = 70
-"""M7, tenfold: grbl's error 20 in its default configuration (ENABLE_M7 of config.h is off)."""
+ODD: Final = re.compile(rb"[^\x20-\x7e\t\r\n]")
+"""Bytes above 7F are commands to grbl, wherever they stand; others belong to no text."""
 
-GROUPS: Final = {
-    **dict.fromkeys((0, 10, 20, 30, 800), "motion"),
-    **dict.fromkeys((40, 530), "one block"),
-    170: "plane",
-    **dict.fromkeys((200, 210), "units"),
-    **dict.fromkeys((900, 910), "distance"),
-    911: "arc distance",
-    940: "feed mode",
-    400: "cutter radius",
-    490: "tool length",
-    **dict.fromkeys(range(540, 600, 10), "work frame"),
-    610: "path",
-}
-
-_FRAME: Final = "moves part zero by what only the controller knows"
-_PLANE: Final = "is another plane; arcs lie in XY here"
-REFUSED: Final = {
-    **dict.fromkeys(("G10", "G92", "G92.1"), _FRAME),
-    **dict.fromkeys(("G28", "G30"), "goes to a place that only the controller remembers"),
-    **dict.fromkeys(("G28.1", "G30.1"), "remembers a place, which is not simulated"),
-    **dict.fromkeys(("G18", "G19"), _PLANE),
-    **dict.fromkeys(("G38.2", "G38.3", "G38.4", "G38.5"), "probes, which cannot be simulated"),
-    "G43": "is unknown to grbl, its error 20",
-    "G43.1": "shifts Z by a tool length",
-    "G93": "says feeds as inverse time, which is not read",
-    "M6": "is unknown to grbl, its error 20",
-    "M7": "is unknown to grbl as it ships, its error 20",
-}
+COMMENT: Final = re.compile(r"\([^)]*\)?|;.*")
 
 
 def read_program(data: bytes, machine: GrblMachine) -> Toolpath:
-    """The moves of a program; ProgramError with block, line and column."""
-    dialect = machine.dialect
-    lexing = Lexing(
-        letters="GMXYZIJKFSTPRL",
-        lower_case=True,
-        blanks="anywhere",
-        parentheses=True,
-        semicolon=True,
-        block_numbers=True,
-        line_chars=dialect.line_chars,
-        counts_blanks=False,
-    )
-    reader = ModalReader(machine, rules_of(machine))
-    for block in blocks_of(data, lexing, reader.take):
-        reader.block(block)
-    if reader.empty:
-        raise ProgramError("the program is empty", mend="a program has blocks such as G0 X1")
-    path = reader.finish()
+    """The moves of a program; ProgramError with block, line and column, and grbl's error."""
+    bounds.check_count(max(data.count(b"\n"), data.count(b"\r")), "line")
+    odd = ODD.search(data)
+    if odd is not None:
+        before = re.split(rb"\r\n|\n|\r", data[: odd.start()])
+        raise ProgramError(
+            f"the byte 0x{data[odd.start()]:02x} belongs to no program",
+            where=f"line {len(before)}, column {len(before[-1]) + 1}",
+            mend="give a program of plain ASCII text",
+        )
+    path = _Reader(data, machine).read()
     return replace(path, findings=(*path.findings, *_too_slow(path, machine)))
+
+
+class _Reader:
+    """One reading of one program."""
+
+    def __init__(self, data: bytes, machine: GrblMachine) -> None:
+        dialect: Dialect = machine.dialect
+        self.path = ToolpathBuilder()
+        self.notes = Notes()
+        self.parser = Parser(machine, self.path, self.notes)
+        self._lines = Lines(data)
+        self._fast = FastFeeds(machine.max_feed_mm_min)
+        self._rule = ArcRule(
+            gap_mm=min(dialect.arc_difference_mm, dialect.arc_most_difference_mm),
+            radius_mm=dialect.arc_least_radius_mm,
+            full_turn_rad=dialect.arc_full_turn_rad,
+            ends_in_plane=True,
+        )
+        self._runs = PlainRuns(self._lines, (dialect.line_chars, True, True, True, True))
+        self._most = dialect.line_chars
+        self._blocks = 0
+        self._slashes: list[int] = []
+        self._realtime: list[int] = []
+
+    def read(self) -> Toolpath:
+        """The moves, with the findings."""
+        number, parser = 0, self.parser
+        while number < self._lines.count:
+            if parser.plain and not parser.ended:
+                count, number = self._runs.run(number, self._blocks, self._take)
+                self._blocks += count
+                if count:
+                    continue
+            self._line(self._lines.text(number), number)
+            number += 1
+        if not self._blocks:
+            raise ProgramError("the program is empty", mend="a program has blocks such as G0 X1")
+        return self.path.finish(self._findings())
+
+    def _line(self, raw: str, number: int) -> None:
+        """A line as it comes in: without blanks and comments, in capitals."""
+        comments = "".join(COMMENT.findall(raw)) if "(" in raw or ";" in raw else ""
+        text = COMMENT.sub("", raw) if comments else raw
+        if any(sign in comments for sign in "!?~"):
+            self._realtime.append(number + 1)
+        if "/" in text:
+            self._slashes.append(number + 1)
+        text = text.translate(_DROPPED).upper()
+        if not text:
+            return
+        if len(text) > self._most:
+            where = self._most
+            message = f"the line has more than {self._most} characters (error:11)"
+            self._fail(Fault(message, where, "shorten it"), raw, number)
+        self.parser.index = self.path.block = self._blocks
+        is_block = has_words(raw)
+        if is_block and self.parser.ended:
+            self._fail(
+                Fault("a block after the end of the program", None, "remove it"), raw, number
+            )
+        try:
+            self.parser.line(text)
+        except Fault as fault:
+            self._fail(fault, raw, number)
+        self._blocks += is_block
+
+    def _fail(self, fault: Fault, raw: str, number: int) -> NoReturn:
+        columns = _columns(raw)
+        at = fault.at
+        if not isinstance(at, int):  # the first word behind a block number
+            numbered = re.match(r"N[0-9.]*", "".join(raw[k] for k in columns).upper())
+            at = numbered.end() if numbered else 0
+        column = columns[at] + 1 if at < len(columns) else len(raw) + 1
+        where = f"block {self._blocks + 1}, line {number + 1}, column {column}"
+        raise ProgramError(fault.message, where=where, mend=fault.mend) from None
+
+    def _take(self, plain: PlainBlocks) -> int:
+        """Rows of plain blocks, up to the first that is no move which grbl surely does."""
+        parser, path = self.parser, self.path
+        motion = -1 if parser.modes.motion == 80 else 10 * parser.modes.motion
+        mm = 25.4 if parser.modes.inches else 1.0
+        x, y, z = parser.position
+        moves = PlainMoves(plain, PlainState(motion, parser.feed, mm, (x, y, z)), self._rule)
+        count = moves.count
+        if not count:
+            return 0
+        rows, feeds = moves.moving[:count], moves.feed[:count]
+        self._fast.note(plain.first, np.where(plain.has(words.F_WORD)[:count], feeds, np.nan))
+        if rows.any():
+            kind = moves.motion[:count][rows]
+            parser.moves.moved = True
+            path.moves(
+                kind=KINDS[kind],
+                end=moves.end[:count][rows],
+                centre=np.where(kind[:, None] > 10, moves.centre[:count][rows], np.nan),
+                feed=np.where(kind >= 10, feeds[rows], np.nan),
+                block=plain.first + np.flatnonzero(rows),
+            )
+        last = int(moves.motion[count - 1])
+        parser.went_on(last // 10 if last >= 0 else None, float(feeds[-1]), path.position)
+        return count
+
+    def _findings(self) -> Iterator[Finding]:
+        notes = self.notes
+        for index, feed in notes.feeds:
+            self._fast.note(index, np.array([feed]))
+        yield from self._fast.findings()
+        if notes.speedless:
+            yield SPINDLE_SPEED_NOT_SAID(where=f"block {notes.speedless[0] + 1}")
+        for sentence, blocks in (
+            (WORDS_PASSED_OVER_COOLANT, notes.coolant),
+            (WORDS_PASSED_OVER_PAUSE, notes.pauses),
+            (NOT_SIMULATED_JOG, notes.jogs),
+        ):
+            if blocks:
+                yield sentence(where=f"block {blocks[0] + 1}", count=len(blocks))
+        for sentence, lines in (
+            (NOT_SIMULATED_SLASH, self._slashes),
+            (NOT_SIMULATED_REALTIME, self._realtime),
+        ):
+            if lines:
+                yield sentence(where=f"line {lines[0]}", count=len(lines))
+        for name, index in notes.frames.items():
+            yield PLACE_UNKNOWN_FRAME(where=f"block {index + 1}", frame=name)
+        for name, index in notes.homes.items():
+            yield PLACE_UNKNOWN_HOME(where=f"block {index + 1}", home=name)
+        if self.parser.moves.chords:
+            yield NOT_SIMULATED_CHORDS(measured=self.parser.moves.chords)
+
+
+_DROPPED: Final = str.maketrans("", "", " \t/")
+
+
+def _columns(raw: str) -> list[int]:
+    """Where in a line the signs stand that grbl keeps, from 0."""
+    blanked = COMMENT.sub(lambda found: " " * len(found[0]), raw)
+    return [k for k, sign in enumerate(blanked) if sign not in " \t/"]
 
 
 def _too_slow(path: Toolpath, machine: GrblMachine) -> Iterator[Finding]:
@@ -120,31 +245,3 @@ def _too_slow(path: Toolpath, machine: GrblMachine) -> Iterator[Finding]:
             count=count,
             least_hz=least_hz,
         )
-
-
-def rules_of(machine: GrblMachine) -> Rules:
-    """What grbl takes; M7 where the machine file says that it was built with it."""
-    dialect, mist = machine.dialect, machine.coolant.mist
-
-    def arc_fault(r1: float, r2: float) -> str:
-        """grbl's error 33; r1 is the radius that counts."""
-        gap = abs(r1 - r2)
-        wide = gap > dialect.arc_difference_mm and gap > dialect.arc_difference_part * r1
-        if r1 <= dialect.arc_least_radius_mm or gap > dialect.arc_most_difference_mm or wide:
-            return f"grbl's error 33: radius {r1:.4f} mm at the start, {r2:.4f} mm at the end"
-        return ""
-
-    return Rules(
-        groups=GROUPS,
-        refused={word: why for word, why in REFUSED.items() if not (mist and word == "M7")},
-        first_motion=0,
-        arc_fault=arc_fault,
-        full_turn_rad=dialect.arc_full_turn_rad,
-        chord_slack_mm=dialect.arc_chord_slack_mm,
-        sure_gap_mm=min(dialect.arc_difference_mm, dialect.arc_most_difference_mm),
-        sure_radius_mm=dialect.arc_least_radius_mm,
-        ends_in_plane=True,
-        m_codes={code: group for code, group in M_CODES.items() if mist or code != MIST},
-        tools="none" if dialect.tool_change == "refuse" else "pause",
-        most_tool=MOST_TOOL,
-    )

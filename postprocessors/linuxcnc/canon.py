@@ -1,8 +1,4 @@
-"""Canonical calls to rows: straight moves, arcs and events in the coordinates of the program, as
-LinuxCNC's interpreter makes them, become rows of a Toolpath in the frame of the part.
-
-Part zero is the zero of the frame (G54 …, G10, G92, G52, rotation) in which the program makes its
-first move; a later frame is placed by what it differs in. Arcs in XZ and YZ become chords.
+"""Canonical calls to rows, as LinuxCNC's interpreter makes them.
 
 While the cutter's radius is compensated, the last move waits until the next one is known, and
 events wait behind it.
@@ -13,39 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
 
-import numpy as np
-
-from camtool import bounds
-from camtool.arrays import Floats
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind
 
-from .faults import Fault
-
-Point = tuple[float, float, float]
-
-CHORD_MM: Final = 1e-4
-"""Chords stray by no more from an arc in XZ or YZ."""
-
-SAME_MM: Final = 1e-9
-"""Places so near are one: units that were changed leave so much."""
-
-_FULL_TURN: Final = 2.0 * math.pi
-
-PLANES: Final = {170: (0, 1, 2), 180: (2, 0, 1), 190: (1, 2, 0)}
-"""First axis, second axis and normal of G17, G18 and G19, tenfold."""
-
-
-@dataclass(frozen=True)
-class Frame:
-    """Where the program's coordinates p lie on the machine, mm and degrees: R(p + shift) + origin,
-    with a turn R about Z."""
-
-    origin: Point = (0.0, 0.0, 0.0)
-    rotation: float = 0.0
-    shift: Point = (0.0, 0.0, 0.0)
+from ..gcode.part_moves import PLANES, PartMoves
 
 
 @dataclass
@@ -65,184 +33,14 @@ class Queued:
     source: str = ""
 
 
-class Canon:
-    """Takes calls, and adds rows to the path."""
+class Canon(PartMoves):
+    """Moves, and those that wait."""
 
     def __init__(self, path: ToolpathBuilder, full_turn_rad: float) -> None:
-        self.path = path
-        self.mm = 1.0
-        """Length of the program's unit, mm."""
-        self.plane = 170
-        self.feed = 0.0
-        """Of moves that are not rapids, mm/min."""
-        self.chords = 0
-        """How many arcs became chords."""
-        self.moved = False
+        super().__init__(path, full_turn_rad)
         self.queue: list[Queued | Callable[[], None]] = []
         self.nose: tuple[float, float] = (0.0, 0.0)
         """Where the controlled point of a lathe tool lies from the centre of its nose: X, Z."""
-        self._full_turn_rad = full_turn_rad
-        self._frame = self._base = Frame()
-        self._turn = (1.0, 0.0)
-        self._shift = (0.0, 0.0, 0.0)
-        self._same = True
-
-    # Frames
-
-    @property
-    def same(self) -> bool:
-        """Whether the coordinates of the program are those of the part."""
-        return self._same
-
-    def place(self, frame: Frame) -> None:
-        """From here on coordinates are of this frame."""
-        self._frame = frame
-        if not self.moved:
-            self._base = frame
-        base = self._base
-        self._same = frame == base
-        # part = R(−b)(R(a)(p + shift) + origin − origin_b) − shift_b
-        x, y = turned(*frame.shift[:2], frame.rotation)
-        x, y = turned(
-            x + frame.origin[0] - base.origin[0],
-            y + frame.origin[1] - base.origin[1],
-            -base.rotation,
-        )
-        self._shift = (
-            x - base.shift[0],
-            y - base.shift[1],
-            frame.shift[2] + frame.origin[2] - base.origin[2] - base.shift[2],
-        )
-        angle = math.radians(frame.rotation - base.rotation)
-        self._turn = (math.cos(angle), math.sin(angle)) if angle else (1.0, 0.0)
-
-    def part(self, x: float, y: float, z: float) -> Point:
-        """The place in the frame of the part, mm."""
-        x, y, z = x * self.mm, y * self.mm, z * self.mm
-        if self._same:
-            return x, y, z
-        (cos, sin), (dx, dy, dz) = self._turn, self._shift
-        if sin:
-            x, y = x * cos - y * sin, x * sin + y * cos
-        return x + dx, y + dy, z + dz
-
-    def near(self, place: Point) -> Point:
-        """The place, with those coordinates of the tool that it has but for rounding."""
-        here = self.path.position
-        if here == place:
-            return here
-        x, y, z = (
-            old if abs(new - old) <= SAME_MM else new for old, new in zip(here, place, strict=True)
-        )
-        return x, y, z
-
-    # Moves
-
-    def rapid(self, x: float, y: float, z: float) -> None:
-        """Straight, as fast as the machine can."""
-        self.moved = True
-        self.path.rapid(*self.near(self.part(x, y, z)))
-
-    def line(self, x: float, y: float, z: float) -> None:
-        """Straight, at the feed."""
-        self.moved = True
-        self.path.line(*self.near(self.part(x, y, z)), feed=self.feed)
-
-    def arc(self, end: list[float], centre: tuple[float, float], turn: int) -> None:
-        """An arc of |turn| turns begun, counter-clockwise where it is above 0: its end and centre
-        are (first, second, normal) and (first, second) of the plane."""
-        self.moved = True
-        if len(self.path) + abs(turn) > bounds.MAX_MOVES:
-            raise Fault(too_many("the turns of this arc"), "p", bounds.SPLIT_PROGRAM)
-        if self.plane == 170:
-            self._flat_arc((end[0], end[1], end[2]), centre, turn)
-        else:
-            self._chords(end, centre, turn)
-
-    def _flat_arc(self, end: Point, centre: tuple[float, float], turn: int) -> None:
-        """Whole turns first, each with its share of the height. An arc so short that the
-        controller takes it for a full circle is one, and a line to its end."""
-        path = self.path
-        x, y, z = path.position
-        to = self.near(self.part(*end))
-        middle = self.part(*centre, 0.0)[:2]
-        own = turn_of((x, y), to[:2], middle)
-        same = (x, y) == to[:2]
-        ccw = turn > 0
-        full = same or abs(own) <= self._full_turn_rad
-        sweep = _FULL_TURN if full else math.fmod((own if ccw else -own) + _FULL_TURN, _FULL_TURN)
-        turns = abs(turn)
-        rise = (to[2] - z) / (_FULL_TURN * (turns - 1) + sweep)
-        if turns > 1:
-            heights = np.arange(1.0, turns) * (rise * _FULL_TURN)
-            self._whole_turns((x, y, z), middle, ccw, heights)
-        ends = (x, y) if full else to[:2]
-        path.arc(*ends, to[2], centre=middle, ccw=ccw, feed=self.feed)
-        if full and not same:
-            path.line(*to[:2], feed=self.feed)
-
-    def _whole_turns(
-        self, start: Point, centre: tuple[float, float], ccw: bool, rise: Floats
-    ) -> None:
-        """Circles from a point, which end so much above it (K,)."""
-        count = len(rise)
-        end = np.empty((count, 3))
-        end[:, :2], end[:, 2] = start[:2], start[2] + rise
-        self.path.moves(
-            kind=np.full(count, int(Kind.ARC_CCW if ccw else Kind.ARC_CW)),
-            end=end,
-            centre=np.broadcast_to(centre, (count, 2)),
-            feed=np.full(count, self.feed),
-        )
-
-    def _chords(self, end: list[float], centre: tuple[float, float], turn: int) -> None:
-        """An arc in XZ or YZ, whose ends may lie at two radii."""
-        self.chords += 1
-        axes = PLANES[self.plane]
-        start = self._program(self.path.position)
-        begin = [start[axis] for axis in axes]
-        out = (begin[0] - centre[0], begin[1] - centre[1])
-        back = (end[0] - centre[0], end[1] - centre[1])
-        alpha, beta = math.atan2(out[1], out[0]), math.atan2(back[1], back[0])
-        if turn > 0:
-            sweep = math.fmod(beta - alpha + 2.0 * _FULL_TURN, _FULL_TURN)
-        else:
-            sweep = -math.fmod(alpha - beta + 2.0 * _FULL_TURN, _FULL_TURN)
-        if abs(sweep) <= self._full_turn_rad:
-            sweep = math.copysign(_FULL_TURN, turn)
-        sweep += math.copysign(_FULL_TURN * (abs(turn) - 1), turn)
-        radii = math.hypot(*out), math.hypot(*back)
-        largest = max(radii) * self.mm
-        chord = 4.0 * math.asin(math.sqrt(min(CHORD_MM / (2.0 * largest), 0.5)))
-        count = max(math.ceil(abs(sweep) / chord), 1)
-        if len(self.path) + count > bounds.MAX_MOVES:
-            raise Fault(too_many("the chords of this arc"), "p", bounds.SPLIT_PROGRAM)
-        share = np.arange(1, count + 1) / count
-        radius = radii[0] + share * (radii[1] - radii[0])
-        angle = alpha + share * sweep
-        points = np.empty((count, 3))
-        points[:, axes[0]] = centre[0] + radius * np.cos(angle)
-        points[:, axes[1]] = centre[1] + radius * np.sin(angle)
-        points[:, axes[2]] = begin[2] + share * (end[2] - begin[2])
-        points[-1, list(axes)] = end
-        placed = np.column_stack(self.part(*points.T))
-        self.path.moves(
-            kind=np.full(count, int(Kind.LINE)),
-            end=placed,
-            centre=np.full((count, 2), np.nan),
-            feed=np.full(count, self.feed),
-        )
-
-    def _program(self, place: Point) -> Point:
-        """A place in the frame of the part in the coordinates of the program."""
-        x, y, z = place
-        if not self._same:
-            (cos, sin), (dx, dy, dz) = self._turn, self._shift
-            x, y, z = x - dx, y - dy, z - dz
-            x, y = x * cos + y * sin, y * cos - x * sin
-        return x / self.mm, y / self.mm, z / self.mm
-
-    # Waiting
 
     def when_due(self, call: Callable[[], None]) -> None:
         """An event: now, or behind the moves that wait."""
@@ -299,25 +97,3 @@ class Canon:
         for k, axis in enumerate(axes):
             place[axis] = end[k]
         (self.rapid if move.kind == Kind.RAPID else self.line)(*place)
-
-
-def turned(x: float, y: float, degrees: float) -> tuple[float, float]:
-    """A point turned about zero."""
-    if degrees == 0.0:
-        return x, y
-    cos, sin = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
-    return x * cos - y * sin, x * sin + y * cos
-
-
-def turn_of(
-    start: tuple[float, float], end: tuple[float, float], centre: tuple[float, float]
-) -> float:
-    """How far an arc turns, rad, in (−π, π]: near 0 for the shortest and for the longest."""
-    ox, oy = start[0] - centre[0], start[1] - centre[1]
-    ex, ey = end[0] - centre[0], end[1] - centre[1]
-    return math.atan2(ox * ey - oy * ex, ox * ex + oy * ey)
-
-
-def too_many(what: str) -> str:
-    """The message for a program of too many moves."""
-    return f"with {what} the program has more than {bounds.MAX_MOVES} moves"

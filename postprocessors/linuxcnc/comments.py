@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from typing import Final
 
-from .faults import Fault
+from ..gcode.faults import Fault
 from .parameters import DEBUG, MOST_PARAMETERS, Parameters
 
 NEAR_ZERO: Final = 1e-4

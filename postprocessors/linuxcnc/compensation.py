@@ -14,8 +14,8 @@ from typing import Final
 
 from camtool.toolpath.moves import Kind
 
+from ..gcode.faults import Fault
 from .canon import Canon, Queued
-from .faults import Fault
 
 CORNER_RAD: Final = 0.05
 """A corner that turns by less is met without an arc (TOLERANCE_CONCAVE_CORNER)."""

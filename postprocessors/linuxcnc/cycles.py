@@ -16,8 +16,8 @@ from typing import Final
 from camtool import bounds
 from camtool.toolpath.moves import Kind, PathMode
 
-from .canon import PLANES, too_many
-from .faults import Fault
+from ..gcode.faults import Fault
+from ..gcode.part_moves import PLANES, too_many
 from .lines import AXES, Block
 from .state import Series, State
 

@@ -16,7 +16,7 @@ from typing import Final
 
 import numpy as np
 
-from .faults import Fault
+from ..gcode.faults import Fault
 from .parameters import MOST_PARAMETERS, Parameters
 
 Function = Callable[[Parameters], float]

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 from camtool.errors import ProgramError
 
-from .faults import Fault
+from ..gcode.faults import Fault
 from .lines import Line, column_of
 from .parameters import ARGUMENTS, Parameters
 from .texts import Folder, ProgramText

@@ -13,9 +13,9 @@ from typing import Final
 
 from camtool.toolpath.builder import ToolpathBuilder
 
-from .canon import Frame, turned
+from ..gcode.faults import Fault
+from ..gcode.part_moves import Frame, turned
 from .dialect import LinuxcncMachine, Tool
-from .faults import Fault
 from .lines import AXES
 from .parameters import Parameters
 from .state import Notes, State

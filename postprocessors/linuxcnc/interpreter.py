@@ -15,8 +15,8 @@ from typing import Final
 
 from camtool.toolpath.moves import Kind, PathMode
 
+from ..gcode.faults import Fault
 from .dialect import Tool
-from .faults import Fault
 from .frames import FRAMES, HOMES
 from .lines import Block
 from .moves import REFUSED, Moves

@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
-from .faults import Fault
+from ..gcode.faults import Fault
 
 if TYPE_CHECKING:
     from .expressions import Value

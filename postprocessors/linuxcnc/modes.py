@@ -15,7 +15,7 @@ from typing import Any
 
 from camtool.toolpath.moves import Kind
 
-from .faults import Fault
+from ..gcode.faults import Fault
 from .frames import FRAMES, Frames
 from .lines import Block, Line
 from .state import State

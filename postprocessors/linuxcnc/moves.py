@@ -13,8 +13,8 @@ from typing import Final
 from camtool import bounds
 from camtool.toolpath.moves import Kind
 
-from .canon import PLANES, too_many
-from .faults import Fault
+from ..gcode.faults import Fault
+from ..gcode.part_moves import PLANES, too_many
 from .frames import HOMES, Frames
 from .lines import AXES, Block
 from .needs import LATHE_CYCLES

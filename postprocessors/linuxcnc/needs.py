@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping
 from typing import Final
 
-from .faults import Fault
+from ..gcode.faults import Fault
 from .lines import AXES, Block
 from .state import State
 

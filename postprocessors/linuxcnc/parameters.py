@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
 from typing import Final
 
-from .faults import Fault
+from ..gcode.faults import Fault
 
 MOST_PARAMETERS: Final = 5602
 """Numbers of parameters are below this (RS274NGC_MAX_PARAMETERS)."""

@@ -25,7 +25,8 @@ from camtool.kernels import words
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
 
-from ..gcode.blocks import ROWS_AT_ONCE, PlainBlocks
+from ..gcode.blocks import PlainBlocks, PlainRuns
+from ..gcode.faults import Fault
 from ..gcode.findings import (
     NEVER_READ,
     SPINDLE_SPEED_NOT_SAID,
@@ -34,7 +35,6 @@ from ..gcode.findings import (
 )
 from ..gcode.plain_moves import KINDS, ArcRule, FastFeeds, PlainMoves, PlainState
 from .dialect import Dialect, LinuxcncMachine
-from .faults import Fault
 from .findings import (
     NOT_SIMULATED_AGAIN,
     NOT_SIMULATED_AXES,
@@ -52,12 +52,6 @@ from .interpreter import Interpreter
 from .lines import Line
 from .state import Notes
 from .texts import Folder, ProgramText
-
-FEWEST: Final = 24
-"""Fewer plain lines in a row than these are read one by one."""
-
-LONGEST_WAIT: Final = 256
-"""Where no lines are plain, it is asked again after so many of them at most."""
 
 BRANCHES: Final = re.compile(rb"(?im)^[ \t]*/?[ \t]*(?:n[\d. \t]*)?(?:o|m[ \t]*9[ \t]*[89])")
 """A line that may send the reading elsewhere."""
@@ -97,11 +91,8 @@ class _Reader:
             radius_mm=dialect.arc_least_radius_mm,
             full_turn_rad=dialect.arc_full_turn_rad,
         )
-        self._rules = (dialect.line_chars, True, True, True, True)
-        self._octets = np.frombuffer(self.text.data, dtype=np.uint8)
-        self._numbers = np.zeros((0, 7))
-        self._facts = np.empty((0, words.FACT_COLUMNS), dtype=np.int64)
-        self._wait, self._waited = 1, 0
+        rules = (dialect.line_chars, True, True, True, True)
+        self._runs = PlainRuns(self.text, rules)
         self._blocks = 0
         """Blocks so far, of a program whose lines are read once and in order."""
         self._empty = True
@@ -163,35 +154,16 @@ class _Reader:
 
     def _plain(self) -> bool:
         """Read plain lines from here on by columns; whether there were any."""
-        flow, machine = self.flow, self.machine
-        self._waited += 1
-        if self._waited < self._wait or flow.seeks or flow.here.text is not self.text:
+        flow = self.flow
+        if flow.seeks or flow.text is not self.text or not self.machine.plain:
             return False
-        if flow.text is not self.text or flow.at >= self.text.count or not machine.plain:
-            return False
-        self._waited = 0
-        if not len(self._facts):
-            self._numbers = np.zeros((ROWS_AT_ONCE, 7))
-            self._facts = np.empty((ROWS_AT_ONCE, words.FACT_COLUMNS), dtype=np.int64)
-        begin = int(self.text.begins[flow.at])
-        rows, _, behind = words.plain_lines(
-            self._octets, begin, flow.at + 1, self._rules, self._numbers, self._facts
-        )
-        count = 0
-        if rows >= FEWEST:
-            if self._branches:
-                first = self.text.blocks_before(int(self._facts[0, words.LINE]) - 1)
-            else:
-                first = self._blocks
-            plain = PlainBlocks(self._numbers[:rows], self._facts[:rows], first)
-            count = self._take(plain)
-        self._wait = 1 if count else min(2 * self._wait, LONGEST_WAIT)
-        if not count:
-            return False
+        first = self._blocks
+        if self._branches:
+            first = self.text.blocks_before(min(flow.at, self.text.count))
+        count, flow.at = self._runs.run(flow.at, first, self._take)
         self._blocks += count
-        self._empty = False
-        flow.at = behind - 1 if count == rows else int(self._facts[count, words.LINE]) - 1
-        return True
+        self._empty = self._empty and not count
+        return count > 0
 
     def _take(self, plain: PlainBlocks) -> int:
         """Rows of plain blocks, up to the first that is no move which LinuxCNC surely does."""

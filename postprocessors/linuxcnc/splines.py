@@ -16,7 +16,7 @@ import numpy as np
 
 from camtool.arrays import Floats
 
-from .faults import Fault
+from ..gcode.faults import Fault
 
 PIECES: Final = 4
 """Pieces for each control point."""

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Final
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind
 
-from .canon import PLANES, Canon
+from ..gcode.faults import Fault
+from ..gcode.part_moves import PLANES
+from .canon import Canon
 from .dialect import Dialect, LinuxcncMachine, Tool
-from .faults import Fault
 from .flow import Call
 from .parameters import Parameters
 

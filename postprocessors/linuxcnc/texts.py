@@ -16,8 +16,8 @@ from camtool import bounds
 from camtool.arrays import Ints
 from camtool.errors import ProgramError
 
-from ..gcode.blocks import has_words
-from .faults import Fault
+from ..gcode.blocks import Lines, has_words
+from ..gcode.faults import Fault
 from .lines import Line
 
 MOST_FILES: Final = 100
@@ -29,34 +29,26 @@ MOST_FILE_BYTES: Final = 10_000_000
 SUFFIX: Final = ".ngc"
 
 _CONTROL: Final = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")
-_BARE_RETURN: Final = re.compile(rb"\r(?!\n)")
 
 
-class ProgramText:
-    """The lines of one file, counted from 0; `name` "" is the program itself."""
+class ProgramText(Lines):
+    """The lines of one file; `name` "" is the program itself."""
 
     def __init__(self, data: bytes, name: str, line_chars: int) -> None:
         _check_bytes(data, name)
+        super().__init__(data)
         self.name = name
-        self.data = _BARE_RETURN.sub(b"\n", data) if b"\r" in data else data
-        octets = np.frombuffer(self.data, dtype=np.uint8)
-        ends = np.flatnonzero(octets == ord("\n"))
-        self.begins: Ints = np.concatenate([[0], ends + 1])
-        self.count = len(self.begins) - (self.begins[-1] == len(self.data))
-        """How many lines."""
         self._line_chars = line_chars
         self._lines: dict[int, Line] = {}
         self._before: Ints | None = None
 
     def raw(self, number: int) -> str:
         """The text of a line, without the blanks at its end."""
-        begin = int(self.begins[number])
-        last = number + 1 == len(self.begins)
-        end = len(self.data) if last else int(self.begins[number + 1]) - 1
-        if end - begin - (self.data[end - 1 : end] == b"\r") > self._line_chars:
+        text = self.text(number)
+        if len(text) > self._line_chars:
             message = f"the line has more than {self._line_chars} characters"
             raise Fault(message, self._line_chars, "shorten it")
-        return self.data[begin:end].decode("latin-1").rstrip(" \t\r\v\f")
+        return text.rstrip(" \t\v\f")
 
     def line(self, number: int, *, keep: bool) -> Line:
         """A line, compiled once where it may be read again (`keep`)."""

@@ -211,6 +211,6 @@ def test_end_blocks_are_read_by_the_reader(blocks: str, words: str) -> None:
 
 def test_m7_is_for_a_grbl_that_was_built_with_it(camtool: Run, tmp_path: Path) -> None:
     (tmp_path / "a.nc").write_text("G21 G90\nM7\nG0 X1\nM2\n")
-    assert b"error 20" in camtool("verify", "a.nc", "-t", "grbl").stderr
+    assert b"error:20" in camtool("verify", "a.nc", "-t", "grbl").stderr
     done = camtool("verify", "a.nc", "-t", "grbl", "--set", "coolant.mist=true")
     assert done.returncode == 0, done.stderr

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 
 class Fault(Exception):
-    """Why LinuxCNC stops at a line; `at`: where in its closed text (`lines.closed`), or the letter
-    of the word, None for the line as a whole. The interpreter makes a ProgramError of it, which
-    has the place."""
+    """Why a controller stops at a line; `at`: where in its text without blanks, or the letter of
+    the word, None for the line as a whole. The reader makes a ProgramError of it, which has the
+    place."""
 
     def __init__(self, message: str, at: int | str | None = None, mend: str = "") -> None:
         super().__init__(message)

@@ -1,0 +1,704 @@
+"""grbl 1.1's parser: what a line does, step by step as `gc_execute_line` takes it (gcode.c).
+
+    1  the modes are copied   2  words are imported   3  all is checked   4  it is executed
+
+So a line does all that it says or nothing, and stops with an error of grbl's own number
+(doc/csv/error_codes_en_US.csv). Positions are those of the machine, in mm; the frame in force when
+the program begins has its zero at 0.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.moves import Kind
+
+from ..gcode.faults import Fault
+from ..gcode.part_moves import PLANES, Frame, PartMoves
+from .dialect import MOST_TOOL, Dialect, GrblMachine
+
+MM_PER_INCH: Final = 25.4
+"""Length of an inch, mm."""
+
+MOST_DIGITS: Final = 8
+"""Further digits of a number count as 0 (MAX_INT_DIGITS)."""
+
+MOST_LINE_NUMBER: Final = 10_000_000
+"""Of an N word (MAX_LINE_NUMBER)."""
+
+MOST_FRAMES: Final = 6
+"""G54 to G59 (N_COORDINATE_SYSTEM)."""
+
+NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)")
+
+WHY: Final = {
+    1: "{}, where the letter of a word should be",
+    2: "no number after {}",
+    3: "a command of the controller itself, which no program may have",
+    4: "{} below 0",
+    16: "a jog with words that no jog has",
+    20: "{} is unknown to grbl",
+    21: "two words of one group ({})",
+    22: "a feed move, and no feed yet",
+    23: "{} is no whole number",
+    24: "two commands that both use the coordinates",
+    25: "two {} words in one block",
+    26: "{} without coordinates",
+    27: "N beyond 10000000",
+    28: "{}",
+    29: "a work frame beyond G59",
+    30: "G53 without G0 or G1 in force",
+    31: "coordinates, but no motion word in force",
+    32: "an arc without a coordinate in its plane",
+    33: "{}",
+    34: "the radius is less than half the chord",
+    35: "an arc without I, J or R in its plane",
+    36: "nothing in the block uses the {} word",
+    37: "G43.1 wants Z alone",
+    38: "T beyond 255",
+}
+"""What grbl's errors say of a line."""
+
+SIGNS: Final = {",": "a decimal comma", "#": "a parameter", "%": "a %", "[": "an expression"}
+"""Signs that begin no word, and what they are elsewhere."""
+
+NONE, NON_MODAL, MOTION, LENGTH = range(4)
+"""What uses the coordinates of a block."""
+
+MODAL: Final = {
+    **{code: ("plane", code) for code in (17, 18, 19)},
+    **{code: ("feed mode", code) for code in (93, 94)},
+    **{code: ("units", code) for code in (20, 21)},
+    40: ("cutter radius", 40),
+    **{code: ("work frame", code - 54) for code in range(54, 60)},
+}
+"""G words that have no decimals, their groups, and what they set."""
+
+NEVER_NEGATIVE: Final = {
+    "F": "a feed",
+    "N": "a number",
+    "P": "a time",
+    "T": "a tool",
+    "S": "a speed",
+}
+
+VALUES: Final = frozenset("FIJKLNPRSTXYZ")
+
+SPINDLE: Final = {3: Kind.SPINDLE_CW, 4: Kind.SPINDLE_CCW, 5: None}
+
+
+def error(number: int, at: int | str | None, what: str = "", mend: str = "") -> Fault:
+    """A line that grbl answers with this error."""
+    return Fault(f"{WHY[number].format(what)} (error:{number})", at, mend)
+
+
+@dataclass
+class Modes:
+    """What is in force from line to line."""
+
+    motion: int = 0
+    plane: int = 17
+    absolute: bool = True
+    feed_mode: int = 94
+    inches: bool = False
+    frame: int = 0
+    spindle: Kind | None = None
+    mist: bool = False
+    flood: bool = False
+
+
+@dataclass
+class Block:
+    """The words of a line: numbers, the modes that they make, the command of this line alone
+    ("G4", "G92.1" …), what uses the coordinates, and where the words stand."""
+
+    modes: Modes
+    numbers: dict[str, float] = field(default_factory=dict)
+    groups: set[str] = field(default_factory=set)
+    once: str = ""
+    uses: int = NONE
+    flow: int | None = None
+    length: str = ""
+    at: dict[str, int] = field(default_factory=dict)
+
+
+@dataclass
+class Notes:
+    """Blocks (index from 0) at which something was passed over or taken for granted."""
+
+    coolant: list[int] = field(default_factory=list)
+    pauses: list[int] = field(default_factory=list)
+    speedless: list[int] = field(default_factory=list)
+    jogs: list[int] = field(default_factory=list)
+    frames: dict[str, int] = field(default_factory=dict)
+    homes: dict[str, int] = field(default_factory=dict)
+    feeds: list[tuple[int, float]] = field(default_factory=list)
+
+
+class Parser:
+    """The state of the parser, and what lines make of it."""
+
+    def __init__(self, machine: GrblMachine, path: ToolpathBuilder, notes: Notes) -> None:
+        dialect: Dialect = machine.dialect
+        self.modes = Modes()
+        self.moves = PartMoves(path, dialect.arc_full_turn_rad)
+        self.notes = notes
+        self.index = 0
+        """Index of the block."""
+        self.ended = False
+        self.position = [0.0, 0.0, 0.0]
+        self.feed = 0.0
+        """mm/min."""
+        self._dialect = dialect
+        self._path = path
+        self._zero = machine.controller.machine_zero_mm
+        self._coolant = machine.coolant
+        self._speed: float | None = None
+        self._tool: int | None = None
+        self._changes_tools = dialect.tool_change != "refuse"
+        self._frames: dict[int, list[float]] = {}
+        self._homes: dict[str, list[float]] = {}
+        self._placed: set[int] = set()
+        self._first_frame: int | None = None
+        self._offset = [0.0, 0.0, 0.0]
+        self._length = 0.0
+        for frame, name in enumerate(("G54", "G55", "G56", "G57", "G58", "G59")):
+            place = {str(key): each for key, each in dialect.work_offsets_mm.items()}.get(name)
+            self._frames[frame] = [0.0, 0.0, 0.0] if place is None else self._machine(place)
+            if place is not None:
+                self._placed.add(frame)
+        for home, place in dialect.homes_mm.items():
+            self._homes[str(home)] = self._machine(place)
+        self._place()
+
+    def _machine(self, place: tuple[float, float, float]) -> list[float]:
+        """A place that is given from machine zero."""
+        return [a + b for a, b in zip(place, self._zero, strict=True)]
+
+    @property
+    def plain(self) -> bool:
+        """Whether blocks of plain moves may be read by columns now."""
+        modes = self.modes
+        known = modes.motion in (0, 1, 2, 3, 80) and modes.plane == 17 and modes.absolute
+        shift = any(self._frames[modes.frame]) or any(self._offset) or self._length
+        return known and modes.feed_mode == 94 and not shift and self.moves.same
+
+    def went_on(self, motion: int | None, feed: float, at: tuple[float, float, float]) -> None:
+        """Blocks of plain moves were read."""
+        self.modes.motion = self.modes.motion if motion is None else motion
+        self.feed = feed
+        if at != tuple(self.position):
+            self._moving()
+        self.position[:] = at
+
+    # Steps 1 and 2: the words
+
+    def line(self, text: str) -> None:
+        """A line without blanks and comments, in capitals; Fault where grbl refuses it."""
+        jogs = text.startswith("$")
+        if jogs and not text.startswith("$J="):
+            raise error(3, 0, mend="send it before the program")
+        block = Block(replace(self.modes))
+        if jogs:
+            block.modes.motion, block.modes.feed_mode = 1, 94
+        at = 3 if jogs else 0
+        while at < len(text):
+            letter = text[at]
+            if not "A" <= letter <= "Z":
+                raise error(1, at, SIGNS.get(letter, repr(letter)))
+            found = NUMBER.match(text, at + 1)
+            if found is None:
+                raise error(2, at, letter)
+            self._word(block, letter, _number(found[0]), found[0], at)
+            at = found.end()
+        if any(axis in block.numbers for axis in "XYZ") and block.uses == NONE:
+            block.uses = MOTION
+        self._check_and_execute(block, jogs=jogs)
+
+    def _word(self, block: Block, letter: str, value: float, said: str, at: int) -> None:
+        whole = math.trunc(value)
+        hundredths = round(100.0 * (value - whole))
+        name = f"{letter}{said}"
+        if letter == "G":
+            group = self._g_word(block, whole, hundredths, name, at)
+            if group in block.groups:
+                raise error(21, at, group)
+            block.groups.add(group)
+        elif letter == "M":
+            if hundredths > 0:
+                raise error(23, at, name)
+            group = self._m_word(block, whole, name, at)
+            if group in block.groups:
+                raise error(21, at, group)
+            block.groups.add(group)
+        else:
+            if letter not in VALUES:
+                raise error(20, at, f"the letter {letter}")
+            if letter == "T" and value > MOST_TOOL:
+                raise error(38, at)
+            if letter in block.numbers:
+                raise error(25, at, letter)
+            if letter in NEVER_NEGATIVE and value < 0.0:
+                raise error(4, at, NEVER_NEGATIVE[letter])
+            block.numbers[letter] = float(whole) if letter in "LTN" else value
+            block.at[letter] = at
+            return
+        block.at[letter] = at
+
+    def _g_word(self, block: Block, whole: int, hundredths: int, name: str, at: int) -> str:
+        """Set what a G word says; its group."""
+        modes = block.modes
+        if whole in (10, 28, 30, 92) and hundredths == 0:
+            self._use(block, NON_MODAL, at)
+        if whole in (28, 30, 92):
+            if hundredths not in (0, 10):
+                raise error(20, at, name)
+            block.once = f"G{whole}" + (".1" if hundredths else "")
+            return "one block"
+        if whole == 38:
+            raise Fault("G38 probes, which cannot be simulated", at)
+        if whole in (43, 49):
+            self._use(block, LENGTH, at)
+            if whole == 43 and hundredths != 10:
+                raise error(20, at, name)
+            block.length = "set" if whole == 43 else "cancel"
+            return "tool length"
+        if whole in (90, 91) and hundredths:
+            if hundredths != 10 or whole == 90:
+                raise error(20, at, name)
+            return "arc distance"
+        group, value = self._plain_g_word(block, whole, name, at)
+        if whole == 61 and hundredths:
+            raise error(20, at, name)
+        if hundredths > 0:
+            raise error(23, at, name)
+        if group == "plane":
+            modes.plane = value
+        elif group == "distance":
+            modes.absolute = value == 90
+        elif group == "feed mode":
+            modes.feed_mode = value
+        elif group == "units":
+            modes.inches = value == 20
+        elif group == "work frame":
+            modes.frame = value
+        return group
+
+    def _plain_g_word(self, block: Block, whole: int, name: str, at: int) -> tuple[str, int]:
+        """The group of a G word without decimals, and what it sets."""
+        if whole in (4, 10, 53):
+            block.once = f"G{whole}"
+            return "one block", whole
+        if whole in (0, 1, 2, 3, 80):
+            if whole != 80:
+                self._use(block, MOTION, at)
+            block.modes.motion = whole
+            return "motion", whole
+        if whole in (90, 91):
+            return "distance", whole
+        if whole == 61:
+            return "path", whole
+        if whole not in MODAL:
+            raise error(20, at, name)
+        return MODAL[whole]
+
+    def _use(self, block: Block, what: int, at: int) -> None:
+        if block.uses != NONE:
+            raise error(24, at)
+        block.uses = what
+
+    def _m_word(self, block: Block, code: int, name: str, at: int) -> str:
+        if code in (0, 1, 2, 30):
+            block.flow = code
+            return "stop"
+        if code in SPINDLE:
+            block.modes.spindle = SPINDLE[code]
+            return "spindle"
+        if code in (8, 9) or (code == 7 and self._coolant.mist):
+            block.modes.mist = code == 7 or (block.modes.mist and code != 9)
+            block.modes.flood = code == 8 or (block.modes.flood and code != 9)
+            return "coolant"
+        raise error(20, at, name)
+
+    # Step 3: checks
+
+    def _check_and_execute(self, block: Block, *, jogs: bool) -> None:
+        numbers, modes = block.numbers, block.modes
+        unused = set(numbers)
+        if numbers.get("N", 0.0) > MOST_LINE_NUMBER:
+            raise error(27, block.at["N"])
+        mm = MM_PER_INCH if modes.inches else 1.0
+        feed = self._feed_of(block, mm, jogs=jogs)
+        if block.once == "G4":
+            if "P" not in numbers:
+                raise error(28, block.at["G"], "a dwell without P", "write G4 P1.5 for 1.5 s")
+            unused.discard("P")
+        axes = [k for k, axis in enumerate("XYZ") if axis in numbers]
+        words = {k: numbers["XYZ"[k]] * mm for k in axes}
+        if block.length == "set" and axes != [2]:
+            raise error(37, block.at["G"])
+        target = self._target(block, words, unused)
+        centre = None
+        if modes.motion == 80:
+            if axes:
+                raise error(31, None, mend="write G0 or G1")
+        elif block.uses == MOTION:
+            if modes.motion == 0:
+                block.uses = MOTION if axes else NONE
+            else:
+                if feed == 0.0:
+                    raise error(22, None, mend="write F first")
+                if modes.motion == 1:
+                    block.uses = MOTION if axes else NONE
+                else:
+                    centre = self._arc(block, target, axes, mm, unused)
+        unused -= set("NF") if jogs else set("NFST")
+        if block.uses != NONE:
+            unused -= set("XYZ")
+        if unused:
+            letter = next(letter for letter in numbers if letter in unused)
+            raise error(36, block.at[letter], letter)
+        if jogs:
+            self._jog(block, target, feed)
+        else:
+            self._execute(block, target, centre, feed)
+
+    def _feed_of(self, block: Block, mm: float, *, jogs: bool) -> float:
+        """The feed of the block: mm/min, or in G93 turns of its move a minute."""
+        numbers, modes = block.numbers, block.modes
+        if jogs:
+            if "F" not in numbers:
+                raise error(22, None, mend="a jog wants F")
+            return numbers["F"] * mm
+        if modes.feed_mode == 93:
+            if block.uses == MOTION and modes.motion not in (0, 80) and "F" not in numbers:
+                raise error(22, None, mend="with G93 each move wants F")
+            return numbers.get("F", 0.0)
+        if self.modes.feed_mode == 94:
+            return numbers["F"] * mm if "F" in numbers else self.feed
+        return numbers.get("F", 0.0)  # the block that leaves G93, as it stands
+
+    def _target(self, block: Block, words: dict[int, float], unused: set[str]) -> list[float]:
+        """Where the block goes, on the machine."""
+        if block.once == "G10":
+            self._check_g10(block, words)
+            unused -= {"L", "P"}
+        if block.once == "G92" and not words:
+            raise error(26, block.at["G"], "G92")
+        if block.once == "G53" and block.modes.motion not in (0, 1):
+            raise error(30, block.at["G"])
+        target = list(self.position)
+        if block.once in ("G10", "G92") or block.uses == LENGTH:
+            return target
+        frame = self._frames[block.modes.frame]
+        for k, value in words.items():
+            if block.once == "G53":
+                target[k] = value + self._zero[k]
+            elif block.modes.absolute:
+                length = self._length if k == 2 else 0.0
+                target[k] = value + frame[k] + self._offset[k] + length
+            else:
+                target[k] = value + self.position[k]
+        return target
+
+    def _check_g10(self, block: Block, words: dict[int, float]) -> None:
+        numbers, at = block.numbers, block.at["G"]
+        if not words:
+            raise error(26, at, "G10")
+        if "P" not in numbers and "L" not in numbers:
+            raise error(28, at, "G10 without P or L")
+        if math.trunc(numbers.get("P", 0.0)) > MOST_FRAMES:
+            raise error(29, block.at["P"])
+        if numbers.get("L") not in (2, 20) or (numbers["L"] == 2 and "R" in numbers):
+            raise error(20, at, f"G10 L{numbers.get('L', 0.0):g}")
+
+    def _arc(
+        self, block: Block, target: list[float], axes: list[int], mm: float, unused: set[str]
+    ) -> tuple[float, float]:
+        """The centre of an arc on the machine, in the order of its plane."""
+        numbers, modes = block.numbers, block.modes
+        first, second, _ = PLANES[modes.plane * 10]
+        if not axes:
+            raise error(26, None, "an arc", "write a coordinate of its end")
+        if first not in axes and second not in axes:
+            raise error(32, None, mend="write X or Y of its end" if first == 0 else "")
+        x = target[first] - self.position[first]
+        y = target[second] - self.position[second]
+        if "R" in numbers:
+            unused.discard("R")
+            offset = self._by_radius(block, x, y, numbers["R"] * mm, target)
+        else:
+            names = "IJK"[first], "IJK"[second]
+            if names[0] not in numbers and names[1] not in numbers:
+                raise error(35, None, mend="write I and J of its centre, or R")
+            unused -= set("IJK")
+            offset = numbers.get(names[0], 0.0) * mm, numbers.get(names[1], 0.0) * mm
+            letter = names[0] if names[0] in numbers else names[1]
+            self._check_radii(offset, (x, y), block.at[letter])
+        return self.position[first] + offset[0], self.position[second] + offset[1]
+
+    def _by_radius(
+        self, block: Block, x: float, y: float, radius: float, target: list[float]
+    ) -> tuple[float, float]:
+        """The offset of the centre: on the left of the chord for a counter-clockwise arc of at
+        most half a turn, on the other side for a negative R."""
+        at = block.at["R"]
+        if target == self.position:
+            raise error(33, at, "an arc by its radius that ends where it starts")
+        chord = math.hypot(x, y)
+        inside = 4.0 * radius * radius - chord * chord
+        if inside < 0.0:
+            raise error(34, at)
+        if chord == 0.0:
+            message = "an arc by its radius that ends above where it starts: grbl finds no centre"
+            raise Fault(message, at)
+        aside = math.sqrt(inside) / chord
+        if (block.modes.motion == 2) == (radius > 0.0):
+            aside = -aside
+        return 0.5 * (x - y * aside), 0.5 * (y + x * aside)
+
+    def _check_radii(self, offset: tuple[float, float], end: tuple[float, float], at: int) -> None:
+        """The radii at both ends are nearly the same."""
+        dialect = self._dialect
+        r1, r2 = math.hypot(*offset), math.dist(end, offset)
+        gap = abs(r1 - r2)
+        wide = gap > dialect.arc_difference_mm and gap > dialect.arc_difference_part * r1
+        if r1 <= dialect.arc_least_radius_mm or gap > dialect.arc_most_difference_mm or wide:
+            raise error(33, at, f"the radius is {r1:.4f} mm at the start, {r2:.4f} mm at the end")
+
+    # Step 4: execution
+
+    def _jog(self, block: Block, target: list[float], feed: float) -> None:
+        """A line at its own feed, which changes no mode."""
+        if block.groups - {"distance", "units", "one block"} or block.once not in ("", "G53"):
+            raise error(16, block.at.get("G"))
+        if block.uses != MOTION:
+            raise error(16, None)
+        self.notes.jogs.append(self.index)
+        if feed == 0.0:
+            raise error(22, None)
+        self._go(Kind.LINE, target, feed)
+
+    def _execute(
+        self,
+        block: Block,
+        target: list[float],
+        centre: tuple[float, float] | None,
+        feed: float,
+    ) -> None:
+        numbers, modes = block.numbers, block.modes
+        before = self.modes
+        self.modes = modes
+        self.feed = feed
+        if "F" in numbers and modes.feed_mode == 94:
+            self.notes.feeds.append((self.index, feed))
+        self._spindle(block, before.spindle)
+        if "T" in numbers:
+            self._tool = int(numbers["T"])
+        if "coolant" in block.groups:
+            self._switch_coolant(modes)
+        if block.once == "G4":
+            self._path.event(Kind.DWELL, numbers["P"])
+        if block.uses == LENGTH:
+            self._length = target_length(block, MM_PER_INCH if modes.inches else 1.0)
+            self._place()
+        if modes.frame != before.frame:
+            self._change_frame()
+        self._do_once(block, target)
+        if block.uses == MOTION and modes.motion != 80 and block.once not in ("G28", "G30"):
+            self._move(block, target, centre, feed)
+        if block.flow is not None:
+            self._stop(block.flow)
+
+    def _spindle(self, block: Block, before: Kind | None) -> None:
+        speed = block.numbers.get("S")
+        changed = speed is not None and speed != self._speed
+        self._speed = self._speed if speed is None else speed
+        now = block.modes.spindle
+        if "spindle" in block.groups and now is None:
+            self._path.event(Kind.SPINDLE_OFF)
+        elif "spindle" in block.groups and now is not None:
+            if self._speed is None:
+                self.notes.speedless.append(self.index)
+            self._path.event(now, self._speed)
+        elif changed and before is not None:
+            self._path.event(before, self._speed)
+
+    def _switch_coolant(self, modes: Modes) -> None:
+        if not self._coolant.kinds:
+            self.notes.coolant.append(self.index)
+            return
+        kind = Kind.COOLANT_OFF
+        if modes.mist or modes.flood:
+            kind = Kind.COOLANT_FLOOD if modes.flood else Kind.COOLANT_MIST
+        self._path.event(kind)
+
+    def _place(self) -> None:
+        """The frame in force, for the moves that follow: the tip of the tool counts."""
+        frame = self._frames[self.modes.frame]
+        x, y, z = (a + b for a, b in zip(frame, self._offset, strict=True))
+        self.moves.place(Frame((x, y, z)))
+
+    def _change_frame(self) -> None:
+        self._place()
+        frame = self.modes.frame
+        known = {self._first_frame, frame} <= self._placed
+        if self._first_frame not in (None, frame) and not known:
+            self.notes.frames.setdefault(f"G{54 + frame}", self.index)
+
+    def _do_once(self, block: Block, target: list[float]) -> None:
+        mm = MM_PER_INCH if block.modes.inches else 1.0
+        words = {k: block.numbers["XYZ"[k]] * mm for k in range(3) if "XYZ"[k] in block.numbers}
+        once = block.once
+        if once == "G10":
+            self._set_frame(block, words)
+        elif once in ("G28", "G30"):
+            self._go_home(once, words, target)
+        elif once in ("G28.1", "G30.1"):
+            self._homes[once[:3]] = list(self.position)
+        elif once == "G92":
+            frame = self._frames[self.modes.frame]
+            for k, value in words.items():
+                length = self._length if k == 2 else 0.0
+                self._offset[k] = self.position[k] - frame[k] - value - length
+            self._place()
+        elif once == "G92.1":
+            self._offset = [0.0, 0.0, 0.0]
+            self._place()
+
+    def _set_frame(self, block: Block, words: dict[int, float]) -> None:
+        """G10 L2: its zero lies there; L20: the tool stands there in it."""
+        number = math.trunc(block.numbers.get("P", 0.0))
+        frame = number - 1 if number > 0 else self.modes.frame
+        place = self._frames[frame]
+        here = block.numbers["L"] == 20
+        for k, value in words.items():
+            length = self._length if k == 2 else 0.0
+            if here:
+                place[k] = self.position[k] - self._offset[k] - value - length
+            else:
+                place[k] = value + self._zero[k]
+        if len(words) == len(place):
+            self._placed.add(frame)
+            if here and self._first_frame is not None:
+                self._placed.add(self._first_frame)
+        self._place()
+
+    def _go_home(self, once: str, words: dict[int, float], target: list[float]) -> None:
+        """By way of the coordinates to the stored place, of the axes that are named."""
+        if once not in self._homes:
+            self.notes.homes.setdefault(once, self.index)
+        home = self._homes.get(once, list(self._zero))
+        if words:
+            self._go(Kind.RAPID, target, 0.0)
+            home = [home[k] if k in words else target[k] for k in range(3)]
+        self._go(Kind.RAPID, home, 0.0)
+
+    def _move(
+        self,
+        block: Block,
+        target: list[float],
+        centre: tuple[float, float] | None,
+        feed: float,
+    ) -> None:
+        motion = block.modes.motion
+        if motion == 0 and block.once == "G53" and self._homing(block, target):
+            return
+        if motion < 2 or centre is None:
+            if block.modes.feed_mode == 93:
+                feed *= math.dist(target, self.position)
+            self._go(Kind.LINE if motion else Kind.RAPID, target, feed)
+            return
+        self._moving()
+        axes = PLANES[block.modes.plane * 10]
+        moves = self.moves
+        off = self._shift()
+        end = [target[axis] - off[axis] for axis in axes]
+        middle = centre[0] - off[axes[0]], centre[1] - off[axes[1]]
+        if block.modes.feed_mode == 93:
+            feed *= self._arc_length(axes, target, centre, ccw=motion == 3)
+        moves.plane, moves.feed = block.modes.plane * 10, feed
+        moves.arc(end, middle, 1 if motion == 3 else -1)
+        self.position[:] = target
+
+    def _arc_length(
+        self,
+        axes: tuple[int, int, int],
+        target: list[float],
+        centre: tuple[float, float],
+        *,
+        ccw: bool,
+    ) -> float:
+        out = self.position[axes[0]] - centre[0], self.position[axes[1]] - centre[1]
+        back = target[axes[0]] - centre[0], target[axes[1]] - centre[1]
+        turn = math.atan2(out[0] * back[1] - out[1] * back[0], out[0] * back[0] + out[1] * back[1])
+        turn = turn if ccw else -turn
+        if turn <= self._dialect.arc_full_turn_rad:
+            turn += 2.0 * math.pi
+        rise = target[axes[2]] - self.position[axes[2]]
+        return math.hypot(math.hypot(*out) * turn, rise)
+
+    def _homing(self, block: Block, target: list[float]) -> bool:
+        """G53 G0 to machine zero: the machine has an event of it; whether it was that."""
+        named = tuple(axis for axis in "XYZ" if axis in block.numbers)
+        kind = {("X", "Y"): Kind.HOME_XY, ("Z",): Kind.HOME_Z}.get(named)
+        if kind is None or any(block.numbers[axis] for axis in named):
+            return False
+        self._moving()
+        x, y, z = (a - b for a, b in zip(target, self._shift(), strict=True))
+        self._path.moved_to(*self.moves.part(x, y, z)).event(kind)
+        self.position[:] = target
+        return True
+
+    def _shift(self) -> list[float]:
+        """Where the coordinates of the program have their zero, for the tip of the tool."""
+        frame = self._frames[self.modes.frame]
+        shift = [a + b for a, b in zip(frame, self._offset, strict=True)]
+        shift[2] += self._length
+        return shift
+
+    def _go(self, kind: Kind, target: list[float], feed: float) -> None:
+        self._moving()
+        x, y, z = (a - b for a, b in zip(target, self._shift(), strict=True))
+        self.moves.feed = feed
+        (self.moves.rapid if kind == Kind.RAPID else self.moves.line)(x, y, z)
+        self.position[:] = target
+
+    def _moving(self) -> None:
+        if self._first_frame is None:
+            self._first_frame = self.modes.frame
+            if any(self._zero):
+                self._placed.add(self.modes.frame)
+
+    def _stop(self, code: int) -> None:
+        if code in (2, 30):
+            self._path.event(Kind.END)
+            self.ended = True
+        elif code == 0 and self._tool is not None and self._changes_tools:
+            self._path.event(Kind.TOOL_CHANGE, float(self._tool))
+            self._tool = None
+        else:
+            self.notes.pauses.append(self.index)
+
+
+def target_length(block: Block, mm: float) -> float:
+    """The length of the tool that G43.1 and G49 set, mm."""
+    return block.numbers["Z"] * mm if block.length == "set" else 0.0
+
+
+def _number(text: str) -> float:
+    """A number as grbl reads it: its first eight digits count."""
+    if len(text) <= MOST_DIGITS:
+        return float(text)
+    digits, kept = 0, []
+    for sign in text:
+        if sign.isdigit():
+            digits += 1
+            kept.append(sign if digits <= MOST_DIGITS else "0")
+        else:
+            kept.append(sign)
+    return float("".join(kept))
