@@ -64,7 +64,7 @@ class Dialect(GcodeDialect, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     homes_mm: dict[Home, tuple[Place, Place, Place]] = msgspec.field(default_factory=dict)
     linear_units: Literal["mm", "in"] = "mm"
     block_delete: bool = False
-    most_lines: Annotated[int, Meta(ge=1, le=100_000_000)] = 500_000
+    most_lines: Annotated[int, Meta(ge=1, le=100_000_000)] = 300_000
 
 
 class LinuxcncController(SlideStart, frozen=True, tag_field="model", tag="linuxcnc"):
