@@ -31,6 +31,9 @@ EQUAL_TO_ONE: Final = 1e-12
 
 NO_FEED: Final = "a feed move, and no feed yet"
 
+EFFORT: Final = 10
+"""A control point of a spline counts as so many lines that are executed."""
+
 GOES: Final = f"{AXES}@^"
 """A line or a rapid without any of these words goes nowhere."""
 
@@ -394,6 +397,7 @@ class Moves(Frames):
         canon, z = self.canon, self.position[2]
         if len(canon.path) + 2 * PIECES * len(points) > bounds.MAX_MOVES:
             raise Fault(too_many("this spline"))
+        self.effort += EFFORT * len(points)
         for piece in pieces_of(points, order):
             if piece.centre is None:
                 canon.line(*piece.end, z)

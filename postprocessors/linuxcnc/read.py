@@ -143,6 +143,8 @@ class _Reader:
         elif self.path.source:
             self.path.source = ""
         machine.execute(line.block(machine.given))
+        flow.lines_read += machine.effort
+        machine.effort = 0
 
     def _restore(self, saved: object) -> None:
         from .modes import Modes, restore

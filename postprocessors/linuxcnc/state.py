@@ -62,6 +62,8 @@ class State:
         self.notes = notes
         self.block_index = 0
         self.ended = False
+        self.effort = 0
+        """Lines that the block counts as beyond one, where it takes as long."""
         self.motion: int | None = None
         """The motion in force, tenfold; None: none yet."""
         self.position = [0.0, 0.0, 0.0]

@@ -60,13 +60,14 @@ def _bound() -> None:
     resource.setrlimit(resource.RLIMIT_FSIZE, (MOST_BYTES, MOST_BYTES))
 
 
-def interpreted(data: bytes, folder: Path) -> list[Call]:
-    """The canonical calls of a program; ProgramError with LinuxCNC's words when it refuses."""
+def interpreted(data: bytes, folder: Path, home: Path | None = None) -> list[Call]:
+    """The canonical calls of a program; ProgramError with LinuxCNC's words when it refuses. `home`
+    is the folder of its subs."""
     file = folder / "program.ngc"
     file.write_bytes(data)
     said = folder / "calls.txt"
     # Some faulty programs make it loop without end, and say the same without end.
-    run = run_rs274("-g", str(file), str(said), cwd=folder, preexec_fn=_bound)
+    run = run_rs274("-g", str(file), str(said), cwd=home or folder, preexec_fn=_bound)
     lines = said.read_text(encoding="latin-1").splitlines() if said.exists() else []
     found = [_CALL.search(line) for line in [*run.stdout.splitlines(), *lines]]
     said.unlink(missing_ok=True)

@@ -1,14 +1,15 @@
-"""The language of LinuxCNC: LinuxCNC's own interpreter makes the same moves of generated programs,
-refuses what the reader refuses, and takes what it takes."""
+"""The language of LinuxCNC: LinuxCNC's own interpreter makes the same moves of generated programs
+and of those that it brings, refuses what the reader refuses, and takes what it takes."""
 
 import random
+import re
 from pathlib import Path
 
 import pytest
 
 from camtool.errors import ProgramError
 from camtool.target.registry import load_target
-from tests.oracles.canonical import difference
+from tests.oracles.canonical import canonical, difference
 from tests.oracles.rs274 import interpreted, needs_rs274
 from tests.postprocessors.linuxcnc.programs import Maker
 
@@ -40,6 +41,35 @@ def disagreement(text: str, folder: Path) -> str:
     return difference(path, calls)
 
 
+INSTALLED = sorted(
+    file
+    for folder in ("/usr/share/linuxcnc", "/usr/share/axis", "/usr/share/doc/linuxcnc")
+    for file in Path(folder).rglob("*.ngc")
+)
+TABLE = Path("/usr/share/doc/linuxcnc/examples/sample-configs/common/tool.tbl")
+
+# Of the programs that LinuxCNC brings: what is not read, or otherwise than by rs274, and why.
+OTHERWISE = {
+    "lathe_g7x_face_boring.ngc": "the lathe cycle G72",
+    "lathe_g7x_quadrants.ngc": "the lathe cycle G70",
+    "base.ngc": "#<_task>, and so a tool that only the machine has",
+    "skeleton.ngc": "rs274 forgets the tool's length at a tool change",
+    "useful-subroutines.ngc": "a lead-in that is exactly as long as the tool's radius",
+}
+
+
+def tools_of(table: Path) -> str:
+    """rs274's own tool table, in inches, as a setting."""
+    tools = []
+    for line in table.read_text().splitlines():
+        words = dict(re.findall(r"([TDZ])\+?([\d.]+)", line.partition(";")[0]))
+        lengths = {"length_mm": "Z", "diameter_mm": "D"}
+        given = [f"{k}={25.4 * float(words[v]):.6f}" for k, v in lengths.items() if v in words]
+        if "T" in words:
+            tools.append(f"{words['T']}={{{', '.join(given)}}}")
+    return f"dialect.tools={{{', '.join(tools)}}}"
+
+
 def agree(seeds: range, folder: Path) -> None:
     wrong = []
     for seed in seeds:
@@ -55,6 +85,36 @@ class TestReferee:
 
     def test_some_programs(self, tmp_path: Path) -> None:
         agree(range(SOME), tmp_path)
+
+    @pytest.mark.slow
+    def test_the_programs_that_it_brings(self, tmp_path: Path) -> None:
+        """Those that probe or have remapped codes are refused by both, or by name."""
+        settings = ["dialect.linear_units=in", tools_of(TABLE)]
+        target = load_target("linuxcnc", settings=settings)
+        assert len(INSTALLED) > 300
+        wrong, moves = [], 0
+        for file in INSTALLED:
+            data = file.read_bytes()
+            try:
+                path = target.target.read_in(data, target.machine, file.parent)
+            except ProgramError as error:
+                found = f"refused: {error}"
+            else:
+                found = ""
+            try:
+                calls = interpreted(data, tmp_path, file.parent)
+            except ProgramError as error:
+                if not found:
+                    wrong.append(f"{file}: read, and LinuxCNC refuses it: {error}")
+                continue
+            if not found:
+                found = difference(path, calls)
+                moves += not found and bool(canonical(calls))
+            known = file.name in OTHERWISE or "probes" in found or "result of probing" in found
+            if found and not known:
+                wrong.append(f"{file}: {found}")
+        assert wrong == []
+        assert moves > 25
 
     @pytest.mark.slow
     def test_many_programs(self, tmp_path: Path) -> None:
