@@ -91,7 +91,7 @@ def test_what_is_no_cycle(text: str, words: str, monkeypatch: pytest.MonkeyPatch
 
 def test_grbl_knows_no_cycles() -> None:
     target = load_target("grbl")
-    with pytest.raises(ProgramError, match="does not know G81"):
+    with pytest.raises(ProgramError, match="G81 is unknown to grbl"):
         target.target.read(b"G81 X1 Z-1 R1 F9\nM2\n", target.machine)
 
 
