@@ -325,7 +325,8 @@ class Code(IntEnum):
         "where the program starts the spindle), a pass deeper than the tool is wide, a cut "
         "deeper than its edges are long, a plunge of a tool that does not cut at its centre, "
         "a chip load or a surface speed beyond the tool's limits, walls and floors that a "
-        "round nose does not reach, presets without a material",
+        "round nose does not reach, presets without a material, parts cut out of the stock "
+        "without tabs",
         "the flag that is named, or none if that is meant",
     )
     TAB_SHARED = (
@@ -1171,6 +1172,14 @@ CUT_DOUBTFUL_NOSE = Sentence(
 CUT_DOUBTFUL_RIDGES = Sentence(
     Code.CUT_DOUBTFUL,
     "the round nose of the tool leaves ridges of {ridge:.3g} mm on floors (--step-over)",
+)
+CUT_DOUBTFUL_LOOSE = Sentence(
+    Code.CUT_DOUBTFUL, "parts are cut out of the stock, and nothing holds them (--tabs 4)"
+)
+CUT_DOUBTFUL_LOOSE_FINISH = Sentence(
+    Code.CUT_DOUBTFUL,
+    "parts are cut out of the stock before their finishing pass, and nothing holds them "
+    "(--tabs 4)",
 )
 CUT_DOUBTFUL_PRESET = Sentence(
     Code.CUT_DOUBTFUL, "the tool has presets for {materials}, and none is taken (--material)"

@@ -50,7 +50,7 @@ OF_OPERATIONS = (*OPERATION, TOOL_NAME, *TOOL_KEYS)
 _RECORDED = tuple(name for name in OPERATION if name != FINISH_TOOL)
 """Keys of operations that say a field of theirs by themselves."""
 
-_OF_FINISH = ("finish", "finish_feed", FINISH_TOOL)
+_OF_FINISH = ("finish", "finish_feed", "finish_spindle", FINISH_TOOL)
 """Keys whose fields depend on tools."""
 
 TABLES = ("place", "stock", "tools", "operations")
@@ -231,15 +231,17 @@ def _operation(
 
 
 def _tooled(operation: Operation, known: Table, used: Used, tools: Tools) -> Operation:
-    """The operation with its tool, and that of its finishing pass with the feed that a preset of
-    that gives it."""
+    """The operation with its tool, and that of its finishing pass with the feed and the speed that
+    a preset of that gives it."""
     fields: dict[str, Any] = {"tool": used.tool, "material": used.material}
     keys = {key: known.given[key] for key in _OF_FINISH if key in known.given}
     if FINISH_TOOL in keys:
         last = tools.of([Table({TOOL_NAME: keys[FINISH_TOOL]})], operation.kind)
         fields["finish_tool"] = last.tool
-        if "feed" in last.preset.given and operation.finish_feed_mm_min is None:
-            fields["finish_feed_mm_min"] = OPERATION["feed"].read(last.preset.given["feed"])
+        for key in ("feed", "spindle"):
+            field = OPERATION[f"finish_{key}"].field
+            if key in last.preset.given and getattr(operation, field) is None:
+                fields[field] = OPERATION[key].read(last.preset.given[key])
     try:
         operation = replace(operation, **fields)
         operation.stages()

@@ -658,6 +658,9 @@ OPERATION = {
     "allowance": Key("allowance_mm", LENGTH, "Left on the wall.", '"0.1mm"', _CLEARING),
     "finish": Key("finish_mm", LENGTH, "Left for a last pass.", '"0.1mm"', _CLEARING),
     "finish_feed": Key("finish_feed_mm_min", FEED, "Of that pass.", kinds=_CLEARING),
+    "finish_spindle": Key(
+        "finish_spindle_rpm", Value(plain(number), "SPEED"), "Of that pass.", kinds=_CLEARING
+    ),
     FINISH_TOOL: Key("finish_tool", Value(_as_given, "NAME"), "Of that pass.", kinds=_CLEARING),
     "feed": Key("feed_mm_min", FEED, "In mm/min.", '"90mm/min"', KINDS),
     "plunge_feed": Key("plunge_feed_mm_min", FEED, "In mm/min.", '"30mm/min"', KINDS),

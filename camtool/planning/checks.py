@@ -22,6 +22,8 @@ from camtool.findings import (
     CUT_DOUBTFUL_DEPTH,
     CUT_DOUBTFUL_EDGE,
     CUT_DOUBTFUL_LENGTH,
+    CUT_DOUBTFUL_LOOSE,
+    CUT_DOUBTFUL_LOOSE_FINISH,
     CUT_DOUBTFUL_NOSE,
     CUT_DOUBTFUL_PLUNGE,
     CUT_DOUBTFUL_PRESET,
@@ -45,6 +47,7 @@ from camtool.planning.items import Setting, Step
 from camtool.planning.job import MILLS, Job, Stock, Tool
 from camtool.planning.naming import operation_name, own_numbers, range_words
 from camtool.planning.settings import lowered_feeds
+from camtool.planning.sides import runs_beside
 from camtool.toolpath.moves import Kind, Toolpath, toolpath_extents
 from camtool.toolpath.rapids import STOCK_TOP_MM, Reach, rapids_through_stock
 
@@ -293,7 +296,11 @@ def doubtful_settings(
     for step in cutting:
         if asks_speed and step.setting.spindle_rpm is None and step.operation.spindle_rpm is None:
             found[CUT_DOUBTFUL_SPEED.words()].append(step)
-        reasons = (*_doubtful(step, starts_spindle), *_beyond_tool(step, stock))
+        reasons = (
+            *_doubtful(step, starts_spindle),
+            *_beyond_tool(step, stock),
+            *_loose(step, stock, steps),
+        )
         for reason in reasons:
             found[reason].append(step)
     if not found:
@@ -322,6 +329,19 @@ def _doubtful(step: Step, starts_spindle: bool) -> Iterator[str]:
     fast = operation.plunge_feed_mm_min is None and feeds.plunge_mm_min >= feeds.cut_mm_min
     if starts_spindle and plunges and fast:
         yield CUT_DOUBTFUL_PLUNGE.words(feed=feeds.plunge_mm_min)
+
+
+def _loose(step: Step, stock: Stock | None, steps: Sequence[Step]) -> Iterator[str]:
+    """Whether an operation cuts parts out of the stock without tabs, which come loose under the
+    tool; where a finishing pass follows, it cuts at loose parts."""
+    operation, closed = step.operation, step.chosen.lines.closed
+    if stock is None or operation.stage == "finish" or operation.tabs is not None:
+        return
+    through = -step.setting.levels_mm[-1] >= stock.thickness_mm - POSITION_EPS_MM
+    if through and runs_beside(operation) and (step.chosen.rim & closed).any():
+        later = steps[steps.index(step) + 1 :]
+        finished = operation.stage == "rough" and later and later[0].operation.stage == "finish"
+        yield (CUT_DOUBTFUL_LOOSE_FINISH if finished else CUT_DOUBTFUL_LOOSE).words()
 
 
 def _beyond_tool(step: Step, stock: Stock | None) -> Iterator[str]:

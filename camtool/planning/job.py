@@ -376,9 +376,10 @@ class Operation:
     left on the wall of a profile or pocket. `depth_mm` is cut below the stock top in passes of
     `step_down_mm` at most (None: one pass), the last of `last_pass_mm` (None: like the others).
     `breakthrough_mm` stands for it: so far below the stock (a Job, which knows that, makes it the
-    depth). `finish_mm` is left on the wall for one more pass at the full depth, with a feed and a
-    tool of its own where these are given (a Job makes two operations of it, the stages). `rest`
-    names the operation that has left something, `rest_of`, whose paths it takes (a Job finds it).
+    depth). `finish_mm` is left on the wall for one more pass at the full depth, with a feed, a
+    speed and a tool of its own where these are given (a Job makes two operations of it, the
+    stages). `rest` names the operation that has left something, `rest_of`, whose paths it takes
+    (a Job finds it).
     `step_over` is the distance of neighbouring passes of a pocket over the tool's diameter.
     `overlap_mm`: how far a closed contour is cut beyond its start. `start`: one of STARTS, or a
     place (x, y) mm. `peck_mm`: how deep a drill goes at a time; `dwell_s` at the bottom.
@@ -403,6 +404,7 @@ class Operation:
     allowance_mm: float = 0.0
     finish_mm: float | None = None
     finish_feed_mm_min: float | None = None
+    finish_spindle_rpm: float | None = None
     finish_tool: Tool | None = None
     stage: str = ""
     rest: str = ""
@@ -466,8 +468,9 @@ class Operation:
             ("tip offset", self.tip_offset_mm, "mm"),
         ):
             above_zero(name, value, unit)
-        if self.spindle_rpm:
-            above_zero("spindle speed", self.spindle_rpm, "rev/min")
+        for speed in (self.spindle_rpm, self.finish_spindle_rpm):
+            if speed:
+                above_zero("spindle speed", speed, "rev/min")
         at_least_zero("allowance", self.allowance_mm, "mm", MOST_WIDE_MM)
         at_least_zero("overlap", self.overlap_mm, "mm")
         at_least_zero("dwell", self.dwell_s, "s")
@@ -624,6 +627,7 @@ class Operation:
         if self.finish_mm is None:
             for key, value in (
                 ("finish_feed", self.finish_feed_mm_min),
+                ("finish_spindle", self.finish_spindle_rpm),
                 ("finish_tool", self.finish_tool),
             ):
                 if value is not None:
@@ -633,9 +637,15 @@ class Operation:
                         mend=f'give what is left for it, finish = "0.2mm", or leave {key} out',
                     )
             return (self,)
-        plain = replace(self, finish_mm=None, finish_feed_mm_min=None, finish_tool=None)
+        plain = replace(
+            self,
+            finish_mm=None,
+            finish_feed_mm_min=None,
+            finish_spindle_rpm=None,
+            finish_tool=None,
+        )
         lead = Lead("arc", self.finish_mm)
-        feed = self.finish_feed_mm_min
+        feed, speed = self.finish_feed_mm_min, self.finish_spindle_rpm
         return (
             replace(plain, stage="rough", allowance_mm=self.allowance_mm + self.finish_mm),
             replace(
@@ -644,6 +654,7 @@ class Operation:
                 name=f"{self.name or self.kind} finish",
                 tool=self.finish_tool or self.tool,
                 feed_mm_min=self.feed_mm_min if feed is None else feed,
+                spindle_rpm=self.spindle_rpm if speed is None else speed,
                 entry=Entry(),
                 lead_in=lead,
                 lead_out=lead,

@@ -63,6 +63,10 @@ KINDS: Mapping[str, tuple[str, ...]] = {
     "engrave": ("--kind", "engrave", "--depth", "1"),
     "drill": ("--kind", "drill", "--tool-kind", "drill", "--depth", "2"),
     "vcarve": ("--kind", "vcarve", "--tool-kind", "v", "--tool-angle", "60", *TOOL),
+    "chamfer": (
+        *("--kind", "chamfer", "--tool-kind", "v", "--tool-angle", "60", "--chamfer", "0.2"),
+        *("--select", "closed", *TOOL),
+    ),
 }
 """Flags of a plain operation of each kind."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from camtool.findings import Code, Severity
 from camtool.geometry.polylines import Polyline
 from camtool.pipeline import post_drawing
 from camtool.planning.checks import ridge_mm
-from camtool.planning.job import Entry, Job, Operation, Stock, Tool, job_of
+from camtool.planning.job import Entry, Job, Operation, Stock, Tabs, Tool, job_of
 from camtool.target.registry import load_target
 from tests.drawings import drawing_of
 
@@ -115,7 +116,15 @@ TOOL_SAID = {"spindle_rpm": 5000.0, "feed_mm_min": 400.0, "plunge_feed_mm_min": 
         ({"tool_kind": "ball"}, "leaves 0.25 mm at the foot of walls"),
         ({"tool_kind": "ball", "side": "on"}, ""),
         ({"tool_kind": "bull", "tool_corner_radius_mm": 0.1}, "leaves 0.1 mm"),
-        ({"tool_kind": "bull", "tool_corner_radius_mm": 0.1, "stock": Stock(0.4)}, ""),
+        (
+            {
+                "tool_kind": "bull",
+                "tool_corner_radius_mm": 0.1,
+                "stock": Stock(0.4),
+                "tabs": Tabs(4),
+            },
+            "",
+        ),
         ({"tool_materials": ("brass", "wood")}, "presets for brass, wood"),
         ({"tool_materials": ("brass", "wood"), "material": "wood"}, ""),
     ],
@@ -135,3 +144,27 @@ def test_ridges_are_as_high_as_the_nose_between_two_paths(tool: Tool, step_over:
     heights = np.linspace(0.0, 3.0, 300_001)
     reached = [height for height in heights[::100] if tool.radius_at(float(height)) >= half]
     assert ridge_mm(tool, step_over) == pytest.approx(reached[0], abs=1.1e-3)
+
+
+@pytest.mark.parametrize(
+    ("said", "words"),
+    [
+        ({"depth_mm": 3.0}, "parts are cut out of the stock, and nothing holds them"),
+        ({"depth_mm": 3.2, "finish_mm": 0.1}, "before their finishing pass, and nothing holds"),
+        ({"depth_mm": 3.0, "side": "outside"}, "nothing holds them"),
+        ({"depth_mm": 2.9}, ""),
+        ({"depth_mm": 3.0, "tabs": Tabs(4)}, ""),
+        ({"depth_mm": 3.0, "side": "inside"}, ""),
+        ({"depth_mm": 3.0, "kind": "pocket"}, ""),
+    ],
+)
+def test_parts_that_nothing_holds(said: dict[str, object], words: str) -> None:
+    settings = ALL_SAID | {"step_down_mm": 0.5, **said}
+    job = replace(job_of(**settings), stock=Stock(3.0))
+    message = _said("grbl", job)
+    assert words in message
+    assert bool(words) == bool(message)
+
+
+def test_a_part_without_known_stock_may_be_held_by_it() -> None:
+    assert _said("grbl", job_of(**ALL_SAID, depth_mm=3.0, step_down_mm=0.5)) == ""

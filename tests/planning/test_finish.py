@@ -164,7 +164,9 @@ def test_the_job_says_what_each_stage_does() -> None:
         tool=Tool(3.0),
         finish_mm=0.2,
         finish_feed_mm_min=50.0,
+        finish_spindle_rpm=9000.0,
         feed_mm_min=100.0,
+        spindle_rpm=6000.0,
         allowance_mm=0.1,
         breakthrough_mm=0.5,
         finish_tool=Tool(2.0),
@@ -177,6 +179,7 @@ def test_the_job_says_what_each_stage_does() -> None:
         Tool(3.0),
     )
     assert (done.allowance_mm, done.feed_mm_min, done.tool) == (0.1, 50.0, Tool(2.0))
+    assert (rough.spindle_rpm, done.spindle_rpm) == (6000.0, 9000.0)
     assert (rough.name, done.name, rough.depth_mm, done.depth_mm) == (
         "edge",
         "edge finish",
@@ -190,6 +193,7 @@ def test_the_job_says_what_each_stage_does() -> None:
     ("settings", "words"),
     [
         ({"finish_feed_mm_min": 3.0}, "has no effect without finish"),
+        ({"finish_spindle_rpm": 3.0}, "has no effect without finish"),
         ({"finish_tool": Tool(1.0)}, "has no effect without finish"),
         ({"finish_mm": 0.3}, "more than a quarter of the tool of 1 mm"),
         ({"finish_mm": 0.1, "finish_tool": Tool(2.0)}, "does not fit where one of 1 mm cleared"),
