@@ -190,7 +190,7 @@ class Link(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     `baud` None: not known, or the program is in the machine before it runs.
     `bits_per_character` counts start, stop and parity bits. `wait` "sequential": a block is sent
     when the one before has been cut, so that both times add up; "streamed": the next is sent
-    meanwhile."""
+    meanwhile. A target whose line leaves more open extends it by its own keys."""
 
     baud: Rate | None = None
     bits_per_character: Annotated[float, Meta(ge=1.0, le=1000.0)] = 10.0
@@ -263,17 +263,19 @@ class MechanicsOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 # 3.13 on.
 ControllerT = TypeVar("ControllerT", bound=SlideStart, default=SlideStart, covariant=True)
 DialectT = TypeVar("DialectT", bound=msgspec.Struct, default=msgspec.Struct, covariant=True)
+LinkT = TypeVar("LinkT", bound=Link, default=Link, covariant=True)
 _Record = TypeVar("_Record", bound=SlideStart)
 
 
 class Machine(
     msgspec.Struct,
-    Generic[ControllerT, DialectT],
+    Generic[ControllerT, DialectT, LinkT],
     frozen=True,
     forbid_unknown_fields=True,
     kw_only=True,
 ):
-    """Everything known about one machine; its target says what `controller` and `dialect` are."""
+    """Everything known about one machine; its target says what `controller`, `dialect` and `link`
+    are."""
 
     target: TargetNames
     axes: Axes
@@ -283,7 +285,7 @@ class Machine(
     spindle: Spindle = Spindle()
     coolant: Coolant = Coolant()
     controller: ControllerT
-    link: Link = Link()
+    link: LinkT = Link()  # type: ignore[assignment]
     mechanics: MechanicsOptions = MechanicsOptions()
     play_map: PlayMap = PlayMap()
     dialect: DialectT
@@ -349,10 +351,12 @@ def _given(record: msgspec.Struct) -> dict[str, Any]:
     for field in msgspec.structs.fields(record):
         value = getattr(record, field.name)
         made = field.default_factory
-        if value != (field.default if made is msgspec.NODEFAULT else made()):
-            given[field.encode_name] = (
-                _given(value) if isinstance(value, msgspec.Struct) else value
-            )
+        if value == (field.default if made is msgspec.NODEFAULT else made()):
+            continue
+        if not isinstance(value, msgspec.Struct):
+            given[field.encode_name] = value
+        elif inner := _given(value):
+            given[field.encode_name] = inner
     return given
 
 

@@ -20,13 +20,14 @@ import msgspec
 
 from camtool.errors import MachineError
 from camtool.findings import TargetCode
-from camtool.machine.model import Axis, Machine, SlideStart
+from camtool.machine.model import Axis, Link, Machine, SlideStart
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from camtool.simulation.controller import ControllerModel
     from camtool.target.twin import Twin
+    from camtool.target.wire import NoWire, Wire
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
 
@@ -56,12 +57,13 @@ class Target(ABC):
 
     `controllers`: the records of `[controller]`, one for each `model`; the exact path
     (`PathController`) is always possible. `dialect`: the record of `[dialect]`; writer and reader
-    find it in `machine.dialect`.
+    find it in `machine.dialect`. `link`: the record of `[link]`, with keys of its own line.
     """
 
     name: ClassVar[str]
     controllers: ClassVar[tuple[type[SlideStart], ...]] = ()
     dialect: ClassVar[type[msgspec.Struct]] = NoDialect
+    link: ClassVar[type[Link]] = Link
 
     interpolators: ClassVar[tuple[str, ...]] = ()
     """The choices of `--interpolator`, if there are any."""
@@ -112,6 +114,12 @@ class Target(ABC):
         raise MachineError(
             f"{self.name} has no settings that can be read from a port", where="--port"
         )
+
+    def wire(self) -> Wire | NoWire:
+        """How its programs are sent; by default they are not, and why."""
+        from camtool.target.wire import NoWire
+
+        return NoWire()
 
     def listing(self, data: bytes, machine: Machine[Any, Any]) -> Listing | None:
         """The program, which `read` accepts, divided into blocks; None without such a listing."""

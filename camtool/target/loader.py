@@ -67,8 +67,8 @@ def machine_of(target: Target, table: Table, name: str) -> Machine:
     `name` as the source."""
     records: Any = reduce(or_, _records(target))
     generic: Any = Machine
-    kind: type[Machine] = generic[records, target.dialect]
-    whole = table if "dialect" in table else table | {"dialect": {}}
+    kind: type[Machine] = generic[records, target.dialect, target.link]
+    whole: Table = {"dialect": {}, "link": {}} | table
     machine: Machine = convert(whole, kind, name)
     if machine.coolant.kinds and not target.switches_coolant:
         raise MachineError(

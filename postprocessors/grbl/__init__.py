@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from camtool.toolpath.program import Listing, Program
 
     from .controller import GrblModel
+    from .wire import GrblWire
 
 
 class Grbl(Target):
@@ -71,6 +72,12 @@ class Grbl(Target):
         from .settings import asked
 
         return asked(port)
+
+    def wire(self) -> GrblWire:
+        """Lines, as many as its buffer takes."""
+        from .wire import GrblWire
+
+        return GrblWire()
 
     def listing(self, data: bytes, machine: GrblMachine) -> Listing:
         """The lines that are blocks."""

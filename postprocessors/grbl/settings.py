@@ -14,6 +14,8 @@ from typing import Any
 from camtool.errors import MachineError
 from camtool.target.contract import Setting
 
+from .dialect import GrblController, GrblMachine
+
 _SETTING = re.compile(r"(?<![\w$])\$(\d{1,3})\s*=\s*([^\s(,;]*)")
 
 _AXES = {
@@ -77,6 +79,58 @@ def _setting(key: str, number: int, text: str, line: int) -> Setting:
             raise MachineError(f"{text} steps/mm are none", where=where)
         return Setting(key, 1.0 / value, f"${number} = {text} steps/mm", where)
     return Setting(key, int(value) if value.is_integer() else value, f"${number}", where)
+
+
+# Comparing with the machine file, before a program is sent.
+
+SAID_TOLERANCE = 6e-4
+"""Settings are said with three decimals: what is nearer is the same."""
+
+REPORT_INCHES, LASER = 13, 32
+
+
+def differences(text: str, machine: GrblMachine) -> tuple[list[str], list[str]]:
+    """Where a listing says something else than the machine file: what would spoil the part or
+    leave the travel (steps, rates, travels, arcs, units of reports), and what only changes times.
+    MachineError as `settings_of`."""
+    said = {each.said.split()[0]: each for each in settings_of(text) or ()}
+    if not said:
+        raise MachineError("its answer to $$ has no settings")
+    errors, remarks = list[str](), list[str]()
+    for axis, letter in zip(machine.axes, "xyz", strict=True):
+        offset = "xyz".index(letter)
+        wanted = {
+            "coded_step_mm": 1.0 / axis.coded_step_mm,
+            "max_rate_mm_min": axis.max_rate_mm_min,
+            "acceleration_mm_s2": axis.acceleration_mm_s2,
+            "travel_mm": axis.travel_mm,
+        }
+        for key, value in wanted.items():
+            found = said[f"${_AXES[key] + offset}"]
+            into = remarks if key == "acceleration_mm_s2" else errors
+            into += _difference(found, value, key == "coded_step_mm")
+    if isinstance(machine.controller, GrblController):
+        errors += _difference(said["$12"], machine.controller.arc_tolerance_mm)
+        remarks += _difference(said["$11"], machine.controller.junction_deviation_mm)
+    numbers = {int(number): value for number, value in _SETTING.findall(text)}
+    if float(numbers.get(REPORT_INCHES, "0")) != 0.0:
+        errors.append("$13 reports inches: set $13=0, so that places can be followed")
+    if float(numbers.get(LASER, "0")) != 0.0:
+        remarks.append("$32 is laser mode: M3 and M4 mean a laser")
+    return errors, remarks
+
+
+def _difference(found: Setting, wanted: float | None, inverse: bool = False) -> list[str]:
+    """A sentence where a setting is not what the machine file says, if it says anything."""
+    value = float(found.value)
+    shown = 1.0 / value if inverse else value
+    if wanted is None or abs(shown - wanted) <= SAID_TOLERANCE:
+        return []
+    number = found.said.split()[0]
+    return [
+        f"{number} is {shown:.3f}, but {found.key} of the machine file means {wanted:.3f}: "
+        "change one of the two"
+    ]
 
 
 # The port.

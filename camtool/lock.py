@@ -1,0 +1,96 @@
+"""A lock that one process holds: a file that the operating system locks for it.
+
+The lock lasts as long as the process lives, so that none is ever stale. The file names the
+process, and is removed at the end; after a crash it stays, unlocked, and whoever comes next takes
+it over.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import socket
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+_NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP)
+"""Errors of file systems that have no locks."""
+
+_LOCKED = (errno.EWOULDBLOCK, errno.EAGAIN, errno.EACCES, errno.EDEADLK)
+"""Errors for a file that another process has locked."""
+
+_READ_BYTES = 1000
+"""How much is read of the lock file of another process."""
+
+
+@contextmanager
+def held(place: Path, taken: Callable[[str], Exception]) -> Iterator[bool]:
+    """Within the block, this process alone holds the lock at `place`; False where its file system
+    has no locks. Raises what `taken` makes of the words for the process that has it, and OSError
+    where the file cannot be made."""
+    handle, locked = _opened(place, taken)
+    try:
+        with suppress(OSError):  # a full disk: the lock holds without a name in it
+            os.ftruncate(handle, 0)
+            os.lseek(handle, 0, os.SEEK_SET)
+            os.write(handle, f"process {os.getpid()} on {socket.gethostname()}\n".encode())
+        yield locked
+    finally:
+        _release(place, handle)
+
+
+def _opened(place: Path, taken: Callable[[str], Exception]) -> tuple[int, bool]:
+    """The lock file, opened, and whether it is locked."""
+    while True:
+        handle = os.open(place, os.O_RDWR | os.O_CREAT, 0o666)
+        try:
+            _lock(handle)
+            if _is_at(handle, place):
+                return handle, True
+            os.close(handle)  # its owner removed it before we had locked it
+        except OSError as error:
+            if error.errno in _NO_LOCKS:
+                return handle, False
+            who = os.read(handle, _READ_BYTES).decode(errors="replace").strip()
+            os.close(handle)
+            if error.errno not in _LOCKED:
+                raise
+            raise taken(who or "it has just begun") from error
+
+
+def _is_at(handle: int, place: Path) -> bool:
+    try:
+        return os.path.samestat(os.fstat(handle), place.stat())
+    except OSError:
+        return False
+
+
+if sys.platform == "win32":
+    import msvcrt
+
+    _FAR = 1 << 20
+    """Windows lets nobody read locked bytes: the locked one is far behind the text."""
+
+    def _lock(handle: int) -> None:
+        """Lock an open file, or OSError at once."""
+        os.lseek(handle, _FAR, os.SEEK_SET)
+        msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
+
+    def _release(place: Path, handle: int) -> None:
+        os.close(handle)
+        with suppress(OSError):  # another process has opened it meanwhile
+            place.unlink()
+
+else:
+    import fcntl
+
+    def _lock(handle: int) -> None:
+        """Lock an open file, or OSError at once."""
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+    def _release(place: Path, handle: int) -> None:
+        with suppress(OSError):  # the folder is gone or write-protected by now
+            place.unlink()
+        os.close(handle)

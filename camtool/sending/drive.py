@@ -1,0 +1,160 @@
+"""A conversation joined to its line, the clock, the journal and the user.
+
+All that decides what is sent is in the conversation; here bytes are carried, and nothing is
+thought. Before bytes go out the journal says so.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Protocol
+
+from camtool.errors import OutputError
+from camtool.target.wire import Conversation, Reopen, State, Tell, Write
+
+TICK_S = 0.05
+"""The user's wishes and the signals are looked at so often."""
+
+REOPEN_S = 60.0
+"""A port that is to come back is waited for so long."""
+
+
+class Wish(Enum):
+    """What the user wants."""
+
+    PAUSE = "pause"
+    RESUME = "resume"
+    STEP = "step"
+    STOP = "stop"
+    CLOSE = "close"
+
+
+class Line(Protocol):
+    """What bytes go through (`camtool.sending.line.Line`)."""
+
+    def read(self, wait_s: float) -> bytes: ...
+
+    def write(self, data: bytes) -> None: ...
+
+    def reopen(self, wait_s: float) -> None: ...
+
+    def close(self) -> None: ...
+
+
+class Record(Protocol):
+    """Where counts are kept (`camtool.sending.journal.Journal`)."""
+
+    def note(self, **counts: object) -> None: ...
+
+
+def _nothing(_: Conversation) -> None:
+    return
+
+
+def _no_wish() -> Wish | None:
+    return None
+
+
+@dataclass
+class Driver:
+    """Carries a conversation to its end. `speed`: the clock runs so many times as fast as that on
+    the wall, for virtual machines that do the same."""
+
+    line: Line
+    journal: Record | None = None
+    block_of: Callable[[int], int] = lambda block: block
+    wish: Callable[[], Wish | None] = _no_wish
+    watch: Callable[[Conversation], None] = _nothing
+    tell: Callable[[str], None] = lambda text: None
+    speed: float = 1.0
+    trouble: OutputError | None = field(default=None, init=False)
+    """Why the journal could not be written, if it could not."""
+
+    def now(self) -> float:
+        """The time of the conversation, s."""
+        return time.monotonic() * self.speed
+
+    def carry(self, conversation: Conversation) -> State:
+        """Hold the conversation; how it ended."""
+        try:
+            conversation.begin(self.now())
+            while self._act(conversation):
+                self._hear(conversation)
+                self._obey(conversation)
+        except OSError as error:
+            conversation.lost(f"the port is gone ({error.strerror or error})", self.now())
+        except BaseException:
+            conversation.lost("camtool was ended", self.now())
+            raise
+        self._note(conversation)
+        self.watch(conversation)
+        return conversation.state
+
+    def _act(self, conversation: Conversation) -> bool:
+        """Do what the conversation wants; False at its end."""
+        for action in conversation.actions():
+            if isinstance(action, Tell):
+                self.tell(action.text)
+                continue
+            if not self._note(conversation):
+                break  # what is not noted must not be sent; the stop is
+            if isinstance(action, Write):
+                self.line.write(action.data)
+            elif isinstance(action, Reopen):
+                self.line.reopen(REOPEN_S)
+        self._note(conversation)
+        self.watch(conversation)
+        return not conversation.ended or conversation.has_actions
+
+    def _hear(self, conversation: Conversation) -> None:
+        if conversation.ended or conversation.has_actions:
+            return
+        wait_s = min((conversation.next_s - self.now()) / self.speed, TICK_S)
+        data = self.line.read(max(wait_s, 0.0))
+        now = self.now()
+        if data:
+            conversation.received(data, now)
+        if now >= conversation.next_s:
+            conversation.elapsed(now)
+
+    def _obey(self, conversation: Conversation) -> None:
+        wish, now = self.wish(), self.now()
+        if wish is Wish.PAUSE:
+            conversation.pause(now)
+        elif wish is Wish.RESUME:
+            conversation.single = False
+            conversation.resume(now)
+        elif wish is Wish.STEP:
+            conversation.single = True
+            conversation.resume(now)
+        elif wish is Wish.STOP:
+            conversation.stop(now)
+        elif wish is Wish.CLOSE:
+            self.line.close()
+            conversation.lost("the port was closed at once: the machine was not told", now)
+
+    def _note(self, conversation: Conversation) -> bool:
+        """Say in the journal how the conversation stands; when that fails, it is stopped."""
+        if self.journal is None or self.trouble is not None:
+            return True
+        try:
+            self.journal.note(**counts_of(conversation, self.block_of))
+        except OutputError as error:
+            self.trouble = error
+            conversation.stop(self.now())
+            return False
+        return True
+
+
+def counts_of(conversation: Conversation, block_of: Callable[[int], int]) -> dict[str, int]:
+    """How far a conversation has come: packets, and the last block of the program that is done."""
+    block = conversation.block
+    return {
+        "sent": conversation.sent,
+        "acknowledged": conversation.acknowledged,
+        "done": conversation.done,
+        "block": block_of(block) if block >= 0 else -1,
+    }

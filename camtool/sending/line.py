@@ -1,0 +1,161 @@
+"""The line to a controller: a serial port, a pseudo-terminal or a socket, held by one process.
+
+pyserial opens all of them: `/dev/ttyUSB0`, `COM3`, `socket://localhost:5007`. Nothing listens on
+the network here.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from camtool.errors import InputError
+from camtool.lock import held
+
+WRITE_S: Final = 10.0
+"""A port that takes no more bytes for so long is stuck."""
+
+REOPEN_S: Final = 0.1
+"""How often a port is looked for that has gone for a while."""
+
+AT_ONCE: Final = 4096
+
+_FRAMES: Final = ("8N1", "7N1", "8E1", "7E1", "8O1", "7O1", "8N2", "7E2")
+
+
+@dataclass(frozen=True)
+class Port:
+    """Which port, and how: `baud` None is for those that have no rate."""
+
+    name: str
+    baud: int | None = None
+    frame: str = "8N1"
+
+    @property
+    def is_virtual(self) -> bool:
+        """Whether it is a socket of this computer or a pseudo-terminal: a rate means nothing."""
+        if "://" in self.name:
+            return True
+        return os.path.realpath(self.name).startswith("/dev/pts/")
+
+
+class Line:
+    """An open port. OSError (of pyserial too) when it is gone."""
+
+    def __init__(self, port: Port) -> None:
+        self.port = port
+        self._serial = _opened(port)
+
+    def read(self, wait_s: float) -> bytes:
+        """What has come, after `wait_s` at the latest."""
+        self._serial.timeout = max(wait_s, 0.0)
+        data = bytes(self._serial.read(1))
+        if data:
+            data += bytes(self._serial.read(min(self._serial.in_waiting, AT_ONCE)))
+        return data
+
+    def write(self, data: bytes) -> None:
+        """Write all of it."""
+        self._serial.write(data)
+
+    def reopen(self, wait_s: float) -> None:
+        """Close the port, and open it again when it is there, for `wait_s` at the most."""
+        self.close()
+        end = time.monotonic() + wait_s
+        while True:
+            try:
+                self._serial = _opened(self.port)
+            except (OSError, ValueError):
+                if time.monotonic() >= end:
+                    raise
+                time.sleep(REOPEN_S)
+            else:
+                return
+
+    def close(self) -> None:
+        """Close it; what was not sent yet is dropped."""
+        with suppress(OSError, ValueError):
+            self._serial.close()
+
+
+@contextmanager
+def opened_line(port: Port) -> Iterator[Line]:
+    """The port, opened and held; InputError where it cannot be used, or another camtool has it."""
+    if port.frame not in _FRAMES:
+        raise InputError(f"{port.frame!r} is no frame", mend=f"give one of {', '.join(_FRAMES)}")
+
+    def taken(who: str) -> InputError:
+        return InputError(
+            f"another camtool sends there ({who})", file=port.name, mend="end it first"
+        )
+
+    with held(_lock_of(port), taken):
+        try:
+            line = Line(port)
+        except (OSError, ValueError) as error:
+            raise InputError(
+                f"the port cannot be opened ({_words(error)})",
+                file=port.name,
+                mend="camtool ports lists them; close other programs that use it",
+            ) from error
+        try:
+            yield line
+        finally:
+            line.close()
+
+
+def _lock_of(port: Port) -> Path:
+    name = port.name if "://" in port.name else os.path.realpath(port.name)
+    digest = hashlib.sha256(name.encode()).hexdigest()[:16]
+    return Path(tempfile.gettempdir()) / f"camtool-port-{digest}.lock"
+
+
+def _opened(port: Port) -> Any:
+    import serial  # seldom needed
+
+    settings: dict[str, Any] = {"timeout": 0.0, "write_timeout": WRITE_S}
+    if port.baud is not None:
+        settings["baudrate"] = port.baud
+    if "://" not in port.name:
+        bits, parity, stops = tuple(port.frame)
+        # XON/XOFF stays off: 11H and 13H are bytes like any other to some controllers.
+        settings |= {"bytesize": int(bits), "parity": parity, "stopbits": int(stops)}
+        settings["exclusive"] = None if sys.platform == "win32" else True
+    return serial.serial_for_url(port.name, **settings)
+
+
+def _words(error: Exception) -> str:
+    strerror = getattr(error, "strerror", None)
+    return str(strerror or error)
+
+
+@dataclass(frozen=True)
+class FoundPort:
+    """A serial port of this computer: its name, what it says it is, and its hardware id."""
+
+    name: str
+    description: str
+    hardware: str
+
+
+def found_ports() -> list[FoundPort]:
+    """The serial ports of this computer, by name."""
+    from serial.tools import list_ports
+
+    found = [
+        FoundPort(each.device, _said(each.description), _said(each.hwid))
+        for each in list_ports.comports()
+    ]
+    return sorted(found, key=lambda each: each.name)
+
+
+def _said(text: str | None) -> str:
+    return "" if text in (None, "n/a") else str(text)

@@ -1,0 +1,373 @@
+"""The contract of a wire: how a program comes down the line to a controller, without the line.
+
+A `Wire` cuts a program into packets, and holds conversations about them. A `Conversation` is a
+value with an explicit clock: it is given what was received, what the user wants, and the time; it
+gives what to write and when it wants to be woken. It opens no port, reads no clock and starts no
+thread, so that tests run thousands of faults through it in a second. `camtool.sending` joins it to
+a port.
+
+    conversation.begin(now)
+    while not conversation.ended:
+        for action in conversation.actions():  ...   # write, reopen, tell
+        ...                                          # wait for bytes, or until .next_s
+        conversation.received(data, now)             # or .elapsed(now), .pause(now), .stop(now) ...
+
+Three counts of packets say where it stands: those that were `sent`, those that the controller has
+`acknowledged` (or that are taken for acknowledged, where it says nothing), and those that are
+`done`: what is cut for certain. After a crash a program goes on behind what is done.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from camtool.arrays import Floats, Ints
+from camtool.errors import CamtoolError, MachineError
+from camtool.machine.model import Machine
+
+if TYPE_CHECKING:
+    from camtool.toolpath.moves import Toolpath
+
+Place = tuple[float, float, float]
+
+
+class WireError(CamtoolError):
+    """A conversation with a controller that failed; exit code 1: the part is not finished."""
+
+    exit_code = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Forecast:
+    """What the simulation says of the B blocks of a program: `decoded`, the moves; `seconds` (B,)
+    of each with its compensation, `compensation_s` (B,) the part of it for compensation; `outputs`
+    (B,) of steps, each of one axis or several, `steps` (B, 3) of the axes, `reversals` (B, 3) of
+    them, and where each ends, `end_mm` (B, 3)."""
+
+    decoded: Toolpath
+    seconds: Floats
+    compensation_s: Floats
+    outputs: Ints
+    steps: Ints
+    reversals: Ints
+    end_mm: Floats
+
+    def __len__(self) -> int:
+        return len(self.seconds)
+
+
+@dataclass(frozen=True)
+class Packet:
+    """What goes out in one piece and is acknowledged as one.
+
+    `block`: the last block of the program that is done when it is done, −1 before the first;
+    `seconds`: how long the machine is busy with it, by the simulation. `counts`: how many reports
+    of it the controller may give, where it gives any. `ask`: what the user must do or allow before
+    it goes out. `note`: what the user must know while the machine waits in it.
+    """
+
+    data: bytes
+    block: int = -1
+    seconds: float = 0.0
+    counts: tuple[int, ...] = ()
+    ask: str = ""
+    note: str = ""
+
+
+class State(Enum):
+    """How a conversation stands."""
+
+    OPENING = "opening"
+    SENDING = "sending"
+    WAITING = "waiting"  # for the user: `why` says what for
+    PAUSING = "pausing"
+    PAUSED = "paused"
+    STOPPING = "stopping"
+    FINISHED = "finished"
+    STOPPED = "stopped"
+    FAILED = "failed"
+
+
+ENDS = frozenset({State.FINISHED, State.STOPPED, State.FAILED})
+HALTS = frozenset({State.WAITING, State.PAUSED})
+
+
+@dataclass(frozen=True)
+class Write:
+    """Bytes to be written now."""
+
+    data: bytes
+
+
+@dataclass(frozen=True)
+class Reopen:
+    """The port is to be closed and opened again, since the controller begins anew."""
+
+
+@dataclass(frozen=True)
+class Tell:
+    """A sentence for the user, such as what the controller says."""
+
+    text: str
+
+
+Action = Write | Reopen | Tell
+
+NEVER = math.inf
+
+
+LATE_S = 0.05
+"""How late a port and its cable may deliver what was written, s."""
+
+PATIENCE = 60
+"""A controller that owes an answer and is silent for so many times the lateness of the line (3 s)
+does not answer."""
+
+
+@dataclass(frozen=True)
+class Manner:
+    """How a conversation is held. `single`: it waits for `resume` after every packet; `home`: the
+    machine is homed first; `late_s`: how late the line may be, s; `checked`: settings of the
+    controller are compared with the machine file."""
+
+    single: bool = False
+    home: bool = False
+    late_s: float = LATE_S
+    checked: bool = True
+
+    @property
+    def patience_s(self) -> float:
+        """How long an answer that is due may take, s."""
+        return PATIENCE * self.late_s
+
+
+class Conversation(ABC):
+    """One conversation about some packets; see above. `place_mm`: where the controller says that
+    it is, in the work frame, None where it does not say."""
+
+    def __init__(self, packets: Sequence[Packet], manner: Manner) -> None:
+        self.packets = tuple(packets)
+        self.manner = manner
+        self.single = manner.single
+        self.state = State.OPENING
+        self.why = ""
+        self.sent = self.acknowledged = self.done = 0
+        self.place_mm: Place | None = None
+        self.next_s = NEVER
+        """The time at which it wants `elapsed`; whoever calls earlier does no harm."""
+        self._out: list[Action] = []
+
+    @property
+    def ended(self) -> bool:
+        """Whether there is nothing more to say."""
+        return self.state in ENDS
+
+    @property
+    def block(self) -> int:
+        """The last block that is done for certain, −1 before the first."""
+        return max((packet.block for packet in self.packets[: self.done]), default=-1)
+
+    def actions(self) -> list[Action]:
+        """What is to be done now, in order; each is given once."""
+        out, self._out = self._out, []
+        return out
+
+    @property
+    def has_actions(self) -> bool:
+        """Whether there are any."""
+        return bool(self._out)
+
+    @abstractmethod
+    def begin(self, now: float) -> None:
+        """The port is open."""
+
+    @abstractmethod
+    def received(self, data: bytes, now: float) -> None:
+        """These bytes have come."""
+
+    @abstractmethod
+    def elapsed(self, now: float) -> None:
+        """The clock has come to `now`."""
+
+    @abstractmethod
+    def pause(self, now: float) -> None:
+        """Come to rest; PAUSED when the machine stands."""
+
+    @abstractmethod
+    def resume(self, now: float) -> None:
+        """Go on after a pause, or after what the user was waited for."""
+
+    @abstractmethod
+    def stop(self, now: float) -> None:
+        """End for good; STOPPED when the machine stands, as far as its protocol can stop it."""
+
+    def lost(self, why: str, now: float) -> None:
+        """The port is gone: nobody can be told anything any more."""
+        if not self.ended:
+            self._out.clear()
+            self._end(State.FAILED, why)
+
+    def _write(self, data: bytes) -> None:
+        self._out.append(Write(data))
+
+    def _tell(self, text: str) -> None:
+        self._out.append(Tell(text))
+
+    def _end(self, state: State, why: str = "") -> None:
+        self.state, self.why, self.next_s = state, why, NEVER
+
+
+class PacketByPacket(Conversation):
+    """A conversation in which a packet goes out when the one before is done.
+
+    Pauses are between packets, and so is a stop, unless `_halt` can do more.
+    """
+
+    def __init__(self, packets: Sequence[Packet], manner: Manner) -> None:
+        super().__init__(packets, manner)
+        self._busy = False
+        """Whether a packet is out that is not done."""
+        self._asked = False
+        """Whether the user has been asked for what the next packet asks."""
+        self._failing = ""
+        """Why it fails, while the machine is being stopped."""
+
+    def _send(self, packet: Packet, now: float) -> None:
+        """Write a packet, and set `next_s`."""
+        raise NotImplementedError
+
+    def _halt(self, now: float) -> bool:
+        """Stop the machine within a packet; False where the protocol cannot."""
+        return False
+
+    def begin(self, now: float) -> None:
+        """Send the first packet."""
+        self.state = State.SENDING
+        self._go_on(now)
+
+    def pause(self, now: float) -> None:
+        """Come to rest when the packet that is out is done."""
+        if self.state is State.SENDING:
+            self.state = State.PAUSING
+            if not self._busy:
+                self.state = State.PAUSED
+
+    def resume(self, now: float) -> None:
+        """Go on with the next packet."""
+        if self.state is State.PAUSING:
+            self.state = State.SENDING
+        elif self.state in HALTS:
+            self._asked = self.state is State.WAITING
+            self.state, self.why = State.SENDING, ""
+            self._go_on(now)
+
+    def stop(self, now: float) -> None:
+        """Send nothing more; stopped when the packet that is out is done or has been halted."""
+        if self.ended or self.state is State.STOPPING:
+            return
+        self.state = State.STOPPING
+        if not self._busy:
+            self._stopped()
+        else:
+            self._halt(now)
+
+    def _go_on(self, now: float) -> None:
+        """Send the next packet, unless the user is to be waited for."""
+        if self.done == len(self.packets):
+            self._end(State.FINISHED)
+            return
+        packet = self.packets[self.done]
+        if packet.ask and not self._asked:
+            self.state, self.why, self.next_s = State.WAITING, packet.ask, NEVER
+            return
+        self._asked, self._busy = False, True
+        self.sent = self.done + 1
+        self._send(packet, now)
+
+    def _packet_done(self, now: float) -> None:
+        """The packet that is out has been executed."""
+        self._busy, self.next_s = False, NEVER
+        self.done = self.acknowledged = self.sent
+        if self.state is State.STOPPING:
+            self._stopped()
+        elif self.state is State.PAUSING:
+            self.state = State.PAUSED
+        elif self.single and self.done < len(self.packets):
+            self.state, self.why = State.PAUSED, "single block"
+        else:
+            self._go_on(now)
+
+    def _stopped(self) -> None:
+        if self._failing:
+            self._end(State.FAILED, self._failing)
+        else:
+            self._end(State.STOPPED)
+
+    def _fail(self, why: str, now: float) -> None:
+        """Stop the machine where the protocol can, and fail."""
+        if self.ended or self._failing:
+            return
+        self._failing, self.state = why, State.STOPPING
+        if not self._busy or not self._halt(now):
+            self._end(State.FAILED, why)
+
+
+class Wire(ABC):
+    """The protocol of one controller. `baud` and `frame` (data bits, parity, stop bits) are those
+    of a serial port; `baud` None: not known. `ready` says what the user must see to beforehand."""
+
+    baud: ClassVar[int | None] = None
+    frame: ClassVar[str] = "8N1"
+    ready: ClassVar[tuple[str, ...]] = ()
+    stopping: ClassVar[str] = ""
+    """What a stop does, such as "the machine stops at once"."""
+
+    @abstractmethod
+    def packets(
+        self, data: bytes, machine: Machine[Any, Any], forecast: Forecast
+    ) -> Sequence[Packet]:
+        """The packets of a program, which `read` accepts; MachineError and ProgramError for what
+        the line cannot carry."""
+
+    @abstractmethod
+    def conversation(
+        self, packets: Sequence[Packet], machine: Machine[Any, Any], manner: Manner
+    ) -> Conversation:
+        """The conversation that sends these packets of a program. MachineError where the machine
+        has no command to home and the manner asks for it."""
+
+    def command(
+        self,
+        action: str,
+        machine: Machine[Any, Any],
+        values: Mapping[str, float],
+        manner: Manner,
+    ) -> Conversation:
+        """The conversation that makes the machine "home", "zero" or "jog"; `values` are those of
+        axes ("x", "y", "z", mm) and the "feed" (mm/min). MachineError where the controller has no
+        such command."""
+        raise MachineError(
+            f"{machine.target.name} has no command to {action} over its line",
+            mend="do it at the machine",
+        )
+
+    def explained(self, said: str) -> str:
+        """What a line of the controller means, "" where that is not known."""
+        return ""
+
+    def typed(self, line: str) -> bytes:
+        """The bytes for a line that the user types."""
+        return line.encode("latin-1", "replace") + b"\n"
+
+
+@dataclass(frozen=True)
+class NoWire:
+    """A machine to which camtool sends nothing: `why`, and what does instead, `mend`."""
+
+    why: str = "no protocol of its controller is known"
+    mend: str = "send the program as the machine's own programs do"

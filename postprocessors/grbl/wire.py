@@ -1,0 +1,609 @@
+"""How programs are sent to grbl 1.1: lines, as many as its buffer takes, and their answers.
+
+grbl answers each line with `ok` or `error:N`, in order. Its serial buffer holds 128 bytes and
+drops what is beyond them without a word; so no more than 127 bytes may be in it. Counting answers
+alone would trust every single one of them: an `ok` that the line doubles would let the buffer
+overflow, and a block would be lost. So a query of its parser state, `$G`, goes along every few
+lines: its answer, `[GC:…]` and an `ok`, stands in the order of the lines, and shows whether
+exactly the answers have come that are due. What has been written since the last such answer never
+exceeds the buffer, whatever happens to the answers.
+
+`ok` means planned, not done: done for certain is what lies before all that its planner can hold,
+and everything once it is idle (grbl 1.1 wiki, "Grbl v1.1 Interface"; serial.c, planner.h,
+stepper.c, protocol.c).
+"""
+
+from __future__ import annotations
+
+import re
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Final
+
+from camtool.errors import MachineError
+from camtool.target.wire import (
+    HALTS,
+    Conversation,
+    Forecast,
+    Manner,
+    Packet,
+    State,
+    Wire,
+)
+
+from .dialect import GrblController, GrblMachine
+from .settings import BAUD, differences
+
+BUFFER_BYTES: Final = 127
+"""128 bytes (RX_BUFFER_SIZE, serial.h), of which the ring leaves one empty."""
+
+SEGMENTS: Final = 6
+"""Pieces of blocks that wait behind the planner (SEGMENT_BUFFER_SIZE, stepper.h)."""
+
+POLLS: Final = 5
+"""A status report is asked for whenever so many times the lateness of the line (0.25 s) is over:
+the wiki advises 5 Hz at most."""
+
+PROBE: Final = b"$G\n"
+PROBE_EVERY: Final = 36
+"""After so many bytes of lines: two queries are under way in a full buffer, which never dries."""
+
+HOLD, RESUME, STATUS, RESET = b"!", b"~", b"?", b"\x18"
+
+MOST_LINE: Final = 1000
+"""No answer is longer."""
+
+_COMMENT = re.compile(r"\(([^()]*)\)|;(.*)")
+_BLANK = re.compile(r"[ \t]")
+_NUMBER = re.compile(r"N\d+(?:\.\d*)?", re.IGNORECASE)
+_PAUSES = re.compile(r"M0*[01](?![\d.])", re.IGNORECASE)
+
+_STATUS = re.compile(
+    r"<(Idle|Run|Hold:[01]|Jog|Alarm|Door:[0-3]|Check|Home|Sleep)((?:\|[A-Za-z]+:[^|<>]*)*)>"
+)
+_PLACE = re.compile(r"-?\d+\.\d+(?:,-?\d+\.\d+){2,}")
+_SETTING = re.compile(r"\$\d{1,3}=[^\s=]+")
+_PUSHED = re.compile(r"\[[A-Za-z0-9]{1,6}:.*\]")
+
+ERRORS: Final = {
+    1: "a letter was expected",
+    2: "a number is missing or wrong",
+    3: "no such $ command",
+    4: "a value must not be negative",
+    5: "homing is not enabled ($22)",
+    6: "the pulse is shorter than 3 µs",
+    7: "its memory of settings could not be read: the defaults hold",
+    8: "it must be idle for this",
+    9: "it is locked: home it ($H) or unlock it ($X)",
+    10: "soft limits need homing",
+    11: "the line is too long",
+    12: "the step rate is above what it can do",
+    13: "the safety door is open",
+    14: "the line is longer than its memory",
+    15: "the jog would leave the travel",
+    16: "the jog is not written as jogs are",
+    17: "laser mode needs a spindle with PWM",
+    20: "a word that it does not know",
+    21: "two words of one group",
+    22: "no feed is set",
+    23: "a whole number was expected",
+    24: "two words that both need axes",
+    25: "a word twice",
+    26: "an axis is missing",
+    27: "the line number is out of range",
+    28: "a value is missing",
+    29: "G59.x does not exist",
+    30: "G53 needs G0 or G1",
+    31: "axes that no word needs",
+    32: "an arc without an axis in its plane",
+    33: "the end of the arc is off its circle",
+    34: "the radius of the arc is none",
+    35: "an arc without an offset in its plane",
+    36: "words that nothing needs",
+    37: "the tool length offset is on another axis",
+    38: "the tool number is too large",
+}
+ALARMS: Final = {
+    1: "a limit switch was hit; its position is lost",
+    2: "the target is outside of the travel; its position is kept",
+    3: "it was reset while it moved; its position is lost",
+    4: "the probe is not in its first state",
+    5: "the probe did not touch",
+    6: "homing: it was reset",
+    7: "homing: the door was opened",
+    8: "homing: the switch did not open",
+    9: "homing: no switch was found",
+}
+STATES: Final = {
+    "Idle": "it stands, and nothing waits",
+    "Run": "it moves",
+    "Hold:0": "it is held, and stands; ~ goes on",
+    "Hold:1": "it is being held, and still moves",
+    "Jog": "it jogs",
+    "Alarm": "it is locked: home it ($H) or unlock it ($X)",
+    "Door:0": "the door is closed; ~ goes on",
+    "Door:1": "the door is open, and it stands",
+    "Door:2": "the door is open, and it retracts",
+    "Door:3": "the door is closed, and it goes back",
+    "Check": "it checks programs and does not move",
+    "Home": "it homes",
+    "Sleep": "it sleeps; a reset wakes it",
+}
+
+
+class GrblWire(Wire):
+    """grbl 1.1 over a serial port."""
+
+    baud = BAUD
+    ready = (
+        "opening the port may reset the controller: where it is then, is zero to it until it is "
+        "homed or zeroed",
+    )
+    stopping = "it is held, then reset: the slides come to rest, then the spindle stops"
+
+    def packets(self, data: bytes, machine: GrblMachine, forecast: Forecast) -> Sequence[Packet]:
+        """A packet is a line with words, without blanks and comments."""
+        packets = list(_packets(data, forecast))
+        for packet in packets:
+            if len(packet.data) > BUFFER_BYTES - len(PROBE):
+                raise MachineError(
+                    f"its line has {len(packet.data)} characters, more than the buffer holds",
+                    where=f"block {packet.block + 1}",
+                )
+        return packets
+
+    def conversation(
+        self, packets: Sequence[Packet], machine: GrblMachine, manner: Manner
+    ) -> GrblConversation:
+        """The conversation that sends these lines."""
+        return GrblConversation(packets, machine, manner)
+
+    def command(
+        self,
+        action: str,
+        machine: GrblMachine,
+        values: Mapping[str, float],
+        manner: Manner,
+    ) -> GrblConversation:
+        """`$H`; the place as zero of G54; `$J=`."""
+        if action == "home":
+            return GrblConversation((), machine, manner, (b"$H",))
+        axes = "".join(f"{axis.upper()}{values[axis]:.3f}" for axis in "xyz" if axis in values)
+        if action == "zero":
+            return GrblConversation((), machine, manner, (f"G10L20P1{axes}".encode(),))
+        line = f"$J=G91G21{axes}F{values['feed']:.1f}"
+        return GrblConversation((), machine, manner, (line.encode(),))
+
+    def explained(self, said: str) -> str:
+        """The meaning of an error, an alarm, or a state."""
+        said = said.strip()
+        for begin, meanings in (("error:", ERRORS), ("ALARM:", ALARMS)):
+            number = said.removeprefix(begin)
+            if said.startswith(begin) and number.isdigit():
+                return meanings.get(int(number), "")
+        status = _STATUS.fullmatch(said)
+        return STATES.get(status[1], "") if status else ""
+
+    def typed(self, line: str) -> bytes:
+        """A line, or one of the single signs that grbl obeys at once."""
+        if line in ("?", "!", "~"):
+            return line.encode()
+        if line.lower() in ("^x", "reset"):
+            return RESET
+        return line.encode("ascii", "replace") + b"\n"
+
+
+def _packets(data: bytes, forecast: Forecast) -> Iterator[Packet]:
+    """The lines that are blocks, as their reader counts them; a line that stops the program has
+    the comments since the last block as its note."""
+    block, notes = 0, list[str]()
+    for line in re.split(r"\r\n|\n|\r", data.decode("latin-1")):
+        notes += [(one or other).strip() for one, other in _COMMENT.findall(line)]
+        words = _BLANK.sub("", _COMMENT.sub("", line)).replace("%", "")
+        if not _NUMBER.sub("", words, count=1):
+            continue
+        note = "; ".join(notes) if _PAUSES.search(words) else ""
+        notes = []
+        yield Packet(
+            words.encode("latin-1") + b"\n", block, float(forecast.seconds[block]), note=note
+        )
+        block += 1
+
+
+class _Line:
+    """A line that is out: a packet, a query, or a command; whether its answer has come."""
+
+    def __init__(self, data: bytes, packet: int | None = None) -> None:
+        self.data = data
+        self.packet = packet
+        """How many packets are sent with it; None for what is none."""
+        self.seen = False
+        """Of a query: whether its report has come, and only its `ok` is missing."""
+
+    @property
+    def is_probe(self) -> bool:
+        return self.data == PROBE
+
+
+class GrblConversation(Conversation):
+    """The conversation with a grbl: greeting, settings, homing, `commands`, then the packets."""
+
+    def __init__(
+        self,
+        packets: Sequence[Packet],
+        machine: GrblMachine,
+        manner: Manner,
+        commands: Sequence[bytes] = (),
+    ) -> None:
+        super().__init__(packets, manner)
+        self._machine = machine
+        controller = machine.controller
+        blocks = controller.buffer_blocks if isinstance(controller, GrblController) else 16
+        self._depth = blocks - 1 + SEGMENTS
+        homing = (b"$H",) if manner.home else ()
+        asked = (b"$$",) if manner.checked and packets else ()
+        self._commands = deque(each + b"\n" for each in (*asked, *homing, *commands))
+        self._listing: list[str] = []
+        self._rest = b""
+        self._out_lines: deque[_Line] = deque()  # written, not answered
+        self._unconfirmed = 0  # bytes of lines since the last query that was answered
+        self._since_probe = 0  # bytes of lines behind the last query
+        self._confirmed = 0  # packets before the last query that was answered
+        self._probed = 0  # packets before the last query that was sent
+        self._phase = "greeting"
+        self._offset = (0.0, 0.0, 0.0)
+        self._idle = 0  # idle reports in a row
+        self._polled = self._answered = 0.0
+        self._waits_since = 0.0  # when the answer that is due began to be due
+        self._waiting = False  # a report is asked for that has not come
+        self._resets = 0  # banners that are due
+        self._failing = ""
+        self._halted = 0.0
+        self._reset_sent = False
+
+    # What the user wants.
+
+    def begin(self, now: float) -> None:
+        """Ask how it stands; a controller that begins anew with the port says so by itself."""
+        self._answered = now
+        self._poll(now)
+
+    def pause(self, now: float) -> None:
+        """Feed hold."""
+        if self.state is State.SENDING:
+            self.state, self._halted = State.PAUSING, now
+            self._idle = 0
+            self._write(HOLD)
+
+    def resume(self, now: float) -> None:
+        """Go on where it was held; behind a single block, the next one."""
+        if self.state in HALTS or self.state is State.PAUSING:
+            held = self.why != SINGLE
+            self.state, self.why, self._idle = State.SENDING, "", 0
+            if held:
+                self._write(RESUME)
+            self._go_on(now, anew=True)
+
+    def stop(self, now: float) -> None:
+        """Feed hold, and a reset when it stands."""
+        if self.ended or self.state is State.STOPPING:
+            return
+        if not self.sent and not self._out_lines:
+            self._end(State.STOPPED)
+            return
+        self.state, self._halted, self._idle = State.STOPPING, now, 0
+        self._write(HOLD)
+        self._poll(now)
+
+    def _fail(self, why: str, now: float) -> None:
+        """Stop, and say why."""
+        if self.ended or self._failing:
+            return
+        self._failing = why
+        if self.state is not State.STOPPING:
+            self.stop(now)
+        if self.state is State.STOPPED:
+            self._end(State.FAILED, why)
+
+    # The clock.
+
+    def elapsed(self, now: float) -> None:
+        """Ask for reports, and notice what does not come."""
+        if self.ended:
+            return
+        patience = self.manner.patience_s
+        if self._phase == "greeting" and now - self._answered >= patience:
+            self._end(State.FAILED, "nothing answers: is it a grbl, and is it switched on?")
+            return
+        if self.state is State.STOPPING and now - self._halted >= patience:
+            if self._reset_sent:
+                why = self._failing or "it was to stop"
+                self._end(State.FAILED, f"{why}; it did not confirm the stop: switch it off")
+                return
+            self._reset(now)
+        homing = any(line.data == b"$H\n" for line in self._out_lines)
+        if self._phase != "greeting" and not homing and now - self._answered >= patience:
+            self._answered = now
+            self._fail("it does not answer any more", now)
+        if now - self._polled >= POLLS * self.manner.late_s:
+            if self.state is State.PAUSING and now - self._halted >= patience / 2.0:
+                self._write(HOLD)
+                self._halted = now
+            self._poll(now)
+        self._wake(now)
+
+    def _poll(self, now: float) -> None:
+        if not any(line.data == b"$H\n" for line in self._out_lines):
+            self._write(STATUS)
+        self._polled = now
+        self._wake(now)
+
+    def _wake(self, now: float) -> None:
+        if not self.ended:
+            self.next_s = self._polled + POLLS * self.manner.late_s
+
+    # What it says.
+
+    def received(self, data: bytes, now: float) -> None:
+        """Line by line."""
+        if self.ended:
+            return
+        *lines, self._rest = (self._rest + data).split(b"\n")
+        for line in lines:
+            if not self.ended:
+                self._line(line.decode("latin-1").strip("\r"), now)
+        if len(self._rest) > MOST_LINE:
+            self._rest = b""
+            self._fail("what it says is no line of grbl", now)
+
+    def _line(self, line: str, now: float) -> None:
+        if not line:
+            return
+        if self._phase == "greeting" and not _understood(line):
+            return  # what a port says that has just been opened
+        self._answered = now
+        status = _STATUS.fullmatch(line)
+        if status:
+            self._status(status[1], status[2], now)
+        elif line.startswith("Grbl "):
+            self._banner(now)
+        elif line == "ok" or re.fullmatch(r"error:\d+", line):
+            self._answer(line, now)
+        elif re.fullmatch(r"ALARM:\d+", line):
+            meaning = ALARMS.get(int(line[6:]), "it says no more")
+            self._reset_sent = True
+            self._failing = self._failing or f"{line}: {meaning}"
+            self._end(State.FAILED, self._failing)
+        elif line.startswith("[GC:") and line.endswith("]"):
+            self._reported(now)
+        elif _SETTING.fullmatch(line) and self._phase == "settings":
+            self._listing.append(line)
+        elif _PUSHED.fullmatch(line):
+            if line.startswith("[MSG:") and self.sent:
+                self._tell(f"it says: {line[5:-1]}")
+        elif self.state is not State.STOPPING:
+            self._fail(f"an answer that it cannot have meant: {line[:40]!r}", now)
+
+    def _status(self, state: str, fields: str, now: float) -> None:
+        self._where(fields, now)
+        self._idle = self._idle + 1 if state == "Idle" else 0
+        still = state == "Hold:0" or self._idle >= 2 or state.startswith("Door:1")
+        if self._phase == "greeting":
+            self._greeted(state, now)
+        elif self.state is State.STOPPING:
+            if still and not self._reset_sent:
+                self._reset(now)
+        elif state == "Alarm":
+            self._end(State.FAILED, "it is locked: home it, or unlock it in camtool console ($X)")
+        elif self.state is State.PAUSING and still:
+            self.state = State.PAUSED
+        elif state.startswith("Door") and self.state is State.SENDING:
+            self.state, self.why = State.WAITING, "its door is open: close it and go on"
+        elif state == "Hold:0" and self.state is State.SENDING and self._stops():
+            self.state, self.why = State.WAITING, self._stop_note()
+        elif self._idle >= 2 and self.state is State.SENDING:
+            self._at_rest(now)
+
+    def _where(self, fields: str, now: float) -> None:
+        """The place in the work frame, of the fields of a report."""
+        said = dict(field.split(":", 1) for field in fields.split("|") if field)
+        for name in ("WCO", "MPos", "WPos"):
+            text = said.get(name)
+            if text is None:
+                continue
+            if not _PLACE.fullmatch(text):
+                self._fail(f"a report with a place that is none: {text[:40]!r}", now)
+                return
+            x, y, z = (float(each) for each in text.split(",")[:3])
+            if name == "WCO":
+                self._offset = (x, y, z)
+            elif name == "WPos":
+                self.place_mm = (x, y, z)
+            else:
+                a, b, c = self._offset
+                self.place_mm = (x - a, y - b, z - c)
+
+    def _greeted(self, state: str, now: float) -> None:
+        """Its first report: only a controller at rest is begun with, and anew, so that nothing of
+        an earlier sender is left in its buffer."""
+        if state == "Idle":
+            if self._resets == 0:
+                self._resets = 1
+                self._write(RESET)
+        elif state == "Alarm" and (b"$H\n" in self._commands):
+            self._ready(now)
+        elif state == "Alarm":
+            self._end(
+                State.FAILED,
+                "it is locked, since it has not been homed: give --home, or unlock it in "
+                "camtool console ($X)",
+            )
+        elif state in ("Run", "Home", "Jog"):
+            if self.why != "moves":
+                self.why = "moves"
+                self._tell("it still moves: waiting until it stands")
+        else:
+            meaning = STATES.get(state, "")
+            self._end(State.FAILED, f"it is not ready: {state}, {meaning}")
+
+    def _banner(self, now: float) -> None:
+        if self._phase == "greeting":
+            if self._resets:
+                self._ready(now)
+            return  # it has begun by itself: the next report says how it stands
+        if self.state is State.STOPPING and self._reset_sent:
+            if self._failing:
+                self._end(State.FAILED, self._failing)
+            else:
+                self._end(State.STOPPED)
+        else:
+            self._reset_sent = True
+            self._end(State.FAILED, "the controller was reset while it worked")
+
+    def _ready(self, now: float) -> None:
+        self._phase, self.why, self._idle = "commands", "", 0
+        self.state = State.SENDING
+        self._go_on(now)
+
+    def _reported(self, now: float) -> None:
+        """The report of a query: all lines before it must have been answered, and it not."""
+        head = self._out_lines[0] if self._out_lines else None
+        if self.state is State.STOPPING:
+            return
+        if head is None or not head.is_probe:
+            self._fail("an answer is missing: a line of the program may be lost", now)
+        elif head.seen:
+            self._fail("an answer has come twice", now)
+        else:
+            head.seen = True
+
+    def _answer(self, line: str, now: float) -> None:
+        if self.state is State.STOPPING:
+            return
+        if not self._out_lines:
+            self._fail("an answer more than lines were sent", now)
+            return
+        head = self._out_lines[0]
+        if line != "ok":
+            meaning = ERRORS.get(int(line[6:]), "it says no more")
+            said = head.data.decode("latin-1").strip()
+            self._fail(f"{line} to {said}: {meaning}", now)
+            return
+        if head.is_probe and not head.seen:
+            self._fail("an answer more than lines were sent", now)
+            return
+        self._out_lines.popleft()
+        self._idle = 0
+        if head.is_probe:
+            self._confirm()
+        elif head.packet is not None:
+            self.acknowledged = head.packet
+        elif head.data == b"$$\n":
+            self._phase = "commands"
+            self._compare(now)
+        self._go_on(now)
+
+    def _confirm(self) -> None:
+        """A query was answered: everything before it has been taken."""
+        self._confirmed = self.acknowledged
+        self._unconfirmed = sum(len(line.data) for line in self._out_lines)
+        self.done = max(self.done, self._confirmed - self._depth)
+
+    def _compare(self, now: float) -> None:
+        try:
+            errors, remarks = differences("\n".join(self._listing), self._machine)
+        except MachineError as error:
+            self._fail(str(error), now)
+            return
+        for remark in remarks:
+            self._tell(remark)
+        if errors:
+            self._fail("; ".join(errors), now)
+
+    # Sending.
+
+    def _go_on(self, now: float, *, anew: bool = False) -> None:
+        """Write what may be written now."""
+        if self.state is not State.SENDING or self._phase in ("greeting", "settings"):
+            return
+        if self._commands:
+            if not self._out_lines:
+                line = self._commands.popleft()
+                if line == b"$$\n":
+                    self._phase = "settings"
+                self._put(_Line(line))
+            return
+        if any(line.packet is None and not line.is_probe for line in self._out_lines):
+            return
+        if self.single:
+            if anew or not self.sent:
+                self._next_packet()
+                self._probe()
+            return
+        while self.sent < len(self.packets):
+            size = len(self.packets[self.sent].data) + len(PROBE)
+            if self._unconfirmed + size > BUFFER_BYTES:
+                break
+            self._next_packet()
+            if self._since_probe >= PROBE_EVERY:
+                self._probe()
+        # Behind the last line that fits there is a query, or nothing would ever make room.
+        if self._since_probe:
+            self._probe()
+
+    def _next_packet(self) -> None:
+        if self.sent < len(self.packets):
+            packet = self.packets[self.sent]
+            self.sent += 1
+            self._since_probe += len(packet.data)
+            self._put(_Line(packet.data, self.sent))
+
+    def _probe(self) -> None:
+        self._since_probe = 0
+        self._put(_Line(PROBE))
+
+    def _put(self, line: _Line) -> None:
+        self._out_lines.append(line)
+        self._unconfirmed += len(line.data)
+        self._idle = 0
+        self._write(line.data)
+
+    def _at_rest(self, now: float) -> None:
+        """Two reports in a row say that it stands, and nothing has been answered between them."""
+        if self._phase == "settings":
+            return
+        if self._out_lines:
+            if self._out_lines[0].packet is not None or self._out_lines[0].is_probe:
+                self._fail("an answer is missing: a line of the program may be lost", now)
+            return
+        if self._commands:
+            return
+        self.done = self._confirmed
+        if self.done == len(self.packets):
+            self._end(State.FINISHED)
+        elif self.single and self.sent == self.done:
+            self.state, self.why = State.PAUSED, SINGLE
+
+    def _reset(self, now: float) -> None:
+        self._reset_sent, self._halted = True, now
+        self._rest = b""
+        self._write(RESET)
+
+    def _stops(self) -> bool:
+        """Whether a block that stops the program is among those under way."""
+        texts = (packet.data.decode("latin-1") for packet in self._under_way())
+        return any(_PAUSES.search(text) for text in texts)
+
+    def _under_way(self) -> Sequence[Packet]:
+        return self.packets[max(0, self.acknowledged - 1) : self.sent]
+
+    def _stop_note(self) -> str:
+        notes = [packet.note for packet in self._under_way() if packet.note]
+        return f"the program waits: {notes[0]}" if notes else "the program waits"
+
+
+SINGLE: Final = "single block"
+
+
+def _understood(line: str) -> bool:
+    return bool(_STATUS.fullmatch(line)) or line.startswith("Grbl ")
