@@ -57,6 +57,7 @@ COMMANDS = (
     "job",
     "post",
     "preview",
+    "send",
     "stale",
     "targets",
     "tools",
@@ -96,6 +97,7 @@ def cli() -> None:
     camtool batch   drawings/ -t pic-mmh -o build/   many, those that have changed
     camtool convert logo.pic --from pic-mmh --to grbl
     camtool preview logo.dxf -o logo.svg        picture of a drawing or program
+    camtool send    logo.pic -t pic-mmh --port /dev/ttyUSB0
     camtool filter  logo.dxf                    LinuxCNC opens the drawing
     camtool stale   drawings/ -t pic-mmh        programs that are out of date
     camtool job new logo.dxf                    a job file to fill in, from its layers

@@ -355,7 +355,7 @@ def _given(record: msgspec.Struct) -> dict[str, Any]:
             continue
         if not isinstance(value, msgspec.Struct):
             given[field.encode_name] = value
-        elif inner := _given(value):
+        elif (inner := _given(value)) or not isinstance(field.default, msgspec.Struct):
             given[field.encode_name] = inner
     return given
 

@@ -222,7 +222,7 @@ def _entry(decoded: Toolpath, low: int, target: LoadedTarget) -> Toolpath:
 
 
 def _plunge_feed(decoded: Toolpath, low: int, target: LoadedTarget) -> float:
-    """mm/min: the feed of the last plunge before the row, else of the first, else the machine's."""
+    """mm/min: the feed of the last plunge before the row, else the first, else the machine's."""
     machine = target.machine
     drops = (decoded.kind == Kind.LINE) & (decoded.end[:, 2] < decoded.starts[:, 2])
     plunges = np.flatnonzero(drops)

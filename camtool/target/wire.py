@@ -10,7 +10,7 @@ a port.
     while not conversation.ended:
         for action in conversation.actions():  ...   # write, reopen, tell
         ...                                          # wait for bytes, or until .next_s
-        conversation.received(data, now)             # or .elapsed(now), .pause(now), .stop(now) ...
+        conversation.received(data, now)             # or .elapsed(now), .stop(now) ...
 
 Three counts of packets say where it stands: those that were `sent`, those that the controller has
 `acknowledged` (or that are taken for acknowledged, where it says nothing), and those that are

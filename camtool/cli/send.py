@@ -1,0 +1,307 @@
+"""`camtool send`: a program to its machine, by the machine's own protocol."""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from camtool.cli.files import read_bytes, shown
+from camtool.cli.life_signs import progress
+from camtool.cli.messages import say, say_findings, show_facts, show_text
+from camtool.cli.options import MachineFlags, machine_options, talk_options
+from camtool.errors import InputError, OptionError
+from camtool.plain import one_line
+
+if TYPE_CHECKING:
+    from camtool.sending.drive import Wish
+    from camtool.sending.line import Port
+    from camtool.sending.prepare import Consignment
+    from camtool.target.registry import LoadedTarget
+    from camtool.target.wire import Conversation
+
+NAME_WIDTH = 11
+"""Columns before the words of a dry run."""
+
+
+@click.command(short_help="Send a program to its machine.")
+@click.argument("program", metavar="PROGRAM")
+@machine_options
+@click.option("--port", metavar="PORT", help="Such as /dev/ttyUSB0, COM3, socket://host:5007.")
+@click.option("--baud", type=click.IntRange(min=1), help="Rate of the port, where not its own.")
+@click.option("--yes", is_flag=True, help="Begin without asking.")
+@click.option("--from", "first", type=click.IntRange(min=1), metavar="BLOCK", help="Begin there.")
+@click.option("--resume", is_flag=True, help="Go on behind what the journal says is done.")
+@click.option("--single", is_flag=True, help="Wait after every block.")
+@click.option("--home", is_flag=True, help="Home the machine first.")
+@click.option("--journal", metavar="FILE", help="Where it says how far it is  [PROGRAM.journal]")
+@click.option("--json", "as_json", is_flag=True, help="Progress on stdout, as JSON lines.")
+@click.option(
+    "--speed",
+    type=click.FloatRange(min=0.001, max=1e6),
+    default=1.0,
+    help="For a virtual machine whose clock runs so many times as fast.",
+)
+@talk_options
+def send(
+    program: str,
+    machine: MachineFlags,
+    port: str | None,
+    baud: int | None,
+    yes: bool,
+    first: int | None,
+    resume: bool,
+    single: bool,
+    home: bool,
+    journal: str | None,
+    as_json: bool,
+    speed: float,
+    quiet: bool,
+    verbose: bool,
+) -> int:
+    """Send PROGRAM to its machine, and watch over it.
+
+    First the program is verified, and what will be done is said; nothing goes out before --yes or
+    an answer. Without --port that is all. Ctrl-C stops the machine as its protocol can; a second
+    one closes the port at once. On a terminal: p pauses, r goes on, s does a single block, q
+    stops. Exit code 1 when the program was not finished.
+    """
+    from camtool.sending.prepare import consignment, lines_of
+
+    if first is not None and resume:
+        raise click.UsageError("--from and --resume are two beginnings; give one of them")
+    target, data = machine.load(), read_bytes(program)
+    place = Path(journal or f"{program}.journal")
+    begin = _resumed(place, data, target) if resume else (first or 1) - 1
+    one = consignment(data, target, source=shown(program), first=begin, progress=progress())
+    say_findings(one.run.findings, quiet=quiet, verbose=verbose)
+    if one.run.failed:
+        say(
+            f"camtool: error: {one.run.source}: the errors above would spoil the part", quiet=False
+        )
+        return 1
+    if not quiet:
+        rows = lines_of(one, target)
+        facts = "\n".join(f"{name:<{NAME_WIDTH}}{one_line(words)}" for name, words in rows)
+        show_facts(facts, NAME_WIDTH, {}, err=as_json)
+    if port is None:
+        return 0
+    line = _port(port, baud, one, target, speed)
+    if not yes and not _agreed():
+        return 1
+    job = _Job(one, target, line, place, resume, as_json, quiet)
+    return job.run(single=single, home=home, speed=speed, yes=yes)
+
+
+def _resumed(place: Path, data: bytes, target: LoadedTarget) -> int:
+    """The block (from 0) on which a journal goes on; InputError for one of another program."""
+    from camtool.sending.journal import read_journal
+    from camtool.sending.prepare import digest
+
+    found = read_journal(place)
+    if found.sha256 != digest(data):
+        raise InputError("is the journal of another program", file=str(place))
+    if found.machine != target.machine.digest:
+        raise InputError(
+            "the machine file has changed since", file=str(place), mend="begin with --from"
+        )
+    if found.finished:
+        raise OptionError("the program was finished", where="--resume", mend="leave it out")
+    return found.block
+
+
+def _port(
+    name: str, baud: int | None, one: Consignment, target: LoadedTarget, speed: float
+) -> Port:
+    from camtool.sending.line import Port
+
+    link, wire = target.machine.link, one.wire
+    rate = baud or wire.baud or (round(link.baud) if link.baud else None)
+    port = Port(name, rate, wire.frame)
+    if rate is None and not port.is_virtual:
+        raise OptionError("the rate of the port is not known", where="--baud", mend="give it")
+    if speed != 1.0 and not port.is_virtual:
+        raise OptionError("a real machine has only its own speed", where="--speed")
+    return port
+
+
+def _agreed() -> bool:
+    """Whether the user, at a terminal, says yes."""
+    if not sys.stdin.isatty():
+        raise click.UsageError("nobody can be asked here: give --yes")
+    if click.confirm("Begin?", err=True, default=False):
+        return True
+    say("camtool: nothing was sent", quiet=False)
+    return False
+
+
+@dataclass
+class _Job:
+    """One program under way: what the user wants, and what is shown."""
+
+    one: Consignment
+    target: LoadedTarget
+    port: Port
+    place: Path
+    more: bool
+    as_json: bool
+    quiet: bool
+    _signals: int = field(default=0, init=False)
+    _obeyed: int = field(default=0, init=False)
+    _shown: dict[str, Any] = field(default_factory=dict, init=False)
+    _left: list[float] = field(default_factory=list, init=False)
+
+    def run(self, *, single: bool, home: bool, speed: float, yes: bool) -> int:
+        """Send it; the exit code."""
+        from camtool.sending.drive import Driver, counts_of
+        from camtool.sending.journal import Journal
+        from camtool.sending.line import opened_line
+        from camtool.target.wire import LATE_S, Manner, State
+
+        one = self.one
+        left = 0.0
+        for packet in reversed(one.packets):
+            self._left.append(left)
+            left += packet.seconds
+        self._left = [left, *reversed(self._left)]
+        progress().begin("sending", len(one.packets))
+        manner = Manner(single=single, home=home, late_s=LATE_S * speed)
+        conversation = one.wire.conversation(one.packets, self.target.machine, manner)
+        with opened_line(self.port) as line, self._caught(), _keys() as key:
+            journal = Journal(self.place, self._head(), more=self.more)
+            wishes = _Wishes(key, conversation, self._signal)
+            driver = Driver(line, journal, one.block_of, wishes, self._watch, self._tell, speed)
+            try:
+                driver.carry(conversation)
+            finally:
+                counts = counts_of(conversation, one.block_of)
+                with suppress(OSError):
+                    journal.close(conversation.state.value, conversation.why, **counts)
+        if conversation.state is State.FINISHED and driver.trouble is None:
+            say(f"camtool: finished: {len(one.packets)} packets", quiet=self.quiet)
+            return 0
+        block = one.block_of(conversation.block) if conversation.block >= 0 else -1
+        done = f"block {block + 1} is the last that is done" if block >= 0 else "no block is done"
+        why = str(driver.trouble or conversation.why or conversation.state.value)
+        say(f"camtool: error: {one.run.source}: {why}; {done}; --resume goes on", quiet=False)
+        return 1
+
+    def _head(self) -> dict[str, Any]:
+        one = self.one
+        return {
+            "program": one.run.source,
+            "sha256": one.sha256,
+            "target": self.target.machine.target.name,
+            "machine": self.target.machine.digest,
+            "port": self.port.name,
+            "first": one.first,
+            "packets": len(one.packets),
+        }
+
+    def _tell(self, text: str) -> None:
+        say(f"camtool: {one_line(text)}", quiet=self.quiet)
+
+    def _watch(self, conversation: Conversation) -> None:
+        """Show where it stands, when that has changed."""
+        from camtool.sending.prepare import clock
+
+        block = (
+            self.one.block_of(self.one.packets[conversation.acknowledged - 1].block)
+            if (conversation.acknowledged)
+            else -1
+        )
+        left = self._left[conversation.acknowledged]
+        now = {
+            "state": conversation.state.value,
+            "packet": conversation.acknowledged,
+            "packets": len(self.one.packets),
+            "block": block + 1,
+            "place_mm": conversation.place_mm,
+            "left_s": round(left, 1),
+            "why": conversation.why,
+        }
+        if now == self._shown:
+            return
+        before, self._shown = self._shown, now
+        if self.as_json:
+            show_text(json.dumps(now))
+        place = conversation.place_mm
+        where = "" if place is None else " X{:.3f} Y{:.3f} Z{:.3f}".format(*place)
+        signs = progress()
+        signs.stage = f"{conversation.state.value}, block {block + 1}{where}, {clock(left)} left"
+        signs.done = conversation.acknowledged
+        if conversation.state.value == "waiting" and before.get("state") != "waiting":
+            self._tell(f"waiting: {conversation.why} (r goes on)")
+
+    def _signal(self) -> int:
+        """How many signals to end have come that were not obeyed yet."""
+        if self._obeyed == self._signals:
+            return 0
+        self._obeyed += 1
+        return self._obeyed
+
+    @contextmanager
+    def _caught(self) -> Iterator[None]:
+        """Within the block, signals to end are wishes to stop."""
+
+        def count(number: int, frame: FrameType | None) -> None:
+            self._signals += 1
+
+        names = [getattr(signal, name, None) for name in ("SIGINT", "SIGTERM", "SIGHUP")]
+        olds = {each: signal.signal(each, count) for each in names if each is not None}
+        try:
+            yield
+        finally:
+            for each, old in olds.items():
+                signal.signal(each, old)
+
+
+@dataclass
+class _Wishes:
+    """What the user wants next: a key, or a signal."""
+
+    key: Callable[[], str]
+    conversation: Conversation
+    signals: Callable[[], int]
+
+    def __call__(self) -> Wish | None:
+        from camtool.sending.drive import Wish
+
+        count = self.signals()
+        if count:
+            return Wish.STOP if count == 1 else Wish.CLOSE
+        keys = {"p": Wish.PAUSE, "r": Wish.RESUME, "\n": Wish.RESUME, "s": Wish.STEP}
+        return (keys | {"q": Wish.STOP, " ": Wish.PAUSE}).get(self.key())
+
+
+@contextmanager
+def _keys() -> Iterator[Callable[[], str]]:
+    """A function that gives the key that was pressed, "" without one; only on a terminal."""
+    if sys.platform == "win32" or not sys.stdin.isatty():
+        yield lambda: ""
+        return
+    import termios
+    import tty
+
+    handle = sys.stdin.fileno()
+    before = termios.tcgetattr(handle)
+
+    def key() -> str:
+        ready, _, _ = select.select([handle], [], [], 0)
+        return os.read(handle, 1).decode("latin-1") if ready else ""
+
+    try:
+        tty.setcbreak(handle)
+        yield key
+    finally:
+        termios.tcsetattr(handle, termios.TCSADRAIN, before)

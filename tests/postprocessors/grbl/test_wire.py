@@ -1,0 +1,200 @@
+"""grbl's wire, in memory: a small grbl that answers as its wiki says, and faults of the line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from camtool_postprocessors.grbl.wire import BUFFER_BYTES, GrblWire
+
+from camtool.sending.prepare import forecast_of
+from camtool.target.registry import load_target
+from camtool.target.wire import Conversation, Manner, Packet, State, Write
+
+PLAIN = Manner()
+TARGET = load_target("grbl")
+PROGRAM = b"(a part)\nG21 G90\nG0 Z5\nG0 X1 Y1 ; there\n" + b"".join(
+    b"G1 X%d.125 Y%d.375 F200\n" % (k % 9, k % 7) for k in range(60)
+)
+LISTING = {
+    **{100 + k: 250.0 for k in range(3)},
+    **{110 + k: 500.0 for k in range(3)},
+    **{120 + k: 10.0 for k in range(3)},
+    **{130 + k: 200.0 for k in range(3)},
+    11: 0.01,
+    12: 0.002,
+}
+
+
+class Small:
+    """A controller that takes a line every `line_s`, and has a buffer of 127 bytes."""
+
+    def __init__(self, line_s: float = 0.05, settings: dict[int, float] | None = None) -> None:
+        self.buffer, self.lines = b"", list[bytes]()
+        self.line_s, self.next, self.held, self.reset = line_s, 0.0, False, 0
+        self.settings = LISTING if settings is None else settings
+        self.after_stop = 0
+
+    def write(self, data: bytes, now: float) -> list[bytes]:
+        said = list[bytes]()
+        for octet in data:
+            one = bytes([octet])
+            if one == b"?":
+                moving = self.buffer and not self.held
+                state = "Hold:0" if self.held else "Run" if moving else "Idle"
+                said.append(f"<{state}|MPos:0.000,0.000,0.000|FS:0,0>".encode())
+            elif one == b"!":
+                self.held = True
+            elif one == b"~":
+                self.held = False
+            elif one == b"\x18":
+                self.buffer, self.held, self.reset = b"", False, self.reset + 1
+                said.append(b"Grbl 1.1h ['$' for help]")
+            elif len(self.buffer) < BUFFER_BYTES:
+                self.buffer += one
+        return said
+
+    def run(self, now: float) -> list[bytes]:
+        if self.held or now < self.next or b"\n" not in self.buffer:
+            return []
+        self.next = now + self.line_s
+        line, _, self.buffer = self.buffer.partition(b"\n")
+        if line == b"$G":
+            return [b"[GC:G0 G54 G17 G21 G90 G94 M5 M9 T0 F0 S0]", b"ok"]
+        if line == b"$$":
+            rows = [b"$%d=%.3f" % each for each in self.settings.items()]
+            return [*rows, b"ok"]
+        self.lines.append(line)
+        return [b"ok"]
+
+
+def packets() -> list[Packet]:
+    decoded = TARGET.target.read(PROGRAM, TARGET.machine)
+    return list(GrblWire().packets(PROGRAM, TARGET.machine, forecast_of(decoded, TARGET)))
+
+
+def held(
+    fault: Callable[[int, bytes], list[bytes]] = lambda number, line: [line],
+    wish: Callable[[Conversation, float], None] = lambda conversation, now: None,
+    small: Small | None = None,
+    manner: Manner = PLAIN,
+) -> tuple[Conversation, Small]:
+    """A conversation to its end; `fault` makes of a line of the controller what arrives."""
+    small = small or Small()
+    talk = GrblWire().conversation(packets(), TARGET.machine, manner)
+    number, now = 0, 0.0
+    talk.begin(now)
+    while not talk.ended or talk.has_actions:
+        said = list[bytes]()
+        for action in talk.actions():
+            if isinstance(action, Write):
+                said += small.write(action.data, now)
+        now += 0.01
+        said += small.run(now)
+        for line in said:
+            for come in fault(number, line):
+                talk.received(come + b"\r\n", now)
+            number += 1
+        wish(talk, now)
+        if now >= talk.next_s:
+            talk.elapsed(now)
+        assert now < 120.0, (talk.state, talk.why)
+    return talk, small
+
+
+def test_packets_are_the_blocks_without_comments_and_blanks() -> None:
+    made = packets()
+    assert [each.data for each in made[:3]] == [b"G21G90\n", b"G0Z5\n", b"G0X1Y1\n"]
+    assert [each.block for each in made] == list(range(63))
+    assert made[5].seconds > 0.0
+
+
+def test_every_line_arrives_once_and_in_order() -> None:
+    talk, small = held()
+    assert talk.state is State.FINISHED
+    assert small.lines == [each.data.strip() for each in packets()]
+    assert talk.done == len(packets())
+
+
+def test_settings_that_differ_are_an_error_that_names_them() -> None:
+    talk, small = held(small=Small(settings={**LISTING, 101: 80.0}))
+    assert talk.state is State.FAILED
+    assert "$101 is 80.000" in talk.why
+    assert small.lines == []
+
+
+@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("kind", ["drop", "double", "garble"])
+def test_no_fault_of_an_answer_loses_or_doubles_a_block(kind: str, seed: int) -> None:
+    at = int(np.random.default_rng(seed).integers(18, 140))
+    made = {"drop": [], "double": [b"", b""], "garble": [b""]}
+
+    def fault(number: int, line: bytes) -> list[bytes]:
+        if number != at:
+            return [line]
+        return [line if kind == "double" else b"\x01" + line[1:] for _ in made[kind]]
+
+    talk, small = held(fault)
+    assert talk.state in (State.FINISHED, State.FAILED)
+    wanted = [each.data.strip() for each in packets()]
+    assert small.lines == wanted[: len(small.lines)]
+    assert talk.done <= len(small.lines)
+    if talk.state is State.FAILED:
+        assert small.reset == 2  # at the beginning, and to stop it
+
+
+def test_many_doubled_answers_never_overflow_its_buffer() -> None:
+    talk, small = held(lambda number, line: [line, line] if line == b"ok" else [line])
+    assert talk.state is State.FAILED
+    wanted = [each.data.strip() for each in packets()]
+    assert small.lines == wanted[: len(small.lines)]
+
+
+def test_a_stop_holds_resets_and_says_where_it_stands() -> None:
+    def wish(talk: Conversation, now: float) -> None:
+        if talk.acknowledged >= 30:
+            talk.stop(now)
+
+    talk, small = held(wish=wish)
+    assert talk.state is State.STOPPED
+    assert small.buffer == b""
+    assert 30 <= len(small.lines) < 60
+    assert talk.done <= len(small.lines)
+
+
+def test_a_pause_is_one_only_when_it_stands_and_goes_on() -> None:
+    seen = list[State]()
+
+    def wish(talk: Conversation, now: float) -> None:
+        seen.append(talk.state)
+        if talk.acknowledged == 20 and State.PAUSED not in seen:
+            talk.pause(now)
+        elif talk.state is State.PAUSED:
+            talk.resume(now)
+
+    talk, small = held(wish=wish)
+    assert State.PAUSED in seen
+    assert talk.state is State.FINISHED
+    assert len(small.lines) == len(packets())
+
+
+def test_single_blocks_wait_each() -> None:
+    waits = 0
+
+    def wish(talk: Conversation, now: float) -> None:
+        nonlocal waits
+        if talk.state is State.PAUSED:
+            waits += 1
+            assert talk.sent == talk.done == waits
+            talk.resume(now)
+
+    talk, _ = held(wish=wish, manner=Manner(single=True))
+    assert talk.state is State.FINISHED
+    assert waits == len(packets()) - 1
+
+
+def test_silence_ends_within_bounds() -> None:
+    talk, _ = held(lambda number, line: [] if number > 40 else [line])
+    assert talk.state is State.FAILED
+    assert "not" in talk.why

@@ -1,0 +1,184 @@
+"""`camtool send` as a process, to a small grbl behind a pseudo-terminal; journals; the rest of a
+program."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import select
+import signal
+import subprocess
+import sys
+import threading
+import time
+import tty
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from camtool.errors import InputError, OptionError
+from camtool.sending.journal import Journal, read_journal
+from camtool.sending.prepare import consignment, rest_of
+from camtool.target.registry import load_target
+from tests.postprocessors.grbl.test_wire import PROGRAM, Small
+from tests.waiting import heard_from
+
+TARGET = load_target("grbl")
+BLOCKS = 63
+
+
+@contextmanager
+def behind_a_terminal(small: Small) -> Iterator[str]:
+    """The name of a port at which a controller answers."""
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    over = threading.Event()
+
+    def serve() -> None:
+        while not over.is_set():
+            now = time.monotonic()
+            ready, _, _ = select.select([master], [], [], 0.001)
+            said = small.write(os.read(master, 4096), now) if ready else []
+            for line in (*said, *small.run(now)):
+                os.write(master, line + b"\r\n")
+
+    server = threading.Thread(target=serve)
+    server.start()
+    try:
+        yield os.ttyname(slave)
+    finally:
+        over.set()
+        server.join()
+        os.close(master)
+        os.close(slave)
+
+
+def command(*arguments: str) -> list[str]:
+    return [sys.executable, "-m", "camtool", "send", *arguments]
+
+
+@pytest.fixture
+def program(tmp_path: Path) -> Path:
+    file = tmp_path / "part.nc"
+    file.write_bytes(PROGRAM)
+    return file
+
+
+def test_a_program_goes_out_once_and_the_journal_says_so(program: Path) -> None:
+    small = Small(line_s=0.001)
+    with behind_a_terminal(small) as port:
+        line = command(str(program), "-t", "grbl", "--port", port, "--yes", "--json")
+        done = subprocess.run(line, capture_output=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert len(small.lines) == BLOCKS
+    assert json.loads(done.stdout.splitlines()[-1])["state"] == "finished"
+    place = read_journal(Path(f"{program}.journal"))
+    assert place.finished
+    assert place.block == BLOCKS
+
+
+def test_nothing_goes_out_before_it_is_confirmed(program: Path) -> None:
+    small = Small()
+    with behind_a_terminal(small) as port:
+        line = command(str(program), "-t", "grbl", "--port", port)
+        done = subprocess.run(line, capture_output=True, stdin=subprocess.DEVNULL, check=False)
+    assert done.returncode == 2
+    assert b"--yes" in done.stderr
+    assert small.lines == []
+    assert small.reset == 0
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_after_a_kill_it_goes_on_behind_what_is_done(program: Path, seed: int) -> None:
+    count = int(np.random.default_rng(seed).integers(25, 55))
+    small = Small(line_s=0.01)
+    with behind_a_terminal(small) as port:
+        line = command(str(program), "-t", "grbl", "--port", port, "--yes", "--json")
+        running = subprocess.Popen(line, stdout=subprocess.PIPE, text=True)
+        heard_from(running, rf'"packet": {count},')
+        running.send_signal(signal.SIGKILL)
+        running.wait()
+        assert running.stdout is not None
+        running.stdout.close()
+        while small.buffer:
+            time.sleep(0.01)
+        first = list(small.lines)
+        block = read_journal(Path(f"{program}.journal")).block
+        assert block <= len(first)
+        done = subprocess.run([*line, "--resume"], capture_output=True, check=False)
+        assert done.returncode == 0, done.stderr
+    second = b"\n".join(small.lines[len(first) :]) + b"\n"
+    assert read_journal(Path(f"{program}.journal")).finished
+    whole = TARGET.target.read(PROGRAM, TARGET.machine)
+    rest = TARGET.target.read(second, TARGET.machine)
+    low = int(np.flatnonzero(whole.block >= block)[0])
+    wanted = whole.end[low:][whole.is_motion[low:]]
+    assert np.allclose(rest.end[rest.is_motion][-len(wanted) :], wanted)
+
+
+def test_an_interrupt_stops_the_machine(program: Path) -> None:
+    small = Small(line_s=0.02)
+    with behind_a_terminal(small) as port:
+        line = command(str(program), "-t", "grbl", "--port", port, "--yes", "--json")
+        with subprocess.Popen(
+            line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        ) as running:
+            heard_from(running, '"packet": 10,')
+            running.send_signal(signal.SIGINT)
+            _, said = running.communicate()
+        assert running.returncode == 1
+        assert "--resume" in said
+        assert small.buffer == b""
+        assert len(small.lines) < BLOCKS
+        assert small.reset == 2
+
+
+def test_one_sender_a_port(program: Path) -> None:
+    small = Small(line_s=0.02)
+    with behind_a_terminal(small) as port:
+        line = command(str(program), "-t", "grbl", "--port", port, "--yes", "--json")
+        with subprocess.Popen(line, stdout=subprocess.PIPE, text=True) as running:
+            heard_from(running, '"packet": 2,')
+            second = subprocess.run(line, capture_output=True, check=False)
+            running.send_signal(signal.SIGINT)
+            running.communicate()
+    assert second.returncode == 2
+    assert b"another camtool sends there (process" in second.stderr
+
+
+def test_the_rest_begins_above_the_place_and_makes_the_same_moves() -> None:
+    whole = TARGET.target.read(PROGRAM, TARGET.machine)
+    data, entry = rest_of(whole, TARGET, 30)
+    rest = TARGET.target.read(data, TARGET.machine)
+    moves = rest.part(0, int(np.flatnonzero(rest.block >= entry)[0]))
+    place = whole.starts_of(np.array([int(np.flatnonzero(whole.block >= 30)[0])]))[0]
+    assert (moves.end[moves.is_motion, 2] >= place[2]).all()
+    assert np.allclose(moves.end[-1], place)
+    with pytest.raises(OptionError, match="no block 900"):
+        rest_of(whole, TARGET, 899)
+
+
+def test_a_program_for_another_machine_file_is_refused() -> None:
+    other = b"(settings 12345678)\n" + PROGRAM
+    with pytest.raises(InputError, match="another machine file"):
+        consignment(other, TARGET, source="part.nc")
+
+
+def test_a_journal_holds_to_its_last_whole_line(tmp_path: Path) -> None:
+    file = tmp_path / "a.journal"
+    head = {"sha256": "a", "machine": "b", "target": "c", "first": 0}
+    journal = Journal(file, head)
+    journal.note(sent=9, acknowledged=7, done=5, block=4)
+    file.write_bytes(file.read_bytes() + b'{"s": 3, "blo')
+    assert read_journal(file).block == 5
+    more = Journal(file, head | {"first": 5}, more=True)
+    assert read_journal(file).block == 5
+    more.note(sent=2, acknowledged=1, done=1, block=8)
+    assert read_journal(file).block == 9
+    (tmp_path / "b").write_bytes(b"G0\n")
+    with pytest.raises(InputError, match="no journal"):
+        read_journal(tmp_path / "b")
