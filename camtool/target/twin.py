@@ -106,7 +106,9 @@ class Slides:
         self._slide: Floats = np.empty((0, 3))
         self._before = self._mechanics.states.copy()
         self._added: Ints = np.empty((0, 3), dtype=np.int64)
-        self._block, self._done = -1, 0
+        self.done = 0
+        """How many outputs of the last travel were made."""
+        self._block = -1
         self._pieces: list[Trace] = []
 
     def begin(self, travel: Travel, now: float, block: int) -> None:
@@ -120,7 +122,7 @@ class Slides:
         late = np.cumsum(steps * travel.added_s)
         self._travel, self._slide = travel, slide
         self._times = now + travel.seconds + late
-        self._block, self._done = block, 0
+        self._block, self.done = block, 0
         self._added = reversals * self._mechanics.compensation_steps
         self.ends_s = now + travel.total_s + (float(late[-1]) if count else 0.0)
 
@@ -128,19 +130,19 @@ class Slides:
         """When the next output is due, or the end; None where nothing is under way."""
         if self.ends_s is None:
             return None
-        left = self._times[self._done : self._done + 1]
+        left = self._times[self.done : self.done + 1]
         return float(left[0]) if len(left) else self.ends_s
 
     def until(self, now: float) -> tuple[Ints, Ints]:
         """Do what is due. The steps (K, 3) of the axes in the outputs since the last call, and
         those of compensation (K, 3) in front of them."""
-        low = self._done
+        low = self.done
         high = int(np.searchsorted(self._times, now, side="right"))
         high = max(high, low) if self.ends_s is not None else low
         before = self.commanded_mm
         made = self._travel.commanded[low:high]
         if high > low:
-            self._done, self.commanded_mm = high, made[-1]
+            self.done, self.commanded_mm = high, made[-1]
             owner = np.full(high - low, self._block, dtype=np.int64)
             self._pieces.append(Trace(self._times[low:high], owner, made, self._slide[low:high]))
         if self.ends_s is not None and now >= self.ends_s:
@@ -155,7 +157,7 @@ class Slides:
         self.until(now)
         if self.ends_s is not None:
             self._mechanics.states[:] = self._before
-            made = self._travel.commanded[: self._done]
+            made = self._travel.commanded[: self.done]
             self._mechanics.follow(made, np.array([0, len(made)]))
         self.ends_s = None
 

@@ -123,6 +123,12 @@ class ToolpathBuilder:
         self._gather()
         return np.asarray(self._columns["run"].whole(), dtype=np.int64)
 
+    def drained(self) -> Toolpath:
+        """The rows so far, which it then forgets: for what is read one block at a time."""
+        path, self._start = self.finish(), self.position
+        self._columns = {name: _Column(name) for name in (*COLUMNS, "run")}
+        return path
+
     def finish(self, findings: Iterable[Finding] = ()) -> Toolpath:
         """The rows so far as a Toolpath."""
         self._gather()

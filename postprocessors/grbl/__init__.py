@@ -6,6 +6,8 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
+import msgspec
+
 from camtool.target.contract import Setting, Target
 
 from ..gcode.dialect import check_blocks, feed_decimals, last_decimal_mm
@@ -13,11 +15,12 @@ from .dialect import Dialect, GrblController, GrblMachine
 from .findings import CODES
 
 if TYPE_CHECKING:
-    from camtool.machine.model import Axis
+    from camtool.machine.model import Axis, Machine
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
 
     from .controller import GrblModel
+    from .twin import Choices, GrblTwin
     from .wire import GrblWire
 
 
@@ -84,6 +87,20 @@ class Grbl(Target):
         from ..gcode.blocks import listing
 
         return listing(data)
+
+    def twin_choices(self) -> type[Choices]:
+        """How a virtual grbl is set up."""
+        from .twin import Choices
+
+        return Choices
+
+    def twin(
+        self, machine: Machine[GrblController, Dialect], choices: msgspec.Struct | None = None
+    ) -> GrblTwin:
+        """The virtual controller; docs/wires/grbl.md."""
+        from .twin import Choices, GrblTwin
+
+        return GrblTwin(machine, choices if isinstance(choices, Choices) else Choices())
 
 
 POST = Grbl()

@@ -108,7 +108,7 @@ def sampled(
             stops = np.append(_from_rest(known, path), True)[len(last) + 1 :][:count]
             np.add.at(seconds, own.row[stops] - low, controller.idle_delay_ms / 1000.0)
         dwells = low + np.flatnonzero(path.kind[low:high] == Kind.DWELL)
-        seconds[dwells - low] = [_dwell_s(value) for value in path.value[dwells].tolist()]
+        seconds[dwells - low] = [dwell_s(value) for value in path.value[dwells].tolist()]
         samples = GrblSamples(own, np.arange(low, high + 1), machine)
         yield SampledRows(low, high, low, samples, seconds, iterates=True)
         before, low = plan.behind(count, squares), high
@@ -167,7 +167,7 @@ def _controller(machine: _Machine) -> GrblController:
     return machine.controller
 
 
-def _dwell_s(seconds: float) -> float:
+def dwell_s(seconds: float) -> float:
     """What `delay_sec` makes of a dwell; its count is a 32-bit float."""
     per_second = np.float32(1.0 / DWELL_STEP_S)
     return math.ceil(per_second * np.float32(seconds)) * DWELL_STEP_S
@@ -253,22 +253,31 @@ def blocks_of(path: Toolpath, machine: _Machine, controller: GrblController) -> 
     begin = _rounded(path.start[None, :].astype(np.float32), machine)
     for low in range(0, len(path), ROWS_AT_ONCE):
         rows = np.arange(low, min(low + ROWS_AT_ONCE, len(path)))
-        targets = targets_of(path, rows, machine, controller)
-        stop = _rounded(targets.mm, machine)
-        far = (np.abs(stop) > MAX_STEPS).any(axis=1)
-        if far.any():
-            row = int(targets.row[far.argmax()])
-            block = int(path.block[row])
-            raise ProgramError(
-                "a position is beyond all that the controller can count",
-                where=f"block {block + 1}" if block >= 0 else f"move {row}",
-            )
-        start = np.concatenate([begin, stop])
-        begin, start = start[-1:], start[:-1]
-        way = stop - start
-        moves = way.any(axis=1)
-        columns = targets.row[moves], start[moves], way[moves]
-        yield Blocks(*(column.astype(np.int32) for column in columns))
+        blocks, begin = blocks_from(begin, path, rows, machine, controller)
+        yield blocks
+
+
+def blocks_from(
+    begin: Ints, path: Toolpath, rows: Ints, machine: _Machine, controller: GrblController
+) -> tuple[Blocks, Ints]:
+    """The blocks of rows (R,), which follow one another, from `begin` (1, 3) steps on; and where
+    the last of them ends."""
+    targets = targets_of(path, rows, machine, controller)
+    stop = _rounded(targets.mm, machine)
+    far = (np.abs(stop) > MAX_STEPS).any(axis=1)
+    if far.any():
+        row = int(targets.row[far.argmax()])
+        block = int(path.block[row])
+        raise ProgramError(
+            "a position is beyond all that the controller can count",
+            where=f"block {block + 1}" if block >= 0 else f"move {row}",
+        )
+    start = np.concatenate([begin, stop])
+    begin, start = start[-1:], start[:-1]
+    way = stop - start
+    moves = way.any(axis=1)
+    columns = targets.row[moves], start[moves], way[moves]
+    return Blocks(*(column.astype(np.int32) for column in columns)), begin
 
 
 def _rounded(mm: Singles, machine: _Machine) -> Ints:
