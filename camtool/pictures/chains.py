@@ -7,7 +7,7 @@ turn is written as two, since a nearly full circle is ill-defined by its end poi
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -18,6 +18,16 @@ from camtool.geometry.measure import segment_boxes
 from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, Segments
 from camtool.pictures.svg import MM_DECIMALS, PathData
 from camtool.toolpath.moves import Kind, Toolpath, rows_of
+
+MOST_TAPERS = 30_000
+"""The outlines of more moves than this would make too large a picture: some 5 MB."""
+
+TAPER_ARC_RAD = 0.2
+"""Arcs along which a tool may become wider are taken as chords of this turn: of a circle of 1 mm
+they are 5 µm off."""
+
+LEAST_TAPER_MM = 1e-6
+"""A tool that cuts less than this at the surface is a point there."""
 
 LONGEST_ARC_RAD = 1.5 * math.pi
 """A longer arc is written as two."""
@@ -383,3 +393,72 @@ def _quarters(begin: Floats, sweep: Floats) -> tuple[Floats, Ints]:
 def _signs(lengths: Floats) -> Ints:
     up, down = lengths > POSITION_EPS_MM, lengths < -POSITION_EPS_MM
     return up.astype(np.int64) - down.astype(np.int64)
+
+
+def tapers(toolpath: Toolpath, radius_at: Callable[[float], float]) -> tuple[Chain, ...]:
+    """What each feed below the stock top cuts at the surface with a tool that is as wide as it is
+    deep, `radius_at` mm at a depth mm: the hull of the discs at its ends, CCW. () for more moves
+    than MOST_TAPERS."""
+    rows = np.flatnonzero(
+        toolpath.is_feed & (np.minimum(toolpath.starts[:, 2], toolpath.end[:, 2]) < 0.0)
+    )
+    if len(rows) > MOST_TAPERS:
+        return ()
+    starts, ends = toolpath.starts_of(rows), toolpath.end[rows]
+    sweeps = np.where(toolpath.is_arc[rows], toolpath.sweeps_of(rows), 0.0)
+    found = []
+    for start, end, centre, sweep in zip(
+        starts, ends, toolpath.centre[rows], sweeps.tolist(), strict=True
+    ):
+        places = _places_along(start, end, centre, sweep)
+        radii = [radius_at(max(-z, 0.0)) for z in places[:, 2].tolist()]
+        for k in range(len(places) - 1):
+            hull = _hull(places[k, :2], radii[k], places[k + 1, :2], radii[k + 1])
+            if hull is not None:
+                found.append(hull)
+    return tuple(found)
+
+
+def _places_along(start: Floats, end: Floats, centre: Floats, sweep: float) -> Floats:
+    """(K, 3) mm: the ends of a line; of an arc those of its chords."""
+    count = math.ceil(abs(sweep) / TAPER_ARC_RAD)
+    if count < 2:
+        return np.stack([start, end])
+    share = np.linspace(0.0, 1.0, count + 1)[:, None]
+    spoke, turn = start[:2] - centre, share * sweep
+    cos, sin = np.cos(turn), np.sin(turn)
+    round_ = centre + cos * spoke + sin * np.array([-spoke[1], spoke[0]])
+    return np.hstack([round_, start[2] + share * (end[2] - start[2])])
+
+
+def _hull(one: Floats, radius: float, other: Floats, last: float) -> Chain | None:
+    """The outline of two discs and what lies between them; None for points.
+
+    Their common tangents touch both where the radius makes the angle φ with the line from one to
+    the other, cos φ = (r − s) / d; there are none where one disc holds the other.
+    """
+    if max(radius, last) < LEAST_TAPER_MM:
+        return None
+    ahead = other - one
+    distance = float(np.hypot(ahead[0], ahead[1]))
+    if distance <= abs(radius - last) + LEAST_TAPER_MM:
+        centre, wide = (one, radius) if radius >= last else (other, last)
+        return _round([(centre, wide, 0.0, 2.0 * math.pi)])
+    angle = math.atan2(float(ahead[1]), float(ahead[0]))
+    touch = math.acos((radius - last) / distance)
+    behind = (one, radius, angle + touch, 2.0 * (math.pi - touch))
+    return _round([behind, (other, last, angle - touch, 2.0 * touch)])
+
+
+def _round(arcs: Sequence[tuple[Floats, float, float, float]]) -> Chain:
+    """A closed chain of arcs (centre, radius, first angle, turn), each in two halves, and the
+    lines between them."""
+    points, centres, sweeps = list[Floats](), list[Floats](), list[float]()
+    for centre, radius, begin, turn in arcs:
+        for k in range(3):
+            angle = begin + 0.5 * k * turn
+            points.append(centre + radius * np.array([math.cos(angle), math.sin(angle)]))
+            centres.append(centre)
+            sweeps.append(0.5 * turn if k < 2 and radius > LEAST_TAPER_MM else 0.0)
+    points.append(points[0])
+    return Chain(np.array(points), np.array(centres), np.array(sweeps), closed=True)

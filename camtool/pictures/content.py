@@ -19,6 +19,7 @@ from camtool.pictures.chains import (
     chains_of,
     moves_of,
     reversals_of,
+    tapers,
 )
 from camtool.pictures.colours import DRAWING, LAYER_COLOURS
 from camtool.pictures.options import AS_USUAL, Options
@@ -114,10 +115,15 @@ class Content:
         chosen = [k for k in range(len(starts)) if k == 0 or (k + 1) % step == 0]
         return [str(k + 1) for k in chosen], [starts[k] for k in chosen]
 
-    @property
+    @cached_property
     def swept(self) -> tuple[Chain, ...]:
-        """The moves that cut, where the diameter of the tool is known."""
-        return (*self.moves.feeds, *self.moves.ramps) if self.scene.tool_mm else ()
+        """The moves that cut, where the diameter of the tool is known; what each of them cuts at
+        the surface, where that changes with its depth."""
+        if self.scene.tool_mm:
+            return (*self.moves.feeds, *self.moves.ramps)
+        if self.scene.nose is None or self.scene.toolpath is None:
+            return ()
+        return tapers(self.scene.toolpath, self.scene.nose.radius_at)
 
     @property
     def stock(self) -> tuple[Chain, ...]:

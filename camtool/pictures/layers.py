@@ -279,14 +279,18 @@ def _noted(content: Content) -> list[Part]:
 
 def _swept(content: Content, plot: Plot) -> str:
     """The cuts at the true width of the tool."""
-    width = content.scene.tool_mm or 0.0
+    width = content.scene.tool_mm
+    if width is None:
+        return plot.lines("swept", content.swept, {"fill": SWEPT, "stroke": "none"})
     line: Look = {"fill": "none", "stroke": SWEPT, "stroke-width": width}
     ends: Look = {"stroke-linecap": "round", "stroke-linejoin": "round"}
     return plot.lines("swept", content.swept, {**line, **ends})
 
 
 def _swept_legend(content: Content, view: View) -> Iterator[Entry]:
-    yield Entry(line_swatch(SWEPT, 9.0), f"tool {content.scene.tool_mm:.4g} mm wide")
+    wide = content.scene.tool_mm
+    words = "tool, as wide as it is deep" if wide is None else f"tool {wide:.4g} mm wide"
+    yield Entry(line_swatch(SWEPT, 9.0), words)
 
 
 def _travel(content: Content, plot: Plot) -> str:

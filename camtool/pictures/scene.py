@@ -21,7 +21,7 @@ from camtool.toolpath.moves import Kind, Toolpath, toolpath_extents
 
 if TYPE_CHECKING:
     from camtool.machine.model import Machine
-    from camtool.planning.job import Job
+    from camtool.planning.job import Job, Tool
     from camtool.toolpath.program import Listing
     from camtool.verification.report import Report
     from camtool.verification.verify import Verification
@@ -44,7 +44,8 @@ class Scene:
     size of the table's travel from (0, 0), stock_mm the stock's left, lower, right and upper edge.
     `wanted` are the lines and arcs with which the trace
     was compared, `worst` the places of its largest errors, mm, the largest first; `tool_mm` is the
-    diameter of the tool, if there is only one; `rounds` are full circles with their errors.
+    diameter of the tool, if there is only one, and `nose` a tool that is as wide as it is deep,
+    where that changes along the path; `rounds` are full circles with their errors.
     `tabs` are the places of tabs, mm. `playback` gives how the toolpath runs; only the viewer
     calls it.
 
@@ -63,6 +64,7 @@ class Scene:
     wanted: Segments | None = None
     worst: tuple[tuple[float, float], ...] = ()
     tool_mm: float | None = None
+    nose: Tool | None = None
     rounds: tuple[Round, ...] = ()
     playback: Callable[[], Playback] | None = None
     stock_mm: tuple[float, float, float, float] | None = None
@@ -207,7 +209,10 @@ def scene_of(
         from camtool.planning.place import place
 
         drawing = place(drawing, job)
+    from camtool.verification.case import nose_of
+
     trace = verification.trace if verification is not None else None
+    width = None if job is None else _width_mm(job, toolpath)
     worst = () if verification is None else verification.report.worst
     return Scene(
         title=title,
@@ -221,7 +226,8 @@ def scene_of(
         notes=verification.report.notes() if verification is not None else (),
         wanted=verification.wanted.segments if verification is not None else None,
         worst=tuple(one.at_mm for one in worst),
-        tool_mm=None if job is None else _width_mm(job, toolpath),
+        tool_mm=width,
+        nose=None if job is None or width is not None else nose_of(job),
         rounds=() if verification is None else rounds_of(verification),
         tabs=tabs,
         playback=_playback(toolpath, verification, machine, listing),

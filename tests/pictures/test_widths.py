@@ -1,13 +1,22 @@
 """How wide pictures draw a tool: as it cuts at the surface."""
 
+import math
+
 import numpy as np
 import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
 
 from camtool.geometry.polylines import Polyline
+from camtool.pictures.chains import Chain, tapers
+from camtool.pictures.content import content_of
+from camtool.pictures.draw import render
 from camtool.pictures.scene import scene_of
 from camtool.pipeline import post_drawing
 from camtool.planning.job import Job, Operation, Tool
 from camtool.target.registry import load_target
+from camtool.toolpath.builder import ToolpathBuilder
 from tests.drawings import drawing_of
 
 CORNERS = [[0, 0, 0], [10, 0, 0], [10, 10, 0], [0, 10, 0.0]]
@@ -44,3 +53,51 @@ def test_several_depths_of_several_operations_have_no_single_width() -> None:
     shallow = Operation("engrave", "one", tool=BIT, depth_mm=0.5)
     deep = Operation("engrave", "two", tool=BIT, depth_mm=1.0)
     assert width(shallow, deep) is None
+
+
+def outline(chain: Chain) -> shapely.Polygon:
+    """What a closed chain holds, its arcs in dense chords."""
+    places = []
+    for k, sweep in enumerate(chain.sweep.tolist()):
+        spoke = chain.points[k] - chain.centre[k]
+        for turn in np.linspace(0.0, sweep, 200, endpoint=False) if sweep else [0.0]:
+            cos, sin = math.cos(turn), math.sin(turn)
+            turned = np.array([cos * spoke[0] - sin * spoke[1], sin * spoke[0] + cos * spoke[1]])
+            places.append(chain.centre[k] + turned if sweep else chain.points[k])
+    return shapely.Polygon(places)
+
+
+small = st.floats(-3.0, 3.0)
+
+
+@given(st.lists(st.tuples(small, small, st.floats(-2.0, 0.0)), min_size=2, max_size=6))
+def test_a_slope_cuts_what_the_discs_along_it_cover(
+    places: list[tuple[float, float, float]],
+) -> None:
+    builder = ToolpathBuilder()
+    builder.rapid(places[0][0], places[0][1], 1.0)
+    for x, y, z in places:
+        builder.line(x, y, round(z, 3), feed=100.0)
+    toolpath = builder.finish()
+    found = shapely.union_all([outline(each).buffer(0) for each in tapers(toolpath, lambda d: d)])
+    discs = []
+    for row in np.flatnonzero(toolpath.is_feed).tolist():
+        start, end = toolpath.starts[row], toolpath.end[row]
+        for share in np.linspace(0.0, 1.0, 60):
+            x, y, z = start + share * (end - start)
+            if z < -1e-3:
+                discs.append(shapely.Point(x, y).buffer(-z, quad_segs=64))
+    swept = shapely.union_all(discs)
+    assert swept.difference(found.buffer(2e-3)).is_empty
+    # Between the discs of a coarse row their hull covers more.
+    assert found.difference(swept.buffer(0.1)).is_empty
+
+
+def test_a_carving_is_drawn_as_wide_as_it_cuts() -> None:
+    job, target = Job((Operation("vcarve", tool=BIT, depth_mm=2.0),)), load_target("linuxcnc")
+    run = post_drawing(drawing_of([SQUARE]), job, target, check=False)
+    scene = scene_of(title="", drawing=drawing_of([SQUARE]), job=job, toolpath=run.decoded)
+    swept = shapely.union_all([outline(each).buffer(0) for each in content_of(scene).swept])
+    square = shapely.box(0, 0, 10, 10)
+    assert swept.difference(square.buffer(0.01)).is_empty
+    assert b"as wide as it is deep" in render(scene, "sign.svg")
