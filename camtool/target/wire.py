@@ -26,11 +26,11 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from camtool.arrays import Floats, Ints
 from camtool.errors import CamtoolError, MachineError
 from camtool.machine.model import Machine
 
 if TYPE_CHECKING:
+    from camtool.arrays import Floats, Ints
     from camtool.toolpath.moves import Toolpath
 
 Place = tuple[float, float, float]

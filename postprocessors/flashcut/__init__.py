@@ -14,6 +14,7 @@ from .dialect import Dialect, FlashcutController, FlashcutMachine, check
 
 if TYPE_CHECKING:
     from camtool.machine.model import Axis
+    from camtool.target.wire import NoWire
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
 
@@ -52,6 +53,16 @@ class Flashcut(Target):
     def unit_mm(self, machine: FlashcutMachine, axis: Axis) -> float:
         """The last decimal of a coordinate."""
         return float(10.0**-machine.dialect.decimals)
+
+    def wire(self) -> NoWire:
+        """None: its port is no line, and the PC is its clock (L1044-1050)."""
+        from camtool.target.wire import NoWire
+
+        return NoWire(
+            "its parallel port carries no protocol: the PC itself switches the coils, each "
+            "millisecond, and an ordinary system keeps no such time",
+            "let the machine's own program on its own PC drive it",
+        )
 
     def listing(self, data: bytes, machine: FlashcutMachine) -> Listing:
         """The lines that are blocks."""

@@ -12,7 +12,7 @@ import msgspec
 
 from camtool.target.contract import Target
 
-from .dialect import Dialect, Interpolator, PicMmhController, PicMmhMachine
+from .dialect import Dialect, Interpolator, PicMmhController, PicMmhLink, PicMmhMachine
 
 if TYPE_CHECKING:
     from camtool.machine.model import Axis, Machine
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from .controller import PicMmhModel
     from .twin import Choices, PicMmhTwin
+    from .wire import PicMmhWire
 
 
 class PicMmh(Target):
@@ -29,6 +30,7 @@ class PicMmh(Target):
     name = "pic-mmh"
     controllers = (PicMmhController,)
     dialect = Dialect
+    link = PicMmhLink
     interpolators = get_args(Interpolator)
 
     def write(self, toolpath: Toolpath, machine: PicMmhMachine) -> Program:
@@ -55,6 +57,12 @@ class PicMmh(Target):
 
         steps = (each.coded_step_mm for each in machine.axes)
         return max(1.0 / UNITS_PER_MM[machine.dialect.form], *steps)
+
+    def wire(self) -> PicMmhWire:
+        """A block, its echo, its steps."""
+        from .wire import PicMmhWire
+
+        return PicMmhWire()
 
     def listing(self, data: bytes, machine: PicMmhMachine) -> Listing:
         """What stands before each semicolon, with it."""

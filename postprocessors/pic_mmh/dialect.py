@@ -6,7 +6,7 @@ from typing import Literal
 
 import msgspec
 
-from camtool.machine.model import Machine, SlideStart
+from camtool.machine.model import Link, Machine, SlideStart
 from camtool.machine.ranges import Count
 
 
@@ -36,6 +36,17 @@ class PicMmhController(SlideStart, frozen=True, tag_field="model", tag="pic-mmh"
     arc_end: ArcEnd = "final-quadrant"
     initial_error: Literal["zero", "rounded-radius"] = "zero"
     time_base: Literal["event", "iteration"] = "event"
+
+
+class PicMmhLink(Link, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What its thesis leaves open. `echo`: each block comes back, at its end or character by
+    character ("echo"), or not at all ("none"). `step_byte`: a byte for each output of steps, in
+    "bits", or one for each axis in it, as "letters", or "none". `compensation`: whether the steps
+    of a compensation are "reported" too, or "silent"."""
+
+    echo: Literal["echo", "none"] = "echo"
+    step_byte: Literal["bits", "letters", "none"] = "bits"
+    compensation: Literal["silent", "reported"] = "silent"
 
 
 PicMmhMachine = Machine[SlideStart, Dialect]

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from camtool.toolpath.program import Listing, Program
 
     from .controller import ValcncModel
+    from .wire import ValcncWire
 
 
 class Valcnc(Target):
@@ -53,6 +54,12 @@ class Valcnc(Target):
         """The last decimal of a coordinate, on the axis where it is the most."""
         dialect = machine.dialect
         return float(10.0**-dialect.decimals / scales_of(machine, dialect).min())
+
+    def wire(self) -> ValcncWire:
+        """A block and its time."""
+        from .wire import ValcncWire
+
+        return ValcncWire()
 
     def listing(self, data: bytes, machine: ValcncMachine) -> Listing:
         """The lines that are blocks."""

@@ -182,3 +182,11 @@ def test_a_journal_holds_to_its_last_whole_line(tmp_path: Path) -> None:
     (tmp_path / "b").write_bytes(b"G0\n")
     with pytest.raises(InputError, match="no journal"):
         read_journal(tmp_path / "b")
+
+
+def test_a_machine_without_a_line_is_refused_and_why(tmp_path: Path) -> None:
+    (tmp_path / "a.nc").write_bytes(b"G01 X1.0 F3.0\n")
+    line = command(str(tmp_path / "a.nc"), "-t", "flashcut", "--port", "/dev/null", "--yes")
+    done = subprocess.run(line, capture_output=True, check=False)
+    assert done.returncode == 2
+    assert b"parallel port" in done.stderr

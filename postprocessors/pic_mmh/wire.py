@@ -1,0 +1,247 @@
+"""How programs are sent to the PIC18F8720: a block, its echo, its steps, the next block.
+
+A block goes out whole and comes back (L1592-1596, L1670-1673); what comes back is compared. Then
+it is executed, and each output of steps reports a byte; any character that comes meanwhile stops
+the machine (L1789-1807), so nothing is written until the block is over: when as many reports have
+come as the simulation makes outputs, and its time is over. The controller says neither "done" nor
+"wrong". `[link]` says what its thesis leaves open.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+from camtool.errors import MachineError
+from camtool.target.wire import Forecast, Manner, Packet, PacketByPacket, State, Wire
+
+from .dialect import PicMmhLink, PicMmhMachine
+
+ALTO: Final = b"A;"
+
+SLOWER: Final = 1.05
+"""How much longer than simulated a block may take, beyond what the line is late."""
+
+UNTIL_SILENT: Final = (-1,)
+"""The reports of what nobody can count beforehand, as homing."""
+
+SILENT: Final = 20
+"""It is over when nothing has come for so many times the lateness of the line (1 s)."""
+
+MOST_STEPS: Final = 9999
+MOST_COMPENSATION_UM: Final = 999
+
+
+class PicMmhWire(Wire):
+    """The controller over RS-232; the rate of its line is not given."""
+
+    ready = (
+        "the compensation of X and Y is set to what the machine file says (BX, BY)",
+        "no key may be pressed at the machine's own interface: any character stops it",
+    )
+    stopping = "A; stops it at once; its motors keep their place"
+
+    def packets(self, data: bytes, machine: PicMmhMachine, forecast: Forecast) -> Sequence[Packet]:
+        """The compensations, then the blocks."""
+        packets = [Packet(text) for text in _compensations(machine)]
+        *blocks, _ = data.split(b";")
+        room = machine.dialect.buffer_chars
+        for number, block in enumerate(blocks):
+            text = block.strip() + b";"
+            if room is not None and len(text) > room:
+                raise MachineError(
+                    f"has {len(text)} characters, and the controller's buffer {room}",
+                    where=f"block {number + 1}",
+                )
+            seconds = float(forecast.seconds[number])
+            counts = (_reports(forecast, number, machine),)
+            packets.append(Packet(text, number, seconds, counts))
+        return packets
+
+    def conversation(
+        self, packets: Sequence[Packet], machine: PicMmhMachine, manner: Manner
+    ) -> PicMmhConversation:
+        """The conversation that sends these blocks."""
+        if manner.home:
+            raise MachineError(
+                "homing leaves part zero unknown to it",
+                where="--home",
+                mend="home it by camtool home, and go to part zero",
+            )
+        return PicMmhConversation(packets, machine, manner)
+
+    def command(
+        self,
+        action: str,
+        machine: PicMmhMachine,
+        values: Mapping[str, float],
+        manner: Manner,
+    ) -> PicMmhConversation:
+        """`H;`; `Q;`, which is for all axes; `PX+1000;`."""
+        if action == "home":
+            packets = [Packet(b"H;", counts=UNTIL_SILENT)]
+        elif action == "zero" and set("xyz") <= values.keys() and not any(values.values()):
+            packets = [Packet(b"Q;")]
+        elif action == "jog":
+            packets = [
+                Packet(text, counts=UNTIL_SILENT)
+                for letter, axis in zip("xyz", machine.axes, strict=True)
+                if letter in values
+                for text in _steps(letter, values[letter], axis.coded_step_mm)
+            ]
+        else:
+            return super().command(action, machine, values, manner)  # type: ignore[return-value]
+        return PicMmhConversation(packets, machine, manner)
+
+    def typed(self, line: str) -> bytes:
+        """A string ends with ; and nothing else."""
+        return line.strip().rstrip(";").encode("latin-1", "replace") + b";"
+
+
+def _compensations(machine: PicMmhMachine) -> list[bytes]:
+    """`BX204;` `BY178;`: what the simulation reckons with, in µm."""
+    found = []
+    for letter, axis in zip("XY", machine.axes, strict=False):
+        um = round(axis.compensation_mm * 1000.0)
+        if abs(um - axis.compensation_mm * 1000.0) > 1e-6 or um > MOST_COMPENSATION_UM:
+            raise MachineError(
+                f"the controller takes a compensation in whole µm, up to {MOST_COMPENSATION_UM}",
+                where=f"axes.{letter.lower()}.compensation_mm",
+            )
+        found.append(f"B{letter}{um:03d};".encode())
+    return found
+
+
+def _reports(forecast: Forecast, block: int, machine: PicMmhMachine) -> int:
+    """How many bytes report the steps of a block."""
+    link = machine.link
+    assert isinstance(link, PicMmhLink)
+    if link.step_byte == "none":
+        return 0
+    letters = link.step_byte == "letters"
+    count = int(forecast.steps[block].sum() if letters else forecast.outputs[block])
+    if link.compensation == "reported":
+        count += sum(
+            int(reversals) * round(axis.compensation_mm / axis.coded_step_mm)
+            for reversals, axis in zip(forecast.reversals[block], machine.axes, strict=True)
+        )
+    return count
+
+
+def _steps(letter: str, way_mm: float, step_mm: float) -> list[bytes]:
+    left, sense = round(abs(way_mm) / step_mm), "-" if way_mm < 0.0 else "+"
+    parts = [MOST_STEPS] * (left // MOST_STEPS) + [left % MOST_STEPS] * (left % MOST_STEPS > 0)
+    return [f"P{letter.upper()}{sense}{part:04d};".encode() for part in parts]
+
+
+class PicMmhConversation(PacketByPacket):
+    """A block, its echo, its steps."""
+
+    def __init__(self, packets: Sequence[Packet], machine: PicMmhMachine, manner: Manner) -> None:
+        super().__init__(packets, manner)
+        link = machine.link
+        assert isinstance(link, PicMmhLink)
+        self._link = link
+        self._echo = b""
+        self._count = 0
+        self._over = 0.0  # when the time of the block is over
+        self._halting = self._heard = False
+
+    def _send(self, packet: Packet, now: float) -> None:
+        self._write(packet.data)
+        self._echo = packet.data if self._link.echo == "echo" else b""
+        self._count = 0
+        self.next_s = now + self.manner.patience_s
+        if not self._echo:
+            self._moves(now)
+
+    def _moves(self, now: float) -> None:
+        """The block has been taken: from now on it is executed."""
+        packet = self.packets[self.sent - 1]
+        self._over = now + packet.seconds
+        if packet.counts == UNTIL_SILENT:
+            self.next_s = now + SILENT * self.manner.late_s
+            return
+        if self._link.step_byte == "none" or self._link.echo == "none":
+            self._over = now + SLOWER * packet.seconds + 2.0 * self.manner.late_s
+        self._count_on(now)
+
+    def _count_on(self, now: float) -> None:
+        """Done when all has been reported and its time is over."""
+        wanted = self.packets[self.sent - 1].counts
+        missing = (wanted[0] if wanted else 0) - self._count
+        if missing < 0:
+            self._fail(f"it has reported {-missing} steps too many", now)
+        elif missing:
+            packet = self.packets[self.sent - 1]
+            self.next_s = self._over + (SLOWER - 1.0) * packet.seconds + self.manner.patience_s
+        elif now >= self._over:
+            self._packet_done(now)
+        else:
+            self.next_s = self._over
+
+    def received(self, data: bytes, now: float) -> None:
+        """First the echo, then the steps."""
+        if self.ended or not data:
+            return
+        if self._halting:
+            self._heard = True
+            self.next_s = now + 4.0 * self.manner.late_s
+            return
+        if not self._busy:
+            self._fail(f"it says {data[:20]!r} without being asked", now)
+            return
+        packet = self.packets[self.sent - 1]
+        count = min(len(self._echo), len(data))
+        if data[:count] != self._echo[:count]:
+            sent = packet.data.decode("latin-1")
+            self._fail(f"the echo of {sent} is another: {data[:count]!r}", now)
+            return
+        begins = bool(self._echo) and count == len(self._echo)
+        self._echo, steps = self._echo[count:], data[count:]
+        self._count += len(steps)
+        if any(not self._is_report(octet) for octet in steps):
+            self._fail(f"it says {steps[:20]!r}, which is no step", now)
+        elif packet.counts == UNTIL_SILENT and not self._echo:
+            self.next_s = now + SILENT * self.manner.late_s
+        elif begins:
+            self._moves(now)
+        elif not self._echo:
+            self._count_on(now)
+
+    def _is_report(self, octet: int) -> bool:
+        if self._link.step_byte == "letters":
+            return chr(octet) in "XYZxyz"
+        return self._link.step_byte == "bits" and 0x40 < octet < 0x80
+
+    def elapsed(self, now: float) -> None:
+        """The block is over, or what should have come has not."""
+        if self.ended or now < self.next_s:
+            return
+        if self._halting:
+            if self._heard or self._link.echo == "none":
+                self._busy = False
+                self._stopped()
+            else:
+                why = self._failing or "it was to stop"
+                self._end(State.FAILED, f"{why}; it did not confirm the stop: switch it off")
+            return
+        if not self._busy:
+            self.next_s = now + self.manner.patience_s
+            return
+        packet = self.packets[self.sent - 1]
+        if self._echo:
+            self._fail(f"no echo of {packet.data.decode('latin-1')}", now)
+        elif packet.counts == UNTIL_SILENT:
+            self._packet_done(now)
+        elif packet.counts and self._count < packet.counts[0]:
+            self._fail(f"it has reported {self._count} of {packet.counts[0]} steps", now)
+        else:
+            self._count_on(now)
+
+    def _halt(self, now: float) -> bool:
+        """Any character stops it; A; is one that it knows."""
+        self._halting, self._heard = True, False
+        self._write(ALTO)
+        self.next_s = now + self.manner.patience_s
+        return True
