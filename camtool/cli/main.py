@@ -61,6 +61,7 @@ COMMANDS = (
     "stale",
     "targets",
     "tools",
+    "twin",
     "verify",
 )
 """Each is a function of the same name in a module of the same name."""

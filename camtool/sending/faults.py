@@ -165,6 +165,11 @@ class Wired:
         times = self._there.next_s(), self._back.next_s(), self.twin.next_s()
         return min((at for at in times if at is not None), default=None)
 
+    def turn_s(self) -> float | None:
+        """The same, outputs of a travel left aside: so far a clock that keeps to nothing jumps."""
+        times = self._there.next_s(), self._back.next_s(), self.twin.turn_s()
+        return min((at for at in times if at is not None), default=None)
+
     def unplugged(self, now: float) -> bool:
         """Whether the plug has been pulled."""
         return self._unplug_s is not None and now >= self._unplug_s

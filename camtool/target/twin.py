@@ -198,7 +198,7 @@ def _joined(pieces: Sequence[Trace]) -> Trace:
 
 class Twin(ABC):
     """A virtual controller. A target's own overrides `_take`, what it does with a byte, and where
-    it does more by itself than move: `_turn_s`, when that is, and `_due`, what."""
+    it does more by itself than move: `turn_s`, when that is, and `_due`, what."""
 
     wire: ClassVar[str]
     """The line as its terminal programs are told it, such as "115200 8N1"."""
@@ -234,7 +234,7 @@ class Twin(ABC):
 
     def next_s(self) -> float | None:
         """When it does something next if nothing comes in, each output counted; None: never."""
-        times = [at for at in (self._turn_s(), self.slides.next_s()) if at is not None]
+        times = [at for at in (self.turn_s(), self.slides.next_s()) if at is not None]
         return min(times, default=None)
 
     @property
@@ -246,19 +246,19 @@ class Twin(ABC):
     def _take(self, octet: int) -> None:
         """A byte has come in at `self.now`."""
 
-    def _turn_s(self) -> float | None:
+    def turn_s(self) -> float | None:
         """When it does something by itself, besides the outputs of a travel; None: never."""
         return self.slides.ends_s
 
     def _due(self) -> None:  # noqa: B027 - not all do more than move
-        """It is `self.now`, which `_turn_s` had said."""
+        """It is `self.now`, which `turn_s` had said."""
 
     def _pass(self) -> None:
         """Outputs became due meanwhile."""
         self.slides.until(self.now)
 
     def _run(self, now: float) -> None:
-        while (at := self._turn_s()) is not None and at <= now:
+        while (at := self.turn_s()) is not None and at <= now:
             self.now = max(at, self.now)
             self._pass()
             self._due()

@@ -25,6 +25,10 @@ class Flashcut(Target):
     """Writer and reader share no code but the options of `[dialect]`."""
 
     name = "flashcut"
+    no_twin = (
+        "its PC drives the coils itself, by the parallel port and its own clock, so there is no "
+        "wire to listen to"
+    )
     controllers = (FlashcutController,)
     dialect = Dialect
 

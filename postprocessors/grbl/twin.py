@@ -260,7 +260,7 @@ class GrblTwin(Twin):
 
     # The main loop.
 
-    def _turn_s(self) -> float | None:
+    def turn_s(self) -> float | None:
         times = [at for at in (self.slides.ends_s, self._rest_s) if at is not None]
         return min(times, default=None)
 
