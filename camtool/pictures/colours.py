@@ -62,6 +62,7 @@ _DARK = {
     RAPID: "#78848f",
     PLUNGE: "#f5a03c",
     TRAVEL: "#7d6ca6",
+    STOCK: "#b8976a",
     GAP: "#ff6b57",
     SWEPT: "#28435f",
     REVERSAL: "#c79bff",

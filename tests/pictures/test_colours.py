@@ -92,3 +92,12 @@ def painted(colour: str) -> str:
 
 def test_names_that_look_like_colours_are_left_alone() -> None:
     assert colours.darkened("<title>#ffffff</title>") == "<title>#ffffff</title>"
+
+
+def test_every_colour_of_the_palette_has_one_on_dark_ground() -> None:
+    own = {name: value for name, value in vars(colours).items() if name.isupper()}
+    names = {name: value for name, value in own.items() if str(value).startswith("#")}
+    assert "STOCK" in names
+    missing = [name for name, value in names.items() if not colours.on_dark(value)]
+    missing += [each for each in colours.LAYER_COLOURS if not colours.on_dark(each)]
+    assert missing == []
