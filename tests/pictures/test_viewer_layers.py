@@ -8,9 +8,11 @@ import pytest
 
 from camtool.geometry.polylines import Polylines, Segments
 from camtool.pictures import layers
-from camtool.pictures.draw import draw
+from camtool.pictures.draw import draw, render
+from camtool.pictures.options import Options
 from camtool.pictures.scene import Scene
 from camtool.pipeline import verify_program
+from camtool.planning.job import Tool
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
@@ -206,3 +208,28 @@ def _square() -> Toolpath:
     for x, y in ((4.0, 0.0), (4.0, 3.0), (0.0, 3.0), (0.0, 0.0)):
         path.line(x, y, feed=8.0)
     return path.rapid(z=1.0).event(Kind.END).finish()
+
+
+def test_a_tool_that_is_as_wide_as_it_is_deep_fills_what_it_cuts(shown: Any) -> None:
+    builder = ToolpathBuilder()
+    builder.rapid(0.0, 0.0, 1.0)
+    builder.line(0.0, 0.0, 0.0, feed=100.0)
+    builder.line(10.0, 0.0, -2.0, feed=100.0)
+    builder.line(10.0, 10.0, -2.0, feed=100.0)
+    builder.rapid(z=1.0)
+    bit = Tool(8.0, "v", tip_angle_rad=1.5707963267948966)
+    scene = Scene(title="slope", toolpath=builder.finish())
+    plain, wide = shown(scene), shown(replace(scene, nose=bit))
+    assert "as it is deep" in wide.text("#layers")
+    assert wide.pixels("ground") > plain.pixels("ground")
+    wide.press("s")
+    assert wide.pixels("ground") == plain.pixels("ground")
+
+
+def test_the_page_of_a_job_with_stock_opens(shown: Any) -> None:
+    stock = (-1.0, -1.0, 6.0, 4.0)
+    view = shown(replace(busy(SCENES["toolpath"]), stock_mm=stock))
+    assert "stock 7 × 5 mm" in view.text("#layers")
+    assert b"stock" in render(
+        replace(SCENES["toolpath"], stock_mm=stock), "a.svg", Options(dark=True)
+    )

@@ -8,6 +8,7 @@ number before, the first from 0). Floats of 32 bits hold a place on a table of 8
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +23,9 @@ from camtool.pictures.scene import Playback, Scene
 from camtool.pictures.trace import Trace, bins_of, nearest_points
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.units import UM_PER_MM
+
+if TYPE_CHECKING:
+    from camtool.planning.job import Tool
 
 Columns = dict[str, npt.NDArray[np.generic]]
 
@@ -43,7 +47,7 @@ def columns_of(content: Content, run: Playback | None) -> Columns:
     }
     return {
         **_drawing(scene.drawing),
-        **_moves(scene.toolpath, run),
+        **_moves(scene.toolpath, run, scene.nose),
         **{name: points.astype(FLOAT) for name, points in places.items()},
         **_wanted(scene.wanted if run is not None else None),
     }
@@ -119,10 +123,13 @@ def _drawing(drawing: Drawing | None) -> Columns:
     }
 
 
-def _moves(toolpath: Toolpath | None, run: Playback | None) -> Columns:
+def _moves(toolpath: Toolpath | None, run: Playback | None, nose: Tool | None) -> Columns:
     if toolpath is None or run is None:
         none = np.empty(0)
-        floats = ("move_start", "move_end", "move_feed", "move_seconds", "move_error")
+        floats = (
+            *("move_start", "move_end", "move_feed", "move_seconds", "move_error"),
+            "move_wide",
+        )
         return {
             **_bends("move", none.astype(np.bool_), none.reshape(0, 2), none),
             **{name: none.astype(FLOAT) for name in floats},
@@ -141,8 +148,21 @@ def _moves(toolpath: Toolpath | None, run: Playback | None) -> Columns:
         "move_block": toolpath.block.astype(INT),
         "move_source": toolpath.source.astype(INT),
         "move_kind": toolpath.kind.astype(BYTE),
+        "move_wide": _wide(toolpath, nose),
         "move_sort": _sorts(toolpath),
     }
+
+
+def _wide(toolpath: Toolpath, nose: Tool | None) -> npt.NDArray[np.generic]:
+    """(N, 2) mm: how wide the tool cuts on each side at the start and the end of each feed, where
+    that changes with its depth; (0, 2) where it does not."""
+    if nose is None:
+        return np.empty((0, 2), dtype=FLOAT)
+    wide = np.zeros((len(toolpath), 2))
+    for row in np.flatnonzero(toolpath.is_feed).tolist():
+        ends = toolpath.starts[row, 2], toolpath.end[row, 2]
+        wide[row] = [nose.radius_at(max(-float(z), 0.0)) for z in ends]
+    return wide.astype(FLOAT)
 
 
 def _sorts(toolpath: Toolpath) -> npt.NDArray[np.generic]:

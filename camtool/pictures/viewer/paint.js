@@ -141,6 +141,46 @@ function paintTrack(ctx, view, track, rows, styleOf, styles) {
   strokePens(ctx, pens, styles);
 }
 
+const TAPER_TURN = 0.2;
+
+/** Fill what the rows from … to−1 of a track cut with a tool that is as wide as it is deep: `wide`
+ * (2 N) mm on each side, at the start and the end of each; arcs in chords. */
+function paintTapers(ctx, view, track, rows, wide, colour) {
+  const path = new Path2D();
+  for (let row = rows.from; row < rows.to; row++) {
+    const first = wide[2 * row] * view.scale, last = wide[2 * row + 1] * view.scale;
+    if (!first && !last) continue;
+    const arc = track.arc(row);
+    const pieces = arc ? Math.max(1, Math.ceil(Math.abs(arc.sweep) / TAPER_TURN)) : 1;
+    let from = track.at(row, 0), radius = first;
+    for (let piece = 1; piece <= pieces; piece++) {
+      const share = piece / pieces, to = track.at(row, share);
+      const next = first + share * (last - first);
+      addHull(path, [view.px(from[0]), view.py(from[1]), radius], [view.px(to[0]), view.py(to[1]), next]);
+      from = to;
+      radius = next;
+    }
+  }
+  ctx.fillStyle = colour;
+  ctx.fill(path);
+}
+
+/** Two discs (x, y, radius) and what lies between them, along their common tangents. */
+function addHull(path, one, other) {
+  const [x, y, radius] = one, [u, v, last] = other, distance = Math.hypot(u - x, v - y);
+  if (distance <= Math.abs(radius - last) + 1e-6) {
+    const [atX, atY, wide] = radius > last ? one : other;
+    path.moveTo(atX + wide, atY);
+    path.arc(atX, atY, wide, 0, TURN);
+    return;
+  }
+  const angle = Math.atan2(v - y, u - x), touch = Math.acos((radius - last) / distance);
+  path.moveTo(x + radius * Math.cos(angle + touch), y + radius * Math.sin(angle + touch));
+  path.arc(x, y, radius, angle + touch, angle - touch + TURN);
+  path.arc(u, v, last, angle - touch, angle + touch);
+  path.closePath();
+}
+
 /** Stroke points first … last of a line of points (2 T) mm, each piece in the style of its end;
  * pieces smaller than a pixel become one, in the highest of their styles. */
 function paintPoints(ctx, view, points, range, styleOf, styles) {

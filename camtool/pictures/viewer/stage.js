@@ -90,6 +90,7 @@ class Layers {
     const moves = columns.move_kind.length > 0, travel = head.travel_mm;
     const width = head.tool_mm === null ? "" : Number(head.tool_mm.toPrecision(4));
     if (moves && width) this.add("swept", `tool's width, ${width} mm`, "s");
+    if (columns.move_wide.length) this.add("swept", "tool's width, as it is deep", "s");
     if (travel) this.add("travel", `travel, ${travel[0]} × ${travel[1]} mm`, "t");
     if (moves) {
       this.add("rapid", "rapids", "r");
@@ -205,9 +206,16 @@ class Layers {
     return [...this.mapColours().map((colour) => ({ colour, width: 2 })), null];
   }
 
+  /** How wide the tool cuts where it is, mm; null where that is not known. */
+  widthAt({ row, share }) {
+    const wide = this.columns.move_wide;
+    if (!wide.length) return this.head.tool_mm;
+    return 2 * (wide[2 * row] + share * (wide[2 * row + 1] - wide[2 * row]));
+  }
+
   /** Cuts at the true width of the tool. */
   sweptStyles(colours, scale) {
-    if (!this.on.get("swept")) return [null, null, null];
+    if (!this.on.get("swept") || this.head.tool_mm === null) return [null, null, null];
     const wide = { colour: colours.swept, width: this.head.tool_mm * scale };
     return [null, wide, wide];
   }
@@ -378,6 +386,8 @@ class Stage {
     const plain = traced && layers.by === "kind" ? { ...layers.paleStyles(colours) } : { of, styles };
     const swept = layers.sweptStyles(colours, view.scale);
     paintTrack(this.contexts.ground, view, moves, rows, layers.sortOf, swept);
+    const wide = layers.on.get("swept") ? layers.columns.move_wide : [];
+    if (wide.length) paintTapers(this.contexts.ground, view, moves, rows, wide, colours.swept);
     paintTrack(ctx, view, moves, rows, plain.of, plain.styles);
     this.paintTrace(ctx, whole);
     this.done.row = whole;
@@ -401,7 +411,7 @@ class Stage {
       if (row < 0) continue;
       paintTrack(ctx, view, track, { from: row, to: row + 1 }, { [row]: 0 }, [picked]);
     }
-    if (moves.count) paintTool(ctx, view, moves, run, this.layers.head.tool_mm, colours);
+    if (moves.count) paintTool(ctx, view, moves, run, this.layers.widthAt(run), colours);
   }
 
   /** Copy everything to the lowest canvas: printed, an empty canvas would hide those below it. */
