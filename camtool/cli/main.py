@@ -53,8 +53,11 @@ COMMANDS = (
     "convert",
     "coupon",
     "filter",
+    "home",
     "init",
     "job",
+    "jog",
+    "ports",
     "post",
     "preview",
     "send",
@@ -63,6 +66,7 @@ COMMANDS = (
     "tools",
     "twin",
     "verify",
+    "zero",
 )
 """Each is a function of the same name in a module of the same name."""
 
@@ -99,6 +103,8 @@ def cli() -> None:
     camtool convert logo.pic --from pic-mmh --to grbl
     camtool preview logo.dxf -o logo.svg        picture of a drawing or program
     camtool send    logo.pic -t pic-mmh --port /dev/ttyUSB0
+    camtool ports                               where machines may be
+    camtool home, jog, zero                     a machine moved by hand
     camtool filter  logo.dxf                    LinuxCNC opens the drawing
     camtool stale   drawings/ -t pic-mmh        programs that are out of date
     camtool job new logo.dxf                    a job file to fill in, from its layers

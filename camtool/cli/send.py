@@ -76,7 +76,7 @@ def send(
     one closes the port at once. On a terminal: p pauses, r goes on, s does a single block, q
     stops. Exit code 1 when the program was not finished.
     """
-    from camtool.sending.prepare import consignment, lines_of
+    from camtool.sending.prepare import consignment, lines_of, port_of
 
     if first is not None and resume:
         raise click.UsageError("--from and --resume are two beginnings; give one of them")
@@ -96,7 +96,9 @@ def send(
         show_facts(facts, NAME_WIDTH, {}, err=as_json)
     if port is None:
         return 0
-    line = _port(port, baud, one, target, speed)
+    line = port_of(port, baud, one.wire, target)
+    if speed != 1.0 and not line.is_virtual:
+        raise OptionError("a real machine has only its own speed", where="--speed")
     if not yes and not _agreed():
         return 1
     job = _Job(one, target, line, place, resume, as_json, quiet)
@@ -118,21 +120,6 @@ def _resumed(place: Path, data: bytes, target: LoadedTarget) -> int:
     if found.finished:
         raise OptionError("the program was finished", where="--resume", mend="leave it out")
     return found.block
-
-
-def _port(
-    name: str, baud: int | None, one: Consignment, target: LoadedTarget, speed: float
-) -> Port:
-    from camtool.sending.line import Port
-
-    link, wire = target.machine.link, one.wire
-    rate = baud or wire.baud or (round(link.baud) if link.baud else None)
-    port = Port(name, rate, wire.frame)
-    if rate is None and not port.is_virtual:
-        raise OptionError("the rate of the port is not known", where="--baud", mend="give it")
-    if speed != 1.0 and not port.is_virtual:
-        raise OptionError("a real machine has only its own speed", where="--speed")
-    return port
 
 
 def _agreed() -> bool:

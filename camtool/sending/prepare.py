@@ -18,6 +18,7 @@ import numpy as np
 
 from camtool.errors import MachineError, OptionError, PostError, ProgramError
 from camtool.pipeline import read_program, verify_program
+from camtool.sending.line import Port
 from camtool.simulation.motion import Options
 from camtool.target.wire import Forecast, NoWire, Packet, Wire
 from camtool.toolpath.builder import ToolpathBuilder
@@ -80,6 +81,17 @@ def wire_of(target: LoadedTarget) -> Wire:
         name = target.machine.target.name
         raise MachineError(f"camtool does not drive {name}: {wire.why}", mend=wire.mend)
     return wire
+
+
+def port_of(name: str, baud: int | None, wire: Wire, target: LoadedTarget) -> Port:
+    """The port of that name at the rate that is given, or that of the wire, or of the machine
+    file; OptionError where none is known and the port has one."""
+    link = target.machine.link
+    rate = baud or wire.baud or (round(link.baud) if link.baud else None)
+    port = Port(name, rate, wire.frame)
+    if rate is None and not port.is_virtual:
+        raise OptionError("the rate of the port is not known", where="--baud", mend="give it")
+    return port
 
 
 def check_settings(data: bytes, target: LoadedTarget, file: str) -> None:

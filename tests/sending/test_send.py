@@ -190,3 +190,20 @@ def test_a_machine_without_a_line_is_refused_and_why(tmp_path: Path) -> None:
     done = subprocess.run(line, capture_output=True, check=False)
     assert done.returncode == 2
     assert b"parallel port" in done.stderr
+
+
+def test_by_hand_goes_the_way_of_programs() -> None:
+    small = Small(line_s=0.001)
+    with behind_a_terminal(small) as port:
+        for words in (["jog", "X-1.5", "Y2mm", "F200"], ["zero"], ["home"]):
+            line = [sys.executable, "-m", "camtool", *words, "-t", "grbl", "--port", port]
+            done = subprocess.run(line, capture_output=True, check=False)
+            assert done.returncode == 0, done.stderr
+    assert small.lines == [b"$J=G91G21X-1.500Y2.000F200.0", b"G10L20P1X0.000Y0.000Z0.000", b"$H"]
+
+
+def test_no_command_where_the_controller_has_none() -> None:
+    line = [sys.executable, "-m", "camtool", "home", "-t", "valcnc", "--port", "/dev/null"]
+    done = subprocess.run(line, capture_output=True, check=False)
+    assert done.returncode == 2
+    assert b"no command to home" in done.stderr

@@ -1,0 +1,79 @@
+"""`camtool home`, `zero` and `jog`: a machine moved by hand, where its line can do so."""
+
+from __future__ import annotations
+
+import click
+
+from camtool.cli.messages import say
+from camtool.cli.options import MachineFlags, machine_options, talk_options
+from camtool.errors import OptionError
+from camtool.units import parse_feed, parse_length
+
+PORT = click.option("--port", metavar="PORT", required=True, help="Such as /dev/ttyUSB0.")
+BAUD = click.option("--baud", type=click.IntRange(min=1), help="Rate, where not its own.")
+
+
+@click.command(short_help="Home a machine.")
+@machine_options
+@PORT
+@BAUD
+@talk_options
+def home(machine: MachineFlags, port: str, baud: int | None, quiet: bool, verbose: bool) -> int:
+    """Send the machine to its switches."""
+    return act("home", machine, port, baud, {}, quiet=quiet)
+
+
+def act(
+    action: str,
+    machine: MachineFlags,
+    name: str,
+    baud: int | None,
+    values: dict[str, float],
+    *,
+    quiet: bool,
+) -> int:
+    """Hold the conversation of one command; the exit code. Ctrl-C stops the machine."""
+    import signal
+    from types import FrameType
+
+    from camtool.sending.drive import Driver, Wish
+    from camtool.sending.line import opened_line
+    from camtool.sending.prepare import port_of, wire_of
+    from camtool.target.wire import Manner, State
+
+    target = machine.load()
+    wire = wire_of(target)
+    conversation = wire.command(action, target.machine, values, Manner())
+    wishes: list[Wish] = []
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        wishes.append(Wish.CLOSE if wishes or conversation.state is State.STOPPING else Wish.STOP)
+
+    def tell(text: str) -> None:
+        say(f"camtool: {text}", quiet=quiet)
+
+    with opened_line(port_of(name, baud, wire, target)) as line:
+        before = signal.signal(signal.SIGINT, stop)
+        try:
+            Driver(line, wish=lambda: wishes.pop(0) if wishes else None, tell=tell).carry(
+                conversation
+            )
+        finally:
+            signal.signal(signal.SIGINT, before)
+    if conversation.state is State.FINISHED:
+        say(f"camtool: {action}: done", quiet=quiet)
+        return 0
+    why = conversation.why or conversation.state.value
+    say(f"camtool: error: {action}: {why}", quiet=False)
+    return 1
+
+
+def axes_of(words: tuple[str, ...]) -> dict[str, float]:
+    """`X1.5 Y-2mm F200` as mm and mm/min by axis; OptionError for other words."""
+    values: dict[str, float] = {}
+    for word in words:
+        letter, text = word[:1].lower(), word[1:]
+        if letter not in ("x", "y", "z", "f") or letter in values or not text:
+            raise OptionError(f"{word!r} is no axis with a length", mend="write X1.5 Y-2mm F200")
+        values[letter] = parse_feed(text) if letter == "f" else parse_length(text)
+    return values

@@ -1,0 +1,32 @@
+"""`camtool ports`: the serial ports of this computer."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+
+import click
+
+from camtool.cli.messages import say, show_text
+from camtool.cli.options import talk_options
+from camtool.plain import one_line
+
+
+@click.command(short_help="List the serial ports.")
+@click.option("--json", "as_json", is_flag=True, help="As JSON, on stdout.")
+@talk_options
+def ports(as_json: bool, quiet: bool, verbose: bool) -> int:
+    """List the serial ports of this computer, for `camtool send --port`."""
+    from camtool.sending.line import found_ports
+
+    found = found_ports()
+    if as_json:
+        show_text(json.dumps([asdict(each) for each in found], indent=2, ensure_ascii=False))
+        return 0
+    width = max((len(each.name) for each in found), default=0)
+    for each in found:
+        said = each.description + (f" [{each.hardware}]" if verbose and each.hardware else "")
+        show_text(one_line(f"{each.name:<{width}}  {said}".rstrip()))
+    if not found:
+        say("camtool: no serial port is here; is the cable in?", quiet=quiet)
+    return 0
