@@ -503,7 +503,7 @@ class GrblTwin(Twin):
     def _command(self, text: str) -> Job:
         rest = text[1:]
         moving = not self._idle() or self._held
-        if rest in ("", "$", "G", "C", "X") and moving and not self._alarm:
+        if rest in ("$", "C", "X") and moving and not self._alarm:  # not "" and G: system.c
             return CODES["not idle"]
         if rest == "":
             self._out += (
