@@ -25,6 +25,7 @@ import msgspec
 from camtool.errors import InputError, OutputError
 
 VERSION = 1
+"""The form of journals: one of another form is refused."""
 SUFFIX = ".journal"
 SYNC_S = 1.0
 """What it says is brought to the disk itself once in so many seconds, and at the end."""

@@ -27,6 +27,7 @@ REOPEN_S: Final = 0.1
 """How often a port is looked for that has gone for a while."""
 
 AT_ONCE: Final = 4096
+"""So many bytes are taken from a port at a time."""
 
 _FRAMES: Final = ("8N1", "7N1", "8E1", "7E1", "8O1", "7O1", "8N2", "7E2")
 

@@ -119,6 +119,7 @@ class Tell:
 Action = Write | Reopen | Tell
 
 NEVER = math.inf
+"""The time of what does not happen by itself, s."""
 
 
 LATE_S = 0.05
@@ -369,5 +370,5 @@ class Wire(ABC):
 class NoWire:
     """A machine to which camtool sends nothing: `why`, and what does instead, `mend`."""
 
-    why: str = "no protocol of its controller is known"
+    why: str = "camtool does not speak the protocol of its line"
     mend: str = "send the program as the machine's own programs do"

@@ -394,7 +394,9 @@ class GrblConversation(Conversation):
             if still and not self._reset_sent:
                 self._reset(now)
         elif state == "Alarm":
-            self._end(State.FAILED, "it is locked: home it, or unlock it in camtool console ($X)")
+            self._end(
+                State.FAILED, "it is locked: home it, or unlock it with $X from a terminal program"
+            )
         elif self.state is State.PAUSING and still:
             self.state = State.PAUSED
         elif state.startswith("Door") and self.state is State.SENDING:
@@ -435,8 +437,8 @@ class GrblConversation(Conversation):
         elif state == "Alarm":
             self._end(
                 State.FAILED,
-                "it is locked, since it has not been homed: give --home, or unlock it in "
-                "camtool console ($X)",
+                "it is locked, since it has not been homed: give --home, or unlock it with "
+                "$X from a terminal program",
             )
         elif state in ("Run", "Home", "Jog"):
             if self.why != "moves":

@@ -29,7 +29,9 @@ SILENT: Final = 20
 """It is over when nothing has come for so many times the lateness of the line (1 s)."""
 
 MOST_STEPS: Final = 9999
+"""A block PX moves by no more steps: its number has four digits."""
 MOST_COMPENSATION_UM: Final = 999
+"""The largest compensation that a block BX can say: it has three digits."""
 
 
 class PicMmhWire(Wire):
