@@ -44,6 +44,7 @@ def job() -> None:
 @click.option("-o", "--output", metavar="FILE", help="The file; - is stdout.  [job.toml]")
 @click.option("--tool-diameter", callback=length, metavar="LENGTH", help="Of the end mill.")
 @click.option("--tool", metavar="NAME", help="The end mill; see camtool tools.")
+@click.option("--material", metavar="NAME", help="What is cut, for which the tool has a preset.")
 @click.option("--thickness", callback=length, metavar="LENGTH", help="Of the stock: cut through.")
 @machine_options
 @drawing_options
@@ -53,6 +54,7 @@ def new(
     output: str | None,
     tool_diameter: float | None,
     tool: str | None,
+    material: str | None,
     thickness: float | None,
     machine: MachineFlags,
     drawing: DrawingFlags,
@@ -73,11 +75,16 @@ def new(
     above_zero("thickness", thickness, "mm")
     if tool is not None and tool_diameter is not None:
         raise click.UsageError("--tool has a diameter: leave --tool-diameter out")
+    if material is not None and tool is None:
+        raise click.UsageError("--material is for the presets of a tool: give --tool too")
     proposal = Proposal(tool_diameter or 0.0, thickness or 0.0)
     if tool is not None:
-        named = JobFlags(given={"tool": tool}, project=project_of(Path.cwd())).job(drawing)
+        given = {"tool": tool} if material is None else {"tool": tool, "material": material}
+        named = JobFlags(given=given, project=project_of(Path.cwd())).job(drawing)
         known = named.operations[0].tool
-        proposal = Proposal(known.diameter_mm, proposal.thickness_mm, tool, known.materials)
+        proposal = Proposal(
+            known.diameter_mm, proposal.thickness_mm, tool, known.materials, material or ""
+        )
     output = output or "job.toml"
     check_places([source, *machine.files()], [output])
     check_new(output)

@@ -71,12 +71,13 @@ class _Group:
 class Proposal:
     """What is known of the cut, mm, 0 where it is not: the tool's diameter, the stock's
     thickness. `tool`: its name in a library, and the materials that it has presets for, which say
-    how deep passes are."""
+    how deep passes are; `material`: the one of them that is cut, where that is said."""
 
     tool_mm: float = 0.0
     thickness_mm: float = 0.0
     tool: str = ""
     materials: tuple[str, ...] = ()
+    material: str = ""
 
     @property
     def breakthrough_mm(self) -> float:
@@ -84,6 +85,13 @@ class Proposal:
         if not self.thickness_mm:
             return 0.0
         return min(BREAKTHROUGH_MM, Stock(self.thickness_mm).through_mm)
+
+
+def _materials(proposal: Proposal) -> Iterator[str]:
+    """What is cut, and as comments what else it may be."""
+    for name in proposal.materials:
+        said = name == proposal.material
+        yield _row(f"{'' if said else '# '}material = {quoted(name)}", "as --material")
 
 
 def job_template(
@@ -102,7 +110,7 @@ def job_template(
     lines = [
         *_head(drawing, size, machine),
         *_comments(WHOLE),
-        *(_row(f"# material = {quoted(name)}", "as --material") for name in proposal.materials),
+        *_materials(proposal),
         "",
         "[place]",
         _row('origin = "lower-left"', PLACE["origin"].help),

@@ -370,5 +370,5 @@ class Wire(ABC):
 class NoWire:
     """A machine to which camtool sends nothing: `why`, and what does instead, `mend`."""
 
-    why: str = "camtool does not speak the protocol of its line"
+    why: str = "the protocol of its line is not among those that can be sent"
     mend: str = "send the program as the machine's own programs do"

@@ -188,3 +188,19 @@ def test_the_page_says_what_presets_have() -> None:
     (more,) = (line for line in page.splitlines() if line.startswith("`surface_speed`."))
     assert {key for key in PRESET if f"`{key}`" in told + more} == set(PRESET)
     assert set(PRESET) & set(TOOL) == {"chip_load", "surface_speed"}
+
+
+def test_a_new_job_says_the_material(camtool: Run, tmp_path: Path, samples: Path) -> None:
+    assert camtool("tools", "new", "--project").returncode == 0
+    new = ("job", "new", samples / "plate.dxf", "--tool", "mill", "--thickness", "3mm")
+    assert camtool(*new, "--material", "plywood").returncode == 0
+    text = (tmp_path / "job.toml").read_text(encoding="utf-8")
+    assert '\nmaterial = "plywood"' in text
+    assert '\n# material = "mdf"' in text
+    done = camtool(*new, "--material", "oak", "-o", "other.toml")
+    assert done.returncode == 2
+    assert b"no preset for 'oak'" in done.stderr
+    done = camtool("job", "new", samples / "plate.dxf", "--material", "oak", "-o", "other.toml")
+    assert done.returncode == 2
+    assert b"give --tool too" in done.stderr
+    assert not (tmp_path / "other.toml").exists()
