@@ -90,12 +90,12 @@ def put_words(
 G_WORD, X_WORD, Y_WORD, Z_WORD, I_WORD, J_WORD, F_WORD = range(7)
 """Columns of numbers; a word's bit in `MASK` is 1 << its column."""
 
-FORM, MASK, TWO_DIGITS, ONE_BLANK, BEGIN, LINE = range(6)
+FORM, MASK, TWO_DIGITS, ONE_BLANK, LINE = range(5)
 """Columns of facts: the letters in their order, each as column + 1, as digits of a number in base
 8; which there are; whether G has two digits and nothing else; whether words are parted by one
-blank each; where the line begins, and its number."""
+blank each; the number of the line."""
 
-FACT_COLUMNS = 6
+FACT_COLUMNS = 5
 """How many columns."""
 
 MOST_DIGITS, MOST_EXACT_DIGITS = 22, 15
@@ -225,7 +225,7 @@ def plain_lines(
 
     `rules`: the most characters of a line; whether small letters count as capitals, whether blocks
     may be numbered, and whether comments in parentheses and behind a semicolon are passed over, on
-    lines of their own. numbers (R, 7) and facts (R, 6) are filled, no more rows than these.
+    lines of their own. numbers (R, 7) and facts (R, 5) are filled, no more rows than these.
     """
     most_chars, lower_case, numbered, parentheses, semicolon = rules
     rows, size = 0, len(data)
@@ -243,7 +243,7 @@ def plain_lines(
             if words < 0:
                 break
             if words > 0:
-                facts[rows, BEGIN], facts[rows, LINE] = at, line
+                facts[rows, LINE] = line
                 rows += 1
         at = end
         if at < size:

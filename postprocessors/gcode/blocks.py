@@ -1,21 +1,19 @@
-"""Reading RS274-like text: bytes to blocks of (letter, number text), strict and quick. Shared by
-the dialects whose blocks are rows of words, one block a line.
+"""Reading RS274-like text: lines, runs of plain blocks among them, and the words of blocks.
 
-    for block in blocks_of(data, Lexing(letters="GMXYZIJF", lower_case=True)):
-        for letter, number in block.words: ...           # ("X", "-1.50"), letters always capital
+What a *block* is: a line with at least one word, apart from its number. `listing` has a program's
+blocks, counted from 0 as in `Toolpath.block`; lines are counted from 1 in messages. Lines end with
+LF, CR LF or CR, also mixed.
+
+Blocks of moves alone, thousands in a row, are offered by columns (`PlainRuns`, `PlainBlocks`) to
+readers that want them so. All other lines are read one by one: by an interpreter of the dialect's
+own over `Lines`, or, where blocks are rows of words and nothing else, by `blocks_of`:
+
+    for block in blocks_of(data, Lexing(letters="GMXYZIJF")):
+        for letter, number in block.words: ...           # ("X", "-1.50")
         block.fail("a Z beside X", word=2)               # ProgramError: block, line and column
 
-What a *block* is: a line with at least one word. `Block.index` counts them from 0 (so does
-`Toolpath.block`), `Block.line` counts lines of the file from 1; empty lines and comments are lines
-but no blocks. Lines end with LF, CR LF or CR, also mixed. N words in front are taken off
-where `Lexing.block_numbers` allows them. Columns are those of the file's own line, from 1, and
-are only worked out when something is wrong, so that words need not carry them.
-
-Blocks of moves alone, thousands in a row, are offered by columns (`PlainBlocks`) to readers that
-want them so.
-
-`Block.comments` holds the texts of the line's comments, without their delimiters; a line of
-comments alone is given too when `Lexing.comment_lines` (with no words and an index of −1).
+Columns are those of the file's own line, from 1, and are only worked out when something is wrong,
+so that words need not carry them.
 
 Writers never use this module, readers never `format.py`.
 """
@@ -58,11 +56,10 @@ SURE_PART: Final = 0.999
 
 # Possessive (++): a number is matched in one way only, so that no line costs more than its length.
 _NUMBER: Final = r"[+-]?+(?:\d++(?:\.\d*+)?|\.\d++)"
-_COMMENT: Final = re.compile(r"\(([^()]*)\)|;(.*)")
 _ODD: Final = re.compile(rb"[^\x20-\x7e\t\r\n]")
-_CONTROL: Final = re.compile(rb"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
 _BARE_RETURN: Final = re.compile(rb"\r(?!\n)")
 _LINE_END: Final = re.compile(rb"\r\n|\n|\r")
+_NO_BLANKS: Final = str.maketrans("", "", " \t")
 _NO_WORDS: Final = re.compile(r"\([^()]*\)|;.*|[ \t%]")
 _BLOCK_NUMBER: Final = re.compile(r"[Nn]\d+(?:\.\d*)?")
 
@@ -75,88 +72,33 @@ _SIGNS: Final = {
     "/": ("a block that a switch may leave out", "write it without / or remove it"),
     "%": ("a %, which is no word and frames no program here", "remove it"),
     "=": ("an assignment", "only plain numbers can be read"),
+    **dict.fromkeys("();", ("this dialect has no comments", "remove them")),
 }
 
-Blanks = Literal["anywhere", "between", "none"]
 
+class Lines:
+    """The lines of a program, counted from 0; CR alone ends one too."""
 
-@dataclass(frozen=True)
-class Lexing:
-    """What a dialect's text may hold.
+    def __init__(self, data: bytes) -> None:
+        self.data = _BARE_RETURN.sub(b"\n", data) if b"\r" in data else data
+        self.octets = np.frombuffer(self.data, dtype=np.uint8)
+        ends = np.flatnonzero(self.octets == ord("\n"))
+        self.begins: Ints = np.concatenate([[0], ends + 1])
+        self.count = len(self.begins) - int(self.begins[-1] == len(self.data))
+        """How many lines."""
 
-    `letters`: those that begin words. `lower_case`: small letters count as capitals. `blanks`:
-    spaces and tabs "anywhere" (even inside a number), "between" words (and around them), or
-    "none". `parentheses`, `semicolon`: comments of that sign. `block_numbers`: a leading N word.
-    `line_chars`: longest line; `counts_blanks`: whether blanks and comments count for it (the
-    controller may drop them as they come in). `foreign_comments`: comments may hold signs beyond
-    ASCII (grbl takes such bytes for commands, even there).
-    """
-
-    letters: str
-    lower_case: bool = False
-    blanks: Blanks = "between"
-    parentheses: bool = False
-    semicolon: bool = False
-    block_numbers: bool = False
-    line_chars: int = LINE_CHARS
-    counts_blanks: bool = True
-    comment_lines: bool = False
-    foreign_comments: bool = False
-
-
-class Block:
-    """One block: `words` [(letter, number text)], where it stands, and its `comments`."""
-
-    __slots__ = ("_lexing", "behind", "comments", "index", "line", "text", "words")
-
-    def __init__(
-        self,
-        index: int,
-        line: int,
-        text: str,
-        words: list[tuple[str, str]],
-        comments: tuple[str, ...],
-        lexing: Lexing,
-        behind: int = 0,
-    ) -> None:
-        self.index = index
-        self.line = line
-        self.behind = behind
-        """Where in the program's bytes the next line begins."""
-        self.text = text
-        """The file's own line."""
-        self.words = words
-        self.comments = comments
-        self._lexing = lexing
-
-    def column(self, word: int) -> int:
-        """Column, from 1, of a word's letter."""
-        plain = _blanked(self.text, self._lexing).upper()
-        starts = [found.start() + 1 for found in re.finditer("[A-Z]", plain)]
-        numbered = len(starts) - len(self.words)
-        return starts[word + numbered]
-
-    def fail(self, message: str, *, word: int | None = None, mend: str = "") -> NoReturn:
-        """ProgramError at this block and the column of `word` (its first one when None)."""
-        column = self.column(word or 0) if self.words else 1
-        raise ProgramError(message, where=_place(self.index, self.line, column), mend=mend)
-
-    def fail_at(
-        self, letter: str, message: str, *, number: str | None = None, mend: str = ""
-    ) -> NoReturn:
-        """ProgramError at the last word of that letter (and number text)."""
-        at = [
-            index
-            for index, (other, text) in enumerate(self.words)
-            if other == letter and number in (None, text)
-        ]
-        self.fail(message, word=at[-1] if at else None, mend=mend)
+    def text(self, number: int) -> str:
+        """A line, each byte a character."""
+        begin = int(self.begins[number])
+        last = number + 1 == len(self.begins)
+        end = len(self.data) if last else int(self.begins[number + 1]) - 1
+        return self.data[begin:end].decode("latin-1").removesuffix("\r")
 
 
 @dataclass(frozen=True, eq=False)
 class PlainBlocks:
     """N blocks in a row whose lines hold nothing but words of G X Y Z I J F, each once at most, G
-    being G0 to G3: numbers (N, 7) and facts (N, 6) of `camtool.kernels.words`; `first`: the index
+    being G0 to G3: numbers (N, 7) and facts (N, 5) of `camtool.kernels.words`; `first`: the index
     of the first of them. What a block has no word for is undefined in `numbers`."""
 
     numbers: Floats
@@ -165,10 +107,6 @@ class PlainBlocks:
 
     def __len__(self) -> int:
         return len(self.facts)
-
-    def behind(self, count: int) -> PlainBlocks:
-        """Without so many in front."""
-        return PlainBlocks(self.numbers[count:], self.facts[count:], self.first + count)
 
     def has(self, column: int) -> Bools:
         """(N,) whether a block has the word of this column."""
@@ -193,230 +131,17 @@ Take = Callable[[PlainBlocks], int]
 """Takes blocks in a row, as many as it can by columns, and says how many these are."""
 
 
-def blocks_of(data: bytes, lexing: Lexing, take: Take | None = None) -> Iterator[Block]:
-    """The blocks of a program one by one, but for those that `take` has taken; ProgramError at the
-    first that is none, and for more lines than a program may have.
-
-    Where thousands of lines in a row are plain, Python objects for each of them would be most of
-    the time; all others, and whatever `take` does not want, are given here. So `take` need not
-    know any fault: it leaves the block.
-    """
-    check_count(max(data.count(b"\n"), data.count(b"\r")), "line")
-    _check_bytes(data, lexing)
-    reader = _Lines(data, lexing)
-    at, number, index = 0, 1, 0
-    while at < len(data):
-        if take is not None:
-            plain, at, number = reader.plain(at, number, index)
-            done, alone = 0, 1
-            while done < len(plain):
-                taken = take(plain.behind(done)) if len(plain) - done >= LEAST_RUN else 0
-                done += taken
-                # Where nothing is taken it is asked less and less often.
-                alone = 1 if taken else 2 * alone
-                for begin, line in plain.facts[done : done + alone, words.BEGIN :].tolist():
-                    block, _ = reader.block(begin, line, index + done)
-                    done += 1
-                    if block is not None:
-                        yield block
-            index += len(plain)
-        if at < len(data):
-            block, at = reader.block(at, number, index)
-            number += 1
-            if block is not None:
-                index += len(block.words) > 0
-                yield block
-
-
-class _Lines:
-    """The lines of a program, read from any of them on."""
-
-    def __init__(self, data: bytes, lexing: Lexing) -> None:
-        self._data, self._lexing = data, lexing
-        self._line_of_words, self._word = _patterns(lexing)
-        self._numbers = np.empty((0, 7))
-        self._facts = np.empty((0, words.FACT_COLUMNS), dtype=np.int64)
-        self._rules = (
-            lexing.line_chars,
-            lexing.lower_case,
-            lexing.block_numbers,
-            lexing.parentheses,
-            lexing.semicolon,
-        )
-
-    def plain(self, at: int, number: int, index: int) -> tuple[PlainBlocks, int, int]:
-        """The plain blocks from the line of this number on, which begins at `at`; and where they
-        end, in which line. They are good until the next are read."""
-        if not len(self._facts):
-            self._numbers = np.zeros((ROWS_AT_ONCE, 7))
-            self._facts = np.empty((ROWS_AT_ONCE, words.FACT_COLUMNS), dtype=np.int64)
-        octets = np.frombuffer(self._data, dtype=np.uint8)
-        rows, at, number = words.plain_lines(
-            octets, at, number, self._rules, self._numbers, self._facts
-        )
-        return PlainBlocks(self._numbers[:rows], self._facts[:rows], index), at, number
-
-    def block(self, at: int, number: int, index: int) -> tuple[Block | None, int]:
-        """The block in the line of this number, which begins at `at`, or a line of comments alone
-        where these are wanted; and where the next line begins."""
-        lexing = self._lexing
-        end = _LINE_END.search(self._data, at)
-        stop, behind = end.span() if end else (len(self._data), len(self._data))
-        raw = text = self._data[at:stop].decode("latin-1")
-        comments: tuple[str, ...] = ()
-        if "(" in text or ";" in text or ")" in text:
-            comments = _comments(raw, index, number, lexing)
-            text = _blanked(text, lexing)
-        if lexing.lower_case and text.isascii():
-            text = text.upper()
-        if lexing.blanks == "anywhere":
-            text = text.replace(" ", "").replace("\t", "")
-        if len(raw if lexing.counts_blanks else text) > lexing.line_chars:
-            message = f"the line has more than {lexing.line_chars} characters"
-            raise _error(message, index, number, lexing.line_chars + 1, "shorten it")
-        if not text.isascii() or self._line_of_words.fullmatch(text) is None:
-            raise _fault(raw, index, number, lexing)
-        found: list[tuple[str, str]] = self._word.findall(text)
-        if found and found[0][0] == "N" and lexing.block_numbers:
-            del found[0]
-        if found:
-            return Block(index, number, raw, found, comments, lexing, behind), behind
-        if comments and lexing.comment_lines:
-            return Block(-1, number, raw, found, comments, lexing, behind), behind
-        return None, behind
-
-
-def _patterns(lexing: Lexing) -> tuple[re.Pattern[str], re.Pattern[str]]:
-    """(the whole line, one word) as compiled patterns."""
-    known = re.escape(lexing.letters)
-    blank = r"[ \t]*+" if lexing.blanks == "between" else ""
-    numbered = rf"(?>(?:N\d++(?:\.\d*+)?{blank})?)" if lexing.block_numbers else ""
-    line = rf"{blank}{numbered}(?>(?:[{known}]{_NUMBER}{blank})*)"
-    letters = known + ("N" if lexing.block_numbers else "")
-    return re.compile(line), re.compile(rf"([{letters}])({_NUMBER})")
-
-
-def _check_bytes(data: bytes, lexing: Lexing) -> None:
-    """ProgramError at the first byte that is no printable ASCII, tab or line end.
-
-    Where comments may hold other signs, each of their bytes stands as one: columns count bytes.
-    """
-    odd = (_CONTROL if lexing.foreign_comments else _ODD).search(data)
-    if odd:
-        before = _LINE_END.split(data[: odd.start()])
-        raise ProgramError(
-            f"the byte 0x{data[odd.start()]:02x} belongs to no program",
-            where=f"line {len(before)}, column {len(before[-1]) + 1}",
-            mend="give a program of plain ASCII text",
-        )
-
-
-def _place(index: int, line: int, column: int) -> str:
-    """Block and line from 1."""
-    return f"block {index + 1}, line {line}, column {column}"
-
-
-def _error(message: str, index: int, line: int, column: int, mend: str = "") -> ProgramError:
-    return ProgramError(message, where=_place(index, line, column), mend=mend)
-
-
-def _blanked(text: str, lexing: Lexing) -> str:
-    """The line with blanks in place of its comments: columns stay."""
-    if not (lexing.parentheses or lexing.semicolon):
-        return text
-    return _COMMENT.sub(lambda found: " " * len(found[0]), text)
-
-
-def _comments(raw: str, index: int, line: int, lexing: Lexing) -> tuple[str, ...]:
-    """The texts of a line's comments; ProgramError where the dialect has none, and for
-    parentheses that are nested or not closed."""
-    found = list(_COMMENT.finditer(raw))
-    for one in found:
-        if not (lexing.semicolon if one[1] is None else lexing.parentheses):
-            raise _error(
-                "this dialect has no comments", index, line, one.start() + 1, "remove them"
-            )
-    rest = _COMMENT.sub(lambda one: " " * len(one[0]), raw)
-    odd = re.search(r"[()]", rest)
-    if odd:
-        message = "a comment that is nested or not closed"
-        raise _error(
-            message, index, line, odd.start() + 1, "write one ( and one ) for each comment"
-        )
-    texts = (one[2] if one[1] is None else one[1] for one in found)
-    return tuple(text.encode("latin-1").decode("utf-8", errors="replace") for text in texts)
-
-
-def _fault(raw: str, index: int, line: int, lexing: Lexing) -> ProgramError:
-    """Why a line is no row of words: the first place where it stops being one."""
-    text = _blanked(raw, lexing)
-    text = text.upper() if lexing.lower_case else text
-    if lexing.blanks == "anywhere":
-        kept = [at for at, sign in enumerate(text) if sign not in " \t"]
-    else:
-        kept = list(range(len(text)))
-    packed = "".join(text[at] for at in kept)
-    blank = r"[ \t]*+" if lexing.blanks == "between" else ""
-    numbered = rf"(?>(?:N\d++(?:\.\d*+)?{blank})?)" if lexing.block_numbers else ""
-    head = re.compile(rf"{blank}{numbered}(?>(?:[{re.escape(lexing.letters)}]{_NUMBER}{blank})*)")
-    match = head.match(packed)
-    at = match.end() if match else 0
-    message, mend, more = _explained(packed[at:], packed[:at], lexing)
-    return _error(message, index, line, kept[at + more] + 1, mend)
-
-
-def _explained(rest: str, before: str, lexing: Lexing) -> tuple[str, str, int]:
-    """(message, mend, characters to pass over) for text that begins with no word."""
-    sign, behind = rest[0], rest[1:].lstrip()
-    shown = repr(rest[:SHOWN_CHARS])
-    if sign in lexing.letters:
-        wrong = re.match(r"[+-]?", rest[1:])
-        past = 1 + (wrong.end() if wrong else 0)
-        past = past if past < len(rest) else 0
-        return f"no number after {sign}", "digits, with a point if need be, follow a letter", past
-    if sign in _SIGNS:
-        return _SIGNS[sign][0], _SIGNS[sign][1], 0
-    if sign in " \t":
-        return f"a blank within the block, before {behind[:SHOWN_CHARS]!r}", "remove it", 0
-    if sign.islower() and sign.upper() in lexing.letters:
-        return "this controller takes no small letters", "write capital letters", 0
-    if sign == "N" and before.strip() == "" and lexing.block_numbers:
-        return "a block number is digits only", "write N10", 0
-    if sign.isalpha():
-        return f"the letter {sign} is no word here", f"known letters: {lexing.letters}", 0
-    if sign.isdigit() or sign in ".+-":
-        return f"a number without its letter, {shown}", "each number has one letter before it", 0
-    return f"{sign!r} begins no word", "remove it", 0
-
-
-class Lines:
-    """The lines of a program, counted from 0; CR alone ends one too."""
-
-    def __init__(self, data: bytes) -> None:
-        self.data = _BARE_RETURN.sub(b"\n", data) if b"\r" in data else data
-        self.octets = np.frombuffer(self.data, dtype=np.uint8)
-        ends = np.flatnonzero(self.octets == ord("\n"))
-        self.begins: Ints = np.concatenate([[0], ends + 1])
-        self.count = len(self.begins) - int(self.begins[-1] == len(self.data))
-        """How many lines."""
-
-    def text(self, number: int) -> str:
-        """A line, each byte a character."""
-        begin = int(self.begins[number])
-        last = number + 1 == len(self.begins)
-        end = len(self.data) if last else int(self.begins[number + 1]) - 1
-        return self.data[begin:end].decode("latin-1").removesuffix("\r")
-
-
 class PlainRuns:
-    """Runs of plain lines, as they are met: where lines are not plain, it is asked less and less
-    often. `rules` are those of `words.plain_lines`."""
+    """Runs of plain lines, as they are met: where lines are not plain, or few of them are taken,
+    it is asked less and less often; and twice as many are offered at most as were taken before.
+    `rules` are those of `words.plain_lines`."""
 
     def __init__(self, lines: Lines, rules: tuple[int, bool, bool, bool, bool]) -> None:
         self._lines, self._rules = lines, rules
         self._numbers = np.zeros((0, 7))
         self._facts = np.empty((0, words.FACT_COLUMNS), dtype=np.int64)
         self._wait, self._waited = 1, 0
+        self._most = ROWS_AT_ONCE
 
     def run(self, number: int, index: int, take: Take) -> tuple[int, int]:
         """Have plain lines from this one on taken, the first of which is the block of this index:
@@ -429,16 +154,144 @@ class PlainRuns:
             self._numbers = np.zeros((ROWS_AT_ONCE, 7))
             self._facts = np.empty((ROWS_AT_ONCE, words.FACT_COLUMNS), dtype=np.int64)
         begin = int(self._lines.begins[number])
+        numbers, facts = self._numbers[: self._most], self._facts[: self._most]
         rows, _, behind = words.plain_lines(
-            self._lines.octets, begin, number + 1, self._rules, self._numbers, self._facts
+            self._lines.octets, begin, number + 1, self._rules, numbers, facts
         )
         count = 0
         if rows >= LEAST_RUN:
-            count = take(PlainBlocks(self._numbers[:rows], self._facts[:rows], index))
-        self._wait = 1 if count else min(2 * self._wait, LONGEST_WAIT)
+            count = take(PlainBlocks(numbers[:rows], facts[:rows], index))
+        self._wait = 1 if count >= LEAST_RUN else min(2 * self._wait, LONGEST_WAIT)
+        self._most = min(2 * max(count, LEAST_RUN), ROWS_AT_ONCE)
         if not count:
             return 0, number
-        return count, behind - 1 if count == rows else int(self._facts[count, words.LINE]) - 1
+        return count, behind - 1 if count == rows else int(facts[count, words.LINE]) - 1
+
+
+@dataclass(frozen=True)
+class Lexing:
+    """What a dialect's text may hold whose blocks are rows of words, without comments and block
+    numbers.
+
+    `letters`: those that begin words, capitals only. `blanks`: spaces and tabs "anywhere" (even
+    inside a number), or "between" words (and around them). `line_chars`: longest line.
+    """
+
+    letters: str
+    blanks: Literal["anywhere", "between"] = "between"
+    line_chars: int = LINE_CHARS
+
+
+class Block:
+    """One block: `words` [(letter, number text)], and where it stands."""
+
+    __slots__ = ("index", "line", "text", "words")
+
+    def __init__(self, index: int, line: int, text: str, words: list[tuple[str, str]]) -> None:
+        self.index = index
+        self.line = line
+        self.text = text
+        """The file's own line."""
+        self.words = words
+
+    def column(self, word: int) -> int:
+        """Column, from 1, of a word's letter."""
+        return [found.start() + 1 for found in re.finditer("[A-Z]", self.text)][word]
+
+    def fail(self, message: str, *, word: int | None = None, mend: str = "") -> NoReturn:
+        """ProgramError at this block and the column of `word` (its first one when None)."""
+        raise _error(message, self.index, self.line, self.column(word or 0), mend)
+
+
+def blocks_of(data: bytes, lexing: Lexing, take: Take | None = None) -> Iterator[Block]:
+    """The blocks of a program one by one, but for those that `take` has taken; ProgramError at the
+    first that is none, and for more lines than a program may have.
+
+    Where thousands of lines in a row are plain, Python objects for each of them would be most of
+    the time; all others, and whatever `take` does not want, are given here. So `take` need not
+    know any fault: it leaves the block.
+    """
+    check_count(max(data.count(b"\n"), data.count(b"\r")), "line")
+    check_ascii(data)
+    lines = Lines(data)
+    runs = PlainRuns(lines, (lexing.line_chars, False, False, False, False))
+    row_of_words, word = _patterns(lexing)
+    number, index = 0, 0
+    while number < lines.count:
+        if take is not None:
+            count, number = runs.run(number, index, take)
+            index += count
+            if count:
+                continue
+        text = lines.text(number)
+        number += 1
+        if len(text) > lexing.line_chars:
+            text = text[: lexing.line_chars]
+            if not set("();") & set(text):  # to shorten a comment would be no mend
+                message = f"the line has more than {lexing.line_chars} characters"
+                raise _error(message, index, number, lexing.line_chars + 1, "shorten it")
+        packed = text.translate(_NO_BLANKS) if lexing.blanks == "anywhere" else text
+        if row_of_words.fullmatch(packed) is None:
+            raise _fault(text, index, number, lexing)
+        found: list[tuple[str, str]] = word.findall(packed)
+        if found:
+            yield Block(index, number, text, found)
+            index += 1
+
+
+def check_ascii(data: bytes) -> None:
+    """ProgramError at the first byte that is no printable ASCII, tab or line end."""
+    odd = _ODD.search(data)
+    if odd:
+        before = _LINE_END.split(data[: odd.start()])
+        raise ProgramError(
+            f"the byte 0x{data[odd.start()]:02x} belongs to no program",
+            where=f"line {len(before)}, column {len(before[-1]) + 1}",
+            mend="give a program of plain ASCII text",
+        )
+
+
+def _patterns(lexing: Lexing) -> tuple[re.Pattern[str], re.Pattern[str]]:
+    """(a row of words, one word) as compiled patterns, for lines from which blanks are taken out
+    where they may stand anywhere."""
+    letters = re.escape(lexing.letters)
+    blank = r"[ \t]*+" if lexing.blanks == "between" else ""
+    row = rf"{blank}(?>(?:[{letters}]{_NUMBER}{blank})*)"
+    return re.compile(row), re.compile(rf"([{letters}])({_NUMBER})")
+
+
+def _error(message: str, index: int, line: int, column: int, mend: str) -> ProgramError:
+    where = f"block {index + 1}, line {line}, column {column}"
+    return ProgramError(message, where=where, mend=mend)
+
+
+def _fault(raw: str, index: int, line: int, lexing: Lexing) -> ProgramError:
+    """Why a line is no row of words: the first place where it stops being one."""
+    kept = [at for at, sign in enumerate(raw) if lexing.blanks == "between" or sign not in " \t"]
+    packed = "".join([raw[at] for at in kept])
+    row = _patterns(lexing)[0].match(packed)
+    at = row.end() if row else 0
+    message, mend, more = _explained(packed[at:], lexing)
+    return _error(message, index, line, kept[at + more] + 1, mend)
+
+
+def _explained(rest: str, lexing: Lexing) -> tuple[str, str, int]:
+    """(message, mend, characters to pass over) for text that begins with no word."""
+    sign, shown = rest[0], repr(rest[:SHOWN_CHARS])
+    if sign in lexing.letters:
+        wrong = re.match(r"[+-]?", rest[1:])
+        past = 1 + (wrong.end() if wrong else 0)
+        past = past if past < len(rest) else 0
+        return f"no number after {sign}", "digits, with a point if need be, follow a letter", past
+    if sign in _SIGNS:
+        return _SIGNS[sign][0], _SIGNS[sign][1], 0
+    if sign.islower() and sign.upper() in lexing.letters:
+        return "this controller takes no small letters", "write capital letters", 0
+    if sign.isalpha():
+        return f"the letter {sign} is no word here", f"known letters: {lexing.letters}", 0
+    if sign.isdigit() or sign in ".+-":
+        return f"a number without its letter, {shown}", "each number has one letter before it", 0
+    return f"{sign!r} begins no word", "remove it", 0
 
 
 def listing(data: bytes) -> Listing:

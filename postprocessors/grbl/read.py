@@ -22,7 +22,7 @@ from camtool.kernels import words
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 
-from ..gcode.blocks import Lines, PlainBlocks, PlainRuns, has_words
+from ..gcode.blocks import Lines, PlainBlocks, PlainRuns, check_ascii, has_words
 from ..gcode.faults import Fault
 from ..gcode.findings import (
     SPINDLE_SPEED_NOT_SAID,
@@ -48,23 +48,13 @@ SLOW_GUARD: Final = 1e-6
 ROWS_AT_ONCE: Final = 1 << 14
 """So many moves are compared with the slowest feed at a time."""
 
-ODD: Final = re.compile(rb"[^\x20-\x7e\t\r\n]")
-"""Bytes above 7F are commands to grbl, wherever they stand; others belong to no text."""
-
 COMMENT: Final = re.compile(r"\([^)]*\)?|;.*")
 
 
 def read_program(data: bytes, machine: GrblMachine) -> Toolpath:
     """The moves of a program; ProgramError with block, line and column, and grbl's error."""
     bounds.check_count(max(data.count(b"\n"), data.count(b"\r")), "line")
-    odd = ODD.search(data)
-    if odd is not None:
-        before = re.split(rb"\r\n|\n|\r", data[: odd.start()])
-        raise ProgramError(
-            f"the byte 0x{data[odd.start()]:02x} belongs to no program",
-            where=f"line {len(before)}, column {len(before[-1]) + 1}",
-            mend="give a program of plain ASCII text",
-        )
+    check_ascii(data)  # bytes above 7F are commands to grbl, wherever they stand
     path = _Reader(data, machine).read()
     return replace(path, findings=(*path.findings, *_too_slow(path, machine)))
 

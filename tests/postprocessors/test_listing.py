@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from camtool_postprocessors.gcode.blocks import Lexing, blocks_of
 from camtool_postprocessors.gcode.blocks import listing as lines_of
 
 from camtool.target.registry import LoadedTarget, load_target, target_names
@@ -170,17 +169,30 @@ def test_a_stream_is_listed_as_it_is_sent(settings: tuple[str, ...]) -> None:
         assert [*numbers[2:4], *numbers[6:8]] == [lx[index], ly[index], vx[index], vy[index]]
 
 
+FREE_TEXT = b"\n\n(a G1 X1)\r\nG1 X1 F9 ; Y2\r N10\nN1.5\nn20 g0Z3\n ;X\n(x)(y) M30\n"
+FREE_BLOCKS = ("G1 X1 F9 ; Y2", "n20 g0Z3", "(x)(y) M30")
+
+
 def test_lines_without_a_word_are_no_blocks() -> None:
-    text = b"\n\n(a G1 X1)\r\nG1 X1 ; Y2\r N10\nN1.5\nN20 G0Z3\n ;X\n(x)(y) M30\n"
-    lexing = Lexing(
-        letters="GMXYZ",
-        parentheses=True,
-        semicolon=True,
-        block_numbers=True,
-    )
-    assert lines_of(text).blocks == tuple(b.text.strip() for b in blocks_of(text, lexing))
-    assert lines_of(b"%\n" + text + b"%\n").blocks == lines_of(text).blocks
-    assert lines_of(text).blocks == ("G1 X1 ; Y2", "N20 G0Z3", "(x)(y) M30")
+    assert lines_of(FREE_TEXT).blocks == FREE_BLOCKS
+    assert lines_of(b"%\n" + FREE_TEXT + b"%\n").blocks == FREE_BLOCKS
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("grbl", FREE_TEXT),
+        ("linuxcnc", FREE_TEXT),
+        ("linuxcnc", b"%\n" + FREE_TEXT + b"%\n"),
+        ("flashcut", b"\n \t\nG01 X1.0 Y0.0 F3.0\r\rG00 Z3.0\r\n  \nM30\n\n"),
+        ("valcnc", b"\n \nG01 X.125Y0Z0\r\r G00 X . 125 Y0 Z.375\r\n  \nG01 X1 Y0 Z.375\n\n"),
+    ],
+)
+def test_readers_count_the_blocks_that_are_listed(name: str, text: bytes) -> None:
+    toolpath, listing = listed(text, load_target(name))
+    assert len(listing.blocks) == 3
+    assert toolpath.block.tolist() == [0, 1, 2]
+    assert toolpath.end[:2].ravel() == pytest.approx([1.0, 0.0, 0.0, 1.0, 0.0, 3.0])
 
 
 def test_packets_are_listed_in_hex_by_record() -> None:
