@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from camtool.findings import INFO, WARNING, Code, Sentence
+from camtool.findings import INFO, WARNING, Code, Sentence, TargetCode
 
 FEED_ROUNDED = Sentence(
     Code.FEED_ROUNDED,
@@ -82,3 +82,14 @@ NEVER_READ = Sentence(
     "never reads",
     "lines",
 )
+
+
+def simulated_as_chords(code: TargetCode) -> Sentence:
+    """The sentence of a target's own code for arcs that are not in XY."""
+    return Sentence(
+        code,
+        "{measured:# arc|# arcs} in XZ or YZ {measured:is|are} simulated as chords that stray by "
+        "no more than 0.0001 mm",
+        "arcs",
+        INFO,
+    )

@@ -16,6 +16,7 @@ from camtool.arrays import Bools, Floats
 from camtool.findings import Finding
 from camtool.kernels import words
 from camtool.machine.model import exceeds
+from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind
 
 from .blocks import SURE_PART, PlainBlocks, filled
@@ -60,6 +61,7 @@ class PlainMoves:
     one by one too; the others are not to be used."""
 
     def __init__(self, plain: PlainBlocks, state: PlainState, rule: ArcRule) -> None:
+        self._plain = plain
         has_g, has_feed = plain.has(words.G_WORD), plain.has(words.F_WORD)
         has = [plain.has(column) for column in (words.X_WORD, words.Y_WORD, words.Z_WORD)]
         has_i, has_j = plain.has(words.I_WORD), plain.has(words.J_WORD)
@@ -96,6 +98,31 @@ class PlainMoves:
             sure[arcs] &= (has[0] | has[1])[arcs]
         sure[arcs] &= sure_arcs(start[arcs, :2], self.end[arcs, :2], self.centre[arcs], rule)
         self.count = len(sure) if sure.all() else int(sure.argmin())
+
+    def add_to(self, path: ToolpathBuilder, fast: FastFeeds) -> bool:
+        """Add the rows of the sure ones, of which there is one at least, to a path; whether any
+        moves. Their feeds are noted."""
+        some = slice(self.count)
+        rows, feeds = self.moving[some], self.feed[some]
+        given = self._plain.has(words.F_WORD)[some]
+        fast.note(self._plain.first, np.where(given, feeds, np.nan))
+        if not rows.any():
+            return False
+        kind = self.motion[some][rows]
+        path.moves(
+            kind=KINDS[kind],
+            end=self.end[some][rows],
+            centre=np.where(kind[:, None] > LINE, self.centre[some][rows], np.nan),
+            feed=np.where(kind >= LINE, feeds[rows], np.nan),
+            block=self._plain.first + np.flatnonzero(rows),
+        )
+        return True
+
+    @property
+    def last(self) -> tuple[int | None, float]:
+        """The motion (tenfold, None: none) and the feed in force behind the sure ones."""
+        motion = int(self.motion[self.count - 1])
+        return (motion if motion >= 0 else None), float(self.feed[self.count - 1])
 
 
 def sure_arcs(start: Floats, end: Floats, centre: Floats, rule: ArcRule) -> Bools:

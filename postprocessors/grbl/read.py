@@ -18,7 +18,6 @@ import numpy as np
 from camtool import bounds
 from camtool.errors import ProgramError
 from camtool.findings import Finding
-from camtool.kernels import words
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 
@@ -29,7 +28,7 @@ from ..gcode.findings import (
     WORDS_PASSED_OVER_COOLANT,
     WORDS_PASSED_OVER_PAUSE,
 )
-from ..gcode.plain_moves import KINDS, ArcRule, FastFeeds, PlainMoves, PlainState
+from ..gcode.plain_moves import ArcRule, FastFeeds, PlainMoves, PlainState
 from .dialect import Dialect, GrblController, GrblMachine
 from .findings import (
     FEED_TOO_SLOW,
@@ -140,24 +139,12 @@ class _Reader:
         mm = 25.4 if parser.modes.inches else 1.0
         x, y, z = parser.position
         moves = PlainMoves(plain, PlainState(motion, parser.feed, mm, (x, y, z)), self._rule)
-        count = moves.count
-        if not count:
-            return 0
-        rows, feeds = moves.moving[:count], moves.feed[:count]
-        self._fast.note(plain.first, np.where(plain.has(words.F_WORD)[:count], feeds, np.nan))
-        if rows.any():
-            kind = moves.motion[:count][rows]
-            parser.moves.moved = True
-            path.moves(
-                kind=KINDS[kind],
-                end=moves.end[:count][rows],
-                centre=np.where(kind[:, None] > 10, moves.centre[:count][rows], np.nan),
-                feed=np.where(kind >= 10, feeds[rows], np.nan),
-                block=plain.first + np.flatnonzero(rows),
-            )
-        last = int(moves.motion[count - 1])
-        parser.went_on(last // 10 if last >= 0 else None, float(feeds[-1]), path.position)
-        return count
+        if moves.count:
+            moved = moves.add_to(path, self._fast)
+            parser.moves.moved = parser.moves.moved or moved
+            last, feed = moves.last
+            parser.went_on(None if last is None else last // 10, feed, path.position)
+        return moves.count
 
     def _findings(self) -> Iterator[Finding]:
         notes = self.notes

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from camtool.findings import ERROR, INFO, WARNING, Code, Sentence, TargetCode
 
+from ..gcode.findings import simulated_as_chords
+
 NOT_SIMULATED = TargetCode(
     "linuxcnc.NOT_SIMULATED",
     (WARNING, INFO),
@@ -60,13 +62,7 @@ NOT_SIMULATED_DELETED = Sentence(
     "{count:it is|they are} {how} here (dialect.block_delete)",
     severity=WARNING,
 )
-NOT_SIMULATED_CHORDS = Sentence(
-    NOT_SIMULATED,
-    "{measured:# arc|# arcs} in XZ or YZ {measured:is|are} simulated as chords that stray by no "
-    "more than 0.0001 mm",
-    "arcs",
-    INFO,
-)
+NOT_SIMULATED_CHORDS = simulated_as_chords(NOT_SIMULATED)
 PLACE_UNKNOWN_FRAME = Sentence(
     PLACE_UNKNOWN,
     "the program changes to the work frame {frame}, whose place only the machine knows: what it "

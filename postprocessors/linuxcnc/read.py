@@ -21,7 +21,6 @@ import numpy as np
 from camtool import bounds
 from camtool.errors import ProgramError
 from camtool.findings import Finding
-from camtool.kernels import words
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
 
@@ -33,7 +32,7 @@ from ..gcode.findings import (
     WORDS_PASSED_OVER_COOLANT,
     WORDS_PASSED_OVER_PAUSE,
 )
-from ..gcode.plain_moves import KINDS, ArcRule, FastFeeds, PlainMoves, PlainState
+from ..gcode.plain_moves import ArcRule, FastFeeds, PlainMoves, PlainState
 from .dialect import Dialect, LinuxcncMachine
 from .findings import (
     NOT_SIMULATED_AGAIN,
@@ -175,27 +174,11 @@ class _Reader:
         position = machine.canon.near(machine.canon.part(*machine.position))
         state = PlainState(motion, machine.feed_mm, mm, position)
         moves = PlainMoves(plain, state, self._rule)
-        count = moves.count
-        if not count:
-            return 0
-        rows = moves.moving[:count]
-        given, feeds = plain.has(words.F_WORD)[:count], moves.feed[:count]
-        self._fast.note(plain.first, np.where(given, feeds, np.nan))
-        path.source = self.flow.caller if self.flow.level else ""
-        if rows.any():
-            kind = moves.motion[:count][rows]
-            path.moves(
-                kind=KINDS[kind],
-                end=moves.end[:count][rows],
-                centre=np.where(kind[:, None] > 10, moves.centre[:count][rows], np.nan),
-                feed=np.where(kind >= 10, feeds[rows], np.nan),
-                block=plain.first + np.flatnonzero(rows),
-            )
-        last = int(moves.motion[count - 1])
-        machine.went_on(
-            last if last >= 0 else None, float(feeds[-1]), path.position, moved=bool(rows.any())
-        )
-        return count
+        if moves.count:
+            path.source = self.flow.caller if self.flow.level else ""
+            moved = moves.add_to(path, self._fast)
+            machine.went_on(*moves.last, path.position, moved=moved)
+        return moves.count
 
     # What is said of the program
 
