@@ -42,13 +42,6 @@ class Canon(PartMoves):
         self.nose: tuple[float, float] = (0.0, 0.0)
         """Where the controlled point of a lathe tool lies from the centre of its nose: X, Z."""
 
-    def when_due(self, call: Callable[[], None]) -> None:
-        """An event: now, or behind the moves that wait."""
-        if self.queue:
-            self.queue.append(call)
-        else:
-            call()
-
     def event(self, kind: Kind, value: float | None = None) -> None:
         """A row of an event, when it is due."""
         block = self.path.block

@@ -35,11 +35,6 @@ MOST_PASSES: Final = 100_000
 """Passes of one thread."""
 
 
-def is_cycle(motion: int | None) -> bool:
-    """Whether a motion is a cycle (tenfold)."""
-    return motion in (730, 740) or (motion is not None and 800 < motion < 900)
-
-
 @dataclass
 class _Hole:
     """One hole, in (first, second, normal) of the plane."""

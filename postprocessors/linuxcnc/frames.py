@@ -8,6 +8,7 @@ Frames and homes are stored in parameters, in the units of the machine.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Final
 
@@ -33,7 +34,7 @@ OFFSETS: Final = 5211
 """The parameters of G92 begin here, behind the one that says whether it is in force."""
 
 
-class Frames(State):
+class Frames(State, ABC):
     """The state, and what moves its frame."""
 
     def __init__(self, machine: LinuxcncMachine, path: ToolpathBuilder, notes: Notes) -> None:
@@ -45,9 +46,9 @@ class Frames(State):
         )
         self._use_frame(1)
 
+    @abstractmethod
     def _names(self) -> dict[str, Callable[[], float]]:
         """The names by which expressions ask for the state."""
-        raise NotImplementedError
 
     def _known_parameters(self) -> dict[int, float]:
         """What the machine has stored, in its units: frames, homes, offsets."""
