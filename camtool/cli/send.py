@@ -200,7 +200,7 @@ class _Job:
 
     def _watch(self, conversation: Conversation) -> None:
         """Show where it stands, when that has changed."""
-        from camtool.sending.prepare import clock
+        from camtool.verification.report import clock
 
         block = (
             self.one.block_of(self.one.packets[conversation.acknowledged - 1].block)

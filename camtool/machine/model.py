@@ -298,6 +298,11 @@ class Machine(
         return hashlib.sha256(given).hexdigest()
 
     @property
+    def mark(self) -> str:
+        """So much of the digest stands in programs: eight hexadecimal digits."""
+        return self.digest[:8]
+
+    @property
     def max_feed_mm_min(self) -> float:
         """Highest feed, mm/min: the lowest of the limits that are given; inf where none is.
 

@@ -17,12 +17,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from camtool.errors import MachineError, OptionError, PostError, ProgramError
+from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.pipeline import read_program, verify_program
 from camtool.sending.line import Port
 from camtool.simulation.motion import Options
 from camtool.target.wire import Forecast, NoWire, Packet, Wire
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import COLUMNS, Kind, Toolpath, toolpath_extents
+from camtool.verification.report import clock
 
 if TYPE_CHECKING:
     from camtool.progress import Progress
@@ -35,9 +37,6 @@ comments."""
 
 HEAD = 4096
 """It stands within so many bytes of their beginning."""
-
-SAME_MM = 1e-6
-"""Two places that are nearer than this, beyond the resolution of the dialect, are one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,11 +96,11 @@ def port_of(name: str, baud: int | None, wire: Wire, target: LoadedTarget) -> Po
 def check_settings(data: bytes, target: LoadedTarget, file: str) -> None:
     """ProgramError for a program that says that it was written for other values of the machine."""
     said = _SETTINGS.search(data[:HEAD])
-    if said is None or said[1].decode() == target.machine.digest[:8]:
+    if said is None or said[1].decode() == target.machine.mark:
         return
     raise ProgramError(
         f"was written for another machine file (settings {said[1].decode()}, the machine has "
-        f"{target.machine.digest[:8]})",
+        f"{target.machine.mark})",
         file=file,
         mend="post it again for this machine, or give the machine file it was made with",
     )
@@ -255,9 +254,9 @@ def _same_end(wanted: Toolpath, again: Toolpath, target: LoadedTarget, first: in
         arcs = wanted.is_arc[moves]
         centres = np.nan_to_num(np.abs(wanted.centre[moves] - again.centre[tail])).max(initial=0.0)
         same = (
-            (np.abs(one - other) <= slack + SAME_MM).all()
+            (np.abs(one - other) <= slack + POSITION_EPS_MM).all()
             and (wanted.kind[moves] == again.kind[tail]).all()
-            and (not arcs.any() or centres <= float(slack.max()) + SAME_MM)
+            and (not arcs.any() or centres <= float(slack.max()) + POSITION_EPS_MM)
         )
         if same:
             return int(tail[0])
@@ -320,9 +319,3 @@ def _spindle(decoded: Toolpath, target: LoadedTarget) -> list[str]:
     if target.target.starts_spindle and spindle.switched == "program":
         return ["the program does not start it"]
     return []
-
-
-def clock(seconds: float) -> str:
-    """3:22:13."""
-    whole = round(seconds)
-    return f"{whole // 3600}:{whole // 60 % 60:02d}:{whole % 60:02d}"

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib.metadata import version
-from typing import Final
 
 import numpy as np
 
@@ -22,9 +21,6 @@ from camtool.toolpath.wanted import TOOL_SHAPES, OperationNote, Operations, Tool
 
 from .dialect import UNITS, GcodeDialect, Unit
 from .format import COMMENT_CHARS, NumberStyle, comment, format_column
-
-DIGEST: Final = 8
-"""So many hexadecimal digits of the machine's digest stand in a program."""
 
 Lines = Callable[[int], str]
 """The text of the k-th line."""
@@ -40,9 +36,7 @@ def header(toolpath: Toolpath, machine: Machine, dialect: GcodeDialect) -> list[
         f"{axis} {' to '.join(format_column(reach, style))}"
         for axis, reach in zip("XYZ", toolpath_extents(toolpath), strict=True)
     ]
-    made = (
-        [toolpath.made_from, f"settings {machine.digest[:DIGEST]}"] if toolpath.made_from else []
-    )
+    made = [toolpath.made_from, f"settings {machine.mark}"] if toolpath.made_from else []
     lines = [
         f"camtool {version('camtool')} for {machine.target.name}: {machine.target.title}",
         *made,
