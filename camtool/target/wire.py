@@ -26,7 +26,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from camtool.errors import CamtoolError, MachineError
+from camtool.errors import MachineError
 from camtool.machine.model import Machine
 
 if TYPE_CHECKING:
@@ -34,12 +34,6 @@ if TYPE_CHECKING:
     from camtool.toolpath.moves import Toolpath
 
 Place = tuple[float, float, float]
-
-
-class WireError(CamtoolError):
-    """A conversation with a controller that failed; exit code 1: the part is not finished."""
-
-    exit_code = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +114,6 @@ Action = Write | Reopen | Tell
 
 NEVER = math.inf
 """The time of what does not happen by itself, s."""
-
 
 LATE_S = 0.05
 """How late a port and its cable may deliver what was written, s."""
@@ -238,9 +231,9 @@ class PacketByPacket(Conversation):
         self._failing = ""
         """Why it fails, while the machine is being stopped."""
 
+    @abstractmethod
     def _send(self, packet: Packet, now: float) -> None:
         """Write a packet, and set `next_s`."""
-        raise NotImplementedError
 
     def _halt(self, now: float) -> bool:
         """Stop the machine within a packet; False where the protocol cannot."""
@@ -356,14 +349,6 @@ class Wire(ABC):
             f"{machine.target.name} has no command to {action} over its line",
             mend="do it at the machine",
         )
-
-    def explained(self, said: str) -> str:
-        """What a line of the controller means, "" where that is not known."""
-        return ""
-
-    def typed(self, line: str) -> bytes:
-        """The bytes for a line that the user types."""
-        return line.encode("latin-1", "replace") + b"\n"
 
 
 @dataclass(frozen=True)

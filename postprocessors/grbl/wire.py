@@ -174,24 +174,6 @@ class GrblWire(Wire):
         line = f"$J=G91G21{axes}F{values['feed']:.1f}"
         return GrblConversation((), machine, manner, (line.encode(),))
 
-    def explained(self, said: str) -> str:
-        """The meaning of an error, an alarm, or a state."""
-        said = said.strip()
-        for begin, meanings in (("error:", ERRORS), ("ALARM:", ALARMS)):
-            number = said.removeprefix(begin)
-            if said.startswith(begin) and number.isdigit():
-                return meanings.get(int(number), "")
-        status = _STATUS.fullmatch(said)
-        return STATES.get(status[1], "") if status else ""
-
-    def typed(self, line: str) -> bytes:
-        """A line, or one of the single signs that grbl obeys at once."""
-        if line in ("?", "!", "~"):
-            return line.encode()
-        if line.lower() in ("^x", "reset"):
-            return RESET
-        return line.encode("ascii", "replace") + b"\n"
-
 
 def _packets(data: bytes, forecast: Forecast) -> Iterator[Packet]:
     """The lines that are blocks, as their reader counts them; a line that stops the program has

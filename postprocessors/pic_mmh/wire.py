@@ -95,10 +95,6 @@ class PicMmhWire(Wire):
             return super().command(action, machine, values, manner)  # type: ignore[return-value]
         return PicMmhConversation(packets, machine, manner)
 
-    def typed(self, line: str) -> bytes:
-        """A string ends with ; and nothing else."""
-        return line.strip().rstrip(";").encode("latin-1", "replace") + b";"
-
 
 def _compensations(machine: PicMmhMachine) -> list[bytes]:
     """`BX204;` `BY178;`: what the simulation reckons with, in µm."""
