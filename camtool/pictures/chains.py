@@ -424,11 +424,10 @@ def _places_along(start: Floats, end: Floats, centre: Floats, sweep: float) -> F
     count = math.ceil(abs(sweep) / TAPER_ARC_RAD)
     if count < 2:
         return np.stack([start, end])
-    share = np.linspace(0.0, 1.0, count + 1)[:, None]
-    spoke, turn = start[:2] - centre, share * sweep
-    cos, sin = np.cos(turn), np.sin(turn)
-    round_ = centre + cos * spoke + sin * np.array([-spoke[1], spoke[0]])
-    return np.hstack([round_, start[2] + share * (end[2] - start[2])])
+    arc = Chain(np.stack([start[:2], end[:2]]), centre[None], np.array([sweep]))
+    shares = np.linspace(0.0, 1.0, count + 1)
+    z = start[2] + shares * (end[2] - start[2])
+    return np.column_stack([[arc.at(0, share)[0] for share in shares.tolist()], z])
 
 
 def _hull(one: Floats, radius: float, other: Floats, last: float) -> Chain | None:
