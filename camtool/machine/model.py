@@ -298,7 +298,7 @@ class Machine(
         return hashlib.sha256(given).hexdigest()
 
     @property
-    def mark(self) -> str:
+    def short_digest(self) -> str:
         """So much of the digest stands in programs: eight hexadecimal digits."""
         return self.digest[:8]
 

@@ -96,11 +96,11 @@ def port_of(name: str, baud: int | None, wire: Wire, target: LoadedTarget) -> Po
 def check_settings(data: bytes, target: LoadedTarget, file: str) -> None:
     """ProgramError for a program that says that it was written for other values of the machine."""
     said = _SETTINGS.search(data[:HEAD])
-    if said is None or said[1].decode() == target.machine.mark:
+    if said is None or said[1].decode() == target.machine.short_digest:
         return
     raise ProgramError(
         f"was written for another machine file (settings {said[1].decode()}, the machine has "
-        f"{target.machine.mark})",
+        f"{target.machine.short_digest})",
         file=file,
         mend="post it again for this machine, or give the machine file it was made with",
     )

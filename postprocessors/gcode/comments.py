@@ -36,7 +36,7 @@ def header(toolpath: Toolpath, machine: Machine, dialect: GcodeDialect) -> list[
         f"{axis} {' to '.join(format_column(reach, style))}"
         for axis, reach in zip("XYZ", toolpath_extents(toolpath), strict=True)
     ]
-    made = [toolpath.made_from, f"settings {machine.mark}"] if toolpath.made_from else []
+    made = [toolpath.made_from, f"settings {machine.short_digest}"] if toolpath.made_from else []
     lines = [
         f"camtool {version('camtool')} for {machine.target.name}: {machine.target.title}",
         *made,
