@@ -1058,6 +1058,7 @@ table { border-collapse: collapse; margin: 1rem 0; font-variant-numeric: tabular
 th, td { border-bottom: 1px solid #8886; padding: .2rem .7rem; text-align: left;
   vertical-align: top; }
 td.number, th.number { text-align: right; }
+th, td { overflow-wrap: break-word; max-width: 40rem; }
 img { max-width: 100%; height: auto; background: #fff; }
 figure { margin: 1rem 0; } figcaption { opacity: .7; }
 .error { color: #c5221f; } .warning { color: #a56300; } .fine { color: #2c7a32; }
