@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
@@ -71,6 +72,28 @@ class SelfCrossing:
 
 
 @dataclass(frozen=True)
+class Callout:
+    """A dimension as the file draws it, mm: what it measures, between which places, and what its
+    text and style say of its limits.
+
+    `kind` "linear": `points_mm` are two places, measured along `direction_rad` (None: from one to
+    the other); "diameter": two opposite places of a circle; "radius": its centre and a place on
+    it. `measured_mm` is what the places measure. `text` is what is written in place of that, ""
+    for nothing. `upper_mm` and `lower_mm`: the deviations of its style, None without any.
+    """
+
+    kind: Literal["linear", "diameter", "radius"]
+    points_mm: tuple[tuple[float, float], ...]
+    measured_mm: float
+    text: str
+    layer: str
+    source: str
+    direction_rad: float | None = None
+    upper_mm: float | None = None
+    lower_mm: float | None = None
+
+
+@dataclass(frozen=True)
 class Healing:
     """What was corrected on reading, counted, lengths in mm.
 
@@ -123,7 +146,7 @@ class Drawing:
     scale of the part that it was read for (`ReadOptions.scale`). `used` counts the entities of
     each kind that became geometry; `skipped` the others, with the reason. `marks` are single
     points; a drawing of marks alone has no paths. `gaps` stay open, `closed_gaps` were bridged.
-    `unchosen`: the closed contours that were left out by choice.
+    `unchosen`: the closed contours that were left out by choice. `callouts`: its dimensions.
     """
 
     paths: Polylines
@@ -143,6 +166,7 @@ class Drawing:
     unchosen: Unchosen = field(default_factory=Unchosen)
     off_mm: Floats = field(default_factory=lambda: np.zeros((0, 2)))
     made_for: float = 1.0
+    callouts: tuple[Callout, ...] = ()
 
     def __post_init__(self) -> None:
         count = len(self.paths)

@@ -59,11 +59,12 @@ ALLOWED = {
     "run": JUDGE | {"verification", "pictures"},
     "pipeline": JUDGE | {"verification", "run"},
     "comparison": JUDGE | {"verification", "pictures", "run", "pipeline"},
+    "inspection": MADE - {"pictures"},
     "batches": MADE,
     "sending": MADE,
-    "cli": MADE | {"calibration", "batches", "sending", "jobs", "project"},
+    "cli": MADE | {"inspection", "calibration", "batches", "sending", "jobs", "project"},
     "__main__": {"cli"},
-    "api": MADE | {"calibration", "jobs"},
+    "api": MADE | {"inspection", "calibration", "jobs"},
     "__init__": {"api", "errors"},
 }
 HEAVY = {

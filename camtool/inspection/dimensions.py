@@ -1,0 +1,52 @@
+"""What is inspected: dimensions with limits, as drawings and tolerance files say them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Kind = Literal[
+    "diameter",
+    "radius",
+    "distance",
+    "position",
+    "straightness",
+    "roundness",
+    "profile",
+]
+"""What is measured. "distance" is between two edges, two centres, or an edge and a centre: widths
+are distances. The last four are the zones
+of ISO 1101: their lower limit is 0."""
+
+Place = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Limits:
+    """By how much a dimension may differ from its nominal value, mm, `lower_mm` ≤ `upper_mm`; and
+    the words that say so ("H7", "±0.05", "ISO 2768-m")."""
+
+    lower_mm: float
+    upper_mm: float
+    said: str
+
+
+@dataclass(frozen=True)
+class Dimension:
+    """One dimension of a drawing, mm, in the drawing's frame.
+
+    `places_mm` say of what it is: of a diameter, radius, roundness or position one point, the
+    centre or a point on the circle; of a distance two points, each on an edge, at a corner, at the
+    centre of a circle or on it; of a straightness or profile one point on the edge or outline.
+    `direction_rad`: along which a distance is measured (None: from place to place).
+    `nominal_mm` None: as drawn; `limits` None: none are known, and it is only predicted.
+    `source`: where it comes from ("DIMENSION 4F", "tolerances.toml, dimension 3").
+    """
+
+    name: str
+    kind: Kind
+    places_mm: tuple[Place, ...]
+    source: str
+    direction_rad: float | None = None
+    nominal_mm: float | None = None
+    limits: Limits | None = None
