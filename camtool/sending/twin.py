@@ -71,8 +71,9 @@ class PseudoTerminal:
         """The side of the machine, while somebody has the other one open."""
         looking = select.poll()
         looking.register(self._master, select.POLLIN)
-        gone = any(event & select.POLLHUP for _, event in looking.poll(0))
-        if gone:
+        # What the client has written before it closed is still to be read.
+        both = select.POLLHUP | select.POLLIN
+        if any(event & both == select.POLLHUP for _, event in looking.poll(0)):
             self._open = False
             return None
         if not self._open:
