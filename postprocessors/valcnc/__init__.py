@@ -10,14 +10,17 @@ from typing import TYPE_CHECKING
 
 from camtool.target.contract import Target
 
-from .dialect import Dialect, ValcncController, ValcncMachine, check, scales_of
+from .dialect import Dialect, ValcncController, ValcncLink, ValcncMachine, check, scales_of
 
 if TYPE_CHECKING:
-    from camtool.machine.model import Axis
+    import msgspec
+
+    from camtool.machine.model import Axis, Machine
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
 
     from .controller import ValcncModel
+    from .twin import Choices, ValcncTwin
     from .wire import ValcncWire
 
 
@@ -27,6 +30,7 @@ class Valcnc(Target):
     name = "valcnc"
     controllers = (ValcncController,)
     dialect = Dialect
+    link = ValcncLink
 
     def check(self, machine: ValcncMachine) -> None:
         """Raise MachineError where values of the dialect do not go with the machine."""
@@ -60,6 +64,22 @@ class Valcnc(Target):
         from .wire import ValcncWire
 
         return ValcncWire()
+
+    def twin_choices(self) -> type[Choices]:
+        """What its thesis leaves open of the wire."""
+        from .twin import Choices
+
+        return Choices
+
+    def twin(
+        self,
+        machine: Machine[ValcncController, Dialect],
+        choices: msgspec.Struct | None = None,
+    ) -> ValcncTwin:
+        """The virtual controller; docs/wires/valcnc.md."""
+        from .twin import Choices, ValcncTwin
+
+        return ValcncTwin(machine, choices if isinstance(choices, Choices) else Choices())
 
     def listing(self, data: bytes, machine: ValcncMachine) -> Listing:
         """The lines that are blocks."""

@@ -18,7 +18,7 @@ It issues nothing at reversals; compensation in a machine file would be steps at
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -58,11 +58,15 @@ class ValcncModel(ControllerModel[ValcncController, Dialect]):
 
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
         """The motion, chunk by chunk."""
-        pieces = _Pieces(toolpath, machine)
-        period_s = 1.0 / machine.controller.step_rate_hz
-        waits = waits_s(toolpath, toolpath.running)
-        standing = Standing(pieces.in_steps(toolpath.start), waits, period_s)
-        return LegRun(standing, machine, options).run(pieces.legs())
+        return _run(_Pieces(toolpath, machine), toolpath, machine, options)
+
+    def run_on(
+        self, drawn: Drawn, toolpath: Toolpath, machine: _Machine, options: Options
+    ) -> tuple[list[Chunk], Drawn]:
+        """The motion of rows that follow others, which ended at `drawn`; and where these end."""
+        pieces = _Pieces(toolpath, machine, drawn)
+        chunks = list(_run(pieces, toolpath, machine, options))
+        return chunks, pieces.drawn
 
     def quantised(self, toolpath: Toolpath, machine: _Machine) -> Toolpath:
         """The moves with their ends on whole steps, and arcs about centres as far from both.
@@ -104,15 +108,36 @@ class ValcncModel(ControllerModel[ValcncController, Dialect]):
         )
 
 
-class _Pieces:
-    """The lines of a toolpath: one for each straight row, several for each arc."""
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """How far it has drawn: the last point (3,) mm to which it drew a line, which an arc's angle
+    puts beside the end that was programmed, and where its motors then stand, (3,) steps."""
 
-    def __init__(self, toolpath: Toolpath, machine: _Machine) -> None:
+    point: Floats
+    steps: Ints
+
+
+def _run(
+    pieces: _Pieces, toolpath: Toolpath, machine: _Machine, options: Options
+) -> Iterator[Chunk]:
+    period_s = 1.0 / machine.controller.step_rate_hz
+    waits = waits_s(toolpath, toolpath.running)
+    standing = Standing(pieces.drawn.steps, waits, period_s)
+    return LegRun(standing, machine, options).run(pieces.legs())
+
+
+class _Pieces:
+    """The lines of a toolpath: one for each straight row, several for each arc; the first begins
+    at its start, or where other rows before it have `drawn` to."""
+
+    def __init__(self, toolpath: Toolpath, machine: _Machine, drawn: Drawn | None = None) -> None:
         check_rows(toolpath, machine)
         self._controller = machine.controller
         self._step_mm = coded_steps_mm(machine)
         count = toolpath.running
-        self._start, self._end = toolpath.start, toolpath.end[:count]
+        self._end = toolpath.end[:count]
+        self.drawn = drawn or Drawn(toolpath.start, self.in_steps(toolpath.start))
+        """Where the legs that were asked for end."""
         self._arc_rows = np.flatnonzero(toolpath.is_arc[:count])
         self._arcs = self._angles(toolpath, count)
         parts = np.zeros(count + 1, dtype=np.int64)
@@ -130,15 +155,16 @@ class _Pieces:
     def legs(self) -> Iterator[Legs]:
         """The legs, some thousands at a time."""
         period_s = 1.0 / self._controller.step_rate_hz
-        before, at = self._start[None, :], self.in_steps(self._start[None, :])
+        before, at = self.drawn.point[None, :], self.drawn.steps[None, :]
         for low in range(0, int(self._first[-1]), PIECES_AT_ONCE):
             row, points = self._points(low, min(low + PIECES_AT_ONCE, int(self._first[-1])))
             if self._controller.counting == "coordinates":
                 places = np.concatenate([at, self.in_steps(points)])
-                at, way = places[-1:], np.diff(places, axis=0)
+                way = np.diff(places, axis=0)
             else:
                 way = self.in_steps(np.diff(np.concatenate([before, points]), axis=0))
-                before = points[-1:]
+            before, at = points[-1:], at + way.sum(axis=0)
+            self.drawn = Drawn(before[0], at[0])
             passes = np.abs(way).max(axis=1)
             moves = np.flatnonzero(passes)
             yield Legs(row[moves], way[moves], passes[moves] * period_s)
@@ -170,7 +196,8 @@ class _Pieces:
         self._check_arcs(toolpath)
         offset = np.where(turn[:, None] != 0, toolpath.centre[:count] - ends[:-1, :2], 0.0)
         computed = self._controller.arc_end == "computed"
-        bad = int(arc_angles(turn, ends[:, :2].copy(), offset, computed, angles))
+        begin = self.drawn.point[:2].copy()
+        bad = int(arc_angles(turn, begin, ends[:, :2].copy(), offset, computed, angles))
         if bad >= 0:
             raise ProgramError(
                 "an arc about its own start, or with a chord longer than its diameter",

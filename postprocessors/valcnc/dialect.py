@@ -8,13 +8,17 @@ import msgspec
 from msgspec import Meta
 
 from camtool.arrays import Floats
-from camtool.machine.model import Machine, SlideStart
+from camtool.machine.model import Link, Machine, SlideStart
 from camtool.machine.ranges import Count, Rate, Scale, Step, Tolerance
 
 from ..gcode.dialect import check_unit
 
 if TYPE_CHECKING:
     pass
+
+
+Answer = Annotated[str, Meta(max_length=40, pattern=r"^([!-~]([ -~]*[!-~])?)?$")]
+Margin = Annotated[float, Meta(ge=0.0, le=60.0)]
 
 
 class Dialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -58,6 +62,15 @@ class ValcncController(SlideStart, frozen=True, tag_field="model", tag="valcnc")
     arc_segment_mm: Annotated[float, Meta(ge=0.001, le=1000.0)] = 0.2
     arc_segments: Annotated[int, Meta(ge=1, le=100_000)] | None = None
     arc_end: Literal["computed", "programmed"] = "computed"
+
+
+class ValcncLink(Link, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What its thesis leaves open. `answer`: the line that the controller sends when a block is
+    done, such as "ok"; empty: nothing. `margin_s`: how long a block waits beyond the simulated
+    time of the one before, where nothing is answered."""
+
+    answer: Answer = ""
+    margin_s: Margin = 0.1
 
 
 ValcncMachine = Machine[SlideStart, Dialect]

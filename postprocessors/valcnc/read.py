@@ -48,13 +48,16 @@ Point = tuple[float, float, float]
 def read_program(data: bytes, machine: ValcncMachine) -> Toolpath:
     """The moves of a program; ProgramError naming block, line and column when it is none."""
     reader = _Reader(machine)
-    for block in blocks_of(data, reader.lexing, reader.take):
-        reader.block(block)
-    if not reader.blocks:
-        raise ProgramError(
-            "the program is empty", mend="a program has blocks such as G00 X1 Y1 Z0"
-        )
+    reader.read(data)
     return reader.path.finish(reader.findings())
+
+
+def read_block(data: bytes, machine: ValcncMachine, at: Point) -> tuple[Toolpath, Point]:
+    """The moves of one block that follows others, which ended `at` a place in the program's
+    units; and where it ends. ProgramError when it is none."""
+    reader = _Reader(machine, at)
+    reader.read(data)
+    return reader.path.finish(), reader.at
 
 
 @dataclass
@@ -69,20 +72,29 @@ class _Missed:
 class _Reader:
     """Blocks in, rows out, in mm."""
 
-    def __init__(self, machine: ValcncMachine) -> None:
+    def __init__(self, machine: ValcncMachine, at: Point = (0.0, 0.0, 0.0)) -> None:
         self._dialect = machine.dialect
         scale_x, scale_y, scale_z = scales_of(machine, self._dialect).tolist()
         self._scales = (scale_x, scale_y, scale_z)
         self._alike = abs(scale_x - scale_y) <= SCALE_GUARD * scale_x
         self._feed = machine.max_feed_mm_min
         self._step_mm = machine.axes.x.coded_step_mm
-        self._at: Point = (0.0, 0.0, 0.0)
+        self.at = at
         self._missed = _Missed()
         self.lexing = Lexing(
             letters="GXYZIJ", blanks="anywhere", line_chars=self._dialect.block_chars
         )
-        self.path = ToolpathBuilder()
+        self.path = ToolpathBuilder(start=self._mm(*at))
         self.blocks = 0
+
+    def read(self, data: bytes) -> None:
+        """All blocks; ProgramError at the first that is none, and where there is no block."""
+        for block in blocks_of(data, self.lexing, self.take):
+            self.block(block)
+        if not self.blocks:
+            raise ProgramError(
+                "the program is empty", mend="a program has blocks such as G00 X1 Y1 Z0"
+            )
 
     def block(self, block: Block) -> None:
         """One block."""
@@ -103,7 +115,7 @@ class _Reader:
             self._arc(block, code, values, end)
         else:
             self._line(block, code, values, end)
-        self._at = end
+        self.at = end
 
     def take(self, plain: PlainBlocks) -> int:
         """Decode plain blocks by columns, up to the first that is not surely what `block` would
@@ -120,7 +132,7 @@ class _Reader:
         )
         sure &= (np.abs(ends) <= MOST_UNITS).all(axis=1)
         sure &= line | (np.abs(offset) <= MOST_UNITS).all(axis=1)
-        start = np.concatenate([[self._at], ends[:-1]])
+        start = np.concatenate([[self.at], ends[:-1]])
         travel = ends - start
         flat, deep = (travel[:, :2] != 0.0).any(axis=1), travel[:, 2] != 0.0
         sure &= ~deep | (line & (~flat | (self._dialect.z_order == "together")))
@@ -137,7 +149,7 @@ class _Reader:
         """The moves of the first so many blocks."""
         numbers, kind = plain.numbers[:count], kind[:count]
         end = numbers[:, words.X_WORD : words.Z_WORD + 1]
-        self._at = end[-1, 0].item(), end[-1, 1].item(), end[-1, 2].item()
+        self.at = end[-1, 0].item(), end[-1, 1].item(), end[-1, 2].item()
         end = end / self._scales + 0.0
         start = np.concatenate([[self.path.position], end[:-1]])[:, :2]
         arc = (kind >= Kind.ARC_CW)[:, None]
@@ -192,7 +204,7 @@ class _Reader:
         zero = self._dialect.missing_words == "zero"
         x, y, z = (
             values.get(letter, 0.0 if zero else old)
-            for letter, old in zip("XYZ", self._at, strict=True)
+            for letter, old in zip("XYZ", self.at, strict=True)
         )
         return x, y, z
 
@@ -215,7 +227,7 @@ class _Reader:
 
     def _in_order(self, block: Block, end: Point) -> Point | None:
         """The corner between the parts along Z and in XY, if they are apart."""
-        old, order = self._at, self._dialect.z_order
+        old, order = self.at, self._dialect.z_order
         if end[:2] == old[:2] or end[2] == old[2] or order == "together":
             return None
         if order == "refused":
@@ -243,20 +255,20 @@ class _Reader:
         old_x, old_y, _ = self.path.position
         centre = old_x + i / self._scales[0], old_y + j / self._scales[1]
         order = self._dialect.z_order
-        if end[2] != self._at[2]:
+        if end[2] != self.at[2]:
             if order in ("refused", "together"):
                 block.fail("Z moves along with an arc", mend="move Z in a block of its own")
             if order == "before":
                 self.path.line(old_x, old_y, z, feed=self._feed)
         self.path.arc(x, y, centre=centre, ccw=code == "03", feed=self._feed)
-        if end[2] != self._at[2] and order == "after":
+        if end[2] != self.at[2] and order == "after":
             self.path.line(x, y, z, feed=self._feed)
 
     def _check_arc(self, block: Block, offset: tuple[float, float], end: Point) -> None:
         """That the firmware's formulas (L1284-1326) have a value, and nearly the right one."""
         i, j = offset
         radius = math.hypot(i, j)
-        chord = end[0] - self._at[0], end[1] - self._at[1]
+        chord = end[0] - self.at[0], end[1] - self.at[1]
         other = math.hypot(chord[0] - i, chord[1] - j)
         if radius == 0.0:
             _fail_at_i(block, "an arc about its own start", "give I and J from the start")

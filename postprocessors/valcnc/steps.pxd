@@ -10,5 +10,6 @@ from camtool.kernels.types cimport Int
     theta=double, i=double, j=double
 )
 cpdef Int arc_angles(
-    Int[::1] turn, double[:, ::1] ends, double[:, ::1] offset, bint computed, double[:, ::1] out
+    Int[::1] turn, double[::1] begin, double[:, ::1] ends, double[:, ::1] offset, bint computed,
+    double[:, ::1] out
 ) noexcept

@@ -26,14 +26,16 @@ CHORD_GUARD = 1e-9
 """Part of an arc's diameter: a chord longer by less is a diameter."""
 
 
-def arc_angles(turn: Ints, ends: Floats, offset: Floats, computed: bool, out: Floats) -> int:
+def arc_angles(
+    turn: Ints, begin: Floats, ends: Floats, offset: Floats, computed: bool, out: Floats
+) -> int:
     """Fill `out` (N, 5): centre x and y, R, θ and signed α of each arc; 0 in other rows.
 
-    `turn` (N,): 1 counter-clockwise, −1 clockwise, 0 no arc; `ends` (N + 1, 2): row n goes from
-    ends[n] to ends[n + 1] as programmed; `offset` (N, 2): i and j. Returns the first row whose
-    arcsine has no value, or −1.
+    `turn` (N,): 1 counter-clockwise, −1 clockwise, 0 no arc; `begin` (2,): where the first row
+    really begins; `ends` (N + 1, 2): row n goes from ends[n] to ends[n + 1] as programmed;
+    `offset` (N, 2): i and j. Returns the first row whose arcsine has no value, or −1.
     """
-    x, y = ends[0, 0], ends[0, 1]
+    x, y = begin[0], begin[1]
     for n in range(len(turn)):
         end_x, end_y = ends[n + 1, 0], ends[n + 1, 1]
         for column in range(5):

@@ -3,7 +3,8 @@
 9600 8N1 without handshake (L1177-1209, L1468-1498); `C` and a line feed on opening. No answer and
 no error is documented; the only pace of the PC's own program is its animation. So a block goes out
 when the one before must be over, and a stop or a pause can only leave out what comes next. Of 128
-characters and more a block is lost; that a block ends with a line feed is inferred from `C`.
+characters and more a block is lost; that a block ends with a line feed is inferred from `C`. Where
+`[link]` names an answer, it is waited for as well.
 """
 
 from __future__ import annotations
@@ -12,9 +13,9 @@ from collections.abc import Sequence
 from typing import Final
 
 from camtool.errors import MachineError
-from camtool.target.wire import Forecast, Manner, Packet, PacketByPacket, Wire
+from camtool.target.wire import LATE_S, Forecast, Manner, Packet, PacketByPacket, Wire
 
-from .dialect import ValcncMachine
+from .dialect import ValcncLink, ValcncMachine
 
 OPENING: Final = b"C\n"
 
@@ -33,8 +34,8 @@ class ValcncWire(Wire):
 
     baud = 9600
     ready = (
-        "the controller answers nothing: camtool waits for the simulated times, and cannot see "
-        "whether a block was lost",
+        "camtool waits for the simulated times, and cannot see whether a block was lost where the "
+        "controller answers nothing (link.answer)",
         "keep a hand at the switch: a stop takes effect behind the block that is being cut",
     )
     stopping = "nothing more is sent; the block that is being cut is cut to its end"
@@ -58,24 +59,52 @@ class ValcncWire(Wire):
         """The conversation that sends these blocks."""
         if manner.home:
             raise MachineError("the controller has no command to home", where="--home")
-        return ValcncConversation(packets, manner)
+        assert isinstance(machine.link, ValcncLink)
+        return ValcncConversation(packets, machine.link, manner)
 
 
 class ValcncConversation(PacketByPacket):
-    """A block and its time."""
+    """A block, its time, and its answer where it has one."""
+
+    def __init__(self, packets: Sequence[Packet], link: ValcncLink, manner: Manner) -> None:
+        super().__init__(packets, manner)
+        self._answer = b"".join(link.answer.encode("ascii").split())
+        self._margin_s = link.margin_s * manner.late_s / LATE_S
+        self._said = b""
+        self._awaits = self._answered = False
+        self._over = 0.0  # when the time of the block is over
 
     def _send(self, packet: Packet, now: float) -> None:
         self._write(packet.data)
-        line_s = len(packet.data) * BITS / (ValcncWire.baud or 1)
-        self.next_s = now + line_s + SLOWER * packet.seconds + 2.0 * self.manner.late_s
+        self._awaits = bool(self._answer) and packet.block >= 0  # what C is answered is not known
+        self._answered = False
+        self._over = now + len(packet.data) * BITS / (ValcncWire.baud or 1) + packet.seconds
+        if not self._awaits:
+            self._over += (SLOWER - 1.0) * packet.seconds + self._margin_s
+        self.next_s = self._over
 
     def received(self, data: bytes, now: float) -> None:
-        """Shown; nothing is known of what it might say."""
-        text = data.decode("latin-1").strip()
-        if text and not self.ended:
-            self._tell(f"it says: {text[:60]}")
+        """The answer, where one is awaited, and nothing else; otherwise it is shown."""
+        if self.ended or not data.strip():
+            return
+        if not self._awaits:
+            self._tell(f"it says: {data.strip()[:60].decode('latin-1')}")
+            return
+        self._said += b"".join(data.split())
+        if not self._answer.startswith(self._said) or self._answered:
+            self._fail(f"it says {self._said[:60]!r}, which is not the answer", now)
+        elif self._said == self._answer:
+            self._said, self._answered = b"", True
+            self.elapsed(now)
 
     def elapsed(self, now: float) -> None:
         """The block must be over."""
-        if self._busy and now >= self.next_s:
+        if self.ended or not self._busy or now < self._over:
+            return
+        if self._answered or not self._awaits:
             self._packet_done(now)
+            return
+        seconds = self.packets[self.sent - 1].seconds
+        self.next_s = self._over + (SLOWER - 1.0) * seconds + self.manner.patience_s
+        if now >= self.next_s:
+            self._fail("it does not answer that the block is done", now)

@@ -2,21 +2,31 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import pytest
 from camtool_postprocessors.valcnc.wire import ValcncWire
 
 from camtool.errors import MachineError
-from camtool.sending.prepare import consignment
+from camtool.sending.faults import Faults, Wired
+from camtool.sending.prepare import Consignment, consignment
 from camtool.target.registry import load_target
 from camtool.target.wire import Conversation, Manner, State, Write
-from tests.feeding import logo
+from tests.feeding import logo, made, same_motion
+from tests.sending.talking import talked as talked_with
 
 LOADED = load_target("valcnc")
+ANSWERS = load_target("valcnc", settings=["link.answer=ok"])
+
+
+@cache
+def consigned(*, answers: bool = False) -> Consignment:
+    return consignment(logo("valcnc"), ANSWERS if answers else LOADED, source="logo.ngc")
 
 
 def talked(stop_behind: int = 10**9) -> tuple[Conversation, list[tuple[float, bytes]]]:
     """What went out, and when."""
-    one = consignment(logo("valcnc"), LOADED, source="logo.ngc")
+    one = consigned()
     talk = one.wire.conversation(one.packets, LOADED.machine, Manner())
     out, now = list[tuple[float, bytes]](), 0.0
     talk.begin(now)
@@ -32,7 +42,7 @@ def talked(stop_behind: int = 10**9) -> tuple[Conversation, list[tuple[float, by
 
 def test_each_block_goes_out_once_when_the_one_before_is_over() -> None:
     talk, out = talked()
-    one = consignment(logo("valcnc"), LOADED, source="logo.ngc")
+    one = consigned()
     assert talk.state is State.FINISHED
     assert out[0] == (0.0, b"C\n")
     decoded = LOADED.target.read(b"".join(data for _, data in out[1:]), LOADED.machine)
@@ -52,3 +62,80 @@ def test_a_block_that_is_too_long_is_refused() -> None:
     long = b"G01 X1.0" + b"0" * 128 + b"\n"
     with pytest.raises(MachineError, match="takes 127"):
         ValcncWire().packets(long, LOADED.machine, None)  # type: ignore[arg-type]
+
+
+def conversation(*, answers: bool = False) -> Conversation:
+    one, machine = consigned(answers=answers), (ANSWERS if answers else LOADED).machine
+    return one.wire.conversation(one.packets, machine, Manner())
+
+
+@pytest.mark.parametrize("answers", [False, True])
+@pytest.mark.parametrize("fault", ["", "late=20ms:0.5"])
+def test_a_machine_that_hears_nothing_while_it_draws_hears_every_block(
+    fault: str, answers: bool
+) -> None:
+    twin, loaded = made("valcnc", ["answer=ok"] if answers else [])
+    talk, faults = conversation(answers=answers), Faults.of(fault)
+    talked_with(talk, Wired(twin, faults, faults, paced=True), latest_s=1000.0)
+    assert talk.state is State.FINISHED, talk.why
+    assert b"".join(twin.decoded) == logo("valcnc").replace(b" ", b"")
+    same_motion(twin, logo("valcnc"), loaded)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("fault", ["drop=0.002", "double=0.002", "garble=0.002", "unplug=20s"])
+def test_answers_that_fail_end_it_where_it_stands(fault: str, seed: int) -> None:
+    twin, _ = made("valcnc", ["answer=ok"])
+    talk = conversation(answers=True)
+    line = Wired(twin, back=Faults.of(fault), seed=seed, paced=True)
+    talked_with(talk, line, latest_s=1000.0)
+    whole = logo("valcnc").replace(b" ", b"").splitlines(keepends=True)
+    assert twin.decoded == whole[: len(twin.decoded)]
+    assert talk.block < len(twin.decoded) <= talk.block + 2
+    assert talk.state in (State.FINISHED, State.FAILED)
+    assert (talk.state is State.FINISHED) == (len(twin.decoded) == talk.block + 1 == len(whole))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_block_that_is_lost_on_the_way_is_missed_where_it_answers(seed: int) -> None:
+    twin, _ = made("valcnc", ["answer=ok", "wrong=block"])
+    talk = conversation(answers=True)
+    talked_with(talk, Wired(twin, Faults(drop=0.005), seed=seed, paced=True), latest_s=1000.0)
+    assert talk.state is State.FAILED
+    assert len(twin.decoded) <= talk.block + 2
+
+
+def test_a_pulled_plug_ends_it_where_it_stands() -> None:
+    twin, _ = made("valcnc")
+    talk, pulled = conversation(), Faults(unplug_s=20.0)
+    talked_with(talk, Wired(twin, pulled, pulled, paced=True), latest_s=1000.0)
+    assert talk.state is State.FAILED
+    assert "plug" in talk.why
+    assert talk.block + 1 <= len(twin.decoded) <= talk.block + 2
+
+
+def test_a_pause_is_between_blocks_and_goes_on_behind_them() -> None:
+    twin, loaded = made("valcnc")
+    talk = conversation()
+
+    def wish(talk: Conversation, now: float) -> None:
+        if talk.state is State.SENDING and talk.sent % 40 == 0:
+            talk.pause(now)
+        elif talk.state is State.PAUSED:
+            assert not twin.moves
+            talk.resume(now)
+
+    talked_with(talk, Wired(twin, paced=True), wish, latest_s=1000.0)
+    assert talk.state is State.FINISHED, talk.why
+    same_motion(twin, logo("valcnc"), loaded)
+
+
+def test_what_it_says_unasked_is_an_error_only_where_answers_are_awaited() -> None:
+    for answers, state in ((False, State.SENDING), (True, State.FAILED)):
+        talk = conversation(answers=answers)
+        talk.begin(0.0)
+        talk.received(b"hello\n", 0.0)
+        talk.elapsed(1.0)
+        assert talk.state is State.SENDING
+        talk.received(b"hello\n", 1.0)
+        assert talk.state is state, talk.why
