@@ -187,6 +187,9 @@ def _show(name: str, machine: str | None, settings: tuple[str, ...], as_json: bo
     for name, cells in (("x", loaded.machine.play_map.x), ("y", loaded.machine.play_map.y)):
         if cells is not None:
             show_text("\n" + "\n".join(_backlash_table(name, cells, loaded.machine)), err=True)
+    unknown = [key for key, value in flat("", values["uncertainty"]) if value is None]
+    if unknown:
+        show_text(f"\nuncertainties that are not known: {', '.join(unknown)}", err=True)
     for code in loaded.target.codes:
         grave = " or ".join(severity.name.lower() for severity in code.severities)
         show_text(f"\n{code.name} ({grave}): {code.means}; to fix it: {code.mend}", err=True)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, overload
 
@@ -32,6 +32,7 @@ from camtool.machine.ranges import (
     Step,
     Tolerance,
 )
+from camtool.patterns import guess
 
 if TYPE_CHECKING:
     from camtool.arrays import Bools, Floats
@@ -259,6 +260,142 @@ class MechanicsOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     seed: Annotated[int, Meta(ge=0, le=(1 << 32) - 1)] = 0
 
 
+# How well its numbers are known.
+
+CORRELATED_KEYS = (
+    "x.backlash_mm",
+    "x.scale",
+    "x.compensation_mm",
+    "y.backlash_mm",
+    "y.scale",
+    "y.compensation_mm",
+    "squareness_rad",
+    "tool_diameter_mm",
+    "runout_mm",
+    "temperature_k",
+)
+"""The keys of `[uncertainty]` that may be correlated: one error for all of a part. `process_mm` is
+not among them, since each edge has an error of its own."""
+
+SEMIDEFINITE = 1e-3
+"""A correlation matrix has no eigenvalue below this, negative: rounding coefficients to four
+decimals may make one of 0 a little less than 0."""
+
+Coefficient = Annotated[float, Meta(ge=-1.0, le=1.0)]
+"""Of a correlation."""
+
+Relative = Annotated[float, Meta(ge=0.0, le=0.1)]
+"""Standard uncertainty as a part of the value."""
+
+Expansion = Annotated[float, Meta(ge=-1e-5, le=1e-3)]
+"""1/K by which a length grows: some ceramics shrink, plastics grow by 1e-4."""
+
+
+class AxisUncertainty(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Standard uncertainties of one axis; None: not known, which is not 0.
+
+    `backlash_mm`: of its play, where a map is used of each of its cells, which err together.
+    `scale`: of `real_step_mm`, as a part of it. `compensation_mm`: of what the controller really
+    adds; 0 where it adds what it is set to."""
+
+    backlash_mm: Lost | None = None
+    scale: Relative | None = None
+    compensation_mm: Lost | None = None
+
+
+class Uncertainty(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The standard uncertainties of the values of a machine; None: not known, which is not 0.
+
+    `tool_diameter_mm`: of the tool as measured; `runout_mm`: of the diameter that it cuts, by
+    run-out; `temperature_k`: of the room, about 20 °C, where machine and part grow by
+    `machine_expansion_per_k` and `part_expansion_per_k`; `process_mm`: of the place of a machined
+    edge, for deflection and all else that is not modelled. `correlations`: two keys, such as
+    "x.scale" and "squareness_rad", with their coefficient; pairs that are not named are not
+    correlated. The scatter of an axis is its `repeatability_mm`."""
+
+    x: AxisUncertainty = AxisUncertainty()
+    y: AxisUncertainty = AxisUncertainty()
+    squareness_rad: Annotated[float, Meta(ge=0.0, le=MAX_SQUARENESS_RAD)] | None = None
+    tool_diameter_mm: Lost | None = None
+    runout_mm: Lost | None = None
+    temperature_k: Annotated[float, Meta(ge=0.0, le=100.0)] | None = None
+    machine_expansion_per_k: Expansion | None = None
+    part_expansion_per_k: Expansion | None = None
+    process_mm: Lost | None = None
+    correlations: tuple[tuple[str, str, Coefficient], ...] = ()
+
+    def standard(self, key: str) -> float | None:
+        """The standard uncertainty at a key such as "x.scale"; None: not known."""
+        record, _, name = key.rpartition(".")
+        found: float | None = getattr(getattr(self, record) if record else self, name)
+        return found
+
+    def correlation(self, keys: Sequence[str]) -> Floats:
+        """(P, P) the coefficients between these keys."""
+        import numpy as np
+
+        matrix = np.eye(len(keys))
+        for one, other, coefficient in self.correlations:
+            if one in keys and other in keys:
+                at = keys.index(one), keys.index(other)
+                matrix[at] = matrix[at[::-1]] = coefficient
+        return matrix
+
+    def check(self) -> None:
+        """MachineError for correlations that no numbers can have, or of what is not known."""
+        seen = set[frozenset[str]]()
+        for number, (one, other, _) in enumerate(self.correlations):
+            for key in (one, other):
+                if key not in CORRELATED_KEYS:
+                    raise _wrong_correlation(
+                        f"{key!r} is nothing that can be correlated",
+                        f"{guess(key, CORRELATED_KEYS)}use {', '.join(CORRELATED_KEYS)}",
+                        number,
+                    )
+                if self.standard(key) is None:
+                    raise _wrong_correlation(
+                        f"the uncertainty of {key} is not given",
+                        f"give uncertainty.{key}, or leave the correlation out",
+                        number,
+                    )
+            pair = frozenset((one, other))
+            if len(pair) == 1 or pair in seen:
+                what = "twice" if pair in seen else "with itself"
+                raise _wrong_correlation(
+                    f"{one} is correlated {what}" + (f" with {other}" if pair in seen else ""),
+                    "give each pair of different keys once",
+                    number,
+                )
+            seen.add(pair)
+        self._check_semidefinite()
+
+    def _check_semidefinite(self) -> None:
+        """MachineError, which names the keys, for correlations that contradict each other."""
+        if len(self.correlations) < 2:
+            return
+        import numpy as np
+
+        keys = [key for key in CORRELATED_KEYS if any(key in row for row in self.correlations)]
+        sizes, directions = np.linalg.eigh(self.correlation(keys))
+        least = float(sizes[0])
+        if least >= -SEMIDEFINITE:
+            return
+        # With all coefficients times t the eigenvalues are 1 + t (λ - 1).
+        factor = math.floor(100.0 / (1.0 - least)) / 100.0
+        shares = np.abs(directions[:, 0])
+        involved = [key for key, share in zip(keys, shares, strict=True) if share > SEMIDEFINITE]
+        raise _wrong_correlation(
+            f"those of {', '.join(involved)} contradict each other: the covariance is not "
+            f"positive semidefinite (an eigenvalue of the correlations is {least:.2g})",
+            f"multiply them by {factor:g} or less, or measure them again",
+        )
+
+
+def _wrong_correlation(message: str, mend: str, number: int | None = None) -> MachineError:
+    at = "" if number is None else f"[{number}]"
+    return MachineError(message, where=f"table [uncertainty], key correlations{at}", mend=mend)
+
+
 # `Machine` alone, in an annotation, is a machine of any target. Python knows such defaults from
 # 3.13 on.
 ControllerT = TypeVar("ControllerT", bound=SlideStart, default=SlideStart, covariant=True)
@@ -288,13 +425,16 @@ class Machine(
     link: LinkT = Link()  # type: ignore[assignment]
     mechanics: MechanicsOptions = MechanicsOptions()
     play_map: PlayMap = PlayMap()
+    uncertainty: Uncertainty = Uncertainty()
     dialect: DialectT
 
     @property
     def digest(self) -> str:
         """SHA-256, hex, of all that a file must say to get this machine: equal for equal machines,
-        on every computer, wherever their records stand in the code."""
-        given = msgspec.json.encode(_given(self), order="deterministic")
+        on every computer, wherever their records stand in the code. How well its numbers are known
+        is no part of it: no program depends on that."""
+        known = {key: value for key, value in _given(self).items() if key != "uncertainty"}
+        given = msgspec.json.encode(known, order="deterministic")
         return hashlib.sha256(given).hexdigest()
 
     @property

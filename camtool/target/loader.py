@@ -78,6 +78,7 @@ def machine_of(target: Target, table: Table, name: str) -> Machine:
             mend="leave it out",
         )
     try:
+        machine.uncertainty.check()
         target.check(machine)
     except MachineError as error:
         error.file = name

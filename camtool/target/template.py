@@ -29,8 +29,32 @@ _ABOUT = {
     "dialect": "How programs are written.",
     "link": "The line that programs come down.",
     "mechanics": "The mechanics beyond single axes.",
+    "uncertainty": "How well these numbers are known, as standard uncertainties: what is left out "
+    "is unknown,\n## and a dimension that depends on it is undecided.\n## No values hold for all "
+    "machines: take both # away, and give yours. camtool calibrate writes some.",
 }
 """What the keys of a table say."""
+
+_UNCERTAIN = {
+    "uncertainty": {
+        "process_mm": "mm, of the place of a machined edge: deflection, and what is not modelled",
+        "tool_diameter_mm": "mm, of the tool as measured",
+        "runout_mm": "mm, of the diameter that it cuts, by run-out",
+        "squareness_rad": "rad, of mechanics.squareness_rad",
+        "temperature_k": "K, of the room, about 20 °C",
+        "machine_expansion_per_k": "1/K: 11.5e-6 for steel, 23e-6 for aluminium",
+        "part_expansion_per_k": "1/K",
+    },
+    **{
+        f"uncertainty.{axis}": {
+            "backlash_mm": f"mm, of axes.{axis}.backlash_mm",
+            "scale": f"of axes.{axis}.real_step_mm, as a part of it",
+            "compensation_mm": "mm; 0 where the controller adds just what it is set to",
+        }
+        for axis in "xy"
+    },
+}
+"""What a target's own file need not say: how well the numbers are known, key by key."""
 
 
 def machine_template(
@@ -65,7 +89,16 @@ def machine_template(
         f'name = "{name}"',
         f'title = "{name}"',
     ]
-    for table, rows in _tables(base_text):
+    tables = list(_tables(base_text))
+    for table, keys in _UNCERTAIN.items():
+        own = next((rows for name, rows in tables if name == table), None)
+        if own is None:
+            tables.append((table, own := []))
+        there = {key[2] for key in map(_KEY.match, own) if key}
+        own += [
+            f"## {key + ' =':<25} # {about}" for key, about in keys.items() if key not in there
+        ]
+    for table, rows in tables:
         lines += ["", f"[{table}]"]
         if table in _ABOUT:
             lines.append(f"## {_ABOUT[table]}")
