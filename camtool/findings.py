@@ -159,6 +159,14 @@ class Code(IntEnum):
         "warning where whole paths became a point and are left out",
         "none, or a larger scale",
     )
+    NO_GENERAL_TOLERANCE = (
+        118,
+        WARNING,
+        "the general tolerance has no value for a dimension, which therefore has no limits: ISO "
+        "2768-1 ends below 0.5 mm and above 2000 or 4000 mm, its class v begins over 3 mm, and "
+        "form and position have none in it",
+        "give the dimension limits of its own",
+    )
 
     CONTOUR_TOO_SMALL = (
         201,
@@ -846,6 +854,11 @@ SECTION_CHOSEN_FACES = Sentence(
 )
 NOT_APPLIED = Sentence(Code.NOT_APPLIED, "{measured} {what} {why}")
 NOT_APPLIED_TO_ENTITY = Sentence(Code.NOT_APPLIED, "{measured} {kind}: {what} is not applied")
+NO_GENERAL_TOLERANCE = Sentence(
+    Code.NO_GENERAL_TOLERANCE,
+    "{general} has no value for a {kind} of {measured:.4g} mm: it has no limits",
+    "mm",
+)
 UNIT_GUESSED = Sentence(
     Code.UNIT_GUESSED,
     "the file names no unit ({why}): read as {taken}; if that is wrong, name the unit with "

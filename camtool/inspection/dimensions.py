@@ -39,7 +39,9 @@ class Dimension:
     centre or a point on the circle; of a distance two points, each on an edge, at a corner, at the
     centre of a circle or on it; of a straightness or profile one point on the edge or outline.
     `direction_rad`: along which a distance is measured (None: from place to place).
-    `nominal_mm` None: as drawn; `limits` None: none are known, and it is only predicted.
+    `nominal_mm` None: as drawn; `limits` None: none are known, and it is only predicted, unless
+    they depend on the nominal value and this is not known yet: `words` of limits ("H7"), and the
+    `general` tolerance ("ISO 2768-m") where there are none, "" each (`limits.limited`).
     `source`: where it comes from ("DIMENSION 4F", "tolerances.toml, dimension 3").
     """
 
@@ -50,3 +52,5 @@ class Dimension:
     direction_rad: float | None = None
     nominal_mm: float | None = None
     limits: Limits | None = None
+    words: str = ""
+    general: str = ""

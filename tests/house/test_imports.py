@@ -74,6 +74,7 @@ HEAVY = {
     "ezdxf",
     "fontTools",
     "HersheyFonts",
+    "pressfit",
     "resvg_py",
     "rich",
     "scipy",
