@@ -81,16 +81,17 @@ def _probability(part: str, text: str) -> float:
 
 
 class Line:
-    """One direction of a line. A byte takes `byte_s` seconds; none overtakes another."""
+    """One direction of a line. A byte takes `byte_s` seconds; none overtakes another. `faults` are
+    those of what is sent from now on."""
 
     def __init__(self, faults: Faults, random: Random, byte_s: float = 0.0) -> None:
-        self._faults, self._random, self._byte_s = faults, random, byte_s
+        self.faults, self._random, self._byte_s = faults, random, byte_s
         self._under_way: list[tuple[float, int]] = []
         self._free_s = 0.0  # when the last byte will have come
 
     def put(self, data: bytes, now: float) -> None:
         """Send bytes; those behind the pulling of the plug are lost."""
-        faults, random = self._faults, self._random
+        faults, random = self.faults, self._random
         if not data:
             return
         late = faults.late_s if faults.late and random.random() < faults.late else 0.0
@@ -117,7 +118,7 @@ class Line:
         return self._under_way[0][0] if self._under_way else None
 
     def _unplugged(self, now: float) -> bool:
-        return self._faults.unplug_s is not None and now >= self._faults.unplug_s
+        return self.faults.unplug_s is not None and now >= self.faults.unplug_s
 
 
 class Wired:
@@ -138,44 +139,42 @@ class Wired:
     ) -> None:
         byte_s = twin.byte_s if paced else 0.0
         self.twin = twin
-        self._unplug_s = min(
-            (each.unplug_s for each in (there, back) if each.unplug_s is not None), default=None
-        )
-        self._there = Line(there, Random(f"{seed} there"), byte_s)
-        self._back = Line(back, Random(f"{seed} back"), byte_s)
+        self.there = Line(there, Random(f"{seed} there"), byte_s)
+        self.back = Line(back, Random(f"{seed} back"), byte_s)
 
     def connect(self, now: float) -> None:
         """Open the line."""
         self._run(now)
-        self._back.put(self.twin.connected(now), now)
+        self.back.put(self.twin.connected(now), now)
 
     def write(self, data: bytes, now: float) -> None:
         """Send bytes to the machine."""
         self._run(now)
-        self._there.put(data, now)
+        self.there.put(data, now)
         self._run(now)
 
     def read(self, now: float) -> bytes:
         """What has come from the machine by now, since the last call."""
         self._run(now)
-        return self._back.take(now)
+        return self.back.take(now)
 
     def next_s(self) -> float | None:
         """When something happens next by itself; None: never."""
-        times = self._there.next_s(), self._back.next_s(), self.twin.next_s()
+        times = self.there.next_s(), self.back.next_s(), self.twin.next_s()
         return min((at for at in times if at is not None), default=None)
 
     def turn_s(self) -> float | None:
         """The same, outputs of a travel left aside: so far a clock that keeps to nothing jumps."""
-        times = self._there.next_s(), self._back.next_s(), self.twin.turn_s()
+        times = self.there.next_s(), self.back.next_s(), self.twin.turn_s()
         return min((at for at in times if at is not None), default=None)
 
     def unplugged(self, now: float) -> bool:
         """Whether the plug has been pulled."""
-        return self._unplug_s is not None and now >= self._unplug_s
+        times = self.there.faults.unplug_s, self.back.faults.unplug_s
+        return any(at is not None and now >= at for at in times)
 
     def _run(self, now: float) -> None:
-        while (at := self._there.next_s()) is not None and at <= now:
-            self._back.put(self.twin.advance(at), at)
-            self._back.put(self.twin.receive(self._there.take(at), at), at)
-        self._back.put(self.twin.advance(now), now)
+        while (at := self.there.next_s()) is not None and at <= now:
+            self.back.put(self.twin.advance(at), at)
+            self.back.put(self.twin.receive(self.there.take(at), at), at)
+        self.back.put(self.twin.advance(now), now)

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import MachineError, OptionError, PostError, ProgramError
 from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.pipeline import read_program, verify_program
@@ -23,7 +24,7 @@ from camtool.sending.line import Port
 from camtool.simulation.motion import Options
 from camtool.target.wire import Forecast, NoWire, Packet, Wire
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.toolpath.moves import COLUMNS, Kind, Toolpath, toolpath_extents
+from camtool.toolpath.moves import COLUMNS, Kind, PolarArcs, Toolpath, toolpath_extents
 from camtool.verification.report import clock
 
 if TYPE_CHECKING:
@@ -40,18 +41,32 @@ HEAD = 4096
 
 
 @dataclass(frozen=True, eq=False)
+class Rest:
+    """A program from its block `first` on: `data`, whose first `entry` blocks bring the machine
+    there; `done` (B,): the last block of the program that is done with each of its blocks, −1
+    within the entry."""
+
+    data: bytes
+    first: int
+    entry: int
+    done: Ints
+
+
+@dataclass(frozen=True, eq=False)
 class Consignment:
-    """A program ready to be sent. `run`: the program as verified; `data`: the bytes that are sent,
-    which are the program's own, or those of its rest from `first` on, behind an entry of `entry`
-    blocks; `forecast` is of `data`."""
+    """A program ready to be sent. `run`: the program as verified; `rest`: what is sent where that
+    is not the whole program; `forecast` is of what is sent."""
 
     run: Run
     wire: Wire
-    data: bytes
     forecast: Forecast
     packets: tuple[Packet, ...]
-    first: int = 0
-    entry: int = 0
+    rest: Rest | None = None
+
+    @property
+    def first(self) -> int:
+        """The block with which it begins."""
+        return 0 if self.rest is None else self.rest.first
 
     @property
     def sha256(self) -> str:
@@ -64,8 +79,9 @@ class Consignment:
         return float(sum(packet.seconds for packet in self.packets))
 
     def block_of(self, sent: int) -> int:
-        """The block of the program of a block (from 0) of what is sent; −1 within the entry."""
-        return sent if not self.first else max(sent - self.entry + self.first, -1)
+        """The last block of the program that is done with a block (from 0) of what is sent; −1
+        within the entry."""
+        return sent if self.rest is None or sent < 0 else int(self.rest.done[sent])
 
 
 def digest(data: bytes) -> str:
@@ -120,19 +136,19 @@ def consignment(
     check_settings(data, target, source)
     run = verify_program(data, target, source=source, progress=progress)
     if run.failed:
-        return Consignment(run, wire, b"", _no_forecast(run), (), first)
-    decoded = run.decoded
+        return Consignment(run, wire, _no_forecast(run), ())
+    decoded, rest = run.decoded, None
     assert decoded is not None
-    rest, entry = data, 0
     if first:
-        rest, entry = rest_of(decoded, target, first)
-        decoded = read_program(rest, target, source=source).decoded
+        rest = rest_of(decoded, target, first)
+        data = rest.data
+        decoded = read_program(data, target, source=source).decoded
         assert decoded is not None
     if progress is not None:
         progress.begin(f"simulating {PurePath(source).name}")
     forecast = forecast_of(decoded, target)
-    packets = tuple(wire.packets(rest, target.machine, forecast))
-    return Consignment(run, wire, rest, forecast, packets, first, entry)
+    packets = tuple(wire.packets(data, target.machine, forecast))
+    return Consignment(run, wire, forecast, packets, rest)
 
 
 def _no_forecast(run: Run) -> Forecast:
@@ -164,8 +180,8 @@ def forecast_of(decoded: Toolpath, target: LoadedTarget) -> Forecast:
 # The rest of a program.
 
 
-def rest_of(decoded: Toolpath, target: LoadedTarget, first: int) -> tuple[bytes, int]:
-    """The program from a block on, and how many of its blocks are the entry.
+def rest_of(decoded: Toolpath, target: LoadedTarget, first: int) -> Rest:
+    """The program from a block (from 0) on, behind an entry.
 
     It begins as the program does, at part zero: up, tool, spindle and coolant on as they are
     there, across above the place, down to it at the feed of plunges. Behind that come the same
@@ -177,7 +193,7 @@ def rest_of(decoded: Toolpath, target: LoadedTarget, first: int) -> tuple[bytes,
     if not 0 <= first < blocks or not len(rows):
         raise OptionError(f"there is no block {first + 1}", mend=f"blocks are 1 to {blocks}")
     low, high = int(rows[0]), decoded.running
-    if low >= high or not decoded.is_motion[low:high].any():
+    if low >= high or not _goes_on(decoded.part(low, high)):
         raise OptionError(f"nothing moves from block {first + 1} on", mend="it is finished")
     machine = target.machine
     entry = _entry(decoded, low, target)
@@ -192,8 +208,27 @@ def rest_of(decoded: Toolpath, target: LoadedTarget, first: int) -> tuple[bytes,
     whole = replace(decoded, **columns, findings=(), drawn=None, operations=None)
     program = target.target.write(whole, machine)
     again = target.target.read(program.data, machine)
-    at = _same_end(decoded.part(low, high), again, target, first)
-    return program.data, int(again.block[at])
+    wanted = decoded.part(low, high)
+    found = _Pairs(wanted, again, target).found()
+    if found is None:
+        raise PostError(
+            f"the rest of the program cannot be written again as it is from block {first + 1} on",
+            mend="choose the block at the beginning of a contour",
+        )
+    ends, into = found
+    # A block of the program is done when all moves up to its last one are.
+    moves = np.flatnonzero(wanted.is_motion)
+    last = np.append(wanted.block[moves[1:]] > wanted.block[moves[:-1]], True)
+    done = np.full(int(again.block.max()) + 1, -1)
+    np.maximum.at(done, again.block[ends[last]], wanted.block[moves[last]])
+    done[: again.block[into]] = -1
+    return Rest(program.data, first, int(again.block[into]), np.maximum.accumulate(done))
+
+
+def _goes_on(path: Toolpath) -> bool:
+    """Whether anything moves in it."""
+    somewhere = (path.starts != path.end).any(axis=1) | path.is_arc
+    return bool((path.is_motion & somewhere).any())
 
 
 def _entry(decoded: Toolpath, low: int, target: LoadedTarget) -> Toolpath:
@@ -218,9 +253,14 @@ def _entry(decoded: Toolpath, low: int, target: LoadedTarget) -> Toolpath:
     if turns:
         value = float(before.value[spindle[-1]])
         path.event(Kind(int(kinds[spindle[-1]])), None if math.isnan(value) else value)
-        waits = np.flatnonzero(kinds[spindle[-1] :] == Kind.DWELL)
-        if len(waits) and machine.spindle.spin_up_s:
-            path.event(Kind.DWELL, machine.spindle.spin_up_s)
+        after = before.kind[spindle[-1] :]
+        moves = np.flatnonzero(before.is_motion[spindle[-1] :])
+        waits = np.flatnonzero(after[: moves[0] if len(moves) else None] == Kind.DWELL)
+        spin_up_s = float(before.value[spindle[-1] :][waits].sum())  # as the program waits for it
+        if (after == Kind.DWELL).any():
+            spin_up_s = max(spin_up_s, machine.spindle.spin_up_s or 0.0)
+        if spin_up_s:
+            path.event(Kind.DWELL, spin_up_s)
     coolants = (Kind.COOLANT_MIST, Kind.COOLANT_FLOOD, Kind.COOLANT_OFF)
     cooled = np.flatnonzero(np.isin(kinds, coolants))
     off = cooled[kinds[cooled] == Kind.COOLANT_OFF]
@@ -244,26 +284,104 @@ def _plunge_feed(decoded: Toolpath, low: int, target: LoadedTarget) -> float:
     return min(feed, machine.max_plunge_mm_min)
 
 
-def _same_end(wanted: Toolpath, again: Toolpath, target: LoadedTarget, first: int) -> int:
-    """The row of `again` from which on it makes the wanted moves; PostError where it does not."""
-    moves, others = np.flatnonzero(wanted.is_motion), np.flatnonzero(again.is_motion)
-    if len(others) >= len(moves):
-        tail = others[len(others) - len(moves) :]
-        one, other = wanted.end[moves], again.end[tail]
-        slack = np.array([target.target.unit_mm(target.machine, a) for a in target.machine.axes])
-        arcs = wanted.is_arc[moves]
-        centres = np.nan_to_num(np.abs(wanted.centre[moves] - again.centre[tail])).max(initial=0.0)
-        same = (
-            (np.abs(one - other) <= slack + POSITION_EPS_MM).all()
-            and (wanted.kind[moves] == again.kind[tail]).all()
-            and (not arcs.any() or centres <= float(slack.max()) + POSITION_EPS_MM)
-        )
-        if same:
-            return int(tail[0])
-    raise PostError(
-        f"the rest of the program cannot be written again as it is from block {first + 1} on",
-        mend="choose the block at the beginning of a contour",
-    )
+class _Pairs:
+    """The moves of a program (`wanted`) and those of what was written for them, behind an entry
+    (`again`): the same ones, or, where the writer cuts a move into several, lines that lie on it;
+    what is shorter than the resolution of the dialect may be left out."""
+
+    def __init__(self, wanted: Toolpath, again: Toolpath, target: LoadedTarget) -> None:
+        machine = target.machine
+        self._wanted, self._again = wanted, again
+        self._begins, self._others = wanted.starts, again.starts
+        unit = [target.target.unit_mm(machine, axis) for axis in machine.axes]
+        self._slack = np.array(unit) + POSITION_EPS_MM
+        self._stray = float(self._slack.max()) + machine.defaults.fit_tolerance_mm
+        self._arms = PolarArcs(wanted, wanted.is_arc)
+
+    def found(self) -> tuple[Ints, int] | None:
+        """The row of `again` with which each of the moves that are wanted is done (M,), and its
+        first row that is none of the entry; None where it makes other moves."""
+        rows = np.flatnonzero(self._wanted.is_motion)
+        others = np.flatnonzero(self._again.is_motion)
+        tail = others[max(len(others) - len(rows), 0) :]
+        if len(tail) == len(rows) and self._same(rows, tail).all():
+            return tail, int(tail[0])
+        ends, at = np.empty(len(rows), dtype=np.int64), len(self._again)
+        for k in range(len(rows) - 1, -1, -1):
+            row = rows[k : k + 1]
+            ends[k], begin = self._last_move(at), None
+            if self._is_nothing(self._wanted, self._begins, row):
+                continue
+            if ends[k] >= 0:
+                begin = self._begin(row, int(ends[k]))
+            if begin is None:
+                return None
+            at = begin
+        return np.maximum(ends, at), at
+
+    def _last_move(self, at: int) -> int:
+        """The last row in front of `at` that moves, −1 where none does."""
+        at -= 1
+        while at >= 0 and self._is_nothing(self._again, self._others, np.array([at])):
+            at -= 1
+        return at
+
+    def _begin(self, row: Ints, at: int) -> int | None:
+        """The first of the rows, the last being `at`, that make a wanted move."""
+        part = np.array([at])
+        if self._same(row, part).all():
+            return at
+        if not self._near(self._wanted.end[row], self._again.end[part]).all():
+            return None
+        while self._lies_on(row, part):
+            if self._near(self._begins[row], self._others[part]).all():
+                return int(part[0])
+            part = np.array([self._last_move(int(part[0]))])
+            if part[0] < 0:
+                return None
+        return None
+
+    def _is_nothing(self, path: Toolpath, starts: Floats, row: Ints) -> bool:
+        """Whether a row is no move, or one that the dialect cannot tell from none."""
+        if path.is_arc[row].any():
+            return False
+        return not path.is_motion[row].any() or bool(self._near(starts[row], path.end[row]).all())
+
+    def _near(self, ones: Floats, others: Floats) -> Bools:
+        """(K,) of points (K, 3)."""
+        return np.asarray((np.abs(ones - others) <= self._slack).all(axis=1))
+
+    def _same(self, rows: Ints, others: Ints) -> Bools:
+        """(K,): whether moves are the same."""
+        wanted, again = self._wanted, self._again
+        off = np.nan_to_num(np.abs(wanted.centre[rows] - again.centre[others])).max(axis=1)
+        same: Bools = (wanted.kind[rows] == again.kind[others]) & (off <= self._slack.max())
+        same &= self._near(self._begins[rows], self._others[others])
+        return same & self._near(wanted.end[rows], again.end[others])
+
+    def _lies_on(self, row: Ints, part: Ints) -> bool:
+        """Whether a line, or an arc about the same centre, is a part of a wanted move."""
+        wanted, again = self._wanted, self._again
+        rapid = wanted.kind[row] == Kind.RAPID, again.kind[part] == Kind.RAPID
+        if rapid[0] != rapid[1] or not again.is_motion[part].all():
+            return False
+        points = np.concatenate([self._others[part], again.end[part]])
+        if again.is_arc[part].any():
+            off = np.abs(wanted.centre[row] - again.centre[part]).max()
+            if wanted.kind[row] != again.kind[part] or off > self._slack.max():
+                return False
+        else:
+            points = np.concatenate([points, points.mean(axis=0)[None, :]])
+        if wanted.is_arc[row].any():
+            arms, k = self._arms, int(np.searchsorted(self._arms.row, row[0]))
+            radius = np.hypot(*(points[:, :2] - arms.centre[k]).T)
+            low, high = sorted((float(arms.radius[k]), float(arms.end_radius[k])))
+            far = np.maximum(low - radius, radius - high)
+        else:
+            begin, way = self._begins[row[0]], wanted.end[row[0]] - self._begins[row[0]]
+            share = np.clip((points - begin) @ way / (way @ way), 0.0, 1.0)
+            far = np.linalg.norm(begin + share[:, None] * way - points, axis=1)
+        return bool((far <= self._stray).all())
 
 
 def lines_of(one: Consignment, target: LoadedTarget) -> Sequence[tuple[str, str]]:
@@ -284,9 +402,9 @@ def lines_of(one: Consignment, target: LoadedTarget) -> Sequence[tuple[str, str]
         ("travel", f"{size} mm"),
         ("begin", _stand(decoded, target)),
     ]
-    if one.first:
+    if one.rest is not None:
         x, y, z = decoded.starts_of(
-            np.array([int(np.flatnonzero(decoded.block >= one.entry)[0])])
+            np.array([int(np.flatnonzero(decoded.block >= one.rest.entry)[0])])
         )[0]
         lines.append(
             (

@@ -233,7 +233,9 @@ class Twin(ABC):
         return self._sent()
 
     def next_s(self) -> float | None:
-        """When it does something next if nothing comes in, each output counted; None: never."""
+        """When it may say something next if nothing comes in; None: never. A controller that
+        reports its outputs says something at each; one that does not needs no more than
+        `turn_s`."""
         times = [at for at in (self.turn_s(), self.slides.next_s()) if at is not None]
         return min(times, default=None)
 

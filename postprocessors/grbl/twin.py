@@ -153,6 +153,7 @@ class GrblTwin(Twin):
         self._running = self._stopping = self._held = self._jogging = self._homing = False
         self._stale = False  # the plan of the block that runs is not that of the ring
         self._rest_s: float | None = None  # until then a stop or a dwell holds what comes next
+        self._left_s: float | None = None  # so much of it is left behind a hold
         self._feed_percent = self._rapid_percent = self._spindle_percent = 100
         self._wco_in = self._ov_in = 0
         self._spindle, self._rpm, self._coolant, self._tool = "M5", 0.0, "M9", 0
@@ -240,13 +241,23 @@ class GrblTwin(Twin):
         self._ov_in = 0
 
     def _hold(self) -> None:
-        """A feed hold: slow down along the path, then stand."""
-        if self._running and not self._stopping:
-            self._stopping = self._stale = True
+        """A feed hold: slow down along the path, then stand; what dwells stops to count
+        (`protocol_exec_rt_system`)."""
+        if self._alarm or self._check or self._asleep or self._homing or self._held:
+            return
+        if self._running:
+            self._stale = self._stale or not self._stopping
+            self._stopping = True
+            return
+        self._held = True
+        if self._rest_s is not None:
+            self._left_s, self._rest_s = self._rest_s - self.now, None
 
     def _resume(self) -> None:
         if self._held:
             self._held = self._stopping = False
+            if self._left_s is not None:
+                self._rest_s, self._left_s = self.now + self._left_s, None
 
     def _reset(self) -> None:
         moving = self._running
@@ -259,6 +270,10 @@ class GrblTwin(Twin):
         self._greet()
 
     # The main loop.
+
+    def next_s(self) -> float | None:
+        """It says nothing at an output."""
+        return self.turn_s()
 
     def turn_s(self) -> float | None:
         times = [at for at in (self.slides.ends_s, self._rest_s) if at is not None]
@@ -344,7 +359,10 @@ class GrblTwin(Twin):
         return 0
 
     def _idle(self) -> bool:
-        return not self._ring and not self._running and self._rest_s is None
+        return not self._ring and not self._running and self._rested()
+
+    def _rested(self) -> bool:
+        return self._rest_s is None and self._left_s is None
 
     def _carry_out(self, path: Toolpath, owner: int) -> Generator[Ready, None, None]:
         """The rows of a line, each to the planner or at once."""
@@ -356,7 +374,7 @@ class GrblTwin(Twin):
                 yield self._idle
                 self._last = NO_BLOCKS
                 self._event(kind, float(path.value[row]))
-                yield lambda: self._rest_s is None
+                yield self._rested
             else:
                 yield from self._plan(path, row, owner)
 

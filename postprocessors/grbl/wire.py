@@ -44,6 +44,10 @@ POLLS: Final = 5
 """A status report is asked for whenever so many times the lateness of the line (0.25 s) is over:
 the wiki advises 5 Hz at most."""
 
+HELD: Final = 3
+"""So many reports in a row say that it is held though nobody has asked for it: by a button, or
+since a ~ was lost."""
+
 PROBE: Final = b"$G\n"
 PROBE_EVERY: Final = 36
 """After so many bytes of lines: two queries are under way in a full buffer, which never dries."""
@@ -56,6 +60,7 @@ MOST_LINE: Final = 1000
 _COMMENT = re.compile(r"\(([^()]*)\)|;(.*)")
 _BLANK = re.compile(r"[ \t]")
 _NUMBER = re.compile(r"N\d+(?:\.\d*)?", re.IGNORECASE)
+_DWELLS = re.compile(r"G0*4(?![\d.])", re.IGNORECASE)
 _PAUSES = re.compile(r"M0*[01](?![\d.])", re.IGNORECASE)
 
 _STATUS = re.compile(
@@ -235,10 +240,14 @@ class GrblConversation(Conversation):
         self._phase = "greeting"
         self._offset = (0.0, 0.0, 0.0)
         self._idle = 0  # idle reports in a row
+        self._idle_since = 0.0  # the first of them
+        self._holds = 0  # reports in a row that it is held, while it should work
+        self._resumes = False  # whether it is to go on as soon as it stands
         self._polled = self._answered = 0.0
         self._waits_since = 0.0  # when the answer that is due began to be due
         self._waiting = False  # a report is asked for that has not come
         self._resets = 0  # banners that are due
+        self._begun = 0.0  # since then
         self._failing = ""
         self._halted = 0.0
         self._reset_sent = False
@@ -252,6 +261,7 @@ class GrblConversation(Conversation):
 
     def pause(self, now: float) -> None:
         """Feed hold."""
+        self._resumes = False
         if self.state is State.SENDING:
             self.state, self._halted = State.PAUSING, now
             self._idle = 0
@@ -259,9 +269,11 @@ class GrblConversation(Conversation):
 
     def resume(self, now: float) -> None:
         """Go on where it was held; behind a single block, the next one."""
-        if self.state in HALTS or self.state is State.PAUSING:
+        if self.state is State.PAUSING:  # grbl passes over ~ until it stands
+            self._resumes = True
+        elif self.state in HALTS:
             held = self.why != SINGLE
-            self.state, self.why, self._idle = State.SENDING, "", 0
+            self.state, self.why, self._idle, self._holds = State.SENDING, "", 0, 0
             if held:
                 self._write(RESUME)
             self._go_on(now, anew=True)
@@ -296,6 +308,9 @@ class GrblConversation(Conversation):
         patience = self.manner.patience_s
         if self._phase == "greeting" and now - self._answered >= patience:
             self._end(State.FAILED, "nothing answers: is it a grbl, and is it switched on?")
+            return
+        if self._phase == "greeting" and self._resets and now - self._begun >= patience:
+            self._end(State.FAILED, "it was reset, and does not say that it has begun anew")
             return
         if self.state is State.STOPPING and now - self._halted >= patience:
             if self._reset_sent:
@@ -369,6 +384,9 @@ class GrblConversation(Conversation):
     def _status(self, state: str, fields: str, now: float) -> None:
         self._where(fields, now)
         self._idle = self._idle + 1 if state == "Idle" else 0
+        if self._idle == 1:
+            self._idle_since = now
+        self._holds = self._holds + 1 if state == "Hold:0" else 0
         still = state == "Hold:0" or self._idle >= 2 or state.startswith("Door:1")
         if self._phase == "greeting":
             self._greeted(state, now)
@@ -380,11 +398,19 @@ class GrblConversation(Conversation):
                 State.FAILED, "it is locked: home it, or unlock it with $X from a terminal program"
             )
         elif self.state is State.PAUSING and still:
-            self.state = State.PAUSED
+            self.state, self._holds = State.PAUSED, 0
+            if self._resumes:
+                self.resume(now)
         elif state.startswith("Door") and self.state is State.SENDING:
             self.state, self.why = State.WAITING, "its door is open: close it and go on"
-        elif state == "Hold:0" and self.state is State.SENDING and self._stops():
-            self.state, self.why = State.WAITING, self._stop_note()
+        elif self.state is State.SENDING and state == "Hold:0":
+            if self._stops():
+                self.state, self.why = State.WAITING, self._stop_note()
+            elif self._holds >= HELD:
+                self.state, self.why = State.WAITING, "it is held"
+        elif self.state is State.WAITING and state in ("Run", "Idle"):
+            self.state, self.why = State.SENDING, ""  # somebody has let it go on at the machine
+            self._go_on(now)
         elif self._idle >= 2 and self.state is State.SENDING:
             self._at_rest(now)
 
@@ -412,7 +438,7 @@ class GrblConversation(Conversation):
         an earlier sender is left in its buffer."""
         if state == "Idle":
             if self._resets == 0:
-                self._resets = 1
+                self._resets, self._begun = 1, now
                 self._write(RESET)
         elif state == "Alarm" and (b"$H\n" in self._commands):
             self._ready(now)
@@ -557,7 +583,8 @@ class GrblConversation(Conversation):
         if self._phase == "settings":
             return
         if self._out_lines:
-            if self._out_lines[0].packet is not None or self._out_lines[0].is_probe:
+            missing = self._out_lines[0].packet is not None or self._out_lines[0].is_probe
+            if missing and now > self._idle_since + self._dwell_s():
                 self._fail("an answer is missing: a line of the program may be lost", now)
             return
         if self._commands:
@@ -567,6 +594,15 @@ class GrblConversation(Conversation):
             self._end(State.FINISHED)
         elif self.single and self.sent == self.done:
             self.state, self.why = State.PAUSED, SINGLE
+
+    def _dwell_s(self) -> float:
+        """How long it may be idle with lines that it has not answered: as long as they dwell."""
+        out = {line.packet for line in self._out_lines}
+        return sum(
+            packet.seconds
+            for number, packet in enumerate(self.packets[: self.sent], 1)
+            if number in out and _DWELLS.search(packet.data.decode("latin-1"))
+        )
 
     def _reset(self, now: float) -> None:
         self._reset_sent, self._halted = True, now

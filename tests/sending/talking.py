@@ -7,41 +7,62 @@ from collections.abc import Callable
 from camtool.sending.faults import Wired
 from camtool.target.wire import Conversation, Reopen, Write
 
+Wish = Callable[[Conversation, float], None]
+
+
+class Talking:
+    """A conversation, its line, and the time, s. `coarse`: reports of steps come all at once, when
+    a travel is over, which is faster and on a line without faults the same."""
+
+    def __init__(self, talk: Conversation, line: Wired, *, coarse: bool = False) -> None:
+        self.talk, self.line, self.now = talk, line, 0.0
+        self.coarse = coarse
+        line.connect(self.now)
+        talk.begin(self.now)
+
+    def until(self, end_s: float, wish: Wish = lambda talk, now: None) -> None:
+        """Let time pass until then, or to the end of the conversation. `wish`: what the user does,
+        asked again and again."""
+        talk, line = self.talk, self.line
+        while not talk.ended or talk.has_actions:
+            self.act()
+            if line.unplugged(self.now):
+                talk.lost("the plug was pulled", self.now)
+                continue
+            data = line.read(self.now)
+            if data:
+                talk.received(data, self.now)
+            wish(talk, self.now)
+            if talk.ended or talk.has_actions:
+                continue
+            other = line.turn_s() if self.coarse else line.next_s()
+            at = talk.next_s if other is None else min(talk.next_s, other)
+            if at > end_s:
+                self.now = max(self.now, min(end_s, at))
+                return
+            self.now = max(self.now, at)
+            if self.now >= talk.next_s:
+                talk.elapsed(self.now)
+
+    def act(self) -> None:
+        """Do what the conversation wants now."""
+        for action in self.talk.actions():
+            if isinstance(action, Write):
+                self.line.write(action.data, self.now)
+            elif isinstance(action, Reopen):
+                self.line.connect(self.now)
+
 
 def talked(
     talk: Conversation,
     line: Wired,
-    wish: Callable[[Conversation, float], None] = lambda talk, now: None,
+    wish: Wish = lambda talk, now: None,
     *,
     latest_s: float,
+    coarse: bool = False,
 ) -> float:
     """Hold it to its end; when that was. AssertionError when it has none by `latest_s`."""
-    now = 0.0
-    line.connect(now)
-    talk.begin(now)
-    while not talk.ended or talk.has_actions:
-        for action in talk.actions():
-            if isinstance(action, Write):
-                line.write(action.data, now)
-            elif isinstance(action, Reopen):
-                line.connect(now)
-        if line.unplugged(now):
-            talk.lost("the plug was pulled", now)
-            continue
-        data = line.read(now)
-        if data:
-            talk.received(data, now)
-        wish(talk, now)
-        if talk.ended or talk.has_actions:
-            continue
-        other = line.next_s()
-        at = talk.next_s if other is None else min(talk.next_s, other)
-        if at == float("inf"):
-            wish(talk, now)
-            assert talk.ended or talk.has_actions, (talk.state, talk.why)
-            continue
-        now = max(now, at)
-        assert now < latest_s, (talk.state, talk.why, talk.sent, now)
-        if now >= talk.next_s:
-            talk.elapsed(now)
-    return now
+    both = Talking(talk, line, coarse=coarse)
+    both.until(latest_s, wish)
+    assert talk.ended, (talk.state, talk.why, talk.sent, both.now)
+    return both.now

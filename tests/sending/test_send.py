@@ -138,7 +138,7 @@ def test_an_interrupt_stops_the_machine(program: Path) -> None:
 
 
 def test_one_sender_a_port(program: Path) -> None:
-    small = Small(line_s=0.02)
+    small = Small(line_s=0.4)
     with behind_a_terminal(small) as port:
         line = command(str(program), "-t", "grbl", "--port", port, "--yes", "--json")
         with subprocess.Popen(line, stdout=subprocess.PIPE, text=True) as running:
@@ -152,14 +152,36 @@ def test_one_sender_a_port(program: Path) -> None:
 
 def test_the_rest_begins_above_the_place_and_makes_the_same_moves() -> None:
     whole = TARGET.target.read(PROGRAM, TARGET.machine)
-    data, entry = rest_of(whole, TARGET, 30)
-    rest = TARGET.target.read(data, TARGET.machine)
-    moves = rest.part(0, int(np.flatnonzero(rest.block >= entry)[0]))
+    made = rest_of(whole, TARGET, 30)
+    rest = TARGET.target.read(made.data, TARGET.machine)
+    moves = rest.part(0, int(np.flatnonzero(rest.block >= made.entry)[0]))
     place = whole.starts_of(np.array([int(np.flatnonzero(whole.block >= 30)[0])]))[0]
     assert (moves.end[moves.is_motion, 2] >= place[2]).all()
     assert np.allclose(moves.end[-1], place)
     with pytest.raises(OptionError, match="no block 900"):
         rest_of(whole, TARGET, 899)
+
+
+def test_the_rest_of_arcs_and_dwells_says_which_block_is_done_when() -> None:
+    program = (
+        b"G21 G90\nM3 S900\nG4 P2\nG0 Z5\nG0 X0 Y0\nG1 Z-1 F60\nG1 X0 F80\nG2 X2 Y2 I2 F80\n"
+        b"G2 X2.001 Y2.001 I0.0005 J0.0005 F80\nM5\nM3 S500\nG1 X3\nG0 Z5\nM5\nM30\n"
+    )
+    whole = TARGET.target.read(program, TARGET.machine)
+    for first in range(1, 13):
+        made = rest_of(whole, TARGET, first)
+        rest = TARGET.target.read(made.data, TARGET.machine)
+        assert (np.diff(made.done) >= 0).all()
+        assert (made.done[: made.entry] == -1).all()
+        assert made.done[-1] == 12  # of its moves
+        assert (b"G4 P2" in made.data) == (first < 10)
+        for block, done in enumerate(made.done.tolist()):
+            if done >= 0:  # all that it says is done has been reached
+                ends = whole.end[whole.is_motion & (whole.block <= done)]
+                there = rest.end[rest.is_motion & (rest.block <= block)]
+                assert np.allclose(ends[-1], there[-1])
+    with pytest.raises(OptionError, match="nothing moves"):
+        rest_of(whole, TARGET, 13)
 
 
 def test_a_program_for_another_machine_file_is_refused() -> None:

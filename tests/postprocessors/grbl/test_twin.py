@@ -161,6 +161,20 @@ def test_a_hold_that_ends_behind_a_corner() -> None:
         same_motion(twin, b"\n".join(twin.decoded), loaded)
 
 
+def test_a_hold_in_a_dwell_stops_its_clock() -> None:
+    twin, _ = made("grbl")
+    twin.receive(b"G4P2\nG1X1F500\n", 0.0)
+    assert report(twin, 0.5).startswith("<Idle|")  # as grbl says of a dwell
+    twin.receive(b"!", 0.5)
+    assert report(twin, 30.0).startswith("<Hold:0|")
+    assert len(twin.slides.trace) == 0
+    twin.receive(b"~", 30.0)
+    twin.advance(31.4)
+    assert len(twin.slides.trace) == 0
+    at_rest(twin, 31.4)
+    assert twin.slides.commanded_mm[0] == pytest.approx(1.0)
+
+
 def test_a_reset_in_motion_is_an_alarm_until_it_is_unlocked() -> None:
     twin, _ = made("grbl")
     twin.receive(SQUARE, 0.0)

@@ -69,3 +69,19 @@ def test_a_stop_leaves_nothing_that_moves() -> None:
     talked(talk, Wired(twin), wish, latest_s=100.0)
     assert talk.state is State.STOPPED, talk.why
     assert not twin.moves
+
+
+def test_dwells_are_no_missing_answers_and_missing_ones_are_noticed() -> None:
+    program = b"G21 G90\nG1 X1 F500\nG4 P5\nG1 X2\nG4 P3\n"
+    twin, _ = made("grbl")
+    talk = conversation(program)
+    talked(talk, Wired(twin), latest_s=100.0)
+    assert talk.state is State.FINISHED, talk.why
+    twin, _ = made("grbl")
+    line, talk = Wired(twin), conversation(program)
+
+    def wish(talk: Conversation, now: float) -> None:
+        line.back.faults = Faults(drop=1.0 if talk.acknowledged == 2 and now < 6.5 else 0.0)
+
+    talked(talk, line, wish, latest_s=100.0)
+    assert talk.state is State.FAILED

@@ -40,7 +40,7 @@ def test_the_logo_arrives_block_by_block_and_moves_as_verify_says() -> None:
     twin, loaded = made("pic-mmh")
     program = logo("pic-mmh")
     talk = conversation(program, loaded)
-    talked(talk, Wired(twin), latest_s=30_000.0)
+    talked(talk, Wired(twin), latest_s=30_000.0, coarse=True)
     assert talk.state is State.FINISHED, talk.why
     assert twin.decoded == executed(program)
     assert twin.commands == [b"BX204;", b"BY178;"]

@@ -1,0 +1,288 @@
+"""Senders and virtual machines under whatever may happen, in any order, on a virtual clock: faults
+of the line, pauses, stops, a pulled plug."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+from hypothesis import Phase, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import (
+    RuleBasedStateMachine,
+    initialize,
+    invariant,
+    precondition,
+    rule,
+    run_state_machine_as_test,
+)
+
+from camtool.arrays import Floats
+from camtool.sending.faults import Faults, Wired
+from camtool.sending.prepare import forecast_of, rest_of
+from camtool.target.registry import LoadedTarget, load_target
+from camtool.target.twin import Twin
+from camtool.target.wire import Forecast, Manner, Packet, State
+from camtool.toolpath.moves import Toolpath
+from tests.sending.talking import Talking
+
+PROGRAMS = {
+    "grbl": b"G21 G90\nG0 Z5\nM3 S1000\nG0 X1 Y1\n"
+    + b"".join(b"G1 X%d.125 Y%d.375 F400\n" % (k % 9, k % 7) for k in range(40))
+    + b"G4 P0.3\nG2 X4.125 Y5.375 I1 F300\nG0 Z5\nM5\nM30\n",
+    "pic-mmh": b"G54;G90;G00Z00010.00;G00X00003.00Y00002.00;G01Z-00002.00F08;"
+    b"G01X00006.00Y00002.00F08;G02X00009.00Y00005.00I00006.00J00005.00F08;"
+    b"G01X00003.00Y00002.00F08;G04P01;G01X00001.00Y00002.00F08;G00Z00010.00;M30;",
+}
+"""A program of each machine: short, with more blocks than its buffers hold."""
+
+BOUND = 3.0
+"""A program ends within so many times its simulated time, and what the machine may be silent."""
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A program, or its rest: what is sent, and what the simulation says of it."""
+
+    packets: tuple[Packet, ...]
+    forecast: Forecast
+
+    @property
+    def blocks(self) -> list[bytes]:
+        """As the controller is to have them."""
+        return [packet.data.strip() for packet in self.packets if packet.block >= 0]
+
+    @property
+    def seconds(self) -> float:
+        return sum(packet.seconds for packet in self.packets)
+
+
+@cache
+def loaded(name: str) -> LoadedTarget:
+    return load_target(name)
+
+
+@cache
+def part(name: str, first: int = 0) -> Part:
+    """The program of a machine from a block on."""
+    target, data = loaded(name), PROGRAMS[name]
+    decoded = target.target.read(data, target.machine)
+    if first:
+        data = rest_of(decoded, target, first).data
+        decoded = target.target.read(data, target.machine)
+    forecast = forecast_of(decoded, target)
+    wire: Any = target.target.wire()
+    return Part(tuple(wire.packets(data, target.machine, forecast)), forecast)
+
+
+def outputs_until(twin: Twin, block: int) -> int:
+    """How many outputs its slides have made for the blocks up to this one."""
+    of = twin.slides.trace.block
+    return int(np.count_nonzero((of >= 0) & (of <= block)))
+
+
+def ends_of(decoded: Toolpath, low: int = 0) -> Floats:
+    """(K, 3) mm: where the moves from a row on end, if they are longer than nothing."""
+    path = decoded.part(low, decoded.running)
+    moved = path.is_motion & ((path.starts != path.end).any(axis=1) | path.is_arc)
+    return path.end[moved]
+
+
+class Sending(RuleBasedStateMachine):
+    """One program on its way to one virtual machine."""
+
+    name: ClassVar[str]
+
+    @initialize(seed=st.integers(0, 2**16), single=st.sampled_from([False, False, False, True]))
+    def opened(self, seed: int, single: bool) -> None:
+        target = loaded(self.name)
+        self.part = part(self.name)
+        self.twin: Any = target.twin([])
+        self.line = Wired(self.twin, seed=seed)
+        wire: Any = target.target.wire()
+        talk = wire.conversation(self.part.packets, target.machine, Manner(single=single))
+        self.both = Talking(talk, self.line)
+        self.talk = talk
+        self.true = True  # whether all bytes to the machine have arrived as they were
+        self.still: int | None = None  # the outputs when a halt was said
+        self.asked_s: float | None = None  # when a stop was asked for
+
+    # What happens.
+
+    @rule(seconds=st.sampled_from([0.01, 0.1, 0.3, 1.0, 4.0, 20.0]))
+    def time_passes(self, seconds: float) -> None:
+        end = self.both.now + seconds
+        self.both.until(end)
+        if self.talk.ended and not self.line.unplugged(end):
+            self.line.read(end)  # nobody speaks any more, and the machine goes on as it is
+        self.both.now = max(self.both.now, end)
+
+    @rule(
+        to_machine=st.sampled_from([False, False, False, True]),
+        kind=st.sampled_from(["drop", "double", "garble", "late"]),
+        often=st.sampled_from([0.002, 0.02, 0.2, 1.0]),
+        late_s=st.sampled_from([0.2, 2.0, 8.0]),
+        seconds=st.sampled_from([0.02, 0.2, 2.0]),
+    )
+    def the_line_is_bad(
+        self, to_machine: bool, kind: str, often: float, late_s: float, seconds: float
+    ) -> None:
+        """For a while."""
+        line = self.line.there if to_machine else self.line.back
+        before = line.faults
+        line.faults = Faults(**{kind: often}, late_s=late_s)
+        self.true = self.true and not to_machine
+        self.time_passes(seconds)
+        if before.unplug_s is None:
+            line.faults = before
+
+    @precondition(lambda self: not self.talk.ended)
+    @rule()
+    def pause(self) -> None:
+        self.talk.pause(self.both.now)
+        self.both.act()
+
+    @precondition(lambda self: not self.talk.ended)
+    @rule()
+    def resume(self) -> None:
+        self.still = None
+        self.talk.resume(self.both.now)
+        self.both.act()
+
+    @precondition(lambda self: not self.talk.ended)
+    @rule(step=st.booleans())
+    def single(self, step: bool) -> None:
+        self.talk.single = step
+
+    @precondition(lambda self: not self.talk.ended)
+    @rule()
+    def stop(self) -> None:
+        self.talk.stop(self.both.now)
+        self.both.act()
+        if self.asked_s is None:
+            self.asked_s = self.both.now
+
+    @precondition(lambda self: not self.talk.ended and not self.line.unplugged(self.both.now))
+    @rule(likely=st.sampled_from([False, False, True]))
+    def the_plug_is_pulled(self, likely: bool) -> None:
+        if likely:
+            gone = Faults(unplug_s=self.both.now)
+            self.line.there.faults = self.line.back.faults = gone
+
+    # What must hold, whatever happens.
+
+    @invariant()
+    def all_is_well(self) -> None:
+        self.no_block_is_skipped_or_doubled()
+        self.the_counts_are_in_order()
+        self.what_is_done_is_done()
+        self.nothing_moves_behind_a_halt()
+        self.a_stop_is_quick()
+
+    def no_block_is_skipped_or_doubled(self) -> None:
+        if self.true:
+            assert self.twin.decoded == self.part.blocks[: len(self.twin.decoded)]
+
+    def the_counts_are_in_order(self) -> None:
+        talk = self.talk
+        assert 0 <= talk.done <= talk.acknowledged <= talk.sent <= len(self.part.packets)
+
+    def what_is_done_is_done(self) -> None:
+        if self.true:
+            block = self.talk.block
+            wanted = int(self.part.forecast.outputs[: block + 1].sum())
+            assert outputs_until(self.twin, block) == wanted
+
+    def nothing_moves_behind_a_halt(self) -> None:
+        halted = self.talk.state in (State.STOPPED, State.PAUSED)
+        halted = halted or (
+            self.talk.state is State.FAILED and not _unknown(self.talk.why) and self.true
+        )
+        if not halted:
+            self.still = None
+            return
+        assert not self.twin.moves, (self.talk.state, self.talk.why)
+        count = len(self.twin.slides.trace)
+        assert self.still in (None, count)
+        self.still = count
+
+    def a_stop_is_quick(self) -> None:
+        """As long as a block, and what the machine may be silent."""
+        if self.asked_s is not None and not self.talk.ended:
+            longest = max(packet.seconds for packet in self.part.packets)
+            assert self.both.now - self.asked_s <= longest + 3.0 * self.talk.manner.patience_s
+
+    def teardown(self) -> None:
+        """It comes to an end; whatever is missing is completed by another machine."""
+        if not hasattr(self, "both"):
+            return
+        patience_s = self.talk.manner.patience_s
+
+        def going_on(talk: Any, now: float) -> None:
+            if talk.state in (State.PAUSED, State.WAITING):
+                talk.resume(now)
+
+        self.talk.single = False
+        self.both.until(self.both.now + BOUND * self.part.seconds + 10.0 * patience_s, going_on)
+        assert self.talk.ended, (self.talk.state, self.talk.why)
+        self.all_is_well()
+        if self.talk.state is State.FINISHED:
+            assert self.talk.done == len(self.part.packets)
+            assert not self.twin.moves
+            if self.true:
+                assert self.twin.decoded == self.part.blocks
+        else:
+            self._completed(self.talk.block + 1)
+
+    def _completed(self, first: int) -> None:
+        """The rest of the program, on a machine that stands at part zero again."""
+        decoded = part(self.name).forecast.decoded
+        rows = np.flatnonzero(decoded.block >= first)
+        target = loaded(self.name)
+        if not len(rows) or not len(ends_of(decoded, int(rows[0]))):
+            return  # nothing moves any more
+        rest = part(self.name, first)
+        twin: Any = target.twin([])
+        wire: Any = target.target.wire()
+        talk = wire.conversation(rest.packets, target.machine, Manner())
+        both = Talking(talk, Wired(twin), coarse=True)
+        both.until(BOUND * rest.seconds + 60.0)
+        assert talk.state is State.FINISHED, talk.why
+        assert twin.decoded == rest.blocks
+        again, wanted = ends_of(rest.forecast.decoded), ends_of(decoded, int(rows[0]))
+        unit = [target.target.unit_mm(target.machine, axis) for axis in target.machine.axes]
+        for end in wanted[::-1]:  # arcs may have become lines
+            while (np.abs(again[-1] - end) > unit).any():
+                again = again[:-1]
+
+
+def _unknown(why: str) -> bool:
+    """Whether a failure says that nobody knows whether the machine stands."""
+    return "switch it off" in why or "plug" in why or "nothing answers" in why
+
+
+def run(name: str, examples: int) -> None:
+    machine = type(f"Sending to {name}", (Sending,), {"name": name})
+    run_state_machine_as_test(  # type: ignore[no-untyped-call]
+        machine,
+        settings=settings(
+            max_examples=examples,
+            stateful_step_count=20,
+            phases=(Phase.explicit, Phase.generate),  # to shrink a failure takes minutes
+            report_multiple_bugs=False,
+        ),
+    )
+
+
+@pytest.mark.parametrize("name", sorted(PROGRAMS))
+def test_some_orders(name: str) -> None:
+    run(name, 20)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(PROGRAMS))
+def test_two_thousand_orders(name: str) -> None:
+    run(name, 2000)
