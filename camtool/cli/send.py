@@ -162,7 +162,8 @@ class _Job:
             left += packet.seconds
         self._left = [left, *reversed(self._left)]
         progress().begin("sending", len(one.packets))
-        manner = Manner(single=single, home=home, late_s=LATE_S * speed)
+        real = not self.port.is_virtual
+        manner = Manner(single=single, home=home, late_s=LATE_S * speed, paced=real)
         conversation = one.wire.conversation(one.packets, self.target.machine, manner)
         with opened_line(self.port) as line, self._caught(), _keys() as key:
             journal = Journal(self.place, self._head(), more=self.more)

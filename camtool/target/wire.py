@@ -127,12 +127,14 @@ does not answer."""
 class Manner:
     """How a conversation is held. `single`: it waits for `resume` after every packet; `home`: the
     machine is homed first; `late_s`: how late the line may be, s; `checked`: settings of the
-    controller are compared with the machine file."""
+    controller are compared with the machine file; `paced`: each byte takes the time that the rate
+    of the line gives it, so that a reply that comes sooner is none."""
 
     single: bool = False
     home: bool = False
     late_s: float = LATE_S
     checked: bool = True
+    paced: bool = False
 
     @property
     def patience_s(self) -> float:

@@ -10,13 +10,18 @@ from typing import TYPE_CHECKING
 
 from camtool.target.contract import Target
 
-from .dialect import Dialect, I8751Controller, I8751Machine, check
+from .dialect import Dialect, I8751Controller, I8751Link, I8751Machine, check
 
 if TYPE_CHECKING:
+    import msgspec
+
+    from camtool.machine.model import Machine
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
 
     from .controller import I8751Model
+    from .twin import Choices, I8751Twin
+    from .wire import I8751Wire
 
 
 class I8751(Target):
@@ -25,6 +30,7 @@ class I8751(Target):
     name = "i8751"
     controllers = (I8751Controller,)
     dialect = Dialect
+    link = I8751Link
 
     def check(self, machine: I8751Machine) -> None:
         """Raise MachineError where values of the dialect do not go with the machine."""
@@ -52,15 +58,35 @@ class I8751(Target):
         """How far ends of records may lie from their lines, and lines from their arcs."""
         return machine.dialect.tolerance_mm + machine.dialect.arc_tolerance_mm
 
+    def wire(self) -> I8751Wire:
+        """A byte and its reply, a packet and its F."""
+        from .wire import I8751Wire
+
+        return I8751Wire()
+
+    def twin_choices(self) -> type[Choices]:
+        """What its thesis leaves open of the wire."""
+        from .twin import Choices
+
+        return Choices
+
+    def twin(
+        self, machine: Machine[I8751Controller, Dialect], choices: msgspec.Struct | None = None
+    ) -> I8751Twin:
+        """The virtual controller; docs/wires/i8751.md."""
+        from .twin import Choices, I8751Twin
+
+        return I8751Twin(machine, choices if isinstance(choices, Choices) else Choices())
+
     def line_bytes(self, data: bytes, machine: I8751Machine) -> int:
         """The bytes of the packets, whatever the form of the file."""
-        from .wire import packet_count
+        from .stream import stream_of
 
-        return packet_count(data, machine)
+        return len(stream_of(data, machine))
 
     def listing(self, data: bytes, machine: I8751Machine) -> Listing:
         """The bytes of each record."""
-        from .wire import listing
+        from .stream import listing
 
         return listing(data, machine)
 

@@ -10,7 +10,7 @@ import re
 from typing import Final, Literal
 
 from camtool.errors import MachineError
-from camtool.machine.model import Machine, SlideStart
+from camtool.machine.model import Link, Machine, SlideStart
 from camtool.machine.ranges import Tolerance
 
 from .pulses import Firmware
@@ -90,6 +90,13 @@ class I8751Controller(SlideStart, frozen=True, tag_field="model", tag="i8751"):
     How its firmware counts and times pulses decides what its bytes mean too, so those options
     stand once, in `[dialect]`: `camtool_postprocessors.i8751.pulses`.
     """
+
+
+class I8751Link(Link, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What its thesis leaves open beside the replies of `[dialect]`: whether the end of a packet,
+    which is stored too (L4343-4352), is answered by an M before its F."""
+
+    packet_end: Literal["F", "M F"] = "F"
 
 
 I8751Machine = Machine[SlideStart, Dialect]

@@ -81,7 +81,14 @@ class ByteFault(Exception):
 
 def read_program(data: bytes, machine: I8751Machine) -> Toolpath:
     """The moves of a program; ProgramError naming record and byte, or line and column."""
-    return _toolpath(decoded_records(data, machine), machine, machine.dialect)
+    return _toolpath(decoded_records(data, machine), machine, np.zeros(3, dtype=np.int64))
+
+
+def read_packet(records: bytes, machine: I8751Machine, at: Ints) -> Toolpath:
+    """The moves of the records of one packet, of a machine that stands `at` (3,) steps from part
+    zero; ProgramError as `read_program`."""
+    whole = bytes([ACCESS]) + records + bytes([PACKET_END, DATA_END])
+    return _toolpath(_read_packets(whole, machine.dialect), machine, at)
 
 
 def decoded_records(data: bytes, machine: I8751Machine) -> Decoded:
@@ -111,12 +118,13 @@ def _read_packets(data: bytes, dialect: Dialect) -> Decoded:
         ) from None
 
 
-def _toolpath(decoded: Decoded, machine: I8751Machine, dialect: Dialect) -> Toolpath:
-    """Rows of all records, then END."""
-    path, times = ToolpathBuilder(), PulseTimes(dialect)
+def _toolpath(decoded: Decoded, machine: I8751Machine, at: Ints) -> Toolpath:
+    """Rows of all records, then END; the first begins `at` (3,) steps from part zero."""
+    dialect = machine.dialect
     step_mm = np.array([axis.coded_step_mm for axis in machine.axes])
-    goes_below = bool((np.cumsum(decoded.steps[:, 2]) < 0).any())
-    at = np.zeros(3, dtype=np.int64)
+    x, y, z = (at * step_mm).tolist()
+    path, times = ToolpathBuilder(start=(x, y, z)), PulseTimes(dialect)
+    goes_below = bool((at[2] + np.cumsum(decoded.steps[:, 2]) < 0).any())
     for low in range(0, len(decoded.steps), RECORDS_AT_ONCE):
         records = slice(low, low + RECORDS_AT_ONCE)
         steps, waits = decoded.steps[records].astype(np.int64), decoded.waits[records]

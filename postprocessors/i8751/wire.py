@@ -1,36 +1,252 @@
-"""The packets of a program in any of its three forms: how many bytes they have, and which."""
+"""How programs are sent to the Intel 8751: a byte, its reply, the next byte; a packet, its F.
+
+2400 8N1 (L3921), raw bytes; 13H and 11H are data, so that no flow control may be on. The key 13H
+is answered by LISTO, or by OTRO, and is then sent again (L4397-4426). Each byte of a record is
+answered by one character (L4428-4463), and each packet by F when it has been executed
+(L4343-4366). So nothing moves before all of a packet has been answered. A reply that is missing
+or another one ends the program; a wrong bit on the way to the machine is not seen, since replies
+do not repeat what came. `[dialect]` and `[link]` say what the thesis leaves open.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
 import numpy as np
 
-from camtool.toolpath.program import Listing
+from camtool.errors import MachineError
+from camtool.target.wire import Forecast, Manner, Packet, PacketByPacket, State, Wire
 
-from .dialect import I8751Machine
-from .read import decoded_records
-from .write import END_OF_DATA, byte_table, packet_bytes
+from .dialect import Dialect, I8751Link, I8751Machine
+from .pulses import PulseTimes
+from .stream import stream_of
+from .write import END_OF_DATA, END_OF_PACKET, KEY, STOPPED, packet_bytes
+
+READY: Final = "LISTO"
+AGAIN: Final = "OTRO"
+
+TRIES: Final = 5
+"""So often the key is sent; ours."""
+
+SLOWER: Final = 1.05
+"""How much longer than simulated a packet may take, beyond what the line is late."""
+
+ANY: Final = "?"
+"""A reply of which nothing is known, not even whether there is one."""
+
+NONE: Final = "-"
+"""No reply."""
+
+ROUND_TRIP_S: Final = 2.0 * 10.0 / 2400.0 * 0.9
+"""What comes sooner behind a byte cannot be its reply, s: both take ten bits on the line; a tenth
+is for clocks that are not alike."""
+
+UNANSWERED: Final = 2.0
+"""A byte without a reply is given so many times the lateness of the line."""
 
 
-def packet_count(data: bytes, machine: I8751Machine) -> int:
-    """The length of the program as packets; ProgramError as its reader has it."""
-    dialect = machine.dialect
-    if dialect.format == "packets":
-        return len(data)
-    decoded = decoded_records(data, machine)
-    return len(
-        packet_bytes(decoded.steps.astype(np.int64), decoded.waits.astype(np.int64), dialect)
+class I8751Wire(Wire):
+    """The controller over RS-232."""
+
+    baud = 2400
+    ready = (
+        "the controller knows only steps: wherever the tool stands is part zero to it",
+        "the controller has just been reset: it waits for its key",
+        "a wrong bit on the way to the machine is not seen: replies do not repeat what came",
+    )
+    stopping = (
+        "a packet that is being executed is executed to its end; one that is not complete yet is "
+        "never begun, and the controller must then be reset"
     )
 
+    def packets(self, data: bytes, machine: I8751Machine, forecast: Forecast) -> Sequence[Packet]:
+        """The packets of up to five records, the first with the key; then the end of the data."""
+        packets, record = [], 0
+        for part in _parts(stream_of(data, machine), machine):
+            seconds = float(forecast.seconds[record : record + part.records].sum())
+            record += part.records
+            # The end of the data is a block of its own, behind the last record.
+            block = record - 1 if part.records else record
+            packets.append(Packet(part.data, block, seconds))
+        return packets
 
-def listing(data: bytes, machine: I8751Machine) -> Listing:
-    """The bytes of each record in hex, then the end of the data; whatever the form of the file."""
-    dialect = machine.dialect
-    decoded = decoded_records(data, machine)
-    end = f"{END_OF_DATA:02X}"
-    if not len(decoded.steps):
-        return Listing((end,), binary=True)
-    table, used = byte_table(
-        decoded.steps.astype(np.int64), decoded.waits.astype(np.int64), dialect
-    )
-    lines = (row[sent].tobytes().hex(" ").upper() for row, sent in zip(table, used, strict=True))
-    return Listing((*lines, end), binary=True)
+    def conversation(
+        self, packets: Sequence[Packet], machine: I8751Machine, manner: Manner
+    ) -> I8751Conversation:
+        """The conversation that sends these packets."""
+        if manner.home:
+            raise MachineError("the controller has no switches to home to", where="--home")
+        return I8751Conversation(packets, machine, manner)
+
+    def command(
+        self,
+        action: str,
+        machine: I8751Machine,
+        values: Mapping[str, float],
+        manner: Manner,
+    ) -> I8751Conversation:
+        """A jog is a program of its steps; the machine has one speed."""
+        if action != "jog":
+            return super().command(action, machine, values, manner)  # type: ignore[return-value]
+        axes = zip("xyz", machine.axes, strict=True)
+        way = [round(values.get(letter, 0.0) / axis.coded_step_mm) for letter, axis in axes]
+        if not any(way):
+            raise MachineError("that is less than a step", mend="jog by more")
+        most = machine.dialect.most_steps
+        count = -(-max(map(abs, way)) // most)
+        ends = np.outer(np.arange(count + 1), way) // count
+        steps = np.diff(ends, axis=0)
+        times = PulseTimes(machine.dialect)
+        seconds = float(times.legs_s(steps[:, :2]).sum() + times.alone_s(steps[:, 2]).sum())
+        stream = packet_bytes(steps, np.zeros((count, 2), dtype=np.int64), machine.dialect)
+        parts = list(_parts(stream, machine))
+        packets = [Packet(part.data, seconds=seconds) for part in parts]
+        return I8751Conversation(packets, machine, manner)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A packet: its bytes, the reply to each, and how many records it has."""
+
+    data: bytes
+    replies: tuple[str, ...]
+    records: int
+
+
+def _parts(stream: bytes, machine: I8751Machine) -> Iterator[_Part]:
+    """The packets of a stream that its reader accepts, or that the writer has made."""
+    dialect: Dialect = machine.dialect
+    assert isinstance(machine.link, I8751Link)
+    begin = at = records = 0
+    replies: list[str] = []
+    while at < len(stream):
+        octet = stream[at]
+        if octet == KEY:
+            replies.append(READY)
+        elif octet == END_OF_PACKET:
+            replies.append("".join(machine.link.packet_end.split()))
+        elif octet == END_OF_DATA:
+            replies.append("A")
+        elif octet in (1, 2, 3):
+            records += octet == 1
+            data = 1 if stream[at + 1] == STOPPED else 3
+            replies += [dialect.motor_reply, *"M" * data]
+        else:
+            replies += dialect.dwell_replies
+        at = begin + len(replies)
+        if octet in (END_OF_PACKET, END_OF_DATA):
+            yield _Part(stream[begin:at], tuple(replies), records)
+            begin, replies, records = at, [], 0
+
+
+class I8751Conversation(PacketByPacket):
+    """A byte and its reply."""
+
+    def __init__(self, packets: Sequence[Packet], machine: I8751Machine, manner: Manner) -> None:
+        super().__init__(packets, manner)
+        whole = b"".join(packet.data for packet in packets)
+        self._replies = [part.replies for part in _parts(whole, machine)]
+        self._known = machine.dialect.motor_reply + "M"
+        self._at = 0  # the byte of the packet that is out
+        self._said = ""
+        self._tries = 0
+        self._written = 0.0
+
+    def _send(self, packet: Packet, now: float) -> None:
+        self._at, self._tries = 0, 1
+        self._send_byte(now)
+
+    def _send_byte(self, now: float) -> None:
+        packet, octet = self.packets[self.sent - 1], self._octet
+        self._write(octet)
+        self._said, self._written = "", now
+        wait_s = self.manner.patience_s
+        if self._reply in (ANY, NONE):
+            wait_s = UNANSWERED * self.manner.late_s
+        elif self._executes:
+            wait_s += SLOWER * packet.seconds
+        self.next_s = now + wait_s
+
+    @property
+    def _octet(self) -> bytes:
+        return self.packets[self.sent - 1].data[self._at : self._at + 1]
+
+    @property
+    def _executes(self) -> bool:
+        """Whether the byte that is out is the one that makes the machine move."""
+        return self._octet[0] == END_OF_PACKET and self._at == len(self._packet_replies) - 1
+
+    @property
+    def _packet_replies(self) -> tuple[str, ...]:
+        return self._replies[self.sent - 1]
+
+    @property
+    def _reply(self) -> str:
+        return self._packet_replies[self._at]
+
+    def received(self, data: bytes, now: float) -> None:
+        """The reply to the byte that is out; line ends are passed over."""
+        text = "".join(data.decode("latin-1").split())
+        if self.ended or not text:
+            return
+        if not self._busy:
+            self._fail(f"it says {text[:20]!r} without being asked", now)
+            return
+        self._said += text
+        awaits_key = self._reply == READY and self._tries < TRIES
+        if self.manner.paced and now - self._written < ROUND_TRIP_S:
+            self._fail(f"{self._said[:20]!r} comes too soon{self._in_reply}", now)
+        elif self._is_answered:
+            self._byte_done(now)
+        elif awaits_key and self._said == AGAIN:
+            self._tries += 1
+            self._send_byte(now)
+        elif not self._reply.startswith(self._said) and not (
+            awaits_key and AGAIN.startswith(self._said)
+        ):
+            self._fail(f"it says {self._said[:20]!r}, not {self._reply}{self._in_reply}", now)
+
+    @property
+    def _is_answered(self) -> bool:
+        if self._reply == ANY:
+            return len(self._said) == 1 and self._said in self._known
+        return self._said == self._reply
+
+    @property
+    def _in_reply(self) -> str:
+        return f", to the byte {self._octet.hex().upper()}H{self._mend}"
+
+    @property
+    def _mend(self) -> str:
+        if self._executes:
+            return ""
+        return "; nothing of this packet has moved, and the controller must be reset"
+
+    def _byte_done(self, now: float) -> None:
+        packet = self.packets[self.sent - 1]
+        self._at += 1
+        if self._at == len(packet.data):
+            self._packet_done(now)
+        elif self.state is State.STOPPING:
+            self._halt(now)
+        else:
+            self._send_byte(now)
+
+    def elapsed(self, now: float) -> None:
+        """A reply has not come, or none was awaited."""
+        if self.ended or not self._busy or now < self.next_s:
+            return
+        if self._reply in (ANY, NONE):
+            self._byte_done(now)
+        else:
+            self._fail(f"no reply, {self._reply} was awaited{self._in_reply}", now)
+
+    def _halt(self, now: float) -> bool:
+        """A packet that is not complete is never executed."""
+        if self._executes:
+            return False
+        self._busy = False
+        self._stopped()
+        return True

@@ -102,3 +102,10 @@ def test_pic_mmh(tmp_path: Path) -> None:
 
 def test_grbl(tmp_path: Path) -> None:
     check("grbl", tmp_path, settings=[], choices=[], speed=10)
+
+
+def test_i8751(tmp_path: Path) -> None:
+    steps = [f"axes.{axis}.coded_step_mm=0.0125" for axis in "xyz"]
+    settings = [*steps, "feed.default_mm_min=78.3"]
+    twin = check("i8751", tmp_path, settings=settings, choices=[], speed=1e5)
+    assert b"\x13" + b"".join(twin.decoded) + b"\x54" == logo("i8751", *settings)

@@ -1,0 +1,198 @@
+"""The Intel 8751 at the other end of its serial line, as docs/wires/i8751.md describes it.
+
+Nothing is taken before the key 13H (L4397-4426). Then each byte of a record is stored and answered
+(L4428-4463), and nothing moves until 45H ends the packet; when its records have been executed the
+controller says F, and takes the next packet or 54H, which it answers by A (L4343-4383).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+from itertools import pairwise
+from typing import TYPE_CHECKING, Final, Literal
+
+import msgspec
+import numpy as np
+
+from camtool.errors import ProgramError
+from camtool.machine.model import Machine
+from camtool.target.twin import COMMANDED, Slides, Travel, Twin, travel_of
+
+from .controller import I8751Model
+from .dialect import RECORDS_PER_PACKET, Dialect, I8751Controller
+from .read import ACCESS, DATA_END, PACKET_END, STANDS, read_packet
+
+if TYPE_CHECKING:
+    from camtool.toolpath.moves import Toolpath
+
+STORED: Final = b"M"
+"""A datum has been stored (L4443-4463)."""
+
+EXECUTED: Final = ord("F")
+"""The packet has been executed (L4343-4357)."""
+
+DONE: Final = ord("A")
+"""The end of the data has been taken (L4372-4383)."""
+
+SENSES: Final = (3, 4, STANDS)
+"""Forward, backward, standing (L4106-4119)."""
+
+LINE_ENDS: Final = {"none": b"", "cr": b"\r", "lf": b"\n", "crlf": b"\r\n"}
+"""What may stand behind LISTO and OTRO."""
+
+
+class Choices(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What the thesis leaves open.
+
+    `key`: 13H opens the acquisition "once", or stands before "each-packet". `line_end`: behind
+    LISTO and OTRO. `motor_reply`: to the number of a motor, printed as B and as 8. `dwell_reply`:
+    to the two bytes of a wait, B being the reply to a motor. `packet_end`: to 45H. `opening` of
+    the line by somebody does "nothing", or a "reset".
+    """
+
+    key: Literal["once", "each-packet"] = "once"
+    line_end: Literal["crlf", "cr", "lf", "none"] = "crlf"
+    motor_reply: Literal["B", "8"] = "B"
+    dwell_reply: Literal["B M", "M", "none"] = "B M"
+    packet_end: Literal["F", "M F"] = "F"
+    opening: Literal["nothing", "reset"] = "nothing"
+
+
+class I8751Twin(Twin):
+    """The controller after a reset, at rest."""
+
+    wire = "2400 8N1"
+    byte_s = 10.0 / 2400.0
+
+    def __init__(self, machine: Machine[I8751Controller, Dialect], choices: Choices) -> None:
+        super().__init__(Slides(machine))
+        self._machine, self._choices = machine, choices
+        self._model = I8751Model()
+        self._step_mm = np.array([axis.coded_step_mm for axis in machine.axes])
+        self._executing: Iterator[tuple[Travel, int]] | None = None
+        self._reset()
+
+    def connected(self, now: float) -> bytes:
+        """Somebody opens the line, which says nothing to a controller that stands."""
+        sent = super().connected(now)
+        if self._choices.opening == "reset" and self._executing is None:
+            self._reset()
+        return sent
+
+    def _reset(self) -> None:
+        self._dialogue = self._program()
+        next(self._dialogue)
+
+    def _take(self, octet: int) -> None:
+        if self._executing is None:
+            self._dialogue.send(octet)
+
+    def _due(self) -> None:
+        if self._executing is not None and not self.moves:
+            self._next_record()
+
+    # The dialogue. What it does not wait for is neither stored nor answered; ours.
+
+    def _program(self) -> Generator[None, int, None]:
+        """One program after the other, byte by byte."""
+        while True:
+            yield from self._key((yield))
+            yield from self._wanted(1)
+            yield from self._packet()
+            again = ACCESS if self._choices.key == "each-packet" else 1
+            while (octet := (yield)) != DATA_END:
+                if again == ACCESS:
+                    yield from self._key(octet)
+                    octet = yield from self._wanted(1)
+                if octet == 1:
+                    yield from self._packet()
+            self._out.append(DONE)
+
+    def _key(self, octet: int) -> Generator[None, int, None]:
+        """Until it is the key."""
+        end = LINE_ENDS[self._choices.line_end]
+        while octet != ACCESS:
+            self._out += b"OTRO" + end
+            octet = yield
+        self._out += b"LISTO" + end
+        self.commands.append(bytes([ACCESS]))
+
+    def _packet(self) -> Generator[None, int, None]:
+        """Records, the first of which has begun, to the end of the packet."""
+        records: list[bytes] = []
+        octet = 1
+        while octet != PACKET_END:
+            records.append((yield from self._record()))
+            full = len(records) == RECORDS_PER_PACKET
+            octet = yield from self._wanted(PACKET_END, *(() if full else (1,)))
+        if self._choices.packet_end == "M F":
+            self._out += STORED
+        self._execute(records)
+
+    def _record(self) -> Generator[None, int, bytes]:
+        """A record whose first byte has come."""
+        record = bytearray()
+        for motor in (1, 2, 3):
+            if motor > 1:
+                yield from self._wanted(motor)
+            self._out += self._choices.motor_reply.encode()
+            sense = yield from self._wanted(*SENSES)
+            self._out += STORED
+            record += bytes([motor, sense])
+            for _ in range(0 if sense == STANDS else 2):
+                record.append((yield))
+                self._out += STORED
+            if motor > 1:
+                first, second = self._dwell_replies
+                record.append((yield from self._wanted(self._machine.dialect.dwell_mark_byte)))
+                self._out += first
+                record.append((yield))
+                self._out += second
+        return bytes(record)
+
+    @property
+    def _dwell_replies(self) -> tuple[bytes, bytes]:
+        """To the mark of a wait, which stands where a motor's number could, and to its seconds."""
+        if self._choices.dwell_reply == "none":
+            return b"", b""
+        mark = STORED if self._choices.dwell_reply == "M" else self._choices.motor_reply.encode()
+        return mark, STORED
+
+    @staticmethod
+    def _wanted(*octets: int) -> Generator[None, int, int]:
+        """The next of these that comes."""
+        while (octet := (yield)) not in octets:
+            pass
+        return octet
+
+    # What is executed.
+
+    def _execute(self, records: list[bytes]) -> None:
+        """Begin with the first record; nothing, not even F, comes of a motor that turns for 0
+        steps."""
+        at = np.rint(self.slides.commanded_mm / self._step_mm).astype(np.int64)
+        try:
+            path = read_packet(b"".join(records), self._machine, at)
+        except ProgramError:
+            return
+        block = len(self.decoded)
+        records[-1] += bytes([PACKET_END])
+        self.decoded += records
+        self._executing = self._travels(path, block, len(records))
+        self._next_record()
+
+    def _travels(self, path: Toolpath, block: int, count: int) -> Iterator[tuple[Travel, int]]:
+        """How each record moves, and its index."""
+        edges = np.searchsorted(path.block, np.arange(count + 1))
+        for index, (low, high) in enumerate(pairwise(edges.tolist())):
+            rows = path.part(low, high)
+            chunks = self._model.run(rows, self._machine, COMMANDED) if high > low else ()
+            yield travel_of(chunks), block + index
+
+    def _next_record(self) -> None:
+        assert self._executing is not None
+        for travel, block in self._executing:
+            self.slides.begin(travel, self.now, block)
+            return
+        self._executing = None
+        self._out.append(EXECUTED)

@@ -1,0 +1,149 @@
+"""i8751's wire: programs sent to the virtual controller byte by byte, with and without faults."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import pytest
+
+from camtool.errors import MachineError
+from camtool.sending.faults import Faults, Wired
+from camtool.sending.prepare import Consignment, consignment
+from camtool.target.wire import Conversation, Manner, State
+from tests.feeding import same_motion
+from tests.postprocessors.i8751.machines import loaded
+from tests.sending.talking import talked
+
+RECORDS = bytes.fromhex(
+    "01 03 00 64 02 04 00 05 00 01 03 04 00 2C 00 01 01 05 02 03 00 07 00 00 03 05 00 00"
+)
+SHORT = b"\x13" + (2 * RECORDS + RECORDS[:16] + b"\x45") * 4 + RECORDS + b"\x45\x54"
+
+
+@cache
+def consigned(data: bytes, *settings: str) -> Consignment:
+    return consignment(data, loaded(*settings), source="logo.bin")
+
+
+def conversation(data: bytes, *settings: str, manner: Manner | None = None) -> Conversation:
+    one = consigned(data, *settings)
+    return one.wire.conversation(one.packets, loaded(*settings).machine, manner or Manner())
+
+
+@pytest.mark.parametrize(
+    ("settings", "choices"),
+    [
+        ([], ["line_end=none"]),
+        (["key=each-packet"], ["key=each-packet", "line_end=cr"]),
+        (["motor_reply='8'"], ["motor_reply=8", "line_end=lf"]),
+        (["dwell_reply=M"], ["dwell_reply=M"]),
+        (["dwell_reply=none"], ["dwell_reply=none"]),
+        (["dwell_reply=unstated"], ["dwell_reply=none"]),
+        (["dwell_reply=unstated"], ["dwell_reply=B M"]),
+        (["dwell_mark=30H"], []),
+        (["high_byte='255'", "first_pulse=repeats"], []),
+        (["format=listing"], []),
+        (["format=hex"], []),
+    ],
+)
+def test_each_reading_of_what_is_open(settings: list[str], choices: list[str]) -> None:
+    target = loaded(*settings)
+    decoded = loaded().target.read(SHORT, loaded().machine)
+    data = target.target.write(decoded, target.machine).data
+    twin, talk = target.twin(choices), conversation(data, *settings)
+    talked(talk, Wired(twin, paced=True), latest_s=3000.0)
+    assert talk.state is State.FINISHED, talk.why
+    same_motion(twin, data, target)
+
+
+def test_an_end_of_a_packet_that_is_stored_too() -> None:
+    target = loaded().with_settings(["link.packet_end=M F"])
+    for choice, state in (("M F", State.FINISHED), ("F", State.FAILED)):
+        one = consignment(SHORT, target, source="a.bin")
+        talk = one.wire.conversation(one.packets, target.machine, Manner())
+        talked(talk, Wired(target.twin([f"packet_end={choice}"])), latest_s=3000.0)
+        assert talk.state is state, talk.why
+
+
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("fault", ["drop=0.003", "double=0.003", "garble=0.003", "unplug=60s"])
+@pytest.mark.parametrize("way", ["there", "back"])
+def test_faults_never_skip_or_double_a_record(fault: str, seed: int, way: str) -> None:
+    twin, faults = loaded().twin(), Faults.of(fault)
+    talk = conversation(SHORT, manner=Manner(paced=True))
+    line = Wired(twin, **{way: faults}, seed=seed, paced=True)  # type: ignore[arg-type]
+    now = talked(talk, line, latest_s=1000.0)
+    wanted = consigned(SHORT).packets
+    assert talk.state in (State.FINISHED, State.FAILED)
+    assert now < 1000.0
+    if fault.startswith("garble") and way == "there":
+        return  # replies do not repeat what came: nobody sees a wrong number of steps
+    taken = b"".join(twin.decoded)
+    whole = b"".join(packet.data for packet in wanted)[1:]
+    assert whole.startswith(taken)
+    assert talk.block < len(twin.decoded) + 1
+    assert len(twin.decoded) <= talk.block + 1 + 5
+    assert (talk.state is State.FINISHED) == (taken + b"\x54" == whole and talk.block == 22)
+    if talk.state is State.FAILED and "reset" in talk.why:
+        assert not twin.moves
+
+
+def test_an_access_that_is_denied_is_asked_for_again() -> None:
+    talk = conversation(SHORT)
+    talk.begin(0.0)
+    assert len(talk.actions()) == 1
+    for _ in range(4):
+        talk.received(b"OT", 1.0)
+        talk.received(b"RO\r\n", 1.0)
+        assert [action.data for action in talk.actions()] == [b"\x13"]  # type: ignore[union-attr]
+    talk.received(b"OTRO", 1.0)
+    assert talk.state is State.FAILED
+
+
+@pytest.mark.parametrize("at_s", [0.01, 0.2, 1.0, 20.0, 35.0])
+def test_a_stop_never_begins_what_is_not_complete(at_s: float) -> None:
+    twin, talk = loaded().twin(), conversation(SHORT, manner=Manner(paced=True))
+
+    def wish(talk: Conversation, now: float) -> None:
+        if now >= at_s:
+            talk.stop(now)
+
+    talked(talk, Wired(twin, paced=True), wish, latest_s=200.0)
+    assert talk.state is State.STOPPED, talk.why
+    assert not twin.moves
+    assert len(twin.decoded) == talk.block + 1
+
+
+@pytest.mark.parametrize("single", [False, True])
+def test_pauses_are_between_packets(single: bool) -> None:
+    target = loaded()
+    twin, talk = target.twin(), conversation(SHORT, manner=Manner(single=single))
+    rests = list[int]()
+
+    def wish(talk: Conversation, now: float) -> None:
+        if talk.state is State.SENDING and not single:
+            talk.pause(now)
+        elif talk.state is State.PAUSED:
+            assert not twin.moves
+            rests.append(talk.done)
+            talk.resume(now)
+
+    talked(talk, Wired(twin), wish, latest_s=2000.0)
+    assert talk.state is State.FINISHED, talk.why
+    assert rests[-5:] == [1, 2, 3, 4, 5]
+    same_motion(twin, SHORT, target)
+
+
+def test_a_jog_is_a_program_of_its_steps() -> None:
+    target = loaded()
+    wire, twin = target.target.wire(), target.twin()
+    values = {"x": 10.0, "z": -1.0, "feed": 60.0}
+    talk = wire.command("jog", target.machine, values, Manner())  # type: ignore[union-attr]
+    talked(talk, Wired(twin, paced=True), latest_s=1000.0)
+    assert talk.state is State.FINISHED, talk.why
+    assert twin.slides.commanded_mm == pytest.approx([10.0, 0.0, -1.0])
+    for action in ("home", "zero"):
+        with pytest.raises(MachineError, match=f"no command to {action}"):
+            wire.command(action, target.machine, {}, Manner())  # type: ignore[union-attr]
+    with pytest.raises(MachineError, match="no switches"):
+        conversation(SHORT, manner=Manner(home=True))
