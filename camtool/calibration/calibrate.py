@@ -11,13 +11,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from camtool.arrays import Bools, Floats
 from camtool.calibration.measurements import Measurements
 from camtool.calibration.model import SQUARENESS, Model, Parameter, Reading, readings_of
 from camtool.errors import InputError
-from camtool.machine.model import Axis, Machine
+from camtool.machine.model import Axis, AxisUncertainty, Machine, Uncertainty
 from camtool.units import UM_PER_MM
 
 # Weighted least squares, and parameters that the readings do not determine.
@@ -179,6 +180,10 @@ ZERO_SIGMAS = 3.0
 a lower one is a fault of the measurements."""
 
 
+COEFFICIENT_DECIMALS = 4
+"""Correlations are rounded to so many decimal places."""
+
+
 @dataclass(frozen=True)
 class Estimate:
     """A value of the machine: `before` is that of its file, `value` the measured one, with its
@@ -232,7 +237,8 @@ class Calibration:
     """The result of a calibration. `freedom`: number of readings less that of estimated
     parameters; `spread_mm`: standard deviation of the residuals, None without freedom;
     `uncertainty_mm`: that of the instrument, as the root mean square over the readings, None when
-    not known for all."""
+    not known for all. `known`: how well the values are known with it, as machine files say it, for
+    X and Y; given the values that are not estimated."""
 
     target: str
     file: str
@@ -242,6 +248,7 @@ class Calibration:
     freedom: int
     spread_mm: float | None
     uncertainty_mm: float | None
+    known: Uncertainty
 
     def estimate(self, what: str, axis: str = "", region: str = "") -> Estimate | None:
         """The estimate of this value, or None."""
@@ -290,6 +297,7 @@ def calibrate(measurements: Measurements, machine: Machine) -> Calibration:
         uncertainty_mm=_norm(known) / math.sqrt(len(known))
         if len(known) == len(readings)
         else None,
+        known=_known(model, solution),
     )
 
 
@@ -344,6 +352,69 @@ def _mean_backlash(model: Model, solution: Solution, machine: Machine) -> list[E
             known = sure if math.isfinite(sure) else None
             found.append(Estimate("play", axis, "", said.backlash_mm, value, known, count))
     return found
+
+
+def _known(model: Model, solution: Solution) -> Uncertainty:
+    """The standard uncertainties of the estimates and their correlations.
+
+    With J the derivatives of the machine's values by the parameters, their covariance is J C Jᵀ.
+    Of the cells of an axis J takes the mean; their variance is the mean of those of the cells,
+    which is more than that of the mean: a part lies in few cells. Readings that fit without any
+    residual say nothing of their uncertainty. Where all coupons were cut with compensation, what
+    it errs by is in the backlash.
+    """
+    covariance = np.nan_to_num(solution.covariance)
+    certain = ~(np.diag(covariance) > 0.0)
+    rows = {
+        key: row for key, row in _rows(model, solution.values) if not certain[row != 0.0].any()
+    }
+    if not rows:
+        return Uncertainty()
+    slopes = np.array(list(rows.values()))
+    joint = slopes @ covariance @ slopes.T
+    for k, (key, row) in enumerate(rows.items()):
+        if key.endswith("backlash_mm"):
+            joint[k, k] = row @ np.diag(covariance)
+    standard = dict(zip(rows, np.sqrt(np.diag(joint)).tolist(), strict=True))
+    matrix = joint / np.sqrt(np.outer(np.diag(joint), np.diag(joint)))
+    keys = list(rows)
+    pairs = tuple(
+        (keys[a], keys[b], round(float(matrix[a, b]), COEFFICIENT_DECIMALS) + 0.0)
+        for a in range(len(keys))
+        for b in range(a + 1, len(keys))
+    )
+    x, y = (
+        AxisUncertainty(
+            backlash_mm=standard.get(f"{axis}.backlash_mm"),
+            scale=standard.get(f"{axis}.scale"),
+            compensation_mm=0.0 if f"{axis}.backlash_mm" in standard and added else None,
+        )
+        for axis, added in (("x", _compensated(model, "x")), ("y", _compensated(model, "y")))
+    )
+    return Uncertainty(
+        x=x,
+        y=y,
+        squareness_rad=standard.get("squareness_rad"),
+        correlations=tuple(pair for pair in pairs if pair[2]),
+    )
+
+
+def _rows(model: Model, values: Floats) -> Iterator[tuple[str, Floats]]:
+    """(key of `[uncertainty]`, (P,) derivatives of its value by the parameters)."""
+    for axis in "xy":
+        for what, key in (("play", "backlash_mm"), ("scale", "scale")):
+            own = [each.what == what and each.axis == axis for each in model.parameters]
+            if any(own):
+                by = np.where(own, values, 1.0) if what == "scale" else 1.0
+                yield f"{axis}.{key}", np.array(own) / (sum(own) * by)
+    lean = np.array([each == SQUARENESS for each in model.parameters])
+    yield "squareness_rad", lean / (1.0 + values**2)
+
+
+def _compensated(model: Model, axis: str) -> bool:
+    """Whether the controller added something at the reversals of an axis in every coupon."""
+    courses = [each for reading in model.readings for each in reading.measure.courses]
+    return all(each.added_mm > 0.0 for each in courses if each.axis == axis)
 
 
 def _refuse_negative_backlash(estimate: Estimate, machine: Machine, file: str) -> None:
@@ -401,6 +472,7 @@ def to_data(calibration: Calibration, machine: Machine) -> dict[str, Any]:
         "not_estimated": [
             {"name": each.name, "why": each.why} for each in calibration.not_estimated
         ],
+        "uncertainty": _given_only(msgspec.to_builtins(calibration.known)),
         "compensation": [
             {"axis": axis, "mm": mm, "steps": steps}
             for axis, mm, steps in compensations(calibration, machine)
@@ -419,6 +491,15 @@ def to_data(calibration: Calibration, machine: Machine) -> dict[str, Any]:
             for each in calibration.fitted
         ],
     }
+
+
+def _given_only(table: dict[str, Any]) -> dict[str, Any]:
+    """A table without what is not known."""
+    inner = {
+        key: _given_only(value) if isinstance(value, dict) else value
+        for key, value in table.items()
+    }
+    return {key: value for key, value in inner.items() if value not in (None, {}, ())}
 
 
 def compensations(calibration: Calibration, machine: Machine) -> Iterator[tuple[str, float, int]]:

@@ -25,6 +25,9 @@ WITHIN_UNCERTAINTY = 0.02
 DIGITS = 9
 """Significant digits of values whose uncertainty is not known."""
 
+UNCERTAINTY_DIGITS = 3
+"""Significant digits of standard uncertainties."""
+
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -46,6 +49,7 @@ def machine_file(
         _set(said, "mechanics.squareness_rad", _rounded(squareness))
         notes["mechanics.squareness_rad"] = _note(squareness, calibration)
     _set_map(said, notes, calibration, measurements, machine)
+    _set_uncertainty(said, notes, calibration)
     head = (
         f"# {machine.target.name}, calibrated from {_plain(calibration.file)}.",
         "# ± is the standard uncertainty.",
@@ -80,6 +84,43 @@ def _set_map(
         elif whole is not None and machine.play_map.use and getattr(machine.play_map, axis):
             _set(said, "play_map.use", False)
             notes["play_map.use"] = f"the play of {axis} was measured as a whole since"
+
+
+def _set_uncertainty(said: Table, notes: dict[str, str], calibration: Calibration) -> None:
+    """Set how well the measured values are known; what an older file says of how well these
+    were known holds no more, and the rest of it stays."""
+    measured = [
+        f"{axis}.{key}"
+        for axis in ("x", "y")
+        for what, key in (("step", "scale"), ("play", "backlash_mm"))
+        if calibration.estimate(what, axis) is not None
+    ]
+    if calibration.estimate("squareness") is not None:
+        measured.append("squareness_rad")
+    known, own = calibration.known, said.get("uncertainty", {})
+    for key in measured:
+        table, _, name = f"uncertainty.{key}".rpartition(".")
+        _table(said, table).pop(name, None)
+        standard = known.standard(key)
+        if standard is not None:
+            _set(said, f"uncertainty.{key}", float(f"{standard:.{UNCERTAINTY_DIGITS}g}"))
+            notes[f"uncertainty.{key}"] = _plain(calibration.file)
+    for axis in ("x", "y"):
+        if known.standard(f"{axis}.compensation_mm") is not None:
+            _set(said, f"uncertainty.{axis}.compensation_mm", 0.0)
+            notes[f"uncertainty.{axis}.compensation_mm"] = "what it errs by is in the backlash"
+    older = [row for row in own.get("correlations", []) if not {*row[:2]} & {*measured}]
+    if older or known.correlations:
+        _set(said, "uncertainty.correlations", [*older, *known.correlations])
+    elif "correlations" in own:
+        del own["correlations"]
+
+
+def _table(said: Table, path: str) -> Table:
+    """The table at this path; an empty one where there is none."""
+    for name in path.split("."):
+        said = said.get(name, {})
+    return said
 
 
 def _rounded(estimate: Estimate | None) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +12,7 @@ import pytest
 from camtool.calibration.calibrate import Calibration, calibrate
 from camtool.calibration.machine_file import machine_file
 from camtool.calibration.measurements import read_measurements
-from camtool.machine.model import Machine
+from camtool.machine.model import CORRELATED_KEYS, Machine, Uncertainty
 from camtool.tables import read_table
 from camtool.target.registry import load_target
 
@@ -121,3 +123,62 @@ def test_no_play_is_written_as_none(tmp_path: Path) -> None:
     assert play is not None
     assert play.value < 0.0
     assert machine.axes.x.backlash_mm == 0.0
+
+
+@pytest.mark.parametrize("name", ["valcnc-steps", "pic-mmh-lines", "pic-mmh-circles"])
+def test_how_well_the_values_are_known_goes_into_the_machine(tmp_path: Path, name: str) -> None:
+    target = name.rpartition("-")[0]
+    result, _, machine = made(tmp_path, MEASURED / f"{name}.toml", target)
+    count = 0
+    for key in CORRELATED_KEYS:
+        known, said = result.known.standard(key), machine.uncertainty.standard(key)
+        if known is not None:
+            count += 1
+            assert said == pytest.approx(known, rel=0.006)
+    assert count == {"valcnc-steps": 2, "pic-mmh-lines": 4, "pic-mmh-circles": 7}[name]
+    assert machine.uncertainty.correlations == result.known.correlations
+    assert bool(result.known.correlations) == (name == "pic-mmh-circles")
+
+
+def test_a_cell_is_less_well_known_than_the_mean_of_all_cells(tmp_path: Path) -> None:
+    result, _, _ = made(tmp_path, MEASURED / "pic-mmh-lines.toml", "pic-mmh")
+    cells = [result.estimate("play", "x", name) for name in ("H1", "H2", "H3")]
+    mean = result.estimate("play", "x")
+    assert mean is not None
+    assert mean.uncertainty is not None
+    each = [cell.uncertainty for cell in cells if cell is not None and cell.uncertainty]
+    assert len(each) == 3
+    assert result.known.x.backlash_mm == pytest.approx(math.sqrt(sum(u * u for u in each) / 3.0))
+    assert result.known.x.backlash_mm == pytest.approx(math.sqrt(3.0) * mean.uncertainty)
+
+
+def test_one_reading_of_each_value_says_nothing_of_how_well_it_is_known(tmp_path: Path) -> None:
+    result, text, machine = made(tmp_path, MEASURED / "flashcut-lines.toml", "flashcut")
+    assert result.known == Uncertainty()
+    assert "[uncertainty" not in text
+    assert machine.uncertainty == load_target("flashcut").machine.uncertainty
+
+
+def test_what_an_older_file_says_of_what_was_measured_again_holds_no_more(tmp_path: Path) -> None:
+    own = tmp_path / "own.toml"
+    own.write_text(
+        'extends = "valcnc"\n[uncertainty]\nprocess_mm = 0.05\ntool_diameter_mm = 0.01\n'
+        'correlations = [["x.scale", "y.backlash_mm", 0.5], '
+        '["tool_diameter_mm", "y.backlash_mm", 0.25]]\n'
+        "[uncertainty.x]\nscale = 0.05\n[uncertainty.y]\nbacklash_mm = 0.07\n"
+    )
+    result, _, machine = made(tmp_path, MEASURED / "valcnc-steps.toml", "valcnc", own)
+    said = machine.uncertainty
+    assert said.x.scale == pytest.approx(result.known.x.scale, rel=0.006)
+    assert (said.process_mm, said.y.backlash_mm) == (0.05, 0.07)
+    assert said.correlations == (("tool_diameter_mm", "y.backlash_mm", 0.25),)
+
+
+def test_a_value_without_uncertainty_takes_the_older_one_away(tmp_path: Path) -> None:
+    own = tmp_path / "own.toml"
+    own.write_text(
+        'extends = "flashcut"\n[uncertainty]\ncorrelations = [["x.scale", "x.backlash_mm", 0.5]]'
+        "\n[uncertainty.x]\nscale = 0.05\nbacklash_mm = 0.01\n"
+    )
+    _, text, _ = made(tmp_path, MEASURED / "flashcut-lines.toml", "flashcut", own)
+    assert tomllib.loads(text)["uncertainty"] == {"x": {"scale": 0.05}}

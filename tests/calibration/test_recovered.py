@@ -22,7 +22,7 @@ from camtool.calibration.measurements import (
     Square,
     Steps,
 )
-from camtool.machine.model import Machine
+from camtool.machine.model import CORRELATED_KEYS, Machine
 from camtool.target.registry import load_target
 from tests.oracles import measured
 
@@ -141,3 +141,45 @@ def test_scattered_readings_give_it_within_the_uncertainty(kind: Kind) -> None:
     assert 0.75 < math.sqrt(np.mean(np.square(off))) < 1.1  # s is never below the instrument's
     assert abs(np.mean(off)) < 0.2
     assert max(map(abs, off)) < 4.5
+
+
+def truth_of(machine: Machine, key: str) -> float:
+    """The value to which this key of `[uncertainty]` belongs; scale as a part of one."""
+    axis, _, name = key.rpartition(".")
+    if name == "squareness_rad":
+        return machine.mechanics.squareness_rad
+    record = getattr(machine.axes, axis)
+    return float(record.backlash_mm if name == "backlash_mm" else record.real_step_mm)
+
+
+def found_at(result: Calibration, key: str) -> float:
+    axis, _, name = key.rpartition(".")
+    what = {"backlash_mm": "play", "scale": "step", "squareness_rad": "squareness"}[name]
+    estimate = result.estimate(what, axis)
+    assert estimate is not None
+    return estimate.value
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_covariance_is_that_of_many_calibrations(kind: Kind) -> None:
+    """How the values err together over many draws is what each calibration says."""
+    machine = machine_of((1.004, 0.997), (0.12, 0.03), (0.1, 0.1), 0.004)
+    drawn = sheet(kind, (60.0, 40.0), (1, 1), machine)
+    rows, squares = [], []
+    for seed in range(150):
+        result = found(drawn, machine, sigma_mm=0.002, seed=seed)
+        known = result.known
+        keys = [key for key in CORRELATED_KEYS if known.standard(key)]
+        assert ("squareness_rad" in keys) == (kind in TELLS_SQUARENESS)
+        assert (known.x.compensation_mm, known.y.compensation_mm) == (0.0, 0.0)
+        assert known.tool_diameter_mm is None
+        off = np.array([found_at(result, key) - truth_of(machine, key) for key in keys])
+        for k, key in enumerate(keys):
+            if key.endswith("scale"):
+                off[k] /= truth_of(machine, key)
+        off /= [known.standard(key) for key in keys]
+        rows.append(off)
+        said = known.correlation(keys)
+        squares.append(float(off @ np.linalg.solve(said, off)) / len(keys))
+    assert 0.75 < np.mean(squares) < 1.1
+    assert np.abs(np.corrcoef(np.array(rows).T) - said).max() < 4.0 / math.sqrt(len(rows))
