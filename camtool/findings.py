@@ -6,7 +6,7 @@ the numbers (`yield HOLE_SIZE(where=…, measured=…, limit=…)`); how they ar
 Sentences that only one machine says stand in that machine's own `findings.py`; a plug-in adds
 codes of its own there too (`TargetCode`). docs/findings.md is made from all of them. Numbers are
 stable: add, never renumber. Hundreds: 1xx drawing, 2xx planning, 3xx program, 4xx motion and
-result.
+result, 5xx inspection.
 """
 
 from __future__ import annotations
@@ -610,6 +610,26 @@ class Code(IntEnum):
         "than it asks for, or corners are rounded farther than the machine file lets them "
         "(`G64 P`)",
         "post again; give `camtool verify` the flags of the post",
+    )
+    DIMENSION_UNBOUND = (
+        501,
+        WARNING,
+        "a dimension fits no feature of the drawing, or several that differ, and is not inspected",
+        "name a place on the feature in tolerances.toml (`at`, `from`, `to`)",
+    )
+    DIMENSION_NOT_CUT = (
+        502,
+        WARNING,
+        "the program does not cut a feature of a dimension, or cuts little of it, so that it "
+        "cannot be inspected",
+        "cut it in the same program, or take the dimension out of tolerances.toml",
+    )
+    DIMENSION_NOT_IN = (
+        503,
+        (WARNING, ERROR),
+        "a dimension is out of its limits, or it is undecided whether it is; an error where "
+        "`--require` asks for more",
+        "`camtool meet` looks for what would make it hold; measure what it says is uncertain",
     )
 
 
@@ -1510,4 +1530,21 @@ SETTING_DIFFERS_DWELL = Sentence(
     "the tool waits {measured:g} s, where {limit:g} s are asked for; at {places:# place|# places}",
     "s",
     ERROR,
+)
+DIMENSION_UNBOUND = Sentence(
+    Code.DIMENSION_UNBOUND,
+    "{name} is not inspected: {measured:no|one|#} {what} {measured:is|is|are} there",
+)
+DIMENSION_NOT_CUT = Sentence(
+    Code.DIMENSION_NOT_CUT, "{name} is not inspected: the program does not cut its {what}"
+)
+DIMENSION_OUT = Sentence(
+    Code.DIMENSION_NOT_IN,
+    "{name} is out: {measured:.4f} mm at worst, where {limit:.4f} mm is the limit",
+    "mm",
+)
+DIMENSION_UNDECIDED = Sentence(
+    Code.DIMENSION_NOT_IN,
+    "{name} is undecided: {measured:.4f} mm at worst, where {limit:.4f} mm is the limit; {why}",
+    "mm",
 )

@@ -36,7 +36,7 @@ SCALE_SHARE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class _Map:
+class Map:
     """p ↦ `matrix` p + `shift`: (2, 2) and (2,), mm; lengths grow `scale` times."""
 
     matrix: Floats
@@ -58,7 +58,7 @@ class _Map:
         bulge = 0.0 - vertices[:, 2] if flipped else vertices[:, 2]
         return np.column_stack([self.points(vertices[:, :2]), bulge])
 
-    def moved(self, shift: Floats) -> _Map:
+    def moved(self, shift: Floats) -> Map:
         """The same, and then moved by `shift` (2,) mm."""
         return replace(self, shift=self.shift + shift)
 
@@ -82,12 +82,20 @@ def _placed(drawing: Drawing, job: Job) -> Drawing:
     """The drawing where the job's placement says, however large."""
     placement = job.placement
     _refuse_too_many(drawing, placement)
-    first, shifts = _first_map(drawing, job), _copy_shifts(placement)
-    first = first.moved(-_origin(drawing, job, first, shifts))
-    if len(shifts) == 1 and _is_identity(first):
+    maps = placements(drawing, job)
+    if len(maps) == 1 and _is_identity(maps[0]):
         return drawing
-    maps = [first.moved(shift) for shift in shifts]
     return _repeated(drawing, maps)
+
+
+def placements(drawing: Drawing, job: Job) -> list[Map]:
+    """Where each copy of the drawing comes to lie in the work frame, row by row.
+
+    Raises OptionError for an impossible fit.
+    """
+    first, shifts = _first_map(drawing, job), _copy_shifts(job.placement)
+    first = first.moved(-_origin(drawing, job, first, shifts))
+    return [first.moved(shift) for shift in shifts]
 
 
 def part_scale(drawing: Drawing, job: Job) -> float:
@@ -118,16 +126,16 @@ def collapsed(drawing: Drawing, placed: Drawing, job: Job) -> list[Finding]:
     ]
 
 
-def _first_map(drawing: Drawing, job: Job) -> _Map:
+def _first_map(drawing: Drawing, job: Job) -> Map:
     """Mirror, rotation and scale about the drawing's zero."""
     placement = job.placement
     cosine, sine = _cosine_and_sine(placement.rotate_rad)
     flip = np.diag([-1.0 if placement.mirror == axis else 1.0 for axis in ("x", "y")])
-    turned = _Map(np.array([[cosine, -sine], [sine, cosine]]) @ flip, np.zeros(2), 1.0)
+    turned = Map(np.array([[cosine, -sine], [sine, cosine]]) @ flip, np.zeros(2), 1.0)
     scale = placement.scale
     if placement.fit_mm is not None:
         scale = _fitting_scale(placement.fit_mm, _box(drawing, job, turned), drawing.file)
-    return _Map(scale * turned.matrix, turned.shift, scale)
+    return Map(scale * turned.matrix, turned.shift, scale)
 
 
 def _cosine_and_sine(angle_rad: float) -> tuple[float, float]:
@@ -164,7 +172,7 @@ def _fitting_scale(fit_mm: tuple[float, float], box: Floats | None, file: str) -
     return float(min(scales))
 
 
-def _origin(drawing: Drawing, job: Job, first: _Map, shifts: Floats) -> Floats:
+def _origin(drawing: Drawing, job: Job, first: Map, shifts: Floats) -> Floats:
     """(2,) the place, before it is moved, that becomes part zero."""
     origin = job.placement.origin
     if not isinstance(origin, str):
@@ -177,7 +185,7 @@ def _origin(drawing: Drawing, job: Job, first: _Map, shifts: Floats) -> Floats:
     return np.asarray(low if origin == "lower-left" else 0.5 * (low + high))
 
 
-def _box(drawing: Drawing, job: Job, where: _Map) -> Floats | None:
+def _box(drawing: Drawing, job: Job, where: Map) -> Floats | None:
     """(2, 2) the box of all that the operations take, there; None when they take nothing."""
     paths, marks = taken(drawing, job)
     boxes = []
@@ -269,11 +277,11 @@ def _what_enlarges(placement: Placement) -> str:
     return "pitch" if placement.copies != (1, 1) else ""
 
 
-def _is_identity(where: _Map) -> bool:
+def _is_identity(where: Map) -> bool:
     return np.array_equal(where.matrix, np.eye(2)) and not where.shift.any()
 
 
-def _repeated(drawing: Drawing, maps: list[_Map]) -> Drawing:
+def _repeated(drawing: Drawing, maps: list[Map]) -> Drawing:
     """All that has a place, once for each map; paths that the scale makes a point are left out."""
     paths, rows, kept = _lines(drawing.paths, maps)
     off = np.tile(maps[0].scale * drawing.off_mm, (len(maps), 1))
@@ -300,7 +308,7 @@ def _repeated(drawing: Drawing, maps: list[_Map]) -> Drawing:
     )
 
 
-def _lines(lines: Polylines, maps: list[_Map]) -> tuple[Polylines, Ints, Ints]:
+def _lines(lines: Polylines, maps: list[Map]) -> tuple[Polylines, Ints, Ints]:
     """The paths under each map, one map after the other, which of these (copy · paths + path) are
     left, and which of all vertices: points that the scale brings together are merged, and a path
     of one point is none.
@@ -336,7 +344,7 @@ def _lines(lines: Polylines, maps: list[_Map]) -> tuple[Polylines, Ints, Ints]:
         ) from error
 
 
-def _around(unchosen: Unchosen, maps: list[_Map]) -> Unchosen:
+def _around(unchosen: Unchosen, maps: list[Map]) -> Unchosen:
     """What was not chosen, once for each map, but for contours that shrink to points."""
     try:
         paths, rows, _ = _lines(unchosen.paths, maps)
@@ -356,7 +364,7 @@ def _copy_name(source: str, copy: int) -> str:
     return source if copy == 0 else f"{source} copy {copy + 1}"
 
 
-def _gaps(gaps: tuple[Gap, ...], maps: list[_Map]) -> tuple[Gap, ...]:
+def _gaps(gaps: tuple[Gap, ...], maps: list[Map]) -> tuple[Gap, ...]:
     return tuple(
         replace(gap, at_mm=where.point(gap.at_mm), size_mm=gap.size_mm * where.scale)
         for where in maps
@@ -364,7 +372,7 @@ def _gaps(gaps: tuple[Gap, ...], maps: list[_Map]) -> tuple[Gap, ...]:
     )
 
 
-def _healing(drawing: Drawing, maps: list[_Map], rows: Ints) -> Healing:
+def _healing(drawing: Drawing, maps: list[Map], rows: Ints) -> Healing:
     """The places of branches and crossings of the paths `rows` that are left; what was counted on
     reading stays as it was."""
     healing, paths = drawing.healing, len(drawing.paths)

@@ -20,7 +20,7 @@ from importlib.metadata import version
 import msgspec
 import numpy as np
 
-from camtool.arrays import Floats, Ints
+from camtool.arrays import Floats, Indices, Ints
 from camtool.findings import Finding
 from camtool.geometry.drawing import Drawing
 from camtool.progress import Progress
@@ -76,13 +76,15 @@ __all__ = ["Case", "Verification", "VerifyOptions", "judge", "verify"]
 @dataclass(frozen=True, eq=False)
 class Verification:
     """The report, the findings in it, the path of the slides for pictures, the figures of each
-    row, the moves with which the path was compared, and full circles."""
+    row, the moves with which the path was compared, which of their rows each decoded row follows
+    (N,), −1 for none, and full circles."""
 
     report: Report
     trace: Trace
     findings: tuple[Finding, ...]
     rows: RowFigures
     wanted: CutMoves
+    follows: Indices
     circles: tuple[SeenCircle, ...] = ()
 
     def with_findings(self, findings: tuple[Finding, ...]) -> Verification:
@@ -160,7 +162,8 @@ def judge(
     findings = _all_findings(case, coverage, conformance, (*turned, *motion_faults, *overcut))
     result = Result(case, cuts, looped, coverage, slides, tally, conformance)
     report = result.report(extents, findings, trace, shape)
-    return Verification(report, trace, findings, rows, wanted, slides.seen())
+    follows = coverage.match.row
+    return Verification(report, trace, findings, rows, wanted, follows, slides.seen())
 
 
 def _compared(

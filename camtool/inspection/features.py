@@ -1,0 +1,335 @@
+"""The circles and straight edges of a drawing, and of which of them a dimension is.
+
+A dimension names places (`camtool.inspection.dimensions`). A place belongs to a centre that lies
+there, to an edge that it lies on and that is square to the direction of measuring, or to the
+outermost point of a circle in that direction. What fits nothing, or several features that differ,
+is a finding, and the dimension is not inspected.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from camtool.arrays import Bools, Floats
+from camtool.findings import DIMENSION_UNBOUND, Finding
+from camtool.geometry.polylines import Polyline, Polylines, Segments
+from camtool.inspection.dimensions import Dimension, Place
+from camtool.planning.place import Map
+
+BIND_MM = 0.01
+"""A place lies on a feature that is no farther away than this: programs round the places that
+dimensions measure to a hundredth."""
+
+SAME_CIRCLE_MM = 1e-4
+"""Arcs of one path whose centres and radii differ by no more are one circle."""
+
+SQUARE_RAD = 2e-3
+"""An edge is square to a direction within this, and parallel to another edge: 0.1°."""
+
+FULL_TURN_RAD = 1e-6
+"""Arcs that lack no more than this of a whole turn are a whole circle."""
+
+
+@dataclass(frozen=True, eq=False)
+class Circle:
+    """A circle, or arcs of one: centre and radius mm, and its arcs (A, 2): start angle and sweep,
+    rad."""
+
+    path: int
+    centre_mm: Place
+    radius_mm: float
+    arcs: Floats
+
+    @property
+    def whole(self) -> bool:
+        """Whether it has no gap."""
+        return bool(np.abs(self.arcs[:, 1]).sum() >= 2.0 * math.pi - FULL_TURN_RAD)
+
+    def has(self, angle: Floats, slack: float = 0.0) -> Bools:
+        """(K,) true for the angles, rad, that lie on an arc of it, or within `slack` beside."""
+        found = np.zeros(np.shape(angle), dtype=np.bool_)
+        for start, sweep in self.arcs:
+            first = start if sweep > 0.0 else start + sweep
+            beyond = np.mod(angle - first + slack, 2.0 * math.pi)
+            found |= beyond <= abs(sweep) + 2.0 * slack
+        return found
+
+    def distance_mm(self, place: Place) -> float:
+        """How far a place is from its arcs, along the radius; infinite beside them."""
+        x, y = place[0] - self.centre_mm[0], place[1] - self.centre_mm[1]
+        slack = BIND_MM / max(self.radius_mm, BIND_MM)
+        on_arc = self.has(np.array([math.atan2(y, x)]), slack)[0]
+        return abs(math.hypot(x, y) - self.radius_mm) if on_arc else math.inf
+
+    def placed(self, where: Map) -> Circle:
+        """It in the work frame."""
+        turn = math.atan2(where.matrix[1, 0], where.matrix[0, 0])
+        flip = -1.0 if np.linalg.det(where.matrix) < 0.0 else 1.0
+        arcs = np.column_stack([turn + flip * self.arcs[:, 0], flip * self.arcs[:, 1]])
+        return Circle(self.path, where.point(self.centre_mm), where.scale * self.radius_mm, arcs)
+
+
+@dataclass(frozen=True, eq=False)
+class Edge:
+    """A straight edge from `start_mm` to `end_mm`."""
+
+    path: int
+    start_mm: Place
+    end_mm: Place
+
+    @property
+    def along(self) -> Floats:
+        """(2,) the unit vector from start to end."""
+        vector = np.subtract(self.end_mm, self.start_mm)
+        return np.asarray(vector / np.hypot(*vector))
+
+    @property
+    def length_mm(self) -> float:
+        """Its length."""
+        return math.dist(self.start_mm, self.end_mm)
+
+    def is_square_to(self, direction: Floats) -> bool:
+        """Whether it is square to a unit vector (2,)."""
+        return abs(float(self.along @ direction)) <= SQUARE_RAD
+
+    def distance_mm(self, place: Place) -> float:
+        """How far a place is from it."""
+        beside = np.subtract(place, self.start_mm)
+        at = float(np.clip(beside @ self.along, 0.0, self.length_mm))
+        return float(np.hypot(*(beside - at * self.along)))
+
+    def placed(self, where: Map) -> Edge:
+        """It in the work frame."""
+        return Edge(self.path, where.point(self.start_mm), where.point(self.end_mm))
+
+
+Feature = Circle | Edge
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """A whole path, whose profile is inspected: all its circles and edges."""
+
+    path: int
+    features: tuple[Feature, ...]
+
+    def placed(self, where: Map) -> Outline:
+        """It in the work frame."""
+        return Outline(self.path, tuple(each.placed(where) for each in self.features))
+
+
+@dataclass(frozen=True, eq=False)
+class End:
+    """One end of a distance: the edge itself, the centre of a circle, or the outermost point of a
+    circle in the direction of measuring (`side` +1) or against it (−1)."""
+
+    feature: Feature
+    how: Literal["edge", "centre", "outermost"]
+    side: int = 1
+
+    def placed(self, where: Map) -> End:
+        """It in the work frame."""
+        return End(self.feature.placed(where), self.how, self.side)
+
+
+@dataclass(frozen=True, eq=False)
+class Bound:
+    """A dimension and its features: one circle, edge or outline, or two ends of a distance along
+    the unit vector `direction` (2,), which leads from the first to the second. `drawn_mm` is what
+    the features measure as drawn, 0 for zones."""
+
+    dimension: Dimension
+    of: tuple[Circle | Edge | Outline, ...]
+    ends: tuple[End, ...]
+    direction: Floats
+    drawn_mm: float
+
+    @property
+    def nominal_mm(self) -> float:
+        """Its nominal value: as the dimension says, or as drawn."""
+        given = self.dimension.nominal_mm
+        return self.drawn_mm if given is None else given
+
+    @property
+    def features(self) -> tuple[Feature, ...]:
+        """All circles and edges on which it depends."""
+        whole = [each.features if isinstance(each, Outline) else (each,) for each in self.of]
+        return (*(one for several in whole for one in several), *(e.feature for e in self.ends))
+
+    def placed(self, where: Map) -> Bound:
+        """It in the work frame, where lengths are as in the drawing."""
+        direction = where.matrix @ self.direction / where.scale
+        return Bound(
+            self.dimension,
+            tuple(each.placed(where) for each in self.of),
+            tuple(end.placed(where) for end in self.ends),
+            direction,
+            self.drawn_mm,
+        )
+
+
+def features_of(paths: Polylines) -> list[Feature]:
+    """The circles and edges of all paths, in order; segments in line are one edge, and arcs of
+    one path about one centre are one circle."""
+    return [feature for index, path in enumerate(paths) for feature in _of_path(index, path)]
+
+
+def _of_path(index: int, path: Polyline) -> Iterator[Feature]:
+    segments = Segments.of(path)
+    yield from _circles(index, segments)
+    yield from _edges(index, segments, closed=path.closed)
+
+
+def _circles(index: int, segments: Segments) -> Iterator[Circle]:
+    which = np.flatnonzero(segments.is_arc)
+    left = segments[which]
+    todo = np.arange(len(which))
+    while len(todo):
+        gap = np.hypot(*(left.centre[todo] - left.centre[todo[0]]).T)
+        gap = np.maximum(gap, np.abs(left.radius[todo] - left.radius[todo[0]]))
+        mine = todo[gap <= SAME_CIRCLE_MM]
+        todo = todo[gap > SAME_CIRCLE_MM]
+        x, y = left.centre[mine].mean(axis=0).tolist()
+        arcs = np.column_stack([left.start_angle[mine], left.sweep[mine]])
+        yield Circle(index, (x, y), float(left.radius[mine].mean()), arcs)
+
+
+def _edges(index: int, segments: Segments, *, closed: bool) -> Iterator[Edge]:
+    straight = ~segments.is_arc
+    vector = segments.end - segments.start
+    unit = vector / np.maximum(np.hypot(vector[:, 0], vector[:, 1]), 1e-300)[:, None]
+    before = np.roll(unit, 1, axis=0)
+    turns = np.abs(before[:, 0] * unit[:, 1] - before[:, 1] * unit[:, 0]) > SAME_LINE
+    goes_on = straight & np.roll(straight, 1) & ~turns & ((before * unit).sum(axis=1) > 0.0)
+    if not closed and len(goes_on):
+        goes_on[0] = False
+    begins = np.flatnonzero(straight & ~goes_on)
+    for begin in begins.tolist():
+        last = begin
+        while goes_on[(last + 1) % len(goes_on)] and (last + 1) % len(goes_on) != begin:
+            last = (last + 1) % len(goes_on)
+        (x, y), (to_x, to_y) = segments.start[begin].tolist(), segments.end[last].tolist()
+        yield Edge(index, (x, y), (to_x, to_y))
+
+
+SAME_LINE = 1e-6
+"""Segments whose directions differ by no more than this, rad, are one edge."""
+
+
+def bind(dimension: Dimension, features: Sequence[Feature], file: str) -> Bound | Finding:
+    """The dimension with its features, or the finding that says why there are none."""
+    if dimension.kind == "distance":
+        return _distance(dimension, features, file)
+    if dimension.kind == "straightness":
+        found: list[Feature] = [
+            each for each in features if isinstance(each, Edge) and _near(each, dimension)
+        ]
+        return _single(dimension, found, "edge", 0.0, file)
+    if dimension.kind == "profile":
+        paths = sorted({each.path for each in features if _near(each, dimension)})
+        if len(paths) != 1:
+            return _unbound(dimension, len(paths), "outline", file)
+        whole = Outline(paths[0], tuple(each for each in features if each.path == paths[0]))
+        return Bound(dimension, (whole,), (), np.zeros(2), 0.0)
+    circles = [each for each in features if isinstance(each, Circle) and _is_of(each, dimension)]
+    if len(circles) > 1 and dimension.nominal_mm is not None:
+        wanted = dimension.nominal_mm * (0.5 if dimension.kind == "diameter" else 1.0)
+        circles = [each for each in circles if abs(each.radius_mm - wanted) <= BIND_MM] or circles
+    drawn = 0.0
+    if circles and dimension.kind in ("diameter", "radius"):
+        drawn = circles[0].radius_mm * (2.0 if dimension.kind == "diameter" else 1.0)
+    return _single(dimension, circles, "circle", drawn, file)
+
+
+def _near(feature: Feature, dimension: Dimension) -> bool:
+    return all(feature.distance_mm(place) <= BIND_MM for place in dimension.places_mm)
+
+
+def _is_of(circle: Circle, dimension: Dimension) -> bool:
+    """Whether each place is its centre or lies on it."""
+    return all(
+        math.dist(place, circle.centre_mm) <= BIND_MM or circle.distance_mm(place) <= BIND_MM
+        for place in dimension.places_mm
+    )
+
+
+def _single(
+    dimension: Dimension, found: Sequence[Feature], what: str, drawn_mm: float, file: str
+) -> Bound | Finding:
+    if len(found) != 1:
+        return _unbound(dimension, len(found), what, file)
+    return Bound(dimension, (found[0],), (), np.zeros(2), drawn_mm)
+
+
+def _distance(dimension: Dimension, features: Sequence[Feature], file: str) -> Bound | Finding:
+    first, second = dimension.places_mm
+    direction = np.subtract(second, first)
+    if dimension.direction_rad is not None:
+        angle = dimension.direction_rad
+        along = np.array([math.cos(angle), math.sin(angle)])
+        direction = along if float(along @ direction) >= 0.0 else -along
+    elif not direction.any():
+        return _unbound(dimension, 0, "second place", file)
+    direction = direction / np.hypot(*direction)
+    ends = []
+    for place in (first, second):
+        found = _ends_at(place, direction, features)
+        if len(found) != 1:
+            return _unbound(dimension, len(found), "feature", file, place)
+        ends.append(found[0])
+    places = [_place_of(end, direction) for end in ends]
+    drawn = float((places[1] - places[0]) @ direction)
+    return Bound(dimension, (), tuple(ends), direction, drawn)
+
+
+def _place_of(end: End, direction: Floats) -> Floats:
+    """(2,) mm a point of the end as it is drawn."""
+    if isinstance(end.feature, Edge):
+        return np.asarray(end.feature.start_mm)
+    beyond = end.side * end.feature.radius_mm if end.how == "outermost" else 0.0
+    return np.asarray(end.feature.centre_mm + beyond * direction)
+
+
+def _ends_at(place: Place, direction: Floats, features: Sequence[Feature]) -> list[End]:
+    """What a place can mean for a measurement along `direction`. Edges come before the circles
+    that go on from them with the same direction."""
+    circles = [each for each in features if isinstance(each, Circle)]
+    centres = [
+        End(each, "centre") for each in circles if math.dist(place, each.centre_mm) <= BIND_MM
+    ]
+    edges = [
+        End(each, "edge")
+        for each in features
+        if isinstance(each, Edge)
+        and each.distance_mm(place) <= BIND_MM
+        and each.is_square_to(direction)
+    ]
+    if centres or edges:
+        return [*centres, *edges]
+    outermost = []
+    for each in circles:
+        spoke = np.subtract(place, each.centre_mm)
+        if each.distance_mm(place) > BIND_MM:
+            continue
+        away = float(spoke @ direction) / each.radius_mm
+        # A place that is BIND_MM off has turned by up to BIND_MM / radius.
+        if abs(away) >= math.cos(min(SQUARE_RAD + BIND_MM / each.radius_mm, 0.5)):
+            outermost.append(End(each, "outermost", 1 if away > 0.0 else -1))
+    return outermost
+
+
+def _unbound(
+    dimension: Dimension, count: int, what: str, file: str, place: Place | None = None
+) -> Finding:
+    x, y = dimension.places_mm[0] if place is None else place
+    return DIMENSION_UNBOUND(
+        where=f"{file}, {dimension.source}, at ({x:.3f}, {y:.3f}) mm",
+        measured=count,
+        name=dimension.name,
+        what=what,
+    )

@@ -1,0 +1,199 @@
+"""The dimensions of a program's part on any variant of its machine: simulate, and measure.
+
+The features of all dimensions are found once, and with them which moves cut each; for every
+variant of the machine the program is simulated again and the same stations are measured.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from camtool.arrays import Floats, Ints
+from camtool.errors import OptionError
+from camtool.findings import DIMENSION_NOT_CUT, Finding
+from camtool.inspection.dimensions import Dimension
+from camtool.inspection.features import Bound, Edge, Feature, bind, features_of
+from camtool.inspection.sizes import Cut, Size, Swept, cut_of, edge_at, rows_of, size_of
+from camtool.machine.model import Machine
+from camtool.planning.job import Job, Tool
+from camtool.planning.place import SCALE_SHARE, placements
+from camtool.run import Run
+from camtool.toolpath.moves import Toolpath
+from camtool.verification.case import TRACE_POINTS, VerifyOptions, tool_mm
+from camtool.verification.cuts import CutMoves, moved_lengths, sample_cuts
+from camtool.verification.slides import Trace
+
+CHORD_MM = 1e-4
+"""Arcs of the slides' path are chords within this, as far as `MOST_POINTS` allows."""
+
+MOST_POINTS = 400_000
+"""A path has at most about so many points for inspection: 13 MB."""
+
+
+@dataclass(frozen=True, eq=False)
+class Inspected:
+    """A dimension in the work frame, how each of its features is cut, and of which copy it is
+    (None where there is one)."""
+
+    bound: Bound
+    cuts: tuple[Cut, ...]
+    copy: int | None = None
+
+    @property
+    def name(self) -> str:
+        """The dimension's name, with the number of the copy from 1."""
+        name = self.bound.dimension.name
+        return name if self.copy is None else f"{name}, copy {self.copy + 1}"
+
+
+class Inspector:
+    """Measures the dimensions of the part that the program of a run makes. `dimensions` are what
+    can be measured, `findings` say why the others cannot."""
+
+    def __init__(self, run: Run, dimensions: Iterable[Dimension]) -> None:
+        """`run` has a drawing, a job and a verification. Raises OptionError where its job scales
+        the part: limits hold for the part as it is drawn."""
+        assert run.drawing is not None
+        assert run.job is not None
+        assert run.decoded is not None
+        assert run.verification is not None
+        self._decoded, self._target = run.decoded, run.target
+        wanted = run.verification.wanted
+        self._follows = run.verification.follows.astype(np.int64)
+        self._tool = ToolAt(wanted.toolpath, run.job, tool_mm(run.job))
+        moves = swept_moves(wanted, self._tool)
+        self._points = _points(wanted)
+        found: list[Finding] = []
+        self.dimensions: tuple[Inspected, ...] = tuple(_inspected(run, dimensions, moves, found))
+        self.findings = tuple(found)
+
+    def sizes(self, machine: Machine | None = None, wider_mm: float = 0.0) -> list[Size]:
+        """The sizes of the dimensions on this machine (None: that of the run), with a tool that is
+        wider in diameter by so much. A feature that is not cut there is NaN."""
+        slides = self._slides(machine or self._target.machine).wider(0.5 * wider_mm)
+        lies: dict[int, Floats] = {}
+        sizes = []
+        for each in self.dimensions:
+            for feature, cut in zip(each.bound.features, each.cuts, strict=True):
+                if id(cut) not in lies:
+                    lies[id(cut)] = edge_at(feature, cut, rows_of(slides, cut, feature))
+            size = size_of(each.bound, [lies[id(cut)] for cut in each.cuts])
+            sizes.append(size or Size(math.nan, math.nan, math.nan))
+        return sizes
+
+    def _slides(self, machine: Machine) -> Swept:
+        """What the slides of this machine do with the program."""
+        from camtool.verification.verify import verify
+
+        options = VerifyOptions(trace_points=self._points)
+        done = verify(self._decoded, replace(self._target, machine=machine), options=options)
+        return swept_trace(done.trace, self._follows, self._tool)
+
+
+def _inspected(
+    run: Run, dimensions: Iterable[Dimension], moves: Swept, found: list[Finding]
+) -> Iterable[Inspected]:
+    assert run.drawing is not None
+    assert run.job is not None
+    features = features_of(run.drawing.paths)
+    maps = placements(run.drawing, run.job)
+    if abs(maps[0].scale - 1.0) > SCALE_SHARE:
+        raise OptionError(
+            f"the part is made {maps[0].scale:g} times as large as it is drawn",
+            file=run.drawing.file,
+            where="tolerances",
+            mend="limits hold for the part as drawn: leave out fit and scale",
+        )
+    known: dict[tuple[int, int], tuple[Feature, Cut | None]] = {}
+    for dimension in dimensions:
+        bound = bind(dimension, features, run.drawing.file)
+        if isinstance(bound, Finding):
+            found.append(bound)
+            continue
+        for copy, where in enumerate(maps):
+            placed = bound.placed(where)
+            cuts = []
+            for drawn, feature in zip(bound.features, placed.features, strict=True):
+                key = id(drawn), copy
+                if key not in known:
+                    known[key] = feature, cut_of(feature, moves)
+                cuts.append(known[key][1])
+            here = Inspected(placed, tuple(filter(None, cuts)), copy if len(maps) > 1 else None)
+            if len(here.cuts) == len(cuts):
+                yield here
+                continue
+            missing = placed.features[cuts.index(None)]
+            found.append(
+                DIMENSION_NOT_CUT(
+                    where=f"{run.drawing.file}, {dimension.source}",
+                    name=here.name,
+                    what="edge" if isinstance(missing, Edge) else "circle",
+                )
+            )
+
+
+class ToolAt:
+    """How wide the tool of each wanted row cuts at the surface."""
+
+    def __init__(self, wanted: Toolpath, job: Job, diameter_mm: float | None) -> None:
+        """The tools of the operations that the wanted moves name; where they name none, one of
+        this diameter (None: without width)."""
+        rows = np.arange(len(wanted))
+        starts, ends = wanted.starts_of(rows)[:, 2], wanted.end[:, 2]
+        self.z = np.maximum(starts, ends)
+        """(N,) mm: the height to which each row cuts at least."""
+        lowest = np.minimum(starts, ends)
+        self.radius = np.full(len(wanted), 0.5 * (diameter_mm or 0.0))
+        """(N,) mm: the radius at the surface."""
+        operations = wanted.operations
+        if operations is None:
+            return
+        tools: dict[str, Tool] = {each.name: each.tool for each in job.operations}
+        last = [*operations.begin[1:].tolist(), len(wanted)]
+        for note, begin, end in zip(
+            operations.notes, operations.begin.tolist(), last, strict=True
+        ):
+            tool = tools.get(note.name)
+            widest = 0.5 * note.tool.diameter_mm
+            part = slice(begin, end)
+            self.radius[part] = widest
+            if tool is not None and (tool.kind == "v" or tool.nose_mm):
+                depth = np.maximum(-lowest[part], 0.0)
+                wide = np.array([tool.radius_at(each) for each in depth.tolist()])
+                self.radius[part] = np.minimum(wide, widest) if widest else wide
+
+
+def swept_moves(wanted: CutMoves, tool: ToolAt) -> Swept:
+    """The cutting moves as segments within `CHORD_MM` of their arcs."""
+    arcs = wanted.segments.is_arc
+    least = float(wanted.segments.radius[arcs].min()) if arcs.any() else math.inf
+    samples = sample_cuts(wanted, min(math.sqrt(8.0 * least * CHORD_MM), 1.0))
+    inside = np.flatnonzero(samples.segment[1:] == samples.segment[:-1])
+    row = wanted.segments.path[samples.segment[inside]].astype(np.int64)
+    a, b = samples.points[inside], samples.points[inside + 1]
+    return Swept(a, b, tool.radius[row], tool.z[row], row)
+
+
+def swept_trace(trace: Trace, follows: Ints, tool: ToolAt) -> Swept:
+    """The slides' path where they cut, as segments; `follows` (N,) is the wanted row of each
+    decoded row."""
+    last = np.flatnonzero(trace.cutting)
+    last = last[last > 0]
+    row = follows[trace.row[last]]
+    last, row = last[row >= 0], row[row >= 0]
+    a, b = trace.points[last - 1], trace.points[last]
+    return Swept(a, b, tool.radius[row], tool.z[row], row)
+
+
+def _points(wanted: CutMoves) -> int:
+    """So many points has the slides' path for chords within `CHORD_MM` of the smallest arc."""
+    arcs = wanted.segments.is_arc
+    if not arcs.any():
+        return TRACE_POINTS
+    chord = math.sqrt(8.0 * float(wanted.segments.radius[arcs].min()) * CHORD_MM)
+    length = float(moved_lengths(wanted.toolpath).sum())
+    return int(min(max(4.0 * length / chord, TRACE_POINTS), MOST_POINTS))

@@ -1,0 +1,501 @@
+"""Sizes of machined features: where the tool's envelope lies along circles and edges.
+
+Stations stand along a feature as drawn, each with the normal that points to the side of the tool.
+Where the tool's centre moves from a to b, a tool of radius r clears all within r of that segment.
+Along the normal of a station, at u = 0 in its own axes (u along the feature, v along the normal),
+the cleared region begins at the least v of
+
+    the discs:   v_a − √(r² − u_a²),   v_b − √(r² − u_b²)
+    the side:    a + λ (b − a) − r N,   λ from u = 0,  0 ≤ λ ≤ 1,
+
+N being the unit normal of b − a with N_v > 0. The least over all segments is where the machined
+edge lies: above 0 material is left, below 0 too much is cut. With r = 0 it is where the path
+crosses the normal.
+
+Sizes of it are those of ISO 14405-1 (two-point sizes, the least-squares size) and zones of ISO
+1101 (minimum zones, as linear programmes in the deviations, which are small beside the feature).
+Not looked at: the lay of the surface, taper of the tool, burrs.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from camtool.arrays import Bools, Floats, Ints
+from camtool.inspection.features import Bound, Circle, Edge, End, Feature
+from camtool.verification.circles import least_squares_centre
+
+CIRCLE_STATIONS = 360
+"""Stations on a whole circle: an even number, so that each has one opposite."""
+
+EDGE_STATIONS = 128
+"""Stations on an edge."""
+
+REACHED_MM = 0.005
+"""Where the planned edge is farther than this from its own middle, the tool cannot reach (corners
+narrower than it), or another cut crosses: stations there are not measured."""
+
+FEWEST_SHARE = 0.25
+"""A feature of which less than this is cut is not measured."""
+
+ON_PATH_SHARE = 0.25
+"""A tool whose centre comes nearer to a feature than this part of its radius runs along it: the
+feature is then its path, not its edge."""
+
+BESIDE_MM = 0.5
+"""Moves are looked for up to this beyond the radius of the tool from a feature: slides may be
+that far from what was planned."""
+
+
+@dataclass(frozen=True, eq=False)
+class Swept:
+    """Segments of a tool's path, K: from `a` to `b` (K, 2) mm, `radius` (K,) mm of the tool at the
+    surface, the height `z` (K,) mm to which it is cut at least, and the wanted row (K,) that each
+    belongs to."""
+
+    a: Floats
+    b: Floats
+    radius: Floats
+    z: Floats
+    row: Ints
+
+    def of(self, which: Ints | Bools) -> Swept:
+        """Some of them."""
+        return Swept(
+            self.a[which], self.b[which], self.radius[which], self.z[which], self.row[which]
+        )
+
+    def wider(self, by_mm: float) -> Swept:
+        """With a tool whose radius is larger by so much; paths without width stay so."""
+        radius = np.where(self.radius > 0.0, np.maximum(self.radius + by_mm, 0.0), 0.0)
+        return Swept(self.a, self.b, radius, self.z, self.row)
+
+
+@dataclass(frozen=True, eq=False)
+class Stations:
+    """Where a feature is measured: places (S, 2) mm, unit normals (S, 2) towards the tool, and
+    which of them are (S,). `wide`: radians or mm from one to the next."""
+
+    places: Floats
+    normals: Floats
+    measured: Bools
+    wide: float
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """How a feature is cut: on which `side` the tool runs (+1: outside of a circle, left of an
+    edge), whether it runs along it (`on_path`), the wanted `rows` that cut it, its stations, the
+    lowest height at which all of it is cut, and which stations (L, S) are cut at each of L depths
+    (the surface, and the deepest)."""
+
+    side: int
+    on_path: bool
+    rows: Ints
+    stations: Stations
+    levels_mm: tuple[float, ...]
+    seen: Bools
+
+
+def stations_of(feature: Feature, side: int) -> Stations:
+    """The stations of a feature."""
+    if isinstance(feature, Circle):
+        wide = 2.0 * math.pi / CIRCLE_STATIONS
+        angle = np.arange(0.5 * wide, 2.0 * math.pi, wide)
+        spoke = np.column_stack([np.cos(angle), np.sin(angle)])
+        places = np.asarray(feature.centre_mm) + feature.radius_mm * spoke
+        on_arc = feature.has(angle)
+        return Stations(places, side * spoke, on_arc, wide)
+    share = (np.arange(EDGE_STATIONS) + 0.5) / EDGE_STATIONS
+    along = feature.along
+    places = np.asarray(feature.start_mm) + share[:, None] * feature.length_mm * along
+    normal = side * np.array([-along[1], along[0]])
+    every = np.ones(EDGE_STATIONS, dtype=np.bool_)
+    normals = np.broadcast_to(normal, places.shape)
+    return Stations(places, normals, every, feature.length_mm / EDGE_STATIONS)
+
+
+def envelope(
+    feature: Feature, stations: Stations, swept: Swept, asked: Bools, above_mm: float = 0.0
+) -> Floats:
+    """(S,) mm: where the machined edge lies along each normal, above 0 where material is left, at
+    the stations that are `asked` (S,) for; infinite where no segment clears it, or only more than
+    `above_mm` (not 0) above the middle of all.
+
+    Segments that cross a normal themselves come first, which is quick, and gives a bound: of the
+    others only those can matter whose discs reach below it.
+    """
+    crossing = _envelope(feature, stations, swept, asked, -math.inf)
+    known = crossing[asked & np.isfinite(crossing)]
+    bound = math.inf
+    if len(known) and above_mm:
+        bound = float(np.median(known)) + above_mm
+    elif len(known) == asked.sum():
+        bound = float(known.max(initial=-math.inf))
+    return np.minimum(crossing, _envelope(feature, stations, swept, asked, bound))
+
+
+def _envelope(
+    feature: Feature, stations: Stations, swept: Swept, asked: Bools, bound_mm: float
+) -> Floats:
+    """(S,) mm as `envelope`, of the segments that can reach below `bound_mm`; with −∞, of those
+    that cross a normal themselves."""
+    found = np.full(len(stations.places), np.inf)
+    if len(swept.a) == 0:
+        return found
+    segment, station = _pairs(feature, stations, swept, bound_mm)
+    keep = asked[station]
+    segment, station = segment[keep], station[keep]
+    place, normal = stations.places[station], stations.normals[station]
+    along = np.column_stack([normal[:, 1], -normal[:, 0]])
+    radius = swept.radius[segment]
+    from_a, from_b = swept.a[segment] - place, swept.b[segment] - place
+    ua, va = (from_a * along).sum(axis=1), (from_a * normal).sum(axis=1)
+    ub, vb = (from_b * along).sum(axis=1), (from_b * normal).sum(axis=1)
+    wide = radius > 0.0
+    for u, v in ((ua, va), (ub, vb)):
+        under = wide & (np.abs(u) <= radius)
+        low = v[under] - np.sqrt(radius[under] ** 2 - u[under] ** 2)
+        np.minimum.at(found, station[under], low)
+    du, dv = ub - ua, vb - va
+    length = np.hypot(du, dv)
+    moves = np.flatnonzero(du != 0.0)
+    du, dv, length = du[moves], dv[moves], length[moves]
+    # N is (−dv, du) or (dv, −du) over the length, with a v above 0.
+    nu, nv = -dv * np.sign(du) / length, np.abs(du) / length
+    share = (radius[moves] * nu - ua[moves]) / du
+    crosses = (share >= 0.0) & (share <= 1.0)
+    low = va[moves] - radius[moves] * nv + share * dv
+    np.minimum.at(found, station[moves][crosses], low[crosses])
+    return found
+
+
+def _pairs(
+    feature: Feature, stations: Stations, swept: Swept, bound_mm: float
+) -> tuple[Ints, Ints]:
+    """The segments and stations that can meet: those of discs that reach the normal below
+    `bound_mm`."""
+    count = len(stations.places)
+    if isinstance(feature, Circle):
+        centre = np.asarray(feature.centre_mm)
+        from_a, from_b = swept.a - centre, swept.b - centre
+        step = from_b - from_a
+        share = -(from_a * step).sum(axis=1) / np.maximum((step * step).sum(axis=1), 1e-300)
+        nearest = np.hypot(*(from_a + np.clip(share, 0.0, 1.0)[:, None] * step).T)
+        farthest = np.maximum(np.hypot(*from_a.T), np.hypot(*from_b.T))
+        outer = float(stations.normals[0] @ (stations.places[0] - centre)) > 0.0
+        least_v = nearest - feature.radius_mm if outer else feature.radius_mm - farthest
+        reach = _reach(swept.radius, least_v, bound_mm)
+        sine = reach / np.maximum(nearest, 1e-300)
+        half = np.where(sine >= 1.0, math.pi, np.arcsin(np.minimum(sine, 1.0)))
+        first = np.arctan2(from_a[:, 1], from_a[:, 0])
+        last = np.arctan2(from_b[:, 1], from_b[:, 0])
+        turn = np.mod(last - first + math.pi, 2.0 * math.pi) - math.pi
+        low, high = first + np.minimum(turn, 0.0) - half, first + np.maximum(turn, 0.0) + half
+    else:
+        start, along = np.asarray(feature.start_mm), feature.along
+        s = (swept.a - start) @ along, (swept.b - start) @ along
+        v = np.minimum(
+            (swept.a - start) @ stations.normals[0], (swept.b - start) @ stations.normals[0]
+        )
+        reach = _reach(swept.radius, v, bound_mm)
+        low, high = np.minimum(*s) - reach, np.maximum(*s) + reach
+    first_at = np.ceil(low / stations.wide - 0.5).astype(np.int64)
+    last_at = np.floor(high / stations.wide - 0.5).astype(np.int64)
+    if isinstance(feature, Edge):
+        first_at, last_at = np.maximum(first_at, 0), np.minimum(last_at, count - 1)
+    many = np.clip(last_at - first_at + 1, 0, count)
+    segment = np.repeat(np.arange(len(many)), many)
+    place = np.arange(len(segment)) - np.repeat(np.cumsum(many) - many, many)
+    station = np.mod(first_at[segment] + place, count)
+    return segment, station
+
+
+def _reach(radius: Floats, least_v: Floats, bound_mm: float) -> Floats:
+    """(K,) how far to either side a disc can lie below `bound_mm` on a normal, when its centre is
+    no lower than `least_v`: v − √(r² − u²) ≤ bound needs u² ≤ r² − (v − bound)²."""
+    if bound_mm == -math.inf:
+        return np.zeros(len(radius))
+    below = np.maximum(least_v - bound_mm, 0.0)
+    return np.where(below < radius, np.sqrt(np.maximum(radius**2 - below**2, 0.0)), 0.0)
+
+
+# Which moves cut a feature.
+
+
+def cut_of(feature: Feature, wanted: Swept) -> Cut | None:
+    """How the wanted moves cut a feature; None where they do not."""
+    near = _near(feature, wanted)
+    v, beside = _offsets(feature, wanted, near)
+    near, v = near[beside], v[beside]
+    if not len(near):
+        return None
+    radius = wanted.radius[near]
+    inner = np.abs(v) <= ON_PATH_SHARE * radius + REACHED_MM
+    on_path = bool(inner.any())
+    if on_path:
+        side, mine = 1, near[inner]
+    else:
+        best = int(np.argmin(np.abs(np.abs(v) - radius)))
+        side = 1 if v[best] > 0.0 else -1
+        mine = near[side * v > ON_PATH_SHARE * radius]
+    rows = np.unique(wanted.row[mine])
+    chosen = wanted.of(np.isin(wanted.row, rows))
+    if on_path:
+        chosen = replace(chosen, radius=np.zeros(len(chosen.a)))
+    stations = stations_of(feature, side)
+    levels = _levels(chosen)
+    seen = []
+    for level in levels:
+        part = chosen.of(chosen.z <= level)
+        planned = envelope(feature, stations, part, stations.measured, 2.0 * REACHED_MM)
+        finite = np.isfinite(planned)
+        middle = float(np.median(planned[finite])) if finite.any() else math.nan
+        seen.append(finite & (np.abs(planned - middle) <= REACHED_MM))
+    reached = np.array(seen)
+    if reached[0].sum() < FEWEST_SHARE * stations.measured.sum():
+        return None
+    return Cut(side, on_path, rows, stations, levels, reached)
+
+
+def _levels(swept: Swept) -> tuple[float, ...]:
+    """The surface, where all moves count, and the deepest height."""
+    deepest = float(swept.z.min())
+    return (math.inf,) if bool((swept.z <= deepest).all()) else (math.inf, deepest)
+
+
+def _near(feature: Feature, swept: Swept) -> Ints:
+    """Segments whose boxes come within reach of the feature's box."""
+    if isinstance(feature, Circle):
+        low = np.asarray(feature.centre_mm) - feature.radius_mm
+        high = np.asarray(feature.centre_mm) + feature.radius_mm
+    else:
+        low = np.minimum(feature.start_mm, feature.end_mm)
+        high = np.maximum(feature.start_mm, feature.end_mm)
+    reach = (swept.radius + BESIDE_MM)[:, None]
+    least, most = np.minimum(swept.a, swept.b), np.maximum(swept.a, swept.b)
+    return np.flatnonzero(((most >= low - reach) & (least <= high + reach)).all(axis=1))
+
+
+def _offsets(feature: Feature, swept: Swept, which: Ints) -> tuple[Floats, Bools]:
+    """(J,) mm how far the middles of segments are from the feature, above 0 outside of a circle
+    and left of an edge; and which of them lie beside it and within reach."""
+    middle = 0.5 * (swept.a[which] + swept.b[which])
+    if isinstance(feature, Circle):
+        spoke = middle - np.asarray(feature.centre_mm)
+        v = np.hypot(spoke[:, 0], spoke[:, 1]) - feature.radius_mm
+        beside = feature.has(np.arctan2(spoke[:, 1], spoke[:, 0]))
+    else:
+        along = feature.along
+        away = middle - np.asarray(feature.start_mm)
+        v = away @ np.array([-along[1], along[0]])
+        s = away @ along
+        beside = (s >= 0.0) & (s <= feature.length_mm)
+    return v, np.asarray(beside & (np.abs(v) <= swept.radius[which] + BESIDE_MM))
+
+
+# Sizes of envelopes.
+
+
+@dataclass(frozen=True)
+class Size:
+    """A dimension as machined, mm: the least-squares size, and the least and the largest of its
+    local sizes. Of a zone all three are its width."""
+
+    fit_mm: float
+    low_mm: float
+    high_mm: float
+
+
+def edge_at(feature: Feature, cut: Cut, swept: Swept) -> Floats:
+    """(L, S) mm where the feature's machined edge lies at each depth, outwards from a circle and
+    to the left of an edge; NaN where it is not cut. `swept` is what the slides do."""
+    found: list[Floats] = []
+    for level, seen in zip(cut.levels_mm, cut.seen, strict=True):
+        mine = swept.of(swept.z <= level)
+        lies = envelope(feature, cut.stations, mine, seen)
+        lies[~np.isfinite(lies)] = np.nan
+        found.append(cut.side * lies)
+    return np.array(found)
+
+
+def rows_of(swept: Swept, cut: Cut, feature: Feature) -> Swept:
+    """The segments of the slides that belong to the moves that cut a feature, near it."""
+    mine = swept.of(_near(feature, swept))
+    mine = mine.of(np.isin(mine.row, cut.rows))
+    return replace(mine, radius=np.zeros(len(mine.a))) if cut.on_path else mine
+
+
+def size_of(bound: Bound, lies: Sequence[Floats]) -> Size | None:
+    """The size of a dimension whose features' machined edges lie so (L, S), as `edge_at` gives
+    them in the order of `bound.features`; None where one is not cut."""
+    found = []
+    for level in range(max(len(each) for each in lies)):
+        here = [each[min(level, len(each) - 1)] for each in lies]
+        if all(np.isfinite(each).sum() >= FEWEST_STATIONS for each in here):
+            found.append(_size(bound, here))
+    if not found:
+        return None
+    return Size(
+        found[0].fit_mm, min(each.low_mm for each in found), max(each.high_mm for each in found)
+    )
+
+
+FEWEST_STATIONS = 3
+"""A size needs at least so many stations."""
+
+
+def _size(bound: Bound, lies: Sequence[Floats]) -> Size:
+    kind = bound.dimension.kind
+    if kind == "distance":
+        first, second = (
+            _values(end, each, bound.direction) for end, each in zip(bound.ends, lies, strict=True)
+        )
+        return _between(first, second)
+    if kind == "profile":
+        widest = max(float(np.nanmax(np.abs(each))) for each in lies)
+        return _zone(2.0 * widest)
+    feature, off = bound.features[0], lies[0]
+    if isinstance(feature, Edge):
+        return _zone(_width(_edge_table(feature, off), off[np.isfinite(off)]))
+    points = _circle_points(feature, off)
+    centre, radius = fitted_circle(points, np.asarray(feature.centre_mm))
+    if kind == "position":
+        return _zone(2.0 * math.dist(centre, feature.centre_mm))
+    spoke = points - centre
+    angle, rho = np.arctan2(spoke[:, 1], spoke[:, 0]), np.hypot(spoke[:, 0], spoke[:, 1])
+    if kind == "roundness":
+        table = np.column_stack([np.ones(len(angle)), np.cos(angle), np.sin(angle)])
+        return _zone(_width(table, rho - radius))
+    if kind == "radius":
+        return Size(radius, float(rho.min()), float(rho.max()))
+    local = 2.0 * rho
+    if feature.whole and len(rho) >= 0.5 * CIRCLE_STATIONS:
+        opposite = np.interp(angle + math.pi, angle, rho, period=2.0 * math.pi)
+        local = rho + opposite
+    return Size(2.0 * radius, float(local.min()), float(local.max()))
+
+
+def _zone(wide_mm: float) -> Size:
+    return Size(wide_mm, wide_mm, wide_mm)
+
+
+def _circle_points(circle: Circle, off: Floats) -> Floats:
+    """(J, 2) mm points of the machined circle, by angle, where it is cut."""
+    stations = stations_of(circle, 1)
+    seen = np.isfinite(off)
+    return np.asarray(stations.places[seen] + off[seen, None] * stations.normals[seen])
+
+
+def fitted_circle(points: Floats, near: Floats) -> tuple[Floats, float]:
+    """Centre (2,) and radius, mm, with the least squares of radial distances to points (J, 2);
+    `near` (2,) is a place near the centre."""
+    centre = near + least_squares_centre(points - near)
+    return centre, float(np.hypot(*(points - centre).T).mean())
+
+
+@dataclass(frozen=True, eq=False)
+class _Values:
+    """Where one end of a distance lies: values (J,) mm along the direction of measuring, their
+    places (J,) mm across it (None: it is a point), and the value of its best fit."""
+
+    values: Floats
+    across: Floats | None
+    fit_mm: float
+
+
+def _values(end: End, off: Floats, direction: Floats) -> _Values:
+    feature, seen = end.feature, np.isfinite(off)
+    if isinstance(feature, Edge):
+        stations = stations_of(feature, 1)
+        points = stations.places[seen] + off[seen, None] * stations.normals[seen]
+        across = points @ np.array([-direction[1], direction[0]])
+        values = points @ direction
+        return _Values(values, across, float(values.mean()))
+    points = _circle_points(feature, off)
+    centre, radius = fitted_circle(points, np.asarray(feature.centre_mm))
+    middle = float(centre @ direction)
+    if end.how == "centre":
+        return _Values(np.array([middle]), None, middle)
+    extreme = end.side * float((end.side * (points @ direction)).max())
+    return _Values(np.array([extreme]), None, middle + end.side * radius)
+
+
+def _between(first: _Values, second: _Values) -> Size:
+    """The distance of two ends: point by point where both are edges beside each other, otherwise
+    any point of one from any of the other."""
+    fit = second.fit_mm - first.fit_mm
+    if first.across is not None and second.across is not None:
+        order = np.argsort(second.across)
+        across, values = second.across[order], second.values[order]
+        beside = (first.across >= across[0]) & (first.across <= across[-1])
+        if beside.any():
+            local = np.interp(first.across[beside], across, values) - first.values[beside]
+            return Size(fit, float(local.min()), float(local.max()))
+    least = float(second.values.min() - first.values.max())
+    most = float(second.values.max() - first.values.min())
+    return Size(fit, least, most)
+
+
+def _edge_table(edge: Edge, off: Floats) -> Floats:
+    """(J, 2) a constant and the place along the edge, −1 to 1, of the stations that are cut."""
+    share = np.linspace(-1.0, 1.0, len(off))
+    return np.column_stack([np.ones(len(off)), share])[np.isfinite(off)]
+
+
+# Minimum zones. With deviations e_i and the functions of a line or a circle in a table T (a
+# constant and the place along it; a constant, cos and sin),
+#
+#     minimise h   subject to   −h ≤ e_i − T_i x ≤ h,
+#
+# is a linear programme of three or four unknowns, and 2 h is the width of the zone.
+
+
+def _width(table: Floats, off: Floats) -> float:
+    """The width, mm, of the narrowest zone around deviations (J,) by functions (J, K)."""
+    ones = np.ones((len(off), 1))
+    rows = np.vstack([np.hstack([table, ones]), np.hstack([-table, ones])])
+    middle = float(off.mean())
+    bounds = np.concatenate([off - middle, middle - off])
+    goal = np.append(np.zeros(table.shape[1]), 1.0)
+    return max(2.0 * float(least(goal, rows, bounds)[-1]), 0.0)
+
+
+LEAST_ROUNDS = 500
+"""Exchanges of a linear programme at most; some ten are usual."""
+
+LEAST_SLACK = 1e-12
+"""A condition that is broken by no more than this holds, mm."""
+
+
+def least(goal: Floats, rows: Floats, bounds: Floats) -> Floats:
+    """(K,) the x with the least goal · x for which rows (J, K) x ≥ bounds (J,).
+
+    By the dual simplex method, from a wide box: K conditions hold exactly; the one that is broken
+    most takes the place of one of them, until none is broken.
+    """
+    count = len(goal)
+    wide = 1e3 * (1.0 + float(np.abs(bounds).max(initial=0.0)))
+    signs = np.where(goal >= 0.0, 1.0, -1.0)
+    every = np.vstack([rows, np.diag(signs)])
+    limits = np.concatenate([bounds, np.full(count, -wide)])
+    active = np.arange(len(rows), len(every))
+    x = np.zeros(count)
+    for _ in range(LEAST_ROUNDS):
+        basis = every[active]
+        x = np.linalg.solve(basis, limits[active])
+        short = limits - every @ x
+        enters = int(np.argmax(short))
+        if short[enters] <= LEAST_SLACK:
+            break
+        price = np.linalg.solve(basis.T, goal)
+        change = np.linalg.solve(basis.T, every[enters])
+        may = np.flatnonzero(change > LEAST_SLACK)
+        if not len(may):
+            break
+        active[may[np.argmin(price[may] / change[may])]] = enters
+    return x
