@@ -624,13 +624,6 @@ class Code(IntEnum):
         "cannot be inspected",
         "cut it in the same program, or take the dimension out of tolerances.toml",
     )
-    DIMENSION_NOT_IN = (
-        503,
-        (WARNING, ERROR),
-        "a dimension is out of its limits, or it is undecided whether it is; an error where "
-        "`--require` asks for more",
-        "`camtool meet` looks for what would make it hold; measure what it says is uncertain",
-    )
 
 
 @dataclass(frozen=True)
@@ -1537,14 +1530,4 @@ DIMENSION_UNBOUND = Sentence(
 )
 DIMENSION_NOT_CUT = Sentence(
     Code.DIMENSION_NOT_CUT, "{name} is not inspected: the program does not cut its {what}"
-)
-DIMENSION_OUT = Sentence(
-    Code.DIMENSION_NOT_IN,
-    "{name} is out: {measured:.4f} mm at worst, where {limit:.4f} mm is the limit",
-    "mm",
-)
-DIMENSION_UNDECIDED = Sentence(
-    Code.DIMENSION_NOT_IN,
-    "{name} is undecided: {measured:.4f} mm at worst, where {limit:.4f} mm is the limit; {why}",
-    "mm",
 )
