@@ -167,6 +167,14 @@ class Code(IntEnum):
         "form and position have none in it",
         "give the dimension limits of its own",
     )
+    CALLOUT_NOT_READ = (
+        119,
+        INFO,
+        "dimensions of the drawing that are not inspected, counted, with the reason: they measure "
+        "angles, ordinates or lengths of arcs, or lack what they measure; a drawing without "
+        "`--tolerances` is made all the same",
+        "give their limits in `tolerances.toml` where they matter",
+    )
 
     CONTOUR_TOO_SMALL = (
         201,
@@ -867,6 +875,10 @@ SECTION_CHOSEN_FACES = Sentence(
 )
 NOT_APPLIED = Sentence(Code.NOT_APPLIED, "{measured} {what} {why}")
 NOT_APPLIED_TO_ENTITY = Sentence(Code.NOT_APPLIED, "{measured} {kind}: {what} is not applied")
+CALLOUT_NOT_READ = Sentence(
+    Code.CALLOUT_NOT_READ,
+    "{measured} {kind} cannot be inspected: {reason}",
+)
 NO_GENERAL_TOLERANCE = Sentence(
     Code.NO_GENERAL_TOLERANCE,
     "{general} has no value for a {kind} of {measured:.4g} mm: it has no limits",

@@ -78,8 +78,11 @@ class Callout:
 
     `kind` "linear": `points_mm` are two places, measured along `direction_rad` (None: from one to
     the other); "diameter": two opposite places of a circle; "radius": its centre and a place on
-    it. `measured_mm` is what the places measure. `text` is what is written in place of that, ""
-    for nothing. `upper_mm` and `lower_mm`: the deviations of its style, None without any.
+    it. `measured_mm` is what the places measure. `text` is what is written in place of that, with
+    "<>" for what is measured, "" for nothing else than that. `upper_mm` and `lower_mm`: the
+    deviations of its style, None without any. `mm_per_unit`: the unit of the numbers in its text.
+    `scale`: its text says so many times what is drawn (a view of another scale). `exact`: its
+    frame says that it is theoretically exact, without limits.
     """
 
     kind: Literal["linear", "diameter", "radius"]
@@ -91,6 +94,9 @@ class Callout:
     direction_rad: float | None = None
     upper_mm: float | None = None
     lower_mm: float | None = None
+    mm_per_unit: float = 1.0
+    scale: float = 1.0
+    exact: bool = False
 
 
 @dataclass(frozen=True)

@@ -40,6 +40,7 @@ from camtool.findings import (
     Severity,
 )
 from camtool.geometry.drawing import (
+    Callout,
     Drawing,
     Gap,
     Healing,
@@ -70,11 +71,13 @@ def assemble(
     findings: list[Finding],
     options: ReadOptions,
     marks: Sequence[Mark] = (),
+    callouts: Sequence[Callout] = (),
 ) -> Drawing:
     """The Drawing of these pieces, in the order in which their first members came.
 
     `findings` are those of the reader (units, repairs); gaps, size and one ENTITY_SKIPPED for
-    each kind of `skipped` are added here. A drawing of `marks` alone has no paths. Raises
+    each kind of `skipped` are added here. A drawing of `marks` alone has no paths; `callouts` are
+    all kept, whatever is selected. Raises
     DrawingError when a number is no position or when nothing is left to draw.
     """
     every = pieces
@@ -104,6 +107,7 @@ def assemble(
         unchosen=_unchosen(every, pieces, file, options),
         off_mm=off_drawn(pieces, result.lines),
         made_for=options.scale,
+        callouts=tuple(callouts),
     )
     # What is drawn twice has a finding of its own.
     once = [item for item in clean.skipped if item.reason != IS_DRAWN_TWICE]

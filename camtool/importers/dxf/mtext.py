@@ -81,6 +81,25 @@ def _plain(content: str) -> str:
     return NUMBERED.sub(lambda match: _ESCAPED.sub(r"\\\g<0>", numbered(match[1])), content)
 
 
+def plain_text(content: str) -> str:
+    """The text without its codes; stacked parts stand beside one another, "+0.1/-0.2", and those
+    of a fraction with its own sign, "1⁄2". Unusable for codes that cannot be read."""
+    from ezdxf.tools.text import MTextParser, TokenType
+
+    text = ""
+    try:
+        for token in MTextParser(_plain(content)):
+            if token.type == TokenType.STACK:
+                upper, lower, bar = token.data
+                fraction = bar != "^" and upper.strip().isdigit() and lower.strip().isdigit()
+                text += f" {upper.strip()}{'⁄' if fraction else '/'}{lower.strip()} "
+            else:
+                text += token.data if token.type == TokenType.WORD else " "
+    except _CODE_ERRORS as error:
+        raise Unusable("has codes in its text that cannot be read") from error
+    return text
+
+
 def _columns(entity: Any) -> Columns:
     """Width, gutter and heights; one column as high as need be where the entity sets none."""
     width = max(0.0, float(entity.dxf.get("width", 0.0)))

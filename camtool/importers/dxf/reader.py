@@ -14,6 +14,7 @@ from typing import Any
 
 from camtool.errors import DrawingError
 from camtool.findings import (
+    CALLOUT_NOT_READ,
     FILE_REPAIRED,
     NOT_APPLIED_TO_ENTITY,
     UNIT_GUESSED,
@@ -45,6 +46,7 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
     return assemble(
         walk.pieces,
         marks=walk.marks,
+        callouts=walk.callouts,
         file=file,
         units=units,
         used=dict(walk.used),
@@ -53,6 +55,7 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
             *_repaired(repairs),
             *findings,
             *_not_applied(walk.lacking),
+            *_not_callouts(walk.unread),
             *font_findings(walk.fonts),
         ],
         options=options,
@@ -84,6 +87,14 @@ def _not_applied(lacking: Counter[tuple[str, str]]) -> list[Finding]:
     return [
         NOT_APPLIED_TO_ENTITY(measured=count, kind=kind, what=what)
         for (kind, what), count in lacking.items()
+    ]
+
+
+def _not_callouts(unread: Counter[tuple[str, str]]) -> list[Finding]:
+    """The dimensions that say nothing of what can be inspected, with the reason."""
+    return [
+        CALLOUT_NOT_READ(measured=count, kind=kind, reason=reason)
+        for (kind, reason), count in unread.items()
     ]
 
 

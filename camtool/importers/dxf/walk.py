@@ -16,8 +16,9 @@ import numpy as np
 
 from camtool.arrays import Floats
 from camtool.errors import DrawingError
-from camtool.geometry.drawing import Mark
+from camtool.geometry.drawing import Callout, Mark
 from camtool.importers.dxf.bulk import Lines
+from camtool.importers.dxf.dimensions import CALLOUTS, callout
 from camtool.importers.dxf.load import Loaded, printable
 from camtool.importers.dxf.shapes import (
     Frame,
@@ -68,6 +69,8 @@ class Walk:
     options: ReadOptions
     pieces: list[Piece] = field(default_factory=list)
     marks: list[Mark] = field(default_factory=list)
+    callouts: list[Callout] = field(default_factory=list)
+    unread: Counter[tuple[str, str]] = field(default_factory=Counter)
     used: Counter[str] = field(default_factory=Counter)
     skipped: Counter[tuple[str, str]] = field(default_factory=Counter)
     lacking: Counter[tuple[str, str]] = field(default_factory=Counter)
@@ -76,11 +79,13 @@ class Walk:
     def __post_init__(self) -> None:
         self._inserted = 0
         self._visited = 0
+        self._mm_per_unit = 1.0
         self._sizes = BlockSizes(self.loaded.document.blocks)
         self._looks = Looks.of(self.loaded.document)
 
     def space(self, space: Any, mm_per_unit: float) -> None:
         """All entities of a space; what other layouts hold is counted."""
+        self._mm_per_unit = mm_per_unit
         self._entities(space, Scope(Frame(mm_per_unit * np.eye(3), np.zeros(3))))
         self.pieces = [piece for piece in self.pieces if piece is not _NOWHERE]
         for layout in self.loaded.document.layouts:
@@ -124,6 +129,8 @@ class Walk:
     def _entity(self, entity: Any, scope: Scope, look: Look) -> None:
         """Any entity but a LINE."""
         kind = entity.dxftype()
+        if kind in CALLOUTS and not scope.source:
+            self._callout(entity, scope, look)
         if kind == "INSERT":
             self._insert(entity, scope, look)
         elif kind in READERS:
@@ -230,6 +237,19 @@ class Walk:
         self._take(shapes, entity, scope, look)
         if lacks:
             self.fonts[lacks] += 1
+
+    def _callout(self, entity: Any, scope: Scope, look: Look) -> None:
+        """What a dimension says, whether its lines are read or not."""
+        source, paper = _source(entity, scope), self.options.layout is not None
+        unit_mm = self._mm_per_unit
+        try:
+            said = callout(
+                entity, scope.frame, unit_mm, layer=look.layer, source=source, paper=paper
+            )
+        except Unusable as reason:
+            self.unread[entity.dxftype(), printable(str(reason))] += 1
+        else:
+            self.callouts.append(said)
 
     def _parts(self, entity: Any, scope: Scope, look: Look) -> None:
         """What a dimension, a multiple line or a proxy is drawn with."""
