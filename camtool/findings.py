@@ -619,6 +619,49 @@ class Code(IntEnum):
         "(`G64 P`)",
         "post again; give `camtool verify` the flags of the post",
     )
+    DRAWING_PLACE = (
+        420,
+        (ERROR, INFO),
+        "where a drawing lies under a program that others made: its cuts do not follow the lines "
+        "there, or would as well elsewhere (errors); a remark by how much the drawing was moved",
+        "`--align` looks for the place, `--origin` gives it; `--scale`, `--mirror`, `--rotate` "
+        "and `--units` as the message says",
+    )
+    TOOL_FOUND = (
+        421,
+        (ERROR, WARNING),
+        "a program that others made keeps to several distances from the drawing, so that its tool "
+        "is not known (an error), or to another one than that of the tool that was given",
+        "give `--tool-diameter`",
+    )
+    NOT_CUT = (
+        422,
+        WARNING,
+        "a program that others made does not cut this contour of the drawing, or a part of it",
+        "none, if another program does, or tabs shall hold the part",
+    )
+    CUTS_BESIDE = (
+        423,
+        INFO,
+        "a program that others made cuts where no contour of the drawing asks for it: leads, "
+        "clearings of pockets, links",
+        "none, if that is meant",
+    )
+    OFF_DRAWING = (
+        424,
+        WARNING,
+        "a program that others made follows the drawing from afar: its chords or its digits are "
+        "coarse",
+        "`--max-error` makes an error of more than is allowed",
+    )
+    CUT_INTO_PART = (
+        425,
+        WARNING,
+        "a program that others made cuts into what one of its contours leaves standing, as the "
+        "drawing and the other cuts along that contour have it: a lead on the wrong side, a link "
+        "in the stock",
+        "lead in from the other side, or lift before the link; none for reliefs of corners",
+    )
     DIMENSION_UNBOUND = (
         501,
         WARNING,
@@ -1276,6 +1319,69 @@ FEED_ABOVE_LIMIT_LOWERED = Sentence(
 )
 
 # What verification says.
+
+DRAWING_PLACE_NOWHERE = Sentence(
+    Code.DRAWING_PLACE,
+    "{measured:.0f} % of the cuts follow the drawing, wherever it is moved",
+    "%",
+    ERROR,
+)
+DRAWING_PLACE_OTHERWISE = Sentence(
+    Code.DRAWING_PLACE,
+    "{measured:.0f} % of the cuts follow the drawing, {limit:.0f} % would with {flag}",
+    "%",
+    ERROR,
+)
+DRAWING_PLACE_ELSEWHERE = Sentence(
+    Code.DRAWING_PLACE,
+    "{measured:.0f} % of the cuts follow the drawing where its zero is, {limit:.0f} % would if it "
+    "lay at X{x:.3f} Y{y:.3f}: --align",
+    "%",
+    ERROR,
+)
+DRAWING_PLACE_AMBIGUOUS = Sentence(
+    Code.DRAWING_PLACE,
+    "the cuts follow the drawing at X{x:.3f} Y{y:.3f} and as well at X{other_x:.3f} "
+    "Y{other_y:.3f}: give its place with --origin in the place of --align",
+    "%",
+    ERROR,
+)
+DRAWING_PLACE_MOVED = Sentence(
+    Code.DRAWING_PLACE, "the drawing was moved to X{x:.3f} Y{y:.3f}", severity=INFO
+)
+TOOL_FOUND_SEVERAL = Sentence(
+    Code.TOOL_FOUND,
+    "{share:.0%} of the cuts keep to the drawing for a tool of {measured:.3f} mm, "
+    "{other_share:.0%} for one of {other:.3f} mm: give --tool-diameter",
+    "mm",
+    ERROR,
+)
+TOOL_FOUND_OTHER = Sentence(
+    Code.TOOL_FOUND,
+    "the cuts keep to the drawing for a tool of {measured:.3f} mm, not {limit:.3f} mm",
+    "mm",
+    WARNING,
+)
+NOT_CUT = Sentence(Code.NOT_CUT, "{contour} is not cut" + _and_more("contours"))
+NOT_CUT_PART = Sentence(
+    Code.NOT_CUT,
+    "{measured:.3f} mm of the path along {contour} is not cut ({share:.0%})"
+    + _and_more("contours"),
+    "mm",
+)
+CUT_INTO_PART = Sentence(
+    Code.CUT_INTO_PART,
+    "cuts up to {measured:.3f} mm into what {contour} leaves standing" + _and_more("moves"),
+    "mm",
+)
+CUTS_BESIDE = Sentence(
+    Code.CUTS_BESIDE,
+    "{measured:.3f} mm of cuts in {moves:# move follows|# moves follow} no contour of the drawing",
+    "mm",
+)
+OFF_DRAWING = Sentence(
+    Code.OFF_DRAWING, "the program runs up to {measured:.4f} mm beside the drawing", "mm"
+)
 
 ARC_MISSES_END = Sentence(
     Code.ARC_MISSES_END,

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from camtool.toolpath.program import Program
     from camtool.toolpath.wanted import Kept
     from camtool.verification.conformance import Asked
+    from camtool.verification.registration import Registration
     from camtool.verification.report import (
         Before,
         Gates,
@@ -61,6 +62,8 @@ PLANNING = "planning"
 class Judging:
     """How a program is judged.
 
+    `found`: what of the drawing it cuts is found from the program, of a job only the place of the
+    drawing and the diameter of its tool are taken; `align`: the place is looked for too.
     `interpolator` takes the place of the controller's own; `effects` are the parts of the
     mechanics that act (None: all); exceeding `gates` is a finding; `compensated`: the program was
     posted with compensation against the mechanics. `worst` moves are listed, and `trace_points` of
@@ -73,13 +76,16 @@ class Judging:
     compensated: bool = False
     worst: int | None = None
     trace_points: int | None = None
+    found: bool = False
+    align: bool = False
 
 
 @dataclass(frozen=True, eq=False)
 class _Goal:
     """What a program is compared with: the wanted toolpath, the drawing in its frame, the toolpath
     compensated against the mechanics, what else the job asks for, and the moves from which the
-    program was written, with the row of these of each decoded row; None for what there is not."""
+    program was written, with the row of these of each decoded row, or what of the drawing it was
+    found to cut; None for what there is not."""
 
     wanted: Toolpath | None = None
     drawing: Drawing | None = None
@@ -87,6 +93,7 @@ class _Goal:
     asked: Asked | None = None
     written_from: Toolpath | None = None
     row_from: Ints | None = None
+    registration: Registration | None = None
 
 
 @dataclass(frozen=True)
@@ -287,7 +294,9 @@ def verify_program(
     assert decoded is not None
     goal = _Goal()
     kept: tuple[Kept, ...] = ()
-    if drawing is not None:
+    if drawing is not None and judging.found:
+        goal, job = _registered(drawing, job or Job(), decoded, target, align=judging.align)
+    elif drawing is not None:
         from camtool.planning.drawn import kept_of
         from camtool.planning.plan import planned
 
@@ -322,6 +331,44 @@ def verify_program(
         verification=found,
         findings=found.findings,
     )
+
+
+def _registered(
+    drawing: Drawing, job: Job, decoded: Toolpath, target: LoadedTarget, *, align: bool
+) -> tuple[_Goal, Job]:
+    """What of the drawing a program cuts, and the job with the drawing and the tool so found."""
+    from camtool.planning.place import place
+    from camtool.verification.case import coverage_of, tool_mm
+    from camtool.verification.cuts import is_flat
+    from camtool.verification.registration import register
+
+    placed = place(drawing, job)
+    found = register(
+        decoded,
+        placed,
+        tool_diameter_mm=tool_mm(job),
+        align=align,
+        limit_mm=coverage_of(target.machine),
+        flat_cuts=is_flat(decoded),
+    )
+    job = _found_job(job, found)
+    wanted = found.wanted if found.report.followed else None
+    return _Goal(wanted, place(drawing, job), registration=found), job
+
+
+def _found_job(job: Job, found: Registration) -> Job:
+    """The job with the tool of a program, and the drawing where it lies under it."""
+    if found.diameter_mm is not None:
+        operations = tuple(
+            replace(each, tool=replace(each.tool, diameter_mm=found.diameter_mm))
+            for each in job.operations
+        )
+        job = replace(job, operations=operations)
+    x, y = found.shift_mm
+    if x or y:
+        # Aligning is refused where the job says an origin, so that the drawing's zero is it.
+        job = replace(job, placement=replace(job.placement, origin=(-x, -y)))
+    return job
 
 
 def convert_program(
@@ -571,6 +618,7 @@ def _judged(
         asked=goal.asked,
         written_from=goal.written_from,
         row_from=goal.row_from,
+        registration=goal.registration,
         progress=progress,
     )
 

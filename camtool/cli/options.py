@@ -14,7 +14,7 @@ pictures are in `picture_options`.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
@@ -485,6 +485,13 @@ class JobFlags:
             for key, each in said.items()
         }
         return Shop(self.project.libraries, **given)
+
+    def beyond(self, names: Collection[str]) -> list[str]:
+        """What is given of a job beside the keys of these names: `--job` and flags."""
+        from camtool.jobs.keys import flag_name
+
+        flags = [flag_name(name) for name in self.given if name not in names]
+        return [*(["--job"] if self.file is not None else []), *flags]
 
     def files(self) -> list[str]:
         """The job file, its library of tools, and its tool table."""

@@ -57,6 +57,11 @@ if TYPE_CHECKING:
 @machine_options
 @click.option("--against", metavar="DRAWING", help="The drawing that it should make.")
 @click.option(
+    "--align",
+    is_flag=True,
+    help="Find where the drawing lies under a program that others made; for --against.",
+)
+@click.option(
     "--interpolator",
     metavar="[dsm|dda|stairs]",
     help="How the controller draws arcs, to compare; default: as the machine does.",
@@ -108,6 +113,7 @@ def verify(
     program: str,
     machine: MachineFlags,
     against: str | None,
+    align: bool,
     interpolator: str | None,
     without: tuple[str, ...],
     worst: int | None,
@@ -131,9 +137,14 @@ def verify(
     and which way round it cuts, at the resolution of the dialect; feeds, spindle, tool and dwells
     as far as the flags name them; clearance of rapids; its end. Exit code 1 when a finding is an
     error.
+
+    Of a program that others made, without flags that say how it cuts, it is found which contours
+    it cuts, on which side and with what tool (or --tool-diameter), and with --align where the
+    drawing lies; then how far it is from them, and what is not cut.
     """
     wishes = Wishes(Outputs(preview, report, page), picture, beside, quiet, verbose)
     wishes.check(comparing=compare is not None, gated=gates.given)
+    finding = _finds(job, against, align=align, comparing=compare is not None)
     wishes.outputs.check([program, against, beside, *machine.files(), *job.files()])
 
     from camtool.comparison import effects_without
@@ -147,15 +158,36 @@ def verify(
         compensated=compensated,
         worst=worst,
         trace_points=None if compare else points_for(wishes.outputs.pictures),
+        found=align,
+        align=align,
     )
     target = machine.load()
     wanted = job.job(drawing)
     read = drawing.read(against, target.machine, wanted) if against else None
-    case = Case(target, judging, read, wanted)
+    case = Case(target, judging, read, wanted, finding)
     with job.blamed():
         if compare is not None:
             return _compare(program, _variants(compare, machine, judging), case, wishes)
         return _judge(program, case, wishes)
+
+
+def _finds(job: JobFlags, against: str | None, *, align: bool, comparing: bool) -> bool:
+    """Whether nothing says how the program cuts, so that this is found; a usage error where that
+    contradicts `--align`."""
+    from camtool.jobs.keys import PLACE
+
+    said = job.beyond({*PLACE, "tool_diameter"})
+    if align and against is None:
+        raise click.UsageError("--align needs --against DRAWING")
+    if align and comparing:
+        raise click.UsageError("--align is for a single variant; drop --compare")
+    if align and said:
+        raise click.UsageError(
+            f"--align finds how the program cuts; drop {', '.join(said)}, or --align"
+        )
+    if align and "origin" in job.given:
+        raise click.UsageError("--align finds the place; drop --origin, or --align")
+    return against is not None and not said
 
 
 def _variants(spec: str, machine: MachineFlags, judging: Judging) -> list[Variant]:
@@ -200,24 +232,29 @@ class Wishes:
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """How programs are judged: on which machine, by what, against which drawing."""
+    """How programs are judged: on which machine, by what, against which drawing; `finding`: for
+    those that others made it is found what they cut of it."""
 
     target: LoadedTarget
     judging: Judging
     drawing: Drawing | None
     job: Job
+    finding: bool = False
 
     def judged(self, file: str) -> Run:
         """The program in a file, run and judged."""
         from camtool.pipeline import verify_program
 
+        data, judging = read_bytes(file), self.judging
+        if self.finding and self.target.target.made_elsewhere(data):
+            judging = replace(judging, found=True)
         return verify_program(
-            read_bytes(file),
+            data,
             self.target,
             source=shown(file),
             drawing=self.drawing,
             job=self.job,
-            judging=self.judging,
+            judging=judging,
             progress=progress(),
         )
 

@@ -125,6 +125,10 @@ class Target(ABC):
         """The program, which `read` accepts, divided into blocks; None without such a listing."""
         return None
 
+    def made_elsewhere(self, data: bytes) -> bool:
+        """Whether another program than camtool wrote this one, as far as its text shows."""
+        return False
+
     def line_bytes(self, data: bytes, machine: Machine[Any, Any]) -> int:
         """The number of bytes sent over the line to the machine, where it is not the file's
         size."""

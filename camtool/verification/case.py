@@ -13,6 +13,7 @@ from camtool.target.registry import LoadedTarget
 from camtool.toolpath.moves import Compensated, Toolpath
 from camtool.toolpath.wanted import Kept
 from camtool.verification.conformance import Asked
+from camtool.verification.registration import Registration
 
 COVERAGE_MM = 0.005
 """A move is missing, or extra, when farther than this from all moves of the other side ..."""
@@ -54,6 +55,14 @@ def tool_mm(job: Job) -> float | None:
     """The diameter of the tool with which all operations cut, mm; None for several or none."""
     diameters = {operation.tool.diameter_mm for operation in job.operations}
     return (diameters.pop() or None) if len(diameters) == 1 else None
+
+
+def coverage_of(machine: Machine) -> float:
+    """How far moves of one side may be from those of the other on a machine, mm."""
+    axes = (machine.axes.x, machine.axes.y)
+    coarse = max(axis.coded_step_mm for axis in axes)
+    unit = max(axis.resolution_mm or 0.0 for axis in axes)
+    return max(COVERAGE_MM, COVERAGE_STEPS * coarse, COVERAGE_RESOLUTIONS * unit)
 
 
 @dataclass(frozen=True)
@@ -99,6 +108,7 @@ class Case:
     asked: Asked | None = None
     written_from: Toolpath | None = None
     row_from: Ints | None = None
+    registration: Registration | None = None
 
     @property
     def machine(self) -> Machine:
@@ -123,11 +133,7 @@ class Case:
     @property
     def coverage_mm(self) -> float:
         """How far moves of one side may be from those of the other, mm."""
-        axes = (self.machine.axes.x, self.machine.axes.y)
-        coarse = max(axis.coded_step_mm for axis in axes)
-        unit = max(axis.resolution_mm or 0.0 for axis in axes)
-        least = max(COVERAGE_MM, COVERAGE_STEPS * coarse, COVERAGE_RESOLUTIONS * unit)
-        return least + self.options.stray_mm
+        return coverage_of(self.machine) + self.options.stray_mm
 
     @property
     def depth_mm(self) -> float:

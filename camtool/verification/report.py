@@ -234,6 +234,35 @@ class AskedReport(msgspec.Struct, frozen=True):
     limit_um: float
 
 
+class FoundTool(msgspec.Struct, frozen=True):
+    """A tool whose path keeps to the lines of the drawing: its number, None where the program
+    mounts none, its diameter, 0 for a path on the lines, and whether that was given."""
+
+    number: int | None
+    diameter_mm: float
+    given: bool
+
+
+class FoundReport(msgspec.Struct, frozen=True):
+    """What of a drawing a program that others made was found to cut: by how much the drawing was
+    moved to lie under it, and whether its place was looked for (`aligned`); the part of the cuts
+    that follow it, and the length of those that do not; the tools; on which side how many contours
+    are cut; how far the program itself lies from them."""
+
+    shift_mm: tuple[float, float]
+    aligned: bool
+    followed: float
+    beside_mm: float = 0.0
+    tools: tuple[FoundTool, ...] = ()
+    outside: int = 0
+    inside: int = 0
+    on_line: int = 0
+    drilled: int = 0
+    not_cut: int = 0
+    off_max_um: float | None = None
+    off_rms_um: float | None = None
+
+
 class FindingReport(msgspec.Struct, frozen=True):
     """A finding, by the names of its code and severity."""
 
@@ -349,6 +378,7 @@ class Report(msgspec.Struct, frozen=True):
     assumptions: tuple[str, ...] = ()
     asked: AskedReport | None = None
     against: str = "program"
+    found: FoundReport | None = None
 
     def to_json(self) -> str:
         """Indented JSON with keys in the order of the record, and a newline at the end."""
@@ -521,6 +551,8 @@ def facts(report: Report) -> Iterator[tuple[str, str]]:
         yield "before", _before_words(report)
     if report.asked is not None:
         yield "as asked", _asked_words(report.asked)
+    if report.found is not None:
+        yield from (("as found", line) for line in _found_words(report.found))
     error = report.error_um.total
     yield (
         "error",
@@ -546,6 +578,34 @@ def _asked_words(asked: AskedReport) -> str:
         f"{asked.alike} of {asked.moves} cutting moves are those that camtool writes, the others"
         f" up to {asked.off_um:.2f} µm off ({asked.limit_um:.2f} µm allowed)"
     )
+
+
+def _found_words(found: FoundReport) -> Iterator[str]:
+    """What the program cuts of the drawing, with what, and how far beside it."""
+    if not found.tools and not found.drilled:
+        yield "nothing of the drawing"
+        return
+    sides = {
+        "outside": found.outside,
+        "inside": found.inside,
+        "on the line": found.on_line,
+        "drilled": found.drilled,
+        "not cut": found.not_cut,
+    }
+    counts = ", ".join(f"{count} {side}" for side, count in sides.items() if count)
+    tools = ", ".join(
+        ("tool" if each.number is None else f"tool {each.number}")
+        + (f" of {mm(each.diameter_mm)} mm" if each.diameter_mm else " on the lines")
+        + (" as given" if each.given else "")
+        for each in found.tools
+    )
+    yield f"contours: {counts or 'none'}{'; ' if tools else ''}{tools}"
+    x, y = found.shift_mm
+    where = f"drawing at X{x:.3f} Y{y:.3f}" if x or y else "drawing at its own zero"
+    beside = f", {mm(found.beside_mm)} mm beside it" if found.beside_mm else ""
+    yield f"{where}; {found.followed:.1%} of the cuts follow it{beside}"
+    if found.off_max_um is not None:
+        yield f"program off it by {um(found.off_max_um)} µm at most, rms {um(found.off_rms_um)}"
 
 
 def _operation_words(operations: Sequence[PlannedOperation]) -> Iterator[str]:

@@ -59,6 +59,7 @@ from camtool.verification.figures import (
 from camtool.verification.matching import Goal, carried_match, own_match
 from camtool.verification.motion_findings import motion_findings
 from camtool.verification.nearest import MoveIndex
+from camtool.verification.registration import Registration
 from camtool.verification.report import Before, Planned, Report, certain, number, reported
 from camtool.verification.shape import Wanted as WantedShape
 from camtool.verification.shape import (
@@ -108,17 +109,27 @@ def verify(
     asked: Asked | None = None,
     written_from: Toolpath | None = None,
     row_from: Ints | None = None,
+    registration: Registration | None = None,
     progress: Progress | None = None,
 ) -> Verification:
     """Simulate `decoded` on the target's machine and judge it, against `wanted` if it is given.
 
-    `drawing` gives its findings; `compensated`, `asked`, `written_from` and `row_from` are as in
-    `Case`. `progress` is told how many rows are judged.
+    `drawing` gives its findings; `compensated`, `asked`, `written_from`, `row_from` and
+    `registration` are as in `Case`. `progress` is told how many rows are judged.
     Toolpaths are in the work frame. Raises what `LoadedTarget.simulate` raises.
     """
     options = options or VerifyOptions()
     case = Case(
-        decoded, target, wanted, drawing, options, compensated, asked, written_from, row_from
+        decoded,
+        target,
+        wanted,
+        drawing,
+        options,
+        compensated,
+        asked,
+        written_from,
+        row_from,
+        registration,
     )
     target.check_options(case.simulation)
     fused = target.model.fused_run(decoded, target.machine, case.simulation)
@@ -242,6 +253,8 @@ def _all_findings(
     places = coverage.findings
     if conformance is not None and conformance.place:
         places = conformance.place
+    if case.registration is not None:  # the wanted moves are what the program follows
+        places = case.registration.findings
     groups = (
         case.drawing.findings if case.drawing is not None else (),
         case.wanted.findings if case.wanted is not None else (),
@@ -308,6 +321,7 @@ class Result:
             assumptions=assumptions(case),
             asked=self._asked(),
             against="program" if case.wanted is None or case.wanted.drawn is None else "drawing",
+            found=None if case.registration is None else case.registration.report,
         )
 
     def _errors(self) -> record.Errors:

@@ -22,6 +22,12 @@ from camtool.toolpath.wanted import TOOL_SHAPES, OperationNote, Operations, Tool
 from .dialect import UNITS, GcodeDialect, Unit
 from .format import COMMENT_CHARS, NumberStyle, comment, format_column
 
+MAKER = "camtool "
+"""What the heading of a program begins with."""
+
+HEADING_LINES = 20
+"""The heading is looked for in so many lines: a machine's own start may stand before it."""
+
 Lines = Callable[[int], str]
 """The text of the k-th line."""
 
@@ -38,12 +44,18 @@ def header(toolpath: Toolpath, machine: Machine, dialect: GcodeDialect) -> list[
     ]
     made = [toolpath.made_from, f"settings {machine.short_digest}"] if toolpath.made_from else []
     lines = [
-        f"camtool {version('camtool')} for {machine.target.name}: {machine.target.title}",
+        f"{MAKER}{version('camtool')} for {machine.target.name}: {machine.target.title}",
         *made,
         f"{unit} and {unit}/min - part zero at X0 Y0 Z0",
         *bounds,
     ]
     return [comment(line) for line in lines]
+
+
+def has_heading(data: bytes) -> bool:
+    """Whether a program has the heading that `header` writes."""
+    heading = f"({MAKER}".encode()
+    return any(line.startswith(heading) for line in data[:4096].splitlines()[:HEADING_LINES])
 
 
 def comments(

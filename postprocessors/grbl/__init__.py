@@ -82,6 +82,12 @@ class Grbl(Target):
 
         return GrblWire()
 
+    def made_elsewhere(self, data: bytes) -> bool:
+        """Whether it does not begin with camtool's own heading."""
+        from ..gcode.comments import has_heading
+
+        return not has_heading(data)
+
     def listing(self, data: bytes, machine: GrblMachine) -> Listing:
         """The lines that are blocks."""
         from ..gcode.blocks import listing
