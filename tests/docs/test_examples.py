@@ -24,7 +24,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 BLOCK = re.compile(r"^```(console|python|text)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
-PYTHON_PAGES = {"python.md", "tutorial.md"}
+PYTHON_PAGES = {"python.md", "tutorial.md", "uncertainty.md"}
 """Pages whose Python is run; others show parts of files."""
 
 

@@ -1,0 +1,583 @@
+"""How sure predicted sizes are: from what is uncertain in a machine to a budget of each size.
+
+    machine ─inputs_of─▶ Inputs ─propagate─▶ Budget      finite differences of simulations
+                              └─monte_carlo─▶ Draws      a simulation for each draw
+
+Whoever asks gives `values`: a function that simulates a program on a `Variant` (a machine, and by
+how much its tool is wider) and measures K sizes, mm. All inputs act on a machine along few
+*directions*, in which the simulation is repeated:
+
+    direction      what is moved                   inputs that move along it, with their factors
+    backlash       of an axis, by region too       backlash: 1; compensation: −(real / coded step)
+    scale          real step of an axis, relative  scale: 1; temperature: α_machine − α_part
+    squareness     of X and Y                      squareness: 1
+    tool           its diameter                    tool diameter: 1; run-out: 1
+
+Compensation. At a reversal the motor moves by C more, of which the mechanics lose B: only B − k·C
+matters (camtool/calibration/model.py), and to add δ more is to lose k·δ less.
+Temperature. The slides of a machine that is warmer by T grow by α_machine·T, and so does all that
+is cut; the part shrinks by α_part·T until it is measured at 20 °C.
+
+The spread of the values. Let S (K, D) be the derivatives along the directions, M (D, P) the
+factors of the inputs and Σ (P, P) their covariance. Then, with C = S M,
+
+    covariance = C Σ Cᵀ + Σ_d 2 e_d e_dᵀ + edges.
+
+Derivatives are differences over a step h of one standard uncertainty s, no infinitesimal one, for
+controllers round to steps and sizes are minima and maxima. Backlash bends: roundness is least
+where compensation equals it, and grows on both sides. There the simulation runs on both sides,
+at h = √3 s, and e = ½ f″ s², of which a normal error makes the mean e and the variance 2 e² (GUM,
+5.1.2, note). With that step both are those of Gauss and Hermite's rule of three points: exact to
+the second order, and for the mean of a bend as sharp as |x| wrong by 0.22 s. Mixed terms are left
+out.
+
+Edges. The process and the scatter of an axis shift each machined edge by itself. `edges`
+(K, E, 2) says by how much the values change with the place of E edges in X and Y: a width in X has
+(1, 0) for one edge and (−1, 0) for the other. With the process u, and the repeatability of
+the axes u_x and u_y, their covariance is Σ_E (u² + u_x²) w_x w_xᵀ + (u² + u_y²) w_y w_yᵀ.
+
+An input that is not known has no part in a covariance; `Budget.unknown` names those on which a
+value depends, which a single step shows. Not modelled: distributions other than normal ones (a
+backlash is cut off at 0 in draws), and directions whose scale or squareness depend on the place.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import msgspec
+import numpy as np
+
+from camtool.machine.model import Machine, PlayCells
+
+if TYPE_CHECKING:
+    from camtool.arrays import Floats
+
+PROBE_MM = 0.01
+"""The step along a length, mm, where no standard uncertainty is known."""
+
+PROBE_SCALE = 1e-3
+"""The same along a scale."""
+
+PROBE_RAD = 1e-3
+"""The same along squareness, rad."""
+
+PROBE_K = 5.0
+"""The same along the temperature, K."""
+
+PROBE_PER_K = 1e-5
+"""1/K by which parts and machines may differ where their expansions are not known."""
+
+NEGLIGIBLE_MM = 1e-5
+"""A value depends on an input where such a step changes it by more than this, mm."""
+
+CERTAIN = 1e-12
+"""Standard deviations below this are 0, mm."""
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A machine that differs from the one in the file; its tool is wider by `wider_mm` than the
+    job says. Variants of the tool alone have the very machine of the one they vary, so that its
+    motion need not be simulated again."""
+
+    machine: Machine
+    wider_mm: float = 0.0
+
+
+STEP_IN_BENDS = math.sqrt(3.0)
+"""Steps where values bend, in standard uncertainties: the outer nodes of Gauss and Hermite's rule
+of three points."""
+
+Values = Callable[[Variant], "Floats"]
+"""Simulates a variant and measures K sizes of its part: (K,) mm."""
+
+Moved = Callable[[Variant, float], Variant]
+
+
+@dataclass(frozen=True)
+class Direction:
+    """A way in which machines vary. `moved` gives the variant that is further along it by so much,
+    which may be as low as `lowest`. `bends`: the values may be far from linear in it."""
+
+    name: str
+    moved: Moved
+    lowest: float = -math.inf
+    bends: bool = False
+
+
+@dataclass(frozen=True)
+class Input:
+    """What is uncertain: `name` as in `[uncertainty]` ("x.backlash_mm", "process_mm"), its `value`
+    on the machine, its `standard` uncertainty in the same unit (None: not known), and a `probe`, a
+    step that shows what depends on it.
+
+    It moves the machine along `along`, (direction, factor), or the machined edges: then `edges`
+    are its shares in X and Y.
+    """
+
+    name: str
+    unit: str
+    value: float
+    standard: float | None
+    probe: float
+    along: tuple[tuple[Direction, float], ...] = ()
+    edges: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """The uncertain inputs of one machine; `correlation` (P, P) in their order."""
+
+    variant: Variant
+    each: tuple[Input, ...]
+    correlation: Floats
+
+    @property
+    def directions(self) -> tuple[Direction, ...]:
+        """Those along which any of the inputs moves the machine."""
+        return tuple(dict.fromkeys(one for each in self.each for one, _ in each.along))
+
+    @property
+    def factors(self) -> Floats:
+        """(D, P) by how much the machine moves along each direction, for 1 of each input."""
+        found, directions = np.zeros((len(self.directions), len(self.each))), self.directions
+        for column, each in enumerate(self.each):
+            for direction, factor in each.along:
+                found[directions.index(direction), column] += factor
+        return found
+
+    @property
+    def standards(self) -> Floats:
+        """(P,) standard uncertainties, 0 where they are not known."""
+        return np.array([each.standard or 0.0 for each in self.each])
+
+    @property
+    def probes(self) -> Floats:
+        """(P,) steps that show what depends on the inputs that are not known, 0 for others."""
+        return np.array([each.probe if each.standard is None else 0.0 for each in self.each])
+
+    @property
+    def covariance(self) -> Floats:
+        """(P, P); 0 for what is not known."""
+        joint: Floats = self.correlation * np.outer(self.standards, self.standards)
+        return joint
+
+
+# From a machine to its inputs.
+
+
+def inputs_of(machine: Machine, tool_diameter_mm: float) -> Inputs:
+    """All that is uncertain where this machine cuts with such a tool (0: one without a width).
+
+    What nothing depends on is left out: the uncertainty of a compensation of 0, that of a tool
+    without width, and scatter that is not modelled. Sizes are predicted without scatter.
+    """
+    said = machine.uncertainty
+    found: list[Input] = []
+    scales = []
+    axes = [
+        ("x", machine.axes.x, said.x, machine.play_map.used[0]),
+        ("y", machine.axes.y, said.y, machine.play_map.used[1]),
+    ]
+    length, part, angle = (
+        partial(_input, unit, probe)
+        for unit, probe in (("mm", PROBE_MM), ("", PROBE_SCALE), ("rad", PROBE_RAD))
+    )
+    for name, axis, known, cells in axes:
+        plays = [play for row in cells.play_mm for play in row] if cells else [axis.backlash_mm]
+        lost = Direction(f"{name}.backlash", _with_backlash(name), lowest=-max(plays), bends=True)
+        scale = Direction(f"{name}.scale", _with_scale(name))
+        scales.append(scale)
+        ratio = axis.real_step_mm / axis.coded_step_mm
+        mean, added = sum(plays) / len(plays), axis.compensation_mm
+        found.append(length(f"{name}.backlash_mm", mean, known.backlash_mm, (lost, 1.0)))
+        if added > 0.0:
+            against = lost, -ratio
+            found.append(length(f"{name}.compensation_mm", added, known.compensation_mm, against))
+        found.append(part(f"{name}.scale", ratio, known.scale, (scale, 1.0)))
+    lean = Direction("squareness", _with_squareness), 1.0
+    value = machine.mechanics.squareness_rad
+    found.append(angle("squareness_rad", value, said.squareness_rad, lean))
+    if tool_diameter_mm > 0.0:
+        wider = Direction("tool", _with_tool), 1.0
+        found.append(length("tool_diameter_mm", tool_diameter_mm, said.tool_diameter_mm, wider))
+        found.append(length("runout_mm", 0.0, said.runout_mm, wider))
+    found.append(_temperature(machine, scales))
+    found.append(length("process_mm", 0.0, said.process_mm, edges=(1.0, 1.0)))
+    for name, axis, shares in (("x", axes[0][1], (1.0, 0.0)), ("y", axes[1][1], (0.0, 1.0))):
+        if axis.repeatability_mm > 0.0:
+            scatter = axis.repeatability_mm
+            found.append(length(f"{name}.repeatability_mm", 0.0, scatter, edges=shares))
+    correlation = said.correlation([each.name for each in found])
+    return Inputs(Variant(machine), tuple(found), correlation)
+
+
+def _input(
+    unit: str,
+    probe: float,
+    name: str,
+    value: float,
+    standard: float | None,
+    *along: tuple[Direction, float],
+    edges: tuple[float, float] = (0.0, 0.0),
+) -> Input:
+    return Input(name, unit, value, standard, probe, along, edges)
+
+
+def _temperature(machine: Machine, scales: Sequence[Direction]) -> Input:
+    """That of the room, K from 20 °C; not known unless both expansions are."""
+    said = machine.uncertainty
+    of_machine, of_part = said.machine_expansion_per_k, said.part_expansion_per_k
+    differ, standard = PROBE_PER_K, None
+    if of_machine is not None and of_part is not None:
+        differ, standard = of_machine - of_part, said.temperature_k
+    elif said.temperature_k == 0.0:
+        standard = 0.0
+    along = tuple((scale, differ) for scale in scales)
+    return Input("temperature_k", "K", 0.0, standard, PROBE_K, along)
+
+
+def _with_backlash(name: str) -> Moved:
+    def moved(variant: Variant, by_mm: float) -> Variant:
+        machine = variant.machine
+        index = "xy".index(name)
+        cells = machine.play_map.used[index]
+        if cells is not None:
+            own = {name: _more_play(cells, by_mm)}
+            return _varied(variant, play_map=msgspec.structs.replace(machine.play_map, **own))
+        axis = (machine.axes.x, machine.axes.y)[index]
+        own_axis = msgspec.structs.replace(axis, backlash_mm=max(0.0, axis.backlash_mm + by_mm))
+        return _varied(variant, axes=msgspec.structs.replace(machine.axes, **{name: own_axis}))
+
+    return moved
+
+
+def _more_play(cells: PlayCells, by_mm: float) -> PlayCells:
+    rows = tuple(tuple(max(0.0, play + by_mm) for play in row) for row in cells.play_mm)
+    return msgspec.structs.replace(cells, play_mm=rows)
+
+
+def _with_scale(name: str) -> Moved:
+    def moved(variant: Variant, by: float) -> Variant:
+        axes = variant.machine.axes
+        axis = axes.x if name == "x" else axes.y
+        axis = msgspec.structs.replace(axis, real_step_mm=axis.real_step_mm * (1.0 + by))
+        return _varied(variant, axes=msgspec.structs.replace(axes, **{name: axis}))
+
+    return moved
+
+
+def _with_squareness(variant: Variant, by_rad: float) -> Variant:
+    mechanics = variant.machine.mechanics
+    lean = mechanics.squareness_rad + by_rad
+    return _varied(variant, mechanics=msgspec.structs.replace(mechanics, squareness_rad=lean))
+
+
+def _with_tool(variant: Variant, by_mm: float) -> Variant:
+    return replace(variant, wider_mm=variant.wider_mm + by_mm)
+
+
+def _varied(variant: Variant, **records: msgspec.Struct) -> Variant:
+    return replace(variant, machine=msgspec.structs.replace(variant.machine, **records))
+
+
+def without_scatter(variant: Variant) -> Variant:
+    """The variant whose slides arrive where their axes on average do."""
+    axes = variant.machine.axes
+    if not any(axis.repeatability_mm for axis in axes):
+        return variant
+    plain = {
+        name: msgspec.structs.replace(axis, repeatability_mm=0.0)
+        for name, axis in zip("xyz", axes, strict=True)
+    }
+    return _varied(variant, axes=msgspec.structs.replace(axes, **plain))
+
+
+# The weights of edges.
+
+
+def opposite_edges(direction_rad: float) -> Floats:
+    """(2, 2) the weights of a width or a diameter that is measured along a direction: its two
+    edges in X and Y."""
+    along = math.cos(direction_rad), math.sin(direction_rad)
+    return np.array([along, (-along[0], -along[1])])
+
+
+def edges_of(features: Sequence[tuple[int, Floats]]) -> Floats:
+    """(K, E, 2) weights from those (E_f, 2) of each of some features, of which so many values are
+    taken, such as a least and a greatest diameter. Features share no edges."""
+    rows = sum(count for count, _ in features)
+    weights = np.zeros((rows, sum(len(own) for _, own in features), 2))
+    row = column = 0
+    for count, own in features:
+        weights[row : row + count, column : column + len(own)] = own
+        row, column = row + count, column + len(own)
+    return weights
+
+
+# Propagation by finite differences.
+
+
+@dataclass(frozen=True)
+class Contribution:
+    """What one input adds to the uncertainty of a value. `standard_mm` is the value's standard
+    uncertainty if only this input were uncertain: |sensitivity| times that of the input, and what
+    bends add; `variance_mm2` is its part of the value's variance, with its share of the
+    covariances: these add up, and may be negative."""
+
+    input: Input
+    sensitivity: float
+    standard_mm: float
+    variance_mm2: float
+
+
+@dataclass(frozen=True, eq=False)
+class Budget:
+    """The uncertainty of K values from P inputs.
+
+    `values` (K,) mm: as simulated on the machine itself; `shifts` (K,) mm: by how much their
+    expectations differ from that, where they bend. `sensitivities` (K, P): of edges the root of
+    the sum of their squares; 0 for what is known exactly. `covariance` (K, K) mm²; `variances`
+    (K, P) mm² its diagonal by input, and `alone` (K, P) mm² without correlations. `probed` (K, P)
+    mm: by how much a step changes the value, where an input is not known, else 0. `runs`: variants
+    that were measured.
+    """
+
+    inputs: tuple[Input, ...]
+    values: Floats
+    shifts: Floats
+    sensitivities: Floats
+    covariance: Floats
+    variances: Floats
+    alone: Floats
+    probed: Floats
+    runs: int
+
+    @property
+    def expected(self) -> Floats:
+        """(K,) mm the values that are expected."""
+        return self.values + self.shifts
+
+    @cached_property
+    def standards(self) -> Floats:
+        """(K,) mm standard uncertainties, from what is known."""
+        return np.sqrt(np.clip(np.diag(self.covariance), 0.0, None))
+
+    def contributions(self, value: int) -> tuple[Contribution, ...]:
+        """What the known inputs add to a value, the largest first; those that add nothing are left
+        out."""
+        found = [
+            Contribution(
+                each,
+                float(self.sensitivities[value, column]),
+                math.sqrt(self.alone[value, column]),
+                float(self.variances[value, column]),
+            )
+            for column, each in enumerate(self.inputs)
+            if each.standard
+        ]
+        found = [each for each in found if each.standard_mm or each.variance_mm2]
+        return tuple(sorted(found, key=lambda each: (-abs(each.variance_mm2), -each.standard_mm)))
+
+    def unknown(self, value: int) -> tuple[Input, ...]:
+        """The inputs on which a value depends, and of which it is not known how uncertain they
+        are."""
+        return tuple(
+            each
+            for column, each in enumerate(self.inputs)
+            if each.standard is None and self.probed[value, column] > NEGLIGIBLE_MM
+        )
+
+
+def propagate(values: Values, inputs: Inputs, edges: Floats) -> Budget:
+    """The budget of K values: by at most eight simulations, and one more measurement where
+    the tool has a width. `edges` (K, E, 2) are the weights of the values' edges."""
+    base = without_scatter(inputs.variant)
+    centre = np.asarray(values(base), dtype=np.float64)
+    factors, covariance = inputs.factors, inputs.covariance
+    spread = np.sqrt(np.clip(np.diag(factors @ covariance @ factors.T), 0.0, None))
+    slopes = np.zeros((len(centre), len(spread)))
+    bends = np.zeros_like(slopes)
+    runs = 1
+    for column, direction in enumerate(inputs.directions):
+        step = float(spread[column]) * (STEP_IN_BENDS if direction.bends else 1.0)
+        step = step or float(max(np.abs(factors[column]) * inputs.probes))
+        if not step:
+            continue
+        above = values(direction.moved(base, step)) - centre
+        slopes[:, column] = above / step
+        runs += 1
+        back = min(step, -direction.lowest)
+        if direction.bends and back > CERTAIN:
+            below = values(direction.moved(base, -back)) - centre
+            runs += 1
+            slopes[:, column] = (above - below) / (step + back)
+            second = 2.0 * (above / step + below / back) / (step + back)
+            bends[:, column] = 0.5 * second * spread[column] ** 2
+    sensitivities = slopes @ factors
+    linear = sensitivities @ covariance @ sensitivities.T
+    variances = sensitivities * (sensitivities @ covariance)
+    joint = linear + 2.0 * bends @ bends.T
+    # What a direction adds by its bend belongs to its inputs by their variances along it.
+    parts = factors**2 * inputs.standards**2
+    whole = parts.sum(axis=1, keepdims=True)
+    parts = np.divide(parts, whole, out=np.zeros_like(parts), where=whole > 0.0)
+    bent = 2.0 * bends**2 @ parts
+    variances += bent
+    alone = (sensitivities * inputs.standards) ** 2 + bent
+    for column, each in enumerate(inputs.each):
+        if any(each.edges):
+            weights = _weights(edges, each)
+            sensitivities[:, column] = np.sqrt((weights**2).sum(axis=1))
+            own = (each.standard or 0.0) ** 2 * weights @ weights.T
+            joint += own
+            variances[:, column] = alone[:, column] = np.diag(own)
+    return Budget(
+        inputs=inputs.each,
+        values=centre,
+        shifts=bends.sum(axis=1),
+        sensitivities=sensitivities,
+        covariance=joint,
+        variances=variances,
+        alone=alone,
+        probed=np.abs(sensitivities) * inputs.probes,
+        runs=runs,
+    )
+
+
+def _weights(edges: Floats, each: Input) -> Floats:
+    """(K, 2E) the weights of the edges with an input's shares in X and Y."""
+    shared: Floats = edges * np.array(each.edges)
+    return shared.reshape(len(edges), -1)
+
+
+# Monte Carlo.
+
+
+@dataclass(frozen=True, eq=False)
+class Draws:
+    """Values (N, K) mm of N draws of the known inputs, each simulated."""
+
+    values: Floats
+
+    @property
+    def standards(self) -> Floats:
+        """(K,) mm."""
+        return np.asarray(self.values.std(axis=0, ddof=1))
+
+    def probability(self, low: int, high: int, limits: tuple[float, float]) -> float:
+        """The share of the draws in which value `low` is not below the lower limit, and value
+        `high` not above the upper one."""
+        lower, upper = limits
+        inside = (self.values[:, low] >= lower) & (self.values[:, high] <= upper)
+        return float(inside.mean())
+
+
+def monte_carlo(values: Values, inputs: Inputs, edges: Floats, draws: int, seed: int) -> Draws:
+    """The values of so many variants, drawn from the inputs' joint normal distribution, each
+    simulated with its own scatter of the axes. What is not known stays as it is; a backlash below
+    0 becomes 0."""
+    random = np.random.default_rng(seed)
+    sizes, axes = np.linalg.eigh(inputs.covariance)
+    root = axes * np.sqrt(np.clip(sizes, 0.0, None))
+    process = next((each for each in inputs.each if all(each.edges)), None)
+    found = []
+    for _ in range(draws):
+        off = inputs.factors @ (root @ random.standard_normal(len(inputs.each)))
+        variant = inputs.variant
+        for direction, by in zip(inputs.directions, off.tolist(), strict=True):
+            if by:
+                variant = direction.moved(variant, max(by, direction.lowest))
+        mechanics = msgspec.structs.replace(
+            variant.machine.mechanics, seed=int(random.integers(1 << 32))
+        )
+        if without_scatter(variant) is not variant:
+            variant = _varied(variant, mechanics=mechanics)
+        drawn = np.asarray(values(variant), dtype=np.float64)
+        if process is not None and process.standard:
+            weights = _weights(edges, process)
+            shifts = random.standard_normal(weights.shape[1])
+            drawn = drawn + process.standard * weights @ shifts
+        found.append(drawn)
+    return Draws(np.array(found))
+
+
+# Normal distributions.
+
+
+def normal_below(z: float) -> float:
+    """The probability that a standard normal variable is at most z; relative error 1e-15."""
+    return 0.5 * math.erfc(-z / math.sqrt(2.0))
+
+
+FAR = 9.0
+"""Beyond so many standard deviations a normal variable has a probability below 2e-19."""
+
+NODES = 24
+"""Nodes of Gauss and Legendre's rule on each piece of an integral."""
+
+STEEPNESS = (-FAR, -3.0, 0.0, 3.0, FAR)
+"""Where an integral is divided about the steep place of its integrand, in widths of that."""
+
+
+def both_below(a: float, b: float, correlation: float) -> float:
+    """The probability that two standard normal variables are at most a and b; error below 1e-12.
+
+    Given the first, x, the second is normal about r·x with the variance 1 − r²:
+
+        ∫_{−∞}^{a} φ(x) Φ((b − r·x) / √(1 − r²)) dx,
+
+    by Gauss and Legendre's rule on pieces. Near r = ±1 the second factor is steep at x = b/r: the
+    pieces are finer there.
+    """
+    r = min(1.0, max(-1.0, correlation))
+    rest = math.sqrt((1.0 - r) * (1.0 + r))
+    if rest < CERTAIN:
+        if r > 0.0:
+            return normal_below(min(a, b))
+        return max(0.0, normal_below(a) - normal_below(-b))
+    end = min(a, FAR)
+    if end <= -FAR:
+        return 0.0
+    if b >= FAR:
+        return normal_below(a)
+    ends = {-FAR, end, *(float(x) for x in range(-8, 9, 2))}
+    if r:
+        ends |= {(b + rest * each) / r for each in STEEPNESS}
+    pieces = sorted(x for x in ends if -FAR <= x <= end)
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    total = 0.0
+    for start, stop in pairwise(pieces):
+        half = 0.5 * (stop - start)
+        x = start + half * (nodes + 1.0)
+        density = np.exp(-0.5 * x * x) / math.sqrt(2.0 * math.pi)
+        given = [normal_below((b - r * each) / rest) for each in x.tolist()]
+        total += half * float(weights @ (density * given))
+    return min(1.0, max(0.0, total))
+
+
+def probability(low: float, high: float, covariance: Floats, limits: tuple[float, float]) -> float:
+    """The probability that a lower size is not below the lower limit and an upper one not above
+    the upper limit, both normal with the expectations `low` and `high` and the `covariance`
+    (2, 2). For one size give it twice, with its variance four times. A limit may be infinite."""
+    lower, upper = limits
+    s_low, s_high = (math.sqrt(max(0.0, float(covariance[k, k]))) for k in (0, 1))
+    above = _sigmas(low - lower, s_low)
+    below = _sigmas(upper - high, s_high)
+    if s_low < CERTAIN or s_high < CERTAIN:
+        return normal_below(above) * normal_below(below)
+    # Not below the limit is: −low is at most −lower. So the correlation turns over.
+    return both_below(above, below, -float(covariance[0, 1]) / (s_low * s_high))
+
+
+def _sigmas(inside: float, standard: float) -> float:
+    """By how many standard deviations something is inside; ±inf where it is certain."""
+    if standard < CERTAIN:
+        return math.inf if inside >= 0.0 else -math.inf
+    return inside / standard
