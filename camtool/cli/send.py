@@ -9,14 +9,14 @@ import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from camtool.cli.files import read_bytes, shown
+from camtool.cli.files import read_bytes, shown, write_all
 from camtool.cli.life_signs import progress
 from camtool.cli.messages import say, say_findings, show_facts, show_text
 from camtool.cli.options import MachineFlags, machine_options, talk_options
@@ -101,7 +101,7 @@ def send(
         raise OptionError("a real machine has only its own speed", where="--speed")
     if not yes and not _agreed():
         return 1
-    job = _Job(one, target, line, place, resume, as_json, quiet)
+    job = _Job(program, one, target, line, place, resume, as_json, quiet)
     return job.run(single=single, home=home, speed=speed, yes=yes)
 
 
@@ -136,6 +136,7 @@ def _agreed() -> bool:
 class _Job:
     """One program under way: what the user wants, and what is shown."""
 
+    program: str
     one: Consignment
     target: LoadedTarget
     port: Port
@@ -164,6 +165,7 @@ class _Job:
         progress().begin("sending", len(one.packets))
         real = not self.port.is_virtual
         manner = Manner(single=single, home=home, late_s=LATE_S * speed, paced=real)
+        manner = replace(manner, file=self._laid())
         conversation = one.wire.conversation(one.packets, self.target.machine, manner)
         with opened_line(self.port) as line, self._caught(), _keys() as key:
             journal = Journal(self.place, self._head(), more=self.more)
@@ -183,6 +185,19 @@ class _Job:
         why = str(driver.trouble or conversation.why or conversation.state.value)
         say(f"camtool: error: {one.run.source}: {why}; {done}; --resume goes on", quiet=False)
         return 1
+
+    def _laid(self) -> str:
+        """The path at which what is sent lies, for a controller that opens a file itself."""
+        one = self.one
+        if not one.wire.opens_file:
+            return ""
+        if self.program == "-":
+            raise click.UsageError("the controller opens a file: save the program in one")
+        file = Path(self.program)
+        copy = file.with_name(f"{file.stem}.sent{file.suffix}").resolve()
+        write_all({str(copy): one.data})
+        say(f"camtool: it opens {shown(str(copy))}", quiet=self.quiet)
+        return str(copy)
 
     def _head(self) -> dict[str, Any]:
         one = self.one

@@ -69,6 +69,13 @@ class Consignment:
         return 0 if self.rest is None else self.rest.first
 
     @property
+    def data(self) -> bytes:
+        """What is sent."""
+        if self.rest is not None:
+            return self.rest.data
+        return self.run.program.data if self.run.program else b""
+
+    @property
     def sha256(self) -> str:
         """The digest of the program as a whole, hex."""
         return digest(self.run.program.data if self.run.program else b"")

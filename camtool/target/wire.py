@@ -62,7 +62,8 @@ class Packet:
     `block`: the last block of the program that is done when it is done, −1 before the first;
     `seconds`: how long the machine is busy with it, by the simulation. `counts`: how many reports
     of it the controller may give, where it gives any. `ask`: what the user must do or allow before
-    it goes out. `note`: what the user must know while the machine waits in it.
+    it goes out. `note`: what the user must know while the machine waits in it. `end_mm`: where it
+    ends, in the work frame, where the conversation looks at that.
     """
 
     data: bytes
@@ -71,6 +72,7 @@ class Packet:
     counts: tuple[int, ...] = ()
     ask: str = ""
     note: str = ""
+    end_mm: Place | None = None
 
 
 class State(Enum):
@@ -128,13 +130,15 @@ class Manner:
     """How a conversation is held. `single`: it waits for `resume` after every packet; `home`: the
     machine is homed first; `late_s`: how late the line may be, s; `checked`: settings of the
     controller are compared with the machine file; `paced`: each byte takes the time that the rate
-    of the line gives it, so that a reply that comes sooner is none."""
+    of the line gives it, so that a reply that comes sooner is none; `file`: where what is sent
+    lies, for controllers that open it by themselves."""
 
     single: bool = False
     home: bool = False
     late_s: float = LATE_S
     checked: bool = True
     paced: bool = False
+    file: str = ""
 
     @property
     def patience_s(self) -> float:
@@ -320,6 +324,8 @@ class Wire(ABC):
     baud: ClassVar[int | None] = None
     frame: ClassVar[str] = "8N1"
     ready: ClassVar[tuple[str, ...]] = ()
+    opens_file: ClassVar[bool] = False
+    """Whether the controller opens the program as a file (`Manner.file`)."""
     stopping: ClassVar[str] = ""
     """What a stop does, such as "the machine stops at once"."""
 

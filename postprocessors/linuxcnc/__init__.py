@@ -9,17 +9,21 @@ from typing import TYPE_CHECKING
 from camtool.target.contract import Setting, Target
 
 from ..gcode.dialect import check_blocks, feed_decimals, last_decimal_mm
-from .dialect import Dialect, LinuxcncController, LinuxcncMachine
+from .dialect import Dialect, LinuxcncController, LinuxcncLink, LinuxcncMachine
 from .findings import CODES
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from camtool.machine.model import Axis
+    import msgspec
+
+    from camtool.machine.model import Axis, Machine
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
 
     from .controller import LinuxcncModel
+    from .twin import Choices, LinuxcncTwin
+    from .wire import LinuxcncWire
 
 
 class Linuxcnc(Target):
@@ -28,6 +32,7 @@ class Linuxcnc(Target):
     name = "linuxcnc"
     controllers = (LinuxcncController,)
     dialect = Dialect
+    link = LinuxcncLink
     starts_spindle = True
     switches_coolant = True
     any_machine = True
@@ -62,6 +67,28 @@ class Linuxcnc(Target):
         from .controller import LinuxcncModel
 
         return LinuxcncModel()
+
+    def wire(self) -> LinuxcncWire:
+        """A file that it opens, told and watched through linuxcncrsh."""
+        from .wire import LinuxcncWire
+
+        return LinuxcncWire()
+
+    def twin_choices(self) -> type[Choices]:
+        """How it is set up."""
+        from .twin import Choices
+
+        return Choices
+
+    def twin(
+        self,
+        machine: Machine[LinuxcncController, Dialect],
+        choices: msgspec.Struct | None = None,
+    ) -> LinuxcncTwin:
+        """The virtual controller; docs/wires/linuxcnc.md."""
+        from .twin import Choices, LinuxcncTwin
+
+        return LinuxcncTwin(machine, choices if isinstance(choices, Choices) else Choices())
 
     def unit_mm(self, machine: LinuxcncMachine, axis: Axis) -> float:
         """The last decimal of a coordinate."""

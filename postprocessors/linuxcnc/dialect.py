@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from camtool.machine.model import Machine, SlideStart
+from camtool.machine.model import Link, Machine, SlideStart
 from camtool.machine.ranges import Place, Tolerance
 
 from ..gcode.dialect import GcodeDialect
@@ -80,6 +80,19 @@ class LinuxcncController(SlideStart, frozen=True, tag_field="model", tag="linuxc
     servo_period_s: Annotated[float, Meta(ge=1e-6, le=1.0)] = 0.001
     lookahead_moves: Annotated[int, Meta(ge=2, le=10_000)] = 50
     kink_ratio: Annotated[float, Meta(ge=0.001, le=0.7071)] = 0.1
+
+
+Word = Annotated[str, Meta(pattern=r"^[!-~]+$")]
+
+
+class LinuxcncLink(Link, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """linuxcncrsh: the passwords of its line (`--connectpw`) and of its commands (`--enablepw`),
+    and the `folder` in which the computer of LinuxCNC finds the programs that are sent, where that
+    is not the path that they have here."""
+
+    password: Word = "EMC"
+    enable_password: Word = "EMCTOO"
+    folder: Word | None = None
 
 
 LinuxcncMachine = Machine[SlideStart, Dialect]

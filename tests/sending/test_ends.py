@@ -37,9 +37,6 @@ PARTS = {
 SPEED = {"grbl": 12.0, "pic-mmh": 60.0}
 """Of the clocks of both ends."""
 
-SECONDS = {"grbl": 26.0, "pic-mmh": 60.0}
-"""How long the programs take, about."""
-
 
 class Over(Exception):
     """The end of a host."""
@@ -97,7 +94,7 @@ def killed_and_resumed(name: str, folder: Path, seed: int) -> bool:
     program = folder / f"part{seed}.txt"
     program.write_bytes(PARTS[name])
     first: Any = loaded.twin([])
-    seconds = SECONDS[name] / SPEED[name]
+    seconds = float(motion(PARTS[name], loaded).time_s[-1]) / SPEED[name]
     with hosted(first, SPEED[name]) as port:
         with subprocess.Popen(
             command(name, program, port), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL

@@ -1,0 +1,393 @@
+"""A LinuxCNC behind linuxcncrsh, as docs/wires/linuxcnc.md describes it.
+
+Lines of text come in and are answered one by one. A program is a file, which is read by the
+target's own reader and run by its model as a whole; what is asked about it (line, place, state)
+follows from how much of the motion is over. Nothing moves before it is switched on, enabled and
+homed.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Final, Literal
+
+import msgspec
+import numpy as np
+
+from camtool.arrays import Floats, Ints
+from camtool.errors import CamtoolError
+from camtool.machine.model import Machine
+from camtool.target.twin import COMMANDED, Slides, Travel, Twin, travel_of
+from camtool.toolpath.moves import Toolpath
+
+from .controller import LinuxcncModel
+from .dialect import Dialect, LinuxcncController, LinuxcncLink
+from .read import read_program
+
+HOMING_MM_S: Final = 10.0
+"""The speed of its homing, in which every axis goes to machine zero; ours."""
+
+JOINTS: Final = 6
+"""It reports so many, whichever there are (linuxcncrsh of 2.9)."""
+
+FRAME: Final = re.compile(r"G10 ?L20 ?P0((?: ?[XYZ]-?\d*\.?\d+)+)", re.IGNORECASE)
+WORD: Final = re.compile(r"([XYZ])(-?\d*\.?\d+)", re.IGNORECASE)
+PAUSES: Final = re.compile(rb"^[^(;]*M0*[01](?![\d.])", re.IGNORECASE)
+BLOCK: Final = re.compile(rb"[A-Za-z#]")
+
+
+class Choices(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """How it is found. `power`: "ready" (switched on and homed), "on" (not homed), or "estop"."""
+
+    power: Literal["ready", "on", "estop"] = "ready"
+
+
+class LinuxcncTwin(Twin):
+    """A LinuxCNC that has just been started, its slides at machine zero."""
+
+    wire = "linuxcncrsh, TCP"
+
+    def __init__(self, machine: Machine[LinuxcncController, Dialect], choices: Choices) -> None:
+        super().__init__(Slides(machine))
+        self._machine = machine
+        assert isinstance(machine.link, LinuxcncLink)
+        self._link = machine.link
+        self._estop, self._on = choices.power == "estop", choices.power != "estop"
+        self._homed = choices.power == "ready"
+        self._zero: Floats = np.zeros(3)  # of the work frame, on the machine
+        self._mode, self._status = "MANUAL", "IDLE"
+        self._file, self._program = "", b""
+        self._error = ""
+        self._steps = False  # whether the program stops behind each line
+        self._travel: Travel | None = None  # of the whole program
+        self._done = 0  # so many of its outputs have been made
+        self._since = 0.0  # and so much of its time is over
+        self._line_ends: Floats = np.empty(0)  # when each line is over, s of the program
+        self._lines: Ints = np.empty(0, dtype=np.int64)
+        self._halts: list[float] = []  # where it waits, s of the program
+        self._segment_s = 0.0
+        self._homing = False
+        self.read_file: Callable[[str], bytes] = lambda name: Path(name).read_bytes()
+        """How it opens files."""
+        self._hang_up()
+
+    def _hang_up(self) -> None:
+        """What belongs to a connection."""
+        self._text = bytearray()
+        self._greeted = self._enabled = self._verbose = False
+        self._echo = True
+
+    def connected(self, now: float) -> bytes:
+        """A new client has to greet again; what runs goes on."""
+        sent = self.advance(now)
+        self._hang_up()
+        return sent
+
+    def next_s(self) -> float | None:
+        """It says nothing by itself."""
+        return self.turn_s()
+
+    # Lines.
+
+    def _take(self, octet: int) -> None:
+        if octet not in b"\r\n":
+            self._text.append(octet)
+            return
+        line, self._text = bytes(self._text).decode("utf-8", "replace").strip(), bytearray()
+        if line:
+            if self._echo and self._greeted:
+                self._say(line)
+            self._do(line)
+
+    def _say(self, text: str) -> None:
+        self._out += f"{text}\r\n".encode()
+
+    def _do(self, line: str) -> None:
+        verb, _, rest = line.partition(" ")
+        name, _, value = rest.strip().partition(" ")
+        verb, name, value = verb.lower(), name.lower(), value.strip()
+        if verb == "hello":
+            words = line.split()
+            self._greeted = len(words) == 4 and words[1] == self._link.password
+            self._say("HELLO ACK EMCNETSVR 1.1" if self._greeted else "HELLO NAK")
+        elif not self._greeted:
+            return
+        elif verb == "get":
+            answer = self._get(name)
+            self._say(f"GET {name.upper()} NAK" if answer is None else f"{name.upper()} {answer}")
+        elif verb == "set":
+            done = self._set(name, value)
+            if self._verbose or not done:
+                self._out += f"SET {name.upper()} {'ACK' if done else 'NAK'}\n\r".encode()
+
+    # Questions.
+
+    def _get(self, name: str) -> str | None:
+        answers: dict[str, Callable[[], str]] = {
+            "estop": lambda: _on(self._estop),
+            "machine": lambda: _on(self._on),
+            "mode": lambda: self._mode,
+            "program_status": lambda: self._status,
+            "program": lambda: self._file or "NONE",
+            "program_line": lambda: str(self._line()),
+            "joint_homed": lambda: " ".join(
+                ["YES" if self._homed else "NO"] * 3 + ["NO"] * (JOINTS - 3)
+            ),
+            "teleop_enable": lambda: "YES" if self._homed else "NO",
+            "rel_act_pos": lambda: _place(self.slides.commanded_mm - self._zero),
+            "rel_cmd_pos": lambda: _place(self.slides.commanded_mm - self._zero),
+            "abs_act_pos": lambda: _place(self.slides.commanded_mm),
+            "abs_cmd_pos": lambda: _place(self.slides.commanded_mm),
+            "pos_offset": lambda: _place(self._zero),
+            "error": self._popped,
+            "operator_text": lambda: "OK",
+            "operator_display": lambda: "OK",
+            "linear_unit_conversion": lambda: "MM",
+            "feed_override": lambda: "100",
+            "echo": lambda: _on(self._echo),
+            "verbose": lambda: _on(self._verbose),
+            "enable": lambda: _on(self._enabled),
+        }
+        return answers[name]() if name in answers else None
+
+    def _popped(self) -> str:
+        error, self._error = self._error, ""
+        return error or "OK"
+
+    def _line(self) -> int:
+        """The line that it is at, from 1; behind the end the last that moved."""
+        if not len(self._lines):
+            return 0
+        at = int(np.searchsorted(self._line_ends, self._program_s(), side="right"))
+        return int(self._lines[min(at, len(self._lines) - 1)])
+
+    def _program_s(self) -> float:
+        """How much of the program's time is over."""
+        if self._status == "RUNNING" and self.slides.ends_s is not None:
+            left = max(self.slides.ends_s - self.now, 0.0)
+            return self._since + self._segment_s - left
+        return self._since
+
+    # Orders.
+
+    def _set(self, name: str, value: str) -> bool:
+        if name in ("echo", "verbose"):
+            setattr(self, f"_{name}", value.lower() == "on")
+            return value.lower() in ("on", "off")
+        if name == "enable":
+            self._enabled = value == self._link.enable_password
+            return self._enabled or value.lower() == "off"
+        if name in ("set_wait", "linear_unit_conversion"):
+            return value.lower() in ("received", "mm")
+        orders: dict[str, Callable[[str], bool]] = {
+            "estop": self._set_estop,
+            "machine": self._set_machine,
+            "mode": self._set_mode,
+            "home": self._home,
+            "open": self._open,
+            "run": self._run_program,
+            "step": self._step,
+            "pause": self._pause,
+            "resume": self._resume,
+            "abort": lambda _: self._abort(),
+            "mdi": self._mdi,
+            "jog_incr": self._jog,
+            "teleop_enable": lambda _: self._homed,
+        }
+        if name not in orders or not self._enabled:
+            return False
+        done = orders[name](value)
+        if done:
+            self.commands.append(f"{name} {value}".strip().encode())
+        return done
+
+    def _set_estop(self, value: str) -> bool:
+        self._estop = value.lower() == "on"
+        if self._estop:
+            self._abort()
+            self._on = False
+        return True
+
+    def _set_machine(self, value: str) -> bool:
+        self._on = value.lower() == "on" and not self._estop
+        if not self._on:
+            self._abort()
+        return True
+
+    def _set_mode(self, value: str) -> bool:
+        if value.lower() not in ("manual", "auto", "mdi") or self._status != "IDLE":
+            return False
+        self._mode = value.upper()
+        return True
+
+    def _may_move(self) -> bool:
+        return self._on and self._status == "IDLE" and self.slides.ends_s is None
+
+    def _home(self, value: str) -> bool:
+        if self._mode != "MANUAL" or not self._may_move():
+            return False
+        self.slides.begin(_straight(self.slides.commanded_mm, np.zeros(3)), self.now, -1)
+        self._homing, self._homed = True, False
+        return True
+
+    def _jog(self, value: str) -> bool:
+        words = value.lower().split()
+        if len(words) != 3 or words[0] not in ("x", "y", "z") or not self._homed:
+            return False
+        if self._mode != "MANUAL" or not self._may_move():
+            return False
+        speed, way = float(words[1]) / 60.0, float(words[2])
+        here = self.slides.commanded_mm
+        to = here.copy()
+        to["xyz".index(words[0])] += np.copysign(way, speed)
+        self.slides.begin(_straight(here, to, abs(speed)), self.now, -1)
+        return True
+
+    def _mdi(self, value: str) -> bool:
+        """G10 L20 P0, or a line in absolute coordinates."""
+        if self._mode != "MDI" or not self._may_move() or not self._homed:
+            return True  # it is acknowledged, and an operator's error is shown
+        found = FRAME.fullmatch(value)
+        if found:
+            for axis, text in WORD.findall(found[1]):
+                at = "XYZ".index(axis.upper())
+                self._zero[at] = self.slides.commanded_mm[at] - float(text)
+            return True
+        path = self._decoded(value.encode() + b"\nM2\n", here=True)
+        if path is not None:
+            motion = LinuxcncModel().run(path, self._machine, COMMANDED)
+            self.slides.begin(travel_of(motion).moved(self._zero), self.now, -1)
+        return True
+
+    def _open(self, name: str) -> bool:
+        try:
+            self._program = self.read_file(name)
+        except OSError:
+            self._error = f"Unable to open file <{name}>"
+            return True
+        self._file = name
+        return True
+
+    def _decoded(self, data: bytes, *, here: bool = False) -> Toolpath | None:
+        try:
+            path = read_program(data, self._machine, None)
+        except CamtoolError as error:
+            self._error = str(error)
+            return None
+        start = self.slides.commanded_mm - self._zero
+        return replace(path, start=start) if here or len(path) else path
+
+    def _run_program(self, value: str, *, steps: bool = False) -> bool:
+        """From its beginning; a line to run from is not modelled."""
+        if self._mode != "AUTO" or not self._may_move() or not self._homed or value:
+            self._error = "" if self._homed else "Can't run a program when not homed"
+            return True
+        path = self._decoded(self._program)
+        if path is None:
+            return True
+        lines = self._program.replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n")
+        numbers = [k for k, line in enumerate(lines, 1) if _has_words(line)]
+        self.decoded += [lines[number - 1].strip() for number in numbers]
+        path = path.first(path.running)
+        chunks = list(LinuxcncModel().run(path, self._machine, COMMANDED))
+        self._travel = travel_of(chunks).moved(self._zero)
+        ends = np.zeros(len(path))
+        for chunk in chunks:
+            np.add.at(ends, chunk.ledger.row, chunk.ledger.duration_s)
+        self._line_ends = np.cumsum(ends)
+        self._lines = np.array(numbers, dtype=np.int64)[path.block]
+        halting = [k for k, number in enumerate(numbers) if PAUSES.match(lines[number - 1])]
+        last = np.searchsorted(path.block, np.array(halting), side="right")
+        self._halts = [float(self._line_ends[k - 1]) if k else 0.0 for k in last]
+        self._done, self._since, self._steps = 0, 0.0, steps
+        self._begin_segment()
+        return True
+
+    def _step(self, value: str) -> bool:
+        if self._status == "IDLE":
+            return self._run_program("", steps=True)
+        self._steps = True
+        if self._status == "PAUSED":
+            self._begin_segment()
+        return True
+
+    def _pause(self, value: str) -> bool:
+        if self._status == "RUNNING":
+            self._since = self._program_s()
+            self.slides.stop(self.now)
+            self._done += self.slides.done
+            self._status = "PAUSED"
+        return True
+
+    def _resume(self, value: str) -> bool:
+        if self._status == "PAUSED":
+            self._steps = False
+            self._begin_segment()
+        return True
+
+    def _abort(self) -> bool:
+        self.slides.stop(self.now)
+        self._travel, self._status, self._homing = None, "IDLE", False
+        return True
+
+    # Motion.
+
+    def _begin_segment(self) -> None:
+        """Set out on the program from where it is, to where it waits next."""
+        assert self._travel is not None
+        whole = self._travel
+        end = next((at for at in self._halts if at > self._since), whole.total_s)
+        if self._steps:
+            moves = self._line_ends[self._line_ends > self._since]
+            end = min(end, float(moves[0]) if len(moves) else whole.total_s)
+        last = int(np.searchsorted(whole.seconds, end, side="right"))
+        last = len(whole) if end >= whole.total_s else last
+        part = slice(self._done, last)
+        self._segment_s = end - self._since
+        self._status = "RUNNING"
+        travel = Travel(
+            whole.commanded[part],
+            np.maximum(whole.seconds[part] - self._since, 0.0),
+            whole.added_s[part],
+            self._segment_s,
+        )
+        self.slides.begin(travel, self.now, len(self.decoded) - 1)
+
+    def _due(self) -> None:
+        if self.slides.ends_s is not None:
+            return
+        if self._homing:
+            self._homing, self._homed = False, True
+        elif self._status == "RUNNING" and self._travel is not None:
+            self._since += self._segment_s
+            self._done += self.slides.done
+            if self._since >= self._travel.total_s and self._since not in self._halts:
+                self._status, self._travel = "IDLE", None
+            else:
+                self._halts = [at for at in self._halts if at != self._since]
+                self._status = "PAUSED"
+
+
+def _has_words(line: bytes) -> bool:
+    bare = re.sub(rb"\([^()]*\)|;.*|[ \t%]", b"", line)
+    return bool(re.sub(rb"^[Nn]\d+(?:\.\d*)?", b"", bare))
+
+
+def _on(value: bool) -> str:
+    return "ON" if value else "OFF"
+
+
+def _place(mm: Floats) -> str:
+    return " ".join(f"{value:.6f}" for value in [*mm.tolist(), 0.0, 0.0, 0.0])
+
+
+def _straight(here: Floats, to: Floats, speed: float = HOMING_MM_S) -> Travel:
+    """A line, in parts of 0.01 mm."""
+    length = float(np.linalg.norm(to - here))
+    count = max(int(np.ceil(length / 0.01)), 1)
+    share = np.arange(1, count + 1)[:, None] / count
+    seconds = share[:, 0] * length / max(speed, 1e-9)
+    return Travel(here + share * (to - here), seconds, np.zeros(count), float(seconds[-1]))

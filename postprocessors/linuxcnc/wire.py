@@ -1,0 +1,477 @@
+"""How programs are sent to LinuxCNC: as a file that it opens, watched through linuxcncrsh.
+
+linuxcncrsh takes one line of text at a time over TCP and answers it (linuxcncrsh(1) of LinuxCNC
+2.9, tried with Debian's linuxcnc-uspace). LinuxCNC itself reads the program, so that nothing of it
+goes over the line; `get program_line` says which line it is at. At the beginning of a program that
+may be the line that is read, which is ahead of the motion, since the line of the motion before
+still stands there: so a block is done for certain only when the simulated time allows it too.
+
+A conversation is written as it is held: generators, which yield a request and are sent its answer,
+or yield how long to wait.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Generator, Mapping, Sequence
+from dataclasses import replace
+from typing import Final, cast
+
+import numpy as np
+
+from camtool.errors import MachineError
+from camtool.target.wire import (
+    HALTS,
+    Conversation,
+    Forecast,
+    Manner,
+    Packet,
+    Place,
+    State,
+    Wire,
+)
+
+from ..gcode.blocks import has_words
+from .dialect import LinuxcncLink, LinuxcncMachine
+
+POLLS: Final = 4
+"""How it stands is asked whenever so many times the lateness of the line (0.2 s) is over."""
+
+HOMES_S: Final = 600.0
+"""Homing takes no longer."""
+
+NEAR_MM: Final = 0.02
+"""A place that is reported is one that is wanted when it lies so near, as blends and an encoder
+leave it."""
+
+FASTEST: Final = 3.0
+"""Overrides of feed and rapids make a program no more than so many times as fast."""
+
+STANDS: Final = 2
+"""It stands when so many reports in a row give the same place."""
+
+JOINTS: Final = 3
+"""X, Y and Z, in the order of its joints and of the places that it reports."""
+
+_FRAMES = re.compile(rb"G0*(?:10|52|5[5-9]|92)(?!\d)", re.IGNORECASE)
+"""Words behind which a place is told in another frame than it is programmed in."""
+
+_ENDS = re.compile(rb"[\r\n]+")
+_LINES = re.compile(r"\r\n|\n|\r")
+
+Script = Generator["str | float", str, None]
+"""What is held: requests and waits go out, answers come in."""
+
+
+class _Refused(Exception):
+    """It cannot go on, and why."""
+
+
+class LinuxcncWire(Wire):
+    """linuxcncrsh at a TCP port (socket://HOST:5007)."""
+
+    opens_file = True
+    ready = (
+        "it must be switched on, homed and idle; its own limits and offsets hold",
+        "LinuxCNC runs the program by itself: without this line it goes on, and is stopped at the "
+        "machine",
+    )
+    stopping = "the program is aborted: the slides slow down and stand"
+
+    def packets(
+        self, data: bytes, machine: LinuxcncMachine, forecast: Forecast
+    ) -> Sequence[Packet]:
+        """A packet is a line that is a block; nothing of it goes over the line."""
+        packets: list[Packet] = []
+        steady = bool((np.diff(forecast.decoded.block) >= 0).all())
+        for number, line in enumerate(_LINES.split(data.decode("latin-1")), 1):
+            if has_words(line) and len(packets) < len(forecast):
+                block = len(packets)
+                seconds = float(forecast.seconds[block])
+                # Where lines are executed again, none is done for certain before the end.
+                counts = (number if steady else 0,)
+                packets.append(Packet(line.encode("latin-1"), block, seconds, counts))
+        if not packets:
+            raise MachineError("the program has no blocks")
+        ends = forecast.end_mm[~np.isnan(forecast.end_mm).any(axis=1)]
+        if len(ends) and not any(_FRAMES.search(packet.data) for packet in packets):
+            x, y, z = ends[-1].tolist()
+            packets[-1] = replace(packets[-1], end_mm=(x, y, z))
+        return packets
+
+    def conversation(
+        self, packets: Sequence[Packet], machine: LinuxcncMachine, manner: Manner
+    ) -> LinuxcncConversation:
+        """Open the file, run it, and watch it to its end."""
+        link = _link(machine)
+        if link.folder is not None:
+            name = re.split(r"[/\\]", manner.file)[-1]
+            manner = replace(manner, file=f"{link.folder.rstrip('/')}/{name}")
+        if re.search(r"\s", manner.file):
+            raise MachineError(
+                f"linuxcncrsh takes no blanks in the name of a file: {manner.file!r}",
+                mend="put the program elsewhere",
+            )
+        return LinuxcncConversation(packets, link, manner, "run")
+
+    def command(
+        self,
+        action: str,
+        machine: LinuxcncMachine,
+        values: Mapping[str, float],
+        manner: Manner,
+    ) -> LinuxcncConversation:
+        """`set home -1`; G10 L20 of the frame that is active; `set jog_incr`, axis by axis."""
+        return LinuxcncConversation((), _link(machine), manner, action, values)
+
+
+def _link(machine: LinuxcncMachine) -> LinuxcncLink:
+    assert isinstance(machine.link, LinuxcncLink)
+    return machine.link
+
+
+class LinuxcncConversation(Conversation):
+    """One request at a time, and its answer."""
+
+    def __init__(
+        self,
+        packets: Sequence[Packet],
+        link: LinuxcncLink,
+        manner: Manner,
+        action: str,
+        values: Mapping[str, float] | None = None,
+    ) -> None:
+        super().__init__(packets, manner)
+        self._link, self._values = link, values or {}
+        acts: dict[str, Callable[[], Script]] = {
+            "run": self._run,
+            "home": self._home,
+            "zero": self._zero,
+            "jog": self._jog,
+        }
+        self._script, self._fresh = self._held(acts[action]), True
+        self._rest, self._asked, self._now = b"", "", 0.0
+        self._begun = self._aborting = self._pausing = self._going_on = False
+        self._why_aborted = ""
+        self._said = ""
+        """What it has said of errors."""
+        self._ends = np.cumsum([packet.seconds for packet in packets])
+        self._lines = [packet.counts[0] for packet in packets]
+
+    # What the user wants; the script looks at it at its next turn.
+
+    def begin(self, now: float) -> None:
+        """Greet it."""
+        self._go(None, now)
+
+    def pause(self, now: float) -> None:
+        """Hold the program; PAUSED when the slides stand."""
+        if self.state is State.SENDING:
+            self.state, self._pausing = State.PAUSING, True
+
+    def resume(self, now: float) -> None:
+        """Go on, or with the next line where single blocks are wanted."""
+        if self.state in HALTS or self.state is State.PAUSING:
+            self._pausing, self._going_on = False, True
+            self.state, self.why = State.SENDING, ""
+
+    def stop(self, now: float) -> None:
+        """Abort."""
+        if self.ended or self.state is State.STOPPING:
+            return
+        if not self._begun:
+            self._end(State.STOPPED)
+            return
+        self._abort_at(now)
+
+    def lost(self, why: str, now: float) -> None:
+        """Without its line it goes on."""
+        if self._begun:
+            why += "; LinuxCNC goes on with the program: stop it at the machine"
+        super().lost(why, now)
+
+    def _abort_at(self, now: float) -> None:
+        self.state, self._aborting = State.STOPPING, True
+        self._script, self._fresh = self._abort(), True
+        if not self._asked:
+            self._go(None, now)
+
+    # The line and the clock.
+
+    def received(self, data: bytes, now: float) -> None:
+        """Lines; what it echoes is passed over."""
+        *lines, self._rest = _ENDS.split(self._rest + data)
+        for line in lines:
+            text = line.decode("latin-1").strip()
+            if not text or self.ended or text == self._asked or not self._asked:
+                continue
+            self._asked = ""
+            self._go(text, now)
+
+    def elapsed(self, now: float) -> None:
+        """Go on after a wait, or miss an answer."""
+        if self.ended or now < self.next_s:
+            return
+        if not self._asked:
+            self._go(None, now)
+        elif self._aborting or not self._begun:
+            more = "; it did not confirm the stop: stop it at the machine" if self._begun else ""
+            why = self._why_aborted or f"no answer to {_shown(self._asked)!r}"
+            self._end(State.FAILED, why + more)
+        else:
+            self._why_aborted, self._asked = f"no answer to {_shown(self._asked)!r}", ""
+            self._abort_at(now)
+
+    def _go(self, answer: str | None, now: float) -> None:
+        """The next turn of the script."""
+        self._now = now
+        try:
+            # A script that begins has asked nothing yet, whatever was answered to another.
+            fresh, self._fresh = self._fresh, False
+            step = self._script.send(cast(str, None if fresh else answer))
+        except StopIteration:
+            return
+        except _Refused as refused:
+            if self._begun and not self._aborting:
+                self._why_aborted = str(refused)
+                self._abort_at(now)
+            else:
+                self._end(State.FAILED, self._why_aborted or str(refused))
+            return
+        if isinstance(step, str):
+            self._asked = step
+            self._write(step.encode("utf-8") + b"\r\n")
+            self.next_s = now + self.manner.patience_s
+        else:
+            self.next_s = now + step
+
+    # Requests.
+
+    def _get(self, name: str) -> Generator[str | float, str, str]:
+        answer = yield f"get {name}"
+        head, _, value = answer.partition(" ")
+        if head.upper() != name.upper():
+            raise _Refused(f"an answer to 'get {name}' that is none: {answer[:60]!r}")
+        return value.strip()
+
+    def _set(self, words: str) -> Script:
+        answer = yield f"set {words}"
+        name = words.split(" ", 1)[0].upper()
+        if answer.upper() != f"SET {name} ACK":
+            raise _Refused(f"it refuses 'set {_shown(words)}': {answer[:60]}")
+
+    def _place(self) -> Generator[str | float, str, Place]:
+        text = yield from self._get("rel_act_pos")
+        try:
+            x, y, z = (float(each) for each in text.split()[:JOINTS])
+        except ValueError:
+            raise _Refused(f"a place that is none: {text[:60]!r}") from None
+        self.place_mm = x, y, z
+        return x, y, z
+
+    def _errors(self) -> Script:
+        for name in ("error", "operator_text", "operator_display"):
+            text = yield from self._get(name)
+            if text != "OK":
+                self._tell(f"it says: {text}")
+                self._said = text if name == "error" else self._said
+
+    # What is held.
+
+    def _held(self, act: Callable[[], Script]) -> Script:
+        """Greet it, see that it is ready, and act."""
+        answer = yield f"hello {self._link.password} camtool 1.0"
+        if not answer.upper().startswith("HELLO ACK"):
+            raise _Refused("it does not take the password of its line (link.password)")
+        yield from self._set("verbose on")
+        yield from self._set("echo off")
+        yield from self._set(f"enable {self._link.enable_password}")
+        yield from self._set("set_wait received")
+        yield from self._set("linear_unit_conversion mm")
+        for name, wanted, mend in (
+            ("estop", "OFF", "its emergency stop is pressed: release it at the machine"),
+            ("machine", "ON", "it is off: switch it on at the machine"),
+            (
+                "program_status",
+                "IDLE",
+                "a program runs on it: wait for its end, or abort it",
+            ),
+        ):
+            if (yield from self._get(name)).upper() != wanted:
+                raise _Refused(mend)
+        while (yield from self._get("error")) != "OK":
+            pass  # of earlier programs
+        if act == self._run and self.manner.home:
+            yield from self._homing()
+        if act != self._home and not (yield from self._homed()):
+            raise _Refused("it is not homed: give --home, or home it by camtool home")
+        yield from act()
+
+    def _homed(self) -> Generator[str | float, str, bool]:
+        return (yield from self._get("joint_homed")).upper().split()[:JOINTS] == ["YES"] * JOINTS
+
+    def _homing(self) -> Script:
+        yield from self._set("mode manual")
+        self._begun = True
+        yield from self._set("home -1")
+        end = self._now + HOMES_S
+        while not (yield from self._homed()):
+            if self._now > end:
+                raise _Refused("homing does not end")
+            yield self._poll_s
+        self._begun = False
+
+    @property
+    def _poll_s(self) -> float:
+        return POLLS * self.manner.late_s
+
+    def _run(self) -> Script:
+        file = self.manner.file
+        yield from self._set("mode auto")
+        yield from self._set(f"open {file}")
+        if (yield from self._get("program")) != file:
+            said = yield from self._get("error")
+            raise _Refused(f"it cannot open {file}{'' if said == 'OK' else f' ({said})'}")
+        self._begun, self.state, self.sent = True, State.SENDING, len(self.packets)
+        yield from self._set("step" if self.single else "run")
+        yield from self._watch()
+
+    def _watch(self) -> Script:
+        """Until it is idle again."""
+        begun, ran, before = self._now, 0.0, self._now
+        busy, still, last = False, 0, None
+        while True:
+            status = (yield from self._get("program_status")).upper()
+            line = yield from self._get("program_line")
+            place = yield from self._place()
+            yield from self._errors()
+            still, last = (still + 1 if place == last else 0), place
+            now = self._now
+            if status == "RUNNING":
+                ran += now - before
+            before = now
+            if status != "IDLE":
+                busy = True
+                self._reached(line, ran)
+                yield from self._obey(status, still >= STANDS - 1)
+            elif busy or now - begun > POLLS * self._poll_s:
+                self._over(line, ran)
+                return
+            yield self._poll_s
+
+    def _obey(self, status: str, stands: bool) -> Script:
+        """What the user wants of a program that is under way."""
+        if self._pausing:
+            self._pausing = False
+            yield from self._set("pause")
+        elif self._going_on:
+            self._going_on = False
+            yield from self._set("step" if self.single else "resume")
+        elif status == "PAUSED" and stands:
+            if self.state is State.PAUSING:
+                self.state = State.PAUSED
+            elif self.state is State.SENDING and self.single:
+                self.state, self.why = State.PAUSED, "single block"
+            elif self.state is State.SENDING:
+                self.state, self.why = State.WAITING, "the program waits"
+        elif status == "RUNNING" and self.state in HALTS:
+            self.state, self.why = State.SENDING, ""  # somebody has let it go on at the machine
+
+    def _reached(self, text: str, ran: float) -> None:
+        """Count what lies before the line that it is at, as far as the time allows it."""
+        line = _whole(text)
+        if self._lines and self._lines[0]:
+            at = int(np.searchsorted(self._lines, line))
+            possible = int(np.searchsorted(self._ends, ran, side="right"))
+            self.acknowledged = max(self.acknowledged, min(at, len(self.packets)))
+            self.done = max(self.done, min(at, possible))
+
+    def _over(self, text: str, ran: float) -> None:
+        """It is idle: at the end of the program, or before it."""
+        if self._said:
+            raise _Refused(f"it has stopped: {self._said}")
+        end, total = self.packets[-1].end_mm, float(self._ends[-1])
+        at = int(np.searchsorted(self._lines, _whole(text)))
+        left = total - float(self._ends[min(at, len(self._ends) - 1)]) if self._lines[0] else 0.0
+        place = self.place_mm
+        elsewhere = (
+            end is not None
+            and place is not None
+            and max(abs(one - other) for one, other in zip(end, place, strict=True)) > NEAR_MM
+        )
+        early = FASTEST * ran + self.manner.patience_s < total
+        if elsewhere or early or left > self.manner.patience_s:
+            raise _Refused("it has stopped before the end of the program")
+        self.acknowledged = self.done = len(self.packets)
+        self._end(State.FINISHED)
+
+    def _abort(self) -> Script:
+        """Until it is idle, and stands. Another client may have taken the say meanwhile."""
+        yield from self._set(f"enable {self._link.enable_password}")
+        yield from self._set("abort")
+        end, last, still = self._now + self.manner.patience_s, None, 0
+        while still < STANDS:
+            status = yield from self._get("program_status")
+            place = yield from self._place()
+            still = still + 1 if place == last and status.upper() == "IDLE" else 0
+            last = place
+            if self._now > end:
+                why = self._why_aborted or "it was to stop"
+                self._why_aborted = f"{why}; it does not stand: stop it at the machine"
+                break
+            yield self._poll_s
+        self._end(State.FAILED if self._why_aborted else State.STOPPED, self._why_aborted)
+
+    # By hand.
+
+    def _home(self) -> Script:
+        yield from self._homing()
+        self._end(State.FINISHED)
+
+    def _zero(self) -> Script:
+        words = "".join(f" {axis.upper()}{self._values[axis]:.6f}" for axis in self._axes)
+        yield from self._set("mode mdi")
+        yield from self._set(f"mdi G10 L20 P0{words}")
+        yield self._poll_s
+        place = yield from self._place()
+        yield from self._errors()
+        yield from self._set("mode manual")
+        off = [abs(place["xyz".index(axis)] - self._values[axis]) for axis in self._axes]
+        if self._said or max(off) > NEAR_MM:
+            raise _Refused(f"it has not taken it {self._said}".strip())
+        self._end(State.FINISHED)
+
+    @property
+    def _axes(self) -> list[str]:
+        return [axis for axis in "xyz" if axis in self._values]
+
+    def _jog(self) -> Script:
+        """One axis after the other."""
+        yield from self._set("mode manual")
+        yield from self._set("teleop_enable on")
+        self._begun = True
+        for axis in self._axes:
+            way, feed = self._values[axis], self._values["feed"]
+            at = "xyz".index(axis)
+            to = (yield from self._place())[at] + way
+            sense = "-" if way < 0.0 else ""
+            yield from self._set(f"jog_incr {axis} {sense}{feed:.6f} {abs(way):.6f}")
+            end = self._now + 2.0 * 60.0 * abs(way) / feed + 2.0 * self.manner.patience_s
+            while abs((yield from self._place())[at] - to) > NEAR_MM / 10.0:
+                yield from self._errors()
+                if self._said or self._now > end:
+                    raise _Refused(self._said or f"{axis.upper()} does not arrive")
+                yield self._poll_s
+        self._end(State.FINISHED)
+
+
+def _whole(text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise _Refused(f"a line that is none: {text[:60]!r}") from None
+
+
+def _shown(request: str) -> str:
+    """A request without its password."""
+    return re.sub(r"^(hello|(?:set )?enable) \S+", r"\1 …", request)

@@ -1,0 +1,206 @@
+"""LinuxCNC itself, without a screen: camtool's sender drives it through linuxcncrsh, and its
+joints go where `verify` says. One instance at a time on a computer, hence the lock."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+from shapely import LineString, points
+
+from camtool.arrays import Floats
+from camtool.target.registry import load_target
+from tests.feeding import motion
+
+HEADLESS = Path(__file__).parent / "headless"
+LOCK = Path("/tmp/linuxcnc.lock")
+NEAR_MM = 0.012
+"""A blend of G64 P0.01, and what lies between two samples of the motion."""
+
+DISPLAY = """#!/bin/sh
+halsampler -t > samples.txt &
+linuxcncrsh -p $RSH_PORT -- -ini machine.ini
+kill %1
+"""
+
+PROGRAM = (
+    b"G21 G90 G17\nG64 P0.01\nF900\nG0 Z5\nG0 X2 Y1\nM3 S1000\nG4 P0.3\nG1 Z-1 F300\n"
+    b"G1 X14 F900\nG2 X18 Y5 I0 J4\nG1 Y9\nG3 X14 Y13 I-4 J0\nG1 X2\nG1 X2 Y1\nG0 Z5\nG0 X0 Y0\n"
+    b"M5\nM2\n"
+)
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.referee,
+    pytest.mark.skipif(
+        shutil.which("linuxcnc") is None or shutil.which("linuxcncrsh") is None,
+        reason="LinuxCNC (Debian's linuxcnc-uspace) is not installed",
+    ),
+]
+
+
+def free_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        return int(server.getsockname()[1])
+
+
+class Hands:
+    """Who stands at the machine: speaks to linuxcncrsh beside camtool."""
+
+    def __init__(self, port: int) -> None:
+        self._port = port
+
+    def do(self, *orders: str) -> None:
+        """Each on a connection of its own, since the last that is enabled has the say."""
+        for order in orders:
+            with socket.create_connection(("127.0.0.1", self._port), timeout=5.0) as line:
+                for each in ("hello EMC test 1.0", "set enable EMCTOO", order):
+                    line.sendall(each.encode() + b"\r\n")
+                    time.sleep(0.2)
+
+
+@contextmanager
+def live(folder: Path) -> Iterator[tuple[int, Hands]]:
+    """LinuxCNC, switched on; the port of linuxcncrsh."""
+    for file in HEADLESS.iterdir():
+        shutil.copy(file, folder)
+    (folder / "machine.var").touch()
+    (folder / "display.sh").write_text(DISPLAY)
+    (folder / "display.sh").chmod(0o755)
+    for each in (folder, *folder.parents[:2]):
+        with suppress(PermissionError):
+            each.chmod(0o777)  # its real-time part gives up being root
+    port = free_port()
+    own = {
+        "RTAPI_UID": "65534",
+        "RTAPI_FIFO_PATH": str(folder / "fifo"),
+        "HOME": str(folder),
+        "DISPLAY": "",
+        "RSH_PORT": str(port),
+    }
+    with LOCK.open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        log = (folder / "linuxcnc.log").open("w")
+        running = subprocess.Popen(
+            ["linuxcnc", "machine.ini"],
+            cwd=folder,
+            env=os.environ | own,
+            stdout=log,
+            stderr=log,
+            start_new_session=True,
+        )
+        try:
+            yield port, _switched_on(port)
+        finally:
+            with suppress(OSError):
+                Hands(port).do("shutdown")
+            try:
+                running.wait(20.0)
+            except subprocess.TimeoutExpired:
+                os.killpg(running.pid, signal.SIGTERM)
+                running.wait(20.0)
+            log.close()
+            for left in _begun_in(folder):
+                os.kill(left, signal.SIGKILL)
+
+
+def _begun_in(folder: Path) -> list[int]:
+    """The processes of LinuxCNC that were left behind there."""
+    found = []
+    for process in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):
+            if (process / "cwd").readlink() == folder and "python" not in (
+                process / "cmdline"
+            ).read_text(errors="replace"):
+                found.append(int(process.name))
+    return found
+
+
+def _switched_on(port: int) -> Hands:
+    end = time.monotonic() + 40.0
+    hands = Hands(port)
+    while True:
+        try:
+            hands.do("set estop off", "set machine on")
+        except OSError:
+            if time.monotonic() > end:
+                raise
+            time.sleep(0.3)
+        else:
+            return hands
+
+
+def camtool(*words: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "camtool", *words]
+    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=200)
+
+
+def sampled(folder: Path) -> Floats:
+    """(K, 3) mm: where the joints were, at 1 kHz, each place once."""
+    rows = [line.split() for line in (folder / "samples.txt").read_text().splitlines()]
+    places = np.array([row[1:4] for row in rows if len(row) >= 5], dtype=np.float64)
+    moved = np.append(True, (np.diff(places, axis=0) != 0.0).any(axis=1))
+    return np.asarray(places[moved])
+
+
+def apart_mm(path: Floats, places: Floats) -> float:
+    """How far places lie from a path, mm at the most: in XY, and in XZ."""
+    found = 0.0
+    for columns in ([0, 1], [0, 2]):
+        line = LineString(path[:, columns])
+        found = max(found, float(line.distance(points(places[:, columns])).max()))
+    return found
+
+
+def test_a_program_is_driven_and_its_path_is_the_predicted_one(tmp_path: Path) -> None:
+    loaded = load_target("linuxcnc")
+    predicted = motion(PROGRAM, loaded).commanded
+    program = tmp_path / "part.ngc"
+    program.write_bytes(PROGRAM)
+    words = ["send", str(program), "-t", "linuxcnc", "--yes", "--json"]
+    with live(tmp_path) as (port, hands):
+        at = ["--port", f"socket://127.0.0.1:{port}"]
+        refused = camtool(*words, *at)
+        assert refused.returncode == 1
+        assert "not homed" in refused.stderr
+        done = camtool(*words, *at, "--home")
+        assert done.returncode == 0, done.stderr
+        time.sleep(0.5)
+        first = sampled(tmp_path)
+        assert apart_mm(predicted, first) < NEAR_MM
+        assert apart_mm(first, predicted) < NEAR_MM
+        # From a block: up, across, down, and the rest.
+        rest = camtool(*words, *at, "--from", "10")
+        assert rest.returncode == 0, rest.stderr
+        # A stop: it stands, and the journal knows where.
+        slow = tmp_path / "slow.ngc"
+        slow.write_bytes(PROGRAM.replace(b"F900", b"F60"))
+        command = [sys.executable, "-m", "camtool", "send", str(slow), *words[2:], *at]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as sending:
+            time.sleep(8.0)
+            sending.send_signal(signal.SIGINT)
+            _, said = sending.communicate(timeout=30.0)
+        assert sending.returncode == 1, said
+        assert b"stopped" in said
+        before = len(sampled(tmp_path))
+        time.sleep(1.0)
+        assert len(sampled(tmp_path)) == before
+        # By hand.
+        for action in (["jog", "X1.5", "Y-2", "F600"], ["zero", "X0"], ["home"]):
+            by_hand = camtool(*action, "-t", "linuxcnc", *at)
+            assert by_hand.returncode == 0, by_hand.stderr
+        hands.do("set estop on")
+        stopped = camtool(*words, *at)
+        assert stopped.returncode == 1
+        assert "emergency stop" in stopped.stderr

@@ -1,0 +1,232 @@
+"""LinuxCNC's wire and its virtual controller, which share no code: they meet over lines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from camtool.errors import MachineError
+from camtool.sending.faults import Wired
+from camtool.sending.prepare import forecast_of
+from camtool.target.registry import LoadedTarget, load_target
+from camtool.target.wire import Conversation, Manner, State
+from tests.feeding import logo, same_motion
+from tests.sending.talking import talked
+
+FILE = "/programs/part.ngc"
+PROGRAM = (
+    b"G21 G90 G61\nF600\n(a part)\nG0 Z5\nG0 X1 Y1\nM3 S1000\nG4 P0.5\nG1 Z-1 F100\nG1 X10 F600\n"
+    b"G2 X12 Y3 I2 J0\nG1 X2\nG1 Y1\nG0 Z5\nM5\nM2\n"
+)
+
+
+def met(
+    program: bytes,
+    *,
+    choices: list[str] | None = None,
+    there: bool = True,
+    wish: Callable[[Conversation, float], None] = lambda talk, now: None,
+    **manner: Any,
+) -> tuple[Any, Conversation, LoadedTarget]:
+    """A program on its way to a twin: both, and the target."""
+    loaded = load_target("linuxcnc")
+    twin: Any = loaded.twin(choices or [])
+
+    def read(name: str) -> bytes:
+        if name != FILE or not there:
+            raise FileNotFoundError
+        return program
+
+    twin.read_file = read
+    wire: Any = loaded.target.wire()
+    decoded = loaded.target.read(program, loaded.machine)
+    packets = wire.packets(program, loaded.machine, forecast_of(decoded, loaded))
+    talk = wire.conversation(packets, loaded.machine, Manner(file=FILE, **manner))
+    talked(talk, Wired(twin), wish, latest_s=2000.0)
+    return twin, talk, loaded
+
+
+@pytest.mark.parametrize("program", [PROGRAM, logo("linuxcnc")], ids=["part", "logo"])
+def test_a_program_is_opened_run_and_watched_to_its_end(program: bytes) -> None:
+    counts = []
+
+    def wish(talk: Conversation, now: float) -> None:
+        counts.append((talk.done, talk.acknowledged))
+
+    twin, talk, loaded = met(program, wish=wish)
+    assert talk.state is State.FINISHED, talk.why
+    same_motion(twin, program, loaded)
+    assert talk.done == len(talk.packets) == len(twin.decoded)
+    done = np.array(counts)
+    assert (np.diff(done, axis=0) >= 0).all()
+    assert len(np.unique(done[:, 0])) > 4  # it is counted on the way
+    assert talk.place_mm == pytest.approx(twin.slides.commanded_mm, abs=1e-6)
+
+
+def test_what_is_done_has_been_done() -> None:
+    loaded = load_target("linuxcnc")
+    decoded = loaded.target.read(PROGRAM, loaded.machine)
+    ends = forecast_of(decoded, loaded).end_mm
+
+    def wish(talk: Any, now: float) -> None:
+        block = talk.block
+        if block >= 0 and not np.isnan(ends[block]).any() and talk.state is State.SENDING:
+            trace = reached[0].slides.trace.commanded
+            assert (np.abs(trace - ends[block]).max(axis=1) < 1e-6).any() or not ends[block].any()
+
+    reached: list[Any] = []
+    twin = loaded.twin([])
+    twin.read_file = lambda name: PROGRAM  # type: ignore[attr-defined]
+    reached.append(twin)
+    wire: Any = loaded.target.wire()
+    packets = wire.packets(PROGRAM, loaded.machine, forecast_of(decoded, loaded))
+    talk = wire.conversation(packets, loaded.machine, Manner(file=FILE))
+    talked(talk, Wired(twin), wish, latest_s=100.0)
+    assert talk.state is State.FINISHED, talk.why
+
+
+def test_a_pause_stands_and_goes_on() -> None:
+    seen: list[State] = []
+    stood: list[int] = []
+
+    def wish(talk: Any, now: float) -> None:
+        seen.append(talk.state)
+        if talk.acknowledged >= 8 and State.PAUSED not in seen:
+            talk.pause(now)
+        elif talk.state is State.PAUSED:
+            stood.append(1)
+            talk.resume(now)
+
+    twin, talk, loaded = met(PROGRAM, wish=wish)
+    assert talk.state is State.FINISHED, talk.why
+    assert stood
+    same_motion(twin, PROGRAM, loaded)
+
+
+def test_single_lines_wait_each() -> None:
+    places = []
+
+    def wish(talk: Any, now: float) -> None:
+        if talk.state is State.PAUSED:
+            places.append(talk.place_mm)
+            talk.resume(now)
+
+    twin, talk, loaded = met(PROGRAM, wish=wish, single=True)
+    assert talk.state is State.FINISHED, talk.why
+    assert len(set(places)) >= 7
+    same_motion(twin, PROGRAM, loaded)
+
+
+def test_m0_waits_for_the_user() -> None:
+    waits = []
+
+    def wish(talk: Any, now: float) -> None:
+        if talk.state is State.WAITING:
+            waits.append(now)
+            talk.resume(now)
+
+    program = PROGRAM.replace(b"G1 X2\n", b"M0\nG1 X2\n")
+    twin, talk, loaded = met(program, wish=wish)
+    assert talk.state is State.FINISHED, talk.why
+    assert len(waits) == 1
+    same_motion(twin, program, loaded)
+
+
+@pytest.mark.parametrize("at_s", [1.0, 2.5, 4.0])
+def test_a_stop_aborts_and_nothing_moves_behind_it(at_s: float) -> None:
+    def wish(talk: Conversation, now: float) -> None:
+        if now >= at_s:
+            talk.stop(now)
+
+    twin, talk, _ = met(PROGRAM, wish=wish)
+    assert talk.state is State.STOPPED, talk.why
+    count = len(twin.slides.trace)
+    twin.advance(1000.0)
+    assert len(twin.slides.trace) == count
+    assert not twin.moves
+
+
+@pytest.mark.parametrize(
+    ("choices", "manner", "there", "words"),
+    [
+        (["power=estop"], {}, True, "emergency stop"),
+        (["power=on"], {}, True, "not homed"),
+        ([], {}, False, "cannot open"),
+    ],
+)
+def test_what_it_is_not_ready_for(
+    choices: list[str], manner: dict[str, bool], there: bool, words: str
+) -> None:
+    twin, talk, _ = met(PROGRAM, choices=choices, there=there, **manner)
+    assert talk.state is State.FAILED
+    assert words in talk.why
+    assert len(twin.slides.trace) == 0
+
+
+def test_it_is_homed_where_that_is_asked_for() -> None:
+    _, talk, _ = met(PROGRAM, choices=["power=on"], home=True)
+    assert talk.state is State.FINISHED, talk.why
+
+
+def test_an_abort_at_the_machine_is_no_end() -> None:
+    aborted = []
+
+    def wish(talk: Any, now: float) -> None:
+        if now > 3.0 and not aborted:
+            aborted.append(now)
+            twins[0]._abort()
+
+    loaded = load_target("linuxcnc")
+    twins: list[Any] = [loaded.twin([])]
+    twins[0].read_file = lambda name: PROGRAM
+    wire: Any = loaded.target.wire()
+    decoded = loaded.target.read(PROGRAM, loaded.machine)
+    packets = wire.packets(PROGRAM, loaded.machine, forecast_of(decoded, loaded))
+    talk = wire.conversation(packets, loaded.machine, Manner(file=FILE))
+    talked(talk, Wired(twins[0]), wish, latest_s=100.0)
+    assert talk.state is State.FAILED
+    assert "before the end" in talk.why
+
+
+def test_the_words_of_the_line_and_names_of_files() -> None:
+    loaded = load_target("linuxcnc", settings=["link.folder=/home/cnc/nc"])
+    wire: Any = loaded.target.wire()
+    decoded = loaded.target.read(PROGRAM, loaded.machine)
+    packets = wire.packets(PROGRAM, loaded.machine, forecast_of(decoded, loaded))
+    talk = wire.conversation(packets, loaded.machine, Manner(file=r"C:\parts\a.ngc"))
+    assert talk.manner.file == "/home/cnc/nc/a.ngc"
+    with pytest.raises(MachineError, match="no blanks"):
+        wire.conversation(packets, loaded.machine, Manner(file="/my parts/a b.ngc"))
+    wrong = load_target("linuxcnc", settings=["link.password=other"])
+    twin = wrong.twin([])
+    talk = wire.conversation(packets, loaded.machine, Manner(file=FILE))
+    talked(talk, Wired(twin), latest_s=100.0)
+    assert "password" in talk.why
+
+
+@pytest.mark.parametrize(
+    ("action", "values"),
+    [
+        ("home", {}),
+        ("jog", {"x": 1.5, "y": -2.0, "feed": 300.0}),
+        ("zero", {"x": 0.0, "y": 0.0, "z": 12.5}),
+    ],
+)
+def test_by_hand(action: str, values: dict[str, float]) -> None:
+    loaded = load_target("linuxcnc")
+    twin: Any = loaded.twin(["power=on"] if action == "home" else [])
+    wire: Any = loaded.target.wire()
+    talk = wire.command(action, loaded.machine, values, Manner())
+    talked(talk, Wired(twin), latest_s=200.0)
+    assert talk.state is State.FINISHED, talk.why
+    if action == "jog":
+        assert twin.slides.commanded_mm == pytest.approx([1.5, -2.0, 0.0])
+    if action == "zero":
+        assert twin._get("rel_act_pos") == _text(0.0, 0.0, 12.5)
+
+
+def _text(*mm: float) -> str:
+    return " ".join(f"{value:.6f}" for value in [*mm, 0.0, 0.0, 0.0])
