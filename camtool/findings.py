@@ -675,6 +675,34 @@ class Code(IntEnum):
         "cannot be inspected",
         "cut it in the same program, or take the dimension out of tolerances.toml",
     )
+    CALLOUT_TEXT = (
+        520,
+        WARNING,
+        "the text of a dimension is none that camtool reads (a size with limits, such as `Ø6 H7` "
+        "or `20 ±0.05`); it is not inspected",
+        "correct the text, or name the dimension in tolerances.toml",
+    )
+    DIMENSION_DIFFERS = (
+        521,
+        (ERROR, WARNING),
+        "the nominal size of a dimension is not what is drawn; a warning for dimensions of a view "
+        "of another scale, which are not inspected",
+        "correct the drawing, or the size in its text or in tolerances.toml",
+    )
+    DIMENSION_TWICE = (
+        522,
+        (INFO, WARNING),
+        "two dimensions measure the same: the one of tolerances.toml holds, else the first with "
+        "limits; a warning where two of the drawing have different limits",
+        "none, or delete one of them",
+    )
+    COUNT_DIFFERS = (
+        523,
+        WARNING,
+        "a dimension counts equal features (`4x Ø5`), and another number of them is drawn: only "
+        "the one at which it stands is inspected",
+        "correct the count, or name each in tolerances.toml",
+    )
 
 
 @dataclass(frozen=True)
@@ -1648,4 +1676,33 @@ DIMENSION_UNBOUND = Sentence(
 )
 DIMENSION_NOT_CUT = Sentence(
     Code.DIMENSION_NOT_CUT, "{name} is not inspected: the program does not cut its {what}"
+)
+CALLOUT_TEXT = Sentence(
+    Code.CALLOUT_TEXT, "the text {text!r} is not understood: this dimension is not inspected"
+)
+DIMENSION_DIFFERS = Sentence(
+    Code.DIMENSION_DIFFERS,
+    "{name} is to be {limit:.6g} mm, but {measured:.6g} mm are drawn",
+    "mm",
+    ERROR,
+)
+DIMENSION_DIFFERS_VIEW = Sentence(
+    Code.DIMENSION_DIFFERS,
+    "says {limit:.6g} mm where {measured:.6g} mm are drawn, by the scale of its view (DIMLFAC, or "
+    "that of its block): it is not inspected",
+    "mm",
+    WARNING,
+)
+DIMENSION_TWICE = Sentence(
+    Code.DIMENSION_TWICE, "measures the same as {holds}, which holds", severity=INFO
+)
+DIMENSION_TWICE_DIFFERS = Sentence(
+    Code.DIMENSION_TWICE,
+    "measures the same as {holds} with other limits ({limits}, there {others}), which hold",
+    severity=WARNING,
+)
+COUNT_DIFFERS = Sentence(
+    Code.COUNT_DIFFERS,
+    "{name} counts {limit:.0f} equal features, but {measured:.0f} of this size are drawn: only "
+    "this one is inspected",
 )

@@ -29,6 +29,11 @@ drawn as 6.0000001 mm is one of 6 mm, the last size of its band."""
 SAME_LIMIT_MM = 1e-6
 """Limits that are said twice, as a class and as numbers, agree within this."""
 
+
+class NotUnderstood(OptionError):
+    """Words that are no limits at all."""
+
+
 LONGEST_WORDS = 200
 """Words of limits with more characters are refused unread."""
 
@@ -125,7 +130,7 @@ def read_words(words: str, mm_per_unit: float = 1.0) -> Words:
     in DXF, or `+-`.
     """
     if len(words) > LONGEST_WORDS:
-        raise OptionError(f"limits of {len(words)} characters are not read", mend=_EXAMPLES)
+        raise NotUnderstood(f"limits of {len(words)} characters are not read", mend=_EXAMPLES)
     text = plain_words(words)
     if _CLASS.fullmatch(text):
         return Words(text)
@@ -163,7 +168,7 @@ def _numbers(text: str, mm_per_unit: float) -> Words:
             sign = alone["a"] if alone["a"][0] in "+-" else f"±{alone['a']}"
             hint = {"+": f"{sign}/0", "-": f"0/{sign}"}.get(sign[0], sign)
             raise OptionError(f"limits {text!r} are one number of two", mend=f"write {hint}")
-        raise OptionError(f"limits {text!r} are not understood", mend=_EXAMPLES)
+        raise NotUnderstood(f"limits {text!r} are not understood", mend=_EXAMPLES)
     units = {found[name] for name in ("aunit", "bunit") if found[name]}
     if len(units) > 1:
         raise OptionError(f"limits {text!r} have two units", mend="write both in one unit")

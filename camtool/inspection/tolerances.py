@@ -1,0 +1,530 @@
+"""The dimensions of a drawing that are inspected: its callouts, and those of `tolerances.toml`.
+
+    tolerances.toml ──read_tolerances──▶ dimensions ─┐
+    Drawing.callouts ──text, style──▶ dimensions ────┴─bind─▶ known size: limits ──▶ Dimension
+
+A dimension of the file holds where a callout measures the same. The nominal size is what file or
+text say, else what is drawn; where both are known they must agree within DIFFERS_MM.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import msgspec
+
+from camtool.errors import DrawingError, InputError, OptionError
+from camtool.findings import (
+    CALLOUT_TEXT,
+    COUNT_DIFFERS,
+    DIMENSION_DIFFERS,
+    DIMENSION_DIFFERS_VIEW,
+    DIMENSION_TWICE,
+    DIMENSION_TWICE_DIFFERS,
+    Finding,
+)
+from camtool.geometry.drawing import Callout, Drawing
+from camtool.inspection.dimensions import Dimension, Kind, Limits
+from camtool.inspection.features import BIND_MM, Bound, Circle, Feature, bind, features_of
+from camtool.inspection.limits import (
+    NotUnderstood,
+    Words,
+    deviation_words,
+    general_class,
+    limited,
+    plain_words,
+    read_words,
+)
+from camtool.plain import one_line
+from camtool.tables import convert, read_table
+from camtool.units import MM_PER_UNIT, parse_angle, parse_length
+
+DIFFERS_MM = 0.02
+"""A nominal size that is farther from what is drawn is an error. Inches with three decimals are
+rounded by up to 0.0127 mm."""
+
+LARGEST_MM = 1e6
+"""Places and sizes are no larger, mm."""
+
+Length = str | float
+_ZONES = ("position", "straightness", "roundness", "profile")
+
+
+def dimensions_of(
+    drawing: Drawing, tolerances_file: Path | None = None
+) -> tuple[tuple[Dimension, ...], tuple[Finding, ...]]:
+    """The dimensions of a drawing, those of the file first, with nominal sizes and limits as far
+    as they are known; and what was found on the way. A dimension that fits no feature is among
+    them. Raises CamtoolError for a file or a callout whose limits are wrong, with place and mend.
+    """
+    general = ""
+    asked: tuple[Dimension, ...] = ()
+    if tolerances_file is not None:
+        general, asked = read_tolerances(tolerances_file)
+    features = features_of(drawing.paths)
+    findings: list[Finding] = []
+    dimensions: list[Dimension] = []
+    known: dict[object, Dimension] = {}
+    for each in asked:
+        bound = bind(each, features, drawing.file)
+        dimensions += _settled(each, bound, drawing.file, findings)
+        if isinstance(bound, Bound):
+            known.setdefault(_what(bound), each)
+    drawn = [
+        (place, each)
+        for place, callout in enumerate(drawing.callouts)
+        if not _is_known(callout, known, features, drawing.file, findings)
+        for each in _of_callout(callout, drawing.file, general, features, findings)
+    ]
+    kept: list[tuple[int, Dimension]] = []
+    for place, each in sorted(drawn, key=lambda item: item[1].limits is None):
+        bound = bind(each, features, drawing.file)
+        if isinstance(bound, Bound):
+            same = known.setdefault(_what(bound), each)
+            if same is not each:
+                if same.source != each.source:
+                    findings.append(_twice(each, same, drawing.file))
+                continue
+        kept += ((place, one) for one in _settled(each, bound, drawing.file, findings))
+    dimensions += (each for _, each in sorted(kept, key=lambda item: item[0]))
+    return tuple(_named(dimensions)), tuple(findings)
+
+
+def _is_known(
+    callout: Callout,
+    known: dict[object, Dimension],
+    features: Sequence[Feature],
+    file: str,
+    findings: list[Finding],
+) -> bool:
+    """Whether the file says something of what a callout measures, whatever its text is."""
+    bound = bind(_measured(callout), features, file)
+    same = known.get(_what(bound)) if isinstance(bound, Bound) else None
+    if same is not None:
+        findings.append(_twice(_measured(callout), same, file))
+    return same is not None
+
+
+def _twice(one: Dimension, holds: Dimension, file: str) -> Finding:
+    """That two dimensions measure the same; of two of the drawing with other limits, a warning."""
+    where = f"{file}, {one.source}"
+    ours, theirs = one.limits, holds.limits
+    if ours is None or theirs is None or _deviations(ours) == _deviations(theirs):
+        return DIMENSION_TWICE(where=where, holds=holds.source)
+    return DIMENSION_TWICE_DIFFERS(
+        where=where, limits=ours.said, holds=holds.source, others=theirs.said
+    )
+
+
+def _deviations(limits: Limits) -> tuple[float, float]:
+    """Lower and upper, mm."""
+    return limits.lower_mm, limits.upper_mm
+
+
+def _settled(
+    dimension: Dimension, bound: Bound | Finding, file: str, findings: list[Finding]
+) -> list[Dimension]:
+    """The dimension with its limits, once the size of its feature is known; none where its nominal
+    size is another one. What fits no feature stays as far as it is known."""
+    drawn = bound.drawn_mm if isinstance(bound, Bound) else dimension.nominal_mm
+    if drawn is None or dimension.kind in _ZONES:
+        return [dimension]
+    nominal = dimension.nominal_mm
+    if nominal is not None and abs(nominal - drawn) > DIFFERS_MM:
+        where = f"{file}, {_place_of(dimension)}"
+        findings.append(
+            DIMENSION_DIFFERS(where=where, measured=drawn, limit=nominal, name=dimension.name)
+        )
+        return []
+    try:
+        settled, lacks = limited(dimension, drawn)
+    except OptionError as error:
+        raise InputError(
+            error.message, file=file, where=_place_of(dimension), mend=error.mend
+        ) from error
+    findings += lacks
+    return [settled]
+
+
+def _place_of(dimension: Dimension) -> str:
+    x, y = dimension.places_mm[0]
+    return f"{dimension.source}, at ({x:.3f}, {y:.3f}) mm"
+
+
+def _what(bound: Bound) -> object:
+    """What is measured: the same of two dimensions that are one."""
+    if not bound.ends:
+        return bound.dimension.kind, tuple(map(id, bound.features))
+    x, y = (round(float(part), 3) + 0.0 for part in bound.direction)
+    ends = frozenset((id(end.feature), end.how) for end in bound.ends)
+    return ends, (x, y) if (x, y) > (0.0, 0.0) else (0.0 - x, 0.0 - y)
+
+
+def _named(dimensions: Sequence[Dimension]) -> Iterator[Dimension]:
+    """Each with a name of its own."""
+    names = [each.name for each in dimensions]
+    taken: set[str] = set()
+    for each in dimensions:
+        name, number = each.name, 1
+        while name in taken or (number == 1 and names.count(name) > 1):
+            name, number = f"{each.name} #{number}", number + 1
+        taken.add(name)
+        yield replace(each, name=name)
+
+
+# tolerances.toml
+
+
+class _Row(msgspec.Struct, forbid_unknown_fields=True, rename={"start": "from"}):
+    """One [[dimension]]."""
+
+    kind: Literal[
+        "diameter",
+        "distance",
+        "width",
+        "radius",
+        "position",
+        "straightness",
+        "roundness",
+        "profile",
+    ]
+    name: str = ""
+    at: tuple[Length, Length] | None = None
+    start: tuple[Length, Length] | None = None
+    to: tuple[Length, Length] | None = None
+    direction: Length | None = None
+    nominal: Length | None = None
+    limits: str | None = None
+    zone: Length | None = None
+
+
+class _File(msgspec.Struct, forbid_unknown_fields=True):
+    """The whole file."""
+
+    general: str = ""
+    dimension: list[dict[str, Any]] = []
+
+
+def read_tolerances(path: Path) -> tuple[str, tuple[Dimension, ...]]:
+    """The general tolerance of a file ("" for none) and its dimensions; CamtoolError with file,
+    place and mend for anything that it may not say."""
+    file = str(path)
+    table = convert(read_table(path), _File, file)
+    if table.general:
+        with _Blame(file, "key general"):
+            general_class(table.general)
+    rows = [
+        _dimension(convert(row, _Row, file, f"dimension {number}"), number, table.general, path)
+        for number, row in enumerate(table.dimension, 1)
+    ]
+    return table.general, tuple(rows)
+
+
+class _Blame:
+    """Within the block, an error gets file and place."""
+
+    def __init__(self, file: str, where: str) -> None:
+        self._file, self._where = file, where
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, _kind: object, error: object, _trace: object) -> None:
+        if isinstance(error, OptionError):
+            raise InputError(
+                error.message, file=self._file, where=self._where, mend=error.mend
+            ) from error
+
+
+def _dimension(row: _Row, number: int, general: str, path: Path) -> Dimension:
+    """A dimension as the file says it."""
+    place = f"dimension {number}"
+    _check_keys(row, str(path), place)
+
+    def mm(value: Length, key: str, least: float = -LARGEST_MM) -> float:
+        with _Blame(str(path), f"{place}, key {key}"):
+            return _mm(value, key, least)
+
+    pairs = {"at": row.at, "from": row.start, "to": row.to}
+    places = tuple(
+        (mm(pair[0], key), mm(pair[1], key)) for key, pair in pairs.items() if pair is not None
+    )
+    kind: Kind = "distance" if row.kind == "width" else row.kind
+    limits, words = None, ""
+    if row.zone is not None:
+        size = mm(row.zone, "zone", 0.0)
+        if not size:
+            raise InputError(
+                "a zone of 0 holds no part",
+                file=str(path),
+                where=f"{place}, key zone",
+                mend="give its width",
+            )
+        limits = Limits(0.0, size, f"zone {size:g}")
+    nominal = None if row.nominal is None else mm(row.nominal, "nominal", 0.0)
+    if row.limits is not None:
+        with _Blame(str(path), f"{place}, key limits"):
+            said = read_words(row.limits)
+            _check_units(row.nominal, said)
+            words = row.limits
+            if nominal is not None:
+                limits, words = said.limits(nominal), ""
+    direction = None
+    if row.direction is not None:
+        with _Blame(str(path), f"{place}, key direction"):
+            direction = _direction(row.direction)
+    if len(places) == 2 and math.dist(*places) <= BIND_MM:
+        raise InputError(
+            "from and to are the same place",
+            file=str(path),
+            where=place,
+            mend="give two places that differ",
+        )
+    return Dimension(
+        name=one_line(row.name) or f"{row.kind} {number}",
+        kind=kind,
+        places_mm=places,
+        source=f"{path.name}, {place}",
+        direction_rad=direction,
+        nominal_mm=nominal,
+        limits=limits,
+        words=words,
+        general="" if kind in _ZONES else general,
+    )
+
+
+def _check_keys(row: _Row, file: str, place: str) -> None:
+    """InputError for a key that this kind lacks or does not know."""
+    given = {
+        "at": row.at,
+        "from": row.start,
+        "to": row.to,
+        "direction": row.direction,
+        "nominal": row.nominal,
+        "limits": row.limits,
+        "zone": row.zone,
+    }
+    needed = ["from", "to"] if row.kind in ("distance", "width") else ["at"]
+    sizes = ["direction", "nominal", "limits"] if len(needed) == 2 else ["nominal", "limits"]
+    takes = [*needed, *(["zone"] if row.kind in _ZONES else sizes)]
+    for key, value in given.items():
+        where = f"{place}, key {key}"
+        if value is not None and key not in takes:
+            raise InputError(
+                f"a {row.kind} has no {key}",
+                file=file,
+                where=where,
+                mend=f"it takes {', '.join(takes)}",
+            )
+        if value is None and key in needed:
+            example = '["10mm", "5mm"]'
+            raise InputError(
+                "key is missing", file=file, where=where, mend=f"write {key} = {example}"
+            )
+
+
+def _mm(value: Length, name: str, least: float) -> float:
+    found = parse_length(value, name=name) if isinstance(value, str) else float(value)
+    if not least <= found <= LARGEST_MM:
+        raise OptionError(
+            f"{name} {value!r} is not between {least:g} and {LARGEST_MM:g} mm",
+            mend="correct it or its unit",
+        )
+    return found
+
+
+def _check_units(nominal: Length | None, words: Words) -> None:
+    """OptionError where one is in inches and the other in millimetres."""
+    unit = re.sub(r"[\s\d.+/-]", "", nominal) if isinstance(nominal, str) else ""
+    if not unit or words.in_inches is None:
+        return
+    if (unit.lower() in ("in", '"', "ft")) != words.in_inches:
+        raise OptionError(
+            f"limits in {words.unit} contradict a nominal size in {unit}",
+            mend="write both in one unit",
+        )
+
+
+def _direction(value: Length) -> float:
+    """x, y or an angle, as rad."""
+    if isinstance(value, str) and value.strip().lower() in ("x", "y"):
+        return 0.0 if value.strip().lower() == "x" else math.pi / 2.0
+    try:
+        found = parse_angle(value) if isinstance(value, str) else math.radians(value)
+    except OptionError as error:
+        raise OptionError(error.message, mend='use "x", "y" or degrees') from error
+    return found
+
+
+# Callouts
+
+
+@dataclass(frozen=True)
+class Said:
+    """The text of a callout, understood: `count` of equal features, `sign` "Ø", "R" or "", the
+    nominal size ("<>" is None), the `words` of its limits, and whether the size is only for
+    information, in parentheses, or theoretically exact, in brackets."""
+
+    count: int = 1
+    sign: str = ""
+    nominal_mm: float | None = None
+    words: str = ""
+    bare: bool = False
+
+
+_NOTES = re.compile(r"(?i)\s*\b(?:typ\.?|thru|through)(?=\s|$)")
+"""Words that say nothing about limits."""
+
+_TEXT = re.compile(r"(?:(?P<count>\d{1,3})\s?[xX×]\s*)?(?P<sign>[Ø⌀∅ϕφΦR])?\s*(?P<rest>.*)")
+_NUMBER = r"(?:\d+(?:\.\d*)?|\.\d+)"
+_SIZE = re.compile(
+    rf"(?P<size><>|{_NUMBER}(?![\d.]))\s*(?P<unit>mm|cm|in|\")?\s*(?P<limits>(?:[±+A-Za-z-]|0\b).*)?"
+)
+"""A size, and limits that begin with a sign, a letter or 0."""
+
+_SIZES = re.compile(rf"{_NUMBER}\s*(?:/|…|\.\.\.?|\bto\b|\s)\s*{_NUMBER}\s*(?:mm|in|\")?")
+_AROUND = {"(": ")", "[": "]"}
+
+
+def read_text(text: str, mm_per_unit: float = 1.0) -> Said | None:
+    """The text of a callout, numbers without a unit in one of so many mm; None where it is not
+    understood.
+
+    >>> read_text("4x Ø5 H7")
+    Said(count=4, sign='Ø', nominal_mm=5.0, words='H7', bare=False)
+    """
+    plain = plain_words(_NOTES.sub("", text)) or "<>"
+    bare = _AROUND.get(plain[:1], "") == plain[-1:] != ""
+    found = _TEXT.fullmatch(plain[1:-1].strip() if bare else plain)
+    if found is None or found["count"] == "0":
+        return None
+    sign = "Ø" if found["sign"] not in ("R", None) else found["sign"] or ""
+    said = Said(count=int(found["count"] or 1), sign=sign, bare=bare)
+    size = _SIZE.fullmatch(found["rest"])
+    if size is None:  # limits of size alone: 20.1/19.9
+        return replace(said, words=found["rest"]) if _SIZES.fullmatch(found["rest"]) else None
+    nominal = None
+    if size["size"] != "<>":
+        nominal = float(size["size"]) * MM_PER_UNIT.get(size["unit"] or "", mm_per_unit)
+        if not 0.0 < nominal <= LARGEST_MM:
+            return None
+    return replace(said, nominal_mm=nominal, words=size["limits"] or "")
+
+
+def _of_callout(
+    callout: Callout,
+    file: str,
+    general: str,
+    features: Sequence[Feature],
+    findings: list[Finding],
+) -> Iterator[Dimension]:
+    """What a callout says: one dimension, or as many as its text counts."""
+    where = f"{file}, {callout.source}"
+    text = one_line(callout.text)
+    if callout.scale != 1.0:
+        shown = callout.measured_mm * callout.scale
+        findings.append(
+            DIMENSION_DIFFERS_VIEW(where=where, measured=callout.measured_mm, limit=shown)
+        )
+        return
+    said = read_text(callout.text, callout.mm_per_unit)
+    if said is None:
+        findings.append(CALLOUT_TEXT(where=where, text=text))
+        return
+    one = _as_said(_measured(callout), said.sign)
+    assert one.nominal_mm is not None
+    drawn = one.nominal_mm
+    nominal = drawn if said.nominal_mm is None else round(said.nominal_mm, 9)
+    sign = {"diameter": "Ø", "radius": "R"}.get(one.kind, said.sign)
+    one = replace(one, name=f"{sign}{round(nominal, 4):g}", nominal_mm=nominal)
+    if abs(nominal - drawn) > DIFFERS_MM:
+        at = f"{file}, {_place_of(one)}"
+        findings.append(DIMENSION_DIFFERS(where=at, measured=drawn, limit=nominal, name=one.name))
+        return
+    try:
+        limits = _limits(callout, said, nominal)
+    except NotUnderstood:
+        findings.append(CALLOUT_TEXT(where=where, text=text))
+        return
+    except OptionError as error:
+        mend = f"{error.mend}, or name the dimension in tolerances.toml"
+        raise DrawingError(
+            f"{error.message}{f' (text {text})' if text else ''}",
+            file=file,
+            where=_place_of(one),
+            mend=mend,
+        ) from error
+    alone = said.bare or callout.exact
+    one = replace(one, limits=limits, general="" if alone or limits else general)
+    yield from _counted(one, said.count, features, where, findings)
+
+
+def _measured(callout: Callout) -> Dimension:
+    """What a callout measures, without what its text says."""
+    linear = callout.kind == "linear"
+    return Dimension(
+        name="",
+        kind="distance" if callout.kind == "linear" else callout.kind,
+        places_mm=callout.points_mm if linear else callout.points_mm[1:],
+        source=callout.source,
+        direction_rad=callout.direction_rad,
+        nominal_mm=round(callout.measured_mm, 9),
+    )
+
+
+_OF_SIGN: dict[str, Kind] = {"Ø": "diameter", "R": "radius"}
+
+
+def _as_said(measured: Dimension, sign: str) -> Dimension:
+    """A text with Ø or R makes a diameter of a radius, and back."""
+    kind = _OF_SIGN.get(sign, measured.kind)
+    if measured.kind == "distance" or kind == measured.kind or measured.nominal_mm is None:
+        return measured
+    share = 2.0 if kind == "diameter" else 0.5
+    return replace(measured, kind=kind, nominal_mm=share * measured.nominal_mm)
+
+
+def _limits(callout: Callout, said: Said, nominal_mm: float) -> Limits | None:
+    """The limits of its text, else those of its style where the text shows them; None without."""
+    if said.words:
+        return read_words(said.words, callout.mm_per_unit).limits(nominal_mm)
+    shown = not callout.text or "<>" in callout.text
+    if not shown or said.bare or callout.upper_mm is None or callout.lower_mm is None:
+        return None
+    lower, upper = callout.lower_mm, callout.upper_mm
+    return read_words(deviation_words(lower, upper)).limits(nominal_mm)
+
+
+def _counted(
+    one: Dimension, count: int, features: Sequence[Feature], where: str, findings: list[Finding]
+) -> Iterator[Dimension]:
+    """The dimension, and the same of the other circles of its size where there are as many as it
+    counts; where there are not, it stands alone and a finding says so."""
+    if count == 1:
+        yield one
+        return
+    assert one.nominal_mm is not None
+    radius = one.nominal_mm * (0.5 if one.kind == "diameter" else 1.0)
+    equal = [
+        each
+        for each in features
+        if isinstance(each, Circle)
+        and one.kind != "distance"
+        and abs(each.radius_mm - radius) <= BIND_MM
+    ]
+    if len(equal) != count:
+        findings.append(
+            COUNT_DIFFERS(where=where, measured=len(equal), limit=count, name=one.name)
+        )
+        yield one
+        return
+    for each in equal:
+        middle = float(each.arcs[0, 0] + 0.5 * each.arcs[0, 1])
+        x, y = each.centre_mm
+        on_it = x + each.radius_mm * math.cos(middle), y + each.radius_mm * math.sin(middle)
+        yield replace(one, places_mm=(on_it,))
