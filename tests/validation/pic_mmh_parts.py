@@ -98,7 +98,12 @@ def lines(name: str, *settings: str) -> tuple[float, float]:
 
 def square(*settings: str, at: tuple[float, float] = CORNERS[1]) -> tuple[float, float]:
     """(Dx, Dy) mm from edge to edge."""
-    top, left, bottom, right = piece("pic-mmh-square", *FIRST, *settings, at=at).cuts
+    return square_of(piece("pic-mmh-square", *FIRST, *settings, at=at))
+
+
+def square_of(made: Piece) -> tuple[float, float]:
+    """(Dx, Dy) mm from edge to edge."""
+    top, left, bottom, right = made.cuts
     across = np.median(right[:, 0]) - np.median(left[:, 0])
     return float(across), float(np.median(top[:, 1]) - np.median(bottom[:, 1]))
 
@@ -116,8 +121,13 @@ def circles(*settings: str) -> Piece:
 
 def diameters(*settings: str) -> dict[float, np.ndarray]:
     """(8,) mm of each circle, through the middle of its extremes."""
+    return diameters_of(circles(*settings))
+
+
+def diameters_of(made: Piece) -> dict[float, np.ndarray]:
+    """(8,) mm of each circle, through the middle of its extremes."""
     found = {}
-    for radius, slide in zip((1.0, 2.0, 3.0), circles(*settings).cuts, strict=True):
+    for radius, slide in zip((1.0, 2.0, 3.0), made.cuts, strict=True):
         arm = slide - 0.5 * (slide.min(axis=0) + slide.max(axis=0))
         angle = np.degrees(np.arctan2(arm[:, 1], arm[:, 0]))
         far = np.hypot(arm[:, 0], arm[:, 1])
