@@ -96,6 +96,9 @@ def send(
         show_facts(facts, NAME_WIDTH, {}, err=as_json)
     if port is None:
         return 0
+    asks = sum(bool(packet.ask) for packet in one.packets[1:])
+    if asks and not sys.stdin.isatty():
+        raise click.UsageError(f"it waits for an answer {asks} times: run it at a terminal")
     line = port_of(port, baud, one.wire, target)
     if speed != 1.0 and not line.is_virtual:
         raise OptionError("a real machine has only its own speed", where="--speed")
@@ -166,7 +169,9 @@ class _Job:
         real = not self.port.is_virtual
         manner = Manner(single=single, home=home, late_s=LATE_S * speed, paced=real)
         manner = replace(manner, file=self._laid())
-        conversation = one.wire.conversation(one.packets, self.target.machine, manner)
+        # The dry run has asked for the first packet.
+        packets = [replace(packet, ask="") for packet in one.packets[:1]] + [*one.packets[1:]]
+        conversation = one.wire.conversation(packets, self.target.machine, manner)
         with opened_line(self.port) as line, self._caught(), _keys() as key:
             journal = Journal(self.place, self._head(), more=self.more)
             wishes = _Wishes(key, conversation, self._signal)

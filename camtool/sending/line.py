@@ -68,16 +68,17 @@ class Line:
         self._serial.write(data)
 
     def reopen(self, wait_s: float) -> None:
-        """Close the port, and open it again when it is there, for `wait_s` at the most."""
+        """Close the port for a while, so that the other end sees it, and open it again when it is
+        there, for `wait_s` at the most."""
         self.close()
         end = time.monotonic() + wait_s
         while True:
+            time.sleep(REOPEN_S)
             try:
                 self._serial = _opened(self.port)
             except (OSError, ValueError):
                 if time.monotonic() >= end:
                     raise
-                time.sleep(REOPEN_S)
             else:
                 return
 

@@ -147,7 +147,7 @@ def consignment(
     decoded, rest = run.decoded, None
     assert decoded is not None
     if first:
-        rest = rest_of(decoded, target, first)
+        rest = rest_of(decoded, target, first, data)
         data = rest.data
         decoded = read_program(data, target, source=source).decoded
         assert decoded is not None
@@ -187,8 +187,11 @@ def forecast_of(decoded: Toolpath, target: LoadedTarget) -> Forecast:
 # The rest of a program.
 
 
-def rest_of(decoded: Toolpath, target: LoadedTarget, first: int) -> Rest:
-    """The program from a block (from 0) on, behind an entry.
+def rest_of(
+    decoded: Toolpath, target: LoadedTarget, first: int, data: bytes | None = None
+) -> Rest:
+    """The program (`data`, where it is at hand) from a block (from 0) on, behind an entry, which
+    is the target's own where it has one.
 
     It begins as the program does, at part zero: up, tool, spindle and coolant on as they are
     there, across above the place, down to it at the feed of plunges. Behind that come the same
@@ -203,6 +206,11 @@ def rest_of(decoded: Toolpath, target: LoadedTarget, first: int) -> Rest:
     if low >= high or not _goes_on(decoded.part(low, high)):
         raise OptionError(f"nothing moves from block {first + 1} on", mend="it is finished")
     machine = target.machine
+    own = None if data is None else target.target.rest(data, machine, first)
+    if own is not None:
+        done = np.arange(first - own[1], blocks)
+        done[: own[1]] = -1
+        return Rest(own[0], first, own[1], done)
     entry = _entry(decoded, low, target)
     count = len(entry)
     columns: dict[str, Any] = {

@@ -142,6 +142,14 @@ class Target(ABC):
         """The resolution of positions in a program along an axis, mm."""
         return max(axis.coded_step_mm, axis.resolution_mm or 0.0)
 
+    def rest(
+        self, data: bytes, machine: Machine[Any, Any], first: int
+    ) -> tuple[bytes, int] | None:
+        """The program from one of its blocks (from 0) on, and how many of its blocks bring the
+        machine there; None: the moves are written again behind an entry. PostError where that
+        cannot be."""
+        return None
+
     def twin_choices(self) -> type[msgspec.Struct]:
         """What the sources of its wire leave open, as a record whose defaults are ours."""
         return NoChoices

@@ -11,13 +11,24 @@ from typing import TYPE_CHECKING
 
 from camtool.target.contract import Target
 
-from .dialect import Dialect, MatlabRouterController, MatlabRouterMachine, dialect_of
+from .dialect import (
+    Dialect,
+    MatlabRouterController,
+    MatlabRouterLink,
+    MatlabRouterMachine,
+    dialect_of,
+)
 
 if TYPE_CHECKING:
+    import msgspec
+
+    from camtool.machine.model import Machine
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
 
     from .controller import MatlabRouterModel
+    from .twin import Choices, MatlabRouterTwin
+    from .wire import MatlabRouterWire
 
 
 class MatlabRouter(Target):
@@ -26,6 +37,7 @@ class MatlabRouter(Target):
     name = "matlab-router"
     controllers = (MatlabRouterController,)
     dialect = Dialect
+    link = MatlabRouterLink
 
     def check(self, machine: MatlabRouterMachine) -> None:
         """Raise MachineError where values of the dialect do not go with the machine."""
@@ -48,6 +60,36 @@ class MatlabRouter(Target):
         from .controller import MatlabRouterModel
 
         return MatlabRouterModel()
+
+    def wire(self) -> MatlabRouterWire:
+        """Numbers, and the time of a job."""
+        from .wire import MatlabRouterWire
+
+        return MatlabRouterWire()
+
+    def rest(
+        self, data: bytes, machine: MatlabRouterMachine, first: int
+    ) -> tuple[bytes, int] | None:
+        """The arrays from a line on: going home, to its start and down is what each job does."""
+        from .wire import rest_of
+
+        return rest_of(data, machine, first)
+
+    def twin_choices(self) -> type[Choices]:
+        """What its thesis leaves open of the wire."""
+        from .twin import Choices
+
+        return Choices
+
+    def twin(
+        self,
+        machine: Machine[MatlabRouterController, Dialect],
+        choices: msgspec.Struct | None = None,
+    ) -> MatlabRouterTwin:
+        """The virtual controller; docs/wires/matlab-router.md."""
+        from .twin import Choices, MatlabRouterTwin
+
+        return MatlabRouterTwin(machine, choices if isinstance(choices, Choices) else Choices())
 
     def listing(self, data: bytes, machine: MatlabRouterMachine) -> Listing:
         """The columns of the arrays that each block is."""

@@ -32,7 +32,7 @@ from camtool.simulation.motion import NO_SAMPLES, Chunk, Ledger, Options
 from camtool.simulation.rows import placed, refuse
 from camtool.toolpath.moves import Kind, Toolpath
 
-from .dialect import Dialect, MatlabRouterController
+from .dialect import Dialect, MatlabRouterController, dialect_of
 from .steps import (
     COUNT,
     PLACE,
@@ -225,8 +225,9 @@ equal parts."""
 class Lines:
     """L orders of the master.
 
-    orders (L, 11): `Program.lines` of the kernel; pauses_s (L,) behind each; extra_s (N,): what
-    rows take besides (dwells, and the numbers of a job on their way from the PC).
+    orders (L, 11): `Program.lines` of the kernel; pauses_s (L,) behind each, negative where the
+    next line begins on a tick; extra_s (N,): what rows take besides (dwells, and the numbers of a
+    job on their way from the PC).
     """
 
     orders: Ints
@@ -263,7 +264,8 @@ def lines_of(path: Toolpath, rows: int, machine: _Machine) -> Lines:
     orders = np.column_stack([amount, ref, first, second, most, part])
     header = ~straight[first] | (way[:, 2] != 0.0)
     extra = np.where(kind == Kind.DWELL, path.value[:rows], 0.0)
-    return Lines(orders, _pauses(header, router), extra + _link(header, first, rows, router))
+    ends = _ends(header, homes[first], machine)
+    return Lines(orders, _pauses(header, ends, router), extra + _link(header, first, rows, router))
 
 
 def _check(path: Toolpath, rows: int) -> None:
@@ -376,14 +378,24 @@ def _patience(way_mm: Floats, ref: Ints, amount: Ints, machine: _Machine) -> Int
     return np.asarray(np.ceil(most).astype(np.int64))
 
 
-def _pauses(header: Bools, router: MatlabRouterController) -> Floats:
-    """(L,) s behind each line."""
+def _ends(header: Bools, homing: Bools, machine: _Machine) -> Bools:
+    """(L,) lines that are the last of their job: the last cut, or, where the master raises the
+    tool and goes home behind it, that."""
+    ends: Bools = ~header & np.append(header[1:], True)
+    if dialect_of(machine).end == "raise":
+        behind_cuts = np.cumsum(~header) > 0
+        ends = homing & behind_cuts & np.append((header & ~homing)[1:], True)
+    if len(ends):
+        ends[-1] = True
+    return ends
+
+
+def _pauses(header: Bools, ends: Bools, router: MatlabRouterController) -> Floats:
+    """(L,) s behind each line; negative behind the last of a job, since the next begins by a reset
+    of the master, which knows nothing of the slaves' ticks: on a tick, ours."""
     pauses = np.where(header, router.pause_s, router.turnaround_s)
-    last = ~header & np.append(header[1:], True)
-    if len(last):
-        last[-1] = True
     settle = SETTLE_TAUS * max(router.time_constant_s)
-    return np.where(last, np.maximum(settle, router.turnaround_s), pauses)
+    return np.where(ends, -np.maximum(settle, pauses), pauses)
 
 
 def _link(header: Bools, first: Ints, rows: int, router: MatlabRouterController) -> Floats:

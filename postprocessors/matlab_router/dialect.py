@@ -14,7 +14,7 @@ import msgspec
 from msgspec import Meta
 
 from camtool.errors import MachineError
-from camtool.machine.model import Machine, SlideStart
+from camtool.machine.model import Link, Machine, SlideStart
 from camtool.machine.ranges import Depth, FeedRate, Speed, Step, Tolerance
 
 UNIT_MM: Final = 0.1
@@ -181,6 +181,18 @@ class MatlabRouterController(SlideStart, frozen=True, tag_field="model", tag="ma
     start_lag_s: Annotated[float, Meta(ge=0.0, le=0.005)] = 0.0004
     header_pause_s: Pause = 0.01
     number_pause_s: Pause = 0.001
+
+
+class MatlabRouterLink(Link, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What its thesis leaves open. `echo`: whether the master sends back what it takes, as the
+    library of its compiler does; "detected": it is looked for behind the first number of a job.
+    `reset`: who resets the master before the next job: the user by "hand", the "opening" of the
+    port, or "none" where a master takes one job after the other. `margin_s`: how long a job is
+    left alone beyond its simulated time."""
+
+    echo: Literal["detected", "echo", "none"] = "detected"
+    reset: Literal["hand", "opening", "none"] = "hand"
+    margin_s: Annotated[float, Meta(ge=0.0, le=600.0)] = 2.0
 
 
 MatlabRouterMachine = Machine[SlideStart, Dialect]

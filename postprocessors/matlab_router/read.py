@@ -8,6 +8,7 @@ rapids to the place of home, so that other machines can follow.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -55,6 +56,11 @@ _STREAM: Final = re.compile(rb"-?\d+\r(?!\n)")
 
 def read_program(data: bytes, machine: MatlabRouterMachine) -> Toolpath:
     """The moves of a program; ProgramError naming the place when it is none."""
+    return path_of(read_jobs(data, machine), machine)
+
+
+def read_jobs(data: bytes, machine: MatlabRouterMachine) -> Iterator[ReadJob]:
+    """The jobs of a program, checked; ProgramError naming the place when it is none."""
     dialect = dialect_of(machine)
     streamed = _STREAM.match(data) is not None
     if streamed != (dialect.format == "stream"):
@@ -63,8 +69,13 @@ def read_program(data: bytes, machine: MatlabRouterMachine) -> Toolpath:
         if data and _looks_like_text(data):
             raise ProgramError("this is no serial stream", mend="use --set dialect.format=m")
     read = read_stream if dialect.format == "stream" else read_text
-    moves = _Moves(machine, dialect)
-    for job in read(data, dialect):
+    yield from read(data, dialect)
+
+
+def path_of(jobs: Iterable[ReadJob], machine: MatlabRouterMachine) -> Toolpath:
+    """The moves of checked jobs."""
+    moves = _Moves(machine, dialect_of(machine))
+    for job in jobs:
         moves.add(job)
     return moves.finish()
 

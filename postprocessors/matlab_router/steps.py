@@ -54,8 +54,9 @@ class Program(NamedTuple):
     lines (L, 11): amount of each axis (chunks; counts when `text`; `HOME_AMOUNT`; 0), its speed
     with sign, the row of its samples, the row of those from where an axis (its number) has passed
     a count on, the ticks after which it is given up, that axis and that count. pauses (L,) ticks
-    behind each, at least 1; axes (3, 8); table (1001,); lag: ticks by which Y begins after X;
-    text: the chapters' way instead of the listing's.
+    behind each, at least 1, and negative where the next line begins on a tick; axes (3, 8); table
+    (1001,); lag: ticks by which Y begins after X; text: the chapters' way instead of the
+    listing's.
     """
 
     lines: Ints
@@ -368,7 +369,10 @@ def _close(all_: Slaves, line: int, tick: int) -> None:
     """All slaves have answered: account for the line, and tell when the next one begins."""
     lines, motors, begin = all_.lines, all_.motors, all_.begin
     done = max(motors[0, DONE], motors[1, DONE], motors[2, DONE])
-    after = max(done + all_.pauses[line], float(tick))
+    pause = all_.pauses[line]
+    after = max(done + abs(pause), float(tick))
+    if pause < 0.0:
+        after = math.ceil(after)
     parted = min(begin[1], after) if begin[1] > begin[0] else after
     all_.ticks[lines[line, FIRST_ROW]] += parted - begin[0]
     all_.ticks[lines[line, SECOND_ROW]] += after - parted

@@ -47,10 +47,9 @@ def write_program(toolpath: Toolpath, machine: MatlabRouterMachine) -> Program:
         )
     refuse_too_long(len(made.lines.row) + len(made.offsets) - 1, "block")
     stream = dialect.format == "stream"
-    jobs, count = _numbers_of(made), len(made.offsets) - 1
     heads = np.array(made.offsets[:-1])
     return Program(
-        data=_stream(jobs, dialect) if stream else _matlab(jobs, count, dialect),
+        data=program_of(_numbers_of(made), len(heads), dialect),
         extension=STREAM_EXTENSION if stream else machine.target.extension,
         target=machine.target.name,
         row_of_block=np.insert(made.lines.row, heads, -1),
@@ -63,7 +62,7 @@ Pair = tuple[list[int], list[int]]
 
 
 @dataclass(frozen=True)
-class _JobNumbers:
+class JobNumbers:
     """One job as the words of its numbers: x and y in a pair each."""
 
     count: int
@@ -73,7 +72,7 @@ class _JobNumbers:
     velxy: Pair
 
 
-def _numbers_of(jobs: Jobs) -> Iterator[_JobNumbers]:
+def _numbers_of(jobs: Jobs) -> Iterator[JobNumbers]:
     """All jobs as plain numbers."""
     lines = jobs.lines
     for low, high in pairwise(jobs.offsets):
@@ -81,10 +80,17 @@ def _numbers_of(jobs: Jobs) -> Iterator[_JobNumbers]:
         xy = np.concatenate([start[:1], end]).T.tolist()
         length, speed = np.abs(end - start).T.tolist(), jobs.speed[low:high].T.tolist()
         first = xy[0][0], xy[1][0]
-        yield _JobNumbers(high - low, first, tuple(xy), tuple(length), tuple(speed))
+        yield JobNumbers(high - low, first, tuple(xy), tuple(length), tuple(speed))
 
 
-def _matlab(jobs: Iterable[_JobNumbers], count: int, dialect: Choices) -> bytes:
+def program_of(jobs: Iterable[JobNumbers], count: int, dialect: Choices) -> bytes:
+    """So many jobs in the form that the dialect has."""
+    if dialect.format == "stream":
+        return stream_of(jobs, dialect)
+    return _matlab(jobs, count, dialect)
+
+
+def _matlab(jobs: Iterable[JobNumbers], count: int, dialect: Choices) -> bytes:
     """One section a job: the last job's arrays remain when all are run; `jobs{}` then holds all
     `count`."""
     lines = [
@@ -120,7 +126,7 @@ def _matrix(name: str, rows: Pair) -> list[str]:
     return [f"{name} = [", first, second, "];"]
 
 
-def _stream(jobs: Iterable[_JobNumbers], dialect: Choices) -> bytes:
+def stream_of(jobs: Iterable[JobNumbers], dialect: Choices) -> bytes:
     """Each number in digits and a carriage return: lines, first x and y, all lx, ly, velx, vely
     (L4294-4360)."""
     parts = []

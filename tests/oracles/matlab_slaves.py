@@ -229,7 +229,8 @@ def run(
     most: int = 10_000,
 ) -> tuple[list[list[int]], list[float]]:
     """Counts at each tick until the last pause is over, and when each line began and the last one
-    was over. `orders`: for each line (distance, speed) of each axis."""
+    was over. `orders`: for each line (distance, speed) of each axis; behind a negative pause the
+    next line begins on a tick."""
     counts: list[list[int]] = []
     begins = [0.0]
     tick = 0
@@ -250,7 +251,8 @@ def run(
             tick += 1
             counts.append([slave.count for slave in slaves])
         done = max(slave.done for slave in slaves if slave.done is not None)
-        begins.append(max(done + pause, float(tick)))
+        after = max(done + abs(pause), float(tick))
+        begins.append(float(math.ceil(after)) if pause < 0.0 else after)
     while tick < begins[-1]:
         for slave in slaves:
             slave.tick(tick, None, (0, 0))

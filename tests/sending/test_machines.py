@@ -43,20 +43,19 @@ def at_a_port(twin: Twin) -> Iterator[str]:
 
 
 def sent(
-    twin: Twin, name: str, program: bytes, folder: Path, *flags: str
+    name: str, port: str, program: bytes, folder: Path, *flags: str
 ) -> subprocess.CompletedProcess[str]:
     """`camtool send` to the end."""
     file = folder / "logo.program"
     file.write_bytes(program)
-    with at_a_port(twin) as port:
-        words = ["send", str(file), "-t", name, "--port", port, "--yes", *flags]
-        return subprocess.run(
-            [sys.executable, "-m", "camtool", *words],
-            capture_output=True,
-            text=True,
-            check=False,
-            stdin=subprocess.DEVNULL,
-        )
+    words = ["send", str(file), "-t", name, "--port", port, "--yes", *flags]
+    return subprocess.run(
+        [sys.executable, "-m", "camtool", *words],
+        capture_output=True,
+        text=True,
+        check=False,
+        stdin=subprocess.DEVNULL,
+    )
 
 
 def check(
@@ -72,7 +71,8 @@ def check(
     twin, loaded = made(name, choices, settings)
     assert isinstance(twin, Twin)
     flags = [word for setting in settings for word in ("--set", setting)]
-    done = sent(twin, name, program, folder, "--speed", f"{speed:g}", *flags)
+    with at_a_port(twin) as port:
+        done = sent(name, port, program, folder, "--speed", f"{speed:g}", *flags)
     assert done.returncode == 0, done.stderr
     assert read_journal(folder / "logo.program.journal").finished
     same_motion(twin, program, loaded)
@@ -109,3 +109,17 @@ def test_i8751(tmp_path: Path) -> None:
     settings = [*steps, "feed.default_mm_min=78.3"]
     twin = check("i8751", tmp_path, settings=settings, choices=[], speed=1e5)
     assert b"\x13" + b"".join(twin.decoded) + b"\x54" == logo("i8751", *settings)
+
+
+def test_matlab_router(tmp_path: Path) -> None:
+    # A mended master, which takes job after job: nobody is there to reset it.
+    settings = ["link.echo=echo", "link.reset=none", "link.margin_s=0"]
+    choices = ["echo=characters", "reset=itself"]
+    twin = check("matlab-router", tmp_path, settings=settings, choices=choices, speed=1000)
+    assert b"".join(twin.decoded) == logo("matlab-router", "dialect.format=stream")
+
+
+def test_a_program_that_asks_is_not_begun_where_nobody_can_answer(tmp_path: Path) -> None:
+    done = sent("matlab-router", "/dev/null", logo("matlab-router"), tmp_path)
+    assert done.returncode == 2
+    assert "it waits for an answer 31 times: run it at a terminal" in done.stderr

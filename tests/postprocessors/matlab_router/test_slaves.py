@@ -128,7 +128,7 @@ def test_random_lines_of_the_text(seed: int) -> None:
         ]
         for _ in range(5)
     ]
-    pauses = [luck.choice([1.0, 1.24, 30.0]) for _ in orders]
+    pauses = [luck.choice([1.0, 1.24, -1.24, 30.0]) for _ in orders]
     found, _, account = filled(slaves, orders, pauses)
     counts, begins = run(slaves, orders, pauses, 0.08)
     assert np.abs(found - np.array(counts)).max() <= 1

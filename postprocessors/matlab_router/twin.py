@@ -1,0 +1,151 @@
+"""The master and the slaves of the Matlab router at the other end of a USB cable, as
+docs/wires/matlab-router.md has it.
+
+Numbers come as characters and a carriage return, until a job is complete (L4668-4708). With its
+last number the machine goes home, to the first point and down, and runs the lines (L4718-4929).
+Then the master does nothing more until it is reset. It says nothing, but perhaps an echo.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from typing import Final, Literal
+
+import msgspec
+import numpy as np
+
+from camtool.arrays import Ints
+from camtool.errors import ProgramError
+from camtool.machine.model import Machine
+from camtool.target.twin import COMMANDED, Slides, Twin, travel_of
+
+from .controller import MatlabRouterModel
+from .dialect import Dialect, MatlabRouterController, dialect_of
+from .jobs import ReadJob, check_count, check_job
+from .read import path_of
+
+END: Final = 13
+"""The character that ends a number."""
+
+CHARACTERS: Final = 6
+"""A number has no more: the others are dropped (a buffer of 7, L4668-4708)."""
+
+PRINTABLE: Final = range(ord(" "), ord("~") + 1)
+"""What the library's get_string_usb takes, and sends back; it drops the others."""
+
+HEADER: Final = 3
+"""Numbers of a job before those of its lines (L4294-4360)."""
+
+INT16: Final = 1 << 16
+"""Numbers of the master repeat themselves behind so many (L4668-4708)."""
+
+NUMBER: Final = re.compile(rb"[+-]?\d+")
+
+
+class Choices(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What the thesis leaves open.
+
+    `echo`: the master sends back the characters that it takes, or "none". `reset`: it is reset
+    when somebody opens the port and nothing moves (as a user's hand would), or, as a mended master
+    might be, by "itself" when a job is done; what has come meanwhile then waits in the cable.
+    """
+
+    echo: Literal["none", "characters"] = "none"
+    reset: Literal["opening", "itself"] = "opening"
+
+
+class MatlabRouterTwin(Twin):
+    """The master after a reset, its slides at part zero."""
+
+    wire = "USB (CDC), whose rate means nothing"
+
+    def __init__(
+        self, machine: Machine[MatlabRouterController, Dialect], choices: Choices
+    ) -> None:
+        super().__init__(Slides(machine))
+        # What the numbers take on their way they have taken already when a job begins.
+        at_once = msgspec.structs.replace(
+            machine.controller, header_pause_s=0.0, number_pause_s=0.0
+        )
+        self._machine = msgspec.structs.replace(machine, controller=at_once)
+        self._choices, self._dialect = choices, dialect_of(machine)
+        self._model = MatlabRouterModel()
+        self._jobs: list[ReadJob] = []
+        self._outputs, self._seconds = 0, 0.0  # of all jobs so far
+        self._reset()
+
+    def connected(self, now: float) -> bytes:
+        """Somebody opens the port."""
+        sent = super().connected(now)
+        if self._choices.reset == "opening" and not self.moves:
+            self._reset()
+        return sent
+
+    def _reset(self) -> None:
+        self._numbers: list[int] = []
+        self._word, self._raw, self._waiting = bytearray(), bytearray(), bytearray()
+        self._listens = True
+
+    def _due(self) -> None:
+        if self._choices.reset == "opening" or self.moves:
+            return
+        waiting = self._waiting
+        self._reset()
+        for octet in waiting:
+            self._take(octet)
+
+    def _take(self, octet: int) -> None:
+        if not self._listens:
+            self._waiting.append(octet)
+            return
+        self._raw.append(octet)
+        if octet == END:
+            self._numbers.append(_number(bytes(self._word)))
+            self._word.clear()
+            self._look()
+        elif octet in PRINTABLE and len(self._word) < CHARACTERS:
+            self._word.append(octet)
+            if self._choices.echo == "characters":
+                self._out.append(octet)
+
+    def _look(self) -> None:
+        """Begin when the job is complete. More lines than its arrays have are written beyond them
+        (L4625-4635), and a slave may run away: both hang it here, until it is reset."""
+        count = self._numbers[0]
+        if not 1 <= count <= self._dialect.max_lines:
+            self._listens = False
+        elif len(self._numbers) == HEADER + 4 * count:
+            self._listens = False
+            table = np.array(self._numbers[HEADER:], dtype=np.int64).reshape(4, count)
+            first: Ints = np.array(self._numbers[1:HEADER], dtype=np.int64)
+            number = len(self._jobs) + 1
+            self._begin(ReadJob(number, first, table[:2], table[2:], lambda *_: f"job {number}"))
+
+    def _begin(self, job: ReadJob) -> None:
+        """The slaves go on from all that they have done: they were never reset."""
+        try:
+            check_count(job.length.shape[1], job.where, self._dialect)
+            check_job(job, self._dialect)
+            path = path_of([*self._jobs, job], self._machine)
+            whole = travel_of(self._model.run(path, self._machine, COMMANDED))
+        except ProgramError:
+            return
+        self._jobs.append(job)
+        self.decoded.append(bytes(self._raw))
+        travel = replace(
+            whole,
+            commanded=whole.commanded[self._outputs :],
+            seconds=whole.seconds[self._outputs :] - self._seconds,
+            added_s=whole.added_s[self._outputs :],
+            total_s=whole.total_s - self._seconds,
+        )
+        self._outputs, self._seconds = len(whole), whole.total_s
+        self.slides.begin(travel, self.now, len(self.decoded) - 1)
+
+
+def _number(word: bytes) -> int:
+    """What atol makes of it, in a signed int16: 0 of what does not begin with a number."""
+    found = NUMBER.match(word)
+    value = int(found[0]) if found else 0
+    return (value + INT16 // 2) % INT16 - INT16 // 2
