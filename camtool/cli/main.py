@@ -63,6 +63,7 @@ COMMANDS = (
     "send",
     "stale",
     "targets",
+    "tolerances",
     "tools",
     "twin",
     "verify",
@@ -109,6 +110,7 @@ def cli() -> None:
     camtool stale   drawings/ -t pic-mmh        programs that are out of date
     camtool job new logo.dxf                    a job file to fill in, from its layers
     camtool targets                             the machines it knows
+    camtool tolerances new logo.dxf             its dimensions, to give limits to
     camtool tools                               the tools that jobs may name
     camtool init                                a machine file of your own, by questions
     camtool coupon  lines -o coupon.dxf         a drawing to cut and measure

@@ -74,7 +74,7 @@ def dimensions_of(
         bound = bind(each, features, drawing.file)
         dimensions += _settled(each, bound, drawing.file, findings)
         if isinstance(bound, Bound):
-            known.setdefault(_what(bound), each)
+            known.setdefault(measured_by(bound), each)
     drawn = [
         (place, each)
         for place, callout in enumerate(drawing.callouts)
@@ -85,7 +85,7 @@ def dimensions_of(
     for place, each in sorted(drawn, key=lambda item: item[1].limits is None):
         bound = bind(each, features, drawing.file)
         if isinstance(bound, Bound):
-            same = known.setdefault(_what(bound), each)
+            same = known.setdefault(measured_by(bound), each)
             if same is not each:
                 if same.source != each.source:
                     findings.append(_twice(each, same, drawing.file))
@@ -104,7 +104,7 @@ def _is_known(
 ) -> bool:
     """Whether the file says something of what a callout measures, whatever its text is."""
     bound = bind(_measured(callout), features, file)
-    same = known.get(_what(bound)) if isinstance(bound, Bound) else None
+    same = known.get(measured_by(bound)) if isinstance(bound, Bound) else None
     if same is not None:
         findings.append(_twice(_measured(callout), same, file))
     return same is not None
@@ -156,7 +156,7 @@ def _place_of(dimension: Dimension) -> str:
     return f"{dimension.source}, at ({x:.3f}, {y:.3f}) mm"
 
 
-def _what(bound: Bound) -> object:
+def measured_by(bound: Bound) -> object:
     """What is measured: the same of two dimensions that are one."""
     if not bound.ends:
         return bound.dimension.kind, tuple(map(id, bound.features))

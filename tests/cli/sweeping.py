@@ -44,6 +44,7 @@ PROGRAM = (
     b"G21\nG90\nG17\nG94\nG0 Z5\nG0 X1 Y1\nG1 Z-1 F100\nG1 X9 F200\nG2 X9 Y5 I0 J2\nG0 Z5\nM2\n"
 )
 TABLE = b"T1 P1 D3.0 ;flat\n"
+TOLERANCES = b'[[dimension]]\nkind = "diameter"\nat = [16, 6]\nlimits = "H7"\n'
 JOB = b'[[operation]]\nname = "all"\nlayers = ["*"]\n'
 
 
@@ -54,6 +55,7 @@ def set_up(folder: Path) -> None:
     (folder / "a.nc").write_bytes(PROGRAM)
     (folder / "tool.tbl").write_bytes(TABLE)
     (folder / "job.toml").write_bytes(JOB)
+    (folder / "tolerances.toml").write_bytes(TOLERANCES)
 
 
 TOOL = ("--tool-diameter", "1", "--depth", "1")
@@ -84,6 +86,8 @@ BASES: Mapping[str, tuple[str, ...]] = {
     "targets new": ("--extends", "grbl", "-o", "mine.toml"),
     "init": ("-t", "grbl", "-o", "mine.toml"),
     "tools new": (),
+    "tolerances new": ("-o", "-"),
+    "tolerances show": ("--against", DRAWING),
     "coupon": ("-t", "linuxcnc", "-o", "out.svg"),
     "calibrate": (
         "-t",
@@ -106,6 +110,8 @@ ARGUMENTS: Mapping[str, str] = {
     "targets new": "mine",
     "init": "mine",
     "tools new": "",
+    "tolerances new": DRAWING,
+    "tolerances show": "tolerances.toml",
     "coupon": "lines",
     "calibrate": "lengths.toml",
 }

@@ -1,0 +1,146 @@
+"""`camtool tolerances`: begin a file of dimensions and their limits, or see what one says."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from camtool.cli.files import STDOUT, check_new, check_places, write_all
+from camtool.cli.messages import say, say_findings, show_text
+from camtool.cli.options import DrawingFlags, SectionedCommand, drawing_options, talk_options
+from camtool.findings import Finding, Severity
+from camtool.plain import one_line, to_json
+
+if TYPE_CHECKING:
+    from camtool.inspection.dimensions import Dimension
+
+FILE = "tolerances.toml"
+
+
+@click.group(short_help="Dimensions and their limits: begin a file, or see what one says.")
+def tolerances() -> None:
+    """Files of tolerances say which sizes of a drawing are inspected, and within which limits.
+
+    \b
+    camtool tolerances new  part.dxf                  a file to fill in, from the drawing
+    camtool tolerances show tolerances.toml           what it says
+    camtool tolerances show tolerances.toml --against part.dxf
+                                                      the same with sizes and limits as numbers
+    """
+
+
+@tolerances.command(cls=SectionedCommand, short_help="Begin a file of tolerances.")
+@click.argument("source", metavar="DRAWING")
+@click.option("-o", "--output", metavar="FILE", help=f"The file; - is stdout.  [{FILE}]")
+@drawing_options
+@talk_options
+def new(
+    source: str, output: str | None, drawing: DrawingFlags, quiet: bool, verbose: bool
+) -> None:
+    """Write the dimensions of DRAWING (- is stdin): those that it says itself with their limits,
+    then its holes, slots and the overall sizes of its outlines, whose limits are to be filled in.
+    """
+    from camtool.inspection.proposal import proposed
+
+    output = output or FILE
+    check_places([source], [output])
+    check_new(output)
+    read = drawing.read(source)
+    text, findings = proposed(read)
+    write_all({output: text.encode()})
+    say_findings((*read.findings, *findings), quiet=quiet, verbose=verbose)
+    where = "stdout" if output == STDOUT else output
+    count = text.count("[[dimension]]")
+    said = f"{count} dimension{'s' if count != 1 else ''}"
+    say(f"written: {where}, {said}; put in the limits that matter", quiet=quiet)
+
+
+@tolerances.command(cls=SectionedCommand, short_help="What a file of tolerances says.")
+@click.argument("file", metavar="FILE")
+@click.option(
+    "--against", metavar="DRAWING", help="Say the sizes and limits in this drawing, and its own."
+)
+@click.option("--json", "report", metavar="FILE", help="The same as JSON; - is stdout.")
+@drawing_options
+@talk_options
+def show(
+    file: str,
+    against: str | None,
+    report: str | None,
+    drawing: DrawingFlags,
+    quiet: bool,
+    verbose: bool,
+) -> None:
+    """Check the tolerances FILE, and say nominal size and limits of each of its dimensions, with
+    --against also those that the drawing says itself."""
+    from camtool.inspection.tolerances import dimensions_of, read_tolerances
+
+    check_places([file, against], [report])
+    _, dimensions = read_tolerances(Path(file))
+    findings: tuple[Finding, ...] = ()
+    if against is not None:
+        read = drawing.read(against)
+        dimensions, found = dimensions_of(read, Path(file))
+        findings = (*read.findings, *found)
+    if report is not None:
+        rows = [_facts(each) for each in dimensions]
+        said = [
+            {
+                "code": each.code.name,
+                "severity": each.severity.name.lower(),
+                "message": each.message,
+                "where": each.where,
+            }
+            for each in findings
+        ]
+        write_all({report: to_json({"dimensions": rows, "findings": said}).encode()})
+    if not quiet and report != STDOUT:
+        for line in _lines(dimensions):
+            show_text(one_line(line).rstrip())
+    say_findings(findings, quiet=quiet, verbose=verbose)
+    if any(each.severity == Severity.ERROR for each in findings):
+        raise click.exceptions.Exit(1)
+
+
+def _facts(each: Dimension) -> dict[str, Any]:
+    """A dimension as JSON has it."""
+    limits = each.limits
+    return {
+        "name": each.name,
+        "kind": each.kind,
+        "places_mm": each.places_mm,
+        "direction_rad": each.direction_rad,
+        "nominal_mm": each.nominal_mm,
+        "lower_mm": None if limits is None else limits.lower_mm,
+        "upper_mm": None if limits is None else limits.upper_mm,
+        "limits": limits.said if limits is not None else each.words or each.general or None,
+        "source": each.source,
+    }
+
+
+def _lines(dimensions: Sequence[Dimension]) -> Iterator[str]:
+    """A line for each: name, kind, nominal size, deviations, smallest and largest size."""
+    rows = [_cells(each) for each in dimensions]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        yield "  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True))
+
+
+def _cells(each: Dimension) -> tuple[str, ...]:
+    from camtool.inspection.limits import deviation_words
+
+    nominal = "as drawn" if each.nominal_mm is None else f"{round(each.nominal_mm, 6):.6g} mm"
+    limits, sizes = each.words or each.general or "no limits", ""
+    zone = limits if each.limits is None else each.limits.said
+    if each.limits is not None and each.kind in ("diameter", "radius", "distance"):
+        lower, upper = each.limits.lower_mm, each.limits.upper_mm
+        limits = deviation_words(lower, upper)
+        if each.nominal_mm is not None:
+            sizes = f"{each.nominal_mm + lower:.7g} … {each.nominal_mm + upper:.7g} mm"
+    elif each.limits is not None:
+        nominal, limits = "", f"{each.limits.upper_mm:g} mm"
+    by = zone if zone != limits else ""
+    return each.name, each.kind, nominal, limits, sizes, by, each.source

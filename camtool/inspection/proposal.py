@@ -1,0 +1,196 @@
+"""The `tolerances.toml` that a drawing begins: its callouts, circles, slots and overall sizes.
+
+A slot is a closed path of two equal half circles and two edges. Every other closed path that is no
+circle has an overall size along x and along y, where it ends at an edge or at the outermost point
+of an arc: a corner is no feature that could be measured.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import chain, groupby
+
+import numpy as np
+
+from camtool.arrays import Floats
+from camtool.errors import InputError
+from camtool.findings import Finding
+from camtool.geometry.drawing import Drawing
+from camtool.geometry.polylines import POSITION_EPS_MM
+from camtool.inspection.dimensions import Dimension, Place
+from camtool.inspection.features import Bound, Circle, Edge, Feature, bind, features_of
+from camtool.inspection.limits import limited
+from camtool.inspection.tolerances import dimensions_of, measured_by
+
+MOST_DIMENSIONS = 200
+"""A file begins with at most so many dimensions; a comment counts the others."""
+
+DIGITS = 4
+"""Places and sizes are written with so many decimals of a millimetre."""
+
+_HEADER = """\
+# The dimensions of a drawing and their limits (docs/tolerances.md). Lengths take units ("6mm",
+# "1/4in"); bare numbers are mm, places are in the frame of the drawing.
+
+# Limits of all sizes that have none of their own: ISO 2768-f, -m, -c or -v.
+# general = "ISO 2768-m"
+"""
+
+
+def proposed(drawing: Drawing) -> tuple[str, tuple[Finding, ...]]:
+    """The text of a file with the dimensions of this drawing, and what was found in its callouts.
+    InputError where there is nothing to measure."""
+    said, findings = dimensions_of(drawing)
+    features = features_of(drawing.paths)
+    known = set()
+    for each in said:
+        bound = bind(each, features, drawing.file)
+        if isinstance(bound, Bound):
+            known.add(measured_by(bound))
+    rows = list(said)
+    left = 0
+    for each in _sizes(features, drawing.paths.closed.tolist()):
+        if len(rows) >= MOST_DIMENSIONS:
+            left += 1
+            continue
+        bound = bind(each, features, drawing.file)
+        if isinstance(bound, Bound) and measured_by(bound) not in known:
+            known.add(measured_by(bound))
+            rows.append(limited(each, bound.drawn_mm)[0])
+    if not rows:
+        raise InputError(
+            "has no circles, slots or outlines to measure",
+            file=drawing.file,
+            mend="write tolerances.toml by hand (docs/tolerances.md)",
+        )
+    text = _HEADER + "".join(map(_row, rows))
+    if left:
+        text += f"\n# {left} more circles, slots and sizes of the drawing are not listed.\n"
+    return text, findings
+
+
+def _row(each: Dimension) -> str:
+    """One [[dimension]]."""
+    lines = ["", "[[dimension]]", f"name = {_quoted(each.name)}", f'kind = "{each.kind}"']
+    if each.kind == "distance":
+        first, second = each.places_mm
+        lines += [f"from = {_pair(first)}", f"to = {_pair(second)}"]
+        if each.direction_rad is not None:
+            lines.append(f"direction = {_turned(each.direction_rad)}")
+    else:
+        lines.append(f"at = {_pair(each.places_mm[0])}")
+    if each.nominal_mm is not None:
+        lines.append(f'nominal = "{_number(each.nominal_mm)}mm"')
+    if each.limits is None:
+        lines.append(f'# limits = "{"H7" if each.kind == "diameter" else "±0.05"}"')
+    else:
+        lines.append(f'limits = "{each.limits.said}"')
+    return "\n".join(lines) + "\n"
+
+
+def _number(value: float) -> str:
+    return f"{round(value, DIGITS) + 0.0:.{DIGITS}f}".rstrip("0").rstrip(".")
+
+
+def _pair(place: Place) -> str:
+    return f"[{_number(place[0])}, {_number(place[1])}]"
+
+
+def _turned(direction: float) -> str:
+    """x, y or degrees."""
+    degrees = math.degrees(direction) % 180.0
+    for name, of in (("x", 0.0), ("y", 90.0), ("x", 180.0)):
+        if abs(degrees - of) <= 10.0**-DIGITS:
+            return f'"{name}"'
+    return f"{degrees:.9g}"
+
+
+def _quoted(name: str) -> str:
+    """A name as TOML text."""
+    return '"' + name.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+def _sizes(features: Sequence[Feature], closed: Sequence[bool]) -> Iterator[Dimension]:
+    """The sizes of all paths, path by path: circles, slots, outlines."""
+    paths = [list(of) for _, of in groupby(features, lambda each: each.path)]
+    circles = [of[0] for of in paths if len(of) == 1 and isinstance(of[0], Circle)]
+    whole = [each for each in circles if each.whole]
+    shapes = [of for of in paths if closed[of[0].path] and of[0] not in whole]
+    for number, circle in enumerate(whole, 1):
+        name, size = f"circle {number}", 2.0 * circle.radius_mm
+        yield Dimension(name, "diameter", (circle.centre_mm,), "", nominal_mm=size)
+    slots = [(of, slot) for of in shapes if (slot := _slot(of)) is not None]
+    for number, (_, slot) in enumerate(slots, 1):
+        for what, (first, second, direction) in zip(("width", "length"), slot, strict=True):
+            yield Dimension(
+                f"slot {number} {what}", "distance", (first, second), "", direction_rad=direction
+            )
+    is_slot = {id(of) for of, _ in slots}
+    outlines = [of for of in shapes if id(of) not in is_slot]
+    yield from chain.from_iterable(
+        _overall(f"outline {number}", of) for number, of in enumerate(outlines, 1)
+    )
+
+
+def _slot(of: Sequence[Feature]) -> tuple[tuple[Place, Place, float], ...] | None:
+    """From, to and direction of the width and the length of a slot; None for anything else."""
+    ends = [each for each in of if isinstance(each, Circle)]
+    edges = [each for each in of if isinstance(each, Edge)]
+    if len(ends) != 2 or len(edges) != 2:
+        return None
+    half = all(abs(abs(float(each.arcs[:, 1].sum())) - math.pi) <= 1e-3 for each in ends)
+    if not half or abs(ends[0].radius_mm - ends[1].radius_mm) > 10.0**-DIGITS:
+        return None
+    (x, y), (to_x, to_y) = ends[0].centre_mm, ends[1].centre_mm
+    axis = math.atan2(to_y - y, to_x - x)
+    along = np.array([math.cos(axis), math.sin(axis)])
+    first = _point(np.subtract(ends[0].centre_mm, ends[0].radius_mm * along))
+    last = _point(np.add(ends[1].centre_mm, ends[1].radius_mm * along))
+    across = (axis + 0.5 * math.pi) % math.pi
+    width = _middle(edges[0]), _middle(edges[1]), across
+    return width, (first, last, axis % math.pi)
+
+
+def _overall(name: str, of: Sequence[Feature]) -> Iterator[Dimension]:
+    """The sizes of a path along x and y."""
+    for axis, letter in enumerate("xy"):
+        direction = np.eye(2)[axis]
+        ends = [_outermost(of, direction, side) for side in (-1.0, 1.0)]
+        if ends[0] is not None and ends[1] is not None:
+            yield Dimension(
+                f"{name} {letter}",
+                "distance",
+                (ends[0], ends[1]),
+                "",
+                direction_rad=axis * 0.5 * math.pi,
+            )
+
+
+def _outermost(of: Sequence[Feature], direction: Floats, side: float) -> Place | None:
+    """The place of an edge or an arc that lies farthest out; None where a corner does."""
+    farthest, place = -math.inf, None
+    for each in of:
+        if isinstance(each, Edge):
+            at = max(side * float(direction @ end) for end in (each.start_mm, each.end_mm))
+            here = _middle(each) if each.is_square_to(direction) else None
+        else:
+            angle = math.atan2(*(side * direction)[::-1])
+            here = _point(each.centre_mm + side * each.radius_mm * direction)
+            at = side * float(direction @ np.array(here))
+            if not each.has(np.array([angle]))[0]:
+                ends = np.cumsum(each.arcs, axis=1).ravel()
+                tips = np.column_stack([np.cos(ends), np.sin(ends)]) * each.radius_mm
+                at = float((side * (each.centre_mm + tips) @ direction).max())
+                here = None
+        if at > farthest + POSITION_EPS_MM or (at > farthest - POSITION_EPS_MM and place is None):
+            farthest, place = max(at, farthest), here
+    return place
+
+
+def _middle(edge: Edge) -> Place:
+    return _point(np.add(edge.start_mm, edge.end_mm) / 2.0)
+
+
+def _point(point: Floats) -> Place:
+    return float(point[0]), float(point[1])
