@@ -675,6 +675,14 @@ class Code(IntEnum):
         "cannot be inspected",
         "cut it in the same program, or take the dimension out of tolerances.toml",
     )
+    DIMENSION_NOT_IN = (
+        503,
+        (WARNING, ERROR),
+        "a dimension is out of its limits, or it is undecided whether it is (ISO 14253-1, 95 %); "
+        "an error where `--require` asks for more",
+        "look at what contributes most to its uncertainty in the report, and measure that; or "
+        "change the job: allowance, compensation, order, direction",
+    )
     CALLOUT_TEXT = (
         520,
         WARNING,
@@ -1705,4 +1713,14 @@ COUNT_DIFFERS = Sentence(
     Code.COUNT_DIFFERS,
     "{name} counts {limit:.0f} equal features, but {measured:.0f} of this size are drawn: only "
     "this one is inspected",
+)
+DIMENSION_NOT_IN_OUT = Sentence(
+    Code.DIMENSION_NOT_IN,
+    "{name} is out: {measured:.4f} mm at worst, where {limit:.4f} mm is the limit",
+    "mm",
+)
+DIMENSION_NOT_IN_UNDECIDED = Sentence(
+    Code.DIMENSION_NOT_IN,
+    "{name} is undecided: {measured:.4f} mm at worst, where {limit:.4f} mm is the limit; {why}",
+    "mm",
 )

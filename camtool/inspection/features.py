@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -164,8 +164,9 @@ class Bound:
     def placed(self, where: Map) -> Bound:
         """It in the work frame, where lengths are as in the drawing."""
         direction = where.matrix @ self.direction / where.scale
+        places = tuple(where.point(place) for place in self.dimension.places_mm)
         return Bound(
-            self.dimension,
+            replace(self.dimension, places_mm=places),
             tuple(each.placed(where) for each in self.of),
             tuple(end.placed(where) for end in self.ends),
             direction,

@@ -18,6 +18,7 @@ from camtool.findings import DIMENSION_NOT_CUT, Finding
 from camtool.inspection.dimensions import Dimension
 from camtool.inspection.features import Bound, Edge, Feature, bind, features_of
 from camtool.inspection.sizes import Cut, Size, Swept, cut_of, edge_at, rows_of, size_of
+from camtool.inspection.uncertainty import Variant, edges_of, opposite_edges
 from camtool.machine.model import Machine
 from camtool.planning.job import Job, Tool
 from camtool.planning.place import SCALE_SHARE, placements
@@ -67,14 +68,16 @@ class Inspector:
         self._tool = ToolAt(wanted.toolpath, run.job, tool_mm(run.job))
         moves = swept_moves(wanted, self._tool)
         self._points = _points(wanted)
+        self._last: tuple[Machine, Swept] | None = None
         found: list[Finding] = []
         self.dimensions: tuple[Inspected, ...] = tuple(_inspected(run, dimensions, moves, found))
         self.findings = tuple(found)
 
-    def sizes(self, machine: Machine | None = None, wider_mm: float = 0.0) -> list[Size]:
-        """The sizes of the dimensions on this machine (None: that of the run), with a tool that is
-        wider in diameter by so much. A feature that is not cut there is NaN."""
-        slides = self._slides(machine or self._target.machine).wider(0.5 * wider_mm)
+    def sizes(self, variant: Variant | None = None) -> list[Size]:
+        """The sizes of the dimensions on a variant of the machine (None: that of the run). Where a
+        feature is not cut there they are NaN."""
+        variant = variant or Variant(self._target.machine)
+        slides = self._slides(variant.machine).wider(0.5 * variant.wider_mm)
         lies: dict[int, Floats] = {}
         sizes = []
         for each in self.dimensions:
@@ -85,13 +88,48 @@ class Inspector:
             sizes.append(size or Size(math.nan, math.nan, math.nan))
         return sizes
 
+    def values(self, variant: Variant) -> Floats:
+        """(3 D,) mm: of each dimension its best fit, its least and its largest local size."""
+        sizes = self.sizes(variant)
+        return np.array([(each.fit_mm, each.low_mm, each.high_mm) for each in sizes]).reshape(-1)
+
+    @property
+    def edges(self) -> Floats:
+        """(3 D, E, 2) by how much the values change with the place of each machined edge."""
+        return edges_of([(3, _edges_of(each.bound)) for each in self.dimensions])
+
+    @property
+    def tool_diameter_mm(self) -> float:
+        """That of the widest tool; 0 where none has a width."""
+        return 2.0 * float(self._tool.radius.max(initial=0.0))
+
     def _slides(self, machine: Machine) -> Swept:
         """What the slides of this machine do with the program."""
-        from camtool.verification.verify import verify
+        known = self._last
+        if known is None or known[0] is not machine:
+            from camtool.verification.verify import verify
 
-        options = VerifyOptions(trace_points=self._points)
-        done = verify(self._decoded, replace(self._target, machine=machine), options=options)
-        return swept_trace(done.trace, self._follows, self._tool)
+            options = VerifyOptions(trace_points=self._points)
+            done = verify(self._decoded, replace(self._target, machine=machine), options=options)
+            known = self._last = machine, swept_trace(done.trace, self._follows, self._tool)
+        return known[1]
+
+
+def _edges_of(bound: Bound) -> Floats:
+    """(E, 2) the weights in X and Y of the edges that make a dimension: a centre lies midway
+    between two edges, a zone is as wide as one edge is off."""
+    kind = bound.dimension.kind
+    if kind == "diameter":
+        return opposite_edges(0.0)
+    if kind == "distance":
+        rows: list[Floats] = []
+        for sign, end in zip((-1.0, 1.0), bound.ends, strict=True):
+            half = [0.5, 0.5] if end.how == "centre" else [1.0]
+            rows += [sign * share * bound.direction for share in half]
+        return np.array(rows)
+    if kind == "position":
+        return np.array([(1.0, 0.0), (1.0, 0.0)])
+    return np.array([(2.0, 0.0) if kind == "profile" else (1.0, 0.0)])
 
 
 def _inspected(

@@ -35,9 +35,10 @@ CIRCLE_STATIONS = 360
 EDGE_STATIONS = 128
 """Stations on an edge."""
 
-REACHED_MM = 0.005
+REACHED_MM = 5e-4
 """Where the planned edge is farther than this from its own middle, the tool cannot reach (corners
-narrower than it), or another cut crosses: stations there are not measured."""
+narrower than it), or another cut crosses: stations there are not measured. Planned moves are
+exact to a fifth of this."""
 
 FEWEST_SHARE = 0.25
 """A feature of which less than this is cut is not measured."""

@@ -35,6 +35,9 @@ GAP = "#d5311e"
 SWEPT = "#d6e6f6"
 REVERSAL = "#8a2be2"
 
+VERDICTS = {"in": "#009e73", "undecided": "#e69f00", "out": GAP, "predicted": RAPID}
+"""The colours of inspected dimensions."""
+
 LAYER_COLOURS = ("#2b4c6f", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#5a5a5a")
 
 BINS = 24

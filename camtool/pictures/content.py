@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -133,6 +134,15 @@ class Content:
         left, low, right, high = self.scene.stock_mm
         corners = [[left, low, 0.0], [right, low, 0.0], [right, high, 0.0], [left, high, 0.0]]
         return chains_of(Polylines.of([Polyline(np.array(corners), closed=True)]))
+
+    def straight(self, ends: Sequence[tuple[Place, Place]]) -> tuple[Chain, ...]:
+        """A line between each two places that differ."""
+        lines = [
+            Polyline(np.array([(*one, 0.0), (*other, 0.0)]))
+            for one, other in ends
+            if math.dist(one, other) > POSITION_EPS_MM
+        ]
+        return chains_of(Polylines.of(lines))
 
     @cached_property
     def reversals(self) -> Floats:

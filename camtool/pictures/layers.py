@@ -31,6 +31,7 @@ from camtool.pictures.colours import (
     STOCK,
     SWEPT,
     TRAVEL,
+    VERDICTS,
     bin_colours,
 )
 from camtool.pictures.svg import Look, PathData, element, number, title
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from camtool.pictures.content import Content, Place
     from camtool.pictures.plot import Plot
     from camtool.pictures.view import View
+    from camtool.verification.report import InspectedReport
 
 SWATCH = 34.0
 """Width of the swatch before a line of the legend."""
@@ -356,6 +358,47 @@ def _worst_legend(content: Content, view: View) -> Iterator[Entry]:
         yield Entry(dot_swatch(WORST_MARK), "largest errors, by rank")
 
 
+# Dimensions with their verdicts.
+
+INSPECTED_PEN = 2.2
+
+
+def _inspected(content: Content) -> list[Part]:
+    """A line from end to end of each dimension, in the colour of its verdict."""
+    parts: list[Part] = []
+    for verdict, colour in VERDICTS.items():
+        mine = [each for each in content.scene.inspected if each.verdict == verdict]
+        look: Look = {"stroke": colour, "stroke-width": INSPECTED_PEN}
+        chains = content.straight([each.places_mm for each in mine])
+        parts.append(Lines(f"dimensions-{verdict}", f"dimension: {verdict}", chains, look))
+    return parts
+
+
+def _sizes(content: Content) -> list[Part]:
+    """The ends of each dimension, and its size beside it."""
+    parts: list[Part] = []
+    every = content.scene.inspected
+    for verdict, colour in VERDICTS.items():
+        ends = [end for each in every if each.verdict == verdict for end in each.places_mm]
+        look: Look = {"r": 3.4, "fill": colour, "stroke": PAPER, "stroke-width": 1.0}
+        parts.append(Dots(f"ends-{verdict}", "", ends, look))
+    middles = [_middle(*each.places_mm) for each in every]
+    return [*parts, Texts("sizes", [_size_words(each) for each in every], middles, INK)]
+
+
+def _middle(one: Place, other: Place) -> Place:
+    return 0.5 * (one[0] + other[0]), 0.5 * (one[1] + other[1])
+
+
+def _size_words(item: InspectedReport) -> str:
+    """Nominal size, limits, and the predicted size with its uncertainty."""
+    sign = {"diameter": "Ø", "radius": "R"}.get(item.kind, "")
+    band = "" if item.standard_um is None else f" ± {2e-3 * item.standard_um:.3f}"
+    nominal = f"{sign}{item.nominal_mm:g}" if item.nominal_mm else item.kind
+    wanted = f"{nominal} {item.limits}".rstrip()
+    return f"{wanted}: {item.fit_mm:.3f}{band}"
+
+
 # Part zero.
 
 
@@ -512,6 +555,22 @@ LAYERS = (
         height=9,
         place=13,
         hint="; tabs of a job, or --tabs, make some",
+    ),
+    Layer(
+        "dimensions",
+        _inspected,
+        in_mm=True,
+        height=7,
+        place=14,
+        hint="; --tolerances names some",
+        key="d",
+    ),
+    Layer(
+        "sizes",
+        _sizes,
+        legend=lambda content, view: (),
+        height=10,
+        hint="; --tolerances names some",
     ),
     Layer("doubts", _noted, height=6, place=9, needs="drawing"),
 )

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from camtool.machine.model import Machine
     from camtool.planning.job import Job, Tool
     from camtool.toolpath.program import Listing
-    from camtool.verification.report import Report
+    from camtool.verification.report import InspectedReport, Report
     from camtool.verification.verify import Verification
 
 
@@ -46,8 +46,8 @@ class Scene:
     was compared, `worst` the places of its largest errors, mm, the largest first; `tool_mm` is the
     diameter of the tool, if there is only one, and `nose` a tool that is as wide as it is deep,
     where that changes along the path; `rounds` are full circles with their errors.
-    `tabs` are the places of tabs, mm. `playback` gives how the toolpath runs; only the viewer
-    calls it.
+    `tabs` are the places of tabs, mm; `inspected` the dimensions with their verdicts. `playback`
+    gives how the toolpath runs; only the viewer calls it.
 
     With a trace the picture leaves out rapids and plunges, and feeds are pale. ValueError when the
     trace is incomplete or not finite.
@@ -69,6 +69,7 @@ class Scene:
     playback: Callable[[], Playback] | None = None
     stock_mm: tuple[float, float, float, float] | None = None
     tabs: tuple[tuple[float, float], ...] = ()
+    inspected: tuple[InspectedReport, ...] = ()
 
     def __post_init__(self) -> None:
         points, error = self.trace_points, self.trace_error_mm
@@ -230,6 +231,7 @@ def scene_of(
         nose=None if job is None or width is not None else nose_of(job),
         rounds=() if verification is None else rounds_of(verification),
         tabs=tabs,
+        inspected=() if verification is None else verification.report.inspection,
         playback=_playback(toolpath, verification, machine, listing),
     )
 

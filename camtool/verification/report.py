@@ -263,6 +263,45 @@ class FoundReport(msgspec.Struct, frozen=True):
     off_rms_um: float | None = None
 
 
+class Contribution(msgspec.Struct, frozen=True):
+    """What one input contributes to the standard uncertainty of a dimension, µm; null where it is
+    not known how well the input is."""
+
+    input: str
+    um: float | None
+
+
+class InspectedReport(msgspec.Struct, frozen=True):
+    """A dimension of the part with its limits, in mm but where a name says otherwise.
+
+    `places_mm`: two places in the work frame between which a picture shows it. `lower_mm` and
+    `upper_mm` are limits of the size, null without any. Predicted are the best fit and the least
+    and the largest local size. `standard_um` is the standard uncertainty of that one of these that
+    decides, `guard_um` by how much it must be within its limit to be surely in. `probability`: to
+    be within the limits. `verdict`: "in", "out", "undecided", or "predicted" without limits.
+    `unknown`: inputs that matter and of which it is not known how well they are; `measure`: that
+    which one should measure next, "" for none."""
+
+    name: str
+    kind: str
+    source: str
+    places_mm: tuple[tuple[float, float], tuple[float, float]]
+    nominal_mm: float
+    limits: str
+    lower_mm: float | None
+    upper_mm: float | None
+    fit_mm: float
+    low_mm: float
+    high_mm: float
+    verdict: str
+    standard_um: float | None = None
+    guard_um: float | None = None
+    probability: float | None = None
+    contributions: tuple[Contribution, ...] = ()
+    unknown: tuple[str, ...] = ()
+    measure: str = ""
+
+
 class FindingReport(msgspec.Struct, frozen=True):
     """A finding, by the names of its code and severity."""
 
@@ -379,6 +418,7 @@ class Report(msgspec.Struct, frozen=True):
     asked: AskedReport | None = None
     against: str = "program"
     found: FoundReport | None = None
+    inspection: tuple[InspectedReport, ...] = ()
 
     def to_json(self) -> str:
         """Indented JSON with keys in the order of the record, and a newline at the end."""
@@ -568,6 +608,40 @@ def facts(report: Report) -> Iterator[tuple[str, str]]:
         yield "ends", f"{report.unreached.moves} moves end elsewhere, up to {far:.2f} µm away"
     if report.shape is not None:
         yield "shape", _shape_words(report.shape)
+    yield from (("dimension", inspected_words(each)) for each in report.inspection)
+
+
+def inspected_words(item: InspectedReport) -> str:
+    """A dimension in one line: its limits, its predicted sizes, its verdict."""
+    sign = {"diameter": "Ø", "radius": "R"}.get(item.kind, "")
+    nominal = f"{sign}{item.nominal_mm:.6g}" if item.nominal_mm else item.kind
+    words = f"{item.name}: {nominal} {item.limits}".rstrip()
+    size = f"{item.fit_mm:.4f} mm"
+    if item.high_mm > item.low_mm:
+        size += f" ({item.low_mm:.4f} to {item.high_mm:.4f})"
+    if item.standard_um is not None:
+        size += f" ± {COVERAGE * item.standard_um:.1f} µm"
+    words += f"; predicted {size}"
+    if item.verdict == "predicted":
+        return words
+    words += f"; {item.verdict}"
+    if item.probability is not None:
+        words += f", probability of in {_chance(item.probability)}"
+    if item.unknown:
+        words += f", not known: {', '.join(item.unknown)}"
+    return words + (f"; measure {item.measure}" if item.measure else "")
+
+
+def _chance(probability: float) -> str:
+    """A probability in per cent, never rounded to certainty."""
+    share = 100.0 * probability
+    if share > 99.9:
+        return "over 99.9 %"
+    return "under 0.1 %" if share < 0.1 else f"{share:.1f} %"
+
+
+COVERAGE = 2.0
+"""Uncertainties in tables are expanded by this, to cover some 95 %."""
 
 
 def _asked_words(asked: AskedReport) -> str:
@@ -790,8 +864,10 @@ class Sheet:
 
 
 def sheets(report: Report) -> Iterator[Sheet]:
-    """Errors by source, dimensions, circles, contours and worst moves, without empty tables."""
+    """Inspected dimensions, errors by source, sizes, circles, contours and worst moves, without
+    empty tables."""
     every = (
+        _inspection_sheet(report),
         _error_sheet(report),
         _dimension_sheet(report),
         _circle_sheet(report),
@@ -800,6 +876,27 @@ def sheets(report: Report) -> Iterator[Sheet]:
         _worst_sheet(report),
     )
     return (sheet for sheet in every if sheet.rows)
+
+
+def _inspection_sheet(report: Report) -> Sheet:
+    limits, sizes = ("lower mm", "upper mm"), ("least mm", "fit mm", "largest mm")
+    heads = ("inspected", "verdict", "most from", *limits, *sizes, "± µm", "in")
+    rows = tuple(
+        (
+            item.name,
+            item.verdict,
+            item.contributions[0].input if item.contributions else "–",
+            "–" if item.lower_mm is None else f"{item.lower_mm:.4f}",
+            "–" if item.upper_mm is None else f"{item.upper_mm:.4f}",
+            f"{item.low_mm:.4f}",
+            f"{item.fit_mm:.4f}",
+            f"{item.high_mm:.4f}",
+            um(None if item.standard_um is None else COVERAGE * item.standard_um),
+            "–" if item.probability is None else _chance(item.probability),
+        )
+        for item in report.inspection
+    )
+    return Sheet("dimensions", heads, rows, words=3)
 
 
 def _error_sheet(report: Report) -> Sheet:

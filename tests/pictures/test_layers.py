@@ -13,6 +13,7 @@ import pytest
 from camtool.errors import OptionError
 from camtool.geometry.drawing import Gap
 from camtool.pictures.chains import reversals_of
+from camtool.pictures.colours import VERDICTS
 from camtool.pictures.content import content_of
 from camtool.pictures.draw import draw
 from camtool.pictures.layers import chosen, layer_names, layers_in, usual_layers
@@ -21,6 +22,7 @@ from camtool.pictures.page import page_of
 from camtool.pictures.plot import CLEAR, labels_beside
 from camtool.pictures.scene import Scene
 from camtool.toolpath.builder import ToolpathBuilder
+from camtool.verification.report import InspectedReport
 from tests.oracles import literal_reversals, svg_page
 from tests.pictures.conftest import (
     SCENES,
@@ -37,6 +39,24 @@ MILLED = replace(
     tool_mm=0.5,
     stock_mm=(-1.0, -1.0, 6.0, 4.0),
     tabs=((1.0, 0.5),),
+    inspected=tuple(
+        InspectedReport(
+            name="width",
+            kind="distance",
+            source="test",
+            places_mm=((0.5, y), (4.5, y)),
+            nominal_mm=4.0,
+            limits="±0.01",
+            lower_mm=3.99,
+            upper_mm=4.01,
+            fit_mm=4.002,
+            low_mm=4.001,
+            high_mm=4.003,
+            verdict=verdict,
+            standard_um=3.0,
+        )
+        for y, verdict in enumerate(VERDICTS)
+    ),
 )
 JUDGED = replace(SCENES["result"], worst=((4.5, 2.5), (2.5, 0.5), (4.5, 2.5)))
 GROUPS = {
@@ -50,6 +70,8 @@ GROUPS = {
     "arrows": ("arrows",),
     "reversals": ("reversals",),
     "tabs": ("tabs",),
+    "dimensions": tuple(f"dimensions-{verdict}" for verdict in VERDICTS),
+    "sizes": ("sizes", *(f"ends-{verdict}" for verdict in VERDICTS)),
     "zero": ("part-zero",),
 }
 
