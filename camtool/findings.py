@@ -680,8 +680,9 @@ class Code(IntEnum):
         (WARNING, ERROR),
         "a dimension is out of its limits, or it is undecided whether it is (ISO 14253-1, 95 %); "
         "an error where `--require` asks for more",
-        "look at what contributes most to its uncertainty in the report, and measure that; or "
-        "change the job: allowance, compensation, order, direction",
+        "look at what contributes most to its uncertainty in the report, and measure that; say in "
+        "`[uncertainty]` of the machine file what is known (`camtool calibrate` does); or change "
+        "the job: allowance, compensation, order, direction",
     )
     CALLOUT_TEXT = (
         520,
@@ -1680,7 +1681,7 @@ SETTING_DIFFERS_DWELL = Sentence(
 )
 DIMENSION_UNBOUND = Sentence(
     Code.DIMENSION_UNBOUND,
-    "{name} is not inspected: {measured:no|one|#} {what} {measured:is|is|are} there",
+    "{name} is not inspected: {measured:nothing that is drawn fits|one fits|# features fit}",
 )
 DIMENSION_NOT_CUT = Sentence(
     Code.DIMENSION_NOT_CUT, "{name} is not inspected: the program does not cut its {what}"

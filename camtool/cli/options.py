@@ -19,7 +19,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, cast
 
 import click
 
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from camtool.machine.model import Machine
     from camtool.planning.job import Job
     from camtool.project import Project
+    from camtool.run import Run
     from camtool.target.registry import LoadedTarget
     from camtool.verification.report import Gates
 
@@ -290,6 +291,68 @@ def gate_options(command: Command) -> Command:
                 callback=duration,
                 metavar="TIME",
                 help="Time of the whole program, such as 90min or 1h.",
+            ),
+        ],
+    )
+
+
+# Dimensions that must hold.
+
+
+@dataclass(frozen=True)
+class InspectionFlags:
+    """`--tolerances` and `--require`."""
+
+    tolerances: str | None = None
+    require: Literal["in", "not-out"] | None = None
+
+    def check(self, *, without: str | None) -> None:
+        """A usage error for `--require` alone, and beside a flag (`without`) that leaves nothing
+        to inspect."""
+        if self.require is not None and self.tolerances is None:
+            raise click.UsageError("--require needs --tolerances")
+        if self.tolerances is not None and without is not None:
+            raise click.UsageError(f"{without} leaves nothing to inspect; drop --tolerances")
+
+    def files(self) -> list[str]:
+        """The file, if it is one."""
+        return [] if self.tolerances in (None, DRAWING) else [str(self.tolerances)]
+
+    def inspected(self, run: Run) -> Run:
+        """The run with the verdicts of its dimensions."""
+        if self.tolerances is None or run.drawing is None:
+            return run
+        from camtool.inspection.tolerances import dimensions_of
+        from camtool.inspection.verdicts import Tolerances, inspect
+
+        file = None if self.tolerances == DRAWING else Path(self.tolerances)
+        dimensions, findings = dimensions_of(run.drawing, file)
+        return inspect(run, Tolerances(dimensions, findings, self.require))
+
+
+DRAWING = "drawing"
+"""`--tolerances drawing` is for the dimensions of the drawing alone."""
+
+
+def inspection_options(command: Command) -> Command:
+    """Adds `inspection: InspectionFlags`."""
+    return with_flags(
+        command,
+        "inspection",
+        InspectionFlags,
+        [
+            option(
+                _LIMITS,
+                "--tolerances",
+                metavar="FILE",
+                help="Dimensions with limits, and whether they will hold: a tolerances.toml with "
+                "those of the drawing, or 'drawing' for these alone.",
+            ),
+            option(
+                _LIMITS,
+                "--require",
+                type=click.Choice(["in", "not-out"]),
+                help="What every dimension with limits must be.",
             ),
         ],
     )

@@ -27,12 +27,14 @@ from camtool.cli.options import (
     Command,
     DrawingFlags,
     GateFlags,
+    InspectionFlags,
     JobFlags,
     MachineFlags,
     SectionedCommand,
     decorate,
     drawing_options,
     gate_options,
+    inspection_options,
     job_options,
     machine_options,
     own_job,
@@ -82,6 +84,7 @@ class Posting:
 
     machine: MachineFlags
     gates: GateFlags
+    inspection: InspectionFlags
     job: JobFlags
     drawing: DrawingFlags
     no_verify: bool
@@ -91,6 +94,7 @@ class Posting:
         """The target; a usage error when the flags contradict each other."""
         if self.no_verify and self.gates.given:
             raise click.UsageError("--no-verify leaves nothing to hold against limits")
+        self.inspection.check(without="--no-verify" if self.no_verify else None)
         return self.machine.load()
 
     def make(
@@ -105,7 +109,8 @@ class Posting:
         read."""
         from camtool.pipeline import post_drawing
 
-        return self._made(post_drawing, source, target, on_read=on_read, pictures=pictures)
+        run = self._made(post_drawing, source, target, on_read=on_read, pictures=pictures)
+        return self.inspection.inspected(run)
 
     def make_by_tool(
         self, source: str, target: LoadedTarget, *, pictures: Sequence[str] = ()
@@ -143,8 +148,9 @@ class Posting:
             )
 
     def files(self, source: str) -> list[str]:
-        """The files that a program is made of: drawing, job, its tool table, and machine."""
-        return [source, *self.job.files(), *self.machine.files()]
+        """The files that a program is made of: drawing, job, its tool table, tolerances, and
+        machine."""
+        return [source, *self.job.files(), *self.inspection.files(), *self.machine.files()]
 
     def of(self, source: str) -> Posting:
         """The same with the drawing's own job file if it has one, in the place of `--job`; flags
@@ -156,7 +162,8 @@ class Posting:
 def posting_options(command: Command) -> Command:
     """Adds `posting: Posting`."""
     inner = with_flags(command, "posting", Posting, [])
-    inner = machine_options(gate_options(job_options(drawing_options(inner))))
+    inner = inspection_options(job_options(drawing_options(inner)))
+    inner = machine_options(gate_options(inner))
     return decorate(
         inner,
         [
@@ -221,6 +228,7 @@ def post(
         raise click.UsageError("--watch works on files: neither reads stdin nor writes stdout")
     outputs = Outputs(preview, report, page)
     picture.check(outputs.pictures, UNVERIFIED if posting.no_verify else RESULT)
+    posting.inspection.check(without=None if split is None else "--split")
     if split is not None and STDOUT in (output or source, preview, page):
         raise click.UsageError("--split writes several files; name the one that they begin with")
     if before_after:

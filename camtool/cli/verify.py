@@ -22,11 +22,13 @@ from camtool.cli.messages import (
 from camtool.cli.options import (
     DrawingFlags,
     GateFlags,
+    InspectionFlags,
     JobFlags,
     MachineFlags,
     SectionedCommand,
     drawing_options,
     gate_options,
+    inspection_options,
     job_options,
     machine_options,
     talk_options,
@@ -106,6 +108,7 @@ if TYPE_CHECKING:
 )
 @picture_options
 @gate_options
+@inspection_options
 @job_options
 @drawing_options
 @talk_options
@@ -125,6 +128,7 @@ def verify(
     beside: str | None,
     picture: PictureFlags,
     gates: GateFlags,
+    inspection: InspectionFlags,
     job: JobFlags,
     drawing: DrawingFlags,
     quiet: bool,
@@ -145,7 +149,12 @@ def verify(
     wishes = Wishes(Outputs(preview, report, page), picture, beside, quiet, verbose)
     wishes.check(comparing=compare is not None, gated=gates.given)
     finding = _finds(job, against, align=align, comparing=compare is not None)
-    wishes.outputs.check([program, against, beside, *machine.files(), *job.files()])
+    leaves_none = "--compare" if compare is not None else None
+    inspection.check(without=leaves_none)
+    if inspection.tolerances is not None and against is None:
+        raise click.UsageError("--tolerances needs the drawing: give --against")
+    read_files = [*machine.files(), *job.files(), *inspection.files()]
+    wishes.outputs.check([program, against, beside, *read_files])
 
     from camtool.comparison import effects_without
     from camtool.pictures.options import points_for
@@ -168,7 +177,7 @@ def verify(
     with job.blamed():
         if compare is not None:
             return _compare(program, _variants(compare, machine, judging), case, wishes)
-        return _judge(program, case, wishes)
+        return _judge(program, case, inspection, wishes)
 
 
 def _finds(job: JobFlags, against: str | None, *, align: bool, comparing: bool) -> bool:
@@ -259,9 +268,9 @@ class Case:
         )
 
 
-def _judge(file: str, case: Case, wishes: Wishes) -> int:
+def _judge(file: str, case: Case, inspection: InspectionFlags, wishes: Wishes) -> int:
     """The verdict on one program, in words and files; the exit code."""
-    run, outputs = case.judged(file), wishes.outputs
+    run, outputs = inspection.inspected(case.judged(file)), wishes.outputs
 
     def scenes() -> list[Scene]:
         return [run.scene(), *([case.judged(wishes.beside).scene()] if wishes.beside else [])]

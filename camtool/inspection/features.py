@@ -230,21 +230,29 @@ def bind(dimension: Dimension, features: Sequence[Feature], file: str) -> Bound 
         found: list[Feature] = [
             each for each in features if isinstance(each, Edge) and _near(each, dimension)
         ]
-        return _single(dimension, found, "edge", 0.0, file)
+        return _single(dimension, found, 0.0, file)
     if dimension.kind == "profile":
         paths = sorted({each.path for each in features if _near(each, dimension)})
         if len(paths) != 1:
-            return _unbound(dimension, len(paths), "outline", file)
+            return _unbound(dimension, len(paths), file)
         whole = Outline(paths[0], tuple(each for each in features if each.path == paths[0]))
         return Bound(dimension, (whole,), (), np.zeros(2), 0.0)
     circles = [each for each in features if isinstance(each, Circle) and _is_of(each, dimension)]
     if len(circles) > 1 and dimension.nominal_mm is not None:
         wanted = dimension.nominal_mm * (0.5 if dimension.kind == "diameter" else 1.0)
         circles = [each for each in circles if abs(each.radius_mm - wanted) <= BIND_MM] or circles
+    circles = _preferred(circles)
     drawn = 0.0
     if circles and dimension.kind in ("diameter", "radius"):
         drawn = circles[0].radius_mm * (2.0 if dimension.kind == "diameter" else 1.0)
-    return _single(dimension, circles, "circle", drawn, file)
+    return _single(dimension, circles, drawn, file)
+
+
+def _preferred(circles: list[Circle]) -> list[Circle]:
+    """Of circles about one centre the whole one, where there is just one: people mean the hole,
+    not the rounding of the corner around it."""
+    whole = [each for each in circles if each.whole]
+    return whole if len(whole) == 1 else circles
 
 
 def _near(feature: Feature, dimension: Dimension) -> bool:
@@ -260,10 +268,10 @@ def _is_of(circle: Circle, dimension: Dimension) -> bool:
 
 
 def _single(
-    dimension: Dimension, found: Sequence[Feature], what: str, drawn_mm: float, file: str
+    dimension: Dimension, found: Sequence[Feature], drawn_mm: float, file: str
 ) -> Bound | Finding:
     if len(found) != 1:
-        return _unbound(dimension, len(found), what, file)
+        return _unbound(dimension, len(found), file)
     return Bound(dimension, (found[0],), (), np.zeros(2), drawn_mm)
 
 
@@ -275,13 +283,13 @@ def _distance(dimension: Dimension, features: Sequence[Feature], file: str) -> B
         along = np.array([math.cos(angle), math.sin(angle)])
         direction = along if float(along @ direction) >= 0.0 else -along
     elif not direction.any():
-        return _unbound(dimension, 0, "second place", file)
+        return _unbound(dimension, 0, file)
     direction = direction / np.hypot(*direction)
     ends = []
     for place in (first, second):
         found = _ends_at(place, direction, features)
         if len(found) != 1:
-            return _unbound(dimension, len(found), "feature", file, place)
+            return _unbound(dimension, len(found), file, place)
         ends.append(found[0])
     places = [_place_of(end, direction) for end in ends]
     drawn = float((places[1] - places[0]) @ direction)
@@ -300,9 +308,8 @@ def _ends_at(place: Place, direction: Floats, features: Sequence[Feature]) -> li
     """What a place can mean for a measurement along `direction`. Edges come before the circles
     that go on from them with the same direction."""
     circles = [each for each in features if isinstance(each, Circle)]
-    centres = [
-        End(each, "centre") for each in circles if math.dist(place, each.centre_mm) <= BIND_MM
-    ]
+    about = [each for each in circles if math.dist(place, each.centre_mm) <= BIND_MM]
+    centres = [End(each, "centre") for each in _preferred(about)]
     edges = [
         End(each, "edge")
         for each in features
@@ -324,13 +331,10 @@ def _ends_at(place: Place, direction: Floats, features: Sequence[Feature]) -> li
     return outermost
 
 
-def _unbound(
-    dimension: Dimension, count: int, what: str, file: str, place: Place | None = None
-) -> Finding:
+def _unbound(dimension: Dimension, count: int, file: str, place: Place | None = None) -> Finding:
     x, y = dimension.places_mm[0] if place is None else place
     return DIMENSION_UNBOUND(
         where=f"{file}, {dimension.source}, at ({x:.3f}, {y:.3f}) mm",
         measured=count,
         name=dimension.name,
-        what=what,
     )

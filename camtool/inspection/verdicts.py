@@ -202,9 +202,7 @@ def _findings(verdicts: Iterable[InspectedReport], require: Required | None) -> 
             continue
         why = f"measure {each.measure}"
         if each.unknown:
-            why = f"it is not known how sure {', '.join(each.unknown)} " + (
-                "is" if len(each.unknown) == 1 else "are"
-            )
+            why = f"[uncertainty] of the machine file does not say {', '.join(each.unknown)}"
         yield DIMENSION_NOT_IN_UNDECIDED(
             where=each.source,
             measured=worst,

@@ -132,3 +132,18 @@ def test_placed_features_lie_where_the_drawing_comes_to_lie(
             assert isinstance(other, Edge)
             assert here.start_mm == pytest.approx(other.start_mm, abs=1e-9)
             assert here.end_mm == pytest.approx(other.end_mm, abs=1e-9)
+
+
+def test_a_hole_is_meant_and_not_the_rounding_around_it() -> None:
+    bulge = math.tan(math.pi / 8)
+    outline = [(5, 0, 0), (30, 0, 0), (30, 30, 0), (0, 30, 0), (0, 5, bulge)]
+    hole = [(7, 5, 1), (3, 5, 1)]
+    paths = [Polyline(np.array(p, dtype=float), True) for p in (outline, hole)]
+    features = features_of(Polylines.of(paths))
+    found = bind(Dimension("d", "diameter", ((5, 5),), "test"), features, "x")
+    assert isinstance(found, Bound)
+    assert found.drawn_mm == pytest.approx(4.0)
+    across = Dimension("d", "distance", ((5, 5), (30, 10)), "test", 0.0)
+    reach = bind(across, features, "x")
+    assert isinstance(reach, Bound)
+    assert reach.drawn_mm == pytest.approx(25.0)
