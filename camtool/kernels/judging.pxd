@@ -6,13 +6,16 @@ from camtool.kernels.offsets cimport apart_square, wait_for_children
 from camtool.kernels.types cimport Int
 
 cdef class Curves:
-    cdef double[:, ::1] start, end, arcs
+    cdef const double[:, :] start, end
+    cdef double[:, ::1] arcs
     cdef int[::1] arc
 
 cdef class Search:
     cdef Curves curves
-    cdef double[:, ::1] heights, nodes
-    cdef Int[::1] order, found, stack, parts, by
+    cdef const double[:, :] heights
+    cdef double[:, ::1] nodes
+    cdef int[::1] order
+    cdef Int[::1] found, stack, parts, by
     cdef double[::1] box, x, y, error, other
     cdef readonly Int looked
 
@@ -45,7 +48,7 @@ cpdef double smallest(double[::1] values, Int low, Int high) noexcept
 
 @cython.locals(k=Int, square=double, over=double)
 cdef void _to_line(
-    double[:, ::1] start, double[:, ::1] end, Int row, double[::1] x, double[::1] y,
+    const double[:, :] start, const double[:, :] end, Int row, double[::1] x, double[::1] y,
     double[::1] errors
 ) noexcept  # wide
 
@@ -69,7 +72,7 @@ cdef void _to_circle(
 
 @cython.locals(k=Int, above_half=bint, inside=bint)
 cdef void _to_arc(
-    double[:, ::1] start, double[:, ::1] end, Int row, double[:, ::1] arcs, Int at,
+    const double[:, :] start, const double[:, :] end, Int row, double[:, ::1] arcs, Int at,
     double[::1] x, double[::1] y, double[::1] errors
 ) noexcept  # wide
 
@@ -86,13 +89,13 @@ cdef double larger(double one, double other) noexcept  # inline
 cdef Int first_of(double[::1] values, Int low, double value) noexcept
 
 cdef bint _counts(
-    Int k, Int first, Int last, double z_low, double z_high, double[:, ::1] heights
+    Int k, Int first, Int last, double z_low, double z_high, const double[:, :] heights
 ) noexcept  # inline
 
 @cython.locals(
     leaves=Int, height=Int, node=Int, low=Int, place=Int, k=Int, nearest=Int, best=double,
-    order=Int[::1], stack=Int[::1], curves=Curves, nodes=double[:, ::1],
-    heights=double[:, ::1], spot_x=double[::1], spot_y=double[::1], spot_error=double[::1]
+    order=int[::1], stack=Int[::1], curves=Curves, nodes=double[:, ::1],
+    heights="const double[:, :]", spot_x=double[::1], spot_y=double[::1], spot_error=double[::1]
 )
 cdef Int _nearest(
     double x, double y, double within, Int first, Int last, double z_low, double z_high,
@@ -144,8 +147,8 @@ cdef void _lowered(
 @cython.locals(
     leaves=Int, height=Int, node=Int, low=Int, place=Int, k=Int, n=Int, count=Int, most=Int,
     some=Int,
-    order=Int[::1], stack=Int[::1], found=Int[::1], curves=Curves, nodes=double[:, ::1],
-    heights=double[:, ::1], box=double[::1]
+    order=int[::1], stack=Int[::1], found=Int[::1], curves=Curves, nodes=double[:, ::1],
+    heights="const double[:, :]", box=double[::1]
 )
 cdef bint _compared(
     double[::1] x, double[::1] y, Int own, Int first, Int last, double z_low, double z_high,

@@ -22,10 +22,11 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from camtool.arrays import Floats, Ints
+from camtool.arrays import Floats, Indices, Ints
 from camtool.kernels.move_tree import FIRST as FIRST_BELOW
 from camtool.kernels.move_tree import LAST as LAST_BELOW
-from camtool.kernels.offsets import DEPTH, LEAF, apart_square, wait_for_children
+from camtool.kernels.move_tree import LEAF
+from camtool.kernels.offsets import DEPTH, apart_square, wait_for_children
 
 # Bins for the sizes of errors: those of a float's own bits. Plain numpy: no kernel.
 #
@@ -178,7 +179,7 @@ class Shapes(NamedTuple):
 
     start: Floats
     end: Floats
-    arc: npt.NDArray[np.int32]
+    arc: Indices
     arcs: Floats
 
 
@@ -361,7 +362,7 @@ class Moves(NamedTuple):
     shapes: Shapes
     heights: Floats
     nodes: Floats
-    order: Ints
+    order: Indices
 
 
 class Search:

@@ -11,14 +11,17 @@ holds `LEAF` moves of the order. Made by numpy, in a few turns for each level.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import numpy.typing as npt
-
-from camtool.kernels.offsets import LEAF
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Indices = npt.NDArray[np.int32]
+
+LEAF = 8
+"""So many moves have one leaf; fewer make more nodes, which take most of the room."""
 
 FIRST, LAST = 4, 5
 """Columns of a node after its box: the first row below it, and one past the last."""
@@ -30,20 +33,29 @@ LEVELS = 16
 """Squares are halved so often: the middles are told apart to a 65,536th of the whole."""
 
 
-def move_tree(boxes: Floats, group: Ints | Indices | None = None) -> tuple[Floats, Ints]:
-    """(2L, 6) nodes over `boxes` (K, 4), and the order (K,) of the rows in their L leaves. Rows of
-    one `group` (K,), ascending, stay together: a search among these looks at no others."""
-    order = hilbert_order(boxes[:, :2], boxes[:, 2:])
+def move_tree(
+    count: int, boxes: Callable[[Ints | Indices], Floats], group: Ints | Indices | None = None
+) -> tuple[Floats, Indices]:
+    """(2L, 6) nodes over so many rows K, whose `boxes` (J, 4) are asked for some rows (J,) at a
+    time, and the order (K,) of the rows in their L leaves. Rows of one `group` (K,), ascending,
+    stay together: a search among these looks at no others."""
+
+    def middles(rows: Ints) -> Floats:
+        box = boxes(rows)
+        return np.asarray(0.5 * (box[:, :2] + box[:, 2:]))
+
+    order = _hilbert_order(count, middles)
     if group is not None:
         order = order[np.argsort(group[order], kind="stable")]
     leaves = 1
-    while leaves * LEAF < len(boxes):
+    while leaves * LEAF < count:
         leaves *= 2
     # Largest numbers are the least of those with the other sign.
     tree = np.full((2 * leaves, 6), np.inf)
-    for low in range(0, len(order), AT_ONCE):
+    for low in range(0, count, AT_ONCE):
         rows = order[low : low + AT_ONCE]
-        lows = np.column_stack([boxes[rows, :2], -boxes[rows, 2:], rows, -1.0 - rows])
+        box = boxes(rows)
+        lows = np.column_stack([box[:, :2], -box[:, 2:], rows, -1.0 - rows])
         first = leaves + low // LEAF
         begins = np.arange(0, len(rows), LEAF)
         tree[first : first + len(begins)] = np.minimum.reduceat(lows, begins)
@@ -62,18 +74,24 @@ def hilbert_order(starts: Floats, ends: Floats) -> Ints:
     The quarters of a square come in the order (0, 0), (0, 1), (1, 1), (1, 0). In the first and the
     last the curve is that of the whole with X and Y exchanged, in the last it is mirrored besides.
     """
-    if len(starts) == 0:
-        return np.empty(0, dtype=np.int64)
-    lots = [slice(first, first + AT_ONCE) for first in range(0, len(starts), AT_ONCE)]
+    order = _hilbert_order(len(starts), lambda rows: 0.5 * (starts[rows] + ends[rows]))
+    return order.astype(np.int64)
+
+
+def _hilbert_order(count: int, middles: Callable[[Ints], Floats]) -> Indices:
+    """The same of so many rows, whose `middles` (J, 2) are asked for some rows (J,) at a time."""
+    if count == 0:
+        return np.empty(0, dtype=np.int32)
+    lots = [(first, min(first + AT_ONCE, count)) for first in range(0, count, AT_ONCE)]
     low, high = np.full(2, np.inf), np.full(2, -np.inf)
     for lot in lots:
-        middles = 0.5 * (starts[lot] + ends[lot])
-        low, high = np.minimum(low, middles.min(axis=0)), np.maximum(high, middles.max(axis=0))
+        here = middles(np.arange(*lot))
+        low, high = np.minimum(low, here.min(axis=0)), np.maximum(high, here.max(axis=0))
     size = max(float((high - low).max()), np.finfo(np.float64).tiny)
-    place = np.empty(len(starts), dtype=np.uint32)
+    place = np.empty(count, dtype=np.uint32)
     for lot in lots:
-        place[lot] = _hilbert_places((0.5 * (starts[lot] + ends[lot]) - low) / size)
-    return np.argsort(place, kind="stable")
+        place[slice(*lot)] = _hilbert_places((middles(np.arange(*lot)) - low) / size)
+    return np.argsort(place, kind="stable").astype(np.int32)
 
 
 def _hilbert_places(points: Floats) -> Ints:

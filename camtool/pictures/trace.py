@@ -150,7 +150,8 @@ def nearest_points(points: Floats, wanted: Segments) -> Floats:
     from camtool.kernels.fits import nearest_rows
 
     boxes = segment_boxes(wanted)
-    row = nearest_rows(points, wanted.start, wanted.end, wanted.bulge, boxes)
+    bulge = np.ascontiguousarray(wanted.bulge)  # of lines alone one number, seen as many
+    row = nearest_rows(points, wanted.start, wanted.end, bulge, boxes)
     begin, end, sweep = wanted.start[row], wanted.end[row], wanted.sweep[row]
     chord = end - begin
     square = (chord**2).sum(axis=1)

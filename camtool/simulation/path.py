@@ -35,7 +35,7 @@ from camtool.machine.model import Machine, PathController
 from camtool.simulation.controller import ControllerModel
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import Chunk, Options
-from camtool.simulation.rows import check_positions, check_rows, placed
+from camtool.simulation.rows import check_positions, check_rows, placed, with_ends
 from camtool.simulation.samples import (
     ROWS_AT_ONCE,
     CountedSamples,
@@ -128,10 +128,10 @@ def on_steps(toolpath: Toolpath, machine: Machine) -> Toolpath:
     exact = placed(toolpath, home)
     home = _on_grid(home, machine)
     start = _on_grid(exact.start, machine)
-    end = frozen(exact.by_parts(lambda part: _on_grid(part.end, machine)))
+    end = exact.by_parts(lambda part: _on_grid(part.end, machine))
     arcs = np.flatnonzero(exact.is_arc)
     sweeps = exact.sweeps_of(arcs)
-    made = _centred(replace(exact, start=start, end=end), arcs, np.abs(sweeps), machine)
+    made = _centred(with_ends(exact, start, end), arcs, np.abs(sweeps), machine)
     while True:
         bent = made.is_arc[arcs]
         arcs, sweeps = arcs[bent], sweeps[bent]

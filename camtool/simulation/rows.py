@@ -31,7 +31,15 @@ def placed(toolpath: Toolpath, home: Floats) -> Toolpath:
         known = np.where(toolpath.is_motion | (kind == homing), np.arange(count), -1)
         latest = np.maximum.accumulate(known)
         end[:, axis] = np.where(latest < 0, toolpath.start[axis], end[latest, axis])
-    return toolpath if (end == toolpath.end).all() else replace(toolpath, end=frozen(end))
+    return with_ends(toolpath, toolpath.start, end)
+
+
+def with_ends(toolpath: Toolpath, start: Floats, end: Floats) -> Toolpath:
+    """The toolpath with this start (3,) and these ends (N, 3) mm; the very toolpath where they are
+    its own."""
+    if (start == toolpath.start).all() and (end == toolpath.end).all():
+        return toolpath
+    return replace(toolpath, start=start, end=frozen(end))
 
 
 def check_positions(toolpath: Toolpath, machine: Machine) -> None:

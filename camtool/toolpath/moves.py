@@ -150,7 +150,7 @@ class Toolpath:
         """(N, 3) mm: where each row begins."""
         return np.concatenate([self.start[None, :], self.end[:-1]]) if len(self) else self.end
 
-    def starts_of(self, rows: Ints) -> Floats:
+    def starts_of(self, rows: Ints | Indices) -> Floats:
         """(K, 3) mm: where these rows begin."""
         starts = self.end.take(rows - 1, axis=0)  # several times as fast as an index
         starts[rows == 0] = self.start
@@ -177,7 +177,7 @@ class Toolpath:
         sweeps[arcs] = self.sweeps_of(arcs)
         return sweeps
 
-    def sweeps_of(self, arcs: Ints) -> Floats:
+    def sweeps_of(self, arcs: Ints | Indices) -> Floats:
         """(J,) the same of these rows, which are arcs.
 
         CCW: sweep = (angle(end) − angle(start)) mod 2π, taken in (0, 2π];  CW: mirrored.

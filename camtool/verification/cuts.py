@@ -20,7 +20,7 @@ import numpy as np
 from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.geometry.measure import point_at, segment_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
-from camtool.toolpath.moves import ROWS_AT_ONCE, Kind, Toolpath
+from camtool.toolpath.moves import ROWS_AT_ONCE, Kind, Toolpath, are_arcs
 from camtool.toolpath.rapids import STOCK_TOP_MM
 
 FEWEST_SAMPLES = 4
@@ -46,7 +46,7 @@ class CutMoves:
     first: Indices
     contour: Indices
 
-    def heights(self, which: Ints) -> Floats:
+    def heights(self, which: Ints | Indices) -> Floats:
         """(J, 2) mm: the heights of the starts and ends of these segments, between which their
         height changes evenly: the segments of a row are equal parts of it."""
         row = self.segments.path[which]
@@ -164,21 +164,27 @@ def _segments(toolpath: Toolpath, first: Indices, arcs: tuple[Ints, Floats]) -> 
     (J,) that are arcs, and their sweeps (J,). The points between parts lie on the start's
     radius."""
     row = np.repeat(np.arange(len(toolpath)), np.diff(first))
+    bulge = np.broadcast_to(np.zeros(1), len(row))
+    if not len(arcs[0]) and len(row) and row[0] > 0 and (np.diff(row) == 1).all():
+        low, high = row[0], row[-1] + 1  # the toolpath's own points
+        ends = toolpath.end[low - 1 : high - 1, :2], toolpath.end[low:high, :2]
+        return Segments(*ends, bulge, row)
     start, end = toolpath.end[row - 1, :2], toolpath.end[row, :2]
     start[row == 0] = toolpath.start[:2]
-    bulge = np.zeros(len(row))
-    bent = np.flatnonzero(toolpath.is_arc[row])
-    of, begin, centre = row[bent], start[bent], toolpath.centre[row[bent]]
-    turn: Floats = arcs[1][np.searchsorted(arcs[0], of)] / (first[of + 1] - first[of])
-    part = bent - first[of]
-    inner = np.flatnonzero(part)
-    start[bent[inner]] = _turned(begin, centre, part * turn)[inner]
-    end[bent] = _turned(begin, centre, (part + 1) * turn)
-    bulge[bent] = np.tan(0.25 * turn)
+    if len(arcs[0]):
+        bulge = np.zeros(len(row))
+        bent = np.flatnonzero(toolpath.is_arc[row])
+        of, begin, centre = row[bent], start[bent], toolpath.centre[row[bent]]
+        turn: Floats = arcs[1][np.searchsorted(arcs[0], of)] / (first[of + 1] - first[of])
+        part = bent - first[of]
+        inner = np.flatnonzero(part)
+        start[bent[inner]] = _turned(begin, centre, part * turn)[inner]
+        end[bent] = _turned(begin, centre, (part + 1) * turn)
+        bulge[bent] = np.tan(0.25 * turn)
     if len(row) and (start[1:] == end[:-1]).all():  # one path, whose points are stored once
         points = np.concatenate([start[:1], end])
         start, end = points[:-1], points[1:]
-    return Segments.between(start, end, bulge, row)
+    return Segments(start, end, bulge, row)
 
 
 def _turned(points: Floats, centre: Floats, angle: Floats) -> Floats:
@@ -297,26 +303,27 @@ def loops(cuts: CutMoves, gap_mm: float) -> Ints:
     found = np.full((len(begin), 2), NO_LOOP, dtype=np.int64)
     whole = cuts.closed(gap_mm) & _level(cuts)
     found[whole] = np.column_stack([begin, finish])[whole]
-    rows = np.flatnonzero(cuts.is_cut & ~np.append(whole, True)[cuts.contour])
+    rows = np.flatnonzero(cuts.is_cut & ~np.append(whole, True)[cuts.contour]).astype(np.int32)
     begins = np.flatnonzero(np.diff(cuts.contour[rows], prepend=-1))
     toolpath = cuts.toolpath
-    starts = toolpath.starts_of(rows[begins])[:, :2]
-    places = np.insert(toolpath.end[rows, :2], begins, starts, axis=0)
-    offsets = np.append(begins + np.arange(len(begins)), len(places))
+    # Of each contour the places where it begins and where its rows end; sizes stand at the latter.
+    offsets = np.append(begins, len(rows)) + np.arange(len(begins) + 1)
+    places, sums = np.empty((offsets[-1], 2)), np.zeros((offsets[-1], 2))
+    places[offsets[:-1]] = toolpath.starts_of(rows[begins])[:, :2]
+    for low in range(0, len(rows), ROWS_AT_ONCE):
+        some = np.arange(low, min(low + ROWS_AT_ONCE, len(rows)))
+        at = some + np.searchsorted(begins, some, side="right")
+        places[at] = toolpath.end[rows[some], :2]
+        sums[at] = _lengths_and_areas(toolpath, rows[some])
     latest = latest_near(places, offsets, gap_mm)
     # Most contours without a loop are lines that come back nowhere.
-    again = np.flatnonzero(latest >= 0)
-    if len(again) == 0:
-        return found
-    sizes = toolpath.by_parts(_lengths_and_areas)[rows]
-    for run in np.unique(np.searchsorted(offsets, again, side="right") - 1).tolist():
+    for run in np.flatnonzero(np.maximum.reduceat(latest, offsets[:-1]) >= 0).tolist():
         low, high = offsets[run], offsets[run + 1]
-        mine = slice(low - run, high - run - 1)
-        loop = _longest_loop(
-            sizes[mine], places[low:high], np.maximum(latest[low:high] - low, -1), gap_mm
-        )
+        np.cumsum(sums[low:high], axis=0, out=sums[low:high])
+        loop = _longest_loop(sums[low:high], places[low:high], latest[low:high] - low, gap_mm)
         if loop is not None:
-            found[cuts.contour[rows[begins[run]]]] = rows[mine][loop[0]], rows[mine][loop[1]]
+            mine = rows[low - run : high - run - 1]
+            found[cuts.contour[mine[0]]] = mine[loop[0]], mine[loop[1]]
     return found
 
 
@@ -340,36 +347,40 @@ def _level(cuts: CutMoves) -> Bools:
     return np.asarray(low == high)
 
 
-def _lengths_and_areas(toolpath: Toolpath) -> Floats:
-    """(N, 2) the length of each row in mm, and the signed area in mm² between it and the origin.
+def _lengths_and_areas(toolpath: Toolpath, rows: Indices) -> Floats:
+    """(R, 2) the length of each of these moves (R,) in mm, and the signed area in mm² between it
+    and the origin.
 
     Green's theorem: half the cross product of the ends of a move, and for an arc of sweep t the
     area (r²/2)(t − sin t) of its circular segment on top.
     """
-    (ax, ay), (bx, by) = toolpath.starts[:, :2].T, toolpath.end[:, :2].T
-    sweep = toolpath.sweeps()
-    spoke = toolpath.starts[:, :2] - toolpath.centre
-    square = np.where(toolpath.is_arc, (spoke**2).sum(axis=1), 0.0)
-    area = 0.5 * (ax * by - ay * bx) + 0.5 * square * (sweep - np.sin(sweep))
-    return np.column_stack([_lengths(toolpath), area])
+    begin, end = toolpath.starts_of(rows)[:, :2], toolpath.end[rows, :2]
+    length = np.hypot(*(end - begin).T)
+    area = 0.5 * (begin[:, 0] * end[:, 1] - begin[:, 1] * end[:, 0])
+    arcs = np.flatnonzero(are_arcs(toolpath.kind[rows]))
+    spoke, sweep = begin[arcs] - toolpath.centre[rows[arcs]], toolpath.sweeps_of(rows[arcs])
+    length[arcs] = np.hypot(*spoke.T) * np.abs(sweep)
+    area[arcs] += 0.5 * (spoke**2).sum(axis=1) * (sweep - np.sin(sweep))
+    return np.column_stack([length, area])
 
 
 def _longest_loop(
-    sizes: Floats, places: Floats, latest: Ints | Indices, gap_mm: float
+    sums: Floats, places: Floats, latest: Indices, gap_mm: float
 ) -> tuple[int, int] | None:
-    """First and last row, from 0, of the loop of one contour: `sizes` (R, 2) of its cutting rows
-    as `_lengths_and_areas` has them, and where it begins and its rows end, `places` (R + 1, 2);
-    `latest` (R + 1,) the latest of these before each that is the same place, below 0 for none."""
-    sums = np.concatenate([np.zeros((1, 2)), np.cumsum(sizes, axis=0)])
-    high = np.flatnonzero(latest >= 0)
-    low = latest[high]
-    (ax, ay), (bx, by) = places[high].T, places[low].T
-    long, area = (sums[high] - sums[low]).T
-    around = np.abs(area + 0.5 * (ax * by - ay * bx)) > gap_mm * gap_mm
+    """First and last row, from 0, of the loop of one contour, which begins and whose rows end at
+    `places` (R + 1, 2); `sums` (R + 1, 2) of what `_lengths_and_areas` gives for the rows before
+    each place, and `latest` (R + 1,) the latest place before each that is the same, below 0 for
+    none."""
     best, most = None, 0.0
-    for first, end, length in zip(
-        low[around].tolist(), high[around].tolist(), long[around].tolist(), strict=True
-    ):
-        if length >= AS_LONG * most:
-            best, most = (first, end - 1), max(most, length)
+    for first in range(0, len(places), ROWS_AT_ONCE):
+        high = first + np.flatnonzero(latest[first : first + ROWS_AT_ONCE] >= 0)
+        low = latest[high]
+        (ax, ay), (bx, by) = places[high].T, places[low].T
+        long, area = (sums[high] - sums[low]).T
+        around = np.abs(area + 0.5 * (ax * by - ay * bx)) > gap_mm * gap_mm
+        for begin, end, length in zip(
+            low[around].tolist(), high[around].tolist(), long[around].tolist(), strict=True
+        ):
+            if length >= AS_LONG * most:
+                best, most = (begin, end - 1), max(most, length)
     return best

@@ -19,7 +19,6 @@ import numpy as np
 from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.errors import ProgramError
 from camtool.geometry.measure import segment_boxes
-from camtool.geometry.polylines import Segments
 from camtool.progress import Progress
 from camtool.simulation.controller import FusedRun
 from camtool.simulation.motion import Chunk
@@ -210,11 +209,22 @@ class Tasks:
         contour = paths.wanted.contour[self._rows]
         self._begins = np.searchsorted(contour, np.arange(paths.wanted.contour_count + 1))
         known = bool((match.only[paths.decoded.is_cut] != ANY_CONTOUR).all())
-        tree = move_tree(move_boxes(paths.wanted), contour if known else None)
         every = shapes(paths.wanted, 0, len(paths.wanted.contour))
-        self._moves = Moves(every, move_heights(paths.wanted), *tree)
+        heights = move_heights(paths.wanted)
+        tree = move_tree(len(self._rows), self._boxes, contour if known else None)
+        self._moves = Moves(every, heights, *tree)
         self._centre = np.array([circle.centre_mm for circle in paths.circles]).reshape(-1, 2)
         self._directions = bin_directions()
+
+    def _boxes(self, which: Ints | Indices) -> Floats:
+        """(J, 4) mm: the boxes of these moves that cut."""
+        ends = _ends(self._paths.wanted, self._rows[which])
+        segments, (first, last) = self._paths.wanted.segments, np.array(ends, dtype=np.int64)
+        boxes, parted = segment_boxes(segments[first]), np.flatnonzero(first < last)
+        other = segment_boxes(segments[last[parted]])
+        boxes[parted, :2] = np.minimum(boxes[parted, :2], other[:, :2])
+        boxes[parted, 2:] = np.maximum(boxes[parted, 2:], other[:, 2:])
+        return boxes
 
     def of(self, low: int, high: int) -> Task:
         """The task of the rows low:high."""
@@ -294,51 +304,34 @@ def _in_order(first: Ints, last: Ints) -> Iterator[int]:
 # Cutting moves as columns for the compiled judge: one move for each row that cuts.
 
 
-def _blocks(cuts: CutMoves) -> Iterator[tuple[slice, int, int]]:
-    """The places of the moves that cut in blocks of rows low:high, and these rows."""
-    done = 0
-    for low in range(0, len(cuts.contour), ROWS_AT_ONCE):
-        high = min(low + ROWS_AT_ONCE, len(cuts.contour))
-        count = int((cuts.contour[low:high] >= 0).sum())
-        yield slice(done, done + count), low, high
-        done += count
-
-
 def move_heights(cuts: CutMoves) -> Floats:
-    """(J, 2) mm: the lowest and highest points of the moves that cut."""
-    found = np.empty((int(cuts.is_cut.sum()), 2))
-    for here, low, high in _blocks(cuts):
-        _, first, last = _part(cuts, low, high)
-        z = np.sort(cuts.heights(np.arange(cuts.first[low], cuts.first[high])), axis=1)
-        found[here, 0] = np.minimum(z[first, 0], z[last, 0])
-        found[here, 1] = np.maximum(z[first, 1], z[last, 1])
-    return found
+    """(J, 2) mm: the lowest and highest points of the moves that cut; one row, seen as many, where
+    all are at one height."""
+    rows = cuts.rows
+    found = np.empty((len(rows), 2))
+    for low in range(0, len(rows), ROWS_AT_ONCE):
+        first, last = _ends(cuts, rows[low : low + ROWS_AT_ONCE])
+        ends = np.column_stack([cuts.heights(first), cuts.heights(last)])
+        found[low : low + len(ends), 0] = ends.min(axis=1)
+        found[low : low + len(ends), 1] = ends.max(axis=1)
+    level = len(found) and (found == found[0, 0]).all()
+    return np.broadcast_to(found[:1].copy(), found.shape) if level else found
 
 
-def move_boxes(cuts: CutMoves) -> Floats:
-    """(J, 4) mm: the boxes of the moves that cut."""
-    found = np.empty((int(cuts.is_cut.sum()), 4))
-    for here, low, high in _blocks(cuts):
-        segments, first, last = _part(cuts, low, high)
-        boxes = segment_boxes(segments)
-        found[here, :2] = np.minimum(boxes[first, :2], boxes[last, :2])
-        found[here, 2:] = np.maximum(boxes[first, 2:], boxes[last, 2:])
-    return found
-
-
-def _part(cuts: CutMoves, low: int, high: int) -> tuple[Segments, Indices, Indices]:
-    """The segments of the rows low:high, and which of them are the first and the last (J,), (J,)
-    of each row that cuts."""
-    begin, end = int(cuts.first[low]), int(cuts.first[high])
-    rows = low + np.flatnonzero(cuts.contour[low:high] >= 0)
-    return cuts.segments[begin:end], cuts.first[rows] - begin, cuts.first[rows + 1] - 1 - begin
+def _ends(cuts: CutMoves, rows: Ints | Indices) -> tuple[Indices, Indices]:
+    """(J,), (J,) the first and the last segment of each of these rows, which cut."""
+    return cuts.first[rows], cuts.first[rows + 1] - 1
 
 
 def shapes(cuts: CutMoves, low: int, high: int) -> Shapes:
     """Those of the rows low:high that cut, one move for each."""
     from camtool.kernels import judging as at
 
-    segments, first, last = _part(cuts, low, high)
+    begin = cuts.first[low]
+    segments = cuts.segments[begin : cuts.first[high]]
+    first, last = _ends(cuts, low + np.flatnonzero(cuts.contour[low:high] >= 0))
+    first -= begin
+    last -= begin
     start, end = segments.start, segments.end
     if len(first) < len(segments):
         start, end = start[first], end[last]

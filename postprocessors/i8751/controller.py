@@ -15,7 +15,6 @@ It issues nothing at reversals; compensation in a machine file would be steps at
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 
@@ -25,8 +24,8 @@ from camtool.machine.model import Machine
 from camtool.simulation.controller import ControllerModel
 from camtool.simulation.legs import LegRun, Legs, Standing, check_rows, coded_steps_mm, waits_s
 from camtool.simulation.motion import Chunk, Options
-from camtool.simulation.rows import refuse
-from camtool.toolpath.moves import Toolpath, frozen
+from camtool.simulation.rows import refuse, with_ends
+from camtool.toolpath.moves import Toolpath
 
 from .dialect import Dialect, I8751Controller
 from .pulses import PulseTimes
@@ -54,11 +53,9 @@ class I8751Model(ControllerModel[I8751Controller, Dialect]):
         """The same with start and ends at their nearest steps; ProgramError for arcs, homing."""
         _check(toolpath, machine)
         step_mm = coded_steps_mm(machine)
-        return replace(
-            toolpath,
-            start=_in_steps(toolpath.start[None, :], machine)[0] * step_mm,
-            end=frozen(toolpath.by_parts(lambda part: _in_steps(part.end, machine) * step_mm)),
-        )
+        start = _in_steps(toolpath.start[None, :], machine)[0] * step_mm
+        end = toolpath.by_parts(lambda part: _in_steps(part.end, machine) * step_mm)
+        return with_ends(toolpath, start, end)
 
     def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
         """A diagonal and the rest along an axis; there are no arcs."""

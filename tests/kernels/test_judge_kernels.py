@@ -10,7 +10,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from camtool.arrays import Floats
+from camtool.arrays import Floats, Indices, Ints
 from camtool.kernels.judging import (
     ANGLE_BINS,
     WRITTEN,
@@ -25,8 +25,7 @@ from camtool.kernels.judging import (
     trace_block,
     unwritten,
 )
-from camtool.kernels.move_tree import FIRST, LAST, hilbert_order, move_tree
-from camtool.kernels.offsets import LEAF
+from camtool.kernels.move_tree import FIRST, LAST, LEAF, hilbert_order, move_tree
 from tests.oracles.kernel_doors import (
     fill_bins_,
     nearest_errors_,
@@ -133,6 +132,11 @@ def walk(rng: np.random.Generator, count: int, size: float) -> tuple[np.ndarray,
     return np.ascontiguousarray(path[:, 0]), np.ascontiguousarray(path[:, 1])
 
 
+def tree_of(boxes: Floats, group: Ints | None = None) -> tuple[Floats, Indices]:
+    """The tree over boxes (K, 4) that are there."""
+    return move_tree(len(boxes), boxes.__getitem__, group)
+
+
 @pytest.mark.parametrize("size", [0.0, 1e-4, 0.01, 0.3])
 @pytest.mark.parametrize("count", [1, 2, 60, 400])
 def test_the_nearest_of_many_is_that_of_a_loop(size: float, count: int) -> None:
@@ -141,7 +145,7 @@ def test_the_nearest_of_many_is_that_of_a_loop(size: float, count: int) -> None:
     moves[-1] = moves[0]  # twice the same
     table = np.array([move.row() for move in moves], dtype=np.float64)
     boxes = np.array([move.box() for move in moves], dtype=np.float64)
-    tree = move_tree(boxes, np.sort(rng.integers(0, count, count)) if size else None)
+    tree = tree_of(boxes, np.sort(rng.integers(0, count, count)) if size else None)
     low = rng.uniform(-1.0, 0.0, count)
     heights = np.column_stack([low, low + rng.uniform(0.0, 0.3, count)])
     for _ in range(25):
@@ -194,7 +198,7 @@ def test_points_along_lines_that_cross(
     x = np.array([ax + t * (bx - ax) + chance.uniform(-one, one) for t, one in each])
     y = np.array([ay + t * (by - ay) + chance.uniform(-one, one) for t, one in each])
     table = np.array([move.row() for move in moves], dtype=np.float64)
-    tree = move_tree(np.array([move.box() for move in moves], dtype=np.float64))
+    tree = tree_of(np.array([move.box() for move in moves], dtype=np.float64))
     out = np.empty(count)
     expected = chance.choice([own, -1, chance.randrange(len(moves))])
     whole = (0, len(moves), 0.0, 0.0)
@@ -225,7 +229,7 @@ def test_the_side_at_a_corner_is_inside_or_outside(
     ]
     x, y = np.array([*points, *beyond]).T.copy()
     table = np.array([move.row() for move in moves], dtype=np.float64)
-    tree = move_tree(np.array([move.box() for move in moves], dtype=np.float64))
+    tree = tree_of(np.array([move.box() for move in moves], dtype=np.float64))
     out, whole = np.empty(len(x)), (0, len(moves), 0.0, 0.0)
     own = min(own, len(moves) - 1)
     nearest_errors_(x, y, own, whole, Moves(shapes(table), np.zeros((len(moves), 2)), *tree), out)
@@ -238,7 +242,7 @@ def test_of_equally_near_moves_the_own_one_gives_the_side() -> None:
     """There and back on one line: what is to the left of one is to the right of the other."""
     moves = [Line((0.0, 0.0), (9.0, 0.0)), Line((9.0, 0.0), (0.0, 0.0))]
     table = np.array([move.row() for move in moves], dtype=np.float64)
-    tree = move_tree(np.array([move.box() for move in moves], dtype=np.float64))
+    tree = tree_of(np.array([move.box() for move in moves], dtype=np.float64))
     x, y, out = np.array([2.0, 3.0]), np.array([0.5, 0.5]), np.empty(2)
     for own, error in ((0, 0.5), (1, -0.5)):
         whole = (0, 2, 0.0, 0.0)
@@ -260,7 +264,7 @@ def test_nodes_know_what_is_below_them(count: int, together: bool) -> None:
     low = rng.uniform(-9.0, 9.0, (count, 2))
     boxes = np.column_stack([low, low + rng.uniform(0.0, 2.0, (count, 2))])
     group = np.sort(rng.integers(0, count // 3 + 1, count))
-    nodes, order = move_tree(boxes, group if together else None)
+    nodes, order = tree_of(boxes, group if together else None)
     assert not together or np.array_equal(group[order], group)
     leaves = len(nodes) // 2
     assert sorted(order.tolist()) == list(range(count))
@@ -285,7 +289,7 @@ def test_a_search_in_a_spiral_looks_at_few_of_its_turns() -> None:
     table = np.array([line.row() for line in lines], dtype=np.float64)
     heights, out = np.zeros((len(lines), 2)), np.empty(1)
     boxes = np.array([line.box() for line in lines])
-    moves = Moves(shapes(table), heights, *move_tree(boxes))
+    moves = Moves(shapes(table), heights, *tree_of(boxes))
     looked = []
     for k in range(100, 8000, 700):
         at, whole = np.array([[places[k][0]], [places[k][1]]]), (0, len(lines), 0.0, 0.0)
@@ -302,7 +306,7 @@ def test_a_search_in_one_scribble_of_many_looks_at_no_others() -> None:
     scribble, boxes = np.arange(2000) // 40, np.array([line.box() for line in lines])
     looked = []
     for group in (None, scribble):
-        moves = Moves(shapes(table), heights, *move_tree(boxes, group))
+        moves = Moves(shapes(table), heights, *tree_of(boxes, group))
         for k in range(0, 2000, 97):
             x, y = np.array([lines[k].a]).T + 1e-6  # beside the line
             only = (40 * int(scribble[k]), 40 * int(scribble[k]) + 40, 0.0, 0.0)
@@ -320,7 +324,7 @@ def test_points_of_a_row_look_at_their_surroundings_alone() -> None:
     moves = Moves(
         shapes(table),
         np.zeros((len(lines), 2)),
-        *move_tree(np.array([line.box() for line in lines])),
+        *tree_of(np.array([line.box() for line in lines])),
     )
     x, y, out = np.linspace(0.0, 50.0, 700), np.full(700, 1000.001), np.empty(700)
     _, looked = nearest_errors_(x, y, 10_000, (0, len(lines), 0.0, 0.0), moves, out)

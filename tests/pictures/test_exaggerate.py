@@ -17,6 +17,8 @@ from camtool.pictures.draw import draw
 from camtool.pictures.options import Options
 from camtool.pictures.scene import Scene
 from camtool.pictures.trace import exaggerated, nearest_points
+from camtool.toolpath.builder import ToolpathBuilder
+from camtool.verification.cuts import cut_moves
 from tests.oracles import svg_page
 from tests.pictures.conftest import SCENES, circle, line
 
@@ -42,6 +44,13 @@ def test_the_nearest_point_is_on_the_path_and_no_other_is_nearer(
         along = point_at(segments, np.full(101, row), shares)
         for point, distance in zip(points, away, strict=True):
             assert distance <= np.hypot(*(along - point).T).min() + 1e-6
+
+
+def test_cuts_that_are_the_toolpath_s_own_lines_have_nearest_points() -> None:
+    path = ToolpathBuilder().rapid(0, 0, -1).line(4, 0, feed=1).line(4, 3, feed=1).finish()
+    wanted = cut_moves(path, flat_cuts=False).segments
+    foot = nearest_points(np.array([[1.0, 0.5], [4.2, 2.0]]), wanted)
+    assert foot.tolist() == [[1.0, 0.0], [4.0, 2.0]]
 
 
 def test_the_deviation_grows_by_the_factor_and_points_on_the_path_stay() -> None:

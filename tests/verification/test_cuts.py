@@ -117,6 +117,17 @@ def test_samples_include_both_ends_and_stay_bounded() -> None:
         assert len(own) >= 5
 
 
+def test_lines_that_follow_one_another_are_the_toolpath_s_own_points() -> None:
+    lines = cut(ToolpathBuilder(), 0, 0).line(1, 2, feed=1).line(3, 4, feed=1)
+    path = lines.finish()
+    cuts = cut_moves(path, flat_cuts=False)
+    assert cuts.segments.end.tolist() == [[1.0, 2.0], [3.0, 4.0]]
+    assert np.shares_memory(cuts.segments.start, path.end)
+    apart = cut_moves(lines.event(Kind.DWELL, 1.0).line(5, 4, feed=1).finish(), flat_cuts=False)
+    assert apart.segments.start.tolist() == [[0.0, 0.0], [1.0, 2.0], [3.0, 4.0]]
+    assert not np.shares_memory(apart.segments.start, path.end)
+
+
 def test_an_empty_toolpath_has_no_cuts() -> None:
     cuts = cut_moves(ToolpathBuilder().finish(), flat_cuts=True)
     assert len(cuts.segments) == 0
