@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from typing import Any, cast
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from camtool.inspection.uncertainty import (
 )
 from tests.validation import pic_mmh_parts as pic
 from tests.validation import test_validation_flashcut as flashcut
+from tests.validation import test_validation_others as others
 from tests.validation.page import check, mm
 from tests.validation.pieces import UM, Piece, piece
 
@@ -34,11 +36,12 @@ X, Y = 0.0, 0.5 * math.pi
 @dataclass(frozen=True)
 class Size:
     """A size of a part: its name, the direction in which it is measured, and what was measured,
-    mm, on one part or several."""
+    mm, on one part or several. It has two edges, or one, where it is a place."""
 
     name: str
     direction_rad: float
     measured_mm: tuple[float, ...]
+    edges: int = 2
 
 
 @dataclass(frozen=True)
@@ -78,6 +81,31 @@ def rectangle(name: str) -> Callable[[], Piece]:
 def circle(half_period: int) -> Callable[[], Piece]:
     setting = f"controller.half_period_ms={half_period}"
     return lambda: piece("flashcut-circle", setting, job=flashcut.ALONE)
+
+
+def turns(axis: str) -> Part:
+    """The places after six to ten turns of a screw, from what the first five say: the step and how
+    well it is known, and how much the readings scatter."""
+
+    def made() -> Piece:
+        found = others.by_five(axis)
+        settings = (
+            f"axes.{axis}.real_step_mm={others.step_by_five(axis)!r}",
+            f"uncertainty.{axis}.scale={found.known.standard(f'{axis}.scale')!r}",
+            f"uncertainty.process_mm={found.spread_mm!r}",
+        )
+        return Piece(cast(Any, None), *others.turned(axis, *settings))
+
+    def places(moved: Piece) -> list[float]:
+        found: list[float] = others.places_of(moved.decoded, moved.machine, axis)[5:].tolist()
+        return found
+
+    read = others.readings()[axis].tolist()
+    sizes = tuple(
+        Size(f"{axis.upper()} after {k} turns", X if axis == "x" else Y, (read[k - 1],), 1)
+        for k in range(6, 11)
+    )
+    return Part("ValCNC", "by five turns", made, places, sizes)
 
 
 def both(x: Sequence[float], y: Sequence[float]) -> tuple[Size, ...]:
@@ -126,6 +154,8 @@ PARTS = (
             Size("A to B", Y, (flashcut.APART_MM,)),
         ),
     ),
+    turns("x"),
+    turns("y"),
 )
 
 
@@ -137,7 +167,9 @@ def budget_of(part: Part) -> Budget:
     def values(variant: Variant) -> Floats:
         return np.array(part.sizes_of(replace(made, machine=variant.machine)))
 
-    edges = edges_of([(1, opposite_edges(size.direction_rad)) for size in part.sizes])
+    edges = edges_of(
+        [(1, opposite_edges(size.direction_rad)[: size.edges]) for size in part.sizes]
+    )
     return propagate(values, inputs_of(made.machine, 0.0), edges)
 
 

@@ -8,13 +8,15 @@ import tomllib
 import numpy as np
 import pytest
 
-from camtool.calibration.calibrate import calibrate
+from camtool.calibration.calibrate import Calibration, calibrate
 from camtool.calibration.measurements import Measurements, Steps, read_measurements
 from camtool.importers.read import read_drawing
+from camtool.machine.model import Machine
 from camtool.pipeline import post_drawing
 from camtool.planning.job import job_of
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.moves import Toolpath
 from tests.oracles.motion_rows import rows_of
 from tests.targets import simulate
 from tests.validation.page import check, mm, signed
@@ -32,18 +34,34 @@ def readings() -> dict[str, np.ndarray]:
 
 def ten_turns(axis: str, *settings: str) -> np.ndarray:
     """(10,) mm: where a program of ten moves of 8 mm leads the slide."""
+    return places_of(*turned(axis, *settings), axis)
+
+
+def turned(axis: str, *settings: str) -> tuple[Toolpath, Machine]:
+    """The program of ten moves of 8 mm as it is decoded, and the machine."""
     target = load_target("valcnc", settings=settings)
     path = ToolpathBuilder()
     for place in TURNS:
         path.rapid(**{axis: float(place)})
     program = target.target.write(path.finish(), target.machine)
-    decoded = target.target.read(program.data, target.machine)
-    rows = rows_of(simulate(decoded, target.machine))
+    return target.target.read(program.data, target.machine), target.machine
+
+
+def places_of(decoded: Toolpath, machine: Machine, axis: str) -> np.ndarray:
+    """(10,) mm: where the slide stands after each move."""
+    rows = rows_of(simulate(decoded, machine))
     return np.array([row.slide[-1, "xyz".index(axis)] for row in rows if len(row.slide)])
 
 
 def step_by_five(axis: str) -> float:
     """What the first five turns say of the step."""
+    estimate = by_five(axis).estimate("step", axis)
+    assert estimate is not None
+    return estimate.value
+
+
+def by_five(axis: str) -> Calibration:
+    """What the first five turns say."""
     said = read_measurements(MEASURED)
     ((name, coupon),) = [each for each in said.coupons if getattr(each[1], "axis", "") == axis]
     assert isinstance(coupon, Steps)
@@ -53,9 +71,7 @@ def step_by_five(axis: str) -> float:
     some = Measurements(
         said.file, said.target, None, said.compensation_mm, said.regions, ((name, half),)
     )
-    estimate = calibrate(some, load_target("valcnc").machine).estimate("step", axis)
-    assert estimate is not None
-    return estimate.value
+    return calibrate(some, load_target("valcnc").machine)
 
 
 def test_valcnc(bless: bool) -> None:
