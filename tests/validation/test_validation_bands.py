@@ -8,6 +8,7 @@ number for is unknown, has no part in a band, and is named.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -21,14 +22,15 @@ from camtool.inspection.uncertainty import (
     Variant,
     edges_of,
     inputs_of,
+    normal_below,
     opposite_edges,
     propagate,
 )
 from tests.validation import pic_mmh_parts as pic
 from tests.validation import test_validation_flashcut as flashcut
 from tests.validation import test_validation_others as others
-from tests.validation.page import check, mm
-from tests.validation.pieces import UM, Piece, piece
+from tests.validation.page import PAGE, check, mm
+from tests.validation.pieces import ROOT, UM, Piece, piece
 
 X, Y = 0.0, 0.5 * math.pi
 
@@ -205,3 +207,171 @@ def test_the_simulation_of_variants_is_that_of_the_report() -> None:
         if part.sizes_of is extents:
             made = part.made()
             assert np.allclose(extents(made), made.size, atol=1e-6)
+
+
+# The comparison.
+
+LEVELS = (0.5, 0.68, 0.8, 0.9, 0.95, 0.99)
+"""Of the bands of the reliability diagram."""
+
+KINDS = (
+    ("PIC machine: squares", "squares of 2.5", ""),
+    ("PIC machine: circles", "circles", ""),
+    ("PIC machine: logos, X", "puma|gmm", "X"),
+    ("PIC machine: logos, Y", "puma|gmm", "Y"),
+    ("parallel port: rectangles", "10x10|10x5|3x10", ""),
+    ("parallel port: diagonals", "diagonals", ""),
+    ("parallel port: circles", "ms", ""),
+    ("ValCNC: turns", "turns", ""),
+)
+"""What is counted together: its name, parts, and sizes."""
+
+GROUPS = (
+    ("PIC machine", "squares|circles|puma|gmm", ""),
+    ("parallel port", "10x10|10x5|3x10|diagonals|ms", ""),
+    ("ValCNC", "turns", ""),
+)
+
+ALL = (("all but circles, parallel port", "squares|circles|puma|gmm|10x|3x|diag|turns", ""),
+       ("all", "", ""))  # fmt: skip
+
+DIAGRAM = ROOT / "docs" / "images" / "reliability.svg"
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """Readings against what was predicted: `off` (N,) mm measured less predicted, the `standard`
+    uncertainties (N,) mm, and how many `edges` (N,) each size has."""
+
+    off: Floats
+    standard: Floats
+    edges: Floats
+
+    @property
+    def sigmas(self) -> Floats:
+        """(N,) the deviations in standard uncertainties."""
+        return np.asarray(self.off / self.standard)
+
+    @property
+    def needed_um(self) -> float:
+        """What `process_mm`, µm, would have to be besides what it is, so that the deviations were
+        as large as predicted, in the mean of squares; 0 where they are no larger."""
+        low, high = 0.0, 10.0
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            spread = self.standard**2 + self.edges * middle**2
+            if float(np.mean(self.off**2 / spread)) > 1.0:
+                low = middle
+            else:
+                high = middle
+        return low * UM
+
+    def inside(self, level: float) -> float:
+        """The share that lies in the bands of this level."""
+        below = np.vectorize(normal_below)(np.abs(self.sigmas))
+        return float((below <= 0.5 + 0.5 * level).mean())
+
+
+def compared(parts: str, sizes: str = "") -> Compared:
+    """The readings of some sizes of some parts."""
+    rows = [
+        (
+            read - float(budget_of(part).expected[k]),
+            float(budget_of(part).standards[k]),
+            size.edges,
+        )
+        for part in PARTS
+        if re.search(parts, part.name)
+        for k, size in enumerate(part.sizes)
+        if sizes in size.name
+        for read in size.measured_mm
+    ]
+    off, standard, edges = np.array(rows).T
+    return Compared(off, standard, edges)
+
+
+def test_every_reading_is_counted_once() -> None:
+    counted = sum(len(compared(parts, sizes).off) for _, parts, sizes in KINDS)
+    assert counted == sum(len(size.measured_mm) for part in PARTS for size in part.sizes) == 63
+
+
+def test_coverage(bless: bool) -> None:
+    rows = [_row(name, compared(parts, sizes)) for name, parts, sizes in (*KINDS, *ALL)]
+    heads = ["", "readings", *(f"in {100 * level:g} %" for level in LEVELS)]
+    but = compared(ALL[0][1])
+    said = f"95 % bands hold {100.0 * but.inside(0.95):.0f} %"
+    page = PAGE.read_text(encoding="utf-8")
+    assert f"### Compared: {said}\n" in page
+    assert f"{said} of {len(but.off)} readings" in page
+    check("coverage", [*heads, "rms, standard uncertainties", "needed, µm"], rows, bless)
+
+
+def _row(name: str, read: Compared) -> list[str]:
+    shares = [f"{100.0 * read.inside(level):.0f} %" for level in LEVELS]
+    rms = math.sqrt(float(np.mean(read.sigmas**2)))
+    return [name, str(len(read.off)), *shares, f"{rms:.1f}", f"{read.needed_um:.1f}"]
+
+
+def test_no_part_has_a_verdict() -> None:
+    """Of each size something is not known on which it depends: none can be said to hold, and the
+    circles of the parallel port, far outside of their bands, are undecided, too."""
+    for part in PARTS:
+        budget = budget_of(part)
+        for k in range(len(part.sizes)):
+            unknown = {each.name for each in budget.unknown(k)}
+            assert "temperature_k" in unknown
+            assert ("process_mm" in unknown) == part.group.startswith("parallel port")
+    far = compared("ms")
+    assert (far.sigmas < -30.0).all()
+    assert far.inside(0.99) == 0.0
+
+
+def test_reliability(bless: bool) -> None:
+    """The diagram: how many readings lie in a band, by how many should."""
+    levels = np.arange(0.05, 1.0, 0.05)
+    lines = {
+        name: [compared(parts).inside(float(level)) for level in levels]
+        for name, parts, _ in (*GROUPS, ALL[0])
+    }
+    text = _diagram(levels.tolist(), lines)
+    if bless:
+        DIAGRAM.write_text(text, encoding="utf-8")
+    assert DIAGRAM.read_text(encoding="utf-8") == text
+
+
+def _diagram(levels: Sequence[float], lines: dict[str, list[float]]) -> str:
+    """SVG: predicted shares to the right, observed ones up, 0 to 100 %."""
+
+    def at(x: float, y: float) -> str:
+        return f"{60 + 300 * x:.1f},{330 - 300 * y:.1f}"
+
+    parts = [
+        '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 560 390" font-family="sans-serif" '
+        'font-size="12" fill="#333">',
+        '<rect width="560" height="390" fill="#fff"/>',
+        f'<polyline points="{at(0, 0)} {at(1, 1)}" stroke="#999" stroke-dasharray="4 4"/>',
+    ]
+    for tick in range(0, 101, 20):
+        part = tick / 100.0
+        x, y = at(part, 0.0).split(",")[0], at(0.0, part).split(",")[1]
+        parts += [
+            f'<polyline points="{at(part, 0)} {at(part, 1)}" stroke="#ddd"/>',
+            f'<polyline points="{at(0, part)} {at(1, part)}" stroke="#ddd"/>',
+            f'<text x="{x}" y="347" text-anchor="middle">{tick}</text>',
+            f'<text x="52" y="{float(y) + 4:.1f}" text-anchor="end">{tick}</text>',
+        ]
+    colours = ("#0072b2", "#d55e00", "#009e73", "#333333")
+    for k, ((name, shares), colour) in enumerate(zip(lines.items(), colours, strict=True)):
+        points = " ".join(at(x, y) for x, y in zip(levels, shares, strict=True))
+        parts += [
+            f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="2"/>',
+            f'<rect x="380" y="{50 + 24 * k}" width="18" height="3" fill="{colour}"/>',
+            f'<text x="404" y="{56 + 24 * k}">{name}</text>',
+        ]
+    parts += [
+        '<text x="210" y="372" text-anchor="middle">readings predicted in the band, %</text>',
+        '<text x="18" y="180" text-anchor="middle" transform="rotate(-90 18 180)">'
+        "readings in the band, %</text>",
+        "</svg>",
+    ]
+    return "\n".join(parts) + "\n"
