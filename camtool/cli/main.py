@@ -50,6 +50,7 @@ COMMANDS = (
     "calibrate",
     "check",
     "completion",
+    "console",
     "convert",
     "coupon",
     "filter",
@@ -106,6 +107,7 @@ def cli() -> None:
     camtool send    logo.pic -t pic-mmh --port /dev/ttyUSB0
     camtool ports                               where machines may be
     camtool home, jog, zero                     a machine moved by hand
+    camtool console grbl /dev/ttyUSB0           type to a controller
     camtool filter  logo.dxf                    LinuxCNC opens the drawing
     camtool stale   drawings/ -t pic-mmh        programs that are out of date
     camtool job new logo.dxf                    a job file to fill in, from its layers

@@ -7,6 +7,7 @@ import os
 import select
 import signal
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
@@ -20,12 +21,13 @@ from camtool.cli.files import read_bytes, shown, write_all
 from camtool.cli.life_signs import progress
 from camtool.cli.messages import say, say_findings, show_facts, show_text
 from camtool.cli.options import MachineFlags, machine_options, talk_options
-from camtool.errors import InputError, OptionError
+from camtool.errors import InputError, OptionError, OutputError
 from camtool.plain import one_line
 
 if TYPE_CHECKING:
     from camtool.sending.drive import Wish
     from camtool.sending.line import Port
+    from camtool.sending.live import LivePage
     from camtool.sending.prepare import Consignment
     from camtool.target.registry import LoadedTarget
     from camtool.target.wire import Conversation
@@ -45,6 +47,7 @@ NAME_WIDTH = 11
 @click.option("--single", is_flag=True, help="Wait after every block.")
 @click.option("--home", is_flag=True, help="Home the machine first.")
 @click.option("--journal", metavar="FILE", help="Where it says how far it is  [PROGRAM.journal]")
+@click.option("--live", metavar="FILE", help="A page for a browser that shows how far it is.")
 @click.option("--json", "as_json", is_flag=True, help="Progress on stdout, as JSON lines.")
 @click.option(
     "--speed",
@@ -64,6 +67,7 @@ def send(
     single: bool,
     home: bool,
     journal: str | None,
+    live: str | None,
     as_json: bool,
     speed: float,
     quiet: bool,
@@ -104,7 +108,7 @@ def send(
         raise OptionError("a real machine has only its own speed", where="--speed")
     if not yes and not _agreed():
         return 1
-    job = _Job(program, one, target, line, place, resume, as_json, quiet)
+    job = _Job(program, one, target, line, place, live, resume, as_json, quiet)
     return job.run(single=single, home=home, speed=speed, yes=yes)
 
 
@@ -144,6 +148,7 @@ class _Job:
     target: LoadedTarget
     port: Port
     place: Path
+    live: str | None
     more: bool
     as_json: bool
     quiet: bool
@@ -151,12 +156,15 @@ class _Job:
     _obeyed: int = field(default=0, init=False)
     _shown: dict[str, Any] = field(default_factory=dict, init=False)
     _left: list[float] = field(default_factory=list, init=False)
+    _page: LivePage | None = field(default=None, init=False)
+    _paged: tuple[float, str] = field(default=(0.0, ""), init=False)
 
     def run(self, *, single: bool, home: bool, speed: float, yes: bool) -> int:
         """Send it; the exit code."""
         from camtool.sending.drive import Driver, counts_of
         from camtool.sending.journal import Journal
         from camtool.sending.line import opened_line
+        from camtool.sending.live import LivePage
         from camtool.target.wire import LATE_S, Manner, State
 
         one = self.one
@@ -165,6 +173,14 @@ class _Job:
             self._left.append(left)
             left += packet.seconds
         self._left = [left, *reversed(self._left)]
+        if self.live is not None:
+            self._page = LivePage(Path(self.live), one.run.source, one.forecast.decoded)
+            try:
+                self._page.write(self._page.html("opening", {}, -1))
+            except OSError as error:
+                raise OutputError(
+                    f"cannot be written ({error.strerror})", file=self.live
+                ) from error
         progress().begin("sending", len(one.packets))
         real = not self.port.is_virtual
         manner = Manner(single=single, home=home, late_s=LATE_S * speed, paced=real)
@@ -238,6 +254,7 @@ class _Job:
             "left_s": round(left, 1),
             "why": conversation.why,
         }
+        self._show_page(conversation, left)
         if now == self._shown:
             return
         before, self._shown = self._shown, now
@@ -250,6 +267,31 @@ class _Job:
         signs.done = conversation.acknowledged
         if conversation.state.value == "waiting" and before.get("state") != "waiting":
             self._tell(f"waiting: {conversation.why} (r goes on)")
+
+    def _show_page(self, conversation: Conversation, left_s: float) -> None:
+        """Write the live page anew, once a second and when the state changes. A page that cannot
+        be written is given up: the machine is not stopped for it."""
+        from camtool.sending.live import EVERY_S
+        from camtool.verification.report import clock
+
+        state, now = conversation.state.value, time.monotonic()
+        if self._page is None or (now - self._paged[0] < EVERY_S and state == self._paged[1]):
+            return
+        self._paged = now, state
+        done = self.one.packets[: conversation.acknowledged]
+        block = done[-1].block if done else -1
+        place = conversation.place_mm
+        facts = {
+            "block": f"{self.one.block_of(block) + 1} of {self.one.blocks}",
+            "time left": clock(left_s),
+            "place": "" if place is None else "X{:.3f} Y{:.3f} Z{:.3f}".format(*place),
+            "": conversation.why,
+        }
+        try:
+            self._page.write(self._page.html(state, facts, block, place))
+        except OSError as error:
+            say(f"camtool: {self.live} cannot be written ({error.strerror})", quiet=False)
+            self._page = None
 
     def _signal(self) -> int:
         """How many signals to end have come that were not obeyed yet."""

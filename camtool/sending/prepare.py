@@ -76,6 +76,11 @@ class Consignment:
         return self.run.program.data if self.run.program else b""
 
     @property
+    def blocks(self) -> int:
+        """How many the program has."""
+        return int(self.run.decoded.block.max(initial=-1)) + 1 if self.run.decoded else 0
+
+    @property
     def sha256(self) -> str:
         """The digest of the program as a whole, hex."""
         return digest(self.run.program.data if self.run.program else b"")

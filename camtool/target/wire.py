@@ -31,6 +31,7 @@ from camtool.machine.model import Machine
 
 if TYPE_CHECKING:
     from camtool.arrays import Floats, Ints
+    from camtool.target.terminal import Terminal
     from camtool.toolpath.moves import Toolpath
 
 Place = tuple[float, float, float]
@@ -357,6 +358,12 @@ class Wire(ABC):
             f"{machine.target.name} has no command to {action} over its line",
             mend="do it at the machine",
         )
+
+    def terminal(self, machine: Machine[Any, Any]) -> Terminal:
+        """What a person types to it, and what its answers mean."""
+        from camtool.target.terminal import Terminal
+
+        return Terminal()
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
 from camtool.errors import MachineError
+from camtool.target.terminal import Terminal
 from camtool.target.wire import (
     HALTS,
     Conversation,
@@ -162,6 +163,10 @@ class GrblWire(Wire):
     ) -> GrblConversation:
         """The conversation that sends these lines."""
         return GrblConversation(packets, machine, manner)
+
+    def terminal(self, machine: GrblMachine) -> GrblTerminal:
+        """Lines, and the numbers of its errors, alarms and settings."""
+        return GrblTerminal()
 
     def command(
         self,
@@ -623,6 +628,95 @@ class GrblConversation(Conversation):
 
 
 SINGLE: Final = "single block"
+
+
+SETTINGS: Final = {
+    0: "step pulse, µs",
+    1: "step idle delay, ms (255: motors stay on)",
+    2: "step pulses inverted (mask of axes)",
+    3: "directions inverted (mask of axes)",
+    4: "step enable inverted",
+    5: "limit switches inverted",
+    6: "probe inverted",
+    10: "what status reports hold (mask)",
+    11: "junction deviation, mm",
+    12: "arc tolerance, mm",
+    13: "reports in inches",
+    20: "soft limits",
+    21: "hard limits",
+    22: "homing",
+    23: "homing directions inverted (mask of axes)",
+    24: "homing locate feed, mm/min",
+    25: "homing search feed, mm/min",
+    26: "homing debounce, ms",
+    27: "homing pull-off, mm",
+    30: "highest spindle speed, rev/min",
+    31: "lowest spindle speed, rev/min",
+    32: "laser mode",
+}
+"""Those that belong to no axis (settings_codes_en_US.csv)."""
+OF_AXES: Final = {
+    100: "steps per mm",
+    110: "highest rate, mm/min",
+    120: "mm/s²",
+    130: "travel, mm",
+}
+"""Those of X; Y and Z follow."""
+FIELDS: Final = {
+    "MPos": "machine position",
+    "WPos": "work position",
+    "WCO": "work zero on the machine",
+    "Bf": "free blocks, free bytes",
+    "FS": "feed, spindle",
+    "F": "feed",
+    "Ln": "line",
+    "Pn": "switches that are closed",
+    "Ov": "overrides of feed, rapids, spindle, %",
+    "A": "spindle (S cw, C ccw), flood (F), mist (M)",
+}
+"""Fields of a status report (report.c)."""
+
+
+class GrblTerminal(Terminal):
+    """Lines; ? ! ~ and ^X alone go out as the real-time bytes they are."""
+
+    stop = HOLD
+    about = (
+        "a line is answered by ok or error:N. Alone on a line: ? how it stands, ! feed hold, "
+        "~ go on, ^X reset; $$ settings, $G modes, $X unlock, $H home"
+    )
+
+    def typed(self, line: str) -> bytes:
+        """A real-time byte has no end, and no answer of its own."""
+        word = line.strip()
+        if word in ("?", "!", "~"):
+            return word.encode()
+        if word.upper() == "^X" or word == "\\x18":
+            self.due = 0
+            return RESET
+        self.due += 1
+        return super().typed(word)
+
+    def meaning(self, line: str) -> str:
+        """Of errors, alarms, settings and reports."""
+        if line == "ok" or line.startswith("error:"):
+            self.due = max(self.due - 1, 0)
+        if line.startswith(("Grbl ", "ALARM:")):
+            self.due = 0
+        if found := re.fullmatch(r"(error|ALARM):(\d+)", line):
+            known = ERRORS if found[1] == "error" else ALARMS
+            return known.get(int(found[2]), "it says no more")
+        if found := re.fullmatch(r"\$(\d+)=.*", line):
+            number = int(found[1])
+            first, axis = number - number % 10, number % 10
+            if first in OF_AXES and axis < 3:
+                return f"{'XYZ'[axis]}: {OF_AXES[first]}"
+            return SETTINGS.get(number, "")
+        if found := _STATUS.fullmatch(line):
+            fields = [each.split(":", 1) for each in found[2].split("|") if each]
+            said = [f"{FIELDS.get(name, name)} {value}" for name, value in fields]
+            return "; ".join([STATES[found[1]], *said])
+        return ""
 
 
 def _understood(line: str) -> bool:

@@ -181,7 +181,7 @@ class LinuxcncTwin(Twin):
             self._enabled = value == self._link.enable_password
             return self._enabled or value.lower() == "off"
         if name in ("set_wait", "linear_unit_conversion"):
-            return value.lower() in ("received", "mm")
+            return self._on and value.lower() in ("received", "mm")
         orders: dict[str, Callable[[str], bool]] = {
             "estop": self._set_estop,
             "machine": self._set_machine,

@@ -20,6 +20,7 @@ from typing import Final, cast
 import numpy as np
 
 from camtool.errors import MachineError
+from camtool.target.terminal import Terminal
 from camtool.target.wire import (
     HALTS,
     Conversation,
@@ -113,6 +114,10 @@ class LinuxcncWire(Wire):
                 mend="put the program elsewhere",
             )
         return LinuxcncConversation(packets, link, manner, "run")
+
+    def terminal(self, machine: LinuxcncMachine) -> LinuxcncTerminal:
+        """The words of linuxcncrsh."""
+        return LinuxcncTerminal(_link(machine))
 
     def command(
         self,
@@ -286,8 +291,6 @@ class LinuxcncConversation(Conversation):
         yield from self._set("verbose on")
         yield from self._set("echo off")
         yield from self._set(f"enable {self._link.enable_password}")
-        yield from self._set("set_wait received")
-        yield from self._set("linear_unit_conversion mm")
         for name, wanted, mend in (
             ("estop", "OFF", "its emergency stop is pressed: release it at the machine"),
             ("machine", "ON", "it is off: switch it on at the machine"),
@@ -299,6 +302,8 @@ class LinuxcncConversation(Conversation):
         ):
             if (yield from self._get(name)).upper() != wanted:
                 raise _Refused(mend)
+        yield from self._set("set_wait received")
+        yield from self._set("linear_unit_conversion mm")
         while (yield from self._get("error")) != "OK":
             pass  # of earlier programs
         if act == self._run and self.manner.home:
@@ -475,3 +480,26 @@ def _whole(text: str) -> int:
 def _shown(request: str) -> str:
     """A request without its password."""
     return re.sub(r"^(hello|(?:set )?enable) \S+", r"\1 …", request)
+
+
+class LinuxcncTerminal(Terminal):
+    """Lines to linuxcncrsh, which is greeted first."""
+
+    end = b"\r\n"
+    stop = b"set abort\r\n"
+    about = (
+        "get program_status, get rel_act_pos, get error, set mode mdi, set mdi G0 X1, set abort; "
+        "help lists them all"
+    )
+
+    def __init__(self, link: LinuxcncLink) -> None:
+        super().__init__()
+        words = f"hello {link.password} camtool 1.0", "set verbose on", "set echo off"
+        orders = [*words, f"set enable {link.enable_password}"]
+        self.hello = b"".join(order.encode() + self.end for order in orders)
+
+    def meaning(self, line: str) -> str:
+        """Of refusals."""
+        if line.endswith(" NAK"):
+            return "refused: not enabled, switched off, or unknown"
+        return ""

@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from camtool.errors import MachineError
+from camtool.target.terminal import Terminal
 from camtool.target.wire import Forecast, Manner, Packet, PacketByPacket, State, Wire
 
 from .dialect import PicMmhLink, PicMmhMachine
@@ -71,6 +72,11 @@ class PicMmhWire(Wire):
                 mend="home it by camtool home, and go to part zero",
             )
         return PicMmhConversation(packets, machine, manner)
+
+    def terminal(self, machine: PicMmhMachine) -> PicMmhTerminal:
+        """Strings, their echo, and steps by the dozen."""
+        assert isinstance(machine.link, PicMmhLink)
+        return PicMmhTerminal(machine.link)
 
     def command(
         self,
@@ -243,3 +249,65 @@ class PicMmhConversation(PacketByPacket):
         self._write(ALTO)
         self.next_s = now + self.manner.patience_s
         return True
+
+
+class PicMmhTerminal(Terminal):
+    """Strings that end with ; and go out as they are typed; steps are counted."""
+
+    end = b";"
+    stop = ALTO
+    about = (
+        "a string ends with ; (added where it is missing): H; home, A; stop, Q; zero here, "
+        "PX+0100; steps, JX+; until a character comes, BX204; compensation, G…; blocks"
+    )
+
+    def __init__(self, link: PicMmhLink) -> None:
+        super().__init__()
+        self._link = link
+        self._steps: list[tuple[str, int]] = []  # kinds of outputs and how many of each
+        self._echo = b""  # what is to come back: letters are bytes of steps too
+
+    def typed(self, line: str) -> bytes:
+        """As it is, with its end."""
+        data = self.unescaped(line.strip())
+        if data and not data.endswith(self.end):
+            data += self.end
+        self._echo = data if self._link.echo == "echo" else b""
+        return data
+
+    def heard(self, data: bytes) -> list[str]:
+        """The echo as it is; outputs as many at a time as have come."""
+        said: list[str] = []
+        for octet in data:
+            echoed = self._echo[:1] == bytes([octet])
+            self._echo = self._echo[1:] if echoed else self._echo
+            step = "" if echoed else self._output(octet)
+            if step and self._steps and self._steps[-1][0] == step:
+                self._steps[-1] = step, self._steps[-1][1] + 1
+            elif step:
+                self._steps.append((step, 1))
+            else:
+                said += self._counted()
+                self._rest += bytes([octet])
+                if octet == ord(";"):
+                    said += super().left()
+        return said
+
+    def left(self) -> list[str]:
+        """The outputs that were counted, and what has no end."""
+        return [*self._counted(), *super().left()]
+
+    def _counted(self) -> list[str]:
+        steps, self._steps = self._steps, []
+        return [f"{count} × {step}" for step, count in steps]
+
+    def _output(self, octet: int) -> str:
+        """The axes of an output and their senses; "" for a byte that reports none."""
+        if self._link.step_byte == "letters" and chr(octet) in "XYZxyz":
+            return f"{chr(octet).upper()}{'+' if chr(octet).isupper() else '-'}"
+        if self._link.step_byte != "bits" or not 0x40 < octet < 0x80:
+            return ""
+        axes = [(letter, octet >> 2 * k & 3) for k, letter in enumerate("XYZ")]
+        if any(bits == 2 for _, bits in axes):
+            return ""
+        return " ".join(f"{letter}{'+' if bits == 1 else '-'}" for letter, bits in axes if bits)

@@ -61,13 +61,18 @@ class Hands:
     def __init__(self, port: int) -> None:
         self._port = port
 
-    def do(self, *orders: str) -> None:
-        """Each on a connection of its own, since the last that is enabled has the say."""
+    def do(self, *orders: str) -> str:
+        """Each on a connection of its own, since the last that is enabled has the say; what is
+        answered to them."""
+        said = ""
         for order in orders:
             with socket.create_connection(("127.0.0.1", self._port), timeout=5.0) as line:
                 for each in ("hello EMC test 1.0", "set enable EMCTOO", order):
                     line.sendall(each.encode() + b"\r\n")
-                    time.sleep(0.2)
+                    time.sleep(0.3)
+                with suppress(OSError):
+                    said += line.recv(4096).decode()
+        return said
 
 
 @contextmanager
@@ -131,14 +136,11 @@ def _switched_on(port: int) -> Hands:
     end = time.monotonic() + 40.0
     hands = Hands(port)
     while True:
-        try:
-            hands.do("set estop off", "set machine on")
-        except OSError:
-            if time.monotonic() > end:
-                raise
-            time.sleep(0.3)
-        else:
-            return hands
+        with suppress(OSError):
+            if "MACHINE ON" in hands.do("set estop off", "set machine on", "get machine"):
+                return hands
+        assert time.monotonic() < end, "LinuxCNC does not begin"
+        time.sleep(0.3)
 
 
 def camtool(*words: str) -> subprocess.CompletedProcess[str]:

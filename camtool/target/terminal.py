@@ -1,0 +1,71 @@
+"""The contract of a terminal: what a person types to a controller, and what its answers mean.
+
+A `Terminal` is a value like a conversation: typed lines go in and bytes come out, bytes that were
+heard go in and sentences come out. It opens nothing; `camtool console` joins it to a port. What it
+says of an answer stands behind the answer itself, never in its place.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import ClassVar
+
+_ESCAPE = re.compile(r"\\x([0-9A-Fa-f]{2})")
+_ENDS = re.compile(rb"[\r\n]+")
+
+MOST_LINE = 1000
+"""An answer without an end is shown when it has so many characters."""
+
+
+class Terminal:
+    """A controller that is spoken to in lines and answers in lines; a target with words of its own
+    overrides what it knows better."""
+
+    end: ClassVar[bytes] = b"\n"
+    """What ends a line that is typed."""
+    stop: ClassVar[bytes] = b""
+    """What stops the machine, for Ctrl-C; b"" where nothing does."""
+    about: ClassVar[str] = "each line goes out with a line feed; \\x13 is the byte of that number"
+    """How to speak to it."""
+
+    def __init__(self) -> None:
+        self.due = 0
+        """How many answers it owes, where it owes one for each line; what is piped in waits for
+        them."""
+        self.hello = b""
+        """What is said when the port is open."""
+        self._rest = b""
+
+    def typed(self, line: str) -> bytes:
+        """The bytes of a line that was typed; `\\x13` in it is the byte of that number."""
+        return self.unescaped(line) + self.end
+
+    def heard(self, data: bytes) -> list[str]:
+        """What is to be shown of what has come; an answer that is not whole is kept."""
+        *lines, self._rest = _ENDS.split(self._rest + data)
+        if len(self._rest) > MOST_LINE:
+            lines, self._rest = [*lines, self._rest], b""
+        return [self._shown(line) for line in lines if line]
+
+    def left(self) -> list[str]:
+        """What has come without an end."""
+        rest, self._rest = self._rest, b""
+        return [self._shown(rest)] if rest else []
+
+    def meaning(self, line: str) -> str:
+        """What an answer means; "" where it speaks for itself."""
+        return ""
+
+    def _shown(self, line: bytes) -> str:
+        text = "".join(chr(octet) if 0x20 <= octet < 0x7F else f"\\x{octet:02X}" for octet in line)
+        meaning = self.meaning(text)
+        return f"{text}    {meaning}" if meaning else text
+
+    @staticmethod
+    def unescaped(line: str) -> bytes:
+        """Text as bytes."""
+        parts = _ESCAPE.split(line)
+        return b"".join(
+            bytes([int(part, 16)]) if k % 2 else part.encode("utf-8")
+            for k, part in enumerate(parts)
+        )
