@@ -12,7 +12,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypedDict, Unpack
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack
 
 from camtool.bounds import program_bytes
 from camtool.calibration.calibrate import Calibration, to_text
@@ -67,6 +67,7 @@ __all__ = [
     "calibrate",
     "compare",
     "convert",
+    "inspect",
     "job_of",
     "load_target",
     "plan",
@@ -333,6 +334,29 @@ def post_by_tool(
     loaded, wanted = as_target(target), job or Job()
     read = as_drawing(drawing, loaded, wanted)
     return by_tool(read, wanted, loaded, check=check, compensate=compensate, gates=gates)
+
+
+def inspect(
+    run: Run,
+    tolerances: str | Path | None = None,
+    *,
+    require: Literal["in", "not-out"] | None = None,
+) -> Run:
+    """The run with a verdict on each dimension of its part: `report.inspection`, in mm and µm.
+
+    `tolerances`: the file that names them besides those of the drawing; None: these alone. What
+    falls short of `require` is an error of `findings`. Raises OptionError for a wrong file,
+    and where the job scales the part. Source: docs/tolerances.md, ISO 14253-1.
+    """
+    from camtool.inspection.tolerances import dimensions_of
+    from camtool.inspection.verdicts import Tolerances
+    from camtool.inspection.verdicts import inspect as inspected
+
+    if run.drawing is None:
+        raise OptionError("a run without a drawing has no dimensions", mend="post a drawing")
+    file = None if tolerances is None else Path(tolerances)
+    dimensions, findings = dimensions_of(run.drawing, file)
+    return inspected(run, Tolerances(dimensions, findings, require))
 
 
 def convert(

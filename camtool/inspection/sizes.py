@@ -418,12 +418,11 @@ def _values(end: End, off: Floats, direction: Floats) -> _Values:
         values = points @ direction
         return _Values(values, across, float(values.mean()))
     points = _circle_points(feature, off)
-    centre, radius = fitted_circle(points, np.asarray(feature.centre_mm))
-    middle = float(centre @ direction)
     if end.how == "centre":
+        middle = float(fitted_circle(points, np.asarray(feature.centre_mm))[0] @ direction)
         return _Values(np.array([middle]), None, middle)
     extreme = end.side * float((end.side * (points @ direction)).max())
-    return _Values(np.array([extreme]), None, middle + end.side * radius)
+    return _Values(np.array([extreme]), None, extreme)
 
 
 def _between(first: _Values, second: _Values) -> Size:
