@@ -221,7 +221,7 @@ class I8751Conversation(PacketByPacket):
     @property
     def _mend(self) -> str:
         if self._executes:
-            return ""
+            return "; it may be executing the packet: switch it off"
         return "; nothing of this packet has moved, and the controller must be reset"
 
     def _byte_done(self, now: float) -> None:

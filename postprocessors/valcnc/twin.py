@@ -46,6 +46,18 @@ class Choices(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     answer: Literal["none", "ok"] = "none"
 
 
+def _with_all_defined(
+    machine: Machine[ValcncController, Dialect],
+) -> Machine[ValcncController, Dialect]:
+    """The machine with a meaning for what `[dialect]` refuses because the thesis gives it none: a
+    controller does something all the same. What ours does is in the page of its wire."""
+    dialect = machine.dialect
+    meant = {"z_order": "before", "missing_words": "keep", "full_circles": "whole"}
+    given = {key: value for key, value in meant.items() if getattr(dialect, key) == "refused"}
+    dialect = msgspec.structs.replace(dialect, **given)
+    return msgspec.structs.replace(machine, dialect=dialect)
+
+
 class ValcncTwin(Twin):
     """The controller at rest at part zero, which is where its slides stand."""
 
@@ -54,7 +66,7 @@ class ValcncTwin(Twin):
 
     def __init__(self, machine: Machine[ValcncController, Dialect], choices: Choices) -> None:
         super().__init__(Slides(machine))
-        self._machine, self._choices = machine, choices
+        self._machine, self._choices = _with_all_defined(machine), choices
         self._model = ValcncModel()
         self._line, self._spoilt = bytearray(), False
         self._kept = bytearray()

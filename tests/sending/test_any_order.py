@@ -36,8 +36,24 @@ PROGRAMS = {
     "pic-mmh": b"G54;G90;G00Z00010.00;G00X00003.00Y00002.00;G01Z-00002.00F08;"
     b"G01X00006.00Y00002.00F08;G02X00009.00Y00005.00I00006.00J00005.00F08;"
     b"G01X00003.00Y00002.00F08;G04P01;G01X00001.00Y00002.00F08;G00Z00010.00;M30;",
+    "i8751": b"\x13"
+    + bytes.fromhex("01 05 02 05 00 00 03 03 00 28 00 00")
+    + (b"".join(b"\1\3\0%c\2\4\0%c\0\0\3\5\0\1" % (9 * k, 5 + k) for k in (1, 2, 12, 20)) + b"E")
+    + 3 * (bytes.fromhex("01 04 00 07 02 05 00 00 03 05 00 00") * 5 + b"E")
+    + b"T",
+    "valcnc": b"G00X0Y0Z0.625\nG00X0.1Y0.1Z0.625\nG01X0.1Y0.1Z-0.125\n"
+    + b"".join(b"G01X%d.5Y0.%dZ-0.125\n" % (k % 5, k % 7) for k in range(12))
+    + b"G02X2.5Y1.4Z-0.125I1.0J0.0\nG00X2.5Y1.4Z0.625\n",
 }
 """A program of each machine: short, with more blocks than its buffers hold."""
+
+SETTINGS = {
+    "i8751": (*(f"axes.{axis}.coded_step_mm=0.0125" for axis in "xyz"), "feed.default_mm_min=78"),
+    "valcnc": ("link.answer=ok",),
+}
+CHOICES = {"valcnc": ["answer=ok"]}
+END = {"valcnc": b"\n"}
+"""What machine files leave out, what is chosen of what is open, and what ends a block."""
 
 BOUND = 3.0
 """A program ends within so many times its simulated time, and what the machine may be silent."""
@@ -49,11 +65,8 @@ class Part:
 
     packets: tuple[Packet, ...]
     forecast: Forecast
-
-    @property
-    def blocks(self) -> list[bytes]:
-        """As the controller is to have them."""
-        return [packet.data.strip() for packet in self.packets if packet.block >= 0]
+    blocks: list[bytes]
+    """As the controller is to have them."""
 
     @property
     def seconds(self) -> float:
@@ -62,7 +75,7 @@ class Part:
 
 @cache
 def loaded(name: str) -> LoadedTarget:
-    return load_target(name)
+    return load_target(name, settings=SETTINGS.get(name, ()))
 
 
 @cache
@@ -75,7 +88,13 @@ def part(name: str, first: int = 0) -> Part:
         decoded = target.target.read(data, target.machine)
     forecast = forecast_of(decoded, target)
     wire: Any = target.target.wire()
-    return Part(tuple(wire.packets(data, target.machine, forecast)), forecast)
+    packets = tuple(wire.packets(data, target.machine, forecast))
+    end = END.get(name, b"")
+    blocks = [packet.data.strip() + end for packet in packets if packet.block >= 0]
+    listed = target.target.listing(data, target.machine)
+    if listed.binary:  # several blocks a packet; the key in front and the end are none
+        blocks = [bytes.fromhex(line).lstrip(b"\x13") for line in listed.blocks[:-1]]
+    return Part(packets, forecast, blocks)
 
 
 def outputs_until(twin: Twin, block: int) -> int:
@@ -100,7 +119,7 @@ class Sending(RuleBasedStateMachine):
     def opened(self, seed: int, single: bool) -> None:
         target = loaded(self.name)
         self.part = part(self.name)
-        self.twin: Any = target.twin([])
+        self.twin: Any = target.twin(CHOICES.get(self.name, []))
         self.line = Wired(self.twin, seed=seed)
         wire: Any = target.target.wire()
         talk = wire.conversation(self.part.packets, target.machine, Manner(single=single))
@@ -245,7 +264,7 @@ class Sending(RuleBasedStateMachine):
         if not len(rows) or not len(ends_of(decoded, int(rows[0]))):
             return  # nothing moves any more
         rest = part(self.name, first)
-        twin: Any = target.twin([])
+        twin: Any = target.twin(CHOICES.get(self.name, []))
         wire: Any = target.target.wire()
         talk = wire.conversation(rest.packets, target.machine, Manner())
         both = Talking(talk, Wired(twin), coarse=True)

@@ -159,7 +159,8 @@ def test_a_full_disk_stops_the_machine(name: str, room: int, tmp_path: Path) -> 
 
     with hosted(twin, SPEED[name]) as port:
         done = subprocess.run(
-            command(name, program, port),
+            command(name, Path(program.name), port),  # the journal names it: a short name
+            cwd=tmp_path,
             capture_output=True,
             text=True,
             check=False,

@@ -66,12 +66,20 @@ def test_words_that_are_missing_stay_as_the_last_block_left_them() -> None:
 
 
 @pytest.mark.parametrize(
-    "line", [b"", b"G05X1Y1Z0", b"G01X1", b"HELLO", b"G01X1Y1Z0" + b"0" * 127, b"G01X1Y1Z1"]
+    "line", [b"", b"G05X1Y1Z0", b"X1", b"HELLO", b"G01X1Y1Z0" + b"0" * 127, b"G02X1Y1Z0"]
 )
 def test_what_it_cannot_decode_is_passed_over_in_silence(line: bytes) -> None:
     twin, _ = made("valcnc")
     assert twin.receive(line + b"\n", 0.0) == b""
     assert (twin.decoded, twin.commands, twin.moves) == ([], [], False)
+
+
+def test_what_the_thesis_gives_no_meaning_is_done_all_the_same() -> None:
+    twin, _ = made("valcnc")
+    feed(twin, b"G01X1\nG01X1Y1Z1\nG02X1Y1Z1I1J0\n")
+    assert len(twin.decoded) == 3
+    np.testing.assert_allclose(twin.slides.commanded_mm, 8.0)
+    assert twin.slides.trace.commanded[:, 0].max() == pytest.approx(24.0)
 
 
 def test_the_pc_says_c_when_it_has_opened_the_line() -> None:
