@@ -189,6 +189,11 @@ def inputs_of(machine: Machine, tool_diameter_mm: float) -> Inputs:
         partial(_input, unit, probe)
         for unit, probe in (("mm", PROBE_MM), ("", PROBE_SCALE), ("rad", PROBE_RAD))
     )
+    # The tool comes first: the motion of the machine itself is still known then.
+    if tool_diameter_mm > 0.0:
+        wider = Direction("tool", _with_tool), 1.0
+        found.append(length("tool_diameter_mm", tool_diameter_mm, said.tool_diameter_mm, wider))
+        found.append(length("runout_mm", 0.0, said.runout_mm, wider))
     for name, axis, known, cells in axes:
         plays = [play for row in cells.play_mm for play in row] if cells else [axis.backlash_mm]
         lost = Direction(f"{name}.backlash", _with_backlash(name), lowest=-max(plays), bends=True)
@@ -204,10 +209,6 @@ def inputs_of(machine: Machine, tool_diameter_mm: float) -> Inputs:
     lean = Direction("squareness", _with_squareness), 1.0
     value = machine.mechanics.squareness_rad
     found.append(angle("squareness_rad", value, said.squareness_rad, lean))
-    if tool_diameter_mm > 0.0:
-        wider = Direction("tool", _with_tool), 1.0
-        found.append(length("tool_diameter_mm", tool_diameter_mm, said.tool_diameter_mm, wider))
-        found.append(length("runout_mm", 0.0, said.runout_mm, wider))
     found.append(_temperature(machine, scales))
     found.append(length("process_mm", 0.0, said.process_mm, edges=(1.0, 1.0)))
     for name, axis, shares in (("x", axes[0][1], (1.0, 0.0)), ("y", axes[1][1], (0.0, 1.0))):

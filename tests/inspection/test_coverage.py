@@ -19,10 +19,8 @@ from camtool.inspection.inspector import Inspector
 from camtool.inspection.uncertainty import (
     Inputs,
     Variant,
-    edges_of,
     inputs_of,
     monte_carlo,
-    opposite_edges,
     propagate,
 )
 from camtool.machine.model import Machine
@@ -150,30 +148,16 @@ def inspector(target: str) -> tuple[Inspector, Inputs]:
     return made, inputs_of(loaded.machine, TOOL_MM)
 
 
-EDGES = edges_of(
-    [
-        (3, opposite_edges(0.0)),
-        (3, opposite_edges(0.5 * math.pi)),
-        (3, opposite_edges(0.0)),
-        (3, np.array([[1.0, 0.0]])),
-    ]
-)
-
-
 def simulated(target: str, draws: int) -> tuple[Floats, Floats]:
     """(12,) the share of parts, each cut on a machine drawn about the one in the file, whose sizes
     lie in the predicted bands, and their scatter over the predicted one."""
     made, inputs = inspector(target)
 
-    def values(variant: Variant) -> Floats:
-        sizes = made.sizes(variant.machine, variant.wider_mm)
-        return np.array([(each.fit_mm, each.low_mm, each.high_mm) for each in sizes]).ravel()
-
-    budget = propagate(values, inputs, EDGES)
+    budget = propagate(made.values, inputs, made.edges)
     assert budget.runs == 9
-    for row in range(len(EDGES)):
+    for row in range(len(budget.values)):
         assert {each.name for each in budget.unknown(row)} == {"temperature_k"}
-    true = monte_carlo(values, inputs, EDGES, draws, 17)
+    true = monte_carlo(made.values, inputs, made.edges, draws, 17)
     covered = np.abs(true.values - budget.expected) <= BAND * budget.standards
     return covered.mean(axis=0), true.standards / budget.standards
 
