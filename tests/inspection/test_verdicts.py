@@ -233,3 +233,14 @@ def test_probabilities_agree_with_brute_force(plate: Path) -> None:
     assert share == pytest.approx(
         chance, abs=3.0 * math.sqrt(chance * (1 - chance) / count) + 0.02
     )
+
+
+def test_from_python_as_the_command_says_it(plate: Path, tmp_path: Path) -> None:
+    file = tmp_path / "tolerances.toml"
+    file.write_text('[[dimension]]\nkind = "diameter"\nat = [15, 20]\nlimits = "±0.1"\n')
+    done = camtool.inspect(posted(plate), file, require="in")
+    assert done.report is not None
+    assert [each.verdict for each in done.report.inspection] == ["in"]
+    assert camtool.inspect(posted(plate)).report == posted(plate).report  # it draws none
+    with pytest.raises(OptionError, match="without a drawing"):
+        camtool.inspect(camtool.verify(done.data, "linuxcnc"))
