@@ -41,7 +41,7 @@ def new(
     source: str, output: str | None, drawing: DrawingFlags, quiet: bool, verbose: bool
 ) -> None:
     """Write the dimensions of DRAWING (- is stdin): those that it says itself with their limits,
-    then its holes, slots and the overall sizes of its outlines, whose limits are to be filled in.
+    then its circles, slots and the overall sizes of its outlines, to which you give limits.
     """
     from camtool.inspection.proposal import proposed
 
@@ -49,13 +49,17 @@ def new(
     check_places([source], [output])
     check_new(output)
     read = drawing.read(source)
-    text, findings = proposed(read)
+    text, findings, faults = proposed(read)
     write_all({output: text.encode()})
     say_findings((*read.findings, *findings), quiet=quiet, verbose=verbose)
+    for fault in faults:
+        say(f"camtool: warning: {fault}", quiet=quiet)
     where = "stdout" if output == STDOUT else output
     count = text.count("[[dimension]]")
     said = f"{count} dimension{'s' if count != 1 else ''}"
     say(f"written: {where}, {said}; put in the limits that matter", quiet=quiet)
+    if any(each.severity == Severity.ERROR for each in findings):
+        raise click.exceptions.Exit(1)
 
 
 @tolerances.command(cls=SectionedCommand, short_help="What a file of tolerances says.")

@@ -60,11 +60,15 @@ class Circle:
         return found
 
     def distance_mm(self, place: Place) -> float:
-        """How far a place is from its arcs, along the radius; infinite beside them."""
+        """How far a place is from its arcs, along the radius; infinite beside them, as far as it
+        is nearer than BIND_MM to the whole circle."""
         x, y = place[0] - self.centre_mm[0], place[1] - self.centre_mm[1]
+        away = abs(math.hypot(x, y) - self.radius_mm)
+        if away > BIND_MM:  # of most of the circles of a drawing
+            return away
         slack = BIND_MM / max(self.radius_mm, BIND_MM)
         on_arc = self.has(np.array([math.atan2(y, x)]), slack)[0]
-        return abs(math.hypot(x, y) - self.radius_mm) if on_arc else math.inf
+        return away if on_arc else math.inf
 
     def placed(self, where: Map) -> Circle:
         """It in the work frame."""
@@ -99,9 +103,12 @@ class Edge:
 
     def distance_mm(self, place: Place) -> float:
         """How far a place is from it."""
-        beside = np.subtract(place, self.start_mm)
-        at = float(np.clip(beside @ self.along, 0.0, self.length_mm))
-        return float(np.hypot(*(beside - at * self.along)))
+        (x, y), (to_x, to_y) = self.start_mm, self.end_mm
+        along_x, along_y = to_x - x, to_y - y
+        beside_x, beside_y = place[0] - x, place[1] - y
+        square = along_x * along_x + along_y * along_y
+        share = min(max((beside_x * along_x + beside_y * along_y) / (square or 1.0), 0.0), 1.0)
+        return math.hypot(beside_x - share * along_x, beside_y - share * along_y)
 
     def placed(self, where: Map) -> Edge:
         """It in the work frame."""

@@ -14,7 +14,7 @@ from itertools import chain, groupby
 import numpy as np
 
 from camtool.arrays import Floats
-from camtool.errors import InputError
+from camtool.errors import DrawingError, InputError
 from camtool.findings import Finding
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.polylines import POSITION_EPS_MM
@@ -22,6 +22,7 @@ from camtool.inspection.dimensions import Dimension, Place
 from camtool.inspection.features import Bound, Circle, Edge, Feature, bind, features_of
 from camtool.inspection.limits import limited
 from camtool.inspection.tolerances import dimensions_of, measured_by
+from camtool.plain import one_line
 
 MOST_DIMENSIONS = 200
 """A file begins with at most so many dimensions; a comment counts the others."""
@@ -38,10 +39,12 @@ _HEADER = """\
 """
 
 
-def proposed(drawing: Drawing) -> tuple[str, tuple[Finding, ...]]:
-    """The text of a file with the dimensions of this drawing, and what was found in its callouts.
-    InputError where there is nothing to measure."""
-    said, findings = dimensions_of(drawing)
+def proposed(drawing: Drawing) -> tuple[str, tuple[Finding, ...], tuple[DrawingError, ...]]:
+    """The text of a file with the dimensions of this drawing, what was found in its callouts, and
+    whose limits are wrong: these stand there without. InputError where there is nothing to
+    measure."""
+    faults: list[DrawingError] = []
+    said, findings = dimensions_of(drawing, faults=faults)
     features = features_of(drawing.paths)
     known = set()
     for each in said:
@@ -65,9 +68,11 @@ def proposed(drawing: Drawing) -> tuple[str, tuple[Finding, ...]]:
             mend="write tolerances.toml by hand (docs/tolerances.md)",
         )
     text = _HEADER + "".join(map(_row, rows))
+    for fault in faults:
+        text += f"\n# {one_line(f'{fault.where}: {fault.message}')}\n"
     if left:
         text += f"\n# {left} more circles, slots and sizes of the drawing are not listed.\n"
-    return text, findings
+    return text, findings, tuple(faults)
 
 
 def _row(each: Dimension) -> str:

@@ -56,58 +56,53 @@ _ZONES = ("position", "straightness", "roundness", "profile")
 
 
 def dimensions_of(
-    drawing: Drawing, tolerances_file: Path | None = None
+    drawing: Drawing,
+    tolerances_file: Path | None = None,
+    *,
+    faults: list[DrawingError] | None = None,
 ) -> tuple[tuple[Dimension, ...], tuple[Finding, ...]]:
     """The dimensions of a drawing, those of the file first, with nominal sizes and limits as far
     as they are known; and what was found on the way. A dimension that fits no feature is among
-    them. Raises CamtoolError for a file or a callout whose limits are wrong, with place and mend.
-    """
+    them. Raises CamtoolError for a file or a callout whose limits are wrong, with place and mend;
+    where `faults` is given, those of callouts join it, and the dimension has no limits."""
     general = ""
     asked: tuple[Dimension, ...] = ()
     if tolerances_file is not None:
         general, asked = read_tolerances(tolerances_file)
-    features = features_of(drawing.paths)
+    features, file = features_of(drawing.paths), drawing.file
     findings: list[Finding] = []
     dimensions: list[Dimension] = []
     known: dict[object, Dimension] = {}
     for each in asked:
-        bound = bind(each, features, drawing.file)
-        dimensions += _settled(each, bound, drawing.file, findings)
+        bound = bind(each, features, file)
+        dimensions += _settled(each, bound, file, findings)
         if isinstance(bound, Bound):
             known.setdefault(measured_by(bound), each)
-    drawn = [
-        (place, each)
-        for place, callout in enumerate(drawing.callouts)
-        if not _is_known(callout, known, features, drawing.file, findings)
-        for each in _of_callout(callout, drawing.file, general, features, findings)
-    ]
+    drawn: list[tuple[int, Dimension]] = []
+    for place, callout in enumerate(drawing.callouts):
+        measured = replace(_measured(callout), general=general)
+        bound = bind(measured, features, file)
+        if isinstance(bound, Bound):
+            if measured_by(bound) in known:
+                findings.append(_twice(measured, known[measured_by(bound)], file))
+                continue
+            # Programs round the places of a dimension: what is drawn counts.
+            if abs(bound.drawn_mm - callout.measured_mm) <= DIFFERS_MM:
+                measured = replace(measured, nominal_mm=round(bound.drawn_mm, 9))
+        said = _of_callout(callout, measured, file, features, findings, faults)
+        drawn += ((place, each) for each in said)
     kept: list[tuple[int, Dimension]] = []
     for place, each in sorted(drawn, key=lambda item: item[1].limits is None):
-        bound = bind(each, features, drawing.file)
+        bound = bind(each, features, file)
         if isinstance(bound, Bound):
             same = known.setdefault(measured_by(bound), each)
             if same is not each:
                 if same.source != each.source:
-                    findings.append(_twice(each, same, drawing.file))
+                    findings.append(_twice(each, same, file))
                 continue
-        kept += ((place, one) for one in _settled(each, bound, drawing.file, findings))
+        kept += ((place, one) for one in _settled(each, bound, file, findings))
     dimensions += (each for _, each in sorted(kept, key=lambda item: item[0]))
     return tuple(_named(dimensions)), tuple(findings)
-
-
-def _is_known(
-    callout: Callout,
-    known: dict[object, Dimension],
-    features: Sequence[Feature],
-    file: str,
-    findings: list[Finding],
-) -> bool:
-    """Whether the file says something of what a callout measures, whatever its text is."""
-    bound = bind(_measured(callout), features, file)
-    same = known.get(measured_by(bound)) if isinstance(bound, Bound) else None
-    if same is not None:
-        findings.append(_twice(_measured(callout), same, file))
-    return same is not None
 
 
 def _twice(one: Dimension, holds: Dimension, file: str) -> Finding:
@@ -418,12 +413,13 @@ def read_text(text: str, mm_per_unit: float = 1.0) -> Said | None:
 
 def _of_callout(
     callout: Callout,
+    measured: Dimension,
     file: str,
-    general: str,
     features: Sequence[Feature],
     findings: list[Finding],
+    faults: list[DrawingError] | None,
 ) -> Iterator[Dimension]:
-    """What a callout says: one dimension, or as many as its text counts."""
+    """What a callout says of what it measures: one dimension, or as many as its text counts."""
     where = f"{file}, {callout.source}"
     text = one_line(callout.text)
     if callout.scale != 1.0:
@@ -436,7 +432,7 @@ def _of_callout(
     if said is None:
         findings.append(CALLOUT_TEXT(where=where, text=text))
         return
-    one = _as_said(_measured(callout), said.sign)
+    one = _as_said(measured, said.sign)
     assert one.nominal_mm is not None
     drawn = one.nominal_mm
     nominal = drawn if said.nominal_mm is None else round(said.nominal_mm, 9)
@@ -446,21 +442,24 @@ def _of_callout(
         at = f"{file}, {_place_of(one)}"
         findings.append(DIMENSION_DIFFERS(where=at, measured=drawn, limit=nominal, name=one.name))
         return
+    limits = None
     try:
         limits = _limits(callout, said, nominal)
     except NotUnderstood:
         findings.append(CALLOUT_TEXT(where=where, text=text))
         return
     except OptionError as error:
-        mend = f"{error.mend}, or name the dimension in tolerances.toml"
-        raise DrawingError(
+        fault = DrawingError(
             f"{error.message}{f' (text {text})' if text else ''}",
             file=file,
             where=_place_of(one),
-            mend=mend,
-        ) from error
-    alone = said.bare or callout.exact
-    one = replace(one, limits=limits, general="" if alone or limits else general)
+            mend=f"{error.mend}, or name the dimension in tolerances.toml",
+        )
+        if faults is None:
+            raise fault from error
+        faults.append(fault)
+    alone = said.bare or callout.exact or limits is not None
+    one = replace(one, limits=limits, general="" if alone else one.general)
     yield from _counted(one, said.count, features, where, findings)
 
 

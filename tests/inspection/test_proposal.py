@@ -23,7 +23,7 @@ SAMPLES = Path(__file__).parents[2] / "samples"
 
 
 def rows(drawing: Drawing) -> list[dict]:
-    text, findings = proposed(drawing)
+    text, findings, _ = proposed(drawing)
     assert not findings
     return tomllib.loads(text)["dimension"]
 
@@ -49,7 +49,7 @@ def test_circles_and_outlines_of_a_part():
 
 
 def test_callouts_come_first_with_their_limits_and_once():
-    text, findings = proposed(drawn(with_text(part(), "%%c6 H7")))
+    text, findings, _ = proposed(drawn(with_text(part(), "%%c6 H7")))
     assert not findings
     found = tomllib.loads(text)["dimension"]
     assert (found[0]["name"], found[0]["nominal"], found[0]["limits"]) == ("Ø6", "6mm", "H7")
@@ -128,13 +128,28 @@ def test_many_circles_are_counted():
     doc = document()
     for number in range(MOST_DIMENSIONS + 7):
         doc.modelspace().add_circle((3 * number, 0), 1)
-    text, _ = proposed(drawn(doc))
+    text, _, _ = proposed(drawn(doc))
     assert text.count("[[dimension]]") == MOST_DIMENSIONS
     assert "# 7 more circles, slots and sizes" in text
 
 
 def test_names_from_texts_stay_text(tmp_path):
     drawing = drawn(with_text(part(), 'see "x" [[dimension]]'))
-    text, findings = proposed(drawing)
+    text, findings, _ = proposed(drawing)
     assert len(findings) == 1
     assert len(tomllib.loads(text)["dimension"]) == 7
+
+
+def test_a_callout_with_wrong_limits_stands_there_without_them(tmp_path):
+    drawing = drawn(with_text(part(), "%%c6 P7"))
+    text, _, (fault,) = proposed(drawing)
+    assert "class P7 of 6 mm" in str(fault)
+    assert "class P7 of 6 mm" in text
+    found = tomllib.loads(text)["dimension"]
+    assert (found[0]["name"], "limits" in found[0]) == ("Ø6", False)
+    file = tmp_path / "tolerances.toml"
+    mended = text.replace('# limits = "H7"', 'limits = "-0.012/-0.024"', 1)
+    file.write_text(mended, encoding="utf-8")
+    (bore, *_), _ = dimensions_of(drawing, file)
+    assert bore.limits is not None
+    assert bore.limits.upper_mm == -0.012

@@ -413,3 +413,21 @@ def test_a_callout_on_nothing_stays_for_the_binder():
     (one,), findings = dimensions_of(replace(drawing, callouts=(loose,)))
     assert one.limits == limits_of("±0.1", 2.0)
     assert not findings
+
+
+@pytest.mark.parametrize(
+    ("text", "nominal", "lower", "upper"),
+    [("", 7.004, 0.0, 0.015), ("7 H7", 7.0, 0.0, 0.015), ("7.1/6.95", 7.004, -0.054, 0.096)],
+)
+def test_what_is_drawn_counts_not_the_rounded_places_of_a_dimension(text, nominal, lower, upper):
+    doc = document()
+    doc.modelspace().add_circle((20, 10), 3.502)
+    said = text or "<> H7"
+    dimension = doc.modelspace().add_diameter_dim(center=(20, 10), radius=3.5, angle=0)
+    dimension.render()
+    dimension.dimension.dxf.text = said
+    (bore,), findings = dimensions_of(drawn(doc))
+    assert not findings
+    assert bore.nominal_mm == pytest.approx(nominal)
+    assert bore.limits.lower_mm == pytest.approx(lower)
+    assert bore.limits.upper_mm == pytest.approx(upper)
