@@ -278,8 +278,14 @@ class Painter:
     def closeups(self) -> Iterator[tuple[str, bytes]]:
         """Caption and SVG of what a page shows besides; of the last scene, which is the result."""
         from camtool.pictures.draw import render
+        from camtool.pictures.limits import draw_limits, has_limits
         from camtool.pictures.picture import closeups
 
+        if has_limits(self.scenes[-1]):
+            yield (
+                "Dimensions and their limits",
+                draw_limits(self.scenes[-1], self.flags.options()).encode(),
+            )
         for caption, options in closeups(self.scenes[-1], self.flags.options()):
             yield caption, render(self.scenes[-1], CLOSEUP, options)
 
