@@ -59,13 +59,12 @@ LEAST_WAY_MM = 1e-9
 """The rest of a move between blends counts as nothing when it is shorter."""
 
 LAST_PART = 0.5
-"""Fraction of its acceleration that the last move before a wait uses in the mode "blend"."""
+"""Fraction of its acceleration that the last move before a wait uses in the mode "blend", and a
+move that overlaps with another."""
 
-REST_PERIODS = 1.0
-"""Servo periods that coming to rest takes beyond the trapezoid (measured)."""
-
-PERIOD_EPS = 1e-6
-"""Periods: a time that exceeds a whole number of them by less counts as that number."""
+REST_PERIODS = 2.0
+"""Servo periods that coming to rest takes beyond the trapezoid in whole periods, the nearest
+number: 1 to 3 in all, by where the last of them ends (measured on 278 stops)."""
 
 
 class LinuxcncModel(ControllerModel[LinuxcncController, Dialect]):
@@ -153,12 +152,14 @@ class _Run:
             planned = self._planned(base, end)
             places = slice(2 * own.start, None if end == rows else -1)
             lasting, speeds = _speeds(planned, places, self._rules.modes, self._before)
+            overlap = np.append(planned.corners.overlap[1:], 0.0)
+            overlaps = _in_turns(0.0, overlap)[lasting]
             done = int(lasting[: 2 * own.stop].sum())
             if end == rows or len(speeds.length_mm) >= done + window:
                 break
             known *= 2  # some of the moves are too short to be planned
         taken = np.zeros(len(lasting) + 1)
-        taken[:-1][lasting] = self._in_periods(speeds, done)
+        taken[:-1][lasting] = self._in_periods(speeds, overlaps, done)
         here = slice(self._row(low), self._row(high))
         seconds = _seconds(planned, taken)[here.start - base : here.stop - base]
         samples = LinuxcncSamples(planned, self._machine, self._spacing_mm, self._passed_mm)
@@ -178,14 +179,17 @@ class _Run:
         moves = moves_of(tangents, chain, self._rules)
         return Planned(tangents, moves, corners_of(moves, tangents, self._rules))
 
-    def _in_periods(self, plan: SpeedPlan, done: int) -> Floats:
-        """(N,) s of each block; from rest to rest it takes whole servo periods, and
-        `REST_PERIODS`. The next plan begins behind the first `done` of these."""
+    def _in_periods(self, plan: SpeedPlan, overlaps: Floats, done: int) -> Floats:
+        """(N,) s of each block, less its overlap (N,) with the next; from rest to rest it takes
+        whole servo periods, and `REST_PERIODS`. The next plan begins behind the first `done` of
+        these."""
         controller = self._machine.controller
         period_s = controller.servo_period_s
         squares = plan.squares(controller.lookahead_moves)
         seconds = plan.seconds(squares)
-        rests = np.flatnonzero(squares[1:] == 0.0)  # blocks behind which the machine stands
+        seconds -= np.minimum(overlaps, 0.5 * seconds)
+        stands = (squares[1:] == 0.0) & (overlaps == 0.0)
+        rests = np.flatnonzero(stands)  # blocks behind which the machine stands
         since = np.concatenate([[0], rests + 1])
         runs = np.add.reduceat(seconds, since[:-1]) if len(rests) else np.zeros(0)
         runs[:1] += self._since_rest_s
@@ -193,7 +197,7 @@ class _Run:
         before_s = 0.0 if last else self._since_rest_s
         self._since_rest_s = before_s + float(seconds[since[last] : done].sum())
         self._before = plan.behind(done, squares)
-        periods = np.ceil(runs / period_s - PERIOD_EPS) + REST_PERIODS
+        periods = np.rint(runs / period_s) + REST_PERIODS
         seconds[rests] += periods * period_s - runs
         return seconds
 
@@ -214,7 +218,10 @@ class LinuxcncSamples(CountedSamples):
         super().__init__(path, machine, spacing_mm)
         self._tangents = planned.tangents
         self._row_of, self._row, self._reach = moves.row_of, moves.row, np.append(reach, 0.0)
-        self._blends = bool(reach.any())
+        corners = planned.corners
+        self._before = np.append(corners.before, 0.0)
+        self._behind = np.append(corners.behind, 0.0)
+        self._blends = bool(reach.any() or corners.before.any())
         self._length = moves.length
         self._row_length = move_lengths(path)
         lengths = np.where(moves.row_of >= 0, self._row_length, 0.0)
@@ -248,6 +255,26 @@ class LinuxcncSamples(CountedSamples):
         behind = np.flatnonzero(along < self._reach[move])
         self._inward(points, ahead, move[ahead] + 1, left[ahead], -1.0)
         self._inward(points, behind, move[behind], along[behind], 1.0)
+        ahead = np.flatnonzero(left < self._before[move + 1])
+        behind = np.flatnonzero(along < self._behind[move])
+        corner, s = move[ahead] + 1, left[ahead]
+        self._overlapped(points, ahead, corner, 0.5 - 0.5 * s / self._before[corner], -s, 0.0 * s)
+        corner, s = move[behind], along[behind]
+        self._overlapped(points, behind, corner, 0.5 + 0.5 * s / self._behind[corner], 0.0 * s, s)
+
+    def _overlapped(
+        self, points: Floats, on: Ints, corner: Ints, x: Floats, back: Floats, ahead: Floats
+    ) -> None:
+        """Move points (K, 3) where moves overlap: while the first slows down evenly over its last
+        `before` mm, the second speeds up over its first `behind` mm. At the part x of that time
+        the tool is at P − (1 − x)² before t_− + x² behind t_+; the first half of it stands for the
+        end of the first move, the second for the start of the second. `back`, `ahead` (K,) mm:
+        where the points are along the tangents without."""
+        corners, of = np.unique(corner, return_inverse=True)
+        first = self._tangents.at_ends(self._row[corners - 1])[of]
+        second = self._tangents.at_starts(self._row[corners])[of]
+        points[on] += (-((1.0 - x) ** 2) * self._before[corner] - back)[:, None] * first
+        points[on] += (x**2 * self._behind[corner] - ahead)[:, None] * second
 
     def _inward(self, points: Floats, on: Ints, corner: Ints, s: Floats, side: float) -> None:
         corners, of = np.unique(corner, return_inverse=True)
@@ -270,7 +297,7 @@ def _speeds(
     before a move, then the move: which of them last and lie in `places`, and these.
 
     In the mode "blend" the last move before a wait accelerates by half: it was kept ready for a
-    blend that never came (`tcGetOverallMaxAccel`).
+    blend that never came (`tcGetOverallMaxAccel`). So do moves that overlap.
     """
     moves, corners = planned.moves, planned.corners
     own = moves.length - corners.reach
@@ -278,10 +305,11 @@ def _speeds(
     ways = _in_turns(corners.way, np.maximum(own, 0.0, out=own))
     lasting = np.zeros(len(ways), dtype=np.bool_)
     lasting[places] = ways[places] > LEAST_WAY_MM
+    along, fastest = _along_moves(moves, modes, corners)
     return lasting, SpeedPlan(
         ways[lasting],
-        _in_turns(corners.speed, moves.speed)[lasting],
-        _in_turns(corners.acceleration, _along_moves(moves, modes, corners))[lasting],
+        _in_turns(corners.speed, np.minimum(moves.speed, fastest))[lasting],
+        _in_turns(corners.acceleration, along)[lasting],
         _in_turns(np.inf, np.where(corners.reach > 0.0, np.inf, corners.speed))[lasting],
         before,
     )
@@ -309,12 +337,20 @@ def _in_turns(blends: Floats | float, moves: Floats) -> Floats:
     return both
 
 
-def _along_moves(moves: Moves, modes: Modes, corners: Corners) -> Floats:
-    """(M,) mm/s² along the moves, less what bends at their ends and a last stop take."""
+def _along_moves(moves: Moves, modes: Modes, corners: Corners) -> tuple[Floats, Floats]:
+    """(M,) mm/s² along the moves, less what bends at their ends and a last stop take; and (M,)
+    mm/s, how fast arcs may be with that. An arc before a wait was never finished for its next
+    move, and keeps half for turning."""
     lost = np.maximum(corners.lost, np.append(corners.lost[1:], 0.0))
     last = np.append(moves.waits[1:], np.ones(min(len(lost), 1), dtype=np.bool_))
-    spared = np.where(last & modes.blend(moves.mode), LAST_PART, 1.0)
-    return np.asarray(moves.acceleration * (1.0 - lost) * spared)
+    overlapped = corners.overlap > 0.0
+    overlapped |= np.append(overlapped[1:], False)
+    spared = np.where(overlapped | (last & modes.blend(moves.mode)), LAST_PART, 1.0)
+    overall = moves.acceleration * (1.0 - lost) * spared
+    along, fastest = moves.tangential(np.arange(len(overall)), overall)
+    rough = last & moves.is_arc
+    along[rough], fastest[rough] = TANGENT_RATIO * overall[rough], np.inf
+    return along, fastest
 
 
 @dataclass(frozen=True, eq=False)
@@ -422,20 +458,52 @@ def merged(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Ints]:
     `tolerance_mm` (N,) of each row, 0: it is not merged.
 
     Only feed moves with one feed and one path mode, and nothing but moves of no length between
-    them, are merged; any event, an MSG comment too, ends a line.
+    them, are merged; any event, an MSG comment too, ends a line. Arcs that bow out by less than
+    the tolerance are lines too.
     """
     count = len(path)
-    chain = np.arange(count)
     if not tolerance_mm.any():
-        return path, chain
+        return path, np.arange(count)
+    path, middle = _straightened(path, tolerance_mm)
     same_feed = np.zeros(count, dtype=np.bool_)
     same_feed[1:] = path.feed[1:] == path.feed[:-1]
     is_line = path.kind == Kind.LINE
     apart = ~(is_line & same_feed) | (tolerance_mm == 0.0)
     apart[1:] |= ~is_line[:-1] | (path.mode[1:] != path.mode[:-1])
-    points, moved = np.concatenate([path.start[None, :], path.end]), np.empty((count, 3))
-    merge_lines(points, apart, tolerance_mm, chain, moved)
-    return replace(path, end=frozen(moved)), chain
+    # The middle of an arc that is a line now is a point of the chain too.
+    bent = np.isfinite(middle[:, 0])
+    row = np.repeat(np.arange(count), 1 + bent)
+    last = np.cumsum(1 + bent) - 1
+    points, parts = np.insert(path.end, np.flatnonzero(bent), middle[bent], axis=0), len(row)
+    apart = apart[row] & (np.diff(row, prepend=-1) > 0)
+    chain, moved = np.empty(parts, dtype=np.int64), np.empty((parts, 3))
+    merge_lines(
+        np.concatenate([path.start[None, :], points]), apart, tolerance_mm[row], chain, moved
+    )
+    return replace(path, end=frozen(moved[last])), chain[last]
+
+
+def _straightened(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Floats]:
+    """The rows with a line in the place of each arc that bows out by less than `tolerance_mm` (N,)
+    of its row, and the middles of these arcs (N, 3), NaN for other rows (ARC_FEED, emccanon.cc).
+    """
+    middle = np.full((len(path), 3), np.nan)
+    arcs = np.flatnonzero(path.is_arc & (tolerance_mm > 0.0))
+    if len(arcs) == 0:
+        return path, middle
+    arms = PolarArcs(path, path.is_arc & (tolerance_mm > 0.0))
+    bow = arms.radius * (1.0 - np.cos(0.5 * arms.sweep))
+    flat = np.flatnonzero(bow < tolerance_mm[arcs])
+    if len(flat) == 0:
+        return path, middle
+    angle = arms.angle[flat] + 0.5 * arms.sweep[flat]
+    spoke = arms.radius[flat, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+    rows = arcs[flat]
+    middle[rows, :2] = arms.centre[flat] + spoke
+    middle[rows, 2] = 0.5 * (arms.begin[flat, 2] + arms.end[flat, 2])
+    kind, centre = path.kind.copy(), path.centre.copy()
+    kind[rows], centre[rows] = Kind.LINE, np.nan
+    return replace(path, kind=frozen(kind), centre=frozen(centre)), middle
 
 
 def begins_of(path: Toolpath, modes: Modes) -> tuple[Ints, Floats]:
@@ -463,7 +531,9 @@ def begins_of(path: Toolpath, modes: Modes) -> tuple[Ints, Floats]:
 class Moves:
     """M moves in order. row_of (N,): the move of each row of the program, −1 for rows that do not
     move; row (M,): the first of each, and mode (M,) its mode. length mm, speed mm/s (as
-    programmed, within the limits), acceleration mm/s² (along the way), each (M,); is_arc (M,);
+    programmed, within the limits), acceleration mm/s² (of the whole machine in that direction),
+    each (M,); is_arc (M,), and of arcs the `highest` speed (M,) mm/s and the acceleration `bend`
+    (M,) mm/s² that turns the tool at it, 0 of lines;
     waits (M,): the machine comes to rest before this move, whatever the corner; like (M,): this
     move and the one before are both rapids or both at a feed."""
 
@@ -474,8 +544,22 @@ class Moves:
     speed: Floats
     acceleration: Floats
     is_arc: Bools
+    highest: Floats
+    bend: Floats
     waits: Bools
     like: Bools
+
+    def tangential(self, which: Ints, overall: Floats) -> tuple[Floats, Floats]:
+        """(K,) mm/s² along moves (K,) that accelerate by `overall` (K,) in all, and (K,) mm/s, the
+        highest speed with that: what turning at it leaves, where that is more than half, else
+        half (`pmCircleActualMaxVel`)."""
+        bend, part = self.bend[which], NORMAL_RATIO * overall
+        steep = bend > part
+        left = np.sqrt(np.maximum(1.0 - (bend / overall) ** 2, 0.0))
+        along = np.where(steep, TANGENT_RATIO, left) * overall
+        with np.errstate(divide="ignore", invalid="ignore"):
+            slower = self.highest[which] * np.sqrt(part / bend)
+        return along, np.where(steep, slower, np.inf)
 
 
 def moves_of(tangents: Tangents, chain: Ints, rules: CornerRules) -> Moves:
@@ -495,13 +579,15 @@ def moves_of(tangents: Tangents, chain: Ints, rules: CornerRules) -> Moves:
     highest, along = allowed_along(rules.rate, begin), allowed_along(rules.acceleration, begin)
     on = np.flatnonzero(is_arc)
     arm, limits = tangents.arm_of(lead[on]), (rules.rate, rules.acceleration)
-    highest[on], along[on] = _arc_limits(tangents.arms, arm, length[on], limits)
+    bend = np.zeros(len(lead))
+    highest[on], along[on], bend[on] = _arc_limits(tangents.arms, arm, length[on], limits)
     highest = np.minimum(highest, length / (LEAST_PERIODS * period_s))
     cuts = path.is_feed[lead]
     speed = np.minimum(np.where(cuts, path.feed[lead], np.inf) / 60.0, highest)
     waits = np.diff(np.cumsum(np.isin(path.kind, WAITS))[lead], prepend=-1) > 0
     like = cuts == np.roll(cuts, 1)
-    return Moves(row_of, lead, path.mode[lead], length, speed, along, is_arc, waits, like)
+    mode = path.mode[lead]
+    return Moves(row_of, lead, mode, length, speed, along, is_arc, highest, bend, waits, like)
 
 
 class Tangents:
@@ -519,11 +605,23 @@ class Tangents:
         """(K, 3) where rows (K,), which move, begin."""
         return self._at(rows, self.arms.radius, 0.0)
 
-    def at_ends(self, rows: Ints) -> Floats:
-        """(K, 3) where they end."""
-        return self._at(rows, self.arms.end_radius, 1.0)
+    def at_ends(self, rows: Ints, *, level: bool = False) -> Floats:
+        """(K, 3) where they end; with `level`, of arcs without their rise."""
+        return self._at(rows, self.arms.end_radius, 1.0, level=level)
 
-    def _at(self, rows: Ints, radius: Floats, share: float) -> Floats:
+    def pushed_at_starts(self, rows: Ints, acceleration: Floats, speed: Floats) -> Floats:
+        """(K, 3) unit vectors of what accelerates a tool at the starts of rows (K,): along lines,
+        and of arcs along and inward, at accelerations (K,) and half of speeds (K,)."""
+        push = self._at(rows, self.arms.radius, 0.0, level=True)
+        on = np.flatnonzero(are_arcs(self.path.kind[rows]))
+        arm = self.arm_of(rows[on])
+        angle, radius = self.arms.angle[arm], self.arms.radius[arm]
+        inward = np.column_stack([-np.cos(angle), -np.sin(angle), np.zeros(len(on))])
+        push[on] *= acceleration[on, None]
+        push[on] += ((0.5 * speed[on]) ** 2 / radius)[:, None] * inward
+        return _unit(push)
+
+    def _at(self, rows: Ints, radius: Floats, share: float, *, level: bool = False) -> Floats:
         path, arms = self.path, self.arms
         tangent = path.end.take(rows, axis=0) - path.starts_of(rows)
         kind = path.kind[rows]
@@ -534,14 +632,16 @@ class Tangents:
         cos, sin = np.cos(angle), np.sin(angle)
         tangent[on, 0] = grows * cos - r * sweep * sin
         tangent[on, 1] = grows * sin + r * sweep * cos
+        if level:
+            tangent[on, 2] = 0.0
         tangent /= np.linalg.norm(tangent, axis=1)[:, None]
         return tangent
 
 
 def _arc_limits(
     arms: PolarArcs, arm: Ints, length: Floats, limits: tuple[Floats, Floats]
-) -> tuple[Floats, Floats]:
-    """Highest speed and acceleration along the way of arcs."""
+) -> tuple[Floats, Floats, Floats]:
+    """Highest speed of arcs, their acceleration, and how much of it turns them at that speed."""
     rate, acceleration = limits
     v_xy, a_xy = rate[:2].min(), acceleration[:2].min()
     r, r_end, sweep = arms.radius[arm], arms.end_radius[arm], np.abs(arms.sweep[arm])
@@ -554,7 +654,7 @@ def _arc_limits(
     highest = length / np.maximum(rise / rate[2], level / planar)
     overall = length / np.maximum(rise / acceleration[2], level / a_xy)
     highest = np.minimum(highest, np.sqrt(NORMAL_RATIO * overall * radius))
-    return highest, TANGENT_RATIO * overall
+    return highest, overall, highest**2 / radius
 
 
 # How LinuxCNC meets the corners between its moves.
@@ -592,6 +692,10 @@ ARC_END_PART = 2.0 / 3.0
 ARC_START_PART = 1.0 / 3.0
 """Fraction of an arc: a blend at its start uses no more (`blendInit3FromLineArc`)."""
 
+COPLANAR = 1e-6
+"""Arcs and what they meet lie in one plane when the normal of their tangents leaves that of the
+arc by no more than this."""
+
 LEAST_BEND_RAD = 1e-3
 """Moves that bend by less have no arc between them (TP_MIN_ARC_ANGLE)."""
 
@@ -601,13 +705,17 @@ class Corners:
     """What happens at the start of each of M moves: `speed` (M,) mm/s, 0 for a stop; `lost` (M,):
     the part of the acceleration that a bend takes from the moves on both sides; `reach` (M,) mm:
     how far from the corner a blend begins and ends, 0 without one; `acceleration` (M,) mm/s²
-    along blends; `way` (M,) mm along them."""
+    along blends; `way` (M,) mm along them. Where moves overlap: `before` and `behind` (M,) mm, how
+    far from the corner they do, and `overlap` (M,) s, for how long; 0 elsewhere."""
 
     speed: Floats
     lost: Floats
     reach: Floats
     acceleration: Floats
     way: Floats
+    before: Floats
+    behind: Floats
+    overlap: Floats
 
 
 @dataclass(frozen=True)
@@ -653,17 +761,20 @@ class Bends:
 def corners_of(moves: Moves, tangents: Tangents, rules: CornerRules) -> Corners:
     """What happens at the start of each move."""
     count = len(moves.length)
-    corners = Corners(*(np.zeros(count) for _ in range(5)))
+    corners = Corners(*(np.zeros(count) for _ in range(8)))
     bends = Bends(
         tangents.at_ends(np.roll(moves.row, 1)),  # nothing comes of that before the first
         tangents.at_starts(moves.row),
     )
-    _meet(corners, moves, np.arange(count), bends, rules)
+    _meet(corners, moves, tangents, bends, rules)
     return corners
 
 
-def _meet(corners: Corners, moves: Moves, at: Ints, bends: Bends, rules: CornerRules) -> None:
-    """Fill in the corners `at` (K,)."""
+def _meet(
+    corners: Corners, moves: Moves, tangents: Tangents, bends: Bends, rules: CornerRules
+) -> None:
+    """Fill in all corners."""
+    at = np.arange(len(moves.length))
     before = moves.mode[at - 1]
     turn = bends.after - bends.before
     back = np.linalg.norm(bends.after + bends.before, axis=1) < STRAIGHT_BACK_RAD
@@ -673,21 +784,65 @@ def _meet(corners: Corners, moves: Moves, at: Ints, bends: Bends, rules: CornerR
     highest = np.minimum(moves.speed[at - 1], moves.speed[at])
     jolt = highest / rules.period_s + moves.acceleration[at]
     part = (np.abs(turn) * jolt[:, None] / rules.acceleration).max(axis=1, initial=0.0)
-    part = np.where(moves.is_arc[at] | moves.is_arc[at - 1], part / TANGENT_RATIO, part)
+    curved = moves.is_arc[at] | moves.is_arc[at - 1]
+    part = np.where(curved, part / TANGENT_RATIO, part)
     smooth = free & (part < rules.kink_ratio)
     corners.speed[at] = np.where(smooth, np.inf, 0.0)
     corners.lost[at] = np.where(smooth, part, 0.0)
-    blended = np.flatnonzero(free & ~smooth & rules.modes.blend(before))
-    on, bends = at[blended], bends.picked(blended)
-    _blend(corners, moves, on, bends, rules)
+    blends = free & ~smooth & rules.modes.blend(before)
+    normal = np.cross(bends.before, bends.after)
+    flat = np.hypot(normal[:, 0], normal[:, 1]) <= COPLANAR * np.linalg.norm(normal, axis=1)
+    rounded = np.flatnonzero(blends & (flat | ~curved))
+    _blend(corners, moves, rounded, bends.picked(rounded), rules)
+    loose = np.flatnonzero(blends & ~flat & curved)
+    worth = _overlap(corners, moves, tangents, loose, rules)
     # A bend that passes for straight at low speed, where that is faster than the blend.
+    blended = np.flatnonzero(blends)
     kink = highest[blended] * rules.kink_ratio / part[blended]
-    faster = kink > corners.speed[on]
-    corners.speed[on] = np.maximum(corners.speed[on], kink)
-    corners.lost[on[faster]] = rules.kink_ratio
-    corners.reach[on[faster]] = 0.0
-    theta = bends.theta
-    corners.way[on] = corners.reach[on] * np.tan(theta) * (np.pi - 2.0 * theta)
+    against = corners.speed[blended]
+    against[np.searchsorted(blended, loose)] = worth
+    faster = kink > against
+    on = blended[faster]
+    corners.speed[on] = kink[faster]
+    corners.lost[on] = rules.kink_ratio
+    for none in (corners.reach, corners.before, corners.behind, corners.overlap):
+        none[on] = 0.0
+    theta = bends.picked(rounded).theta
+    corners.way[rounded] = corners.reach[rounded] * np.tan(theta) * (np.pi - 2.0 * theta)
+
+
+def _overlap(
+    corners: Corners, moves: Moves, tangents: Tangents, on: Ints, rules: CornerRules
+) -> Floats:
+    """Fill in how moves overlap at the corners `on` (K,); (K,) mm/s, what that is worth against
+    the speed of a bend."""
+    one, _ = moves.tangential(on - 1, LAST_PART * moves.acceleration[on - 1])
+    other, _ = moves.tangential(on, LAST_PART * moves.acceleration[on])
+    reachable = [
+        np.minimum(np.sqrt(acceleration * moves.length[k]), moves.speed[k])
+        for k, acceleration in ((on - 1, one), (on, other))
+    ]
+    lasting = np.minimum(moves.length[on - 1] / reachable[0], moves.length[on] / reachable[1])
+    blend_s = np.minimum(lasting, np.maximum(reachable[0] / one, reachable[1] / other))
+    first = np.minimum(reachable[0], blend_s * one)
+    second = np.minimum(reachable[1], blend_s * other)
+    before = tangents.at_ends(moves.row[on - 1], level=True)
+    push = LAST_PART * moves.acceleration[on]
+    after = tangents.pushed_at_starts(moves.row[on], push, moves.speed[on])
+    theta = Bends(before, after).theta
+    asked, cosine = rules.modes.tolerance_mm(moves.mode[on - 1]), np.cos(theta)
+    bends = cosine > 0.5 * LEAST_BEND_RAD
+    within = 2.0 * np.sqrt(one * asked / np.where(bends, cosine, 1.0))
+    worth = np.minimum(first, np.where(bends, within, np.inf))
+    worth = 0.25 * np.sin(theta) * (worth + np.minimum(second, np.where(bends, within, np.inf)))
+    first = np.minimum(first, np.where(bends, within, np.inf))
+    # While the first comes to rest, the second begins as from rest, whatever its share was.
+    seconds = first / one
+    reached = np.minimum(moves.speed[on], seconds * other)
+    corners.overlap[on] = seconds
+    corners.before[on] = 0.5 * first * seconds
+    corners.behind[on] = reached * (seconds - 0.5 * reached / other)
+    return np.asarray(worth)
 
 
 def _blend(corners: Corners, moves: Moves, on: Ints, bends: Bends, rules: CornerRules) -> None:

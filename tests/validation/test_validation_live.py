@@ -1,0 +1,202 @@
+"""Twenty programs through the LinuxCNC that is installed, without a screen, against the model.
+
+    pytest -m slow tests/validation/test_validation_live.py            (about fifteen minutes)
+    pytest -m slow --bless tests/validation/test_validation_live.py    writes docs/validation.md
+
+Debian's linuxcnc-uspace runs in real time, one instance at a time on a machine: a lock, in the
+folder for temporary files, sees to that. `live/` has its configuration: the axes of the machine
+file, tools 1 to 9, and the sampler. CAMTOOL_LIVE names a folder in which the recordings are kept;
+those that are there already are not made again.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from camtool.arrays import Floats
+from camtool.simulation.motion import IDEAL, Options
+from camtool.target.registry import load_target
+from tests.oracles.motion_rows import rows_of
+from tests.targets import simulate
+from tests.validation.page import check, mm, signed
+from tests.validation.pieces import UM
+
+HERE = Path(__file__).parent
+SAMPLES = HERE.parents[1] / "samples"
+NC_FILES = Path("/usr/share/linuxcnc/ncfiles")
+RECORDED = ("circle10", "helix", "short61", "star", "zigzag")
+OWN = ("hole-circle", "polar", "3dtest", "toplevel", "spiral")
+PLATE = ("pocket", "slot", "window", "holes", "sign", "line", "outline")
+OF_PLATE = ("plate.dxf", "--job", "plate.toml", "--feed", "1500", "--operation")
+POSTED = {
+    "logo": ("logo.dxf",),
+    **{f"plate-{name}": (*OF_PLATE, name) for name in PLATE},
+    "bore": ("board.dxf", "--job", "board.toml", "--operation", "screws", "--feed", "1000"),
+    "chamfer": (
+        *("mount.dxf", "--kind", "chamfer", "--tool-kind", "v", "--tool-angle", "90"),
+        *("--tool-diameter", "6", "--chamfer", "0.5", "--feed", "1500"),
+    ),
+}
+
+PATH_UM = 10.0
+TIME_PART = 0.005
+MOST_MISSES = 2
+
+CAUSES = {
+    "plate-outline": "arcs that a slope meets: LinuxCNC overlaps them without a tolerance, and"
+    " leaves the corner by more than the model's straight tangents",
+    "3dtest": "arcs in XZ and YZ are chords in a toolpath; each chord is a move of its own",
+    "bore": "helices one after the other, and lines out of them",
+}
+"""Why programs are off by more than is aimed at."""
+
+MOST_POINTS = 3000
+WINDOW_S = 1.0
+WINDOW_PART = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """Positions (N, 3) mm and when the tool is there (N,) s."""
+
+    points: Floats
+    seconds: Floats
+
+    def fewer(self) -> Line:
+        every = max(1, len(self.points) // MOST_POINTS)
+        return Line(self.points[::every], self.seconds[::every])
+
+
+def posted(name: str, folder: Path) -> Path:
+    """A program of the twenty."""
+    file = folder / f"{name}.ngc"
+    if name in RECORDED:
+        shutil.copyfile(HERE / "referees" / "linuxcnc" / f"{name}.ngc", file)
+    elif name in OWN:
+        shutil.copyfile(NC_FILES / f"{name}.ngc", file)
+    else:
+        drawing, *flags = POSTED[name]
+        flags = [str(SAMPLES / flag) if flag.endswith(".toml") else flag for flag in flags]
+        command = [sys.executable, "-m", "camtool", "post", str(SAMPLES / drawing), "-q"]
+        subprocess.run([*command, "-t", "linuxcnc", *flags, "-o", str(file)], check=True)
+    return file
+
+
+@contextmanager
+def alone() -> Iterator[None]:
+    """No other LinuxCNC runs on this machine meanwhile."""
+    with Path(tempfile.gettempdir(), "linuxcnc.lock").open("a", encoding="ascii") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
+def record(programs: list[Path], folder: Path) -> None:
+    """Run programs, each of which gets its samples beside it."""
+    work = folder / "machine"
+    shutil.copytree(HERE / "live", work, dirs_exist_ok=True)
+    for name in ("machine.var", "log"):
+        (work / name).touch()
+    for path in (work, folder):
+        path.chmod(0o777)  # as root, the real-time part gives root away
+    environment = os.environ | {
+        "CNC_PROGRAMS": " ".join(map(str, programs)),
+        "HOME": str(work),
+        "DISPLAY": "",
+        "RTAPI_FIFO_PATH": str(work / "fifo"),
+        "RTAPI_UID": str(os.getuid() or 65534),
+    }
+    with alone(), (work / "log").open("w", encoding="utf-8") as log:
+        subprocess.run(
+            ["linuxcnc", "machine.ini"], cwd=work, env=environment, stdout=log, stderr=log,
+            stdin=subprocess.DEVNULL, timeout=3600, check=False,
+        )  # fmt: skip
+
+
+def recorded(program: Path) -> Line:
+    """What LinuxCNC did, from the first move out of X0 Y0 Z0 to the last."""
+    rows = []
+    with Path(f"{program}.samples").open(encoding="ascii") as lines:
+        for line in lines:
+            parts = line.split()
+            if len(parts) >= 4 and parts[0].isdigit():
+                rows.append([float(part) for part in parts[:4]])
+    samples = np.array(rows)
+    points = samples[:, 1:]
+    moves = np.flatnonzero(np.abs(np.diff(points, axis=0)).max(axis=1) > 0.0)
+    begins = moves[np.abs(points[moves]).max(axis=1) < 1e-9]
+    mine = slice(int(begins[0]), int(moves[-1]) + 2)
+    seconds = 0.001 * (samples[mine, 0] - samples[mine.start, 0])
+    return Line(points[mine], seconds)
+
+
+def predicted(program: Path) -> Line:
+    """What the model does, with about the times of its samples."""
+    target = load_target("linuxcnc")
+    path = target.target.read_in(program.read_bytes(), target.machine, program.parent)
+    points, seconds, now = [np.zeros((1, 3))], [np.zeros(1)], 0.0
+    for row in rows_of(simulate(path, target.machine, Options(effects=IDEAL))):
+        count = len(row.commanded)
+        points.append(row.commanded)
+        seconds.append(now + row.duration_s * np.arange(1, count + 1) / max(count, 1))
+        now += row.duration_s
+    every = np.concatenate(points)
+    return Line(np.append(every, every[-1:], axis=0), np.append(np.concatenate(seconds), now))
+
+
+def off(some: Line, line: Line) -> float:
+    """The farthest of some points from a line, of which only what is there at about the same time
+    counts: a path that goes elsewhere, or another way, is not near by chance."""
+    scale = line.seconds[-1] / some.seconds[-1]
+    begin, way = line.points[:-1], np.diff(line.points, axis=0)
+    square = (way**2).sum(axis=1)
+    window = WINDOW_S + WINDOW_PART * line.seconds[-1]
+    some = some.fewer()
+    low = np.searchsorted(line.seconds[1:], some.seconds * scale - window)
+    high = np.searchsorted(line.seconds[:-1], some.seconds * scale + window)
+    most = 0.0
+    for point, first, last in zip(some.points, low.tolist(), high.tolist(), strict=True):
+        near = slice(min(first, len(begin) - 1), max(last, min(first, len(begin) - 1) + 1))
+        along = ((point - begin[near]) * way[near]).sum(axis=1)
+        share = np.clip(along / np.where(square[near] > 0.0, square[near], 1.0), 0.0, 1.0)
+        apart = begin[near] + share[:, None] * way[near] - point
+        most = max(most, float((apart**2).sum(axis=1).min()))
+    return float(np.sqrt(most))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("linuxcnc") is None, reason="LinuxCNC is not installed")
+@pytest.mark.skipif(not NC_FILES.is_dir(), reason="LinuxCNC's own programs are not installed")
+def test_linuxcnc_live(bless: bool, tmp_path: Path) -> None:
+    folder = Path(os.environ.get("CAMTOOL_LIVE", tmp_path)).absolute()
+    names = [*RECORDED, *POSTED, *OWN]
+    assert len(names) == 20
+    programs = {name: posted(name, folder) for name in names}
+    left = [file for file in programs.values() if not Path(f"{file}.samples").exists()]
+    if left:
+        record(left, folder)
+    rows, misses = [], []
+    for name, program in programs.items():
+        live, model = recorded(program), predicted(program)
+        wanted_s, found_s = float(live.seconds[-1]), float(model.seconds[-1])
+        beside = UM * max(off(live, model), off(model, live))
+        part = found_s / wanted_s - 1.0
+        missed = beside > PATH_UM or abs(part) > TIME_PART
+        misses += [name] if missed else []
+        cells = [mm(wanted_s, 2), mm(found_s, 2), signed(100.0 * part, 2), mm(beside, 1)]
+        rows.append([name, *cells, CAUSES.get(name, "") if missed else ""])
+    heads = ["program", "LinuxCNC, s", "model, s", "%", "paths apart, µm", "cause of a miss"]
+    check("live-linuxcnc", heads, rows, bless)
+    assert len(misses) <= MOST_MISSES, misses
+    assert set(misses) <= set(CAUSES), misses
