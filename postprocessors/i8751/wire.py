@@ -10,6 +10,7 @@ do not repeat what came. `[dialect]` and `[link]` say what the thesis leaves ope
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -17,6 +18,7 @@ from typing import Final
 import numpy as np
 
 from camtool.errors import MachineError
+from camtool.target.terminal import Terminal
 from camtool.target.wire import Forecast, Manner, Packet, PacketByPacket, State, Wire
 
 from .dialect import Dialect, I8751Link, I8751Machine
@@ -80,6 +82,10 @@ class I8751Wire(Wire):
             raise MachineError("the controller has no switches to home to", where="--home")
         return I8751Conversation(packets, machine, manner)
 
+    def terminal(self, machine: I8751Machine) -> Terminal:
+        """Bytes in hex, and what the letters mean."""
+        return I8751Terminal()
+
     def command(
         self,
         action: str,
@@ -104,6 +110,48 @@ class I8751Wire(Wire):
         parts = list(_parts(stream, machine))
         packets = [Packet(part.data, seconds=seconds) for part in parts]
         return I8751Conversation(packets, machine, manner)
+
+
+class I8751Terminal(Terminal):
+    """Bytes go out in hex, and letters come back."""
+
+    end = b""
+    about = (
+        "bytes in hex: 13 is the key, 01 03 00 64 makes 100 steps of X, 45 executes a packet, 54 "
+        "ends; nothing stops what is executed but the switch"
+    )
+
+    MEANINGS: Final = {
+        READY: "the key was right: records may come",
+        AGAIN: "this is not the key",
+        "B": "the number of a motor was taken",
+        "8": "the number of a motor was taken",
+        "M": "a datum was stored",
+        "F": "the packet has been executed",
+        "A": "the end of the data was taken",
+    }
+    _WORDS: Final = re.compile(f"{READY}|{AGAIN}|.")
+
+    def typed(self, line: str) -> bytes:
+        """Hex digits, or text as everywhere."""
+        try:
+            return bytes.fromhex(line)
+        except ValueError:
+            return self.unescaped(line)
+
+    def heard(self, data: bytes) -> list[str]:
+        """All letters, and what the last one means; a word that is not whole is kept."""
+        text = "".join((self._rest + data).decode("latin-1").split())
+        self._rest = b""
+        if any(word.startswith(text) and word != text for word in (READY, AGAIN)):
+            self._rest = text.encode("latin-1")
+            return []
+        words = self._WORDS.findall(text)
+        return [self._shown(" ".join(words).encode("latin-1"))] if words else []
+
+    def meaning(self, line: str) -> str:
+        """Of its last word."""
+        return self.MEANINGS.get(line.rpartition(" ")[2], "")
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ import numpy as np
 
 from camtool.arrays import Ints
 from camtool.errors import MachineError, PostError
+from camtool.target.terminal import Terminal
 from camtool.target.wire import (
     LATE_S,
     Forecast,
@@ -90,6 +91,20 @@ class MatlabRouterWire(Wire):
         if manner.home:
             raise MachineError("each job goes home by itself", where="--home", mend="leave it out")
         return MatlabRouterConversation(packets, machine, manner)
+
+    def terminal(self, machine: MatlabRouterMachine) -> Terminal:
+        """Numbers."""
+        return MatlabRouterTerminal()
+
+
+class MatlabRouterTerminal(Terminal):
+    """Numbers, of which nothing but an echo comes back."""
+
+    end = END
+    about = (
+        "a number a line: lines n, first x and y, all lx, ly, velx, vely; the machine goes home "
+        "on the last of 3 + 4n, and nothing stops it but its switch"
+    )
 
 
 def _streams(jobs: Sequence[ReadJob], data: bytes, machine: MatlabRouterMachine) -> list[bytes]:

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from camtool.errors import MachineError
+from camtool.target.terminal import Terminal
 from camtool.target.wire import LATE_S, Forecast, Manner, Packet, PacketByPacket, Wire
 
 from .dialect import ValcncLink, ValcncMachine
@@ -61,6 +62,23 @@ class ValcncWire(Wire):
             raise MachineError("the controller has no command to home", where="--home")
         assert isinstance(machine.link, ValcncLink)
         return ValcncConversation(packets, machine.link, manner)
+
+    def terminal(self, machine: ValcncMachine) -> Terminal:
+        """Blocks."""
+        return ValcncTerminal()
+
+
+class ValcncTerminal(Terminal):
+    """Blocks, one a line, of which none is known to be answered."""
+
+    about = (
+        "blocks such as G01 X1 Y0 Z0, each when the one before has been drawn; no answer is "
+        "known, and nothing stops the machine but its switch"
+    )
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.hello = OPENING
 
 
 class ValcncConversation(PacketByPacket):

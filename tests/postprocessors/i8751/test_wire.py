@@ -147,3 +147,15 @@ def test_a_jog_is_a_program_of_its_steps() -> None:
             wire.command(action, target.machine, {}, Manner())  # type: ignore[union-attr]
     with pytest.raises(MachineError, match="no switches"):
         conversation(SHORT, manner=Manner(home=True))
+
+
+def test_what_a_person_types_and_reads() -> None:
+    terminal = loaded().target.wire().terminal(loaded().machine)  # type: ignore[union-attr]
+    assert terminal.typed("13") == b"\x13"
+    assert terminal.typed("01 03 00 64") == b"\x01\x03\x00\x64"
+    assert terminal.typed("\\x13x") == b"\x13x"
+    assert terminal.heard(b"LIS") == []
+    assert terminal.heard(b"TO\r\n") == ["LISTO    the key was right: records may come"]
+    assert terminal.heard(b"BMMM") == ["B M M M    a datum was stored"]
+    assert terminal.heard(b"\r\n") == []
+    assert terminal.heard(b"OTRO") == ["OTRO    this is not the key"]

@@ -177,3 +177,8 @@ def test_no_rest_where_the_master_begins_at_one_place() -> None:
 def test_homing_is_each_jobs_own() -> None:
     with pytest.raises(MachineError, match="by itself"):
         conversation(JOBS, STREAM, manner=Manner(home=True))
+
+
+def test_what_a_person_types() -> None:
+    terminal = loaded().target.wire().terminal(loaded().machine)  # type: ignore[union-attr]
+    assert (terminal.hello, terminal.typed("128")) == (b"", b"128\r")

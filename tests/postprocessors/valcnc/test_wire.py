@@ -139,3 +139,8 @@ def test_what_it_says_unasked_is_an_error_only_where_answers_are_awaited() -> No
         assert talk.state is State.SENDING
         talk.received(b"hello\n", 1.0)
         assert talk.state is state, talk.why
+
+
+def test_what_a_person_types() -> None:
+    terminal = LOADED.target.wire().terminal(LOADED.machine)  # type: ignore[union-attr]
+    assert (terminal.hello, terminal.typed("G01 X1")) == (b"C\n", b"G01 X1\n")
