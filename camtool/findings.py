@@ -664,15 +664,16 @@ class Code(IntEnum):
     )
     DIMENSION_UNBOUND = (
         501,
-        WARNING,
-        "a dimension fits no feature of the drawing, or several that differ, and is not inspected",
+        (WARNING, ERROR),
+        "a dimension fits no feature of the drawing, or several that differ: it is not inspected; "
+        "an error with `--require`",
         "name a place on the feature in tolerances.toml (`at`, `from`, `to`)",
     )
     DIMENSION_NOT_CUT = (
         502,
-        WARNING,
+        (WARNING, ERROR),
         "the program does not cut a feature of a dimension, or cuts little of it, so that it "
-        "cannot be inspected",
+        "cannot be inspected; an error with `--require`",
         "cut it in the same program, or take the dimension out of tolerances.toml",
     )
     DIMENSION_NOT_IN = (
@@ -686,9 +687,9 @@ class Code(IntEnum):
     )
     CALLOUT_TEXT = (
         520,
-        WARNING,
+        (WARNING, ERROR),
         "the text of a dimension is none that camtool reads (a size with limits, such as `Ø6 H7` "
-        "or `20 ±0.05`); it is not inspected",
+        "or `20 ±0.05`); it is not inspected; an error with `--require`",
         "correct the text, or name the dimension in tolerances.toml",
     )
     DIMENSION_DIFFERS = (
@@ -1682,12 +1683,17 @@ SETTING_DIFFERS_DWELL = Sentence(
 DIMENSION_UNBOUND = Sentence(
     Code.DIMENSION_UNBOUND,
     "{name} is not inspected: {measured:nothing that is drawn fits|one fits|# features fit}",
+    severity=WARNING,
 )
 DIMENSION_NOT_CUT = Sentence(
-    Code.DIMENSION_NOT_CUT, "{name} is not inspected: the program does not cut its {what}"
+    Code.DIMENSION_NOT_CUT,
+    "{name} is not inspected: the program does not cut its {what}",
+    severity=WARNING,
 )
 CALLOUT_TEXT = Sentence(
-    Code.CALLOUT_TEXT, "the text {text!r} is not understood: this dimension is not inspected"
+    Code.CALLOUT_TEXT,
+    "the text {text!r} is not understood: this dimension is not inspected",
+    severity=WARNING,
 )
 DIMENSION_DIFFERS = Sentence(
     Code.DIMENSION_DIFFERS,

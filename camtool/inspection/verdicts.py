@@ -26,6 +26,7 @@ from camtool.arrays import Floats
 from camtool.findings import (
     DIMENSION_NOT_IN_OUT,
     DIMENSION_NOT_IN_UNDECIDED,
+    Code,
     Finding,
     Severity,
 )
@@ -68,13 +69,24 @@ def inspect(run: Run, tolerances: Tolerances) -> Run:
         return run
     inspector = Inspector(run, tolerances.dimensions)
     verdicts = tuple(verdicts_of(inspector, run))
-    wrong = tuple(_findings(verdicts, tolerances.require))
-    findings = tuple(
-        dict.fromkeys((*run.findings, *tolerances.findings, *inspector.findings, *wrong))
-    )
+    wrong = _findings(verdicts, tolerances.require)
+    left_out = (*tolerances.findings, *inspector.findings)
+    if tolerances.require is not None:
+        left_out = tuple(map(_as_error, left_out))
+    findings = tuple(dict.fromkeys((*run.findings, *left_out, *wrong)))
     verification = run.verification.with_findings(findings)
     report = msgspec.structs.replace(verification.report, inspection=verdicts)
     return replace(run, verification=replace(verification, report=report), findings=findings)
+
+
+NOT_INSPECTED = (Code.DIMENSION_UNBOUND, Code.DIMENSION_NOT_CUT, Code.CALLOUT_TEXT)
+"""Errors where something is required of every dimension: nobody knows whether these hold."""
+
+
+def _as_error(finding: Finding) -> Finding:
+    """The finding, an error if a dimension is not inspected."""
+    wrong = finding.code in NOT_INSPECTED
+    return replace(finding, severity=Severity.ERROR) if wrong else finding
 
 
 def verdicts_of(inspector: Inspector, run: Run) -> Iterator[InspectedReport]:

@@ -175,6 +175,18 @@ def test_what_is_not_cut_and_what_fits_nothing_are_findings(plate: Path) -> None
     assert [each.kind for each in done.report.inspection] == ["distance"]
 
 
+@pytest.mark.parametrize("place", [(1.0, 1.0), (15.0, 20.0)])
+def test_what_cannot_be_inspected_is_an_error_where_something_is_required(
+    plate: Path, place: Place
+) -> None:
+    target = camtool.load_target("linuxcnc", settings=[*EXACT, *KNOWN])
+    job = camtool.job_of(tool_diameter_mm=2.0, select=("outer",))
+    run = camtool.post(plate, target, job=job)
+    hole = dimension("diameter", place)
+    assert not inspect(run, Tolerances((hole,))).failed
+    assert inspect(run, Tolerances((hole,), (), "not-out")).failed
+
+
 def test_a_scaled_part_is_refused(plate: Path) -> None:
     with pytest.raises(OptionError, match="as drawn"):
         inspect(posted(plate, scale=2.0), Tolerances((WIDTH,)))
