@@ -117,19 +117,21 @@ class Inspector:
 
 def _edges_of(bound: Bound) -> Floats:
     """(E, 2) the weights in X and Y of the edges that make a dimension: a centre lies midway
-    between two edges, a zone is as wide as one edge is off."""
+    between two edges, a zone is as wide as one edge is off. Round features have edges on all
+    sides, which count in X and in Y alike."""
     kind = bound.dimension.kind
     if kind == "diameter":
-        return opposite_edges(0.0)
+        return opposite_edges(0.25 * math.pi)
     if kind == "distance":
         rows: list[Floats] = []
         for sign, end in zip((-1.0, 1.0), bound.ends, strict=True):
             half = [0.5, 0.5] if end.how == "centre" else [1.0]
             rows += [sign * share * bound.direction for share in half]
         return np.array(rows)
+    alike = np.full(2, math.sqrt(0.5))
     if kind == "position":
-        return np.array([(1.0, 0.0), (1.0, 0.0)])
-    return np.array([(2.0, 0.0) if kind == "profile" else (1.0, 0.0)])
+        return np.array([alike, alike])
+    return np.array([2.0 * alike if kind == "profile" else alike])
 
 
 def _inspected(

@@ -113,6 +113,17 @@ def test_a_budget_adds_up(plate: Path) -> None:
     assert width.guard_um == pytest.approx(1.6449 * (width.standard_um or 0.0), rel=1e-3)
 
 
+def test_the_scatter_of_both_axes_is_in_a_diameter(plate: Path) -> None:
+    scatter = "axes.x.repeatability_mm=0.003", "axes.y.repeatability_mm=0.004"
+    hole, width = verdicts(posted(plate, *scatter), HOLE, WIDTH)
+    found = [{each.input: each.um for each in one.contributions} for one in (hole, width)]
+    # Of a diameter both edges, half of each in X and half in Y; a width in X has none of Y's.
+    assert found[0]["x.repeatability_mm"] == pytest.approx(3.0, rel=1e-3)
+    assert found[0]["y.repeatability_mm"] == pytest.approx(4.0, rel=1e-3)
+    assert found[1]["x.repeatability_mm"] == pytest.approx(3.0 * math.sqrt(2.0), rel=1e-3)
+    assert "y.repeatability_mm" not in found[1]
+
+
 @pytest.mark.parametrize(
     ("limits", "verdict"),
     [
