@@ -327,7 +327,7 @@ class GrblConversation(Conversation):
         if self._phase != "greeting" and not homing and now - self._answered >= patience:
             self._answered = now
             self._fail("it does not answer any more", now)
-        if now - self._polled >= POLLS * self.manner.late_s:
+        if now >= self._polled + POLLS * self.manner.late_s:  # as `_wake` reckons it
             if self.state is State.PAUSING and now - self._halted >= patience / 2.0:
                 self._write(HOLD)
                 self._halted = now
@@ -599,6 +599,8 @@ class GrblConversation(Conversation):
             self._end(State.FINISHED)
         elif self.single and self.sent == self.done:
             self.state, self.why = State.PAUSED, SINGLE
+        else:  # it was to do single blocks, and need not any more
+            self._go_on(now)
 
     def _dwell_s(self) -> float:
         """How long it may be idle with lines that it has not answered: as long as they dwell."""

@@ -7,6 +7,9 @@ from collections.abc import Callable
 from camtool.sending.faults import Wired
 from camtool.target.wire import Conversation, Reopen, Write
 
+MOST_TURNS = 10_000
+"""So much is said in one instant at most."""
+
 Wish = Callable[[Conversation, float], None]
 
 
@@ -24,7 +27,10 @@ class Talking:
         """Let time pass until then, or to the end of the conversation. `wish`: what the user does,
         asked again and again."""
         talk, line = self.talk, self.line
+        turns, before = 0, self.now
         while not talk.ended or talk.has_actions:
+            turns, before = (turns + 1 if self.now == before else 0), self.now
+            assert turns < MOST_TURNS, ("time stands still", self.now, talk.state, talk.why)
             self.act()
             if line.unplugged(self.now):
                 talk.lost("the plug was pulled", self.now)

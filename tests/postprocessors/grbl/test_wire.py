@@ -194,6 +194,17 @@ def test_single_blocks_wait_each() -> None:
     assert waits == len(packets()) - 1
 
 
+def test_single_blocks_that_are_no_longer_wanted_go_on() -> None:
+    def wish(talk: Conversation, now: float) -> None:
+        if talk.sent and talk.state is State.SENDING:
+            talk.single = False
+            talk.resume(now)
+
+    talk, small = held(wish=wish, manner=Manner(single=True))
+    assert talk.state is State.FINISHED
+    assert len(small.lines) == len(packets())
+
+
 def test_silence_ends_within_bounds() -> None:
     talk, _ = held(lambda number, line: [] if number > 40 else [line])
     assert talk.state is State.FAILED
