@@ -35,7 +35,7 @@ if not events["on_boot"].wait(60):
     os._exit(3)  # its threads would keep it alive
 time.sleep(3.0)  # opening the port resets it, and so does the streamer
 grbl.poll_start()
-grbl.incremental_streaming = True  # its other mode lost lines in two of three runs
+grbl.incremental_streaming = True  # its other mode takes lines from two threads without a lock
 grbl.load_file(program)
 events["on_job_completed"].clear()  # of the empty job before
 grbl.job_run()
