@@ -134,12 +134,13 @@ def _lines(dimensions: Sequence[Dimension]) -> Iterator[str]:
 
 
 def _cells(each: Dimension) -> tuple[str, ...]:
+    from camtool.inspection.dimensions import ZONES
     from camtool.inspection.limits import deviation_words
 
     nominal = "as drawn" if each.nominal_mm is None else f"{round(each.nominal_mm, 6):.6g} mm"
     limits, sizes = each.words or each.general or "no limits", ""
     zone = limits if each.limits is None else each.limits.said
-    if each.limits is not None and each.kind in ("diameter", "radius", "distance"):
+    if each.limits is not None and each.kind not in ZONES:
         lower, upper = each.limits.lower_mm, each.limits.upper_mm
         limits = deviation_words(lower, upper)
         if each.nominal_mm is not None:

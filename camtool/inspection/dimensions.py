@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal
 
 Kind = Literal[
     "diameter",
@@ -15,8 +15,10 @@ Kind = Literal[
     "profile",
 ]
 """What is measured. "distance" is between two edges, two centres, or an edge and a centre: widths
-are distances. The last four are the zones
-of ISO 1101: their lower limit is 0."""
+are distances."""
+
+ZONES: Final = ("position", "straightness", "roundness", "profile")
+"""Kinds that are the widths of zones of ISO 1101: nothing nominal, and no lower limit."""
 
 Place = tuple[float, float]
 

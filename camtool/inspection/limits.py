@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 
 from camtool.errors import OptionError
 from camtool.findings import NO_GENERAL_TOLERANCE, Finding
-from camtool.inspection.dimensions import Dimension, Kind, Limits
+from camtool.inspection.dimensions import ZONES, Dimension, Kind, Limits
 from camtool.units import MM_PER_UNIT, UM_PER_MM
 
 SIZE_DIGITS = 3
@@ -317,7 +317,7 @@ def general_limits(words: str, kind: Kind, nominal_mm: float) -> Limits | None:
     none: for form and position, sizes below LEAST_GENERAL_MM, and the ends of its tables."""
     of = _CLASSES.index(general_class(words))
     size = round(nominal_mm, SIZE_DIGITS)
-    if kind not in ("diameter", "distance", "radius") or not size >= LEAST_GENERAL_MM:
+    if kind in ZONES or not size >= LEAST_GENERAL_MM:
         return None
     table = _TABLE_2 if kind == "radius" else _TABLE_1
     for most, values in table:

@@ -90,9 +90,9 @@ class Stations:
 @dataclass(frozen=True, eq=False)
 class Cut:
     """How a feature is cut: on which `side` the tool runs (+1: outside of a circle, left of an
-    edge), whether it runs along it (`on_path`), the wanted `rows` that cut it, its stations, the
-    lowest height at which all of it is cut, and which stations (L, S) are cut at each of L depths
-    (the surface, and the deepest)."""
+    edge), whether it runs along it (`on_path`), the wanted `rows` that cut it, its stations, and
+    at which of them (L, S) it is cut at each of L depths: the moves that cut at least to
+    `levels_mm`, all (infinite) and those at the deepest."""
 
     side: int
     on_path: bool

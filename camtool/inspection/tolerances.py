@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -29,7 +30,7 @@ from camtool.findings import (
     Finding,
 )
 from camtool.geometry.drawing import Callout, Drawing
-from camtool.inspection.dimensions import Dimension, Kind, Limits
+from camtool.inspection.dimensions import ZONES, Dimension, Kind, Limits
 from camtool.inspection.features import BIND_MM, Bound, Circle, Feature, bind, features_of
 from camtool.inspection.limits import (
     NotUnderstood,
@@ -52,7 +53,6 @@ LARGEST_MM = 1e6
 """Places and sizes are no larger, mm."""
 
 Length = str | float
-_ZONES = ("position", "straightness", "roundness", "profile")
 
 
 def dimensions_of(
@@ -127,7 +127,7 @@ def _settled(
     """The dimension with its limits, once the size of its feature is known; none where its nominal
     size is another one. What fits no feature stays as far as it is known."""
     drawn = bound.drawn_mm if isinstance(bound, Bound) else dimension.nominal_mm
-    if drawn is None or dimension.kind in _ZONES:
+    if drawn is None or dimension.kind in ZONES:
         return [dimension]
     nominal = dimension.nominal_mm
     if nominal is not None and abs(nominal - drawn) > DIFFERS_MM:
@@ -136,12 +136,8 @@ def _settled(
             DIMENSION_DIFFERS(where=where, measured=drawn, limit=nominal, name=dimension.name)
         )
         return []
-    try:
+    with _blamed(file, _place_of(dimension)):
         settled, lacks = limited(dimension, drawn)
-    except OptionError as error:
-        raise InputError(
-            error.message, file=file, where=_place_of(dimension), mend=error.mend
-        ) from error
     findings += lacks
     return [settled]
 
@@ -211,7 +207,7 @@ def read_tolerances(path: Path) -> tuple[str, tuple[Dimension, ...]]:
     file = str(path)
     table = convert(read_table(path), _File, file)
     if table.general:
-        with _Blame(file, "key general"):
+        with _blamed(file, "key general"):
             general_class(table.general)
     rows = [
         _dimension(convert(row, _Row, file, f"dimension {number}"), number, table.general, path)
@@ -220,20 +216,13 @@ def read_tolerances(path: Path) -> tuple[str, tuple[Dimension, ...]]:
     return table.general, tuple(rows)
 
 
-class _Blame:
-    """Within the block, an error gets file and place."""
-
-    def __init__(self, file: str, where: str) -> None:
-        self._file, self._where = file, where
-
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(self, _kind: object, error: object, _trace: object) -> None:
-        if isinstance(error, OptionError):
-            raise InputError(
-                error.message, file=self._file, where=self._where, mend=error.mend
-            ) from error
+@contextmanager
+def _blamed(file: str, where: str) -> Iterator[None]:
+    """An error of the block gets file and place."""
+    try:
+        yield
+    except OptionError as error:
+        raise InputError(error.message, file=file, where=where, mend=error.mend) from error
 
 
 def _dimension(row: _Row, number: int, general: str, path: Path) -> Dimension:
@@ -242,7 +231,7 @@ def _dimension(row: _Row, number: int, general: str, path: Path) -> Dimension:
     _check_keys(row, str(path), place)
 
     def mm(value: Length, key: str, least: float = -LARGEST_MM) -> float:
-        with _Blame(str(path), f"{place}, key {key}"):
+        with _blamed(str(path), f"{place}, key {key}"):
             return _mm(value, key, least)
 
     pairs = {"at": row.at, "from": row.start, "to": row.to}
@@ -263,7 +252,7 @@ def _dimension(row: _Row, number: int, general: str, path: Path) -> Dimension:
         limits = Limits(0.0, size, f"zone {size:g}")
     nominal = None if row.nominal is None else mm(row.nominal, "nominal", 0.0)
     if row.limits is not None:
-        with _Blame(str(path), f"{place}, key limits"):
+        with _blamed(str(path), f"{place}, key limits"):
             said = read_words(row.limits)
             _check_units(row.nominal, said)
             words = row.limits
@@ -271,7 +260,7 @@ def _dimension(row: _Row, number: int, general: str, path: Path) -> Dimension:
                 limits, words = said.limits(nominal), ""
     direction = None
     if row.direction is not None:
-        with _Blame(str(path), f"{place}, key direction"):
+        with _blamed(str(path), f"{place}, key direction"):
             direction = _direction(row.direction)
     if len(places) == 2 and math.dist(*places) <= BIND_MM:
         raise InputError(
@@ -289,7 +278,7 @@ def _dimension(row: _Row, number: int, general: str, path: Path) -> Dimension:
         nominal_mm=nominal,
         limits=limits,
         words=words,
-        general="" if kind in _ZONES else general,
+        general="" if kind in ZONES else general,
     )
 
 
@@ -306,7 +295,7 @@ def _check_keys(row: _Row, file: str, place: str) -> None:
     }
     needed = ["from", "to"] if row.kind in ("distance", "width") else ["at"]
     sizes = ["direction", "nominal", "limits"] if len(needed) == 2 else ["nominal", "limits"]
-    takes = [*needed, *(["zone"] if row.kind in _ZONES else sizes)]
+    takes = [*needed, *(["zone"] if row.kind in ZONES else sizes)]
     for key, value in given.items():
         where = f"{place}, key {key}"
         if value is not None and key not in takes:

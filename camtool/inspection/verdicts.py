@@ -30,7 +30,7 @@ from camtool.findings import (
     Finding,
     Severity,
 )
-from camtool.inspection.dimensions import Dimension
+from camtool.inspection.dimensions import ZONES, Dimension
 from camtool.inspection.features import Circle, Edge
 from camtool.inspection.inspector import Inspected, Inspector
 from camtool.inspection.sizes import Size
@@ -103,7 +103,7 @@ def verdicts_of(inspector: Inspector, run: Run) -> Iterator[InspectedReport]:
 def _verdict(each: Inspected, size: Size, budget: Budget, first: int) -> InspectedReport:
     """The verdict of a dimension whose values are the three from `first` on in the budget."""
     bound, limits = each.bound, each.bound.dimension.limits
-    zone = bound.dimension.kind in ("position", "straightness", "roundness", "profile")
+    zone = bound.dimension.kind in ZONES
     lower = upper = None
     if limits is not None:
         lower = None if zone else bound.nominal_mm + limits.lower_mm

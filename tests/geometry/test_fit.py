@@ -42,10 +42,10 @@ def _check(curve, fit, tolerance):
     assert fit.rms_mm <= fit.max_mm
 
 
-def _smooth(fit, curve):
-    """All joints away from the curve's own corners turn by nothing."""
+def _smooth(fit, curve, tips=()):
+    """All joints away from the curve's own corners, and from its `tips`, turn by nothing."""
     nodes = curve_nodes(curve, TOLERANCE_MM, MIN_STEPS)
-    sharp = nodes.point[nodes.corner]
+    sharp = np.array([*nodes.point[nodes.corner], *tips])
     inner = fit.vertices[1:-1, :2]
     away = np.array([np.hypot(*(sharp - p).T).min() > 1e-5 for p in inner], dtype=bool)
     chords = np.hypot(*np.diff(fit.vertices[:, :2], axis=0).T)
@@ -88,9 +88,9 @@ def test_random_ellipses(size, ratio, turn, start, sweep):
         assert np.hypot(*(points - fit.vertices[0, :2]).T).max() <= POSITION_EPS_MM
         return
     _check(curve, fit, TOLERANCE_MM)
-    # A tip narrower than the tolerance may be cut off, and then folds.
-    if size * ratio > TOLERANCE_MM:
-        _smooth(fit, curve)
+    # Tips rounder than two positions are apart are corners to all that measures.
+    pointed = size * ratio**2 < POSITION_EPS_MM
+    _smooth(fit, curve, curve.centre + np.array([major, -major]) if pointed else ())
 
 
 def test_an_ellipse_of_ten_to_one_needs_few_arcs():

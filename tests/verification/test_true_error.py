@@ -154,8 +154,8 @@ def test_more_random_curves(
 
 @pytest.mark.parametrize("scale", SCALES)
 def test_the_sample_too(scale: float) -> None:
-    # At a twentieth of its size the blend comes where the fit is worst: both fits count.
-    check(ROOT / "samples" / "logo.dxf", "linuxcnc", scale, fits=2.0)
+    # At a twentieth of its size blends, up to the tolerance of G64, come where the fit is worst.
+    check(ROOT / "samples" / "logo.dxf", "linuxcnc", scale, fits=1.2 if scale == 0.05 else 1.0)
 
 
 def test_the_tolerance_is_of_the_part_whatever_brings_it_to_its_size(tmp_path: Path) -> None:
