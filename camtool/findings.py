@@ -1690,6 +1690,11 @@ DIMENSION_NOT_CUT = Sentence(
     "{name} is not inspected: the program does not cut its {what}",
     severity=WARNING,
 )
+DIMENSION_NOT_CUT_THERE = Sentence(
+    Code.DIMENSION_NOT_CUT,
+    "{name} is not inspected: the slides leave what is drawn by too much, or may leave it",
+    severity=WARNING,
+)
 CALLOUT_TEXT = Sentence(
     Code.CALLOUT_TEXT,
     "the text {text!r} is not understood: this dimension is not inspected",

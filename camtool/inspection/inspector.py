@@ -16,7 +16,7 @@ from camtool.arrays import Floats, Ints
 from camtool.errors import OptionError
 from camtool.findings import DIMENSION_NOT_CUT, Finding
 from camtool.inspection.dimensions import Dimension
-from camtool.inspection.features import Bound, Edge, Feature, bind, features_of
+from camtool.inspection.features import Bound, Edge, bind, features_of
 from camtool.inspection.sizes import Cut, Size, Swept, cut_of, edge_at, rows_of, size_of
 from camtool.inspection.uncertainty import Variant, edges_of, opposite_edges
 from camtool.machine.model import Machine
@@ -148,7 +148,7 @@ def _inspected(
             where="tolerances",
             mend="limits hold for the part as drawn: leave out fit and scale",
         )
-    known: dict[tuple[int, int], tuple[Feature, Cut | None]] = {}
+    known: dict[tuple[int, int], Cut | None] = {}
     for dimension in dimensions:
         bound = bind(dimension, features, run.drawing.file)
         if isinstance(bound, Finding):
@@ -160,8 +160,8 @@ def _inspected(
             for drawn, feature in zip(bound.features, placed.features, strict=True):
                 key = id(drawn), copy
                 if key not in known:
-                    known[key] = feature, cut_of(feature, moves)
-                cuts.append(known[key][1])
+                    known[key] = cut_of(feature, moves)
+                cuts.append(known[key])
             here = Inspected(placed, tuple(filter(None, cuts)), copy if len(maps) > 1 else None)
             if len(here.cuts) == len(cuts):
                 yield here

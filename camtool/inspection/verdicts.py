@@ -24,6 +24,7 @@ import numpy as np
 
 from camtool.arrays import Floats
 from camtool.findings import (
+    DIMENSION_NOT_CUT_THERE,
     DIMENSION_NOT_IN_OUT,
     DIMENSION_NOT_IN_UNDECIDED,
     Code,
@@ -68,9 +69,11 @@ def inspect(run: Run, tolerances: Tolerances) -> Run:
     if run.verification is None or run.drawing is None or run.job is None:
         return run
     inspector = Inspector(run, tolerances.dimensions)
-    verdicts = tuple(verdicts_of(inspector, run))
+    found = tuple(verdicts_of(inspector, run))
+    verdicts = tuple(each for each in found if isinstance(each, InspectedReport))
     wrong = _findings(verdicts, tolerances.require)
-    left_out = (*tolerances.findings, *inspector.findings)
+    unmeasured = (each for each in found if isinstance(each, Finding))
+    left_out = (*tolerances.findings, *inspector.findings, *unmeasured)
     if tolerances.require is not None:
         left_out = tuple(map(_as_error, left_out))
     findings = tuple(dict.fromkeys((*run.findings, *left_out, *wrong)))
@@ -89,15 +92,20 @@ def _as_error(finding: Finding) -> Finding:
     return replace(finding, severity=Severity.ERROR) if wrong else finding
 
 
-def verdicts_of(inspector: Inspector, run: Run) -> Iterator[InspectedReport]:
-    """The verdicts of all dimensions, in order."""
+def verdicts_of(inspector: Inspector, run: Run) -> Iterator[InspectedReport | Finding]:
+    """The verdicts of all dimensions, in order; a finding for one whose feature the slides leave,
+    or may leave on a machine that differs by an uncertainty."""
     if not inspector.dimensions:
         return
     inputs = inputs_of(run.target.machine, inspector.tool_diameter_mm)
     budget = propagate(inspector.values, inputs, inspector.edges)
     sizes = budget.values.reshape(-1, 3)
-    for index, (each, row) in enumerate(zip(inspector.dimensions, sizes.tolist(), strict=True)):
-        yield _verdict(each, Size(*row), budget, 3 * index)
+    measured = np.isfinite([budget.values, budget.standards]).all(axis=0).reshape(-1, 3)
+    for index, each in enumerate(inspector.dimensions):
+        if measured[index].all():
+            yield _verdict(each, Size(*sizes[index].tolist()), budget, 3 * index)
+        else:
+            yield DIMENSION_NOT_CUT_THERE(where=each.bound.dimension.source, name=each.name)
 
 
 def _verdict(each: Inspected, size: Size, budget: Budget, first: int) -> InspectedReport:

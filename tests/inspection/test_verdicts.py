@@ -198,6 +198,18 @@ def test_what_cannot_be_inspected_is_an_error_where_something_is_required(
     assert inspect(run, Tolerances((hole,), (), "not-out")).failed
 
 
+def test_slides_that_are_elsewhere_give_no_size(plate: Path) -> None:
+    run = posted(plate, "axes.x.real_step_mm=0.002")  # two fifths of the step
+    done = inspect(run, Tolerances(ALL, (), "not-out"))
+    assert done.report is not None
+    assert done.failed
+    left = {each.message.split()[0] for each in done.findings if each.code == 502}
+    assert "diameter" in left
+    for each in done.report.inspection:
+        assert math.isfinite(each.fit_mm)
+        assert math.isfinite(each.standard_um or 0.0)
+
+
 def test_a_scaled_part_is_refused(plate: Path) -> None:
     with pytest.raises(OptionError, match="as drawn"):
         inspect(posted(plate, scale=2.0), Tolerances((WIDTH,)))
