@@ -80,7 +80,10 @@ def show(
 ) -> None:
     """Check the tolerances FILE, and say nominal size and limits of each of its dimensions, with
     --against also those that the drawing says itself."""
+    import msgspec
+
     from camtool.inspection.tolerances import dimensions_of, read_tolerances
+    from camtool.verification.report import reported
 
     check_places([file, against], [report])
     _, dimensions = read_tolerances(Path(file))
@@ -91,15 +94,7 @@ def show(
         findings = (*read.findings, *found)
     if report is not None:
         rows = [_facts(each) for each in dimensions]
-        said = [
-            {
-                "code": each.code.name,
-                "severity": each.severity.name.lower(),
-                "message": each.message,
-                "where": each.where,
-            }
-            for each in findings
-        ]
+        said = msgspec.to_builtins(reported(findings))
         write_all({report: to_json({"dimensions": rows, "findings": said}).encode()})
     if not quiet and report != STDOUT:
         for line in _lines(dimensions):

@@ -29,6 +29,7 @@ from camtool.pictures.page import (
     colour_bar_width,
     fitted,
     foot_of,
+    legend_below,
     legend_rows,
     scale_bar,
     sheet,
@@ -171,7 +172,7 @@ def _polars(scenes: Sequence[Scene], which: int, options: Options) -> str:
         for shown, head, down in zip(errors, grid.heads, grid.downs, strict=True)
     ]
     entries = list(dict.fromkeys(entry for circles in plots for entry in polar.entries(circles)))
-    below, foot = polar.legend_below(entries, grid.rows[-1], page)
+    below, foot = legend_below(entries, grid.rows[-1], page)
     return sheet(_title(scenes), (page, foot), options, *grid.placed(panels), below)
 
 

@@ -391,12 +391,9 @@ def _middle(one: Place, other: Place) -> Place:
 
 
 def _size_words(item: InspectedReport) -> str:
-    """Nominal size, limits, and the predicted size with its uncertainty."""
-    sign = {"diameter": "Ø", "radius": "R"}.get(item.kind, "")
-    band = "" if item.standard_um is None else f" ± {2e-3 * item.standard_um:.3f}"
-    nominal = f"{sign}{item.nominal_mm:g}" if item.nominal_mm else item.kind
-    wanted = f"{nominal} {item.limits}".rstrip()
-    return f"{wanted}: {item.fit_mm:.3f}{band}"
+    """What is asked, and the predicted size with its uncertainty."""
+    band = "" if item.expanded_um is None else f" ± {1e-3 * item.expanded_um:.3f}"
+    return f"{item.asked}: {item.fit_mm:.3f}{band}"
 
 
 # Part zero.

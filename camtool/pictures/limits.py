@@ -13,8 +13,7 @@ from camtool.pictures import text
 from camtool.pictures.colours import FRAME, INK, QUIET, SWEPT, VERDICTS
 from camtool.pictures.layers import Entry, line_swatch
 from camtool.pictures.options import SVG_WIDTH_PX, Options
-from camtool.pictures.page import sheet, title_and_notes
-from camtool.pictures.polar import legend_below
+from camtool.pictures.page import legend_below, sheet, title_and_notes
 from camtool.pictures.scene import Scene
 from camtool.pictures.svg import Look, PathData, element, title
 from camtool.pictures.text import Style
@@ -71,7 +70,7 @@ def _row(item: InspectedReport, y: float, width: float) -> str:
         return left + axis * min(max(share, 0.0), 1.0)
 
     colour = VERDICTS[item.verdict]
-    spread = COVERAGE * (item.standard_um or 0.0) / UM_PER_MM
+    spread = (item.expanded_um or 0.0) / UM_PER_MM
     limits: Look = {"x": at(lower), "y": y - 0.36 * ROW, "height": 0.72 * ROW, "fill": SWEPT}
     ends: Look = {"fill": "none", "stroke": FRAME, "stroke-width": 1.0}
     thin: Look = {"fill": "none", "stroke": colour, "stroke-width": 1.6}

@@ -259,6 +259,16 @@ def legend_rows(table: Sequence[Sequence[Entry]], left: float, middle: float) ->
     return element("g", {"id": "legend"}, *parts) if parts else ""
 
 
+def legend_below(entries: Sequence[Entry], top: float, width: float) -> tuple[str, float]:
+    """The legend below `top` on a page of this width, and the height of that page."""
+    if not entries:
+        return "", round(top + MARGIN)
+    room = width - 2.0 * MARGIN
+    table = rows_of(entries, room, room)
+    legend_y = top + 0.5 * ROW_STEP
+    return legend_rows(table, MARGIN, legend_y), foot_of(table, legend_y)
+
+
 def colour_bar_labels(top_um: float, height: float) -> list[tuple[float, str]]:
     """(value µm, text) along the colour bar: round numbers, and the largest error at the top."""
     step = round_step(top_um * LEAST_BAR_SPACING / height)

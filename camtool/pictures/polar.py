@@ -17,7 +17,7 @@ from camtool.pictures import text
 from camtool.pictures.colours import BACK, BACK_SPREAD, FEED, FRAME, GRID, INK, PLOT, QUIET, SPREAD
 from camtool.pictures.layers import Entry, line_swatch
 from camtool.pictures.options import SVG_WIDTH_PX, Options
-from camtool.pictures.page import ROW_STEP, foot_of, legend_rows, rows_of, sheet, title_and_notes
+from camtool.pictures.page import legend_below, sheet, title_and_notes
 from camtool.pictures.scene import Round, Scene
 from camtool.pictures.svg import Look, PathData, element, number
 from camtool.pictures.text import Style
@@ -67,16 +67,6 @@ def draw_polar(scene: Scene, which: int, options: Options) -> str:
     foot = dial.middle[1] + dial.outer + ROOM
     below, foot = legend_below(entries(circles), foot, width)
     return sheet(scene.title, (width, foot), options, head, *plot(errors, dial), below)
-
-
-def legend_below(entries: Sequence[Entry], top: float, width: float) -> tuple[str, float]:
-    """The legend below `top` on a page of this width, and the height of that page."""
-    if not entries:
-        return "", round(top + MARGIN)
-    room = width - 2.0 * MARGIN
-    table = rows_of(entries, room, room)
-    legend_y = top + 0.5 * ROW_STEP
-    return legend_rows(table, MARGIN, legend_y), foot_of(table, legend_y)
 
 
 def entries(circles: Sequence[CircleErrors]) -> list[Entry]:

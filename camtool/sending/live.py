@@ -15,14 +15,16 @@ from typing import Final
 
 import numpy as np
 
-from camtool.arrays import Floats, Ints
+from camtool.arrays import Bools, Floats, Ints
+from camtool.target.wire import Place
 from camtool.toolpath.moves import PolarArcs, Toolpath
 
 EVERY_S: Final = 1.0
 """The page is written, and loaded, so often."""
 
 MOST_POINTS: Final = 12_000
-"""Of longer paths only every so-manieth point is drawn, so that a page takes milliseconds."""
+"""Of longer paths only so many points are drawn, evenly spread, so that a page takes
+milliseconds."""
 
 ARC_PARTS: Final = 24
 """An arc is drawn as so many chords."""
@@ -82,13 +84,16 @@ class LivePage:
         self._box = f"{x:.4f} {-y - h:.4f} {w:.4f} {h:.4f}"
         self._radius = 0.008 * max(w, h)
         self._cuts = _drawn(path, points, row, path.is_feed)
-        self._rapids = _drawn(path, points, row, path.is_motion & ~path.is_feed)
+        rapids = _drawn(path, points, row, path.is_motion & ~path.is_feed)
+        self._ways = "".join(rapids.pieces), "".join(self._cuts.pieces)
 
-    def html(self, state: str, facts: Mapping[str, str], block: int, place: object = None) -> str:
+    def html(
+        self, state: str, facts: Mapping[str, str], block: int, place: Place | None = None
+    ) -> str:
         """The page; `block`: the last of what is sent that is acknowledged; `place` (x, y, z)."""
-        last = int(self._cuts.block.max(initial=-1))
+        rapids, cuts = self._ways
         dot = ""
-        if isinstance(place, tuple):
+        if place is not None:
             dot = f'<circle class="place" cx="{place[0]:.4f}" cy="{-place[1]:.4f}" '
             dot += f'r="{self._radius:.4f}"/>'
         seconds = f'<meta http-equiv="refresh" content="{EVERY_S:g}">'
@@ -100,8 +105,8 @@ class LivePage:
             facts=" · ".join(rows),
             box=self._box,
             width=WIDTH,
-            rapids=self._rapids.until(int(self._rapids.block.max(initial=-1))),
-            cuts=self._cuts.until(last),
+            rapids=rapids,
+            cuts=cuts,
             done=self._cuts.until(block),
             place=dot,
         )
@@ -126,9 +131,9 @@ def _points(path: Toolpath) -> tuple[Floats, Ints]:
     return points[order], row[order]
 
 
-def _drawn(path: Toolpath, points: Floats, row: Ints, chosen: object) -> _Drawn:
+def _drawn(path: Toolpath, points: Floats, row: Ints, chosen: Bools) -> _Drawn:
     """The moves of the chosen rows (N,)."""
-    mine = np.asarray(chosen)[row]
+    mine = chosen[row]
     before = np.concatenate([path.start[None, :], points[:-1]]) if len(points) else points
     stride = max(-(-int(mine.sum()) // MOST_POINTS), 1)
     pieces, blocks, at = [], [], -1

@@ -263,6 +263,10 @@ class FoundReport(msgspec.Struct, frozen=True):
     off_rms_um: float | None = None
 
 
+COVERAGE = 2.0
+"""Uncertainties in tables and pictures are expanded by this, to cover some 95 %."""
+
+
 class Contribution(msgspec.Struct, frozen=True):
     """What one input contributes to the standard uncertainty of a dimension, µm; null where it is
     not known how well the input is."""
@@ -300,6 +304,18 @@ class InspectedReport(msgspec.Struct, frozen=True):
     contributions: tuple[Contribution, ...] = ()
     unknown: tuple[str, ...] = ()
     measure: str = ""
+
+    @property
+    def asked(self) -> str:
+        """What is asked of it: "Ø5 H7", "roundness zone 0.02"."""
+        sign = {"diameter": "Ø", "radius": "R"}.get(self.kind, "")
+        nominal = f"{sign}{self.nominal_mm:g}" if self.nominal_mm else self.kind
+        return f"{nominal} {self.limits}".rstrip()
+
+    @property
+    def expanded_um(self) -> float | None:
+        """Its uncertainty, expanded by COVERAGE; None where it is not known."""
+        return None if self.standard_um is None else COVERAGE * self.standard_um
 
 
 class FindingReport(msgspec.Struct, frozen=True):
@@ -613,14 +629,12 @@ def facts(report: Report) -> Iterator[tuple[str, str]]:
 
 def inspected_words(item: InspectedReport) -> str:
     """A dimension in one line: its limits, its predicted sizes, its verdict."""
-    sign = {"diameter": "Ø", "radius": "R"}.get(item.kind, "")
-    nominal = f"{sign}{item.nominal_mm:.6g}" if item.nominal_mm else item.kind
-    words = f"{item.name}: {nominal} {item.limits}".rstrip()
+    words = f"{item.name}: {item.asked}"
     size = f"{item.fit_mm:.4f} mm"
     if item.high_mm > item.low_mm:
         size += f" ({item.low_mm:.4f} to {item.high_mm:.4f})"
-    if item.standard_um is not None:
-        size += f" ± {COVERAGE * item.standard_um:.1f} µm"
+    if item.expanded_um is not None:
+        size += f" ± {item.expanded_um:.1f} µm"
     words += f"; predicted {size}"
     if item.verdict == "predicted":
         return words
@@ -638,10 +652,6 @@ def _chance(probability: float) -> str:
     if share > 99.9:
         return "over 99.9 %"
     return "under 0.1 %" if share < 0.1 else f"{share:.1f} %"
-
-
-COVERAGE = 2.0
-"""Uncertainties in tables are expanded by this, to cover some 95 %."""
 
 
 def _asked_words(asked: AskedReport) -> str:
@@ -891,7 +901,7 @@ def _inspection_sheet(report: Report) -> Sheet:
             f"{item.low_mm:.4f}",
             f"{item.fit_mm:.4f}",
             f"{item.high_mm:.4f}",
-            um(None if item.standard_um is None else COVERAGE * item.standard_um),
+            um(item.expanded_um),
             "–" if item.probability is None else _chance(item.probability),
         )
         for item in report.inspection

@@ -8,7 +8,7 @@ from camtool_postprocessors.matlab_router.twin import MatlabRouterTwin
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.feeding import at_rest, logo, made, motion, same_motion
+from tests.feeding import at_rest, at_rest_quickly, logo, made, motion, same_motion
 
 JOBS = (
     b"2\r14\r14\r4\r10\r2\r0\r240\r-480\r48\r0\r",
@@ -28,14 +28,7 @@ def fed(twin: MatlabRouterTwin, *jobs: bytes) -> bytes:
     for job in jobs:
         said += twin.connected(twin.now)
         said += twin.receive(job, twin.now)
-        said += at_rest_quickly(twin)
-    return said
-
-
-def at_rest_quickly(twin: MatlabRouterTwin) -> bytes:
-    said = b""
-    while twin.slides.ends_s is not None:
-        said += twin.advance(twin.slides.ends_s)
+        said += at_rest_quickly(twin, twin.now)[0]
     return said
 
 
@@ -134,7 +127,7 @@ def test_no_bytes_make_it_fall(pieces: list[bytes]) -> None:
         now = max(now, twin.now)
         twin.receive(piece, now)
         twin.connected(now)
-    at_rest_quickly(twin)
+    at_rest_quickly(twin, twin.now)
     assert np.isfinite(twin.slides.commanded_mm).all()
 
 

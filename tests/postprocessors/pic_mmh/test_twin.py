@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from camtool.errors import MachineError, OptionError
 from camtool.target.registry import load_target
 from camtool.target.twin import Twin
-from tests.feeding import at_rest, logo, made, motion, same_motion
+from tests.feeding import at_rest, at_rest_quickly, logo, made, motion, same_motion
 
 BLOCK = b"G01X00014.00Y00007.00F08;"
 STEP_UM = 0.14
@@ -27,15 +27,6 @@ def feed(twin: Twin, program: bytes, *, echo: bool = True) -> tuple[bytes, float
         more, now = at_rest_quickly(twin, now)
         reported += sent + more
     return reported, now
-
-
-def at_rest_quickly(twin: Twin, now: float) -> tuple[bytes, float]:
-    """As `at_rest`, a block at a time."""
-    sent = b""
-    while twin.slides.ends_s is not None:
-        now = twin.slides.ends_s
-        sent += twin.advance(now)
-    return sent, now
 
 
 def test_the_logo_runs_as_verify_says() -> None:

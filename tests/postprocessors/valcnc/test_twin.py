@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from camtool.errors import OptionError
 from camtool.target.twin import Twin
-from tests.feeding import at_rest, logo, made, motion, same_motion
+from tests.feeding import at_rest, at_rest_quickly, logo, made, motion, same_motion
 
 ARCS = (
     b"G00X0Y0Z0.625\nG03X1.25Y1.25Z0.625I0J1.25\nG02X-1.25Y1.25Z0.625I-1.25J0\n"
@@ -22,9 +22,8 @@ def feed(twin: Twin, program: bytes) -> tuple[bytes, float]:
     now, sent = 0.0, b""
     for block in program.splitlines():
         sent += twin.receive(block + b"\n", now)
-        while twin.slides.ends_s is not None:
-            now = twin.slides.ends_s
-            sent += twin.advance(now)
+        more, now = at_rest_quickly(twin, now)
+        sent += more
     return sent, now
 
 
