@@ -3,22 +3,17 @@
     pytest -m slow tests/validation/test_validation_live.py            (about fifteen minutes)
     pytest -m slow --bless tests/validation/test_validation_live.py    writes docs/validation.md
 
-Debian's linuxcnc-uspace runs in real time, one instance at a time on a machine: a lock, in the
-folder for temporary files, sees to that. `live/` has its configuration: the axes of the machine
-file, tools 1 to 9, and the sampler. CAMTOOL_LIVE names a folder in which the recordings are kept;
-those that are there already are not made again.
+`live.py` runs them within Debian's linuxcnc-uspace. CAMTOOL_LIVE names a folder in which the
+recordings are kept; those that are there already are not made again.
 """
 
 from __future__ import annotations
 
-import fcntl
 import os
 import shutil
 import subprocess
 import sys
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,6 +23,7 @@ import pytest
 from camtool.arrays import Floats
 from camtool.simulation.motion import IDEAL, Options
 from camtool.target.registry import load_target
+from tests.oracles.linuxcnc_headless import COMMAND, alone, laid_out
 from tests.oracles.motion_rows import rows_of
 from tests.targets import simulate
 from tests.validation.page import check, mm, signed
@@ -94,32 +90,14 @@ def posted(name: str, folder: Path) -> Path:
     return file
 
 
-@contextmanager
-def alone() -> Iterator[None]:
-    """No other LinuxCNC runs on this machine meanwhile."""
-    with Path(tempfile.gettempdir(), "linuxcnc.lock").open("a", encoding="ascii") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        yield
-
-
-def record(programs: list[Path], folder: Path) -> None:
-    """Run programs, each of which gets its samples beside it."""
+def record(programs: list[Path], folder: Path, above: Sequence[Path]) -> None:
+    """Run programs, each of which gets its samples beside it; `above` as `laid_out` has it."""
     work = folder / "machine"
-    shutil.copytree(HERE / "live", work, dirs_exist_ok=True)
-    for name in ("machine.var", "log"):
-        (work / name).touch()
-    for path in (work, folder):
-        path.chmod(0o777)  # as root, the real-time part gives root away
-    environment = os.environ | {
-        "CNC_PROGRAMS": " ".join(map(str, programs)),
-        "HOME": str(work),
-        "DISPLAY": "",
-        "RTAPI_FIFO_PATH": str(work / "fifo"),
-        "RTAPI_UID": str(os.getuid() or 65534),
-    }
+    environment = laid_out(work, (HERE / "live.py").read_text(encoding="utf-8"), above)
+    environment["CNC_PROGRAMS"] = " ".join(map(str, programs))
     with alone(), (work / "log").open("w", encoding="utf-8") as log:
         subprocess.run(
-            ["linuxcnc", "machine.ini"], cwd=work, env=environment, stdout=log, stderr=log,
+            COMMAND, cwd=work, env=environment, stdout=log, stderr=log,
             stdin=subprocess.DEVNULL, timeout=3600, check=False,
         )  # fmt: skip
 
@@ -185,7 +163,7 @@ def test_linuxcnc_live(bless: bool, tmp_path: Path) -> None:
     programs = {name: posted(name, folder) for name in names}
     left = [file for file in programs.values() if not Path(f"{file}.samples").exists()]
     if left:
-        record(left, folder)
+        record(left, folder, [folder, *tmp_path.parents[:2]])
     rows, misses = [], []
     for name, program in programs.items():
         live, model = recorded(program), predicted(program)

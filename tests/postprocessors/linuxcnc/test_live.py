@@ -1,9 +1,8 @@
 """LinuxCNC itself, without a screen: camtool's sender drives it through linuxcncrsh, and its
-joints go where `verify` says. One instance at a time on a computer, hence the lock."""
+joints go where `verify` says."""
 
 from __future__ import annotations
 
-import fcntl
 import os
 import shutil
 import signal
@@ -22,9 +21,8 @@ from shapely import LineString, points
 from camtool.arrays import Floats
 from camtool.target.registry import load_target
 from tests.feeding import motion
+from tests.oracles.linuxcnc_headless import COMMAND, alone, laid_out
 
-HEADLESS = Path(__file__).parent / "headless"
-LOCK = Path("/tmp/linuxcnc.lock")
 NEAR_MM = 0.012
 """A blend of G64 P0.01, and what lies between two samples of the motion."""
 
@@ -78,29 +76,13 @@ class Hands:
 @contextmanager
 def live(folder: Path) -> Iterator[tuple[int, Hands]]:
     """LinuxCNC, switched on; the port of linuxcncrsh."""
-    for file in HEADLESS.iterdir():
-        shutil.copy(file, folder)
-    (folder / "machine.var").touch()
-    (folder / "display.sh").write_text(DISPLAY)
-    (folder / "display.sh").chmod(0o755)
-    for each in (folder, *folder.parents[:2]):
-        with suppress(PermissionError):
-            each.chmod(0o777)  # its real-time part gives up being root
     port = free_port()
-    own = {
-        "RTAPI_UID": "65534",
-        "RTAPI_FIFO_PATH": str(folder / "fifo"),
-        "HOME": str(folder),
-        "DISPLAY": "",
-        "RSH_PORT": str(port),
-    }
-    with LOCK.open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        log = (folder / "linuxcnc.log").open("w")
+    environment = laid_out(folder, DISPLAY, folder.parents[:2]) | {"RSH_PORT": str(port)}
+    with alone(), (folder / "linuxcnc.log").open("w") as log:
         running = subprocess.Popen(
-            ["linuxcnc", "machine.ini"],
+            COMMAND,
             cwd=folder,
-            env=os.environ | own,
+            env=environment,
             stdout=log,
             stderr=log,
             start_new_session=True,
@@ -115,7 +97,6 @@ def live(folder: Path) -> Iterator[tuple[int, Hands]]:
             except subprocess.TimeoutExpired:
                 os.killpg(running.pid, signal.SIGTERM)
                 running.wait(20.0)
-            log.close()
             for left in _begun_in(folder):
                 os.kill(left, signal.SIGKILL)
 
