@@ -9,7 +9,7 @@ is a finding, and the dimension is not inspected.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -17,6 +17,7 @@ import numpy as np
 
 from camtool.arrays import Bools, Floats
 from camtool.findings import DIMENSION_UNBOUND, Finding
+from camtool.geometry.boxes import BoxIndex
 from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.inspection.dimensions import Dimension, Place
 from camtool.planning.place import Map
@@ -30,6 +31,9 @@ SAME_CIRCLE_MM = 1e-4
 
 SQUARE_RAD = 2e-3
 """An edge is square to a direction within this, and parallel to another edge: 0.1°."""
+
+SAME_LINE = 1e-6
+"""Segments whose directions differ by no more than this, rad, are one edge."""
 
 FULL_TURN_RAD = 1e-6
 """Arcs that lack no more than this of a whole turn are a whole circle."""
@@ -60,15 +64,11 @@ class Circle:
         return found
 
     def distance_mm(self, place: Place) -> float:
-        """How far a place is from its arcs, along the radius; infinite beside them, as far as it
-        is nearer than BIND_MM to the whole circle."""
+        """How far a place is from its arcs, along the radius; infinite beside them."""
         x, y = place[0] - self.centre_mm[0], place[1] - self.centre_mm[1]
-        away = abs(math.hypot(x, y) - self.radius_mm)
-        if away > BIND_MM:  # of most of the circles of a drawing
-            return away
         slack = BIND_MM / max(self.radius_mm, BIND_MM)
         on_arc = self.has(np.array([math.atan2(y, x)]), slack)[0]
-        return away if on_arc else math.inf
+        return abs(math.hypot(x, y) - self.radius_mm) if on_arc else math.inf
 
     def placed(self, where: Map) -> Circle:
         """It in the work frame."""
@@ -103,12 +103,9 @@ class Edge:
 
     def distance_mm(self, place: Place) -> float:
         """How far a place is from it."""
-        (x, y), (to_x, to_y) = self.start_mm, self.end_mm
-        along_x, along_y = to_x - x, to_y - y
-        beside_x, beside_y = place[0] - x, place[1] - y
-        square = along_x * along_x + along_y * along_y
-        share = min(max((beside_x * along_x + beside_y * along_y) / (square or 1.0), 0.0), 1.0)
-        return math.hypot(beside_x - share * along_x, beside_y - share * along_y)
+        beside = np.subtract(place, self.start_mm)
+        at = float(np.clip(beside @ self.along, 0.0, self.length_mm))
+        return float(np.hypot(*(beside - at * self.along)))
 
     def placed(self, where: Map) -> Edge:
         """It in the work frame."""
@@ -181,10 +178,36 @@ class Bound:
         )
 
 
-def features_of(paths: Polylines) -> list[Feature]:
+class Features:
+    """Circles and edges in order, and which of them are where."""
+
+    def __init__(self, each: Iterable[Feature]) -> None:
+        self._each = tuple(each)
+        self._index = BoxIndex(np.array([_box(one) for one in self._each]).reshape(-1, 4))
+
+    def __iter__(self) -> Iterator[Feature]:
+        return iter(self._each)
+
+    def at(self, place: Place) -> list[Feature]:
+        """Those whose box, widened by BIND_MM, has a place in it: of a circle its centre too."""
+        x, y = place
+        around = np.array([[x - BIND_MM, y - BIND_MM, x + BIND_MM, y + BIND_MM]])
+        return [self._each[row] for row in self._index.touching(around)[1].tolist()]
+
+
+def _box(feature: Feature) -> tuple[float, float, float, float]:
+    """Left, low, right and high, mm; of an arc that of its whole circle."""
+    if isinstance(feature, Circle):
+        (x, y), radius = feature.centre_mm, feature.radius_mm
+        return x - radius, y - radius, x + radius, y + radius
+    (x, y), (to_x, to_y) = feature.start_mm, feature.end_mm
+    return min(x, to_x), min(y, to_y), max(x, to_x), max(y, to_y)
+
+
+def features_of(paths: Polylines) -> Features:
     """The circles and edges of all paths, in order; segments in line are one edge, and arcs of
     one path about one centre are one circle."""
-    return [feature for index, path in enumerate(paths) for feature in _of_path(index, path)]
+    return Features(each for index, path in enumerate(paths) for each in _of_path(index, path))
 
 
 def _of_path(index: int, path: Polyline) -> Iterator[Feature]:
@@ -225,26 +248,23 @@ def _edges(index: int, segments: Segments, *, closed: bool) -> Iterator[Edge]:
         yield Edge(index, (x, y), (to_x, to_y))
 
 
-SAME_LINE = 1e-6
-"""Segments whose directions differ by no more than this, rad, are one edge."""
-
-
-def bind(dimension: Dimension, features: Sequence[Feature], file: str) -> Bound | Finding:
+def bind(dimension: Dimension, features: Features, file: str) -> Bound | Finding:
     """The dimension with its features, or the finding that says why there are none."""
     if dimension.kind == "distance":
         return _distance(dimension, features, file)
+    here = features.at(dimension.places_mm[0])
     if dimension.kind == "straightness":
         found: list[Feature] = [
-            each for each in features if isinstance(each, Edge) and _near(each, dimension)
+            each for each in here if isinstance(each, Edge) and _near(each, dimension)
         ]
         return _single(dimension, found, 0.0, file)
     if dimension.kind == "profile":
-        paths = sorted({each.path for each in features if _near(each, dimension)})
+        paths = sorted({each.path for each in here if _near(each, dimension)})
         if len(paths) != 1:
             return _unbound(dimension, len(paths), file)
         whole = Outline(paths[0], tuple(each for each in features if each.path == paths[0]))
         return Bound(dimension, (whole,), (), np.zeros(2), 0.0)
-    circles = [each for each in features if isinstance(each, Circle) and _is_of(each, dimension)]
+    circles = [each for each in here if isinstance(each, Circle) and _is_of(each, dimension)]
     if len(circles) > 1 and dimension.nominal_mm is not None:
         wanted = dimension.nominal_mm * (0.5 if dimension.kind == "diameter" else 1.0)
         circles = [each for each in circles if abs(each.radius_mm - wanted) <= BIND_MM] or circles
@@ -282,7 +302,7 @@ def _single(
     return Bound(dimension, (found[0],), (), np.zeros(2), drawn_mm)
 
 
-def _distance(dimension: Dimension, features: Sequence[Feature], file: str) -> Bound | Finding:
+def _distance(dimension: Dimension, features: Features, file: str) -> Bound | Finding:
     first, second = dimension.places_mm
     direction = np.subtract(second, first)
     if dimension.direction_rad is not None:
@@ -294,7 +314,7 @@ def _distance(dimension: Dimension, features: Sequence[Feature], file: str) -> B
     direction = direction / np.hypot(*direction)
     ends = []
     for place in (first, second):
-        found = _ends_at(place, direction, features)
+        found = _ends_at(place, direction, features.at(place))
         if len(found) != 1:
             return _unbound(dimension, len(found), file, place)
         ends.append(found[0])
@@ -312,8 +332,8 @@ def _place_of(end: End, direction: Floats) -> Floats:
 
 
 def _ends_at(place: Place, direction: Floats, features: Sequence[Feature]) -> list[End]:
-    """What a place can mean for a measurement along `direction`. Edges come before the circles
-    that go on from them with the same direction."""
+    """What a place, near which these features are, can mean for a measurement along `direction`.
+    Edges come before the circles that go on from them with the same direction."""
     circles = [each for each in features if isinstance(each, Circle)]
     about = [each for each in circles if math.dist(place, each.centre_mm) <= BIND_MM]
     centres = [End(each, "centre") for each in _preferred(about)]

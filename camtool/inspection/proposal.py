@@ -8,7 +8,7 @@ of an arc: a corner is no feature that could be measured.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain, groupby
 
 import numpy as np
@@ -116,7 +116,7 @@ def _quoted(name: str) -> str:
     return '"' + name.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
-def _sizes(features: Sequence[Feature], closed: Sequence[bool]) -> Iterator[Dimension]:
+def _sizes(features: Iterable[Feature], closed: Sequence[bool]) -> Iterator[Dimension]:
     """The sizes of all paths, path by path: circles, slots, outlines."""
     paths = [list(of) for _, of in groupby(features, lambda each: each.path)]
     circles = [of[0] for of in paths if len(of) == 1 and isinstance(of[0], Circle)]

@@ -31,7 +31,7 @@ from camtool.findings import (
 )
 from camtool.geometry.drawing import Callout, Drawing
 from camtool.inspection.dimensions import ZONES, Dimension, Kind, Limits
-from camtool.inspection.features import BIND_MM, Bound, Circle, Feature, bind, features_of
+from camtool.inspection.features import BIND_MM, Bound, Circle, Features, bind, features_of
 from camtool.inspection.limits import (
     NotUnderstood,
     Words,
@@ -404,7 +404,7 @@ def _of_callout(
     callout: Callout,
     measured: Dimension,
     file: str,
-    features: Sequence[Feature],
+    features: Features,
     findings: list[Finding],
     faults: list[DrawingError] | None,
 ) -> Iterator[Dimension]:
@@ -489,7 +489,7 @@ def _limits(callout: Callout, said: Said, nominal_mm: float) -> Limits | None:
 
 
 def _counted(
-    one: Dimension, count: int, features: Sequence[Feature], where: str, findings: list[Finding]
+    one: Dimension, count: int, features: Features, where: str, findings: list[Finding]
 ) -> Iterator[Dimension]:
     """The dimension, and the same of the other circles of its size where there are as many as it
     counts; where there are not, it stands alone and a finding says so."""
