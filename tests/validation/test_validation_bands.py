@@ -26,6 +26,7 @@ from camtool.inspection.uncertainty import (
     opposite_edges,
     propagate,
 )
+from camtool.pictures.text import Style, label
 from tests.validation import pic_mmh_parts as pic
 from tests.validation import test_validation_flashcut as flashcut
 from tests.validation import test_validation_others as others
@@ -236,6 +237,7 @@ ALL = (("all but circles, parallel port", "squares|circles|puma|gmm|10x|3x|diag|
        ("all", "", ""))  # fmt: skip
 
 DIAGRAM = ROOT / "docs" / "images" / "reliability.svg"
+CAP = 9.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -346,19 +348,18 @@ def _diagram(levels: Sequence[float], lines: dict[str, list[float]]) -> str:
         return f"{60 + 300 * x:.1f},{330 - 300 * y:.1f}"
 
     parts = [
-        '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 560 390" font-family="sans-serif" '
-        'font-size="12" fill="#333">',
-        '<rect width="560" height="390" fill="#fff"/>',
+        '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 640 390">',
+        '<rect width="640" height="390" fill="#fff"/>',
         f'<polyline points="{at(0, 0)} {at(1, 1)}" stroke="#999" stroke-dasharray="4 4"/>',
     ]
     for tick in range(0, 101, 20):
         part = tick / 100.0
-        x, y = at(part, 0.0).split(",")[0], at(0.0, part).split(",")[1]
+        x, y = 60.0 + 300.0 * part, 330.0 - 300.0 * part
         parts += [
             f'<polyline points="{at(part, 0)} {at(part, 1)}" stroke="#ddd"/>',
             f'<polyline points="{at(0, part)} {at(1, part)}" stroke="#ddd"/>',
-            f'<text x="{x}" y="347" text-anchor="middle">{tick}</text>',
-            f'<text x="52" y="{float(y) + 4:.1f}" text-anchor="end">{tick}</text>',
+            label(str(tick), (x, 347.0), Style(CAP, anchor="middle")),
+            label(str(tick), (52.0, y + 4.0), Style(CAP, anchor="end")),
         ]
     colours = ("#0072b2", "#d55e00", "#009e73", "#333333")
     for k, ((name, shares), colour) in enumerate(zip(lines.items(), colours, strict=True)):
@@ -366,12 +367,12 @@ def _diagram(levels: Sequence[float], lines: dict[str, list[float]]) -> str:
         parts += [
             f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="2"/>',
             f'<rect x="380" y="{50 + 24 * k}" width="18" height="3" fill="{colour}"/>',
-            f'<text x="404" y="{56 + 24 * k}">{name}</text>',
+            label(name, (404.0, 56.0 + 24.0 * k), Style(CAP)),
         ]
     parts += [
-        '<text x="210" y="372" text-anchor="middle">readings predicted in the band, %</text>',
-        '<text x="18" y="180" text-anchor="middle" transform="rotate(-90 18 180)">'
-        "readings in the band, %</text>",
-        "</svg>",
+        label("readings predicted in the band, %", (210.0, 372.0), Style(CAP, anchor="middle")),
+        '<g transform="rotate(-90 18 180)">',
+        label("readings in the band, %", (18.0, 180.0), Style(CAP, anchor="middle")),
+        "</g></svg>",
     ]
     return "\n".join(parts) + "\n"
