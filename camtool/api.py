@@ -306,13 +306,13 @@ def post(
     """The drawing as a program of the target, read back, simulated and judged.
 
     `data` are the bytes of the program, `verification` its figures (None with `check=False`),
-    `findings` those of all stages. `compensate` corrects the path for backlash, scale and
-    squareness; exceeding one of the `gates` is a finding. Raises OptionError, and PostError for
-    what the machine or its dialect cannot do. Source: docs/verifying.md.
+    `findings` those of all stages. `compensate`, as the job's, corrects the path for
+    backlash, scale and squareness; exceeding one of the `gates` is a finding. Raises OptionError,
+    and PostError for what the machine or its dialect cannot do. Source: docs/verifying.md.
     """
-    loaded, wanted = as_target(target), job or Job()
+    loaded, wanted = as_target(target), _compensating(job, compensate)
     read = as_drawing(drawing, loaded, wanted)
-    return post_drawing(read, wanted, loaded, check=check, compensate=compensate, gates=gates)
+    return post_drawing(read, wanted, loaded, check=check, gates=gates)
 
 
 def post_by_tool(
@@ -331,9 +331,15 @@ def post_by_tool(
     """
     from camtool.pipeline import post_by_tool as by_tool
 
-    loaded, wanted = as_target(target), job or Job()
+    loaded, wanted = as_target(target), _compensating(job, compensate)
     read = as_drawing(drawing, loaded, wanted)
-    return by_tool(read, wanted, loaded, check=check, compensate=compensate, gates=gates)
+    return by_tool(read, wanted, loaded, check=check, gates=gates)
+
+
+def _compensating(job: Job | None, compensate: bool) -> Job:
+    """The job, which compensates if it says so itself or is told to."""
+    wanted = job or Job()
+    return replace(wanted, compensate=True) if compensate else wanted
 
 
 def inspect(

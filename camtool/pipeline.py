@@ -65,15 +65,13 @@ class Judging:
     `found`: what of the drawing it cuts is found from the program, of a job only the place of the
     drawing and the diameter of its tool are taken; `align`: the place is looked for too.
     `interpolator` takes the place of the controller's own; `effects` are the parts of the
-    mechanics that act (None: all); exceeding `gates` is a finding; `compensated`: the program was
-    posted with compensation against the mechanics. `worst` moves are listed, and `trace_points` of
-    the slides' path are kept (None: the default numbers).
+    mechanics that act (None: all); exceeding `gates` is a finding. `worst` moves are listed, and
+    `trace_points` of the slides' path are kept (None: the default numbers).
     """
 
     interpolator: str | None = None
     effects: Effects | None = None
     gates: Gates | None = None
-    compensated: bool = False
     worst: int | None = None
     trace_points: int | None = None
     found: bool = False
@@ -101,7 +99,6 @@ class _Posting:
     """How drawings are posted, as `post_drawing` says."""
 
     check: bool = True
-    compensate: bool = False
     gates: Gates | None = None
     trace_points: int | None = None
     progress: Progress = field(default_factory=Progress)
@@ -113,25 +110,24 @@ def post_drawing(
     target: LoadedTarget,
     *,
     check: bool = True,
-    compensate: bool = False,
     gates: Gates | None = None,
     trace_points: int | None = None,
     progress: Progress | None = None,
 ) -> Run:
     """Plan, write, read back, simulate and judge.
 
-    `check=False` leaves out the last two; `compensate` compensates what is written against the
-    machine's mechanics; at most `trace_points` of the slides' path are kept (None: the default).
+    `check=False` leaves out the last two; at most `trace_points` of the slides' path are kept
+    (None: the default).
     `progress` is told of each stage. Raises OptionError, MachineError, and PostError for what the
     target cannot write.
     """
     from camtool.planning.plan import planned
 
-    how = _Posting(check, compensate, gates, trace_points, progress or Progress())
+    how = _Posting(check, gates, trace_points, progress or Progress())
 
     def plain() -> Run | None:
         other = _plain(job)
-        if other == job and not compensate:
+        if other == job:
             return None
         return post_drawing(drawing, other, target, progress=progress)
 
@@ -148,7 +144,6 @@ def post_by_tool(
     target: LoadedTarget,
     *,
     check: bool = True,
-    compensate: bool = False,
     gates: Gates | None = None,
     trace_points: int | None = None,
     progress: Progress | None = None,
@@ -160,7 +155,7 @@ def post_by_tool(
     """
     from camtool.planning.plan import parted, planned, turns_of_tools
 
-    how = _Posting(check, compensate, gates, trace_points, progress or Progress())
+    how = _Posting(check, gates, trace_points, progress or Progress())
     machine = target.machine
     how.progress.begin(PLANNING)
     every = planned(drawing, job, machine)
@@ -170,7 +165,7 @@ def post_by_tool(
     @cache
     def plains() -> tuple[Run | None, ...]:
         other = _plain(job)
-        if other == job and not compensate:
+        if other == job:
             return (None,) * len(turns)
         runs = post_by_tool(drawing, other, target, progress=progress)
         return runs if len(runs) == len(turns) else (None,) * len(turns)
@@ -215,7 +210,7 @@ def _posted(
         return replace(run, findings=findings)
     judged = plan if how.check else None
     del plan  # what is not judged needs no stages of it
-    compensation = _compensated(wanted, target.machine) if how.compensate else None
+    compensation = _compensated(wanted, target.machine) if job.compensate else None
     written = wanted if compensation is None else compensation.toolpath
     program, decoded = _written(written, target, drawing.file, progress)
     repeated = _repeated(program, decoded)
@@ -303,7 +298,7 @@ def verify_program(
         wanted, machine = job or Job(), target.machine
         progress.begin(PLANNING)
         plan = planned(drawing, wanted, machine)
-        compensation = _compensated(plan.toolpath, machine) if judging.compensated else None
+        compensation = _compensated(plan.toolpath, machine) if wanted.compensate else None
         asked = _asked(wanted, target, plan.toolpath, compensation)
         if compensation is None and _plain(wanted) != wanted:
             plan = planned(drawing, wanted, machine, undivided=True)
@@ -576,8 +571,8 @@ def _compensated(wanted: Toolpath, machine: Machine) -> Compensated:
 
 
 def _plain(job: Job) -> Job:
-    """The job without its measures against reversals."""
-    return replace(job, minimise="rapids", approach=False)
+    """The job without its measures against reversals and backlash."""
+    return replace(job, minimise="rapids", approach=False, compensate=False)
 
 
 def _before(plain: Run | None) -> Before | None:

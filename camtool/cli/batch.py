@@ -36,11 +36,6 @@ _RUN = "How the batch runs"
 @click.option("--reports", is_flag=True, help="The report of each as JSON beside its program.")
 @click.option("--json", "summary", metavar="FILE", help="The result of each drawing; - is stdout.")
 @click.option("--no-verify", is_flag=True, help="Write without simulating the machine.")
-@click.option(
-    "--compensate",
-    is_flag=True,
-    help="Compensate the path for the machine's backlash, scale and squareness.",
-)
 @click.option("--no-own-jobs", is_flag=True, help="Ignore part.toml beside part.dxf.")
 @option(_RUN, "--jobs", "-j", type=click.IntRange(min=1), help="Processes.  [one for each core]")
 @option(_RUN, "--scheduler", metavar="ADDRESS", help="Run on a Dask cluster, tcp://host:8786.")
@@ -66,7 +61,6 @@ def batch(
     reports: bool,
     summary: str | None,
     no_verify: bool,
-    compensate: bool,
     no_own_jobs: bool,
     jobs: int | None,
     scheduler: str | None,
@@ -104,7 +98,6 @@ def batch(
         preview=None if preview is None else f".{preview}",
         reports=reports,
         check=not no_verify,
-        compensate=compensate,
         looks=picture,
     )
     running = Running(jobs, scheduler, timeout, force, fail_fast)

@@ -52,7 +52,6 @@ class PostWork:
     preview: str | None = None
     reports: bool = False
     check: bool = True
-    compensate: bool = False
     looks: PictureFlags = field(default_factory=PictureFlags)
 
     @property
@@ -86,7 +85,6 @@ class PostWork:
                 order.job,
                 self.target,
                 check=self.check,
-                compensate=self.compensate,
                 gates=self.gates,
                 trace_points=None if self.preview else 0,
             )
@@ -101,7 +99,7 @@ class PostWork:
         import msgspec
 
         target = self.target
-        options = (self.preview, self.reports, self.check, self.compensate, self.gates, self.looks)
+        options = (self.preview, self.reports, self.check, self.gates, self.looks)
         return digest_of(
             __version__,
             packages_digest("camtool"),

@@ -88,7 +88,6 @@ class Posting:
     job: JobFlags
     drawing: DrawingFlags
     no_verify: bool
-    compensate: bool
 
     def load(self) -> LoadedTarget:
         """The target; a usage error when the flags contradict each other."""
@@ -141,7 +140,6 @@ class Posting:
                 wanted,
                 target,
                 check=not self.no_verify,
-                compensate=self.compensate,
                 gates=self.gates.gates(),
                 trace_points=points_for(pictures),
                 progress=progress(),
@@ -169,11 +167,6 @@ def posting_options(command: Command) -> Command:
         [
             click.option(
                 "--no-verify", is_flag=True, help="Write without simulating the machine."
-            ),
-            click.option(
-                "--compensate",
-                is_flag=True,
-                help="Compensate the path for the machine's backlash, scale and squareness.",
             ),
         ],
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -77,7 +77,7 @@ def preview(
     """Draw FILE: a drawing; with --target its toolpath; or a program of that target.
 
     With --target, a file with the target's own extension (such as .pic), or whose content is no
-    drawing, is taken for its program.
+    drawing, is taken for its program. With --compensate, a toolpath is shown as it is written.
     """
     if simulate and machine.name() is None:
         raise click.UsageError("--simulate needs --target")
@@ -166,6 +166,7 @@ class Seen:
     def _of_job(self, source: str, target: LoadedTarget) -> tuple[Scene, Findings]:
         from camtool.pictures.options import points_for
         from camtool.pipeline import post_drawing
+        from camtool.planning.compensating import compensated
         from camtool.planning.plan import plan
         from camtool.run import Run
 
@@ -184,6 +185,8 @@ class Seen:
             progress().begin("planning")
             moves = plan(read, job, target.machine)
         run = Run(source=read.file, target=target, drawing=read, job=job, wanted=moves)
+        if job.compensate:
+            run = replace(run, decoded=compensated(moves, target.machine).toolpath)
         return run.scene(title), read.findings
 
 

@@ -82,11 +82,6 @@ if TYPE_CHECKING:
     help="How many of the moves with the largest errors to list.",
 )
 @click.option(
-    "--compensated",
-    is_flag=True,
-    help="It was posted with --compensate; for --against.",
-)
-@click.option(
     "--compare",
     metavar="WHAT",
     help="Judge several variants: interpolators, mechanics, backlash=0,0.1,0.2 or any "
@@ -120,7 +115,6 @@ def verify(
     interpolator: str | None,
     without: tuple[str, ...],
     worst: int | None,
-    compensated: bool,
     compare: str | None,
     preview: str | None,
     report: str | None,
@@ -164,7 +158,6 @@ def verify(
         interpolator=interpolator,
         effects=effects_without(without) if without else None,
         gates=gates.gates(),
-        compensated=compensated,
         worst=worst,
         trace_points=None if compare else points_for(wishes.outputs.pictures),
         found=align,

@@ -521,6 +521,12 @@ WHOLE = {
     "approach": Key(
         "approach", SWITCH, "Take up the backlash of X and Y before every cut.", "true"
     ),
+    "compensate": Key(
+        "compensate",
+        SWITCH,
+        "Compensate the path for the machine's backlash, scale and squareness.",
+        "true",
+    ),
     "frames": Key(
         "frames",
         Value(plain(layers), "PATTERNS"),

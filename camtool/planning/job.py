@@ -867,7 +867,8 @@ class Stock:
 @dataclass(frozen=True)
 class Job:
     """How a drawing is cut. `approach`: every cut starts after a move that takes up the backlash
-    of both axes. `minimise`: one of GOALS. `frames`: patterns of the layers whose contours, where
+    of both axes. `minimise`: one of GOALS. `compensate`: what is written is bent beforehand
+    against the mechanics of its machine. `frames`: patterns of the layers whose contours, where
     they are not cut, are no edges of parts. Operations with a breakthrough get their depth,
     those with a finishing pass become two. Raises OptionError for what no job can be."""
 
@@ -877,6 +878,7 @@ class Job:
     safe_z_mm: float | None = None
     minimise: str = "rapids"
     approach: bool = False
+    compensate: bool = False
     frames: tuple[str, ...] = FRAMES
 
     def __post_init__(self) -> None:

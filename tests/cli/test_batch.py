@@ -137,6 +137,14 @@ def test_a_job_beside_a_drawing_is_its_own(
     assert asked(camtool, pools) == []
     assert asked(camtool, pools, "--no-own-jobs") == ["letter"]
     assert (tmp_path / "build" / "letter.pic").read_bytes() == plain
+    (drawings / "letter.toml").write_text("compensate = true\n")
+    assert asked(camtool, pools) == ["letter"]
+    bent = (tmp_path / "build" / "letter.pic").read_bytes()
+    assert bent != plain
+    everything = asked(camtool, pools, "--compensate")
+    assert everything
+    assert "letter" not in everything  # its own job says so already
+    assert (tmp_path / "build" / "letter.pic").read_bytes() == bent
 
 
 @pytest.mark.usefixtures("pools")
@@ -279,7 +287,6 @@ def test_all_that_outputs_depend_on_is_in_the_digest(monkeypatch: pytest.MonkeyP
         "preview": ".svg",
         "reports": True,
         "check": False,
-        "compensate": True,
         "looks": PictureFlags(dark=True),
     }
     assert other.keys() == {field.name for field in fields(work)}, "a new field counts too"

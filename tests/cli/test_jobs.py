@@ -30,6 +30,7 @@ WHOLE_FILE = """
 safe_z = "0.5mm"
 minimise = "reversals"
 approach = true
+compensate = true
 depth = "100um"
 step_down = 0.05
 tool_table = "tool.tbl"
@@ -164,6 +165,7 @@ EXPECTED = Job(
     safe_z_mm=0.5,
     minimise="reversals",
     approach=True,
+    compensate=True,
 )
 
 
@@ -186,7 +188,7 @@ def test_every_key_has_its_place(tmp_path: Path) -> None:
         assert got == expected
     assert made.stock == expected_stock
     assert (made.placement, made.safe_z_mm) == (EXPECTED.placement, EXPECTED.safe_z_mm)
-    assert (made.minimise, made.approach) == ("reversals", True)
+    assert (made.minimise, made.approach, made.compensate) == ("reversals", True, True)
 
 
 def test_an_empty_file_is_the_job_that_says_nothing(tmp_path: Path) -> None:

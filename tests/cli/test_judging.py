@@ -188,10 +188,46 @@ def test_compensation_makes_the_part_better(camtool: Run, tmp_path: Path) -> Non
         "mm",
         *play,
     )
-    again = camtool(*verify, "--compensated", "--json", "-")
+    again = camtool(*verify, "--compensate", "--json", "-")
     assert again.returncode == 0, again.stderr
     assert json.loads(again.stdout)["error_um"]["total"] == report["error_um"]["total"]
     assert camtool(*verify).returncode == 1  # taken as it stands, it cuts beside the drawing
+
+
+def test_a_job_file_compensates_as_the_flag_does(camtool: Run, tmp_path: Path) -> None:
+    (tmp_path / "square.svg").write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" width="2mm" height="2mm" viewBox="0 0 2 2">'
+        '<path d="M0 0 1 0.2 1.2 1.3 0.1 1z"/></svg>'
+    )
+    (tmp_path / "bent.toml").write_text('kind = "engrave"\ncompensate = true\n')
+    (tmp_path / "plain.toml").write_text('kind = "engrave"\ncompensate = false\n')
+    play = ("--set", "axes.x.backlash_mm=0.1", "--set", "axes.y.backlash_mm=0.06")
+    known = ("-t", "grbl", *play)
+
+    def program(*flags: str) -> bytes:
+        done = camtool("post", "square.svg", *known, *flags, "-o", "square.nc")
+        assert done.returncode == 0, done.stderr
+        return (tmp_path / "square.nc").read_bytes()
+
+    by_flag, plain = program("--kind", "engrave", "--compensate"), program("--kind", "engrave")
+    assert program("--job", "plain.toml") == plain
+    assert program("--job", "plain.toml", "--compensate") == by_flag
+    assert program("--job", "bent.toml") == by_flag != plain
+    # The same file tells verify and stale what the program should be.
+    judge = ("verify", "square.nc", "--against", "square.svg", *known)
+    assert camtool(*judge, "--job", "bent.toml").returncode == 0
+    assert camtool(*judge, "--job", "plain.toml").returncode == 1
+    (tmp_path / "square.toml").write_text((tmp_path / "bent.toml").read_text())
+    assert camtool("stale", "square.svg", *known).returncode == 0
+    (tmp_path / "square.toml").write_text((tmp_path / "plain.toml").read_text())
+    assert camtool("stale", "square.svg", *known).returncode == 1
+    # And a picture of the toolpath is of what is written.
+    shown = {}
+    for name in ("bent", "plain"):
+        done = camtool("preview", "square.svg", *known, "--job", f"{name}.toml", "-o", "a.svg")
+        assert done.returncode == 0, done.stderr
+        shown[name] = (tmp_path / "a.svg").read_bytes()
+    assert shown["bent"] != shown["plain"]
 
 
 @pytest.mark.parametrize("target", ["matlab-router", "pic-mmh", "grbl"])

@@ -12,7 +12,7 @@ from camtool.errors import CamtoolError
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.polylines import Polyline
-from camtool.pipeline import Judging, post_drawing, verify_program
+from camtool.pipeline import post_drawing, verify_program
 from camtool.planning.job import Job, Placement, job_of
 from camtool.run import Run
 from camtool.toolpath.builder import ToolpathBuilder
@@ -54,12 +54,10 @@ def drawings(draw: st.DrawFn, scale: float) -> Drawing:
     return drawing_of([scaled(path, scale) for path in paths])
 
 
-def post(name: str, drawing: Drawing, job: Job, *, compensate: bool) -> Run:
+def post(name: str, drawing: Drawing, job: Job) -> Run:
     """The program; another example where the target cannot make it."""
     try:
-        made = post_drawing(
-            drawing, job, sound(name)[0].target, check=False, compensate=compensate
-        )
+        made = post_drawing(drawing, job, sound(name)[0].target, check=False)
     except CamtoolError:
         assume(False)
         raise
@@ -67,12 +65,9 @@ def post(name: str, drawing: Drawing, job: Job, *, compensate: bool) -> Run:
     return made
 
 
-def judged(
-    name: str, data: bytes, drawing: Drawing, job: Job, *, compensated: bool = False
-) -> Verification:
-    judging = Judging(compensated=compensated)
+def judged(name: str, data: bytes, drawing: Drawing, job: Job) -> Verification:
     target = sound(name)[0].target
-    run = verify_program(data, target, source="a", drawing=drawing, job=job, judging=judging)
+    run = verify_program(data, target, source="a", drawing=drawing, job=job)
     return run.verification
 
 
@@ -117,10 +112,10 @@ def rearranged(path: Toolpath, random: Random) -> Toolpath:
 def check_own(name: str, data: st.DataObject) -> None:
     """Post, and verify with the same flags."""
     drawing, job = data.draw(drawings(CASES[name][0])), data.draw(jobs(name))
-    bent = data.draw(st.booleans())
-    made = post(name, drawing, job, compensate=bent)
+    job = replace(job, compensate=data.draw(st.booleans()))
+    made = post(name, drawing, job)
     assert made.program is not None
-    verification = judged(name, made.program.data, drawing, job, compensated=bent)
+    verification = judged(name, made.program.data, drawing, job)
     assert against(verification) == []
     asked = verification.report.asked
     assert asked is not None
@@ -132,7 +127,7 @@ def check_rearranged(name: str, data: st.DataObject) -> None:
     drawing, job = data.draw(drawings(CASES[name][0])), data.draw(jobs(name))
     job = replace(job, minimise="rapids", approach=False)
     assume(job.operations[0].kind != "pocket")
-    made = post(name, drawing, job, compensate=False)
+    made = post(name, drawing, job)
     target = sound(name)[0].target
     other = rearranged(made.wanted, data.draw(st.randoms(use_true_random=False)))
     program = target.target.write(other, target.machine)
