@@ -9,7 +9,8 @@ how much its tool is wider) and measures K sizes, mm. All inputs act on a machin
 
     direction      what is moved                   inputs that move along it, with their factors
     backlash       of an axis, by region too       backlash: 1; compensation: −(real / coded step)
-    scale          real step of an axis, relative  scale: 1; temperature: α_machine − α_part
+    scale          real step of an axis, relative  scale: 1
+    growth         both scales at once             temperature: α_machine − α_part
     squareness     of X and Y                      squareness: 1
     tool           its diameter                    tool diameter: 1; run-out: 1
 
@@ -25,7 +26,8 @@ factors of the inputs and Σ (P, P) their covariance. Then, with C = S M,
 
 Derivatives are differences over a step h of one standard uncertainty s, no infinitesimal one, for
 controllers round to steps and sizes are minima and maxima. Backlash bends: roundness is least
-where compensation equals it, and grows on both sides. There the simulation runs on both sides,
+where compensation equals it, and grows on both sides. So do the least and the largest diameter of
+a circle in whatever makes an ellipse of it. There the simulation runs on both sides,
 at h = √3 s, and e = ½ f″ s², of which a normal error makes the mean e and the variance 2 e² (GUM,
 5.1.2, note). With that step both are those of Gauss and Hermite's rule of three points: exact to
 the second order, and for the mean of a bend as sharp as |x| wrong by 0.22 s. Mixed terms are left
@@ -37,8 +39,12 @@ Edges. The process and the scatter of an axis shift each machined edge by itself
 the axes u_x and u_y, their covariance is Σ_E (u² + u_x²) w_x w_xᵀ + (u² + u_y²) w_y w_yᵀ.
 
 An input that is not known has no part in a covariance; `Budget.unknown` names those on which a
-value depends, which a single step shows. Not modelled: distributions other than normal ones (a
-backlash is cut off at 0 in draws), and directions whose scale or squareness depend on the place.
+value depends, which a single step shows. Where physics bounds what is not known, `Budget.at_most`
+says by how much it can change each value; nothing is assumed of where within that it lies. Only
+the temperature is so bounded: of a room ±ROOM_K, of the materials EXPANSIONS_OF_MACHINES and
+EXPANSIONS_OF_PARTS, where [uncertainty] does not say them. Not modelled: distributions other than
+normal ones (a backlash is cut off at 0 in draws), and directions whose scale or squareness depend
+on the place.
 """
 
 from __future__ import annotations
@@ -70,8 +76,21 @@ PROBE_RAD = 1e-3
 PROBE_K = 5.0
 """The same along the temperature, K."""
 
-PROBE_PER_K = 1e-5
-"""1/K by which parts and machines may differ where their expansions are not known."""
+ROOM_K = 15.0
+"""A workshop is within 20 ± 15 °C, whatever it is: the bound of a temperature that is not known.
+Sizes hold at 20 °C (ISO 1)."""
+
+EXPANSIONS_OF_MACHINES = (0.0, 3e-5)
+"""1/K by which the screws, belts and scales grow by which machines place their slides: from Invar
+(1e-6) over steel (11e-6) to aluminium (24e-6) and zinc (30e-6)."""
+
+EXPANSIONS_OF_PARTS = (0.0, 2e-4)
+"""1/K by which parts grow: glass, wood and metals, and plastics up to polyethylene of high density
+(1.06e-4 to 1.98e-4; Callister, Materials Science and Engineering, table B.6). Softer ones grow by
+more: they must be said."""
+
+MOST_SIGMAS = 3.0
+"""A temperature whose standard uncertainty is known is off by no more of them."""
 
 NEGLIGIBLE_MM = 1e-5
 """A value depends on an input where such a step changes it by more than this, mm."""
@@ -103,12 +122,14 @@ Moved = Callable[[Variant, float], Variant]
 @dataclass(frozen=True)
 class Direction:
     """A way in which machines vary. `moved` gives the variant that is further along it by so much,
-    which may be as low as `lowest`. `bends`: the values may be far from linear in it."""
+    which may be as low as `lowest`. `bends`: values may be far from linear in it; `distorts`: it
+    makes ellipses of circles, so that their least and their largest diameter are."""
 
     name: str
     moved: Moved
     lowest: float = -math.inf
     bends: bool = False
+    distorts: bool = False
 
 
 @dataclass(frozen=True)
@@ -118,7 +139,9 @@ class Input:
     step that shows what depends on it.
 
     It moves the machine along `along`, (direction, factor), or the machined edges: then `edges`
-    are its shares in X and Y.
+    are its shares in X and Y. Where it is not known, `missing` are the keys that would say it, and
+    `most` bounds by how much its value can be off, as `within` says in words (infinite and "":
+    nothing bounds it).
     """
 
     name: str
@@ -128,6 +151,9 @@ class Input:
     probe: float
     along: tuple[tuple[Direction, float], ...] = ()
     edges: tuple[float, float] = (0.0, 0.0)
+    missing: tuple[str, ...] = ()
+    most: float = math.inf
+    within: str = ""
 
 
 @dataclass(frozen=True)
@@ -180,7 +206,6 @@ def inputs_of(machine: Machine, tool_diameter_mm: float) -> Inputs:
     """
     said = machine.uncertainty
     found: list[Input] = []
-    scales = []
     axes = [
         ("x", machine.axes.x, said.x, machine.play_map.used[0]),
         ("y", machine.axes.y, said.y, machine.play_map.used[1]),
@@ -197,8 +222,7 @@ def inputs_of(machine: Machine, tool_diameter_mm: float) -> Inputs:
     for name, axis, known, cells in axes:
         plays = [play for row in cells.play_mm for play in row] if cells else [axis.backlash_mm]
         lost = Direction(f"{name}.backlash", _with_backlash(name), lowest=-max(plays), bends=True)
-        scale = Direction(f"{name}.scale", _with_scale(name))
-        scales.append(scale)
+        scale = Direction(f"{name}.scale", _with_scale(name), distorts=True)
         ratio = axis.real_step_mm / axis.coded_step_mm
         mean, added = sum(plays) / len(plays), axis.compensation_mm
         found.append(length(f"{name}.backlash_mm", mean, known.backlash_mm, (lost, 1.0)))
@@ -206,10 +230,10 @@ def inputs_of(machine: Machine, tool_diameter_mm: float) -> Inputs:
             against = lost, -ratio
             found.append(length(f"{name}.compensation_mm", added, known.compensation_mm, against))
         found.append(part(f"{name}.scale", ratio, known.scale, (scale, 1.0)))
-    lean = Direction("squareness", _with_squareness), 1.0
+    lean = Direction("squareness", _with_squareness, distorts=True), 1.0
     value = machine.mechanics.squareness_rad
     found.append(angle("squareness_rad", value, said.squareness_rad, lean))
-    found.append(_temperature(machine, scales))
+    found.append(_temperature(machine))
     found.append(length("process_mm", 0.0, said.process_mm, edges=(1.0, 1.0)))
     for name, axis, shares in (("x", axes[0][1], (1.0, 0.0)), ("y", axes[1][1], (0.0, 1.0))):
         if axis.repeatability_mm > 0.0:
@@ -228,20 +252,50 @@ def _input(
     *along: tuple[Direction, float],
     edges: tuple[float, float] = (0.0, 0.0),
 ) -> Input:
-    return Input(name, unit, value, standard, probe, along, edges)
+    missing = (name,) if standard is None else ()
+    return Input(name, unit, value, standard, probe, along, edges, missing)
 
 
-def _temperature(machine: Machine, scales: Sequence[Direction]) -> Input:
-    """That of the room, K from 20 °C; not known unless both expansions are."""
+def _temperature(machine: Machine) -> Input:
+    """That of the room, K from 20 °C; not known unless both expansions are. Then the expansions
+    differ by as much as those of the materials can that are not said."""
     said = machine.uncertainty
-    of_machine, of_part = said.machine_expansion_per_k, said.part_expansion_per_k
-    differ, standard = PROBE_PER_K, None
-    if of_machine is not None and of_part is not None:
-        differ, standard = of_machine - of_part, said.temperature_k
-    elif said.temperature_k == 0.0:
-        standard = 0.0
-    along = tuple((scale, differ) for scale in scales)
-    return Input("temperature_k", "K", 0.0, standard, PROBE_K, along)
+    known = said.part_expansion_per_k, said.machine_expansion_per_k
+    usual = EXPANSIONS_OF_PARTS, EXPANSIONS_OF_MACHINES
+    part, slides = (
+        every if own is None else (own, own) for own, every in zip(known, usual, strict=True)
+    )
+    differ = max(slides[1] - part[0], part[1] - slides[0], key=abs)
+    if None not in known:
+        differ = slides[0] - part[0]
+    every_key = (
+        ("part_expansion_per_k", known[0]),
+        ("machine_expansion_per_k", known[1]),
+        ("temperature_k", said.temperature_k),
+    )
+    missing = tuple(key for key, value in every_key if value is None)
+    if not missing or said.temperature_k == 0.0:
+        standard, missing = said.temperature_k, ()
+    else:
+        standard = None
+    warmer = ROOM_K
+    if said.temperature_k is not None:
+        warmer = min(ROOM_K, MOST_SIGMAS * said.temperature_k)
+    within = [f"20 ± {warmer:g} °C"]
+    for what, own, (low, high) in zip(("part", "machine"), known, usual, strict=True):
+        if own is None:
+            within.append(f"{what} {low * 1e6:g} to {high * 1e6:g} µm/m per K")
+    return Input(
+        name="temperature_k",
+        unit="K",
+        value=0.0,
+        standard=standard,
+        probe=PROBE_K,
+        along=((Direction("growth", _grown), differ),),
+        missing=missing,
+        most=warmer if missing else math.inf,
+        within=", ".join(within) if missing else "",
+    )
 
 
 def _with_backlash(name: str) -> Moved:
@@ -272,6 +326,10 @@ def _with_scale(name: str) -> Moved:
         return _varied(variant, axes=msgspec.structs.replace(axes, **{name: axis}))
 
     return moved
+
+
+def _grown(variant: Variant, by: float) -> Variant:
+    return _with_scale("y")(_with_scale("x")(variant, by), by)
 
 
 def _with_squareness(variant: Variant, by_rad: float) -> Variant:
@@ -370,6 +428,14 @@ class Budget:
         """(K,) mm standard uncertainties, from what is known."""
         return np.sqrt(np.clip(np.diag(self.covariance), 0.0, None))
 
+    @cached_property
+    def at_most(self) -> Floats:
+        """(K, P) mm by how much an input that is not known can change a value: infinite where
+        nothing bounds it, 0 where the value does not depend on it."""
+        most = np.array([each.most / each.probe for each in self.inputs])
+        matters = self.probed > NEGLIGIBLE_MM
+        return np.where(matters, np.where(matters, self.probed, 1.0) * most, 0.0)
+
     def contributions(self, value: int) -> tuple[Contribution, ...]:
         """What the known inputs add to a value, the largest first; those that add nothing are left
         out."""
@@ -396,28 +462,32 @@ class Budget:
         )
 
 
-def propagate(values: Values, inputs: Inputs, edges: Floats) -> Budget:
-    """The budget of K values: by at most eight simulations, and one more measurement where
-    the tool has a width. `edges` (K, E, 2) are the weights of the values' edges."""
+def propagate(values: Values, inputs: Inputs, edges: Floats, *, extremes: bool = False) -> Budget:
+    """The budget of K values: by at most nine simulations, twelve where they are `extremes`
+    (minima and maxima along a feature), and one more measurement where the tool has a width.
+    `edges` (K, E, 2) are the weights of the values' edges."""
     base = without_scatter(inputs.variant)
     centre = np.asarray(values(base), dtype=np.float64)
     factors, covariance = inputs.factors, inputs.covariance
     spread = np.sqrt(np.clip(np.diag(factors @ covariance @ factors.T), 0.0, None))
     slopes = np.zeros((len(centre), len(spread)))
-    bends = np.zeros_like(slopes)
+    bends, reach = np.zeros_like(slopes), np.zeros_like(slopes)
     runs = 1
     for column, direction in enumerate(inputs.directions):
-        step = float(spread[column]) * (STEP_IN_BENDS if direction.bends else 1.0)
+        twice = direction.bends or (extremes and direction.distorts)
+        step = float(spread[column]) * (STEP_IN_BENDS if twice else 1.0)
         step = step or float(max(np.abs(factors[column]) * inputs.probes))
         if not step:
             continue
         above = values(direction.moved(base, step)) - centre
         slopes[:, column] = above / step
+        reach[:, column] = np.abs(above) / step
         runs += 1
         back = min(step, -direction.lowest)
-        if direction.bends and back > CERTAIN:
+        if twice and back > CERTAIN:
             below = values(direction.moved(base, -back)) - centre
             runs += 1
+            reach[:, column] = np.maximum(reach[:, column], np.abs(below) / back)
             slopes[:, column] = (above - below) / (step + back)
             second = 2.0 * (above / step + below / back) / (step + back)
             bends[:, column] = 0.5 * second * spread[column] ** 2
@@ -432,10 +502,12 @@ def propagate(values: Values, inputs: Inputs, edges: Floats) -> Budget:
     bent = 2.0 * bends**2 @ parts
     variances += bent
     alone = (sensitivities * inputs.standards) ** 2 + bent
+    largest = reach @ np.abs(factors)
     for column, each in enumerate(inputs.each):
         if any(each.edges):
             weights = _weights(edges, each)
             sensitivities[:, column] = np.sqrt((weights**2).sum(axis=1))
+            largest[:, column] = sensitivities[:, column]
             own = (each.standard or 0.0) ** 2 * weights @ weights.T
             joint += own
             variances[:, column] = alone[:, column] = np.diag(own)
@@ -447,7 +519,7 @@ def propagate(values: Values, inputs: Inputs, edges: Floats) -> Budget:
         covariance=joint,
         variances=variances,
         alone=alone,
-        probed=np.abs(sensitivities) * inputs.probes,
+        probed=largest * inputs.probes,
         runs=runs,
     )
 

@@ -8,8 +8,10 @@ the probability of that,
     out         P ≤ 5 %       or beyond them by as much,
     undecided   otherwise,
 
-and undecided where it is not known how certain an input is on which the dimension depends: an
-unknown uncertainty is not zero.
+An unknown uncertainty is not zero. Where it is not known how certain an input is on which the
+dimension depends, P is only known to lie between that of limits that are narrower, and that of
+limits that are wider, by all that physics lets the input change the size (`Budget.at_most`): the
+dimension is in, or out, if all of that range is. Where nothing bounds an input, it is undecided.
 """
 
 from __future__ import annotations
@@ -22,7 +24,6 @@ from typing import Literal
 import msgspec
 import numpy as np
 
-from camtool.arrays import Floats
 from camtool.findings import (
     DIMENSION_NOT_CUT_THERE,
     DIMENSION_NOT_IN_OUT,
@@ -98,7 +99,7 @@ def verdicts_of(inspector: Inspector, run: Run) -> Iterator[InspectedReport | Fi
     if not inspector.dimensions:
         return
     inputs = inputs_of(run.target.machine, inspector.tool_diameter_mm)
-    budget = propagate(inspector.values, inputs, inspector.edges)
+    budget = propagate(inspector.values, inputs, inspector.edges, extremes=True)
     sizes = budget.values.reshape(-1, 3)
     measured = np.isfinite([budget.values, budget.standards]).all(axis=0).reshape(-1, 3)
     for index, each in enumerate(inspector.dimensions):
@@ -116,24 +117,22 @@ def _verdict(each: Inspected, size: Size, budget: Budget, first: int) -> Inspect
     if limits is not None:
         lower = None if zone else bound.nominal_mm + limits.lower_mm
         upper = (0.0 if zone else bound.nominal_mm) + limits.upper_mm
-    low, high = first + 1, first + 2
-    deciding = _deciding(size, budget.standards, (lower, upper), first)
+    deciding = _deciding(size, budget, (lower, upper), first)
     standard = float(budget.standards[deciding])
+    most = float(budget.at_most[deciding].sum())
     unknown = budget.unknown(deciding)
-    contributions = budget.contributions(deciding)
+    contributions = _contributions(budget, deciding)
     chance, verdict = None, "predicted"
     if upper is not None:
-        expected = budget.expected
-        both = np.ix_([low, high], [low, high])
-        allowed = -math.inf if lower is None else lower, upper
-        inside = probability(
-            float(expected[low]), float(expected[high]), budget.covariance[both], allowed
-        )
-        chance = None if unknown else inside
-        verdict = _word(chance)
+        chance, verdict = _decided(budget, first, (lower, upper))
     measure = ""
     if verdict == "undecided":
-        measure = unknown[0].name if unknown else contributions[0].input.name
+        # Where what is known alone leaves it open, whatever is largest counts.
+        open_by = [one for one in contributions if one.um is None] if chance is None else ()
+        largest = max(open_by or contributions, key=_likely_um).input
+        keys = {one.name: one.missing[0] for one in unknown}
+        measure = keys.get(largest, largest)
+    bounded = math.isfinite(most)
     return InspectedReport(
         name=each.name,
         kind=bound.dimension.kind,
@@ -147,39 +146,98 @@ def _verdict(each: Inspected, size: Size, budget: Budget, first: int) -> Inspect
         low_mm=certain(size.low_mm),
         high_mm=certain(size.high_mm),
         verdict=verdict,
-        standard_um=None if unknown else number(standard, UM_PER_MM),
-        guard_um=None if unknown else number(GUARD * standard, UM_PER_MM),
+        standard_um=number(standard, UM_PER_MM) if bounded else None,
+        unknown_um=number(most, UM_PER_MM) if bounded else None,
+        guard_um=number(GUARD * standard + most, UM_PER_MM) if bounded else None,
         probability=chance,
-        contributions=(
-            *(
-                Contribution(one.input.name, number(one.standard_mm, UM_PER_MM))
-                for one in contributions
-            ),
-            *(Contribution(one.name, None) for one in unknown),
-        ),
-        unknown=tuple(one.name for one in unknown),
+        contributions=contributions,
+        unknown=tuple(key for one in unknown for key in one.missing),
         measure=measure,
     )
 
 
-def _word(chance: float | None) -> str:
-    if chance is None or 1.0 - SURE < chance < SURE:
+def _contributions(budget: Budget, value: int) -> tuple[Contribution, ...]:
+    """What the inputs contribute to a value: the known ones, the largest first, then those that
+    are not known, first what nothing bounds."""
+    known = (
+        Contribution(one.input.name, number(one.standard_mm, UM_PER_MM))
+        for one in budget.contributions(value)
+    )
+    most = dict(zip(budget.inputs, budget.at_most[value].tolist(), strict=True))
+    unknown = (
+        Contribution(
+            one.name,
+            None,
+            number(most[one], UM_PER_MM) if math.isfinite(most[one]) else None,
+            one.within,
+        )
+        for one in sorted(budget.unknown(value), key=lambda one: -most[one])
+    )
+    return (*known, *unknown)
+
+
+def _likely_um(one: Contribution) -> float:
+    """A standard uncertainty: that of a uniform distribution where only a bound is known."""
+    if one.um is None:
+        return math.inf if one.at_most_um is None else one.at_most_um / math.sqrt(3.0)
+    return one.um
+
+
+def _decided(
+    budget: Budget, first: int, limits: tuple[float | None, float]
+) -> tuple[float | None, str]:
+    """The verdict on a dimension whose values are the three from `first` on, and the probability
+    to be within its limits: where something is not known the one that is least in favour of the
+    verdict; None where that leaves it open."""
+    low, high = first + 1, first + 2
+    lower, upper = -math.inf if limits[0] is None else limits[0], limits[1]
+    covariance = budget.covariance[np.ix_([low, high], [low, high])]
+    least_mm, most_mm = float(budget.expected[low]), float(budget.expected[high])
+    off_low, off_high = (float(budget.at_most[value].sum()) for value in (low, high))
+
+    def chance(share: float) -> float:
+        """With limits that are wider by a share of all that is not known."""
+        wide = lower - share * off_low, upper + share * off_high
+        return probability(least_mm, most_mm, covariance, wide)
+
+    known = chance(0.0)
+    if not off_low and not off_high:
+        return known, _word(known)
+    if math.isfinite(off_low + off_high):
+        least, most = chance(-1.0), chance(1.0)
+        if _word(least) == "in":
+            return least, "in"
+        if _word(most) == "out":
+            return most, "out"
+        if _word(known) == "undecided":
+            return known, "undecided"
+    return None, "undecided"
+
+
+def _word(chance: float) -> str:
+    if 1.0 - SURE < chance < SURE:
         return "undecided"
     return "in" if chance >= SURE else "out"
 
 
 def _deciding(
-    size: Size, standards: Floats, limits: tuple[float | None, float | None], first: int
+    size: Size, budget: Budget, limits: tuple[float | None, float | None], first: int
 ) -> int:
-    """Which of a dimension's values is nearest to its limit, in standard uncertainties; the best
-    fit where there are no limits."""
+    """Which of a dimension's values is nearest to its limit, in standard uncertainties, or what is
+    not known changes by most; the best fit where there are no limits."""
     lower, upper = limits
     if upper is None:
         return first
-    sides = [(upper - size.high_mm, first + 2)]
+    low, high = first + 1, first + 2
+    inside = {high: upper - size.high_mm}
     if lower is not None:
-        sides.append((size.low_mm - lower, first + 1))
-    return min(sides, key=lambda side: side[0] / max(float(standards[side[1]]), 1e-12))[1]
+        inside[low] = size.low_mm - lower
+    most = budget.at_most.sum(axis=1)
+
+    def sigmas(value: int) -> float:
+        return float((inside[value] - most[value]) / max(budget.standards[value], 1e-12))
+
+    return min(inside, key=sigmas)
 
 
 def _shown_between(each: Inspected) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -221,7 +279,7 @@ def _findings(verdicts: Iterable[InspectedReport], require: Required | None) -> 
             )
             continue
         why = f"measure {each.measure}"
-        if each.unknown:
+        if each.measure in each.unknown:
             why = f"[uncertainty] of the machine file does not say {', '.join(each.unknown)}"
         yield DIMENSION_NOT_IN_UNDECIDED(
             where=each.source,

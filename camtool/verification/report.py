@@ -269,10 +269,13 @@ COVERAGE = 2.0
 
 class Contribution(msgspec.Struct, frozen=True):
     """What one input contributes to the standard uncertainty of a dimension, µm; null where it is
-    not known how well the input is."""
+    not known how well the input is. Then `at_most_um` bounds by how much it can change the
+    dimension `within` what is said there; null where nothing does."""
 
     input: str
     um: float | None
+    at_most_um: float | None = None
+    within: str = ""
 
 
 class InspectedReport(msgspec.Struct, frozen=True):
@@ -281,10 +284,12 @@ class InspectedReport(msgspec.Struct, frozen=True):
     `places_mm`: two places in the work frame between which a picture shows it. `lower_mm` and
     `upper_mm` are limits of the size, null without any. Predicted are the best fit and the least
     and the largest local size. `standard_um` is the standard uncertainty of that one of these that
-    decides, `guard_um` by how much it must be within its limit to be surely in. `probability`: to
-    be within the limits. `verdict`: "in", "out", "undecided", or "predicted" without limits.
-    `unknown`: inputs that matter and of which it is not known how well they are; `measure`: that
-    which one should measure next, "" for none."""
+    decides, from what is known, and `unknown_um` by how much all that is not known can change it,
+    both null where nothing bounds that; `guard_um` by how much it must be within its limit to be
+    surely in. `probability`: to be within the limits, where something is not known that which is
+    least in favour of the verdict. `verdict`: "in", "out", "undecided", or "predicted" without
+    limits. `unknown`: keys of [uncertainty] that matter and that nobody says; `measure`: what one
+    should measure next, "" for none."""
 
     name: str
     kind: str
@@ -299,6 +304,7 @@ class InspectedReport(msgspec.Struct, frozen=True):
     high_mm: float
     verdict: str
     standard_um: float | None = None
+    unknown_um: float | None = None
     guard_um: float | None = None
     probability: float | None = None
     contributions: tuple[Contribution, ...] = ()
@@ -313,9 +319,17 @@ class InspectedReport(msgspec.Struct, frozen=True):
         return f"{nominal} {self.limits}".rstrip()
 
     @property
+    def not_known(self) -> tuple[Contribution, ...]:
+        """The inputs that matter and of which it is not known how well they are."""
+        return tuple(each for each in self.contributions if each.um is None)
+
+    @property
     def expanded_um(self) -> float | None:
-        """Its uncertainty, expanded by COVERAGE; None where it is not known."""
-        return None if self.standard_um is None else COVERAGE * self.standard_um
+        """Its uncertainty, expanded by COVERAGE, and all that is not known; None where nothing
+        bounds that."""
+        if self.standard_um is None:
+            return None
+        return COVERAGE * self.standard_um + (self.unknown_um or 0.0)
 
 
 class FindingReport(msgspec.Struct, frozen=True):
@@ -641,9 +655,16 @@ def inspected_words(item: InspectedReport) -> str:
     words += f"; {item.verdict}"
     if item.probability is not None:
         words += f", probability of in {_chance(item.probability)}"
-    if item.unknown:
-        words += f", not known: {', '.join(item.unknown)}"
-    return words + (f"; measure {item.measure}" if item.measure else "")
+    if item.not_known:
+        words += f", not known: {', '.join(map(_unknown_words, item.not_known))}"
+    verb = "say" if item.measure in item.unknown else "measure"
+    return words + (f"; {verb} {item.measure}" if item.measure else "")
+
+
+def _unknown_words(item: Contribution) -> str:
+    if item.at_most_um is None:
+        return item.input
+    return f"{item.input} (at most {item.at_most_um:.1f} µm at {item.within})"
 
 
 def _chance(probability: float) -> str:
@@ -890,12 +911,13 @@ def sheets(report: Report) -> Iterator[Sheet]:
 
 def _inspection_sheet(report: Report) -> Sheet:
     limits, sizes = ("lower mm", "upper mm"), ("least mm", "fit mm", "largest mm")
-    heads = ("inspected", "verdict", "most from", *limits, *sizes, "± µm", "in")
+    heads = ("inspected", "verdict", "most from", "not known", *limits, *sizes, "± µm", "in")
     rows = tuple(
         (
             item.name,
             item.verdict,
             item.contributions[0].input if item.contributions else "–",
+            ", ".join(map(_unknown_words, item.not_known)) or "–",
             "–" if item.lower_mm is None else f"{item.lower_mm:.4f}",
             "–" if item.upper_mm is None else f"{item.upper_mm:.4f}",
             f"{item.low_mm:.4f}",
@@ -906,7 +928,7 @@ def _inspection_sheet(report: Report) -> Sheet:
         )
         for item in report.inspection
     )
-    return Sheet("dimensions", heads, rows, words=3)
+    return Sheet("dimensions", heads, rows, words=4)
 
 
 def _error_sheet(report: Report) -> Sheet:

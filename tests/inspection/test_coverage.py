@@ -153,8 +153,8 @@ def simulated(target: str, draws: int) -> tuple[Floats, Floats]:
     lie in the predicted bands, and their scatter over the predicted one."""
     made, inputs = inspector(target)
 
-    budget = propagate(made.values, inputs, made.edges)
-    assert budget.runs == 9
+    budget = propagate(made.values, inputs, made.edges, extremes=True)
+    assert budget.runs == 13
     for row in range(len(budget.values)):
         assert {each.name for each in budget.unknown(row)} == {"temperature_k"}
     true = monte_carlo(made.values, inputs, made.edges, draws, 17)

@@ -15,7 +15,7 @@ from camtool.inspection.inspector import Inspector
 from camtool.inspection.uncertainty import Variant
 from camtool.inspection.verdicts import SURE, Tolerances, inspect
 from camtool.run import Run
-from camtool.verification.report import InspectedReport
+from camtool.verification.report import InspectedReport, inspected_words
 
 KNOWN = (
     "uncertainty.x.backlash_mm=0.004",
@@ -157,6 +157,115 @@ def test_what_is_not_known_is_not_zero(plate: Path) -> None:
     assert width.standard_um is None
 
 
+COLD = tuple(each for each in KNOWN if "temperature" not in each and "expansion" not in each)
+"""All is known but the temperature and how parts and machine grow."""
+
+GROWS = 15.0 * 2e-4
+"""By which part of its size a part may differ where nothing of that is known."""
+
+
+def at_room(plate: Path, *settings: str) -> Run:
+    target = camtool.load_target("linuxcnc", settings=[*EXACT, *COLD, *settings])
+    return camtool.post(plate, target, job=camtool.job_of(tool_diameter_mm=2.0))
+
+
+@pytest.mark.parametrize(
+    ("limits", "verdict"),
+    [
+        ((-0.1, 0.1), "in"),
+        ((0.1, 0.2), "out"),
+        ((-0.2, -0.1), "out"),
+        ((-0.035, 0.035), "undecided"),  # in without the bound of 8 mm · 0.3 %
+        ((-0.01, 0.01), "undecided"),  # by what is known alone
+    ],
+)
+def test_a_temperature_that_cannot_change_a_verdict_does_not_hinder_it(
+    plate: Path, limits: tuple[float, float], verdict: str
+) -> None:
+    hole = dimension("diameter", (15.0, 20.0), limits=limits)
+    one = verdicts(at_room(plate), hole)[0]
+    assert one.verdict == verdict
+    keys = "part_expansion_per_k", "machine_expansion_per_k", "temperature_k"
+    assert one.unknown == keys
+    (room,) = one.not_known
+    assert room.um is None
+    # The slides grow: a hole by the way of the tool's centre.
+    assert room.at_most_um == pytest.approx(6.0 * GROWS * 1e3, rel=2e-2)
+    assert room.within == "20 ± 15 °C, part 0 to 200 µm/m per K, machine 0 to 30 µm/m per K"
+    assert one.standard_um is not None
+    assert one.unknown_um == room.at_most_um
+    assert one.expanded_um == pytest.approx(2.0 * one.standard_um + (room.at_most_um or 0.0))
+    assert one.guard_um == pytest.approx(
+        1.6449 * one.standard_um + (room.at_most_um or 0.0), abs=1e-3
+    )
+
+
+def test_the_probability_is_the_worst_of_all_rooms(plate: Path) -> None:
+    """Against machines that really are so much larger or smaller, in rooms of 20 °C."""
+    hole = dimension("diameter", (15.0, 20.0), limits=(-0.045, 0.045))
+    unknown = verdicts(at_room(plate), hole)[0]
+    assert unknown.verdict == "in"
+    step = at_room(plate).target.machine.axes.x.coded_step_mm
+    chances = []
+    for share in np.linspace(-GROWS, GROWS, 5):
+        real = step * (1.0 + float(share))
+        larger = f"axes.x.real_step_mm={real}", f"axes.y.real_step_mm={real}"
+        one = verdicts(at_room(plate, *larger, *KNOWN), hole)[0]
+        chances.append(one.probability or 0.0)
+    # As if it could leave both limits at once: at most twice the share that is beyond.
+    assert unknown.probability is not None
+    assert 1.0 - 2.2 * (1.0 - min(chances)) <= unknown.probability <= min(chances) + 1e-6
+
+
+@pytest.mark.parametrize(
+    ("said", "missing", "differ_k"),
+    [
+        (("part_expansion_per_k=5e-6",), ("machine_expansion_per_k", "temperature_k"), 15 * 25e-6),
+        (("machine_expansion_per_k=11e-6", "part_expansion_per_k=23e-6"), ("temperature_k",),
+         15 * 12e-6),
+        (("machine_expansion_per_k=11e-6", "temperature_k=1.0"), ("part_expansion_per_k",),
+         3 * 189e-6),
+        (("machine_expansion_per_k=11e-6", "part_expansion_per_k=11e-6"), (), 0.0),
+        (("temperature_k=0.0",), (), 0.0),
+    ],
+)  # fmt: skip
+def test_whatever_is_said_of_the_temperature_narrows_its_bound(
+    plate: Path, said: tuple[str, ...], missing: tuple[str, ...], differ_k: float
+) -> None:
+    run = at_room(plate, *(f"uncertainty.{each}" for each in said))
+    width = verdicts(run, WIDTH)[0]
+    assert width.unknown == missing
+    assert width.unknown_um == pytest.approx(42e3 * differ_k, rel=1e-2)
+
+
+def test_what_nothing_bounds_hinders_every_verdict(plate: Path) -> None:
+    target = camtool.load_target("linuxcnc", settings=[*EXACT, *COLD[:-1]])
+    run = camtool.post(plate, target, job=camtool.job_of(tool_diameter_mm=2.0))
+    hole = dimension("diameter", (15.0, 20.0), limits=(-0.5, 0.5))
+    one = inspect(run, Tolerances((hole,), (), "in"))
+    assert one.report is not None
+    said = one.report.inspection[0]
+    assert (said.verdict, said.measure) == ("undecided", "process_mm")
+    assert said.unknown_um is said.guard_um is said.expanded_um is None
+    assert "process_mm" in said.unknown
+    assert one.failed
+
+
+def test_words_of_what_is_not_known(plate: Path) -> None:
+    words = [inspected_words(each) for each in verdicts(at_room(plate), HOLE, ROUND)]
+    within = "20 ± 15 °C, part 0 to 200 µm/m per K, machine 0 to 30 µm/m per K"
+    assert "; in, probability of in 99" in words[0]
+    assert words[0].endswith(f" not known: temperature_k (at most 18.1 µm at {within})")
+    # A circle that grows stays round.
+    assert "not known" not in words[1]
+    tight = dimension("diameter", (15.0, 20.0), limits=(-0.035, 0.035))
+    done = inspect(at_room(plate), Tolerances((tight,)))
+    assert done.report is not None
+    assert inspected_words(done.report.inspection[0]).endswith("; say part_expansion_per_k")
+    (finding,) = [each for each in done.findings if each.code == Code.DIMENSION_NOT_IN]
+    assert "does not say part_expansion_per_k, machine_expansion_per_k" in finding.message
+
+
 @pytest.mark.parametrize("require", ["in", "not-out"])
 def test_what_is_required(plate: Path, require: str) -> None:
     run = posted(plate)
@@ -250,6 +359,53 @@ def test_turned_and_mirrored_with_exchanged_axes_no_verdict_changes(
         assert one.verdict == two.verdict
         assert one.fit_mm == pytest.approx(two.fit_mm, abs=2e-3)
         assert one.standard_um == pytest.approx(two.standard_um, rel=0.1, abs=0.3)
+
+
+BIG = """<svg xmlns="http://www.w3.org/2000/svg" width="90mm" height="90mm" viewBox="0 0 90 90">
+<circle cx="45" cy="45" r="30" fill="none" stroke="black"/></svg>"""
+
+
+@pytest.mark.parametrize("scales", [(2e-4, 2e-4), (3e-4, 0.0), (0.0, 0.0)])
+@pytest.mark.parametrize("lean", [0.0, 2e-4])
+@pytest.mark.parametrize("limits", [(-0.02, 0.05), (-0.05, 0.02), (-0.01, 0.01)])
+def test_what_makes_ellipses_of_circles_makes_the_least_diameter_less(
+    tmp_path: Path, scales: tuple[float, float], lean: float, limits: tuple[float, float]
+) -> None:
+    """With the scales 1 + a and 1 + b and the squareness c, a circle of the diameter D has
+    diameters from D (1 + (a + b)/2 − h) to D (1 + (a + b)/2 + h), h = √((a − b)² + c²)/2."""
+    file = tmp_path / "big.svg"
+    file.write_text(BIG)
+    exact = [each.partition("=")[0] + "=0.0" for each in KNOWN]
+    x, y = scales
+    said = (
+        f"uncertainty.x.scale={x}",
+        f"uncertainty.y.scale={y}",
+        f"uncertainty.squareness_rad={lean}",
+    )
+    target = camtool.load_target("linuxcnc", settings=[*EXACT, *exact, *said])
+    run = camtool.post(file, target, job=camtool.job_of(tool_diameter_mm=2.0))
+    one = verdicts(run, dimension("diameter", (45.0, 45.0), limits=limits))[0]
+    random, count = np.random.default_rng(3), 100_000
+    a, b = random.normal(0.0, x, count), random.normal(0.0, y, count)
+    h = 0.5 * np.hypot(a - b, random.normal(0.0, lean, count))
+    way = 58.0  # of the tool's centre
+    middle, off = one.fit_mm + way * 0.5 * (a + b), way * h
+    true = float(((middle - off >= 60 + limits[0]) & (middle + off <= 60 + limits[1])).mean())
+    assert one.probability is not None
+    # Bends are as if each were alone: too wide by a tenth, never too narrow.
+    assert true - 0.18 <= one.probability <= true + 0.02
+
+
+def test_squareness_that_nobody_says_matters_to_a_circle(plate: Path) -> None:
+    """To either side it makes the same ellipse: the derivative is 0."""
+    said = [each for each in KNOWN if "squareness" not in each]
+    target = camtool.load_target("linuxcnc", settings=[*EXACT, *said])
+    run = camtool.post(plate, target, job=camtool.job_of(tool_diameter_mm=2.0))
+    wide = dimension("roundness", (15.0, 20.0), limits=(0.0, 1.0))
+    width, hole, roundness = verdicts(run, WIDTH, HOLE, wide)
+    assert width.unknown == ()
+    assert hole.unknown == roundness.unknown == ("squareness_rad",)
+    assert hole.verdict == roundness.verdict == "undecided"
 
 
 def test_probabilities_agree_with_brute_force(plate: Path) -> None:
