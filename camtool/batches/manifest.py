@@ -30,6 +30,7 @@ class Entry:
     files: Mapping[str, str]
     warnings: int = 0
     figures: Mapping[str, float] = field(default_factory=dict)
+    verdicts: Mapping[str, int] = field(default_factory=dict)
 
 
 class Manifest:
@@ -92,6 +93,7 @@ def _line(stem: str, entry: Entry) -> str:
         "files": dict(entry.files),
         "warnings": entry.warnings,
         "figures": dict(entry.figures),
+        "verdicts": dict(entry.verdicts),
     }
     return json.dumps(row, ensure_ascii=True, sort_keys=True)
 

@@ -36,13 +36,14 @@ class Task:
 @dataclass(frozen=True, kw_only=True)
 class Result:
     """What the summary says of one drawing: `remarks` are findings, one line each, errors first;
-    `figures` are a few numbers; `code` is that of the finding which is the error, "" for other
-    errors."""
+    `figures` are a few numbers; `verdicts` counts those of inspected dimensions; `code` is that of
+    the finding which is the error, "" for other errors."""
 
     error: str | None = None
     remarks: tuple[str, ...] = ()
     warnings: int = 0
     figures: Mapping[str, float] = field(default_factory=dict)
+    verdicts: Mapping[str, int] = field(default_factory=dict)
     seconds: float = 0.0
     code: str = ""
 
@@ -141,6 +142,7 @@ def run_batch(
             tuple(entry.files),
             warnings=entry.warnings,
             figures=entry.figures,
+            verdicts=entry.verdicts,
         )
     if not left:
         return
@@ -173,6 +175,7 @@ def _finished(task: Task, made: Made, order: Order, manifest: Manifest) -> Outco
                 {name: content_digest(data) for name, data in files.items()},
                 made.warnings,
                 dict(made.figures),
+                dict(made.verdicts),
             )
             try:
                 manifest.add(task.stem, entry)
@@ -187,6 +190,7 @@ def _finished(task: Task, made: Made, order: Order, manifest: Manifest) -> Outco
         remarks=remarks,
         warnings=made.warnings,
         figures=made.figures,
+        verdicts=made.verdicts,
         seconds=made.seconds,
         code=made.code,
     )

@@ -10,12 +10,14 @@ from camtool.cli.files import check_places
 from camtool.cli.options import (
     DrawingFlags,
     GateFlags,
+    InspectionFlags,
     JobFlags,
     MachineFlags,
     SectionedCommand,
     drawing_options,
     duration,
     gate_options,
+    inspection_options,
     job_options,
     machine_options,
     option,
@@ -36,7 +38,11 @@ _RUN = "How the batch runs"
 @click.option("--reports", is_flag=True, help="The report of each as JSON beside its program.")
 @click.option("--json", "summary", metavar="FILE", help="The result of each drawing; - is stdout.")
 @click.option("--no-verify", is_flag=True, help="Write without simulating the machine.")
-@click.option("--no-own-jobs", is_flag=True, help="Ignore part.toml beside part.dxf.")
+@click.option(
+    "--no-own-jobs",
+    is_flag=True,
+    help="Ignore part.toml and part.tolerances.toml beside part.dxf.",
+)
 @option(_RUN, "--jobs", "-j", type=click.IntRange(min=1), help="Processes.  [one for each core]")
 @option(_RUN, "--scheduler", metavar="ADDRESS", help="Run on a Dask cluster, tcp://host:8786.")
 @option(
@@ -50,6 +56,7 @@ _RUN = "How the batch runs"
 @option(_RUN, "--fail-fast", is_flag=True, help="Stop at the first that fails.")
 @picture_options
 @gate_options
+@inspection_options
 @job_options
 @drawing_options
 @talk_options
@@ -69,6 +76,7 @@ def batch(
     fail_fast: bool,
     picture: PictureFlags,
     gates: GateFlags,
+    inspection: InspectionFlags,
     job: JobFlags,
     drawing: DrawingFlags,
     quiet: bool,
@@ -78,17 +86,19 @@ def batch(
 
     Folders are kept below --out. Drawings that are up to date by content are skipped. A drawing
     that fails does not stop the others; exit code 1 when any failed. A job file beside a drawing,
-    part.toml for part.dxf, is its job; --job is for those without one.
+    part.toml for part.dxf, is its job, and part.tolerances.toml has its dimensions; --job and
+    --tolerances are for those without one.
     """
     if no_verify and (gates.given or reports):
         raise click.UsageError("--no-verify leaves nothing to report or to hold against limits")
     if scheduler is not None and (jobs is not None or timeout is not None):
         raise click.UsageError("--jobs and --timeout are for processes here, not for a cluster")
     picture.check([preview and f".{preview}"], UNVERIFIED if no_verify else RESULT)
-    check_places([*machine.files(), *job.files()], [summary])
+    inspection.check(without="--no-verify" if no_verify else None)
+    check_places([*machine.files(), *job.files(), *inspection.files()], [summary])
 
     from camtool.cli.batch_messages import Verbosity
-    from camtool.cli.batch_run import BatchRun, Running
+    from camtool.cli.batch_run import BatchRun, Flags, Running
     from camtool.cli.batch_work import PostWork
 
     work = PostWork(
@@ -99,7 +109,9 @@ def batch(
         reports=reports,
         check=not no_verify,
         looks=picture,
+        require=inspection.require,
     )
     running = Running(jobs, scheduler, timeout, force, fail_fast)
     run = BatchRun(work, Path(out), running, summary, Verbosity(quiet, verbose))
-    return run.run(sources, job, machine.files(), own_jobs=not no_own_jobs)
+    flags = Flags(job, inspection, own=not no_own_jobs, inspects=not no_verify)
+    return run.run(sources, flags, machine.files())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import PurePath
@@ -164,9 +164,10 @@ def say_summary(outcomes: Sequence[Outcome], seconds: float, *, quiet: bool) -> 
     made = counts[State.MADE]
     rate = f", {made / seconds:.1f} made a second" if made and seconds > 0.0 else ""
     warnings = f"; {len(warned)} with warnings (-v shows them)" if warned else ""
+    verdicts = _verdict_words(verdicts_of(outcomes))
     say(
         f"{_counted(len(outcomes), 'drawing')}: {', '.join(parts)}; {seconds:.1f} s{rate}"
-        f"{warnings}",
+        f"{warnings}{'; dimensions: ' if verdicts else ''}{verdicts}",
         quiet=quiet and not failed,
     )
 
@@ -185,6 +186,7 @@ def summary_json(outcomes: Sequence[Outcome], target: str, seconds: float) -> by
         "target": target,
         "seconds": round(seconds, 3),
         **{state.name.lower(): counts[state] for state in State},
+        "verdicts": dict(verdicts_of(outcomes)),
         "drawings": rows,
     }
     return to_json(whole).encode()
@@ -196,7 +198,23 @@ def _line(outcome: Outcome) -> str:
     error = outcome.figures.get("error_um")
     figure = "" if error is None else f", error {error:.3g} µm"
     warned = f", {_counted(outcome.warnings, 'warning')}" if outcome.warnings else ""
-    return f"made: {outcome.source} → {', '.join(outcome.files)}{figure}{warned}"
+    verdicts = _verdict_words(outcome.verdicts)
+    told = f", dimensions: {verdicts}" if verdicts else ""
+    return f"made: {outcome.source} → {', '.join(outcome.files)}{figure}{warned}{told}"
+
+
+def verdicts_of(outcomes: Sequence[Outcome]) -> Counter[str]:
+    """The verdicts on all dimensions of all drawings, counted."""
+    counts: Counter[str] = Counter()
+    for each in outcomes:
+        counts.update(each.verdicts)
+    return counts
+
+
+def _verdict_words(counts: Mapping[str, int]) -> str:
+    """ "3 in, 1 out", the usual first."""
+    order = ("in", "out", "undecided", "predicted")
+    return ", ".join(f"{counts[each]} {each}" for each in order if counts.get(each))
 
 
 def _counted(number: int, noun: str) -> str:

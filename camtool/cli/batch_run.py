@@ -14,9 +14,11 @@ import time
 from collections.abc import Callable, Collection, Generator, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
+from functools import cache, partial
 from itertools import chain
 from pathlib import Path
 from types import FrameType
+from typing import TYPE_CHECKING
 
 from camtool.batches.inputs import find_tasks
 from camtool.batches.lock import NAME as LOCK
@@ -28,8 +30,11 @@ from camtool.cli.batch_messages import Display, Verbosity, display, say_summary,
 from camtool.cli.batch_work import SVG, JobOrder, PostWork
 from camtool.cli.files import is_foreign, refuse_same, write_all
 from camtool.cli.messages import say
-from camtool.cli.options import JobFlags, own_job
+from camtool.cli.options import InspectionFlags, JobFlags, own_job, own_tolerances
 from camtool.errors import CamtoolError, OutputError
+
+if TYPE_CHECKING:
+    from camtool.inspection.tolerances import Asked
 
 EXIT_SIGNAL = 128
 """Added to the number of the signal that ended a run."""
@@ -47,13 +52,25 @@ class Running:
 
 
 @dataclass(frozen=True)
+class Flags:
+    """The job and the tolerances of drawings that have none beside them; whether those beside them
+    count (`own`), and whether dimensions are inspected at all."""
+
+    job: JobFlags
+    inspection: InspectionFlags
+    own: bool
+    inspects: bool
+
+
+@dataclass(frozen=True)
 class Ordered:
-    """Tasks with their jobs, a text that identifies each job (by stem), and the drawings whose own
-    job is wrong."""
+    """Tasks with their jobs and tolerances, a text that identifies these (by stem), the drawings
+    whose own job or tolerances are wrong, and all files beside drawings that are read."""
 
     tasks: list[Task]
-    jobs: dict[str, str]
+    own: dict[str, str]
     failed: list[Outcome]
+    reads: list[str]
 
 
 @dataclass(frozen=True)
@@ -88,16 +105,14 @@ class BatchRun:
     summary: str | None
     verbosity: Verbosity
 
-    def run(
-        self, sources: Sequence[str], job: JobFlags, reads: Sequence[str], *, own_jobs: bool
-    ) -> int:
+    def run(self, sources: Sequence[str], flags: Flags, reads: Sequence[str]) -> int:
         """Find the drawings, make what is not up to date, report; the exit code. CamtoolError for
         errors that belong to no single drawing.
 
         `reads` are files that are read besides drawings and jobs.
         """
         try:
-            ended, number = self._run(sources, job, reads, own_jobs=own_jobs)
+            ended, number = self._run(sources, flags, reads)
         except KeyboardInterrupt:  # before the first drawing, or for the second time
             ended, number = Ended((), None), int(signal.SIGINT)
         if number is not None:
@@ -109,15 +124,16 @@ class BatchRun:
         return int(any(outcome.error is not None for outcome in ended.outcomes))
 
     def _run(
-        self, sources: Sequence[str], job: JobFlags, reads: Sequence[str], *, own_jobs: bool
+        self, sources: Sequence[str], flags: Flags, reads: Sequence[str]
     ) -> tuple[Ended, int | None]:
         """The outcomes, and the signal that stopped the run."""
         begin = time.monotonic()
         made = Manifest(self.out).outputs()
         tasks = find_tasks(sources, self.out, made)
         with stoppable() as stop:
-            ordered = self._ordered(tasks, job, own_jobs)
-            self._refuse_overwriting(ordered, [*reads, *job.files()], made)
+            ordered = self._ordered(tasks, flags)
+            reads = [*reads, *flags.job.files(), *flags.inspection.files(), *ordered.reads]
+            self._refuse_overwriting(ordered, reads, made)
             _make_folder(self.out)
             with alone_in(self.out) as locked:
                 if not locked:
@@ -133,7 +149,7 @@ class BatchRun:
     ) -> None:
         """OutputError when an output would replace a file that is read or another output, or a
         picture would replace a file that no batch has `made` there."""
-        own = {task.order.file for task in ordered.tasks} - {None, *reads}
+        own = {task.order.file for task in ordered.tasks} - {None}
         jobs = chain.from_iterable(JobFlags(file).files() for file in sorted(own))
         ours = [str(self.out / name) for name in (MANIFEST, LOCK)]
         makes = [
@@ -142,6 +158,7 @@ class BatchRun:
             for extension in self.work.extensions
         ]
         sources = [task.source for task in ordered.tasks]
+        sources += [failed.source for failed in ordered.failed]
         refuse_same([*sources, *reads, *jobs], [*ours, self.summary, *makes])
         places = RealPaths()
         for task in ordered.tasks if self.work.preview == SVG else ():
@@ -156,26 +173,32 @@ class BatchRun:
     def _note(self, text: str) -> None:
         say(f"camtool: {text}", quiet=self.verbosity.quiet)
 
-    def _ordered(self, tasks: Sequence[Task], job: JobFlags, own_jobs: bool) -> Ordered:
-        """The tasks with their jobs. A wrong job beside a drawing fails that drawing; a wrong job
-        of --job or of the flags fails the whole command. Flags override both."""
-        ordered = Ordered([], {}, [])
-        common: tuple[JobOrder, str] | None = None
+    def _ordered(self, tasks: Sequence[Task], flags: Flags) -> Ordered:
+        """The tasks with their jobs and tolerances. What is wrong beside a drawing fails that
+        drawing; what is wrong in --job, --tolerances or the flags fails the whole command. Flags
+        override both jobs."""
+        ordered = Ordered([], {}, [], [])
+        common_job = cache(partial(_order, flags.job, self.work))
+        common_limits = cache(partial(_asked, flags.inspection.files()))
         for task in tasks:
-            own = own_job(task.path) if own_jobs else None
+            job = own_job(task.path) if flags.own else None
+            limits = own_tolerances(task.path) if flags.own and flags.inspects else None
+            ordered.reads.extend(str(each) for each in (job, limits) if each is not None)
+            wanted = None if job is not None else common_job()
+            asked = None if limits is not None else common_limits()
             try:
-                if own is not None:
-                    wanted = _order(replace(job, file=str(own)), self.work)
-                else:
-                    wanted = common = common or _order(job, self.work)
+                if wanted is None:
+                    wanted = _order(replace(flags.job, file=str(job)), self.work)
+                if limits is not None:
+                    asked = _asked([str(limits)])
             except CamtoolError as error:
-                if own is None:
-                    raise
                 text = f"{task.source}: {error}"
                 ordered.failed.append(Outcome(task.source, task.stem, State.FAILED, error=text))
             else:
-                ordered.tasks.append(replace(task, order=wanted[0]))
-                ordered.jobs[task.stem] = wanted[1]
+                inspects = limits is not None or flags.inspection.tolerances is not None
+                wanted = replace(wanted, asked=asked, inspects=inspects)
+                ordered.tasks.append(replace(task, order=wanted))
+                ordered.own[task.stem] = repr(replace(wanted, file=None))
         return ordered
 
     def _made(self, ordered: Ordered, manifest: Manifest, stop: Stop) -> Ended:
@@ -201,7 +224,7 @@ class BatchRun:
     ) -> Generator[Outcome]:
         """The outcomes until something stops the run."""
         force = self.running.force
-        order = Order(self.out, write_all, self.work.digest(), ordered.jobs, force)
+        order = Order(self.out, write_all, self.work.digest(), ordered.own, force)
         pool = LazyPool(lambda: pool_for(self, shown.note), shown.begins)
         with closing(run_batch(ordered.tasks, order, manifest, pool)) as outcomes:
             for outcome in chain(ordered.failed, outcomes):
@@ -239,10 +262,18 @@ def pool_for(batch: BatchRun, note: Callable[[str], None]) -> Pool:
     return LocalPool(work, options)
 
 
-def _order(job: JobFlags, work: PostWork) -> tuple[JobOrder, str]:
-    """A job, and the text that identifies it."""
-    wanted = job.job(work.drawing)
-    return JobOrder(wanted, job.file), repr(wanted)
+def _order(job: JobFlags, work: PostWork) -> JobOrder:
+    """The order of a job."""
+    return JobOrder(job.job(work.drawing), job.file)
+
+
+def _asked(files: Sequence[str]) -> Asked | None:
+    """What a file of tolerances says. Many batches have none, and load nothing for it."""
+    if not files:
+        return None
+    from camtool.inspection.tolerances import read_tolerances
+
+    return read_tolerances(Path(files[0]))
 
 
 def _make_folder(out: Path) -> None:

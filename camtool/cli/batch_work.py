@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -17,6 +18,8 @@ from camtool.findings import Finding, Severity
 from camtool.plain import one_line
 
 if TYPE_CHECKING:
+    from camtool.inspection.tolerances import Asked
+    from camtool.inspection.verdicts import Required
     from camtool.planning.job import Job
     from camtool.run import Run
     from camtool.target.registry import LoadedTarget
@@ -35,16 +38,20 @@ SVG = ".svg"
 
 @dataclass(frozen=True)
 class JobOrder:
-    """The job of one drawing; `file` names what it was read from."""
+    """The job of one drawing; `file` names what it was read from. `asked` is what its file of
+    tolerances says, None for the dimensions of the drawing alone; nothing is inspected unless
+    `inspects`."""
 
     job: Job
     file: str | None
+    asked: Asked | None = None
+    inspects: bool = False
 
 
 @dataclass(frozen=True)
 class PostWork:
     """Post one drawing as `camtool post` does; `preview` is an extension, None for no picture, and
-    `looks` says how pictures look."""
+    `looks` says how pictures look; `require` what dimensions must be that are inspected."""
 
     target: LoadedTarget
     drawing: DrawingFlags
@@ -53,6 +60,7 @@ class PostWork:
     reports: bool = False
     check: bool = True
     looks: PictureFlags = field(default_factory=PictureFlags)
+    require: Required | None = None
 
     @property
     def extensions(self) -> tuple[str, ...]:
@@ -88,6 +96,7 @@ class PostWork:
                 gates=self.gates,
                 trace_points=None if self.preview else 0,
             )
+            run = self._inspected(run, order)
         made = _made(task, run)
         if made.error is not None:
             return made
@@ -99,7 +108,9 @@ class PostWork:
         import msgspec
 
         target = self.target
-        options = (self.preview, self.reports, self.check, self.gates, self.looks)
+        options = (
+            self.preview, self.reports, self.check, self.gates, self.looks, self.require,
+        )  # fmt: skip
         return digest_of(
             __version__,
             packages_digest("camtool"),
@@ -110,6 +121,14 @@ class PostWork:
             repr(self.drawing),
             repr(options),
         )
+
+    def _inspected(self, run: Run, order: JobOrder) -> Run:
+        if not order.inspects or run.drawing is None:
+            return run
+        from camtool.inspection.tolerances import dimensions_of
+        from camtool.inspection.verdicts import Tolerances, inspect
+
+        return inspect(run, Tolerances(*dimensions_of(run.drawing, order.asked), self.require))
 
     def _files(self, task: Task, run: Run) -> Iterator[tuple[str, bytes]]:
         if run.program is not None:
@@ -137,7 +156,9 @@ def _made(task: Task, run: Run) -> Made:
     remarks = tuple(
         f"{task.source}: {one_line(str(finding))}" for finding in (*errors, *warnings)[:REMARKS]
     )
-    made = Made(remarks=remarks, warnings=len(warnings))
+    report = run.report
+    verdicts = Counter(each.verdict for each in report.inspection) if report else {}
+    made = Made(remarks=remarks, warnings=len(warnings), verdicts=dict(verdicts))
     if not run.failed and run.program is not None:
         return made
     more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""

@@ -605,6 +605,16 @@ def own_job(drawing: Path) -> Path | None:
     return beside if beside.is_file() else None
 
 
+OWN_TOLERANCES = ".tolerances.toml"
+"""`part.tolerances.toml` beside `part.dxf` has its dimensions."""
+
+
+def own_tolerances(drawing: Path) -> Path | None:
+    """The file of tolerances beside a drawing; None without one."""
+    beside = drawing.parent / f"{drawing.stem}{OWN_TOLERANCES}"
+    return beside if beside.is_file() else None
+
+
 def job_options(command: Command) -> Command:
     """Adds `job: JobFlags`."""
 

@@ -55,20 +55,24 @@ LARGEST_MM = 1e6
 Length = str | float
 
 
+Asked = tuple[str, tuple[Dimension, ...]]
+"""What a file of tolerances says: the general tolerance ("" for none), and its dimensions."""
+
+
 def dimensions_of(
     drawing: Drawing,
-    tolerances_file: Path | None = None,
+    tolerances_file: Path | Asked | None = None,
     *,
     faults: list[DrawingError] | None = None,
 ) -> tuple[tuple[Dimension, ...], tuple[Finding, ...]]:
-    """The dimensions of a drawing, those of the file first, with nominal sizes and limits as far
-    as they are known; and what was found on the way. A dimension that fits no feature is among
-    them. Raises CamtoolError for a file or a callout whose limits are wrong, with place and mend;
-    where `faults` is given, those of callouts join it, and the dimension has no limits."""
-    general = ""
-    asked: tuple[Dimension, ...] = ()
-    if tolerances_file is not None:
-        general, asked = read_tolerances(tolerances_file)
+    """The dimensions of a drawing, those of the file (or of what it says) first, with nominal
+    sizes and limits as far as they are known; and what was found on the way. A dimension that
+    fits no feature is among them. Raises CamtoolError for a file or a callout whose limits are
+    wrong, with place and mend; where `faults` is given, those of callouts join it, and the
+    dimension has no limits."""
+    if isinstance(tolerances_file, Path):
+        tolerances_file = read_tolerances(tolerances_file)
+    general, asked = tolerances_file or ("", ())
     features, file = features_of(drawing.paths), drawing.file
     findings: list[Finding] = []
     dimensions: list[Dimension] = []
@@ -201,7 +205,7 @@ class _File(msgspec.Struct, forbid_unknown_fields=True):
     dimension: list[dict[str, Any]] = []
 
 
-def read_tolerances(path: Path) -> tuple[str, tuple[Dimension, ...]]:
+def read_tolerances(path: Path) -> Asked:
     """The general tolerance of a file ("" for none) and its dimensions; CamtoolError with file,
     place and mend for anything that it may not say."""
     file = str(path)

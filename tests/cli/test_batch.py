@@ -288,6 +288,7 @@ def test_all_that_outputs_depend_on_is_in_the_digest(monkeypatch: pytest.MonkeyP
         "reports": True,
         "check": False,
         "looks": PictureFlags(dark=True),
+        "require": "in",
     }
     assert other.keys() == {field.name for field in fields(work)}, "a new field counts too"
     digests = [work.digest(), *(replace(work, **{key: other[key]}).digest() for key in other)]
@@ -345,3 +346,124 @@ def test_a_run_that_cannot_go_on_still_sums_up(
     whole = json.loads(done.stdout)
     assert (whole["made"], whole["not_run"]) == (1, 1)
     assert files_in(tmp_path / "build") == {MANIFEST, "letter.pic"}
+
+
+# Dimensions.
+
+KNOWN = """extends = "grbl"
+[uncertainty]
+squareness_rad = 0.0001
+tool_diameter_mm = 0.004
+runout_mm = 0.0
+part_expansion_per_k = 23e-6
+process_mm = 0.002
+[uncertainty.x]
+backlash_mm = 0.002
+scale = 0.0001
+[uncertainty.y]
+backlash_mm = 0.002
+scale = 0.0001
+"""
+PLATE = """<svg xmlns="http://www.w3.org/2000/svg" width="{wide}mm" height="9mm"
+viewBox="0 0 {wide} 9"><rect x="1" y="1" width="4" height="4" fill="none" stroke="black"/></svg>"""
+WIDTH = """[[dimension]]
+kind = "width"
+from = [1, 6]
+to = [5, 6]
+limits = "{limits}"
+"""
+
+
+@pytest.fixture
+def plates(tmp_path: Path) -> Path:
+    """Two plates with a square of 4 mm each, and a machine of which all is known that matters."""
+    folder = tmp_path / "plates"
+    folder.mkdir()
+    for name, wide in (("one", 9), ("two", 10)):
+        (folder / f"{name}.svg").write_text(PLATE.format(wide=wide))
+    (tmp_path / "mine.toml").write_text(KNOWN)
+    (tmp_path / "common.toml").write_text(WIDTH.format(limits="±0.1"))
+    return folder
+
+
+INSPECTED = ("batch", "plates", "--machine", "mine.toml", "-o", "build", "--json", "all.json")
+
+
+def verdicts_in(folder: Path) -> list[dict[str, int]]:
+    whole = json.loads((folder / "all.json").read_text())
+    return [whole["verdicts"], *(row["verdicts"] for row in whole["drawings"])]
+
+
+def test_dimensions_of_many_drawings(
+    camtool: Run, plates: Path, tmp_path: Path, pools: list[HerePool]
+) -> None:
+    limits = ("--tolerances", "common.toml")
+    done = camtool(*INSPECTED, *limits, "--reports")
+    assert done.returncode == 0, done.stderr.decode()
+    assert verdicts_in(tmp_path) == [{"in": 2}, {"in": 1}, {"in": 1}]
+    assert "dimensions: 2 in" in done.stderr.decode().splitlines()[-1]
+    assert "one.nc, one.json, error" in done.stderr.decode()
+    report = json.loads((tmp_path / "build" / "one.json").read_text())
+    assert [each["verdict"] for each in report["inspection"]] == ["in"]
+    # Nothing has changed: the counts come from the manifest.
+    before = len(pools)
+    assert camtool(*INSPECTED, *limits, "--reports").returncode == 0
+    assert len(pools) == before
+    assert verdicts_in(tmp_path) == [{"in": 2}, {"in": 1}, {"in": 1}]
+    # One drawing has its own limits now, which are narrower than anybody can say.
+    (plates / "one.tolerances.toml").write_text(WIDTH.format(limits="±0.001"))
+    done = camtool(*INSPECTED, *limits, "--reports", "--require", "not-out")
+    assert done.returncode == 0, done.stderr.decode()
+    assert pools[-1].asked == ["one", "two"]  # something else is required
+    assert verdicts_in(tmp_path) == [{"in": 1, "undecided": 1}, {"undecided": 1}, {"in": 1}]
+    assert "dimensions: 1 undecided" in done.stderr.decode()
+    (plates / "one.tolerances.toml").write_text(WIDTH.format(limits="±0.002"))
+    camtool(*INSPECTED, *limits, "--reports", "--require", "not-out")
+    assert pools[-1].asked == ["one"]
+    camtool(*INSPECTED, *limits, "--reports", "--require", "not-out", "--no-own-jobs")
+    assert pools[-1].asked == ["one"]
+    assert verdicts_in(tmp_path)[0] == {"in": 2}
+
+
+@pytest.mark.usefixtures("pools")
+def test_what_every_dimension_of_a_batch_must_be(
+    camtool: Run, plates: Path, tmp_path: Path
+) -> None:
+    (plates / "one.tolerances.toml").write_text(WIDTH.format(limits="±0.001"))
+    done = camtool(*INSPECTED, "--tolerances", "drawing", "--require", "in")
+    assert done.returncode == 1
+    said = done.stderr.decode()
+    assert "1 failed (1 DIMENSION_NOT_IN)" in said
+    assert "width 1 is undecided" in said
+    assert files_in(tmp_path / "build") == {MANIFEST, "two.nc"}
+    assert verdicts_in(tmp_path) == [{"undecided": 1}, {"undecided": 1}, {}]
+
+
+@pytest.mark.usefixtures("pools")
+def test_limits_beside_a_drawing_need_no_flag(camtool: Run, plates: Path, tmp_path: Path) -> None:
+    (plates / "one.tolerances.toml").write_text(WIDTH.format(limits="±0.1"))
+    assert camtool(*INSPECTED).returncode == 0
+    assert verdicts_in(tmp_path) == [{"in": 1}, {"in": 1}, {}]
+    assert camtool(*INSPECTED, *QUICK).returncode == 0
+    assert verdicts_in(tmp_path) == [{}, {}, {}]
+
+
+@pytest.mark.usefixtures("pools")
+def test_wrong_tolerances_fail_their_drawing_or_all(
+    camtool: Run, plates: Path, tmp_path: Path
+) -> None:
+    (plates / "one.tolerances.toml").write_text(WIDTH.format(limits="+0.1"))
+    done = camtool(*INSPECTED, "--tolerances", "common.toml")
+    assert done.returncode == 1
+    assert "plates/one.svg: plates/one.tolerances.toml: dimension 1, key limits" in (
+        done.stderr.decode()
+    )
+    assert files_in(tmp_path / "build") == {MANIFEST, "two.nc"}
+    (tmp_path / "common.toml").write_text(WIDTH.format(limits="+0.1"))
+    done = camtool(*INSPECTED, "--tolerances", "common.toml")
+    assert done.returncode == 2
+    for flags in (("--require", "in"), ("--tolerances", "drawing", *QUICK)):
+        assert camtool(*INSPECTED, *flags).returncode == 2
+    done = camtool("batch", "plates", "--machine", "mine.toml", "-o", ".", "--json",
+                   "plates/one.tolerances.toml")  # fmt: skip
+    assert done.returncode == 2
