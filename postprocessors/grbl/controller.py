@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -53,6 +53,12 @@ DWELL_STEP_S = 0.05
 """Dwells are counted in whole steps of this, rounded up (DWELL_TIME_STEP, `delay_sec`)."""
 
 
+LASER_ASSUMPTION = (
+    "laser mode ($32): what the laser burns is not simulated (it is off in rapids, and M4 scales "
+    "its power with the speed)"
+)
+
+
 class GrblModel(ControllerModel[GrblController, Dialect]):
     """grbl 1.1: chords, whole steps, trapezoids planned ahead."""
 
@@ -79,6 +85,7 @@ class GrblModel(ControllerModel[GrblController, Dialect]):
             f"corners by a junction deviation of {controller.junction_deviation_mm:g} mm ($11), "
             f"speeds planned {controller.buffer_blocks - 1} blocks ahead",
             "the sender keeps grbl's buffer full; overrides stand at 100 %",
+            *((LASER_ASSUMPTION,) if controller.laser_mode else ()),
         )
 
 
@@ -88,7 +95,7 @@ def sampled(
     """All rows, some thousand at a time. With the blocks of these are planned the one before
     them, for the corner between them, and as many behind them as the ring holds."""
     window = controller.buffer_blocks - 1
-    parts = blocks_of(path, machine, controller)
+    parts, stops = blocks_of(path, machine, controller), stops_of(path, controller)
     coming: list[Blocks] = []
     last, before, low = NO_BLOCKS, FROM_REST, 0
     while low < len(path):
@@ -100,13 +107,13 @@ def sampled(
         own = coming.pop(0)
         count, high = len(own), min(low + ROWS_AT_ONCE, len(path))
         known = joined([last, own, *coming]).part(0, len(last) + count + window)
-        plan = speeds_of(known, path, machine, before, len(last))
+        plan = speeds_of(known, path, machine, before, len(last), stops)
         squares = plan.squares(window)
         seconds = np.zeros(high - low)
         np.add.at(seconds, own.row - low, plan.seconds(squares)[:count])
         if controller.idle_delay_ms != ALWAYS_ON:
-            stops = np.append(_from_rest(known, path), True)[len(last) + 1 :][:count]
-            np.add.at(seconds, own.row[stops] - low, controller.idle_delay_ms / 1000.0)
+            behind = np.append(stops.before(known), True)[len(last) + 1 :][:count]
+            np.add.at(seconds, own.row[behind] - low, controller.idle_delay_ms / 1000.0)
         dwells = low + np.flatnonzero(path.kind[low:high] == Kind.DWELL)
         seconds[dwells - low] = [dwell_s(value) for value in path.value[dwells].tolist()]
         samples = GrblSamples(own, np.arange(low, high + 1), machine)
@@ -201,8 +208,11 @@ WAITS = (
     Kind.COOLANT_OFF,
     Kind.END,
 )
-"""Before these the machine comes to rest (`protocol_buffer_synchronize`)."""
+"""Before these the machine comes to rest (`protocol_buffer_synchronize`), but not where they say
+what holds already, and in laser mode not before a new power alone."""
 
+SPINDLE = (Kind.SPINDLE_CW, Kind.SPINDLE_CCW, Kind.SPINDLE_OFF)
+COOLANT = (Kind.COOLANT_MIST, Kind.COOLANT_FLOOD, Kind.COOLANT_OFF)
 
 ROWS_AT_ONCE = 1 << 12
 """So many rows become blocks together."""
@@ -215,10 +225,11 @@ Shorts = npt.NDArray[np.int32]
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """B blocks in order: the row (B,) that each is of, where it starts and its way, both (B, 3)
-    steps."""
+    """B blocks in order: the row (B,) that each is of, which target (B,) of all it ends at, where
+    it starts and its way, both (B, 3) steps. Targets without a block are those without a step."""
 
     row: Shorts
+    target: Shorts
     start: Shorts
     way: Shorts
 
@@ -232,16 +243,19 @@ class Blocks:
 
     def part(self, low: int, high: int) -> Blocks:
         """The blocks low:high."""
-        return Blocks(self.row[low:high], self.start[low:high], self.way[low:high])
+        at = slice(low, high)
+        return Blocks(self.row[at], self.target[at], self.start[at], self.way[at])
 
 
-NO_BLOCKS = Blocks(np.empty(0, np.int32), np.empty((0, 3), np.int32), np.empty((0, 3), np.int32))
+_NONE = np.empty(0, np.int32)
+NO_BLOCKS = Blocks(_NONE, _NONE, _NONE.reshape(0, 3), _NONE.reshape(0, 3))
 
 
 def joined(parts: list[Blocks]) -> Blocks:
     """Blocks that follow one another."""
     return Blocks(
         np.concatenate([part.row for part in parts]),
+        np.concatenate([part.target for part in parts]),
         np.concatenate([part.start for part in parts]),
         np.concatenate([part.way for part in parts]),
     )
@@ -250,18 +264,19 @@ def joined(parts: list[Blocks]) -> Blocks:
 def blocks_of(path: Toolpath, machine: _Machine, controller: GrblController) -> Iterator[Blocks]:
     """The blocks of a program, `ROWS_AT_ONCE` at a time; ProgramError for positions beyond all
     that grbl can count."""
-    begin = _rounded(path.start[None, :].astype(np.float32), machine)
+    begin, asked = _rounded(path.start[None, :].astype(np.float32), machine), 0
     for low in range(0, len(path), ROWS_AT_ONCE):
         rows = np.arange(low, min(low + ROWS_AT_ONCE, len(path)))
-        blocks, begin = blocks_from(begin, path, rows, machine, controller)
-        yield blocks
+        blocks, begin, count = blocks_from(begin, path, rows, machine, controller)
+        yield replace(blocks, target=blocks.target + np.int32(asked))
+        asked += count
 
 
 def blocks_from(
     begin: Ints, path: Toolpath, rows: Ints, machine: _Machine, controller: GrblController
-) -> tuple[Blocks, Ints]:
-    """The blocks of rows (R,), which follow one another, from `begin` (1, 3) steps on; and where
-    the last of them ends."""
+) -> tuple[Blocks, Ints, int]:
+    """The blocks of rows (R,), which follow one another, from `begin` (1, 3) steps on; where the
+    last of them ends; and how many targets there are."""
     targets = targets_of(path, rows, machine, controller)
     stop = _rounded(targets.mm, machine)
     far = (np.abs(stop) > MAX_STEPS).any(axis=1)
@@ -275,9 +290,9 @@ def blocks_from(
     start = np.concatenate([begin, stop])
     begin, start = start[-1:], start[:-1]
     way = stop - start
-    moves = way.any(axis=1)
-    columns = targets.row[moves], start[moves], way[moves]
-    return Blocks(*(column.astype(np.int32) for column in columns)), begin
+    moves = np.flatnonzero(way.any(axis=1))
+    columns = targets.row[moves], moves, start[moves], way[moves]
+    return Blocks(*(column.astype(np.int32) for column in columns)), begin, len(way)
 
 
 def _rounded(mm: Singles, machine: _Machine) -> Ints:
@@ -288,7 +303,12 @@ def _rounded(mm: Singles, machine: _Machine) -> Ints:
 
 
 def speeds_of(
-    blocks: Blocks, path: Toolpath, machine: _Machine, before: Approach, first: int
+    blocks: Blocks,
+    path: Toolpath,
+    machine: _Machine,
+    before: Approach,
+    first: int,
+    stops: Stops,
 ) -> SpeedPlan:
     """How fast each block from `first` on may go, and each corner be passed.
 
@@ -332,17 +352,47 @@ def speeds_of(
         corner = np.sqrt(np.where(cosine < -STRAIGHT_COS, np.inf, square))
         corner[cosine > STRAIGHT_COS] = 0.0
         corners[at] = corner
-    corners[_from_rest(blocks, path)] = 0.0
+    corners[stops.before(blocks)] = 0.0
     return SpeedPlan(lengths_mm[first:], speeds[first:], along[first:], corners[first:], before)
 
 
-def _from_rest(blocks: Blocks, path: Toolpath) -> Bools:
-    """(B,) true for blocks before which the machine stands."""
-    if not len(blocks):
-        return np.zeros(0, dtype=np.bool_)
-    first, last = int(blocks.row[0]), int(blocks.row[-1])
-    waits = np.cumsum(np.isin(path.kind[first : last + 1], WAITS))[blocks.row - first]
-    return np.asarray(np.diff(waits, prepend=-1) > 0)
+@dataclass(frozen=True, eq=False)
+class Stops:
+    """Where the machine comes to rest: before rows (N,), and at targets without a step that rows
+    (N,) have, None where there are no such rows."""
+
+    rows: Bools
+    lit: Bools | None
+
+    def before(self, blocks: Blocks) -> Bools:
+        """(B,) true for blocks before which the machine stands."""
+        if not len(blocks):
+            return np.zeros(0, dtype=np.bool_)
+        first, last = int(blocks.row[0]), int(blocks.row[-1])
+        waits = np.cumsum(self.rows[first : last + 1])[blocks.row - first]
+        rests = np.diff(waits, prepend=-1) > 0
+        if self.lit is not None:
+            rests |= self.lit[blocks.row] & (np.diff(blocks.target, prepend=0) > 1)
+        return np.asarray(rests)
+
+
+def stops_of(path: Toolpath, controller: GrblController) -> Stops:
+    """Events that say what holds already stop nothing. In laser mode neither does another power,
+    but a target without a step stops a laser of constant power (M3), which is then set at once
+    (`mc_line`)."""
+    rows = np.isin(path.kind, WAITS)
+    coolant = np.flatnonzero(np.isin(path.kind, COOLANT))
+    kind = np.append(Kind.COOLANT_OFF, path.kind[coolant])
+    rows[coolant[kind[1:] == kind[:-1]]] = False
+    spindle = np.flatnonzero(np.isin(path.kind, SPINDLE))
+    kind = np.append(Kind.SPINDLE_OFF, path.kind[spindle])
+    speed = np.nan_to_num(np.append(0.0, path.value[spindle]))
+    same = (kind[1:] == Kind.SPINDLE_OFF) | (speed[1:] == speed[:-1]) | controller.laser_mode
+    rows[spindle[same & (kind[1:] == kind[:-1])]] = False
+    if not controller.laser_mode:
+        return Stops(rows, None)
+    index = np.searchsorted(spindle, np.arange(len(path)), side="right")
+    return Stops(rows, kind[index] == Kind.SPINDLE_CW)
 
 
 # The targets that grbl 1.1 hands to its planner, in its own 32-bit floats.

@@ -46,6 +46,7 @@ class GrblController(SlideStart, frozen=True, tag_field="model", tag="grbl"):
     next for so long, 255 keeps the motors on and holds nothing (`st_go_idle`, stepper.c).
     `least_step_hz`: no axis that has the most steps makes fewer a second: 16 MHz / (65535 · 8),
     the longest tick of its timer at the highest smoothing (`st_prep_buffer`, stepper.c).
+    `laser_mode` is its $32: a laser instead of a spindle, whose power changes while it moves.
     """
 
     arc_tolerance_mm: Tolerance = 0.002
@@ -54,6 +55,7 @@ class GrblController(SlideStart, frozen=True, tag_field="model", tag="grbl"):
     arc_correction: Annotated[int, Meta(ge=1, le=10_000)] = 12
     idle_delay_ms: Annotated[int, Meta(ge=0, le=255)] = 25
     least_step_hz: Annotated[float, Meta(ge=0.01, le=10_000.0)] = 30.518
+    laser_mode: bool = False
 
 
 GrblMachine = Machine[SlideStart, Dialect]

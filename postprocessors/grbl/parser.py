@@ -19,13 +19,17 @@ from camtool.toolpath.moves import Kind
 
 from ..gcode.faults import Fault
 from ..gcode.part_moves import PLANES, Frame, PartMoves
-from .dialect import MOST_TOOL, Dialect, GrblMachine
+from .dialect import MOST_TOOL, Dialect, GrblController, GrblMachine
 
 MM_PER_INCH: Final = 25.4
 """Length of an inch, mm."""
 
 MOST_DIGITS: Final = 8
 """Further digits of a number count as 0 (MAX_INT_DIGITS)."""
+
+MOST_COUNTED: Final = 1 << 31
+"""Of a code grbl keeps eight bits, and sixteen of its decimals; of codes beyond this nobody knows
+what its compiler makes."""
 
 MOST_LINE_NUMBER: Final = 10_000_000
 """Of an N word (MAX_LINE_NUMBER)."""
@@ -157,6 +161,10 @@ class Parser:
         self._path = path
         self._zero = machine.controller.machine_zero_mm
         self._coolant = machine.coolant
+        self.laser = isinstance(machine.controller, GrblController) and (
+            machine.controller.laser_mode
+        )
+        """Laser mode ($32): what stops the machine is other than with a spindle."""
         self._speed: float | None = None
         self._tool: int | None = None
         self._changes_tools = dialect.tool_change != "refuse"
@@ -195,6 +203,12 @@ class Parser:
             self._moving()
         self.position[:] = at
 
+    def rewind(self) -> None:
+        """M2 and M30 set most modes back; units, feed and offsets stay (`gc_execute_line`)."""
+        self.ended = False
+        self.modes = Modes(motion=1, inches=self.modes.inches)
+        self._place()
+
     # Steps 1 and 2: the words
 
     def line(self, text: str) -> None:
@@ -220,8 +234,8 @@ class Parser:
         self._check_and_execute(block, jogs=jogs)
 
     def _word(self, block: Block, letter: str, value: float, said: str, at: int) -> None:
-        whole = math.trunc(value)
-        hundredths = round(100.0 * (value - whole))
+        whole = math.trunc(value) % 256 if abs(value) < MOST_COUNTED else 255
+        hundredths = round(100.0 * (value - whole)) % 65536
         name = f"{letter}{said}"
         if letter == "G":
             group = self._g_word(block, whole, hundredths, name, at)
@@ -244,7 +258,9 @@ class Parser:
                 raise error(25, at, letter)
             if letter in NEVER_NEGATIVE and value < 0.0:
                 raise error(4, at, NEVER_NEGATIVE[letter])
-            block.numbers[letter] = float(whole) if letter in "LTN" else value
+            if letter in "LT":
+                value = float(whole)
+            block.numbers[letter] = float(math.trunc(value)) if letter == "N" else value
             block.at[letter] = at
             return
         block.at[letter] = at
@@ -496,16 +512,15 @@ class Parser:
         self.feed = feed
         if "F" in numbers and modes.feed_mode == 94:
             self.notes.feeds.append((self.index, feed))
-        self._spindle(block, before.spindle)
+        self._spindle(block, before)
         if "T" in numbers:
             self._tool = int(numbers["T"])
         if "coolant" in block.groups:
-            self._switch_coolant(modes)
+            self._switch_coolant(before)
         if block.once == "G4":
             self._path.event(Kind.DWELL, numbers["P"])
         if block.uses == LENGTH:
-            self._length = target_length(block, MM_PER_INCH if modes.inches else 1.0)
-            self._place()
+            self._change_length(target_length(block, MM_PER_INCH if modes.inches else 1.0))
         if modes.frame != before.frame:
             self._change_frame()
         self._do_once(block, target)
@@ -514,28 +529,52 @@ class Parser:
         if block.flow is not None:
             self._stop(block.flow)
 
-    def _spindle(self, block: Block, before: Kind | None) -> None:
-        speed = block.numbers.get("S")
-        changed = speed is not None and speed != self._speed
-        self._speed = self._speed if speed is None else speed
-        now = block.modes.spindle
-        if "spindle" in block.groups and now is None:
-            self._path.event(Kind.SPINDLE_OFF)
-        elif "spindle" in block.groups and now is not None:
-            if self._speed is None:
-                self.notes.speedless.append(self.index)
-            self._path.event(now, self._speed)
-        elif changed and before is not None:
-            self._path.event(before, self._speed)
+    def _rest(self) -> None:
+        """The machine comes to rest, as before a dwell, and nothing else happens: where grbl
+        waits for its buffer to run empty (`protocol_buffer_synchronize`)."""
+        self._path.event(Kind.DWELL, 0.0)
 
-    def _switch_coolant(self, modes: Modes) -> None:
+    def _spindle(self, block: Block, before: Modes) -> None:
+        """Spindle or laser. In laser mode another power goes with the move of its block; in a
+        block that moves nothing grbl waits, and sets it at once."""
+        speed = block.numbers.get("S", self._speed)
+        changed = (speed or 0.0) != (self._speed or 0.0)
+        self._speed = speed
+        now, said = block.modes.spindle, "spindle" in block.groups
+        stays = now is not None and now == before.spindle and block.uses != MOTION
+        if self.laser and stays and (changed or self._relights(block, before)):
+            self._rest()
+        if said and now is None:
+            self._path.event(Kind.SPINDLE_OFF)
+        elif now is not None and (said or changed):
+            if speed is None:
+                self.notes.speedless.append(self.index)
+            self._path.event(now, speed)
+
+    @staticmethod
+    def _relights(block: Block, before: Modes) -> bool:
+        """In laser mode: whether a block that moves nothing goes from cuts to rapids, or back,
+        under constant power (M3), which is switched with that."""
+        cuts = (1, 2, 3)
+        return before.spindle == Kind.SPINDLE_CW and (
+            (before.motion in cuts) != (block.modes.motion in cuts)
+        )
+
+    def _switch_coolant(self, before: Modes) -> None:
+        kind, now = _cooling(before), _cooling(self.modes)
+        changed = (before.mist, before.flood) != (self.modes.mist, self.modes.flood)
         if not self._coolant.kinds:
             self.notes.coolant.append(self.index)
-            return
-        kind = Kind.COOLANT_OFF
-        if modes.mist or modes.flood:
-            kind = Kind.COOLANT_FLOOD if modes.flood else Kind.COOLANT_MIST
-        self._path.event(kind)
+        else:
+            self._path.event(now)
+        if changed and (kind == now or not self._coolant.kinds):
+            self._rest()
+
+    def _change_length(self, length: float) -> None:
+        if length != self._length:
+            self._rest()
+        self._length = length
+        self._place()
 
     def _place(self) -> None:
         """The frame in force, for the moves that follow: the tip of the tool counts."""
@@ -544,6 +583,7 @@ class Parser:
         self.moves.place(Frame((x, y, z)))
 
     def _change_frame(self) -> None:
+        self._rest()
         self._place()
         frame = self.modes.frame
         known = {self._first_frame, frame} <= self._placed
@@ -554,6 +594,8 @@ class Parser:
         mm = MM_PER_INCH if block.modes.inches else 1.0
         words = {k: block.numbers["XYZ"[k]] * mm for k in range(3) if "XYZ"[k] in block.numbers}
         once = block.once
+        if once in ("G10", "G28.1", "G30.1", "G92", "G92.1"):  # it writes to its memory
+            self._rest()
         if once == "G10":
             self._set_frame(block, words)
         elif once in ("G28", "G30"):
@@ -683,6 +725,14 @@ class Parser:
             self._tool = None
         else:
             self.notes.pauses.append(self.index)
+            if code == 0:
+                self._rest()
+
+
+def _cooling(modes: Modes) -> Kind:
+    if modes.flood:
+        return Kind.COOLANT_FLOOD
+    return Kind.COOLANT_MIST if modes.mist else Kind.COOLANT_OFF
 
 
 def target_length(block: Block, mm: float) -> float:

@@ -33,7 +33,15 @@ _KEYS = {
 } | {"controller.junction_deviation_mm": 11, "controller.arc_tolerance_mm": 12}
 """What every listing says ..."""
 
-_MORE = {"controller.idle_delay_ms": 1, "spindle.max_rpm": 30, "spindle.min_rpm": 31}
+LASER = 32
+"""The setting of laser mode."""
+
+_MORE = {
+    "controller.idle_delay_ms": 1,
+    "spindle.max_rpm": 30,
+    "spindle.min_rpm": 31,
+    "controller.laser_mode": LASER,
+}
 """... and what it may say besides."""
 
 
@@ -78,6 +86,8 @@ def _setting(key: str, number: int, text: str, line: int) -> Setting:
         if value <= 0.0:
             raise MachineError(f"{text} steps/mm are none", where=where)
         return Setting(key, 1.0 / value, f"${number} = {text} steps/mm", where)
+    if number == LASER:
+        return Setting(key, value != 0.0, f"${number}", where)
     return Setting(key, int(value) if value.is_integer() else value, f"${number}", where)
 
 
@@ -86,7 +96,17 @@ def _setting(key: str, number: int, text: str, line: int) -> Setting:
 SAID_TOLERANCE = 6e-4
 """Settings are said with three decimals: what is nearer is the same."""
 
-REPORT_INCHES, LASER = 13, 32
+REPORT_INCHES = 13
+"""The setting of inches in status reports."""
+
+LASER_IS = (
+    "$32 is laser mode, in which a spindle stops in rapids and does not wait: set $32=0, or "
+    "controller.laser_mode = true in the machine file"
+)
+LASER_IS_NOT = (
+    "$32=0 is no laser mode, so that M3 burns on in rapids, but the machine file has "
+    "controller.laser_mode: set $32=1"
+)
 
 
 def differences(text: str, machine: GrblMachine) -> tuple[list[str], list[str]]:
@@ -112,11 +132,12 @@ def differences(text: str, machine: GrblMachine) -> tuple[list[str], list[str]]:
     if isinstance(machine.controller, GrblController):
         errors += _difference(said["$12"], machine.controller.arc_tolerance_mm)
         remarks += _difference(said["$11"], machine.controller.junction_deviation_mm)
+        laser = said.get(f"${LASER}")
+        if laser is not None and laser.value != machine.controller.laser_mode:
+            errors.append(LASER_IS if laser.value else LASER_IS_NOT)
     numbers = {int(number): value for number, value in _SETTING.findall(text)}
     if float(numbers.get(REPORT_INCHES, "0")) != 0.0:
         errors.append("$13 reports inches: set $13=0, so that places can be followed")
-    if float(numbers.get(LASER, "0")) != 0.0:
-        remarks.append("$32 is laser mode: M3 and M4 mean a laser")
     return errors, remarks
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, Final, Literal
 
@@ -29,16 +29,18 @@ from camtool.toolpath.moves import Kind, Toolpath
 from ..gcode.faults import Fault
 from .controller import (
     ALWAYS_ON,
+    COOLANT,
     NO_BLOCKS,
+    SPINDLE,
     WAITS,
-    Blocks,
     blocks_from,
     dwell_s,
     joined,
     speeds_of,
+    stops_of,
 )
 from .dialect import Dialect, GrblController
-from .parser import Modes, Notes, Parser
+from .parser import Notes, Parser
 from .steps import step_lines_fill
 
 RX_BYTES: Final = 128
@@ -90,6 +92,10 @@ PAUSE: Final = re.compile(r"M0*0(?![\d.])")
 """M0, which waits for the operator; grbl passes over M1."""
 
 SYNCHRONISED: Final = frozenset(WAITS)
+
+SPINDLES: Final = {Kind.SPINDLE_CW: "M3", Kind.SPINDLE_CCW: "M4", Kind.SPINDLE_OFF: "M5"}
+
+COOLANTS: Final = {Kind.COOLANT_MIST: "M7", Kind.COOLANT_FLOOD: "M8", Kind.COOLANT_OFF: "M9"}
 
 
 class Choices(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -351,7 +357,7 @@ class GrblTwin(Twin):
         if not self._check:
             yield from self._carry_out(path, len(self.decoded) - 1)
         if self._parser.ended:
-            self._rewind()
+            self._parser.rewind()
         if PAUSE.search(text) and not self._check:
             yield self._idle
             self._held = True
@@ -371,45 +377,58 @@ class GrblTwin(Twin):
         for row in range(len(path)):
             kind = Kind(int(path.kind[row]))
             if kind in SYNCHRONISED:
+                value = float(path.value[row])
+                if self._changes_nothing(kind, value):
+                    self._event(kind, value)
+                    continue
                 yield self._idle
                 self._last = NO_BLOCKS
-                self._event(kind, float(path.value[row]))
+                self._event(kind, value)
                 yield self._rested
             else:
                 yield from self._plan(path, row, owner)
 
+    def _changes_nothing(self, kind: Kind, value: float) -> bool:
+        """Whether an event says what holds already, or in laser mode another power: that comes
+        with the move behind it."""
+        if kind in COOLANT:
+            return COOLANTS[kind] == self._coolant
+        if kind not in SPINDLE or SPINDLES[kind] != self._spindle:
+            return False
+        same = kind == Kind.SPINDLE_OFF or not abs(value - self._rpm) > 0.0  # NaN: none is said
+        return same or self._machine.controller.laser_mode
+
     def _event(self, kind: Kind, value: float) -> None:
         if kind == Kind.DWELL:
             self._rest_s = self.now + dwell_s(value)
-        elif kind in (Kind.SPINDLE_CW, Kind.SPINDLE_CCW, Kind.SPINDLE_OFF):
-            self._spindle = {Kind.SPINDLE_CW: "M3", Kind.SPINDLE_CCW: "M4"}.get(kind, "M5")
+        elif kind in SPINDLE:
+            self._spindle = SPINDLES[kind]
             self._rpm = value if value == value else self._rpm  # NaN: none is said
-        elif kind in (Kind.COOLANT_MIST, Kind.COOLANT_FLOOD, Kind.COOLANT_OFF):
-            self._coolant = {Kind.COOLANT_MIST: "M7", Kind.COOLANT_FLOOD: "M8"}.get(kind, "M9")
+        elif kind in COOLANT:
+            self._coolant = COOLANTS[kind]
         elif kind == Kind.TOOL_CHANGE:
             self._tool = int(value)
         elif kind == Kind.END:
             self._spindle, self._coolant = "M5", "M9"
             self._out += b"[MSG:Pgm End]\r\n"
 
-    def _rewind(self) -> None:
-        """M2 and M30 set most modes back; units, feed and offsets stay (`gc_execute_line`)."""
-        parser = self._parser
-        parser.ended = False
-        parser.modes = Modes(motion=1, inches=parser.modes.inches)
-
     # The planner.
 
     def _plan(self, path: Toolpath, row: int, owner: int) -> Generator[Ready, None, None]:
         """A move into the ring, block by block; waits where the ring is full."""
         machine, controller = self._machine, self._machine.controller
-        own, self._planned = blocks_from(self._planned, path, np.array([row]), machine, controller)
+        rows = np.array([row])
+        own, self._planned, asked = blocks_from(self._planned, path, rows, machine, controller)
+        if len(own) < asked and controller.laser_mode and self._spindle == "M3":
+            yield self._idle
+            self._last = NO_BLOCKS
         if not len(own):
             return
         last = self._last
-        own = Blocks(np.full(len(own), row, np.int32), own.start, own.way)
-        known = joined([Blocks(np.full(len(last), row, np.int32), last.start, last.way), own])
-        plan = speeds_of(known, path, machine, FROM_REST, len(last))
+        last = replace(last, row=np.full(len(last), row, np.int32))
+        own = replace(own, row=np.full(len(own), row, np.int32))
+        stops = stops_of(path, controller)
+        plan = speeds_of(joined([last, own]), path, machine, FROM_REST, len(last), stops)
         ways = own.way * coded_steps_mm(machine)
         units = ways / np.linalg.norm(ways, axis=1)[:, None]
         highest = allowed_along(axis_limits(machine, "max_rate_mm_min") / 60.0, units)
@@ -631,9 +650,15 @@ class GrblTwin(Twin):
             changed = msgspec.structs.replace(getattr(machine.axes, name), **given)
             axes = msgspec.structs.replace(machine.axes, **{name: changed})
             self._machine = msgspec.structs.replace(machine, axes=axes)
-        elif number in (1, 11, 12):
-            key = {1: "idle_delay_ms", 11: "junction_deviation_mm", 12: "arc_tolerance_mm"}[number]
-            given = {key: int(value) if number == 1 else value}
+        elif number in (1, 11, 12, 32):
+            changes: dict[int, dict[str, Any]] = {
+                1: {"idle_delay_ms": int(value)},
+                11: {"junction_deviation_mm": value},
+                12: {"arc_tolerance_mm": value},
+                32: {"laser_mode": bool(int(value))},
+            }
+            given = changes[number]
+            self._parser.laser = given.get("laser_mode", self._parser.laser)
             controller = msgspec.structs.replace(controller, **given)
             self._machine = msgspec.structs.replace(machine, controller=controller)
         return 0
@@ -709,7 +734,8 @@ def _shown(number: int, value: float) -> str:
 def _settings(machine: Machine[GrblController, Dialect], *, homing: bool) -> dict[int, str]:
     """Numbers and values of `$$` (settings_codes_en_US.csv, defaults.h)."""
     controller, spindle = machine.controller, machine.spindle
-    values: dict[int, float] = dict.fromkeys((2, 3, 4, 5, 6, 13, 20, 21, 23, 31, 32), 0.0)
+    values: dict[int, float] = dict.fromkeys((2, 3, 4, 5, 6, 13, 20, 21, 23, 31), 0.0)
+    values[32] = float(controller.laser_mode)
     values |= {0: 10.0, 1: controller.idle_delay_ms, 10: 1.0, 22: float(homing)}
     values |= {11: controller.junction_deviation_mm, 12: controller.arc_tolerance_mm}
     values |= {24: 25.0, 25: SEEK_MM_S * 60.0, 26: 250.0, 27: PULL_OFF_MM}

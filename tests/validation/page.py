@@ -17,8 +17,11 @@ LAST_PLACES = 2.0
 Rows = Sequence[Sequence[str]]
 
 
-def check(name: str, heads: Sequence[str], rows: Rows, bless: bool) -> None:
-    """The table `name` of the page is this one; with `bless` it becomes it."""
+def check(
+    name: str, heads: Sequence[str], rows: Rows, bless: bool, places: float = LAST_PLACES
+) -> None:
+    """The table `name` of the page is this one, but for so many of the last places; with `bless`
+    it becomes it."""
     page = PAGE.read_text(encoding="utf-8")
     text = _table(heads, rows)
     begin, end = f"<!-- {name} -->\n", "<!-- end -->"
@@ -31,26 +34,26 @@ def check(name: str, heads: Sequence[str], rows: Rows, bless: bool) -> None:
     again = f"pytest --bless tests/validation writes {name} anew"
     lines = zip(held.splitlines(), text.splitlines(), strict=False)
     for line, wanted in lines:
-        assert same(line, wanted), f"{line}\n{wanted}\n{again}"
+        assert same(line, wanted, places), f"{line}\n{wanted}\n{again}"
     assert len(held.splitlines()) == len(text.splitlines()), again
 
 
-def same(line: str, wanted: str) -> bool:
+def same(line: str, wanted: str, last: float = LAST_PLACES) -> bool:
     """Whether two lines of a table say the same."""
     if NUMBER.sub("#", line) != NUMBER.sub("#", wanted):
         return False
     pairs = zip(NUMBER.findall(line), NUMBER.findall(wanted), strict=True)
-    return all(_near(one, other) for one, other in pairs)
+    return all(_near(one, other, last) for one, other in pairs)
 
 
-def _near(one: str, other: str) -> bool:
+def _near(one: str, other: str, last: float) -> bool:
     places = len(one.partition(".")[2])
     if places != len(other.partition(".")[2]):
         return False
     if not places:
         return one == other  # counts and lines of a thesis
     apart = abs(float(one.replace("−", "-")) - float(other.replace("−", "-")))
-    return bool(apart < (LAST_PLACES + 0.5) * 0.1**places)
+    return bool(apart < (last + 0.5) * 0.1**places)
 
 
 def _table(heads: Sequence[str], rows: Rows) -> str:

@@ -58,6 +58,9 @@ CAUSES = {
 }
 """Why programs are off by more than is aimed at."""
 
+SCATTER_PLACES = 15.0
+"""No two runs of a real-time process are the same: paths differ by 1 µm, times by some periods."""
+
 MOST_POINTS = 3000
 WINDOW_S = 1.0
 WINDOW_PART = 0.02
@@ -175,6 +178,6 @@ def test_linuxcnc_live(bless: bool, tmp_path: Path) -> None:
         cells = [mm(wanted_s, 2), mm(found_s, 2), signed(100.0 * part, 2), mm(beside, 1)]
         rows.append([name, *cells, CAUSES.get(name, "") if missed else ""])
     heads = ["program", "LinuxCNC, s", "model, s", "%", "paths apart, µm", "cause of a miss"]
-    check("live-linuxcnc", heads, rows, bless)
+    check("live-linuxcnc", heads, rows, bless, SCATTER_PLACES)
     assert len(misses) <= MOST_MISSES, misses
     assert set(misses) <= set(CAUSES), misses

@@ -76,23 +76,23 @@ def digest(steps: Floats) -> str:
 
 
 def test_grbl(bless: bool) -> None:
-    """$1 as recorded; the reset's own stop in front of the recording is taken off. Without
+    """$1 and $32 as recorded; the reset's own stop in front of the recording is taken off. Without
     smoothing the timer's longest tick is longer, 16 MHz / (65535 · 64)."""
-    assert len(GRBL) == 8
+    assert len(GRBL) == 11
     rows = []
     for file in GRBL:
         said: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-        idle = said.get("settings", {}).get("$1", 255)
+        settings = said.get("settings", {})
+        idle, laser = settings.get("$1", 255), bool(settings.get("$32", 0))
         reset_s = 0.0 if idle == 255 else idle / 1000.0
         wanted_s = said["with_amass"]["time_s"] - reset_s
-        setting = f"controller.idle_delay_ms={idle}"
-        _, seconds = run("grbl", said["program"].encode(), setting)
+        program = said["program"].encode()
+        set_ = f"controller.idle_delay_ms={idle}", f"controller.laser_mode={str(laser).lower()}"
+        _, seconds = run("grbl", program, *set_)
         assert abs(seconds - wanted_s) < GRBL_TIME_PART * wanted_s, file.name
         recorded = said["without_amass"]
         plain_s = recorded["time_s"] - reset_s
-        motion, plain = run(
-            "grbl", said["program"].encode(), setting, "controller.least_step_hz=3.8"
-        )
+        motion, plain = run("grbl", program, *set_, "controller.least_step_hz=3.8")
         assert abs(plain - plain_s) < GRBL_TIME_PART * plain_s, file.name
         steps = samples(motion) / 0.004
         assert len(steps) == recorded["step_ticks"], file.name
@@ -101,13 +101,14 @@ def test_grbl(bless: bool) -> None:
             [
                 file.stem,
                 str(idle),
+                str(int(laser)),
                 str(len(steps)),
                 mm(wanted_s),
                 mm(seconds),
                 signed(100.0 * (seconds / wanted_s - 1.0), 2),
             ]
         )
-    heads = ["program", "$1", "events, all equal", "grbl, s", "model, s", "%"]
+    heads = ["program", "$1", "$32", "events, all equal", "grbl, s", "model, s", "%"]
     check("referee-grbl", heads, rows, bless)
 
 

@@ -98,6 +98,7 @@ def test_events() -> None:
         (Kind.SPINDLE_CCW, 200.0),
         (Kind.SPINDLE_OFF, None),
         (Kind.DWELL, 0.5),
+        *[(Kind.DWELL, 0.0)] * 3,  # coolant that nothing answers to, and M0, stop it too
         (Kind.END, None),
     ]
     assert [(note.code, note.where) for note in path.findings] == [
@@ -117,7 +118,7 @@ def test_tools_and_messages() -> None:
     ]
     assert path.texts == ("swap the vice", "also here")
     pause = read("T2 M0\nM0\nM2", "grbl", "dialect.tool_change=pause")
-    assert pause.kind.tolist() == [Kind.TOOL_CHANGE, Kind.END]
+    assert pause.kind.tolist() == [Kind.TOOL_CHANGE, Kind.DWELL, Kind.END]
     assert pause.findings[0].where == "block 2"
     with pytest.raises(ProgramError, match="M6 is unknown to grbl"):
         read("T2 M6", "grbl", "dialect.tool_change=pause")

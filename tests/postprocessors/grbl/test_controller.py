@@ -217,7 +217,7 @@ def test_events_bring_the_machine_to_rest() -> None:
     one = ToolpathBuilder().line(5.0, 0.0, 0.0, feed=300.0).line(10.0, 0.0, 0.0, feed=300.0)
     passing = sum(seconds(one.finish(), awake()))
     assert passing == pytest.approx(10.0 / v + v / a)
-    for kind in (Kind.SPINDLE_CW, Kind.SPINDLE_OFF, Kind.TOOL_CHANGE):
+    for kind in (Kind.SPINDLE_CW, Kind.SPINDLE_CCW, Kind.COOLANT_FLOOD, Kind.TOOL_CHANGE):
         two = ToolpathBuilder().line(5.0, 0.0, 0.0, feed=300.0).event(kind, 1.0)
         found = seconds(two.line(10.0, 0.0, 0.0, feed=300.0).finish(), awake())
         assert sum(found) == pytest.approx(10.0 / v + 2.0 * v / a)

@@ -3,6 +3,7 @@ of inverse time. What it refuses, and by which error, stands in `gcode/test_read
 
 import numpy as np
 import pytest
+from camtool_postprocessors.grbl.controller import stops_of
 from camtool_postprocessors.grbl.findings import PLACE_UNKNOWN
 from camtool_postprocessors.grbl.parser import WHY
 
@@ -93,6 +94,48 @@ def test_what_grbl_does_otherwise_than_it_looks() -> None:
     path = read("/G0 X1\nG0 Y1 (hold!)\n")
     assert len(path) == 2
     assert said(path) == [("grbl.NOT_SIMULATED", Severity.WARNING)] * 2
+
+
+def kinds(text: str, *settings: str) -> list[str]:
+    return [Kind(kind).name for kind in read(text, *settings).kind if kind > Kind.ARC_CCW]
+
+
+@pytest.mark.parametrize(
+    ("lines", "stops"),
+    [
+        ("M3 S9|G1 X1 F99|M3|X2|M3 S9|X3|S9|X4", 0),
+        ("M5|G1 X1 F99|M5 S3|X2|G54|X3|G49|X4|M1|X5|M9|X6", 0),
+        ("M3 S9|G1 X1 F99|S8|X2 S7|M4|X3|M4 S7|X4|M5|X5", 3),
+        ("M8|G1 X1 F99|M8|X2|M9|X3|M9|X4", 1),
+    ],
+)
+def test_what_says_nothing_new_stops_nothing(lines: str, stops: int) -> None:
+    target = load_target("grbl", settings=("coolant.flood=true",))
+    path = target.target.read(lines.replace("|", "\n").encode(), target.machine)
+    moves = np.flatnonzero(path.is_motion)
+    waits = np.cumsum(stops_of(path, target.machine.controller).rows)[moves]
+    assert np.count_nonzero(np.diff(waits)) == stops
+
+
+@pytest.mark.parametrize(
+    "line", ["M0", "G55", "G92 X1", "G92.1", "G10 L2 P3 X1", "G28.1", "G43.1 Z1"]
+)
+def test_where_grbl_waits_for_its_buffer_the_machine_stops(line: str) -> None:
+    known = "dialect.work_offsets_mm={G54=[0,0,0], G55=[0,0,0]}"
+    path = read(f"G0 X1\n{line}\nG0 X2\n", known)
+    assert path.kind.tolist() == [Kind.RAPID, Kind.DWELL, Kind.RAPID]
+    assert path.value[1] == 0.0
+
+
+def test_laser_mode() -> None:
+    """Power that comes with a move does not stop it; what grbl does at once is behind a stop."""
+    laser = "controller.laser_mode=true"
+    head = "M3 S9\nG1 X1 F99\n"
+    assert kinds(head + "X2 S8\nG0 X3 S7", laser) == ["SPINDLE_CW"] * 3
+    assert kinds(head + "S8", laser) == ["SPINDLE_CW", "DWELL", "SPINDLE_CW"]
+    assert kinds(head + "G0\nG1\nG0 X1\nG1 X2", laser) == ["SPINDLE_CW", "DWELL", "DWELL"]
+    assert kinds(head.replace("M3", "M4") + "G0\nG1\nX5", laser) == ["SPINDLE_CCW"]
+    assert kinds(head + "G28 X1 S5", laser) == ["SPINDLE_CW", "DWELL", "SPINDLE_CW"]
 
 
 def test_every_error_is_grbl_s_own() -> None:

@@ -298,3 +298,20 @@ def test_no_bytes_make_it_fall_and_its_slides_never_jump(
     steps = np.diff(trace.commanded, axis=0, prepend=np.zeros((1, 3)))
     assert np.abs(steps).max(initial=0.0) <= 0.004 + 1e-9
     assert (np.diff(trace.time_s) >= -1e-9).all()
+
+
+def test_laser_mode_changes_power_without_a_stop() -> None:
+    program = b"G21 G90\nM4 S0\n" + b"".join(
+        b"G1 X%.1f S%d F500\n" % (0.2 * k, 7 * k % 90) for k in range(1, 30)
+    )
+    program += b"S50\nM4\nG1 X0 Y2\nM3\nX0\nX1 S9\nM5\nM2\n"
+    twin, loaded = made("grbl", settings=["controller.laser_mode=true"])
+    assert "$32=1" in reply(twin, "$$")
+    _, now = stream(twin, program)
+    same_motion(twin, program, loaded)
+    assert now == pytest.approx(motion(program, loaded).time_s[-1], rel=1e-6)
+    spindle, _ = made("grbl")
+    slow = stream(spindle, program)[1]
+    assert slow > 2.0 * now
+    assert reply(spindle, "$32=1", slow) == "ok"
+    assert stream(spindle, program, slow)[1] - slow < 1.5 * now  # it begins elsewhere
