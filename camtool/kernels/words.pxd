@@ -23,24 +23,18 @@ cdef Int _number(
 ) noexcept
 
 @cython.locals(first=Int)
-cdef bint _is_comment(
-    const unsigned char[::1] data, Int at, Int end, bint parentheses, bint semicolon
-) noexcept
+cdef bint _is_comment(const unsigned char[::1] data, Int at, Int end) noexcept
 
 @cython.locals(
-    words=Int, form=Int, mask=Int, one_blank=Int, blanks=Int, sign=Int, first=Int, column=Int,
-    code=double, plain_digits=bint
+    words=Int, form=Int, mask=Int, one_blank=Int, numbered=bint, blanks=Int, sign=Int, first=Int,
+    column=Int, code=double, plain_digits=bint
 )
 cdef Int _plain_line(
-    const unsigned char[::1] data, Int at, Int end, bint lower_case, bint numbered,
-    double[::1] numbers, Int[::1] facts
+    const unsigned char[::1] data, Int at, Int end, bint free, double[::1] numbers, Int[::1] facts
 ) noexcept
 
-@cython.locals(
-    most_chars=Int, lower_case=bint, numbered=bint, parentheses=bint, semicolon=bint, rows=Int,
-    size=Int, end=Int, first=Int, words=Int
-)
+@cython.locals(rows=Int, size=Int, end=Int, first=Int, words=Int)
 cpdef (Int, Int, Int) plain_lines(
-    const unsigned char[::1] data, Int at, Int line, (Int, bint, bint, bint, bint) rules,
+    const unsigned char[::1] data, Int at, Int line, Int most_chars, bint free,
     double[:, ::1] numbers, Int[:, ::1] facts
 ) noexcept

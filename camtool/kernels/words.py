@@ -145,13 +145,13 @@ def _number(data: Octets, at: int, end: int, numbers: Floats, column: int) -> in
     return at
 
 
-def _is_comment(data: Octets, at: int, end: int, parentheses: bool, semicolon: bool) -> bool:
+def _is_comment(data: Octets, at: int, end: int) -> bool:
     """Whether a line that begins so is a comment alone, and not one in parentheses with a comma:
     that may be obeyed, or shown to the operator."""
     first = data[at]
     if first == _SEMICOLON:
-        return semicolon
-    if first != _OPEN or not parentheses:
+        return True
+    if first != _OPEN:
         return False
     at += 1
     while at < end and data[at] != _OPEN and data[at] != _CLOSE:
@@ -166,11 +166,9 @@ def _is_comment(data: Octets, at: int, end: int, parentheses: bool, semicolon: b
     return at == end
 
 
-def _plain_line(
-    data: Octets, at: int, end: int, lower_case: bool, numbered: bool, numbers: Floats, facts: Ints
-) -> int:
+def _plain_line(data: Octets, at: int, end: int, free: bool, numbers: Floats, facts: Ints) -> int:
     """Read a line; how many words it has, or −1 when it is not plain."""
-    words, form, mask, one_blank = 0, 0, 0, 1
+    words, form, mask, one_blank, numbered = 0, 0, 0, 1, free
     facts[TWO_DIGITS] = 0
     while True:
         blanks = at
@@ -179,7 +177,7 @@ def _plain_line(
         if at == end:
             break
         sign = data[at]
-        if lower_case and _SMALL_A <= sign <= _SMALL_Z:
+        if free and _SMALL_A <= sign <= _SMALL_Z:
             sign -= 32
         if sign == _BIG_N and numbered and words == 0:
             numbered = False
@@ -216,18 +214,19 @@ def plain_lines(
     data: Octets,
     at: int,
     line: int,
-    rules: tuple[int, bool, bool, bool, bool],
+    most_chars: int,
+    free: bool,
     numbers: Floats,
     facts: Ints,
 ) -> tuple[int, int, int]:
     """Read lines from `at` on, which is the begin of the line of this number, up to the first that
     is not plain: how many have words, and where and in which line it stopped.
 
-    `rules`: the most characters of a line; whether small letters count as capitals, whether blocks
-    may be numbered, and whether comments in parentheses and behind a semicolon are passed over, on
-    lines of their own. numbers (R, 7) and facts (R, 5) are filled, no more rows than these.
+    `most_chars`: of a line. `free`: lines are as RS274/NGC has them, where small letters count as
+    capitals, blocks may be numbered, and comments that stand alone are passed over; otherwise they
+    hold words in capitals and nothing else. numbers (R, 7) and facts (R, 5) are filled, no more
+    rows than these.
     """
-    most_chars, lower_case, numbered, parentheses, semicolon = rules
     rows, size = 0, len(data)
     while at < size and rows < len(facts):
         end = at
@@ -238,8 +237,8 @@ def plain_lines(
         first = at
         while first < end and data[first] == _BLANK:
             first += 1
-        if first < end and not _is_comment(data, first, end, parentheses, semicolon):
-            words = _plain_line(data, first, end, lower_case, numbered, numbers[rows], facts[rows])
+        if first < end and not (free and _is_comment(data, first, end)):
+            words = _plain_line(data, first, end, free, numbers[rows], facts[rows])
             if words < 0:
                 break
             if words > 0:

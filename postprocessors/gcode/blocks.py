@@ -134,10 +134,10 @@ Take = Callable[[PlainBlocks], int]
 class PlainRuns:
     """Runs of plain lines, as they are met: where lines are not plain, or few of them are taken,
     it is asked less and less often; and twice as many are offered at most as were taken before.
-    `rules` are those of `words.plain_lines`."""
+    `most_chars` and `free` are those of `words.plain_lines`."""
 
-    def __init__(self, lines: Lines, rules: tuple[int, bool, bool, bool, bool]) -> None:
-        self._lines, self._rules = lines, rules
+    def __init__(self, lines: Lines, most_chars: int, *, free: bool) -> None:
+        self._lines, self._most_chars, self._free = lines, most_chars, free
         self._numbers = np.zeros((0, 7))
         self._facts = np.empty((0, words.FACT_COLUMNS), dtype=np.int64)
         self._wait, self._waited = 1, 0
@@ -156,7 +156,7 @@ class PlainRuns:
         begin = int(self._lines.begins[number])
         numbers, facts = self._numbers[: self._most], self._facts[: self._most]
         rows, _, behind = words.plain_lines(
-            self._lines.octets, begin, number + 1, self._rules, numbers, facts
+            self._lines.octets, begin, number + 1, self._most_chars, self._free, numbers, facts
         )
         count = 0
         if rows >= LEAST_RUN:
@@ -214,7 +214,7 @@ def blocks_of(data: bytes, lexing: Lexing, take: Take | None = None) -> Iterator
     check_count(max(data.count(b"\n"), data.count(b"\r")), "line")
     check_ascii(data)
     lines = Lines(data)
-    runs = PlainRuns(lines, (lexing.line_chars, False, False, False, False))
+    runs = PlainRuns(lines, lexing.line_chars, free=False)
     row_of_words, word = _patterns(lexing)
     number, index = 0, 0
     while number < lines.count:

@@ -74,7 +74,7 @@ class _Reader:
             full_turn_rad=dialect.arc_full_turn_rad,
             ends_in_plane=True,
         )
-        self._runs = PlainRuns(self._lines, (dialect.line_chars, True, True, True, True))
+        self._runs = PlainRuns(self._lines, dialect.line_chars, free=True)
         self._most = dialect.line_chars
         self._blocks = 0
         self._slashes: list[int] = []

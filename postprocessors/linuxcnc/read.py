@@ -90,8 +90,7 @@ class _Reader:
             radius_mm=dialect.arc_least_radius_mm,
             full_turn_rad=dialect.arc_full_turn_rad,
         )
-        rules = (dialect.line_chars, True, True, True, True)
-        self._runs = PlainRuns(self.text, rules)
+        self._runs = PlainRuns(self.text, dialect.line_chars, free=True)
         self._blocks = 0
         """Blocks so far, of a program whose lines are read once and in order."""
         self._empty = True
