@@ -192,9 +192,10 @@ class Code(IntEnum):
         203,
         (WARNING, ERROR),
         "the tool beside one contour cuts into another one, or into the allowance that is left "
-        "on it, or a pocket clears away what another operation keeps; place and amount are "
-        "given. A warning where the other contour is not cut, and, where the job names the "
-        "side, for contours of the same operation and contours that cross",
+        "on it, or a pocket clears away what another operation keeps, or an allowance below 0 "
+        "takes more of what is to stay than there is; place and amount are given. A warning where "
+        "the other contour is not cut, for what an allowance below 0 takes, and, where the job "
+        "names the side, for contours of the same operation and contours that cross",
         'use a smaller tool, `side = "auto"`, or the right side; draw islands on a layer of '
         "the pocket",
     )
@@ -1020,6 +1021,13 @@ GOUGE_OF_ALLOWANCE = Sentence(
     "{tool} beside {contour} cuts {amount:.4g} mm into the allowance on {other}",
     "mm",
 )
+GOUGE_BEYOND = Sentence(
+    Code.GOUGE,
+    "{tool} cuts {amount:.4g} mm beyond the lines, and what is to stay is less than "
+    "{measured:.4g} mm wide here: it is cut away from both sides",
+    "mm",
+    WARNING,
+)
 GOUGE_MORE = Sentence(Code.GOUGE, "{measured:# more place|# more places} like this")
 GOUGE_BY_POCKET = Sentence(
     Code.GOUGE,
@@ -1262,6 +1270,11 @@ CUT_DOUBTFUL_WIDTH = Sentence(
 CUT_DOUBTFUL_DEPTH = Sentence(
     Code.CUT_DOUBTFUL,
     "a pass of {depth:.4g} mm is deeper than the tool of {width:g} mm is wide (--step-down)",
+)
+CUT_DOUBTFUL_BEYOND = Sentence(
+    Code.CUT_DOUBTFUL,
+    "{beyond:g} mm are cut beyond the lines, more than a quarter of the tool's radius "
+    "(--allowance)",
 )
 CUT_DOUBTFUL_PLUNGE = Sentence(
     Code.CUT_DOUBTFUL,

@@ -203,7 +203,9 @@ def _does(operation: dict[str, Any]) -> str:
     below = operation["below_stock_mm"]
     through = "" if below is None else f", through the stock and {below:.4g} mm below"
     left = operation["allowance_mm"]
-    left_on = f", leaves {left:g} mm on the wall" if left else ""
+    left_on = f", leaves {left:g} mm on the wall" if left > 0.0 else ""
+    if left < 0.0:
+        left_on = f", cuts {-left:g} mm beyond the line"
     if operation["stage"] == "finish":
         left_on += ", along the wall at the full depth"
     if operation["rest"]:

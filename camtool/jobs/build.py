@@ -51,6 +51,9 @@ _RECORDED = tuple(name for name in OPERATION if name != FINISH_TOOL)
 """Keys of operations that say a field of theirs by themselves."""
 
 _OF_FINISH = ("finish", "finish_feed", "finish_spindle", FINISH_TOOL)
+"""Keys of a finishing pass."""
+
+_OF_WALLS = ("allowance", *_OF_FINISH)
 """Keys whose fields depend on tools."""
 
 TABLES = ("place", "stock", "tools", "operations")
@@ -234,7 +237,7 @@ def _tooled(operation: Operation, known: Table, used: Used, tools: Tools) -> Ope
     """The operation with its tool, and that of its finishing pass with the feed and the speed that
     a preset of that gives it."""
     fields: dict[str, Any] = {"tool": used.tool, "material": used.material}
-    keys = {key: known.given[key] for key in _OF_FINISH if key in known.given}
+    keys = {key: known.given[key] for key in _OF_WALLS if key in known.given}
     if FINISH_TOOL in keys:
         last = tools.of([Table({TOOL_NAME: keys[FINISH_TOOL]})], operation.kind)
         fields["finish_tool"] = last.tool

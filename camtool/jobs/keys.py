@@ -661,7 +661,13 @@ OPERATION = {
     ),
     "chamfer": Key("chamfer_mm", LENGTH, "Its width from above.", '"0.5mm"', _CHAMFER),
     "tip_offset": Key("tip_offset_mm", LENGTH, "Its bit's tip below it.", '"0.1mm"', _CHAMFER),
-    "allowance": Key("allowance_mm", LENGTH, "Left on the wall.", '"0.1mm"', _CLEARING),
+    "allowance": Key(
+        "allowance_mm",
+        LENGTH,
+        "Left on the wall; below 0: cut beyond the line.",
+        '"0.1mm"',
+        _CLEARING,
+    ),
     "finish": Key("finish_mm", LENGTH, "Left for a last pass.", '"0.1mm"', _CLEARING),
     "finish_feed": Key("finish_feed_mm_min", FEED, "Of that pass.", kinds=_CLEARING),
     "finish_spindle": Key(

@@ -3,10 +3,11 @@
     circles ──outermost, each once──▶ bores ──rings──▶ a helix each ──▶ a Fixed item per bore
 
 For a circle of radius R and a tool of radius r the tool centre runs on a circle of radius
-ρ = R − r − allowance. One helix clears the ring from ρ − r to ρ + r; where that leaves a core
-(ρ > r), which would come loose in a through cut, smaller rings are bored first, from the inside
-out, a step-over apart at most. A ring goes down evenly, no steeper than the angle of the entry and
-by no more than the step down in a turn, goes once round at the bottom, and leaves for the centre:
+ρ = R − r − allowance (below 0 the hole is wider than drawn). One helix clears the ring from ρ − r
+to ρ + r; where that leaves a core (ρ > r), which would come loose in a through cut, smaller rings
+are bored first, from the inside out, a step-over apart at most. A ring goes down evenly, no
+steeper than the angle of the entry and by no more than the step down in a turn, goes once round at
+the bottom, and leaves for the centre:
 
           start ↓
         ╭───────╮      n turns, then one at the full depth,
@@ -29,18 +30,21 @@ from camtool.arrays import Floats
 from camtool.errors import OptionError
 from camtool.findings import (
     ENTRY_CHANGED_IN_POCKET,
+    GOUGE_BEYOND,
+    GOUGE_MORE,
     NOT_BORED,
     NOT_BORED_TOO_SMALL,
     NOT_BORED_WITHIN,
     NOTHING_DRAWN_TO_BORE,
     Finding,
 )
+from camtool.geometry.distance import near_paths
 from camtool.geometry.polylines import Polyline, Polylines
 from camtool.planning.drill import HOLE_SIZE_MM, SAME_HOLE_MM, Hole, circles_of, named
 from camtool.planning.finish import along_walls
 from camtool.planning.items import Chosen, Contours, CutRun, Fixed, Setting, Work
 from camtool.planning.job import Operation
-from camtool.planning.naming import at_place, key_of, operation_name, tool_name
+from camtool.planning.naming import at_place, key_of, operation_name, shortened_list, tool_name
 from camtool.planning.paths import QUARTER
 from camtool.planning.ramps import feeds_along
 
@@ -68,11 +72,12 @@ def bore(chosen: Chosen, setting: Setting) -> Work:
             mend="give the tool a diameter",
         )
     circles, others = circles_of(chosen)
-    least = operation.tool.diameter_mm + 2.0 * operation.allowance_mm + HOLE_SIZE_MM
+    least = 2.0 * operation.away_mm + HOLE_SIZE_MM
     wide = [hole for hole in circles if _diameter(hole) > least]
     small = [hole for hole in circles if _diameter(hole) <= least]
     holes = _outermost(wide)
     findings = [*_no_circles(others), *_too_small(small, operation), *_inner(wide, holes)]
+    findings += _cut_away_between(holes, operation)
     if not holes:
         findings.append(NOTHING_DRAWN_TO_BORE(where=operation_name(operation)))
     if operation.stage == "finish":
@@ -87,7 +92,7 @@ def bore(chosen: Chosen, setting: Setting) -> Work:
 
 def _walls(holes: list[Hole], setting: Setting) -> Contours:
     """The contours along the walls of the bores."""
-    away = setting.operation.tool.radius_mm + setting.operation.allowance_mm
+    away = setting.operation.away_mm
     rings = [
         helix(hole.at_mm, 0.5 * _diameter(hole) - away, 0.0, 0)[:4, [0, 1, 3]] for hole in holes
     ]
@@ -114,7 +119,7 @@ def radii(wide_mm: float, tool_mm: float, step_mm: float) -> list[float]:
 def _runs(hole: Hole, setting: Setting) -> tuple[tuple[CutRun, ...], list[Finding]]:
     """The runs of a bore, one for each ring; and what of them is steeper than it should be."""
     operation = setting.operation
-    wide = 0.5 * _diameter(hole) - operation.tool.radius_mm - operation.allowance_mm
+    wide = 0.5 * _diameter(hole) - operation.away_mm
     step = operation.step_over * operation.tool.diameter_mm
     depth = -setting.levels_mm[-1]
     runs, found = [], list[Finding]()
@@ -187,10 +192,32 @@ def _too_small(holes: list[Hole], operation: Operation) -> Iterator[Finding]:
         yield NOT_BORED_TOO_SMALL(
             where=named([hole.name for hole in holes]),
             measured=min(map(_diameter, holes)),
-            limit=operation.tool.diameter_mm + 2.0 * operation.allowance_mm,
+            limit=2.0 * operation.away_mm,
             count=len(holes),
             tool=tool_name(operation.tool),
         )
+
+
+def _cut_away_between(holes: list[Hole], operation: Operation) -> list[Finding]:
+    """Bores that are cut beyond their circles, of which two leave nothing between them."""
+    if not operation.beyond_mm or not holes:
+        return []
+    most, found = 2.0 * operation.beyond_mm, list[Finding]()
+    circles = Polylines.of(hole.outline for hole in holes if hole.outline is not None)
+    for one, other in near_paths(circles, circles, most):
+        first, second = holes[one], holes[other]
+        apart = math.dist(first.at_mm, second.at_mm)
+        gap = apart - 0.5 * (_diameter(first) + _diameter(second))
+        if one < other and 0.0 < gap < most:
+            found.append(
+                GOUGE_BEYOND(
+                    where=at_place(first.name, first.at_mm),
+                    measured=most,
+                    tool=tool_name(operation.tool),
+                    amount=operation.beyond_mm,
+                )
+            )
+    return shortened_list(found, GOUGE_MORE)
 
 
 def _no_circles(names: list[str]) -> Iterator[Finding]:

@@ -17,6 +17,7 @@ import numpy as np
 from camtool.arrays import Bools, Floats
 from camtool.findings import (
     CUT_DOUBTFUL,
+    CUT_DOUBTFUL_BEYOND,
     CUT_DOUBTFUL_CENTRE,
     CUT_DOUBTFUL_CHIP,
     CUT_DOUBTFUL_DEPTH,
@@ -59,6 +60,10 @@ FEED_TOLERANCE = 1e-6
 
 MOST_LISTED = 10
 """At most this many rapids are listed; the last finding counts the others."""
+
+BEYOND_MOST = 0.25
+"""An allowance that takes a tool farther beyond a line than this part of its radius looks like a
+mistake: corrections of wear and play are hundredths of millimetres."""
 
 IN_PASSES = ("profile", "pocket", "engrave", "chamfer")
 """Kinds of operation that go down in passes, each of one depth."""
@@ -315,10 +320,12 @@ def doubtful_settings(
 def _doubtful(step: Step, starts_spindle: bool) -> Iterator[str]:
     """What is doubtful about an operation, each with the flag that changes it."""
     operation, feeds, tool = step.operation, step.setting.feeds, step.operation.tool
-    wide = tool.radius_mm + operation.allowance_mm > 0.0
+    wide = operation.away_mm > 0.0
     on_line = operation.kind == "profile" and operation.side != "on" and not wide
     if starts_spindle and on_line and step.chosen.lines.closed.any():
         yield CUT_DOUBTFUL_WIDTH.words()
+    if operation.beyond_mm > BEYOND_MOST * tool.radius_mm:
+        yield CUT_DOUBTFUL_BEYOND.words(beyond=operation.beyond_mm)
     deepest = deepest_pass(step.setting)
     finishes = operation.stage == "finish"  # beside the wall, in what is roughed
     mills = operation.kind in IN_PASSES and tool.kind in MILLS and tool.radius_mm > 0.0

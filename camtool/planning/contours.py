@@ -236,7 +236,7 @@ def _slope(contour: Contour, along: MeasuredPath) -> tuple[float | None, list[Fi
 
 
 def with_starts(
-    path: Polyline, rule: str | tuple[float, float], tool_radius_mm: float
+    path: Polyline, rule: str | tuple[float, float], away_mm: float
 ) -> tuple[Polyline, Ints]:
     """The path, perhaps with one more vertex, and the vertices at which it may begin.
 
@@ -245,7 +245,7 @@ def with_starts(
 
     - "longest-line": the middle of the longest line; without lines, of the longest arc.
     - "corner": where the path turns, and where it begins to round a corner of the part, in an arc
-      as large as a tool of `tool_radius_mm`.
+      as large as the tool's centre is away from it, `away_mm`.
     """
     any_vertex = np.empty(0, dtype=np.int64)
     if not path.closed or rule == "nearest":
@@ -255,7 +255,7 @@ def with_starts(
         # Where it turns back at once is the tip of a relief.
         bend = np.abs(along.turns)
         turns = (bend > START_CORNER_RAD) & (bend < math.pi - START_CORNER_RAD)
-        around = np.abs(along.segments.radius - tool_radius_mm) <= POSITION_EPS_MM
+        around = np.abs(along.segments.radius - away_mm) <= POSITION_EPS_MM
         return path, np.flatnonzero(turns | around)
     length = _midpoint(along) if isinstance(rule, str) else along.nearest_to(rule)
     begun, start = _with_vertex(path, along, length)

@@ -10,7 +10,8 @@ The edge of a closed contour is the drawn line. Its size, and that of what the t
     on the line      drawn       box of the tool's centre
     within it        drawn       that box and a tool's radius all round; of a V bit its radius at
                                  the surface, which depth makes
-    round it         drawn       drawn, and the allowance all round
+    round it         drawn       drawn, and the allowance all round; of one below 0 the box of the
+                                 wall, which moves farther at a corner than along a side
 
 where a line is cut by one contour alone; of contours that share a line, or that run round several
 ones, both are what the tool leaves. Round a line the box of the centre would not do: sharp joins
@@ -21,14 +22,15 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from itertools import zip_longest
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
-from camtool.geometry.measure import path_extents
+from camtool.geometry.measure import extents, path_extents
 from camtool.geometry.nesting import nesting
-from camtool.geometry.polylines import Polylines, Segments
+from camtool.geometry.polylines import Polylines, Segments, reverse
 from camtool.planning.items import Contour, Contours, Fixed, Item, Step
 from camtool.planning.job import Operation
 from camtool.planning.sides import runs_beside
@@ -62,14 +64,14 @@ def drawn_of(toolpath: Toolpath, runs: Ints, steps: Sequence[Step], placed: Draw
     edge = np.broadcast_to(np.int64(-1), len(toolpath))
     boxes: list[tuple[Floats, Floats]] = []
     first = 0
-    for step in steps:
+    for step, later in zip_longest(steps, steps[1:]):
         rows = np.flatnonzero((runs >= first) & (runs < first + len(step.runs)))
         mine = rows[toolpath.is_feed[rows]]
         for some, values in _off(toolpath, mine, step, placed):
             off = off if off.flags.writeable else off.copy()
             off[some] = values
         of_item = np.full(len(step.items), -1, dtype=np.int64)
-        for index, box in _edges(step, placed):
+        for index, box in _edges(step, later, placed):
             of_item[index] = len(boxes)
             boxes.append(box)
         if (of_item >= 0).any():
@@ -139,18 +141,28 @@ def _points(toolpath: Toolpath, rows: Ints) -> Floats:
     return np.asarray(points.reshape(-1, 2))
 
 
-def _edges(step: Step, placed: Drawing) -> Iterator[tuple[int, tuple[Floats, Floats]]]:
-    """The indices of items that cut an edge, each with its nominal and its planned box."""
+def _edges(
+    step: Step, later: Step | None, placed: Drawing
+) -> Iterator[tuple[int, tuple[Floats, Floats]]]:
+    """The indices of items that cut an edge, each with its nominal and its planned box; `later` is
+    the step after this one."""
     cut = step.owner[_cuts_edge(step)[step.owner]]
     index = list(dict.fromkeys(cut.tolist()))
     items = [step.items[k] for k in index]
     share = Counter(item.source for item in items)
     drawn = path_extents(placed.paths)
+    boxes = _centre_boxes(items)
     # Another stage, or what it clears the rest of, makes the edge what it is.
     if step.operation.stage == "rough" or step.operation.rest_of is not None:
-        yield from ((k, (drawn[it.source],) * 2) for k, it in zip(index, items, strict=True))
+        finish = later.operation if later is not None else None
+        maker = finish if finish and finish.stage == "finish" else step.operation.rest_of
+        left = 0.0 if maker is None else maker.allowance_mm
+        for k, item, centre in zip(index, items, boxes, strict=True):
+            edge = drawn[item.source]
+            within = isinstance(item, Fixed) or centre[0, 0] > edge[0, 0]
+            yield k, (edge, edge + (-left if within else left) * np.array([-1.0, 1.0]))
         return
-    for k, item, centre in zip(index, items, _centre_boxes(items), strict=True):
+    for k, item, centre in zip(index, items, boxes, strict=True):
         nominal, planned = _boxes(item, drawn[item.source], centre)
         yield k, (nominal if share[item.source] == 1 else planned, planned)
 
@@ -198,13 +210,27 @@ def _boxes(item: Item, drawn: Floats, centre: Floats) -> tuple[Floats, Floats]:
         # Reliefs reach farther into corners than the walls are apart.
         low, high = (drawn - allowance * wider).T
         return drawn, np.clip(centre + radius * wider, low[:, None], high[:, None])
+    wall = drawn + allowance * wider if allowance >= 0.0 else _wall_box(item, drawn)
     # A sharp join reaches farther out than the tool is wide, as far as its limit lets it.
     spare = 0.0
     if operation.joins != "round":
         spare = 2.0 * (radius + allowance) * (operation.mitre_limit - 1.0)
     if more.max() <= SAME_SIZE_MM + spare:
-        return drawn, drawn + allowance * wider
-    return centre - (radius + allowance) * wider, centre - radius * wider
+        return drawn, wall
+    planned = centre - radius * wider if allowance >= 0.0 else wall
+    return centre - (radius + allowance) * wider, planned
+
+
+def _wall_box(contour: Contour, drawn: Floats) -> Floats:
+    """(2, 2) mm: the box of the wall that the tool leaves on the side of a contour where material
+    stays; the middle of what is drawn where nothing is left of it."""
+    from camtool.geometry.offset import offset_shape
+
+    path = contour.path if contour.material_left else reverse(contour.path)
+    wall = offset_shape(Polylines.of([path]), contour.setting.operation.tool.radius_mm)
+    if len(wall):
+        return extents(wall)
+    return np.repeat(drawn.mean(axis=1, keepdims=True), 2, axis=1)
 
 
 def _carved(points: Floats, cone: Cone) -> Floats:
@@ -238,7 +264,8 @@ def _kept(step: Step) -> Iterator[Kept]:
     rows, depth = closed[order], nest.depth[order]
     if operation.kind in ("pocket", "vcarve", "bore"):
         lines = chosen.lines.select(rows.tolist())
-        yield Kept(tuple(run.vertices for run in step.runs), lines, depth % 2 == 1, True)
+        runs = tuple(run.vertices for run in step.runs)
+        yield Kept(runs, lines, depth % 2 == 1, True, operation.beyond_mm)
         return
     beside = operation.kind == "profile" and runs_beside(operation)
     beside = beside and operation.corners == "none"
@@ -248,7 +275,8 @@ def _kept(step: Step) -> Iterator[Kept]:
         # Beside a rim the rest of the stock is waste; beside a hole it is part.
         for rim in (True, False):
             names = {chosen.names[row] for row in mine[stays == rim].tolist()}
-            yield Kept(_contour_runs(step, names), lines, stays, not rim)
+            runs = _contour_runs(step, names)
+            yield Kept(runs, lines, stays, not rim, operation.beyond_mm)
     judged = {chosen.names[row] for row in rows.tolist()} if beside else set()
     # Open contours are cut on their lines, wherever these are; other runs leave nothing either.
     free = tuple(run.vertices for run in step.runs if run.name not in judged)

@@ -5,6 +5,10 @@ that contour, it takes some of what was to stay: an error, because a strip that 
 off, and a gouge cannot be put back. It is a warning only where the other contour is not cut, for
 that may be of the drawing alone; and where the job itself names the side, for contours of the same
 operation, and for those that cross: whoever draws a notch beyond an edge wants it open.
+
+An allowance below 0 takes a contour's wall back by as much, whatever cuts it: a tool that comes
+from where that wall is free may come nearer by this. A pocket that is cut beyond its lines is
+looked at like a profile.
 """
 
 from __future__ import annotations
@@ -46,7 +50,12 @@ SAMPLES_ROUND = 500
 def side_findings(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> list[Finding]:
     """Findings on the sides of an operation: gouges, and sides that follow from uncut contours."""
     if operation.kind in ("pocket", "bore"):
-        return shortened_list(list(_cleared_away(chosen, sides, operation)), GOUGE_BY_POCKET_MORE)
+        cleared = list(_cleared_away(chosen, sides, operation))
+        beyond = list(_beside_pocket(sides, operation)) if operation.beyond_mm else []
+        return [
+            *shortened_list(cleared, GOUGE_BY_POCKET_MORE),
+            *shortened_list(beyond, GOUGE_MORE),
+        ]
     if not runs_beside(operation):
         return []
     gouges = list(_gouges(work, chosen, sides, operation))
@@ -73,13 +82,14 @@ def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> I
     others = np.flatnonzero(wanted)
     walls = sides.lines.select(others.tolist())
     paths = items.lines.select(beside)
-    for one, which in near_paths(paths, walls, radius + bevel + allowance):
+    for one, which in near_paths(paths, walls, radius + bevel + max(allowance, 0.0)):
         item, other = items[beside[one]], int(others[which])
         wall = walls[which]
         if item.source == other:
             continue
         near = approach(item.path, wall)
         reach = radius if other in own else radius + bevel
+        reach -= _taken_back(sides, other, item.path)
         if near.distance >= reach - GOUGE_TOLERANCE_MM:
             if other in own and near.distance < radius + allowance - GOUGE_TOLERANCE_MM:
                 yield GOUGE_OF_ALLOWANCE(
@@ -110,6 +120,46 @@ def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> I
             contour=item.name,
             amount=amount,
             other=sides.names[other],
+        )
+
+
+def _taken_back(sides: Sides, other: int, path: Polyline) -> float:
+    """How far the wall of a contour is taken back, mm, seen from where another path begins."""
+    without, within = sides.beyond_mm[other].tolist()
+    if not (without or within):
+        return 0.0
+    # What stays is on the other side of the wall.
+    here = inside(np.array(path.vertices[:1, :2]), Segments.of(sides.lines[other]))[0]
+    return float(without if here else within)
+
+
+def _beside_pocket(sides: Sides, pocket: Operation) -> Iterator[Finding]:
+    """Where what is cut beyond the lines of a pocket, or a bore, comes over a contour beside it
+    that a profile follows. Where it only opens towards the contour around it, nothing is lost."""
+    cut = sides.cut_by(pocket) & sides.lines.closed
+    rows, others = np.flatnonzero(cut), np.flatnonzero(sides.sided() & ~cut)
+    lines, walls = (sides.lines.select(each.tolist()) for each in (rows, others))
+    cleared = Segments.of(lines)
+    for one, which in near_paths(lines, walls, pocket.beyond_mm):
+        line, wall = lines[one], walls[which]
+        near = approach(line, wall)
+        if near.distance >= pocket.beyond_mm - GOUGE_TOLERANCE_MM:
+            continue
+        places = _witnesses(wall)
+        aside = nearest(places, cleared).distance > GOUGE_TOLERANCE_MM
+        if not (aside & ~inside(places, cleared)).any():
+            continue  # it goes through the floor
+        if near.distance <= GOUGE_TOLERANCE_MM and _lies_in(line, wall):
+            continue
+        yield GOUGE(
+            where=at_place(sides.names[int(rows[one])], near.point),
+            measured=near.distance,
+            limit=pocket.beyond_mm,
+            severity=Severity.WARNING,
+            tool=tool_name(pocket.tool),
+            contour=sides.names[int(rows[one])],
+            amount=pocket.beyond_mm - near.distance,
+            other=sides.names[int(others[which])],
         )
 
 

@@ -373,13 +373,14 @@ class Operation:
     """How some of the paths are cut.
 
     `layers`, `colours`: patterns of the paths that it takes, empty for all. `allowance_mm` is
-    left on the wall of a profile or pocket. `depth_mm` is cut below the stock top in passes of
-    `step_down_mm` at most (None: one pass), the last of `last_pass_mm` (None: like the others).
-    `breakthrough_mm` stands for it: so far below the stock (a Job, which knows that, makes it the
-    depth). `finish_mm` is left on the wall for one more pass at the full depth, with a feed, a
-    speed and a tool of its own where these are given (a Job makes two operations of it, the
-    stages). `rest` names the operation that has left something, `rest_of`, whose paths it takes
-    (a Job finds it).
+    left on the wall of a profile, pocket or bore; below 0 so much is cut beyond the line, less
+    than the tool's radius (a Job, whose operations have their tools, refuses more). `depth_mm` is
+    cut below the stock top in passes of `step_down_mm` at most (None: one pass), the last of
+    `last_pass_mm` (None: like the others). `breakthrough_mm` stands for it: so far below the stock
+    (a Job, which knows that, makes it the depth). `finish_mm` is left on the wall for one more
+    pass at the full depth, with a feed, a speed and a tool of its own where these are given (a Job
+    makes two operations of it, the stages). `rest` names the operation that has left something,
+    `rest_of`, whose paths it takes (a Job finds it).
     `step_over` is the distance of neighbouring passes of a pocket over the tool's diameter.
     `overlap_mm`: how far a closed contour is cut beyond its start. `start`: one of STARTS, or a
     place (x, y) mm. `peck_mm`: how deep a drill goes at a time; `dwell_s` at the bottom.
@@ -471,7 +472,7 @@ class Operation:
         for speed in (self.spindle_rpm, self.finish_spindle_rpm):
             if speed:
                 above_zero("spindle speed", speed, "rev/min")
-        at_least_zero("allowance", self.allowance_mm, "mm", MOST_WIDE_MM)
+        finite("allowance", self.allowance_mm, "mm", MOST_WIDE_MM)
         at_least_zero("overlap", self.overlap_mm, "mm")
         at_least_zero("dwell", self.dwell_s, "s")
         finite("angle", self.angle_rad, "rad")
@@ -623,7 +624,8 @@ class Operation:
         """The operation, or the two that its finishing pass makes of it: one that leaves this on
         the wall, and one along the wall, which comes in and leaves on quarter arcs as large as
         what was left: from where the tool of the first ran. OptionError for a feed or a tool of
-        a pass that there is not."""
+        a pass that there is not, and for a tool that cannot cut as far beyond the line."""
+        self._refuse_beyond()
         if self.finish_mm is None:
             for key, value in (
                 ("finish_feed", self.finish_feed_mm_min),
@@ -662,6 +664,28 @@ class Operation:
                 tabs=None,
             ),
         )
+
+    def _refuse_beyond(self) -> None:
+        """A cut beyond the line for which the tool's centre would have to cross it."""
+        if self.allowance_mm >= 0.0:
+            return
+        where = f"operation {self.name or self.kind!r}, key allowance"
+        if self.kind == "profile" and self.side == "on":
+            raise OptionError(
+                "a tool on the line cuts beyond it on both sides",
+                where=where,
+                mend='leave allowance out, or give side = "auto"',
+            )
+        last = self.finish_tool or self.tool
+        if min(self.wall_radius_mm, last.radius_mm) + self.allowance_mm < LEAST:
+            wide = f"a tool of {last.diameter_mm:g} mm" if last.diameter_mm else "a point"
+            mend = f"more than {-last.radius_mm:g} mm" if last.diameter_mm else "0 or more"
+            raise OptionError(
+                f"{wide} cannot cut {-self.allowance_mm:g} mm beyond the line: its centre would"
+                " not stay beside it",
+                where=where,
+                mend=f"give {mend}, or a wider tool",
+            )
 
     def through(self, stock: Stock | None) -> Operation:
         """The operation with the depth that its breakthrough makes in this stock; itself without
@@ -739,6 +763,16 @@ class Operation:
         if self.kind == "chamfer":
             return self.tool.radius_at(self.tip_offset_mm)
         return self.tool.radius_mm
+
+    @property
+    def away_mm(self) -> float:
+        """How far from the drawn line the tool's centre runs beside it, mm."""
+        return self.wall_radius_mm + self.allowance_mm
+
+    @property
+    def beyond_mm(self) -> float:
+        """How far it cuts beyond the drawn line, mm: by an allowance below 0."""
+        return max(-self.allowance_mm, 0.0)
 
     @property
     def selects(self) -> bool:

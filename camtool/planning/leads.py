@@ -51,7 +51,7 @@ class KeepOut:
 class Border:
     """What leads must keep to: `line`, the contour, with the tool free on its left or right
     (`free_left`; None: nowhere); and `keep_out`, with the distance `reach_mm` to stay away, and
-    besides `allowance_mm` from what is the operation's own."""
+    besides `allowance_mm` from what is the operation's own, which may be below 0."""
 
     line: Polyline
     free_left: bool | None
@@ -80,7 +80,7 @@ class Border:
 
         What an engraved contour itself cuts there is not kept from its leads.
         """
-        reach = 2.0 * size_mm + self.reach_mm + self.allowance_mm
+        reach = 2.0 * size_mm + self.reach_mm + max(self.allowance_mm, 0.0)
         found = segments_near(self.keep_out.lines, place, reach)
         if self.free_left is None and len(found):
             cut = points_to_segments(place[None], found)[0] < self.reach_mm

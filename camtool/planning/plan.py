@@ -348,7 +348,7 @@ def _with_starts(contours: Contours) -> Contours:
     made = []
     for contour in contours:
         operation = contour.setting.operation
-        path, starts = with_starts(contour.path, operation.start, operation.tool.radius_mm)
+        path, starts = with_starts(contour.path, operation.start, operation.away_mm)
         made.append(replace(contour, path=path, starts=starts))
     return Contours.of(made)
 

@@ -36,7 +36,13 @@ from camtool.geometry.intersect import meetings, self_crossings
 from camtool.geometry.measure import extents, signed_areas
 from camtool.geometry.nesting import nesting, oriented
 from camtool.geometry.offset import offset_shape
-from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
+from camtool.geometry.polylines import (
+    POSITION_EPS_MM,
+    Polyline,
+    Polylines,
+    Segments,
+    lines_reversed,
+)
 from camtool.planning.clearing import (
     SLOT_TOLERANCE,
     ConnectedRegion,
@@ -56,7 +62,7 @@ from camtool.planning.job import Operation
 from camtool.planning.naming import at_place, key_of, operation_name, tool_name
 from camtool.planning.paths import MeasuredPath, joined
 from camtool.planning.ramps import feeds_along
-from camtool.planning.reach import unreached, unreached_findings
+from camtool.planning.reach import cut_away_findings, unreached, unreached_findings
 
 MOST_STEPS = 10_000
 """More steps than this across a pocket are taken as a mistake."""
@@ -114,7 +120,7 @@ def pocket(chosen: Chosen, setting: Setting) -> Work:
         radius = setting.operation.tool.radius_mm
         wanted = offset_shape(each.region, _left_mm(setting))
         slots = slot_paths(wanted, radius)
-        cleared = _cleared(wanted, slots, each, setting)
+        cleared = _cleared(slots, each, setting)
         if not cleared.runs:
             nothing = _too_small if setting.operation.rest_of is None else _no_rest
             findings.append(nothing(each, setting.operation))
@@ -125,6 +131,7 @@ def pocket(chosen: Chosen, setting: Setting) -> Work:
         findings += [_slot(each, slot, setting.operation) for slot in slots]
         hair_mm = 2.0 * SLOT_TOLERANCE * setting.operation.tool.diameter_mm if slots else 0.0
         findings += unreached_findings(wanted, setting, hair_mm=hair_mm)
+    findings += cut_away_findings(kept_by(chosen), setting.operation)
     return Work(tuple(items), tuple(findings))
 
 
@@ -135,12 +142,18 @@ def _walls(chosen: Chosen, setting: Setting) -> Work:
     findings: list[Finding] = []
     for each in pockets(chosen):
         wanted = offset_shape(each.region, operation.allowance_mm)
-        walls = offset_shape(wanted, operation.tool.radius_mm)
+        walls = offset_shape(each.region, operation.away_mm)
         paths += walls
         names += [each.name] * len(walls)
         sources += [each.source] * len(walls)
         findings += unreached_findings(wanted, setting)
+    findings += cut_away_findings(kept_by(chosen), operation)
     return Work(along_walls(Polylines.of(paths), setting, names, sources), tuple(findings))
+
+
+def kept_by(chosen: Chosen) -> Polylines:
+    """The boundary of what the pockets leave, which is on the left of its paths."""
+    return lines_reversed(oriented(chosen.lines))
 
 
 def pockets(chosen: Chosen) -> list[Pocket]:
@@ -155,11 +168,11 @@ def pockets(chosen: Chosen) -> list[Pocket]:
     return found
 
 
-def _cleared(wanted: Polylines, slots: list[Floats], each: Pocket, setting: Setting) -> Cleared:
+def _cleared(slots: list[Floats], each: Pocket, setting: Setting) -> Cleared:
     """The runs of one region: each connected tool centre region, then the slots."""
     groups: list[list[CutRun]] = []
     changed: dict[str, CutRun] = {}
-    for part in _tool_regions(wanted, setting.operation):
+    for part in _tool_regions(each.region, setting):
         whole, runs = ConnectedRegion(part), list[CutRun]()
         for path, around in _paths(part, setting.operation):
             down = down_for(path, around, whole, setting)
@@ -184,15 +197,19 @@ def _left_mm(setting: Setting) -> float:
     return operation.allowance_mm - setting.levels_mm[-1] * slope
 
 
-def _tool_regions(wanted: Polylines, operation: Operation) -> list[Polylines]:
+def _tool_regions(region: Polylines, setting: Setting) -> list[Polylines]:
     """The connected tool centre regions that clear a region; where a wider tool has cleared what
     it reached, those that clear the rest.
+
+    The region shrunk at once by the tool and what it leaves: where it cuts beyond the lines, a
+    region that was grown first would have gaps closed that the tool must not go through.
 
     A disc of radius r reaches into what one of radius R does not cover where its centre is in the
     region shrunk by r, and not in what a disc of radius R − r covers of that: for what R covers,
     shrunk by r, is what R − r covers of the region shrunk by r.
     """
-    tool_region = offset_shape(wanted, operation.tool.radius_mm)
+    operation = setting.operation
+    tool_region = offset_shape(region, operation.tool.radius_mm + _left_mm(setting))
     wider = operation.rest_of
     if wider is None or wider.kind == "vcarve":
         return parts_of(tool_region)

@@ -2,9 +2,9 @@
 
 `auto` takes all closed paths together: the nesting of the whole drawing decides which of them are
 edges of parts and which are edges of holes (`sides`), and the tool runs a tool's radius (and the
-allowance) away: outside of parts and islands, inside of holes. Where parts lie nearer to each
-other than the tool is wide, one contour runs round both. `outside` and `inside` take each closed
-path on its own. Open paths have no inside: the tool runs on them.
+allowance, which below 0 brings it nearer) away: outside of parts and islands, inside of holes.
+Where parts lie nearer to each other than the tool is wide, one contour runs round both. `outside`
+and `inside` take each closed path on its own. Open paths have no inside: the tool runs on them.
 """
 
 from __future__ import annotations
@@ -123,7 +123,8 @@ def _shapes(chosen: Chosen, closed: list[int]) -> list[list[int]]:
 
 def _shape(chosen: Chosen, of: list[int], setting: Setting, found: _Found) -> None:
     """Round a shape of these paths."""
-    from camtool.planning.reach import unreached_findings
+    from camtool.geometry.offset import offset_shape
+    from camtool.planning.reach import cut_away_findings, unreached_findings
 
     lines = chosen.lines.select(of)
     ccw = signed_areas(lines) > 0.0
@@ -134,6 +135,9 @@ def _shape(chosen: Chosen, of: list[int], setting: Setting, found: _Found) -> No
     joined = [each for line in made for each in _joined(chosen, line.of, setting)]
     found.findings += shortened_list(joined, UNREACHED_BETWEEN_MORE)
     free = lines_reversed(shape)
+    found.findings += cut_away_findings(shape, setting.operation)
+    if setting.operation.beyond_mm:  # it reaches where it is to cut beyond the lines
+        free = offset_shape(free, -setting.operation.beyond_mm)
     as_wide = any(finding.code == Code.SLOT_AS_WIDE for finding in found.findings)
     hair_mm = 2.0 * SLOT_TOLERANCE_MM if as_wide else 0.0
     found.findings += unreached_findings(free, setting, hair_mm=hair_mm)
@@ -142,15 +146,17 @@ def _shape(chosen: Chosen, of: list[int], setting: Setting, found: _Found) -> No
 def _each(chosen: Chosen, closed: list[int], setting: Setting, found: _Found) -> None:
     """Round or within each of the closed paths, whatever the others are."""
     from camtool.geometry.offset import offset_each
+    from camtool.planning.reach import cut_away_findings
 
     lines = chosen.lines.select(closed)
     shapes = lines_reversed(lines, (signed_areas(lines) > 0.0) != chosen.rim[closed])
     operation = setting.operation
     paths, of = offset_each(
-        shapes, -_away(setting), joins=operation.joins, mitre_limit=operation.mitre_limit
+        shapes, -operation.away_mm, joins=operation.joins, mitre_limit=operation.mitre_limit
     )
     ends = np.searchsorted(of, np.arange(len(closed) + 1)).tolist()
     for place, k in enumerate(closed):
+        found.findings += cut_away_findings(shapes.select([place]), operation)
         found.lines += (
             _Line(paths[row], True, (k,)) for row in range(ends[place], ends[place + 1])
         )
@@ -162,7 +168,7 @@ def _round(
     chosen: Chosen, of: list[int], shape: Polylines, setting: Setting, found: _Found
 ) -> None:
     """Lines round a shape (on the left of its paths, which are these of the chosen ones)."""
-    paths = _offset(shape, _away(setting), setting)
+    paths = _offset(shape, setting.operation.away_mm, setting)
     sources = _sources(paths, shape)
     for path, along in zip(paths, sources, strict=True):
         found.lines.append(_Line(path, True, tuple(of[k] for k in along)))
@@ -183,7 +189,7 @@ def _missing(
     """Lines along paths of a shape where a tool that is thinner by a hair has room, and findings
     for the others."""
     # What is as wide as the tool has room for one that is thinner by a hair.
-    paths = _offset(shape, max(_away(setting) - SLOT_TOLERANCE_MM, 0.0), setting)
+    paths = _offset(shape, max(setting.operation.away_mm - SLOT_TOLERANCE_MM, 0.0), setting)
     for path, along in zip(paths, _sources(paths, shape), strict=True):
         if missing.issuperset(along):
             missing.difference_update(along)
@@ -199,11 +205,6 @@ def _offset(shape: Polylines, away_mm: float, setting: Setting) -> Polylines:
 
     operation = setting.operation
     return offset_shape(shape, -away_mm, joins=operation.joins, mitre_limit=operation.mitre_limit)
-
-
-def _away(setting: Setting) -> float:
-    """How far the tool centre is from the drawn line, mm."""
-    return setting.operation.wall_radius_mm + setting.operation.allowance_mm
 
 
 def _sources(paths: Polylines, shape: Polylines) -> list[tuple[int, ...]]:
@@ -253,7 +254,7 @@ def _joined(chosen: Chosen, of: tuple[int, ...], setting: Setting) -> Iterator[F
     """Findings of a line that runs round several paths at once: between them nothing is cut."""
     if len(of) == 1:
         return
-    room = 2.0 * _away(setting)
+    room = 2.0 * setting.operation.away_mm
     lines = chosen.lines.select(of)
     for one, other in sorted(near_paths(lines, lines, room)):
         if one >= other:
@@ -279,8 +280,8 @@ def _relieved(line: _Line, chosen: Chosen, setting: Setting, findings: list[Find
     for k in line.of:
         others = (np.arange(len(chosen.lines)) != k) & chosen.lines.closed
         keep_out = chosen.lines.select(np.flatnonzero(others).tolist())
-        kind = setting.operation.corners
-        done = relieved(path, chosen.lines[k], tool.radius_mm, kind, keep_out)
+        kind, near_mm = setting.operation.corners, tool.radius_mm - setting.operation.beyond_mm
+        done = relieved(path, chosen.lines[k], near_mm, kind, keep_out)
         path = done.path
         findings += (
             NOT_RELIEVED(where=at_place(chosen.names[k], corner), tool=tool_name(tool))
@@ -337,7 +338,7 @@ def _far(chosen: Chosen, setting: Setting, lines: list[_Line]) -> Iterator[Findi
 
     At a corner of the angle α the straight sides meet at away / sin(α/2) from it.
     """
-    most = FAR_CORNER * _away(setting)
+    most = FAR_CORNER * setting.operation.away_mm
     for line in lines:
         drawn = Segments.of(chosen.lines.select(line.of))
         corners = line.path.vertices[:, :2]

@@ -18,7 +18,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
-from camtool.findings import UNREACHED, UNREACHED_CORNERS, UNREACHED_MORE, Finding
+from camtool.findings import (
+    GOUGE_BEYOND,
+    GOUGE_MORE,
+    UNREACHED,
+    UNREACHED_CORNERS,
+    UNREACHED_MORE,
+    Finding,
+)
 from camtool.geometry.boxes import Curves
 from camtool.geometry.distance import nearest
 from camtool.geometry.measure import Frames, extents, point_at, segment_lengths, signed_areas
@@ -26,7 +33,8 @@ from camtool.geometry.nesting import regions
 from camtool.geometry.offset import merge_points, offset_shape
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments, reverse
 from camtool.planning.items import Setting
-from camtool.planning.naming import MOST_PLACES, width_name
+from camtool.planning.job import Operation
+from camtool.planning.naming import MOST_PLACES, shortened_list, tool_name, width_name
 from camtool.planning.paths import MeasuredPath, runs_of_true
 
 TOGETHER_MM = 5e-6
@@ -273,6 +281,26 @@ def unreached_findings(
         feet = []
     called = width_name(setting.operation)
     return [*_places(wide, called), *_corners(feet, called)]
+
+
+def cut_away_findings(kept: Polylines, operation: Operation) -> list[Finding]:
+    """Where an operation that cuts beyond its lines cuts away what is to stay (on the left of its
+    closed paths) from both sides: what a disc of that radius does not cover, but for corners."""
+    beyond = operation.beyond_mm
+    if not beyond:
+        return []
+    corner = CORNER_SHARE * np.pi * beyond**2
+    thin = [piece for piece in unreached(kept, beyond) if piece.area_mm2 > corner]
+    found = [
+        GOUGE_BEYOND(
+            where=_where(piece),
+            measured=2.0 * beyond,
+            tool=tool_name(operation.tool),
+            amount=beyond,
+        )
+        for piece in thin
+    ]
+    return shortened_list(found, GOUGE_MORE)
 
 
 def _places(pieces: Sequence[Unreached], called: str) -> Iterator[Finding]:

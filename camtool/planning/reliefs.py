@@ -36,7 +36,7 @@ RELIEF_TURN_RAD = 1e-2
 """Where the tool's path turns by no more than this, there is no corner."""
 
 RELIEF_SLACK_MM = 1e-4
-"""A relief may come nearer to other wanted lines than the tool's radius by this much."""
+"""A relief may come nearer to other wanted lines than it should by this much."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,22 +49,23 @@ class Relieved:
 
 
 def relieved(
-    path: Polyline, original: Polyline, tool_radius_mm: float, kind: str, keep_out: Polylines
+    path: Polyline, original: Polyline, near_mm: float, kind: str, keep_out: Polylines
 ) -> Relieved:
     """A path of the tool centre with reliefs at the sharp inner corners of the `original`.
 
-    `kind` is "dogbone" or "overcut". Reliefs come nowhere nearer to the lines of `keep_out`, and
-    to the walls of the original beyond the corner, than the tool's radius.
+    `kind` is "dogbone" or "overcut". Reliefs come nowhere nearer than `near_mm` to the lines of
+    `keep_out`, and to the walls of the original beyond the corner: the tool's radius, or less by
+    what is cut beyond the lines.
     """
-    if tool_radius_mm == 0.0:
+    if near_mm == 0.0:
         return Relieved(path, np.empty((0, 2)))
     along, walls = MeasuredPath.of(path), MeasuredPath.of(original)
     others = Segments.of(Polylines.of([original, *keep_out]))
     reliefs: dict[int, list[Floats]] = {}
     left: list[Floats] = []
-    for corner, vertex in _stands(along, walls, tool_radius_mm).items():
+    for corner, vertex in _stands(along, walls, near_mm).items():
         move = _move(along, vertex, walls, corner, kind)
-        if _is_clear(move, walls.segments.start[corner], others, tool_radius_mm):
+        if _is_clear(move, walls.segments.start[corner], others, near_mm):
             reliefs.setdefault(vertex, []).append(move[1])
         else:
             left.append(walls.segments.start[corner])
@@ -76,7 +77,7 @@ def relieved(
     return Relieved(Polyline(np.array(rows), path.closed), np.array(left).reshape(-1, 2))
 
 
-def _stands(along: MeasuredPath, walls: MeasuredPath, tool_radius_mm: float) -> dict[int, int]:
+def _stands(along: MeasuredPath, walls: MeasuredPath, near_mm: float) -> dict[int, int]:
     """The corners (vertices of the walls) that the tool misses, and at which vertex of its path it
     stands then: the nearest of those that are equally far from both walls of the corner."""
     found: dict[int, tuple[float, int]] = {}
@@ -84,7 +85,7 @@ def _stands(along: MeasuredPath, walls: MeasuredPath, tool_radius_mm: float) -> 
         v = along.path.vertices[vertex, :2]
         distance = points_to_segments(v[None], walls.segments)[0]
         away = float(distance.min())
-        if away < tool_radius_mm - RELIEF_MATCH_MM:
+        if away < near_mm - RELIEF_MATCH_MM:
             continue
         near = distance <= away + RELIEF_MATCH_MM
         reach = np.hypot(*(walls.segments.start - v).T)
@@ -129,13 +130,13 @@ def _along_longer(along: MeasuredPath, vertex: int, walls: MeasuredPath, corner:
     return np.asarray(ahead if coming > going else back)
 
 
-def _is_clear(move: Floats, corner: Floats, others: Segments, tool_radius_mm: float) -> bool:
+def _is_clear(move: Floats, corner: Floats, others: Segments, near_mm: float) -> bool:
     """Whether a tool that makes this move cuts into no wanted line but those at the corner."""
-    low, high = move.min(axis=0) - tool_radius_mm, move.max(axis=0) + tool_radius_mm
+    low, high = move.min(axis=0) - near_mm, move.max(axis=0) + near_mm
     boxes = segment_boxes(others)
     rows = np.flatnonzero(((boxes[:, :2] < high) & (boxes[:, 2:] > low)).all(axis=1))
     at_corner = points_to_segments(corner[None], others[rows])[0] <= RELIEF_MATCH_MM
     rows = rows[~at_corner]
     line = Segments.between(move[:1], move[1:], np.zeros(1))
     distance, _ = paired_distances(line[np.zeros_like(rows)], others[rows])
-    return bool((distance >= tool_radius_mm - RELIEF_SLACK_MM).all())
+    return bool((distance >= near_mm - RELIEF_SLACK_MM).all())

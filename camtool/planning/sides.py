@@ -175,9 +175,25 @@ class Sides:
         kept = np.zeros(len(self.lines), dtype=np.bool_)
         for number, each in enumerate(self.operations):
             if runs_beside(each) and self._depth(each) <= self._depth(pocket):
-                rim = self.seen_by(each).rim if each.side == "auto" else each.side == "outside"
-                kept |= self.takes[number] & self.lines.closed & rim
+                kept |= self.takes[number] & self.lines.closed & self.holds(each)
         return kept
+
+    def holds(self, profile: Operation) -> Bools:
+        """(M,) the contours within which all stays, where this profile runs beside them."""
+        if profile.side == "auto":
+            return self.seen_by(profile).rim
+        return np.full(len(self.lines), profile.side == "outside")
+
+    @cached_property
+    def beyond_mm(self) -> Floats:
+        """(M, 2) how far profiles cut beyond contours, mm: where what is without them stays, and
+        where what is within them stays."""
+        found = np.zeros((len(self.lines), 2))
+        for number, each in enumerate(self.operations):
+            if each.beyond_mm and runs_beside(each):
+                rows = np.flatnonzero(self.cuts[number] & self.lines.closed)
+                np.maximum.at(found, (rows, self.holds(each)[rows].astype(int)), each.beyond_mm)
+        return found
 
     def _rim(self, bounds: Bools) -> Bools:
         return np.asarray(nesting(self.lines, bounds).depth % 2 == 0)
@@ -300,7 +316,7 @@ def runs_beside(operation: Operation) -> bool:
     on them."""
     if operation.kind not in ("profile", "chamfer") or operation.side == "on":
         return False
-    return operation.wall_radius_mm + operation.allowance_mm > 0.0
+    return operation.away_mm > 0.0
 
 
 def _again(lines: Polylines, cut: Bools, idle: Bools) -> Bools:

@@ -459,7 +459,7 @@ def _corners(along: MeasuredPath, operation: Operation) -> _Corners:
             at = np.append(at, total)
         return np.column_stack([at, at])
 
-    away = operation.tool.radius_mm + operation.allowance_mm
+    away = operation.away_mm
     segments = along.segments
     tight = segments.is_arc & (segments.radius <= ROUND_CORNER * away)
     if tight.all():  # a round path is no corner

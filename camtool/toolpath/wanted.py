@@ -95,10 +95,11 @@ class Kept:
 
     `runs`: vertices (n, 4) each of x, y, z, bulge, mm. `lines`: M closed paths, outer ones before
     those within them; what a path holds stays where `stays` (M,) is true and is free where it is
-    not; `beyond`: whether what no path holds stays.
+    not; `beyond`: whether what no path holds stays. `into_mm`: how far they shall cut into it.
     """
 
     runs: tuple[Floats, ...]
     lines: Polylines
     stays: Bools
     beyond: bool
+    into_mm: float = 0.0

@@ -310,7 +310,8 @@ def _moves(kept: Kept, cutter: Cutter) -> tuple[Segments, Floats]:
 
 
 def _solid(kept: Kept, swept: Any, tolerance: float) -> Any:
-    """What must stay around a region, smaller than drawn by `KEPT_SLACK_MM`."""
+    """What must stay around a region: smaller than drawn by what shall be cut into it, and by
+    `KEPT_SLACK_MM`."""
     import shapely
 
     low_x, low_y, high_x, high_y = shapely.bounds(swept).tolist()
@@ -322,7 +323,7 @@ def _solid(kept: Kept, swept: Any, tolerance: float) -> Any:
         ring = _chords(segments, np.zeros((len(segments), 2)), KEPT_SHARE * tolerance)
         area = shapely.make_valid(shapely.Polygon(ring.points))
         region = shapely.union(region, area) if stays else shapely.difference(region, area)
-    return shapely.buffer(region, -KEPT_SLACK_MM)
+    return shapely.buffer(region, -kept.into_mm - KEPT_SLACK_MM)
 
 
 def _chords(segments: Segments, ends_z: Floats, tolerance: float) -> _Lines:

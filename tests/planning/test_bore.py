@@ -39,7 +39,7 @@ def runs_of(work: Work) -> list[CutRun]:
     step_over=st.floats(0.2, 0.9),
     angle=st.floats(0.02, 0.6),
     step_down=st.none() | st.floats(0.2, 3.0),
-    allowance=st.sampled_from([0.0, 0.004, 0.1]),
+    allowance=st.sampled_from([-0.1, -0.004, 0.0, 0.004, 0.1]),
     conventional=st.booleans(),
 )
 def test_the_tool_clears_the_hole_and_nothing_else(

@@ -43,11 +43,11 @@ BAD = [
     ],
     *[
         (Operation, {n: v})
-        for n in ("allowance_mm", "overlap_mm", "dwell_s", "spindle_rpm")
+        for n in ("overlap_mm", "dwell_s", "spindle_rpm")
         for v in AT_LEAST_ZERO
     ],
     *[(Operation, {"step_over": value}) for value in (0.0, -0.4, 1.01, *NO_NUMBERS)],
-    *[(Operation, {"angle_rad": value}) for value in NO_NUMBERS],
+    *[(Operation, {n: value}) for n in ("angle_rad", "allowance_mm") for value in NO_NUMBERS],
     (Operation, {"kind": "mill"}),
     (Operation, {"side": "left"}),
     (Operation, {"side": ""}),

@@ -89,6 +89,14 @@ def test_random_jobs_do_what_is_asked_and_nothing_else(seed: int) -> None:
     assert judged(asked) == [], described(asked)
 
 
+@pytest.mark.parametrize("seed", range(0, DEFAULT_JOBS, VERIFIED_EACH))
+def test_random_jobs_cut_so_far_beyond_the_line(seed: int) -> None:
+    asked = job_of(seed)
+    if asked.kind in ("profile", "pocket") and asked.side != "on":
+        asked = replace(asked, allowance=-0.1)
+        assert judged(asked) == [], described(asked)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(DEFAULT_JOBS, DEFAULT_JOBS + SLOW_JOBS))
 def test_many_random_jobs(seed: int) -> None:
