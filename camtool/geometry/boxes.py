@@ -7,14 +7,14 @@ compiled loops take them, with the tree of boxes that those loops go down themse
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
-from camtool.geometry.polylines import Segments
-from camtool.kernels.move_tree import hilbert_order
+from camtool.geometry.polylines import SEGMENTS_AT_ONCE, Segments
+from camtool.kernels.move_tree import hilbert_order, hilbert_order_of
 
 PAIRS_AT_A_TIME = 1 << 16
 """How many pairs of boxes are handled at a time: it bounds the memory."""
@@ -172,6 +172,26 @@ class Curves:
         rows = curve_rows_of(segments)
         boxes = curve_boxes(rows, margin_mm)
         return cls(rows, boxes, tree_of(boxes))
+
+
+def curves_in_order(
+    count: int, segments_of: Callable[[Ints], Segments]
+) -> tuple[Floats, Floats, Ints]:
+    """The `rows` (K, 11) and the `tree` of so many segments K, which are asked for some at a time,
+    along Hilbert's curve, since what is near in the plane need not be near in a file; and which
+    segment (K,) each row is."""
+    from camtool.kernels.offsets import SWEEP, curve_boxes, tree_of
+
+    def middles(which: Ints) -> Floats:
+        some = segments_of(which)
+        return 0.5 * (some.start + some.end)
+
+    order = hilbert_order_of(count, middles).astype(np.int64)
+    rows = np.empty((count, SWEEP + 1))  # the last column
+    for first in range(0, count, SEGMENTS_AT_ONCE):
+        some = slice(first, first + SEGMENTS_AT_ONCE)
+        rows[some] = curve_rows_of(segments_of(order[some]))
+    return rows, tree_of(curve_boxes(rows, 0.0)), order
 
 
 def curve_rows_of(segments: Segments) -> Floats:

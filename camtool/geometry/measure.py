@@ -135,9 +135,9 @@ def extents(lines: Polylines) -> Floats:
 def point_at(segments: Segments, row_indices: Ints, t: Floats) -> Floats:
     """(J, 2) the points at the fractions t (J,) in 0..1 of the length of these rows, mm."""
     start, end = segments.start.take(row_indices, axis=0), segments.end.take(row_indices, axis=0)
-    sweep = segments.sweep[row_indices]
-    arcs = np.flatnonzero(sweep)
-    sweep, share = sweep[arcs], t[arcs]
+    bulge = segments.bulge.take(row_indices)
+    arcs = np.flatnonzero(bulge)
+    sweep, share = 4.0 * np.arctan(bulge[arcs]), t[arcs]
     ratio = np.sin(0.5 * share * sweep) / np.sin(0.5 * sweep)
     turn = 0.5 * (share - 1.0) * sweep
     along = np.array(t, dtype=np.float64)

@@ -200,18 +200,18 @@ class Segments:
         """All segments of the paths, in order."""
         if isinstance(lines, Polyline):
             lines = Polylines.of([lines])
-        return cls._leaving(lines, segment_rows(lines))
+        return cls.leaving(lines, segment_rows(lines))
 
     @classmethod
     def lots(cls, lines: Polylines) -> Iterator[Segments]:
         """The same in lots of SEGMENTS_AT_ONCE."""
         rows = segment_rows(lines)
         for first in range(0, len(rows), SEGMENTS_AT_ONCE):
-            yield cls._leaving(lines, rows[first : first + SEGMENTS_AT_ONCE])
+            yield cls.leaving(lines, rows[first : first + SEGMENTS_AT_ONCE])
 
     @classmethod
-    def _leaving(cls, lines: Polylines, rows: Ints) -> Segments:
-        """The segments that leave these vertices, which ascend."""
+    def leaving(cls, lines: Polylines, rows: Ints) -> Segments:
+        """The segments that leave these vertices (K,), which are no ends of open paths."""
         vertices, offsets = lines.vertices, lines.offsets
         path = np.searchsorted(offsets, rows, side="right") - 1
         following = rows + 1
@@ -402,7 +402,7 @@ def without_repeats(vertices: Floats, counts: Ints, closed: Bools) -> tuple[Bool
     owner = np.repeat(np.arange(len(counts)), counts)
     for path in np.unique(owner[~keep]).tolist():
         rows = slice(int(first[path]), int(first[path] + counts[path]))
-        keep[rows] = _kept(vertices[rows])
+        _leave_out(vertices[rows], keep[rows])
     repeated = np.bincount(owner[~keep], minlength=len(counts)).astype(np.int64)
     _drop_closing(vertices, keep, owner, first, closed & filled)
     return keep, repeated
@@ -415,17 +415,21 @@ def encloses(vertices: Floats, owner: Ints, left: Ints) -> Bools:
     return np.asarray((left != 2) | (bent != 0.0))
 
 
-def _kept(path: Floats) -> Bools:
-    """The vertices of one path to keep, which take the bulges of those left out after them."""
-    keep = np.zeros(len(path), dtype=np.bool_)
-    last = -1
-    for row, (x, y, bulge) in enumerate(path.tolist()):
-        if last >= 0 and math.hypot(x - path[last, 0], y - path[last, 1]) <= POSITION_EPS_MM:
-            path[last, 2] = bulge
-        else:
-            keep[row] = True
-            last = row
-    return keep
+def _leave_out(path: Floats, keep: Bools) -> None:
+    """Take vertices of one path out of `keep`, which is false for those on the one before them:
+    those on the last one that is kept, which takes the bulge of the last of these."""
+    done = 0
+    for row in np.flatnonzero(~keep).tolist():
+        if row < done:
+            continue
+        last, done = row - 1, row
+        while done < len(path) and math.dist(path[done, :2], path[last, :2]) <= POSITION_EPS_MM:
+            keep[done] = False
+            path[last, 2] = path[done, 2]
+            done += 1
+        if done < len(path):
+            keep[done] = True
+            done += 1
 
 
 def _drop_closing(vertices: Floats, keep: Bools, owner: Ints, first: Ints, closed: Bools) -> None:

@@ -304,12 +304,12 @@ def off_drawn(pieces: Sequence[Piece], lines: Polylines) -> Floats:
     """(N, 2) mm: the largest and the rms distance between what was drawn as `pieces` and the
     segment that leaves each vertex of the paths made of them."""
     nothing = np.broadcast_to(0.0, (len(lines.vertices), 2))  # one number, seen as many
-    vertices, begin, end, said = _drawn(pieces)
-    if not len(begin) or not len(lines):
+    drawn, said = _drawn(pieces)
+    if not len(drawn) or not len(lines):
         return nothing
     rows = segment_rows(lines)
-    drawn_as = segment_numbers(vertices, begin, end)
-    made_as = segment_numbers(lines.vertices, rows, next_vertices(lines.offsets)[rows])
+    made = _Joined(lines.vertices, rows, next_vertices(lines.offsets)[rows])
+    drawn_as, made_as = drawn.numbers(), made.numbers()
     kept, gone = _is_among(made_as, drawn_as), ~_is_among(drawn_as, made_as)
     if not said.any() and not gone.any() and kept.all():
         return nothing
@@ -317,13 +317,33 @@ def off_drawn(pieces: Sequence[Piece], lines: Polylines) -> Floats:
     if said.any():
         order = np.argsort(drawn_as, kind="stable")
         numbers, first = np.unique(drawn_as[order], return_index=True)
-        most = np.maximum.reduceat(said[begin[order]], first, axis=0)
+        most = np.maximum.reduceat(said[drawn.begin[order]], first, axis=0)
         found[rows[kept]] = most[np.searchsorted(numbers, made_as[kept])]
     if gone.any() or not kept.all():
-        drawn = Segments.between(vertices[begin, :2], vertices[end, :2], vertices[begin, 2])
-        off = _changed(drawn, said[begin], Segments.of(lines), gone, ~kept)
-        found[rows] = np.maximum(found[rows], off)
+        del drawn_as, made_as  # the index takes their room
+        _changed(drawn, said, made, np.flatnonzero(gone), np.flatnonzero(~kept), found)
     return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Joined:
+    """K segments between the rows `begin` and `end` (K,) of `vertices` (N, 3)."""
+
+    vertices: Floats
+    begin: Ints
+    end: Ints
+
+    def __len__(self) -> int:
+        return len(self.begin)
+
+    def numbers(self) -> _Words:
+        """(K,) as `segment_numbers` gives them."""
+        return segment_numbers(self.vertices, self.begin, self.end)
+
+    def of(self, which: Ints) -> Segments:
+        """These segments."""
+        begin = self.vertices[self.begin[which]]
+        return Segments.between(begin[:, :2], self.vertices[self.end[which], :2], begin[:, 2])
 
 
 def _is_among(numbers: _Words, others: _Words) -> Bools:
@@ -333,9 +353,9 @@ def _is_among(numbers: _Words, others: _Words) -> Bools:
     return np.asarray(ordered[np.minimum(at, len(ordered) - 1, out=at)] == numbers)
 
 
-def _drawn(pieces: Sequence[Piece]) -> tuple[Floats, Ints, Ints, Floats]:
-    """The vertices (N, 3) of the pieces, those at both ends of each segment that has a length
-    (K,), (K,), and how far off the segment that leaves a vertex is said to be (N, 2)."""
+def _drawn(pieces: Sequence[Piece]) -> tuple[_Joined, Floats]:
+    """The segments of the pieces that have a length, and how far off the segment that leaves a
+    vertex is said to be (N, 2)."""
     lasting = [piece for piece in pieces if len(piece.vertices)]
     counts = np.array([0, *(len(piece.vertices) for piece in lasting)])
     offsets = np.cumsum(counts)
@@ -350,42 +370,41 @@ def _drawn(pieces: Sequence[Piece]) -> tuple[Floats, Ints, Ints, Floats]:
     there = np.hypot(*(vertices[following, k] - vertices[:, k] for k in (0, 1))) > POSITION_EPS_MM
     there[offsets[1:][[not piece.closed for piece in lasting]] - 1] = False
     rows = np.flatnonzero(there)
-    return vertices, rows, following[rows], said
+    return _Joined(vertices, rows, following[rows]), said
 
 
-def _changed(drawn: Segments, said: Floats, made: Segments, gone: Bools, new: Bools) -> Floats:
-    """(K, 2) of the segments `made`: what `gone` of the drawn ones, and which of them are `new`,
-    says of them, measured both there and back."""
-    off = np.zeros((len(made), 2))
+def _changed(
+    drawn: _Joined, said: Floats, made: _Joined, gone: Ints, new: Ints, off: Floats
+) -> None:
+    """Add to `off` (N, 2), of the segment that leaves each vertex, what `gone` of the drawn
+    segments, and which of the made ones are `new`, says of it, measured both there and back."""
     # What was drawn, to what is there now: the nearest of it, and what is about as near.
-    points, of = _samples(drawn, np.flatnonzero(gone))
+    points, of = _samples(drawn, gone)
     apart, point, row = _near(points, made, 2.0)
-    np.maximum.at(off, row, apart[point, None] + said[of[point]])
+    most = apart[point, None] + said[drawn.begin[of[point]]]
+    np.maximum.at(off, made.begin[row], most)
     # What is there now, to what was drawn.
-    points, of = _samples(made, np.flatnonzero(new))
+    points, of = _samples(made, new)
     apart, point, row = _near(points, drawn, 1.0)
-    np.maximum.at(off, of[point], apart[point, None] + said[row])
-    return off
+    np.maximum.at(off, made.begin[of[point]], apart[point, None] + said[drawn.begin[row]])
 
 
-def _samples(segments: Segments, rows: Ints) -> tuple[Floats, Ints]:
+def _samples(segments: _Joined, rows: Ints) -> tuple[Floats, Ints]:
     """Points (P, 2) along the segments of these rows, and the row of each (P,)."""
-    row = np.repeat(rows, len(PLACES))
-    return point_at(segments, row, np.tile(PLACES, len(rows))), row
+    row = np.repeat(np.arange(len(rows)), len(PLACES))
+    points = point_at(segments.of(rows), row, np.tile(PLACES, len(rows)))
+    return points, rows[row]
 
 
-def _near(points: Floats, segments: Segments, times: float) -> tuple[Floats, Ints, Ints]:
+def _near(points: Floats, segments: _Joined, times: float) -> tuple[Floats, Ints, Ints]:
     """(P,) how far the nearest segment is from each point; and pairs (J,), (J,) of a point and a
     segment that is no farther from it than so many times that."""
-    from camtool.geometry.boxes import Curves
-    from camtool.kernels.move_tree import hilbert_order
+    from camtool.geometry.boxes import curves_in_order
     from camtool.kernels.offsets import curves_within, nearest_distances
 
     points = np.ascontiguousarray(points)
-    # Loose lines come in any order; those that follow one another in the index must be near.
-    order = hilbert_order(segments.start, segments.start)
-    curves = Curves.of(segments[order])
-    apart = nearest_distances(points, curves.rows, curves.tree)
-    pairs = curves_within(points, times * apart + POSITION_EPS_MM, curves.rows, curves.tree)
+    curves, tree, order = curves_in_order(len(segments), segments.of)
+    apart = nearest_distances(points, curves, tree)
+    pairs = curves_within(points, times * apart + POSITION_EPS_MM, curves, tree)
     # Two positions nearer than that are one.
     return np.where(apart > POSITION_EPS_MM, apart, 0.0), pairs[:, 0], order[pairs[:, 1]]

@@ -44,7 +44,7 @@ def move_tree(
         box = boxes(rows)
         return np.asarray(0.5 * (box[:, :2] + box[:, 2:]))
 
-    order = _hilbert_order(count, middles)
+    order = hilbert_order_of(count, middles)
     if group is not None:
         order = order[np.argsort(group[order], kind="stable")]
     leaves = 1
@@ -74,11 +74,11 @@ def hilbert_order(starts: Floats, ends: Floats) -> Ints:
     The quarters of a square come in the order (0, 0), (0, 1), (1, 1), (1, 0). In the first and the
     last the curve is that of the whole with X and Y exchanged, in the last it is mirrored besides.
     """
-    order = _hilbert_order(len(starts), lambda rows: 0.5 * (starts[rows] + ends[rows]))
+    order = hilbert_order_of(len(starts), lambda rows: 0.5 * (starts[rows] + ends[rows]))
     return order.astype(np.int64)
 
 
-def _hilbert_order(count: int, middles: Callable[[Ints], Floats]) -> Indices:
+def hilbert_order_of(count: int, middles: Callable[[Ints], Floats]) -> Indices:
     """The same of so many rows, whose `middles` (J, 2) are asked for some rows (J,) at a time."""
     if count == 0:
         return np.empty(0, dtype=np.int32)

@@ -99,21 +99,20 @@ def _off(
         if made:
             yield rows, np.full((len(rows), 2), made)
         return
-    from camtool.geometry.boxes import Curves
+    from camtool.geometry.boxes import curves_in_order
     from camtool.geometry.polylines import segment_rows
-    from camtool.kernels.move_tree import hilbert_order
     from camtool.kernels.offsets import curves_within, nearest_distances
 
-    segments = Segments.of(lines)
-    # What is near in the drawing need not be near in the file.
-    order = hilbert_order(segments.start, segments.end)
-    curves = Curves.of(segments[order])
-    of = of[segment_rows(lines)[order]]
+    leaves = segment_rows(lines)
+    curves, tree, order = curves_in_order(
+        len(leaves), lambda some: Segments.leaving(lines, leaves[some])
+    )
+    of = of[leaves[order]]
     for begin in range(0, len(rows), ROWS_AT_ONCE):
         some = slice(begin, begin + ROWS_AT_ONCE)
         points = np.ascontiguousarray(_points(toolpath, rows[some]))
-        apart = nearest_distances(points, curves.rows, curves.tree)
-        pairs = curves_within(points, apart + AS_NEAR_MM, curves.rows, curves.tree)
+        apart = nearest_distances(points, curves, tree)
+        pairs = curves_within(points, apart + AS_NEAR_MM, curves, tree)
         most = np.zeros((len(points) // len(PLACES), 2))
         np.maximum.at(most, pairs[:, 0] // len(PLACES), of[pairs[:, 1]])
         yield rows[some], most + made

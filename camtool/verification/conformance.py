@@ -291,7 +291,7 @@ def _place_findings(
     contours that are holes there (`drilled`) and slopes within the tolerance of the stock top."""
     cuts, samples = found.cuts, found.samples
     contour = cuts.contour[found.rows]
-    judged = ~cuts.slopes[samples.segment] | (samples.z < STOCK_TOP_MM - limits[1])
+    judged = ~cuts.slopes(samples.segment) | (samples.z < STOCK_TOP_MM - limits[1])
     bad = np.flatnonzero(np.isinf(found.distance) & judged & ~drilled[contour])
     if len(bad) == 0:
         return

@@ -15,7 +15,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.findings import (
     CONTOUR_MISSING,
     CONTOUR_MISSING_AT_DEPTH,
@@ -35,7 +35,7 @@ from camtool.geometry.boxes import near_points
 from camtool.geometry.measure import point_at, segment_boxes, segment_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
 from camtool.simulation.rows import block_of
-from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.moves import ROWS_AT_ONCE, Kind, Toolpath
 from camtool.toolpath.rapids import STOCK_TOP_MM
 from camtool.verification.cuts import (
     NO_LOOP,
@@ -98,7 +98,7 @@ class _Sampled:
     def bad(self, goal: Goal) -> Bools:
         """(S,) true for samples that the other side does not cut. Slopes within the tolerance of
         the stock top are excepted: they may be flat moves on it, which cut nothing."""
-        sloping = self.cuts.slopes[self.samples.segment]
+        sloping = self.cuts.slopes(self.samples.segment)
         judged = ~sloping | (self.samples.z < STOCK_TOP_MM - goal.depth_mm)
         judged &= ~self.drilled[self.cuts.contour[self.cuts.segments.path[self.samples.segment]]]
         return np.asarray(judged & (self.wrong_depth | (self.found.distance > goal.limit_mm)))
@@ -118,8 +118,9 @@ def cover(
     cuts, wanted, limits = decoded.cuts, goal.moves, (goal.limit_mm, goal.depth_mm)
     own, became = _contours_from(cuts, wanted.cuts, row_from)
     match, rounding, extra = no_match(len(cuts.contour)), Figure(), list[_Uncovered]()
+    beside = _rows_alike(cuts, wanted.cuts, limits, row_from)
     for samples in samples_by_parts(
-        cuts, spacing_mm, cuts.is_cut, SAMPLES_AT_ONCE, whole=cuts.contour
+        cuts, spacing_mm, cuts.is_cut, SAMPLES_AT_ONCE, _together(cuts, own, beside)
     ):
         found, belongs = _own_found(cuts, samples, own, goal)
         other = np.flatnonzero(belongs == ANY_CONTOUR)
@@ -134,7 +135,7 @@ def cover(
         rows = cuts.segments.path[samples.segment]
         rounding.add(found.distance[real], samples.points[real], rows[real])
         match_rows(match, cuts, samples, belongs, found, goal)
-    alike = _lines_alike(cuts, wanted.cuts, limits, row_from)
+    alike = _lines_alike(wanted.cuts, beside, row_from)
     became = np.where(alike, ANY_CONTOUR, became)
     cut = np.append(alike | _fits(wanted.cuts, became, decoded, limits, spacing_mm), True)
     missing = list[_Uncovered]()
@@ -189,31 +190,48 @@ def _own_found(cuts: CutMoves, samples: Samples, own: Ints, goal: Goal) -> tuple
     return found, np.where(fit[mine], own[mine], ANY_CONTOUR)
 
 
-def _lines_alike(cuts: CutMoves, wanted: CutMoves, limits: Limits, row_from: Ints | None) -> Bools:
+def _together(cuts: CutMoves, own: Ints, beside: Ints) -> Indices:
+    """(N,) a number that rows have in common which are judged together: those of one contour,
+    unless all of them are `beside` rows of their `own` one, so that no other decides on any."""
+    alike, every = (
+        np.bincount(cuts.contour[rows], minlength=len(own)) for rows in (beside, cuts.rows)
+    )
+    apart = (own != ANY_CONTOUR) & (alike == every)
+    rows = np.arange(len(cuts.contour), dtype=np.int32)
+    return np.where(np.append(apart, False)[cuts.contour], rows, cuts.contour)
+
+
+def _lines_alike(wanted: CutMoves, beside: Ints, row_from: Ints | None) -> Bools:
     """(C,) the wanted contours of lines alone, from each of which one line was written that lies
-    within the limits of its own."""
-    if row_from is None:
-        return np.zeros(wanted.contour_count, dtype=np.bool_)
-    alike = np.ones(wanted.contour_count, dtype=np.bool_)
-    there = np.zeros(len(wanted.contour), dtype=np.bool_)
-    there[row_from[_rows_alike(cuts, wanted, limits, row_from)]] = True
-    alike[wanted.contour[wanted.rows[~there[wanted.rows]]]] = False
+    `beside` its own."""
+    alike = np.zeros(wanted.contour_count, dtype=np.bool_)
+    if row_from is not None:
+        there = np.zeros(len(wanted.contour), dtype=np.bool_)
+        there[row_from[beside]] = True
+        alike[:] = True
+        alike[wanted.contour[wanted.rows[~there[wanted.rows]]]] = False
     return alike
 
 
-def _rows_alike(cuts: CutMoves, wanted: CutMoves, limits: Limits, row_from: Ints) -> Ints:
+def _rows_alike(cuts: CutMoves, wanted: CutMoves, limits: Limits, row_from: Ints | None) -> Ints:
     """The rows that cut along a line, and alone were written from a line whose start and end lie
     within the limits of theirs: so does each point between them, for the distance of two points
     that run along two lines at once is nowhere larger than at one of the ends."""
+    if row_from is None:
+        return np.empty(0, dtype=np.int64)
     limit_mm, depth_mm = limits
     rows, paths = cuts.rows[row_from[cuts.rows] >= 0], (cuts.toolpath, wanted.toolpath)
-    came = row_from[rows]
-    near = (paths[0].kind[rows] == Kind.LINE) & (paths[1].kind[came] == Kind.LINE)
-    near &= np.bincount(came, minlength=len(paths[1]))[came] == 1
-    mine, theirs = paths[0].starts_of(rows), paths[1].starts_of(came)
-    ends = paths[0].end.take(rows, axis=0) - paths[1].end.take(came, axis=0)
-    for off in (mine - theirs, ends):
-        near &= (np.hypot(off[:, 0], off[:, 1]) <= limit_mm) & (np.abs(off[:, 2]) <= depth_mm)
+    once = np.bincount(row_from[rows], minlength=len(paths[1])) == 1
+    near = np.empty(len(rows), dtype=np.bool_)
+    for low in range(0, len(rows), ROWS_AT_ONCE):
+        some = rows[low : low + ROWS_AT_ONCE]
+        came = row_from[some]
+        fit = (paths[0].kind[some] == Kind.LINE) & (paths[1].kind[came] == Kind.LINE) & once[came]
+        mine, theirs = paths[0].starts_of(some), paths[1].starts_of(came)
+        ends = paths[0].end.take(some, axis=0) - paths[1].end.take(came, axis=0)
+        for off in (mine - theirs, ends):
+            fit &= (np.hypot(off[:, 0], off[:, 1]) <= limit_mm) & (np.abs(off[:, 2]) <= depth_mm)
+        near[low : low + len(some)] = fit
     return np.asarray(rows[near])
 
 
@@ -457,10 +475,11 @@ def cut_other_way(
     compared with everything.
     """
     cuts = decoded.cuts
-    rows = cuts.rows
+    rest = cuts.is_cut
     if row_from is not None:
         alike = _rows_alike(cuts, source.cuts, limits, row_from)
-        rows = np.setdiff1d(rows, alike[_same_way(cuts, source.cuts, alike, row_from)])
+        rest[alike] = ~_same_way(cuts, source.cuts, alike, row_from)
+    rows = np.flatnonzero(rest)
     if len(rows) == 0:
         return
     here, half = cuts.first[rows].astype(np.int64), np.full(len(rows), 0.5)
@@ -483,13 +502,16 @@ def cut_other_way(
 
 def _same_way(cuts: CutMoves, source: CutMoves, rows: Ints, row_from: Ints) -> Bools:
     """(J,) whether these rows, which are lines, have the direction of those they came from."""
-    came = row_from[rows]
-    way, other = (
-        (path.end.take(of, axis=0) - path.starts_of(of))[:, :2]
-        for path, of in ((cuts.toolpath, rows), (source.toolpath, came))
-    )
-    lengths = np.hypot(*way.T) * np.hypot(*other.T)
-    return np.asarray((way * other).sum(axis=1) > ALONG * lengths)
+    same = np.empty(len(rows), dtype=np.bool_)
+    for low in range(0, len(rows), ROWS_AT_ONCE):
+        some = rows[low : low + ROWS_AT_ONCE]
+        way, other = (
+            (path.end.take(of, axis=0) - path.starts_of(of))[:, :2]
+            for path, of in ((cuts.toolpath, some), (source.toolpath, row_from[some]))
+        )
+        lengths = np.hypot(*way.T) * np.hypot(*other.T)
+        same[low : low + len(some)] = (way * other).sum(axis=1) > ALONG * lengths
+    return same
 
 
 def _cosines(cuts: CutMoves, samples: Samples, others: MoveIndex, found: Found) -> Floats:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -68,10 +69,9 @@ class CutMoves:
         """(K, 2) mm: lowest and highest point of each segment."""
         return np.sort(self.ends_z, axis=1)
 
-    @property
-    def slopes(self) -> Bools:
-        """(K,) true where the height changes along a segment."""
-        begin, end = self.ends_z.T
+    def slopes(self, which: Ints) -> Bools:
+        """(J,) true where the height changes along these segments."""
+        begin, end = self.heights(which).T
         return np.asarray(begin != end)
 
     @property
@@ -250,18 +250,27 @@ def samples_by_parts(
     """The samples of `sample_cuts` on the rows (N,) that are true, in parts of whole rows, or of
     rows (N,) with one number `whole`, with about `at_once` samples each, so that memory does not
     grow with the program. The spacing is that of all cuts."""
+    taken, parts, ends = _lots(cuts, spacing_mm, rows, at_once, whole)
+    for low, high in pairwise([0, *ends, len(taken)]):
+        if low < high:
+            yield _samples(cuts, taken[low:high], parts[low:high].astype(np.int64))
+
+
+def _lots(
+    cuts: CutMoves, spacing_mm: float, rows: Bools, at_once: int, whole: Indices | None
+) -> tuple[Ints, Indices, list[int]]:
+    """Of `samples_by_parts` the segments (T,), in how many parts each is sampled (T,), and where
+    among them a lot ends that is not the last."""
     lengths = segment_lengths(cuts.segments)
-    parts = _parts(lengths, max(spacing_mm, float(lengths.sum()) / MOST_SAMPLES))
+    spacing = max(spacing_mm, float(lengths.sum()) / MOST_SAMPLES)
     taken = np.flatnonzero(rows[cuts.segments.path])
-    many = np.cumsum(parts[taken] + 1) // at_once
+    parts = _parts(lengths[taken], spacing).astype(np.int32)
+    del lengths
     # What is whole ends where its last segment does.
-    row = cuts.segments.path[taken]
-    of = row if whole is None else whole[row].astype(np.int64)
-    last = np.append(np.diff(of) != 0, True)[: len(of)]
-    part = many[np.flatnonzero(last)][np.cumsum(last) - last]
-    for which in np.split(taken, np.flatnonzero(np.diff(part)) + 1):
-        if len(which):
-            yield _samples(cuts, which, parts[which])
+    of = cuts.segments.path[taken]
+    last = np.append(np.diff(of if whole is None else whole[of]) != 0, True)[: len(of)]
+    many = np.cumsum(parts + 1, dtype=np.int64)[last] // at_once
+    return taken, parts, (np.flatnonzero(last)[np.flatnonzero(np.diff(many))] + 1).tolist()
 
 
 def _parts(lengths: Floats, spacing_mm: float) -> Ints:

@@ -17,6 +17,7 @@ from functools import cached_property
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Indices, Ints
+from camtool.toolpath.moves import ROWS_AT_ONCE
 from camtool.verification.circles import Circle
 from camtool.verification.cuts import CutMoves, Samples
 from camtool.verification.nearest import ANY_CONTOUR, Found, MoveIndex, ranges, run_offsets
@@ -213,10 +214,12 @@ def _with_neighbours(off_mm: Floats, contour: Indices) -> Floats:
     lag behind."""
     rows = np.flatnonzero(contour >= 0)
     most = off_mm.copy()
-    same = contour[rows[1:]] == contour[rows[:-1]]
-    before, after = rows[:-1][same], rows[1:][same]
-    most[before] = np.maximum(most[before], off_mm[after])
-    most[after] = np.maximum(most[after], off_mm[before])
+    for low in range(0, len(rows) - 1, ROWS_AT_ONCE):
+        some = rows[low : low + ROWS_AT_ONCE + 1]
+        same = contour[some[1:]] == contour[some[:-1]]
+        before, after = some[:-1][same], some[1:][same]
+        most[before] = np.maximum(most[before], off_mm[after])
+        most[after] = np.maximum(most[after], off_mm[before])
     return most
 
 

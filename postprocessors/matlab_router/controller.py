@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.errors import MachineError
 from camtool.kernels.lattice import to_steps
 from camtool.machine.model import Machine
@@ -35,6 +35,8 @@ from camtool.toolpath.moves import Kind, Toolpath
 from .dialect import Dialect, MatlabRouterController, dialect_of
 from .steps import (
     COUNT,
+    HOME_AMOUNT,
+    PART_COUNT,
     PLACE,
     SECOND_ROW,
     SHOWN,
@@ -194,6 +196,9 @@ UNITS_PER_MM = 10
 INT16 = 0xFFFF
 """The slaves' counter of chunks is unsigned, 16 bits (L5589-5600)."""
 
+INT32 = 0x7FFFFFFF
+"""What is ordered, here, fits a signed int of 32 bits."""
+
 NUMBERS_OF_HEADER, NUMBERS_OF_LINE = 3, 4
 """How many numbers the PC sends for a job, and for each of its lines (L4294-4360)."""
 
@@ -208,7 +213,7 @@ PAIR_COUNTS = 10
 """The speeds of a line are searched up to this far from those of its path, in counts in a tick."""
 
 LINES_AT_ONCE = 1 << 12
-"""The speeds of so many lines are searched together."""
+"""So many lines are ordered together."""
 
 PAIR_TOLERANCE = 1e-4
 """A sum of squares of speeds that is a whole number within this comes from a program."""
@@ -230,7 +235,7 @@ class Lines:
     job on their way from the PC).
     """
 
-    orders: Ints
+    orders: Indices
     pauses_s: Floats
     extra_s: Floats
 
@@ -250,22 +255,37 @@ def lines_of(path: Toolpath, rows: int, machine: _Machine) -> Lines:
     first = np.flatnonzero((way_mm != 0.0).any(axis=1))
     second = first.copy()
     tail = _tails(path, way_mm, first)
-    way = way_mm[first]
-    way[np.flatnonzero(tail) - 1] += way[tail]
     second[np.flatnonzero(tail) - 1] = first[tail]
-    speeds = _speeds(path, way_mm, first, machine)
-    keep = ~tail
-    first, second, way, speeds = first[keep], second[keep], way[keep], speeds[keep]
-    amount = _amounts(way, router, machine)
-    ref = np.where(way < 0.0, -speeds, speeds)
-    part = _parting(path, first, second, machine)
-    amount = np.where(homes[first][:, None] & (way != 0.0), -1, amount)
-    most = _patience(way, ref, amount, machine)
-    orders = np.column_stack([amount, ref, first, second, most, part])
-    header = ~straight[first] | (way[:, 2] != 0.0)
+    first, second = first[~tail], second[~tail]
+    orders = np.empty((len(first), PART_COUNT + 1), dtype=np.int32)
+    header = ~straight[first]
+    for low in range(0, len(first), LINES_AT_ONCE):
+        some = slice(low, low + LINES_AT_ONCE)
+        begin, end = first[some], second[some]
+        way = way_mm[begin]
+        way[begin != end] += way_mm[end[begin != end]]
+        speeds = _speeds(path, way_mm, begin, machine)
+        ref = np.where(way < 0.0, -speeds, speeds)
+        amount = _amounts(way, router, machine)
+        amount = np.where(homes[begin][:, None] & (way != 0.0), HOME_AMOUNT, amount)
+        most = _patience(way, ref, amount, machine)
+        part = _parting(path, begin, end, machine)
+        orders[some] = _narrow(np.column_stack([amount, ref, begin, end, most, part]))
+        header[some] |= way[:, 2] != 0.0
     extra = np.where(kind == Kind.DWELL, path.value[:rows], 0.0)
     ends = _ends(header, homes[first], machine)
     return Lines(orders, _pauses(header, ends, router), extra + _link(header, first, rows, router))
+
+
+def _narrow(orders: Ints) -> Indices:
+    """The same numbers in 32 bits; MachineError for those that do not fit."""
+    if np.abs(orders).max(initial=0) > INT32:
+        raise MachineError(
+            "a position has more counts than 32 bits hold",
+            where="table [axes], keys coded_step_mm",
+            mend="write how far each count really goes",
+        )
+    return orders.astype(np.int32)
 
 
 def _check(path: Toolpath, rows: int) -> None:
@@ -328,9 +348,7 @@ def _speeds(path: Toolpath, way_mm: Floats, first: Ints, machine: _Machine) -> I
     wanted = np.minimum(np.where(np.isfinite(along), along / coded, 0.0), INT16)
     sent = to_steps(wanted, 1.0)
     slanted = np.flatnonzero((wanted[:, 0] > 0.0) & (wanted[:, 1] > 0.0) & (wanted[:, 2] == 0.0))
-    for low in range(0, len(slanted), LINES_AT_ONCE):
-        lines = slanted[low : low + LINES_AT_ONCE]
-        sent[lines, :2] = _pairs(wanted[lines, :2])
+    sent[slanted, :2] = _pairs(wanted[slanted, :2])
     rapid_mm = machine.rapid_mm_min / (60.0 * TICKS_PER_S)
     rapid = to_steps(min(rapid_mm, INT16 * coded[0]), float(coded[0]))
     return np.where((path.kind[first] == Kind.LINE)[:, None], sent, rapid)
@@ -429,7 +447,7 @@ IDENTIFIED = 70.0
 """The drive at which gains were measured (L2704): its speed does not depend on the friction."""
 
 
-def program_of(orders: Ints, pauses_s: Floats, machine: _Machine) -> Program:
+def program_of(orders: Indices, pauses_s: Floats, machine: _Machine) -> Program:
     """What the kernel runs; MachineError for gains that the listing's integers cannot hold."""
     router = machine.controller
     text = router.slaves == "text"

@@ -7,7 +7,8 @@ from libc.stdint cimport uint8_t
 from camtool.kernels.types cimport Int
 
 cdef class Slaves:
-    cdef Int[:, ::1] lines, slaves
+    cdef int[:, ::1] lines
+    cdef Int[:, ::1] slaves
     cdef Int[::1] table, clock, loops
     cdef double[:, ::1] axes, motors
     cdef double[::1] pauses, begin, ticks
@@ -61,14 +62,14 @@ cdef void _advance(
 ) noexcept
 
 @cython.locals(
-    index=Int, lines=Int[:, ::1], slaves=Int[:, ::1], motors=double[:, ::1], begin=double[::1]
+    index=Int, lines=int[:, ::1], slaves=Int[:, ::1], motors=double[:, ::1], begin=double[::1]
 )
 cdef void _open(Slaves all_, Int line) noexcept
 
-@cython.locals(lines=Int[:, ::1], motors=double[:, ::1], begin=double[::1])
+@cython.locals(lines=int[:, ::1], motors=double[:, ::1], begin=double[::1])
 cdef void _close(Slaves all_, Int line, Int tick) noexcept
 
-@cython.locals(first=Int, second=Int, axis=Int, ahead=Int, lines=Int[:, ::1], begin=double[::1])
+@cython.locals(first=Int, second=Int, axis=Int, ahead=Int, lines=int[:, ::1], begin=double[::1])
 cdef Int _row(Slaves all_, Int line, Int tick) noexcept
 
 @cython.locals(moving=bint)
@@ -78,7 +79,7 @@ cdef bint _all_still(Int[:, ::1] slaves) noexcept
 cdef void _given_up(double[:, ::1] motors, Int[:, ::1] slaves, Int tick) noexcept
 
 @cython.locals(
-    top=Int, count=Int, filled=Int, tick=Int, line=Int, index=Int, lines=Int[:, ::1],
+    top=Int, count=Int, filled=Int, tick=Int, line=Int, index=Int, lines=int[:, ::1],
     slaves=Int[:, ::1], table=Int[::1], slave=Int[::1], clock=Int[::1], all_=Slaves, text=bint,
     motors=double[:, ::1], axes=double[:, ::1], begin=double[::1], motor=double[::1],
     axis=double[::1]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Indices, Ints
 
 # What the kernel of the Matlab router's slaves is told and keeps: arrays, and their columns.
 
@@ -51,15 +51,15 @@ SIGN_OF_INT32, BITS_OF_INT32 = 1 << 31, (1 << 32) - 1
 class Program(NamedTuple):
     """What the slaves are told, and what they are.
 
-    lines (L, 11): amount of each axis (chunks; counts when `text`; `HOME_AMOUNT`; 0), its speed
-    with sign, the row of its samples, the row of those from where an axis (its number) has passed
-    a count on, the ticks after which it is given up, that axis and that count. pauses (L,) ticks
-    behind each, at least 1, and negative where the next line begins on a tick; axes (3, 8); table
-    (1001,); lag: ticks by which Y begins after X; text: the chapters' way instead of the
-    listing's.
+    lines (L, 11), of 32 bits: amount of each axis (chunks; counts when `text`; `HOME_AMOUNT`; 0),
+    its speed with sign, the row of its samples, the row of those from where an axis (its number)
+    has passed a count on, the ticks after which it is given up, that axis and that count. pauses
+    (L,) ticks behind each, at least 1, and negative where the next line begins on a tick; axes
+    (3, 8); table (1001,); lag: ticks by which Y begins after X; text: the chapters' way instead of
+    the listing's.
     """
 
-    lines: Ints
+    lines: Indices
     pauses: Floats
     axes: Floats
     table: Ints

@@ -19,6 +19,7 @@ from camtool.geometry.polylines import (
     reverse,
     rolled,
     rotated,
+    without_repeats,
 )
 from tests.oracles.geometry import dense_points
 from tests.paths import mirrored, moved, scaled
@@ -198,3 +199,34 @@ def test_rolled_begins_at_that_vertex(path: Polyline, start: int) -> None:
 def test_an_open_path_cannot_begin_in_its_middle() -> None:
     with pytest.raises(GeometryError):
         rolled(Polyline(np.array([[0.0, 0, 0], [1, 0, 0]])), 1)
+
+
+@given(
+    st.lists(st.integers(0, 6), min_size=1, max_size=12),
+    st.lists(st.integers(0, 3), min_size=1, max_size=12),
+    st.booleans(),
+)
+def test_points_on_the_last_one_that_is_kept_are_left_out(
+    steps: list[int], others: list[int], back: bool
+) -> None:
+    """A chain of points, each near the one before, leaves out those near its first one alone; the
+    bulge of the last of them leaves with it. Against the loop over all points, written out."""
+    paths = []
+    for number, row in enumerate((steps, others)):
+        ways = np.array(row) * (0.4 * POSITION_EPS_MM) * np.where(np.arange(len(row)) % 3, 1, -1)
+        at = np.cumsum(ways if back else np.abs(ways)) + 5.0 * number
+        paths.append(np.column_stack([at, np.zeros_like(at), np.arange(len(at)) / 20.0]))
+    vertices, kept = np.concatenate(paths), list[bool]()
+    bulges = vertices[:, 2].copy()
+    for first, path in zip((0, len(steps)), paths, strict=True):
+        last = -1
+        for row, (x, y, bulge) in enumerate(path.tolist(), start=first):
+            fresh = last < 0 or math.dist((x, y), vertices[last, :2]) > POSITION_EPS_MM
+            last = row if fresh else last
+            kept.append(fresh)
+            bulges[last] = bulge
+    counts = np.array([len(steps), len(others)])
+    keep, repeated = without_repeats(vertices, counts, np.zeros(2, dtype=bool))
+    assert keep.tolist() == kept
+    assert vertices[keep, 2].tolist() == bulges[keep].tolist()
+    assert repeated.tolist() == [kept[: len(steps)].count(False), kept[len(steps) :].count(False)]

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
-from camtool.verification import coverage
+from camtool.verification import coverage, matching
 from camtool.verification.circles import full_circles
 from camtool.verification.coverage import Coverage, Drilled, cover, cut_other_way
 from camtool.verification.cuts import cut_moves
@@ -129,6 +129,8 @@ def test_the_size_of_lots_changes_nothing(
     whole, turned = compared(decoded, wanted, came)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(coverage, "SAMPLES_AT_ONCE", size)
+        patch.setattr(coverage, "ROWS_AT_ONCE", size)
+        patch.setattr(matching, "ROWS_AT_ONCE", size)
         parts, turned_too = compared(decoded, wanted, came)
     assert (parts.findings, turned_too) == (whole.findings, turned)
     for name in ("contour", "only", "row", "circle", "off_mm"):

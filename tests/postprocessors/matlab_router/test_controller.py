@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from camtool_postprocessors.matlab_router import controller
 from camtool_postprocessors.matlab_router.controller import (
     TEXT_KID,
     TEXT_KPD,
@@ -108,8 +109,11 @@ def test_all_speeds_of_the_gui_come_back(ways: list[tuple[int, int]]) -> None:
     toolpath, machine = path.finish(), router()
     inside = np.abs(toolpath.end).max() < 3276.7
     if inside:
-        orders = lines_of(quantised(toolpath, machine), len(toolpath), machine).orders
-        assert orders[:, 3:5].tolist() == wanted
+        with pytest.MonkeyPatch.context() as patch:
+            for at_once in (4096, 7):
+                patch.setattr(controller, "LINES_AT_ONCE", at_once)
+                orders = lines_of(quantised(toolpath, machine), len(toolpath), machine).orders
+                assert orders[:, 3:5].tolist() == wanted
 
 
 def test_a_bent_line_is_one_order_and_does_not_stop() -> None:
@@ -454,6 +458,13 @@ def test_the_limits_of_the_format() -> None:
         way = ToolpathBuilder().line(b - a, feed=225).finish()
         chunks = lines_of(quantised(way, router()), 1, router()).orders[0, 0]
         assert chunks == {3: 1, 4: 2, 1: 65536}[round(10 * (b - a))]
+
+
+def test_counts_beyond_32_bits_are_refused() -> None:
+    machine = router("slaves=text", "axes.x.coded_step_mm=1e-6")
+    path = ToolpathBuilder().line(3000.0, feed=225).finish()
+    with pytest.raises(MachineError, match="more counts than 32 bits hold"):
+        lines_of(quantised(path, machine), 1, machine)
 
 
 def test_the_text_divides_distances() -> None:

@@ -34,7 +34,8 @@ def filled(
             + [v for _, v in order]
             + [row, row, 10_000, 0, 0]
             for row, order in enumerate(orders)
-        ]
+        ],
+        dtype=np.int32,
     )
     program = Program(lines, np.array(pauses), axes, np.array(table(slaves[0].top)), lag, text)
     motors, inside = np.zeros((3, 6)), np.zeros((3, 11), dtype=np.int64)
