@@ -221,6 +221,7 @@ class LinuxcncSamples(CountedSamples):
         corners = planned.corners
         self._before = np.append(corners.before, 0.0)
         self._behind = np.append(corners.behind, 0.0)
+        self._ramp = np.append(corners.ramp, 1.0)
         self._blends = bool(reach.any() or corners.before.any())
         self._length = moves.length
         self._row_length = move_lengths(path)
@@ -257,24 +258,32 @@ class LinuxcncSamples(CountedSamples):
         self._inward(points, behind, move[behind], along[behind], 1.0)
         ahead = np.flatnonzero(left < self._before[move + 1])
         behind = np.flatnonzero(along < self._behind[move])
-        corner, s = move[ahead] + 1, left[ahead]
-        self._overlapped(points, ahead, corner, 0.5 - 0.5 * s / self._before[corner], -s, 0.0 * s)
-        corner, s = move[behind], along[behind]
-        self._overlapped(points, behind, corner, 0.5 + 0.5 * s / self._behind[corner], 0.0 * s, s)
+        corner = move[ahead] + 1
+        self._overlapped(points, ahead, corner, 0.5 - 0.5 * left[ahead] / self._before[corner])
+        corner = move[behind]
+        self._overlapped(points, behind, corner, 0.5 + 0.5 * along[behind] / self._behind[corner])
 
-    def _overlapped(
-        self, points: Floats, on: Ints, corner: Ints, x: Floats, back: Floats, ahead: Floats
-    ) -> None:
-        """Move points (K, 3) where moves overlap: while the first slows down evenly over its last
-        `before` mm, the second speeds up over its first `behind` mm. At the part x of that time
-        the tool is at P − (1 − x)² before t_− + x² behind t_+; the first half of it stands for the
-        end of the first move, the second for the start of the second. `back`, `ahead` (K,) mm:
-        where the points are along the tangents without."""
-        corners, of = np.unique(corner, return_inverse=True)
-        first = self._tangents.at_ends(self._row[corners - 1])[of]
-        second = self._tangents.at_starts(self._row[corners])[of]
-        points[on] += (-((1.0 - x) ** 2) * self._before[corner] - back)[:, None] * first
-        points[on] += (x**2 * self._behind[corner] - ahead)[:, None] * second
+    def _overlapped(self, points: Floats, on: Ints, corner: Ints, x: Floats) -> None:
+        """Put points (K, 3) where moves overlap: while the first slows down evenly over its last
+        `before` mm, the second speeds up in the first part `ramp` of that time, and goes on, over
+        its first `behind` mm. At the part x of the time the tool is where both are, one on top of
+        the other; the first half of it stands for the end of the first move, the second for the
+        start of the second."""
+        first, ramp = corner - 1, self._ramp[corner]
+        gone = np.where(x < ramp, x**2 / (2.0 * ramp), x - 0.5 * ramp) / (1.0 - 0.5 * ramp)
+        slowing = self._length[first] - (1.0 - x) ** 2 * self._before[corner]
+        points[on] = self._on(first, slowing)
+        points[on] += self._on(corner, gone * self._behind[corner]) - self._on(corner, 0.0 * x)
+
+    def _on(self, move: Ints, along: Floats) -> Floats:
+        """(K, 3) mm: the points so far (K,) along moves (K,), without blends."""
+        row = self._row[move]
+        arc = self._tangents.path.is_arc[row]
+        found = np.empty((len(row), 3))
+        found[arc] = super().points(row[arc], along[arc] / self._length[move[arc]])
+        row, straight = row[~arc], along[~arc, None]
+        found[~arc] = self._tangents.path.starts_of(row) + straight * self._tangents.at_starts(row)
+        return found
 
     def _inward(self, points: Floats, on: Ints, corner: Ints, s: Floats, side: float) -> None:
         corners, of = np.unique(corner, return_inverse=True)
@@ -653,8 +662,18 @@ def _arc_limits(
     planar = np.minimum(v_xy, np.sqrt(a_xy * NORMAL_RATIO * radius))
     highest = length / np.maximum(rise / rate[2], level / planar)
     overall = length / np.maximum(rise / acceleration[2], level / a_xy)
-    highest = np.minimum(highest, np.sqrt(NORMAL_RATIO * overall * radius))
-    return highest, overall, highest**2 / radius
+    turning = _turning_radius(r, grows / sweep, rise)
+    highest = np.minimum(highest, np.sqrt(NORMAL_RATIO * overall * turning))
+    return highest, overall, highest**2 / turning
+
+
+def _turning_radius(r: Floats, growth: Floats, rise: Floats) -> Floats:
+    """The radius by which the planner bounds the speed of arcs of radius r at their start, which
+    grow by `growth` a radian (`pmCircleEffectiveMinRadius`, blendmath.c). It takes the whole rise
+    for that of a radian, so that helices may be faster than their curvature says."""
+    inner = growth**2 + r**2
+    spiral = inner**1.5 / (inner + growth**2)
+    return np.asarray(spiral + rise**2 / spiral)
 
 
 # How LinuxCNC meets the corners between its moves.
@@ -706,7 +725,8 @@ class Corners:
     the part of the acceleration that a bend takes from the moves on both sides; `reach` (M,) mm:
     how far from the corner a blend begins and ends, 0 without one; `acceleration` (M,) mm/s²
     along blends; `way` (M,) mm along them. Where moves overlap: `before` and `behind` (M,) mm, how
-    far from the corner they do, and `overlap` (M,) s, for how long; 0 elsewhere."""
+    far from the corner they do, `overlap` (M,) s, for how long, and `ramp` (M,), in which part of
+    that time the second of them speeds up; 0 elsewhere."""
 
     speed: Floats
     lost: Floats
@@ -716,6 +736,7 @@ class Corners:
     before: Floats
     behind: Floats
     overlap: Floats
+    ramp: Floats
 
 
 @dataclass(frozen=True)
@@ -761,7 +782,7 @@ class Bends:
 def corners_of(moves: Moves, tangents: Tangents, rules: CornerRules) -> Corners:
     """What happens at the start of each move."""
     count = len(moves.length)
-    corners = Corners(*(np.zeros(count) for _ in range(8)))
+    corners = Corners(*(np.zeros(count) for _ in range(9)))
     bends = Bends(
         tangents.at_ends(np.roll(moves.row, 1)),  # nothing comes of that before the first
         tangents.at_starts(moves.row),
@@ -839,7 +860,7 @@ def _overlap(
     # While the first comes to rest, the second begins as from rest, whatever its share was.
     seconds = first / one
     reached = np.minimum(moves.speed[on], seconds * other)
-    corners.overlap[on] = seconds
+    corners.overlap[on], corners.ramp[on] = seconds, reached / other / seconds
     corners.before[on] = 0.5 * first * seconds
     corners.behind[on] = reached * (seconds - 0.5 * reached / other)
     return np.asarray(worth)

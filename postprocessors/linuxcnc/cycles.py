@@ -154,6 +154,14 @@ def _bound(machine: State, times: int, hole: _Hole, motion: int, kept: dict[str,
         what = "its pecks" if by_pecks else "the repeats of this cycle"
         mend = "write a larger Q" if by_pecks else bounds.SPLIT_PROGRAM
         raise Fault(too_many(what), "q" if by_pecks else "l", mend)
+    strokes = int(times * pecks)  # each takes as long as a line
+    if strokes > machine.most_lines:
+        raise Fault(
+            f"a cycle of more than {machine.most_lines} strokes",
+            "g",
+            "if that is meant, raise --set dialect.most_lines=…",
+        )
+    machine.effort += strokes
 
 
 def _motion_of(

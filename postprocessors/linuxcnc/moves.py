@@ -34,6 +34,9 @@ NO_FEED: Final = "a feed move, and no feed yet"
 EFFORT: Final = 10
 """A control point of a spline counts as so many lines that are executed."""
 
+BESIDE_EFFORT: Final = 2
+"""So many lines more count for a move beside its path, by cutter compensation."""
+
 GOES: Final = f"{AXES}@^"
 """A line or a rapid without any of these words goes nowhere."""
 
@@ -139,6 +142,7 @@ class Moves(Frames):
             if block.g.get("one block") == 530:
                 raise Fault("G53 while the cutter's radius is compensated", "g")
             kind = Kind.RAPID if motion == 0 else Kind.LINE
+            self.effort += BESIDE_EFFORT
             at = self._compensation.straight(kind, self._flat(end), self._flat())
             self._put(at)
             return
@@ -256,6 +260,7 @@ class Moves(Frames):
             return
         from .compensation import Arc
 
+        self.effort += BESIDE_EFFORT
         inside = turn * compensation.side > 0
         radius = abs(words["r"]) if "r" in words else math.dist(begin[:2], centre)
         if inside and compensation.first and radius <= compensation.radius:

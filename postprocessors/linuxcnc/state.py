@@ -64,6 +64,7 @@ class State:
         self.ended = False
         self.effort = 0
         """Lines that the block counts as beyond one, where it takes as long."""
+        self.most_lines = dialect.most_lines
         self.motion: int | None = None
         """The motion in force, tenfold; None: none yet."""
         self.position = [0.0, 0.0, 0.0]

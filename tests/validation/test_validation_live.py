@@ -51,10 +51,7 @@ TIME_PART = 0.005
 MOST_MISSES = 2
 
 CAUSES = {
-    "plate-outline": "arcs that a slope meets: LinuxCNC overlaps them without a tolerance, and"
-    " leaves the corner by more than the model's straight tangents",
     "3dtest": "arcs in XZ and YZ are chords in a toolpath; each chord is a move of its own",
-    "bore": "helices one after the other, and lines out of them",
 }
 """Why programs are off by more than is aimed at."""
 

@@ -121,6 +121,9 @@ ENDLESS = {
     "turns": "F9\no1 while [1]\nG2 I1 P10000\no1 endwhile\n",
     "cycle": "F9 G91 G81 X1 Z-1 R1 L1000000000\n",
     "pecks": "F9 G83 X1 Z-1 R1 Q0.0000001\n",
+    "cycles": "F9\no1 while [1]\nG81 X1 Z-1 R1 L9000\nG80\no1 endwhile\n",
+    "peckings": "F9\no1 while [1]\nG83 X1 Z-1 R1 Q0.001\nG80\no1 endwhile\n",
+    "beside": "F9 G42.1 D1\no1 while [1]\nG1 X1\nY1\nX0\nY0\no1 endwhile\n",
     "chords": "G18 F9\no1 while [1]\nG2 I9999 K0 P100\no1 endwhile\n",
     "thread": "M3 S9 G76 P1 Z-1 I-1 J0.0000001 K1\n",
 }
@@ -130,6 +133,12 @@ BOUNDS = "more than|calls within calls"
 @pytest.mark.parametrize("kind", ENDLESS)
 def test_a_program_without_end_is_stopped(kind: str) -> None:
     with pytest.raises(ProgramError, match=BOUNDS):
+        read(ENDLESS[kind] + "M2\n", "dialect.most_lines=20000")
+
+
+@pytest.mark.parametrize("kind", ["cycles", "peckings", "beside"])
+def test_what_takes_longer_counts_as_more_lines(kind: str) -> None:
+    with pytest.raises(ProgramError, match="more than 20000 lines"):
         read(ENDLESS[kind] + "M2\n", "dialect.most_lines=20000")
 
 
