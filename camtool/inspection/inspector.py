@@ -84,7 +84,7 @@ class Inspector:
             for feature, cut in zip(each.bound.features, each.cuts, strict=True):
                 if id(cut) not in lies:
                     lies[id(cut)] = edge_at(feature, cut, rows_of(slides, cut, feature))
-            size = size_of(each.bound, [lies[id(cut)] for cut in each.cuts])
+            size = size_of(each.bound, each.cuts, [lies[id(cut)] for cut in each.cuts])
             sizes.append(size or Size(math.nan, math.nan, math.nan))
         return sizes
 
@@ -185,7 +185,8 @@ class ToolAt:
         rows = np.arange(len(wanted))
         starts, ends = wanted.starts_of(rows)[:, 2], wanted.end[:, 2]
         self.z = np.maximum(starts, ends)
-        """(N,) mm: the height to which each row cuts at least."""
+        """(N,) mm: the height to which each row cuts at least as wide as at the surface; infinite
+        where the tool tapers all the way."""
         lowest = np.minimum(starts, ends)
         self.radius = np.full(len(wanted), 0.5 * (diameter_mm or 0.0))
         """(N,) mm: the radius at the surface."""
@@ -205,6 +206,10 @@ class ToolAt:
                 depth = np.maximum(-lowest[part], 0.0)
                 wide = np.array([tool.radius_at(each) for each in depth.tolist()])
                 self.radius[part] = np.minimum(wide, widest) if widest else wide
+                # Above its nose a mill is as wide as at the surface; a V bit never is.
+                straight = self.z[part] + tool.nose_mm
+                tapers = (straight >= 0.0) | (tool.kind == "v")
+                self.z[part] = np.where(tapers, np.inf, straight)
 
 
 def swept_moves(wanted: CutMoves, tool: ToolAt) -> Swept:

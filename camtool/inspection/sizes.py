@@ -12,6 +12,12 @@ N being the unit normal of b − a with N_v > 0. The least over all segments is 
 edge lies: above 0 material is left, below 0 too much is cut. With r = 0 it is where the path
 crosses the normal.
 
+A feature is cut in passes, and each pass clears all above its own depth, too: at a depth z the
+segments count that lie no higher. So what is cleared grows from the deepest pass to the surface:
+the least and the largest clearance are there. But where a pass is raised over a tab, or comes down
+a ramp, other stations are cut at other depths, and places and zones neither grow nor shrink. So
+sizes are taken at all depths at which moves lie, and the extreme ones are those of the feature.
+
 Sizes of it are those of ISO 14405-1 (two-point sizes, the least-squares size) and zones of ISO
 1101 (minimum zones, as linear programmes in the deviations, which are small beside the feature).
 Not looked at: the lay of the surface, taper of the tool, burrs.
@@ -22,6 +28,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -43,6 +50,16 @@ exact to a fifth of this."""
 FEWEST_SHARE = 0.25
 """A feature of which less than this is cut is not measured."""
 
+LEVEL_SHARE = 0.5
+"""A depth at which fewer of the stations are cut than this part of those at the surface (the end
+of a ramp) is not measured by itself."""
+
+MOST_LEVELS = 200
+"""Depths at which a feature is measured; of more (a helix of many arcs) so many, evenly spaced."""
+
+SAME_LEVEL_MM = 1e-6
+"""Depths that differ by no more are one."""
+
 ON_PATH_SHARE = 0.25
 """A tool whose centre comes nearer to a feature than this part of its radius runs along it: the
 feature is then its path, not its edge."""
@@ -56,7 +73,8 @@ that far from what was planned."""
 class Swept:
     """Segments of a tool's path, K: from `a` to `b` (K, 2) mm, `radius` (K,) mm of the tool at the
     surface, the height `z` (K,) mm to which it is cut at least, and the wanted row (K,) that each
-    belongs to."""
+    belongs to. Where the tool tapers, so that its radius is that at the surface alone, `z` is
+    infinite."""
 
     a: Floats
     b: Floats
@@ -69,6 +87,19 @@ class Swept:
         return Swept(
             self.a[which], self.b[which], self.radius[which], self.z[which], self.row[which]
         )
+
+    def of_rows(self, rows: Ints) -> Swept:
+        """Those of some rows (R,), which are sorted."""
+        order, row = self._by_row
+        first, last = np.searchsorted(row, rows), np.searchsorted(row, rows, side="right")
+        many = last - first
+        place = np.arange(many.sum()) - np.repeat(np.cumsum(many) - many, many)
+        return self.of(order[np.repeat(first, many) + place])
+
+    @cached_property
+    def _by_row(self) -> tuple[Ints, Ints]:
+        order = np.argsort(self.row, kind="stable")
+        return order, self.row[order]
 
     def wider(self, by_mm: float) -> Swept:
         """With a tool whose radius is larger by so much; paths without width stay so."""
@@ -91,14 +122,14 @@ class Stations:
 class Cut:
     """How a feature is cut: on which `side` the tool runs (+1: outside of a circle, left of an
     edge), whether it runs along it (`on_path`), the wanted `rows` that cut it, its stations, and
-    at which of them (L, S) it is cut at each of L depths: the moves that cut at least to
-    `levels_mm`, all (infinite) and those at the deepest."""
+    at which of them (L, S) it is cut at each of L depths: by the moves that cut at least to
+    `levels_mm`, falling from the surface (infinite), where all of them count, to the deepest."""
 
     side: int
     on_path: bool
     rows: Ints
     stations: Stations
-    levels_mm: tuple[float, ...]
+    levels_mm: Floats
     seen: Bools
 
 
@@ -120,37 +151,59 @@ def stations_of(feature: Feature, side: int) -> Stations:
     return Stations(places, normals, every, feature.length_mm / EDGE_STATIONS)
 
 
+SURFACE = np.array([math.inf])
+"""The depth at which all moves count."""
+
+
 def envelope(
-    feature: Feature, stations: Stations, swept: Swept, asked: Bools, above_mm: float = 0.0
+    feature: Feature,
+    stations: Stations,
+    swept: Swept,
+    asked: Bools,
+    *,
+    levels_mm: Floats = SURFACE,
+    above_mm: float = 0.0,
 ) -> Floats:
-    """(S,) mm: where the machined edge lies along each normal, above 0 where material is left, at
-    the stations that are `asked` (S,) for; infinite where no segment clears it, or only more than
-    `above_mm` (not 0) above the middle of all.
+    """(L, S) mm: where the machined edge lies along each normal at each of L depths, which fall,
+    above 0 where material is left, at the stations that are `asked` (L, S) for; infinite where no
+    segment clears it, or only more than `above_mm` (not 0) above the middle of all.
 
     Segments that cross a normal themselves come first, which is quick, and gives a bound: of the
     others only those can matter whose discs reach below it.
     """
-    crossing = _envelope(feature, stations, swept, asked, -math.inf)
-    known = crossing[asked & np.isfinite(crossing)]
+    crossing = _envelope(feature, stations, swept, asked, levels_mm, -math.inf)
     bound = math.inf
-    if len(known) and above_mm:
-        bound = float(np.median(known)) + above_mm
-    elif len(known) == asked.sum():
-        bound = float(known.max(initial=-math.inf))
-    return np.minimum(crossing, _envelope(feature, stations, swept, asked, bound))
+    finite = asked & np.isfinite(crossing)
+    if finite.any() and above_mm:
+        middles = [np.median(row[here]) for row, here in zip(crossing, finite, strict=True)
+                   if here.any()]  # fmt: skip
+        bound = float(max(middles)) + above_mm
+    elif finite.sum() == asked.sum():
+        bound = float(crossing[finite].max(initial=-math.inf))
+    rest = _envelope(feature, stations, swept, asked, levels_mm, bound)
+    return np.minimum(crossing, rest)
 
 
 def _envelope(
-    feature: Feature, stations: Stations, swept: Swept, asked: Bools, bound_mm: float
+    feature: Feature,
+    stations: Stations,
+    swept: Swept,
+    asked: Bools,
+    levels_mm: Floats,
+    bound_mm: float,
 ) -> Floats:
-    """(S,) mm as `envelope`, of the segments that can reach below `bound_mm`; with −∞, of those
+    """(L, S) mm as `envelope`, of the segments that can reach below `bound_mm`; with −∞, of those
     that cross a normal themselves."""
-    found = np.full(len(stations.places), np.inf)
-    if len(swept.a) == 0:
-        return found
+    found = np.full((len(levels_mm), len(stations.places)), np.inf)
     segment, station = _pairs(feature, stations, swept, bound_mm)
-    keep = asked[station]
+    # The deepest level to which a segment reaches; the shallower ones follow at the end.
+    level = np.searchsorted(-levels_mm, -swept.z + SAME_LEVEL_MM, side="right") - 1
+    wanted: Bools = np.asarray(asked.any(axis=0))
+    keep = wanted[station] & (level[segment] >= 0)
     segment, station = segment[keep], station[keep]
+    if not len(segment):
+        return found
+    level = level[segment]
     place, normal = stations.places[station], stations.normals[station]
     along = np.column_stack([normal[:, 1], -normal[:, 0]])
     radius = swept.radius[segment]
@@ -161,7 +214,7 @@ def _envelope(
     for u, v in ((ua, va), (ub, vb)):
         under = wide & (np.abs(u) <= radius)
         low = v[under] - np.sqrt(radius[under] ** 2 - u[under] ** 2)
-        np.minimum.at(found, station[under], low)
+        np.minimum.at(found, (level[under], station[under]), low)
     du, dv = ub - ua, vb - va
     length = np.hypot(du, dv)
     moves = np.flatnonzero(du != 0.0)
@@ -171,7 +224,9 @@ def _envelope(
     share = (radius[moves] * nu - ua[moves]) / du
     crosses = (share >= 0.0) & (share <= 1.0)
     low = va[moves] - radius[moves] * nv + share * dv
-    np.minimum.at(found, station[moves][crosses], low[crosses])
+    np.minimum.at(found, (level[moves][crosses], station[moves][crosses]), low[crosses])
+    found = np.minimum.accumulate(found[::-1], axis=0)[::-1]
+    found[~asked] = np.inf
     return found
 
 
@@ -229,14 +284,28 @@ def _reach(radius: Floats, least_v: Floats, bound_mm: float) -> Floats:
 
 
 def cut_of(feature: Feature, wanted: Swept) -> Cut | None:
-    """How the wanted moves cut a feature; None where they do not."""
+    """How the wanted moves cut a feature; None where they do not.
+
+    A tool that tapers makes a feature only where it runs along it, or where its edge at the
+    surface is the feature itself: a chamfer is none."""
+    straight = np.isfinite(wanted.z)
+    walls = _cut_of(feature, wanted.of(straight))
+    tapering = _cut_of(feature, wanted.of(~straight))
+    if tapering is not None and tapering[1] <= REACHED_MM:
+        return walls[0] if walls is not None and walls[1] <= REACHED_MM else tapering[0]
+    return None if walls is None else walls[0]
+
+
+def _cut_of(feature: Feature, wanted: Swept) -> tuple[Cut, float] | None:
+    """How these moves cut a feature, and how far from it, mm; None where they do not."""
     near = _near(feature, wanted)
     v, beside = _offsets(feature, wanted, near)
     near, v = near[beside], v[beside]
     if not len(near):
         return None
     radius = wanted.radius[near]
-    inner = np.abs(v) <= ON_PATH_SHARE * radius + REACHED_MM
+    tapers = np.isinf(wanted.z[near])
+    inner = np.abs(v) <= np.where(tapers, 0.0, ON_PATH_SHARE * radius) + REACHED_MM
     on_path = bool(inner.any())
     if on_path:
         side, mine = 1, near[inner]
@@ -250,23 +319,31 @@ def cut_of(feature: Feature, wanted: Swept) -> Cut | None:
         chosen = replace(chosen, radius=np.zeros(len(chosen.a)))
     stations = stations_of(feature, side)
     levels = _levels(chosen)
-    seen = []
-    for level in levels:
-        part = chosen.of(chosen.z <= level)
-        planned = envelope(feature, stations, part, stations.measured, 2.0 * REACHED_MM)
-        finite = np.isfinite(planned)
-        middle = float(np.median(planned[finite])) if finite.any() else math.nan
-        seen.append(finite & (np.abs(planned - middle) <= REACHED_MM))
-    reached = np.array(seen)
-    if reached[0].sum() < FEWEST_SHARE * stations.measured.sum():
+    every = np.broadcast_to(stations.measured, (len(levels), len(stations.measured)))
+    planned = envelope(
+        feature, stations, chosen, every, levels_mm=levels, above_mm=2.0 * REACHED_MM
+    )
+    seen = np.isfinite(planned)
+    middles = []
+    for row, here in zip(planned, seen, strict=True):
+        middles.append(float(np.median(row[here])) if here.any() else math.inf)
+        here[here] = np.abs(row[here] - middles[-1]) <= REACHED_MM
+    counts = seen.sum(axis=1)
+    if counts[0] < FEWEST_SHARE * stations.measured.sum():
         return None
-    return Cut(side, on_path, rows, stations, levels, reached)
+    enough = counts >= LEVEL_SHARE * counts[0]
+    cut = Cut(side, on_path, rows, stations, levels[enough], seen[enough])
+    return cut, abs(middles[0])
 
 
-def _levels(swept: Swept) -> tuple[float, ...]:
-    """The surface, where all moves count, and the deepest height."""
-    deepest = float(swept.z.min())
-    return (math.inf,) if bool((swept.z <= deepest).all()) else (math.inf, deepest)
+def _levels(swept: Swept) -> Floats:
+    """(L,) mm the heights of all moves, falling; of the highest all moves count, and whatever
+    tapers."""
+    heights = np.unique(np.round(swept.z[np.isfinite(swept.z)] / SAME_LEVEL_MM) * SAME_LEVEL_MM)
+    below = heights[:-1][::-1]
+    if len(below) >= MOST_LEVELS:
+        below = below[np.linspace(0, len(below) - 1, MOST_LEVELS - 1).round().astype(np.int64)]
+    return np.concatenate([SURFACE, below])
 
 
 def _near(feature: Feature, swept: Swept) -> Ints:
@@ -315,28 +392,33 @@ class Size:
 def edge_at(feature: Feature, cut: Cut, swept: Swept) -> Floats:
     """(L, S) mm where the feature's machined edge lies at each depth, outwards from a circle and
     to the left of an edge; NaN where it is not cut. `swept` is what the slides do."""
-    found: list[Floats] = []
-    for level, seen in zip(cut.levels_mm, cut.seen, strict=True):
-        mine = swept.of(swept.z <= level)
-        lies = envelope(feature, cut.stations, mine, seen)
-        lies[~np.isfinite(lies)] = np.nan
-        found.append(cut.side * lies)
-    return np.array(found)
+    lies = envelope(feature, cut.stations, swept, cut.seen, levels_mm=cut.levels_mm)
+    lies[~np.isfinite(lies)] = np.nan
+    return np.asarray(cut.side * lies)
 
 
 def rows_of(swept: Swept, cut: Cut, feature: Feature) -> Swept:
     """The segments of the slides that belong to the moves that cut a feature, near it."""
-    mine = swept.of(_near(feature, swept))
-    mine = mine.of(np.isin(mine.row, cut.rows))
+    mine = swept.of_rows(cut.rows)
+    mine = mine.of(_near(feature, mine))
     return replace(mine, radius=np.zeros(len(mine.a))) if cut.on_path else mine
 
 
-def size_of(bound: Bound, lies: Sequence[Floats]) -> Size | None:
-    """The size of a dimension whose features' machined edges lie so (L, S), as `edge_at` gives
-    them in the order of `bound.features`; None where one is not cut."""
-    found = []
-    for level in range(max(len(each) for each in lies)):
-        here = [each[min(level, len(each) - 1)] for each in lies]
+def size_of(bound: Bound, cuts: Sequence[Cut], lies: Sequence[Floats]) -> Size | None:
+    """The size of a dimension from how its features are cut and where their machined edges lie
+    (L, S), as `edge_at` says, in the order of `bound.features`; None where one is not cut. Below
+    the deepest cut of one feature it counts as it is there."""
+    levels = np.unique(np.concatenate([cut.levels_mm for cut in cuts]))[::-1]
+    found: list[Size] = []
+    last: list[Floats] = []
+    for level in levels.tolist():
+        here = [
+            edges[min(int(np.searchsorted(-cut.levels_mm, -level)), len(edges) - 1)]
+            for cut, edges in zip(cuts, lies, strict=True)
+        ]
+        if last and all(map(_alike, here, last)):
+            continue
+        last = here
         if all(np.isfinite(each).sum() >= FEWEST_STATIONS for each in here):
             found.append(_size(bound, here))
     if not found:
@@ -344,6 +426,11 @@ def size_of(bound: Bound, lies: Sequence[Floats]) -> Size | None:
     return Size(
         found[0].fit_mm, min(each.low_mm for each in found), max(each.high_mm for each in found)
     )
+
+
+def _alike(one: Floats, other: Floats) -> bool:
+    """Whether edges lie alike, so that their sizes are."""
+    return bool(np.allclose(one, other, rtol=0.0, atol=SAME_LEVEL_MM, equal_nan=True))
 
 
 FEWEST_STATIONS = 3

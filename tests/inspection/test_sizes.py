@@ -14,6 +14,7 @@ from camtool.arrays import Floats
 from camtool.inspection.dimensions import Dimension, Kind
 from camtool.inspection.features import Bound, Circle, Edge, End, Feature
 from camtool.inspection.sizes import (
+    Size,
     Swept,
     cut_of,
     edge_at,
@@ -29,15 +30,20 @@ HOLE = Circle(0, (1.0, 2.0), 3.0, WHOLE)
 EDGE = Edge(0, (0.0, 0.0), (8.0, 6.0))
 
 
-def swept(points: Floats, radius: float, row: int = 0) -> Swept:
+def swept(points: Floats, radius: float, row: int = 0, z: float = -1.0) -> Swept:
     count = len(points) - 1
     return Swept(
         points[:-1],
         points[1:],
         np.full(count, radius),
-        np.full(count, -1.0),
+        np.full(count, z),
         np.full(count, row),
     )
+
+
+def joined(*paths: Swept) -> Swept:
+    names = ("a", "b", "radius", "z", "row")
+    return Swept(*(np.concatenate([getattr(each, name) for each in paths]) for name in names))
 
 
 def ring(centre: tuple[float, float], radius: float, count: int = 2000) -> Floats:
@@ -79,7 +85,7 @@ def test_envelopes_are_the_edge_of_what_the_tool_clears(
         points = np.asarray(feature.start_mm) + at * 10.0 * feature.along + radius * left
     path = swept(points + random.uniform(-wobble, wobble, points.shape), radius)
     stations = stations_of(feature, side)
-    mine = envelope(feature, stations, path, stations.measured)
+    mine = envelope(feature, stations, path, stations.measured[None])[0]
     theirs = cleared(feature, side, path)
     reached = np.isfinite(theirs)
     assert (np.isfinite(mine) == reached).all()
@@ -89,11 +95,98 @@ def test_envelopes_are_the_edge_of_what_the_tool_clears(
     assert np.median(np.abs(mine[reached] - theirs[reached])) < 1e-5
 
 
+@settings(max_examples=25, deadline=None)
+@given(feature=st.sampled_from([HOLE, EDGE]), seed=st.integers(0, 10_000))
+def test_at_each_depth_the_moves_count_that_reach_it(feature: Feature, seed: int) -> None:
+    random = np.random.default_rng(seed)
+    if isinstance(feature, Circle):
+        points = ring(feature.centre_mm, feature.radius_mm - 1.0, 60)
+    else:
+        left = np.array([-feature.along[1], feature.along[0]])
+        points = feature.start_mm + np.linspace(0.0, 10.0, 40)[:, None] * feature.along + left
+    passes = [
+        swept(points + random.uniform(-0.1, 0.1, points.shape), 1.0, row, -random.integers(1, 5))
+        for row in range(6)
+    ]
+    path = joined(*passes)
+    path = path.of(random.uniform(size=len(path.a)) < 0.8)
+    stations = stations_of(feature, -1 if isinstance(feature, Circle) else 1)
+    levels = np.array([math.inf, -2.0, -3.0, -3.5, -4.0])
+    asked = random.uniform(size=(5, len(stations.places))) < 0.9
+    found = envelope(feature, stations, path, asked, levels_mm=levels)
+    for level, here, each in zip(levels, asked, found, strict=True):
+        alone = envelope(feature, stations, path.of(path.z <= level), here[None])[0]
+        assert each == pytest.approx(alone, abs=1e-12)
+
+
+def test_sizes_of_all_depths_count() -> None:
+    """Three passes about other centres, each as wide as it must be to be seen at its own depth
+    alone: the middle one shows neither at the surface nor at the bottom."""
+    wanted, slides = [], []
+    for row, (z, grown, shift) in enumerate([(-1, 0.2, 0.0), (-2, 0.1, 0.04), (-3, 0.0, 0.0)]):
+        wanted.append(swept(ring(HOLE.centre_mm, 2.0), 1.0, row, z))
+        centre = HOLE.centre_mm[0] + shift, HOLE.centre_mm[1]
+        slides.append(swept(ring(centre, 2.0 + grown), 1.0, row, z))
+    cut = cut_of(HOLE, joined(*wanted))
+    assert cut is not None
+    assert cut.levels_mm.tolist() == [math.inf, -2.0, -3.0]
+    lies = edge_at(HOLE, cut, rows_of(joined(*slides), cut, HOLE))
+
+    def size(kind: Kind) -> Size:
+        bound = Bound(Dimension("d", kind, (), "test"), (HOLE,), (), np.zeros(2), 6.0)
+        found = size_of(bound, [cut], [lies])
+        assert found is not None
+        return found
+
+    assert size("position").high_mm == pytest.approx(0.08, abs=1e-4)
+    assert size("position").fit_mm == pytest.approx(0.0, abs=1e-4)
+    assert size("diameter").high_mm == pytest.approx(6.4, abs=1e-4)
+    assert size("diameter").low_mm == pytest.approx(6.0, abs=1e-4)
+
+
+def test_the_end_of_a_ramp_is_no_depth_of_its_own() -> None:
+    """A helix of one turn for each millimetre, in twelve arcs each, and a last turn at depth."""
+    turn = ring(HOLE.centre_mm, 2.0, 720)
+    arcs = [swept(turn[60 * (k % 12) : 60 * (k % 12) + 61], 1.0, k, -k / 12.0) for k in range(36)]
+    cut = cut_of(HOLE, joined(*arcs, swept(turn, 1.0, 36, -3.0)))
+    assert cut is not None
+    assert cut.levels_mm[-1] == -3.0
+    assert (cut.seen.sum(axis=1) >= 0.5 * cut.seen[0].sum()).all()
+    open_end = cut_of(HOLE, joined(*arcs))
+    assert open_end is not None
+    # Below −2.5 less than half of the circle is cut.
+    assert -2.6 < open_end.levels_mm[-1] < -2.4
+
+
+def test_many_depths_are_thinned_out_but_for_the_last() -> None:
+    turn = ring(HOLE.centre_mm, 2.0, 90)
+    cut = cut_of(HOLE, joined(*(swept(turn, 1.0, k, -0.01 * k) for k in range(1, 500))))
+    assert cut is not None
+    assert len(cut.levels_mm) == 200
+    assert cut.levels_mm[-1] == pytest.approx(-4.99)
+
+
+@pytest.mark.parametrize("tip", [0.0, 0.1, 0.5])
+def test_what_tapers_is_no_wall(tip: float) -> None:
+    """A chamfer, its tip so far behind the wall, whose radius is that at the surface."""
+    wall = swept(ring(HOLE.centre_mm, 2.0), 1.0, 0, -3.0)
+    chamfer = swept(ring(HOLE.centre_mm, 3.0 - tip), 0.5 + tip, 1, math.inf)
+    cut = cut_of(HOLE, joined(wall, chamfer))
+    assert cut is not None
+    assert cut.rows.tolist() == [0]
+    assert not cut.on_path
+    alone = cut_of(HOLE, chamfer)
+    assert (alone is None) == (tip > 0.0)  # along the circle it is a groove
+    sign = cut_of(HOLE, swept(ring(HOLE.centre_mm, 2.4), 0.6, 1, math.inf))
+    assert sign is not None
+    assert sign.levels_mm.tolist() == [math.inf]
+
+
 def measured(kind: Kind, feature: Circle | Edge, wanted: Swept, slides: Swept) -> float:
     cut = cut_of(feature, wanted)
     assert cut is not None
     bound = Bound(Dimension("d", kind, (), "test"), (feature,), (), np.zeros(2), 0.0)
-    size = size_of(bound, [edge_at(feature, cut, rows_of(slides, cut, feature))])
+    size = size_of(bound, [cut], [edge_at(feature, cut, rows_of(slides, cut, feature))])
     assert size is not None
     return size.fit_mm
 
@@ -129,7 +222,7 @@ def test_two_point_sizes_of_an_oval_hole() -> None:
     cut = cut_of(HOLE, wanted)
     assert cut is not None
     bound = Bound(Dimension("d", "diameter", (), "test"), (HOLE,), (), np.zeros(2), 6.0)
-    size = size_of(bound, [edge_at(HOLE, cut, rows_of(swept(oval, 1.0), cut, HOLE))])
+    size = size_of(bound, [cut], [edge_at(HOLE, cut, rows_of(swept(oval, 1.0), cut, HOLE))])
     assert size is not None
     assert size.high_mm == pytest.approx(6.08, abs=1e-3)
     assert size.low_mm == pytest.approx(5.96, abs=1e-3)
@@ -151,10 +244,11 @@ def test_widths_between_edges_that_move_apart() -> None:
     left, right = Edge(0, (0, 0), (0, 10)), Edge(0, (6, 10), (6, 0))
     paths = [np.array([(1.0, -3.0), (1.0, 13.0)]), np.array([(5.0, 13.0), (5.0, -3.0)])]
     slides = [np.array([(0.9, -3.0), (0.98, 13.0)]), np.array([(5.05, 13.0), (5.05, -3.0)])]
-    lies = []
+    cuts, lies = [], []
     for row, (feature, path, slide) in enumerate(zip((left, right), paths, slides, strict=True)):
         cut = cut_of(feature, swept(path, 1.0, row))
         assert cut is not None
+        cuts.append(cut)
         lies.append(edge_at(feature, cut, rows_of(swept(slide, 1.0, row), cut, feature)))
     bound = Bound(
         Dimension("d", "distance", (), "test"),
@@ -163,7 +257,7 @@ def test_widths_between_edges_that_move_apart() -> None:
         np.array([1.0, 0.0]),
         6.0,
     )
-    size = size_of(bound, lies)
+    size = size_of(bound, cuts, lies)
     assert size is not None
     # The left edge runs from x = −0.085 to −0.035 between y 0 and 10; the right one is at 6.05.
     assert size.fit_mm == pytest.approx(6.11, abs=1e-3)

@@ -12,6 +12,7 @@ from camtool.errors import OptionError
 from camtool.findings import Code, Severity
 from camtool.inspection.dimensions import Dimension, Kind, Limits, Place
 from camtool.inspection.inspector import Inspector
+from camtool.inspection.sizes import edge_at, rows_of, size_of
 from camtool.inspection.uncertainty import Variant
 from camtool.inspection.verdicts import SURE, Tolerances, inspect
 from camtool.run import Run
@@ -317,6 +318,101 @@ def test_slides_that_are_elsewhere_give_no_size(plate: Path) -> None:
     for each in done.report.inspection:
         assert math.isfinite(each.fit_mm)
         assert math.isfinite(each.standard_um or 0.0)
+
+
+JOB = """
+feed = "300mm/min"
+step_down = "1mm"
+[tools.mill]
+number = 1
+diameter = "2mm"
+[tools.bit]
+number = 2
+kind = "v"
+diameter = "6mm"
+tip_angle = "90deg"
+[tools.ball]
+number = 3
+kind = "ball"
+diameter = "2mm"
+"""
+OUTLINES = """
+[[operations]]
+kind = "profile"
+tool = "{tool}"
+depth = "4mm"
+{more}
+"""
+RIMS = """
+[[operations]]
+name = "rims"
+kind = "chamfer"
+tool = "bit"
+chamfer = "0.5mm"
+"""
+
+
+def cut_deep(plate: Path, operations: str, *settings: str) -> Run:
+    file = plate.parent / "job.toml"
+    file.write_text(JOB + operations)
+    target = camtool.load_target("linuxcnc", settings=[*EXACT, *KNOWN, *settings])
+    return camtool.post(plate, target, job=camtool.read_job(file))
+
+
+@pytest.mark.parametrize(
+    ("tool", "more"),
+    [
+        ("mill", ""),
+        ("mill", 'tabs = { count = 4, width = "3mm", height = "1.5mm" }'),
+        ("mill", 'entry = { kind = "ramp", angle = "5deg" }'),
+        ("mill", 'finish = "0.2mm"'),
+        ("mill", 'tabs = { count = 3, width = "4mm", height = "2.5mm" }\nentry = "ramp:2deg"'),
+        ("ball", ""),
+    ],
+)
+@pytest.mark.parametrize("rims", ["", RIMS])
+def test_an_exact_machine_makes_what_is_drawn_at_every_depth(
+    plate: Path, tool: str, more: str, rims: str
+) -> None:
+    run = cut_deep(plate, OUTLINES.format(tool=tool, more=more) + rims)
+    inspector = Inspector(run, ALL)
+    assert not inspector.findings
+    for each, size in zip(inspector.dimensions, inspector.sizes(), strict=True):
+        for one in (size.fit_mm, size.low_mm, size.high_mm):
+            assert one == pytest.approx(each.bound.drawn_mm, abs=1e-3)
+
+
+def test_a_chamfer_alone_makes_no_dimension(plate: Path) -> None:
+    done = inspect(cut_deep(plate, RIMS), Tolerances(ALL))
+    assert done.report is not None
+    assert done.report.inspection == ()
+    assert Code.DIMENSION_NOT_CUT in {each.code for each in done.findings}
+
+
+def test_every_depth_counts(plate: Path) -> None:
+    """The first pass comes from elsewhere than the others, so that its reversals are others."""
+    slack = "axes.x.backlash_mm=0.06", "axes.y.backlash_mm=0.04"
+    run = cut_deep(plate, OUTLINES.format(tool="mill", more=""), *slack)
+    one = [Inspector(run, ALL).sizes()]
+    inspector = Inspector(run, ALL)
+    for each in inspector.dimensions:
+        for cut in each.cuts:
+            assert len(cut.levels_mm) == 4
+    # Slide by slide, of the moves of each depth and below: the extremes are among them.
+    slides = inspector._slides(run.target.machine)
+    for index, each in enumerate(inspector.dimensions):
+        sizes = []
+        for level in (math.inf, -2.0, -3.0, -4.0):
+            part = slides.of(slides.z <= level + 1e-9)
+            lies = [
+                edge_at(feature, cut, rows_of(part, cut, feature))
+                for feature, cut in zip(each.bound.features, each.cuts, strict=True)
+            ]
+            size = size_of(each.bound, [*each.cuts], [lie[:1] for lie in lies])
+            assert size is not None
+            sizes.append(size)
+        assert one[0][index].low_mm == pytest.approx(min(s.low_mm for s in sizes), abs=1e-6)
+        assert one[0][index].high_mm == pytest.approx(max(s.high_mm for s in sizes), abs=1e-6)
 
 
 def test_a_scaled_part_is_refused(plate: Path) -> None:
