@@ -7,6 +7,7 @@ takes its place.
 
 from __future__ import annotations
 
+import gc
 import multiprocessing
 import os
 import signal
@@ -229,8 +230,11 @@ def serve(pipe: Connection) -> None:
         os.environ.setdefault(name, "1")
     try:
         work: Work = pipe.recv()
+        gc.disable()
         with suppress(Exception):  # the fault shows again at each drawing, with its name
             work.warm()
+        gc.freeze()  # what is loaded lasts: no search for garbage looks at it
+        gc.enable()
         pipe.send(READY)
         while (task := pipe.recv()) is not None:
             pipe.send((made_of(work, task, None), peak_mib()))

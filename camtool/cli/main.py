@@ -40,9 +40,10 @@ AGAIN_S = 0.01
 _FULL = (errno.ENOSPC, errno.EBADF, errno.EIO, errno.EFBIG)
 """Errors of a full or closed stream, which name no file."""
 
-GARBAGE_AFTER = 50_000
+GARBAGE_AFTER = 150_000
 """How many more objects are made than freed before Python looks for cycles of garbage. Its default
-of 700 suits programs that run long; loading the libraries makes half a million lasting objects."""
+of 700 suits programs that run long; loading the libraries and reading a small DXF, which need no
+search, make fewer than this."""
 
 
 COMMANDS = (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from camtool.arrays import Ints
 from camtool.geometry.drawing import Drawing
@@ -12,8 +13,10 @@ from camtool.simulation.motion import ALL, Effects, Options
 from camtool.target.registry import LoadedTarget
 from camtool.toolpath.moves import Compensated, Toolpath
 from camtool.toolpath.wanted import Kept
-from camtool.verification.conformance import Asked
-from camtool.verification.registration import Registration
+
+if TYPE_CHECKING:
+    from camtool.verification.conformance import Asked
+    from camtool.verification.registration import Registration
 
 COVERAGE_MM = 0.005
 """A move is missing, or extra, when farther than this from all moves of the other side ..."""

@@ -262,7 +262,10 @@ def _at(radius: Floats, least: Floats, largest: Floats, at: int, turn: int) -> t
     below = radius[(at - 1 - np.arange(NEAR_BINS, FAR_BINS)) % count]
     if not (np.isfinite(behind).all() and np.isfinite(below).all()):
         return math.nan, math.nan
-    high, low = (float(np.polyfit(away, side, 1)[1]) for side in (behind, below))
+    # The line through the bins of a side by least squares, at the edge, which is a sum of them.
+    centred = away - away.mean()
+    weights = 1.0 / len(away) - away.mean() * centred / (centred * centred).sum()
+    high, low = (float((weights * side).sum()) for side in (behind, below))
     near = np.arange(at - NEAR_BINS, at + NEAR_BINS) % count
     seen = np.isfinite(largest[near])
     out = float(largest[near][seen].max(initial=-math.inf)) - max(high, low)

@@ -16,6 +16,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from importlib.metadata import version
+from typing import TYPE_CHECKING
 
 import msgspec
 import numpy as np
@@ -33,7 +34,6 @@ from camtool.units import UM_PER_MM
 from camtool.verification import report as record
 from camtool.verification.case import SAMPLE_MM, TRACE_POINTS, Case, VerifyOptions
 from camtool.verification.circles import UNSEEN, full_circles
-from camtool.verification.conformance import Asked, Conformance, conformance_of
 from camtool.verification.coverage import (
     Coverage,
     Drilled,
@@ -59,7 +59,6 @@ from camtool.verification.figures import (
 from camtool.verification.matching import Goal, carried_match, own_match
 from camtool.verification.motion_findings import motion_findings
 from camtool.verification.nearest import MoveIndex
-from camtool.verification.registration import Registration
 from camtool.verification.report import Before, Planned, Report, certain, number, reported
 from camtool.verification.shape import Wanted as WantedShape
 from camtool.verification.shape import (
@@ -70,6 +69,10 @@ from camtool.verification.shape import (
     wanted_shape,
 )
 from camtool.verification.slides import Paths, SeenCircle, SlidePass, Trace, trace_size
+
+if TYPE_CHECKING:
+    from camtool.verification.conformance import Asked, Conformance
+    from camtool.verification.registration import Registration
 
 __all__ = ["Case", "Verification", "VerifyOptions", "judge", "verify"]
 
@@ -242,6 +245,8 @@ def _turned(case: Case, decoded: MoveIndex, goal: Goal, *, flat_cuts: bool) -> t
 def _conformance(case: Case, *, flat_cuts: bool) -> Conformance | None:
     if case.asked is None:
         return None
+    from camtool.verification.conformance import conformance_of
+
     return conformance_of(case.decoded, case.asked, flat_cuts=flat_cuts, sample_mm=SAMPLE_MM)
 
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from camtool.verification.circles import Circle, Pairs, reversing
+from camtool.verification.circles import FAR_BINS, NEAR_BINS, Circle, Pairs, reversing
 
 RADIUS = 5.0
 
@@ -101,3 +101,19 @@ def test_each_circle_has_one_partner() -> None:
     bins = bins_of(travel(True)[1])
     pairs = Pairs([circle(True), circle(True), circle(False)])
     assert [len(pairs.add(index, bins)) for index in range(3)] == [0, 0, 1]
+
+
+def test_steps_are_those_of_lines_by_least_squares() -> None:
+    """Against numpy's fit of the bins on both sides of 0°, on radii of any kind."""
+    rng = np.random.default_rng(4)
+    bins = np.zeros((720, 9))
+    angle = np.radians((np.arange(720) + 0.5) / 2.0)
+    radius = RADIUS + rng.normal(0.0, 0.1, 720)
+    bins[:, 0], bins[:, 1], bins[:, 2] = 1.0, radius * np.cos(angle), radius * np.sin(angle)
+    bins[:, 3] = bins[:, 6] = radius**2
+    of_arc = math.radians(0.25) / math.sin(math.radians(0.25))
+    away = np.arange(NEAR_BINS, FAR_BINS)
+    ahead, behind = (
+        np.polyfit(away + 0.5, of_arc * radius[row], 1)[1] for row in (away, -1 - away)
+    )
+    assert reversing(bins, True).step[0] == pytest.approx(ahead - behind, rel=1e-9)

@@ -22,7 +22,6 @@ from camtool.arrays import Floats
 from camtool.geometry.drawing import Callout
 from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.importers.dxf.load import printable
-from camtool.importers.dxf.mtext import plain_text
 from camtool.importers.dxf.shapes import Frame, require
 from camtool.importers.pieces import Unusable
 
@@ -197,6 +196,8 @@ def _text(entity: Any, style: Mapping[str, Any]) -> str:
         raise Unusable(f"has a text of more than {LONGEST_TEXT} characters")
     if raw and not raw.strip():
         raise Unusable("shows no text")
+    from camtool.importers.dxf.mtext import plain_text
+
     # What follows [] is of the alternative units.
     shown, _, _ = post.partition("[]")
     around = shown if "<>" in shown else f"<>{shown}"
