@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
+from camtool.errors import DrawingError
 from camtool.findings import (
     CUT_INTO_PART,
     CUTS_BESIDE,
@@ -38,6 +39,7 @@ from camtool.findings import (
     TOOL_FOUND_OTHER,
     TOOL_FOUND_SEVERAL,
     Finding,
+    Severity,
 )
 from camtool.geometry.boxes import near_points
 from camtool.geometry.distance import nearest
@@ -147,6 +149,21 @@ TURNS = (
     ("--rotate 270", np.array([[0.0, 1.0], [-1.0, 0.0]])),
 )
 """What is tried where no shift does: flags, and what they make of the drawing's points."""
+
+SCALES = (
+    ("--scale 0.9375", 90.0 / 96.0),  # pixels of 96 in the place of 90 to an inch
+    ("--scale 1.06666667", 96.0 / 90.0),
+    ("--scale 0.75", 72.0 / 96.0),  # points for pixels
+    ("--scale 1.33333333", 96.0 / 72.0),
+    ("--scale 10", 10.0),
+    ("--scale 0.1", 0.1),
+    ("--scale 1000", 1000.0),
+    ("--scale 0.001", 0.001),
+)
+"""Other scales that units are mistaken by, tried where the sizes are about in that proportion."""
+
+ABOUT = 1.2
+"""Proportions of sizes that differ by less are about the same: a tool adds its diameter."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -291,8 +308,14 @@ def register(
     """Find what of a drawing, in the work frame, a program cuts.
 
     `tool_diameter_mm`: the tool, None where it is to be found; `align`: the drawing may lie
-    elsewhere. `limit_mm`: how far moves may be from a track without a finding.
+    elsewhere. `limit_mm`: how far moves may be from a track without a finding. DrawingError for a
+    drawing without lines.
     """
+    if not len(drawing.paths.vertices):
+        raise DrawingError(
+            "holds single points alone, and no line that a program could follow",
+            mend="say what the program does with them, with the flags of its job: --kind drill …",
+        )
     running = decoded.first(decoded.running)
     cuts = cut_moves(running, flat_cuts=flat_cuts)
     lines = _Lines.of(drawing.paths)
@@ -394,13 +417,23 @@ def _turned(path: _Path, lines: _Lines) -> tuple[str, _Placed] | None:
     """Another scale, mirror or turn of the drawing with which the path follows it well, as the
     flag that makes it; None without any."""
     found = []
-    for flag, matrix in TURNS:
+    scales = [(flag, size * np.eye(2)) for flag, size in SCALES if _about(path, lines, size)]
+    for flag, matrix in (*TURNS, *scales):
         other = path.seen(np.linalg.inv(matrix))
         here = _Placed((0.0, 0.0), _followed(other, lines, np.zeros(2)))
         places = [here] if here.share >= FITS_WELL else [here, *_places(other, lines)]
         found.append((flag, max(places, key=lambda each: each.share)))
     best = max(found, key=lambda each: each[1].share)
     return best if best[1].share >= FITS_WELL else None
+
+
+def _about(path: _Path, lines: _Lines, size: float) -> bool:
+    """Whether what is cut is about so many times as large as the drawing."""
+    if not len(path.boxes) or not len(lines.boxes):
+        return False
+    drawn = np.hypot(*(lines.boxes[:, :, 1].max(axis=0) - lines.boxes[:, :, 0].min(axis=0)))
+    cut = np.hypot(*(path.boxes[0, :, 1] - path.boxes[0, :, 0]))
+    return bool(size * drawn / ABOUT < cut < size * drawn * ABOUT)
 
 
 def _rivals(best: _Placed, found: Sequence[_Placed]) -> list[_Placed]:
@@ -728,7 +761,8 @@ class _Follower:
         findings += self._beside(rows, off)
         beside = float(self._row_lengths()[self.cuts.is_cut & ~rows].sum())
         whole = float(self._row_lengths()[self.cuts.is_cut].sum())
-        if whole and beside > (1.0 - FITS) * whole and not findings:
+        wrong = any(each.severity == Severity.ERROR for each in findings)
+        if whole and beside > (1.0 - FITS) * whole and not wrong:
             findings.append(DRAWING_PLACE_NOWHERE(measured=100.0 * (1.0 - beside / whole),
                                           limit=100.0 * FITS))  # fmt: skip
         report = FoundReport(
@@ -1098,8 +1132,10 @@ def _with_tracks(of: _Follower, chosen: _Chosen, follow: _Followed) -> Toolpath:
     from camtool.kernels.passes import lifted
 
     toolpath = of.cuts.toolpath
-    measured = MeasuredPaths(chosen.tracks.paths)
     rows = np.flatnonzero(follow.rows)
+    if not len(rows):
+        return toolpath
+    measured = MeasuredPaths(chosen.tracks.paths)
     new = np.ones(len(rows), dtype=np.bool_)
     lap = np.where(chosen.tracks.paths.closed, measured.total_mm, np.inf)[follow.track[rows]]
     gap = follow.begin[rows[1:]] - follow.end[rows[:-1]]

@@ -13,6 +13,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import ezdxf
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -20,6 +21,7 @@ from hypothesis import strategies as st
 from shapely import Polygon
 
 from camtool.arrays import Floats
+from camtool.errors import DrawingError
 from camtool.findings import Code, Severity
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import sample, signed_area
@@ -158,6 +160,8 @@ def test_a_program_that_lies_elsewhere_is_not_guessed_at() -> None:
     [
         (((1.0 / 25.4, 0.0), (0.0, 1.0 / 25.4)), "--scale 0.03937"),
         (((25.4, 0.0), (0.0, 25.4)), "--scale 25.4"),
+        (((0.9375, 0.0), (0.0, 0.9375)), "--scale 0.9375"),
+        (((1000.0, 0.0), (0.0, 1000.0)), "--scale 1000"),
         (((0.0, -1.0), (1.0, 0.0)), "--rotate 90"),
         (((-1.0, 0.0), (0.0, 1.0)), "--mirror x"),
     ],
@@ -290,6 +294,33 @@ def test_a_program_that_cuts_nothing() -> None:
         limit_mm=0.02, flat_cuts=False,
     )  # fmt: skip
     assert codes(result) == {Code.DRAWING_PLACE: Severity.ERROR}
+
+
+def test_a_drawing_of_points_alone_has_nothing_to_follow(tmp_path: Path) -> None:
+    sheet = ezdxf.new()
+    for x in (0.0, 10.0):
+        sheet.modelspace().add_point((x, 5.0))
+    sheet.saveas(tmp_path / "points.dxf")
+    path = decoded("G1 X9 Z-1 F100")
+    drawing = read_drawing(tmp_path / "points.dxf")
+    with pytest.raises(DrawingError, match="no line that a program could follow"):
+        register(path, drawing, tool_diameter_mm=None, align=True, limit_mm=0.1, flat_cuts=True)
+
+
+def test_moves_that_go_on_beyond_their_line_are_left_as_they_are(tmp_path: Path) -> None:
+    file = tmp_path / "line.svg"
+    file.write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" width="200mm" height="9mm" viewBox="0 0 200 9">'
+        '<path d="M 0 5 H 100" fill="none" stroke="black"/></svg>',
+        encoding="utf-8",
+    )
+    path = decoded("G0 X-20 Y4\nG1 Z-1 F100\nX120 F600\nG0 Z5\n")
+    result = register(
+        path, read_drawing(file), tool_diameter_mm=None, align=False, limit_mm=0.1, flat_cuts=True
+    )
+    assert result.wanted.end.tolist() == path.end.tolist()
+    assert result.report.followed == 0.0
+    assert codes(result)[Code.DRAWING_PLACE] == Severity.ERROR
 
 
 def test_the_wanted_path_is_the_drawing_s() -> None:
