@@ -204,11 +204,11 @@ def _mend(kind: type, values: Any, tables: list[str], key: str) -> str:
 def _finite(value: object, file: str, at: str) -> None:
     """MachineError for inf and nan, which TOML allows and no machine has."""
     if isinstance(value, float) and not math.isfinite(value):
-        raise MachineError("is not finite", file=file, where=f"key {at}")
+        raise MachineError("is not finite", file=file, where=f"key {at}", mend="write a number")
     items: Callable[[], Any] | None = getattr(value, "items", None)
     if items is not None:
         for key, item in items():
             _finite(item, file, f"{at}.{key}" if at else str(key))
     elif isinstance(value, list):
-        for item in value:
-            _finite(item, file, at)
+        for number, item in enumerate(value, 1):
+            _finite(item, file, f"{at} {number}" if isinstance(item, dict) else at)

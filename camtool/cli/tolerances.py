@@ -11,7 +11,7 @@ import click
 from camtool.cli.files import STDOUT, check_new, check_places, write_all
 from camtool.cli.messages import say, say_findings, show_text
 from camtool.cli.options import DrawingFlags, SectionedCommand, drawing_options, talk_options
-from camtool.findings import Finding, Severity
+from camtool.findings import Code, Finding, Severity
 from camtool.plain import one_line, to_json
 
 if TYPE_CHECKING:
@@ -51,11 +51,11 @@ def new(
     read = drawing.read(source)
     text, findings, faults = proposed(read)
     write_all({output: text.encode()})
-    say_findings((*read.findings, *findings), quiet=quiet, verbose=verbose)
+    say_findings((*_told(read.findings), *findings), quiet=quiet, verbose=verbose)
     for fault in faults:
         say(f"camtool: warning: {fault}", quiet=quiet)
     where = "stdout" if output == STDOUT else output
-    count = text.count("[[dimension]]")
+    count = sum(line == "[[dimension]]" for line in text.splitlines())
     said = f"{count} dimension{'s' if count != 1 else ''}"
     say(f"written: {where}, {said}; put in the limits that matter", quiet=quiet)
     if any(each.severity == Severity.ERROR for each in findings):
@@ -82,7 +82,7 @@ def show(
     --against also those that the drawing says itself."""
     import msgspec
 
-    from camtool.inspection.tolerances import dimensions_of, read_tolerances
+    from camtool.inspection.tolerances import dimensions_of, read_tolerances, unbound
     from camtool.verification.report import reported
 
     check_places([file, against], [report])
@@ -91,7 +91,7 @@ def show(
     if against is not None:
         read = drawing.read(against)
         dimensions, found = dimensions_of(read, Path(file))
-        findings = (*read.findings, *found)
+        findings = (*_told(read.findings), *found, *unbound(read, dimensions))
     if report is not None:
         rows = [_facts(each) for each in dimensions]
         said = msgspec.to_builtins(reported(findings))
@@ -102,6 +102,14 @@ def show(
     say_findings(findings, quiet=quiet, verbose=verbose)
     if any(each.severity == Severity.ERROR for each in findings):
         raise click.exceptions.Exit(1)
+
+
+def _told(findings: Sequence[Finding]) -> Iterator[Finding]:
+    """Those of reading the drawing, but not that the lines of its dimensions are left out: the
+    dimensions themselves are read here."""
+    for each in findings:
+        if each.code != Code.ENTITY_SKIPPED or " DIMENSION left out" not in each.message:
+            yield each
 
 
 def _facts(each: Dimension) -> dict[str, Any]:

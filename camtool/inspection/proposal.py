@@ -41,17 +41,21 @@ _HEADER = """\
 
 def proposed(drawing: Drawing) -> tuple[str, tuple[Finding, ...], tuple[DrawingError, ...]]:
     """The text of a file with the dimensions of this drawing, what was found in its callouts, and
-    whose limits are wrong: these stand there without. InputError where there is nothing to
-    measure."""
+    whose limits are wrong: these stand there without. What fits nothing that is drawn is a
+    comment. InputError where there is nothing to measure."""
     faults: list[DrawingError] = []
     said, findings = dimensions_of(drawing, faults=faults)
     features = features_of(drawing.paths)
     known = set()
+    rows: list[Dimension] = []
+    lost: list[tuple[Dimension, Finding]] = []
     for each in said:
         bound = bind(each, features, drawing.file)
         if isinstance(bound, Bound):
             known.add(measured_by(bound))
-    rows = list(said)
+            rows.append(each)
+        else:
+            lost.append((each, bound))
     left = 0
     for each in _sizes(features, drawing.paths.closed.tolist()):
         if len(rows) >= MOST_DIMENSIONS:
@@ -61,18 +65,23 @@ def proposed(drawing: Drawing) -> tuple[str, tuple[Finding, ...], tuple[DrawingE
         if isinstance(bound, Bound) and measured_by(bound) not in known:
             known.add(measured_by(bound))
             rows.append(limited(each, bound.drawn_mm)[0])
-    if not rows:
+    if not rows and not lost:
         raise InputError(
             "has no circles, slots or outlines to measure",
             file=drawing.file,
             mend="write tolerances.toml by hand (docs/tolerances.md)",
         )
     text = _HEADER + "".join(map(_row, rows))
+    for each, why in lost:
+        text += (
+            f"\n# {one_line(f'{each.source}: {why.message}; give it places on edges or circles')}"
+        )
+        text += _row(each).replace("\n# limits", "\nlimits").rstrip().replace("\n", "\n# ") + "\n"
     for fault in faults:
         text += f"\n# {one_line(f'{fault.where}: {fault.message}')}\n"
     if left:
         text += f"\n# {left} more circles, slots and sizes of the drawing are not listed.\n"
-    return text, findings, tuple(faults)
+    return text, (*findings, *(why for _, why in lost)), tuple(faults)
 
 
 def _row(each: Dimension) -> str:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -77,22 +77,28 @@ def dimensions_of(
     findings: list[Finding] = []
     dimensions: list[Dimension] = []
     known: dict[object, Dimension] = {}
+    with_limits: dict[str, list[Dimension]] = {}
     for each in asked:
         bound = bind(each, features, file)
-        dimensions += _settled(each, bound, file, findings)
-        if isinstance(bound, Bound):
-            known.setdefault(measured_by(bound), each)
+        settled = _settled(each, bound, file, findings)
+        holds = known.setdefault(_measures(each, bound), each)
+        if holds is each:
+            with_limits[each.source] = settled
+            dimensions += settled
+        for one in settled if holds is not each else ():
+            findings += (_twice(one, other, file) for other in with_limits[holds.source])
     drawn: list[tuple[int, Dimension]] = []
     for place, callout in enumerate(drawing.callouts):
         measured = replace(_measured(callout), general=general)
         bound = bind(measured, features, file)
-        if isinstance(bound, Bound):
-            if measured_by(bound) in known:
-                findings.append(_twice(measured, known[measured_by(bound)], file))
-                continue
-            # Programs round the places of a dimension: what is drawn counts.
-            if abs(bound.drawn_mm - callout.measured_mm) <= DIFFERS_MM:
-                measured = replace(measured, nominal_mm=round(bound.drawn_mm, 9))
+        what = _measures(measured, bound)
+        if what in known:
+            findings.append(_twice(measured, known[what], file))
+            continue
+        drawn_mm = bound.drawn_mm if isinstance(bound, Bound) else math.inf
+        # Programs round the places of a dimension: what is drawn counts.
+        if abs(drawn_mm - callout.measured_mm) <= DIFFERS_MM:
+            measured = replace(measured, nominal_mm=round(drawn_mm, 9))
         said = _of_callout(callout, measured, file, features, findings, faults)
         drawn += ((place, each) for each in said)
     kept: list[tuple[int, Dimension]] = []
@@ -149,6 +155,22 @@ def _settled(
 def _place_of(dimension: Dimension) -> str:
     x, y = dimension.places_mm[0]
     return f"{dimension.source}, at ({x:.3f}, {y:.3f}) mm"
+
+
+def unbound(drawing: Drawing, dimensions: Iterable[Dimension]) -> list[Finding]:
+    """Findings of those that fit no feature of the drawing, or several."""
+    features = features_of(drawing.paths)
+    bound = (bind(each, features, drawing.file) for each in dimensions)
+    return [each for each in bound if isinstance(each, Finding)]
+
+
+def _measures(dimension: Dimension, bound: Bound | Finding) -> object:
+    """What is measured; of one that fits nothing what it names."""
+    if isinstance(bound, Bound):
+        return measured_by(bound)
+    places = frozenset((round(x, 3), round(y, 3)) for x, y in dimension.places_mm)
+    angle = dimension.direction_rad
+    return dimension.kind, places, None if angle is None else round(angle % math.pi, 6)
 
 
 def measured_by(bound: Bound) -> object:
@@ -209,7 +231,22 @@ def read_tolerances(path: Path) -> Asked:
     """The general tolerance of a file ("" for none) and its dimensions; CamtoolError with file,
     place and mend for anything that it may not say."""
     file = str(path)
-    table = convert(read_table(path), _File, file)
+    whole = read_table(path)
+    if isinstance(whole.get("dimension"), dict):
+        raise InputError(
+            "[dimension] is a single table",
+            file=file,
+            where="table [dimension]",
+            mend="write [[dimension]] above each dimension",
+        )
+    table = convert(whole, _File, file)
+    if not table.general and not table.dimension:
+        raise InputError(
+            "says nothing of any dimension",
+            file=file,
+            mend="write a [[dimension]], or general tolerances; camtool tolerances new DRAWING "
+            "begins a file",
+        )
     if table.general:
         with _blamed(file, "key general"):
             general_class(table.general)
@@ -333,9 +370,13 @@ def _check_units(nominal: Length | None, words: Words) -> None:
         return
     if (unit.lower() in ("in", '"', "ft")) != words.in_inches:
         raise OptionError(
-            f"limits in {words.unit} contradict a nominal size in {unit}",
+            f"limits in {_unit_name(words.unit)} contradict a nominal size in {_unit_name(unit)}",
             mend="write both in one unit",
         )
+
+
+def _unit_name(unit: str) -> str:
+    return {"in": "inches", '"': "inches"}.get(unit.lower(), unit)
 
 
 def _direction(value: Length) -> float:

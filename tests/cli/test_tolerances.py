@@ -44,6 +44,36 @@ def test_a_file_is_begun_filled_in_and_shown(camtool, tmp_path):
     assert [each["code"] for each in said["findings"]].count("DIMENSION_TWICE") == 1
 
 
+def test_a_dimension_on_nothing_is_a_comment_and_a_warning(camtool, tmp_path):
+    """As in drawings that were stretched without their dimensions."""
+    doc = with_text(part(), "<>")
+    doc.modelspace().add_linear_dim(base=(0, -5), p1=(60, 40), p2=(75, 40)).render()
+    (tmp_path / "part.dxf").write_bytes(data_of(doc))
+    made = camtool("tolerances", "new", "part.dxf")
+    assert made.returncode == 0
+    assert b"15 is not inspected: nothing that is drawn fits" in made.stderr
+    assert b"DIMENSION left out" not in made.stderr  # they are read
+    text = (tmp_path / "tolerances.toml").read_text(encoding="utf-8")
+    assert (
+        "nothing that is drawn fits; give it places on edges or circles\n# [[dimension]]" in text
+    )
+    assert "\n# from = [60, 40]\n" in text
+    count = made.stderr.decode().partition(" dimensions;")[0].rpartition(" ")[2]
+    assert text.count("\n[[dimension]]") == int(count)
+    asked = ("tolerances", "show", "tolerances.toml", "--against", "part.dxf")
+    shown = camtool(*asked)
+    assert shown.returncode == 0
+    assert b"DIMENSION_UNBOUND" in shown.stderr
+    # Whoever takes the comment away has it once.
+    lines = text.splitlines()
+    begin = lines.index("# [[dimension]]")
+    lines[begin:] = [line.removeprefix("# ") for line in lines[begin:]]
+    (tmp_path / "tolerances.toml").write_text("\n".join(lines), encoding="utf-8")
+    shown = camtool(*asked)
+    assert shown.stdout.decode().count("15 mm") == 1
+    assert shown.stderr.decode().count("DIMENSION_UNBOUND") == 1
+
+
 def test_without_a_drawing_sizes_are_as_drawn(camtool, tmp_path):
     (tmp_path / "t.toml").write_text(BORE + 'limits = "H7"', encoding="utf-8")
     shown = camtool("tolerances", "show", "t.toml")

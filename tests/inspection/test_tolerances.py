@@ -312,6 +312,15 @@ def test_the_file_holds_where_a_callout_measures_the_same(tmp_path):
     assert "tolerances.toml, dimension 1, which holds" in finding.message
 
 
+def test_two_dimensions_of_a_file_that_measure_the_same(tmp_path):
+    text = BORE + 'limits = "H7"\n' + BORE.replace("[20, 10]", "[23, 10]") + 'limits = "{}"\n'
+    for limits, severity in (("+0.012/0", Severity.INFO), ("H8", Severity.WARNING)):
+        said, (finding,) = dimensions_of(drawn(part()), write(tmp_path, text.format(limits)))
+        assert [each.limits.said for each in said] == ["H7"]
+        assert (finding.code, finding.severity) == (Code.DIMENSION_TWICE, severity)
+        assert "tolerances.toml, dimension 2" in finding.where
+
+
 def test_limits_wait_for_a_feature_that_is_not_there(tmp_path):
     nowhere = '[[dimension]]\nkind = "diameter"\nat = [1, 1]\nlimits = "H7"\n'
     (bore,), findings = dimensions_of(drawn(part()), write(tmp_path, nowhere))
@@ -340,6 +349,16 @@ LONG = '[[dimension]]\nkind = "distance"\nfrom = [0, 10]\nto = [40, 10]\n'
         (LONG + BORE + "tol = 1", r"table \[dimension 2\], key tol", "unknown key", "known keys"),
         ('[[dimension]]\nkind = "angle"', "key kind", "Invalid value", "diameter, distance"),
         ('[[dimension]]\nkind = "diameter"', "dimension 1, key at", "missing", "at = "),
+        ("", "", "says nothing", "tolerances new"),
+        ("# general = 1", "", "says nothing", "tolerances new"),
+        (
+            BORE.replace("[[", "[").replace("]]", "]"),
+            "dimension",
+            "single table",
+            r"\[\[dimension",
+        ),
+        (BORE + 'nominal = "6in"\nlimits = "±1mm"', "key limits", "in inches", "one unit"),
+        (BORE + LONG + "direction = nan", "dimension 2.direction", "not finite", "number"),
         ("dimension = 3", "key dimension", "Expected `array`", ""),
         ("[[dimension]]\nat = [1, 2]", "key kind", "missing", ""),
         (BORE + 'limits = "+0.1/+0.2"', "dimension 1, key limits", "wrong way round", r"\+0\.2/"),
@@ -358,7 +377,7 @@ LONG = '[[dimension]]\nkind = "distance"\nfrom = [0, 10]\nto = [40, 10]\n'
         (BORE + "to = [1, 2]", "key to", "diameter has no to", "takes at"),
         (BORE + "at = [1]", "", "is no TOML", ""),
         (LONG + 'direction = "z"', "key direction", "is no number", '"x", "y"'),
-        (LONG + "direction = inf", "key dimension.direction", "not finite", ""),
+        (LONG + "direction = inf", "key dimension 1.direction", "not finite", ""),
         (LONG.replace("40", "0"), "dimension 1", "same place", "differ"),
         ('[[dimension]]\nkind = "position"\nat = [20, 10]\nzone = 0', "key zone", "0 holds", ""),
         (
