@@ -140,8 +140,6 @@ LEAST_LEFT_MM = 0.5
 """A part of a contour that is not cut is named from this length on: ends of paths differ."""
 
 TURNS = (
-    ("--scale 25.4", 25.4 * np.eye(2)),
-    ("--scale 0.03937008", np.eye(2) / 25.4),
     ("--mirror y", np.diag([1.0, -1.0])),
     ("--mirror x", np.diag([-1.0, 1.0])),
     ("--rotate 90", np.array([[0.0, -1.0], [1.0, 0.0]])),
@@ -151,6 +149,8 @@ TURNS = (
 """What is tried where no shift does: flags, and what they make of the drawing's points."""
 
 SCALES = (
+    ("--scale 25.4", 25.4),
+    ("--scale 0.03937008", 1.0 / 25.4),
     ("--scale 0.9375", 90.0 / 96.0),  # pixels of 96 in the place of 90 to an inch
     ("--scale 1.06666667", 96.0 / 90.0),
     ("--scale 0.75", 72.0 / 96.0),  # points for pixels
@@ -160,10 +160,14 @@ SCALES = (
     ("--scale 1000", 1000.0),
     ("--scale 0.001", 0.001),
 )
-"""Other scales that units are mistaken by, tried where the sizes are about in that proportion."""
+"""Scales that units are mistaken by, tried where the sizes are about in that proportion: a circle
+would follow any larger one, with a tool as wide."""
 
 ABOUT = 1.2
-"""Proportions of sizes that differ by less are about the same: a tool adds its diameter."""
+"""Proportions near 1 that differ by less are about the same: a tool adds its diameter ..."""
+
+ABOUT_FAR = 3.0
+"""... and so do others by less than this: not all of the drawing need be cut."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -431,9 +435,10 @@ def _about(path: _Path, lines: _Lines, size: float) -> bool:
     """Whether what is cut is about so many times as large as the drawing."""
     if not len(path.boxes) or not len(lines.boxes):
         return False
+    about = ABOUT if 0.5 < size < 2.0 else ABOUT_FAR
     drawn = np.hypot(*(lines.boxes[:, :, 1].max(axis=0) - lines.boxes[:, :, 0].min(axis=0)))
     cut = np.hypot(*(path.boxes[0, :, 1] - path.boxes[0, :, 0]))
-    return bool(size * drawn / ABOUT < cut < size * drawn * ABOUT)
+    return bool(size * drawn / about < cut < size * drawn * about)
 
 
 def _rivals(best: _Placed, found: Sequence[_Placed]) -> list[_Placed]:

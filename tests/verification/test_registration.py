@@ -174,6 +174,26 @@ def test_scale_mirror_and_turn_are_named(
     assert flag in result.findings[0].message
 
 
+def test_a_circle_within_a_larger_one_is_no_other_scale(tmp_path: Path) -> None:
+    """Two quarters of one, elsewhere: in one 25.4 times as large they keep about one distance."""
+    (tmp_path / "circle.svg").write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 300 300"><circle cx="0" cy="100" '
+        'r="40" fill="none" stroke="black"/></svg>',
+        encoding="utf-8",
+    )
+    lines = []
+    for begin in (0.0, 90.0):
+        angles = np.radians(np.linspace(begin, begin - 90.0, 167))
+        points = 10.583 * np.column_stack([np.cos(angles), np.sin(angles)]) + [12.5, 45.667]
+        lines += [f"G0 X{points[0, 0]:.3f} Y{points[0, 1]:.3f}", "G1 Z-1 F100"]
+        lines += [f"G1 X{x:.3f} Y{y:.3f} F600" for x, y in points[1:]] + ["G0 Z3"]
+    result = register(
+        decoded("\n".join([*lines, ""])), read_drawing(tmp_path / "circle.svg"),
+        tool_diameter_mm=None, align=True, limit_mm=0.02, flat_cuts=False,
+    )  # fmt: skip
+    assert not any("--scale" in finding.message for finding in result.findings)
+
+
 def test_another_drawing_is_followed_nowhere() -> None:
     other = read_drawing(SAMPLES / "star.csv")
     result = register(
