@@ -281,10 +281,10 @@ def _temperature(machine: Machine) -> Input:
     warmer = ROOM_K
     if said.temperature_k is not None:
         warmer = min(ROOM_K, MOST_SIGMAS * said.temperature_k)
-    within = [f"20 ± {warmer:g} °C"]
+    within = [f"the room is within 20 ± {warmer:g} °C"]
     for what, own, (low, high) in zip(("part", "machine"), known, usual, strict=True):
         if own is None:
-            within.append(f"{what} {low * 1e6:g} to {high * 1e6:g} µm/m per K")
+            within.append(f"the {what} grows by {low * 1e6:g} to {high * 1e6:g} µm/m per K")
     return Input(
         name="temperature_k",
         unit="K",

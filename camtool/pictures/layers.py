@@ -382,6 +382,9 @@ def _sizes(content: Content) -> list[Part]:
         ends = [end for each in every if each.verdict == verdict for end in each.places_mm]
         look: Look = {"r": 3.4, "fill": colour, "stroke": PAPER, "stroke-width": 1.0}
         parts.append(Dots(f"ends-{verdict}", "", ends, look))
+    # Where there is no room for all, those that matter most have it.
+    order = {"out": 0, "undecided": 1}
+    every = tuple(sorted(every, key=lambda each: order.get(each.verdict, 2)))
     middles = [_middle(*each.places_mm) for each in every]
     return [*parts, Texts("sizes", [_size_words(each) for each in every], middles, INK)]
 

@@ -639,6 +639,10 @@ def facts(report: Report) -> Iterator[tuple[str, str]]:
     if report.shape is not None:
         yield "shape", _shape_words(report.shape)
     yield from (("dimension", inspected_words(each)) for each in report.inspection)
+    bounds = {
+        (one.input, one.within): None for each in report.inspection for one in each.not_known
+    }
+    yield from (("not known", f"{name}: if {within}") for name, within in bounds if within)
 
 
 def inspected_words(item: InspectedReport) -> str:
@@ -664,7 +668,7 @@ def inspected_words(item: InspectedReport) -> str:
 def _unknown_words(item: Contribution) -> str:
     if item.at_most_um is None:
         return item.input
-    return f"{item.input} (at most {item.at_most_um:.1f} µm at {item.within})"
+    return f"{item.input} (at most {item.at_most_um:.1f} µm)"
 
 
 def _chance(probability: float) -> str:

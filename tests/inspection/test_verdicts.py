@@ -16,7 +16,7 @@ from camtool.inspection.sizes import edge_at, rows_of, size_of
 from camtool.inspection.uncertainty import Variant
 from camtool.inspection.verdicts import SURE, Tolerances, inspect
 from camtool.run import Run
-from camtool.verification.report import InspectedReport, inspected_words
+from camtool.verification.report import InspectedReport, facts, inspected_words
 
 KNOWN = (
     "uncertainty.x.backlash_mm=0.004",
@@ -165,6 +165,12 @@ GROWS = 15.0 * 2e-4
 """By which part of its size a part may differ where nothing of that is known."""
 
 
+WITHIN = (
+    "the room is within 20 ± 15 °C, the part grows by 0 to 200 µm/m per K, "
+    "the machine grows by 0 to 30 µm/m per K"
+)
+
+
 def at_room(plate: Path, *settings: str) -> Run:
     target = camtool.load_target("linuxcnc", settings=[*EXACT, *COLD, *settings])
     return camtool.post(plate, target, job=camtool.job_of(tool_diameter_mm=2.0))
@@ -192,7 +198,7 @@ def test_a_temperature_that_cannot_change_a_verdict_does_not_hinder_it(
     assert room.um is None
     # The slides grow: a hole by the way of the tool's centre.
     assert room.at_most_um == pytest.approx(6.0 * GROWS * 1e3, rel=2e-2)
-    assert room.within == "20 ± 15 °C, part 0 to 200 µm/m per K, machine 0 to 30 µm/m per K"
+    assert room.within == WITHIN
     assert one.standard_um is not None
     assert one.unknown_um == room.at_most_um
     assert one.expanded_um == pytest.approx(2.0 * one.standard_um + (room.at_most_um or 0.0))
@@ -254,14 +260,14 @@ def test_what_nothing_bounds_hinders_every_verdict(plate: Path) -> None:
 
 def test_words_of_what_is_not_known(plate: Path) -> None:
     words = [inspected_words(each) for each in verdicts(at_room(plate), HOLE, ROUND)]
-    within = "20 ± 15 °C, part 0 to 200 µm/m per K, machine 0 to 30 µm/m per K"
     assert "; in, probability of in 99" in words[0]
-    assert words[0].endswith(f" not known: temperature_k (at most 18.1 µm at {within})")
+    assert words[0].endswith(" not known: temperature_k (at most 18.1 µm)")
     # A circle that grows stays round.
     assert "not known" not in words[1]
     tight = dimension("diameter", (15.0, 20.0), limits=(-0.035, 0.035))
     done = inspect(at_room(plate), Tolerances((tight,)))
     assert done.report is not None
+    assert list(facts(done.report))[-1] == ("not known", f"temperature_k: if {WITHIN}")
     assert inspected_words(done.report.inspection[0]).endswith("; say part_expansion_per_k")
     (finding,) = [each for each in done.findings if each.code == Code.DIMENSION_NOT_IN]
     assert "does not say part_expansion_per_k, machine_expansion_per_k" in finding.message
