@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -170,16 +171,8 @@ def least_squares_centre(points: Floats) -> Floats:
         distance = np.hypot(spoke[:, 0], spoke[:, 1])
         if not distance.all():
             break
-        u, v = (spoke / distance[:, None]).T
-        normal = np.array(
-            [
-                [(u * u).sum(), (u * v).sum(), u.sum()],
-                [(u * v).sum(), (v * v).sum(), v.sum()],
-                [u.sum(), v.sum(), float(len(u))],
-            ]
-        )
-        right = np.array([(u * distance).sum(), (v * distance).sum(), distance.sum()])
-        move = np.linalg.lstsq(normal, right, rcond=None)[0][:2]
+        terms = np.column_stack([spoke / distance[:, None], np.ones(len(points))])
+        move = np.linalg.lstsq(terms.T @ terms, terms.T @ distance, rcond=None)[0][:2]
         centre = centre + move
         if np.hypot(move[0], move[1]) < FIT_END_MM:
             break
@@ -241,12 +234,7 @@ def reversing(bins: Floats, ccw: bool) -> Reversing:
     # The mean point of an arc of angle w lies at sin(w/2)/(w/2) of the radius.
     half = np.pi / len(bins)
     radius = np.hypot(mean[:, 0], mean[:, 1]) * (half / math.sin(half))
-    steps, spikes = [], []
-    for degrees in QUADRANTS_DEG:
-        at = degrees * len(bins) // 360
-        step, spike = _at(radius, least, largest, at, 1 if ccw else -1)
-        steps.append(step)
-        spikes.append(spike)
+    steps, spikes = _steps(radius, least, largest, 1 if ccw else -1)
     return Reversing(
         (steps[0], steps[1], steps[2], steps[3]),
         (spikes[0], spikes[1], spikes[2], spikes[3]),
@@ -254,39 +242,51 @@ def reversing(bins: Floats, ccw: bool) -> Reversing:
     )
 
 
-def _at(radius: Floats, least: Floats, largest: Floats, at: int, turn: int) -> tuple[float, float]:
-    """Step and spike at the lower edge of bin `at`; `turn` is +1 for growing angles."""
+def _steps(
+    radius: Floats, least: Floats, largest: Floats, turn: int
+) -> tuple[list[float], list[float]]:
+    """Steps and spikes at the lower edges of the bins at `QUADRANTS_DEG`; `turn` is +1 for
+    growing angles."""
     count = len(radius)
-    away = np.arange(NEAR_BINS, FAR_BINS) + 0.5
-    behind = radius[(at + np.arange(NEAR_BINS, FAR_BINS)) % count]
-    below = radius[(at - 1 - np.arange(NEAR_BINS, FAR_BINS)) % count]
-    if not (np.isfinite(behind).all() and np.isfinite(below).all()):
-        return math.nan, math.nan
+    at = (np.array(QUADRANTS_DEG) * count // 360)[:, None]
+    reach = np.arange(NEAR_BINS, FAR_BINS)
     # The line through the bins of a side by least squares, at the edge, which is a sum of them.
-    centred = away - away.mean()
-    weights = 1.0 / len(away) - away.mean() * centred / (centred * centred).sum()
-    high, low = (float((weights * side).sum()) for side in (behind, below))
-    near = np.arange(at - NEAR_BINS, at + NEAR_BINS) % count
+    away = reach + 0.5 - (reach + 0.5).mean()
+    weights = 1.0 / len(away) - (reach + 0.5).mean() * away / (away * away).sum()
+    high, low = (
+        (radius[(at + rows) % count] * weights).sum(axis=1) for rows in (reach, -1 - reach)
+    )
+    near = (at + np.arange(-NEAR_BINS, NEAR_BINS)) % count
     seen = np.isfinite(largest[near])
-    out = float(largest[near][seen].max(initial=-math.inf)) - max(high, low)
-    into = min(high, low) - float(least[near][seen].min(initial=math.inf))
-    return turn * (high - low), max(out, 0.0) if out >= into else -max(into, 0.0)
+    out = np.where(seen, largest[near], -np.inf).max(axis=1) - np.maximum(high, low)
+    into = np.minimum(high, low) - np.where(seen, least[near], np.inf).min(axis=1)
+    spike = np.where(out >= into, np.maximum(out, 0.0), -np.maximum(into, 0.0))
+    known = np.isfinite(high) & np.isfinite(low)
+    step = np.where(known, turn * (high - low), np.nan)
+    return step.tolist(), np.where(known, spike, np.nan).tolist()
 
 
 def _values(radius: Floats, ccw: bool) -> tuple[float, float]:
     """B of X and of Y by least squares; NaN when less than half of the bins are filled."""
-    angle = (np.arange(len(radius)) + 0.5) * (2.0 * np.pi / len(radius))
     seen = np.isfinite(radius)
     if seen.sum() < len(radius) // 2:
         return math.nan, math.nan
-    cos, sin = np.cos(angle[seen]), np.sin(angle[seen])
-    turn = 1.0 if ccw else -1.0
+    table = _terms(len(radius), 1.0 if ccw else -1.0)
+    found = np.linalg.lstsq(table[seen], radius[seen], rcond=None)[0]
+    return float(found[3]), float(found[4])
+
+
+@cache
+def _terms(count: int, turn: float) -> Floats:
+    """(B, 5) of so many bins: what one unit of c, e_x, e_y, B_x and B_y adds to the radius."""
+    angle = (np.arange(count) + 0.5) * (2.0 * np.pi / count)
+    cos, sin = np.cos(angle), np.sin(angle)
     # With growing angles, sin > 0 after 0°, and cos < 0 after 90°.
     x = turn * np.sign(sin) * cos
     y = -turn * np.sign(cos) * sin
-    table = np.column_stack([np.ones(len(cos)), cos, sin, 0.5 * x, 0.5 * y])
-    found = np.linalg.lstsq(table, radius[seen], rcond=None)[0]
-    return float(found[3]), float(found[4])
+    terms = np.column_stack([np.ones(count), cos, sin, 0.5 * x, 0.5 * y])
+    terms.flags.writeable = False
+    return terms
 
 
 class Pairs:

@@ -35,7 +35,7 @@ from camtool.geometry.boxes import near_points
 from camtool.geometry.measure import point_at, segment_boxes, segment_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
 from camtool.simulation.rows import block_of
-from camtool.toolpath.moves import ROWS_AT_ONCE, Kind, Toolpath
+from camtool.toolpath.moves import ROWS_AT_ONCE, Kind, Toolpath, are_arcs
 from camtool.toolpath.rapids import STOCK_TOP_MM
 from camtool.verification.cuts import (
     NO_LOOP,
@@ -135,7 +135,7 @@ def cover(
         rows = cuts.segments.path[samples.segment]
         rounding.add(found.distance[real], samples.points[real], rows[real])
         match_rows(match, cuts, samples, belongs, found, goal)
-    alike = _lines_alike(wanted.cuts, beside, row_from)
+    alike = _contours_alike(wanted.cuts, beside, row_from)
     became = np.where(alike, ANY_CONTOUR, became)
     cut = np.append(alike | _fits(wanted.cuts, became, decoded, limits, spacing_mm), True)
     missing = list[_Uncovered]()
@@ -201,9 +201,8 @@ def _together(cuts: CutMoves, own: Ints, beside: Ints) -> Indices:
     return np.where(np.append(apart, False)[cuts.contour], rows, cuts.contour)
 
 
-def _lines_alike(wanted: CutMoves, beside: Ints, row_from: Ints | None) -> Bools:
-    """(C,) the wanted contours of lines alone, from each of which one line was written that lies
-    `beside` its own."""
+def _contours_alike(wanted: CutMoves, beside: Ints, row_from: Ints | None) -> Bools:
+    """(C,) the wanted contours from each of whose rows one was written that lies `beside` it."""
     alike = np.zeros(wanted.contour_count, dtype=np.bool_)
     if row_from is not None:
         there = np.zeros(len(wanted.contour), dtype=np.bool_)
@@ -214,25 +213,47 @@ def _lines_alike(wanted: CutMoves, beside: Ints, row_from: Ints | None) -> Bools
 
 
 def _rows_alike(cuts: CutMoves, wanted: CutMoves, limits: Limits, row_from: Ints | None) -> Ints:
-    """The rows that cut along a line, and alone were written from a line whose start and end lie
-    within the limits of theirs: so does each point between them, for the distance of two points
-    that run along two lines at once is nowhere larger than at one of the ends."""
+    """The rows that cut along a line or an arc, and alone were written from a move of the same
+    kind beside which they lie: each point of them lies within the limits of it.
+
+    Two points that run along two lines at once are nowhere farther apart than at one of the ends.
+    On two arcs they are no farther apart than both centres and, at one of the ends, both spokes,
+    whose angle changes evenly: than twice the centres, an end, and what each end lies beside the
+    circle of its start.
+    """
     if row_from is None:
         return np.empty(0, dtype=np.int64)
     limit_mm, depth_mm = limits
-    rows, paths = cuts.rows[row_from[cuts.rows] >= 0], (cuts.toolpath, wanted.toolpath)
-    once = np.bincount(row_from[rows], minlength=len(paths[1])) == 1
+    rows, mine, theirs = cuts.rows[row_from[cuts.rows] >= 0], cuts.toolpath, wanted.toolpath
+    once = np.bincount(row_from[rows], minlength=len(theirs)) == 1
     near = np.empty(len(rows), dtype=np.bool_)
     for low in range(0, len(rows), ROWS_AT_ONCE):
         some = rows[low : low + ROWS_AT_ONCE]
         came = row_from[some]
-        fit = (paths[0].kind[some] == Kind.LINE) & (paths[1].kind[came] == Kind.LINE) & once[came]
-        mine, theirs = paths[0].starts_of(some), paths[1].starts_of(came)
-        ends = paths[0].end.take(some, axis=0) - paths[1].end.take(came, axis=0)
-        for off in (mine - theirs, ends):
-            fit &= (np.hypot(off[:, 0], off[:, 1]) <= limit_mm) & (np.abs(off[:, 2]) <= depth_mm)
+        fit = (mine.kind[some] == theirs.kind[came]) & once[came]
+        room_mm = np.full(len(some), limit_mm)
+        arcs = np.flatnonzero(fit & are_arcs(mine.kind[some]))
+        if len(arcs):
+            here, there = some[arcs], came[arcs]
+            room_mm[arcs] -= 2.0 * np.hypot(*(mine.centre[here] - theirs.centre[there]).T)
+            room_mm[arcs] -= _beside_circle(mine, here) + _beside_circle(theirs, there)
+            fit[arcs] &= np.abs(mine.sweeps_of(here) - theirs.sweeps_of(there)) < np.pi
+        starts = mine.starts_of(some) - theirs.starts_of(came)
+        ends = mine.end.take(some, axis=0) - theirs.end.take(came, axis=0)
+        for off in (starts, ends):
+            fit &= (np.hypot(off[:, 0], off[:, 1]) <= room_mm) & (np.abs(off[:, 2]) <= depth_mm)
         near[low : low + len(some)] = fit
     return np.asarray(rows[near])
+
+
+def _beside_circle(toolpath: Toolpath, arcs: Ints) -> Floats:
+    """(J,) mm: how far the ends of these arcs lie from the circles of their starts."""
+    centre = toolpath.centre[arcs]
+    out, back = (
+        np.hypot(*(points[:, :2] - centre).T)
+        for points in (toolpath.starts_of(arcs), toolpath.end[arcs])
+    )
+    return np.asarray(np.abs(out - back))
 
 
 def _fits(
@@ -470,7 +491,7 @@ def cut_other_way(
     """CUT_OTHER_WAY for contours of a program that are cut in the direction opposite to that of
     the moves from which it was written, `source`; `row_from` as in `cover`.
 
-    A line beside the one that it was written from, in the same direction, is not turned, nor is a
+    A move beside the one that it was written from, in the same direction, is not turned, nor is a
     row whose middle lies on the contour that it came from, in the same direction; the others are
     compared with everything.
     """
@@ -501,7 +522,8 @@ def cut_other_way(
 
 
 def _same_way(cuts: CutMoves, source: CutMoves, rows: Ints, row_from: Ints) -> Bools:
-    """(J,) whether these rows, which are lines, have the direction of those they came from."""
+    """(J,) whether the chords of these rows have the direction of those of the rows that they came
+    from, which are alike; none has that of a full circle."""
     same = np.empty(len(rows), dtype=np.bool_)
     for low in range(0, len(rows), ROWS_AT_ONCE):
         some = rows[low : low + ROWS_AT_ONCE]

@@ -174,3 +174,42 @@ def test_contours_in_one_place_are_found_too() -> None:
         found = compared(wanted, wanted, row_from)[0]
         assert found.findings == ()
         assert sorted(set(found.match.contour.tolist())) == matched
+
+
+@pytest.mark.parametrize("short", [False, True])
+def test_an_arc_that_ends_beside_its_start_is_no_full_circle(short: bool) -> None:
+    """The ends and the centres of both are alike; what is missing is all of the circle."""
+    end, paths = (10.0, 0.001) if short else (10.0, 0.0), []
+    for x, y in ((10.0, 0.0), end):
+        path = ToolpathBuilder().rapid(z=1.0).rapid(10.0, 0.0).line(z=-1.0, feed=100.0)
+        paths.append(path.arc(x, y, centre=(0.0, 0.0), ccw=True, feed=200.0).rapid(z=1.0).finish())
+    wanted, decoded = paths
+    own, _ = compared(decoded, wanted, np.arange(len(decoded)))
+    assert own.findings == compared(decoded, wanted, None)[0].findings
+    assert bool(own.findings) == short
+
+
+@given(
+    st.floats(0.01, 30.0),
+    st.floats(-3.1, 3.1),
+    st.floats(0.01, 6.2),
+    st.lists(st.floats(-0.002, 0.002), min_size=6, max_size=6),
+)
+def test_arcs_whose_rows_are_alike_lie_within_the_limits(
+    radius: float, begin: float, sweep: float, off: list[float]
+) -> None:
+    """Arcs whose ends and centres are moved a little, against points on both."""
+    paths = []
+    for moved in (np.zeros(6), np.array(off)):
+        start = radius * np.array([np.cos(begin), np.sin(begin)]) + moved[:2]
+        end = radius * np.array([np.cos(begin + sweep), np.sin(begin + sweep)]) + moved[2:4]
+        path = ToolpathBuilder().rapid(z=1.0).rapid(*start).line(z=-1.0, feed=100.0)
+        centre = (float(moved[4]), float(moved[5]))
+        path.arc(*end, centre=centre, ccw=True, feed=200.0)
+        paths.append(cut_moves(path.finish(), flat_cuts=False))
+    one, other = paths
+    rows = coverage._rows_alike(other, one, (LIMIT_MM, DEPTH_MM), np.arange(4))
+    if len(rows):
+        samples = coverage.sample_cuts(other, 0.01)
+        near = MoveIndex(one).nearest_of_all(samples.points, samples.z, LIMIT_MM)
+        assert near.distance.max() <= LIMIT_MM + 1e-9
