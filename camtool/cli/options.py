@@ -325,6 +325,7 @@ class InspectionFlags:
         from camtool.inspection.tolerances import dimensions_of
         from camtool.inspection.verdicts import Tolerances, inspect
 
+        progress().begin("inspecting dimensions")
         file = None if self.tolerances == DRAWING else Path(self.tolerances)
         dimensions, findings = dimensions_of(run.drawing, file)
         return inspect(run, Tolerances(dimensions, findings, self.require))

@@ -155,6 +155,7 @@ class Seen:
         from camtool.pictures.options import points_for
         from camtool.pipeline import Judging, read_program, verify_program
 
+        progress().begin(f"reading {Path(source).name}")
         data = read_bytes(source)
         if not self.simulate:
             return read_program(data, target, source=source).scene()

@@ -137,6 +137,8 @@ def shown_after(written: bytes) -> list[str]:
         ("post {logo} -t grbl -o a.nc --preview a.svg", ["drawing the picture"]),
         ("check {logo}", ["reading logo.dxf"]),
         ("preview {logo} -o a.svg", ["reading logo.dxf"]),
+        ("preview {program} -t grbl -o a.svg", ["reading logo.nc"]),
+        ("post {logo} -t grbl -o a.nc --tolerances drawing", ["inspecting dimensions"]),
         ("verify {program} -t grbl", ["judging"]),
         ("convert {program} --from grbl --to linuxcnc -o b.ngc", ["judging"]),
         ("stale {logo} -t grbl", ["reading logo.dxf", "planning"]),
