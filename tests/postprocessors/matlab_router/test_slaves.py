@@ -199,7 +199,7 @@ def test_a_loop_that_never_gets_there_is_given_up() -> None:
     slaves = three()
     slaves[0].motor.friction = 100.0
     axes = np.array([[8.9, 12.2, 100.0, 28, 159, 5120, 0, 500.0]] * 3)
-    lines = np.array([[1, 0, 0, 480, 0, 0, 0, 0, 50, 0, 0]])
+    lines = np.array([[1, 0, 0, 480, 0, 0, 0, 0, 50, 0, 0]], dtype=np.int32)
     program = Program(lines, np.array([2.0]), axes, np.array(table(480)), 0.0, False)
     state = State(
         np.zeros((3, 6)), np.zeros((3, 11), np.int64), np.zeros(3, np.int64), np.zeros(2)
