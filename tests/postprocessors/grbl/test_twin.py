@@ -6,6 +6,7 @@ import re
 
 import numpy as np
 import pytest
+from camtool_postprocessors.grbl.settings import differences
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -260,6 +261,20 @@ def test_settings_are_those_of_the_machine_and_can_be_changed() -> None:
     slow, _ = made("grbl")
     assert reply(slow, "$110=100") == "ok"
     assert stream(slow, b"G0X10\n")[1] > 1.9 * stream(made("grbl")[0], b"G0X10\n")[1]
+
+
+def test_laser_mode_is_compared_before_a_program_is_sent() -> None:
+    laser, with_laser = made("grbl", settings=["controller.laser_mode=true"])
+    spindle, without = made("grbl")
+    for twin, loaded in ((laser, with_laser), (spindle, without)):
+        listing = reply(twin, "$$")
+        said = {each.key: each.value for each in loaded.target.settings_from(listing)}
+        assert said["controller.laser_mode"] is loaded.machine.controller.laser_mode
+        assert differences(listing, loaded.machine) == ([], [])
+    (error,) = differences(reply(laser, "$$"), without.machine)[0]
+    assert error.startswith("$32 is laser mode")
+    (error,) = differences(reply(spindle, "$$"), with_laser.machine)[0]
+    assert error.startswith("$32=0 is no laser mode")
 
 
 def test_overrides_of_the_feed_act_at_once() -> None:
