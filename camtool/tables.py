@@ -2,7 +2,7 @@
 
 Machine files, job files and measurements come through here. `read_table` reads a file, `convert`
 makes a record of it: an unknown key, a wrong type or a number out of range is an error that says
-which values are allowed.
+which values are allowed. `written` makes text of tables.
 """
 
 from __future__ import annotations
@@ -212,3 +212,78 @@ def _finite(value: object, file: str, at: str) -> None:
     elif isinstance(value, list):
         for number, item in enumerate(value, 1):
             _finite(item, file, f"{at} {number}" if isinstance(item, dict) else at)
+
+
+# Tables as text again.
+
+_SURROGATES = range(0xD800, 0xE000)
+
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+"""Keys that need no quotes."""
+
+
+def written(
+    table: Mapping[str, Any], notes: Mapping[str, str] | None = None, path: tuple[str, ...] = ()
+) -> Iterator[str]:
+    """The lines of a table as TOML, its values before its tables and lists of tables; `notes` are
+    comments behind the values of these keys ("axes.x.backlash_mm")."""
+    notes = notes or {}
+    tables = {key: value for key, value in table.items() if isinstance(value, dict)}
+    lists = {key: value for key, value in table.items() if _are_tables(value)}
+    values = {key: table[key] for key in table if key not in tables and key not in lists}
+    if path and (values or not table):
+        yield ""
+        yield f"[{'.'.join(map(_key, path))}]"
+    yield from _values(values, notes, path)
+    for key, value in tables.items():
+        yield from written(value, notes, (*path, key))
+    for key, rows in lists.items():
+        for row in rows:
+            yield ""
+            yield f"[[{'.'.join(map(_key, (*path, key)))}]]"
+            yield from _values(row, notes, (*path, key))
+
+
+def _are_tables(value: Any) -> bool:
+    return isinstance(value, list | tuple) and any(isinstance(each, dict) for each in value)
+
+
+def _values(
+    values: Mapping[str, Any], notes: Mapping[str, str], path: tuple[str, ...]
+) -> Iterator[str]:
+    for key, value in values.items():
+        note = notes.get(".".join((*path, key)))
+        yield f"{_key(key)} = {_value(value)}" + (f"    # {note}" if note else "")
+
+
+def _key(name: str) -> str:
+    return name if _BARE.fullmatch(name) else _value(name)
+
+
+def _value(value: Any) -> str:
+    """A value as TOML on one line: text, number, boolean, a list of these, or a table."""
+    if isinstance(value, dict):
+        return f"{{{', '.join(f'{_key(key)} = {_value(each)}' for key, each in value.items())}}}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_value, value))}]"
+    if isinstance(value, str):
+        return quoted(value)
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return repr(value)
+
+
+def quoted(text: str) -> str:
+    """A TOML string of any text. Halves of surrogate pairs, which no TOML can hold, become "?"."""
+    return '"' + "".join(map(_escaped, text)) + '"'
+
+
+def _escaped(char: str) -> str:
+    code = ord(char)
+    if code in _SURROGATES:
+        return "?"
+    if char in '"\\':
+        return f"\\{char}"
+    if char.isprintable():
+        return char
+    return f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"

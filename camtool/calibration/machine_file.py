@@ -8,16 +8,13 @@ from __future__ import annotations
 
 import json
 import math
-import re
-from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from camtool.calibration.calibrate import Calibration, Estimate
 from camtool.calibration.measurements import Measurements, Regions
 from camtool.machine.model import Machine
-
-Table = dict[str, Any]
+from camtool.tables import Table, written
 
 WITHIN_UNCERTAINTY = 0.02
 """Values are rounded to this part of their uncertainty."""
@@ -27,8 +24,6 @@ DIGITS = 9
 
 UNCERTAINTY_DIGITS = 3
 """Significant digits of standard uncertainties."""
-
-_BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def machine_file(
@@ -55,7 +50,7 @@ def machine_file(
         "# ± is the standard uncertainty.",
         "",
     )
-    return "\n".join([*head, *_lines(said, (), notes)]) + "\n"
+    return "\n".join([*head, *written(said, notes)]) + "\n"
 
 
 def _set_map(
@@ -155,34 +150,3 @@ def _set(table: Table, key: str, value: Any) -> None:
     for each in tables:
         table = table.setdefault(each, {})
     table[name] = value
-
-
-def _lines(
-    table: Mapping[str, Any], path: tuple[str, ...], notes: Mapping[str, str]
-) -> Iterator[str]:
-    """A table as TOML, with its values before its tables."""
-    values = {key: value for key, value in table.items() if not isinstance(value, dict)}
-    if path and (values or not table):
-        yield ""
-        yield f"[{'.'.join(map(_key, path))}]"
-    for key, value in values.items():
-        note = notes.get(".".join((*path, key)))
-        yield f"{_key(key)} = {_value(value)}" + (f"    # {note}" if note else "")
-    for key, value in table.items():
-        if isinstance(value, dict):
-            yield from _lines(value, (*path, key), notes)
-
-
-def _key(name: str) -> str:
-    return name if _BARE.fullmatch(name) else _value(name)
-
-
-def _value(value: Any) -> str:
-    """A value as TOML: text, number, boolean, or a list of these."""
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_value, value))}]"
-    if isinstance(value, str):
-        return json.dumps(value).replace("\x7f", "\\u007f")
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    return repr(value)

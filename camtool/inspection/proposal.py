@@ -23,6 +23,7 @@ from camtool.inspection.features import Bound, Circle, Edge, Feature, bind, feat
 from camtool.inspection.limits import limited
 from camtool.inspection.tolerances import dimensions_of, measured_by
 from camtool.plain import one_line
+from camtool.tables import quoted
 
 MOST_DIMENSIONS = 200
 """A file begins with at most so many dimensions; a comment counts the others."""
@@ -86,7 +87,7 @@ def proposed(drawing: Drawing) -> tuple[str, tuple[Finding, ...], tuple[DrawingE
 
 def _row(each: Dimension) -> str:
     """One [[dimension]]."""
-    lines = ["", "[[dimension]]", f"name = {_quoted(each.name)}", f'kind = "{each.kind}"']
+    lines = ["", "[[dimension]]", f"name = {quoted(each.name)}", f'kind = "{each.kind}"']
     if each.kind == "distance":
         first, second = each.places_mm
         lines += [f"from = {_pair(first)}", f"to = {_pair(second)}"]
@@ -99,7 +100,7 @@ def _row(each: Dimension) -> str:
     if each.limits is None:
         lines.append(f'# limits = "{"H7" if each.kind == "diameter" else "±0.05"}"')
     else:
-        lines.append(f'limits = "{each.limits.said}"')
+        lines.append(f"limits = {quoted(each.limits.said)}")
     return "\n".join(lines) + "\n"
 
 
@@ -118,11 +119,6 @@ def _turned(direction: float) -> str:
         if abs(degrees - of) <= 10.0**-DIGITS:
             return f'"{name}"'
     return f"{degrees:.9g}"
-
-
-def _quoted(name: str) -> str:
-    """A name as TOML text."""
-    return '"' + name.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
 def _sizes(features: Iterable[Feature], closed: Sequence[bool]) -> Iterator[Dimension]:

@@ -25,6 +25,7 @@ from camtool.jobs.keys import OPERATION, PLACE, TOOL, WHOLE, Key
 from camtool.planning.drill import HOLE_SIZE_MM, circle_of
 from camtool.planning.job import Operation, Stock
 from camtool.planning.sides import CONTINUOUS, Traits
+from camtool.tables import quoted
 
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
@@ -49,7 +50,6 @@ LEAST_TAB_MM = 0.5
 TOOL_NAME = "tool"
 _ORDER = ("drill", "engrave", "bore", "profile")
 _WIDTH = 36
-_SURROGATES = range(0xD800, 0xE000)
 
 
 @dataclass(frozen=True)
@@ -352,19 +352,3 @@ def _commented(text: str) -> str:
 def pattern_of(name: str) -> str:
     """The pattern that matches this name alone (in any case)."""
     return "".join(f"[{char}]" if char in "*?[" else char for char in name)
-
-
-def quoted(text: str) -> str:
-    """A TOML string of any text. Halves of surrogate pairs, which no TOML can hold, become "?"."""
-    return '"' + "".join(map(_escaped, text)) + '"'
-
-
-def _escaped(char: str) -> str:
-    code = ord(char)
-    if code in _SURROGATES:
-        return "?"
-    if char in '"\\':
-        return f"\\{char}"
-    if char.isprintable():
-        return char
-    return f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
