@@ -258,12 +258,14 @@ def _tooled(operation: Operation, known: Table, used: Used, tools: Tools) -> Ope
 
 def _nearest(layers: Sequence[Table]) -> Table:
     """The keys of all layers, the nearest of which is last; a depth in it takes the place of
-    another layer's breakthrough, and the other way round."""
+    another layer's breakthrough, and the other way round, where the operation knows both."""
     merged = layers[0]
+    kinds = [layer.given["kind"].value for layer in layers if "kind" in layer.given]
+    kind = kinds[-1] if kinds else Operation.kind
     for layer in layers[1:]:
         below = dict(merged.given)
         for one, other in (("depth", "breakthrough"), ("breakthrough", "depth")):
-            if one in layer.given:
+            if one in layer.given and kind in OPERATION[one].kinds:
                 below.pop(other, None)
         merged = layer.over(Table(below, merged.where, merged.file))
     return merged

@@ -57,3 +57,8 @@ def test_layers_of_a_file_are_read_as_far_as_the_job_needs_them() -> None:
     path = camtool.plan(SAMPLES / "logo.dxf", "grbl", job)
     assert path.drawing is not None
     assert set(path.drawing.layers) == {"CUT"}
+
+
+def test_a_breakthrough_of_others_leaves_a_carving_its_depth() -> None:
+    job = JobFlags(str(SAMPLES / "sign.toml"), given={"breakthrough": "0.1mm"}).job(DrawingFlags())
+    assert [each.depth_mm for each in job.operations] == [2.5, 2.5, 6.1]

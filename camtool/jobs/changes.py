@@ -1,0 +1,174 @@
+"""A job as a file again: what its file and the flags say together, with changes, as TOML.
+
+    JobTables of the file ─┐
+    JobTables of flags ────┴─▶ together ─▶ tables ─changed─▶ tables ─text_of─▶ a job file
+
+The tables are plain TOML. `build_job` makes of their text what it makes of file and flags.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+from camtool.jobs.build import JobTables
+from camtool.jobs.keys import OPERATION, TOOL_KEYS, TOOL_NAME, Given, Table, length
+from camtool.jobs.template import pattern_of
+from camtool.tables import Table as Values
+from camtool.tables import written
+
+FILES = ("tool_library", "tool_table")
+"""Keys that name files, relative to the job file."""
+
+LEFT_DIGITS = 4
+"""Decimals of an allowance in mm: a tenth of a micrometre."""
+
+_INSTEAD = {
+    "depth": ("breakthrough",),
+    "breakthrough": ("depth",),
+    "scale": ("fit",),
+    "fit": ("scale",),
+    TOOL_NAME: tuple(TOOL_KEYS),
+}
+"""What is said no more where a flag says this."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """Another value of a key: of the operation in this row of the file, or (None) of the job as a
+    whole. `instead`: what the key says so far, "" where it says nothing."""
+
+    key: str
+    value: Any
+    operation: int | None = None
+    instead: str = ""
+
+
+@dataclass(frozen=True)
+class Left:
+    """So much more is left on the walls of an operation, mm (below 0: less): of the contours of
+    these `entities`, or (without any) of all that it takes."""
+
+    operation: int
+    by_mm: float
+    entities: tuple[str, ...] = ()
+
+
+def together(file: JobTables, flags: JobTables, folder: Path) -> Values:
+    """The tables of a job file in `folder` that says what a file and flags say together.
+
+    OptionError for flags of a tool beside operations that name one: a file says either.
+    """
+    whole = _raw(_over(flags.whole, file.whole))
+    for key in FILES:
+        given = flags.whole.given.get(key) or file.whole.given.get(key)
+        if given is not None:
+            whole[key] = _relative(given, file.folder, folder)
+    tables: Values = {**whole, **_raw(file.defaults)}
+    place = _raw(_over(flags.place, file.place))
+    if place:
+        tables["place"] = place
+    if file.stock is not None:
+        tables["stock"] = _raw(file.stock)
+    if file.tools:
+        tables["tools"] = {
+            name: {
+                **_raw(each.keys),
+                **({"presets": _presets(each.presets)} if each.presets else {}),
+            }
+            for name, each in file.tools.items()
+        }
+    rows = file.operations or (Table(),)
+    carved = {str(_raw(own).get("name")) for own in rows if _raw(own).get("kind") == "vcarve"}
+    tables["operations"] = [_operation(own, file.defaults, flags.defaults, carved) for own in rows]
+    return tables
+
+
+def _operation(own: Table, defaults: Table, flags: Table, carved: set[str]) -> Values:
+    """The table of an operation with the flags that it knows over it. The floor of one that is
+    `carved` has its depth."""
+    if _raw(own).get("rest") in carved:
+        flags = flags.only(set(flags.given) - {"depth", "breakthrough"})
+    kind = {**defaults.given, **own.given, **flags.given}.get("kind")
+    named = kind.value if kind is not None else "profile"
+    tool = flags.only(TOOL_KEYS).given
+    if tool and TOOL_NAME in own.given and TOOL_NAME not in flags.given:
+        raise next(iter(tool.values())).refused(
+            "cannot be written into a job file whose operation names its tool",
+            "change the tool in the job file",
+        )
+    known = [name for name in flags.given if name not in OPERATION or _knows(named, name)]
+    return _raw(_over(flags.only(known), own))
+
+
+def _knows(kind: object, name: str) -> bool:
+    return kind in OPERATION[name].kinds
+
+
+def _over(above: Table, below: Table) -> Table:
+    """The keys of both; the upper ones say instead of the lower what contradicts them."""
+    gone = {each for name in above.given for each in _INSTEAD.get(name, ())}
+    return above.over(below.only(set(below.given) - gone))
+
+
+def _raw(table: Table) -> Values:
+    return {name: each.value for name, each in table.given.items()}
+
+
+def _presets(presets: Mapping[str, Table]) -> Values:
+    return {material: _raw(each) for material, each in presets.items()}
+
+
+def _relative(given: Given, was: Path, folder: Path) -> str:
+    """The name of a file from the new folder: a file names it from its own, a flag from here."""
+    named = was / str(given.value) if given.file is not None else Path(str(given.value))
+    return Path(os.path.relpath(named.absolute(), folder.absolute())).as_posix()
+
+
+def changed(tables: Values, changes: Sequence[Change], left: Sequence[Left] = ()) -> Values:
+    """The tables with these changes. An operation with several `left` becomes as many, in their
+    order: together they name all entities that it takes."""
+    made = {**tables, **{each.key: each.value for each in changes if each.operation is None}}
+    names = {str(table.get("name")) for table in tables["operations"]}
+    operations: list[Values] = []
+    for row, table in enumerate(tables["operations"]):
+        own = {each.key: each.value for each in changes if each.operation == row}
+        mine = [each for each in left if each.operation == row]
+        operations += _divided({**table, **own}, mine, names)
+    made["operations"] = operations
+    return made
+
+
+def _divided(table: Values, left: Sequence[Left], names: set[str]) -> list[Values]:
+    """The operations that one becomes; the first has its name, the others numbers behind it."""
+    if not left:
+        return [table]
+    name = str(table.get("name") or table.get("kind") or "profile")
+    parts: list[Values] = []
+    for each in left:
+        by = length(table.get("allowance", 0.0)) + each.by_mm
+        part = {**table, "allowance": f"{round(by, LEFT_DIGITS) + 0.0:.10g}mm"}
+        if each.entities:
+            part["select_entities"] = [pattern_of(entity) for entity in each.entities]
+        if len(left) > 1:
+            part["name"] = name
+        if parts:
+            numbers = (f"{name} ({number})" for number in count(2))
+            part["name"] = next(each for each in numbers if each not in names)
+            names.add(part["name"])
+        parts.append(part)
+    return parts
+
+
+def text_of(tables: Values, head: Sequence[str] = ()) -> str:
+    """The text of a job file; `head` are comments at its top. A single operation stands at the
+    top of the file."""
+    if len(tables["operations"]) == 1:
+        whole = {key: value for key, value in tables.items() if key != "operations"}
+        tables = {**whole, **tables["operations"][0]}
+    comments = [*(f"# {line}" for line in head), *([""] if head else [])]
+    return "\n".join([*comments, *written(tables)]) + "\n"
