@@ -11,6 +11,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack
 
@@ -40,6 +41,7 @@ from camtool.verification.verify import Verification
 if TYPE_CHECKING:
     from camtool.calibration.measurements import Measurements
     from camtool.importers.options import ReadOptions
+    from camtool.inspection.meet import Meeting
     from camtool.machine.model import Machine
 
 
@@ -70,6 +72,7 @@ __all__ = [
     "inspect",
     "job_of",
     "load_target",
+    "meet",
     "plan",
     "post",
     "post_by_tool",
@@ -363,6 +366,39 @@ def inspect(
     file = None if tolerances is None else Path(tolerances)
     dimensions, findings = dimensions_of(run.drawing, file)
     return inspected(run, Tolerances(dimensions, findings, require))
+
+
+def meet(
+    drawing: Drawing | str | Path,
+    target: str | LoadedTarget,
+    tolerances: str | Path | None = None,
+    *,
+    job: str | Path | None = None,
+    most: int | None = None,
+) -> Meeting:
+    """The cheapest change of a job file after which all dimensions of the part hold.
+
+    `tolerances` as for `inspect`; `job`: the file (None: a tool of no width follows all lines).
+    `most` programs are tried (None: 100). `text` is the new job file, `run` its program;
+    `certificate` says why no job does, None where one does. Raises OptionError where the job
+    has errors, and where no dimension has limits. Source: docs/tolerances.md.
+    """
+    from camtool.inspection.meet import MOST_TRIALS, Case
+    from camtool.inspection.meet import meet as met
+    from camtool.inspection.tolerances import dimensions_of
+    from camtool.inspection.verdicts import Tolerances
+    from camtool.jobs.build import JobTables, read_job_file
+    from camtool.jobs.changes import job_of_tables, together
+    from camtool.jobs.tools import Shop
+
+    loaded, place = as_target(target), Path("job.toml" if job is None else job)
+    file = JobTables() if job is None else read_job_file(place)
+    tables = together(file, JobTables(), place.parent)
+    job_of = partial(job_of_tables, place=place, shop=Shop())
+    read = as_drawing(drawing, loaded, job_of(tables))
+    asked = None if tolerances is None else Path(tolerances)
+    case = Case(read, loaded, tables, job_of, Tolerances(*dimensions_of(read, asked)))
+    return met(case, most or MOST_TRIALS)
 
 
 def convert(

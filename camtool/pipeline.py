@@ -101,6 +101,7 @@ class _Posting:
     check: bool = True
     gates: Gates | None = None
     trace_points: int | None = None
+    brief: bool = False
     progress: Progress = field(default_factory=Progress)
 
 
@@ -112,22 +113,23 @@ def post_drawing(
     check: bool = True,
     gates: Gates | None = None,
     trace_points: int | None = None,
+    brief: bool = False,
     progress: Progress | None = None,
 ) -> Run:
     """Plan, write, read back, simulate and judge.
 
-    `check=False` leaves out the last two; at most `trace_points` of the slides' path are kept
-    (None: the default).
-    `progress` is told of each stage. Raises OptionError, MachineError, and PostError for what the
-    target cannot write.
+    `check=False` leaves out the last two; `brief` leaves out the shape of the part that comes out,
+    and what the job would be without its measures against reversals and backlash. At most
+    `trace_points` of the slides' path are kept (None: the default). `progress` is told of each
+    stage. Raises OptionError, MachineError, and PostError for what the target cannot write.
     """
     from camtool.planning.plan import planned
 
-    how = _Posting(check, gates, trace_points, progress or Progress())
+    how = _Posting(check, gates, trace_points, brief, progress or Progress())
 
     def plain() -> Run | None:
         other = _plain(job)
-        if other == job:
+        if brief or other == job:
             return None
         return post_drawing(drawing, other, target, progress=progress)
 
@@ -155,7 +157,7 @@ def post_by_tool(
     """
     from camtool.planning.plan import parted, planned, turns_of_tools
 
-    how = _Posting(check, gates, trace_points, progress or Progress())
+    how = _Posting(check, gates, trace_points, progress=progress or Progress())
     machine = target.machine
     how.progress.begin(PLANNING)
     every = planned(drawing, job, machine)
@@ -232,7 +234,8 @@ def _posted(
         source=drawing.file,
         tool_diameter_mm=tool,
         nose=nose,
-        kept=kept_of(whole.steps) if tool or nose else (),
+        kept=kept_of(whole.steps) if (tool or nose) and not how.brief else (),
+        shape=not how.brief,
         trace_points=TRACE_POINTS if how.trace_points is None else how.trace_points,
     )
     goal = _Goal(

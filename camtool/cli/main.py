@@ -59,6 +59,7 @@ COMMANDS = (
     "init",
     "job",
     "jog",
+    "meet",
     "ports",
     "post",
     "preview",
@@ -114,6 +115,7 @@ def cli() -> None:
     camtool job new logo.dxf                    a job file to fill in, from its layers
     camtool targets                             the machines it knows
     camtool tolerances new logo.dxf             its dimensions, to give limits to
+    camtool meet logo.dxf --tolerances FILE     what would make them hold
     camtool tools                               the tools that jobs may name
     camtool init                                a machine file of your own, by questions
     camtool coupon  lines -o coupon.dxf         a drawing to cut and measure

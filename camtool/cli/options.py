@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from camtool.planning.job import Job
     from camtool.project import Project
     from camtool.run import Run
+    from camtool.tables import Table
     from camtool.target.registry import LoadedTarget
     from camtool.verification.report import Gates
 
@@ -511,6 +512,10 @@ def _patterns(flag: str, text: str) -> Option:
 # The job: each key of a job file by its name with hyphens for underscores.
 
 
+ReadJob = Callable[["Table"], "Job"]
+"""Makes a job of the tables of its file."""
+
+
 @dataclass(frozen=True)
 class JobFlags:
     """`--job`, `--operation` and the flags that say the same as keys; `given` holds the values of
@@ -535,6 +540,25 @@ class JobFlags:
         if drawing.layer and len(job.operations) == 1:
             return replace(job, operations=(replace(job.operations[0], layers=drawing.layer),))
         return job
+
+    def as_file(self, drawing: DrawingFlags, place: Path) -> tuple[Job, Table, ReadJob]:
+        """The job, its tables as one file at this place, and what makes a job of such tables.
+
+        Of one operation `--layer` is a part of it. A usage error for `--operation`.
+        """
+        from camtool.jobs.build import JobTables, read_job_file, tables_of_flags
+        from camtool.jobs.changes import job_of_tables, together
+
+        if self.operations:
+            raise click.UsageError("--operation leaves a part of the job; this needs all of it")
+        wanted = self.job(drawing)
+        file = JobTables() if self.file is None else read_job_file(Path(self.file), self._piped)
+        tables = together(file, tables_of_flags(self.given), place.parent)
+        if drawing.layer and len(wanted.operations) == 1:
+            tables["operations"][0]["layers"] = list(drawing.layer)
+        read = functools.partial(job_of_tables, place=place, shop=self._shop())
+        assert read(tables) == wanted, "a job is not what its file says"
+        return wanted, tables, read
 
     def _shop(self) -> Shop:
         """The tools that the job may name, and the defaults of the project and the user."""

@@ -7,7 +7,7 @@ variant of the machine the program is simulated again and the same stations are 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -55,9 +55,10 @@ class Inspector:
     """Measures the dimensions of the part that the program of a run makes. `dimensions` are what
     can be measured, `findings` say why the others cannot."""
 
-    def __init__(self, run: Run, dimensions: Iterable[Dimension]) -> None:
-        """`run` has a drawing, a job and a verification. Raises OptionError where its job scales
-        the part: limits hold for the part as it is drawn."""
+    def __init__(self, run: Run, dimensions: Iterable[Dimension], *, fine: bool = False) -> None:
+        """`run` has a drawing, a job and a verification; `fine`: with MOST_POINTS of the slides'
+        path, so that it need not be simulated again. Raises OptionError where its job scales the
+        part: limits hold for the part as it is drawn."""
         assert run.drawing is not None
         assert run.job is not None
         assert run.decoded is not None
@@ -69,24 +70,50 @@ class Inspector:
         moves = swept_moves(wanted, self._tool)
         self._points = _points(wanted)
         self._last: tuple[Machine, Swept] | None = None
+        self._edges_of: tuple[Machine, float, dict[int, Floats]] | None = None
+        if fine:
+            trace = run.verification.trace
+            self._last = self._target.machine, swept_trace(trace, self._follows, self._tool)
         found: list[Finding] = []
         self.dimensions: tuple[Inspected, ...] = tuple(_inspected(run, dimensions, moves, found))
         self.findings = tuple(found)
 
-    def sizes(self, variant: Variant | None = None) -> list[Size]:
+    def sizes(
+        self, variant: Variant | None = None, left_mm: Mapping[int, float] | None = None
+    ) -> list[Size]:
         """The sizes of the dimensions on a variant of the machine (None: that of the run). Where a
-        feature is not cut there they are NaN."""
-        variant = variant or Variant(self._target.machine)
-        slides = self._slides(variant.machine).wider(0.5 * variant.wider_mm)
-        lies: dict[int, Floats] = {}
+        feature is not cut there they are NaN.
+
+        `left_mm`: if so much more is left on the walls of these paths of the drawing. The tool's
+        path lies so much farther from them then, and so does the edge that it cuts.
+        """
+        lies = self._edges(variant or Variant(self._target.machine))
+        more = left_mm or {}
         sizes = []
         for each in self.dimensions:
-            for feature, cut in zip(each.bound.features, each.cuts, strict=True):
-                if id(cut) not in lies:
-                    lies[id(cut)] = edge_at(feature, cut, rows_of(slides, cut, feature))
-            size = size_of(each.bound, each.cuts, [lies[id(cut)] for cut in each.cuts])
+            moved = [
+                lies[id(cut)] + (0.0 if cut.on_path else cut.side * more.get(feature.path, 0.0))
+                for feature, cut in zip(each.bound.features, each.cuts, strict=True)
+            ]
+            size = size_of(each.bound, each.cuts, moved)
             sizes.append(size or Size(math.nan, math.nan, math.nan))
         return sizes
+
+    def _edges(self, variant: Variant) -> dict[int, Floats]:
+        """Where the edge of each cut lies on a variant of the machine, by its `id`."""
+        known = self._edges_of
+        if known is None or known[0] is not variant.machine or known[1] != variant.wider_mm:
+            slides = self._slides(variant.machine).wider(0.5 * variant.wider_mm)
+            lies = {
+                id(cut): edge_at(feature, cut, rows_of(slides, cut, feature))
+                for feature, cut in {
+                    id(cut): (feature, cut)
+                    for each in self.dimensions
+                    for feature, cut in zip(each.bound.features, each.cuts, strict=True)
+                }.values()
+            }
+            known = self._edges_of = variant.machine, variant.wider_mm, lies
+        return known[2]
 
     def values(self, variant: Variant) -> Floats:
         """(3 D,) mm: of each dimension its best fit, its least and its largest local size."""

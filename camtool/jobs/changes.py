@@ -15,11 +15,13 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from camtool.jobs.build import JobTables
+from camtool.jobs.build import JobTables, build_job, tables_of
 from camtool.jobs.keys import OPERATION, TOOL_KEYS, TOOL_NAME, Given, Table, length
 from camtool.jobs.template import pattern_of
+from camtool.jobs.tools import Shop
+from camtool.planning.job import Job
 from camtool.tables import Table as Values
-from camtool.tables import written
+from camtool.tables import parsed_table, written
 
 FILES = ("tool_library", "tool_table")
 """Keys that name files, relative to the job file."""
@@ -150,8 +152,10 @@ def _divided(table: Values, left: Sequence[Left], names: set[str]) -> list[Value
     name = str(table.get("name") or table.get("kind") or "profile")
     parts: list[Values] = []
     for each in left:
-        by = length(table.get("allowance", 0.0)) + each.by_mm
-        part = {**table, "allowance": f"{round(by, LEFT_DIGITS) + 0.0:.10g}mm"}
+        part = dict(table)
+        if each.by_mm:
+            by = length(table.get("allowance", 0.0)) + each.by_mm
+            part["allowance"] = f"{round(by, LEFT_DIGITS) + 0.0:.10g}mm"
         if each.entities:
             part["select_entities"] = [pattern_of(entity) for entity in each.entities]
         if len(left) > 1:
@@ -170,5 +174,10 @@ def text_of(tables: Values, head: Sequence[str] = ()) -> str:
     if len(tables["operations"]) == 1:
         whole = {key: value for key, value in tables.items() if key != "operations"}
         tables = {**whole, **tables["operations"][0]}
-    comments = [*(f"# {line}" for line in head), *([""] if head else [])]
-    return "\n".join([*comments, *written(tables)]) + "\n"
+    body = "\n".join(written(tables)).lstrip("\n")
+    return "".join(f"# {line}\n" for line in head) + ("\n" if head else "") + body + "\n"
+
+
+def job_of_tables(tables: Values, place: Path, shop: Shop) -> Job:
+    """The job that a file of these tables at this place says: its text is read."""
+    return build_job(tables_of(parsed_table(text_of(tables)), place), JobTables(), (), shop)

@@ -12,7 +12,7 @@ and its model within the methods that need them.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -67,6 +67,9 @@ class Target(ABC):
 
     interpolators: ClassVar[tuple[str, ...]] = ()
     """The choices of `--interpolator`, if there are any."""
+    ways: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    """Keys of the machine file that say how its controller draws, with what each may be: what
+    `camtool meet` may propose."""
     codes: ClassVar[tuple[TargetCode, ...]] = ()
     """The codes of its own findings; their names start with the name of the target and a dot."""
     starts_spindle: ClassVar[bool] = False

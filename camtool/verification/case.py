@@ -78,7 +78,8 @@ class VerifyOptions:
     `kept`: which runs cut, and what must stay; () where that is not known. `size_bytes`: size of
     the file; `line_bytes`: what is sent over the line to the machine. `stray_mm`: how far the
     dialect may leave the wanted path on purpose. `trace_points`: points of the slides' path for
-    pictures. `worst`: number of moves listed as those with the largest errors.
+    pictures. `worst`: number of moves listed as those with the largest errors. `shape`: the part
+    that comes out is compared with the one that is wanted, if the tool is known.
     """
 
     interpolator: str | None = None
@@ -92,6 +93,7 @@ class VerifyOptions:
     stray_mm: float = 0.0
     trace_points: int = TRACE_POINTS
     worst: int = WORST_LISTED
+    shape: bool = True
 
 
 @dataclass(frozen=True, eq=False)

@@ -146,7 +146,7 @@ def judge(
     progress = progress or Progress()
     paths, coverage, conformance, turned = _compared(case)
     cuts, wanted = paths.decoded, paths.wanted
-    cutter = cutter_of(case.options, cuts)
+    cutter = cutter_of(case.options, cuts) if case.options.shape else None
     shape_points = points_wanted(cuts, cutter)
     # Slides may curve where their program does not: the shape needs no fewer points than pictures,
     # and is the same whether there are any.

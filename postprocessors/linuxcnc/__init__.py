@@ -33,6 +33,7 @@ class Linuxcnc(Target):
     controllers = (LinuxcncController,)
     dialect = Dialect
     link = LinuxcncLink
+    ways = {"dialect.path": ("exact-path", "exact-stop", "blend")}  # noqa: RUF012
     starts_spindle = True
     switches_coolant = True
     any_machine = True

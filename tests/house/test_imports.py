@@ -59,7 +59,7 @@ ALLOWED = {
     "run": JUDGE | {"verification", "pictures"},
     "pipeline": JUDGE | {"verification", "run"},
     "comparison": JUDGE | {"verification", "pictures", "run", "pipeline"},
-    "inspection": MADE - {"pictures"},
+    "inspection": MADE - {"pictures"} | {"jobs"},
     "batches": MADE,
     "sending": MADE,
     "cli": MADE | {"inspection", "calibration", "batches", "sending", "jobs", "project"},

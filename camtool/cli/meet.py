@@ -1,0 +1,112 @@
+"""`camtool meet`: what would make the dimensions of a part hold, as a job file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from camtool.cli.files import STDOUT, check_places, write_all
+from camtool.cli.life_signs import progress
+from camtool.cli.messages import say, say_findings, show_text
+from camtool.cli.options import (
+    DRAWING,
+    DrawingFlags,
+    JobFlags,
+    MachineFlags,
+    SectionedCommand,
+    drawing_options,
+    job_options,
+    machine_options,
+    talk_options,
+)
+from camtool.plain import one_line, to_json
+
+if TYPE_CHECKING:
+    from camtool.inspection.meet import Meeting
+
+
+@click.command(cls=SectionedCommand, short_help="What would make its dimensions hold.")
+@click.argument("source", metavar="DRAWING")
+@click.option(
+    "--tolerances",
+    metavar="FILE",
+    required=True,
+    help="Dimensions with limits: a tolerances.toml, or 'drawing' for the drawing's own alone.",
+)
+@click.option("-o", "--output", metavar="FILE", help="The job; - is stdout.  [DRAWING.meet.toml]")
+@click.option("--json", "report", metavar="FILE", help="The report; - is stdout.")
+@click.option(
+    "--most",
+    type=click.IntRange(min=1),
+    metavar="COUNT",
+    help="So many programs are tried at most.  [100]",
+)
+@machine_options
+@job_options
+@drawing_options
+@talk_options
+def meet(
+    source: str,
+    tolerances: str,
+    output: str | None,
+    report: str | None,
+    most: int | None,
+    machine: MachineFlags,
+    job: JobFlags,
+    drawing: DrawingFlags,
+    quiet: bool,
+    verbose: bool,
+) -> int:
+    """Find the cheapest change of the job after which all dimensions of DRAWING hold.
+
+    Allowances, direction, start, feed, compensation, approach, order and the controller's way to
+    draw are tried, each by a program that is posted, simulated and inspected. The best job is
+    written, with what it changes. Where none holds, exit code 1, and why: the dimension that
+    decides, and how good the machine would have to be.
+    """
+    from camtool.inspection.meet import MOST_TRIALS, Case, to_data, to_text
+    from camtool.inspection.meet import meet as met
+    from camtool.inspection.tolerances import dimensions_of
+    from camtool.inspection.verdicts import Tolerances
+
+    if output is None:
+        output = STDOUT if source == STDOUT else f"{Path(source).stem}.meet.toml"
+    file = None if tolerances == DRAWING else Path(tolerances)
+    check_places([source, tolerances, *machine.files(), *job.files()], [output, report])
+    target = machine.load()
+    place = Path(output) if output != STDOUT else Path("job.toml")
+    wanted, tables, job_of = job.as_file(drawing, place)
+    with job.blamed():
+        read = drawing.read(source, target.machine, wanted)
+        dimensions, findings = dimensions_of(read, file)
+        asked = Tolerances(dimensions, findings)
+        say_findings((*read.findings, *findings), quiet=quiet, verbose=verbose)
+        found = met(Case(read, target, tables, job_of, asked), most or MOST_TRIALS, progress())
+    files = {output: found.text.encode()} if found.changed else {}
+    if report is not None:
+        files[report] = to_json(to_data(found)).encode()
+    write_all(files)
+    if not quiet:
+        for line in to_text(found).splitlines():
+            show_text(one_line(line), err=True)
+    _say_end(found, source, output, quiet=quiet)
+    return 0 if found.holds else 1
+
+
+def _say_end(found: Meeting, source: str, output: str, *, quiet: bool) -> None:
+    """What was written, and whether it holds."""
+    where = "stdout" if output == STDOUT else output
+    if found.holds and not found.changed:
+        say("every dimension holds as it is: no job was written", quiet=quiet)
+    elif found.holds:
+        say(f"written: {where}, a job with which every dimension holds", quiet=quiet)
+    else:
+        count = len(found.after.short) + found.after.missing
+        more = f"; {where} is better, and not enough" if found.changed else ""
+        say(
+            f"camtool: error: {source}: no job was found with which every dimension holds:"
+            f" {count} would not{more}",
+            quiet=False,
+        )

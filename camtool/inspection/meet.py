@@ -1,0 +1,948 @@
+"""What would make the dimensions of a part hold: the cheapest change of its job, or why none does.
+
+A trial is a job file: it is read, posted, read back from its bytes, simulated and inspected, as
+`camtool post --job FILE --tolerances …` would. What a trial may change:
+
+    allowance              of each contour that cuts a dimension: in closed form, see below
+    compensate             of the job
+    direction, start       of the operations that cut a dimension that does not hold
+    approach, minimise     of the job
+    feed                   of these operations
+    how arcs, corners …    are drawn, where the controller has a choice (`Target.ways`)
+
+Trials go by the number of changes, with allowances (of however many contours) as one of them, and
+then by what they cost, as above: what takes no time comes before what takes time. The first that
+holds is the answer. Programs of the same bytes are judged once. Nothing is drawn by lot.
+
+Allowances. With so much more left on a wall, the tool's path runs so much farther from it, and so
+does the edge that it cuts along. So the sizes of a part follow for any allowances from the edges
+of one simulation (`Inspector.sizes`): they are linear in them, but for the profile of a line,
+which is convex. With the upper limit U, the lower L and the standard uncertainty u of a dimension,
+
+    maximise Σ_d t_d − ε Σ_c |a_c|
+    with t_d ≤ FAR_ENOUGH,   u t_d ≤ U − high(a),   u t_d ≤ low(a) − L
+
+is a linear programme; a convex size enters by its tangents at all a that were tried. The trial
+that follows says whether it is so.
+
+A certificate says why nothing holds: the dimension that is farthest from holding, and for each
+number of the machine, alone, how good it would have to be. It is found by bisection; each value
+is that of a job that was posted, simulated and inspected anew.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+import numpy as np
+
+from camtool.arrays import Floats
+from camtool.errors import CamtoolError, OptionError
+from camtool.geometry.nesting import nesting
+from camtool.inspection.inspector import MOST_POINTS, Inspected, Inspector
+from camtool.inspection.sizes import least
+from camtool.inspection.uncertainty import CERTAIN
+from camtool.inspection.verdicts import GUARD, Tolerances, inspect, verdicts_of
+from camtool.jobs.changes import LEFT_DIGITS, Change, Left, changed, text_of
+from camtool.jobs.keys import OPERATION
+from camtool.machine.model import Machine
+from camtool.pipeline import post_drawing
+from camtool.plain import one_line
+from camtool.planning.place import place
+from camtool.planning.sides import Sides
+from camtool.progress import Progress
+from camtool.run import Run
+from camtool.units import UM_PER_MM
+from camtool.verification.report import InspectedReport
+
+if TYPE_CHECKING:
+    from camtool.geometry.drawing import Drawing
+    from camtool.planning.job import Job, Operation
+    from camtool.tables import Table
+    from camtool.target.registry import LoadedTarget
+
+MOST_CHANGES = 3
+"""Proposals of more changes are not looked at."""
+
+MOST_TRIALS = 100
+"""So many programs are tried by default."""
+
+FEED_SHARES = (0.5, 0.25)
+"""Feeds that are tried, as parts of the operation's own."""
+
+MOST_LEFT = 0.25
+"""Allowances change by no more than this part of the tool's radius."""
+
+FAR_ENOUGH = 3.0
+"""A dimension that is within its limits by so many standard uncertainties (99.9 %) needs no more
+allowance."""
+
+PER_MM = 1e-3
+"""ε: what a millimetre of allowance costs, in standard uncertainties."""
+
+STEP_MM = 1e-6
+"""The step, mm, whose differences are the slopes of sizes."""
+
+ROUNDS = 8
+"""Tangents at so many allowances at most are taken."""
+
+SETTLED = 1e-6
+"""Rounds end when sizes differ from their tangents by no more, mm."""
+
+NO_STANDARD_MM = 1e-3
+"""The standard uncertainty that stands for one that is not known, mm: sizes are centred then."""
+
+BISECTIONS = 10
+"""Halvings of what a number of the machine would have to be."""
+
+REFINED = 2
+"""So often allowances are found anew from how they came out."""
+
+NEEDED_DIGITS = 3
+"""Its significant digits."""
+
+LARGEST_INPUTS = 2
+"""So many uncertainties, the largest, are asked how small they would have to be."""
+
+
+# What is asked, and what is tried.
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A drawing, its machine, its job as the tables of a file, and what its dimensions must be.
+    `job_of` reads tables as a job file is read; OptionError for those that are wrong."""
+
+    drawing: Drawing
+    target: LoadedTarget
+    tables: Table
+    job_of: Callable[[Table], Job]
+    tolerances: Tolerances
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """Changes of a job: of keys, of allowances, and of its machine as `--set` says them."""
+
+    changes: tuple[Change, ...] = ()
+    left: tuple[Left, ...] = ()
+    settings: tuple[str, ...] = ()
+
+    @property
+    def count(self) -> int:
+        """How many changes they are; allowances are one."""
+        return len(self.changes) + len(self.settings) + bool(self.left)
+
+    def __add__(self, other: Proposal) -> Proposal:
+        return Proposal(
+            self.changes + other.changes, self.left + other.left, self.settings + other.settings
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A proposal as it came out. `verdicts` of the dimensions, with the `paths` of the drawing
+    that make each; `missing`: how many could not be inspected; `time_s` of the program; `left`:
+    the allowances that should make it better, found from its edges."""
+
+    proposal: Proposal
+    verdicts: tuple[InspectedReport, ...]
+    paths: tuple[tuple[int, ...], ...]
+    missing: int
+    time_s: float
+    left: tuple[Left, ...] = ()
+
+    @property
+    def short(self) -> list[int]:
+        """Which dimensions are not in."""
+        return [k for k, each in enumerate(self.verdicts) if each.verdict != "in"]
+
+    @property
+    def holds(self) -> bool:
+        """Whether all dimensions are in."""
+        return not self.short and not self.missing
+
+    @property
+    def score(self) -> tuple[int, float]:
+        """The less, the better: how many dimensions do not hold, and by how many standard
+        uncertainties the worst is short."""
+        return self.missing + len(self.short), -min(map(margin, self.verdicts), default=math.inf)
+
+    @property
+    def binding(self) -> InspectedReport | None:
+        """The dimension that is farthest from holding; None where all were in or missing."""
+        return min((self.verdicts[k] for k in self.short), key=margin, default=None)
+
+
+def margin(each: InspectedReport) -> float:
+    """By how many standard uncertainties a dimension with limits is within the nearer one."""
+    assert each.upper_mm is not None
+    inside = each.upper_mm - each.high_mm
+    if each.lower_mm is not None:
+        inside = min(inside, each.low_mm - each.lower_mm)
+    return inside / _standard_mm(each)
+
+
+def _standard_mm(each: InspectedReport) -> float:
+    known = (each.standard_um or 0.0) / UM_PER_MM
+    return known or NO_STANDARD_MM
+
+
+@dataclass(frozen=True)
+class Need:
+    """A number of the machine that would have to be better: its key as `--set` has it, what it is,
+    and what it would have to be, in the unit of the key."""
+
+    key: str
+    now: float
+    needed: float
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """Why no proposal holds: the dimension that is farthest from it, the uncertain inputs that are
+    not known, and each number of the machine with which all would hold if it alone were better.
+    `exact`: whether all would with every one of these numbers at its best."""
+
+    binding: InspectedReport | None
+    unknown: tuple[str, ...] = ()
+    needs: tuple[Need, ...] = ()
+    exact: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Meeting:
+    """What came out: the job as it was, the best proposal and its `run`, posted (`brief` as
+    `post_drawing` has it) and inspected, how many programs were tried besides the job as it was,
+    and whether they were `all` that had to be. `text`: the job file of the proposal.
+    `certificate`: why it does not hold, None where it does."""
+
+    before: Trial
+    after: Trial
+    run: Run
+    text: str
+    trials: int
+    all: bool
+    certificate: Certificate | None
+
+    @property
+    def holds(self) -> bool:
+        """Whether all dimensions with limits hold."""
+        return self.after.holds
+
+    @property
+    def changed(self) -> bool:
+        """Whether the proposal is not the job as it was."""
+        return bool(self.after.proposal.count)
+
+
+def meet(case: Case, most: int = MOST_TRIALS, progress: Progress | None = None) -> Meeting:
+    """The cheapest change of the job after which all dimensions hold; without any, the best one
+    and a certificate. Never worse than the start. Raises what `post` and `inspect` raise for the
+    job as it is."""
+    asked = tuple(each for each in case.tolerances.dimensions if each.limits is not None)
+    case = replace(case, tolerances=replace(case.tolerances, dimensions=asked))
+    bench = Bench(case, progress or Progress())
+    bench.progress.begin("trying programs", most)
+    before = bench.first()
+    after, every = before, True
+    if not before.holds:
+        after, every = cheapest(before, levers(case, before), bench.tried, most)
+    trials = bench.trials
+    run, tables = bench.run_of(after.proposal), bench.tables_of(after.proposal)
+    assert run.report is not None
+    after = replace(after, verdicts=run.report.inspection)
+    certificate = None if after.holds else bench.certificate(after)
+    text = text_of(tables, list(_head(case, after)))
+    return Meeting(before, after, run, text, trials, every, certificate)
+
+
+Tried = Callable[[Proposal], "Trial | None"]
+"""Tries a proposal; None for one that cannot be cut."""
+
+
+def cheapest(
+    before: Trial, choices: Sequence[Sequence[Proposal]], tried: Tried, most: int
+) -> tuple[Trial, bool]:
+    """The holding trial with the fewest changes, the first of these; where none holds, that of the
+    best score. Of each of the `choices`, the cheapest of which come first, one is taken at most.
+    And whether all were tried that come before the answer: no more than `most` are."""
+    best, known = before, {Proposal(): before}
+    for count, proposal in enumerate(_proposals(choices, known), start=1):
+        if count > most:
+            return best, False
+        trial = tried(proposal)
+        if trial is None:
+            continue
+        known[proposal] = trial
+        if trial.holds:
+            return trial, True
+        if trial.score < best.score:
+            best = trial
+    return best, True
+
+
+def _proposals(
+    choices: Sequence[Sequence[Proposal]], known: Mapping[Proposal, Trial]
+) -> Iterator[Proposal]:
+    """All up to MOST_CHANGES: of each number of changes first allowances on what was tried with
+    one change less."""
+    for count in range(1, MOST_CHANGES + 1):
+        for base in list(known.values()):
+            if base.proposal.count == count - 1 and base.left and not base.proposal.left:
+                yield replace(base.proposal, left=base.left)
+        for some in itertools.combinations(choices, count):
+            for each in itertools.product(*some):
+                yield sum(each, Proposal())
+
+
+def levers(case: Case, before: Trial) -> list[list[Proposal]]:
+    """What may be changed, the cheapest first: of each list one at most."""
+    job, machine = case.job_of(case.tables), case.target.machine
+    short = {path for k in before.short for path in before.paths[k]}
+    cutting = Contours.of(case, job).cutting(short)
+    mine = [(row, operation) for row, _, operation in _rows(job) if row in cutting]
+    found = [
+        _job_lever("compensate", True, job.compensate),
+        *(_other_words("direction", row, each) for row, each in mine),
+        *(_other_words("start", row, each) for row, each in mine),
+        _job_lever("approach", True, job.approach),
+        _job_lever("minimise", "reversals", job.minimise),
+        *(_slower(row, each, machine) for row, each in mine),
+    ]
+    for key, values in case.target.target.ways.items():
+        now = _at(machine, key)
+        found.append([Proposal(settings=(f'{key}="{each}"',)) for each in values if each != now])
+    return [each for each in found if each]
+
+
+def _job_lever(key: str, value: Any, now: Any) -> list[Proposal]:
+    return [] if now == value else [Proposal((Change(key, value, None, str(now).lower()),))]
+
+
+OTHER_WORDS = {"direction": ("climb", "conventional"), "start": ("longest-line", "corner")}
+"""Keys of operations, with what they may be instead."""
+
+
+def _other_words(key: str, row: int, operation: Operation) -> list[Proposal]:
+    """The other words for a key of an operation, if its kind has that."""
+    if operation.kind not in OPERATION[key].kinds:
+        return []
+    now = getattr(operation, OPERATION[key].field)
+    said = now if isinstance(now, str) else f"{now[0]:g},{now[1]:g}"
+    return [Proposal((Change(key, word, row, said),)) for word in OTHER_WORDS[key] if word != now]
+
+
+def _slower(row: int, operation: Operation, machine: Machine) -> list[Proposal]:
+    """Slower feeds of an operation."""
+    feed = operation.feed_mm_min or machine.feed.default_mm_min
+    words = (f"{share * feed:.6g}mm/min" for share in FEED_SHARES)
+    return [Proposal((Change("feed", word, row, f"{feed:.6g}mm/min"),)) for word in words]
+
+
+def _rows(job: Job) -> Iterator[tuple[int, int, Operation]]:
+    """The operations, but for finishing passes, with their rows in the file and in the job."""
+    first = [k for k, each in enumerate(job.operations) if each.stage != "finish"]
+    return ((row, k, job.operations[k]) for row, k in enumerate(first))
+
+
+# The contours whose walls are moved.
+
+
+@dataclass(frozen=True, eq=False)
+class Contours:
+    """The contours of a job by the names of their entities. `cut`: which names the operation in
+    each row of the file takes; `walls`: the same of those that have allowances; `depth`: in how
+    many others each lies; `head`: walls with one head move alike, for an operation cannot be
+    divided; `most_mm`: how far a wall may be moved; `of_path`: the name of each path drawn."""
+
+    cut: dict[int, tuple[str, ...]]
+    walls: dict[int, tuple[str, ...]]
+    depth: dict[str, int]
+    head: dict[str, str]
+    most_mm: dict[str, float]
+    of_path: tuple[str, ...]
+
+    @classmethod
+    def of(cls, case: Case, job: Job) -> Contours:
+        """Those of a job."""
+        placed = place(case.drawing, job)
+        sides = Sides.of(placed, job, case.target.machine.defaults.cut_depth_mm)
+        depths: dict[str, set[int]] = {}
+        for name, depth in zip(placed.sources, nesting(placed.paths).depth.tolist(), strict=True):
+            depths.setdefault(name, set()).add(depth)
+        rests = {each.rest for each in job.operations} - {""}
+        head = {name: name for name in depths}
+        cut: dict[int, tuple[str, ...]] = {}
+        walls: dict[int, tuple[str, ...]] = {}
+        most: dict[str, float] = {}
+        for row, index, operation in _rows(job):
+            mine = np.flatnonzero(sides.cuts[index, : len(placed.paths)])
+            names = cut[row] = tuple(dict.fromkeys(placed.sources[k] for k in mine))
+            if operation.kind not in OPERATION["allowance"].kinds or not operation.tool.radius_mm:
+                continue
+            walls[row] = names
+            for name in names:
+                most[name] = min(most.get(name, math.inf), MOST_LEFT * operation.tool.radius_mm)
+            alone = not (operation.rest or operation.name in rests)
+            if not (alone and all(name and len(depths[name]) == 1 for name in names)):
+                heads = {head[name] for name in names}
+                head = {name: min(heads) if each in heads else each for name, each in head.items()}
+        depth = {name: min(each) for name, each in depths.items()}
+        return cls(cut, walls, depth, head, most, case.drawing.sources)
+
+    def cutting(self, paths: Iterable[int]) -> set[int]:
+        """The rows of the file that cut some paths of the drawing."""
+        names = {self.of_path[path] for path in paths}
+        return {row for row, mine in self.cut.items() if names.intersection(mine)}
+
+    def left(self, by_name: Mapping[str, float]) -> tuple[Left, ...]:
+        """What is left on walls, mm by the names of contours, as parts of operations: inner
+        contours before those around them."""
+        found: list[Left] = []
+        for row, names in self.walls.items():
+            if not any(by_name.get(name) for name in names):
+                continue
+            parts: list[tuple[float, list[str]]] = []
+            order = sorted(names, key=lambda name: -self.depth[name])
+            for _, level in itertools.groupby(order, key=lambda name: self.depth[name]):
+                here: dict[float, list[str]] = {}
+                for name in level:
+                    here.setdefault(by_name.get(name, 0.0), []).append(name)
+                for by_mm, some in here.items():
+                    if parts and parts[-1][0] == by_mm:
+                        parts[-1][1].extend(some)
+                    else:
+                        parts.append((by_mm, some))
+            found += [
+                Left(row, by_mm, tuple(some) if len(parts) > 1 else ()) for by_mm, some in parts
+            ]
+        return tuple(found)
+
+    def by_name(self, left: Iterable[Left]) -> dict[str, float]:
+        """The other way round."""
+        return {
+            name: each.by_mm
+            for each in left
+            for name in each.entities or self.walls[each.operation]
+        }
+
+
+def closed_form(
+    inspector: Inspector, verdicts: Sequence[InspectedReport | None], contours: Contours
+) -> dict[str, float]:
+    """By how much more should be left on the wall of each contour, mm; {} where nothing helps.
+    `verdicts` are those of the inspector's dimensions, None for what could not be measured."""
+    rows = [(k, each) for k, each in enumerate(verdicts) if each is not None]
+    short = {
+        contours.of_path[path]
+        for k, each in rows
+        if each.verdict != "in"
+        for path in paths_of(inspector.dimensions[k])
+    }
+    heads = sorted({contours.head[name] for name in short if name in contours.most_mm})
+    moved = {name: heads.index(head) for name, head in contours.head.items() if head in heads}
+    most = np.full(len(heads), math.inf)
+    for name, index in moved.items():
+        most[index] = min(most[index], contours.most_mm.get(name, math.inf))
+    if not heads:
+        return {}
+
+    def sizes(left: Floats) -> Floats:
+        """(D, 2) the largest and the least local size of each dimension."""
+        by_path = {
+            path: float(left[moved[name]])
+            for path, name in enumerate(contours.of_path)
+            if name in moved
+        }
+        made = inspector.sizes(left_mm=by_path)
+        return np.array([(made[k].high_mm, made[k].low_mm) for k, _ in rows])
+
+    limits = np.array([(each.upper_mm, each.lower_mm) for _, each in rows], dtype=np.float64)
+    standards = np.array([_standard_mm(each) for _, each in rows])
+    left = np.round(_best_left(sizes, limits, standards, most), LEFT_DIGITS)
+    return {name: float(left[index]) for name, index in moved.items()} if left.any() else {}
+
+
+def _best_left(
+    sizes: Callable[[Floats], Floats], limits: Floats, standards: Floats, most: Floats
+) -> Floats:
+    """(C,) the allowances of the linear programme above; `sizes` gives (D, 2) sizes for (C,), and
+    `limits` (D, 2) are the upper and the lower ones, NaN for none."""
+    count, dims = len(most), len(limits)
+    # x = t_1 … t_D, then what is left and what is taken, both 0 or more, of each contour.
+    goal = np.concatenate([-np.ones(dims), np.full(2 * count, PER_MM)])
+    unit = np.eye(dims)
+    conditions = [
+        (np.hstack([-unit, np.zeros((dims, 2 * count))]), np.full(dims, -FAR_ENOUGH)),
+        (np.hstack([np.zeros((2 * count, dims)), np.eye(2 * count)]), np.zeros(2 * count)),
+        (np.hstack([np.zeros((2 * count, dims)), -np.eye(2 * count)]), -np.tile(most, 2)),
+    ]
+    left = np.zeros(count)
+    for _ in range(ROUNDS):
+        here = sizes(left)
+        slopes = np.stack(
+            [(sizes(left + STEP_MM * step) - here) / STEP_MM for step in np.eye(count)], axis=2
+        )  # (D, 2, C)
+        for side, sign in ((0, 1.0), (1, -1.0)):
+            # sign·size(a) + u t ≤ sign·limit, with size(a) = here + slopes·(a − left).
+            known = np.isfinite(limits[:, side]) & np.isfinite(here[:, side])
+            slope = sign * slopes[known, side]
+            row = np.hstack([-standards[known, None] * unit[known], -slope, slope])
+            bound = sign * (here[known, side] - limits[known, side]) - slope @ left
+            conditions.append((row, bound))
+        rows, bounds = zip(*conditions, strict=True)
+        x = least(goal, np.vstack(rows), np.hstack(bounds))
+        found = x[dims : dims + count] - x[dims + count :]
+        expected = here + slopes @ (found - left)
+        left = found
+        if np.nanmax(np.abs(sizes(left) - expected), initial=0.0) <= SETTLED:
+            break
+    return left
+
+
+def paths_of(each: Inspected) -> tuple[int, ...]:
+    """The paths of the drawing that make a dimension."""
+    return tuple(dict.fromkeys(feature.path for feature in each.bound.features))
+
+
+# Trials.
+
+Varied = Callable[[Machine], Machine]
+
+
+@dataclass(eq=False)
+class Bench:
+    """Posts and inspects the jobs of proposals; equal programs are judged once."""
+
+    case: Case
+    progress: Progress
+    trials: int = 0
+    _known: dict[bytes, Trial] = field(default_factory=dict)
+    _first: dict[tuple[str, int | None], InspectedReport] = field(default_factory=dict)
+
+    @cached_property
+    def contours(self) -> Contours:
+        """Those of the job as it is."""
+        return Contours.of(self.case, self.case.job_of(self.case.tables))
+
+    def first(self) -> Trial:
+        """The job as it is. Raises what posting it raises, and OptionError for a program with
+        errors, and where no dimension with limits can be inspected."""
+        run = self._posted(Proposal(), self.case.target)
+        if run.report is None or run.failed:
+            raise OptionError(
+                "the job has errors, so that no dimension can be inspected",
+                file=self.case.drawing.file,
+                mend="see what camtool post says of it",
+            )
+        trial = self._judged(run, Proposal())
+        if not trial.verdicts:
+            raise OptionError(
+                "no dimension with limits can be inspected",
+                file=self.case.drawing.file,
+                where="tolerances",
+                mend="give limits: camtool tolerances new begins a file",
+            )
+        self._known[_digest(run, self.case.target.machine)] = trial
+        return trial
+
+    def tried(self, proposal: Proposal, varied: Varied | None = None) -> Trial | None:
+        """A proposal as it comes out; None where it cannot be cut, or the program has errors."""
+        self.trials += 1
+        self.progress.done += 1
+        try:
+            target = self._target(proposal, varied)
+            run = self._posted(proposal, target)
+            if run.report is None or run.failed:
+                return None
+            digest = _digest(run, target.machine)
+            if digest not in self._known:
+                self._known[digest] = self._judged(run, proposal)
+        except CamtoolError:
+            return None
+        return replace(self._known[digest], proposal=proposal)
+
+    def run_of(self, proposal: Proposal) -> Run:
+        """The job of a proposal, posted and inspected."""
+        return inspect(self._posted(proposal, self._target(proposal)), self.case.tolerances)
+
+    def tables_of(self, proposal: Proposal) -> Table:
+        """The job file of a proposal."""
+        return changed(self.case.tables, proposal.changes, proposal.left)
+
+    def _target(self, proposal: Proposal, varied: Varied | None = None) -> LoadedTarget:
+        target = self.case.target.with_settings(proposal.settings)
+        return target if varied is None else replace(target, machine=varied(target.machine))
+
+    def _posted(self, proposal: Proposal, target: LoadedTarget) -> Run:
+        job = self.case.job_of(self.tables_of(proposal))
+        return post_drawing(self.case.drawing, job, target, trace_points=MOST_POINTS, brief=True)
+
+    def _judged(self, run: Run, proposal: Proposal) -> Trial:
+        """How a program comes out. A size beyond its limit is in with half the probability at
+        most: then the simulations that give its uncertainty are left out, and that of the job as
+        it is stands for it."""
+        inspector = Inspector(run, self.case.tolerances.dimensions, fine=True)
+        found: list[InspectedReport | None] = list(self._foreseen(inspector))
+        beyond = any(each is None or each.verdict == "out" for each in found)
+        if not self._first or not beyond:
+            found = [
+                each if isinstance(each, InspectedReport) else None
+                for each in verdicts_of(inspector, run)
+            ]
+        seen = [k for k, each in enumerate(found) if each is not None]
+        assert run.report is not None
+        trial = Trial(
+            proposal,
+            verdicts=tuple(each for each in found if each is not None),
+            paths=tuple(paths_of(inspector.dimensions[k]) for k in seen),
+            missing=len(inspector.findings) + len(found) - len(seen),
+            time_s=run.report.time_s,
+        )
+        if not self._first:
+            each_of = zip(inspector.dimensions, found, strict=True)
+            self._first = {_key_of(one): each for one, each in each_of if each is not None}
+        more = closed_form(inspector, found, self.contours) if trial.short else {}
+        if not more:
+            return trial
+        so_far = self.contours.by_name(proposal.left)
+        whole = {name: round(so_far.get(name, 0.0) + by, LEFT_DIGITS) for name, by in more.items()}
+        return replace(trial, left=self.contours.left({**so_far, **whole}))
+
+    def _foreseen(self, inspector: Inspector) -> Iterator[InspectedReport | None]:
+        """The dimensions with their sizes, and what these alone say of them, if they are as sure
+        as those of the job as it is; None for what is not cut, and for what is new."""
+        for one, size in zip(inspector.dimensions, inspector.sizes(), strict=True):
+            known = self._first.get(_key_of(one))
+            if known is None or not math.isfinite(size.low_mm + size.high_mm):
+                yield None
+                continue
+            made = msgspec.structs.replace(
+                known, fit_mm=size.fit_mm, low_mm=size.low_mm, high_mm=size.high_mm
+            )
+            within = margin(made)
+            verdict = "in" if within >= GUARD else "out" if within < 0.0 else "undecided"
+            yield msgspec.structs.replace(made, verdict=verdict)
+
+    def certificate(self, best: Trial) -> Certificate:
+        """Why the best trial does not hold."""
+        binding = best.binding
+        if binding is None or binding.unknown:
+            return Certificate(binding, () if binding is None else binding.unknown)
+        machine = self._target(best.proposal).machine
+        mechanics, standards = list(_mechanics(machine)), list(_standards(machine, binding))
+        numbers = [*mechanics, *standards]
+        needs = []
+        for each in (*mechanics, *standards[:LARGEST_INPUTS]):
+            needed = self._needed(each, best)
+            if needed is not None:
+                needs.append(Need(each.key, each.now, needed))
+
+        def exact(machine: Machine) -> Machine:
+            for each in numbers:
+                machine = each.changed(machine, each.best)
+            return machine
+
+        return Certificate(binding, (), tuple(needs), bool(needs) or self._holds(best, exact))
+
+    def _needed(self, number: _Number, best: Trial) -> float | None:
+        """The value nearest to what a number is with which all holds; None for none."""
+
+        def holds(value: float) -> bool:
+            return self._holds(best, lambda machine: number.changed(machine, value))
+
+        if not holds(number.best):
+            return None
+        good, bad = 1.0, 0.0  # parts of the way from what it is to its best
+        for _ in range(BISECTIONS):
+            middle = 0.5 * (good + bad)
+            good, bad = (middle, bad) if holds(number.at(middle)) else (good, middle)
+        rounded = _rounded(number.at(good), number.best)
+        return rounded if holds(rounded) else number.at(good)
+
+    def _holds(self, best: Trial, varied: Varied) -> bool:
+        """Whether the proposal holds on another machine, with the allowances for that."""
+        trial = self.tried(best.proposal, varied)
+        for _ in range(REFINED):
+            if trial is None or trial.holds or not trial.left:
+                break
+            trial = self.tried(replace(best.proposal, left=trial.left), varied)
+        return trial is not None and trial.holds
+
+
+def _key_of(each: Inspected) -> tuple[str, int | None]:
+    """What tells a dimension from all others, in any program."""
+    return each.bound.dimension.source, each.copy
+
+
+def _digest(run: Run, machine: Machine) -> bytes:
+    """What decides how a program comes out: its bytes, its machine, and which moves were asked."""
+    assert run.program is not None
+    assert run.wanted is not None
+    digest = hashlib.sha256(run.program.data)
+    digest.update(msgspec.json.encode(machine))
+    for column in (run.wanted.kind, run.wanted.end, run.wanted.centre):
+        digest.update(np.ascontiguousarray(column).tobytes())
+    return digest.digest()
+
+
+# Numbers of a machine that may be what it takes.
+
+
+@dataclass(frozen=True)
+class _Number:
+    """A number of a machine: its key, what it is, its best value, and the machine with another."""
+
+    key: str
+    now: float
+    best: float
+    own: Callable[[Machine, float], Machine] | None = None
+    """Where it is not the value of the key alone."""
+
+    def changed(self, machine: Machine, value: float) -> Machine:
+        """The machine with this value."""
+        if self.own is not None:
+            return self.own(machine, value)
+        made: Machine = _with(machine, self.key.split("."), value)
+        return made
+
+    def at(self, share: float) -> float:
+        """So far on the way to its best."""
+        return self.now + share * (self.best - self.now)
+
+
+def _mechanics(machine: Machine) -> Iterator[_Number]:
+    """Backlash, scale and squareness, as far as they are not at their best. Backlash is, where it
+    equals what the controller adds at reversals (`camtool.inspection.uncertainty`)."""
+    for index, name in enumerate("xy"):
+        axis, cells = (machine.axes.x, machine.axes.y)[index], machine.play_map.used[index]
+        ratio = axis.real_step_mm / axis.coded_step_mm
+        plays = [play for row in cells.play_mm for play in row] if cells else [axis.backlash_mm]
+        now, best = sum(plays) / len(plays), axis.compensation_mm * ratio
+        if abs(now - best) > CERTAIN:
+            own = None if cells is None else partial(_with_map, name, now, best)
+            key = f"axes.{name}.backlash_mm" if cells is None else f"play_map.{name}.play_mm"
+            yield _Number(key, now, best, own)
+        if abs(ratio - 1.0) > CERTAIN:
+            yield _Number(f"axes.{name}.real_step_mm", axis.real_step_mm, axis.coded_step_mm)
+    lean = machine.mechanics.squareness_rad
+    if abs(lean) > CERTAIN:
+        yield _Number("mechanics.squareness_rad", lean, 0.0)
+
+
+def _standards(machine: Machine, binding: InspectedReport) -> Iterator[_Number]:
+    """The standard uncertainties that contribute to that of a dimension, the largest first."""
+    for each in binding.contributions:
+        scatter = each.input.endswith(REPEATABILITY)
+        key = f"{'axes' if scatter else 'uncertainty'}.{each.input}"
+        now = _at(machine, key)
+        if isinstance(now, float) and now > 0.0:
+            yield _Number(key, now, 0.0)
+
+
+REPEATABILITY = "repeatability_mm"
+"""The input whose standard uncertainty is a number of the axis itself."""
+
+
+def _at(record: object, key: str) -> object:
+    """The value at a key such as "axes.x.backlash_mm"."""
+    for name in key.split("."):
+        record = getattr(record, name)
+    return record
+
+
+def _with(record: Any, names: Sequence[str], value: float) -> Any:
+    """The record with another value there."""
+    first, *rest = names
+    inner = _with(getattr(record, first), rest, value) if rest else value
+    return msgspec.structs.replace(record, **{first: inner})
+
+
+def _with_map(name: str, now: float, best: float, machine: Machine, value: float) -> Machine:
+    """With each cell of a map as much nearer to the best as the mean is."""
+    share = (value - best) / (now - best)
+    cells = getattr(machine.play_map, name)
+    rows = tuple(
+        tuple(max(0.0, best + share * (play - best)) for play in row) for row in cells.play_mm
+    )
+    made: Machine = _with(machine, ["play_map", name, "play_mm"], rows)  # type: ignore[arg-type]
+    return made
+
+
+def _rounded(value: float, best: float) -> float:
+    """The value with few digits, rounded towards the best one."""
+    off = abs(value - best)
+    if off == 0.0:
+        return value
+    unit = 10.0 ** (math.floor(math.log10(off)) + 1 - NEEDED_DIGITS)
+    return best + math.copysign(math.floor(off / unit) * unit, value - best)
+
+
+# In words.
+
+MOST_NAMED = 4
+"""So many contours are named."""
+
+
+def to_text(meeting: Meeting) -> str:
+    """The dimensions before and after, the changes, and the certificate, for people."""
+    before = {each.name: each for each in meeting.before.verdicts}
+    rows = [("", "limits, mm", "as it is", "", "then", "")]
+    for each in meeting.after.verdicts:
+        known = before.get(each.name)
+        was = ("not cut", "") if known is None else (_extreme(known), known.verdict)
+        rows.append((each.name, _limits(each), *was, _extreme(each), each.verdict))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = [
+        "  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]
+    said = list(changes_said(meeting.after.proposal))
+    lines += ["", *(f"change: {line}" for line in said or ["none"])]
+    took, takes = meeting.before.time_s, meeting.after.time_s
+    lines.append(f"time: {took:.1f} s, then {takes:.1f} s")
+    more = "" if meeting.all else "; --most allows no more"
+    plural = "" if meeting.trials == 1 else "s"
+    lines.append(f"tried: {meeting.trials} program{plural}{more}")
+    if meeting.certificate is not None:
+        lines += ["", *_certified(meeting)]
+    return "\n".join(lines)
+
+
+def _extreme(each: InspectedReport) -> str:
+    """The predicted size, from the least to the largest."""
+    low, high = f"{each.low_mm:.4f}", f"{each.high_mm:.4f}"
+    return low if low == high else f"{low} … {high}"
+
+
+def _limits(each: InspectedReport) -> str:
+    lower = "" if each.lower_mm is None else f"{each.lower_mm:.7g} … "
+    return f"{lower}{each.upper_mm:.7g}"
+
+
+def changes_said(proposal: Proposal) -> Iterator[str]:
+    """A line for each change."""
+    for each in proposal.left:
+        if not each.by_mm:
+            continue
+        more = "more left" if each.by_mm > 0.0 else "less left"
+        names = ", ".join(each.entities[:MOST_NAMED])
+        if len(each.entities) > MOST_NAMED:
+            names += f" and {len(each.entities) - MOST_NAMED} more"
+        of = f"the walls of {names}" if names else "all its walls"
+        yield (
+            f"operation {each.operation + 1}: {abs(each.by_mm):.{LEFT_DIGITS}f} mm {more} on {of}"
+        )
+    for change in proposal.changes:
+        whose = "job" if change.operation is None else f"operation {change.operation + 1}"
+        value = str(change.value).lower() if isinstance(change.value, bool) else change.value
+        was = f", was {change.instead}" if change.instead else ""
+        yield f"{whose}: {change.key} = {value}{was}"
+    for setting in proposal.settings:
+        yield f"machine: --set {setting}"
+
+
+def _certified(meeting: Meeting) -> Iterator[str]:
+    """Why it does not hold."""
+    why = meeting.certificate
+    assert why is not None
+    if why.binding is None:
+        yield "a dimension cannot be inspected: the findings say which, and why"
+        return
+    each = why.binding
+    yield f"{each.name} decides: {_extreme(each)} mm, and must be {_limits(each)} mm"
+    if why.unknown:
+        yield (
+            "nothing can make it hold while [uncertainty] of the machine file does not say "
+            f"{', '.join(why.unknown)}"
+        )
+        return
+    for need in why.needs:
+        better = "at most" if abs(need.needed) < abs(need.now) else "at least"
+        unit = need.key.rpartition("_")[2]
+        yield f"it would take {need.key} {better} {need.needed:.9g} (it is {need.now:.6g}), {unit}"
+    if not why.needs and why.exact:
+        yield "no single number of the machine would do: all of them must be better"
+    if not why.needs and not why.exact:
+        yield (
+            "not even a machine without play, errors of scale and these uncertainties would do: "
+            "the tool, its controller or the limits must be others"
+        )
+
+
+def to_data(meeting: Meeting) -> dict[str, Any]:
+    """The same for pipelines: mm and s, standard uncertainties in µm."""
+    before = {each.name: each for each in meeting.before.verdicts}
+    why, proposal = meeting.certificate, meeting.after.proposal
+    return {
+        "holds": meeting.holds,
+        "changes": [
+            {"operation": row, "key": each.key, "value": each.value, "was": each.instead}
+            for each in proposal.changes
+            for row in [None if each.operation is None else each.operation + 1]
+        ],
+        "allowances": [
+            {"operation": each.operation + 1, "entities": each.entities, "by_mm": each.by_mm}
+            for each in proposal.left
+            if each.by_mm
+        ],
+        "settings": list(proposal.settings),
+        "dimensions": [
+            {
+                "name": each.name,
+                "lower_mm": each.lower_mm,
+                "upper_mm": each.upper_mm,
+                "before": _verdict_data(before.get(each.name)),
+                "after": _verdict_data(each),
+            }
+            for each in meeting.after.verdicts
+        ],
+        "not_inspected": meeting.after.missing,
+        "time_s": {"before": meeting.before.time_s, "after": meeting.after.time_s},
+        "trials": meeting.trials,
+        "all_tried": meeting.all,
+        "certificate": None
+        if why is None
+        else {
+            "binding": None if why.binding is None else why.binding.name,
+            "unknown": why.unknown,
+            "needs": [
+                {"key": each.key, "now": each.now, "needed": each.needed} for each in why.needs
+            ],
+            "exact_machine": why.exact,
+        },
+    }
+
+
+def _verdict_data(each: InspectedReport | None) -> dict[str, Any] | None:
+    if each is None:
+        return None
+    return {
+        "low_mm": each.low_mm,
+        "high_mm": each.high_mm,
+        "standard_um": each.standard_um,
+        "probability": each.probability,
+        "verdict": each.verdict,
+    }
+
+
+def _head(case: Case, best: Trial) -> Iterator[str]:
+    """The comments at the top of a job file."""
+    name = one_line(PurePath(case.drawing.file).name)
+    target = case.target.machine.target.name
+    count, short = len(best.verdicts) + best.missing, len(best.short) + best.missing
+    if best.holds:
+        yield f"Every dimension of {name} that has limits holds on {target} ({count})."
+    else:
+        yield f"NOT ALL dimensions of {name} hold on {target}: {short} of {count} do not."
+    for line in changes_said(best.proposal):
+        yield one_line(line)
