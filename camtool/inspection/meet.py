@@ -100,7 +100,7 @@ SETTLED = 1e-6
 NO_STANDARD_MM = 1e-3
 """The standard uncertainty that stands for one that is not known, mm: sizes are centred then."""
 
-BISECTIONS = 10
+BISECTIONS = 6
 """Halvings of what a number of the machine would have to be."""
 
 REFINED = 2
