@@ -55,10 +55,9 @@ class Inspector:
     """Measures the dimensions of the part that the program of a run makes. `dimensions` are what
     can be measured, `findings` say why the others cannot."""
 
-    def __init__(self, run: Run, dimensions: Iterable[Dimension], *, fine: bool = False) -> None:
-        """`run` has a drawing, a job and a verification; `fine`: with MOST_POINTS of the slides'
-        path, so that it need not be simulated again. Raises OptionError where its job scales the
-        part: limits hold for the part as it is drawn."""
+    def __init__(self, run: Run, dimensions: Iterable[Dimension]) -> None:
+        """`run` has a drawing, a job and a verification. Raises OptionError where its job scales
+        the part: limits hold for the part as it is drawn."""
         assert run.drawing is not None
         assert run.job is not None
         assert run.decoded is not None
@@ -71,9 +70,6 @@ class Inspector:
         self._points = _points(wanted)
         self._last: tuple[Machine, Swept] | None = None
         self._edges_of: tuple[Machine, float, dict[int, Floats]] | None = None
-        if fine:
-            trace = run.verification.trace
-            self._last = self._target.machine, swept_trace(trace, self._follows, self._tool)
         found: list[Finding] = []
         self.dimensions: tuple[Inspected, ...] = tuple(_inspected(run, dimensions, moves, found))
         self.findings = tuple(found)

@@ -47,7 +47,7 @@ import numpy as np
 from camtool.arrays import Floats
 from camtool.errors import CamtoolError, OptionError
 from camtool.geometry.nesting import nesting
-from camtool.inspection.inspector import MOST_POINTS, Inspected, Inspector
+from camtool.inspection.inspector import Inspected, Inspector
 from camtool.inspection.sizes import least
 from camtool.inspection.uncertainty import CERTAIN
 from camtool.inspection.verdicts import GUARD, Tolerances, inspect, verdicts_of
@@ -585,13 +585,13 @@ class Bench:
 
     def _posted(self, proposal: Proposal, target: LoadedTarget) -> Run:
         job = self.case.job_of(self.tables_of(proposal))
-        return post_drawing(self.case.drawing, job, target, trace_points=MOST_POINTS, brief=True)
+        return post_drawing(self.case.drawing, job, target, brief=True)
 
     def _judged(self, run: Run, proposal: Proposal) -> Trial:
         """How a program comes out. A size beyond its limit is in with half the probability at
         most: then the simulations that give its uncertainty are left out, and that of the job as
         it is stands for it."""
-        inspector = Inspector(run, self.case.tolerances.dimensions, fine=True)
+        inspector = Inspector(run, self.case.tolerances.dimensions)
         found: list[InspectedReport | None] = list(self._foreseen(inspector))
         beyond = any(each is None or each.verdict == "out" for each in found)
         if not self._first or not beyond:
