@@ -4,6 +4,7 @@ import itertools
 import math
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -526,6 +527,56 @@ def test_probabilities_agree_with_brute_force(plate: Path) -> None:
     assert share == pytest.approx(
         chance, abs=3.0 * math.sqrt(chance * (1 - chance) / count) + 0.02
     )
+
+
+@pytest.mark.slow
+def test_probabilities_agree_with_ten_thousand_simulated_parts(plate: Path) -> None:
+    """Each draw of backlash, scale, squareness and tool is a machine of its own, on which the
+    program is simulated and its part measured. Widths are as likely in as is said, within the
+    error of so many draws. The extremes of a circle, and of the distance from an edge that leans,
+    bend as |x| does, for which the rule of three points is a few per cent off."""
+    asked = [
+        dimension("distance", (5.0, 20.0), (45.0, 20.0), limits=(-0.05, -0.02)),
+        dimension("distance", (20.0, 5.0), (20.0, 35.0), limits=(-0.03, -0.005)),
+        dimension("distance", (25.0, 20.0), (37.0, 20.0), limits=(-0.02, 0.01)),
+        dimension("distance", (5.0, 20.0), (15.0, 20.0), limits=(-0.02, -0.01)),
+        dimension("diameter", (15.0, 20.0), limits=(-0.045, 0.045)),
+    ]
+    played = ("axes.x.backlash_mm=0.03", "axes.y.backlash_mm=0.02", "uncertainty.process_mm=0.0")
+    run = posted(plate, *played)
+    said = verdicts(run, *asked)
+    inspector, machine = Inspector(run, asked), run.target.machine
+    random, count = np.random.default_rng(11), 10_000
+    inside = np.zeros(len(asked))
+    for _ in range(count):
+        x, y = (
+            msgspec.structs.replace(
+                axis,
+                backlash_mm=axis.backlash_mm + random.normal(0.0, known.backlash_mm),
+                real_step_mm=axis.real_step_mm * (1.0 + random.normal(0.0, known.scale)),
+            )
+            for axis, known in (
+                (machine.axes.x, machine.uncertainty.x),
+                (machine.axes.y, machine.uncertainty.y),
+            )
+        )
+        lean = msgspec.structs.replace(
+            machine.mechanics, squareness_rad=random.normal(0.0, 0.0001)
+        )
+        drawn = msgspec.structs.replace(
+            machine, axes=msgspec.structs.replace(machine.axes, x=x, y=y), mechanics=lean
+        )
+        sizes = inspector.sizes(Variant(drawn, random.normal(0.0, 0.01)))
+        for k, (size, each) in enumerate(zip(sizes, said, strict=True)):
+            assert each.lower_mm is not None
+            assert each.upper_mm is not None
+            inside[k] += size.low_mm >= each.lower_mm and size.high_mm <= each.upper_mm
+    shares = inside / count
+    chances = np.array([each.probability for each in said], dtype=np.float64)
+    errors = np.sqrt(shares * (1.0 - shares) / count)
+    assert ((chances > 0.2) & (chances < 0.98)).all()
+    assert (np.abs(chances - shares)[:3] < 4.0 * errors[:3]).all(), (chances, shares)
+    assert (np.abs(chances - shares)[3:] < 0.05).all(), (chances, shares)
 
 
 def test_from_python_as_the_command_says_it(plate: Path, tmp_path: Path) -> None:
