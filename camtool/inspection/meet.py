@@ -183,12 +183,19 @@ class Trial:
 
 
 def margin(each: InspectedReport) -> float:
-    """By how many standard uncertainties a dimension with limits is within the nearer one."""
+    """By how many standard uncertainties a dimension with limits is within the nearer one,
+    wherever within their bounds the inputs are that are not known."""
+    lower, upper = _limits_mm(each)
+    return min(upper - each.high_mm, each.low_mm - lower) / _standard_mm(each)
+
+
+def _limits_mm(each: InspectedReport) -> tuple[float, float]:
+    """The limits, narrower by what is not known but bounded; the lower one −∞ where there is
+    none."""
     assert each.upper_mm is not None
-    inside = each.upper_mm - each.high_mm
-    if each.lower_mm is not None:
-        inside = min(inside, each.low_mm - each.lower_mm)
-    return inside / _standard_mm(each)
+    narrower = (each.unknown_um or 0.0) / UM_PER_MM
+    lower = -math.inf if each.lower_mm is None else each.lower_mm + narrower
+    return lower, each.upper_mm - narrower
 
 
 def _standard_mm(each: InspectedReport) -> float:
@@ -209,8 +216,9 @@ class Need:
 @dataclass(frozen=True)
 class Certificate:
     """Why no proposal holds: the dimension that is farthest from it, the uncertain inputs that are
-    not known, and each number of the machine with which all would hold if it alone were better.
-    `exact`: whether all would with every one of these numbers at its best."""
+    not known and that nothing bounds, and each number of the machine with which all would hold if
+    it alone were better. `exact`: whether all would with every one of these numbers at its
+    best."""
 
     binding: InspectedReport | None
     unknown: tuple[str, ...] = ()
@@ -466,7 +474,7 @@ def closed_form(
         made = inspector.sizes(left_mm=by_path)
         return np.array([(made[k].high_mm, made[k].low_mm) for k, _ in rows])
 
-    limits = np.array([(each.upper_mm, each.lower_mm) for _, each in rows], dtype=np.float64)
+    limits = np.array([_limits_mm(each)[::-1] for _, each in rows])
     standards = np.array([_standard_mm(each) for _, each in rows])
     left = np.round(_best_left(sizes, limits, standards, most), LEFT_DIGITS)
     return {name: float(left[index]) for name, index in moved.items()} if left.any() else {}
@@ -476,7 +484,7 @@ def _best_left(
     sizes: Callable[[Floats], Floats], limits: Floats, standards: Floats, most: Floats
 ) -> Floats:
     """(C,) the allowances of the linear programme above; `sizes` gives (D, 2) sizes for (C,), and
-    `limits` (D, 2) are the upper and the lower ones, NaN for none."""
+    `limits` (D, 2) are the upper and the lower ones, infinite for none."""
     count, dims = len(most), len(limits)
     # x = t_1 … t_D, then what is left and what is taken, both 0 or more, of each contour.
     goal = np.concatenate([-np.ones(dims), np.full(2 * count, PER_MM)])
@@ -636,8 +644,15 @@ class Bench:
     def certificate(self, best: Trial) -> Certificate:
         """Why the best trial does not hold."""
         binding = best.binding
-        if binding is None or binding.unknown:
-            return Certificate(binding, () if binding is None else binding.unknown)
+        if binding is None:
+            return Certificate(None)
+        unknown = tuple(
+            each.input
+            for each in binding.contributions
+            if each.um is None and each.at_most_um is None
+        )
+        if unknown:
+            return Certificate(binding, unknown)
         machine = self._target(best.proposal).machine
         mechanics, standards = list(_mechanics(machine)), list(_standards(machine, binding))
         numbers = [*mechanics, *standards]
@@ -866,6 +881,9 @@ def _certified(meeting: Meeting) -> Iterator[str]:
             f"{', '.join(why.unknown)}"
         )
         return
+    if each.unknown and each.unknown_um:
+        unsaid = ", ".join(each.unknown)
+        yield f"{each.unknown_um:.3g} µm of that is what [uncertainty] does not say: {unsaid}"
     for need in why.needs:
         better = "at most" if abs(need.needed) < abs(need.now) else "at least"
         unit = need.key.rpartition("_")[2]

@@ -180,7 +180,7 @@ def test_allowances_are_the_best_of_a_grid(data: st.DataObject) -> None:
     wide = np.array(data.draw(st.lists(st.floats(0.0, 0.02), min_size=dims, max_size=dims)))
     bent = np.array(data.draw(st.lists(st.booleans(), min_size=dims, max_size=dims)))
     standards = np.array(data.draw(st.lists(st.floats(1e-3, 5e-3), min_size=dims, max_size=dims)))
-    limits = np.column_stack([np.full(dims, 0.03), np.where(bent, np.nan, -0.03)])
+    limits = np.column_stack([np.full(dims, 0.03), np.where(bent, -np.inf, -0.03)])
     most = np.full(walls, 0.05)
 
     def sizes(left: np.ndarray) -> np.ndarray:
@@ -191,7 +191,7 @@ def test_allowances_are_the_best_of_a_grid(data: st.DataObject) -> None:
 
     def worth(left: np.ndarray) -> float:
         high, low = sizes(left).T
-        inside = np.fmin(limits[:, 0] - high, low - limits[:, 1]) / standards
+        inside = np.minimum(limits[:, 0] - high, low - limits[:, 1]) / standards
         return float(np.minimum(inside, FAR_ENOUGH).sum() - 1e-3 * np.abs(left).sum())
 
     left = best_left(sizes, limits, standards, most)
@@ -379,6 +379,24 @@ def test_what_is_not_known_is_named_first(tmp_path: Path) -> None:
     assert found.certificate.unknown == ("process_mm",)
     assert "process_mm" in to_text(found)
     assert not math.isnan(found.after.score[1])
+
+
+def test_what_is_not_known_but_bounded_makes_limits_narrower(tmp_path: Path) -> None:
+    """A room of which nobody says the temperature: 40 mm grow by 0.12 mm at most."""
+    unsaid = ("temperature", "expansion")
+    known = [each for each in KNOWN if not any(word in each for word in unsaid)]
+    target = camtool.load_target("linuxcnc", settings=[*EXACT, *known])
+    made = case(tmp_path, [limited(BORE, "-0.04/-0.12")])
+    found = meet(replace(made, target=target))
+    assert found.holds
+    (bore,) = found.after.verdicts
+    assert bore.unknown_um is not None
+    assert bore.unknown_um > 10.0
+    assert bore.high_mm + bore.unknown_um / 1000.0 < 7.96
+    never = meet(replace(case(tmp_path, [limited(BORE, "±0.02")]), target=target), most=1)
+    assert never.certificate is not None
+    assert never.certificate.unknown == ()
+    assert "what [uncertainty] does not say: part_expansion_per_k" in to_text(never)
 
 
 def test_no_limits_and_no_program_are_errors(tmp_path: Path) -> None:
