@@ -714,6 +714,14 @@ class Code(IntEnum):
         "the one at which it stands is inspected",
         "correct the count, or name each in tolerances.toml",
     )
+    NOTHING_REQUIRED = (
+        524,
+        ERROR,
+        "`--require` asks something of every dimension with limits, and none of them has any: "
+        "nothing would be judged",
+        "give limits in the drawing or in tolerances.toml (`camtool tolerances new` begins one), "
+        "or drop `--require`",
+    )
 
 
 @dataclass(frozen=True)
@@ -1738,6 +1746,10 @@ COUNT_DIFFERS = Sentence(
     Code.COUNT_DIFFERS,
     "{name} counts {limit:.0f} equal features, but {measured:.0f} of this size are drawn: only "
     "this one is inspected",
+)
+NOTHING_REQUIRED = Sentence(
+    Code.NOTHING_REQUIRED,
+    "no dimension with limits was inspected, so that nothing is known of what --require asks",
 )
 DIMENSION_NOT_IN_OUT = Sentence(
     Code.DIMENSION_NOT_IN,

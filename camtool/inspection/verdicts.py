@@ -28,6 +28,7 @@ from camtool.findings import (
     DIMENSION_NOT_CUT_THERE,
     DIMENSION_NOT_IN_OUT,
     DIMENSION_NOT_IN_UNDECIDED,
+    NOTHING_REQUIRED,
     Code,
     Finding,
     Severity,
@@ -63,7 +64,8 @@ class Tolerances:
 
 def inspect(run: Run, tolerances: Tolerances) -> Run:
     """The run with the verdicts of its dimensions in its report, and the findings about them. A
-    run without a verification (of a program with errors) is returned as it is.
+    run without a verification (of a program with errors) is returned as it is. Where something is
+    required, and no dimension with limits was inspected, that is an error.
 
     Raises OptionError where the job scales the part.
     """
@@ -77,6 +79,8 @@ def inspect(run: Run, tolerances: Tolerances) -> Run:
     left_out = (*tolerances.findings, *inspector.findings, *unmeasured)
     if tolerances.require is not None:
         left_out = tuple(map(_as_error, left_out))
+        if not any(each.upper_mm is not None for each in verdicts):
+            left_out = (*left_out, NOTHING_REQUIRED(where="tolerances"))
     findings = tuple(dict.fromkeys((*run.findings, *left_out, *wrong)))
     verification = run.verification.with_findings(findings)
     report = msgspec.structs.replace(verification.report, inspection=verdicts)
