@@ -171,10 +171,11 @@ class Trial:
         return not self.short and not self.missing
 
     @property
-    def score(self) -> tuple[int, float]:
-        """The less, the better: how many dimensions do not hold, and by how many standard
-        uncertainties the worst is short."""
-        return self.missing + len(self.short), -min(map(margin, self.verdicts), default=math.inf)
+    def score(self) -> tuple[int, int, float]:
+        """The less, the better: how many dimensions cannot be inspected, how many do not hold, and
+        by how many standard uncertainties the worst is short."""
+        worst = -min(map(margin, self.verdicts), default=math.inf)
+        return self.missing, len(self.short), worst
 
     @property
     def binding(self) -> InspectedReport | None:
@@ -401,6 +402,9 @@ class Contours:
             for name in names:
                 most[name] = min(most.get(name, math.inf), MOST_LEFT * operation.tool.radius_mm)
             alone = not (operation.rest or operation.name in rests)
+            if operation.kind != "profile":
+                # A contour within another one is an island of its pocket, or bored with it.
+                alone = alone and not nesting(placed.paths.select(mine)).depth.any()
             if not (alone and all(name and len(depths[name]) == 1 for name in names)):
                 heads = {head[name] for name in names}
                 head = {name: min(heads) if each in heads else each for name, each in head.items()}

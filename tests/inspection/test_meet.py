@@ -63,10 +63,12 @@ PROFILE = {"name": "outline", "kind": "profile", "at": [5, 20]}
 ROUND = {"name": "round", "kind": "roundness", "at": [15, 20]}
 
 
-def case(tmp_path: Path, dimensions: list[dict[str, Any]], *settings: str, job: str = "") -> Case:
-    """The plate of `test_verdicts`, cut by a tool of 2 mm on an exact LinuxCNC."""
+def case(
+    tmp_path: Path, dimensions: list[dict[str, Any]], *settings: str, job: str = "", svg: str = SVG
+) -> Case:
+    """The plate of `test_verdicts`, or another part, cut by 2 mm on an exact LinuxCNC."""
     drawing = tmp_path / "plate.svg"
-    drawing.write_text(SVG)
+    drawing.write_text(svg)
     limits = tmp_path / "tolerances.toml"
     limits.write_text(text_of_rows(dimensions))
     target = camtool.load_target("linuxcnc", settings=[*EXACT, *KNOWN, *settings])
@@ -254,9 +256,9 @@ def test_grids_of_allowances_hold_nothing_cheaper(tmp_path: Path, allowance: str
         left = bench.contours.left({circle: float(one), outline: float(other), window: shift})
         trial = bench.tried(Proposal(left=left))
         assert trial is not None
-        scores.append(min(trial.score[0], 0) + trial.score[1])
+        scores.append(trial.score[2])
     # Beyond FAR_ENOUGH no closed form looks for more.
-    assert found.score[1] <= max(min(scores), -FAR_ENOUGH) + 0.1
+    assert found.score[2] <= max(min(scores), -FAR_ENOUGH) + 0.1
 
 
 # Keys of the job, and the machine.
@@ -313,6 +315,24 @@ def test_only_what_cuts_a_short_dimension_is_changed(tmp_path: Path) -> None:
     names = [each["name"] for each in parsed_table(found.text)["operations"]]
     # Of what lies as deep as each other the one with more left comes where it first is named.
     assert names == ["holes", "holes (2)", "rim"]
+
+
+@pytest.mark.parametrize("kind", ["pocket", "bore"])
+def test_a_pocket_is_not_divided_from_its_islands(tmp_path: Path, kind: str) -> None:
+    """An operation that took the rim of a pocket alone would mill its islands away."""
+    rim = {"name": "rim", "kind": "diameter", "at": [15, 20], "nominal": "16mm"}
+    made = case(tmp_path, [limited(rim, "+0.03/+0.01")], svg=ISLAND)
+    made.tables["operations"] = [{"kind": kind, "tool_diameter": "2mm", "depth": "0.5mm"}]
+    found = meet(made)
+    assert found.holds
+    assert [each.entities for each in found.after.proposal.left] == [()]
+    assert "operations" not in parsed_table(found.text)
+
+
+ISLAND = """<svg xmlns="http://www.w3.org/2000/svg" width="50mm" height="40mm" viewBox="0 0 50 40">
+<g fill="none" stroke="black"><circle cx="15" cy="20" r="8"/>
+<circle cx="15" cy="20" r="3"/>
+<circle cx="35" cy="20" r="5"/></g></svg>"""
 
 
 def held_with(found: Meeting, made: Case, setting: str) -> bool:
