@@ -667,14 +667,14 @@ class Code(IntEnum):
         501,
         (WARNING, ERROR),
         "a dimension fits no feature of the drawing, or several that differ: it is not inspected; "
-        "an error with `--require`",
+        "an error with `--require`, if it is to have limits",
         "name a place on the feature in tolerances.toml (`at`, `from`, `to`)",
     )
     DIMENSION_NOT_CUT = (
         502,
         (WARNING, ERROR),
         "the program does not cut a feature of a dimension, or cuts little of it, so that it "
-        "cannot be inspected; an error with `--require`",
+        "cannot be inspected; an error with `--require`, if it is to have limits",
         "cut it in the same program, or take the dimension out of tolerances.toml",
     )
     DIMENSION_NOT_IN = (

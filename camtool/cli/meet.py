@@ -69,7 +69,7 @@ def meet(
     from camtool.inspection.meet import MOST_TRIALS, Case, to_data, to_text
     from camtool.inspection.meet import meet as met
     from camtool.inspection.tolerances import dimensions_of
-    from camtool.inspection.verdicts import Tolerances
+    from camtool.inspection.verdicts import NOT_INSPECTED, Tolerances
 
     if output is None:
         output = STDOUT if source == STDOUT else f"{Path(source).stem}.meet.toml"
@@ -88,6 +88,8 @@ def meet(
     if report is not None:
         files[report] = to_json(to_data(found)).encode()
     write_all(files)
+    left_out = [each for each in found.run.findings if each.code in NOT_INSPECTED]
+    say_findings(left_out, quiet=quiet, verbose=verbose)
     if not quiet:
         for line in to_text(found).splitlines():
             show_text(one_line(line), err=True)

@@ -56,3 +56,8 @@ class Dimension:
     limits: Limits | None = None
     words: str = ""
     general: str = ""
+
+    @property
+    def asks(self) -> bool:
+        """Whether it is to have limits, also such as are not known yet."""
+        return self.limits is not None or bool(self.words or self.general)

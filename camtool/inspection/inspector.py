@@ -70,9 +70,9 @@ class Inspector:
         self._points = _points(wanted)
         self._last: tuple[Machine, Swept] | None = None
         self._edges_of: tuple[Machine, float, dict[int, Floats]] | None = None
-        found: list[Finding] = []
+        found: list[tuple[Dimension, Finding]] = []
         self.dimensions: tuple[Inspected, ...] = tuple(_inspected(run, dimensions, moves, found))
-        self.findings = tuple(found)
+        self.left_out = tuple(found)
 
     def sizes(
         self, variant: Variant | None = None, left_mm: Mapping[int, float] | None = None
@@ -158,7 +158,7 @@ def _edges_of(bound: Bound) -> Floats:
 
 
 def _inspected(
-    run: Run, dimensions: Iterable[Dimension], moves: Swept, found: list[Finding]
+    run: Run, dimensions: Iterable[Dimension], moves: Swept, found: list[tuple[Dimension, Finding]]
 ) -> Iterable[Inspected]:
     assert run.drawing is not None
     assert run.job is not None
@@ -175,7 +175,7 @@ def _inspected(
     for dimension in dimensions:
         bound = bind(dimension, features, run.drawing.file)
         if isinstance(bound, Finding):
-            found.append(bound)
+            found.append((dimension, bound))
             continue
         for copy, where in enumerate(maps):
             placed = bound.placed(where)
@@ -190,13 +190,12 @@ def _inspected(
                 yield here
                 continue
             missing = placed.features[cuts.index(None)]
-            found.append(
-                DIMENSION_NOT_CUT(
-                    where=f"{run.drawing.file}, {dimension.source}",
-                    name=here.name,
-                    what="edge" if isinstance(missing, Edge) else "circle",
-                )
+            finding = DIMENSION_NOT_CUT(
+                where=f"{run.drawing.file}, {dimension.source}",
+                name=here.name,
+                what="edge" if isinstance(missing, Edge) else "circle",
             )
+            found.append((dimension, finding))
 
 
 class ToolAt:

@@ -46,11 +46,19 @@ import numpy as np
 
 from camtool.arrays import Floats
 from camtool.errors import CamtoolError, OptionError
+from camtool.findings import Severity
 from camtool.geometry.nesting import nesting
 from camtool.inspection.inspector import Inspected, Inspector
 from camtool.inspection.sizes import least
+from camtool.inspection.tolerances import unbound
 from camtool.inspection.uncertainty import CERTAIN
-from camtool.inspection.verdicts import GUARD, Tolerances, inspect, verdicts_of
+from camtool.inspection.verdicts import (
+    GUARD,
+    NOT_INSPECTED,
+    Tolerances,
+    inspect,
+    verdicts_of,
+)
 from camtool.jobs.changes import LEFT_DIGITS, Change, Left, changed, text_of
 from camtool.jobs.keys import OPERATION
 from camtool.machine.model import Machine
@@ -257,6 +265,7 @@ def meet(case: Case, most: int = MOST_TRIALS, progress: Progress | None = None) 
     """The cheapest change of the job after which all dimensions hold; without any, the best one
     and a certificate. Never worse than the start. Raises what `post` and `inspect` raise for the
     job as it is."""
+    _readable(case)
     asked = tuple(each for each in case.tolerances.dimensions if each.limits is not None)
     case = replace(case, tolerances=replace(case.tolerances, dimensions=asked))
     bench = Bench(case, progress or Progress())
@@ -272,6 +281,25 @@ def meet(case: Case, most: int = MOST_TRIALS, progress: Progress | None = None) 
     certificate = None if after.holds else bench.certificate(after)
     text = text_of(tables, list(_head(case, after)))
     return Meeting(before, after, run, text, trials, every, certificate)
+
+
+def _readable(case: Case) -> None:
+    """OptionError for dimensions that no job lets anybody inspect."""
+    wanted = [each for each in case.tolerances.dimensions if each.asks]
+    read = (
+        each
+        for each in case.tolerances.findings
+        if each.severity is Severity.ERROR or each.code in NOT_INSPECTED
+    )
+    lost = [*read, *unbound(case.drawing, wanted)]
+    if lost:
+        more = f" (and {len(lost) - 1} more)" if len(lost) > 1 else ""
+        raise OptionError(
+            f"no job can be said to meet it: {lost[0].message}{more}",
+            file=case.drawing.file,
+            where=lost[0].where,
+            mend=f"{lost[0].code.mend}; or leave it out",
+        )
 
 
 Tried = Callable[[Proposal], "Trial | None"]
@@ -617,7 +645,7 @@ class Bench:
             proposal,
             verdicts=tuple(each for each in found if each is not None),
             paths=tuple(paths_of(inspector.dimensions[k]) for k in seen),
-            missing=len(inspector.findings) + len(found) - len(seen),
+            missing=len(inspector.left_out) + len(found) - len(seen),
             time_s=run.report.time_s,
         )
         if not self._first:

@@ -75,12 +75,21 @@ def inspect(run: Run, tolerances: Tolerances) -> Run:
     found = tuple(verdicts_of(inspector, run))
     verdicts = tuple(each for each in found if isinstance(each, InspectedReport))
     wrong = _findings(verdicts, tolerances.require)
-    unmeasured = (each for each in found if isinstance(each, Finding))
-    left_out = (*tolerances.findings, *inspector.findings, *unmeasured)
-    if tolerances.require is not None:
-        left_out = tuple(map(_as_error, left_out))
-        if not any(each.upper_mm is not None for each in verdicts):
-            left_out = (*left_out, NOTHING_REQUIRED(where="tolerances"))
+    unmeasured = (
+        (inspected.bound.dimension, each)
+        for inspected, each in zip(inspector.dimensions, found, strict=True)
+        if isinstance(each, Finding)
+    )
+    gate = tolerances.require is not None
+    left_out = (
+        *(_as_error(each) if gate else each for each in tolerances.findings),
+        *(
+            _as_error(each) if gate and dimension.asks else each
+            for dimension, each in (*inspector.left_out, *unmeasured)
+        ),
+    )
+    if gate and not any(each.upper_mm is not None for each in verdicts):
+        left_out = (*left_out, NOTHING_REQUIRED(where="tolerances"))
     findings = tuple(dict.fromkeys((*run.findings, *left_out, *wrong)))
     verification = run.verification.with_findings(findings)
     report = msgspec.structs.replace(verification.report, inspection=verdicts)
@@ -88,7 +97,8 @@ def inspect(run: Run, tolerances: Tolerances) -> Run:
 
 
 NOT_INSPECTED = (Code.DIMENSION_UNBOUND, Code.DIMENSION_NOT_CUT, Code.CALLOUT_TEXT)
-"""Errors where something is required of every dimension: nobody knows whether these hold."""
+"""Errors where something is required of every dimension with limits: nobody knows whether these
+hold."""
 
 
 def _as_error(finding: Finding) -> Finding:

@@ -78,6 +78,33 @@ def test_why_nothing_holds_is_said(camtool, plate):
     assert report["certificate"]["needs"]
 
 
+def test_what_fits_nothing_is_not_passed_over(camtool, plate):
+    """Limits as drawn are not known where nothing is drawn; `post --require in` refuses them."""
+    ghost = {"name": "ghost", "kind": "diameter", "at": [9, 9], "limits": "±0.1"}
+    for rows in ([ghost], [ghost, limited(BORE, "±0.05")]):
+        (plate / "limits.toml").write_text(text_of_rows(rows))
+        found = camtool(*ASKED)
+        assert found.returncode == 2
+        assert b"no job can be said to meet it: ghost is not inspected: nothing" in found.stderr
+
+
+def test_a_job_that_leaves_out_what_has_limits_is_told(camtool, plate):
+    (plate / "limits.toml").write_text(text_of_rows([limited(BORE, "±0.05"), WIDTH]))
+    holds = camtool(*ASKED, "--select", "inner", "--json", "-")
+    assert holds.returncode == 0, holds.stderr
+    asked = ("--tolerances", "limits.toml", "--require", "in", "--tool-diameter", "2mm")
+    posted = camtool("post", "plate.svg", *MACHINE, *asked, "--select", "inner", "-o", "-")
+    assert posted.returncode == 0, posted.stderr  # nothing is asked of the width
+    (plate / "limits.toml").write_text(
+        text_of_rows([limited(BORE, "±0.05"), limited(WIDTH, "±0.05")])
+    )
+    lacks = camtool(*ASKED, "--select", "inner", "--most", "2")
+    assert lacks.returncode == 1
+    assert b"width is not inspected: the program does not cut its edge" in lacks.stderr
+    posted = camtool("post", "plate.svg", *MACHINE, *asked, "--select", "inner", "-o", "-")
+    assert posted.returncode == 1
+
+
 def test_wrong_use_is_one_line(camtool, plate):
     none = camtool("meet", "plate.svg", *MACHINE)
     assert none.returncode == 2

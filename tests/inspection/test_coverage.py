@@ -144,7 +144,7 @@ def inspector(target: str) -> tuple[Inspector, Inputs]:
     loaded = load_target(target, settings=MACHINES[target])
     job = job_of(kind="profile", tool_diameter_mm=TOOL_MM, depth_mm=1.0)
     made = Inspector(post_drawing(read_bytes(PART, "part.svg"), job, loaded), DIMENSIONS)
-    assert not made.findings
+    assert not made.left_out
     return made, inputs_of(loaded.machine, TOOL_MM)
 
 

@@ -383,7 +383,7 @@ def test_an_exact_machine_makes_what_is_drawn_at_every_depth(
 ) -> None:
     run = cut_deep(plate, OUTLINES.format(tool=tool, more=more) + rims)
     inspector = Inspector(run, ALL)
-    assert not inspector.findings
+    assert not inspector.left_out
     for each, size in zip(inspector.dimensions, inspector.sizes(), strict=True):
         for one in (size.fit_mm, size.low_mm, size.high_mm):
             assert one == pytest.approx(each.bound.drawn_mm, abs=1e-3)
