@@ -277,7 +277,8 @@ def meet(case: Case, most: int = MOST_TRIALS, progress: Progress | None = None) 
     trials = bench.trials
     run, tables = bench.run_of(after.proposal), bench.tables_of(after.proposal)
     assert run.report is not None
-    after = replace(after, verdicts=run.report.inspection)
+    missing = sum(each.code in NOT_INSPECTED for each in run.findings)
+    after = replace(after, verdicts=run.report.inspection, missing=missing)
     certificate = None if after.holds else bench.certificate(after)
     text = text_of(tables, list(_head(case, after)))
     return Meeting(before, after, run, text, trials, every, certificate)
@@ -634,7 +635,8 @@ class Bench:
         inspector = Inspector(run, self.case.tolerances.dimensions)
         found: list[InspectedReport | None] = list(self._foreseen(inspector))
         beyond = any(each is None or each.verdict == "out" for each in found)
-        if not self._first or not beyond:
+        new = any(_key_of(each) not in self._first for each in inspector.dimensions)
+        if new or not beyond:
             found = [
                 each if isinstance(each, InspectedReport) else None
                 for each in verdicts_of(inspector, run)
@@ -648,9 +650,10 @@ class Bench:
             missing=len(inspector.left_out) + len(found) - len(seen),
             time_s=run.report.time_s,
         )
-        if not self._first:
-            each_of = zip(inspector.dimensions, found, strict=True)
-            self._first = {_key_of(one): each for one, each in each_of if each is not None}
+        if new:
+            for one, each in zip(inspector.dimensions, found, strict=True):
+                if each is not None:
+                    self._first.setdefault(_key_of(one), each)
         more = closed_form(inspector, found, self.contours) if trial.short else {}
         if not more:
             return trial

@@ -329,6 +329,23 @@ def test_a_pocket_is_not_divided_from_its_islands(tmp_path: Path, kind: str) -> 
     assert "operations" not in parsed_table(found.text)
 
 
+def test_what_a_change_makes_measurable_is_counted(tmp_path: Path) -> None:
+    """Where the job as it is leaves a dimension uncut, another job's verdict of it counts: what is
+    told at the end is what stands in the report."""
+    bench = Bench(
+        case(tmp_path, [limited(BORE, "-0.01/-0.03"), limited(WIDTH, "±0.05")]),
+        camtool_progress(),
+    )
+    inner = bench.case.tables["operations"][0] | {"select": ["inner"]}
+    bench.case.tables["operations"] = [inner]
+    first = bench.first()
+    assert (first.missing, [each.name for each in first.verdicts]) == (1, ["bore"])
+    more = bench.tried(Proposal((Change("select", ["closed"], 0),)))
+    assert more is not None
+    assert (more.missing, [each.name for each in more.verdicts]) == (0, ["bore", "width"])
+    assert [each.verdict for each in more.verdicts] == ["out", "in"]
+
+
 ISLAND = """<svg xmlns="http://www.w3.org/2000/svg" width="50mm" height="40mm" viewBox="0 0 50 40">
 <g fill="none" stroke="black"><circle cx="15" cy="20" r="8"/>
 <circle cx="15" cy="20" r="3"/>
