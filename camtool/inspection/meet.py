@@ -297,7 +297,6 @@ def _readable(case: Case) -> None:
         more = f" (and {len(lost) - 1} more)" if len(lost) > 1 else ""
         raise OptionError(
             f"no job can be said to meet it: {lost[0].message}{more}",
-            file=case.drawing.file,
             where=lost[0].where,
             mend=f"{lost[0].code.mend}; or leave it out",
         )

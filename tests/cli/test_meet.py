@@ -86,6 +86,7 @@ def test_what_fits_nothing_is_not_passed_over(camtool, plate):
         found = camtool(*ASKED)
         assert found.returncode == 2
         assert b"no job can be said to meet it: ghost is not inspected: nothing" in found.stderr
+        assert found.stderr.startswith(b"camtool: error: plate.svg, limits.toml, dimension 1, at")
 
 
 def test_a_job_that_leaves_out_what_has_limits_is_told(camtool, plate):
