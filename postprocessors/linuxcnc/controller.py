@@ -222,6 +222,7 @@ class LinuxcncSamples(CountedSamples):
         self._before = np.append(corners.before, 0.0)
         self._behind = np.append(corners.behind, 0.0)
         self._ramp = np.append(corners.ramp, 1.0)
+        self._turn = _turn_of(self._before, self._behind, self._ramp)
         self._blends = bool(reach.any() or corners.before.any())
         self._length = moves.length
         self._row_length = move_lengths(path)
@@ -259,18 +260,21 @@ class LinuxcncSamples(CountedSamples):
         ahead = np.flatnonzero(left < self._before[move + 1])
         behind = np.flatnonzero(along < self._behind[move])
         corner = move[ahead] + 1
-        self._overlapped(points, ahead, corner, 0.5 - 0.5 * left[ahead] / self._before[corner])
+        turn = self._turn[corner]
+        self._overlapped(points, ahead, corner, turn * (1.0 - left[ahead] / self._before[corner]))
         corner = move[behind]
-        self._overlapped(points, behind, corner, 0.5 + 0.5 * along[behind] / self._behind[corner])
+        turn = self._turn[corner]
+        later = (1.0 - turn) * along[behind] / self._behind[corner]
+        self._overlapped(points, behind, corner, turn + later)
 
     def _overlapped(self, points: Floats, on: Ints, corner: Ints, x: Floats) -> None:
         """Put points (K, 3) where moves overlap: while the first slows down evenly over its last
         `before` mm, the second speeds up in the first part `ramp` of that time, and goes on, over
         its first `behind` mm. At the part x of the time the tool is where both are, one on top of
-        the other; the first half of it stands for the end of the first move, the second for the
+        the other; what is before `_turn_of` stands for the end of the first move, the rest for the
         start of the second."""
-        first, ramp = corner - 1, self._ramp[corner]
-        gone = np.where(x < ramp, x**2 / (2.0 * ramp), x - 0.5 * ramp) / (1.0 - 0.5 * ramp)
+        first = corner - 1
+        gone = _gone(x, self._ramp[corner])
         slowing = self._length[first] - (1.0 - x) ** 2 * self._before[corner]
         points[on] = self._on(first, slowing)
         points[on] += self._on(corner, gone * self._behind[corner]) - self._on(corner, 0.0 * x)
@@ -665,6 +669,32 @@ def _arc_limits(
     turning = _turning_radius(r, grows / sweep, rise)
     highest = np.minimum(highest, np.sqrt(NORMAL_RATIO * overall * turning))
     return highest, overall, highest**2 / turning
+
+
+def _gone(x: Floats, ramp: Floats) -> Floats:
+    """Which part of its way the second of two moves that overlap has gone at the part x of the
+    time, while it speeds up in the first part `ramp` of that."""
+    return np.where(x < ramp, x**2 / (2.0 * ramp), x - 0.5 * ramp) / (1.0 - 0.5 * ramp)
+
+
+def _turn_of(before: Floats, behind: Floats, ramp: Floats) -> Floats:
+    """(M,) the part x of the time of an overlap at which the first move lacks as much as the
+    second has gone: there the tool is nearest to the corner, and one ends and the other begins.
+
+    (1 − x)² before falls, and gone(x) behind grows, so that they meet once: by bisection. 0.5
+    where nothing overlaps.
+    """
+    low, high = np.zeros(len(before)), np.ones(len(before))
+    ramp = np.where(before > 0.0, ramp, 1.0)
+    for _ in range(TURN_ROUNDS):
+        middle = 0.5 * (low + high)
+        early = (1.0 - middle) ** 2 * before > _gone(middle, ramp) * behind
+        low, high = np.where(early, middle, low), np.where(early, high, middle)
+    return np.where((before > 0.0) & (behind > 0.0), 0.5 * (low + high), 0.5)
+
+
+TURN_ROUNDS = 40
+"""Halvings of the time of an overlap: to the last digits."""
 
 
 def _turning_radius(r: Floats, growth: Floats, rise: Floats) -> Floats:

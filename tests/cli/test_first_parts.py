@@ -92,11 +92,7 @@ def test_the_mounting_plate_is_what_was_drawn(
     job = str(samples / "mount.toml")
     done = camtool("post", str(samples / name), "--job", job, "-t", target, "-o", "mount.nc")
     assert done.returncode == 0, done.stderr
-    warned = [line for line in done.stderr.splitlines() if b"camtool: warning" in line]
-    if target == "linuxcnc":  # it overlaps ramps with the corners behind them, whatever P says
-        assert [b"END_NOT_REACHED" in line for line in warned] == [True]
-    else:
-        assert warned == []
+    assert b"camtool: warning" not in done.stderr
     moves = moves_of((tmp_path / "mount.nc").read_text(encoding="ascii"))
     part, radius = mount(), 0.5 * 3.175
     touched = cut_below(moves, -1e-9, radius)
