@@ -239,17 +239,17 @@ def scene_of(
 def rounds_of(verification: Verification) -> tuple[Round, ...]:
     """The full circles as polar plots show them, each with the number of the same circle in the
     other direction."""
-    from camtool.verification.circles import Pairs, both_ways
+    from camtool.verification.circles import Pairs
 
     seen = verification.circles
     pairs = Pairs([one.circle for one in seen])
+    both_mm: dict[int | None, float] = {}
+    for index, one in enumerate(seen):
+        for both in pairs.add(index, one.bins):
+            both_mm[index] = both_mm[pairs.partner(index)] = both.circular_mm
     found = []
     for index, one in enumerate(seen):
-        partner, both_mm = pairs.partner(index), math.nan
-        if partner is not None:
-            bins = np.concatenate([one.bins, seen[partner].bins])
-            both_mm = both_ways(one.circle, bins).circular_mm
-        figures = one.figures
+        partner, figures = pairs.partner(index), one.figures
         found.append(
             Round(
                 one.circle.centre_mm,
@@ -260,7 +260,7 @@ def rounds_of(verification: Verification) -> tuple[Round, ...]:
                 (figures.radial_max_mm, figures.radial_min_mm, figures.radial_mean_mm),
                 one.reversing.value,
                 None if partner is None else partner + 1,
-                both_mm,
+                both_mm.get(index, math.nan),
             )
         )
     return tuple(found)

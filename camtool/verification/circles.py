@@ -172,7 +172,10 @@ def least_squares_centre(points: Floats) -> Floats:
         if not distance.all():
             break
         terms = np.column_stack([spoke / distance[:, None], np.ones(len(points))])
-        move = np.linalg.lstsq(terms.T @ terms, terms.T @ distance, rcond=None)[0][:2]
+        # Sums, not products of matrices, whose last digits may differ from run to run.
+        normal = (terms[:, :, None] * terms[:, None, :]).sum(axis=0)
+        right = (terms * distance[:, None]).sum(axis=0)
+        move = np.linalg.lstsq(normal, right, rcond=None)[0][:2]
         centre = centre + move
         if np.hypot(move[0], move[1]) < FIT_END_MM:
             break
