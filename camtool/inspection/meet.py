@@ -111,11 +111,11 @@ NO_STANDARD_MM = 1e-3
 BISECTIONS = 6
 """Halvings of what a number of the machine would have to be."""
 
-REFINED = 2
-"""So often allowances are found anew from how they came out."""
-
 NEEDED_DIGITS = 3
 """Its significant digits."""
+
+REFINED = 2
+"""So often allowances are found anew from how they came out."""
 
 LARGEST_INPUTS = 2
 """So many uncertainties, the largest, are asked how small they would have to be."""

@@ -32,7 +32,6 @@ class PicMmh(Target):
     dialect = Dialect
     link = PicMmhLink
     interpolators = get_args(Interpolator)
-    ways = {"controller.arcs": interpolators}  # noqa: RUF012
 
     def write(self, toolpath: Toolpath, machine: PicMmhMachine) -> Program:
         """The program; PostError naming the move that cannot be written or done."""
