@@ -37,7 +37,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
@@ -273,7 +273,7 @@ def meet(case: Case, most: int = MOST_TRIALS, progress: Progress | None = None) 
     before = bench.first()
     after, every = before, True
     if not before.holds:
-        after, every = cheapest(before, levers(case, before), bench.tried, most)
+        after, every = cheapest(before, levers(bench, before), bench.tried, most)
     trials = bench.trials
     run, tables = bench.run_of(after.proposal), bench.tables_of(after.proposal)
     assert run.report is not None
@@ -341,11 +341,12 @@ def _proposals(
                 yield sum(each, Proposal())
 
 
-def levers(case: Case, before: Trial) -> list[list[Proposal]]:
+def levers(bench: Bench, before: Trial) -> list[list[Proposal]]:
     """What may be changed, the cheapest first: of each list one at most."""
-    job, machine = case.job_of(case.tables), case.target.machine
+    job, target = bench.job, bench.case.target
+    machine = target.machine
     short = {path for k in before.short for path in before.paths[k]}
-    cutting = Contours.of(case, job).cutting(short)
+    cutting = bench.contours.cutting(short)
     mine = [(row, operation) for row, _, operation in _rows(job) if row in cutting]
     found = [
         _job_lever("compensate", True, job.compensate),
@@ -355,7 +356,7 @@ def levers(case: Case, before: Trial) -> list[list[Proposal]]:
         _job_lever("minimise", "reversals", job.minimise),
         *(_slower(row, each, machine) for row, each in mine),
     ]
-    for key, values in case.target.target.ways.items():
+    for key, values in target.target.ways.items():
         now = _at(machine, key)
         found.append([Proposal(settings=(f'{key}="{each}"',)) for each in values if each != now])
     return [each for each in found if each]
@@ -556,8 +557,6 @@ def paths_of(each: Inspected) -> tuple[int, ...]:
 
 # Trials.
 
-Varied = Callable[[Machine], Machine]
-
 
 @dataclass(eq=False)
 class Bench:
@@ -570,9 +569,14 @@ class Bench:
     _first: dict[tuple[str, int | None], InspectedReport] = field(default_factory=dict)
 
     @cached_property
+    def job(self) -> Job:
+        """The job as it is."""
+        return self.case.job_of(self.case.tables)
+
+    @cached_property
     def contours(self) -> Contours:
         """Those of the job as it is."""
-        return Contours.of(self.case, self.case.job_of(self.case.tables))
+        return Contours.of(self.case, self.job)
 
     def first(self) -> Trial:
         """The job as it is. Raises what posting it raises, and OptionError for a program with
@@ -595,12 +599,12 @@ class Bench:
         self._known[_digest(run, self.case.target.machine)] = trial
         return trial
 
-    def tried(self, proposal: Proposal, varied: Varied | None = None) -> Trial | None:
+    def tried(self, proposal: Proposal) -> Trial | None:
         """A proposal as it comes out; None where it cannot be cut, or the program has errors."""
         self.trials += 1
         self.progress.done += 1
         try:
-            target = self._target(proposal, varied)
+            target = self._target(proposal)
             run = self._posted(proposal, target)
             if run.report is None or run.failed:
                 return None
@@ -619,9 +623,8 @@ class Bench:
         """The job file of a proposal."""
         return changed(self.case.tables, proposal.changes, proposal.left)
 
-    def _target(self, proposal: Proposal, varied: Varied | None = None) -> LoadedTarget:
-        target = self.case.target.with_settings(proposal.settings)
-        return target if varied is None else replace(target, machine=varied(target.machine))
+    def _target(self, proposal: Proposal) -> LoadedTarget:
+        return self.case.target.with_settings(proposal.settings)
 
     def _posted(self, proposal: Proposal, target: LoadedTarget) -> Run:
         job = self.case.job_of(self.tables_of(proposal))
@@ -689,25 +692,20 @@ class Bench:
             return Certificate(binding, unknown)
         machine = self._target(best.proposal).machine
         mechanics, standards = list(_mechanics(machine)), list(_standards(machine, binding))
-        numbers = [*mechanics, *standards]
         needs = []
         for each in (*mechanics, *standards[:LARGEST_INPUTS]):
             needed = self._needed(each, best)
             if needed is not None:
                 needs.append(Need(each.key, each.now, needed))
 
-        def exact(machine: Machine) -> Machine:
-            for each in numbers:
-                machine = each.changed(machine, each.best)
-            return machine
-
+        exact = [each.setting(each.best) for each in (*mechanics, *standards)]
         return Certificate(binding, (), tuple(needs), bool(needs) or self._holds(best, exact))
 
     def _needed(self, number: _Number, best: Trial) -> float | None:
         """The value nearest to what a number is with which all holds; None for none."""
 
         def holds(value: float) -> bool:
-            return self._holds(best, lambda machine: number.changed(machine, value))
+            return self._holds(best, [number.setting(value)])
 
         if not holds(number.best):
             return None
@@ -718,13 +716,15 @@ class Bench:
         rounded = _rounded(number.at(good), number.best)
         return rounded if holds(rounded) else number.at(good)
 
-    def _holds(self, best: Trial, varied: Varied) -> bool:
-        """Whether the proposal holds on another machine, with the allowances for that."""
-        trial = self.tried(best.proposal, varied)
+    def _holds(self, best: Trial, settings: Sequence[str]) -> bool:
+        """Whether the proposal holds on a machine with other numbers, with the allowances for
+        that."""
+        proposal = best.proposal + Proposal(settings=tuple(settings))
+        trial = self.tried(proposal)
         for _ in range(REFINED):
             if trial is None or trial.holds or not trial.left:
                 break
-            trial = self.tried(replace(best.proposal, left=trial.left), varied)
+            trial = self.tried(replace(proposal, left=trial.left))
         return trial is not None and trial.holds
 
 
@@ -749,20 +749,24 @@ def _digest(run: Run, machine: Machine) -> bytes:
 
 @dataclass(frozen=True)
 class _Number:
-    """A number of a machine: its key, what it is, its best value, and the machine with another."""
+    """A number of a machine: its key, what it is, and its best value."""
 
     key: str
     now: float
     best: float
-    own: Callable[[Machine, float], Machine] | None = None
-    """Where it is not the value of the key alone."""
+    cells: tuple[tuple[float, ...], ...] = ()
+    """Of a map of backlash, whose mean it is: each cell is as much nearer to the best as that."""
 
-    def changed(self, machine: Machine, value: float) -> Machine:
-        """The machine with this value."""
-        if self.own is not None:
-            return self.own(machine, value)
-        made: Machine = _with(machine, self.key.split("."), value)
-        return made
+    def setting(self, value: float) -> str:
+        """The machine with this value, as `--set` says it."""
+        if not self.cells:
+            return f"{self.key}={value!r}"
+        share = (value - self.best) / (self.now - self.best)
+        rows = [
+            [max(0.0, self.best + share * (each - self.best)) for each in row]
+            for row in self.cells
+        ]
+        return f"{self.key}={rows}"
 
     def at(self, share: float) -> float:
         """So far on the way to its best."""
@@ -778,9 +782,8 @@ def _mechanics(machine: Machine) -> Iterator[_Number]:
         plays = [play for row in cells.play_mm for play in row] if cells else [axis.backlash_mm]
         now, best = sum(plays) / len(plays), axis.compensation_mm * ratio
         if abs(now - best) > CERTAIN:
-            own = None if cells is None else partial(_with_map, name, now, best)
-            key = f"axes.{name}.backlash_mm" if cells is None else f"play_map.{name}.play_mm"
-            yield _Number(key, now, best, own)
+            key = f"play_map.{name}.play_mm" if cells else f"axes.{name}.backlash_mm"
+            yield _Number(key, now, best, cells.play_mm if cells else ())
         if abs(ratio - 1.0) > CERTAIN:
             yield _Number(f"axes.{name}.real_step_mm", axis.real_step_mm, axis.coded_step_mm)
     lean = machine.mechanics.squareness_rad
@@ -807,24 +810,6 @@ def _at(record: object, key: str) -> object:
     for name in key.split("."):
         record = getattr(record, name)
     return record
-
-
-def _with(record: Any, names: Sequence[str], value: float) -> Any:
-    """The record with another value there."""
-    first, *rest = names
-    inner = _with(getattr(record, first), rest, value) if rest else value
-    return msgspec.structs.replace(record, **{first: inner})
-
-
-def _with_map(name: str, now: float, best: float, machine: Machine, value: float) -> Machine:
-    """With each cell of a map as much nearer to the best as the mean is."""
-    share = (value - best) / (now - best)
-    cells = getattr(machine.play_map, name)
-    rows = tuple(
-        tuple(max(0.0, best + share * (play - best)) for play in row) for row in cells.play_mm
-    )
-    made: Machine = _with(machine, ["play_map", name, "play_mm"], rows)  # type: ignore[arg-type]
-    return made
 
 
 def _rounded(value: float, best: float) -> float:

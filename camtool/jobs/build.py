@@ -68,6 +68,9 @@ _OPERATION_NUMBER = re.compile(r"\d{1,6}")
 _OF_TOOLS = ("material", "tool_library", "tool_table", "tool_table_units")
 """Keys of the job as a whole that are for its tools."""
 
+EITHER = {"depth": "breakthrough", "breakthrough": "depth", "scale": "fit", "fit": "scale"}
+"""Keys that say the same in another way: one of a nearer layer takes the place of the other."""
+
 _ANY_STOCK = {"thickness_mm": 1.0}
 
 
@@ -264,9 +267,9 @@ def _nearest(layers: Sequence[Table]) -> Table:
     kind = kinds[-1] if kinds else Operation.kind
     for layer in layers[1:]:
         below = dict(merged.given)
-        for one, other in (("depth", "breakthrough"), ("breakthrough", "depth")):
-            if one in layer.given and kind in OPERATION[one].kinds:
-                below.pop(other, None)
+        for one in layer.only(OPERATION).given:
+            if one in EITHER and kind in OPERATION[one].kinds:
+                below.pop(EITHER[one], None)
         merged = layer.over(Table(below, merged.where, merged.file))
     return merged
 
@@ -372,9 +375,8 @@ def _why_unused(name: str, operation: Operation) -> OptionError | None:
 def _placement(file: JobTables, flags: JobTables) -> Placement:
     """The drawing's placement; a scale on the command line takes the place of the file's fit."""
     below = dict(file.place.given)
-    for one, other in (("scale", "fit"), ("fit", "scale")):
-        if one in flags.place.given:
-            below.pop(other, None)
+    for one in flags.place.given:
+        below.pop(EITHER.get(one, ""), None)
     return record_of(
         Placement, PLACE, flags.place.over(Table(below, file.place.where, file.place.file))
     )

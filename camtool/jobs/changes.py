@@ -15,7 +15,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from camtool.jobs.build import JobTables, build_job, tables_of
+from camtool.jobs.build import EITHER, JobTables, build_job, tables_of
 from camtool.jobs.keys import OPERATION, TOOL_KEYS, TOOL_NAME, Given, Table, length
 from camtool.jobs.template import pattern_of
 from camtool.jobs.tools import Shop
@@ -28,15 +28,6 @@ FILES = ("tool_library", "tool_table")
 
 LEFT_DIGITS = 4
 """Decimals of an allowance in mm: a tenth of a micrometre."""
-
-_INSTEAD = {
-    "depth": ("breakthrough",),
-    "breakthrough": ("depth",),
-    "scale": ("fit",),
-    "fit": ("scale",),
-    TOOL_NAME: tuple(TOOL_KEYS),
-}
-"""What is said no more where a flag says this."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +104,9 @@ def _knows(kind: object, name: str) -> bool:
 
 def _over(above: Table, below: Table) -> Table:
     """The keys of both; the upper ones say instead of the lower what contradicts them."""
-    gone = {each for name in above.given for each in _INSTEAD.get(name, ())}
+    gone = {EITHER[name] for name in above.given if name in EITHER}
+    if TOOL_NAME in above.given:
+        gone |= set(TOOL_KEYS)
     return above.over(below.only(set(below.given) - gone))
 
 

@@ -307,7 +307,7 @@ def test_only_what_cuts_a_short_dimension_is_changed(tmp_path: Path) -> None:
         {"name": "rim", "tool_diameter": "2mm", "select": ["outer"], "depth": "0.5mm"},
     ]
     bench = Bench(made, camtool_progress())
-    choices = levers(made, bench.first())
+    choices = levers(bench, bench.first())
     rows = {each.operation for some in choices for one in some for each in one.changes}
     assert rows == {None, 0}
     found = meet(made)
