@@ -51,7 +51,7 @@ from camtool.simulation.speed_plan import (
 from camtool.toolpath.moves import Kind, PathMode, PolarArcs, Toolpath, are_arcs, frozen
 
 from .dialect import Dialect, LinuxcncController
-from .steps import MOST_IN_CHAIN, merge_lines
+from .steps import merge_lines
 
 _Machine = Machine[LinuxcncController, Dialect]
 
@@ -122,14 +122,17 @@ class _Run:
     """One run of a program, some thousand rows at a time.
 
     A block of rows begins where a move does. Planned with it are the move before it, for the
-    corner between them, and as many moves behind it as the planner knows of.
+    corner between them, and as many moves behind it as the planner knows of. What is planned
+    together begins where a row does: a merged line that begins in the middle of an arc is planned
+    with the lines before it.
     """
 
     def __init__(self, path: Toolpath, machine: _Machine) -> None:
         """MachineError for missing limits."""
         self._path, self._machine = path, machine
         self._rules = _rules(_modes(path, machine), machine)
-        self._begins, length = begins_of(path, self._rules.modes)
+        self._begins, apart, length = begins_of(path, self._rules.modes)
+        self._apart = np.append(np.flatnonzero(apart), len(apart)).astype(np.int32)
         self._spacing_mm = spacing_along(length, machine)
         self._before, self._since_rest_s = FROM_REST, 0.0
         self._passed_mm = 0.0, 0.0  # before the rows of a block: by rows, and by moves
@@ -137,18 +140,27 @@ class _Run:
     def blocks(self) -> Iterator[SampledRows]:
         """All rows."""
         wanted = np.arange(0, len(self._path), ROWS_AT_ONCE)
-        first = np.unique(np.searchsorted(self._begins, wanted))
+        first = np.unique(self._from(np.searchsorted(self._begins, wanted)))
         inner = first[first < len(self._begins)].tolist()
         for low, high in pairwise([*inner, len(self._begins)]):
             yield self._block(low, high)
 
+    def _from(self, move: Ints | int) -> Ints:
+        """Each move (K,), or the first behind it that can be planned without those before it."""
+        place = np.searchsorted(self._apart, move)
+        return np.asarray(self._apart[np.minimum(place, len(self._apart) - 1)])
+
+    def _before_block(self, low: int) -> int:
+        """The last move before a block that can be planned without those before it."""
+        return int(self._apart[max(int(np.searchsorted(self._apart, low)) - 1, 0)])
+
     def _block(self, low: int, high: int) -> SampledRows:
         """The rows of the moves low:high."""
-        base, rows = self._row(low - 1), len(self._path)
-        own = slice(min(low, 1), min(low, 1) + high - low)
+        before, rows = self._before_block(low), len(self._path)
+        base, own = self._row(before), slice(low - before, high - before)
         window = known = self._machine.controller.lookahead_moves
         while True:
-            end = self._row(high + known)
+            end = self._row(int(self._from(high + known)))
             planned = self._planned(base, end)
             places = slice(2 * own.start, None if end == rows else -1)
             lasting, speeds = _speeds(planned, places, self._rules.modes, self._before)
@@ -163,7 +175,8 @@ class _Run:
         here = slice(self._row(low), self._row(high))
         seconds = _seconds(planned, taken)[here.start - base : here.stop - base]
         samples = LinuxcncSamples(planned, self._machine, self._spacing_mm, self._passed_mm)
-        self._passed_mm = samples.passed_mm(self._row(high - 1) - base, own.stop - 1)
+        last = self._before_block(high)  # with which the next block is planned
+        self._passed_mm = samples.passed_mm(self._row(last) - base, last - before)
         return SampledRows(here.start, here.stop, base, samples, seconds)
 
     def _row(self, move: int) -> int:
@@ -174,7 +187,7 @@ class _Run:
     def _planned(self, low: int, high: int) -> Planned:
         """The rows low:high."""
         part, modes = self._path.part(low, high), self._rules.modes
-        part, chain = merged(part, modes.merging_mm(part.mode))
+        part, chain, _ = merged(part, modes.merging_mm(part.mode))
         tangents = Tangents(part)
         moves = moves_of(tangents, chain, self._rules)
         return Planned(tangents, moves, corners_of(moves, tangents, self._rules))
@@ -466,17 +479,20 @@ WAITS = (
 """Before these the machine comes to rest (their preconditions in emctaskmain.cc)."""
 
 
-def merged(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Ints]:
-    """The rows with the ends of merged lines on their common line, and the line of each row (N,);
-    `tolerance_mm` (N,) of each row, 0: it is not merged.
+def merged(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Ints, Bools]:
+    """The rows with the ends of merged lines on their common line, the line of each row (N,), and
+    whether all of a row is on that line (N,), or the line begins in its middle; `tolerance_mm`
+    (N,) of each row, 0: it is not merged.
 
     Only feed moves with one feed and one path mode, and nothing but moves of no length between
     them, are merged; any event, an MSG comment too, ends a line. Arcs that bow out by less than
-    the tolerance are lines too.
+    the tolerance are lines too. Where a line begins in the middle of such an arc, the machine has
+    its corner there; here it has it where the arc's row begins, and is beside that by less than
+    the tolerance.
     """
     count = len(path)
     if not tolerance_mm.any():
-        return path, np.arange(count)
+        return path, np.arange(count), np.ones(count, dtype=np.bool_)
     path, middle = _straightened(path, tolerance_mm)
     same_feed = np.zeros(count, dtype=np.bool_)
     same_feed[1:] = path.feed[1:] == path.feed[:-1]
@@ -493,7 +509,7 @@ def merged(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Ints]:
     merge_lines(
         np.concatenate([path.start[None, :], points]), apart, tolerance_mm[row], chain, moved
     )
-    return replace(path, end=frozen(moved[last])), chain[last]
+    return replace(path, end=frozen(moved[last])), chain[last], chain[last - bent] == chain[last]
 
 
 def _straightened(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Floats]:
@@ -519,25 +535,32 @@ def _straightened(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Float
     return replace(path, kind=frozen(kind), centre=frozen(centre)), middle
 
 
-def begins_of(path: Toolpath, modes: Modes) -> tuple[Ints, Floats]:
-    """Where the rows of each move begin (M,), the first at row 0, and the length of each row with
-    its end where `merged` leaves it (N,)."""
-    length, begins, low = np.empty(len(path)), [np.zeros(1, dtype=np.int32)], 0
-    at_once = max(ROWS_AT_ONCE, MOST_IN_CHAIN + 2)  # more than one line has
+def begins_of(path: Toolpath, modes: Modes) -> tuple[Ints, Bools, Floats]:
+    """Where the rows of each move begin (M,), the first at row 0; whether moves (M,) begin with
+    these rows, not in the middle of an arc; and the length of each row with its end where `merged`
+    leaves it (N,)."""
+    length, low = np.empty(len(path)), 0
+    begins, apart = [np.zeros(1, dtype=np.int32)], [np.ones(1, dtype=np.bool_)]
+    at_once = ROWS_AT_ONCE
     while low < len(path):
         part = path.part(low, min(low + at_once, len(path)))
-        part, chain = merged(part, modes.merging_mm(part.mode))
+        part, chain, whole = merged(part, modes.merging_mm(part.mode))
         rows = len(part)
         if low + rows < len(path):  # the last line may go on
-            rows = int(np.searchsorted(chain, chain[-1]))
+            starts = np.flatnonzero((np.diff(chain, prepend=chain[0]) > 0) & whole)
+            if len(starts) == 0:  # all of these are one line, or lines that begin in arcs
+                at_once *= 2
+                continue
+            rows = int(starts[-1])
         own = move_lengths(part)[:rows]
         lasting = np.bincount(chain[:rows], own) > 0.0
         first = np.searchsorted(chain[:rows], np.flatnonzero(lasting))
         begins.append((low + first).astype(np.int32))
+        apart.append(whole[first])
         length[low : low + rows] = own
-        low += rows
-    found = np.concatenate(begins)
-    return np.concatenate([found[:1], found[2:]]), length
+        low, at_once = low + rows, ROWS_AT_ONCE
+    found, alone = np.concatenate(begins), np.concatenate(apart)
+    return np.append(found[:1], found[2:]), np.append(alone[:1], alone[2:]), length
 
 
 @dataclass(frozen=True, eq=False)

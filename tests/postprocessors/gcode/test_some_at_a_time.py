@@ -11,11 +11,21 @@ from camtool.target.registry import load_target
 from camtool.toolpath import moves
 from tests.oracles.motion_rows import RowMotion, rows_of
 
+
+def wheel(steps: list[int]) -> str:
+    """Arcs of 1 mm one after the other around one centre, each some hundredths of a radian: the
+    modes that merge take them for lines, of which one may end in the middle of an arc."""
+    angles = np.cumsum([0, *steps]) / 50
+    moved = np.diff(np.column_stack([np.sin(angles), np.cos(angles)]), axis=0)
+    return "\n".join(["G91", *(f"G2 X{x:.6f} Y{y:.6f} R1" for x, y in moved), "G90 G1"])
+
+
 PIECES = st.lists(
     st.one_of(
         st.tuples(st.integers(-30, 30), st.integers(-30, 30)).map(
             lambda to: f"G1 X{to[0] / 10} Y{to[1] / 10}"
         ),
+        st.lists(st.integers(1, 14), min_size=1, max_size=12).map(wheel),
         st.sampled_from(
             [
                 "G0 Z1",

@@ -237,7 +237,7 @@ def test_what_is_merged() -> None:
     builder.arc(4.2, 0.0, 0.0, centre=(4.1, -0.1), ccw=False, feed=200.0)
     builder.line(5.0, 0.0, 0.0, feed=200.0).line(6.0, 0.0, 0.0, feed=200.0)
     path = builder.arc(6.2, 0.0, 0.0, centre=(6.1, -5.0), ccw=False, feed=200.0).finish()
-    some, chain = merged(path, np.full(11, 0.01))
+    some, chain, _ = merged(path, np.full(11, 0.01))
     assert chain.tolist() == [0, 1, 1, 1, 2, 3, 4, 5, 6, 6, 6]
     assert some.is_arc.tolist() == [False] * 7 + [True] + [False] * 3
     assert merged(path, np.zeros(11))[1].tolist() == list(range(11))
@@ -253,9 +253,21 @@ def test_an_arc_that_is_a_line_bows_out_by_less_than_the_tolerance() -> None:
         builder.arc(k + 1.0, 0.0, 0.0, centre=middle, ccw=False, feed=100.0)
     path = builder.finish()
     assert merged(path, np.full(4, 0.0079))[0].is_arc.all()
-    some, chain = merged(path, np.full(4, 0.0081))
+    some, chain, whole = merged(path, np.full(4, 0.0081))
     assert not some.is_arc.any()
     assert chain.tolist() == [0, 0, 0, 0]
+    assert whole.all()
+
+
+def test_a_line_begins_in_the_middle_of_an_arc() -> None:
+    """Where its middle still lies on the line before, and its end does not."""
+    builder = ToolpathBuilder((0.0, 1.0, 0.0))
+    for angle in (0.02, 0.30, 0.42):
+        end = (math.sin(angle), math.cos(angle), 0.0)
+        builder.arc(*end, centre=(0.0, 0.0), ccw=False, feed=100.0)
+    _, chain, whole = merged(builder.finish(), np.full(3, 0.01))
+    assert chain.tolist() == [0, 1, 1]
+    assert whole.tolist() == [True, False, True]
 
 
 def test_moves_that_overlap_come_no_nearer_to_the_corner_than_the_tolerance() -> None:
