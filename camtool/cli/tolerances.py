@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from camtool.cli.files import STDOUT, check_new, check_places, write_all
+from camtool.cli.life_signs import progress
 from camtool.cli.messages import say, say_findings, show_text
 from camtool.cli.options import DrawingFlags, SectionedCommand, drawing_options, talk_options
 from camtool.findings import Code, Finding, Severity
@@ -49,6 +50,7 @@ def new(
     check_places([source], [output])
     check_new(output)
     read = drawing.read(source)
+    progress().begin("finding what can be measured")
     text, findings, faults = proposed(read)
     write_all({output: text.encode()})
     say_findings((*_told(read.findings), *findings), quiet=quiet, verbose=verbose)

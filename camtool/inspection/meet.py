@@ -227,12 +227,14 @@ class Certificate:
     """Why no proposal holds: the dimension that is farthest from it, the uncertain inputs that are
     not known and that nothing bounds, and each number of the machine with which all would hold if
     it alone were better. `exact`: whether all would with every one of these numbers at its
-    best."""
+    best. `together`: names of its contours that others have too, so that one allowance is for
+    all of them."""
 
     binding: InspectedReport | None
     unknown: tuple[str, ...] = ()
     needs: tuple[Need, ...] = ()
     exact: bool = False
+    together: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -445,6 +447,11 @@ class Contours:
         names = {self.of_path[path] for path in paths}
         return {row for row, mine in self.cut.items() if names.intersection(mine)}
 
+    def together(self, paths: Iterable[int]) -> tuple[str, ...]:
+        """The names of some paths of the drawing that other contours have too."""
+        names = dict.fromkeys(self.of_path[path] for path in paths)
+        return tuple(name for name in names if self.of_path.count(name) > 1)
+
     def left(self, by_name: Mapping[str, float]) -> tuple[Left, ...]:
         """What is left on walls, mm by the names of contours, as parts of operations: inner
         contours before those around them."""
@@ -583,10 +590,12 @@ class Bench:
         errors, and where no dimension with limits can be inspected."""
         run = self._posted(Proposal(), self.case.target)
         if run.report is None or run.failed:
+            wrong = (each for each in run.findings if each.severity is Severity.ERROR)
+            said = next((f": {each.message}" for each in wrong), "")
             raise OptionError(
-                "the job has errors, so that no dimension can be inspected",
+                f"the job has errors, so that no dimension can be inspected{said}",
                 file=self.case.drawing.file,
-                mend="see what camtool post says of it",
+                mend="" if said else "see what camtool post says of it",
             )
         trial = self._judged(run, Proposal())
         if not trial.verdicts:
@@ -699,7 +708,9 @@ class Bench:
                 needs.append(Need(each.key, each.now, needed))
 
         exact = [each.setting(each.best) for each in (*mechanics, *standards)]
-        return Certificate(binding, (), tuple(needs), bool(needs) or self._holds(best, exact))
+        paths = best.paths[best.verdicts.index(binding)]
+        exactly = bool(needs) or self._holds(best, exact)
+        return Certificate(binding, (), tuple(needs), exactly, self.contours.together(paths))
 
     def _needed(self, number: _Number, best: Trial) -> float | None:
         """The value nearest to what a number is with which all holds; None for none."""
@@ -907,6 +918,11 @@ def _certified(meeting: Meeting) -> Iterator[str]:
         better = "at most" if abs(need.needed) < abs(need.now) else "at least"
         unit = need.key.rpartition("_")[2]
         yield f"it would take {need.key} {better} {need.needed:.9g} (it is {need.now:.6g}), {unit}"
+    for name in why.together:
+        yield (
+            f"several contours are named {name}, and have one allowance: with names of their own "
+            "(an id, or an element each) each would have its own"
+        )
     if not why.needs and why.exact:
         yield "no single number of the machine would do: all of them must be better"
     if not why.needs and not why.exact:
@@ -956,6 +972,7 @@ def to_data(meeting: Meeting) -> dict[str, Any]:
                 {"key": each.key, "now": each.now, "needed": each.needed} for each in why.needs
             ],
             "exact_machine": why.exact,
+            "together": why.together,
         },
     }
 

@@ -68,7 +68,7 @@ def proposed(drawing: Drawing) -> tuple[str, tuple[Finding, ...], tuple[DrawingE
             rows.append(limited(each, bound.drawn_mm)[0])
     if not rows and not lost:
         raise InputError(
-            "has no circles, slots or outlines to measure",
+            "has no circles and slots to measure, nor outlines that end in edges along X or Y",
             file=drawing.file,
             mend="write tolerances.toml by hand (docs/tolerances.md)",
         )

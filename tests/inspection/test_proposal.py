@@ -119,7 +119,7 @@ def test_a_corner_is_no_end_of_a_size():
 def test_nothing_to_measure_is_one_line():
     doc = document()
     doc.modelspace().add_line((0, 0), (5, 5))
-    with pytest.raises(InputError, match="no circles, slots or outlines") as told:
+    with pytest.raises(InputError, match="no circles and slots") as told:
         proposed(drawn(doc))
     assert told.value.mend
 
