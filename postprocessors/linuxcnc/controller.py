@@ -51,7 +51,7 @@ from camtool.simulation.speed_plan import (
 from camtool.toolpath.moves import Kind, PathMode, PolarArcs, Toolpath, are_arcs, frozen
 
 from .dialect import Dialect, LinuxcncController
-from .steps import merge_lines
+from .steps import MOST_IN_CHAIN, merge_lines
 
 _Machine = Machine[LinuxcncController, Dialect]
 
@@ -111,8 +111,10 @@ def _corners_said(mode: PathMode) -> str:
 class Planned:
     """The moves of some rows of a program, and the corners at their starts. Where more of the
     program lies before or behind them, the first corner and the last move miss their neighbours.
+    `origin` (N,): the row that each row of `tangents.path` is, or is half of.
     """
 
+    origin: Ints
     tangents: Tangents
     moves: Moves
     corners: Corners
@@ -122,45 +124,40 @@ class _Run:
     """One run of a program, some thousand rows at a time.
 
     A block of rows begins where a move does. Planned with it are the move before it, for the
-    corner between them, and as many moves behind it as the planner knows of. What is planned
-    together begins where a row does: a merged line that begins in the middle of an arc is planned
-    with the lines before it.
+    corner between them, and as many moves behind it as the planner knows of. Moves begin at
+    places: twice a row, and one more in the middle of an arc that is two lines.
     """
 
     def __init__(self, path: Toolpath, machine: _Machine) -> None:
         """MachineError for missing limits."""
         self._path, self._machine = path, machine
         self._rules = _rules(_modes(path, machine), machine)
-        self._begins, apart, length = begins_of(path, self._rules.modes)
-        self._apart = np.append(np.flatnonzero(apart), len(apart)).astype(np.int32)
+        self._begins, length = begins_of(path, self._rules.modes)
         self._spacing_mm = spacing_along(length, machine)
         self._before, self._since_rest_s = FROM_REST, 0.0
         self._passed_mm = 0.0, 0.0  # before the rows of a block: by rows, and by moves
 
     def blocks(self) -> Iterator[SampledRows]:
         """All rows."""
-        wanted = np.arange(0, len(self._path), ROWS_AT_ONCE)
-        first = np.unique(self._from(np.searchsorted(self._begins, wanted)))
-        inner = first[first < len(self._begins)].tolist()
-        for low, high in pairwise([*inner, len(self._begins)]):
-            yield self._block(low, high)
+        wanted = 2 * np.arange(0, len(self._path), ROWS_AT_ONCE)
+        first = sorted({self._with_row(int(k)) for k in np.searchsorted(self._begins, wanted)})
+        for low, high in pairwise([*first, len(self._begins)]):
+            if low < high:
+                yield self._block(low, high)
 
-    def _from(self, move: Ints | int) -> Ints:
-        """Each move (K,), or the first behind it that can be planned without those before it."""
-        place = np.searchsorted(self._apart, move)
-        return np.asarray(self._apart[np.minimum(place, len(self._apart) - 1)])
-
-    def _before_block(self, low: int) -> int:
-        """The last move before a block that can be planned without those before it."""
-        return int(self._apart[max(int(np.searchsorted(self._apart, low)) - 1, 0)])
+    def _with_row(self, move: int) -> int:
+        """This move, or the first behind it that begins where a row does."""
+        while self._place(move) % 2:
+            move += 1
+        return move
 
     def _block(self, low: int, high: int) -> SampledRows:
         """The rows of the moves low:high."""
-        before, rows = self._before_block(low), len(self._path)
-        base, own = self._row(before), slice(low - before, high - before)
+        base, rows = self._place(low - 1), 2 * len(self._path)
+        own = slice(min(low, 1), min(low, 1) + high - low)
         window = known = self._machine.controller.lookahead_moves
         while True:
-            end = self._row(int(self._from(high + known)))
+            end = self._place(high + known)
             planned = self._planned(base, end)
             places = slice(2 * own.start, None if end == rows else -1)
             lasting, speeds = _speeds(planned, places, self._rules.modes, self._before)
@@ -172,25 +169,27 @@ class _Run:
             known *= 2  # some of the moves are too short to be planned
         taken = np.zeros(len(lasting) + 1)
         taken[:-1][lasting] = self._in_periods(speeds, overlaps, done)
-        here = slice(self._row(low), self._row(high))
-        seconds = _seconds(planned, taken)[here.start - base : here.stop - base]
+        here, first = slice(self._place(low) // 2, self._place(high) // 2), base // 2
+        seconds = _seconds(planned, taken)[here.start - first : here.stop - first]
         samples = LinuxcncSamples(planned, self._machine, self._spacing_mm, self._passed_mm)
-        last = self._before_block(high)  # with which the next block is planned
-        self._passed_mm = samples.passed_mm(self._row(last) - base, last - before)
-        return SampledRows(here.start, here.stop, base, samples, seconds)
+        self._passed_mm = samples.passed_mm(own.stop - 1)
+        return SampledRows(here.start, here.stop, first, samples, seconds)
 
-    def _row(self, move: int) -> int:
-        """Where the rows of a move begin."""
+    def _place(self, move: int) -> int:
+        """Where a move begins."""
         begins = self._begins
-        return int(begins[max(move, 0)]) if move < len(begins) else len(self._path)
+        return int(begins[max(move, 0)]) if move < len(begins) else 2 * len(self._path)
 
     def _planned(self, low: int, high: int) -> Planned:
-        """The rows low:high."""
-        part, modes = self._path.part(low, high), self._rules.modes
-        part, chain, _ = merged(part, modes.merging_mm(part.mode))
+        """What lies between two places."""
+        part, modes = self._path.part(low // 2, (high + 1) // 2), self._rules.modes
+        part, origin = halved(part, modes.merging_mm(part.mode))
+        own = slice(low % 2, len(part) - high % 2)
+        part, origin = part.part(own.start, own.stop), origin[own]
+        part, chain = merged(part, modes.merging_mm(part.mode))
         tangents = Tangents(part)
         moves = moves_of(tangents, chain, self._rules)
-        return Planned(tangents, moves, corners_of(moves, tangents, self._rules))
+        return Planned(origin, tangents, moves, corners_of(moves, tangents, self._rules))
 
     def _in_periods(self, plan: SpeedPlan, overlaps: Floats, done: int) -> Floats:
         """(N,) s of each block, less its overlap (N,) with the next; from rest to rest it takes
@@ -229,6 +228,9 @@ class LinuxcncSamples(CountedSamples):
         not depend, in their last bits, on where a block begins."""
         path, moves, reach = planned.tangents.path, planned.moves, planned.corners.reach
         super().__init__(path, machine, spacing_mm)
+        self._origin = planned.origin
+        halves = np.searchsorted(self._origin, np.arange(int(self._origin[-1]) + 2))
+        self.first = self.first[halves]
         self._tangents = planned.tangents
         self._row_of, self._row, self._reach = moves.row_of, moves.row, np.append(reach, 0.0)
         corners = planned.corners
@@ -244,9 +246,15 @@ class LinuxcncSamples(CountedSamples):
         self._by_moves = np.cumsum(np.append(passed_mm[1], moves.length))
         self._into = self._by_rows[1:] - lengths - self._by_moves[np.maximum(moves.row_of, 0)]
 
-    def passed_mm(self, row: int, move: int) -> tuple[float, float]:
-        """The lengths of all rows before a row, and of all moves before a move."""
+    def passed_mm(self, move: int) -> tuple[float, float]:
+        """The lengths of all rows, and of all moves, before a move."""
+        row = self._row[move] if len(self._row) else 0
         return float(self._by_rows[row]), float(self._by_moves[move])
+
+    def window(self, low: int, high: int) -> tuple[Ints, Floats]:
+        """Row and position of the samples low:high."""
+        row, points = super().window(low, high)
+        return self._origin[row], points
 
     def points(self, row: Ints, share: Floats) -> Floats:
         """(K, 3) mm: the points at shares (K,) of the ways of rows (K,), blended."""
@@ -353,7 +361,7 @@ def _seconds(planned: Planned, taken: Floats) -> Floats:
     moving = np.flatnonzero(moves.row_of >= 0)
     move = moves.row_of[moving]
     seconds[moving] = whole[move] * (move_lengths(path)[moving] / moves.length[move])
-    return seconds
+    return np.asarray(np.bincount(planned.origin, seconds), dtype=np.float64)
 
 
 def _in_turns(blends: Floats | float, moves: Floats) -> Floats:
@@ -479,88 +487,80 @@ WAITS = (
 """Before these the machine comes to rest (their preconditions in emctaskmain.cc)."""
 
 
-def merged(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Ints, Bools]:
-    """The rows with the ends of merged lines on their common line, the line of each row (N,), and
-    whether all of a row is on that line (N,), or the line begins in its middle; `tolerance_mm`
-    (N,) of each row, 0: it is not merged.
+def halved(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Ints]:
+    """The rows with two lines, over its middle, in the place of each arc that bows out by less
+    than `tolerance_mm` (N,) of its row (ARC_FEED, emccanon.cc), and the row that each is or is
+    half of."""
+    every = np.arange(len(path))
+    arcs = np.flatnonzero(path.is_arc & (tolerance_mm > 0.0))
+    if len(arcs) == 0:
+        return path, every
+    arms = PolarArcs(path, path.is_arc & (tolerance_mm > 0.0))
+    bow = arms.radius * (1.0 - np.cos(0.5 * arms.sweep))
+    flat = np.flatnonzero(bow < tolerance_mm[arcs])
+    if len(flat) == 0:
+        return path, every
+    angle = arms.angle[flat] + 0.5 * arms.sweep[flat]
+    spoke = arms.radius[flat, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+    rows = arcs[flat]
+    origin = np.insert(every, rows, rows)
+    first = np.searchsorted(origin, rows)
+    kind, end, centre = path.kind[origin], path.end[origin], path.centre[origin]
+    for half in (first, first + 1):
+        kind[half], centre[half] = Kind.LINE, np.nan
+    end[first, :2] = arms.centre[flat] + spoke
+    end[first, 2] = 0.5 * (arms.begin[flat, 2] + arms.end[flat, 2])
+    kind, end, centre = frozen(kind), frozen(end), frozen(centre)
+    return path.picked(origin, kind=kind, end=end, centre=centre), origin
+
+
+def merged(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Ints]:
+    """The rows with the ends of merged lines on their common line, and the line of each row (N,);
+    `tolerance_mm` (N,) of each row, 0: it is not merged.
 
     Only feed moves with one feed and one path mode, and nothing but moves of no length between
-    them, are merged; any event, an MSG comment too, ends a line. Arcs that bow out by less than
-    the tolerance are lines too. Where a line begins in the middle of such an arc, the machine has
-    its corner there; here it has it where the arc's row begins, and is beside that by less than
-    the tolerance.
+    them, are merged; any event, an MSG comment too, ends a line.
     """
     count = len(path)
     if not tolerance_mm.any():
-        return path, np.arange(count), np.ones(count, dtype=np.bool_)
-    path, middle = _straightened(path, tolerance_mm)
+        return path, np.arange(count)
     same_feed = np.zeros(count, dtype=np.bool_)
     same_feed[1:] = path.feed[1:] == path.feed[:-1]
     is_line = path.kind == Kind.LINE
     apart = ~(is_line & same_feed) | (tolerance_mm == 0.0)
     apart[1:] |= ~is_line[:-1] | (path.mode[1:] != path.mode[:-1])
-    # The middle of an arc that is a line now is a point of the chain too.
-    bent = np.isfinite(middle[:, 0])
-    row = np.repeat(np.arange(count), 1 + bent)
-    last = np.cumsum(1 + bent) - 1
-    points, parts = np.insert(path.end, np.flatnonzero(bent), middle[bent], axis=0), len(row)
-    apart = apart[row] & (np.diff(row, prepend=-1) > 0)
-    chain, moved = np.empty(parts, dtype=np.int64), np.empty((parts, 3))
-    merge_lines(
-        np.concatenate([path.start[None, :], points]), apart, tolerance_mm[row], chain, moved
-    )
-    return replace(path, end=frozen(moved[last])), chain[last], chain[last - bent] == chain[last]
+    points = np.concatenate([path.start[None, :], path.end])
+    chain, moved = np.empty(count, dtype=np.int64), np.empty((count, 3))
+    merge_lines(points, apart, tolerance_mm, chain, moved)
+    return replace(path, end=frozen(moved)), chain
 
 
-def _straightened(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Floats]:
-    """The rows with a line in the place of each arc that bows out by less than `tolerance_mm` (N,)
-    of its row, and the middles of these arcs (N, 3), NaN for other rows (ARC_FEED, emccanon.cc).
-    """
-    middle = np.full((len(path), 3), np.nan)
-    arcs = np.flatnonzero(path.is_arc & (tolerance_mm > 0.0))
-    if len(arcs) == 0:
-        return path, middle
-    arms = PolarArcs(path, path.is_arc & (tolerance_mm > 0.0))
-    bow = arms.radius * (1.0 - np.cos(0.5 * arms.sweep))
-    flat = np.flatnonzero(bow < tolerance_mm[arcs])
-    if len(flat) == 0:
-        return path, middle
-    angle = arms.angle[flat] + 0.5 * arms.sweep[flat]
-    spoke = arms.radius[flat, None] * np.column_stack([np.cos(angle), np.sin(angle)])
-    rows = arcs[flat]
-    middle[rows, :2] = arms.centre[flat] + spoke
-    middle[rows, 2] = 0.5 * (arms.begin[flat, 2] + arms.end[flat, 2])
-    kind, centre = path.kind.copy(), path.centre.copy()
-    kind[rows], centre[rows] = Kind.LINE, np.nan
-    return replace(path, kind=frozen(kind), centre=frozen(centre)), middle
-
-
-def begins_of(path: Toolpath, modes: Modes) -> tuple[Ints, Bools, Floats]:
-    """Where the rows of each move begin (M,), the first at row 0; whether moves (M,) begin with
-    these rows, not in the middle of an arc; and the length of each row with its end where `merged`
-    leaves it (N,)."""
-    length, low = np.empty(len(path)), 0
-    begins, apart = [np.zeros(1, dtype=np.int32)], [np.ones(1, dtype=np.bool_)]
-    at_once = ROWS_AT_ONCE
-    while low < len(path):
-        part = path.part(low, min(low + at_once, len(path)))
-        part, chain, whole = merged(part, modes.merging_mm(part.mode))
-        rows = len(part)
-        if low + rows < len(path):  # the last line may go on
-            starts = np.flatnonzero((np.diff(chain, prepend=chain[0]) > 0) & whole)
-            if len(starts) == 0:  # all of these are one line, or lines that begin in arcs
-                at_once *= 2
-                continue
-            rows = int(starts[-1])
+def begins_of(path: Toolpath, modes: Modes) -> tuple[Ints, Floats]:
+    """The places where moves begin (M,), the first at 0, and the length of each row with its end
+    where `merged` leaves it (N,)."""
+    length, begins = np.zeros(len(path)), [np.zeros(1, dtype=np.int32)]
+    low, end = 0, 2 * len(path)
+    at_once = max(ROWS_AT_ONCE, MOST_IN_CHAIN + 2)  # more than one line has
+    while low < end:
+        base = low // 2
+        part = path.part(base, min(base + at_once, len(path)))
+        ends_here = 2 * (base + len(part)) == end
+        part, origin = halved(part, modes.merging_mm(part.mode))
+        place = 2 * (base + origin)
+        place[1:] += np.diff(origin) == 0
+        part, origin, place = part.part(low % 2, len(part)), origin[low % 2 :], place[low % 2 :]
+        part, chain = merged(part, modes.merging_mm(part.mode))
+        # The last line may go on.
+        rows = len(part) if ends_here else int(np.searchsorted(chain, chain[-1]))
         own = move_lengths(part)[:rows]
         lasting = np.bincount(chain[:rows], own) > 0.0
         first = np.searchsorted(chain[:rows], np.flatnonzero(lasting))
-        begins.append((low + first).astype(np.int32))
-        apart.append(whole[first])
-        length[low : low + rows] = own
-        low, at_once = low + rows, ROWS_AT_ONCE
-    found, alone = np.concatenate(begins), np.concatenate(apart)
-    return np.append(found[:1], found[2:]), np.append(alone[:1], alone[2:]), length
+        begins.append(place[first].astype(np.int32))
+        by_row = np.bincount(origin[:rows], own)
+        length[base : base + len(by_row)] += by_row
+        low = end if ends_here else int(place[rows])
+    found = np.concatenate(begins)
+    return np.concatenate([found[:1], found[2:]]), length
 
 
 @dataclass(frozen=True, eq=False)

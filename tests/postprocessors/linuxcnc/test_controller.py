@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from camtool_postprocessors.linuxcnc.controller import merged
+from camtool_postprocessors.linuxcnc.controller import halved, merged
 from camtool_postprocessors.linuxcnc.steps import merge_lines
 from hypothesis import given
 from hypothesis import strategies as st
@@ -237,9 +237,11 @@ def test_what_is_merged() -> None:
     builder.arc(4.2, 0.0, 0.0, centre=(4.1, -0.1), ccw=False, feed=200.0)
     builder.line(5.0, 0.0, 0.0, feed=200.0).line(6.0, 0.0, 0.0, feed=200.0)
     path = builder.arc(6.2, 0.0, 0.0, centre=(6.1, -5.0), ccw=False, feed=200.0).finish()
-    some, chain, _ = merged(path, np.full(11, 0.01))
-    assert chain.tolist() == [0, 1, 1, 1, 2, 3, 4, 5, 6, 6, 6]
-    assert some.is_arc.tolist() == [False] * 7 + [True] + [False] * 3
+    some, origin = halved(path, np.full(11, 0.01))
+    assert origin.tolist() == [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 10]
+    some, chain = merged(some, np.full(12, 0.01))
+    assert chain.tolist() == [0, 1, 1, 1, 2, 3, 4, 5, 6, 6, 6, 6]
+    assert some.is_arc.tolist() == [False] * 7 + [True] + [False] * 4
     assert merged(path, np.zeros(11))[1].tolist() == list(range(11))
 
 
@@ -252,22 +254,28 @@ def test_an_arc_that_is_a_line_bows_out_by_less_than_the_tolerance() -> None:
         middle = (k + 0.5, bow - radius)
         builder.arc(k + 1.0, 0.0, 0.0, centre=middle, ccw=False, feed=100.0)
     path = builder.finish()
-    assert merged(path, np.full(4, 0.0079))[0].is_arc.all()
-    some, chain, whole = merged(path, np.full(4, 0.0081))
+    assert halved(path, np.full(4, 0.0079))[0] is path
+    some, origin = halved(path, np.full(4, 0.0081))
     assert not some.is_arc.any()
-    assert chain.tolist() == [0, 0, 0, 0]
-    assert whole.all()
+    assert origin.tolist() == [0, 0, 1, 1, 2, 2, 3, 3]
+    assert merged(some, np.full(8, 0.0081))[1].tolist() == [0] * 8
 
 
 def test_a_line_begins_in_the_middle_of_an_arc() -> None:
-    """Where its middle still lies on the line before, and its end does not."""
+    """Where its middle still lies on the line before, and its end does not: so the corner is in
+    the middle of its row."""
     builder = ToolpathBuilder((0.0, 1.0, 0.0))
     for angle in (0.02, 0.30, 0.42):
         end = (math.sin(angle), math.cos(angle), 0.0)
         builder.arc(*end, centre=(0.0, 0.0), ccw=False, feed=100.0)
-    _, chain, whole = merged(builder.finish(), np.full(3, 0.01))
-    assert chain.tolist() == [0, 1, 1]
-    assert whole.tolist() == [True, False, True]
+    path = builder.finish()
+    some, _ = halved(path, np.full(3, 0.01))
+    assert merged(some, np.full(6, 0.01))[1].tolist() == [0, 0, 0, 1, 1, 1]
+    rows = run(path, in_mode("blend", 0.01))
+    assert [row.ended for row in rows] == [True] * 3
+    corner = np.array([math.sin(0.16), math.cos(0.16), 0.0])
+    near = np.linalg.norm(np.concatenate([row.commanded for row in rows]) - corner, axis=1).min()
+    assert near < 0.011  # a blend of two lines that meet there; the start of its row is 0.14 away
 
 
 def test_moves_that_overlap_come_no_nearer_to_the_corner_than_the_tolerance() -> None:
