@@ -28,7 +28,7 @@ from camtool.run import Run
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from camtool.arrays import Bools, Ints
+    from camtool.arrays import Bools, Indices
     from camtool.geometry.drawing import Drawing
     from camtool.machine.model import Machine
     from camtool.planning.items import Step
@@ -90,7 +90,7 @@ class _Goal:
     compensated: Compensated | None = None
     asked: Asked | None = None
     written_from: Toolpath | None = None
-    row_from: Ints | None = None
+    row_from: Indices | None = None
     registration: Registration | None = None
 
 
@@ -429,7 +429,7 @@ def read_program(data: bytes, target: LoadedTarget, *, source: str) -> Run:
 
     decoded = _decoded(data, target, source)
     mine = target.machine.target
-    program = Program(data, mine.extension, mine.name, np.empty(0, dtype=np.int64))
+    program = Program(data, mine.extension, mine.name, np.empty(0, dtype=np.int32))
     return Run(
         source=source, target=target, program=program, decoded=decoded, findings=decoded.findings
     )
@@ -621,12 +621,13 @@ def _judged(
     )
 
 
-def _row_from(program: Program, decoded: Toolpath) -> Ints:
+def _row_from(program: Program, decoded: Toolpath) -> Indices:
     """(N,) the row of the toolpath from which each decoded row was written, −1 for none."""
     import numpy as np
 
     last = len(program.row_of_block)
-    return np.asarray(np.append(program.row_of_block, -1)[decoded.block.clip(max=last)])
+    rows = np.append(program.row_of_block, np.int32(-1))
+    return np.asarray(rows[decoded.block.clip(max=last)])
 
 
 def _asked(
@@ -656,7 +657,7 @@ def _asked(
     )
 
 
-def _feed_named(job: Job, machine: Machine, wanted: Toolpath, row_from: Ints) -> Bools:
+def _feed_named(job: Job, machine: Machine, wanted: Toolpath, row_from: Indices) -> Bools:
     """(N,) true for the written rows whose feed the job names, or which follows from one that it
     names; they were written from the rows `row_from` (N,) of `wanted`."""
     import numpy as np

@@ -240,7 +240,7 @@ def swept_moves(wanted: CutMoves, tool: ToolAt) -> Swept:
     least = float(wanted.segments.radius[arcs].min()) if arcs.any() else math.inf
     samples = sample_cuts(wanted, min(math.sqrt(8.0 * least * CHORD_MM), 1.0))
     inside = np.flatnonzero(samples.segment[1:] == samples.segment[:-1])
-    row = wanted.segments.path[samples.segment[inside]].astype(np.int64)
+    row = wanted.row[samples.segment[inside]].astype(np.int64)
     a, b = samples.points[inside], samples.points[inside + 1]
     return Swept(a, b, tool.radius[row], tool.z[row], row)
 

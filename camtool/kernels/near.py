@@ -16,17 +16,18 @@ exact, to true lines and arcs (`camtool.verification.nearest`). Compiled; C type
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from camtool.arrays import Floats, Ints
+from camtool.arrays import Floats, Indices, Ints
 
-AX, AY, BX, BY, CX, CY, RADIUS, UX, UY, VX, VY, SWEEP, Z, RISE, SLOPE = range(15)
-"""Columns of a move: start; end; of an arc its centre, radius (0: a line), normals into its wedge
-from its two edges, and size of its sweep, rad; height of its start, rise to its end, and slope."""
+CX, CY, RADIUS, UX, UY, VX, VY, SWEEP, LOW_X, LOW_Y, HIGH_X, HIGH_Y = range(12)
+"""Columns of an arc: its centre, radius, normals into its wedge from its two edges, size of its
+sweep, rad, and box."""
 
-COLUMNS = 15
-"""Numbers of a move."""
+COLUMNS = 12
+"""Numbers of an arc."""
 
 FEW_POINTS = 4
 """So many points are not divided any more: they are compared with all their candidates."""
@@ -46,39 +47,51 @@ DEPTH = 80
 logarithm of all of them."""
 
 
+class Moves(NamedTuple):
+    """K moves: start and end (K, 2), (K, 2) mm, and the heights of both (K, 2) mm; which of the
+    arcs each is (K,), −1 for a line; and the arcs (A, 12). What is the same in all rows may be one
+    row, seen as many (`np.broadcast_to`)."""
+
+    start: Floats
+    end: Floats
+    heights: Floats
+    arc: Indices
+    arcs: Floats
+
+
 class Near:
-    """What a search needs: K moves `table` (K, 15) with their `boxes` (K, 4), P `points` (P, 3) mm
-    with their heights, the limit in XY and the window of heights (on a slope, more by the slope),
-    and room for what waits. Of each point: how many moves are within both (`count` (P,)), how far
-    the nearest of these is (`distance` (P,) mm) and its row (`move` (P,))."""
+    """What a search needs: K moves, P `points` (P, 3) mm with their heights, the limit in XY and
+    the window of heights (on a slope, more by the slope), and room for what waits. Of each point:
+    how many moves are within both (`count` (P,)), how far the nearest of these is (`distance`
+    (P,) mm) and its row (`move` (P,))."""
 
     def __init__(
         self,
-        table: Floats,
-        boxes: Floats,
+        moves: Moves,
         points: Floats,
         limits_mm: tuple[float, float],
         found: tuple[Floats, Ints, Ints],
     ) -> None:
-        self.table, self.boxes, self.points = table, boxes, points
+        self.start, self.end, self.heights, self.arc, self.arcs = moves
+        self.points = points
         self.limit, self.window = limits_mm
         self.distance, self.move, self.count = found
         self.order = np.arange(len(points))
-        self.candidates = np.empty(2 * len(table) + 2, dtype=np.int64)
-        self.apart = np.empty(len(table))
+        self.candidates = np.empty(2 * len(moves.arc) + 2, dtype=np.int32)
+        self.apart = np.empty(FEW_MOVES)
         self.waiting = np.empty(4 * DEPTH, dtype=np.int64)
         self.box = np.empty(6)
 
 
 def nearest(
-    table: Floats, boxes: Floats, points: Floats, runs: Ints, limits_mm: tuple[float, float]
+    moves: Moves, points: Floats, runs: Ints, limits_mm: tuple[float, float]
 ) -> tuple[Floats, Ints]:
     """(P,) mm and (P,): the distance of each point from the nearest move within the limits, inf
     for none, and the row of that, −1 for none; arguments as in `Near`. `runs` (R, 4): begin and
     end of some points, begin and end of the moves with which they are compared."""
     count = np.zeros(len(points), dtype=np.int64)
     found = np.full(len(points), np.inf), np.full(len(points), -1, dtype=np.int64), count
-    near = Near(table, boxes, points, limits_mm, found)
+    near = Near(moves, points, limits_mm, found)
     nothing, nowhere = np.empty(0, dtype=np.int64), np.empty(0)
     for run in runs:
         low, high, first, last = run.tolist()
@@ -87,17 +100,17 @@ def nearest(
 
 
 def pairs(
-    table: Floats, boxes: Floats, points: Floats, limits_mm: tuple[float, float]
+    moves: Moves, points: Floats, limits_mm: tuple[float, float]
 ) -> tuple[Ints, Ints, Floats]:
     """All pairs (point, move) within the limits, in order, and their distances, mm; arguments as
     in `Near`."""
     count = np.zeros(len(points), dtype=np.int64)
     place = np.empty(len(points), dtype=np.int64)
-    near = Near(table, boxes, points, limits_mm, (np.empty(len(points)), place, count))
-    divide(0, len(points), 0, len(table), near, np.empty(0, dtype=np.int64), np.empty(0))
+    near = Near(moves, points, limits_mm, (np.empty(len(points)), place, count))
+    divide(0, len(points), 0, len(moves.arc), near, np.empty(0, dtype=np.int64), np.empty(0))
     move, distance = np.empty(int(count.sum()), dtype=np.int64), np.empty(int(count.sum()))
     place[:] = np.cumsum(count) - count
-    divide(0, len(points) if len(move) else 0, 0, len(table), near, move, distance)
+    divide(0, len(points) if len(move) else 0, 0, len(moves.arc), near, move, distance)
     return np.repeat(np.arange(len(points)), count), move, distance
 
 
@@ -125,6 +138,8 @@ def divide(
             if len(found) > 0:
                 _list(low, high, last, end, near, found, distance)
             else:
+                if end - last > len(near.apart):
+                    near.apart = np.empty(2 * (end - last))
                 _compare(low, high, last, end, near)
             continue
         if 2 * (end - last) <= last - first:
@@ -161,38 +176,60 @@ def _set_box(low: int, high: int, near: Near) -> tuple[int, float]:
 def _keep_near(first: int, last: int, near: Near) -> int:
     """Write the candidates first:last that come within the limits of the box behind `last`;
     returns the end of these."""
-    candidates, table, boxes, box = near.candidates, near.table, near.boxes, near.box
+    candidates, box, arcs, heights = near.candidates, near.box, near.arcs, near.heights
+    start, ends = near.start, near.end
     room, window, end = near.limit + SLACK_MM, near.window + SLACK_MM, last
     low_x, low_y, high_x, high_y = box[0] - room, box[1] - room, box[3] + room, box[4] + room
     x, y = 0.5 * (low_x + high_x), 0.5 * (low_y + high_y)
     wide, tall = high_x - x, high_y - y
     for n in range(first, last):
         k = candidates[n]
-        if boxes[k, 0] > high_x or boxes[k, 2] < low_x:
+        arc = near.arc[k]
+        ax, ay, bx, by = start[k, 0], start[k, 1], ends[k, 0], ends[k, 1]
+        if arc < 0:
+            if min(ax, bx) > high_x or max(ax, bx) < low_x:
+                continue
+            if min(ay, by) > high_y or max(ay, by) < low_y:
+                continue
+        else:
+            if arcs[arc, LOW_X] > high_x or arcs[arc, HIGH_X] < low_x:
+                continue
+            if arcs[arc, LOW_Y] > high_y or arcs[arc, HIGH_Y] < low_y:
+                continue
+        z, to_z = heights[k, 0], heights[k, 1]
+        around = window * (1.0 + _slope(near, k))
+        if min(z, to_z) > box[5] + around or max(z, to_z) < box[2] - around:
             continue
-        if boxes[k, 1] > high_y or boxes[k, 3] < low_y:
-            continue
-        z, rise = table[k, Z], table[k, RISE]
-        around = window * (1.0 + table[k, SLOPE])
-        if min(z, z + rise) > box[5] + around or max(z, z + rise) < box[2] - around:
-            continue
-        if table[k, RADIUS] == 0.0:
-            dx, dy = table[k, BX] - table[k, AX], table[k, BY] - table[k, AY]
-            side = dx * (y - table[k, AY]) - dy * (x - table[k, AX])
+        if arc < 0:
+            dx, dy = bx - ax, by - ay
+            side = dx * (y - ay) - dy * (x - ax)
             if abs(side) > (wide * abs(dy) + tall * abs(dx)) * (1.0 + SLACK_MM):
                 continue
         else:
-            dx, dy = abs(x - table[k, CX]), abs(y - table[k, CY])
+            dx, dy = abs(x - arcs[arc, CX]), abs(y - arcs[arc, CY])
             near_x, near_y = max(dx - wide, 0.0), max(dy - tall, 0.0)
-            radius = table[k, RADIUS] + SLACK_MM
+            radius = arcs[arc, RADIUS] + SLACK_MM
             if near_x * near_x + near_y * near_y > radius * radius:
                 continue
-            radius = max(table[k, RADIUS] - SLACK_MM, 0.0)
+            radius = max(arcs[arc, RADIUS] - SLACK_MM, 0.0)
             if (dx + wide) * (dx + wide) + (dy + tall) * (dy + tall) < radius * radius:
                 continue
         candidates[end] = k
         end += 1
     return end
+
+
+def _slope(near: Near, k: int) -> float:
+    """How much the height of a move changes, as a share of its length."""
+    rise, arc = abs(near.heights[k, 1] - near.heights[k, 0]), near.arc[k]
+    if rise == 0.0:
+        return 0.0
+    if arc >= 0:
+        length = near.arcs[arc, RADIUS] * near.arcs[arc, SWEEP]
+    else:
+        dx, dy = near.end[k, 0] - near.start[k, 0], near.end[k, 1] - near.start[k, 1]
+        length = math.sqrt(dx * dx + dy * dy)
+    return float(rise / (length if length > 0.0 else 1.0))
 
 
 def _divided(low: int, high: int, axis: int, middle: float, near: Near) -> int:
@@ -210,42 +247,45 @@ def _divided(low: int, high: int, axis: int, middle: float, near: Near) -> int:
 
 def _apart(near: Near, k: int, x: float, y: float, z: float) -> float:
     """The distance of a point from a move; inf beyond the limits."""
-    table = near.table
-    rise, window = table[k, RISE], near.window * (1.0 + table[k, SLOPE])
-    if rise == 0.0 and abs(table[k, Z] - z) > window:
+    arc, from_z = near.arc[k], near.heights[k, 0]
+    rise, window = near.heights[k, 1] - from_z, near.window * (1.0 + _slope(near, k))
+    if rise == 0.0 and abs(from_z - z) > window:
         return math.inf
+    ax, ay, bx, by = near.start[k, 0], near.start[k, 1], near.end[k, 0], near.end[k, 1]
     share = 0.0
-    if table[k, RADIUS] == 0.0:
-        dx, dy = table[k, BX] - table[k, AX], table[k, BY] - table[k, AY]
-        px, py = x - table[k, AX], y - table[k, AY]
+    if arc < 0:
+        dx, dy = bx - ax, by - ay
+        px, py = x - ax, y - ay
         square = dx * dx + dy * dy
         share = (px * dx + py * dy) * (1.0 / (square if square > 0.0 else 1.0))
         share = min(max(share, 0.0), 1.0)
         px, py = px - share * dx, py - share * dy
         apart = math.sqrt(px * px + py * py)
     else:
-        px, py = x - table[k, CX], y - table[k, CY]
-        sine = table[k, UX] * py - table[k, UY] * px
-        if sine < 0.0 or px * table[k, VY] - py * table[k, VX] < 0.0:
-            to_a = (x - table[k, AX]) ** 2 + (y - table[k, AY]) ** 2
-            to_b = (x - table[k, BX]) ** 2 + (y - table[k, BY]) ** 2
+        arcs = near.arcs
+        px, py = x - arcs[arc, CX], y - arcs[arc, CY]
+        sine = arcs[arc, UX] * py - arcs[arc, UY] * px
+        if sine < 0.0 or px * arcs[arc, VY] - py * arcs[arc, VX] < 0.0:
+            to_a, to_b = (x - ax) ** 2 + (y - ay) ** 2, (x - bx) ** 2 + (y - by) ** 2
             apart = math.sqrt(min(to_a, to_b))
         else:
-            apart = abs(math.sqrt(px * px + py * py) - table[k, RADIUS])
+            apart = abs(math.sqrt(px * px + py * py) - arcs[arc, RADIUS])
         if rise != 0.0 and apart <= near.limit:
-            share = _share_of_arc(near, k, px, py, sine)
+            share = _share_of_arc(arcs, arc, ax, ay, px, py, sine)
     if apart > near.limit:
         return math.inf
-    if rise != 0.0 and abs(table[k, Z] + share * rise - z) > window:
+    if rise != 0.0 and abs(from_z + share * rise - z) > window:
         return math.inf
     return apart
 
 
-def _share_of_arc(near: Near, k: int, px: float, py: float, sine: float) -> float:
-    """Where on an arc its point nearest to a place about its centre lies, from 0 to 1."""
-    table = near.table
-    ax, ay = table[k, AX] - table[k, CX], table[k, AY] - table[k, CY]
-    angle, sweep = math.atan2(sine, ax * px + ay * py), table[k, SWEEP]
+def _share_of_arc(
+    arcs: Floats, arc: int, ax: float, ay: float, px: float, py: float, sine: float
+) -> float:
+    """Where on an arc that begins at (ax, ay) its point nearest to a place about its centre lies,
+    from 0 to 1."""
+    ax, ay = ax - arcs[arc, CX], ay - arcs[arc, CY]
+    angle, sweep = math.atan2(sine, ax * px + ay * py), arcs[arc, SWEEP]
     angle = angle + 2.0 * math.pi if angle < 0.0 else angle
     return 0.0 if angle > math.pi + 0.5 * sweep else min(angle / sweep, 1.0)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from camtool.arrays import Ints
+from camtool.arrays import Indices, Ints
 from camtool.findings import Finding
 from camtool.machine.model import Machine
 
@@ -23,7 +23,7 @@ class Program:
     data: bytes
     extension: str
     target: str
-    row_of_block: Ints
+    row_of_block: Indices
     findings: tuple[Finding, ...] = ()
 
     @classmethod
@@ -31,7 +31,7 @@ class Program:
         cls,
         data: bytes,
         machine: Machine,
-        row_of_block: Sequence[int] | Ints,
+        row_of_block: Sequence[int] | Indices | Ints,
         findings: Iterable[Finding],
     ) -> Program:
         """A program of this text, for a machine that calls its programs so."""
@@ -39,7 +39,7 @@ class Program:
             data=data,
             extension=machine.target.extension,
             target=machine.target.name,
-            row_of_block=np.asarray(row_of_block, dtype=np.int64),
+            row_of_block=np.asarray(row_of_block, dtype=np.int32),
             findings=tuple(findings),
         )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from camtool.arrays import Ints
+from camtool.arrays import Indices
 from camtool.geometry.drawing import Drawing
 from camtool.machine.model import Machine
 from camtool.planning.job import Job, Tool
@@ -112,7 +112,7 @@ class Case:
     compensated: Compensated | None = None
     asked: Asked | None = None
     written_from: Toolpath | None = None
-    row_from: Ints | None = None
+    row_from: Indices | None = None
     registration: Registration | None = None
 
     @property

@@ -247,9 +247,10 @@ def compare_places(
     _near_wanted(there, wanted.moves, limits)
     _written_from_cut(back, wanted.moves, mine.moves, limits)
     trips = round_trips(other.cuts, limits[0])
-    written = other.moves.contour
-    turns = turned(there, trips[written[there.move]], limits)
-    turns_back = turned(back, trips[written[back.samples.segment[back.point]]], limits)
+    written = other.moves.contour_of(there.move)
+    turns = turned(there, trips[written], limits)
+    written = other.moves.contour_of(back.samples.segment[back.point])
+    turns_back = turned(back, trips[written], limits)
     findings = (
         *_place_findings(back, undrilled, limits, Code.CONTOUR_MISSING),
         *_place_findings(there, drilled, limits, Code.EXTRA_CUT),
@@ -303,7 +304,7 @@ def _place_findings(
         extra, known = code == Code.EXTRA_CUT, nearest >= 0
         one, which = (cuts, samples.segment[sample]) if extra else (found.others, nearest)
         at = at_point(samples.points[sample])
-        block = block_name(one.toolpath, int(one.segments.path[which])) if extra or known else ""
+        block = block_name(one.toolpath, int(one.row[which])) if extra or known else ""
         yield _away(near.distance[worst], bool(wrong_depth[worst]), code)(
             where=f"{block} near {at}".strip(),
             measured=float(near.distance[worst]) if known else None,
@@ -368,7 +369,7 @@ def _repeated_cuts(mine: Side, other: Side, alike: Alike, limits: Limits) -> Ite
     middle = point_at(mine.cuts.segments, segment, half)
     z = mine.cuts.heights(segment).mean(axis=1)
     point, move, _ = other.moves.within(middle, z, limits)
-    moves = np.column_stack([point, other.cuts.segments.path[move]])
+    moves = np.column_stack([point, other.cuts.row[move]])
     lie = np.bincount(np.unique(moves, axis=0)[:, 0], minlength=len(rows))
     bad = np.flatnonzero(counts[more_often] > np.maximum(lie, 1))
     for place, more in listed(bad.tolist()):

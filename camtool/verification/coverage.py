@@ -100,12 +100,12 @@ class _Sampled:
         the stock top are excepted: they may be flat moves on it, which cut nothing."""
         sloping = self.cuts.slopes(self.samples.segment)
         judged = ~sloping | (self.samples.z < STOCK_TOP_MM - goal.depth_mm)
-        judged &= ~self.drilled[self.cuts.contour[self.cuts.segments.path[self.samples.segment]]]
+        judged &= ~self.drilled[self.cuts.contour[self.cuts.row[self.samples.segment]]]
         return np.asarray(judged & (self.wrong_depth | (self.found.distance > goal.limit_mm)))
 
 
 def cover(
-    decoded: MoveIndex, goal: Goal, spacing_mm: float, drilled: Drilled, row_from: Ints | None
+    decoded: MoveIndex, goal: Goal, spacing_mm: float, drilled: Drilled, row_from: Indices | None
 ) -> Coverage:
     """Compare decoded with wanted cutting moves, and wanted with decoded ones, on samples about
     `spacing_mm` apart; `row_from` (N,) is the wanted row from which each decoded row was written,
@@ -132,7 +132,7 @@ def cover(
         belongs[other] = match_contours(cuts, samples.of(other), some, goal)
         found.distance[other], found.segment[other] = some.distance, some.segment
         real = np.isfinite(found.distance)
-        rows = cuts.segments.path[samples.segment]
+        rows = cuts.row[samples.segment]
         rounding.add(found.distance[real], samples.points[real], rows[real])
         match_rows(match, cuts, samples, belongs, found, goal)
     alike = _contours_alike(wanted.cuts, beside, row_from)
@@ -151,7 +151,9 @@ def cover(
     return Coverage(with_neighbours(match), rounding, findings)
 
 
-def _contours_from(cuts: CutMoves, wanted: CutMoves, row_from: Ints | None) -> tuple[Ints, Ints]:
+def _contours_from(
+    cuts: CutMoves, wanted: CutMoves, row_from: Indices | None
+) -> tuple[Ints, Ints]:
     """(C,) the wanted contour from which all rows of each decoded contour were written, and (W,)
     the only decoded contour with rows of each wanted contour; ANY_CONTOUR where there is none."""
     mine = np.full(cuts.contour_count, ANY_CONTOUR, dtype=np.int64)
@@ -177,7 +179,7 @@ def _own_found(cuts: CutMoves, samples: Samples, own: Ints, goal: Goal) -> tuple
     it."""
     count, fit = len(samples.points), np.asarray(own != ANY_CONTOUR)
     found = Found(np.full(count, np.inf), np.full(count, -1, dtype=np.int64))
-    mine = cuts.contour[cuts.segments.path[samples.segment]]
+    mine = cuts.contour[cuts.row[samples.segment]]
     some = np.flatnonzero(fit[mine])
     limits = max(goal.limit_mm, LEAST_MM), goal.depth_mm
     for low in range(0, len(some), SAMPLES_AT_ONCE):
@@ -201,7 +203,7 @@ def _together(cuts: CutMoves, own: Ints, beside: Ints) -> Indices:
     return np.where(np.append(apart, False)[cuts.contour], rows, cuts.contour)
 
 
-def _contours_alike(wanted: CutMoves, beside: Ints, row_from: Ints | None) -> Bools:
+def _contours_alike(wanted: CutMoves, beside: Ints, row_from: Indices | None) -> Bools:
     """(C,) the wanted contours from each of whose rows one was written that lies `beside` it."""
     alike = np.zeros(wanted.contour_count, dtype=np.bool_)
     if row_from is not None:
@@ -212,7 +214,9 @@ def _contours_alike(wanted: CutMoves, beside: Ints, row_from: Ints | None) -> Bo
     return alike
 
 
-def _rows_alike(cuts: CutMoves, wanted: CutMoves, limits: Limits, row_from: Ints | None) -> Ints:
+def _rows_alike(
+    cuts: CutMoves, wanted: CutMoves, limits: Limits, row_from: Indices | None
+) -> Ints:
     """The rows that cut along a line or an arc, and alone were written from a move of the same
     kind beside which they lie: each point of them lies within the limits of it.
 
@@ -246,7 +250,7 @@ def _rows_alike(cuts: CutMoves, wanted: CutMoves, limits: Limits, row_from: Ints
     return np.asarray(rows[near])
 
 
-def _beside_circle(toolpath: Toolpath, arcs: Ints) -> Floats:
+def _beside_circle(toolpath: Toolpath, arcs: Ints | Indices) -> Floats:
     """(J,) mm: how far the ends of these arcs lie from the circles of their starts."""
     centre = toolpath.centre[arcs]
     out, back = (
@@ -264,7 +268,7 @@ def _fits(
     fit = np.asarray(own != ANY_CONTOUR)
     limit_mm, depth_mm = limits
     for samples in samples_by_parts(cuts, spacing_mm, np.append(fit, False)[cuts.contour]):
-        mine = cuts.contour[cuts.segments.path[samples.segment]]
+        mine = cuts.contour[cuts.row[samples.segment]]
         near_mm = max(limit_mm, LEAST_MM)
         found = others.nearest(samples.points, samples.z, own[mine], (near_mm, depth_mm))
         fit[mine[found.distance > limit_mm]] = False
@@ -294,7 +298,7 @@ def _uncovered(sampled: _Sampled, goal: Goal) -> Iterator[_Uncovered]:
     bad = np.flatnonzero(sampled.bad(goal))
     if len(bad) == 0:
         return
-    rows = cuts.segments.path[samples.segment]
+    rows = cuts.row[samples.segment]
     contour = cuts.contour[rows]
     all_of = np.bincount(contour)
     order = bad[np.lexsort((bad, -distance[bad], contour[bad]))]
@@ -398,7 +402,7 @@ def contours_drilled(
     stands = np.zeros(len(holes), dtype=np.bool_)
     if not len(holes) or not len(drilled):
         return drilled, stands
-    contour = cuts.contour[cuts.segments.path]
+    contour = cuts.contour[cuts.row]
     begin = np.flatnonzero(np.diff(contour, prepend=-1))
     boxes = segment_boxes(cuts.segments)
     low = np.minimum.reduceat(boxes[:, :2], begin)
@@ -486,7 +490,7 @@ def cut_other_way(
     source: MoveIndex,
     limits: Limits,
     sample_mm: float,
-    row_from: Ints | None,
+    row_from: Indices | None,
 ) -> Iterator[Finding]:
     """CUT_OTHER_WAY for contours of a program that are cut in the direction opposite to that of
     the moves from which it was written, `source`; `row_from` as in `cover`.
@@ -517,11 +521,11 @@ def cut_other_way(
     suspect[rows[_cosines(cuts, middles, source, nearest) < -ALONG]] = True
     if suspect.any():
         found = compared(cuts, suspect, source, limits, sample_mm)
-        trips = round_trips(source.cuts, limits[0])[source.contour[found.move]]
+        trips = round_trips(source.cuts, limits[0])[source.contour_of(found.move)]
         yield from other_way(found, turned(found, trips, limits))
 
 
-def _same_way(cuts: CutMoves, source: CutMoves, rows: Ints, row_from: Ints) -> Bools:
+def _same_way(cuts: CutMoves, source: CutMoves, rows: Ints, row_from: Indices) -> Bools:
     """(J,) whether the chords of these rows have the direction of those of the rows that they came
     from, which are alike; none has that of a full circle."""
     same = np.empty(len(rows), dtype=np.bool_)
@@ -568,16 +572,14 @@ class Compared:
         return float(self.distance[np.isfinite(self.distance)].max(initial=0.0))
 
     @property
-    def rows(self) -> Ints:
+    def rows(self) -> Indices:
         """(S,) the row of each sample."""
-        return self.cuts.segments.path[self.samples.segment]
+        return self.cuts.row[self.samples.segment]
 
     def rows_along(self) -> Ints:
         """(P, 2) rows of both sides that lie on each other and have the same direction."""
         along = self.cosine > ALONG
-        pairs = np.column_stack(
-            [self.rows[self.point[along]], self.others.segments.path[self.move[along]]]
-        )
+        pairs = np.column_stack([self.rows[self.point[along]], self.others.row[self.move[along]]])
         return np.unique(pairs, axis=0)
 
 
@@ -586,9 +588,7 @@ def compared(
 ) -> Compared:
     """The cuts of these rows (N,) of one side against the cuts of the other side, at samples about
     `sample_mm` apart; `limits`: what is near, in XY and in height, mm."""
-    samples = _with_ends(
-        cuts, sample_cuts(cuts, sample_mm, np.flatnonzero(rows[cuts.segments.path]))
-    )
+    samples = _with_ends(cuts, sample_cuts(cuts, sample_mm, np.flatnonzero(rows[cuts.row])))
     point, move, distance = others.within(samples.points, samples.z, limits)
     nearest = np.full(len(samples.points), np.inf)
     np.minimum.at(nearest, point, distance)
@@ -602,7 +602,7 @@ def compared(
 def _with_ends(cuts: CutMoves, samples: Samples) -> Samples:
     """The samples with the last one of each row moved to the programmed end, which need not lie
     on the circle of an arc."""
-    row = cuts.segments.path[samples.segment]
+    row = cuts.row[samples.segment]
     last = (samples.segment == cuts.first[row + 1] - 1) & (samples.share == 1.0)
     points = np.where(last[:, None], cuts.toolpath.end[row, :2], samples.points)
     return replace(samples, points=points)

@@ -37,20 +37,21 @@ class CutMoves:
     """The cutting moves of `toolpath` (N rows) as K segments, in order.
 
     Arcs run about the programmed centre with the radius of their start; above 180° they are two
-    segments. `segments.path` (K,) is the toolpath row; row r owns segments
+    segments. `row` (K,) is the toolpath row of each; row r owns segments
     first[r]:first[r+1] (`first` (N+1,)). `contour` (N,) is the number of the row's contour, from
     0, and −1 for rows that do not cut.
     """
 
     toolpath: Toolpath
     segments: Segments
+    row: Indices
     first: Indices
     contour: Indices
 
     def heights(self, which: Ints | Indices) -> Floats:
         """(J, 2) mm: the heights of the starts and ends of these segments, between which their
         height changes evenly: the segments of a row are equal parts of it."""
-        row = self.segments.path[which]
+        row = self.row[which]
         begin, end = self.toolpath.starts_of(row)[:, 2], self.toolpath.end[row, 2]
         of = self.first[row + 1] - self.first[row]
         part = which - self.first[row]
@@ -61,8 +62,14 @@ class CutMoves:
 
     @property
     def ends_z(self) -> Floats:
-        """(K, 2) mm: heights of each segment's start and end."""
-        return self.heights(np.arange(len(self.segments)))
+        """(K, 2) mm: heights of each segment's start and end; one row, seen as many, where all are
+        at one height."""
+        found = np.empty((len(self.segments), 2))
+        for low in range(0, len(found), ROWS_AT_ONCE):
+            some = np.arange(low, min(low + ROWS_AT_ONCE, len(found)))
+            found[some] = self.heights(some)
+        level = len(found) and (found == found[0, 0]).all()
+        return np.broadcast_to(found[:1].copy(), found.shape) if level else found
 
     @property
     def z(self) -> Floats:
@@ -155,20 +162,23 @@ def cut_moves(toolpath: Toolpath, *, flat_cuts: bool) -> CutMoves:
     parts[arcs[np.abs(sweep) > np.pi]] = 2
     first = np.zeros(len(toolpath) + 1, dtype=np.int32)
     np.cumsum(parts, out=first[1:])
-    segments = _segments(toolpath, first, (arcs, sweep))
-    return CutMoves(toolpath, segments, first, _contours(toolpath, cutting))
+    row = np.repeat(np.arange(len(toolpath), dtype=np.int32), parts)
+    segments = _segments(toolpath, row, first, (arcs, sweep))
+    return CutMoves(toolpath, segments, row, first, _contours(toolpath, cutting))
 
 
-def _segments(toolpath: Toolpath, first: Indices, arcs: tuple[Ints, Floats]) -> Segments:
-    """One segment per part of each row, which owns segments first[r]:first[r+1]; `arcs`: the rows
-    (J,) that are arcs, and their sweeps (J,). The points between parts lie on the start's
-    radius."""
-    row = np.repeat(np.arange(len(toolpath)), np.diff(first))
+def _segments(
+    toolpath: Toolpath, row: Indices, first: Indices, arcs: tuple[Ints, Floats]
+) -> Segments:
+    """One segment per part of each row: that of each is `row` (K,), which owns segments
+    first[r]:first[r+1]; `arcs`: the rows (J,) that are arcs, and their sweeps (J,). The points
+    between parts lie on the start's radius."""
     bulge = np.broadcast_to(np.zeros(1), len(row))
+    path = np.broadcast_to(np.int64(0), len(row))  # the segments of a toolpath are all of one
     if not len(arcs[0]) and len(row) and row[0] > 0 and (np.diff(row) == 1).all():
         low, high = row[0], row[-1] + 1  # the toolpath's own points
         ends = toolpath.end[low - 1 : high - 1, :2], toolpath.end[low:high, :2]
-        return Segments(*ends, bulge, row)
+        return Segments(*ends, bulge, path)
     start, end = toolpath.end[row - 1, :2], toolpath.end[row, :2]
     start[row == 0] = toolpath.start[:2]
     if len(arcs[0]):
@@ -184,7 +194,7 @@ def _segments(toolpath: Toolpath, first: Indices, arcs: tuple[Ints, Floats]) -> 
     if len(row) and (start[1:] == end[:-1]).all():  # one path, whose points are stored once
         points = np.concatenate([start[:1], end])
         start, end = points[:-1], points[1:]
-    return Segments(start, end, bulge, row)
+    return Segments(start, end, bulge, path)
 
 
 def _turned(points: Floats, centre: Floats, angle: Floats) -> Floats:
@@ -263,11 +273,11 @@ def _lots(
     among them a lot ends that is not the last."""
     lengths = segment_lengths(cuts.segments)
     spacing = max(spacing_mm, float(lengths.sum()) / MOST_SAMPLES)
-    taken = np.flatnonzero(rows[cuts.segments.path])
+    taken = np.flatnonzero(rows[cuts.row])
     parts = _parts(lengths[taken], spacing).astype(np.int32)
     del lengths
     # What is whole ends where its last segment does.
-    of = cuts.segments.path[taken]
+    of = cuts.row[taken]
     last = np.append(np.diff(of if whole is None else whole[of]) != 0, True)[: len(of)]
     many = np.cumsum(parts + 1, dtype=np.int64)[last] // at_once
     return taken, parts, (np.flatnonzero(last)[np.flatnonzero(np.diff(many))] + 1).tolist()
@@ -350,7 +360,7 @@ def _level(cuts: CutMoves) -> Bools:
     low, high = np.full(cuts.contour_count, np.inf), np.full(cuts.contour_count, -np.inf)
     for begin in range(0, len(cuts.segments), ROWS_AT_ONCE):
         which = np.arange(begin, min(begin + ROWS_AT_ONCE, len(cuts.segments)))
-        contour, z = cuts.contour[cuts.segments.path[which]], cuts.heights(which)
+        contour, z = cuts.contour[cuts.row[which]], cuts.heights(which)
         np.minimum.at(low, contour, z.min(axis=1))
         np.maximum.at(high, contour, z.max(axis=1))
     return np.asarray(low == high)

@@ -221,12 +221,13 @@ def _extents(cuts: CutMoves, counts: Bools) -> tuple[Floats, Floats]:
     most = np.full((cuts.contour_count, 2), -np.inf)
     lowest = np.full(cuts.contour_count, np.inf)
     for low in range(0, len(cuts.segments), ROWS_AT_ONCE):
-        segments = cuts.segments[low : low + ROWS_AT_ONCE]
-        segments = segments[np.flatnonzero(counts[segments.path])]
-        contour, boxes = cuts.contour[segments.path], segment_boxes(segments)
+        row = cuts.row[low : low + ROWS_AT_ONCE]
+        counted = np.flatnonzero(counts[row])
+        row, contour = row[counted], cuts.contour[row[counted]]
+        boxes = segment_boxes(cuts.segments[low + counted])
         np.minimum.at(least, contour, boxes[:, :2])
         np.maximum.at(most, contour, boxes[:, 2:])
-        begin, end = cuts.toolpath.starts_of(segments.path), cuts.toolpath.end[segments.path]
+        begin, end = cuts.toolpath.starts_of(row), cuts.toolpath.end[row]
         np.minimum.at(lowest, contour, np.minimum(begin[:, 2], end[:, 2]))
     return np.stack([least, most], axis=2), lowest
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.kernels.judging import BEFORE_FIRST, BINS, SHIFT, leading_bits
 from camtool.simulation.motion import Ledger
 from camtool.toolpath.moves import Kind, Toolpath, are_arcs
@@ -42,7 +42,7 @@ class Figure:
         self._squares = 0.0
         self._histogram = np.zeros(BINS, dtype=np.int64)
 
-    def add(self, errors: Floats, points: Floats, rows: Ints) -> None:
+    def add(self, errors: Floats, points: Floats, rows: Ints | Indices) -> None:
         """Errors (J,) mm measured at points (J, 2) mm of these rows (J,)."""
         if len(errors) == 0:
             return
@@ -324,7 +324,7 @@ class ContourSums:
         np.add.at(self._samples, of, samples[known])
         np.add.at(self._squares, of, columns[:, at.TOTAL_SQUARES])
         np.add.at(self._sums, of, columns[:, at.TOTAL_SUM])
-        off = self._match.off_mm[block.rows][known, 0]
+        off = self._match.off_mm[block.rows][known]
         for largest, one in zip(self._largest, (inner, lag, off), strict=True):
             np.maximum.at(largest, of, one)
         order = np.lexsort((known, -total, of))

@@ -36,7 +36,7 @@ class Match:
     `row` (N,) is the wanted row nearest to its middle and `contour` (N,) its contour, −1 for rows
     that do not cut. `only` (N,) is that contour where the slides are compared with it alone, else
     ANY_CONTOUR. `circle` (N,) is the index of the full circle that the row follows, or −1.
-    `off_mm` (N, 2) is the largest distance of the drawing from the wanted rows beside it
+    `off_mm` (N,) is the largest distance of the drawing from the wanted rows beside it
     (`Drawn.off_mm`).
     """
 
@@ -62,14 +62,22 @@ class Goal:
         """(W,) the circle of each wanted row, −1 for none."""
         return _circle_of_row(self.circles, len(self.moves.cuts.contour))
 
+    @cached_property
+    def off_mm(self) -> Floats:
+        """(W,) mm: the largest distance of the drawing from each wanted row, one 0, seen as many,
+        where none is known."""
+        wanted = self.moves.cuts.toolpath
+        if wanted.drawn is None or not wanted.drawn.off_mm.any():
+            return np.broadcast_to(0.0, len(wanted))
+        return wanted.drawn.off_mm[:, 0]
+
 
 def own_match(cuts: CutMoves, circles: list[Circle]) -> Match:
     """The match of a program without wanted moves: each row belongs to itself."""
     count = len(cuts.contour)
     row = np.where(cuts.is_cut, np.arange(count, dtype=np.int32), np.int32(-1))
     circle = _circle_of_row(circles, count)
-    none_off = np.broadcast_to(np.zeros(2), (count, 2))
-    return Match(row, cuts.contour, cuts.contour, circle, none_off)
+    return Match(row, cuts.contour, cuts.contour, circle, np.broadcast_to(0.0, count))
 
 
 def carried_match(match: Match, of: Ints, goal: Goal) -> Match:
@@ -79,7 +87,7 @@ def carried_match(match: Match, of: Ints, goal: Goal) -> Match:
     row = np.where(known, of[np.maximum(match.row, 0)], -1) if len(of) else match.row
     contour = np.where(known, goal.moves.cuts.contour[np.maximum(row, 0)], -1)
     circle = goal.circle_of_row
-    off = np.where(known[:, None], _drawn_off_mm(goal)[np.maximum(row, 0)], 0.0)
+    off = np.where(known, goal.off_mm[np.maximum(row, 0)], 0.0)
     return replace(
         match,
         row=row,
@@ -119,12 +127,12 @@ def match_contours(cuts: CutMoves, samples: Samples, found: Found, goal: Goal) -
     """(S,) the wanted contour to which the decoded contour of each sample belongs, ANY_CONTOUR for
     none. `found` is changed in place to the nearest move of that contour."""
     wanted = goal.moves
-    mine = cuts.contour[cuts.segments.path[samples.segment]]
+    mine = cuts.contour[cuts.row[samples.segment]]
     belongs = np.full(len(mine), ANY_CONTOUR, dtype=np.int64)
-    if len(mine) == 0 or len(wanted.contour) == 0:
+    if len(mine) == 0 or len(wanted.cuts.segments) == 0:
         return belongs
     begin = run_offsets(mine, len(mine))
-    for candidate in _candidates(mine, wanted.contour[found.segment]):
+    for candidate in _candidates(mine, wanted.contour_of(found.segment)):
         open_ = np.flatnonzero((belongs[begin[:-1]] == ANY_CONTOUR) & (candidate >= 0))
         if len(open_) == 0:
             break
@@ -143,7 +151,7 @@ def match_contours(cuts: CutMoves, samples: Samples, found: Found, goal: Goal) -
     return belongs
 
 
-def _candidates(mine: Indices, nearest: Ints) -> list[Ints]:
+def _candidates(mine: Indices, nearest: Indices) -> list[Ints]:
     """For each try (C,): the wanted contour nearest to most samples, then the next, −1 for none.
 
     `mine` (S,) is the decoded contour of each sample (ascending), `nearest` (S,) the wanted one.
@@ -169,7 +177,7 @@ def no_match(count: int) -> Match:
         contour=np.full(count, -1, dtype=np.int32),
         only=np.full(count, ANY_CONTOUR, dtype=np.int32),
         circle=np.full(count, -1, dtype=np.int32),
-        off_mm=np.zeros((count, 2)),
+        off_mm=np.zeros(count),
     )
 
 
@@ -179,21 +187,20 @@ def match_rows(
     """Fill in the match of each row of `cuts` that has samples, which are all of its own;
     `belongs` (S,) and `found` are the result of `match_contours`."""
     wanted = goal.moves
-    rows = cuts.segments.path[samples.segment]
-    if len(rows) == 0 or len(wanted.contour) == 0:
+    rows = cuts.row[samples.segment]
+    if len(rows) == 0 or len(wanted.cuts.segments) == 0:
         return
     offsets = run_offsets(rows, len(rows))
     begin, row = offsets[:-1], rows[offsets[:-1]]
     middle = begin + np.diff(offsets) // 2
-    nearest = wanted.contour[found.segment]
-    followed = wanted.cuts.segments.path[found.segment]
+    nearest = wanted.contour_of(found.segment)
+    followed = wanted.cuts.row[found.segment]
     match.row[row] = followed[middle]
     known = belongs[begin] != ANY_CONTOUR
     match.contour[row] = np.where(known, belongs[begin], nearest[middle])
     match.only[row] = np.where(known, belongs[begin], _unanimous(nearest, offsets))
     match.circle[row] = _unanimous(goal.circle_of_row[followed], offsets)
-    off = _drawn_off_mm(goal).T
-    match.off_mm[row] = np.column_stack([np.maximum.reduceat(one[followed], begin) for one in off])
+    match.off_mm[row] = np.maximum.reduceat(goal.off_mm[followed], begin)
 
 
 def with_neighbours(match: Match) -> Match:
@@ -201,17 +208,9 @@ def with_neighbours(match: Match) -> Match:
     return replace(match, off_mm=_with_neighbours(match.off_mm, match.contour))
 
 
-def _drawn_off_mm(goal: Goal) -> Floats:
-    """(W, 2) mm: distances of the drawing from the wanted rows; 0 where they are not known."""
-    wanted = goal.moves.cuts.toolpath
-    if wanted.drawn is None:
-        return np.broadcast_to(np.zeros(2), (len(wanted), 2))
-    return wanted.drawn.off_mm
-
-
 def _with_neighbours(off_mm: Floats, contour: Indices) -> Floats:
-    """The largest value of each row (N, 2) and of its neighbours in its contour, because slides
-    lag behind."""
+    """The largest value of each row (N,) and of its neighbours in its contour, because slides lag
+    behind."""
     rows = np.flatnonzero(contour >= 0)
     most = off_mm.copy()
     for low in range(0, len(rows) - 1, ROWS_AT_ONCE):

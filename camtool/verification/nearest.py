@@ -16,12 +16,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from camtool.arrays import Floats, Indices, Ints
-from camtool.geometry.measure import segment_boxes, segment_lengths
+from camtool.geometry.measure import segment_boxes
 from camtool.verification.cuts import CutMoves
+
+if TYPE_CHECKING:
+    from camtool.kernels.near import Moves
 
 LIMIT_GROWTH = 4.0
 """A search without a limit begins within a small one, which grows by this factor while no move is
@@ -46,19 +50,19 @@ class MoveIndex:
     def __init__(self, cuts: CutMoves) -> None:
         self.cuts = cuts
 
-    @cached_property
-    def contour(self) -> Ints:
-        """(K,) the contour of each segment."""
-        return self.cuts.contour[self.cuts.segments.path].astype(np.int64)
+    def contour_of(self, segment: Ints) -> Indices:
+        """(J,) the contour of each of these segments (J,)."""
+        return self.cuts.contour[self.cuts.row[segment]]
 
     @cached_property
-    def boxes(self) -> Floats:
-        """(K, 4) mm, of each segment."""
-        return segment_boxes(self.cuts.segments)
+    def _offsets(self) -> Ints:
+        """(C + 1,) where the segments of each contour begin, and where those of the last end."""
+        every = np.arange(self.cuts.contour_count + 1, dtype=np.int32)
+        return np.searchsorted(self.cuts.contour[self.cuts.row], every)
 
     @cached_property
-    def _table(self) -> Floats:
-        return _table(self.cuts)
+    def _moves(self) -> Moves:
+        return _moves(self.cuts)
 
     def nearest(
         self,
@@ -76,15 +80,13 @@ class MoveIndex:
         if len(points) == 0:  # the tables need not be made
             return Found(np.empty(0), np.empty(0, dtype=np.int64))
         places = np.column_stack([points, height])
-        return Found(
-            *nearest(self._table, self.boxes, places, self._runs(choice, len(points)), limits_mm)
-        )
+        return Found(*nearest(self._moves, places, self._runs(choice, len(points)), limits_mm))
 
     def nearest_of_all(self, points: Floats, height: Floats, from_mm: float) -> Found:
         """The nearest move at any distance and height, which is expected within `from_mm`."""
         found = Found(np.full(len(points), np.inf), np.full(len(points), -1, dtype=np.int64))
         rest, limit = np.arange(len(points)), from_mm
-        while len(rest) and len(self.boxes):
+        while len(rest) and len(self.cuts.segments):
             near = self.nearest(points[rest], height[rest], None, (limit, math.inf))
             found.distance[rest], found.segment[rest] = near.distance, near.segment
             rest, limit = rest[np.isinf(near.distance)], limit * LIMIT_GROWTH
@@ -97,20 +99,21 @@ class MoveIndex:
         distances in XY, mm."""
         from camtool.kernels.near import pairs
 
-        return pairs(self._table, self.boxes, np.column_stack([points, height]), limits_mm)
+        return pairs(self._moves, np.column_stack([points, height]), limits_mm)
 
     def shares(self, points: Floats, which: Ints) -> Floats:
         """(J,) where on segment which[j] its point nearest to point j lies, from 0 to 1."""
         from camtool.kernels import near as at
 
-        table = self._table[which]
-        start = table[:, [at.AX, at.AY]]
+        moves = self._moves
+        start = moves.start[which]
         x, y = (points - start).T
-        dx, dy = (table[:, [at.BX, at.BY]] - start).T
+        dx, dy = (moves.end[which] - start).T
         square = dx * dx + dy * dy
         along = (x * dx + y * dy) / np.where(square > 0.0, square, 1.0)
-        arc = np.flatnonzero(table[:, at.RADIUS] > 0.0)
-        table, centre = table[arc], table[arc][:, [at.CX, at.CY]]
+        arc = np.flatnonzero(moves.arc[which] >= 0)
+        table = moves.arcs[moves.arc[which[arc]]]
+        centre = table[:, [at.CX, at.CY]]
         px, py = (points[arc] - centre).T
         ax, ay = (start[arc] - centre).T
         # u points into the wedge, at a right angle to the radius at the start.
@@ -123,37 +126,34 @@ class MoveIndex:
     def _runs(self, choice: Ints | None, count: int) -> Ints:
         """(R, 4) the points, in runs of one choice, and the moves with which they are compared."""
         if choice is None:
-            return np.array([[0, count, 0, len(self.boxes)]])
+            return np.array([[0, count, 0, len(self.cuts.segments)]])
         offsets = run_offsets(choice, max(count, 1))
         contour = choice[offsets[:-1]]
-        low, high = (
-            np.searchsorted(self.contour, contour, side=side) for side in ("left", "right")
-        )
         every = contour == ANY_CONTOUR
-        low, high = np.where(every, 0, low), np.where(every, len(self.boxes), high)
+        low = np.where(every, 0, self._offsets[contour])
+        high = np.where(every, len(self.cuts.segments), self._offsets[contour + 1])
         return np.column_stack([offsets[:-1], offsets[1:], low, high])
 
 
-def _table(cuts: CutMoves) -> Floats:
-    """(K, 15) the segments as `camtool.kernels.near` takes them."""
+def _moves(cuts: CutMoves) -> Moves:
+    """The segments as `camtool.kernels.near` takes them."""
     from camtool.kernels import near as at
 
-    segments, (begin, end) = cuts.segments, cuts.ends_z.T
-    table = np.zeros((len(segments), at.COLUMNS))
-    table[:, [at.AX, at.AY]], table[:, [at.BX, at.BY]] = segments.start, segments.end
-    arcs = np.flatnonzero(segments.is_arc)
-    bent = segments[arcs]
+    segments, rows = cuts.segments, np.flatnonzero(cuts.segments.bulge)
+    arc = np.broadcast_to(np.int32(-1), len(segments))
+    if len(rows):
+        arc = np.full(len(segments), -1, dtype=np.int32)
+        arc[rows] = np.arange(len(rows))
+    bent = segments[rows]
     turn = np.where(bent.bulge < 0.0, -1.0, 1.0)[:, None]
-    table[arcs, at.CX], table[arcs, at.CY] = bent.centre.T
-    table[arcs, at.RADIUS] = bent.radius
+    arcs = np.empty((len(rows), at.COLUMNS))
+    arcs[:, [at.CX, at.CY]], arcs[:, at.RADIUS] = bent.centre, bent.radius
     # Normals that point into the wedge from its two edges.
-    table[arcs, at.UX], table[arcs, at.UY] = (turn * (bent.start - bent.centre)).T
-    table[arcs, at.VX], table[arcs, at.VY] = (turn * (bent.end - bent.centre)).T
-    table[arcs, at.SWEEP] = np.abs(bent.sweep)
-    table[:, at.Z], table[:, at.RISE] = begin, end - begin
-    length = segment_lengths(segments)
-    table[:, at.SLOPE] = np.abs(end - begin) / np.where(length > 0.0, length, 1.0)
-    return table
+    arcs[:, [at.UX, at.UY]] = turn * (bent.start - bent.centre)
+    arcs[:, [at.VX, at.VY]] = turn * (bent.end - bent.centre)
+    arcs[:, at.SWEEP] = np.abs(bent.sweep)
+    arcs[:, [at.LOW_X, at.LOW_Y, at.HIGH_X, at.HIGH_Y]] = segment_boxes(bent)
+    return at.Moves(segments.start, segments.end, cuts.ends_z, arc, arcs)
 
 
 # Runs of neighbouring items in long columns, without Python loops.

@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.errors import DrawingError
 from camtool.findings import (
     CUT_INTO_PART,
@@ -232,7 +232,7 @@ class _Path:
 
     points: Floats
     length: Floats
-    row: Ints
+    row: Indices
     tool: Ints
     boxes: Floats
     centres: Floats
@@ -244,7 +244,7 @@ class _Path:
         samples = sample_cuts(cuts, max(float(sizes.sum()) / MOST_TRACK_POINTS, TRACK_MM))
         counts = np.bincount(samples.segment, minlength=len(sizes))
         arcs = np.flatnonzero(cuts.segments.is_arc)
-        row = cuts.segments.path[samples.segment]
+        row = cuts.row[samples.segment]
         return cls(
             samples.points,
             (sizes / np.maximum(counts, 1))[samples.segment],
@@ -787,9 +787,9 @@ class _Follower:
     def _row_lengths(self) -> Floats:
         """(N,) mm: of each row what its segments measure."""
         sizes = segment_lengths(self.cuts.segments)
-        found: Floats = np.bincount(
-            self.cuts.segments.path, sizes, minlength=len(self.cuts.contour)
-        ).astype(np.float64)
+        found: Floats = np.bincount(self.cuts.row, sizes, minlength=len(self.cuts.contour)).astype(
+            np.float64
+        )
         return found
 
     def _radius(self, mine: Ints, given: float | None) -> tuple[_Try | None, list[Finding]]:
@@ -1063,11 +1063,11 @@ class _Followed:
         tracks = chosen.tracks
         index = MoveIndex(_as_cuts(tracks.paths))
         samples = sample_cuts(cuts, TRACK_MM)
-        row = cuts.segments.path[samples.segment]
+        row = cuts.row[samples.segment]
         most = max(path.near_mm(radius) for radius in chosen.radius_mm.tolist())
         level = np.zeros(len(row))
         found = index.nearest(samples.points, level, None, (most, np.inf))
-        of = np.where(found.segment >= 0, index.contour[found.segment], -1)
+        of = np.where(found.segment >= 0, index.contour_of(found.segment), -1)
         # A row belongs to the track in its middle, and follows it if all of its points do.
         first = np.flatnonzero(np.diff(row, prepend=-1))
         last = np.append(first[1:], len(row))
@@ -1098,7 +1098,7 @@ class _Followed:
             step = np.where(np.isfinite(lap), step - lap * np.rint(step / lap), step)
         step[last - 1] = 0.0
         way = np.add.reduceat(step, first) if len(first) else np.empty(0)
-        size = np.bincount(cuts.segments.path, segment_lengths(cuts.segments))[row[first]]
+        size = np.bincount(cuts.row, segment_lengths(cuts.segments))[row[first]]
         fine &= np.abs(np.abs(way) - size) <= 0.1 * size + 4.0 * most
         count = len(cuts.contour)
         rows = np.zeros(count, dtype=np.bool_)
@@ -1127,9 +1127,8 @@ def _as_cuts(paths: Polylines) -> CutMoves:
         block=np.full(count, -1, dtype=np.int32),
         start=np.zeros(3),
     )
-    rows = replace(segments, path=np.arange(count))
     first = np.arange(count + 1, dtype=np.int32)
-    return CutMoves(toolpath, rows, first, segments.path.astype(np.int32))
+    return CutMoves(toolpath, segments, first[:-1], first, segments.path.astype(np.int32))
 
 
 def _with_tracks(of: _Follower, chosen: _Chosen, follow: _Followed) -> Toolpath:

@@ -245,7 +245,7 @@ class Tasks:
                 [of_row, self._ranges(match.only[low:high]), circle, self._slot[circle], beside]
             ),
             window=np.sort(ends, axis=1) + np.array([-depth_mm, depth_mm]),
-            off=match.off_mm[low:high, 0].copy(),
+            off=match.off_mm[low:high].copy(),
             centre=self._centre,
             directions=self._directions,
         )
@@ -337,12 +337,12 @@ def shapes(cuts: CutMoves, low: int, high: int) -> Shapes:
         start, end = start[first], end[last]
     arcs = np.flatnonzero(segments.bulge[first])
     which = np.full(len(first), -1, dtype=np.int32)
-    bent = segments[first[arcs].astype(np.int64)]
+    bent, row = segments[first[arcs].astype(np.int64)], cuts.row[begin + first[arcs]]
     which[arcs] = np.arange(len(arcs))
     sweep = np.abs(bent.sweep) * (last - first + 1)[arcs]
     turn = np.where(bent.bulge < 0.0, -1.0, 1.0)
     toolpath = cuts.toolpath
-    closed = (toolpath.starts_of(bent.path)[:, :2] == toolpath.end[bent.path, :2]).all(axis=1)
+    closed = (toolpath.starts_of(row)[:, :2] == toolpath.end[row, :2]).all(axis=1)
     table = np.empty((len(arcs), at.COLUMNS))
     table[:, [at.CX, at.CY]] = bent.centre
     table[:, at.RADIUS], table[:, at.TURN] = bent.radius, turn

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 import msgspec
 import numpy as np
 
-from camtool.arrays import Floats, Indices, Ints
+from camtool.arrays import Floats, Indices
 from camtool.findings import Finding
 from camtool.geometry.drawing import Drawing
 from camtool.progress import Progress
@@ -111,7 +111,7 @@ def verify(
     compensated: Compensated | None = None,
     asked: Asked | None = None,
     written_from: Toolpath | None = None,
-    row_from: Ints | None = None,
+    row_from: Indices | None = None,
     registration: Registration | None = None,
     progress: Progress | None = None,
 ) -> Verification:
@@ -386,7 +386,7 @@ class Result:
 
     def _circles(self) -> tuple[record.CircleReport, ...]:
         match, off_mm = self.coverage.match, np.zeros(len(self.slides.circles) + 1)
-        np.maximum.at(off_mm, match.circle, match.off_mm[:, 0])  # the last one is for none, −1
+        np.maximum.at(off_mm, match.circle, match.off_mm)  # the last one is for none, −1
         return tuple(
             record.CircleReport(
                 centre_mm=(certain(circle.centre_mm[0]), certain(circle.centre_mm[1])),
@@ -450,7 +450,7 @@ class Result:
                 interpolation_um=number(inner_mm, UM_PER_MM),
                 mechanics_um=number(lag_mm, UM_PER_MM),
                 source=self._source(int(row)),
-                fit_um=self._off_um(float(self.coverage.match.off_mm[int(row), 0])),
+                fit_um=self._off_um(float(self.coverage.match.off_mm[int(row)])),
             )
             for row, total_mm, inner_mm, lag_mm, x, y in self.slides.rows.worst.found.tolist()
         )

@@ -87,6 +87,10 @@ class Lines:
         self.count = len(self.begins) - int(self.begins[-1] == len(self.data))
         """How many lines."""
 
+    def close(self) -> None:
+        """Let go of the program, of which no line can be read any more."""
+        del self.data, self.octets, self.begins
+
     def text(self, number: int) -> str:
         """A line, each byte a character."""
         begin = int(self.begins[number])

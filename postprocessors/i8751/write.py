@@ -116,7 +116,7 @@ def write_program(toolpath: Toolpath, machine: I8751Machine) -> Program:
         data=data,
         extension=extension,
         target=machine.target.name,
-        row_of_block=np.append(records.row, records.end_row),
+        row_of_block=np.append(records.row, records.end_row).astype(np.int32),
         findings=tuple(_findings(records.counts, dialect)),
     )
 

@@ -61,7 +61,12 @@ def read_program(data: bytes, machine: LinuxcncMachine, folder: Path | None = No
     and the call that led there."""
     count = data.count(b"\n")
     bounds.check_count(count, "line")
-    return _Reader(data, machine, folder).read()
+    reader = _Reader(data, machine, folder)
+    try:
+        return reader.read()
+    finally:
+        # The parts of a reader know each other, and last until garbage is collected.
+        reader.text.close()
 
 
 class _Reader:
@@ -71,8 +76,8 @@ class _Reader:
         dialect: Dialect = machine.dialect
         self.path = ToolpathBuilder()
         self.notes = Notes()
-        self._fast = FastFeeds(machine.max_feed_mm_min)
-        self.notes.feeds = lambda block, feed: self._fast.note(block, np.array([feed]))
+        self._fast = fast = FastFeeds(machine.max_feed_mm_min)
+        self.notes.feeds = lambda block, feed: fast.note(block, np.array([feed]))
         self.machine = Interpreter(machine, self.path, self.notes)
         self.text = ProgramText(data, "", dialect.line_chars)
         self.flow = Flow(

@@ -52,7 +52,7 @@ def write_program(toolpath: Toolpath, machine: MatlabRouterMachine) -> Program:
         data=program_of(_numbers_of(made), len(heads), dialect),
         extension=STREAM_EXTENSION if stream else machine.target.extension,
         target=machine.target.name,
-        row_of_block=np.insert(made.lines.row, heads, -1),
+        row_of_block=np.insert(made.lines.row, heads, -1).astype(np.int32),
         findings=(*findings, *changes.findings(dialect)),
     )
 

@@ -34,7 +34,7 @@ def whole_rows(
                 "at": (column[at.TOTAL_X], column[at.TOTAL_Y]),
                 "arc": decoded.kind[row] in (Kind.ARC_CW, Kind.ARC_CCW),
                 "contour": int(match.contour[row]),
-                "fit": match.off_mm[row, 0],
+                "fit": match.off_mm[row],
                 "off": [0.0, 0.0] if math.isnan(off[0]) else off.tolist(),
                 "ended": bool(ended[row]),
             }

@@ -97,9 +97,9 @@ def test_an_arc_that_misses_its_end_keeps_the_radius_of_its_start() -> None:
 def test_rows_own_their_segments() -> None:
     b = circle(square(ToolpathBuilder(), 0, 0, 1), 5, 5, 1)
     cuts = cut_moves(b.finish(), flat_cuts=False)
-    assert cuts.segments.path.tolist() == [3, 4, 5, 6, 11, 11]
+    assert cuts.row.tolist() == [3, 4, 5, 6, 11, 11]
     for row in cuts.rows:
-        owned = cuts.segments.path[cuts.first[row] : cuts.first[row + 1]]
+        owned = cuts.row[cuts.first[row] : cuts.first[row + 1]]
         assert set(owned.tolist()) == {row}
     assert cuts.z.min() == -0.02
     assert cuts.z.max() == -0.02

@@ -26,9 +26,9 @@ def index_of(segments: Segments, z: np.ndarray | None = None) -> MoveIndex:
     path = ToolpathBuilder()
     for begin, end in np.full((len(segments), 2), -1.0) if z is None else z:
         path.rapid(z=begin).rapid(z=end)
-    own = Segments.between(segments.start, segments.end, segments.bulge, rows[1::2])
     first = np.arange(len(rows) + 1) // 2
-    return MoveIndex(CutMoves(path.finish(), own, first, np.where(rows % 2, rows // 2, -1)))
+    contour = np.where(rows % 2, rows // 2, -1)
+    return MoveIndex(CutMoves(path.finish(), segments, rows[1::2], first, contour))
 
 
 def distance_of(point: tuple[float, float], segments: Segments) -> float:
@@ -165,7 +165,7 @@ def test_the_search_can_be_kept_to_a_contour() -> None:
     found = target.nearest(points, heights, choice, limits)
     for k in range(60):
         near = near_moves(target.cuts, points[k], heights[k], limits)
-        allowed = [p for p in near if choice[k] in (ANY_CONTOUR, target.contour[p[0]])]
+        allowed = [p for p in near if choice[k] in (ANY_CONTOUR, target.contour_of(p[0]))]
         least, segment = nearest(allowed)
         assert found.distance[k] == pytest.approx(least, abs=1e-12)
         assert found.segment[k] == segment
@@ -174,13 +174,13 @@ def test_the_search_can_be_kept_to_a_contour() -> None:
 def test_on_a_chosen_contour_only_what_is_near_is_found() -> None:
     target, limit = drawn(1), 0.3
     samples = sample_cuts(target.cuts, 0.2)
-    choice = (target.contour[samples.segment] + 1) % target.cuts.contour_count
+    choice = (target.contour_of(samples.segment) + 1) % target.cuts.contour_count
     found, wrong_depth = nearest_at_height(samples, choice, target, (limit, 0.01))
     for contour in range(target.cuts.contour_count):
         here = choice == contour
         exact = [
             any(
-                target.contour[k] == contour
+                target.contour_of(np.array([k]))[0] == contour
                 for k, _ in near_moves(target.cuts, point, 0.0, (limit, math.inf))
             )
             for point in samples.points[here]

@@ -36,7 +36,7 @@ def made(rng: np.random.Generator, count: int) -> tuple[CutMoves, Match, np.ndar
     cuts = cut_moves(b.finish(), flat_cuts=False)
     contour = np.sort(rng.integers(-1, 4, count))
     none = np.full(count, -1)
-    match = Match(none, contour, none, none, rng.integers(0, 3, (count, 2)) / 8.0)
+    match = Match(none, contour, none, none, rng.integers(0, 3, count) / 8.0)
     columns = rng.integers(0, 4, (count, at.ROW_COLUMNS)) / 4.0
     columns[:, at.SAMPLES] = rng.integers(0, 3, count)
     columns[:, at.KNOWN] = np.where(cuts.is_cut, columns[:, at.SAMPLES], 0)
