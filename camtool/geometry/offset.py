@@ -34,7 +34,9 @@ that a slice along its own kite is not in it: its depth there is 0. Without kite
 of round joins. A mitre may be longer than a wall is thick, and then takes from what lies beyond.
 
 Of paths that cross themselves or each other, what crosses is no boundary of one region: only loops
-that close on their own side are given.
+that close on their own side are given, and of these none that lies on the right of more paths
+than on the left: three discs leave a gap between them, but none where a fourth one covers it.
+Paths that cross themselves do not count for that.
 
 Tolerances, and what each decides:
 
@@ -77,6 +79,7 @@ from camtool.geometry.measure import (
     signed_areas,
     turned,
 )
+from camtool.geometry.nesting import inside
 from camtool.geometry.polylines import (
     POSITION_EPS_MM,
     Polyline,
@@ -215,7 +218,26 @@ def _left_of(lines: Polylines, asked: Offset) -> tuple[Polylines, Ints]:
     moved, kept = paths_of(stages.loops, stages.kept, stages.trimmed.elements)
     begins = np.array([loop[0] for loop in stages.loops], dtype=np.int64)[kept]
     source = stages.trimmed.source[stages.kept.element[begins]]
-    return moved, Segments.of(lines).path[source]
+    of = Segments.of(lines).path[source]
+    if len(stages.met) == 0:
+        return moved, of
+    plain = np.ones(len(lines), dtype=np.bool_)
+    plain[stages.met[stages.met[:, 0] == stages.met[:, 1]]] = False
+    turns = _turns_about(moved.vertices[moved.offsets[:-1], :2], lines.select(plain.nonzero()[0]))
+    free = np.flatnonzero(turns >= 0)
+    return moved.select(free), of[free]
+
+
+def _turns_about(points: Floats, lines: Polylines) -> Ints:
+    """(P,) of points (P, 2): in how many closed paths that run CCW each lies, less those that run
+    CW."""
+    turns = np.zeros(len(points), dtype=np.int64)
+    signs = np.where(signed_areas(lines) > 0.0, 1, -1).tolist()
+    for path, box, sign in zip(lines, path_extents(lines), signs, strict=True):
+        near = ((points >= box[:, 0]) & (points <= box[:, 1])).all(axis=1)
+        if near.any():
+            turns[near] += sign * inside(points[near], Segments.of(path))
+    return turns
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,6 +250,8 @@ class Stages:
     valid: Bools
     kept: Slices
     loops: list[Ints]
+    met: Ints
+    """(J, 2) the paths at each common point of two, other than between neighbours."""
 
 
 def shape_stages(lines: Polylines, asked: Offset) -> Stages:
@@ -237,13 +261,14 @@ def shape_stages(lines: Polylines, asked: Offset) -> Stages:
     trimmed = trim_raw(raw, source, asked)
     elements, others = trimmed.elements, None
     # Only where paths meet can what is on their right end what is on their left.
-    if _meets_itself(lines):
+    met = _met(lines)
+    if len(met):
         right = raw_offset(lines_reversed(lines), replace(asked, limit=math.inf))
         others = trim_raw(right, source, asked).elements
     slices = slice_elements(elements, others)
     valid = valid_slices(slices, elements, source, asked)
     kept = without_dead_ends(without_doubles(slices[valid], elements))
-    return Stages(raw, trimmed, slices, valid, kept, trace_loops(kept, elements))
+    return Stages(raw, trimmed, slices, valid, kept, trace_loops(kept, elements), met)
 
 
 Arrays = tuple[Floats, Floats, Floats, Floats]
@@ -258,13 +283,8 @@ def source_arrays(source: Segments, kites: Floats) -> Arrays:
     return curves.rows, curves.tree, kites, tree_of(kite_boxes(kites))
 
 
-def _meets_itself(lines: Polylines) -> bool:
-    """Whether closed paths have common points, other than between neighbours."""
-    return len(_met(lines)) > 0
-
-
 def _met(lines: Polylines) -> Ints:
-    """(J,) for each common point of closed paths, other than between neighbours, one of them."""
+    """(J, 2) the paths at each common point of closed paths, other than between neighbours."""
     from camtool.kernels.offsets import TA, TB, meetings_of, pairs_of
 
     segments = Segments.of(lines)
@@ -275,7 +295,7 @@ def _met(lines: Polylines) -> Ints:
     following = _next_rows(lines)
     a_first = (following[one] == other) & (at[:, TA] == 1.0) & (at[:, TB] == 0.0)
     b_first = (following[other] == one) & (at[:, TA] == 0.0) & (at[:, TB] == 1.0)
-    return np.asarray(segments.path[one[~(a_first | b_first)]])
+    return np.asarray(segments.path[met[~(a_first | b_first)]])
 
 
 def _next_rows(lines: Polylines) -> Ints:

@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+import shapely
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from camtool.errors import GeometryError, OptionError
@@ -51,6 +52,7 @@ FRAME = closed((-20, -20), (40, -20), (40, 40), (-20, 40))
 PLATE = [FRAME, CIRCLE, moved(SQUARE, 15, -5), moved(SLOT, 5, 20), closed((-2, 0, 1), (2, 0, 1))]
 PAIR = [SQUARE, moved(SQUARE, 12, 0)]
 RINGS = [scaled(CIRCLE, k) for k in (4.0, 3.0, 2.0, 1.0)]
+DISC = closed((-1, 0, 1), (1, 0, 1))
 TOUCHING = [SQUARE, moved(SQUARE, 10, 3)]
 AT_CORNERS = [SQUARE, moved(SQUARE, 10, 10)]
 HOLE_AT_EDGE = [OBLONG, closed((5, 0), (8, 3), (5, 6), (2, 3))]
@@ -326,6 +328,41 @@ def test_contours_that_cross_each_other(seed: int) -> None:
         assert results.closed.all()
         points = [r for p in results for r in distance_from_all(p, paths, abs(d))]
         assert points == []
+
+
+@settings(max_examples=60)
+@given(
+    st.lists(
+        st.tuples(st.floats(0.0, 6.0), st.floats(0.0, 6.0), st.floats(0.5, 3.0)),
+        min_size=2,
+        max_size=12,
+    ),
+    st.floats(0.05, 0.8),
+)
+@example(
+    discs=[
+        (3.145, 5.19, 3.19),
+        (5.222, 6.443, 3.211),
+        (4.753, 3.998, 3.374),
+        (5.968, 0.491, 2.497),
+        (3.088, 4.094, 1.57),
+    ],
+    d=0.3,
+)
+def test_discs_that_cross_grow_as_one(discs: list[tuple[float, float, float]], d: float) -> None:
+    """Grown discs are larger discs: no gap between some is left where another covers it."""
+    held = [
+        sum(math.hypot(x - u, y - v) + r < s for u, v, s in discs) == 1 for x, y, r in discs
+    ]  # one within another is its hole, within two it is an island
+    discs = [disc for disc, hole in zip(discs, held, strict=True) if not hole]
+    lines = Polylines.of([moved(scaled(DISC, r), x, y) for x, y, r in discs])
+    grown = [shapely.Point(x, y).buffer(r + d, quad_segs=500) for x, y, r in discs]
+    loops = offset_shape(lines, -d)
+    found = float(signed_areas(loops).sum())
+    for x, y, r in discs:
+        away = np.hypot(*(loops.vertices[:, :2] - (x, y)).T)
+        assert away.min() > r + d - 10 * POSITION_EPS_MM
+    assert found == pytest.approx(shapely.union_all(grown).area, rel=1e-4, abs=1e-3)
 
 
 def distance_from_all(result: Polyline, paths: list[Polyline], d: float) -> list[str]:
