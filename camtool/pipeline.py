@@ -12,12 +12,12 @@ Nothing here reads or writes a file.
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, TypeVar
 
-import msgspec
+from msgspec import Struct, field, structs
 
 from camtool.bounds import TooLongError
 from camtool.errors import ProgramError
@@ -78,8 +78,7 @@ class Judging:
     align: bool = False
 
 
-@dataclass(frozen=True, eq=False)
-class _Goal:
+class _Goal(Struct, frozen=True, eq=False):
     """What a program is compared with: the wanted toolpath, the drawing in its frame, the toolpath
     compensated against the mechanics, what else the job asks for, and the moves from which the
     program was written, with the row of these of each decoded row, or what of the drawing it was
@@ -94,8 +93,7 @@ class _Goal:
     registration: Registration | None = None
 
 
-@dataclass(frozen=True)
-class _Posting:
+class _Posting(Struct, frozen=True):
     """How drawings are posted, as `post_drawing` says."""
 
     check: bool = True
@@ -542,10 +540,10 @@ def _timed(
     count = len(planned.operations)
     seconds = np.bincount(turn.clip(min=0), verification.rows.seconds, minlength=count)
     operations = [
-        msgspec.structs.replace(each, time_s=certain(float(seconds[k])))
+        structs.replace(each, time_s=certain(float(seconds[k])))
         for k, each in enumerate(planned.operations)
     ]
-    return msgspec.structs.replace(planned, operations=tuple(operations))
+    return structs.replace(planned, operations=tuple(operations))
 
 
 def _stock(job: Job) -> PlannedStock | None:
@@ -605,7 +603,9 @@ def _judged(
     progress.begin("simulating and judging", len(decoded))
     line_bytes = target.target.line_bytes(data, target.machine)
     stray_mm = target.target.stray_mm(target.machine)
-    sized = replace(options, size_bytes=len(data), line_bytes=line_bytes, stray_mm=stray_mm)
+    sized = structs.replace(
+        options, size_bytes=len(data), line_bytes=line_bytes, stray_mm=stray_mm
+    )
     return verify(
         decoded,
         target,

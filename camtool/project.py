@@ -18,11 +18,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import msgspec
+from msgspec import Struct
 
 from camtool.errors import MachineError
 from camtool.patterns import guess
@@ -57,8 +57,7 @@ class Said(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError("machine and target contradict each other: a machine has its target")
 
 
-@dataclass(frozen=True)
-class Project:
+class Project(Struct, frozen=True):
     """The `camtool.toml` files that hold in a folder, nearest first, each with what it says."""
 
     files: tuple[tuple[Path, Said], ...]

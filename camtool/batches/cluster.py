@@ -13,9 +13,10 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
+
+from msgspec import Struct
 
 from camtool import __version__
 from camtool.batches.pool import TICK_S, made_of
@@ -71,8 +72,7 @@ class ClusterPool:
                     yield None
 
 
-@dataclass(frozen=True)
-class _Order:
+class _Order(Struct, frozen=True):
     """The work, pickled, and its digest. Dask gets only bytes: a worker that could not load an
     object, because it has another camtool, would end without an error."""
 

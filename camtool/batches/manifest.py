@@ -13,16 +13,16 @@ import json
 import os
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+
+from msgspec import Struct, field
 
 NAME = ".camtool-batch.jsonl"
 """The manifest's name in the output folder."""
 
 
-@dataclass(frozen=True)
-class Entry:
+class Entry(Struct, frozen=True):
     """One drawing: the digest of all that its outputs depend on, and the digests of its outputs by
     name."""
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import msgspec
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats
 from camtool.calibration.measurements import Measurements
@@ -61,16 +62,14 @@ OUTLIER_FREEDOM = 4
 many; otherwise it is the uncertainty of the instrument."""
 
 
-@dataclass(frozen=True)
-class FixedParameter:
+class FixedParameter(Struct, frozen=True):
     """A parameter that is not estimated, and the reason."""
 
     parameter: Parameter
     why: str
 
 
-@dataclass(frozen=True, eq=False)
-class Solution:
+class Solution(Struct, frozen=True, eq=False):
     """The least-squares solution.
 
     `values` (P,) of the parameters in the order of the model, and their `covariance` (P, P): nan
@@ -184,8 +183,7 @@ COEFFICIENT_DECIMALS = 4
 """Correlations are rounded to so many decimal places."""
 
 
-@dataclass(frozen=True)
-class Estimate:
+class Estimate(Struct, frozen=True):
     """A value of the machine: `before` is that of its file, `value` the measured one, with its
     standard `uncertainty` (None: not known); `readings` is the number of readings that depend on
     it. Steps and backlash (`what` is "play") in mm, squareness in rad."""
@@ -204,16 +202,14 @@ class Estimate:
         return str(Parameter(self.what, self.axis, self.region))
 
 
-@dataclass(frozen=True)
-class NotEstimated:
+class NotEstimated(Struct, frozen=True):
     """A value that the readings do not determine, with the reason."""
 
     name: str
     why: str
 
 
-@dataclass(frozen=True)
-class Fitted:
+class Fitted(Struct, frozen=True):
     """A reading and its prediction from the estimates; `sigmas`: residual over its standard
     deviation, None where that is not known."""
 

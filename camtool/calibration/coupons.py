@@ -23,9 +23,10 @@ import io
 import json
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any, Literal
+
+from msgspec import Struct, field
 
 from camtool.errors import OptionError
 from camtool.machine.model import Machine
@@ -58,8 +59,7 @@ MOST_REGIONS = 9
 """The most columns and rows of regions."""
 
 
-@dataclass(frozen=True)
-class Cell:
+class Cell(Struct, frozen=True):
     """A rectangle for coupons, mm, without its margin."""
 
     left: float
@@ -68,8 +68,7 @@ class Cell:
     high: float
 
 
-@dataclass(frozen=True)
-class Grid:
+class Grid(Struct, frozen=True):
     """The grid on which coupons lie, and the length of their run-ups, mm."""
 
     unit: float
@@ -173,8 +172,7 @@ STEPS = 10
 """Steps of a ruler (ten "tramos": ValCNC thesis, L1645)."""
 
 
-@dataclass(frozen=True)
-class Path:
+class Path(Struct, frozen=True):
     """A polyline of a drawing: vertices of x, y (mm) and bulge."""
 
     layer: str
@@ -182,8 +180,7 @@ class Path:
     closed: bool = False
 
 
-@dataclass(frozen=True)
-class Sheet:
+class Sheet(Struct, frozen=True):
     """A drawing of `size` mm with its lower left corner at part zero. For the file of
     measurements, `tables` are its coupons, (kind, keys) each, and `regions` its cells, for both
     axes."""

@@ -49,6 +49,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats
 from camtool.calibration.measurements import (
@@ -73,8 +74,7 @@ DERIVATIVE_STEP = 1e-30
 """Imaginary part with which derivatives are computed: its square vanishes beside any number."""
 
 
-@dataclass(frozen=True)
-class Parameter:
+class Parameter(Struct, frozen=True):
     """A value to estimate: `what` is "scale", "play" or "squareness"; only play has a `region`."""
 
     what: str
@@ -89,8 +89,7 @@ class Parameter:
 SQUARENESS = Parameter("squareness", "")
 
 
-@dataclass(frozen=True)
-class Course:
+class Course(Struct, frozen=True):
     """An axis while a coupon was cut: the compensation that the controller added, and the
     region."""
 
@@ -137,8 +136,7 @@ class Measure(Protocol):
         """The length by the model, mm."""
 
 
-@dataclass(frozen=True)
-class AxisDistance:
+class AxisDistance(Struct, frozen=True):
     """The distance along one axis between two positions: `nominal_mm` and `turned` are n and m of
     the second equation above. Along X, `aside_mm` is how much further towards +Y the second
     position lies."""
@@ -157,8 +155,7 @@ class AxisDistance:
         return own + trial.tangent * self.aside_mm
 
 
-@dataclass(frozen=True)
-class Diagonal:
+class Diagonal(Struct, frozen=True):
     """The distance between two positions, from their distances along X and Y."""
 
     x: AxisDistance
@@ -174,8 +171,7 @@ class Diagonal:
         return (across * across + up * up) ** 0.5
 
 
-@dataclass(frozen=True)
-class Diameter:
+class Diameter(Struct, frozen=True):
     """A diameter of a circle, at an angle from the X axis towards the Y axis."""
 
     x: Course

@@ -10,7 +10,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any
@@ -181,6 +181,8 @@ class _Job:
                 raise OutputError(
                     f"cannot be written ({error.strerror})", file=self.live
                 ) from error
+        from msgspec.structs import replace  # not for --help
+
         progress().begin("sending", len(one.packets))
         real = not self.port.is_virtual
         manner = Manner(single=single, home=home, late_s=LATE_S * speed, paced=real)

@@ -8,9 +8,9 @@ compiled loops take them, with the tree of boxes that those loops go down themse
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.polylines import SEGMENTS_AT_ONCE, Segments
@@ -155,8 +155,7 @@ def _looks(boxes: Floats) -> int:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class Curves:
+class Curves(Struct, frozen=True, eq=False):
     """`rows` (K, 11) of camtool.kernels.offsets, their `boxes` (K, 4) and the `tree` of
     camtool.kernels.offsets over these."""
 

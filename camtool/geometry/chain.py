@@ -11,10 +11,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import GeometryError
@@ -23,8 +23,7 @@ from camtool.geometry.measure import path_lengths, signed_areas
 from camtool.geometry.polylines import POSITION_EPS_MM, Polylines
 
 
-@dataclass(frozen=True, eq=False)
-class Chained:
+class Chained(Struct, frozen=True, eq=False):
     """Paths after chaining; `members[i]` are the input paths that became path i, in order.
 
     `closed_gaps`: every gap above `POSITION_EPS_MM` that was bridged. `open_gaps`: for paths that
@@ -39,8 +38,7 @@ class Chained:
     branches: tuple[Branch, ...] = ()
 
 
-@dataclass(frozen=True)
-class Kinds:
+class Kinds(Struct, frozen=True):
     """What is known of paths besides their shape, one item each; None where all are alike.
 
     Paths of different `groups` are never joined. At a branch, paths of one `style` (colour, line
@@ -52,13 +50,12 @@ class Kinds:
     layers: Sequence[str] | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class _Paths:
+class _Paths(Struct, frozen=True, eq=False):
     """All that chaining needs of the paths: their ends, and the names of their layers."""
 
     lines: Polylines
     layers: Sequence[str]
-    ends: Ends = field(repr=False)
+    ends: Ends
 
     @classmethod
     def of(cls, lines: Polylines, kinds: Kinds) -> _Paths:
@@ -183,8 +180,7 @@ MOST_NEIGHBOURS = 64
 """Number of other ends that are examined for each end where very many ends meet at one point."""
 
 
-@dataclass(frozen=True, eq=False)
-class Ends:
+class Ends(Struct, frozen=True, eq=False):
     """The ends of M paths, 2i the start and 2i + 1 the end of path i.
 
     `points` (2M, 2) mm; `leaving` (2M,) rad, the direction in which the path would go on beyond
@@ -215,8 +211,7 @@ class Ends:
         return cls(points, leaving, group, style, ~lines.closed, weights)
 
 
-@dataclass(frozen=True, eq=False)
-class Joints:
+class Joints(Struct, frozen=True, eq=False):
     """`mates` (2M,): the end that each end is joined to, −1 for none; and where ends branch."""
 
     mates: Ints
@@ -374,8 +369,7 @@ def _split(ends: Ends, mates: Ints, node: Ints, reach: float) -> None:
 # chain to its pieces.
 
 
-@dataclass(frozen=True, eq=False)
-class Chains:
+class Chains(Struct, frozen=True, eq=False):
     """C chains of `entries` (E,): the ends by which their paths are entered (2i forwards).
 
     Chain c has entries[begins[c]:begins[c + 1]]; `rings` (C,) says which are closed by joints.
@@ -401,8 +395,7 @@ class Chains:
         return Chains(self.entries & ~1, np.arange(count + 1), np.zeros(count, dtype=np.bool_))
 
 
-@dataclass(frozen=True, eq=False)
-class Joined:
+class Joined(Struct, frozen=True, eq=False):
     """Chains as paths; and the bridged gaps: chain (G,), place (G, 2) mm, size (G,) mm."""
 
     chains: Chains

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Protocol, runtime_checkable
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import force_setattr
 
 from camtool.arrays import Floats
 from camtool.errors import GeometryError
@@ -47,8 +48,7 @@ class Curve(Protocol):
         ...
 
 
-@dataclass(frozen=True, eq=False)
-class Pieces:
+class Pieces(Struct, frozen=True, eq=False):
     """Rational Bézier pieces end to end: `control` (m, p + 1, 3) of x·w, y·w, w about the
     `origin` (2,) mm, and the exact `ends` (2, 2) mm of the whole curve."""
 
@@ -66,8 +66,7 @@ class Pieced(Protocol):
         ...
 
 
-@dataclass(frozen=True, eq=False)
-class FunctionCurve:
+class FunctionCurve(Struct, frozen=True, eq=False):
     """A curve given by two functions (n,) -> (n, 2) and its breaks (k,)."""
 
     at: Callable[[Floats], Floats]
@@ -83,8 +82,7 @@ class FunctionCurve:
         return self.derivative(t)
 
 
-@dataclass(frozen=True, eq=False)
-class BezierCurve:
+class BezierCurve(Struct, frozen=True, eq=False):
     """A Bézier of `control` (4, 2) or (3, 2) mm over 0..1. GeometryError for other shapes."""
 
     control: Floats
@@ -93,7 +91,7 @@ class BezierCurve:
         control = np.array(self.control, dtype=np.float64)
         if control.shape not in ((3, 2), (4, 2)):
             raise GeometryError(f"a Bézier has shape {control.shape}, wanted (3, 2) or (4, 2)")
-        object.__setattr__(self, "control", control)
+        force_setattr(self, "control", control)
 
     @property
     def breaks(self) -> Floats:
@@ -115,8 +113,7 @@ class BezierCurve:
         return Pieces(rows, self.control[0], self.control[[0, -1]])
 
 
-@dataclass(frozen=True, eq=False)
-class EllipseCurve:
+class EllipseCurve(Struct, frozen=True, eq=False):
     """centre + cos(t)·major + sin(t)·minor, t from `start` to `end` rad (end below start: CW).
 
     `major` and `minor` (2,) mm may be any two conjugate half axes: they need not be square to
@@ -168,8 +165,7 @@ class EllipseCurve:
         return np.asarray(self.start + np.copysign(1.0, self.end - self.start) * t)
 
 
-@dataclass(frozen=True, eq=False)
-class SplineCurve:
+class SplineCurve(Struct, frozen=True, eq=False):
     """A B-spline, rational when weights differ: `knots` (n + degree + 1,), `control` (n, 2) mm,
     `weights` (n,) all positive. GeometryError when these do not belong together.
     """
@@ -195,7 +191,7 @@ class SplineCurve:
         if not (weights > 0.0).all():
             raise GeometryError("a weight is not positive")
         for name, column in (("knots", knots), ("control", control), ("weights", weights)):
-            object.__setattr__(self, name, column)
+            force_setattr(self, name, column)
         inner = knots[1:-1]
         repeated = inner[self.degree :] == inner[: len(inner) - self.degree]
         if repeated.any() and self._jumps():

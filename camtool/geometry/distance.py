@@ -18,9 +18,10 @@ measured with the formula above.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import astuple
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.boxes import Curves, box_pairs
@@ -41,16 +42,14 @@ PAIRS_AT_A_TIME = 1 << 18
 """How many pairs of segments `approach` holds at a time: it bounds the memory."""
 
 
-@dataclass(frozen=True, eq=False)
-class Nearest:
+class Nearest(Struct, frozen=True, eq=False):
     """For P points: `distance` (P,) mm to the nearest segment and its row, `segment` (P,)."""
 
     distance: Floats
     segment: Ints
 
 
-@dataclass(frozen=True)
-class Approach:
+class Approach(Struct, frozen=True):
     """Least distance of two paths, mm, and a point (x, y) of one of them that is as far from the
     other one."""
 
@@ -133,8 +132,7 @@ def _box_distance(boxes: Floats, others: Floats) -> Floats:
     return np.asarray(np.hypot(apart[..., 0], apart[..., 1]))
 
 
-@dataclass(frozen=True, eq=False)
-class _Rows:
+class _Rows(Struct, frozen=True, eq=False):
     """Segments in the form of the formula: A, B, d, 4b, 1−b², c(1+b²), T_A and T_B."""
 
     a: Floats
@@ -164,7 +162,7 @@ class _Rows:
         )
 
     def __getitem__(self, rows: Ints) -> _Rows:
-        return _Rows(**{name: column[rows] for name, column in vars(self).items()})
+        return _Rows(*(column[rows] for column in astuple(self)))
 
     def power(self, points: Floats) -> Floats:
         from_a = points - self.a

@@ -7,7 +7,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
+import msgspec
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Floats
 from camtool.findings import Finding
@@ -15,8 +17,7 @@ from camtool.geometry.measure import segment_lengths
 from camtool.geometry.polylines import Polylines, Segments, segment_rows
 
 
-@dataclass(frozen=True)
-class Units:
+class Units(Struct, frozen=True):
     """The unit of the file: its name, mm per unit, and where both come from (one phrase)."""
 
     name: str
@@ -24,8 +25,7 @@ class Units:
     why: str
 
 
-@dataclass(frozen=True)
-class Skipped:
+class Skipped(Struct, frozen=True):
     """Entities that were not used: their kind, how many, and why."""
 
     kind: str
@@ -33,8 +33,7 @@ class Skipped:
     reason: str
 
 
-@dataclass(frozen=True)
-class Gap:
+class Gap(Struct, frozen=True):
     """An open end that may have been meant closed: place (x, y) mm, size mm, layer."""
 
     at_mm: tuple[float, float]
@@ -42,8 +41,7 @@ class Gap:
     layer: str
 
 
-@dataclass(frozen=True)
-class Mark:
+class Mark(Struct, frozen=True):
     """A single point, such as the centre of a hole to drill: (x, y) mm, and where it came from."""
 
     at_mm: tuple[float, float]
@@ -53,8 +51,7 @@ class Mark:
     line_type: str = ""
 
 
-@dataclass(frozen=True)
-class Branch:
+class Branch(Struct, frozen=True):
     """A place (x, y) mm where more than two open ends meet: how many, and the layer of one."""
 
     at_mm: tuple[float, float]
@@ -62,8 +59,7 @@ class Branch:
     layer: str
 
 
-@dataclass(frozen=True)
-class SelfCrossing:
+class SelfCrossing(Struct, frozen=True):
     """A place (x, y) mm where the closed path of this index crosses itself."""
 
     at_mm: tuple[float, float]
@@ -71,8 +67,7 @@ class SelfCrossing:
     layer: str
 
 
-@dataclass(frozen=True)
-class Callout:
+class Callout(Struct, frozen=True):
     """A dimension as the file draws it, mm: what it measures, between which places, and what its
     text and style say of its limits.
 
@@ -99,8 +94,7 @@ class Callout:
     exact: bool = False
 
 
-@dataclass(frozen=True)
-class Healing:
+class Healing(Struct, frozen=True):
     """What was corrected on reading, counted, lengths in mm.
 
     `duplicates`: pieces drawn twice as a whole and left out; `overlaps`: parts of pieces that
@@ -119,8 +113,7 @@ class Healing:
     crossings: tuple[SelfCrossing, ...] = ()
 
 
-@dataclass(frozen=True)
-class FitError:
+class FitError(Struct, frozen=True):
     """Distance between what was drawn and the paths that stand for it, mm: largest, and rms over
     what is not drawn so itself; zeros when all is."""
 
@@ -128,13 +121,12 @@ class FitError:
     rms_mm: float = 0.0
 
 
-@dataclass(frozen=True, eq=False)
-class Unchosen:
+class Unchosen(Struct, frozen=True, eq=False):
     """Closed contours of the file, M of them, that were not chosen (by layer, colour or line
     type): they are not cut, but what is a part and what is a hole depends on them too. `layers`,
     `sources` and `line_types` have one item per path."""
 
-    paths: Polylines = field(default_factory=lambda: Polylines.of([]))
+    paths: Polylines = msgspec.field(default_factory=lambda: Polylines.of([]))
     layers: tuple[str, ...] = ()
     sources: tuple[str, ...] = ()
     line_types: tuple[str, ...] = ()

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from camtool.arrays import Floats, Ints
 from camtool.errors import GeometryError
@@ -152,8 +153,7 @@ MOST_WALL_PAIRS = 200_000
 _PAIRS_AT_A_TIME = 1 << 14
 
 
-@dataclass(frozen=True)
-class Feature:
+class Feature(Struct, frozen=True):
     """A size in mm, its place (x, y) mm, and the path, or the two paths, that it belongs to."""
 
     size_mm: float

@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import GeometryError
@@ -45,8 +45,7 @@ MAX_SIZE_MM = 1e100
 """The products of larger numbers would not be finite."""
 
 
-@dataclass(frozen=True, eq=False)
-class Fit:
+class Fit(Struct, frozen=True, eq=False):
     """A chain of arcs and lines: `vertices` (n, 3) x, y, bulge mm; the last is the end (bulge 0).
 
     `max_mm`, `rms_mm`: distances from the true curve, weighted by its length; `length_mm` of the
@@ -196,8 +195,7 @@ _ASIDE = tuple(10.0**k for k in range(ASIDE_FROM, ASIDE_TO))
 """How far aside (share of what is left to the next break) a tangent is looked for."""
 
 
-@dataclass(frozen=True, eq=False)
-class Nodes:
+class Nodes(Struct, frozen=True, eq=False):
     """n nodes: parameter `t` (n,), `point` (n, 2) mm, unit tangents `arrive` and `leave` (n, 2);
     `corner` (n,) is true at both ends and wherever these two differ."""
 
@@ -234,8 +232,7 @@ def curve_nodes(curve: Curve, tolerance_mm: float, steps: int) -> Nodes:
     return _merged(nodes)
 
 
-@dataclass(eq=False)
-class _NodeColumns:
+class _NodeColumns(Struct, eq=False):
     """Nodes while they grow."""
 
     t: Floats

@@ -8,9 +8,10 @@ and needs no font file.
 from __future__ import annotations
 
 import unicodedata
-from dataclasses import dataclass
 from functools import lru_cache
 from types import MappingProxyType
+
+from msgspec import Struct
 
 CAP_UNITS = 21.0
 """Height of a capital."""
@@ -27,8 +28,7 @@ _SPACE_WIDTH = 13.0
 Strokes = tuple[tuple[tuple[float, float], ...], ...]
 
 
-@dataclass(frozen=True)
-class Glyph:
+class Glyph(Struct, frozen=True):
     """Strokes in font units, x from the left edge of the letter, y down; `advance` to the next."""
 
     strokes: Strokes

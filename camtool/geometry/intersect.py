@@ -20,9 +20,10 @@ moves a crossing.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import astuple
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.boxes import box_pairs, touching_boxes
@@ -31,8 +32,7 @@ from camtool.geometry.measure import Frames, dot, segment_boxes, turned
 from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, Segments
 
 
-@dataclass(frozen=True, eq=False)
-class Crossings:
+class Crossings(Struct, frozen=True, eq=False):
     """All meetings in columns, J rows: `row_a`, `row_b` (J,), `point` (J, 2) mm, `ta`, `tb` (J,).
 
     `ta` and `tb` are fractions of the lengths, exactly 0 or 1 at an end. A pair that shares a
@@ -50,7 +50,7 @@ class Crossings:
 
     def __getitem__(self, rows: Bools | Ints) -> Crossings:
         """The chosen rows."""
-        return Crossings(**{name: column[rows] for name, column in vars(self).items()})
+        return Crossings(*(column[rows] for column in astuple(self)))
 
 
 def crossings(
@@ -95,9 +95,7 @@ def meetings(segments: Segments, row_a: Ints, row_b: Ints) -> tuple[Crossings, B
 def _joined(parts: list[Crossings]) -> Crossings:
     none = np.empty(0, dtype=np.int64)
     parts = [*parts, Crossings(none, none, np.empty((0, 2)), np.empty(0), np.empty(0))]
-    return Crossings(
-        **{name: np.concatenate([vars(part)[name] for part in parts]) for name in vars(parts[0])}
-    )
+    return Crossings(*map(np.concatenate, zip(*map(astuple, parts), strict=True)))
 
 
 def _meetings(a: Frames, b: Frames, row_a: Ints, row_b: Ints, eps: float) -> Crossings:

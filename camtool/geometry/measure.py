@@ -10,9 +10,9 @@ which stays exact when a shallow arc has its centre a kilometre away.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import astuple
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import GeometryError
@@ -174,8 +174,7 @@ def sample(p: Polyline, step_mm: float) -> Floats:
 # which stays exact when a shallow arc has its centre a kilometre away.
 
 
-@dataclass(frozen=True, eq=False)
-class Frames:
+class Frames(Struct, frozen=True, eq=False):
     """Segments described from their start: `start`, `end`, `tangent`, `normal` (K, 2), `curvature`
     1/mm (left positive), `length` mm and `sweep` rad (K,)."""
 
@@ -210,7 +209,7 @@ class Frames:
 
     def __getitem__(self, rows: Bools | Ints) -> Frames:
         """The chosen rows."""
-        return Frames(**{name: column[rows] for name, column in vars(self).items()})
+        return Frames(*(column[rows] for column in astuple(self)))
 
     def tangent_at(self, t: Floats) -> Floats:
         """(K, 2) unit tangent at the fraction t (K,) of each length."""

@@ -15,9 +15,9 @@ samples are found from their other side.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import astuple
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import GeometryError
@@ -38,8 +38,7 @@ MOST_ROUNDS = 200
 """Samples are halved, and searched from the other side, no more often than this."""
 
 
-@dataclass(frozen=True, eq=False)
-class Trace:
+class Trace(Struct, frozen=True, eq=False):
     """Discs (N rows) along the boundary, by element and place on it: `element` (N,), `t` (N,) in
     0 … 1, the middles `x`, `y` and radii `rho` mm, the `partner` element that each touches
     besides and the place `u` there. The curve between three neighbouring rows of one element and
@@ -58,7 +57,7 @@ class Trace:
 
     def rows(self, chosen: Ints | Bools) -> Trace:
         """The chosen rows."""
-        return Trace(*(getattr(self, each.name)[chosen] for each in fields(self)))
+        return Trace(*(column[chosen] for column in astuple(self)))
 
     @property
     def discs(self) -> Floats:
@@ -68,12 +67,7 @@ class Trace:
 
 def concatenated(traces: list[Trace]) -> Trace:
     """The rows of all, one trace after the other."""
-    return Trace(
-        *(
-            np.concatenate([getattr(trace, each.name) for trace in traces])
-            for each in fields(Trace)
-        )
-    )
+    return Trace(*map(np.concatenate, zip(*map(astuple, traces), strict=True)))
 
 
 def discs_at(boundary: Boundary, element: Ints, t: Floats, guess: Ints | None = None) -> Trace:
@@ -203,8 +197,7 @@ ROUND_RAD = 1e-9
 """A reflex corner that turns by less is smooth: the tangents are rounded."""
 
 
-@dataclass(frozen=True, eq=False)
-class Boundary:
+class Boundary(Struct, frozen=True, eq=False):
     """E elements in the order of the paths, region on their left, as `kernels.discs` wants them:
     `table` (E, 10), `links` (E, 3), `boxes` (B, 4)."""
 

@@ -8,9 +8,9 @@ as a hair up and to the right of it, the same way in both questions, so that no 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import GeometryError
@@ -22,8 +22,7 @@ HOLDERS_AT_A_TIME = 256
 """For how many paths those within their boxes are found together: it bounds the memory."""
 
 
-@dataclass(frozen=True, eq=False)
-class Nesting:
+class Nesting(Struct, frozen=True, eq=False):
     """For M paths: `parent` (M,), the smallest closed path that holds each one, −1 if none; and
     `depth` (M,), how many closed paths hold it."""
 
@@ -75,8 +74,7 @@ def inside(points: Floats, ring: Segments) -> Bools:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Places:
+class _Places(Struct, frozen=True, eq=False):
     """The segments of M paths, those of path i from first_segment[i] (M + 1,) on, and `points`
     (P, 2) mm, the vertices and the middles of all segments, those of path i from first_point[i]
     (M + 1,) on."""

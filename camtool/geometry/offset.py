@@ -62,10 +62,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import GeometryError, OptionError
@@ -203,8 +204,7 @@ def _moved(lines: Polylines, distance_mm: float, asked: Offset) -> tuple[Polylin
     return _left_of(lines, asked)
 
 
-@dataclass(frozen=True)
-class Offset:
+class Offset(Struct, frozen=True):
     """An offset to the left by `distance_mm` > 0. `limit` is inf for round joins; else a corner
     may be so many times the distance away from the source, and is cut off there."""
 
@@ -240,8 +240,7 @@ def _turns_about(points: Floats, lines: Polylines) -> Ints:
     return turns
 
 
-@dataclass(frozen=True, eq=False)
-class Stages:
+class Stages(Struct, frozen=True, eq=False):
     """What each stage of one offset to the left gave: to print, to draw, to test."""
 
     raw: RawOffset
@@ -309,8 +308,7 @@ def _next_rows(lines: Polylines) -> Ints:
 # shifted to the left.
 
 
-@dataclass(frozen=True, eq=False)
-class Corners:
+class Corners(Struct, frozen=True, eq=False):
     """Row i is the corner after segment i: its `place`, the tangents `before` and `after` it
     (K, 2), and how far the path turns there, `turn` (K,) rad, left positive. `earlier` (K,) is
     the corner that the same segment begins at.
@@ -357,8 +355,7 @@ def arcs_about(corners: Corners, rows: Ints, asked: Offset) -> tuple[Ints, Segme
     return corner, Segments.between(start, end, np.tan(0.25 * sweep))
 
 
-@dataclass(frozen=True, eq=False)
-class Mitres:
+class Mitres(Struct, frozen=True, eq=False):
     """`reach` (K,): how far the tangents go on beyond the shifted segments at each corner, mm, 0
     where there is no mitre; `cut` (K,) true where it is cut off; and the `kites` (J, 10) that
     they cover (camtool.kernels.offsets).
@@ -411,8 +408,7 @@ def _rotated(vectors: Floats, angle: Floats) -> Floats:
     return np.asarray(cosine * vectors + sine * turned(vectors))
 
 
-@dataclass(frozen=True, eq=False)
-class RawOffset:
+class RawOffset(Struct, frozen=True, eq=False):
     """`elements`: shifted segments and joins, in the order of travel. `source` (K,): the source
     segment of each, or the one before its corner; `join` (K,): true for what is put about a
     corner. `kites` (J, 10): what mitres cover (camtool.kernels.offsets)."""
@@ -510,8 +506,7 @@ SKEW = (0.850650808352040, 0.525731112119133)
 """Unit direction along which points are sorted: drawings have many of equal x or equal y."""
 
 
-@dataclass(frozen=True, eq=False)
-class Slices:
+class Slices(Struct, frozen=True, eq=False):
     """Pieces of elements between two nodes, in columns: `element`, `from_node`, `to_node` (S,)
     and the fractions `t0` < `t1` (S,) of the element's length; `nodes` (N, 2) mm."""
 

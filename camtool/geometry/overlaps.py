@@ -13,10 +13,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import chain
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import astuple
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.boxes import touching_boxes
@@ -27,8 +28,7 @@ SAME_LINE_MM = 1e-4
 """Lines and arcs nearer to each other than this lie on each other, at most the tolerance."""
 
 
-@dataclass(frozen=True, eq=False)
-class Unlapped:
+class Unlapped(Struct, frozen=True, eq=False):
     """The paths without overlaps, the input path that each is or is part of (M,), how many paths
     were shortened or left out, and by what length, mm."""
 
@@ -227,8 +227,7 @@ MOST_PAIRS = 2_000_000
 """At most this many pairs of overlapping intervals are examined."""
 
 
-@dataclass(frozen=True, eq=False)
-class Intervals:
+class Intervals(Struct, frozen=True, eq=False):
     """K intervals: `path` (K,) that each came from, `group` (K,), `loose` (K,), `length` (K,) mm.
 
     Lines have `start` (K, 2) and the unit `direction` (K, 2); circles `centre` (K, 2), `radius`
@@ -246,8 +245,7 @@ class Intervals:
     low: Floats
 
 
-@dataclass(frozen=True, eq=False)
-class Covers:
+class Covers(Struct, frozen=True, eq=False):
     """Pairs of intervals on one carrier: of the interval `a`, `begin` to `end` mm lie on `b`.
 
     A place s mm along b is at  shift + sense·s  along a.
@@ -262,7 +260,7 @@ class Covers:
 
     def __getitem__(self, rows: Bools) -> Covers:
         """The chosen rows."""
-        return Covers(**{name: column[rows] for name, column in vars(self).items()})
+        return Covers(*(column[rows] for column in astuple(self)))
 
 
 def covers(all_of: Intervals, within_mm: float) -> Covers:
@@ -276,9 +274,7 @@ def covers(all_of: Intervals, within_mm: float) -> Covers:
             break
     row, place = np.empty(0, dtype=np.int64), np.empty(0)
     every = [Covers(row, row, place, place, place, place), *found]
-    return Covers(
-        **{name: np.concatenate([vars(part)[name] for part in every]) for name in vars(every[0])}
-    )
+    return Covers(*map(np.concatenate, zip(*map(astuple, every), strict=True)))
 
 
 def _on_lines(of: Intervals, within_mm: float) -> Iterator[Covers]:

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import GeometryError
@@ -176,8 +177,7 @@ def segment_rows(lines: Polylines) -> Ints:
     return np.flatnonzero(keep)
 
 
-@dataclass(frozen=True, eq=False)
-class Segments:
+class Segments(Struct, frozen=True, eq=False, dict=True):
     """Lines and arcs in columns, K rows; `path` (K,) says which polyline each came from.
 
     `start`, `end` (K, 2) mm; `bulge` (K,). What follows from these is computed when it is asked

@@ -18,9 +18,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats
 from camtool.geometry.measure import segment_lengths
@@ -158,8 +158,7 @@ def _whole(rows: Floats) -> bool:
 # arc arrives or leaves; where arcs do both at different ones, all stays as it was.
 
 
-@dataclass(frozen=True, eq=False)
-class Merged:
+class Merged(Struct, frozen=True, eq=False):
     """The paths after merging, and how many segments went."""
 
     lines: Polylines

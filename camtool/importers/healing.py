@@ -12,10 +12,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import DrawingError, GeometryError
@@ -42,8 +42,7 @@ IS_DRAWN_TWICE = "is drawn twice"
 """Why a piece went that is another one again."""
 
 
-@dataclass(frozen=True, eq=False)
-class Cleaned:
+class Cleaned(Struct, frozen=True, eq=False):
     """Paths, the piece that each came from (M,), and what was left out.
 
     `duplicates` pieces of `duplicates_mm` were drawn twice.
@@ -210,8 +209,7 @@ TINY_SHARE = 0.5
 """Segments up to this share of the tolerance are merged into their neighbours."""
 
 
-@dataclass(frozen=True, eq=False)
-class Healed:
+class Healed(Struct, frozen=True, eq=False):
     """Contours, the pieces that each is made of, the gaps, and what was mended."""
 
     lines: Polylines
@@ -325,8 +323,7 @@ def off_drawn(pieces: Sequence[Piece], lines: Polylines) -> Floats:
     return found
 
 
-@dataclass(frozen=True, eq=False)
-class _Joined:
+class _Joined(Struct, frozen=True, eq=False):
     """K segments between the rows `begin` and `end` (K,) of `vertices` (N, 3)."""
 
     vertices: Floats

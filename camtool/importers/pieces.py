@@ -11,7 +11,8 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from camtool.arrays import Floats
 from camtool.errors import DrawingError, OptionError
@@ -31,8 +32,7 @@ class Unusable(Exception):
     """The entity gives no piece; the text is the reason."""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Piece:
+class Piece(Struct, frozen=True, eq=False):
     """One entity: `vertices` (n, 3) of x, y, bulge in mm, and where it came from.
 
     A closed piece may repeat its first point at its end. `source` begins with the kind of the

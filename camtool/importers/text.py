@@ -11,13 +11,13 @@ import math
 import re
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from enum import IntFlag
 from functools import lru_cache, partial
 from pathlib import Path, PurePath
 from typing import Any
 
 import numpy as np
+from msgspec import Struct, field
 
 from camtool.arrays import Floats
 from camtool.geometry import hershey
@@ -67,8 +67,7 @@ _LETTERS_KEPT = 4096  # of each
 _CHOICES_KEPT = 64
 
 
-@dataclass(frozen=True, eq=False)
-class Letter:
+class Letter(Struct, frozen=True, eq=False):
     """`points` (n, 2) of all parts; each contour is the count of points (2 to 4) of its parts."""
 
     points: Floats
@@ -84,8 +83,7 @@ class Letter:
         return cls(points, counts, advance)
 
 
-@dataclass(frozen=True, eq=False)
-class Font:
+class Font(Struct, frozen=True, eq=False):
     """`letter` gives None for what the font lacks: a blank as wide as `blank` stands there.
 
     `em`, the size that a font is asked for by, is in heights of a capital, like all of it; the
@@ -100,8 +98,7 @@ class Font:
     foot: float = 0.0
 
 
-@dataclass(frozen=True)
-class Wanted:
+class Wanted(Struct, frozen=True):
     """A font as a drawing names it: a file, or a family in bold or italic letters."""
 
     file: str = ""
@@ -171,8 +168,7 @@ def _stroke_letter(character: str) -> Letter | None:
     return Letter.of(contours, glyph.advance / hershey.CAP_UNITS)
 
 
-@dataclass(frozen=True, order=True)
-class _Face:
+class _Face(Struct, frozen=True, order=True):
     """One installed font file."""
 
     path: str
@@ -341,8 +337,7 @@ class Rule(IntFlag):
     OVER = 4
 
 
-@dataclass(frozen=True, eq=False)
-class Look:
+class Look(Struct, frozen=True, eq=False):
     """How letters look: `height` of a capital, `slant` = tan(oblique angle)."""
 
     font: Font
@@ -363,8 +358,7 @@ class Look:
         return sum(self.advance(character) for character in text)
 
 
-@dataclass(eq=False)
-class Ink:
+class Ink(Struct, eq=False):
     """What has been drawn: `points` (n, 2) of all parts in turn; each contour as the counts of
     points of its parts, and whether it is closed; the characters that fonts lack."""
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final, Literal
+
+from msgspec import Struct
 
 Kind = Literal[
     "diameter",
@@ -23,8 +24,7 @@ ZONES: Final = ("position", "straightness", "roundness", "profile")
 Place = tuple[float, float]
 
 
-@dataclass(frozen=True)
-class Limits:
+class Limits(Struct, frozen=True):
     """By how much a dimension may differ from its nominal value, mm, `lower_mm` ≤ `upper_mm`; and
     the words that say so ("H7", "±0.05", "ISO 2768-m")."""
 
@@ -33,8 +33,7 @@ class Limits:
     said: str
 
 
-@dataclass(frozen=True)
-class Dimension:
+class Dimension(Struct, frozen=True):
     """One dimension of a drawing, mm, in the drawing's frame.
 
     `places_mm` say of what it is: of a diameter, radius, roundness or position one point, the

@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from camtool.arrays import Bools, Floats
 from camtool.findings import DIMENSION_UNBOUND, Finding
@@ -39,8 +40,7 @@ FULL_TURN_RAD = 1e-6
 """Arcs that lack no more than this of a whole turn are a whole circle."""
 
 
-@dataclass(frozen=True, eq=False)
-class Circle:
+class Circle(Struct, frozen=True, eq=False):
     """A circle, or arcs of one: centre and radius mm, and its arcs (A, 2): start angle and sweep,
     rad."""
 
@@ -78,8 +78,7 @@ class Circle:
         return Circle(self.path, where.point(self.centre_mm), where.scale * self.radius_mm, arcs)
 
 
-@dataclass(frozen=True, eq=False)
-class Edge:
+class Edge(Struct, frozen=True, eq=False):
     """A straight edge from `start_mm` to `end_mm`."""
 
     path: int
@@ -115,8 +114,7 @@ class Edge:
 Feature = Circle | Edge
 
 
-@dataclass(frozen=True, eq=False)
-class Outline:
+class Outline(Struct, frozen=True, eq=False):
     """A whole path, whose profile is inspected: all its circles and edges."""
 
     path: int
@@ -127,8 +125,7 @@ class Outline:
         return Outline(self.path, tuple(each.placed(where) for each in self.features))
 
 
-@dataclass(frozen=True, eq=False)
-class End:
+class End(Struct, frozen=True, eq=False):
     """One end of a distance: the edge itself, the centre of a circle, or the outermost point of a
     circle in the direction of measuring (`side` +1) or against it (−1)."""
 
@@ -141,8 +138,7 @@ class End:
         return End(self.feature.placed(where), self.how, self.side)
 
 
-@dataclass(frozen=True, eq=False)
-class Bound:
+class Bound(Struct, frozen=True, eq=False):
     """A dimension and its features: one circle, edge or outline, or two ends of a distance along
     the unit vector `direction` (2,), which leads from the first to the second. `drawn_mm` is what
     the features measure as drawn, 0 for zones."""

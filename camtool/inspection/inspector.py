@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Floats, Ints
 from camtool.errors import OptionError
@@ -35,8 +36,7 @@ MOST_POINTS = 400_000
 """A path has at most about so many points for inspection: 13 MB."""
 
 
-@dataclass(frozen=True, eq=False)
-class Inspected:
+class Inspected(Struct, frozen=True, eq=False):
     """A dimension in the work frame, how each of its features is cut, and of which copy it is
     (None where there is one)."""
 

@@ -15,7 +15,9 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass, replace
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from camtool.errors import OptionError
 from camtool.findings import NO_GENERAL_TOLERANCE, Finding
@@ -53,8 +55,7 @@ _UPWARDS = ("…", "..", "...", "to")
 _EXAMPLES = "write them like H7, ±0.05, +0.1/-0.2 or 19.9 … 20.1"
 
 
-@dataclass(frozen=True)
-class Words:
+class Words(Struct, frozen=True):
     """Words of limits as they were understood, before the nominal size is known.
 
     One of them, or a class and its deviations: `iso` ("H7", or ""), `deviations_mm` or `sizes_mm`

@@ -36,13 +36,14 @@ import hashlib
 import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 import msgspec
 import numpy as np
+from msgspec import Struct, field
+from msgspec.structs import replace
 
 from camtool.arrays import Floats
 from camtool.errors import CamtoolError, OptionError
@@ -124,8 +125,7 @@ LARGEST_INPUTS = 2
 # What is asked, and what is tried.
 
 
-@dataclass(frozen=True, eq=False)
-class Case:
+class Case(Struct, frozen=True, eq=False):
     """A drawing, its machine, its job as the tables of a file, and what its dimensions must be.
     `job_of` reads tables as a job file is read; OptionError for those that are wrong."""
 
@@ -136,8 +136,7 @@ class Case:
     tolerances: Tolerances
 
 
-@dataclass(frozen=True)
-class Proposal:
+class Proposal(Struct, frozen=True):
     """Changes of a job: of keys, of allowances, and of its machine as `--set` says them."""
 
     changes: tuple[Change, ...] = ()
@@ -155,8 +154,7 @@ class Proposal:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class Trial:
+class Trial(Struct, frozen=True, eq=False):
     """A proposal as it came out. `verdicts` of the dimensions, with the `paths` of the drawing
     that make each; `missing`: how many could not be inspected; `time_s` of the program; `left`:
     the allowances that should make it better, found from its edges."""
@@ -212,8 +210,7 @@ def _standard_mm(each: InspectedReport) -> float:
     return known or NO_STANDARD_MM
 
 
-@dataclass(frozen=True)
-class Need:
+class Need(Struct, frozen=True):
     """A number of the machine that would have to be better: its key as `--set` has it, what it is,
     and what it would have to be, in the unit of the key."""
 
@@ -222,8 +219,7 @@ class Need:
     needed: float
 
 
-@dataclass(frozen=True)
-class Certificate:
+class Certificate(Struct, frozen=True):
     """Why no proposal holds: the dimension that is farthest from it, the uncertain inputs that are
     not known and that nothing bounds, and each number of the machine with which all would hold if
     it alone were better. `exact`: whether all would with every one of these numbers at its
@@ -237,8 +233,7 @@ class Certificate:
     together: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
-class Meeting:
+class Meeting(Struct, frozen=True, eq=False):
     """What came out: the job as it was, the best proposal and its `run`, posted (`brief` as
     `post_drawing` has it) and inspected, how many programs were tried besides the job as it was,
     and whether they were `all` that had to be. `text`: the job file of the proposal.
@@ -397,8 +392,7 @@ def _rows(job: Job) -> Iterator[tuple[int, int, Operation]]:
 # The contours whose walls are moved.
 
 
-@dataclass(frozen=True, eq=False)
-class Contours:
+class Contours(Struct, frozen=True, eq=False):
     """The contours of a job by the names of their entities. `cut`: which names the operation in
     each row of the file takes; `walls`: the same of those that have allowances; `depth`: in how
     many others each lies; `head`: walls with one head move alike, for an operation cannot be
@@ -565,8 +559,7 @@ def paths_of(each: Inspected) -> tuple[int, ...]:
 # Trials.
 
 
-@dataclass(eq=False)
-class Bench:
+class Bench(Struct, eq=False, dict=True):
     """Posts and inspects the jobs of proposals; equal programs are judged once."""
 
     case: Case
@@ -758,8 +751,7 @@ def _digest(run: Run, machine: Machine) -> bytes:
 # Numbers of a machine that may be what it takes.
 
 
-@dataclass(frozen=True)
-class _Number:
+class _Number(Struct, frozen=True):
     """A number of a machine: its key, what it is, and its best value."""
 
     key: str

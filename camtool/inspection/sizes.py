@@ -27,10 +27,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.inspection.features import Bound, Circle, Edge, End, Feature
@@ -69,8 +70,7 @@ BESIDE_MM = 0.5
 that far from what was planned."""
 
 
-@dataclass(frozen=True, eq=False)
-class Swept:
+class Swept(Struct, frozen=True, eq=False, dict=True):
     """Segments of a tool's path, K: from `a` to `b` (K, 2) mm, `radius` (K,) mm of the tool at the
     surface, the height `z` (K,) mm to which it is cut at least, and the wanted row (K,) that each
     belongs to. Where the tool tapers, so that its radius is that at the surface alone, `z` is
@@ -107,8 +107,7 @@ class Swept:
         return Swept(self.a, self.b, radius, self.z, self.row)
 
 
-@dataclass(frozen=True, eq=False)
-class Stations:
+class Stations(Struct, frozen=True, eq=False):
     """Where a feature is measured: places (S, 2) mm, unit normals (S, 2) towards the tool, and
     which of them are (S,). `wide`: radians or mm from one to the next."""
 
@@ -118,8 +117,7 @@ class Stations:
     wide: float
 
 
-@dataclass(frozen=True, eq=False)
-class Cut:
+class Cut(Struct, frozen=True, eq=False):
     """How a feature is cut: on which `side` the tool runs (+1: outside of a circle, left of an
     edge), whether it runs along it (`on_path`), the wanted `rows` that cut it, its stations, and
     at which of them (L, S) it is cut at each of L depths: by the moves that cut at least to
@@ -379,8 +377,7 @@ def _offsets(feature: Feature, swept: Swept, which: Ints) -> tuple[Floats, Bools
 # Sizes of envelopes.
 
 
-@dataclass(frozen=True)
-class Size:
+class Size(Struct, frozen=True):
     """A dimension as machined, mm: the least-squares size, and the least and the largest of its
     local sizes. Of a zone all three are its width."""
 
@@ -486,8 +483,7 @@ def fitted_circle(points: Floats, near: Floats) -> tuple[Floats, float]:
     return centre, float(np.hypot(*(points - centre).T).mean())
 
 
-@dataclass(frozen=True, eq=False)
-class _Values:
+class _Values(Struct, frozen=True, eq=False):
     """Where one end of a distance lies: values (J,) mm along the direction of measuring, their
     places (J,) mm across it (None: it is a point), and the value of its best fit."""
 

@@ -13,11 +13,12 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
 import msgspec
+from msgspec import Struct
+from msgspec.structs import replace
 
 from camtool.errors import DrawingError, InputError, OptionError
 from camtool.findings import (
@@ -393,8 +394,7 @@ def _direction(value: Length) -> float:
 # Callouts
 
 
-@dataclass(frozen=True)
-class Said:
+class Said(Struct, frozen=True):
     """The text of a callout, understood: `count` of equal features, `sign` "Ø", "R" or "", the
     nominal size ("<>" is None), the `words` of its limits, and whether the size is only for
     information, in parentheses, or theoretically exact, in brackets."""

@@ -58,6 +58,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 import numpy as np
+from msgspec import Struct
 
 from camtool.machine.model import Machine, PlayCells
 
@@ -119,8 +120,7 @@ Values = Callable[[Variant], "Floats"]
 Moved = Callable[[Variant, float], Variant]
 
 
-@dataclass(frozen=True)
-class Direction:
+class Direction(Struct, frozen=True):
     """A way in which machines vary. `moved` gives the variant that is further along it by so much,
     which may be as low as `lowest`. `bends`: values may be far from linear in it; `distorts`: it
     makes ellipses of circles, so that their least and their largest diameter are."""
@@ -132,8 +132,7 @@ class Direction:
     distorts: bool = False
 
 
-@dataclass(frozen=True)
-class Input:
+class Input(Struct, frozen=True):
     """What is uncertain: `name` as in `[uncertainty]` ("x.backlash_mm", "process_mm"), its `value`
     on the machine, its `standard` uncertainty in the same unit (None: not known), and a `probe`, a
     step that shows what depends on it.
@@ -156,8 +155,7 @@ class Input:
     within: str = ""
 
 
-@dataclass(frozen=True)
-class Inputs:
+class Inputs(Struct, frozen=True):
     """The uncertain inputs of one machine; `correlation` (P, P) in their order."""
 
     variant: Variant
@@ -383,8 +381,7 @@ def edges_of(features: Sequence[tuple[int, Floats]]) -> Floats:
 # Propagation by finite differences.
 
 
-@dataclass(frozen=True)
-class Contribution:
+class Contribution(Struct, frozen=True):
     """What one input adds to the uncertainty of a value. `standard_mm` is the value's standard
     uncertainty if only this input were uncertain: |sensitivity| times that of the input, and what
     bends add; `variance_mm2` is its part of the value's variance, with its share of the
@@ -396,8 +393,7 @@ class Contribution:
     variance_mm2: float
 
 
-@dataclass(frozen=True, eq=False)
-class Budget:
+class Budget(Struct, frozen=True, eq=False, dict=True):
     """The uncertainty of K values from P inputs.
 
     `values` (K,) mm: as simulated on the machine itself; `shifts` (K,) mm: by how much their
@@ -533,8 +529,7 @@ def _weights(edges: Floats, each: Input) -> Floats:
 # Monte Carlo.
 
 
-@dataclass(frozen=True, eq=False)
-class Draws:
+class Draws(Struct, frozen=True, eq=False):
     """Values (N, K) mm of N draws of the known inputs, each simulated."""
 
     values: Floats

@@ -18,11 +18,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 import msgspec
 import numpy as np
+from msgspec import Struct
 
 from camtool.findings import (
     DIMENSION_NOT_CUT_THERE,
@@ -52,8 +53,7 @@ Required = Literal["in", "not-out"]
 """What `--require` asks of every dimension with limits."""
 
 
-@dataclass(frozen=True)
-class Tolerances:
+class Tolerances(Struct, frozen=True):
     """The dimensions to inspect, the findings of reading them, and what is required of them (None:
     nothing; they are only told)."""
 

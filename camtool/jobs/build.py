@@ -20,9 +20,11 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+from msgspec import Struct, field
 
 from camtool.errors import MachineError, OptionError
 from camtool.jobs.keys import (
@@ -74,8 +76,7 @@ EITHER = {"depth": "breakthrough", "breakthrough": "depth", "scale": "fit", "fit
 _ANY_STOCK = {"thickness_mm": 1.0}
 
 
-@dataclass(frozen=True)
-class JobTables:
+class JobTables(Struct, frozen=True):
     """The tables of a job as a file gives them, or flags. `defaults` hold for all `operations`;
     None are the operations of the other source."""
 

@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 from typing import Any
+
+from msgspec import Struct
 
 from camtool.jobs.build import EITHER, JobTables, build_job, tables_of
 from camtool.jobs.keys import OPERATION, TOOL_KEYS, TOOL_NAME, Given, Table, length
@@ -30,8 +31,7 @@ LEFT_DIGITS = 4
 """Decimals of an allowance in mm: a tenth of a micrometre."""
 
 
-@dataclass(frozen=True)
-class Change:
+class Change(Struct, frozen=True):
     """Another value of a key: of the operation in this row of the file, or (None) of the job as a
     whole. `instead`: what the key says so far, "" where it says nothing."""
 
@@ -41,8 +41,7 @@ class Change:
     instead: str = ""
 
 
-@dataclass(frozen=True)
-class Left:
+class Left(Struct, frozen=True):
     """So much more is left on the walls of an operation, mm (below 0: less): of the contours of
     these `entities`, or (without any) of all that it takes."""
 

@@ -12,11 +12,12 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from camtool.arrays import Ints
 from camtool.geometry.facts import drawing_extents
@@ -52,8 +53,7 @@ _ORDER = ("drill", "engrave", "bore", "profile")
 _WIDTH = 36
 
 
-@dataclass(frozen=True)
-class _Group:
+class _Group(Struct, frozen=True):
     """Paths and marks that one operation takes: the rows of both, and the pattern for them."""
 
     name: str
@@ -67,8 +67,7 @@ class _Group:
         return self.name or f"no {self.key[:-1]}"
 
 
-@dataclass(frozen=True)
-class Proposal:
+class Proposal(Struct, frozen=True):
     """What is known of the cut, mm, 0 where it is not: the tool's diameter, the stock's
     thickness. `tool`: its name in a library, and the materials that it has presets for, which say
     how deep passes are; `material`: the one of them that is cut, where that is said."""
@@ -188,8 +187,7 @@ def _extent(drawing: Drawing, group: _Group) -> float:
     return float(np.ptp(extents(lines), axis=1).sum()) if len(lines) else 0.0
 
 
-@dataclass(frozen=True)
-class _Part:
+class _Part(Struct, frozen=True):
     """What one operation cuts of a group: what it selects of it, and how."""
 
     name: str

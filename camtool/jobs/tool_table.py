@@ -13,7 +13,8 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from camtool.errors import OptionError
 
@@ -25,8 +26,7 @@ _WORD = re.compile(r"([A-Za-z])([+-]?(?:\d+(?:\.\d*)?|\.\d+))")
 _WHOLE = re.compile(r"\d+")
 
 
-@dataclass(frozen=True)
-class TableTool:
+class TableTool(Struct, frozen=True):
     """One line: the tool's `number`; its `diameter` in the table's unit, None without a D; the
     `remark` as it stands; the number of the `line`."""
 

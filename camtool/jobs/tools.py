@@ -18,10 +18,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
+
+from msgspec import Struct, field, structs
 
 from camtool.errors import MachineError, OptionError
 from camtool.jobs.keys import (
@@ -50,16 +52,14 @@ _TOOL_NUMBER = re.compile(r"\d{1,9}")
 """A tool by its number."""
 
 
-@dataclass(frozen=True)
-class Described:
+class Described(Struct, frozen=True):
     """A tool as a file describes it: its keys, and what it is used with, by material."""
 
     keys: Table
     presets: Mapping[str, Table] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class Shop:
+class Shop(Struct, frozen=True):
     """What there is besides the job: the files of `libraries`, the nearest first; the tool of
     operations that say none, and what is cut, where the job does not say it."""
 
@@ -68,8 +68,7 @@ class Shop:
     material: Given | None = None
 
 
-@dataclass(frozen=True)
-class Used:
+class Used(Struct, frozen=True):
     """The tool of an operation, with the limits of its preset; the keys of operations that the
     preset gives, and the material that it is for, "" without one."""
 
@@ -153,7 +152,7 @@ def tools_for(named: Mapping[str, Described], whole: Table, folder: Path, shop: 
             raise units.refused("has no effect without tool_table", "give tool_table too")
         return tools
     unit = "mm" if units is None else WHOLE["tool_table_units"].read(units)
-    return _with_table(replace(tools, units=unit), table)
+    return _with_table(structs.replace(tools, units=unit), table)
 
 
 def _path_of(key: str, whole: Table, folder: Path) -> Path | None:
@@ -166,8 +165,7 @@ def _path_of(key: str, whole: Table, folder: Path) -> Path | None:
     return folder / name if given.file is not None else Path(name)
 
 
-@dataclass(frozen=True)
-class Tools:
+class Tools(Struct, frozen=True, dict=True):
     """The tools of a job: `named` in its file, those of `libraries`, the nearest first, which are
     read when one is needed, and by number those of a LinuxCNC `table`, whose lengths have the unit
     `units`. `material`: what is cut, if it is said, and whether the job or a flag says so;
@@ -203,7 +201,7 @@ class Tools:
                 )
             given = {key.removeprefix("tool_"): value for key, value in own.given.items()}
             keys = Table(given, own.where, own.file).over(keys)
-        return self._used(name, replace(described, keys=keys), kind)
+        return self._used(name, structs.replace(described, keys=keys), kind)
 
     def _used(self, name: str, described: Described, kind: str) -> Used:
         """The tool, and its preset for what is cut. OptionError for a material for which it has
@@ -285,7 +283,7 @@ class Tools:
         if number is None or number not in self.table:
             return described
         known = self._of_table(number, needed="diameter" not in keys.given)
-        return replace(described, keys=keys.over(known))
+        return structs.replace(described, keys=keys.over(known))
 
     def _of_table(self, number: int, *, needed: bool = True) -> Table:
         """The keys of a tool of the table; refused when it lacks a diameter that is needed."""
@@ -308,7 +306,7 @@ def _with_table(tools: Tools, path: Path) -> Tools:
         raise OptionError(
             f"cannot be read ({error.strerror})", file=str(path), mend="check the path"
         ) from error
-    return replace(tools, table=read_tool_table(text, str(path)), table_file=str(path))
+    return structs.replace(tools, table=read_tool_table(text, str(path)), table_file=str(path))
 
 
 def _number_of(keys: Table) -> int | None:

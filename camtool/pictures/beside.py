@@ -11,8 +11,10 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from pathlib import PurePath
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from camtool.errors import OptionError
 from camtool.pictures import polar
@@ -191,8 +193,7 @@ Head = tuple[str, Sequence[str]]
 """Title and notes of a panel."""
 
 
-@dataclass(frozen=True)
-class Grid:
+class Grid(Struct, frozen=True):
     """Panels of `width`, margins included, in `columns` on a page of width `page`; `heads` are the
     SVG of titles and notes, `downs` the heights at which those of each panel's row end; `rows` are
     the heights at which the rows begin."""

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.measure import segment_boxes
@@ -36,8 +36,7 @@ MOVES_AT_ONCE = 1 << 14
 """So many moves of a chain are looked at, or written, together."""
 
 
-@dataclass(frozen=True, eq=False)
-class Chain:
+class Chain(Struct, frozen=True, eq=False):
     """n moves end to end: points (n+1, 2) mm; centre (n, 2) mm; sweep (n,) rad, 0 for lines."""
 
     points: Floats
@@ -81,8 +80,7 @@ class Chain:
         return (cx + radius * math.cos(angle), cy + radius * math.sin(angle)), heading
 
 
-@dataclass(frozen=True, eq=False)
-class Moves:
+class Moves(Struct, frozen=True, eq=False):
     """A toolpath from above: `feeds` (level), `ramps` (that change Z as well) and `rapids` as
     chains; `plunges` (P, 2) mm, where the tool goes straight down, but not from cut to cut;
     `starts` (S, 2) mm, where feeds in XY begin; each place once; `begin` (2,) mm, where the tool
@@ -325,8 +323,7 @@ LEAST_PIECE_RAD = 1e-9
 """Of an arc that begins or ends at a multiple of 90°, a shorter piece is not counted."""
 
 
-@dataclass(frozen=True, eq=False)
-class _Pieces:
+class _Pieces(Struct, frozen=True, eq=False):
     """Where P pieces begin, (P, 2) mm; the signs of X and Y on each, (P, 2); its row of the
     toolpath, (P,)."""
 

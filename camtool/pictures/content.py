@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from camtool.arrays import Floats
 from camtool.geometry.drawing import Drawing
@@ -38,8 +39,7 @@ NOWHERE: Floats = np.empty((0, 2))
 NO_MOVES = Moves((), (), (), NOWHERE, NOWHERE, np.zeros(2))
 
 
-@dataclass(frozen=True)
-class Group:
+class Group(Struct, frozen=True):
     """Paths of one layer of the drawing, in one colour."""
 
     name: str
@@ -47,8 +47,7 @@ class Group:
     chains: tuple[Chain, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class Places:
+class Places(Struct, frozen=True, eq=False):
     """Places (P, 2) mm of a drawing: open ends, drill centres, and crossings and branches, where
     a contour is ambiguous."""
 
@@ -57,8 +56,7 @@ class Places:
     ambiguous: Floats
 
 
-@dataclass(frozen=True, eq=False)
-class Content:
+class Content(Struct, frozen=True, eq=False, dict=True):
     """`outlines` are the paths of the drawing, in `groups` by its layers; `moves` those of the
     toolpath, empty without one; `places` belong to the drawing; `trace` is the predicted path
     where it is shown. `window` (2, 2) mm is the part of the plane that is shown, `crop_mm` the

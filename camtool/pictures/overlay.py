@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from camtool.arrays import Floats
 from camtool.pictures.chains import moves_of
@@ -40,8 +41,7 @@ from camtool.toolpath.moves import Toolpath
 WANTED_PEN, RUN_PEN = 8.0, 2.0
 
 
-@dataclass(frozen=True, eq=False)
-class Overlay:
+class Overlay(Struct, frozen=True, eq=False):
     """`window` (2, 2) mm [[xmin, xmax], [ymin, ymax]]; `wanted` the path without any error;
     `runs` (name, lines of points (n, 2) mm) of the variants, in the order of the legend."""
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from camtool.arrays import Floats
 from camtool.pictures import text
@@ -55,8 +56,7 @@ GUESSED_LEFT = 52.0
 FITS = 3
 
 
-@dataclass(frozen=True, eq=False)
-class Page:
+class Page(Struct, frozen=True, eq=False):
     """`head` is the SVG of title and notes, `rows` the legend; the first row is centred on
     `legend_y`, the scale bar on `bar_y`; `width` and `height` are those of the page."""
 
@@ -339,8 +339,7 @@ BAR_MARK = 5.0
 NUMBERS = Style(TICK_CAP, QUIET)
 
 
-@dataclass(frozen=True)
-class Ticks:
+class Ticks(Struct, frozen=True):
     """Round numbers along both axes, the same `step_mm` on each."""
 
     step_mm: float

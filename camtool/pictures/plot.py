@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.pictures import text
 from camtool.pictures.chains import Chain, path_data
@@ -54,8 +54,7 @@ MOST_LABELS = 400
 DIRECTIONS = ((1.0, -1.0), (-1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
 
 
-@dataclass(frozen=True)
-class Plot:
+class Plot(Struct, frozen=True):
     """What layers draw on: the window of a picture."""
 
     view: View
@@ -194,8 +193,7 @@ def _arrow(data: PathData, at: tuple[float, float], heading: float) -> None:
     data.close()
 
 
-@dataclass(frozen=True)
-class Label:
+class Label(Struct, frozen=True):
     """A short text beside the place that it belongs to, both on the page; `box` is left, top,
     right, bottom."""
 

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from camtool.arrays import Floats
 from camtool.errors import OptionError
@@ -25,8 +26,7 @@ from camtool.pictures.view import MARGIN, Box, decimals_of, page_width, round_st
 from camtool.units import UM_PER_MM
 
 
-@dataclass(frozen=True, eq=False)
-class CircleErrors:
+class CircleErrors(Struct, frozen=True, eq=False):
     """A circle of the plot: its number `which`, and its errors (B, 3) µm."""
 
     which: int
@@ -147,8 +147,7 @@ PENS = ((FEED, SPREAD), (BACK, BACK_SPREAD))
 """Line and band of the first circle of a plot and of the second."""
 
 
-@dataclass(frozen=True)
-class Dial:
+class Dial(Struct, frozen=True):
     """Middle of the plot, its radius, that of the programmed circle, units per µm, µm from ring
     to ring."""
 

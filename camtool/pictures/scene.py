@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.drawing import Drawing
@@ -88,8 +90,7 @@ class Scene:
             raise ValueError("a number of the trace is not finite")
 
 
-@dataclass(frozen=True, eq=False)
-class Round:
+class Round(Struct, frozen=True, eq=False):
     """A circle (x, y) mm of this radius mm and direction, with its bins (B, 9) as
     `camtool.kernels.judging` fills them; circular error G, radial errors F max, F min and
     their mean D, and the reversal values B of X and Y, mm, NaN where unknown. `partner` is the
@@ -121,16 +122,14 @@ class Round:
         return found - self.radius_mm
 
 
-@dataclass(frozen=True)
-class Line:
+class Line(Struct, frozen=True):
     """A line of a table: its cells, and the row of the toolpath that it is about."""
 
     cells: tuple[str, ...]
     move: int | None = None
 
 
-@dataclass(frozen=True)
-class Table:
+class Table(Struct, frozen=True):
     """A table of the report; `columns` are its headings, which may be missing."""
 
     title: str
@@ -138,8 +137,7 @@ class Table:
     lines: tuple[Line, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class Playback:
+class Playback(Struct, frozen=True, eq=False):
     """How N rows of a toolpath run: `seconds` (N,); `error_mm` (N,), NaN where unknown;
     `trace_row` (T,) the row of each point of the scene's trace.
 

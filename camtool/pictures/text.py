@@ -7,8 +7,9 @@ The text itself stands in the label's `<title>` and `aria-label`.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from itertools import accumulate
+
+from msgspec import Struct
 
 from camtool.geometry.hershey import BASELINE, BOX, CAP_UNITS, Glyph, glyph
 from camtool.pictures.colours import INK
@@ -18,8 +19,7 @@ _UNIT = re.compile(r" (?!\(?(?:µm|mm|h)\b)")
 """Blanks where a line may break: not those between a number and its unit."""
 
 
-@dataclass(frozen=True)
-class Style:
+class Style(Struct, frozen=True):
     """`cap` is the height of a capital on the page; `weight` is the width of its strokes as a
     share of `cap`."""
 

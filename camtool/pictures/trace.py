@@ -8,9 +8,9 @@ drawn later: the largest lie on top.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.measure import segment_boxes
@@ -31,8 +31,7 @@ MERGED_SHARE = 1.25e-4
 """Points nearer than this share of the window, half a pixel of 4000, may be left out."""
 
 
-@dataclass(frozen=True, eq=False)
-class Trace:
+class Trace(Struct, frozen=True, eq=False):
     """Points (T, 2) mm, as drawn; |error| (T,) µm; whether the tool cuts between the point before
     and this one (T,); the end of the colour map, µm; `times`, by which the distances of the points
     from the wanted path have been multiplied."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Floats
 
@@ -43,8 +43,7 @@ CROP_SHAPES = (0.2, 2.0)
 ROUND_STEPS = (1.0, 2.0, 5.0, 10.0)
 
 
-@dataclass(frozen=True)
-class Box:
+class Box(Struct, frozen=True):
     """A rectangle; on the page `top` < `bottom`."""
 
     left: float
@@ -61,8 +60,7 @@ class Box:
         return self.bottom - self.top
 
 
-@dataclass(frozen=True)
-class View:
+class View(Struct, frozen=True):
     """`scale` page units per mm; `centre` (x, y) mm is shown in the middle of `box`."""
 
     box: Box

@@ -27,10 +27,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import islice, pairwise
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import GeometryError, OptionError
@@ -92,8 +92,7 @@ MEET_MM = 1e-4
 """Ends of pieces that are nearer than this meet."""
 
 
-@dataclass(frozen=True)
-class Cone:
+class Cone(Struct, frozen=True):
     """A V bit: the tangent of its half angle, the radius of its flat tip, mm, and the largest
     radius that it cuts at the surface, mm (inf: not known)."""
 
@@ -123,8 +122,7 @@ class Cone:
         return np.maximum(rho - self.tip_mm, 0.0) / self.slope
 
 
-@dataclass(frozen=True, eq=False)
-class _Region:
+class _Region(Struct, frozen=True, eq=False):
     """A region to carve: its paths, its name, and the index of its outer path in the drawing."""
 
     lines: Polylines
@@ -279,8 +277,7 @@ def _limited(
         )
 
 
-@dataclass(frozen=True)
-class Band:
+class Band(Struct, frozen=True):
     """Radii mm from `low` to `high`, what the pass before has left and what this one may cut; and
     the tolerance, mm."""
 
@@ -422,8 +419,7 @@ def _off_arc(inner: Floats, begin: Floats, end: Floats, bulge: float) -> float:
     return float((aside + np.abs(inner[:, 2] - radius)).max())
 
 
-@dataclass(frozen=True, eq=False)
-class Graph:
+class Graph(Struct, frozen=True, eq=False):
     """P pieces between V places: `ends` (P, 2) rows of `places` (V, 3) of x, y, rho."""
 
     pieces: list[Floats]

@@ -17,9 +17,8 @@ before.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
+from msgspec.structs import replace
 
 from camtool.findings import NOT_CHAMFERED, NOTHING_DRAWN_TO_CHAMFER, Finding
 from camtool.planning.drill import named

@@ -11,10 +11,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from msgspec import Struct, field
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.distance import nearest, points_to_segments
@@ -74,8 +74,7 @@ POLE_SHARE = 0.01
 """Tolerance for the pole of a region, over the extent of the region."""
 
 
-@dataclass(eq=False)
-class Cell:
+class Cell(Struct, eq=False):
     """A connected tool centre region, the regions that it falls into when shrunk by a step, the
     tips between the two, and how many times it can be shrunk (`height`)."""
 
@@ -85,8 +84,7 @@ class Cell:
     height: int = 0
 
 
-@dataclass(frozen=True)
-class Steps:
+class Steps(Struct, frozen=True):
     """Distance of the rings and radius of the tool, mm; whether rings run as they are oriented
     (the region on their left) or reversed; whether the first one begins as near as possible to
     the pole of its region, where a helix goes down."""
@@ -188,8 +186,7 @@ def _pick(cells: list[Cell], here: Floats | None) -> int:
     return int(np.argmin(apart))
 
 
-@dataclass(frozen=True)
-class Scan:
+class Scan(Struct, frozen=True):
     """Distance of the strokes and radius of the tool, mm, and the angle of the strokes; whether
     the rings run as they are oriented (the region on their left) or reversed."""
 
@@ -199,8 +196,7 @@ class Scan:
     forward: bool = True
 
 
-@dataclass(frozen=True, eq=False)
-class Strokes:
+class Strokes(Struct, frozen=True, eq=False):
     """J pieces of the lines: `row` (J,) of its line, `ends` (J, 2, 2) mm, `span` (J, 2) from and
     to where along its line, mm; all in one connected region."""
 
@@ -455,8 +451,7 @@ def _chained(parts: list[Floats]) -> Floats:
     return tidy(joined(parts))
 
 
-@dataclass(frozen=True, eq=False)
-class ConnectedRegion:
+class ConnectedRegion(Struct, frozen=True, eq=False, dict=True):
     """A connected region on the left of its closed paths, prepared for links within it."""
 
     boundary: Polylines

@@ -9,11 +9,12 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import msgspec
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Floats
 from camtool.errors import GeometryError
@@ -168,8 +169,7 @@ def _add_event(builder: ToolpathBuilder, move: Move, toolpath: Toolpath) -> None
         builder.event(move.kind, move.value)
 
 
-@dataclass
-class _Drive:
+class _Drive(Struct):
     """An axis in motion: where the controller stands, and in which direction ±1 it went last;
     `residual` is that of the region that the tool is in."""
 
@@ -429,8 +429,7 @@ def _residual(axis: Axis, machine: Machine, play_mm: float | None) -> Residual:
     return residual(at_motor, machine.controller)
 
 
-@dataclass(frozen=True)
-class MonotoneSegment:
+class MonotoneSegment(Struct, frozen=True):
     """A part of a line or arc on which no axis reverses: from `begin` to `end` mm, straight, or
     about `centre` (x, y) with `sweep_rad`, CCW positive and at most a quarter turn; Z in
     proportion to the length."""

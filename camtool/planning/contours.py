@@ -12,9 +12,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Floats, Ints
 from camtool.findings import ENTRY_CHANGED, Finding
@@ -49,8 +49,7 @@ Heights = tuple[float | None, list[Tab]]
 """What decides the height of the tool: the angle of its ramps (None: it plunges), and the tabs."""
 
 
-@dataclass(frozen=True, eq=False)
-class CutContours:
+class CutContours(Struct, frozen=True, eq=False):
     """The runs that cut M contours, one contour after the other, and how many of each, `counts`
     (M); what did not go as the operation asks, and the bridges that their tabs leave."""
 
@@ -60,8 +59,7 @@ class CutContours:
     bridges: tuple[Bridge, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class _Pass:
+class _Pass(Struct, frozen=True, eq=False):
     """A run as it is to be made: along the path, with the heights of these parts of it, each of
     which ends where the next one begins, and with these leads."""
 

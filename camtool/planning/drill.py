@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats
 from camtool.findings import (
@@ -61,8 +61,7 @@ NAMES_SHOWN = 3
 """At most this many paths are named in a finding; the others are counted."""
 
 
-@dataclass(frozen=True)
-class Hole:
+class Hole(Struct, frozen=True):
     """A place (x, y) mm to drill; `diameter_mm` of its circle, None for a mark; `source`, the
     index of its path in the placed drawing, −1 for a mark."""
 

@@ -14,9 +14,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 
 import numpy as np
+from msgspec.structs import replace
 
 from camtool.errors import OptionError
 from camtool.findings import FINISH_IN_PASSES, FINISH_IN_PASSES_WHOLE, Code, Finding

@@ -11,10 +11,10 @@ contours and runs are held in columns (`Contours`, `Runs`).
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
 from typing import TypeVar
 
 import numpy as np
+from msgspec import Struct, field
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.findings import Finding
@@ -27,16 +27,14 @@ RAPID = float("nan")
 """The feed of a part of a run that is a rapid (a drill between two pecks)."""
 
 
-@dataclass(frozen=True)
-class Feeds:
+class Feeds(Struct, frozen=True):
     """Feeds of cuts and of plunges, mm/min."""
 
     cut_mm_min: float
     plunge_mm_min: float
 
 
-@dataclass(frozen=True)
-class Setting:
+class Setting(Struct, frozen=True):
     """An operation with what the machine adds to it: feeds; `levels_mm`, the z of its passes,
     downwards, the last at the full depth; `safe_z_mm` above the stock top (z = 0); `spindle_rpm`,
     None: off or unknown."""
@@ -48,8 +46,7 @@ class Setting:
     spindle_rpm: float | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class CutRun:
+class CutRun(Struct, frozen=True, eq=False):
     """`vertices` (n, 4) of x, y, z, bulge in mm, work frame, n ≥ 1; the bulge belongs to the move
     that leaves its vertex (with a change of z it is a helix); `feed_mm_min` (n−1,), RAPID (NaN)
     for a rapid. The tool comes down from safe z to the first vertex at the plunge feed of
@@ -72,8 +69,7 @@ class CutRun:
             raise ValueError("a vertex is not finite")
 
 
-@dataclass(frozen=True, eq=False)
-class Runs:
+class Runs(Struct, frozen=True, eq=False):
     """R runs in columns; each of them is made when it is asked for.
 
     Run i has the rows first[i] to first[i + 1] (R + 1,) of `vertices` (N, 4), and of `feed_mm_min`
@@ -146,8 +142,7 @@ NO_STARTS = np.empty(0, dtype=np.int64)
 NO_STARTS.flags.writeable = False
 
 
-@dataclass(frozen=True, eq=False)
-class Contour:
+class Contour(Struct, frozen=True, eq=False):
     """One path of the tool centre, to be cut at all levels of its setting.
 
     `path` runs as it is to be cut unless `reversible`. `starts`: the vertices of a closed path at
@@ -167,8 +162,7 @@ class Contour:
     outline: Polyline | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Contours:
+class Contours(Struct, frozen=True, eq=False):
     """M contours in columns, each of which is made when it is asked for: their paths, the `lines`,
     and of each what a Contour has; `source` (M,), `reversible` (M,)."""
 
@@ -262,8 +256,7 @@ class Contours:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class Fixed:
+class Fixed(Struct, frozen=True, eq=False):
     """Runs that are cut one after the other as they are: a pocket, a hole, a carved letter.
 
     `outline`: a closed path around it, when there is one, for the nesting.
@@ -280,16 +273,14 @@ Item = Contour | Fixed
 Items = Contours | Sequence[Item]
 
 
-@dataclass(frozen=True, eq=False)
-class Work:
+class Work(Struct, frozen=True, eq=False):
     """What an operation made of its paths, and its findings."""
 
     items: Items
     findings: tuple[Finding, ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
-class Chosen:
+class Chosen(Struct, frozen=True, eq=False):
     """The paths that an operation takes, in the work frame: `lines`; `source` (M,), the index of
     each in the placed drawing; `names` for people; `points` (K, 2) mm, the marks of its layers,
     with their `point_names`. `rim` (M,): whether a closed path is the rim of a part, what lies
@@ -304,8 +295,7 @@ class Chosen:
     file: str | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Bridge:
+class Bridge(Struct, frozen=True, eq=False):
     """What a tab leaves: `centre` (2,), `ahead` (2,) the direction of its contour there, half its
     width, half the width of the slot that it spans, mm; its top; `fall` as of its tab; the name of
     its contour."""
@@ -319,8 +309,7 @@ class Bridge:
     name: str
 
 
-@dataclass(frozen=True, eq=False)
-class Step:
+class Step(Struct, frozen=True, eq=False):
     """What became of one operation: its setting, what it took, its items, the runs in order of
     cutting with the item that each is of, `owner` (R,), how far rapids go in XY: as drawn, and as
     ordered, mm; and the bridges that its tabs leave."""

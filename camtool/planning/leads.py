@@ -15,9 +15,9 @@ its midpoint shows which. A lead that does not fit is halved, and at last left o
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats
 from camtool.findings import LEAD_LEFT_OUT, LEAD_LEFT_OUT_IN_PART, Finding
@@ -38,8 +38,7 @@ LEAD_HALVINGS = 4
 """A lead that does not fit is halved this many times before it is left out."""
 
 
-@dataclass(frozen=True, eq=False)
-class KeepOut:
+class KeepOut(Struct, frozen=True, eq=False):
     """The closed `lines` that leads must leave alone; the operation leaves its allowance on those
     that are its `own` (M,)."""
 
@@ -47,8 +46,7 @@ class KeepOut:
     own: Bools
 
 
-@dataclass(frozen=True, eq=False)
-class Border:
+class Border(Struct, frozen=True, eq=False):
     """What leads must keep to: `line`, the contour, with the tool free on its left or right
     (`free_left`; None: nowhere); and `keep_out`, with the distance `reach_mm` to stay away, and
     besides `allowance_mm` from what is the operation's own, which may be below 0."""
@@ -103,8 +101,7 @@ class Border:
         return bool(((left if self.free_left else -left) >= -LEAD_SLACK_MM).all())
 
 
-@dataclass(frozen=True, eq=False)
-class Leads:
+class Leads(Struct, frozen=True, eq=False):
     """The lead-in and lead-out of a contour, (k, 3) x, y, bulge, k = 0 or 2, both with the place
     at the contour; and what did not fit."""
 

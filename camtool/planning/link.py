@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Floats
 from camtool.machine.model import Machine, Spindle
@@ -148,8 +148,7 @@ def _cool(builder: ToolpathBuilder, now: str, wanted: str) -> str:
     return wanted
 
 
-@dataclass(frozen=True, eq=False)
-class _Lot:
+class _Lot(Struct, frozen=True, eq=False):
     """Some of the runs, from run `first` on; whether the first of them was `begun` in the lot
     before; whether the last one `goes_on` in the next, from the vertex with which this one ends.
     """

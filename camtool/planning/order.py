@@ -11,10 +11,10 @@ within it has been cut). The same input always gives the same order.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import OptionError
@@ -56,8 +56,7 @@ SPECK_MM = 1e-4
 enough to be a line, far shorter than any tool is wide."""
 
 
-@dataclass(frozen=True, eq=False)
-class Choices:
+class Choices(Struct, frozen=True, eq=False):
     """The variants in which M items may be cut, one row each: `owner` (S,), the item, ascending
     from 0, none left out; `entry`, `exit` (S, 2) mm, where the tool goes down and where it comes
     up. The first row of an item is as it is drawn. ValueError for other arrays."""

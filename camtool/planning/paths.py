@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.distance import nearest
@@ -203,8 +203,7 @@ def flat(vertices: Floats) -> Polyline | None:
     return Polyline(np.array(kept)) if len(kept) > 1 else None
 
 
-@dataclass(frozen=True, eq=False)
-class Cuts:
+class Cuts(Struct, frozen=True, eq=False):
     """C lines and arcs to cut, in order: the `run` (C,) of each; where it ends, `end` (C, 3) mm;
     of arcs the `centre` (C, 2) mm, NaN for lines, and the direction `ccw` (C,); the `feed` (C,)
     in mm/min, NaN for a rapid."""

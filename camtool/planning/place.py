@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
+from msgspec import Struct, structs
 
 from camtool.arrays import Floats, Ints
 from camtool.errors import GeometryError, OptionError
@@ -35,8 +36,7 @@ SCALE_SHARE = 1e-3
 """A drawing counts as read for a scale that differs by no more than this share of it."""
 
 
-@dataclass(frozen=True, eq=False)
-class Map:
+class Map(Struct, frozen=True, eq=False):
     """p ↦ `matrix` p + `shift`: (2, 2) and (2,), mm; lengths grow `scale` times."""
 
     matrix: Floats
@@ -60,7 +60,7 @@ class Map:
 
     def moved(self, shift: Floats) -> Map:
         """The same, and then moved by `shift` (2,) mm."""
-        return replace(self, shift=self.shift + shift)
+        return structs.replace(self, shift=self.shift + shift)
 
 
 def place(drawing: Drawing, job: Job) -> Drawing:
@@ -297,7 +297,7 @@ def _repeated(drawing: Drawing, maps: list[Map]) -> Drawing:
         sources=tuple(_copy_name(drawing.sources[each], n) for n, each in which),
         line_types=tuple(drawing.line_types[each] for _, each in which),
         marks=tuple(
-            replace(mark, at_mm=where.point(mark.at_mm), source=_copy_name(mark.source, n))
+            structs.replace(mark, at_mm=where.point(mark.at_mm), source=_copy_name(mark.source, n))
             for n, where in enumerate(maps)
             for mark in drawing.marks
         ),
@@ -366,7 +366,7 @@ def _copy_name(source: str, copy: int) -> str:
 
 def _gaps(gaps: tuple[Gap, ...], maps: list[Map]) -> tuple[Gap, ...]:
     return tuple(
-        replace(gap, at_mm=where.point(gap.at_mm), size_mm=gap.size_mm * where.scale)
+        structs.replace(gap, at_mm=where.point(gap.at_mm), size_mm=gap.size_mm * where.scale)
         for where in maps
         for gap in gaps
     )
@@ -377,15 +377,15 @@ def _healing(drawing: Drawing, maps: list[Map], rows: Ints) -> Healing:
     reading stays as it was."""
     healing, paths = drawing.healing, len(drawing.paths)
     now = {row: index for index, row in enumerate(rows.tolist())}
-    return replace(
+    return structs.replace(
         healing,
         branches=tuple(
-            replace(branch, at_mm=where.point(branch.at_mm))
+            structs.replace(branch, at_mm=where.point(branch.at_mm))
             for where in maps
             for branch in healing.branches
         ),
         crossings=tuple(
-            replace(each, at_mm=where.point(each.at_mm), path=now[each.path + n * paths])
+            structs.replace(each, at_mm=where.point(each.at_mm), path=now[each.path + n * paths])
             for n, where in enumerate(maps)
             for each in healing.crossings
             if each.path + n * paths in now

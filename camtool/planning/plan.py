@@ -10,12 +10,13 @@ Operations follow each other as the job lists them; each is put into order on it
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import chain
 from pathlib import PurePath
 
 import numpy as np
+from msgspec import Struct, structs
 
 from camtool.errors import OptionError
 from camtool.findings import (
@@ -64,8 +65,7 @@ MOST_OVERLAPS = 20
 """A contour may overlap its own start by at most this many times its length: once is enough."""
 
 
-@dataclass(frozen=True, eq=False)
-class Plan:
+class Plan(Struct, frozen=True, eq=False):
     """Every stage of a plan: the job, the drawing in the work frame, the operations, the
     toolpath."""
 
@@ -135,7 +135,7 @@ def _linked(
         tabs_mm=_tabs(steps),
         drawn=drawn_of(toolpath, builder.runs, steps, placed),
     )
-    return replace(plan, toolpath=toolpath)
+    return structs.replace(plan, toolpath=toolpath)
 
 
 def _tabs(steps: Sequence[Step]) -> tuple[tuple[float, float], ...]:
@@ -174,7 +174,7 @@ def parted(
     for turn in turns:
         steps = tuple(plan.steps[index] for index in turn)
         job = replace(plan.job, operations=tuple(step.operation for step in steps))
-        part = replace(plan, job=job, steps=steps)
+        part = structs.replace(plan, job=job, steps=steps)
         parts.append(_linked(part, drawing, plan.job, machine, undivided=undivided))
     return tuple(parts)
 
@@ -292,7 +292,7 @@ def _sparing(steps: list[Step]) -> list[Step]:
     for step in steps:
         kept = raised_over_bridges(step.runs, step.operation, step.setting.feeds, bridges)
         findings = (*step.findings, *of_stage(step.operation, kept.findings))
-        made.append(replace(step, runs=kept.runs, findings=findings))
+        made.append(structs.replace(step, runs=kept.runs, findings=findings))
     return made
 
 
@@ -301,7 +301,9 @@ def _rested(steps: list[Step]) -> list[Step]:
     left = [step.operation.rest for step in steps if step.operation.rest_of is not None]
     codes = (Code.UNREACHED, Code.DEPTH_LIMITED)
     return [
-        replace(step, findings=tuple(each for each in step.findings if each.code not in codes))
+        structs.replace(
+            step, findings=tuple(each for each in step.findings if each.code not in codes)
+        )
         if step.operation.name and step.operation.name in left
         else step
         for step in steps
@@ -349,7 +351,7 @@ def _with_starts(contours: Contours) -> Contours:
     for contour in contours:
         operation = contour.setting.operation
         path, starts = with_starts(contour.path, operation.start, operation.away_mm)
-        made.append(replace(contour, path=path, starts=starts))
+        made.append(structs.replace(contour, path=path, starts=starts))
     return Contours.of(made)
 
 
@@ -363,7 +365,7 @@ def _begun_between_tabs(contours: Contours) -> Contours:
         tabs = contour.setting.operation.tabs
         if tabs and tabs.at_mm and contour.path.closed and not len(contour.starts):
             path, starts = with_starts(contour.path, between(contour.path, tabs.at_mm), 0.0)
-            contour = replace(contour, path=path, starts=starts)
+            contour = structs.replace(contour, path=path, starts=starts)
         made.append(contour)
     return Contours.of(made)
 

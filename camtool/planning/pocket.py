@@ -17,10 +17,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Floats
 from camtool.errors import OptionError
@@ -86,8 +86,7 @@ Link = Callable[[Floats, Floats], Floats | None]
 """From a place (2,) to another: (k, 3) over the floor, or None when there is no link."""
 
 
-@dataclass(frozen=True, eq=False)
-class Pocket:
+class Pocket(Struct, frozen=True, eq=False):
     """One region to be cleared, on the left of its closed paths, work frame; the name of its
     outer path and the index of that in the placed drawing."""
 
@@ -96,8 +95,7 @@ class Pocket:
     source: int
 
 
-@dataclass(frozen=True, eq=False)
-class Cleared:
+class Cleared(Struct, frozen=True, eq=False):
     """The runs that clear a region, in order; and what did not fit of their entries, with the
     first run for which that is so."""
 
@@ -319,8 +317,7 @@ def _slot(each: Pocket, slot: Floats, operation: Operation) -> Finding:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class Down:
+class Down(Struct, frozen=True, eq=False):
     """How the tool goes down: the centre (2,) and radius of a helix; or a ramp; or neither (a
     plunge). `changed` says what did not fit, "" when all does."""
 

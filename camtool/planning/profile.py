@@ -10,10 +10,11 @@ and `inside` take each closed path on its own. Open paths have no inside: the to
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
+from msgspec import Struct, field
+from msgspec.structs import replace
 
 from camtool.arrays import Ints
 from camtool.findings import (
@@ -55,8 +56,7 @@ SLOT_TOLERANCE_MM = 5e-4
 """A slot or hole narrower than the tool by this much or less counts as wide as the tool."""
 
 
-@dataclass(frozen=True, eq=False)
-class _Line:
+class _Line(Struct, frozen=True, eq=False):
     """A path of the tool centre; what is to stay lies to its left, or (False) to its right;
     `of`: the chosen paths that it belongs to, the one it mostly follows first."""
 
@@ -67,8 +67,7 @@ class _Line:
     """The line without its reliefs, when it has any."""
 
 
-@dataclass(eq=False)
-class _Found:
+class _Found(Struct, eq=False):
     """What comes together while the paths of an operation are gone through."""
 
     lines: list[_Line] = field(default_factory=list)

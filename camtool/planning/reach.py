@@ -13,9 +13,9 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.findings import (
@@ -61,8 +61,7 @@ CORNER_SHARE = 0.25
 together: that of a corner of 55 degrees is as large."""
 
 
-@dataclass(frozen=True, eq=False)
-class Unreached:
+class Unreached(Struct, frozen=True, eq=False):
     """A piece that the tool cannot touch: `area_mm2`; `at_mm` (x, y), its vertex farthest from
     what is reached; and its `outline`, the outer path CCW and any holes CW."""
 
@@ -146,8 +145,7 @@ def _apart(lines: Polylines, other: Polylines, least_mm2: float) -> list[Polylin
     return found
 
 
-@dataclass(frozen=True, eq=False)
-class _Parts:
+class _Parts(Struct, frozen=True, eq=False):
     """The parts of a closed path in order: how long and how far from others each is (K,), mm, and
     which of them are wanted."""
 

@@ -16,9 +16,9 @@ A corner that is rounded in the drawing, by however small an arc, is not sharp.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Floats
 from camtool.geometry.distance import paired_distances, points_to_segments
@@ -39,8 +39,7 @@ RELIEF_SLACK_MM = 1e-4
 """A relief may come nearer to other wanted lines than it should by this much."""
 
 
-@dataclass(frozen=True, eq=False)
-class Relieved:
+class Relieved(Struct, frozen=True, eq=False):
     """The path with its reliefs; `left` (K, 2) mm, the corners that got none because the tool
     would have cut into other wanted lines."""
 

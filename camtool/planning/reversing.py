@@ -19,12 +19,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain, pairwise
 
 import msgspec
 import numpy as np
+from msgspec import Struct, field
+from msgspec.structs import replace
 
 from camtool.arrays import Floats, Ints
 from camtool.findings import (
@@ -58,8 +59,7 @@ REVERSAL_STEPS = 0.5
 controllers that follow paths."""
 
 
-@dataclass
-class _Sums:
+class _Sums(Struct):
     """Sums over all contours: runs, reversals while cutting, the greatest predicted error."""
 
     runs: int = 0
@@ -73,8 +73,7 @@ class _Sums:
         self.error_mm = max(self.error_mm, error_mm)
 
 
-@dataclass
-class _Counts:
+class _Counts(Struct):
     """What changes; `whole`: why contours stayed in one piece, with the names of those."""
 
     before: _Sums = field(default_factory=_Sums)
@@ -229,8 +228,7 @@ def _no_backlash(machine: Machine) -> Finding:
     return PLAY_NOT_KNOWN_TO_SAVE(where="axes x, y", machine=machine.target.name)
 
 
-@dataclass(frozen=True)
-class Piece:
+class Piece(Struct, frozen=True):
     """From place `first` to place `last` of the parts (beyond their number on a closed path), cut
     from its end to its start when `backward`; its greatest predicted error, mm; how far off it is
     for the axes driven in their worse direction, mm; its parts' errors times lengths, mm²."""
@@ -243,8 +241,7 @@ class Piece:
     weight_mm2: float
 
 
-@dataclass(frozen=True, eq=False)
-class Division:
+class Division(Struct, frozen=True, eq=False):
     """A path to be divided into runs in which no axis reverses, each in the direction that errs
     less: its parts, the reversals of both axes along them, the residual errors of both axes;
     `either_direction`: pieces may be cut backward.
@@ -415,8 +412,7 @@ def _places(division: Division, begin: int, end: int) -> list[int]:
     return sorted(place for place in found if begin <= place <= end)
 
 
-@dataclass(frozen=True, eq=False)
-class Parts:
+class Parts(Struct, frozen=True, eq=False, dict=True):
     """A path as A parts in its order, each a line, or an arc within one quadrant: arcs are split
     where their tangent lies along an axis. Part i goes from place i to place i + 1 of `places`
     (A+1, 2) mm (the last is the first when closed), and is the share `begin` to `end` (A,) of the
@@ -497,8 +493,7 @@ def parts_of(path: Polyline) -> Parts:
     return Parts(path, row, begin, end, np.concatenate([places, path.end[None, :]]))
 
 
-@dataclass(frozen=True, eq=False)
-class AxisReversals:
+class AxisReversals(Struct, frozen=True, eq=False):
     """Reversals of one axis along A parts.
 
     The positions of the axis are a list of values, and it reverses at its highest and lowest ones.
@@ -678,8 +673,7 @@ def least_reversal_mm(axis: Axis) -> float:
     return REVERSAL_STEPS * axis.coded_step_mm
 
 
-@dataclass(frozen=True)
-class Residual:
+class Residual(Struct, frozen=True):
     """What backlash and its compensation leave over on one axis: the error of its slide in mm when
     driven towards − and towards +; `matters`: there is backlash or compensation; `better`: the
     direction ±1 of the smaller error (where both are alike, the one in which the axis is engaged

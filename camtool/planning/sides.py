@@ -20,10 +20,10 @@ Not every contour bounds material, though. These do not count:
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from msgspec import Struct, field
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import OptionError
@@ -49,8 +49,7 @@ CONTINUOUS = ("", "continuous", "bylayer", "byblock")
 """Line types of edges that are seen."""
 
 
-@dataclass(frozen=True, eq=False)
-class Seen:
+class Seen(Struct, frozen=True, eq=False):
     """The sides of all contours (of `Sides.lines`) as one operation sees them.
 
     `rim` (M,): what is within it is part, and stays. `holder` (M,): the smallest contour that
@@ -66,8 +65,7 @@ class Seen:
     bounds: Bools
 
 
-@dataclass(eq=False)
-class Sides:
+class Sides(Struct, eq=False, dict=True):
     """The M contours of a placed drawing, those that were not chosen after those that were, and
     their sides. `names`: layer and source of each. `takes` (K, M): what each of the `operations`
     takes of them; `cuts` (K, M): the same, but of a bore the circles alone. (M,) each: `worked`,

@@ -22,10 +22,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+from msgspec import Struct, structs
 
 from camtool.arrays import Bools, Floats
 from camtool.errors import OptionError
@@ -93,8 +94,7 @@ BRIDGE_SLACK_MM = 1e-4
 """A bridge may be cut into by this much, by rounding, where its own contour goes up and down."""
 
 
-@dataclass(frozen=True)
-class Tab:
+class Tab(Struct, frozen=True):
     """A bridge: over the lengths `begin` to `end` the tool is at `top_mm` or higher, and to both
     sides the height falls by `fall` mm per mm (infinite: straight down)."""
 
@@ -147,9 +147,9 @@ def with_tabs(contours: Contours) -> tuple[Contours, list[Finding]]:
         kinds=", ".join(f"{count} {kind}" for count, kind in kinds if count),
     )
     setting = contours.settings[0]
-    without = replace(setting, operation=replace(setting.operation, tabs=None))
+    without = structs.replace(setting, operation=replace(setting.operation, tabs=None))
     settings = tuple(setting if k in tabbed else without for k in range(len(asked)))
-    return replace(contours, settings=settings), [finding]
+    return structs.replace(contours, settings=settings), [finding]
 
 
 def _by_hand(contours: Contours) -> Contours:
@@ -178,8 +178,8 @@ def _by_hand(contours: Contours) -> Contours:
     settings = []
     for row in range(len(contours)):
         mine = replace(tabs, at_mm=tuple(places[row])) if row in places else None
-        settings.append(replace(setting, operation=replace(operation, tabs=mine)))
-    return replace(contours, settings=tuple(settings))
+        settings.append(structs.replace(setting, operation=replace(operation, tabs=mine)))
+    return structs.replace(contours, settings=tuple(settings))
 
 
 def between(path: Polyline, places: Sequence[tuple[float, float]]) -> tuple[float, float]:
@@ -347,8 +347,7 @@ def _wanted(total_mm: float, operation: Operation) -> int:
     return tabs.count
 
 
-@dataclass(frozen=True, eq=False)
-class _Corners:
+class _Corners(Struct, frozen=True, eq=False):
     """Where a path is a corner, (C, 2) mm each, from and to: `vertices` where it turns at all,
     those where it turns `sharply`, and `arcs` on which it goes round corners of the drawing."""
 
@@ -357,8 +356,7 @@ class _Corners:
     arcs: Floats
 
 
-@dataclass(frozen=True, eq=False)
-class _Fitting:
+class _Fitting(Struct, frozen=True, eq=False):
     """What decides where tabs like the `model`, with slopes of `foot_mm`, fit on a path; half the
     width of the bridge under them, mm."""
 
@@ -522,8 +520,7 @@ def bridges_of(along: MeasuredPath, tabs: Sequence[Tab], tool: Tool, name: str) 
     return found
 
 
-@dataclass(frozen=True, eq=False)
-class RaisedRuns:
+class RaisedRuns(Struct, frozen=True, eq=False):
     """The runs of an operation, raised where they would have cut bridges, and the
     findings of that."""
 
@@ -613,7 +610,7 @@ def _raised(
     if not tabs:
         return run
     (made,) = lifted(along.paths, [along.index], [raised(points, tabs, None)])
-    return replace(run, vertices=made, feed_mm_min=feeds_along(made, feeds))
+    return structs.replace(run, vertices=made, feed_mm_min=feeds_along(made, feeds))
 
 
 def _drilled(run: CutRun, bridge: Bridge, tool: Tool, found: _Found) -> None:

@@ -16,11 +16,11 @@ import json
 import os
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import msgspec
+from msgspec import Struct
 
 from camtool.errors import InputError, OutputError
 
@@ -31,8 +31,7 @@ SYNC_S = 1.0
 """What it says is brought to the disk itself once in so many seconds, and at the end."""
 
 
-@dataclass(frozen=True)
-class Place:
+class Place(Struct, frozen=True):
     """Where a journal stands: the digest of the program, that of the machine, the target, the
     first block that is not done for certain (from 0), and whether the program is finished."""
 

@@ -13,9 +13,10 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
+
+from msgspec import Struct
 
 from camtool.errors import InputError
 from camtool.lock import held
@@ -32,8 +33,7 @@ AT_ONCE: Final = 4096
 _FRAMES: Final = ("8N1", "7N1", "8E1", "7E1", "8O1", "7O1", "8N2", "7E2")
 
 
-@dataclass(frozen=True)
-class Port:
+class Port(Struct, frozen=True):
     """Which port, and how: `baud` None is for those that have no rate."""
 
     name: str
@@ -139,8 +139,7 @@ def _words(error: Exception) -> str:
     return str(strerror or error)
 
 
-@dataclass(frozen=True)
-class FoundPort:
+class FoundPort(Struct, frozen=True):
     """A serial port of this computer: its name, what it says it is, and its hardware id."""
 
     name: str

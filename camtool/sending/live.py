@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import html
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.target.wire import Place
@@ -54,8 +54,7 @@ path{{fill:none;vector-effect:non-scaling-stroke}}.way{{stroke:#bbb;stroke-width
 """
 
 
-@dataclass(frozen=True, eq=False)
-class _Drawn:
+class _Drawn(Struct, frozen=True, eq=False):
     """A path from above as pieces of SVG, each with the block that it belongs to (K,)."""
 
     pieces: list[str]

@@ -10,11 +10,12 @@ import hashlib
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import MachineError, OptionError, PostError, ProgramError
@@ -40,8 +41,7 @@ HEAD = 4096
 """It stands within so many bytes of their beginning."""
 
 
-@dataclass(frozen=True, eq=False)
-class Rest:
+class Rest(Struct, frozen=True, eq=False):
     """A program from its block `first` on: `data`, whose first `entry` blocks bring the machine
     there; `done` (B,): the last block of the program that is done with each of its blocks, −1
     within the entry."""
@@ -52,8 +52,7 @@ class Rest:
     done: Ints
 
 
-@dataclass(frozen=True, eq=False)
-class Consignment:
+class Consignment(Struct, frozen=True, eq=False):
     """A program ready to be sent. `run`: the program as verified; `rest`: what is sent where that
     is not the whole program; `forecast` is of what is sent."""
 

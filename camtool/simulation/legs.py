@@ -9,9 +9,9 @@ Memory grows with the legs that are given at a time, not with their steps.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Floats, Ints
 from camtool.kernels.motion import legs_fill
@@ -22,8 +22,7 @@ from camtool.simulation.rows import refuse
 from camtool.toolpath.moves import Kind, Toolpath
 
 
-@dataclass(frozen=True, eq=False)
-class Legs:
+class Legs(Struct, frozen=True, eq=False):
     """L legs, each of which starts where the one before ends: `row` (L,) of the toolpath,
     ascending; `steps` (L, 3) of the axes, with sign, none of them all 0; `seconds` (L,)."""
 
@@ -32,8 +31,7 @@ class Legs:
     seconds: Floats
 
 
-@dataclass(frozen=True, eq=False)
-class Standing:
+class Standing(Struct, frozen=True, eq=False):
     """What applies to all R rows up to the end of the program: `start` (3,) steps; `waits` (R,) s
     of rows without motion; `compensation_s`, the time of each step added at a reversal."""
 

@@ -15,9 +15,9 @@ a has a longer diagonal towards (+, +): the squares of its diagonals differ by 4
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Floats, Ints
 from camtool.kernels.lattice import to_steps
@@ -29,8 +29,7 @@ REVERSAL_STEPS = 0.5
 """An axis has reversed when it has moved back by this part of a coded step."""
 
 
-@dataclass(frozen=True)
-class _Varied:
+class _Varied(Struct, frozen=True):
     """Further arguments of `play_varied_fill`: the backlash (3,) mm of the axes, and the cells
     that replace it; the position of machine zero (3,) mm; the shares of the backlash on either
     side; the scatter (3,) mm and its seed."""

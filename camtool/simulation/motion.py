@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 
 
-@dataclass(frozen=True, eq=False)
-class Ledger:
+class Ledger(Struct, frozen=True, eq=False):
     """Time, steps and reversals of R rows of the toolpath in one chunk. A row may be in the
     ledgers of several chunks: their values add up.
 
@@ -45,8 +45,7 @@ def still_ledger(rows: Ints) -> Ledger:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class Chunk:
+class Chunk(Struct, frozen=True, eq=False):
     """K samples in order, of one row of the toolpath or of several.
 
     `row` (K,) ascending. `commanded` (K, 3) mm: the position that the controller assumes after

@@ -10,11 +10,11 @@ all axes are samples, so extents and reversals are exact.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.kernels.lattice import to_steps
@@ -53,8 +53,7 @@ class Samples(Protocol):
         window."""
 
 
-@dataclass(frozen=True, eq=False)
-class SampledRows:
+class SampledRows(Struct, frozen=True, eq=False):
     """The rows low:high of a program, with the time of each, `seconds` (high − low,). `samples`
     are of the rows from `base` on, which may be more; where it `iterates`, each of them is a pass
     of the interpolator."""
@@ -134,8 +133,7 @@ def _lengths(part: Toolpath) -> Floats:
     return np.asarray(length)
 
 
-@dataclass(frozen=True, eq=False)
-class _Pieces:
+class _Pieces(Struct, frozen=True, eq=False, dict=True):
     """Pieces of rows: from `begin` (P,) to `end` (P,), as shares of the length of `row` (P,)."""
 
     row: Ints

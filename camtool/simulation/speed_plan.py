@@ -10,17 +10,15 @@ speed v1:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Floats
 from camtool.errors import MachineError
 from camtool.machine.model import Machine
 
 
-@dataclass(frozen=True)
-class Approach:
+class Approach(Struct, frozen=True):
     """What the blocks before those of a plan leave to it: the highest speed in the last of them,
     and the square of the speed, (mm/s)², that they allow behind it; 0 and 0 before the first."""
 
@@ -31,8 +29,7 @@ class Approach:
 FROM_REST = Approach()
 
 
-@dataclass(frozen=True, eq=False)
-class SpeedPlan:
+class SpeedPlan(Struct, frozen=True, eq=False):
     """N blocks in order: `length_mm`, `speed_mm_s` (the highest in each), `acceleration_mm_s2`,
     and `corner_mm_s`, the highest speed at the start of each, 0 where it starts from rest; each
     (N,), all above 0 except the corners. `before`: what came before them."""

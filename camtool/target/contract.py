@@ -13,10 +13,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import msgspec
+from msgspec import Struct
 
 from camtool.errors import MachineError
 from camtool.findings import TargetCode
@@ -40,8 +40,7 @@ class NoChoices(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The choices of a twin whose wire is known completely."""
 
 
-@dataclass(frozen=True)
-class Setting:
+class Setting(Struct, frozen=True):
     """A value of a machine file that a controller's own settings say: its key, such as
     "axes.x.travel_mm", what says it, such as "$130", and where that stands."""
 

@@ -18,10 +18,11 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Final
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from camtool.arrays import Floats, Ints
 from camtool.machine.model import Machine
@@ -33,8 +34,7 @@ COMMANDED: Final = Options(effects=Effects(False, False, False, False, False))
 which outlive a block."""
 
 
-@dataclass(frozen=True, eq=False)
-class Trace:
+class Trace(Struct, frozen=True, eq=False):
     """What the slides did, K outputs in order: `time_s` (K,), the index (K,) in `Twin.decoded` of
     the block that asked for it (−1: a command), the position (K, 3) mm that the controller
     commanded and that of the slides (K, 3) mm, both in the work frame of when the power came
@@ -49,8 +49,7 @@ class Trace:
         return len(self.time_s)
 
 
-@dataclass(frozen=True, eq=False)
-class Travel:
+class Travel(Struct, frozen=True, eq=False):
     """Outputs to come, K positions (K, 3) mm in order: `seconds` (K,), ascending, from its
     begin until each; `added_s` (K,), what one step of compensation in front of it would take;
     `total_s` with what is waited behind the last; `left_at` (3,): where the controller then takes

@@ -22,9 +22,10 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from enum import Enum
 from typing import TYPE_CHECKING, Any, ClassVar
+
+from msgspec import Struct
 
 from camtool.errors import MachineError
 from camtool.machine.model import Machine
@@ -37,8 +38,7 @@ if TYPE_CHECKING:
 Place = tuple[float, float, float]
 
 
-@dataclass(frozen=True, eq=False)
-class Forecast:
+class Forecast(Struct, frozen=True, eq=False):
     """What the simulation says of the B blocks of a program: `decoded`, the moves; `seconds` (B,)
     of each with its compensation, `compensation_s` (B,) the part of it for compensation; `outputs`
     (B,) of steps, each of one axis or several, `steps` (B, 3) of the axes, `reversals` (B, 3) of
@@ -56,8 +56,7 @@ class Forecast:
         return len(self.seconds)
 
 
-@dataclass(frozen=True)
-class Packet:
+class Packet(Struct, frozen=True):
     """What goes out in one piece and is acknowledged as one.
 
     `block`: the last block of the program that is done when it is done, −1 before the first;
@@ -94,20 +93,17 @@ ENDS = frozenset({State.FINISHED, State.STOPPED, State.FAILED})
 HALTS = frozenset({State.WAITING, State.PAUSED})
 
 
-@dataclass(frozen=True)
-class Write:
+class Write(Struct, frozen=True):
     """Bytes to be written now."""
 
     data: bytes
 
 
-@dataclass(frozen=True)
-class Reopen:
+class Reopen(Struct, frozen=True):
     """The port is to be closed and opened again, since the controller begins anew."""
 
 
-@dataclass(frozen=True)
-class Tell:
+class Tell(Struct, frozen=True):
     """A sentence for the user, such as what the controller says."""
 
     text: str
@@ -126,8 +122,7 @@ PATIENCE = 60
 does not answer."""
 
 
-@dataclass(frozen=True)
-class Manner:
+class Manner(Struct, frozen=True):
     """How a conversation is held. `single`: it waits for `resume` after every packet; `home`: the
     machine is homed first; `late_s`: how late the line may be, s; `checked`: settings of the
     controller are compared with the machine file; `paced`: each byte takes the time that the rate
@@ -366,8 +361,7 @@ class Wire(ABC):
         return Terminal()
 
 
-@dataclass(frozen=True)
-class NoWire:
+class NoWire(Struct, frozen=True):
     """A machine to which camtool sends nothing: `why`, and what does instead, `mend`."""
 
     why: str = "the protocol of its line is not among those that can be sent"

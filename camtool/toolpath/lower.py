@@ -18,9 +18,10 @@ at two radii are spirals (`PolarArcs`).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
+from msgspec import Struct, structs
 
 from camtool.arrays import Bools, Codes, Floats, Ints
 from camtool.errors import OptionError, PostError
@@ -41,8 +42,7 @@ MAX_PARTS = 10_000_000
 """A toolpath that would become more rows than this is refused: its tolerance is far too fine."""
 
 
-@dataclass(frozen=True, eq=False)
-class Lowered:
+class Lowered(Struct, frozen=True, eq=False):
     """A toolpath of M rows and `row` (M,), the row of the given toolpath that each came from;
     `row` ascends, and every given row has at least one."""
 
@@ -51,7 +51,7 @@ class Lowered:
 
     def after(self, earlier: Lowered) -> Lowered:
         """The same with rows numbered as in what `earlier` was made of; this was made of it."""
-        return replace(self, row=earlier.row[self.row])
+        return structs.replace(self, row=earlier.row[self.row])
 
 
 def xy_then_z(toolpath: Toolpath) -> Lowered:
@@ -138,8 +138,7 @@ def arcs_within(toolpath: Toolpath, max_sweep_rad: float) -> Lowered:
     return _split(toolpath, arms, _of_rows(toolpath, arms, np.ceil(excess / max_sweep_rad)))
 
 
-@dataclass(frozen=True, eq=False)
-class _Parts:
+class _Parts(Struct, frozen=True, eq=False):
     """Into how many equal parts each row (N,) is cut; `mend` for when they are too many."""
 
     count: Floats

@@ -15,6 +15,7 @@ from enum import IntEnum
 from typing import Any, Literal, TypeVar, cast
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Codes, Floats, Indices, Ints
 from camtool.errors import PostError
@@ -64,8 +65,7 @@ class Kind(IntEnum):
 Corners = Literal["blend", "exact-path", "exact-stop"]
 
 
-@dataclass(frozen=True)
-class PathMode:
+class PathMode(Struct, frozen=True):
     """How a program asks for corners to be met.
 
     "blend": rounded within `tolerance_mm` (0: as far as the moves allow), lines in a row taken for
@@ -78,8 +78,7 @@ class PathMode:
     merging_mm: float = 0.0
 
 
-@dataclass(frozen=True)
-class Move:
+class Move(Struct, frozen=True):
     """One row, for people: `end` and `start` (x, y, z) mm, `centre` (x, y) mm or None for rows
     that are no arcs, `feed` mm/min or None, `value` the event's argument or None."""
 
@@ -314,8 +313,7 @@ def _or_none(number: np.float64) -> float | None:
     return None if np.isnan(number) else float(number)
 
 
-@dataclass(frozen=True, eq=False)
-class Compensated:
+class Compensated(Struct, frozen=True, eq=False):
     """A toolpath compensated beforehand, so that the slides come out on the wanted one: `toolpath`
     is what the controller is sent, `row` (N,) the row of the wanted toolpath for each of its
     rows."""

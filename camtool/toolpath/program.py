@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Indices, Ints
 from camtool.findings import Finding
@@ -44,8 +45,7 @@ class Program:
         )
 
 
-@dataclass(frozen=True)
-class Listing:
+class Listing(Struct, frozen=True):
     """A program for people: `blocks` (B,) are its lines, numbered as in `Toolpath.block`;
     `binary` where they are bytes in hex."""
 

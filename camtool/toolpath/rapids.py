@@ -15,11 +15,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.boxes import BoxIndex
@@ -42,8 +42,7 @@ CHORD_SHARE, ROUND_SHARE = 0.25, 0.125
 """Parts of the tolerance by which chords stray from arcs, and polygons from discs."""
 
 
-@dataclass(frozen=True, eq=False)
-class Reach:
+class Reach(Struct, frozen=True, eq=False):
     """Radii (N,) mm for each row: `cuts` of what a tool clears at the depth of its tip, `sweeps`
     of what it needs free; `solid` (xmin, ymin, xmax, ymax) mm where there is stock, None: all
     over."""
@@ -53,8 +52,7 @@ class Reach:
     solid: tuple[float, float, float, float] | None = None
 
 
-@dataclass(frozen=True)
-class Through:
+class Through(Struct, frozen=True):
     """A rapid through the stock: its row, its height there and about where, mm."""
 
     row: int

@@ -3,16 +3,15 @@ it must leave standing."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.polylines import Polylines
 
 
-@dataclass(frozen=True, eq=False)
-class Drawn:
+class Drawn(Struct, frozen=True, eq=False):
     """What was drawn, as far as the N rows of a planned toolpath stand for it.
 
     `off_mm` (N, 2): the largest and the rms distance, mm, between the lines that a row was planned
@@ -42,8 +41,7 @@ TOOL_SHAPES = {
 """What people call the shapes of tools that jobs know; any other is called as it is."""
 
 
-@dataclass(frozen=True)
-class ToolNote:
+class ToolNote(Struct, frozen=True):
     """A tool as a program names it: its shape as in jobs ("flat", "v", "drill", ...), its diameter
     (0: no width) and the full angle of its tip, None where it has none."""
 
@@ -54,8 +52,7 @@ class ToolNote:
     tip_angle_rad: float | None = None
 
 
-@dataclass(frozen=True)
-class OperationNote:
+class OperationNote(Struct, frozen=True):
     """What a program says of an operation. `spindle_rpm`: None without a speed; `passes`: None for
     kinds of operation without passes; `peck_mm`: how deep a drill goes at a time."""
 
@@ -70,8 +67,7 @@ class OperationNote:
     peck_mm: float | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Operations:
+class Operations(Struct, frozen=True, eq=False):
     """The K operations that a planned toolpath is cut by, in order: the `notes` on them, and the
     row `begin` (K,) from which on each has its turn; rows before the first are its own too."""
 
@@ -89,8 +85,7 @@ class Operations:
         return replace(self, begin=np.searchsorted(row, self.begin))
 
 
-@dataclass(frozen=True, eq=False)
-class Kept:
+class Kept(Struct, frozen=True, eq=False):
     """Runs of one tool and the region that they must leave.
 
     `runs`: vertices (n, 4) each of x, y, z, bulge, mm. `lines`: M closed paths, outer ones before

@@ -9,10 +9,10 @@ Blocks that are no row of words (events, comments) are put between them afterwar
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from io import BytesIO
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Codes, Ints, Octets
 from camtool.kernels.words import MOST_NUMBER, put_words
@@ -21,8 +21,7 @@ ROWS_AT_ONCE = 1 << 14
 """So many blocks are written in one go, so that little room is needed."""
 
 
-@dataclass(frozen=True, eq=False)
-class Words:
+class Words(Struct, frozen=True, eq=False):
     """A word of M blocks: what stands before its number, the number in whole units of its last
     decimal (M,), and which blocks have it (M,).
 
@@ -45,8 +44,7 @@ class Words:
         return self.digits, self.decimals, kept, int(self.plus)
 
 
-@dataclass(frozen=True, eq=False)
-class Texts:
+class Texts(Struct, frozen=True, eq=False):
     """M lines of text, some of them empty and without a line end: line k is data[ends[k − 1]:
     ends[k]]."""
 

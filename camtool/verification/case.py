@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
+
+from msgspec import Struct
 
 from camtool.arrays import Indices
 from camtool.geometry.drawing import Drawing
@@ -68,8 +69,7 @@ def coverage_of(machine: Machine) -> float:
     return max(COVERAGE_MM, COVERAGE_STEPS * coarse, COVERAGE_RESOLUTIONS * unit)
 
 
-@dataclass(frozen=True)
-class VerifyOptions:
+class VerifyOptions(Struct, frozen=True):
     """How to judge, and what the report says of the program.
 
     `interpolator` None: that of the machine. `effects`: the parts of the mechanics that act.
@@ -96,8 +96,7 @@ class VerifyOptions:
     shape: bool = True
 
 
-@dataclass(frozen=True, eq=False)
-class Case:
+class Case(Struct, frozen=True, eq=False):
     """A program to judge. `compensated`: what the program should say where `wanted` is compensated
     against the mechanics. `asked`: what the job asks for besides, as the dialect would say it.
     `written_from`: the moves from which the program was written, where they are known: contours

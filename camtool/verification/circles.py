@@ -17,10 +17,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Floats, Ints
 from camtool.toolpath.moves import Kind, Toolpath
@@ -36,8 +36,7 @@ FEWEST_BINS = 3
 """A circle has three unknowns."""
 
 
-@dataclass(frozen=True)
-class Circle:
+class Circle(Struct, frozen=True):
     """A full circle of a toolpath: centre (x, y) mm, radius mm, direction, first and last row."""
 
     centre_mm: tuple[float, float]
@@ -48,8 +47,7 @@ class Circle:
     last_row: int
 
 
-@dataclass(frozen=True)
-class CircleFigures:
+class CircleFigures(Struct, frozen=True):
     """Figures of a circle, mm: NaN with fewer than three bins; G also where the slides do not go
     round the programmed centre, as with a backlash near the radius."""
 
@@ -209,8 +207,7 @@ SAME_SHARE = 1e-3
 circle, cut twice."""
 
 
-@dataclass(frozen=True)
-class Reversing:
+class Reversing(Struct, frozen=True):
     """The reversals of a circle, mm: `step` and `spike` at 0°, 90°, 180° and 270°; the reversal
     `value` B of X and Y. NaN with too few bins."""
 
@@ -219,8 +216,7 @@ class Reversing:
     value: tuple[float, float]
 
 
-@dataclass(frozen=True)
-class BothWays:
+class BothWays(Struct, frozen=True):
     """A circle that is cut in both directions, mm: bi-directional circular error G(b) and mean
     bi-directional radial error D."""
 

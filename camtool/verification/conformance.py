@@ -14,10 +14,10 @@ and coolant must be the same.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.findings import (
@@ -75,8 +75,7 @@ from camtool.verification.matching import nearest_at_height
 from camtool.verification.nearest import MoveIndex
 
 
-@dataclass(frozen=True, eq=False)
-class Conformance:
+class Conformance(Struct, frozen=True, eq=False):
     """The result: findings on where is cut (`place`) and on feeds, spindle and the like
     (`settings`); the number of cutting `moves`, how many of them are `alike` in `written`, and the
     largest distance `off_mm` of the others from what was asked (0 where there are none)."""
@@ -125,8 +124,7 @@ LIMIT_UNITS = 1.5
 and the centres of arcs as well."""
 
 
-@dataclass(frozen=True, eq=False)
-class Asked:
+class Asked(Struct, frozen=True, eq=False):
     """What a job asks of its program.
 
     `written`: the moves of the program that camtool would write, as its dialect decodes them;
@@ -151,8 +149,7 @@ class Asked:
         return LIMIT_UNITS * self.unit_mm, LIMIT_UNITS * self.unit_z_mm
 
 
-@dataclass(frozen=True, eq=False)
-class Side:
+class Side(Struct, frozen=True, eq=False, dict=True):
     """One of the toolpaths that are compared, with what is derived from it."""
 
     toolpath: Toolpath
@@ -183,8 +180,7 @@ class Side:
         return np.asarray(self.toolpath.is_feed & still & deep)
 
 
-@dataclass(frozen=True, eq=False)
-class Alike:
+class Alike(Struct, frozen=True, eq=False):
     """A number (N,) for each move of two sides, equal for moves of the same kind, start, end and
     centre."""
 
@@ -225,8 +221,7 @@ def _numbers(toolpath: Toolpath) -> Ints:
 # wherever moves of both sides lie on each other.
 
 
-@dataclass(frozen=True, eq=False)
-class PlaceComparison:
+class PlaceComparison(Struct, frozen=True, eq=False):
     """Findings; the largest distance of a cut from what was asked, mm; `pairs` (P, 2): decoded
     rows that are not in `written`, each with a written row on which it lies, in its direction."""
 
@@ -417,8 +412,7 @@ def compare_settings(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Both:
+class _Both(Struct, frozen=True, eq=False):
     """Decoded rows (R,) that cut or plunge, and pairs (P, 2) of such a row with a written row to
     compare it with."""
 

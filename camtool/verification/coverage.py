@@ -10,10 +10,11 @@ is found. The tolerance of heights allows for slopes that a machine makes in sma
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.findings import (
@@ -67,8 +68,7 @@ Limits = tuple[float, float]
 """What is near, in XY and in height, mm."""
 
 
-@dataclass(frozen=True, eq=False)
-class Coverage:
+class Coverage(Struct, frozen=True, eq=False):
     """The match of the rows, the rounding error, and CONTOUR_MISSING and EXTRA_CUT findings."""
 
     match: Match
@@ -76,16 +76,14 @@ class Coverage:
     findings: tuple[Finding, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class Drilled:
+class Drilled(Struct, frozen=True, eq=False):
     """Which wanted and which decoded contours (C,) are holes on the other side."""
 
     wanted: Bools
     decoded: Bools
 
 
-@dataclass(frozen=True, eq=False)
-class _Sampled:
+class _Sampled(Struct, frozen=True, eq=False):
     """Samples of the cuts of one side, each with the nearest move of the other; `drilled` (C,) as
     in `Drilled`."""
 
@@ -279,8 +277,7 @@ _MISSING = CONTOUR_MISSING, CONTOUR_MISSING_AT_DEPTH, CONTOUR_MISSING_NO_CUTS
 _EXTRA = EXTRA_CUT, EXTRA_CUT_AT_DEPTH, EXTRA_CUT_NONE_WANTED
 
 
-@dataclass(frozen=True)
-class _Uncovered:
+class _Uncovered(Struct, frozen=True):
     """The sample of a contour with the largest distance from the other side, mm, where that does
     not cut a `share` of its samples."""
 
@@ -358,8 +355,7 @@ def _finite(distance: float) -> float | None:
 # and does not cut in XY before it moves on: a plunge with which a contour begins is no hole.
 
 
-@dataclass(frozen=True, eq=False)
-class Holes:
+class Holes(Struct, frozen=True, eq=False):
     """H holes of `toolpath`: their positions `at` (H, 2) mm, the heights of their bottoms (H,) mm,
     and the rows (H,) that first reach them."""
 
@@ -552,8 +548,7 @@ def _cosines(cuts: CutMoves, samples: Samples, others: MoveIndex, found: Found) 
     return cosine
 
 
-@dataclass(eq=False)
-class Compared:
+class Compared(Struct, eq=False):
     """S samples on cuts of one side, and all P pairs of a sample (`point`) with a `move` of the
     other side near it; `cosine` (P,) of the angle between both. `distance` (S,) mm from each
     sample to the nearest move, inf where none is near."""

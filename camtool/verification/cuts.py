@@ -13,10 +13,10 @@ the sides of tabs). A rapid, an air move or homing ends it.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.geometry.measure import point_at, segment_lengths
@@ -32,8 +32,7 @@ MOST_SAMPLES = 200_000
 """Long programs are sampled more coarsely, so that there are about this many points."""
 
 
-@dataclass(frozen=True, eq=False)
-class CutMoves:
+class CutMoves(Struct, frozen=True, eq=False):
     """The cutting moves of `toolpath` (N rows) as K segments, in order.
 
     Arcs run about the programmed centre with the radius of their start; above 180° they are two
@@ -225,8 +224,7 @@ def _leaves_stock(toolpath: Toolpath) -> Bools:
     return np.asarray((moves | homes) & ~sinks)
 
 
-@dataclass(frozen=True, eq=False)
-class Samples:
+class Samples(Struct, frozen=True, eq=False):
     """Points (S, 2) mm on the segments `segment` (S,) of CutMoves, ends included, each at the
     part `share` (S,) of the length of its segment, and their heights `z` (S,) mm."""
 

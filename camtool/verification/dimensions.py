@@ -20,9 +20,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.measure import segment_boxes
@@ -32,8 +32,7 @@ from camtool.verification.cuts import NO_LOOP, CutMoves, of_loops
 from camtool.verification.matching import Match
 
 
-@dataclass(frozen=True)
-class Size:
+class Size(Struct, frozen=True):
     """One dimension, such as "part X" or "contour 3 Y", mm. `of_edge`: it is that of the cut
     edge, not of the tool centre's path."""
 
@@ -50,8 +49,7 @@ class Size:
         return (self.predicted_mm - self.nominal_mm) / self.nominal_mm * 100.0
 
 
-@dataclass(frozen=True, eq=False)
-class LoopedCuts:
+class LoopedCuts(Struct, frozen=True, eq=False):
     """Cutting moves and the loops (C, 2) of their contours (`camtool.verification.cuts.loops`)."""
 
     cuts: CutMoves

@@ -14,9 +14,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.kernels.judging import BEFORE_FIRST, BINS, SHIFT, leading_bits
@@ -98,8 +98,7 @@ class Figure:
 # Figures of rows: taken from the judge's columns some rows at a time, and only their sums kept.
 
 
-@dataclass(frozen=True, eq=False)
-class RowBlock:
+class RowBlock(Struct, frozen=True, eq=False):
     """The columns (R, 19) of `camtool.kernels.judging` of the rows from `low` on, in mm and XY;
     `is_cut` (R,): which of them cut."""
 
@@ -236,8 +235,7 @@ class Books:
         self.cutting_reversals += ledger.reversals[is_cut[rows]].sum(axis=0)
 
 
-@dataclass(frozen=True, eq=False)
-class Tally:
+class Tally(Struct, frozen=True, eq=False):
     """Sums over the whole program. Reversals and times are divided into cutting and the rest;
     `compensation_s` is a part of cutting and air."""
 
@@ -281,8 +279,7 @@ END_STEPS = 1.5
 the rounding of an interpolator."""
 
 
-@dataclass(frozen=True)
-class ContourFigures:
+class ContourFigures(Struct, frozen=True):
     """The total error of one wanted contour, mm: the maximum with its place and toolpath row, the
     root of the mean square, and the signed mean (+ to the left of the direction of travel) without
     the fit; and the largest errors of interpolation, mechanics and fit on it."""

@@ -11,10 +11,11 @@ inner samples.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.toolpath.moves import ROWS_AT_ONCE
@@ -29,8 +30,7 @@ LEAST_MM = 1e-6
 """Moves nearer than this are found even when the tolerance is 0."""
 
 
-@dataclass(frozen=True, eq=False)
-class Match:
+class Match(Struct, frozen=True, eq=False):
     """The wanted moves to which each of the N decoded rows belongs.
 
     `row` (N,) is the wanted row nearest to its middle and `contour` (N,) its contour, −1 for rows
@@ -47,8 +47,7 @@ class Match:
     off_mm: Floats
 
 
-@dataclass(frozen=True, eq=False)
-class Goal:
+class Goal(Struct, frozen=True, eq=False, dict=True):
     """The wanted moves, their full circles, and how far a decoded contour may be from its wanted
     contour in XY and in height, mm."""
 

@@ -14,11 +14,11 @@ grows until a move is found: what is nearest within a limit is nearest of all.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Floats, Indices, Ints
 from camtool.geometry.measure import segment_boxes
@@ -35,8 +35,7 @@ ANY_CONTOUR = -1
 """The contour of points that are compared with the moves of every contour."""
 
 
-@dataclass(frozen=True, eq=False)
-class Found:
+class Found(Struct, frozen=True, eq=False):
     """(J,) distance mm, inf where no move is found, and (J,) segment, −1 there."""
 
     distance: Floats

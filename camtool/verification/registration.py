@@ -18,10 +18,11 @@ Registration knows translations only. Where these do not do, the commonest other
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.errors import DrawingError
@@ -170,8 +171,7 @@ ABOUT_FAR = 3.0
 """... and so do others by less than this: not all of the drawing need be cut."""
 
 
-@dataclass(frozen=True, eq=False)
-class Registration:
+class Registration(Struct, frozen=True, eq=False):
     """The result: `shift_mm` by which the drawing is moved to lie under the program; the `wanted`
     moves; findings; what the report says of it; `diameter_mm` of the tool, where all that follows
     the drawing is cut with one, None otherwise."""
@@ -183,8 +183,7 @@ class Registration:
     diameter_mm: float | None
 
 
-@dataclass(frozen=True, eq=False)
-class _Lines:
+class _Lines(Struct, frozen=True, eq=False):
     """The M paths of a drawing: their segments, frames of these, boxes (M, 2, 2)."""
 
     paths: Polylines
@@ -224,8 +223,7 @@ class _Lines:
         return side * distance, np.where(known[:, None], unit, left), segment
 
 
-@dataclass(frozen=True, eq=False)
-class _Path:
+class _Path(Struct, frozen=True, eq=False):
     """What a program cuts, as points (S, 2) mm with the length that each stands for (S,), the row
     (S,) and the tool (S,) of each. For its place: boxes (B, 2, 2) of its closed parts, centres
     (A, 2) of its arcs, and its holes (H, 2)."""
@@ -364,8 +362,7 @@ def _nothing(running: Toolpath, said: Sequence[Finding]) -> Registration:
 # best of these on, Gauss and Newton move the path until it keeps to the lines at one distance.
 
 
-@dataclass(frozen=True)
-class _Placed:
+class _Placed(Struct, frozen=True):
     """A shift, and the part of the path that follows the lines there."""
 
     shift: tuple[float, float]
@@ -578,8 +575,7 @@ def _followed(path: _Path, lines: _Lines, shift: Floats) -> float:
 # Tracks, and the radius that goes with the path.
 
 
-@dataclass(frozen=True, eq=False)
-class _Tracks:
+class _Tracks(Struct, frozen=True, eq=False):
     """T tracks: their paths, the contour (T,) of each, and its side (T,): −1 within it (or right
     of an open one), 0 on it, 1 outside (or left), and whether its corners are sharp (T,)."""
 
@@ -674,8 +670,7 @@ def _candidate_radii(far: Floats, length: Floats) -> list[float]:
     return list(dict.fromkeys(found))
 
 
-@dataclass(frozen=True, eq=False)
-class _Try:
+class _Try(Struct, frozen=True, eq=False):
     """A radius, its tracks that are followed, and which points (S,) follow them."""
 
     radius_mm: float
@@ -689,8 +684,7 @@ class _Try:
         return set(zip(self.tracks.contour.tolist(), self.tracks.side.tolist(), strict=True))
 
 
-@dataclass(frozen=True, eq=False)
-class _Cells:
+class _Cells(Struct, frozen=True, eq=False):
     """Points along T tracks: the track (C,), place (C, 2), what length each stands for (C,),
     whether it is cut (C,), and how deep (C,) mm, NaN where not."""
 
@@ -709,8 +703,7 @@ class _Cells:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class _Chosen:
+class _Chosen(Struct, frozen=True, eq=False):
     """What is followed: tracks, the radius of each (T,), its tool (T,), and its cells."""
 
     tracks: _Tracks
@@ -719,8 +712,7 @@ class _Chosen:
     cells: _Cells
 
 
-@dataclass(frozen=True, eq=False)
-class _Follower:
+class _Follower(Struct, frozen=True, eq=False):
     """A program over a drawing that lies where it belongs."""
 
     cuts: CutMoves
@@ -1047,8 +1039,7 @@ def _counts(chosen: _Chosen | None, drilled: Bools, count: int) -> dict[str, int
 # The wanted moves: those of the program, along the tracks where they follow one.
 
 
-@dataclass(frozen=True, eq=False)
-class _Followed:
+class _Followed(Struct, frozen=True, eq=False):
     """Which rows (N,) follow a track; the track (N,), and the lengths (N,), (N,) mm along it at
     their starts and ends, the end counted on from the start; `off` (J,) mm as `_Made.wanted`."""
 

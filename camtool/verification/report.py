@@ -13,13 +13,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from html import escape
 from itertools import groupby
 from typing import Any
 from urllib.parse import quote
 
 import msgspec
+from msgspec import Struct
+from msgspec.structs import asdict
 
 from camtool.findings import (
     ABOVE_GATE,
@@ -815,8 +817,7 @@ NAME_SHOWN = 200
 """The text of a cell or a finding is shortened to this many characters on a page, not in JSON."""
 
 
-@dataclass(frozen=True)
-class Changed:
+class Changed(Struct, frozen=True):
     """A value of the machine that `--machine` or `--set` has changed."""
 
     key: str
@@ -824,8 +825,7 @@ class Changed:
     was: str
 
 
-@dataclass(frozen=True)
-class Setup:
+class Setup(Struct, frozen=True):
     """The machine and the settings: digests (SHA-256, hex) of all values of the machine and of the
     program, the values that differ from the target's own, and the flags on the command line."""
 
@@ -836,8 +836,7 @@ class Setup:
     flags: tuple[tuple[str, str], ...] = ()
 
 
-@dataclass(frozen=True)
-class Page:
+class Page(Struct, frozen=True):
     """A page: `report` is None where the program could not be judged; `findings` then say why.
     `pictures` are (caption, address): of a file beside the page, or a data address; `stock` is
     that of the stock with part zero, "" without one."""
@@ -887,8 +886,7 @@ def page_json(page: Page) -> str:
 # The tables of a Report as rows of text, for Markdown and HTML.
 
 
-@dataclass(frozen=True)
-class Sheet:
+class Sheet(Struct, frozen=True):
     """A table: `noun` is what its rows are called, `words` the number of leading columns with text
     (the others hold numbers). Cells are not escaped."""
 

@@ -17,10 +17,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Floats, Ints
 from camtool.findings import OVERCUT, Code, Finding, TargetCode
@@ -65,8 +65,7 @@ MOST_POINTS = 200_000
 """... and so do programs whose path would need more points than this."""
 
 
-@dataclass(frozen=True)
-class Shape:
+class Shape(Struct, frozen=True):
     """The machined shape against the wanted shape, mm and mm²; `tolerance_mm` of the chords."""
 
     diameter_mm: float
@@ -77,8 +76,7 @@ class Shape:
     tolerance_mm: float
 
 
-@dataclass(frozen=True)
-class Cutter:
+class Cutter(Struct, frozen=True):
     """A tool as seen from above: its diameter, and, where it is narrower at its tip, its shape."""
 
     diameter_mm: float
@@ -134,8 +132,7 @@ def points_wanted(decoded: CutMoves, cutter: Cutter | None) -> int | None:
     return points if points <= MOST_POINTS else None
 
 
-@dataclass(frozen=True, eq=False)
-class Wanted:
+class Wanted(Struct, frozen=True, eq=False):
     """What a tool should remove, as a region of shapely; how deep (mm) the wanted path itself cuts
     into what must stay, and where."""
 
@@ -233,8 +230,7 @@ def _pieces(region: Any) -> Any:
     return np.concatenate(found)
 
 
-@dataclass(frozen=True, eq=False)
-class _Lines:
+class _Lines(Struct, frozen=True, eq=False):
     """Chords: points (P, 2) with their heights (P,), and the line (P,) that each belongs to."""
 
     points: Floats

@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.errors import ProgramError
@@ -48,8 +48,7 @@ BINS_KEPT = 64
 """The bins of at most this many circles are kept for pictures, 52 kB each."""
 
 
-@dataclass(frozen=True, eq=False)
-class SeenCircle:
+class SeenCircle(Struct, frozen=True, eq=False):
     """A circle, its figures, and its bins (720, 9) about the programmed centre."""
 
     circle: Circle
@@ -58,8 +57,7 @@ class SeenCircle:
     bins: Floats
 
 
-@dataclass(frozen=True, eq=False)
-class Paths:
+class Paths(Struct, frozen=True, eq=False):
     """The cuts of a program and the wanted ones (one object, where it is compared with itself),
     the full circles of these, and by how much heights may differ, mm."""
 
@@ -358,8 +356,7 @@ def shapes(cuts: CutMoves, low: int, high: int) -> Shapes:
 # sample of each row (`camtool.kernels.judging`).
 
 
-@dataclass(frozen=True, eq=False)
-class Trace:
+class Trace(Struct, frozen=True, eq=False):
     """T positions of the slides in order: `points` (T, 2) mm, `error_mm` (T,) from the wanted
     moves (0 where nothing is cut), `row` (T,) of the decoded toolpath, `cutting` (T,)."""
 
@@ -369,8 +366,7 @@ class Trace:
     cutting: Bools
 
 
-@dataclass(frozen=True, eq=False)
-class TraceSize:
+class TraceSize(Struct, frozen=True, eq=False):
     """The start of the slides (1, 2) mm; one of every `stride` samples of a row is kept (0: none
     at all); the most points of a trace."""
 

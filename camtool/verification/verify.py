@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Floats, Indices
 from camtool.findings import Finding
@@ -229,7 +230,7 @@ def _coverage(case: Case, decoded: MoveIndex, goal: Goal, *, flat_cuts: bool) ->
     match = coverage.match
     if case.compensated is not None:
         match = carried_match(match, case.compensated.row, goal)
-    return replace(coverage, match=match, findings=(*coverage.findings, *unpaired))
+    return msgspec.structs.replace(coverage, match=match, findings=(*coverage.findings, *unpaired))
 
 
 def _turned(case: Case, decoded: MoveIndex, goal: Goal, *, flat_cuts: bool) -> tuple[Finding, ...]:
@@ -274,8 +275,7 @@ def _all_findings(
 # The results as the report's record: mm to µm, NaN to null.
 
 
-@dataclass(frozen=True, eq=False)
-class Result:
+class Result(Struct, frozen=True, eq=False):
     """The results of all stages, from which the report is made."""
 
     case: Case

@@ -21,9 +21,9 @@ Every move ends: the longer axis arrives.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.kernels.lattice import HALF_STEP_GUARD, to_steps
@@ -264,8 +264,7 @@ def _chords(toolpath: Toolpath, per_turn: int) -> Indices:
     return parts.astype(np.int32)
 
 
-@dataclass(frozen=True, eq=False)
-class MoveTable:
+class MoveTable(Struct, frozen=True, eq=False):
     """How many moves each row of a placed toolpath makes, and the moves of any window of rows."""
 
     toolpath: Toolpath

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import ProgramError
@@ -75,8 +76,7 @@ def read_program(data: bytes, machine: FlashcutMachine) -> Toolpath:
     return replace(path, findings=(*path.findings, *_timer_findings(path, machine)))
 
 
-@dataclass
-class _Excess:
+class _Excess(Struct):
     """How many blocks have a feed above the limit, the highest, and the first of them."""
 
     count: int = 0
@@ -306,8 +306,7 @@ ROWS_AT_ONCE: Final = 1 << 14
 """So many rows are looked at together."""
 
 
-@dataclass
-class _Worst:
+class _Worst(Struct):
     """How many rows something is wrong with, the worst of them, and by how much."""
 
     count: int = 0

@@ -16,10 +16,11 @@ units may come out as nearly a full turn, and a short one of a large radius as a
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
+from msgspec import Struct, field
+from msgspec.structs import replace
 
 from camtool.arrays import Bools, Codes, Floats, Ints
 from camtool.toolpath.moves import Kind, Toolpath
@@ -42,8 +43,7 @@ RULE_MARGIN: Final = 0.9
 """Arcs are kept within this part of the controller's tolerance: it may compute in 32 bits."""
 
 
-@dataclass(frozen=True)
-class Piece:
+class Piece(Struct, frozen=True):
     """One row in place of an arc: its kind, end (x, y) and offset of the centre (i, j), units.
     `share`: the part of a helix's rise that is made at its end."""
 
@@ -53,8 +53,7 @@ class Piece:
     share: float = 1.0
 
 
-@dataclass
-class ArcCounts:
+class ArcCounts(Struct):
     """How many arcs were changed, and how."""
 
     flat: int = 0
@@ -66,8 +65,7 @@ class ArcCounts:
     """Row of the first that was re-centred, split or written as lines."""
 
 
-@dataclass(frozen=True, eq=False)
-class Arcs:
+class Arcs(Struct, frozen=True, eq=False):
     """All rows' ends (N, 3) and offsets (N, 2) in units, and `pieces` in place of some rows."""
 
     end: Ints
@@ -181,8 +179,7 @@ def _repair(arcs: Arcs, toolpath: Toolpath, row: int, sweep: float, dialect: Gco
         arcs.pieces[row] = _chords(wanted, begin, stop, dialect)
 
 
-@dataclass(frozen=True, eq=False)
-class _Wanted:
+class _Wanted(Struct, frozen=True, eq=False):
     """An arc in mm ((2,) each) with its signed sweep; radius and angle run evenly from start to
     end, so that ends which are not quite equally far from the centre are both met."""
 

@@ -22,10 +22,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import Final, Literal, NoReturn
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.bounds import check_count
@@ -99,8 +99,7 @@ class Lines:
         return self.data[begin:end].decode("latin-1").removesuffix("\r")
 
 
-@dataclass(frozen=True, eq=False)
-class PlainBlocks:
+class PlainBlocks(Struct, frozen=True, eq=False):
     """N blocks in a row whose lines hold nothing but words of G X Y Z I J F, each once at most, G
     being G0 to G3: numbers (N, 7) and facts (N, 5) of `camtool.kernels.words`; `first`: the index
     of the first of them. What a block has no word for is undefined in `numbers`."""
@@ -172,8 +171,7 @@ class PlainRuns:
         return count, behind - 1 if count == rows else int(facts[count, words.LINE]) - 1
 
 
-@dataclass(frozen=True)
-class Lexing:
+class Lexing(Struct, frozen=True):
     """What a dialect's text may hold whose blocks are rows of words, without comments and block
     numbers.
 

@@ -11,10 +11,11 @@ that were planned, and the first of them may be in the air.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from camtool.arrays import Ints
 from camtool.toolpath.moves import Kind, Toolpath
@@ -25,8 +26,7 @@ CYCLE: Final = 100
 """Stands for the kind of a row that is written as a cycle: it is no motion of the program."""
 
 
-@dataclass(frozen=True)
-class Hole:
+class Hole(Struct, frozen=True):
     """Rows first:last + 1 of a toolpath, of which `cut` is the first at a feed, and lengths in its
     units: the place, the height from which it feeds, the bottom, the deepest bite of pecks (None:
     it is drilled in one go), and the seconds at the bottom (None: none)."""
@@ -85,8 +85,7 @@ def _holes(toolpath: Toolpath, low: int, high: int) -> Iterator[Hole]:
         at += 1
 
 
-@dataclass(frozen=True)
-class _Rows:
+class _Rows(Struct, frozen=True):
     """Some rows as lists."""
 
     kind: list[int]

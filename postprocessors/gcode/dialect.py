@@ -12,11 +12,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import msgspec
-from msgspec import Meta
+from msgspec import Meta, Struct
 
 from camtool.errors import MachineError, ProgramError
 from camtool.machine.model import Machine
@@ -71,8 +70,7 @@ class GcodeDialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     arc_chord_slack_mm: Slack = 0.0
 
 
-@dataclass(frozen=True)
-class Unit:
+class Unit(Struct, frozen=True):
     """A unit of lengths: its `name`, its length in mm, its G word, and how many decimals more than
     mm it is written with."""
 

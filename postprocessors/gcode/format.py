@@ -13,10 +13,10 @@ Readers never use this module, writers never `blocks.py`.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.toolpath.words import Words, line_lengths
@@ -36,8 +36,7 @@ COMMENT_CHARS: Final = 60
 _UNSAFE: Final = re.compile(r"[^A-Za-z0-9 ._+:/=-]")
 
 
-@dataclass(frozen=True)
-class NumberStyle:
+class NumberStyle(Struct, frozen=True):
     """How a number is written: digits after the point; `strip` their trailing zeros (and the point
     if nothing follows it)."""
 

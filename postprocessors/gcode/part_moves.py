@@ -8,10 +8,10 @@ move; a later frame is placed by what it differs in. Arcs in XZ and YZ become ch
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from msgspec import Struct
 
 from camtool import bounds
 from camtool.arrays import Floats
@@ -34,8 +34,7 @@ PLANES: Final = {170: (0, 1, 2), 180: (2, 0, 1), 190: (1, 2, 0)}
 """First axis, second axis and normal of G17, G18 and G19, tenfold."""
 
 
-@dataclass(frozen=True)
-class Frame:
+class Frame(Struct, frozen=True):
     """Where the program's coordinates p lie on the machine, mm and degrees: R(p + shift) + origin,
     with a turn R about Z."""
 

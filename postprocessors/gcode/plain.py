@@ -15,10 +15,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final, Literal
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Codes, Floats, Ints
 from camtool.errors import PostError
@@ -93,8 +94,7 @@ def left_out(toolpath: Toolpath, kinds: Collection[Kind], sentence: Sentence) ->
         yield sentence(where=toolpath.place(int(rows[0])), count=len(rows), kinds=names)
 
 
-@dataclass(frozen=True)
-class ArcRules:
+class ArcRules(Struct, frozen=True):
     """What a dialect wants of arcs: `most_mm` of an offset; `chord_fits`: the chord must
     not exceed twice the radius at the start (a controller that takes its arcsine)."""
 
@@ -104,8 +104,7 @@ class ArcRules:
     chord_fits: bool = False
 
 
-@dataclass(frozen=True, eq=False)
-class PlainRows:
+class PlainRows(Struct, frozen=True, eq=False):
     """M rows in units: `kind` (M,), `end` (M, 3), `offset` (M, 2) of the centre from the start
     (0 where no arc), `start` (3,), and `row` (M,), the given toolpath's row of each."""
 

@@ -7,10 +7,10 @@ next one as a block of words.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats
 from camtool.findings import Finding
@@ -26,8 +26,7 @@ RAPID, LINE, ARC_CCW = 0, 10, 30
 """G words, tenfold; arcs are above LINE."""
 
 
-@dataclass(frozen=True)
-class ArcRule:
+class ArcRule(Struct, frozen=True):
     """Which arcs a controller surely takes: radii at both ends above `radius_mm` that differ by no
     more than `gap_mm`; what turns by less than `full_turn_rad` it may take for a full circle.
     `ends_in_plane`: an arc must have X or Y."""
@@ -43,8 +42,7 @@ KINDS: Final = np.full(ARC_CCW + 1, -1)
 KINDS[[0, 10, 20, 30]] = [Kind.RAPID, Kind.LINE, Kind.ARC_CW, Kind.ARC_CCW]
 
 
-@dataclass(frozen=True)
-class PlainState:
+class PlainState(Struct, frozen=True):
     """What is in force before plain blocks: the motion (a G word tenfold, −1: none), the feed
     (0: none), mm of a unit, and where the tool stands."""
 

@@ -12,12 +12,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import Final
 
-import msgspec
 import numpy as np
+from msgspec import Struct, structs
 
 from camtool.arrays import Bools, Codes, Floats, Ints
 from camtool.bounds import refuse_too_long
@@ -75,8 +75,7 @@ SWITCHES: Final = {
 EventWords = Callable[["Event"], Sequence[str]]
 
 
-@dataclass(frozen=True, eq=False)
-class Style:
+class Style(Struct, frozen=True, eq=False):
     """A dialect's own part of a program.
 
     `header`: its first blocks, which say the unit; `event`: the blocks of an event; `message`:
@@ -111,7 +110,7 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
         feed_words = [f"F{word}" for word in _feed_texts(feeds, holes, decimals)]
         number = NumberStyle(dialect.decimals, strip=dialect.strip_zeros)
         blocks = {**events.blocks, **cycle_blocks(holes, feed_words, number)}
-        events = replace(events, blocks=blocks)
+        events = structs.replace(events, blocks=blocks)
     sent = sent_rows(toolpath, arcs, feeds, events.changes, holes)
     arc_counts = arcs.counts
     del arcs, feeds
@@ -170,7 +169,7 @@ def in_units(
     decimals = dialect.decimals + unit.more_decimals
     return (
         replace(toolpath, **places),
-        msgspec.structs.replace(dialect, decimals=decimals, **lengths),
+        structs.replace(dialect, decimals=decimals, **lengths),
     )
 
 
@@ -298,8 +297,7 @@ def _rounded(toolpath: Toolpath, rows: tuple[int, ...]) -> Iterator[Finding]:
 # The rows that are sent, and the modal text of each, by whole columns.
 
 
-@dataclass(frozen=True, eq=False)
-class Sent:
+class Sent(Struct, frozen=True, eq=False):
     """The rows to send, events among them: kind (M,), end (M, 3) and offset (M, 2) in units,
     feed (M,) in units of the F word, row (M,) of the toolpath; `written` (M, 3): which coordinates
     are written; `forget` (M,): homing or a tool change since the last motion. `dropped` moves were
@@ -467,8 +465,7 @@ def _changes(values: Ints, counts: Bools) -> Bools:
 # Events, as the blocks that grbl and linuxcnc both know.
 
 
-@dataclass(frozen=True)
-class Event:
+class Event(Struct, frozen=True):
     """A row that is no motion; `where` names it in errors. `mounted_before`: a tool change before
     the first move at a feed. `spindle_on`, `cools`: what the program has switched on so far."""
 
@@ -484,8 +481,7 @@ class Event:
         return PostError(message, where=self.where, mend=mend)
 
 
-@dataclass(frozen=True)
-class Events:
+class Events(Struct, frozen=True):
     """`blocks` of the rows that have some; rows whose value was `rounded`; `spindle_on` at the
     end of the program; the rows of tool `changes` that have blocks."""
 

@@ -18,10 +18,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
+from msgspec import Struct
+from msgspec.structs import replace
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import MachineError, ProgramError
@@ -223,8 +224,7 @@ BLOCKS_AT_ONCE = 1 << 14
 Shorts = npt.NDArray[np.int32]
 
 
-@dataclass(frozen=True, eq=False)
-class Blocks:
+class Blocks(Struct, frozen=True, eq=False):
     """B blocks in order: the row (B,) that each is of, which target (B,) of all it ends at, where
     it starts and its way, both (B, 3) steps. Targets without a block are those without a step."""
 
@@ -356,8 +356,7 @@ def speeds_of(
     return SpeedPlan(lengths_mm[first:], speeds[first:], along[first:], corners[first:], before)
 
 
-@dataclass(frozen=True, eq=False)
-class Stops:
+class Stops(Struct, frozen=True, eq=False):
     """Where the machine comes to rest: before rows (N,), and at targets without a step that rows
     (N,) have, None where there are no such rows."""
 
@@ -418,8 +417,7 @@ MOST_SEGMENTS = 1 << 16
 """The chords of an arc are counted in 16 bits."""
 
 
-@dataclass(frozen=True, eq=False)
-class Targets:
+class Targets(Struct, frozen=True, eq=False):
     """T targets in order: mm (T, 3), 32-bit, and the row (T,) of each."""
 
     row: Ints

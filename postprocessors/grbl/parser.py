@@ -11,8 +11,10 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass, field, replace
 from typing import Final
+
+from msgspec import Struct, field
+from msgspec.structs import replace
 
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind
@@ -100,8 +102,7 @@ def error(number: int, at: int | str | None, what: str = "", mend: str = "") -> 
     return Fault(f"{WHY[number].format(what)} (error:{number})", at, mend)
 
 
-@dataclass
-class Modes:
+class Modes(Struct):
     """What is in force from line to line."""
 
     motion: int = 0
@@ -115,8 +116,7 @@ class Modes:
     flood: bool = False
 
 
-@dataclass
-class Block:
+class Block(Struct):
     """The words of a line: numbers, the modes that they make, the command of this line alone
     ("G4", "G92.1" …), what uses the coordinates, and where the words stand."""
 
@@ -130,8 +130,7 @@ class Block:
     at: dict[str, int] = field(default_factory=dict)
 
 
-@dataclass
-class Notes:
+class Notes(Struct):
     """Blocks (index from 0) at which something was passed over or taken for granted."""
 
     coolant: list[int] = field(default_factory=list)

@@ -11,12 +11,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Generator
-from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, Final, Literal
 
 import msgspec
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from camtool.arrays import Floats, Ints
 from camtool.machine.model import Machine
@@ -104,8 +105,7 @@ class Choices(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     homing: Literal["off", "on"] = "off"
 
 
-@dataclass(eq=False)
-class _Planned:
+class _Planned(Struct, eq=False):
     """A block in the ring: its start and way (3,) steps, length, speed without overrides, the
     highest that its axes allow, acceleration, highest speed at its start; mm and s."""
 

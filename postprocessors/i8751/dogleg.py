@@ -32,10 +32,10 @@ many records, but of more equal length and nearer to the line.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Ints
 
@@ -60,8 +60,7 @@ def elbows(steps: Ints) -> Ints:
     return np.asarray(short * (size.max(axis=1, initial=0) - short))
 
 
-@dataclass(frozen=True)
-class Line:
+class Line(Struct, frozen=True):
     """A line of dx, dy steps; `reach` as `reaches` gives it, or FREE."""
 
     dx: int

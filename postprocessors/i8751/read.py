@@ -16,12 +16,12 @@ import re
 from array import array
 from bisect import bisect_right
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import islice
 from typing import Final, NamedTuple, NoReturn
 
 import numpy as np
 import numpy.typing as npt
+from msgspec import Struct
 
 from camtool.arrays import Floats, Ints
 from camtool.bounds import check_count
@@ -54,8 +54,7 @@ RECORDS_AT_ONCE: Final = 1 << 14
 Shorts = npt.NDArray[np.int32]
 
 
-@dataclass(frozen=True, eq=False)
-class Decoded:
+class Decoded(Struct, frozen=True, eq=False):
     """R records as the controller holds them: steps (R, 3), signed by part axes, and waits (R, 2)
     s; `rounded` distances of a listing that were no whole steps, the worst off by so many."""
 

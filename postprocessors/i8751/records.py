@@ -9,10 +9,10 @@ too far (`dogleg.py`) and where a motor would make more steps than two bytes can
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
+from msgspec import Struct, field
 
 from camtool.arrays import Floats, Ints
 from camtool.errors import PostError
@@ -108,8 +108,7 @@ def _check_coordinates(toolpath: Toolpath, machine: I8751Machine) -> None:
         )
 
 
-@dataclass
-class Counts:
+class Counts(Struct):
     """What was changed, for the findings; places name the first of each kind."""
 
     arcs: int = 0
@@ -128,8 +127,7 @@ class Counts:
     feeds: int = 0
 
 
-@dataclass(frozen=True, eq=False)
-class Records:
+class Records(Struct, frozen=True, eq=False):
     """R records: steps (R, 3), waits (R, 2) s, row (R,) of the toolpath that each came from;
     `messages` as (record that it precedes, text); `end_row` of the END, -1 without one."""
 
@@ -267,8 +265,7 @@ def _with_step(steps: Ints) -> Ints:
     return np.concatenate([out, [[-1, 0, 0]]]) if aside else out
 
 
-@dataclass(frozen=True, eq=False)
-class _Plain:
+class _Plain(Struct, frozen=True, eq=False):
     """Records that move, before the waits are put between them."""
 
     steps: Ints

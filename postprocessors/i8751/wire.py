@@ -12,10 +12,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.errors import MachineError
 from camtool.target.terminal import Terminal
@@ -154,8 +154,7 @@ class I8751Terminal(Terminal):
         return self.MEANINGS.get(line.rpartition(" ")[2], "")
 
 
-@dataclass(frozen=True)
-class _Part:
+class _Part(Struct, frozen=True):
     """A packet: its bytes, the reply to each, and how many records it has."""
 
     data: bytes

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind
@@ -16,8 +17,7 @@ from camtool.toolpath.moves import Kind
 from ..gcode.part_moves import PLANES, PartMoves
 
 
-@dataclass
-class Queued:
+class Queued(Struct):
     """A move that waits: its end and its centre (in the order of the plane: first, second, normal)
     in units of the program; `turn` 0 for a straight one; the direction in which it was programmed,
     and how far its arc was to turn (0: its end stays)."""

@@ -9,8 +9,9 @@ program; at one that turns towards it the waiting move ends where both offsets m
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Final
+
+from msgspec import Struct
 
 from camtool.toolpath.moves import Kind
 
@@ -35,8 +36,7 @@ _GOUGES: Final = "the tool does not reach a corner without cutting into the part
 Flat = tuple[float, float]
 
 
-@dataclass
-class Arc:
+class Arc(Struct):
     """An arc as it is programmed: end, centre, and turns begun, above 0 counter-clockwise."""
 
     end: list[float]

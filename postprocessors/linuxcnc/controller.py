@@ -21,10 +21,11 @@ it over some milliseconds at half of the axis's limits; here it acts at once, an
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.machine.model import Machine
@@ -107,8 +108,7 @@ def _corners_said(mode: PathMode) -> str:
     return f"corners are blended within {mode.tolerance_mm:g} mm (G64 P), as the speed needs"
 
 
-@dataclass(frozen=True, eq=False)
-class Planned:
+class Planned(Struct, frozen=True, eq=False):
     """The moves of some rows of a program, and the corners at their starts. Where more of the
     program lies before or behind them, the first corner and the last move miss their neighbours.
     `origin` (N,): the row that each row of `tangents.path` is, or is half of.
@@ -387,8 +387,7 @@ def _along_moves(moves: Moves, modes: Modes, corners: Corners) -> tuple[Floats, 
     return along, fastest
 
 
-@dataclass(frozen=True, eq=False)
-class Modes:
+class Modes(Struct, frozen=True, eq=False):
     """How rows of a mode (an index, as in `Toolpath.mode`) meet the corners behind them: `table`
     has a row for each, of numbers: whether they blend, whether they stop (neither: the path is
     kept without a stop), the tolerance of blends in mm, inf: none, and that of merging, 0: none.
@@ -563,8 +562,7 @@ def begins_of(path: Toolpath, modes: Modes) -> tuple[Ints, Floats]:
     return np.concatenate([found[:1], found[2:]]), length
 
 
-@dataclass(frozen=True, eq=False)
-class Moves:
+class Moves(Struct, frozen=True, eq=False):
     """M moves in order. row_of (N,): the move of each row of the program, −1 for rows that do not
     move; row (M,): the first of each, and mode (M,) its mode. length mm, speed mm/s (as
     programmed, within the limits), acceleration mm/s² (of the whole machine in that direction),
@@ -772,8 +770,7 @@ LEAST_BEND_RAD = 1e-3
 """Moves that bend by less have no arc between them (TP_MIN_ARC_ANGLE)."""
 
 
-@dataclass(frozen=True, eq=False)
-class Corners:
+class Corners(Struct, frozen=True, eq=False):
     """What happens at the start of each of M moves: `speed` (M,) mm/s, 0 for a stop; `lost` (M,):
     the part of the acceleration that a bend takes from the moves on both sides; `reach` (M,) mm:
     how far from the corner a blend begins and ends, 0 without one; `acceleration` (M,) mm/s²
@@ -792,8 +789,7 @@ class Corners:
     ramp: Floats
 
 
-@dataclass(frozen=True)
-class CornerRules:
+class CornerRules(Struct, frozen=True):
     """`modes`: how corners are met; `kink_ratio`; `period_s` of the servo; limits (3,) of the
     axes, mm/s and mm/s²."""
 
@@ -804,8 +800,7 @@ class CornerRules:
     acceleration: Floats
 
 
-@dataclass(frozen=True, eq=False)
-class Bends:
+class Bends(Struct, frozen=True, eq=False):
     """Unit tangents (K, 3) `before` and `after` corners."""
 
     before: Floats

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Final
+
+from msgspec import Struct
 
 from camtool import bounds
 from camtool.toolpath.moves import Kind, PathMode
@@ -35,8 +36,7 @@ MOST_PASSES: Final = 100_000
 """Passes of one thread."""
 
 
-@dataclass
-class _Hole:
+class _Hole(Struct):
     """One hole, in (first, second, normal) of the plane."""
 
     at: list[float]

@@ -12,8 +12,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
+
+from msgspec import Struct
 
 from ..gcode.faults import Fault
 
@@ -122,8 +123,7 @@ def column_of(text: str, at: int) -> int:
     return column + (seen <= at and bool(text))
 
 
-@dataclass(frozen=True, slots=True)
-class Block:
+class Block(Struct, frozen=True):
     """What a line asks for: numbers by letter, G codes (tenfold) and M codes by group, the last
     comment, and the parameters that it sets."""
 
@@ -134,8 +134,7 @@ class Block:
     settings: tuple[tuple[int | str, float], ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Item:
+class Item(Struct, frozen=True):
     """A word or a setting of a line: `letter` ("#" for a setting), its number, and where it
     stands; `name`: the parameter that is set."""
 

@@ -9,9 +9,10 @@ sub ends.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
+
+from msgspec import Struct
 
 from camtool.toolpath.moves import Kind
 
@@ -23,8 +24,7 @@ from .state import State
 Execute = Callable[[Block], None]
 
 
-@dataclass(frozen=True)
-class Modes:
+class Modes(Struct, frozen=True):
     """G codes (tenfold) in force by group, M words, feed, speed and tolerances of the path."""
 
     g: dict[str, int]

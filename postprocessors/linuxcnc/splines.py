@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Floats
 
@@ -33,8 +33,7 @@ MOST_CONTROL_POINTS: Final = 1000
 Flat = tuple[float, float]
 
 
-@dataclass(frozen=True)
-class Piece:
+class Piece(Struct, frozen=True):
     """A piece of the path: its end, and the centre and the direction of an arc (None: a line)."""
 
     end: Flat

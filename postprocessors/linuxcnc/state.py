@@ -6,8 +6,9 @@ Numbers are in the units of the program, as LinuxCNC has them; `Canon` makes row
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
+
+from msgspec import Struct, field
 
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind
@@ -26,8 +27,7 @@ MM_PER_INCH: Final = 25.4
 """Length of an inch, mm."""
 
 
-@dataclass
-class Notes:
+class Notes(Struct):
     """Blocks (index from 0) at which something was passed over or taken for granted."""
 
     coolant: list[int] = field(default_factory=list)
@@ -43,8 +43,7 @@ class Notes:
     feeds: Callable[[int, float], None] = lambda block, feed: None
 
 
-@dataclass
-class Series:
+class Series(Struct):
     """What cycles keep from block to block: the height at which the first of them began (None:
     none has), and the words R, P, Q, I, J, K and that of the depth."""
 

@@ -14,10 +14,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Generator, Mapping, Sequence
-from dataclasses import replace
 from typing import Final, cast
 
 import numpy as np
+from msgspec.structs import replace
 
 from camtool.errors import MachineError
 from camtool.target.terminal import Terminal

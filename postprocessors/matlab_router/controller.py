@@ -18,9 +18,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.errors import MachineError
@@ -226,8 +227,7 @@ TEXT_FACTORS = ((10.0, 1), (100.0, 10), (1100.0, 100), (math.inf, 1000))
 equal parts."""
 
 
-@dataclass(frozen=True, eq=False)
-class Lines:
+class Lines(Struct, frozen=True, eq=False):
     """L orders of the master.
 
     orders (L, 11): `Program.lines` of the kernel; pauses_s (L,) behind each, negative where the

@@ -7,11 +7,10 @@ a whole, and each option of its own overrides its profile. `Lnnnn` are lines of 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Annotated, Any, Final, Literal
 
 import msgspec
-from msgspec import Meta
+from msgspec import Meta, Struct
 
 from camtool.errors import MachineError
 from camtool.machine.model import Link, Machine, SlideStart
@@ -98,8 +97,7 @@ PROFILES: Final[dict[str, dict[str, Any]]] = {
 }
 
 
-@dataclass(frozen=True)
-class Choices:
+class Choices(Struct, frozen=True):
     """Every choice made, by the table or by its profile.
 
     `format` "m": the arrays as a Matlab file; "stream": the bytes of the serial line.

@@ -11,10 +11,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import Final, NoReturn
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Ints
 from camtool.bounds import check_count as check_size
@@ -57,8 +57,7 @@ Where = Callable[[str, int, int], str]
 """The place of a number in the file, by the name of its array, its row and its column."""
 
 
-@dataclass(frozen=True, eq=False)
-class ReadJob:
+class ReadJob(Struct, frozen=True, eq=False):
     """`first` (2,) and `length` (2, n) units, `speed` (2, n) counts in 5 ms with the signs of the
     directions; `number` from 1; `where` names places."""
 
@@ -133,8 +132,7 @@ def _refuse(job: ReadJob, name: str, bad: Bools, what: str) -> None:
 # begins another job.
 
 
-@dataclass(frozen=True, eq=False)
-class _Value:
+class _Value(Struct, frozen=True, eq=False):
     """What a name was set to: numbers (rows, columns), and where they begin in the text."""
 
     table: Ints

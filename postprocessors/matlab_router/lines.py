@@ -12,10 +12,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import PostError
@@ -55,8 +56,7 @@ SNAP_NOTICE_MM: Final = 1e-6
 """A vertex that is moved by less lies on the grid already."""
 
 
-@dataclass(frozen=True, eq=False)
-class Lines:
+class Lines(Struct, frozen=True, eq=False):
     """L lines that the slaves can run: `start`, `end` (L, 2) units from home; `feed` (L,) mm/min;
     `row` (L,) of the toolpath; `stroke` (L,) ascending."""
 
@@ -73,8 +73,7 @@ class Lines:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class Jobs:
+class Jobs(Struct, frozen=True, eq=False):
     """All jobs in columns: their lines, the signed speeds (L, 2) of these in counts in 5 ms, and
     `offsets` (J+1,): job j has the lines offsets[j]:offsets[j+1]."""
 
@@ -297,8 +296,7 @@ class _Maker:
 # across with v = 1 (d · V long), along again.
 
 
-@dataclass(frozen=True)
-class Limits:
+class Limits(Struct, frozen=True):
     """How far a line may bend, the grid of its ends, and the least distance; all in units."""
 
     tolerance: float
@@ -362,8 +360,7 @@ def _pieces(longer: int, shorter: int, counts: int, limits: Limits) -> list[tupl
     return [part for part in parts if part != (0, 0)]
 
 
-@dataclass
-class Changes:
+class Changes(Struct):
     """What one run of the writer changed; places name the worst or the first of each kind."""
 
     snap_mm: float = 0.0

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
+from msgspec import Struct, field
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.bounds import check_count
@@ -155,8 +155,7 @@ class _Moves:
             self._path.rapid(**to)
 
 
-@dataclass(frozen=True, eq=False)
-class Executed:
+class Executed(Struct, frozen=True, eq=False):
     """`points` (n+1, 2) units where the machine comes to stand, and where it was `asked` to."""
 
     points: Ints
@@ -256,8 +255,7 @@ def _off(distance: Floats, speed: Ints, along: Floats) -> Floats:
     return np.asarray(np.abs(speed - straight).max(axis=1))
 
 
-@dataclass
-class Worst:
+class Worst(Struct):
     """How many are beyond a limit, by how much at most, and where the first is."""
 
     count: int = 0
@@ -278,8 +276,7 @@ class Worst:
         return [sentence(where=self.first, measured=self.most, count=self.count, start=start)]
 
 
-@dataclass
-class JobFindings:
+class JobFindings(Struct):
     """What all jobs have that the machine does otherwise, or cannot do."""
 
     machine: MatlabRouterMachine

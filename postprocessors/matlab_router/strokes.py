@@ -8,10 +8,10 @@ point of each job by itself. What it cannot do is a PostError that names the mov
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import PostError
@@ -28,8 +28,7 @@ DEPTH_TOLERANCE_MM: Final = 0.005
 """A cut may lie this much above or below the one depth that the machine plunges to."""
 
 
-@dataclass(frozen=True, eq=False)
-class Cuts:
+class Cuts(Struct, frozen=True, eq=False):
     """The lines to be cut, in their order, L rows: `start`, `end` (L, 2) mm in the work frame;
     `feed` (L,) mm/min; `row` (L,) the row of the toolpath that each came from; `stroke` (L,)
     ascends from 0. Within a stroke each line starts where the one before it ended."""

@@ -9,11 +9,11 @@ Then the master does nothing more until it is reset. It says nothing, but perhap
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from typing import Final, Literal
 
 import msgspec
 import numpy as np
+from msgspec.structs import replace
 
 from camtool.arrays import Ints
 from camtool.errors import ProgramError

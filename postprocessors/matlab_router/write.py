@@ -10,11 +10,11 @@ each line.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.bounds import refuse_too_long
 from camtool.errors import PostError
@@ -61,8 +61,7 @@ Pair = tuple[list[int], list[int]]
 """Numbers of X and of Y."""
 
 
-@dataclass(frozen=True)
-class JobNumbers:
+class JobNumbers(Struct, frozen=True):
     """One job as the words of its numbers: x and y in a pair each."""
 
     count: int

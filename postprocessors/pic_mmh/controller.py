@@ -24,10 +24,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import MachineError, ProgramError
@@ -128,8 +129,7 @@ ROWS_AT_ONCE = 1 << 14
 """The legs of so many rows are made together."""
 
 
-@dataclass(frozen=True)
-class _Leg:
+class _Leg(Struct, frozen=True):
     """A part of a row that one interpolator makes: `samples` positions of `fill`; the position of
     the axes `columns` is origin + sign · filled; an output every `period_s`."""
 
@@ -419,8 +419,7 @@ SEARCH_ROWS = 1 << 14
 """Positions that the search for the end looks at in one go (256 KiB, stays in the cache)."""
 
 
-@dataclass(frozen=True)
-class Arc:
+class Arc(Struct, frozen=True):
     """An arc in steps: start (x, y) and end relative to its centre."""
 
     x: int

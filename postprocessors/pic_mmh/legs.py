@@ -6,10 +6,10 @@ every leg begins is known before any is run.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Floats, Ints
 from camtool.simulation.mechanics import Mechanics
@@ -41,8 +41,7 @@ def positions(toolpath: Toolpath, start: Ints, ends: Ints, home: Ints) -> Ints:
     return places
 
 
-@dataclass(frozen=True, eq=False)
-class Course:
+class Course(Struct, frozen=True, eq=False):
     """Where the controller is to go: `places` (N + 1, 3) of `positions`, `centres` (N, 2) steps of
     the arcs among the rows of the toolpath, `stops` (N,) samples of arcs or −1."""
 
@@ -81,8 +80,7 @@ class Course:
         return np.ascontiguousarray(both[moves])
 
 
-@dataclass(frozen=True, eq=False)
-class Periods:
+class Periods(Struct, frozen=True, eq=False):
     """s between two outputs: `rapid_s` of rapids, at least `least_s` of all others; `step_mm` (2,)
     in XY and in Z."""
 

@@ -11,10 +11,10 @@ the controller then stands):  steps = round(units · unit / step), half away fro
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import PostError
@@ -55,8 +55,7 @@ MOST_TOOL: Final = 99
 """Tools that the two digits of T can hold (L3455-3464)."""
 
 
-@dataclass(frozen=True)
-class Grid:
+class Grid(Struct, frozen=True):
     """The units of one form laid over the steps of one axis."""
 
     units_per_mm: int
@@ -102,8 +101,7 @@ class Grid:
         return np.asarray(np.rint(scaled).astype(np.int64))
 
 
-@dataclass(frozen=True, eq=False)
-class Numbers:
+class Numbers(Struct, frozen=True, eq=False):
     """Of N rows: ends (N, 3) and centres (N, 2) as units and as steps, and feeds (N,) in units of
     the feed word.
 

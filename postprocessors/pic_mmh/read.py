@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Final, NoReturn
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.bounds import check_count
@@ -144,8 +144,7 @@ def _mm(whole: str, decimals: str) -> float:
     return int(whole + decimals) / UNITS_PER_MM["example" if decimals else "annex"]
 
 
-@dataclass
-class _Excess:
+class _Excess(Struct):
     """How many blocks go beyond a limit, by how much at most, and where first."""
 
     count: int = 0
@@ -294,8 +293,7 @@ class _Reader:
 # The grammar of a block: the patterns that match one, and the words that say where it goes wrong.
 
 
-@dataclass(frozen=True)
-class Fault:
+class Fault(Struct, frozen=True):
     """Where a block goes wrong (column from 1), how, and how to fix it."""
 
     column: int

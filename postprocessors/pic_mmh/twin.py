@@ -14,6 +14,7 @@ from typing import Final, Literal
 
 import msgspec
 import numpy as np
+from msgspec import structs
 
 from camtool.arrays import Floats, Ints
 from camtool.errors import ProgramError
@@ -148,7 +149,9 @@ class PicMmhTwin(Twin):
         travel = travel_of(motion, by_passes=by_passes)
         if not all(chunk.ledger.ended.all() for chunk in motion):
             # An arc that never ends is left at its nearest approach, as the model leaves it.
-            travel = replace(travel, left_at=self._model.quantised(row, self._machine).end[0])
+            travel = structs.replace(
+                travel, left_at=self._model.quantised(row, self._machine).end[0]
+            )
         self.slides.begin(travel.moved(self._zero), self.now, len(self.decoded) - 1)
 
     def _set_zero(self) -> None:

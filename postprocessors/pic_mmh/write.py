@@ -13,10 +13,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Final, NoReturn
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.bounds import refuse_too_long
@@ -377,8 +377,7 @@ class _Writer:
         return np.concatenate(steps), np.concatenate(units)
 
 
-@dataclass(frozen=True, eq=False)
-class Arcs:
+class Arcs(Struct, frozen=True, eq=False):
     """J arcs that are more than nothing: their rows; columns of `arcs` (J, 7) in steps; signed
     sweeps rad; landings (J, 3). `nothing`: the rows of those whose end is their start."""
 
@@ -428,8 +427,7 @@ class Arcs:
         return np.where(self.landed, turn, 0.0)
 
 
-@dataclass(frozen=True, eq=False)
-class Points:
+class Points(Struct, frozen=True, eq=False):
     """P points in order: their rows; X and Y in units (P, 2), as they stand behind the point;
     whether a block is sent, whether it is one of Z, whether one of an arc. `before` (J, 2): the
     units from which each arc starts; `misfit`: the first row with a point that cannot be written,
@@ -444,8 +442,7 @@ class Points:
     misfit: int
 
 
-@dataclass(frozen=True, eq=False)
-class Chords:
+class Chords(Struct, frozen=True, eq=False):
     """Lines for J arcs: `count` (J,) of them each; and all their ends but the last of each arc,
     which is its own: `end` (K, 2) mm, the arc, and which of its chords, from 0."""
 
@@ -495,8 +492,7 @@ def chord_ends(start: Floats, centre: Floats, sweep_rad: Floats, sagitta_mm: flo
     return Chords(count, centre[arc] + spoke, arc, part)
 
 
-@dataclass
-class Changes:
+class Changes(Struct):
     """What one run of the writer changed, counted; places name the first of each kind."""
 
     dropped: int = 0

@@ -18,9 +18,10 @@ It issues nothing at reversals; compensation in a machine file would be steps at
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Floats, Ints
 from camtool.errors import ProgramError
@@ -108,8 +109,7 @@ class ValcncModel(ControllerModel[ValcncController, Dialect]):
         )
 
 
-@dataclass(frozen=True, eq=False)
-class Drawn:
+class Drawn(Struct, frozen=True, eq=False):
     """How far it has drawn: the last point (3,) mm to which it drew a line, which an arc's angle
     puts beside the end that was programmed, and where its motors then stand, (3,) steps."""
 

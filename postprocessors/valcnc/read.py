@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Final, NoReturn
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Ints
 from camtool.errors import ProgramError
@@ -60,8 +60,7 @@ def read_block(data: bytes, machine: ValcncMachine, at: Point) -> tuple[Toolpath
     return reader.path.finish(), reader.at
 
 
-@dataclass
-class _Missed:
+class _Missed(Struct):
     """How many arcs the controller's own angle takes past or short of their end, and the worst."""
 
     count: int = 0

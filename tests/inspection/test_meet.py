@@ -6,7 +6,6 @@ from __future__ import annotations
 import itertools
 import math
 import random
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 import camtool
 from camtool.errors import OptionError

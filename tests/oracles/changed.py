@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import replace
 
 import numpy as np
+from msgspec.structs import replace
 
 from camtool.arrays import Floats
 from camtool.toolpath.moves import Kind, Move, Toolpath

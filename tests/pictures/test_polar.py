@@ -1,9 +1,8 @@
 """The polar plot of a circle."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from camtool.errors import OptionError
 from camtool.kernels.judging import bin_directions, empty_bins

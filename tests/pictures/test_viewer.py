@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from camtool.geometry.polylines import Polylines, Segments
 from camtool.pictures.colours import BINS
@@ -174,7 +175,7 @@ def test_the_page_draws_deviations_as_pictures_do() -> None:
     assert picture is not None
     shown = found.columns["trace_bin"][1:].astype(int)
     np.testing.assert_array_equal(
-        np.where(shown == BINS, -1, shown), bins_of(replace(picture, top_um=20.0))
+        np.where(shown == BINS, -1, shown), bins_of(structs.replace(picture, top_um=20.0))
     )
 
 
@@ -207,7 +208,10 @@ def test_full_circles_are_plotted_in_the_colours_of_the_page() -> None:
 
 
 def test_a_circle_in_both_directions_is_plotted_once() -> None:
-    both = (replace(lobed(0.01), partner=2), replace(lobed(0.01), ccw=True, partner=1))
+    both = (
+        structs.replace(lobed(0.01), partner=2),
+        structs.replace(lobed(0.01), ccw=True, partner=1),
+    )
     assert text_of(Scene("t", rounds=both)).count("<figure>") == 1
 
 

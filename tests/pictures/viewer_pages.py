@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from camtool.geometry.polylines import Segments
 from camtool.pictures.scene import Line, Playback, Scene, Table, by_feed
@@ -49,7 +50,7 @@ def traced(scene: Scene) -> Scene:
     assert scene.toolpath is not None
     assert scene.trace_points is not None
     rows = np.linspace(0, len(scene.toolpath) - 1, len(scene.trace_points)).astype(np.int64)
-    return with_run(scene, replace(scene.playback(), trace_row=rows))
+    return with_run(scene, structs.replace(scene.playback(), trace_row=rows))
 
 
 def spiral(count: int) -> Toolpath:

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.drawing import Drawing, Units
@@ -104,7 +105,7 @@ def test_reversals_are_told_apart_and_too_many_are_a_warning() -> None:
     def chunks(reversals: int):
         for piece in follow(decoded, 10):
             counted = np.array([[reversals, 1, 1]])
-            yield replace(piece, ledger=replace(piece.ledger, reversals=counted))
+            yield structs.replace(piece, ledger=structs.replace(piece.ledger, reversals=counted))
 
     case = Case(decoded, on(MACHINE), None, None, VerifyOptions())
     found = judge(case, chunks(1))
@@ -116,7 +117,7 @@ def test_reversals_are_told_apart_and_too_many_are_a_warning() -> None:
     # Their errors do not grow with the part: the thesis's larger ones bore as many.
     assert Code.MANY_REVERSALS not in codes(judge(case, chunks(2)))
     machine = pic_mmh("limits.small_part_mm=5")
-    many = judge(replace(case, target=on(machine)), chunks(2))
+    many = judge(structs.replace(case, target=on(machine)), chunks(2))
     (warning,) = [f for f in many.findings if f.code == Code.MANY_REVERSALS]
     assert (warning.measured, warning.limit) == (18.0, 16.0)
     assert warning.severity == Severity.WARNING
@@ -134,8 +135,8 @@ def test_an_arc_that_never_ends_is_an_error_with_its_block() -> None:
             if piece.ledger.row[0] == 3:
                 missed = piece.commanded.copy()
                 missed[-1, :2] = end[:2] + np.array([STEP, -STEP])
-                ledger = replace(piece.ledger, ended=np.array([False]))
-                yield replace(piece, commanded=missed, ledger=ledger)
+                ledger = structs.replace(piece.ledger, ended=np.array([False]))
+                yield structs.replace(piece, commanded=missed, ledger=ledger)
             else:
                 yield piece
 

@@ -1,9 +1,8 @@
 """Judging made motions whose errors are known: every figure against a formula or dense points."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from camtool.errors import ProgramError
 from camtool.findings import Severity

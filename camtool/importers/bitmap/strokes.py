@@ -14,10 +14,10 @@ Nothing here is random, and nothing depends on where the picture lies.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Floats
 from camtool.geometry.fit import split_bulges
@@ -69,8 +69,7 @@ FEWEST = 3
 """Points of a run that is more than a chord."""
 
 
-@dataclass(frozen=True, eq=False)
-class _Shape:
+class _Shape(Struct, frozen=True, eq=False):
     """A line through `at` along the unit vector `way`, or an arc about `at` with a `radius`, which
     turns by `sweep` (rad, CCW positive); its largest and mean (rms) distance from its points."""
 
@@ -98,8 +97,7 @@ class _Shape:
         return np.asarray((x * self.way[1] - y * self.way[0]) ** 2)
 
 
-@dataclass(frozen=True, eq=False)
-class Strokes:
+class Strokes(Struct, frozen=True, eq=False):
     """`vertices` (n, 3) x, y, bulge; of an open path the last one is its end. `off` (n, 2): the
     largest and the rms distance of the points from the segment that leaves each vertex."""
 
@@ -330,8 +328,7 @@ def _meeting(one: _Shape, other: _Shape, place: Floats, limit: float) -> Floats:
     return np.asarray(place + way * min((limit + MEETING_PX) / (far or 1.0), 1.0))
 
 
-@dataclass(frozen=True, eq=False)
-class _Run:
+class _Run(Struct, frozen=True, eq=False):
     """Points that one line or arc stands for."""
 
     part: Floats

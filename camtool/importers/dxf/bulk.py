@@ -14,9 +14,9 @@ Where handles are missing or name two entities, all is left to ezdxf, which mend
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 
 import numpy as np
+from msgspec import Struct, field
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.importers.dxf.tags import Frame, Tags
@@ -37,16 +37,14 @@ _VERTEX = (10, 20, 40, 41, 42)
 _HATCHES = frozenset(("HATCH", "MPOLYGON"))
 
 
-@dataclass(frozen=True, eq=False)
-class Lines:
+class Lines(Struct, frozen=True, eq=False):
     """LINEs by columns: `ends` (K, 2, 3) in the units of the file."""
 
     handles: list[str]
     ends: Floats
 
 
-@dataclass(frozen=True, eq=False)
-class Bulk:
+class Bulk(Struct, frozen=True, eq=False):
     """`others` (N,): the tags that are left to ezdxf; the LINEs that follow the one of a handle;
     the vertices (K, 5) of the LWPOLYLINE of a handle."""
 

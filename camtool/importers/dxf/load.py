@@ -16,12 +16,12 @@ import re
 import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from io import BytesIO
 from itertools import starmap
 from typing import Any
 
 import numpy as np
+from msgspec import Struct, field
 
 from camtool.errors import DrawingError
 from camtool.importers.dxf.bulk import Bulk, Lines
@@ -52,8 +52,7 @@ _COMMENT = 999
 _NO_ASCII = re.compile(r"[^\x00-\x7f]")
 
 
-@dataclass(frozen=True)
-class Loaded:
+class Loaded(Struct, frozen=True):
     """An `ezdxf` document, the header as the file itself says it, all that was mended, and the
     LINEs that follow some LINE of the document, by its handle."""
 

@@ -9,10 +9,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
 from enum import Enum
 from itertools import groupby, pairwise
 from typing import Any
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from camtool.importers.pieces import Unusable
 from camtool.importers.text import (
@@ -231,8 +233,7 @@ class Glue(Enum):
     TAB = "tab"
 
 
-@dataclass(frozen=True, eq=False)
-class Cell:
+class Cell(Struct, frozen=True, eq=False):
     """A word; a stack of two (`bar` "^" no bar, "/" a bar, "#" a slanted one); or glue.
 
     `lift` is 0 on the baseline of the line, 1 in its middle, 2 at its top.
@@ -258,8 +259,7 @@ class Cell:
         return 0.0 if self.glue is not Glue.NONE else share * self.look.height
 
 
-@dataclass(frozen=True, eq=False)
-class Paragraph:
+class Paragraph(Struct, frozen=True, eq=False):
     """`share` 0 left, 0.5 centred, 1 right; indents of the first line, the others, the right edge;
     `stops` of tabs (x, share); `blank` is the height of an empty line."""
 
@@ -273,8 +273,7 @@ class Paragraph:
     ends_column: bool
 
 
-@dataclass(frozen=True, eq=False)
-class Line:
+class Line(Struct, frozen=True, eq=False):
     """Cells with the x of their left ends; the last one ends at `right`, `margin` stays free after
     it; `stretch` marks a line that is widened to its column."""
 
@@ -287,8 +286,7 @@ class Line:
     ends_column: bool = False
 
 
-@dataclass(frozen=True, eq=False)
-class Columns:
+class Columns(Struct, frozen=True, eq=False):
     """`width` 0 does not wrap; `heights` of all columns but the last, which takes the rest."""
 
     width: float
@@ -296,8 +294,7 @@ class Columns:
     heights: tuple[float, ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
-class Pitch:
+class Pitch(Struct, frozen=True, eq=False):
     """`exact` is the height that all lines count for, 0 for each its own."""
 
     factor: float
@@ -310,8 +307,7 @@ class Pitch:
         return LINE_PITCH * self.factor * above - above + below
 
 
-@dataclass(frozen=True, eq=False)
-class Placed:
+class Placed(Struct, frozen=True, eq=False):
     """A line in its column; the first line's top lies at y = 0."""
 
     column: int

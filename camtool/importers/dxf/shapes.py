@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from msgspec import Struct, field
+from msgspec.structs import replace
 
 from camtool.arrays import Floats
 from camtool.errors import DrawingError, GeometryError
@@ -34,8 +35,7 @@ ROUND_SHARE = 1e-9
 _UPWARDS = (0.0, 0.0, 1.0)
 
 
-@dataclass(frozen=True, eq=False)
-class Plane:
+class Plane(Struct, frozen=True, eq=False, dict=True):
     """(x, y) ↦ origin + x·u + y·v, all (2,) in mm; `scale` is 0 unless circles stay circles.
 
     `rise` (2,): how the origin moves for each unit of elevation.
@@ -88,13 +88,12 @@ class Plane:
         return np.asarray(self.origin + local[:, :1] * self.u + local[:, 1:2] * self.v)
 
 
-@dataclass(frozen=True, eq=False)
-class Frame:
+class Frame(Struct, frozen=True, eq=False):
     """World to mm: p ↦ p @ linear + offset, with linear (3, 3) and offset (3,)."""
 
     linear: Floats
     offset: Floats
-    _planes: dict[tuple[float, ...], Plane] = field(default_factory=dict, repr=False)
+    _planes: dict[tuple[float, ...], Plane] = field(default_factory=dict)
 
     def placed(self, linear: Floats, offset: Floats) -> Frame:
         """This frame behind another map."""
@@ -137,8 +136,7 @@ class Frame:
         return Plane.of(u, v, self.offset, up)
 
 
-@dataclass(frozen=True, eq=False)
-class Shape:
+class Shape(Struct, frozen=True, eq=False):
     """`vertices` (n, 3) mm and `off_mm` of a `Piece`; `lacks` names what was not applied."""
 
     vertices: Floats

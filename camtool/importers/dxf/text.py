@@ -10,11 +10,12 @@ from __future__ import annotations
 import math
 import re
 import unicodedata
-from dataclasses import dataclass, replace
 from itertools import accumulate, pairwise
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from camtool.arrays import Floats
 from camtool.importers.dxf.load import printable
@@ -44,16 +45,14 @@ _BACKWARD, _UPSIDE_DOWN = 2, 4
 _STACKED_LETTERS = 4
 
 
-@dataclass(frozen=True, eq=False)
-class Contour:
+class Contour(Struct, frozen=True, eq=False):
     """Parts (k, 3) of control points, k = 2 (line), 3 (quadratic) or 4 (cubic), end to end."""
 
     parts: list[Floats]
     closed: bool
 
 
-@dataclass(frozen=True, eq=False)
-class TextShape:
+class TextShape(Struct, frozen=True, eq=False):
     """The curves of a text, in world coordinates.
 
     `font` is what it is drawn with; `substituted` names the wanted font when that is another one
@@ -87,8 +86,7 @@ def text_strokes(entity: Any, mode: str) -> TextShape:
     return _text(entity, mode)
 
 
-@dataclass(frozen=True, eq=False)
-class _Place:
+class _Place(Struct, frozen=True, eq=False):
     """(x, y) ↦ origin + x·u + y·v, all (3,)."""
 
     origin: Floats

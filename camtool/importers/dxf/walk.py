@@ -8,11 +8,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import product
 from typing import Any
 
+import msgspec
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from camtool.arrays import Floats
 from camtool.errors import DrawingError
@@ -48,8 +51,7 @@ _NOWHERE = Piece(np.zeros((0, 3)), False, "", "", "")
 _NO_LINES = Lines([], np.zeros((0, 2, 3)))
 
 
-@dataclass(frozen=True, eq=False)
-class Scope:
+class Scope(Struct, frozen=True, eq=False):
     """What holds in a space or inside an INSERT: `blocks` on the way here, and the `look` of the
     INSERT; `within` ends sources, `source` (of a dimension and the like) stands for them."""
 
@@ -535,8 +537,7 @@ CONTINUOUS = "Continuous"
 _BYBLOCK, _BYLAYER, _WHITE = 0, 256, 7
 
 
-@dataclass(frozen=True)
-class Look:
+class Look(Struct, frozen=True):
     """What an entity is drawn with; `hidden` says why it is not shown ("" shown).
 
     `frozen`: an INSERT on its layer shows nothing at all; on one that is merely off it still
@@ -550,12 +551,11 @@ class Look:
     frozen: bool = False
 
 
-@dataclass
-class Looks:
+class Looks(Struct):
     """The looks of all entities of a document, by what these say of themselves."""
 
     layers: dict[str, Look]
-    _known: dict[tuple[Any, ...], Look] = field(default_factory=dict)
+    _known: dict[tuple[Any, ...], Look] = msgspec.field(default_factory=dict)
 
     @classmethod
     def of(cls, document: Any) -> Looks:

@@ -18,11 +18,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import PurePath
 from typing import NoReturn
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Floats
 from camtool.errors import DrawingError
@@ -210,16 +210,14 @@ _BLOCK = re.compile(r"^[ \t]*[%#]\{[ \t\r]*$.*?(?:^[ \t]*[%#]\}[ \t\r]*$|\Z)", r
 _ONLY_NUMBERS = "camtool reads numbers only and runs nothing: write the arrays as plain numbers"
 
 
-@dataclass(frozen=True, eq=False)
-class Value:
+class Value(Struct, frozen=True, eq=False):
     """An array (rows, columns) and the line on which it is assigned."""
 
     array: Floats
     line: int
 
 
-@dataclass(frozen=True)
-class _Token:
+class _Token(Struct, frozen=True):
     kind: str
     text: str
     line: int

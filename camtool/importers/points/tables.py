@@ -9,10 +9,10 @@ import re
 import warnings
 import zipfile
 import zlib
-from dataclasses import dataclass, field
 from typing import Any, NoReturn
 
 import numpy as np
+from msgspec import Struct, field
 
 from camtool.arrays import Floats
 from camtool.errors import DrawingError
@@ -22,8 +22,7 @@ COLUMNS = (2, 3)
 """How many numbers a point may have: x, y, or x, y, bulge."""
 
 
-@dataclass(frozen=True, eq=False)
-class Stroke:
+class Stroke(Struct, frozen=True, eq=False):
     """One polyline: `points` (n, 2) or (n, 3) of x, y, bulge in the file's unit.
 
     `source` says where it stands in the file; `closed` is None when the file does not say: then
@@ -36,8 +35,7 @@ class Stroke:
     layer: str = "0"
 
 
-@dataclass(frozen=True, eq=False)
-class Table:
+class Table(Struct, frozen=True, eq=False):
     """All strokes of a file, its unit (None when the file names none), and where that comes from.
 
     `mm_per_unit` is needed for a unit that is none of `camtool.units` alone.
@@ -83,8 +81,7 @@ def parse_lines(text: str, file: str) -> Table:
     return _Lines(file).parse(text)
 
 
-@dataclass
-class _Lines:
+class _Lines(Struct):
     """What the lines so far have shown: the separator `parted` ("" for blanks), `columns`, and
     where a decimal comma, a decimal point, and a proof of the comma's meaning were first seen."""
 

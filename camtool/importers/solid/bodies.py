@@ -9,10 +9,11 @@ import re
 import sys
 import traceback
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
+
+from msgspec import Struct
 
 from camtool.errors import DrawingError
 
@@ -22,8 +23,7 @@ _NO_NAME = re.compile(
 """What OpenCASCADE writes as the name of a shape that has none."""
 
 
-@dataclass(frozen=True, eq=False)
-class Body:
+class Body(Struct, frozen=True, eq=False):
     """One solid, or a shell, face, wire or edge that belongs to none: a `TopoDS_Shape`."""
 
     shape: Any

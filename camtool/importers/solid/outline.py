@@ -10,10 +10,10 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from msgspec import Struct, field
 
 from camtool.arrays import Floats
 from camtool.errors import DrawingError
@@ -26,8 +26,7 @@ SECTION_MARGIN = 0.1
 """The plane of a section extends beyond the body by this share of the body's size."""
 
 
-@dataclass(frozen=True, eq=False)
-class Outline:
+class Outline(Struct, frozen=True, eq=False):
     """The wires of one face; `kind` is "face", "section", "wire" or "edge"."""
 
     kind: str
@@ -36,8 +35,7 @@ class Outline:
     paths: list[Path]
 
 
-@dataclass(frozen=True, eq=False)
-class Outlines:
+class Outlines(Struct, frozen=True, eq=False):
     """All that is drawn; `levels` are the heights at which solids were taken, `span` is the
     height of the whole model from its lowest to its highest point; of the `missed` bodies nothing
     is drawn, for these reasons."""
@@ -216,8 +214,7 @@ JOINT_MM = 1e-4
 files of other programs within 1e-5 and more."""
 
 
-@dataclass(frozen=True, eq=False)
-class Path:
+class Path(Struct, frozen=True, eq=False):
     """Vertices (n, 3) x, y, bulge and `off` (n, 2) of a `Piece`, in the model's unit."""
 
     vertices: Floats

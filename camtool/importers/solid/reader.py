@@ -21,11 +21,11 @@ import subprocess
 import sys
 import tempfile
 from collections import Counter
-from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.errors import DrawingError
 from camtool.findings import (
@@ -240,8 +240,7 @@ _PREFIXES = {b"": "metre", b"MILLI": "millimetre", b"CENTI": "centimetre", b"MIC
 _SPELLINGS = {"inches": "inch", "in": "inch", "feet": "foot", "ft": "foot"}
 
 
-@dataclass(frozen=True)
-class FileUnit:
+class FileUnit(Struct, frozen=True):
     """`mm` per unit of the file, which its reader has applied already; None: unknown."""
 
     why: str

@@ -12,7 +12,8 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+
+from msgspec import Struct, field
 
 from camtool.errors import DrawingError
 from camtool.importers.svg.tree import Node
@@ -35,8 +36,7 @@ _BRACE = re.compile(r"[{}]")
 _Test = tuple[str, str, str]
 
 
-@dataclass(frozen=True)
-class _Compound:
+class _Compound(Struct, frozen=True):
     """What one element must be: tag ("" any), ids, classes and tests of attributes."""
 
     tag: str = ""
@@ -53,8 +53,7 @@ class _Compound:
         )
 
 
-@dataclass(frozen=True)
-class _Rule:
+class _Rule(Struct, frozen=True):
     """Steps from the element outwards; `child[i]`: step i + 1 is the parent of step i."""
 
     steps: tuple[_Compound, ...]
@@ -92,8 +91,7 @@ class _Rule:
         return bool(places)
 
 
-@dataclass
-class Rules:
+class Rules(Struct):
     """All rules of a document, found by what their element must be; `left_out` counts others."""
 
     left_out: int = 0

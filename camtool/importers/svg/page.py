@@ -9,7 +9,9 @@ Source: Scalable Vector Graphics 1.1, 7.10 to 7.12; CSS 2.1, 4.3.2 for the units
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+
+from msgspec import Struct, structs
 
 from camtool.errors import DrawingError
 from camtool.findings import UNIT_GUESSED_BY_PROGRAM, UNITLESS_PX, Finding
@@ -29,8 +31,7 @@ from camtool.importers.svg.transform import (
 from camtool.importers.svg.tree import Node
 
 
-@dataclass(frozen=True)
-class Page:
+class Page(Struct, frozen=True):
     """`to_mm`: user units of the root to mm; `viewport` (width, height) in user units where
     known; the unit, and the findings about it."""
 
@@ -40,8 +41,7 @@ class Page:
     findings: tuple[Finding, ...] = ()
 
 
-@dataclass(frozen=True)
-class _Side:
+class _Side(Struct, frozen=True):
     """Width or height as written: in mm where it is a size, and its unit ("" without one)."""
 
     text: str
@@ -70,7 +70,7 @@ def page_of(root: Node, options: ReadOptions, writer: Writer | None = None) -> P
     if writer is None or not (box is None or page.units.name == "px"):
         return page
     hint = UNIT_GUESSED_BY_PROGRAM(program=writer[0], px_an_inch=writer[1], usual=DPI)
-    return replace(page, findings=(*page.findings, hint))
+    return structs.replace(page, findings=(*page.findings, hint))
 
 
 def _by_the_file(

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import cmath
 from collections import Counter
-from dataclasses import dataclass, field
 
 import numpy as np
+from msgspec import Struct, field
 
 from camtool.arrays import Floats
 from camtool.errors import DrawingError, GeometryError
@@ -401,8 +401,7 @@ def _cost(found: list[Subpath]) -> int:
 # What the walk over an SVG document counts: used, left out, drawn otherwise than shown.
 
 
-@dataclass
-class Notes:
+class Notes(Struct):
     """Counts by kind and reason; of faults the first of each kind is kept."""
 
     used: Counter[str] = field(default_factory=Counter)

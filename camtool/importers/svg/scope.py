@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Floats
 from camtool.importers.svg.shapes import Lengths
@@ -84,8 +84,7 @@ FRAME_SHARE = 1e-6
 """A piece that leaves a frame by no more of its size lies inside: rounding."""
 
 
-@dataclass(frozen=True)
-class Frame:
+class Frame(Struct, frozen=True):
     """`to_mm` from the units inside; `viewport` what % are of inside; `box` in the units outside,
     whose map to mm is `outer`."""
 

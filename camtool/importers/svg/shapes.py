@@ -13,10 +13,10 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass, field
 from itertools import accumulate
 
 import numpy as np
+from msgspec import Struct, field
 
 from camtool.arrays import Floats
 from camtool.errors import DrawingError
@@ -27,22 +27,19 @@ from camtool.importers.svg.tree import Node
 from camtool.units import MM_PER_UNIT
 
 
-@dataclass(frozen=True, eq=False)
-class Lines:
+class Lines(Struct, frozen=True, eq=False):
     """Straight segments through `points` (n, 2)."""
 
     points: Floats
 
 
-@dataclass(frozen=True, eq=False)
-class Bezier:
+class Bezier(Struct, frozen=True, eq=False):
     """A quadratic (2, 2) or cubic (3, 2) Bézier: `control` without its first point."""
 
     control: Floats
 
 
-@dataclass(frozen=True, eq=False)
-class Arc:
+class Arc(Struct, frozen=True, eq=False):
     """An arc of an ellipse, its half axes `u`, `v` (2,), angles in rad, `end` (2,) exact."""
 
     centre: Floats
@@ -56,8 +53,7 @@ class Arc:
 Segment = Lines | Bezier | Arc
 
 
-@dataclass(frozen=True, eq=False)
-class Subpath:
+class Subpath(Struct, frozen=True, eq=False):
     """A start (2,) and what follows it; `closed` paths have a straight line back, if any."""
 
     start: Floats
@@ -194,8 +190,7 @@ def _odd(text: str) -> str:
     return f"holds {text.strip()[:12]!r}, which does not belong there"
 
 
-@dataclass
-class _Pen:
+class _Pen(Struct):
     """Draws: the point where it stands, the open subpath, and what is done.
 
     The open subpath is its segments, and after them the corners of straight lines that are not
@@ -335,8 +330,7 @@ FONT_UNITS = {"em": 1.0, "ex": 0.5}
 """Units of the font size."""
 
 
-@dataclass(frozen=True)
-class Lengths:
+class Lengths(Struct, frozen=True):
     """Turns lengths into user units: `viewport` (width, height) is what % are of, where known;
     a user unit is a px; em and ex are of `font_px`, ex half of it."""
 

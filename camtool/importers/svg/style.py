@@ -7,9 +7,11 @@ the style attribute; what is `!important` over all. Source: Cascading Style Shee
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
+
+from msgspec import Struct
+from msgspec.structs import asdict, replace
 
 from camtool.importers.svg.colours import parse_colour
 from camtool.importers.svg.css import Rules, declared
@@ -63,8 +65,7 @@ _FURTHEST_FONT_PX = 1e6
 _UNSEEN = ("none", "transparent")
 
 
-@dataclass(frozen=True)
-class Style:
+class Style(Struct, frozen=True, dict=True):
     """The properties of one element, after inheritance; `transform` and its like only where a
     style says them, for attributes of that name are read by the walk. `limits`: the properties of
     LIMITS that the element itself has. `odd`: those of PLAIN_TEXT, and "font-size", that ask for
@@ -126,7 +127,7 @@ _NAMES = ("stroke", "fill", "color", "visibility", "stroke-dasharray", "font-siz
           *LIMITS)  # fmt: skip
 _PROPERTIES = frozenset((*_NAMES, "font"))
 _ATTRIBUTES = tuple(name for name in _NAMES if name not in _SHEET_ONLY)
-_INITIAL = {field.name: field.default for field in fields(Style)}
+_INITIAL = asdict(Style())
 _BLANK = {_FIELDS.get(name, name): _INITIAL[_FIELDS.get(name, name)] for name in _NOT_INHERITED}
 
 
@@ -195,8 +196,7 @@ def _under(above: Style, values: dict[str, str]) -> Style:
             own[target] = written.strip()
         elif value:
             own[target] = value
-    merged = {field.name: getattr(above, field.name) for field in fields(Style)} | own
-    return Style(**merged)
+    return replace(above, **own)
 
 
 def _text_property(name: str, value: str, above: Style, own: dict[str, Any]) -> None:

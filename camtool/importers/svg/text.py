@@ -14,10 +14,11 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import accumulate, pairwise
 
 import numpy as np
+from msgspec import Struct, field
 
 from camtool.arrays import Floats
 from camtool.importers.pieces import Unusable
@@ -56,8 +57,7 @@ class Run:
     style: Style
 
 
-@dataclass(frozen=True, eq=False)
-class Text:
+class Text(Struct, frozen=True, eq=False):
     """The runs of a text and the count of its letters; `unseen`: why some of them are not drawn;
     `lacks`: what fonts lack; `plainer`: weights that fonts are not
     asked for."""
@@ -105,8 +105,7 @@ def _keeps_blanks(node: Node | None) -> bool:
     return False
 
 
-@dataclass(eq=False)
-class _Flow:
+class _Flow(Struct, eq=False):
     """Letters in order, blanks collapsed, each with its style; `at` has the places that elements
     give to letters by their number."""
 
@@ -202,8 +201,7 @@ def _check(letter: str) -> None:
         raise Unusable(f"has letters that are combined (U+{ord(letter):04X})")
 
 
-@dataclass(frozen=True, eq=False)
-class _Words:
+class _Words(Struct, frozen=True, eq=False):
     """Letters of one look from x on, the baseline at y (down)."""
 
     letters: str
@@ -215,8 +213,7 @@ class _Words:
     end: float
 
 
-@dataclass(eq=False)
-class _Writer:
+class _Writer(Struct, eq=False):
     """Fonts by mode; what they lacked, by font and by the font wanted."""
 
     mode: str

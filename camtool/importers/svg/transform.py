@@ -11,9 +11,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Floats
 from camtool.errors import DrawingError
@@ -28,8 +28,7 @@ _ALIGN = re.compile(r"(?:defer\s+)?(none|x(Min|Mid|Max)Y(Min|Mid|Max))(?:\s+(mee
 _SHARE = {"Min": 0.0, "Mid": 0.5, "Max": 1.0}
 
 
-@dataclass(frozen=True)
-class Affine:
+class Affine(Struct, frozen=True):
     """A map of the plane; `outer @ inner` does `inner` first."""
 
     a: float = 1.0
@@ -109,8 +108,7 @@ def parse_numbers(text: str, name: str) -> list[float]:
     return values
 
 
-@dataclass(frozen=True)
-class Box:
+class Box(Struct, frozen=True):
     """A rectangle: its corner of least x and y, and its size."""
 
     x: float

@@ -11,12 +11,13 @@ import codecs
 import gzip
 import re
 import zlib
-from dataclasses import dataclass, field
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
 from xml.sax import SAXException, SAXParseException
 from xml.sax.handler import ContentHandler, feature_external_ges, feature_namespaces
 from xml.sax.xmlreader import InputSource
+
+from msgspec import Struct, field
 
 from camtool.errors import DrawingError
 
@@ -45,8 +46,7 @@ MAX_REFERENCES = 10_000
 _WRONG_PREFIX = "unbound prefix"
 
 
-@dataclass(eq=False, slots=True)
-class Node:
+class Node(Struct, eq=False):
     """One SVG element: `tag` without namespace; foreign elements have the tag "". Attributes
     of SVG itself by name, those of others as "xlink:href", "xml:space", "inkscape:label".
     `text` is what a sheet holds, or the letters in front of the first child of an element within

@@ -7,11 +7,11 @@ number before, the first from 0). Floats of 32 bits hold a place on a table of 8
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.drawing import Drawing
@@ -216,8 +216,7 @@ MOST_COUNTS = 32_000
 """Deviations are whole numbers of counts, this many for the largest."""
 
 
-@dataclass(frozen=True, eq=False)
-class Traced:
+class Traced(Struct, frozen=True, eq=False):
     """The columns of the predicted path, the length of a count of their deviations (0 where the
     wanted path is unknown), and the deviations (W, 2) mm of the worst places."""
 
