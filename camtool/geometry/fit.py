@@ -122,7 +122,7 @@ def split_bulges(vertices: Floats, closed: bool) -> Floats:
 
 def _fit_pieces(pieces: Pieces, tolerance_mm: float) -> Fit:
     """Rational pieces, about their origin."""
-    from camtool.kernels.fits import curve_rows, points_at
+    from camtool.kernels.fits import curve_rows, samples_between
 
     if not np.abs(pieces.control).max() <= MAX_SIZE_MM:
         raise GeometryError("a point or a tangent of a curve is not finite")
@@ -133,17 +133,21 @@ def _fit_pieces(pieces: Pieces, tolerance_mm: float) -> Fit:
         point, arrive, leave = (np.ascontiguousarray(rows[:, k : k + 2]) for k in (1, 3, 5))
         return Nodes(rows[:, 0], point, arrive, leave, corner)
 
-    vertices, judged, _ = _fitted(nodes, lambda t: points_at(control, t), tolerance_mm)
+    vertices, judged, _ = _fitted(nodes, lambda t: samples_between(control, t), tolerance_mm)
     vertices[:, :2] += pieces.origin
     return _checked(vertices, judged, pieces.ends)
 
 
 def _fit_any(curve: Curve, tolerance_mm: float) -> Fit:
     """A curve given by functions."""
+    share = np.arange(MEASURE_STEPS) / MEASURE_STEPS
+
+    def samples(t: Floats) -> Floats:
+        between = (t[:-1, None] + share * np.diff(t)[:, None]).ravel()
+        return curve.point(np.append(between, t[-1]))
+
     vertices, judged, nodes = _fitted(
-        lambda fineness_mm, steps: curve_nodes(curve, fineness_mm, steps),
-        curve.point,
-        tolerance_mm,
+        lambda fineness_mm, steps: curve_nodes(curve, fineness_mm, steps), samples, tolerance_mm
     )
     if len(nodes) == 1:
         return Fit(vertices, *judged)
@@ -151,9 +155,11 @@ def _fit_any(curve: Curve, tolerance_mm: float) -> Fit:
 
 
 def _fitted(
-    nodes_of: Callable[[float, int], Nodes], point_of: Callable[[Floats], Floats], tolerance: float
+    nodes_of: Callable[[float, int], Nodes], samples: Callable[[Floats], Floats], tolerance: float
 ) -> tuple[Floats, Judged, Nodes]:
     """The chain (n, 3) within `tolerance`, its deviations, and the nodes it was chosen from.
+    `samples` gives `MEASURE_STEPS` points of the curve for each step between parameters (n,), and
+    the last one.
 
     A fit whose error turns out too large is done again over finer nodes, since errors peak
     between them; if that is not enough, with less of the tolerance as well.
@@ -165,11 +171,8 @@ def _fitted(
         nodes = nodes_of(fineness, steps)
         if len(nodes) == 1:
             return np.append(nodes.point[0], 0.0)[None, :], (0.0, 0.0, 0.0), nodes
-        share = np.arange(MEASURE_STEPS) / MEASURE_STEPS
-        t = (nodes.t[:-1, None] + share * np.diff(nodes.t)[:, None]).ravel()
-        samples = point_of(np.append(t, nodes.t[-1]))
         columns = (nodes.point, nodes.arrive, nodes.leave, nodes.corner)
-        vertices, judged = fit_nodes(columns, samples, target, tolerance)
+        vertices, judged = fit_nodes(columns, samples(nodes.t), target, tolerance)
         if not judged[0] > ACCEPTED_SHARE * tolerance or len(nodes) >= MAX_NODES:
             break
         steps, fineness = 2 * steps, REFINING * fineness

@@ -10,8 +10,8 @@ from camtool.kernels.types cimport Int
 @cython.locals(degree=Int, i=Int)
 cpdef (double, double, double, double) evaluate(double[:, :, ::1] pieces, Int k, double u) noexcept
 
-@cython.locals(i=Int, k=Int, out=double[:, ::1])
-cpdef points_at(double[:, :, ::1] pieces, double[::1] t)
+@cython.locals(i=Int, j=Int, row=Int, k=Int, here=double, out=double[:, ::1])
+cpdef samples_between(double[:, :, ::1] pieces, double[:] t)
 
 cpdef double speed(double[:, :, ::1] pieces, Int k, double u) noexcept
 
@@ -31,18 +31,19 @@ cdef first_steps(double[:, :, ::1] pieces, Int k, Int each)
 
 @cython.locals(turn=Int, bends=bint, reach=double, off=double)
 cdef bint too_coarse(
-    double[:, :, ::1] pieces, Int k, double[::1] left, double[::1] right, double tolerance
+    double[:, :, ::1] pieces, Int k, double[:, ::1] before, Int i, double[:, ::1] behind, Int j,
+    double tolerance
 ) noexcept
 
 @cython.locals(
-    count=Int, i=Int, depth=Int, column=Int, fine=bint, fastest=double, least=double,
-    stack=double[:, ::1], out=double[:, ::1], grid=double[::1], left=double[::1], right=double[::1]
+    count=Int, i=Int, depth=Int, column=Int, last=Int, top=Int, fine=bint, fastest=double,
+    least=double, stack=double[:, ::1], out=double[:, ::1], grid=double[::1]
 )
 cdef piece_rows(double[:, :, ::1] pieces, Int k, Int each, double tolerance, Int most)
 
 @cython.locals(dx=double, dy=double)
 cdef void fill_row(
-    double[:, :, ::1] pieces, Int k, double u, double least, double[::1] row
+    double[:, :, ::1] pieces, Int k, double u, double least, double[:, ::1] rows, Int i
 ) noexcept
 
 @cython.locals(

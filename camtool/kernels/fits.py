@@ -132,13 +132,17 @@ def evaluate(pieces: Floats, k: int, u: float) -> tuple[float, float, float, flo
     return x / w, y / w, share * (dx * w - x * dw), share * (dy * w - y * dw)
 
 
-def points_at(pieces: Floats, t: Floats) -> Floats:
-    """(n, 2) positions at parameters t (n,) in 0..m."""
-    out = np.empty((len(t), 2))
-    for i in range(len(t)):
-        k = int(t[i])
-        k = min(k, len(pieces) - 1)
-        x, y, _, _ = evaluate(pieces, k, t[i] - float(k))
+def samples_between(pieces: Floats, t: Floats) -> Floats:
+    """((n − 1) · `MEASURE_STEPS` + 1, 2) positions: so many from each of the parameters t (n,) in
+    0..m on to the next one, and that at the last."""
+    out = np.empty(((len(t) - 1) * MEASURE_STEPS + 1, 2))
+    for i in range(len(out)):
+        row, j = i // MEASURE_STEPS, i % MEASURE_STEPS
+        here = t[row]
+        if j > 0:
+            here += float(j) / float(MEASURE_STEPS) * (t[row + 1] - t[row])
+        k = min(int(here), len(pieces) - 1)
+        x, y, _, _ = evaluate(pieces, k, here - float(k))
         out[i, 0], out[i, 1] = x, y
     return np.asarray(out)
 
@@ -203,22 +207,27 @@ def first_steps(pieces: Floats, k: int, each: int) -> tuple[Floats, float]:
     return np.asarray(out[:count]), fastest
 
 
-def too_coarse(pieces: Floats, k: int, left: Floats, right: Floats, tolerance: float) -> bool:
-    """Whether the step between two rows (u, x, y, arrive x, y, leave x, y) must be halved."""
-    middle = 0.5 * (left[0] + right[0])
-    if not left[0] < middle < right[0]:
+def too_coarse(
+    pieces: Floats, k: int, before: Floats, i: int, behind: Floats, j: int, tolerance: float
+) -> bool:
+    """Whether the step between two rows (u, x, y, arrive x, y, leave x, y), row i of those before
+    and row j of those behind, must be halved."""
+    low, high = before[i, 0], behind[j, 0]
+    middle = 0.5 * (low + high)
+    if not low < middle < high:
         return False
-    pair = biarc(left[1], left[2], left[5], left[6], right[1], right[2], right[3], right[4])
-    bends = left[5] * right[3] + left[6] * right[4] < math.cos(STEP_TURN_RAD)
+    ax, ay, bx, by = before[i, 1], before[i, 2], behind[j, 1], behind[j, 2]
+    leave_x, leave_y, arrive_x, arrive_y = before[i, 5], before[i, 6], behind[j, 3], behind[j, 4]
+    pair = biarc(ax, ay, leave_x, leave_y, bx, by, arrive_x, arrive_y)
+    bends = leave_x * arrive_x + leave_y * arrive_y < math.cos(STEP_TURN_RAD)
     reach = 0.0
     for turn in range(3):
         # Halfway first, then a quarter and three quarters.
         share = 0.5 if turn == 0 else 0.25 if turn == 1 else 0.75
-        x, y, _, _ = evaluate(pieces, k, left[0] + share * (right[0] - left[0]))
-        reach = max(reach, abs(x - left[1]), abs(y - left[2]), abs(x - right[1]))
-        reach = max(reach, abs(y - right[2]))
+        x, y, _, _ = evaluate(pieces, k, low + share * (high - low))
+        reach = max(reach, abs(x - ax), abs(y - ay), abs(x - bx), abs(y - by))
         if not bends:
-            off = distance_to_biarc(x, y, left[1], left[2], right[1], right[2], pair)
+            off = distance_to_biarc(x, y, ax, ay, bx, by, pair)
             bends = off > STEP_ERROR_SHARE * tolerance
         if bends and reach > POSITION_EPS_MM:
             return True
@@ -234,40 +243,41 @@ def piece_rows(pieces: Floats, k: int, each: int, tolerance: float, most: int) -
     least = VANISHING_TANGENT * fastest
     stack = np.empty((64, 7))
     out = np.empty((512, 7))
-    fill_row(pieces, k, 0.0, least, out[0])
+    fill_row(pieces, k, 0.0, least, out, 0)
     count = 1
     for i in range(1, len(grid)):
-        fill_row(pieces, k, grid[i], least, stack[0])
+        fill_row(pieces, k, grid[i], least, stack, 0)
         depth = 1
         while depth > 0:
-            left, right = out[count - 1], stack[depth - 1]
+            last, top = count - 1, depth - 1
             fine = depth < len(stack) and count < most
-            if fine and too_coarse(pieces, k, left, right, tolerance):
-                fill_row(pieces, k, 0.5 * (left[0] + right[0]), least, stack[depth])
+            if fine and too_coarse(pieces, k, out, last, stack, top, tolerance):
+                middle = 0.5 * (out[last, 0] + stack[top, 0])
+                fill_row(pieces, k, middle, least, stack, depth)
                 depth += 1
                 continue
             if count == len(out):
                 out = np.concatenate([out, out])
             for column in range(7):
-                out[count, column] = right[column]
+                out[count, column] = stack[top, column]
             count += 1
             depth -= 1
     return np.asarray(out[:count])
 
 
-def fill_row(pieces: Floats, k: int, u: float, least: float, row: Floats) -> None:
-    """Write u, x, y, tangent before and tangent after into `row` (7,)."""
+def fill_row(pieces: Floats, k: int, u: float, least: float, rows: Floats, i: int) -> None:
+    """Write u, x, y, tangent before and tangent after into row i of `rows` (n, 7)."""
     x, y, dx, dy = evaluate(pieces, k, u)
     length = math.sqrt(dx * dx + dy * dy)
-    row[0], row[1], row[2] = u, x, y
+    rows[i, 0], rows[i, 1], rows[i, 2] = u, x, y
     if length > least:
-        row[3], row[4] = dx / length, dy / length
-        row[5], row[6] = row[3], row[4]
+        rows[i, 3], rows[i, 4] = dx / length, dy / length
+        rows[i, 5], rows[i, 6] = rows[i, 3], rows[i, 4]
     else:
         dx, dy = aside(pieces, k, u, -1.0, least)
-        row[3], row[4] = dx, dy
+        rows[i, 3], rows[i, 4] = dx, dy
         dx, dy = aside(pieces, k, u, 1.0, least)
-        row[5], row[6] = dx, dy
+        rows[i, 5], rows[i, 6] = dx, dy
 
 
 def curve_rows(pieces: Floats, steps: int, tolerance: float) -> tuple[Floats, Bools]:

@@ -22,7 +22,7 @@ from camtool.arrays import Floats
 from camtool.errors import DrawingError
 from camtool.importers.options import ReadOptions
 from camtool.importers.svg.style import FONT_PX
-from camtool.importers.svg.transform import MAX_NUMBER, NUMBER, in_bounds, parse_numbers
+from camtool.importers.svg.transform import MAX_NUMBER, NUMBER, in_bounds
 from camtool.importers.svg.tree import Node
 from camtool.units import MM_PER_UNIT
 
@@ -423,13 +423,15 @@ def _corners(node: Node) -> tuple[list[Subpath], str]:
         raise DrawingError(f"points have more than {MAX_PATH_CHARACTERS} characters")
     match = _POINTS.match(text)
     end = match.end() if match else 0
-    numbers = parse_numbers(text[:end], "points")
+    numbers = np.array(list(map(float, NUMBER.findall(text, 0, end))))
+    if len(numbers):
+        in_bounds(float(numbers[np.abs(numbers).argmax()]), "points")
     fault = ""
     if end < len(text):
         fault = f"points hold {text[end : end + 12]!r}, which does not belong there"
     elif len(numbers) % 2:
         fault = f"points hold {len(numbers)} numbers: one coordinate is missing"
-    points = np.array(numbers[: len(numbers) // 2 * 2]).reshape(-1, 2)
+    points = numbers[: len(numbers) // 2 * 2].reshape(-1, 2)
     if len(points) < 2:
         return [], fault
     return [Subpath(points[0], (Lines(points[1:]),), node.tag == "polygon")], fault
