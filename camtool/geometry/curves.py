@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from itertools import pairwise
-from typing import Protocol, runtime_checkable
+from typing import Protocol
 
 import numpy as np
 from msgspec import Struct
@@ -55,15 +55,6 @@ class Pieces(Struct, frozen=True, eq=False):
     control: Floats
     origin: Floats
     ends: Floats
-
-
-@runtime_checkable
-class Pieced(Protocol):
-    """A curve made of rational Bézier pieces."""
-
-    def pieces(self) -> Pieces:
-        """The pieces, in the order of the parameter."""
-        ...
 
 
 class FunctionCurve(Struct, frozen=True, eq=False):
@@ -269,6 +260,10 @@ class SplineCurve(Struct, frozen=True, eq=False):
                 share = ((t - left) / (right - left))[:, None]
                 rows[j] = (1.0 - share) * rows[j - 1] + share * rows[j]
         return np.asarray(rows[degree])
+
+
+Pieced = BezierCurve | EllipseCurve | SplineCurve
+"""Curves made of rational Bézier pieces."""
 
 
 def _bernstein(control: Floats, t: Floats) -> Floats:

@@ -62,7 +62,7 @@ class Fit(Struct, frozen=True, eq=False):
     def off_mm(self) -> Floats:
         """(n, 2) mm: the largest and the rms distance, at every vertex those of the whole
         chain."""
-        return np.tile([self.max_mm, self.rms_mm], (len(self.vertices), 1))
+        return np.full((len(self.vertices), 2), (self.max_mm, self.rms_mm))
 
 
 def fit_curve(curve: Curve, tolerance_mm: float) -> Fit:

@@ -14,6 +14,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, NoReturn
 
+from msgspec import Struct
+
 from camtool.errors import ProgramError
 
 from ..gcode.faults import Fault
@@ -46,16 +48,14 @@ class EndOfFile(Fault):
     """The file ends, and the program has not."""
 
 
-@dataclass
-class Place:
+class Place(Struct):
     """A line of a text, counted from 0."""
 
     text: ProgramText
     line: int
 
 
-@dataclass
-class Label:
+class Label(Struct):
     """Where a label was seen first, by which word; and how often a `repeat` is still to run, −1:
     it has not begun."""
 
@@ -64,8 +64,7 @@ class Label:
     left: int = -1
 
 
-@dataclass
-class Call:
+class Call(Struct):
     """A call that is under way: of which sub, how ("call", "M98"), the place to come back to, the
     parameters before it, and the modes that M70 and M73 have saved for it (None: none).
 
@@ -81,8 +80,7 @@ class Call:
     again: int = -1
 
 
-@dataclass
-class _Word:
+class _Word(Struct):
     """An O word: what it is, its label, and where its text goes on."""
 
     kind: str

@@ -20,6 +20,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import DrawingError
@@ -189,8 +190,7 @@ class TextTags(Tags):
 _MARK = np.zeros(1, dtype=np.int32)
 
 
-@dataclass(frozen=True)
-class Section:
+class Section(Struct, frozen=True):
     """Tags `begin` (its 0 SECTION) to `end` (its 0 ENDSEC; None when that is missing)."""
 
     name: str
@@ -198,8 +198,7 @@ class Section:
     end: int | None
 
 
-@dataclass(frozen=True)
-class Frame:
+class Frame(Struct, frozen=True):
     """The sections, the index of the end mark (None when it is missing), and what is wrong."""
 
     sections: tuple[Section, ...]
