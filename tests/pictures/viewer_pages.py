@@ -22,7 +22,7 @@ HOSTILE = "</script><script>hack()</script><img src=x onerror=hack()> {script} &
 
 def run_of(toolpath: Toolpath, **more: object) -> Playback:
     """The run of a toolpath by its feeds, and whatever else is said."""
-    return replace(by_feed(toolpath, 60.0), **more)
+    return structs.replace(by_feed(toolpath, 60.0), **more)
 
 
 def with_run(scene: Scene, run: Playback) -> Scene:
