@@ -28,23 +28,20 @@ cdef class Judge:
     cdef double[::1] off, pen
     cdef Search search
     cdef double[::1] x, y, slide_x, slide_y, errors, size
-    cdef double[::1] spoke_x, spoke_y, squares
-    cdef Int[::1] bits, places
-
-@cython.locals(j=Int, k=Int, lane=Int, found=double, lanes="double[32]")
-cpdef double total(double[::1] values, Int low, Int high) noexcept
-
-@cython.locals(j=Int, k=Int, lane=Int, found=double, lanes="double[32]")
-cpdef double square_total(double[::1] values, Int low, Int high) noexcept
+    cdef Int[::1] bits
+    cdef int[::1] places
 
 @cython.locals(width=Int, lane=Int)
 cdef double sum_of_lanes(double* lanes) noexcept  # inline
 
-@cython.locals(j=Int, k=Int, lane=Int, found=double, lanes="double[32]")
-cpdef double largest(double[::1] values, Int low, Int high) noexcept
+@cython.locals(width=Int, lane=Int)
+cdef double largest_of_lanes(double* lanes) noexcept  # inline
+
+@cython.locals(width=Int, lane=Int)
+cdef double smallest_of_lanes(double* lanes) noexcept  # inline
 
 @cython.locals(j=Int, k=Int, lane=Int, found=double, lanes="double[32]")
-cpdef double smallest(double[::1] values, Int low, Int high) noexcept
+cpdef double largest(double[::1] values, Int low, Int high) noexcept  # wide
 
 @cython.locals(k=Int, square=double, over=double)
 cdef void _to_line(
@@ -59,10 +56,10 @@ cdef bint _all_in_wedge(
 
 cdef double _depth(double from_start, double from_end, bint above_half) noexcept  # inline
 
-cdef double _off(double height, double over) noexcept  # inline
+cdef double _off(double above, double half, double part) noexcept  # inline
 
 cdef double _outside(
-    double px, double py, double radius, double half, double over
+    double px, double py, double radius, double half, double part
 ) noexcept  # inline
 
 @cython.locals(k=Int, far=Int)
@@ -85,8 +82,8 @@ cdef double smaller(double one, double other) noexcept  # inline
 
 cdef double larger(double one, double other) noexcept  # inline
 
-@cython.locals(k=Int)
-cdef Int first_of(double[::1] values, Int low, double value) noexcept
+@cython.locals(j=Int, k=Int, same=Int)
+cdef Int first_of(double[::1] values, Int low, Int high, double value) noexcept  # wide
 
 cdef bint _counts(
     Int k, Int first, Int last, double z_low, double z_high, const double[:, :] heights
@@ -119,7 +116,8 @@ cdef void _set_box(
 cdef bint _node_near(double[:, ::1] nodes, Int node, double[::1] box) noexcept  # inline
 
 @cython.locals(
-    at=Int, ax=double, ay=double, way_x=double, way_y=double, long=double, wide=double, px=double, py=double, along=double,
+    at=Int, ax=double, ay=double, way_x=double, way_y=double, long=double, wide=double,
+    px=double, py=double, along=double,
     beside=double, near_long=double, near_wide=double, far_long=double, far_wide=double,
     square=double, to_x=double, to_y=double, further=double, across=double, side=double,
     reach=double
@@ -145,19 +143,19 @@ cdef void _lowered(
 ) noexcept
 
 @cython.locals(
-    leaves=Int, height=Int, node=Int, low=Int, place=Int, k=Int, n=Int, count=Int, most=Int,
-    some=Int,
+    leaves=Int, height=Int, node=Int, low=Int, place=Int, k=Int, count=Int, most=Int, some=Int,
     order=int[::1], stack=Int[::1], found=Int[::1], curves=Curves, nodes=double[:, ::1],
     heights="const double[:, :]", box=double[::1]
 )
-cdef bint _compared(
-    double[::1] x, double[::1] y, Int own, Int first, Int last, double z_low, double z_high,
-    Search search, double[::1] errors, Int[::1] by
+cdef Int _list_near(
+    double[::1] x, double[::1] y, double[::1] errors, Int own, Int first, Int last, double z_low,
+    double z_high, Search search
 ) noexcept
 
 @cython.locals(
-    begin=Int, end=Int, height=Int, low=Int, high=Int, middle=Int, k=Int, far=double, curves=Curves,
-    parts=Int[::1], by=Int[::1], mine=Int[::1], here_x=double[::1], here_y=double[::1], here=double[::1]
+    begin=Int, end=Int, height=Int, low=Int, high=Int, middle=Int, k=Int, n=Int, near=Int,
+    told=bint, far=double, curves=Curves, parts=Int[::1], by=Int[::1], found=Int[::1],
+    mine=Int[::1], here_x=double[::1], here_y=double[::1], here=double[::1]
 )
 cpdef bint nearest_errors(
     double[::1] x, double[::1] y, Int own, Int first, Int last, double z_low, double z_high,
@@ -173,34 +171,32 @@ cdef Int _end_of_off(double[::1] errors, Int low) noexcept
 @cython.locals(which=Int)
 cdef Int _bin_of(double x, double y, double[:, ::1] directions) noexcept
 
-@cython.locals(k=Int, inside=Int)
+@cython.locals(j=Int, k=Int, outside=Int, out=bint)
 cdef Int _stay(
-    double[::1] spoke_x, double[::1] spoke_y, Int low, Int count, double[:, ::1] directions,
-    Int which
-) noexcept
-
-@cython.locals(k=Int, outside=Int, out=bint)
-cdef Int _inside(
-    double[::1] spoke_x, double[::1] spoke_y, Int low, Int high, double[:, ::1] directions,
+    double[::1] x, double[::1] y, Int low, double cx, double cy, double[:, ::1] directions,
     Int which
 ) noexcept  # wide
 
 @cython.locals(done=Int, which=Int, stay=Int)
 cpdef void fill_bins(
     double[::1] x, double[::1] y, double cx, double cy, double[:, ::1] directions,
-    double[:, ::1] bins, double[::1] spoke_x, double[::1] spoke_y, double[::1] squares
+    double[:, ::1] bins
 ) noexcept
 
-@cython.locals(k=Int)
-cdef void _spokes(
-    double[::1] x, double[::1] y, double cx, double cy, double[::1] spoke_x, double[::1] spoke_y,
-    double[::1] squares
+@cython.locals(
+    j=Int, k=Int, lane=Int, px=double, py=double, square=double, sum_x=double, sum_y=double,
+    least=double, most=double, sums_x="double[32]", sums_y="double[32]", leasts="double[32]",
+    mosts="double[32]"
+)
+cdef void _add(
+    double[::1] x, double[::1] y, Int low, Int high, double cx, double cy, double[:, ::1] bins,
+    Int which
 ) noexcept  # wide
 
-@cython.locals(k=Int, least=double, most=double)
-cdef void _add(
-    double[::1] spoke_x, double[::1] spoke_y, double[::1] squares, Int low, Int high,
-    double[:, ::1] bins, Int which
+@cython.locals(k=Int)
+cdef void _place(
+    double[::1] x, double[::1] y, Int low, double cx, double cy, double square,
+    double[:, ::1] bins, Int which, Int column
 ) noexcept
 
 @cython.locals(at=Int)
@@ -216,26 +212,37 @@ cpdef void trace_block(
     double[:, ::1] trace
 ) noexcept
 
-@cython.locals(count=Int, k=Int, low_x=double, low_y=double, high_x=double, high_y=double)
+@cython.locals(
+    j=Int, k=Int, lane=Int, low_x=double, low_y=double, high_x=double, high_y=double, most=double,
+    sum_=double, here_x=double, here_y=double, off_x=double, off_y=double, square=double,
+    lows_x="double[32]", lows_y="double[32]", highs_x="double[32]", highs_y="double[32]",
+    mosts="double[32]", sums="double[32]"
+)
 cdef (double, double) _spread(
     double[:, ::1] figures, Int row, double[::1] x, double[::1] y, double[::1] slide_x,
-    double[::1] slide_y, double[::1] squares
+    double[::1] slide_y
 ) noexcept  # wide
 
-@cython.locals(count=Int, k=Int, leading=Int)
+@cython.locals(
+    j=Int, k=Int, lane=Int, leading=Int, most=double, squares=double, signed=double,
+    mosts="double[32]", sums="double[32]", signs="double[32]"
+)
 cdef (double, double, double) _sizes(
-    double[::1] errors, double off, double[::1] size, Int[::1] bits, Int[::1] places
+    double[::1] errors, double off, double[::1] size, Int[::1] bits, int[::1] places
 ) noexcept  # wide
+
+cdef int _place_of(Int bits, Int turn) noexcept  # inline
 
 @cython.locals(k=Int)
-cdef void _count(Int[::1] places, Int count, Int[:, ::1] histograms, Int which) noexcept
+cdef void _count(int[::1] places, Int count, Int[:, ::1] histograms, Int which) noexcept
 
 @cython.locals(
     last=Int, own=Int, of_program=Int, k=Int, circle=Int, first=Int, upto=Int, beside=Int,
     search=Search, rows=Int[:, ::1], bits=Int[::1],
-    places=Int[::1], shown=double, most=double, squares=double, signed=double,
-    figures=double[:, ::1], window=double[:, ::1], x=double[::1], y=double[::1],
-    slide_x=double[::1], slide_y=double[::1], errors=double[::1], size=double[::1], pen=double[::1]
+    places=int[::1], shown=double, most=double, squares=double, signed=double,
+    figures=double[:, ::1], window=double[:, ::1], bins=double[:, ::1], x=double[::1],
+    y=double[::1], slide_x=double[::1], slide_y=double[::1], errors=double[::1],
+    size=double[::1], pen=double[::1]
 )
 cdef void judge_block(Int row, Int count, Judge judge) noexcept
 

@@ -17,7 +17,7 @@ of steps; C types stand in the .pxd beside this file.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -58,44 +58,16 @@ BEFORE_FIRST = ((1023 - 30) << MANTISSA_BITS) - 1
 BINS = ((1023 + 20) << MANTISSA_BITS) - BEFORE_FIRST + 1
 """How many bins; the last one is also for what is too large."""
 
-# Sums, largest and smallest numbers, of parts of arrays of finite numbers.
+# Sums, largest and smallest of finite numbers, one loop over a block for all that it is asked for.
 #
-# `LANES` partial results take turns, so that the processor handles several numbers at once and
-# none waits for the one before. Which number goes to which is fixed: all processors round alike.
+# `LANES` partial results of each take turns, so that the processor handles several numbers at once
+# and none waits for the one before; what is left at the end comes one by one. Which number goes to
+# which is fixed: all processors round alike. Such a loop writes to no array besides: then its
+# partial results stay in registers.
 
 
 LANES = 32
 """How many partial results take turns; a power of two."""
-
-
-def total(values: Floats, low: int, high: int) -> float:
-    """The sum of values[low:high]."""
-    found, k = 0.0, low
-    if high - low >= LANES:
-        lanes = [0.0] * LANES
-        while k + LANES <= high:
-            for lane in range(LANES):
-                lanes[lane] += values[k + lane]
-            k += LANES
-        found = sum_of_lanes(lanes)
-    for j in range(k, high):
-        found += values[j]
-    return found
-
-
-def square_total(values: Floats, low: int, high: int) -> float:
-    """The sum of the squares of values[low:high]."""
-    found, k = 0.0, low
-    if high - low >= LANES:
-        lanes = [0.0] * LANES
-        while k + LANES <= high:
-            for lane in range(LANES):
-                lanes[lane] += values[k + lane] * values[k + lane]
-            k += LANES
-        found = sum_of_lanes(lanes)
-    for j in range(k, high):
-        found += values[j] * values[j]
-    return found
 
 
 def sum_of_lanes(lanes: list[float]) -> float:
@@ -108,41 +80,38 @@ def sum_of_lanes(lanes: list[float]) -> float:
     return lanes[0]
 
 
+def largest_of_lanes(lanes: list[float]) -> float:
+    """The largest of all lanes, in pairs; they are changed."""
+    width = LANES // 2
+    while width > 0:
+        for lane in range(width):
+            lanes[lane] = larger(lanes[lane], lanes[lane + width])
+        width //= 2
+    return lanes[0]
+
+
+def smallest_of_lanes(lanes: list[float]) -> float:
+    """The smallest of all lanes, in pairs; they are changed."""
+    width = LANES // 2
+    while width > 0:
+        for lane in range(width):
+            lanes[lane] = smaller(lanes[lane], lanes[lane + width])
+        width //= 2
+    return lanes[0]
+
+
 def largest(values: Floats, low: int, high: int) -> float:
     """The largest of values[low:high], of which there is one at least."""
     found, k = values[low], low
     if high - low >= LANES:
-        lanes = [0.0] * LANES
-        for lane in range(LANES):
-            lanes[lane] = values[low + lane]
+        lanes = [-math.inf] * LANES
         while k + LANES <= high:
             for lane in range(LANES):
-                value = values[k + lane]
-                lanes[lane] = value if value > lanes[lane] else lanes[lane]
+                lanes[lane] = larger(values[k + lane], lanes[lane])
             k += LANES
-        for lane in range(LANES):
-            found = lanes[lane] if lanes[lane] > found else found
+        found = largest_of_lanes(lanes)
     for j in range(k, high):
-        found = values[j] if values[j] > found else found
-    return float(found)
-
-
-def smallest(values: Floats, low: int, high: int) -> float:
-    """The smallest of values[low:high], of which there is one at least."""
-    found, k = values[low], low
-    if high - low >= LANES:
-        lanes = [0.0] * LANES
-        for lane in range(LANES):
-            lanes[lane] = values[low + lane]
-        while k + LANES <= high:
-            for lane in range(LANES):
-                value = values[k + lane]
-                lanes[lane] = value if value < lanes[lane] else lanes[lane]
-            k += LANES
-        for lane in range(LANES):
-            found = lanes[lane] if lanes[lane] < found else found
-    for j in range(k, high):
-        found = values[j] if values[j] < found else found
+        found = larger(values[j], found)
     return float(found)
 
 
@@ -222,41 +191,43 @@ def _depth(from_start: float, from_end: float, above_half: bool) -> float:
     return smaller(from_start, from_end)
 
 
-def _off(height: float, over: float) -> float:
-    """How far outside of a circle a point is that is `height` = h above it, for small h.
+def _off(above: float, half: float, part: float) -> float:
+    """How far outside of a circle a point is with |p|² − R² = `above`, for small ones.
 
-    With h = (|p|² − R²) / 2R and q = h / R, `over` being 1 / R, that is
+    With `half` = 1 / 2R, h = above / 2R, `part` = 1 / 2R² and q = h / R = above / 2R² that is
 
         √(R² + 2Rh) − R = h (1 − q/2 + q²/2 − 5q³/8 + 7q⁴/8 − 21q⁵/16 + …);
 
-    within |q| ≤ 2⁻⁹ what is left out is below 2⁻⁵³ R. Roots take three times as long.
+    within |q| ≤ 2⁻⁹ what is left out is below 2⁻⁵³ R. Roots take longer. With −`half` the sign is
+    the other one, to the last bit.
     """
-    q = height * over
-    return height * (1.0 + q * (-0.5 + q * (0.5 + q * (-0.625 + q * 0.875))))
+    q = above * part
+    return above * half * (1.0 + q * (-0.5 + q * (0.5 + q * (-0.625 + q * 0.875))))
 
 
-def _outside(px: float, py: float, radius: float, half: float, over: float) -> float:
-    """How far a point about the centre is outside of the circle; `half` is 1 / 2R. It hangs on
-    the point alone by which way, and so do its last bits."""
-    height = (px * px + py * py - radius * radius) * half
+def _outside(px: float, py: float, radius: float, half: float, part: float) -> float:
+    """How far a point about the centre is outside of the circle; `half` and `part` are those of
+    `_off`. It hangs on the point alone by which way, and so do its last bits."""
+    above = px * px + py * py - radius * radius
     apart = math.sqrt(px * px + py * py) - radius
-    return _off(height, over) if abs(height) <= NEAR * radius else apart
+    near = abs(above) <= 2.0 * NEAR * (radius * radius)
+    return _off(above, half, part) if near else apart
 
 
 def _to_circle(arcs: Floats, row: int, x: Floats, y: Floats, errors: Floats) -> None:
     cx, cy, radius, turn = arcs[row, CX], arcs[row, CY], arcs[row, RADIUS], arcs[row, TURN]
-    square, half, over = radius * radius, 0.5 / radius, 1.0 / radius
-    near, far = NEAR * radius, 0
-    if abs((x[0] - cx) ** 2 + (y[0] - cy) ** 2 - square) * half <= near:
+    square, half, part = radius * radius, 0.5 / radius, 0.5 / (radius * radius)
+    near, inward, far = 2.0 * NEAR * square, -turn * half, 0
+    if abs((x[0] - cx) ** 2 + (y[0] - cy) ** 2 - square) <= near:
         for k in range(len(x)):
             px, py = x[k] - cx, y[k] - cy
-            height = (px * px + py * py - square) * half
-            far += 1 if abs(height) > near else 0
-            errors[k] = -turn * _off(height, over)
+            above = px * px + py * py - square
+            far += 1 if abs(above) > near else 0
+            errors[k] = _off(above, inward, part)
         if far == 0:
             return
     for k in range(len(x)):
-        errors[k] = -turn * _outside(x[k] - cx, y[k] - cy, radius, half, over)
+        errors[k] = -turn * _outside(x[k] - cx, y[k] - cy, radius, half, part)
 
 
 def _to_arc(
@@ -272,10 +243,10 @@ def _to_arc(
     ax, ay, bx, by = start[row, 0], start[row, 1], end[row, 0], end[row, 1]
     cx, cy, radius, turn = arcs[at, CX], arcs[at, CY], arcs[at, RADIUS], arcs[at, TURN]
     ux, uy, vx, vy = arcs[at, UX], arcs[at, UY], arcs[at, VX], arcs[at, VY]
-    above_half, half, over = arcs[at, WIDE] != 0.0, 0.5 / radius, 1.0 / radius
+    above_half, half, part = arcs[at, WIDE] != 0.0, 0.5 / radius, 0.5 / (radius * radius)
     for k in range(len(x)):
         px, py = x[k] - cx, y[k] - cy
-        inward = -turn * _outside(px, py, radius, half, over)
+        inward = -turn * _outside(px, py, radius, half, part)
         to_a = (x[k] - ax) * (x[k] - ax) + (y[k] - ay) * (y[k] - ay)
         to_b = (x[k] - bx) * (x[k] - bx) + (y[k] - by) * (y[k] - by)
         at_end = math.copysign(math.sqrt(smaller(to_a, to_b)), inward)
@@ -304,9 +275,13 @@ def larger(one: float, other: float) -> float:
     return one if one > other else other
 
 
-def first_of(values: Floats, low: int, value: float) -> int:
-    """The first place of `value` in `values` (n,) from `low` on, where it is."""
-    k = low
+def first_of(values: Floats, low: int, high: int, value: float) -> int:
+    """The first place of `value` in values[low:high], where it is."""
+    k, same = low, 0
+    while k + RUN <= high and same == 0:
+        for j in range(k, k + RUN):
+            same += 1 if values[j] == value else 0
+        k += RUN if same == 0 else 0
     while values[k] != value:
         k += 1
     return k
@@ -329,8 +304,9 @@ def first_of(values: Floats, low: int, value: float) -> int:
 # a corner of more than a right angle the other one has the point on its wrong side.
 
 
-BLOCK = 768
-"""Samples that are judged together: their columns about fill a processor's first cache."""
+BLOCK = 1536
+"""Samples that are judged together: their columns stay in a processor's second cache, and what a
+block costs besides them is shared by many."""
 
 FEW = 8
 """A list of so many moves is looked at for any number of points."""
@@ -342,7 +318,7 @@ TIE_MM = 1e-9
 """Moves whose distances differ by no more than this are equally near; points no farther than this
 from their own move lie on it."""
 
-ON_OWN = 4
+ON_OWN = 16
 """So many points in a row on their own move divide those before them from those behind them."""
 
 SLACK = 1e-12
@@ -365,6 +341,14 @@ class Moves(NamedTuple):
     order: Indices
 
 
+def room_for(count: int, dtype: type[np.generic] = np.float64) -> npt.NDArray[Any]:
+    """(count,) numbers of 8 bytes, not set, that begin where a line of the processor's cache does:
+    of what is read and written 64 bytes at once nothing lies in two of them."""
+    whole = np.empty(count + 8, dtype=dtype)
+    begin = -whole.ctypes.data % 64 // 8
+    return whole[begin : begin + count]
+
+
 class Search:
     """The nearest of moves: their arrays, room for what is looked at, and how many nodes and moves
     were looked at."""
@@ -376,7 +360,7 @@ class Search:
         self.stack = np.empty(DEPTH, dtype=np.int64)
         self.parts = np.empty(DEPTH, dtype=np.int64)
         self.x, self.y, self.error = np.empty(1), np.empty(1), np.empty(1)
-        self.other, self.by = np.empty(BLOCK), np.empty(BLOCK, dtype=np.int64)
+        self.other, self.by = room_for(BLOCK), room_for(BLOCK, np.int64)
         self.looked = 0
 
 
@@ -442,9 +426,9 @@ def _set_box(x: Floats, y: Floats, errors: Floats, box: Floats) -> None:
     way_y = way_y / length if length > 0.0 else 0.0
     long, wide, far, k = 0.0, 0.0, 0.0, 0
     if count >= LANES:
-        longs, wides, fars = [0.0] * LANES, [0.0] * LANES, [0.0] * LANES
-        for lane in range(LANES):
-            longs[lane] = wides[lane] = fars[lane] = 0.0
+        longs = [0.0] * LANES
+        wides = [0.0] * LANES
+        fars = [0.0] * LANES
         while k + LANES <= count:
             for lane in range(LANES):
                 px, py = x[k + lane] - middle_x, y[k + lane] - middle_y
@@ -452,9 +436,8 @@ def _set_box(x: Floats, y: Floats, errors: Floats, box: Floats) -> None:
                 wides[lane] = larger(wides[lane], abs(py * way_x - px * way_y))
                 fars[lane] = larger(fars[lane], abs(errors[k + lane]))
             k += LANES
-        for lane in range(LANES):
-            long, wide = larger(long, longs[lane]), larger(wide, wides[lane])
-            far = larger(far, fars[lane])
+        long, wide = largest_of_lanes(longs), largest_of_lanes(wides)
+        far = largest_of_lanes(fars)
     for j in range(k, count):
         px, py = x[j] - middle_x, y[j] - middle_y
         long = larger(long, abs(px * way_x + py * way_y))
@@ -570,20 +553,19 @@ def _lowered(x: Floats, y: Floats, move: int, search: Search, errors: Floats, by
         errors[k], by[k] = other[k], move
 
 
-def _compared(
+def _list_near(
     x: Floats,
     y: Floats,
+    errors: Floats,
     own: int,
     first: int,
     last: int,
     z_low: float,
     z_high: float,
     search: Search,
-    errors: Floats,
-    by: Ints,
-) -> bool:
-    """Lower the errors of the points x, y (n,), whose own move was looked at, to those against
-    the nearest move; false where the list is too long for that."""
+) -> int:
+    """List the moves that may be nearer to some of the points x, y (n,) than their own, from which
+    they have these errors; it comes first. How many these are, or 0 where they are too many."""
     curves, heights, nodes, order = search.curves, search.heights, search.nodes, search.order
     stack, found, box = search.stack, search.found, search.box
     _set_box(x, y, errors, box)
@@ -613,12 +595,10 @@ def _compared(
             # To look for it among more than there are points takes longer than to compare it.
             if _move_near(curves, k, box) and not _is_there(curves, found, min(count, some), k):
                 if count == most:
-                    return False
+                    return 0
                 found[count] = k
                 count += 1
-    for n in range(1, count):
-        _lowered(x, y, found[n], search, errors, by)
-    return True
+    return count
 
 
 def nearest_errors(
@@ -649,18 +629,25 @@ def nearest_errors(
                 out[k] = far
             return False
     set_errors(curves, own, x, y, out)
-    by = search.by
-    for k in range(len(x)):
-        by[k] = own
+    by, found = search.by, search.found
     begin = _first_off(out, 0)
     while begin < len(x):
-        end = _end_of_off(out, begin)
+        end, told = _end_of_off(out, begin), False
         height, parts[0], parts[1] = 2, begin, end
         while height > 0:
             height -= 2
             low, high = parts[height], parts[height + 1]
             here_x, here_y, here, mine = x[low:high], y[low:high], out[low:high], by[low:high]
-            if _compared(here_x, here_y, own, first, last, z_low, z_high, search, here, mine):
+            near = _list_near(here_x, here_y, here, own, first, last, z_low, z_high, search)
+            if near == 1:
+                continue
+            if not told:
+                for k in range(begin, end):
+                    by[k] = own
+                told = True
+            for n in range(1, near):
+                _lowered(here_x, here_y, found[n], search, here, mine)
+            if near > 0:
                 continue
             middle = (low + high) // 2
             within = abs(out[middle])
@@ -709,7 +696,7 @@ ANGLE_BINS = 720
 """Angle bins of a circle: half a degree each."""
 
 RUN = 64
-"""So many points are looked at together to find where the points of a bin end."""
+"""So many points are looked at together to find the first that differs."""
 
 BIN_COLUMNS = 9
 """Of a bin: count; sum x, y; least |p|², its x, y; largest |p|², its x, y."""
@@ -742,97 +729,98 @@ def _bin_of(x: float, y: float, directions: Floats) -> int:
 
 
 def _stay(
-    spoke_x: Floats, spoke_y: Floats, low: int, count: int, directions: Floats, which: int
-) -> int:
-    """How many of `count` points from the row `low` on lie in the bin `which`: at least one."""
-    k = low
-    while k < count:
-        # Some at once, as long as all of them do.
-        inside = _inside(spoke_x, spoke_y, k, min(k + RUN, count), directions, which)
-        k += inside
-        if inside < RUN:
-            break
-    return max(k - low, 1)
-
-
-def _inside(
-    spoke_x: Floats, spoke_y: Floats, low: int, high: int, directions: Floats, which: int
-) -> int:
-    """How many of the points low … high − 1 lie in the bin `which`, from the first on."""
-    from_x, from_y = directions[which, 0], directions[which, 1]
-    to_x, to_y = directions[which + 1, 0], directions[which + 1, 1]
-    outside = 0
-    for k in range(low, high):
-        px, py = spoke_x[k], spoke_y[k]
-        out = (from_x * py - from_y * px < 0.0) | (px * to_y - py * to_x <= 0.0)
-        outside += 1 if out else 0
-    if outside == 0:
-        return high - low
-    k = low
-    while True:
-        px, py = spoke_x[k], spoke_y[k]
-        if from_x * py - from_y * px < 0.0 or px * to_y - py * to_x <= 0.0:
-            return k - low
-        k += 1
-
-
-def fill_bins(
     x: Floats,
     y: Floats,
+    low: int,
     cx: float,
     cy: float,
     directions: Floats,
-    bins: Floats,
-    spoke_x: Floats,
-    spoke_y: Floats,
-    squares: Floats,
+    which: int,
+) -> int:
+    """How many of the points x, y (n,) from `low` on lie in the bin `which`: at least one."""
+    from_x, from_y = directions[which, 0], directions[which, 1]
+    to_x, to_y = directions[which + 1, 0], directions[which + 1, 1]
+    k, outside = low, 0
+    # Some at once, as long as all of them do.
+    while k + RUN <= len(x) and outside == 0:
+        for j in range(k, k + RUN):
+            px, py = x[j] - cx, y[j] - cy
+            out = (from_x * py - from_y * px < 0.0) | (px * to_y - py * to_x <= 0.0)
+            outside += 1 if out else 0
+        k += RUN if outside == 0 else 0
+    while k < len(x):
+        px, py = x[k] - cx, y[k] - cy
+        if from_x * py - from_y * px < 0.0 or px * to_y - py * to_x <= 0.0:
+            break
+        k += 1
+    return max(k - low, 1)
+
+
+def fill_bins(
+    x: Floats, y: Floats, cx: float, cy: float, directions: Floats, bins: Floats
 ) -> None:
-    """Put the points x, y (n,) about the centre (cx, cy) into `bins` (720, 9); there is room (n,)
-    for their spokes and the squares of these."""
-    _spokes(x, y, cx, cy, spoke_x, spoke_y, squares)
+    """Put the points x, y (n,) about the centre (cx, cy) into `bins` (720, 9)."""
     done = 0
     while done < len(x):
-        which = _bin_of(spoke_x[done], spoke_y[done], directions)
-        stay = _stay(spoke_x, spoke_y, done, len(x), directions, which)
-        _add(spoke_x, spoke_y, squares, done, done + stay, bins, which)
+        which = _bin_of(x[done] - cx, y[done] - cy, directions)
+        stay = _stay(x, y, done, cx, cy, directions, which)
+        _add(x, y, done, done + stay, cx, cy, bins, which)
         done += stay
 
 
-def _spokes(
-    x: Floats,
-    y: Floats,
-    cx: float,
-    cy: float,
-    spoke_x: Floats,
-    spoke_y: Floats,
-    squares: Floats,
-) -> None:
-    for k in range(len(x)):
-        px, py = x[k] - cx, y[k] - cy
-        spoke_x[k], spoke_y[k] = px, py
-        squares[k] = px * px + py * py
-
-
 def _add(
-    spoke_x: Floats,
-    spoke_y: Floats,
-    squares: Floats,
-    low: int,
-    high: int,
-    bins: Floats,
-    which: int,
+    x: Floats, y: Floats, low: int, high: int, cx: float, cy: float, bins: Floats, which: int
 ) -> None:
     """Put the points low … high − 1 into one bin."""
-    least, most = smallest(squares, low, high), largest(squares, low, high)
+    sum_x, sum_y, least, most, k = 0.0, 0.0, math.inf, 0.0, low
+    if high - low >= LANES:
+        sums_x = [0.0] * LANES
+        sums_y = [0.0] * LANES
+        leasts = [math.inf] * LANES
+        mosts = [0.0] * LANES
+        while k + LANES <= high:
+            for lane in range(LANES):
+                px, py = x[k + lane] - cx, y[k + lane] - cy
+                square = px * px + py * py
+                sums_x[lane] += px
+                sums_y[lane] += py
+                leasts[lane] = smaller(square, leasts[lane])
+                mosts[lane] = larger(square, mosts[lane])
+            k += LANES
+        sum_x, sum_y = sum_of_lanes(sums_x), sum_of_lanes(sums_y)
+        least, most = smallest_of_lanes(leasts), largest_of_lanes(mosts)
+    for j in range(k, high):
+        px, py = x[j] - cx, y[j] - cy
+        square = px * px + py * py
+        sum_x += px
+        sum_y += py
+        least, most = smaller(square, least), larger(square, most)
     bins[which, 0] += high - low
-    bins[which, 1] += total(spoke_x, low, high)
-    bins[which, 2] += total(spoke_y, low, high)
+    bins[which, 1] += sum_x
+    bins[which, 2] += sum_y
     if least < bins[which, 3]:
-        k = first_of(squares, low, least)
-        bins[which, 3], bins[which, 4], bins[which, 5] = least, spoke_x[k], spoke_y[k]
+        _place(x, y, low, cx, cy, least, bins, which, 3)
     if most > bins[which, 6]:
-        k = first_of(squares, low, most)
-        bins[which, 6], bins[which, 7], bins[which, 8] = most, spoke_x[k], spoke_y[k]
+        _place(x, y, low, cx, cy, most, bins, which, 6)
+
+
+def _place(
+    x: Floats,
+    y: Floats,
+    low: int,
+    cx: float,
+    cy: float,
+    square: float,
+    bins: Floats,
+    which: int,
+    column: int,
+) -> None:
+    """Keep the first point from `low` on whose distance from the centre has this square."""
+    k = low
+    while (x[k] - cx) * (x[k] - cx) + (y[k] - cy) * (y[k] - cy) != square:
+        k += 1
+    bins[which, column] = square
+    bins[which, column + 1], bins[which, column + 2] = x[k] - cx, y[k] - cy
 
 
 # The path of the slides, thinned as it comes: of so many samples of a row that with the largest
@@ -927,7 +915,7 @@ def trace_block(
         at, peak = low, 0.0
         if most > pen[PEAK] and most > 0.0:
             peak = largest(error, low, high)
-            at = first_of(error, low, peak)
+            at = first_of(error, low, high, peak)
         if peak > pen[PEAK]:
             pen[PEAK], pen[PEAK_X], pen[PEAK_Y] = peak, x[at], y[at]
             pen[LAST_IS_WRITTEN] = 1.0 if at == high - 1 else 0.0
@@ -1023,13 +1011,11 @@ class Judge:
         self.figures, self.histograms, self.bins = sums.rows, sums.histograms, sums.bins
         self.trace, self.pen = sums.trace, sums.pen
         self.search = Search(task.moves)
-        self.x, self.y = np.empty(BLOCK), np.empty(BLOCK)
-        self.slide_x, self.slide_y = np.empty(BLOCK), np.empty(BLOCK)
-        size = np.empty(BLOCK)
-        self.errors, self.size, self.bits = np.empty(BLOCK), size, size.view(np.int64)
-        self.places = np.empty(BLOCK, dtype=np.int64)
-        self.spoke_x, self.spoke_y = np.empty(BLOCK), np.empty(BLOCK)
-        self.squares = np.empty(BLOCK)
+        self.x, self.y = room_for(BLOCK), room_for(BLOCK)
+        self.slide_x, self.slide_y = room_for(BLOCK), room_for(BLOCK)
+        size = room_for(BLOCK)
+        self.errors, self.size, self.bits = room_for(BLOCK), size, size.view(np.int64)
+        self.places = np.empty(BLOCK, dtype=np.int32)
 
 
 def _spread(
@@ -1039,37 +1025,85 @@ def _spread(
     y: Floats,
     slide_x: Floats,
     slide_y: Floats,
-    squares: Floats,
 ) -> tuple[float, float]:
     """Extents of the slides; returns the largest square of mechanics and their sum."""
-    count = len(x)
-    for k in range(count):
-        off_x, off_y = slide_x[k] - x[k], slide_y[k] - y[k]
-        squares[k] = off_x * off_x + off_y * off_y
-    figures[row, LOW_X] = min(figures[row, LOW_X], smallest(slide_x, 0, count))
-    figures[row, HIGH_X] = max(figures[row, HIGH_X], largest(slide_x, 0, count))
-    figures[row, LOW_Y] = min(figures[row, LOW_Y], smallest(slide_y, 0, count))
-    figures[row, HIGH_Y] = max(figures[row, HIGH_Y], largest(slide_y, 0, count))
-    return largest(squares, 0, count), total(squares, 0, count)
+    low_x, low_y = figures[row, LOW_X], figures[row, LOW_Y]
+    high_x, high_y = figures[row, HIGH_X], figures[row, HIGH_Y]
+    most, sum_, k = 0.0, 0.0, 0
+    if len(x) >= LANES:
+        lows_x = [math.inf] * LANES
+        lows_y = [math.inf] * LANES
+        highs_x = [-math.inf] * LANES
+        highs_y = [-math.inf] * LANES
+        mosts = [0.0] * LANES
+        sums = [0.0] * LANES
+        while k + LANES <= len(x):
+            for lane in range(LANES):
+                here_x, here_y = slide_x[k + lane], slide_y[k + lane]
+                off_x, off_y = here_x - x[k + lane], here_y - y[k + lane]
+                square = off_x * off_x + off_y * off_y
+                lows_x[lane] = smaller(here_x, lows_x[lane])
+                lows_y[lane] = smaller(here_y, lows_y[lane])
+                highs_x[lane] = larger(here_x, highs_x[lane])
+                highs_y[lane] = larger(here_y, highs_y[lane])
+                mosts[lane] = larger(square, mosts[lane])
+                sums[lane] += square
+            k += LANES
+        sum_ = sum_of_lanes(sums)
+        low_x = smaller(smallest_of_lanes(lows_x), low_x)
+        low_y = smaller(smallest_of_lanes(lows_y), low_y)
+        high_x = larger(largest_of_lanes(highs_x), high_x)
+        high_y = larger(largest_of_lanes(highs_y), high_y)
+        most = largest_of_lanes(mosts)
+    for j in range(k, len(x)):
+        off_x, off_y = slide_x[j] - x[j], slide_y[j] - y[j]
+        square = off_x * off_x + off_y * off_y
+        low_x, low_y = smaller(slide_x[j], low_x), smaller(slide_y[j], low_y)
+        high_x, high_y = larger(slide_x[j], high_x), larger(slide_y[j], high_y)
+        most = larger(square, most)
+        sum_ += square
+    figures[row, LOW_X], figures[row, LOW_Y] = low_x, low_y
+    figures[row, HIGH_X], figures[row, HIGH_Y] = high_x, high_y
+    return most, sum_
 
 
 def _sizes(
-    errors: Floats, off: float, size: Floats, bits: Ints, places: Ints
+    errors: Floats, off: float, size: Floats, bits: Ints, places: Indices
 ) -> tuple[float, float, float]:
     """Sizes of errors, all `off` larger than they are alone, and their places in a histogram,
     where four samples take turns so that none waits for the one before; returns the largest, the
     sum of squares, and the sum of the errors alone with their signs. `bits` are those of `size`.
     """
-    count = len(errors)
-    for k in range(count):
-        size[k] = abs(errors[k]) + off
-    for k in range(count):
-        leading = (bits[k] >> SHIFT) - BEFORE_FIRST
-        places[k] = 4 * min(max(leading, 0), BINS - 1) + (k & 3)
-    return largest(size, 0, count), square_total(size, 0, count), total(errors, 0, count)
+    for j in range(len(errors)):
+        size[j] = abs(errors[j]) + off
+    most, squares, signed, k = 0.0, 0.0, 0.0, 0
+    if len(errors) >= LANES:
+        mosts = [0.0] * LANES
+        sums = [0.0] * LANES
+        signs = [0.0] * LANES
+        while k + LANES <= len(errors):
+            for lane in range(LANES):
+                mosts[lane] = larger(size[k + lane], mosts[lane])
+                sums[lane] += size[k + lane] * size[k + lane]
+                signs[lane] += errors[k + lane]
+                places[k + lane] = _place_of(bits[k + lane], lane & 3)
+            k += LANES
+        squares, signed = sum_of_lanes(sums), sum_of_lanes(signs)
+        most = largest_of_lanes(mosts)
+    for j in range(k, len(errors)):
+        most = larger(size[j], most)
+        squares += size[j] * size[j]
+        signed += errors[j]
+        places[j] = _place_of(bits[j], j & 3)
+    return most, squares, signed
 
 
-def _count(places: Ints, count: int, histograms: Ints, which: int) -> None:
+def _place_of(bits: int, turn: int) -> int:
+    """The place of a size ≥ 0 in a histogram, from its bits."""
+    return 4 * min(max((bits >> SHIFT) - BEFORE_FIRST, 0), BINS - 1) + turn
+
+
+def _count(places: Indices, count: int, histograms: Ints, which: int) -> None:
     for k in range(count):
         histograms[which, places[k]] += 1
 
@@ -1087,7 +1121,7 @@ def judge_block(row: int, count: int, judge: Judge) -> None:
     errors, size, bits, places = judge.errors[:count], judge.size[:count], judge.bits, judge.places
     figures, rows, window, pen = judge.figures, judge.rows, judge.window, judge.pen
     of_program, row = row, row - judge.low
-    lag, lags = _spread(figures, row, x, y, slide_x, slide_y, judge.squares)
+    lag, lags = _spread(figures, row, x, y, slide_x, slide_y)
     last = count - 1
     figures[row, SAMPLES] += count
     figures[row, END_X], figures[row, END_Y] = slide_x[last], slide_y[last]
@@ -1109,24 +1143,15 @@ def judge_block(row: int, count: int, judge: Judge) -> None:
             figures[row, TOTAL_SQUARES] += squares
             figures[row, TOTAL_SUM] += signed
             if shown > figures[row, TOTAL_MAX] or figures[row, KNOWN] == 0.0:
-                k = first_of(size, 0, shown)
+                k = first_of(size, 0, count, shown)
                 figures[row, TOTAL_MAX] = shown
                 figures[row, TOTAL_X], figures[row, TOTAL_Y] = slide_x[k], slide_y[k]
             figures[row, KNOWN] += count
             _count(places, count, judge.histograms, 1)
         if circle >= 0:
             cx, cy = judge.centre[circle, 0], judge.centre[circle, 1]
-            fill_bins(
-                slide_x,
-                slide_y,
-                cx,
-                cy,
-                judge.directions,
-                judge.bins[rows[row, SLOT]],
-                judge.spoke_x,
-                judge.spoke_y,
-                judge.squares,
-            )
+            bins = judge.bins[rows[row, SLOT]]
+            fill_bins(slide_x, slide_y, cx, cy, judge.directions, bins)
     trace_block(of_program, slide_x, slide_y, size, shown, pen, judge.trace)
 
 

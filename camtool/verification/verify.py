@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import cache
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
@@ -317,7 +318,7 @@ class Result(Struct, frozen=True, eq=False):
             contours=self.cuts.contour_count,
             time_split_s=_time_split(tally, link_s),
             interpolator=_interpolator(case),
-            camtool_version=version("camtool"),
+            camtool_version=_version(),
             contour_errors=self._contours(),
             bidirectional=self._both_ways(),
             unreached=self._unreached(),
@@ -527,6 +528,12 @@ def _block(case: Case, row: int) -> int | None:
 
 def _max_rms(figure: Figure) -> record.MaxRms:
     return record.MaxRms(number(figure.max, UM_PER_MM), number(figure.rms, UM_PER_MM))
+
+
+@cache
+def _version() -> str:
+    """Ours, as it is installed; it stands in a file."""
+    return version("camtool")
 
 
 def _interpolator(case: Case) -> str:

