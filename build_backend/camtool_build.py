@@ -302,20 +302,6 @@ def mark_functions(folder: Path, module: Extension) -> None:
     source.write_text(text + MARKED, encoding="utf-8")
 
 
-def narrow_arrays(folder: Path, module: Extension) -> None:
-    """Leaves room for `MOST_DIMENSIONS` in the C of a module; all modules must be alike."""
-    source = folder.joinpath(*module.name.split(".")).with_suffix(".c")
-    text = source.read_text(encoding="utf-8")
-    assert not re.search(rf"\[:(, :){{{MOST_DIMENSIONS},}}", _types_of(source)), module.name
-    room = r"\b(Py_ssize_t (?:shape|strides|suboffsets))\[8\];"
-    _write(source, re.sub(room, rf"\1[{MOST_DIMENSIONS}];", text))
-
-
-def _types_of(source: Path) -> str:
-    types = source.with_suffix(".pxd")
-    return types.read_text(encoding="utf-8") if types.exists() else ""
-
-
 class BuildKernels(build_ext):
     """Makes the modules that are compiled."""
 
@@ -326,6 +312,9 @@ class BuildKernels(build_ext):
 
     def run(self) -> None:
         """From Python to C, and from there to machine code."""
+        from Cython.Compiler import Options
+
+        Options.buffer_max_dims = MOST_DIMENSIONS + 1  # read when what follows is loaded
         from Cython.Build import cythonize
 
         before, mode = Path.cwd(), f"checked-{CHECKED}" if CHECKED else "lowered"
@@ -350,7 +339,6 @@ class BuildKernels(build_ext):
             os.chdir(before)
         for each in made:
             mark_functions(folder, each)
-            narrow_arrays(folder, each)
             each.sources = [str(folder / source) for source in each.sources]
             each._needs_stub = False
         self.extensions = made
