@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 import pytest
 import uncertainties
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from camtool.arrays import Floats
@@ -461,6 +461,7 @@ CLOSE = st.floats(0.0, 12.0).map(lambda power: 1.0 - 10.0**-power)
     st.floats(-6.0, 6.0),
     st.one_of(st.floats(-1.0, 1.0), CLOSE, CLOSE.map(lambda r: -r)),
 )
+@example(a=2.2e-309, b=2.2e-309, r=1.0 - 1e-11)
 def test_two_normal_variables(a: float, b: float, r: float) -> None:
     assert both_below(a, b, r) == pytest.approx(owen(a, b, r), abs=2e-11)
     assert both_below(a, b, r) == pytest.approx(both_below(b, a, r), abs=2e-11)
@@ -482,7 +483,9 @@ def owen(a: float, b: float, r: float) -> float:
     parts = 0.5 * (normal_below(a) + normal_below(b))
     for h, k in ((a, b), (b, a)):
         if h:
-            parts -= float(owens_t(h, (k - r * h) / (h * rest)))
+            # (k − r h) / h without cancelling, near r = ±1 and for the smallest of numbers
+            slope = (k - h) / h + (1.0 - r) if r > 0.0 else (k + h) / h - (1.0 + r)
+            parts -= float(owens_t(h, slope / rest))
         else:
             parts -= math.copysign(0.25, k)
     apart = (a < 0.0) != (b < 0.0)
