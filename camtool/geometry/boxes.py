@@ -7,14 +7,19 @@ compiled loops take them, with the tree of boxes that those loops go down themse
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Bools, Floats, Ints
-from camtool.geometry.polylines import SEGMENTS_AT_ONCE, Segments
-from camtool.kernels.move_tree import hilbert_order, hilbert_order_of
+from camtool.arrays import Bools, Floats, Indices, Ints
+from camtool.geometry.polylines import Segments
+from camtool.kernels.move_tree import LEAF, hilbert_order, move_tree
+
+if TYPE_CHECKING:
+    from camtool.kernels.near import Moves
+    from camtool.kernels.offsets import SegmentTree
 
 PAIRS_AT_A_TIME = 1 << 16
 """How many pairs of boxes are handled at a time: it bounds the memory."""
@@ -173,24 +178,18 @@ class Curves(Struct, frozen=True, eq=False):
         return cls(rows, boxes, tree_of(boxes))
 
 
-def curves_in_order(
-    count: int, segments_of: Callable[[Ints], Segments]
-) -> tuple[Floats, Floats, Ints]:
-    """The `rows` (K, 11) and the `tree` of so many segments K, which are asked for some at a time,
-    along Hilbert's curve, since what is near in the plane need not be near in a file; and which
-    segment (K,) each row is."""
-    from camtool.kernels.offsets import SWEEP, curve_boxes, tree_of
+def segment_tree(vertices: Floats, begin: Indices, end: Indices) -> SegmentTree:
+    """The segments between the rows `begin` and `end` (K,) of vertices (N, 3), to be asked which
+    of them lie beside points; along Hilbert's curve, since what is near in the plane need not be
+    near in a file."""
+    from camtool.kernels.offsets import SegmentTree, curve_boxes
 
-    def middles(which: Ints) -> Floats:
-        some = segments_of(which)
-        return 0.5 * (some.start + some.end)
+    def boxes(which: Ints | Indices) -> Floats:
+        here, there = vertices.take(begin[which], axis=0), vertices.take(end[which], axis=0)
+        segments = Segments.between(here[:, :2], there[:, :2], here[:, 2])
+        return curve_boxes(curve_rows_of(segments), 0.0)
 
-    order = hilbert_order_of(count, middles).astype(np.int64)
-    rows = np.empty((count, SWEEP + 1))  # the last column
-    for first in range(0, count, SEGMENTS_AT_ONCE):
-        some = slice(first, first + SEGMENTS_AT_ONCE)
-        rows[some] = curve_rows_of(segments_of(order[some]))
-    return rows, tree_of(curve_boxes(rows, 0.0)), order
+    return SegmentTree(vertices, (begin, end), *move_tree(len(begin), boxes), LEAF)
 
 
 def curve_rows_of(segments: Segments) -> Floats:
@@ -199,3 +198,26 @@ def curve_rows_of(segments: Segments) -> Floats:
 
     columns = (segments.start, segments.end, segments.bulge)
     return curve_rows(*(np.ascontiguousarray(column) for column in columns))
+
+
+def moves_of(segments: Segments, heights: Floats) -> Moves:
+    """The segments, with the heights of their starts and ends (K, 2) mm, as
+    `camtool.kernels.near` takes them."""
+    from camtool.geometry.measure import segment_boxes
+    from camtool.kernels import near as at
+
+    rows = np.flatnonzero(segments.bulge)
+    arc = np.broadcast_to(np.int32(-1), len(segments))
+    if len(rows):
+        arc = np.full(len(segments), -1, dtype=np.int32)
+        arc[rows] = np.arange(len(rows))
+    bent = segments[rows]
+    turn = np.where(bent.bulge < 0.0, -1.0, 1.0)[:, None]
+    arcs = np.empty((len(rows), at.COLUMNS))
+    arcs[:, [at.CX, at.CY]], arcs[:, at.RADIUS] = bent.centre, bent.radius
+    # Normals that point into the wedge from its two edges.
+    arcs[:, [at.UX, at.UY]] = turn * (bent.start - bent.centre)
+    arcs[:, [at.VX, at.VY]] = turn * (bent.end - bent.centre)
+    arcs[:, at.SWEEP] = np.abs(bent.sweep)
+    arcs[:, [at.LOW_X, at.LOW_Y, at.HIGH_X, at.HIGH_Y]] = segment_boxes(bent)
+    return at.Moves(segments.start, segments.end, heights, arc, arcs)

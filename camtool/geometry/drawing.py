@@ -189,7 +189,8 @@ class Drawing:
             return FitError()
         rows = segment_rows(self.paths)
         largest, rms = self.off_mm[rows].T
-        length = np.where(largest > 0.0, segment_lengths(Segments.of(self.paths)), 0.0)
+        length = np.concatenate([segment_lengths(some) for some in Segments.lots(self.paths)])
+        length[largest == 0.0] = 0.0
         whole = float(length.sum())
         if not whole:
             return FitError()

@@ -234,10 +234,10 @@ def self_crossings_of(lines: Polylines, layers: Sequence[str]) -> tuple[SelfCros
 
     At most about MOST_CROSSINGS.
     """
+    if not lines.closed.any():
+        return ()
     segments = Segments.of(lines)
     segments = segments[lines.closed[segments.path]]
-    if not len(segments):
-        return ()
     frames = Frames.of(segments)
     found: dict[tuple[int, int, int], SelfCrossing] = {}
     for row_a, row_b in _pairs_of_one_path(segments):

@@ -101,8 +101,9 @@ class Polylines:
         """Columns from single paths, which were checked when they were made."""
         items = list(paths)
         counts = np.array([0] + [len(path.vertices) for path in items], dtype=np.int64)
+        vertices = [path.vertices for path in items] or [np.empty((0, 3))]
         columns = (
-            np.concatenate([path.vertices for path in items]) if items else np.empty((0, 3)),
+            vertices[0] if len(vertices) == 1 else np.concatenate(vertices),
             np.cumsum(counts),
             np.array([path.closed for path in items], dtype=np.bool_),
         )

@@ -22,7 +22,7 @@ from collections.abc import Iterator
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Bools, Floats
+from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.measure import segment_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
 
@@ -186,43 +186,41 @@ def without_tiny(lines: Polylines, limit_mm: float) -> Merged:
     return Merged(Polylines.of(paths), gone)
 
 
-def _merged(path: Polyline, lengths: Floats, limit: float) -> tuple[list[int], list[int]]:
+def _merged(path: Polyline, lengths: Floats, limit: float) -> tuple[Ints, Ints]:
     """For each vertex of the new path the old one whose place it takes, and whose bulge."""
-    bulges = path.vertices[:, 2].tolist()
-    steps = lengths.tolist()
+    bulges = path.vertices[:, 2]
     count = len(bulges)
-    place: list[int] = []
-    bend: list[int] = []
-    i = 0
-    while i < count:
+    place, bend = np.arange(count), np.arange(count)
+    keep = np.ones(count, dtype=np.bool_)
+    after = 0
+    for i in np.flatnonzero(lengths[: count - 1] <= limit).tolist():
+        if i < after:
+            continue
         j, run = i, 0.0
-        while j + 1 < count and run + steps[j] <= limit:
-            run += steps[j]
+        while j + 1 < count and run + float(lengths[j]) <= limit:
+            run += float(lengths[j])
             j += 1
         arrives = bulges[i - 1] != 0.0 and (i > 0 or path.closed)
         leaves = bulges[j] != 0.0
         is_last = not path.closed and j == count - 1
-        if j > i and (
-            (arrives and (leaves or is_last)) or (i == 0 and leaves and not path.closed)
-        ):
-            # An end of an open path stays where it is, as an arc does.
-            place.extend(range(i, j + 1))
-            bend.extend(range(i, j + 1))
-        else:
-            place.append(j if leaves or is_last else i)
-            bend.append(j)
-        i = j + 1
-    return place, bend
+        # An end of an open path stays where it is, as an arc does.
+        stays = arrives and (leaves or is_last)
+        if not (stays or (i == 0 and leaves and not path.closed)):
+            keep[i + 1 : j + 1] = False
+            place[i], bend[i] = j if leaves or is_last else i, j
+        after = j + 1
+    return place[keep], bend[keep]
 
 
-def _made(path: Polyline, place: list[int], bend: list[int]) -> Polyline | None:
+def _made(path: Polyline, place: Ints, bend: Ints) -> Polyline | None:
     """The path of these vertices; None when it is no path, or nothing has changed."""
     if len(place) == len(path.vertices) or len(place) < 2:
         return None
-    vertices = path.vertices[place].copy()
+    vertices = path.vertices[place]
     vertices[:, 2] = path.vertices[bend, 2]
     if path.closed and len(vertices) < 3 and not vertices[:, 2].any():
         return None
+    vertices.flags.writeable = False  # it need not be copied
     step = np.roll(vertices[:, :2], -1, axis=0) - vertices[:, :2]
-    shortest = min(math.hypot(x, y) for x, y in (step if path.closed else step[:-1]).tolist())
+    shortest = np.hypot(*(step if path.closed else step[:-1]).T).min()
     return Polyline(vertices, path.closed) if shortest > POSITION_EPS_MM else None

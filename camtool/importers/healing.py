@@ -11,13 +11,13 @@ length, and what is drawn twice.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 import numpy.typing as npt
 from msgspec import Struct
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.errors import DrawingError, GeometryError
 from camtool.geometry.chain import Chained, Kinds, chain, numbered
 from camtool.geometry.drawing import Gap, Healing, Skipped
@@ -173,7 +173,7 @@ def _drawn_once(lines: Polylines, styles: Iterable[tuple[str, str]]) -> Bools:
     return once
 
 
-def segment_numbers(vertices: Floats, begin: Ints, end: Ints) -> _Words:
+def segment_numbers(vertices: Floats, begin: Ints | Indices, end: Ints | Indices) -> _Words:
     """(K,) a number mixed from the rounded ends and the bulge of the segment between two vertices
     (of N, 3), the rows (K,) of which are given; the same in both directions."""
     found = np.empty(len(begin), dtype=np.uint64)
@@ -305,8 +305,8 @@ def off_drawn(pieces: Sequence[Piece], lines: Polylines) -> Floats:
     drawn, said = _drawn(pieces)
     if not len(drawn) or not len(lines):
         return nothing
-    rows = segment_rows(lines)
-    made = _Joined(lines.vertices, rows, next_vertices(lines.offsets)[rows])
+    rows = segment_rows(lines).astype(np.int32)
+    made = _Joined(lines.vertices, rows, next_vertices(lines.offsets)[rows].astype(np.int32))
     drawn_as, made_as = drawn.numbers(), made.numbers()
     kept, gone = _is_among(made_as, drawn_as), ~_is_among(drawn_as, made_as)
     if not said.any() and not gone.any() and kept.all():
@@ -327,8 +327,8 @@ class _Joined(Struct, frozen=True, eq=False):
     """K segments between the rows `begin` and `end` (K,) of `vertices` (N, 3)."""
 
     vertices: Floats
-    begin: Ints
-    end: Ints
+    begin: Indices
+    end: Indices
 
     def __len__(self) -> int:
         return len(self.begin)
@@ -356,7 +356,8 @@ def _drawn(pieces: Sequence[Piece]) -> tuple[_Joined, Floats]:
     lasting = [piece for piece in pieces if len(piece.vertices)]
     counts = np.array([0, *(len(piece.vertices) for piece in lasting)])
     offsets = np.cumsum(counts)
-    vertices = np.concatenate([np.empty((0, 3)), *(piece.vertices for piece in lasting)])
+    every = [piece.vertices for piece in lasting] or [np.empty((0, 3))]
+    vertices = every[0] if len(every) == 1 else np.concatenate(every)
     said = np.broadcast_to(0.0, (len(vertices), 2))  # one number, seen as many
     if any(piece.off_mm is not None for piece in lasting):
         said = np.zeros((len(vertices), 2))
@@ -366,8 +367,8 @@ def _drawn(pieces: Sequence[Piece]) -> tuple[_Joined, Floats]:
     following = next_vertices(offsets)
     there = np.hypot(*(vertices[following, k] - vertices[:, k] for k in (0, 1))) > POSITION_EPS_MM
     there[offsets[1:][[not piece.closed for piece in lasting]] - 1] = False
-    rows = np.flatnonzero(there)
-    return _Joined(vertices, rows, following[rows]), said
+    rows = np.flatnonzero(there).astype(np.int32)
+    return _Joined(vertices, rows, following[rows].astype(np.int32)), said
 
 
 def _changed(
@@ -376,32 +377,33 @@ def _changed(
     """Add to `off` (N, 2), of the segment that leaves each vertex, what `gone` of the drawn
     segments, and which of the made ones are `new`, says of it, measured both there and back."""
     # What was drawn, to what is there now: the nearest of it, and what is about as near.
-    points, of = _samples(drawn, gone)
-    apart, point, row = _near(points, made, 2.0)
-    most = apart[point, None] + said[drawn.begin[of[point]]]
-    np.maximum.at(off, made.begin[row], most)
+    for rows, apart, point, row in _near(drawn, gone, made, 2.0):
+        most = apart[point, None] + said[drawn.begin[rows[point]]]
+        np.maximum.at(off, made.begin[row], most)
     # What is there now, to what was drawn.
-    points, of = _samples(made, new)
-    apart, point, row = _near(points, drawn, 1.0)
-    np.maximum.at(off, made.begin[of[point]], apart[point, None] + said[drawn.begin[row]])
+    for rows, apart, point, row in _near(made, new, drawn, 1.0):
+        most = apart[point, None] + said[drawn.begin[row]]
+        np.maximum.at(off, made.begin[rows[point]], most)
 
 
-def _samples(segments: _Joined, rows: Ints) -> tuple[Floats, Ints]:
-    """Points (P, 2) along the segments of these rows, and the row of each (P,)."""
-    row = np.repeat(np.arange(len(rows)), len(PLACES))
-    points = point_at(segments.of(rows), row, np.tile(PLACES, len(rows)))
-    return points, rows[row]
+def _near(
+    segments: _Joined, which: Ints, others: _Joined, times: float
+) -> Iterator[tuple[Ints, Floats, Ints, Ints]]:
+    """For some of the segments `which` at a time: which of them (P,) each point along them is on,
+    and how far (P,) mm the nearest of the others is from it; and pairs (J,), (J,) of a point and
+    one of the others that is no farther from it than so many times that."""
+    from camtool.geometry.boxes import segment_tree
+    from camtool.kernels.offsets import distances_from, segments_within
 
-
-def _near(points: Floats, segments: _Joined, times: float) -> tuple[Floats, Ints, Ints]:
-    """(P,) how far the nearest segment is from each point; and pairs (J,), (J,) of a point and a
-    segment that is no farther from it than so many times that."""
-    from camtool.geometry.boxes import curves_in_order
-    from camtool.kernels.offsets import curves_within, nearest_distances
-
-    points = np.ascontiguousarray(points)
-    curves, tree, order = curves_in_order(len(segments), segments.of)
-    apart = nearest_distances(points, curves, tree)
-    pairs = curves_within(points, times * apart + POSITION_EPS_MM, curves, tree)
-    # Two positions nearer than that are one.
-    return np.where(apart > POSITION_EPS_MM, apart, 0.0), pairs[:, 0], order[pairs[:, 1]]
+    if not len(which):
+        return
+    tree = segment_tree(others.vertices, others.begin, others.end)
+    for first in range(0, len(which), SEGMENTS_AT_ONCE):
+        some = which[first : first + SEGMENTS_AT_ONCE]
+        row = np.repeat(np.arange(len(some)), len(PLACES))
+        points = point_at(segments.of(some), row, np.tile(PLACES, len(some)))
+        apart = distances_from(points, tree)
+        pairs = segments_within(points, times * apart + POSITION_EPS_MM, tree)
+        # Two positions nearer than that are one.
+        apart = np.where(apart > POSITION_EPS_MM, apart, 0.0)
+        yield some[row], apart, pairs[:, 0], pairs[:, 1]

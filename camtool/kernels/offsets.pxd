@@ -27,6 +27,13 @@ cdef bint touch(double[:, ::1] one, Int i, double[:, ::1] other, Int j) noexcept
 @cython.locals(rows=double[:, ::1], i=Int)
 cpdef curve_rows(double[:, ::1] start, double[:, ::1] end, double[::1] bulge)
 
+@cython.locals(
+    dx=double, dy=double, chord=double, grown=double, cosine=double, sine=double, turn=double
+)
+cdef void set_curve_row(
+    double[:, ::1] rows, Int i, double ax, double ay, double bx, double by, double b
+) noexcept
+
 @cython.locals(boxes=double[:, ::1], i=Int)
 cpdef curve_boxes(double[:, ::1] curves, double margin)
 
@@ -69,6 +76,33 @@ cpdef nearest_distances(double[:, ::1] points, double[:, ::1] curves, double[:, 
 cpdef curves_within(
     double[:, ::1] points, double[::1] reach, double[:, ::1] curves, double[:, ::1] tree
 )
+
+cdef class SegmentTree:
+    cdef const double[:, :] vertices
+    cdef double[:, ::1] nodes, rows
+    cdef const int[:] begin, end, order
+    cdef Int[::1] kept
+    cdef Int leaf
+
+@cython.locals(
+    slot=Int, first=Int, last=Int, k=Int, at=Int, begin=Int, end=Int, ax=double, ay=double,
+    bx=double, by=double
+)
+cdef (Int, Int) _rows_of(SegmentTree tree, Int leaf) noexcept
+
+@cython.locals(
+    found=double[::1], stack=Int[::1], apart=double[::1], nodes=double[:, ::1],
+    rows=double[:, ::1], leaves=Int, i=Int, x=double, y=double, best=double, height=Int, node=Int,
+    low=Int, high=Int, k=Int, near=Int, far=Int, to_near=double, to_far=double
+)
+cpdef distances_from(double[:, ::1] points, SegmentTree tree)
+
+@cython.locals(
+    found=Int[:, ::1], more=Int[:, ::1], stack=Int[::1], nodes=double[:, ::1],
+    rows=double[:, ::1], leaves=Int, count=Int, i=Int, x=double, y=double, limit=double,
+    height=Int, node=Int, low=Int, high=Int, k=Int
+)
+cpdef segments_within(double[:, ::1] points, double[::1] reach, SegmentTree tree)
 
 @cython.locals(
     leaves=Int, count=Int, height=Int, node=Int, low=Int, row=Int

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Indices, Ints
 
 # A binary tree of boxes over rows in their order: what is far away is left out at once.
 #
@@ -111,21 +111,27 @@ def curve_rows(start: Floats, end: Floats, bulge: Floats) -> Floats:
     """(K, 11) rows of the segments from `start` to `end` (K, 2) with their bulges (K,)."""
     rows = np.empty((len(bulge), 11))
     for i in range(len(bulge)):
-        b = bulge[i]
-        dx, dy = end[i, 0] - start[i, 0], end[i, 1] - start[i, 1]
-        chord = math.hypot(dx, dy)
-        # The tangents are the chord turned by ∓ sweep/2, and b = tan(sweep/4).
-        grown = 1.0 + b * b
-        cosine, sine = (1.0 - b * b) / (grown * chord), 2.0 * b / (grown * chord)
-        rows[i, AX], rows[i, AY] = start[i, 0], start[i, 1]
-        rows[i, BX], rows[i, BY] = end[i, 0], end[i, 1]
-        rows[i, TX], rows[i, TY] = cosine * dx + sine * dy, cosine * dy - sine * dx
-        rows[i, UX], rows[i, UY] = cosine * dx - sine * dy, cosine * dy + sine * dx
-        rows[i, BEND] = 4.0 * b / (chord * grown)
-        turn = math.atan(b)
-        rows[i, LENGTH] = chord if b == 0.0 else chord * grown * turn / b
-        rows[i, SWEEP] = 4.0 * turn
+        set_curve_row(rows, i, start[i, 0], start[i, 1], end[i, 0], end[i, 1], bulge[i])
     return np.asarray(rows)
+
+
+def set_curve_row(
+    rows: Floats, i: int, ax: float, ay: float, bx: float, by: float, b: float
+) -> None:
+    """Row i of the segment from (ax, ay) to (bx, by) with the bulge b."""
+    dx, dy = bx - ax, by - ay
+    chord = math.hypot(dx, dy)
+    # The tangents are the chord turned by ∓ sweep/2, and b = tan(sweep/4).
+    grown = 1.0 + b * b
+    cosine, sine = (1.0 - b * b) / (grown * chord), 2.0 * b / (grown * chord)
+    rows[i, AX], rows[i, AY], rows[i, BX], rows[i, BY] = ax, ay, bx, by
+    rows[i, TX], rows[i, TY] = cosine * dx + sine * dy, cosine * dy - sine * dx
+    rows[i, UX], rows[i, UY] = cosine * dx - sine * dy, cosine * dy + sine * dx
+    rows[i, BEND] = 4.0 * b / (chord * grown)
+    rows[i, LENGTH], rows[i, SWEEP] = chord, 0.0
+    if b != 0.0:
+        turn = math.atan(b)
+        rows[i, LENGTH], rows[i, SWEEP] = chord * grown * turn / b, 4.0 * turn
 
 
 def curve_boxes(curves: Floats, margin: float) -> Floats:
@@ -370,6 +376,115 @@ def curves_within(points: Floats, reach: Floats, curves: Floats, tree: Floats) -
             for row in range(low, min(low + LEAF, len(curves))):
                 if distance_to(curves, row, x, y) <= limit:
                     found[count, 0], found[count, 1] = i, row
+                    count += 1
+    return np.asarray(found[:count])
+
+
+# Which segments lie beside points, of so many that their rows are not stored.
+#
+# Rows take 88 bytes a segment. Here those of a leaf are made from ends and bulges when a point
+# comes near its box, and stay until another leaf takes their place, so that a segment has no more
+# than its part of the tree (`camtool.kernels.move_tree`) and its place in it. Points that follow
+# each other along a path come near the same few leaves.
+
+
+LEAVES_KEPT = 256
+"""The rows of so many leaves are kept: 180 kB."""
+
+
+class SegmentTree:
+    """K segments between the rows `begin` and `end` (K,) of `vertices` (N, 3) of x, y and the
+    bulge of the segment that leaves; `nodes` (2L, 6) over the `order` (K,) of them, `leaf` of
+    which a leaf holds."""
+
+    def __init__(
+        self,
+        vertices: Floats,
+        ends: tuple[Indices, Indices],
+        nodes: Floats,
+        order: Indices,
+        leaf: int,
+    ) -> None:
+        self.vertices, self.nodes, self.order = vertices, nodes, order
+        self.begin, self.end = ends
+        self.leaf = leaf
+        self.rows = np.empty((LEAVES_KEPT * leaf, 11))
+        self.kept = np.full(LEAVES_KEPT, -1)
+
+
+def _rows_of(tree: SegmentTree, leaf: int) -> tuple[int, int]:
+    """Where the rows of a leaf begin and end, which are made if they are not there."""
+    slot = leaf % LEAVES_KEPT
+    first = slot * tree.leaf
+    last = first + min(tree.leaf, len(tree.order) - leaf * tree.leaf)
+    if tree.kept[slot] == leaf:
+        return first, last
+    tree.kept[slot] = leaf
+    for k in range(first, last):
+        at = tree.order[leaf * tree.leaf + k - first]
+        begin, end = tree.begin[at], tree.end[at]
+        ax, ay = tree.vertices[begin, 0], tree.vertices[begin, 1]
+        bx, by = tree.vertices[end, 0], tree.vertices[end, 1]
+        set_curve_row(tree.rows, k, ax, ay, bx, by, tree.vertices[begin, 2])
+    return first, last
+
+
+def distances_from(points: Floats, tree: SegmentTree) -> Floats:
+    """(P,) distance of each point (P, 2) from the nearest segment; inf where there is none."""
+    found = np.empty(len(points))
+    stack, apart = np.empty(DEPTH, np.int64), np.empty(DEPTH)
+    nodes, rows, leaves = tree.nodes, tree.rows, len(tree.nodes) // 2
+    for i in range(len(points)):
+        x, y, best = points[i, 0], points[i, 1], math.inf
+        height, stack[0], apart[0] = 1, 1, apart_square(nodes, 1, x, y)
+        while height > 0:
+            height -= 1
+            node = stack[height]
+            if apart[height] >= best * best:
+                continue
+            if node >= leaves:
+                low, high = _rows_of(tree, node - leaves)
+                for k in range(low, high):
+                    best = min(best, distance_to(rows, k, x, y))
+                continue
+            near, far = 2 * node, 2 * node + 1
+            to_near, to_far = apart_square(nodes, near, x, y), apart_square(nodes, far, x, y)
+            if to_far < to_near:
+                near, far, to_near, to_far = far, near, to_far, to_near
+            stack[height], apart[height] = far, to_far
+            stack[height + 1], apart[height + 1] = near, to_near
+            height += 2
+        found[i] = best
+    return np.asarray(found)
+
+
+def segments_within(points: Floats, reach: Floats, tree: SegmentTree) -> Ints:
+    """(J, 2) pairs of a point (P, 2) and a segment that is no farther from it than `reach` (P,),
+    in the order of the points."""
+    found = np.empty((len(points) + tree.leaf, 2), np.int64)
+    stack = np.empty(DEPTH, np.int64)
+    nodes, rows, leaves, count = tree.nodes, tree.rows, len(tree.nodes) // 2, 0
+    for i in range(len(points)):
+        x, y, limit = points[i, 0], points[i, 1], reach[i]
+        height, stack[0] = 1, 1
+        while height > 0:
+            height -= 1
+            node = stack[height]
+            if apart_square(nodes, node, x, y) > limit * limit:
+                continue
+            if node < leaves:
+                stack[height], stack[height + 1] = 2 * node + 1, 2 * node
+                height += 2
+                continue
+            if count + tree.leaf > len(found):
+                more = np.empty((2 * len(found), 2), np.int64)
+                more[:count] = found[:count]
+                found = more
+            low, high = _rows_of(tree, node - leaves)
+            for k in range(low, high):
+                if distance_to(rows, k, x, y) <= limit:
+                    found[count, 0] = i
+                    found[count, 1] = tree.order[(node - leaves) * tree.leaf + k - low]
                     count += 1
     return np.asarray(found[:count])
 

@@ -30,7 +30,7 @@ import numpy as np
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.measure import extents, path_extents
 from camtool.geometry.nesting import nesting
-from camtool.geometry.polylines import Polylines, Segments, reverse
+from camtool.geometry.polylines import Polylines, reverse
 from camtool.planning.items import Contour, Contours, Fixed, Item, Step
 from camtool.planning.job import Operation
 from camtool.planning.sides import runs_beside
@@ -93,28 +93,25 @@ def _off(
 
         made = CARVE_TOLERANCE_MM
     lines, of = step.chosen.lines, placed.off_mm
-    if of.any():
+    if of.any() and lines.vertices is not placed.paths.vertices:
         of = of[_vertex_rows(placed.paths, step.chosen.source)]
     if not len(rows) or not of.any():
         if made:
             yield rows, np.full((len(rows), 2), made)
         return
-    from camtool.geometry.boxes import curves_in_order
-    from camtool.geometry.polylines import segment_rows
-    from camtool.kernels.offsets import curves_within, nearest_distances
+    from camtool.geometry.boxes import segment_tree
+    from camtool.geometry.polylines import next_vertices, segment_rows
+    from camtool.kernels.offsets import distances_from, segments_within
 
-    leaves = segment_rows(lines)
-    curves, tree, order = curves_in_order(
-        len(leaves), lambda some: Segments.leaving(lines, leaves[some])
-    )
-    of = of[leaves[order]]
-    for begin in range(0, len(rows), ROWS_AT_ONCE):
-        some = slice(begin, begin + ROWS_AT_ONCE)
+    begin = segment_rows(lines).astype(np.int32)
+    end = next_vertices(lines.offsets)[begin].astype(np.int32)
+    tree = segment_tree(lines.vertices, begin, end)
+    for first in range(0, len(rows), ROWS_AT_ONCE):
+        some = slice(first, first + ROWS_AT_ONCE)
         points = np.ascontiguousarray(_points(toolpath, rows[some]))
-        apart = nearest_distances(points, curves, tree)
-        pairs = curves_within(points, apart + AS_NEAR_MM, curves, tree)
+        pairs = segments_within(points, distances_from(points, tree) + AS_NEAR_MM, tree)
         most = np.zeros((len(points) // len(PLACES), 2))
-        np.maximum.at(most, pairs[:, 0] // len(PLACES), of[pairs[:, 1]])
+        np.maximum.at(most, pairs[:, 0] // len(PLACES), of[begin[pairs[:, 1]]])
         yield rows[some], most + made
 
 

@@ -21,7 +21,7 @@ import numpy as np
 from msgspec import Struct
 
 from camtool.arrays import Floats, Indices, Ints
-from camtool.geometry.measure import segment_boxes
+from camtool.geometry.boxes import moves_of
 from camtool.verification.cuts import CutMoves
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ class MoveIndex:
 
     @cached_property
     def _moves(self) -> Moves:
-        return _moves(self.cuts)
+        return moves_of(self.cuts.segments, self.cuts.ends_z)
 
     def nearest(
         self,
@@ -132,27 +132,6 @@ class MoveIndex:
         low = np.where(every, 0, self._offsets[contour])
         high = np.where(every, len(self.cuts.segments), self._offsets[contour + 1])
         return np.column_stack([offsets[:-1], offsets[1:], low, high])
-
-
-def _moves(cuts: CutMoves) -> Moves:
-    """The segments as `camtool.kernels.near` takes them."""
-    from camtool.kernels import near as at
-
-    segments, rows = cuts.segments, np.flatnonzero(cuts.segments.bulge)
-    arc = np.broadcast_to(np.int32(-1), len(segments))
-    if len(rows):
-        arc = np.full(len(segments), -1, dtype=np.int32)
-        arc[rows] = np.arange(len(rows))
-    bent = segments[rows]
-    turn = np.where(bent.bulge < 0.0, -1.0, 1.0)[:, None]
-    arcs = np.empty((len(rows), at.COLUMNS))
-    arcs[:, [at.CX, at.CY]], arcs[:, at.RADIUS] = bent.centre, bent.radius
-    # Normals that point into the wedge from its two edges.
-    arcs[:, [at.UX, at.UY]] = turn * (bent.start - bent.centre)
-    arcs[:, [at.VX, at.VY]] = turn * (bent.end - bent.centre)
-    arcs[:, at.SWEEP] = np.abs(bent.sweep)
-    arcs[:, [at.LOW_X, at.LOW_Y, at.HIGH_X, at.HIGH_Y]] = segment_boxes(bent)
-    return at.Moves(segments.start, segments.end, cuts.ends_z, arc, arcs)
 
 
 # Runs of neighbouring items in long columns, without Python loops.

@@ -203,7 +203,9 @@ class Tasks:
 
         self._paths, self._match = paths, match
         self._slot = np.append(slot, -1)  # the last one is for none, −1
-        self._rows = paths.wanted.rows.astype(np.int32)
+        row = paths.wanted.row  # an arc of more than a half circle has two segments
+        begins = np.diff(row, prepend=-1) != 0
+        self._rows = row if begins.all() else row[begins]
         contour = paths.wanted.contour[self._rows]
         self._begins = np.searchsorted(contour, np.arange(paths.wanted.contour_count + 1))
         known = bool((match.only[paths.decoded.is_cut] != ANY_CONTOUR).all())

@@ -66,7 +66,8 @@ class ArcCounts(Struct):
 
 
 class Arcs(Struct, frozen=True, eq=False):
-    """All rows' ends (N, 3) and offsets (N, 2) in units, and `pieces` in place of some rows."""
+    """All rows' ends (N, 3) and offsets (N, 2) in units, one row, seen as many, where there are no
+    arcs; and `pieces` in place of some rows."""
 
     end: Ints
     offset: Ints
@@ -79,12 +80,12 @@ def arcs_of(toolpath: Toolpath, dialect: GcodeDialect) -> Arcs:
     """The toolpath's rows in units, arcs as this controller takes them."""
     unit = 10.0**-dialect.decimals
     end = units_of(toolpath.end, dialect.decimals)
-    offset = np.zeros((len(toolpath), 2), dtype=np.int64)
     kind = np.array(toolpath.kind)
-    arcs = Arcs(end, offset, kind, {})
     rows = np.flatnonzero(toolpath.is_arc)
     if not len(rows):
-        return arcs
+        return Arcs(end, np.broadcast_to(np.int64(0), (len(toolpath), 2)), kind, {})
+    offset = np.zeros((len(toolpath), 2), dtype=np.int64)
+    arcs = Arcs(end, offset, kind, {})
     sweep = toolpath.sweeps()[rows]
     arm = toolpath.starts[rows, :2] - toolpath.centre[rows]
     radius = np.hypot(arm[:, 0], arm[:, 1])

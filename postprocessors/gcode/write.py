@@ -24,7 +24,7 @@ from camtool.bounds import refuse_too_long
 from camtool.errors import PostError
 from camtool.findings import Finding
 from camtool.machine.model import Machine
-from camtool.toolpath.moves import Kind, PathMode, Toolpath, mounted_before
+from camtool.toolpath.moves import Kind, PathMode, Toolpath, mounted_before, rows_of
 from camtool.toolpath.program import Program
 from camtool.toolpath.words import Words, texts_of
 
@@ -379,15 +379,16 @@ def sent_rows(
     kept = ~motion | written.any(axis=1)
     gone = of[~kept]
     wanted = (toolpath.end[gone] != toolpath.starts_of(gone)).any(axis=1)
-    of = of[kept]
+    rows = np.flatnonzero(kept)
+    of = of[rows]
     return Sent(
-        kind[kept],
-        end[kept],
-        offset[kept],
+        kind[rows],
+        end[rows],
+        rows_of(offset, rows),
         feeds[of],
         of,
-        written[kept],
-        _first_after((home_xy | home_z)[kept], motion[kept]),
+        written[rows],
+        _first_after((home_xy | home_z)[rows], motion[rows]),
         int(wanted.sum()) + arcs.counts.dropped,
     )
 

@@ -38,11 +38,13 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
     """The Drawing of a file of points; DrawingError naming line and column."""
     table = _table(data, file)
     units = _units(table, options)
+    pieces = [_piece(stroke, units.mm_per_unit) for stroke in table.strokes]
+    del data, table  # their numbers are in the pieces
     return assemble(
-        [_piece(stroke, units.mm_per_unit) for stroke in table.strokes],
+        pieces,
         file=file,
         units=units,
-        used={"stroke": len(table.strokes)},
+        used={"stroke": len(pieces)},
         skipped=[],
         findings=[],
         options=options,

@@ -9,6 +9,8 @@ import re
 import warnings
 import zipfile
 import zlib
+from array import array
+from collections.abc import Iterator
 from typing import Any, NoReturn
 
 import numpy as np
@@ -76,6 +78,19 @@ _ONE_SIGN = "write every number with one decimal sign, and no sign between thous
 _NAMED_COLUMNS = "give two numbers a line, or name the columns x,y,bulge in the first line"
 
 
+CHARS_AT_ONCE = 1 << 16
+"""So much of a text is divided into lines at a time: each line is a string of its own."""
+
+
+def _lines_of(text: str) -> Iterator[str]:
+    """The lines of a text, as `str.splitlines` divides it."""
+    begin = 0
+    while begin < len(text):
+        end = text.find("\n", begin + CHARS_AT_ONCE) + 1 or len(text)
+        yield from text[begin:end].splitlines()
+        begin = end
+
+
 def parse_lines(text: str, file: str) -> Table:
     """The strokes of a text of points; DrawingError naming line and column."""
     return _Lines(file).parse(text)
@@ -92,13 +107,13 @@ class _Lines(Struct):
     comma_line: int = 0
     point_line: int = 0
     proven: bool = False
-    rows: list[tuple[float, ...]] = field(default_factory=list)
+    numbers: array[float] = field(default_factory=lambda: array("d"))
     starts: list[tuple[int, int]] = field(default_factory=list)
 
     def parse(self, text: str) -> Table:
         fresh, may_name = True, True
         pattern: re.Pattern[str] | None = None
-        for number, line in enumerate(text.splitlines(), start=1):
+        for number, line in enumerate(_lines_of(text), start=1):
             content = _COMMENT.split(line, maxsplit=1)[0] if "#" in line or "%" in line else line
             if not content.strip(_BLANK_LINE):
                 # A line that is nothing but a comment does not end a stroke.
@@ -113,14 +128,14 @@ class _Lines(Struct):
                 self.parted = _separator(content, self.columns)
                 pattern = _row_pattern(self.parted, self.columns)
             if fresh:
-                self.starts.append((len(self.rows), number))
+                self.starts.append((len(self.numbers) // self.columns, number))
                 fresh = False
-            self.rows.append(self._row(content, number, pattern))
+            self.numbers.extend(self._row(content, number, pattern))
         self._refuse_ambiguous()
         return Table(self._strokes(), self.unit)
 
     def _strokes(self) -> list[Stroke]:
-        points = np.array(self.rows, dtype=np.float64).reshape(-1, self.columns)
+        points = np.frombuffer(self.numbers, dtype=np.float64).reshape(-1, self.columns)
         following = [*self.starts[1:], (len(points), 0)]
         return [
             Stroke(points[first:end], f"at line {line}")
