@@ -9,7 +9,10 @@ from hypothesis import HealthCheck, settings
 # What somebody who runs the tests keeps for camtool is no matter of theirs.
 os.environ["XDG_CONFIG_HOME"] = "/nonexistent"
 
-# No deadline: kernels compile on first use, and speed is no matter of tests here.
+# Commands that tests start would compile all sources anew, each time.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
+# No deadline: speed is no matter of tests here.
 settings.register_profile(
     "default",
     max_examples=60,
