@@ -69,8 +69,11 @@ cdef double least_below(
 @cython.locals(found=double[::1], apart=double[::1], i=Int, stack=Int[::1])
 cpdef nearest_distances(double[:, ::1] points, double[:, ::1] curves, double[:, ::1] tree)
 
+@cython.locals(more=Int[:, ::1])
+cdef twice_the_room(Int[:, ::1] found)
+
 @cython.locals(
-    found=Int[:, ::1], more=Int[:, ::1], stack=Int[::1], i=Int, leaves=Int, count=Int, height=Int,
+    found=Int[:, ::1], stack=Int[::1], i=Int, leaves=Int, count=Int, height=Int,
     node=Int, low=Int, row=Int
 )
 cpdef curves_within(
@@ -98,7 +101,7 @@ cdef (Int, Int) _rows_of(SegmentTree tree, Int leaf) noexcept
 cpdef distances_from(double[:, ::1] points, SegmentTree tree)
 
 @cython.locals(
-    found=Int[:, ::1], more=Int[:, ::1], stack=Int[::1], nodes=double[:, ::1],
+    found=Int[:, ::1], stack=Int[::1], nodes=double[:, ::1],
     rows=double[:, ::1], leaves=Int, count=Int, i=Int, x=double, y=double, limit=double,
     height=Int, node=Int, low=Int, high=Int, k=Int
 )

@@ -350,6 +350,13 @@ def nearest_distances(points: Floats, curves: Floats, tree: Floats) -> Floats:
     return np.asarray(found)
 
 
+def twice_the_room(found: Ints) -> Ints:
+    """The same pairs (J, 2), and room for as many more."""
+    more = np.empty((2 * len(found), 2), np.int64)
+    more[: len(found)] = found
+    return more
+
+
 def curves_within(points: Floats, reach: Floats, curves: Floats, tree: Floats) -> Ints:
     """(J, 2) pairs of a point (P, 2) and a curve that is no farther from it than `reach` (P,), in
     the order of the points."""
@@ -369,9 +376,7 @@ def curves_within(points: Floats, reach: Floats, curves: Floats, tree: Floats) -
                 height += 2
                 continue
             if count + LEAF > len(found):
-                more = np.empty((2 * len(found), 2), np.int64)
-                more[:count] = found[:count]
-                found = more
+                found = twice_the_room(found)
             low = (node - leaves) * LEAF
             for row in range(low, min(low + LEAF, len(curves))):
                 if distance_to(curves, row, x, y) <= limit:
@@ -477,9 +482,7 @@ def segments_within(points: Floats, reach: Floats, tree: SegmentTree) -> Ints:
                 height += 2
                 continue
             if count + tree.leaf > len(found):
-                more = np.empty((2 * len(found), 2), np.int64)
-                more[:count] = found[:count]
-                found = more
+                found = twice_the_room(found)
             low, high = _rows_of(tree, node - leaves)
             for k in range(low, high):
                 if distance_to(rows, k, x, y) <= limit:
