@@ -50,6 +50,22 @@ def test_largest_of_parts_of_arrays(drawn: tuple[Floats, int, int]) -> None:
         assert largest(values, low, high) == max(values[low:high].tolist())
 
 
+@given(st.lists(st.tuples(st.floats(1e2, 1e3), st.floats(0.01, 0.5)), max_size=140))
+def test_sums_of_bins_are_nearly_exact(drawn: list[tuple[float, float]]) -> None:
+    """n numbers, added one by one, round by at most n·2⁻⁵³ of their sizes. All lie in one bin."""
+    x, y = np.array(drawn, dtype=np.float64).reshape(-1, 2).T.copy()
+    bins = empty_bins(1)[0]
+    fill_bins_(x, y, (0.0, 0.0), bin_directions(), bins)
+    assert bins[0, 0] == len(drawn)
+    for column, values in ((1, x.tolist()), (2, y.tolist())):
+        exact = math.fsum(values)
+        assert abs(bins[0, column] - exact) <= len(values) * 2.0**-53 * exact
+    squares = [(a * a + b * b) for a, b in drawn]
+    if squares:
+        assert bins[0, 3] == min(squares)
+        assert bins[0, 6] == max(squares)
+
+
 def test_sums_are_the_same_on_every_processor() -> None:
     """To the last bit what a loop in the same order finds."""
     x = 1e3 + np.sin(np.arange(1.0, 1001.0) ** 2 % 97.0)
