@@ -7,7 +7,7 @@ numbers may differ by two of their last place, which another computer's sines ma
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 PAGE = Path(__file__).parents[2] / "docs" / "validation.md"
@@ -18,10 +18,15 @@ Rows = Sequence[Sequence[str]]
 
 
 def check(
-    name: str, heads: Sequence[str], rows: Rows, bless: bool, places: float = LAST_PLACES
+    name: str,
+    heads: Sequence[str],
+    rows: Rows,
+    bless: bool,
+    places: float = LAST_PLACES,
+    scatter: Mapping[tuple[str, str], float] | None = None,
 ) -> None:
-    """The table `name` of the page is this one, but for so many of the last places; with `bless`
-    it becomes it."""
+    """The table `name` of the page is this one, but for so many of the last places, or for those
+    of `scatter` in the cells that it names by row and head; with `bless` it becomes it."""
     page = PAGE.read_text(encoding="utf-8")
     text = _table(heads, rows)
     begin, end = f"<!-- {name} -->\n", "<!-- end -->"
@@ -34,7 +39,10 @@ def check(
     again = f"pytest --bless tests/validation writes {name} anew"
     lines = zip(held.splitlines(), text.splitlines(), strict=False)
     for line, wanted in lines:
-        assert same(line, wanted, places), f"{line}\n{wanted}\n{again}"
+        row, told = wanted.split("|")[1].strip(), f"{line}\n{wanted}\n{again}"
+        assert line.count("|") == wanted.count("|"), told
+        for head, *cells in zip(["", *heads, ""], line.split("|"), wanted.split("|"), strict=True):
+            assert same(*cells, (scatter or {}).get((row, head), places)), told
     assert len(held.splitlines()) == len(text.splitlines()), again
 
 

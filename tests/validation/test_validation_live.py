@@ -51,14 +51,16 @@ TIME_PART = 0.005
 MOST_MISSES = 2
 
 CAUSES = {
-    "plate-holes": "the task waits some periods more or less at each of many stops",
     "3dtest": "arcs in XZ and YZ are chords in a toolpath; each chord is a move of its own",
 }
 """Why programs are off by more than is aimed at."""
 
-SCATTER_PLACES = 70.0
-"""No two runs are the same: paths differ by 1 µm, and times by some periods at each stop, 0.6 % of
-the program that stops most often."""
+SCATTER_PLACES = 15.0
+"""No two runs of a real-time process are the same: paths differ by 1 µm, times by some periods."""
+
+LATE = {("plate-holes", "LinuxCNC, s"): 70.0, ("plate-holes", "%"): 70.0}
+"""More places for the times of a program that stops so often that they scatter by 0.6 %: on a busy
+computer LinuxCNC's task is late at each stop."""
 
 MOST_POINTS = 3000
 WINDOW_S = 1.0
@@ -172,11 +174,12 @@ def test_linuxcnc_live(bless: bool, tmp_path: Path) -> None:
         wanted_s, found_s = float(live.seconds[-1]), float(model.seconds[-1])
         beside = UM * max(off(live, model), off(model, live))
         part = found_s / wanted_s - 1.0
-        missed = beside > PATH_UM or abs(part) > TIME_PART
+        late = (name, "%") in LATE and abs(part) < 2.0 * TIME_PART
+        missed = beside > PATH_UM or (abs(part) > TIME_PART and not late)
         misses += [name] if missed else []
         cells = [mm(wanted_s, 2), mm(found_s, 2), signed(100.0 * part, 2), mm(beside, 1)]
         rows.append([name, *cells, CAUSES.get(name, "") if missed else ""])
     heads = ["program", "LinuxCNC, s", "model, s", "%", "paths apart, µm", "cause of a miss"]
-    check("live-linuxcnc", heads, rows, bless, SCATTER_PLACES)
+    check("live-linuxcnc", heads, rows, bless, SCATTER_PLACES, LATE)
     assert len(misses) <= MOST_MISSES, misses
     assert set(misses) <= set(CAUSES), misses
