@@ -292,7 +292,7 @@ def _deep(operation: Operation, layers: Sequence[Table], stock: Stock | None) ->
 
 def _rested(operations: list[Operation], tables: Sequence[Table]) -> list[Operation]:
     """The operations with what they clear the rest of."""
-    carvings = {each.name for each in operations if each.kind == "vcarve"}
+    carvings = {each.name for each in operations if each.kind == "vcarve" and each.name}
     for operation, own in zip(operations, tables, strict=True):
         for key in ("depth", "breakthrough"):
             if operation.rest in carvings and key in own.given:

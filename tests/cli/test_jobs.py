@@ -445,3 +445,22 @@ def test_a_job_from_a_pipe_is_read_whole(
     done = camtool_process("post", *args, "--job", "pipe", "-o", "b.pic")
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "a.pic").read_bytes() == (tmp_path / "b.pic").read_bytes()
+
+
+def test_a_carving_by_a_file_is_that_by_flags(camtool: Run, tmp_path: Path, samples: Path) -> None:
+    """A job of one operation has no name, and nothing of another one to clear."""
+    tool = {"tool_kind": "v", "tool_tip_angle": "60deg", "tool_diameter": "3mm"}
+    keys = {"kind": "vcarve", "depth": "0.4mm", **tool}
+    text = "".join(f'{key} = "{value}"\n' for key, value in keys.items())
+    (tmp_path / "flat.toml").write_text(text)
+    (tmp_path / "listed.toml").write_text(f"[[operations]]\n{text}")
+    post = ("post", samples / "letter.svg", "-t", "grbl", "--fit", "30x30mm", "-o", "-")
+    flags = camtool(
+        *post, "--kind", "vcarve", "--depth", "0.4mm", "--tool-angle", "60deg",
+        "--tool-diameter", "3mm", "--tool-kind", "v",
+    )  # fmt: skip
+    assert flags.returncode == 0, flags.stderr
+    for name in ("flat.toml", "listed.toml"):
+        done = camtool(*post, "--job", name)
+        assert done.returncode == 0, done.stderr
+        assert done.stdout == flags.stdout
