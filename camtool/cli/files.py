@@ -80,10 +80,10 @@ def refuse_same(reads: Iterable[str | None], writes: Iterable[str | None]) -> No
         taken[place] = name
 
 
-def check_new(name: str) -> None:
+def check_new(name: str, mend: str = "give another name") -> None:
     """OutputError when there is such a file already; streams take whatever comes."""
     if os.path.lexists(name) and not _is_stream(name):
-        raise OutputError("exists already", file=name, mend="give another name")
+        raise OutputError("exists already", file=name, mend=mend)
 
 
 def _check_file(name: str) -> None:

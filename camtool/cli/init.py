@@ -124,6 +124,7 @@ def _axis_flags(command: Callable[..., None]) -> Callable[..., None]:
 )
 @click.option("--project", is_flag=True, help="Keep it here, for this folder alone.")
 @click.option("-o", "--output", metavar="FILE", help="Only write this file; - is stdout.")
+@click.option("--force", is_flag=True, help="Replace a machine of this name; its file is kept.")
 @click.option("--ask/--no-ask", default=None, help="Ask for what is not said.  [at a terminal]")
 @talk_options
 def init(
@@ -134,6 +135,7 @@ def init(
     project: bool,
     output: str | None,
     spindle: str | None,
+    force: bool,
     ask: bool | None,
     quiet: bool,
     verbose: bool,
@@ -185,8 +187,14 @@ def init(
     default = output is None and (project or not names_machine(names / FILE))
     if default:
         files[str(names / FILE)] = naming(names / FILE, name).encode()
-    _write(files, settings)
+    kept = _write(files, settings, force=force)
     say(f"written: {shown(str(place))}", quiet=quiet)
+    if kept is not None:
+        say(f"the machine that it replaces is kept: {shown(kept)}", quiet=quiet)
+    for each in given.values():
+        if each.doubt:
+            value = f"{each.key} = {each.value} ({each.said})"
+            say(f"{value} is not taken, but a comment in it: {each.doubt}", quiet=quiet)
     missing = [flag for flag, (key, *_) in AXES.items() if f"axes.x.{key}" not in given]
     if missing:
         say(f"not known, and a comment in it: {', '.join(missing)}", quiet=quiet)
@@ -336,12 +344,19 @@ def _place(name: str, output: str | None, *, project: bool) -> Path:
     return (Path() if project else user_folder() / MACHINES) / f"{name}.toml"
 
 
-def _write(files: dict[str, bytes], settings: str | None) -> None:
-    """Write the machine file, which must be new, and the `camtool.toml` that names it."""
-    place = next(iter(files))
-    check_new(place)
+def _write(files: dict[str, bytes], settings: str | None, *, force: bool) -> str | None:
+    """Write the machine file, which must be new, and the `camtool.toml` that names it. With
+    `force` an old file stays beside it under another name, which is returned: its numbers may have
+    been measured."""
+    place, kept = next(iter(files)), None
+    if force and Path(place).is_file():
+        kept = f"{place}.old"
+        files = {kept: read_bytes(place), **files}
+    else:
+        check_new(place, "give another name, or --force, which replaces it")
     if place != STDOUT:
         for name in files:
             Path(name).parent.mkdir(parents=True, exist_ok=True)
     check_places([settings], files)
     write_all(files)
+    return kept

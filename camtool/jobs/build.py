@@ -223,6 +223,7 @@ def _operation(
         if kind not in OPERATION[name].kinds:
             raise given.refused(*_unknown(name, kind))
     used = tools.of(layers, kind)
+    preset = tuple(key for key in used.preset.given if key not in merged.given)
     merged = merged.over(used.preset)
     known = merged.only(name for name in OPERATION if kind in OPERATION[name].kinds)
     operation = record_of(Operation, OPERATION, known.only(_RECORDED))
@@ -232,7 +233,7 @@ def _operation(
             raise given.refused(why.message, why.mend)
     if not operation.name and count > 1:
         operation = replace(operation, name=f"{kind} {number}")
-    operation = _tooled(operation, known, used, tools)
+    operation = replace(_tooled(operation, known, used, tools), preset=preset)
     _refuse_tool(operation, own)
     return operation
 

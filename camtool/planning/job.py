@@ -387,7 +387,8 @@ class Operation:
     `chamfer_mm`: how wide a chamfer is, seen from above (a Job makes the depth of it), and
     `tip_offset_mm`: how far below it the tip of its bit runs.
     `max_hole_mm`: circles up to this diameter are drilled (None: as wide as the drill, or any
-    for a drill of no width). `material`: that of the tool's preset, "" where none was taken.
+    for a drill of no width). `material`: that of the tool's preset, "" where none was taken;
+    `preset`: the keys of the operation that it gave.
     Raises OptionError for what no operation can be.
     """
 
@@ -436,6 +437,7 @@ class Operation:
     chamfer_mm: float | None = None
     tip_offset_mm: float = 0.1
     material: str = ""
+    preset: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         one_of("kind of operation", self.kind, KINDS)

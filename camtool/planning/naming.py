@@ -51,8 +51,9 @@ def tool_words(tool: Tool) -> str:
 
 
 def key_of(operation: Operation, key: str) -> str:
-    """Where a setting of an operation stands in its job."""
-    return f"{operation_name(operation)}, key {key}"
+    """Where a setting of an operation stands: in its job, or in the preset of its tool."""
+    of = f" of the tool's preset for {operation.material!r}" if key in operation.preset else ""
+    return f"{operation_name(operation)}, key {key}{of}"
 
 
 def operation_name(operation: Operation) -> str:

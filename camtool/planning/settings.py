@@ -61,10 +61,12 @@ def speed_of(operation: Operation, machine: Machine) -> float | None:
         )
     if not spindle.reaches(given):
         most = "" if spindle.max_rpm is None else f" to {spindle.max_rpm:g}"
+        faster = [f"spindle.max_rpm={given:g}"]
         raise OptionError(
             f"{given:g} rev/min is not in the range of the spindle, {spindle.min_rpm:g}{most}",
             where=key_of(operation, "spindle"),
-            mend="give a speed in it, or leave it out",
+            mend="give a speed in it (--spindle)"
+            + (f"; {own_numbers(machine, faster)}" if given > spindle.min_rpm else ""),
         )
     return given
 

@@ -42,12 +42,14 @@ class NoChoices(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 class Setting(Struct, frozen=True):
     """A value of a machine file that a controller's own settings say: its key, such as
-    "axes.x.travel_mm", what says it, such as "$130", and where that stands."""
+    "axes.x.travel_mm", what says it, such as "$130", and where that stands. `doubt`: why it is no
+    value of this machine; it becomes a comment of the file then."""
 
     key: str
     value: float | int | str
     said: str
     where: str = ""
+    doubt: str = ""
 
 
 class Target(ABC):

@@ -66,7 +66,8 @@ def machine_template(
 ) -> str:
     """TOML text of the machine `name`, which extends the target `base`.
 
-    The values that are `given` stand in it with what says them. Every other value of the target's
+    The values that are `given` stand in it with what says them, as comments where they are in
+    doubt. Every other value of the target's
     own file (`base_text`) is a comment, with its source, for the user to uncomment and change;
     every axis has `backlash_mm`, since every machine has backlash. `needs` are keys that the user
     must give. OptionError for a name that is not a word of small letters, digits and hyphens.
@@ -132,7 +133,10 @@ def _rows(
 
 
 def _line(setting: Setting, key: str) -> str:
-    return f"{f'{key} = {json.dumps(setting.value)}':<28}# {setting.said}"
+    text = f"{key} = {json.dumps(setting.value)}"
+    if setting.doubt:
+        return f"{f'# {text}':<28}# {setting.said}: {setting.doubt}"
+    return f"{text:<28}# {setting.said}"
 
 
 def _within(table: str, keys: Iterable[str]) -> list[str]:

@@ -11,6 +11,8 @@ import re
 import time
 from typing import Any
 
+from msgspec import structs
+
 from camtool.errors import MachineError
 from camtool.target.contract import Setting
 
@@ -33,12 +35,21 @@ _KEYS = {
 } | {"controller.junction_deviation_mm": 11, "controller.arc_tolerance_mm": 12}
 """What every listing says ..."""
 
+FULL_SPEED, FACTORY_FULL_SPEED = 30, 1000.0
+"""The setting of the speed at which the spindle gets full power, and what it is until somebody
+sets it (DEFAULT_SPINDLE_RPM_MAX in defaults.h)."""
+
+NEVER_SET = (
+    "the firmware's own value, which says nothing of this spindle, and with which every speed from"
+    " 1000 on is full power; set $30 to the spindle's highest speed, and max_rpm here"
+)
+
 LASER = 32
 """The setting of laser mode."""
 
 _MORE = {
     "controller.idle_delay_ms": 1,
-    "spindle.max_rpm": 30,
+    "spindle.max_rpm": FULL_SPEED,
     "spindle.min_rpm": 31,
     "controller.laser_mode": LASER,
 }
@@ -69,11 +80,21 @@ def settings_of(text: str) -> list[Setting] | None:
             f"the listing is not whole: {', '.join(missing)} {_be(missing)} missing",
             mend="give all that grbl answers to $$",
         )
-    return [
+    made = [
         _setting(key, number, *said[number])
         for key, number in (_KEYS | _MORE).items()
         if number in said
     ]
+    if not any(each.said == f"${LASER}" and each.value for each in made):
+        made = [structs.replace(each, doubt=_doubt(each)) for each in made]
+    return made
+
+
+def _doubt(setting: Setting) -> str:
+    """Why a setting of a machine with a spindle says nothing of it; "" where it does. Of a laser
+    the same number is the usual full power."""
+    never_set = setting.said == f"${FULL_SPEED}" and setting.value == FACTORY_FULL_SPEED
+    return NEVER_SET if never_set else ""
 
 
 def _setting(key: str, number: int, text: str, line: int) -> Setting:
@@ -135,6 +156,9 @@ def differences(text: str, machine: GrblMachine) -> tuple[list[str], list[str]]:
         laser = said.get(f"${LASER}")
         if laser is not None and laser.value != machine.controller.laser_mode:
             errors.append(LASER_IS if laser.value else LASER_IS_NOT)
+    full = said.get(f"${FULL_SPEED}")
+    if full is not None and machine.spindle.switched == "program":
+        errors += _difference(full, machine.spindle.max_rpm)
     numbers = {int(number): value for number, value in _SETTING.findall(text)}
     if float(numbers.get(REPORT_INCHES, "0")) != 0.0:
         errors.append("$13 reports inches: set $13=0, so that places can be followed")

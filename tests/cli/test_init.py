@@ -353,3 +353,44 @@ def _plate(file: Path) -> None:
     space.add_line((70, 18), (50, 18))
     space.add_arc((50, 15), 3, 90, 270)
     document.saveas(file)
+
+
+def test_a_speed_that_nobody_set_is_no_limit_of_the_spindle(
+    camtool: Run, tmp_path: Path, config: Path, samples: Path
+) -> None:
+    """grbl 1.1's defaults.h has $30=1000: a board where nobody set it says so of any spindle. Of a
+    laser ($32=1) 1000 is what its senders take for full power."""
+    (tmp_path / "grbl.txt").write_text(LISTING.replace("$30=12000", "$30=1000"))
+    done = camtool("init", "mine", "--settings", "grbl.txt")
+    assert done.returncode == 0, done.stderr
+    assert b"spindle.max_rpm = 1000 ($30) is not taken" in done.stderr
+    text = (config / "machines" / "mine.toml").read_text()
+    assert "max_rpm" not in tomllib.loads(text)["spindle"]
+    assert re.search(r"^# max_rpm = 1000 ", text, re.MULTILINE)
+    post = ("post", samples / "logo.dxf", "--machine", "mine", "--spindle", "10000", "-o", "-")
+    done = camtool(*post)
+    assert done.returncode == 0, done.stderr
+    assert re.search(rb"^M3 S10000$|^S10000 M3$", done.stdout, re.MULTILINE), done.stdout[:400]
+    laser = LISTING.replace("$30=12000", "$30=1000\n$32=1")
+    assert camtool("init", "laser", "--settings", "-", stdin=laser.encode()).returncode == 0
+    whole = tomllib.loads((config / "machines" / "laser.toml").read_text())
+    assert whole["spindle"]["max_rpm"] == 1000
+
+
+def test_a_machine_is_replaced_when_that_is_asked(camtool: Run, config: Path) -> None:
+    file = config / "machines" / "mine.toml"
+    camtool("init", "mine", "-t", "grbl", "--travel", "100", "--backlash", "0.031")
+    measured = file.read_bytes()
+    done = camtool("init", "mine", "-t", "grbl", "--travel", "200")
+    assert done.returncode == 2
+    assert b"--force, which replaces it" in done.stderr
+    assert file.read_bytes() == measured
+    done = camtool("init", "mine", "-t", "grbl", "--travel", "200", "--force")
+    assert done.returncode == 0, done.stderr
+    assert said(file)["travel_mm"] == 200.0
+    # What was measured on the old one is not lost.
+    assert (config / "machines" / "mine.toml.old").read_bytes() == measured
+    assert b"mine.toml.old" in done.stderr
+    # A machine that is new needs no old one.
+    assert camtool("init", "other", "-t", "grbl", "--force").returncode == 0
+    assert not (config / "machines" / "other.toml.old").exists()

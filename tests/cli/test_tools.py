@@ -204,3 +204,21 @@ def test_a_new_job_says_the_material(camtool: Run, tmp_path: Path, samples: Path
     assert done.returncode == 2
     assert b"give --tool too" in done.stderr
     assert not (tmp_path / "other.toml").exists()
+
+
+def test_a_number_of_a_preset_that_the_machine_lacks_is_named_with_it(
+    camtool: Run, samples: Path, tmp_path: Path
+) -> None:
+    """The key is in no job: whoever looks for it there does not find it."""
+    (tmp_path / "camtool.toml").write_text("")
+    (tmp_path / "tools.toml").write_text(LIBRARY + "spindle = 9000\n")
+    post = ("post", samples / "logo.dxf", "-t", "grbl", "--set", "spindle.max_rpm=5000")
+    asked = (*post, "--tool", "mill", "--material", "brass", "-o", "-")
+    done = camtool(*asked)
+    assert done.returncode == 2
+    told = done.stderr.decode()
+    assert "key spindle of the tool's preset for 'brass': 9000 rev/min" in told
+    assert "--set spindle.max_rpm=9000" in told
+    # One that stands nearer takes its place, and is named as the job's.
+    done = camtool(*asked, "--spindle", "7000")
+    assert "operation 'profile', key spindle: 7000 rev/min" in done.stderr.decode()

@@ -15,7 +15,7 @@ def test_every_field_of_a_job_has_a_key() -> None:
         assert isinstance(keys, dict)
         return {each.name for each in fields(record)} - {key.field for key in keys.values()}
 
-    assert missing(Operation, OPERATION) == {"tool", "material", "stage", "rest_of"}
+    assert missing(Operation, OPERATION) == {"tool", "material", "preset", "stage", "rest_of"}
     assert missing(Placement, PLACE) == missing(Stock, STOCK) == set()
     assert missing(Entry, ENTRY) == missing(Lead, LEAD) == missing(Tabs, TABS) == set()
     assert missing(Tool, TOOL) == {"name", "materials"}

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from camtool_postprocessors.grbl.settings import differences
 from camtool_postprocessors.grbl.wire import BUFFER_BYTES, GrblWire
 
 from camtool.sending.prepare import forecast_of
@@ -122,6 +123,18 @@ def test_settings_that_differ_are_an_error_that_names_them() -> None:
     assert talk.state is State.FAILED
     assert "$101 is 80.000" in talk.why
     assert small.lines == []
+
+
+def test_another_full_speed_than_the_machine_files_turns_at_another_speed() -> None:
+    """S6000 is half power where $30 is 12000, and full power where it is 1000."""
+    machine = load_target("grbl", settings=["spindle.max_rpm=12000"]).machine
+    for full, count in ((12000.0, 0), (1000.0, 1)):
+        text = "\n".join(
+            f"${number}={value:.3f}" for number, value in (LISTING | {30: full}).items()
+        )
+        errors, _ = differences(text, machine)
+        assert [each for each in errors if "spindle.max_rpm" in each] == errors
+        assert len(errors) == count
 
 
 @pytest.mark.parametrize("seed", range(30))
