@@ -200,16 +200,33 @@ class Conversation(ABC):
 
     @abstractmethod
     def stop(self, now: float) -> None:
-        """End for good; STOPPED when the machine stands, as far as its protocol can stop it."""
+        """End for good: what stops the machine is the next thing to be written, whatever is
+        awaited. STOPPED when the machine stands, as far as its protocol can stop it; `why` then
+        says by what that is known, or that it is not."""
+
+    def hurry(self, now: float) -> None:
+        """Stop harder than `stop` has done, where the protocol can; nobody waits for the end."""
+        self.stop(now)
 
     def lost(self, why: str, now: float) -> None:
         """The port is gone: nobody can be told anything any more."""
         if not self.ended:
             self._out.clear()
-            self._end(State.FAILED, why)
+            self._end(State.FAILED, "; ".join(filter(None, (why, self._alone))))
+
+    @property
+    def _alone(self) -> str:
+        """What the machine does if nobody speaks to it from now on; "" where it stands."""
+        return ""
 
     def _write(self, data: bytes) -> None:
         self._out.append(Write(data))
+
+    def _unwrite(self) -> bool:
+        """Take back what was to be written and was not handed out yet; True if there was any."""
+        told: list[Action] = [action for action in self._out if isinstance(action, Tell)]
+        taken, self._out = len(told) < len(self._out), told
+        return taken
 
     def _tell(self, text: str) -> None:
         self._out.append(Tell(text))

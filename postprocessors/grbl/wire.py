@@ -45,6 +45,10 @@ POLLS: Final = 5
 """A status report is asked for whenever so many times the lateness of the line (0.25 s) is over:
 the wiki advises 5 Hz at most."""
 
+SILENT: Final = 10
+"""A controller that answers no question for so many times the lateness of the line (0.5 s) homes,
+or is none."""
+
 HELD: Final = 3
 """So many reports in a row say that it is held though nobody has asked for it: by a button, or
 since a ~ was lost."""
@@ -53,7 +57,11 @@ PROBE: Final = b"$G\n"
 PROBE_EVERY: Final = 36
 """After so many bytes of lines: two queries are under way in a full buffer, which never dries."""
 
-HOLD, RESUME, STATUS, RESET = b"!", b"~", b"?", b"\x18"
+HOLD, RESUME, STATUS, RESET, JOG_CANCEL = b"!", b"~", b"?", b"\x18", b"\x85"
+HOMING: Final = b"$H\n"
+LISTING: Final = b"$$\n"
+STANDING: Final = frozenset({"Hold:0", "Door:0", "Door:1", "Alarm", "Check", "Sleep"})
+"""States in which nothing moves, whatever was sent before; Idle is one when it is said twice."""
 
 MOST_LINE: Final = 1000
 """No answer is longer."""
@@ -68,6 +76,7 @@ _STATUS = re.compile(
     r"<(Idle|Run|Hold:[01]|Jog|Alarm|Door:[0-3]|Check|Home|Sleep)((?:\|[A-Za-z]+:[^|<>]*)*)>"
 )
 _PLACE = re.compile(r"-?\d+\.\d+(?:,-?\d+\.\d+){2,}")
+_FEED = re.compile(r"\d{1,9}(?:\.\d*)?")
 _SETTING = re.compile(r"\$\d{1,3}=[^\s=]+")
 _PUSHED = re.compile(r"\[[A-Za-z0-9]{1,6}:.*\]")
 
@@ -145,7 +154,10 @@ class GrblWire(Wire):
         "opening the port may reset the controller: where it is then, is zero to it until it is "
         "homed or zeroed",
     )
-    stopping = "it is held, then reset: the slides come to rest, then the spindle stops"
+    stopping = (
+        "it is held, then reset: the slides come to rest, then the spindle stops; homing is reset "
+        "at once"
+    )
 
     def packets(self, data: bytes, machine: GrblMachine, forecast: Forecast) -> Sequence[Packet]:
         """A packet is a line with words, without blanks and comments."""
@@ -253,9 +265,13 @@ class GrblConversation(Conversation):
         self._waiting = False  # a report is asked for that has not come
         self._resets = 0  # banners that are due
         self._begun = 0.0  # since then
-        self._failing = ""
+        self._failing = self._alarm = ""
         self._halted = 0.0
-        self._reset_sent = False
+        self._reset_sent = self._slows = False
+        self._acted = False  # whether anything but questions was sent
+        self._feed = 0.0
+        self._moves = 0  # reports in a row that it moves, while it should stop
+        self._jogs = any(each.startswith(b"$J=") for each in commands)
 
     # What the user wants.
 
@@ -284,25 +300,42 @@ class GrblConversation(Conversation):
             self._go_on(now, anew=True)
 
     def stop(self, now: float) -> None:
-        """Feed hold, and a reset when it stands."""
+        """Feed hold, and a reset when it stands; homing hears nothing but the reset."""
         if self.ended or self.state is State.STOPPING:
             return
-        if not self.sent and not self._out_lines:
-            self._end(State.STOPPED)
+        self._unwrite()
+        if self._phase != "greeting" and not self._acted:
+            self._end(State.STOPPED, "stopped before it was told to move")
             return
         self.state, self._halted, self._idle = State.STOPPING, now, 0
-        self._write(HOLD)
-        self._poll(now)
+        if self._homes or (self._phase == "greeting" and self._resets):
+            self._reset(now)
+        else:
+            # A jog ends by its own byte; ! also holds one that has not begun yet.
+            self._write(JOG_CANCEL + HOLD if self._jogs else HOLD)
+            self._poll(now)
+
+    def hurry(self, now: float) -> None:
+        """Reset it at once, though it moves and its place is lost."""
+        self.stop(now)
+        if not self.ended and not self._reset_sent:
+            self._reset(now)
 
     def _fail(self, why: str, now: float) -> None:
         """Stop, and say why."""
-        if self.ended or self._failing:
-            return
-        self._failing = why
-        if self.state is not State.STOPPING:
+        if not self.ended and not self._failing:
+            self._failing = why
             self.stop(now)
         if self.state is State.STOPPED:
             self._end(State.FAILED, why)
+
+    @property
+    def _alone(self) -> str:
+        if not self._acted or self._reset_sent:
+            return ""
+        if self.sent:
+            return "it goes on with the lines that it has, and then stands with its spindle on"
+        return "it goes on to the end of what it was told"
 
     # The clock.
 
@@ -311,20 +344,25 @@ class GrblConversation(Conversation):
         if self.ended:
             return
         patience = self.manner.patience_s
-        if self._phase == "greeting" and now - self._answered >= patience:
-            self._end(State.FAILED, "nothing answers: is it a grbl, and is it switched on?")
-            return
-        if self._phase == "greeting" and self._resets and now - self._begun >= patience:
-            self._end(State.FAILED, "it was reset, and does not say that it has begun anew")
-            return
-        if self.state is State.STOPPING and now - self._halted >= patience:
-            if self._reset_sent:
-                why = self._failing or "it was to stop"
+        if self.state is State.STOPPING:
+            since = now - self._halted
+            if self._reset_sent and since >= patience:
+                why = self._failing or "it was told to stop"
                 self._end(State.FAILED, f"{why}; it did not confirm the stop: switch it off")
                 return
-            self._reset(now)
-        homing = any(line.data == b"$H\n" for line in self._out_lines)
-        if self._phase != "greeting" and not homing and now - self._answered >= patience:
+            # One that homes since before the port was opened hears nothing else, and says nothing.
+            homes = self._phase == "greeting" and self._answered <= self._halted
+            if not self._reset_sent and since >= (
+                SILENT * self.manner.late_s if homes else patience
+            ):
+                self._reset(now)
+        elif self._phase == "greeting" and now - self._answered >= patience:
+            self._end(State.FAILED, "nothing answers: is it a grbl, and is it switched on?")
+            return
+        elif self._phase == "greeting" and self._resets and now - self._begun >= patience:
+            self._end(State.FAILED, "it was reset, and does not say that it has begun anew")
+            return
+        if self._phase != "greeting" and not self._homes and now - self._answered >= patience:
             self._answered = now
             self._fail("it does not answer any more", now)
         if now >= self._polled + POLLS * self.manner.late_s:  # as `_wake` reckons it
@@ -334,8 +372,13 @@ class GrblConversation(Conversation):
             self._poll(now)
         self._wake(now)
 
+    @property
+    def _homes(self) -> bool:
+        """True while homing is under way: nothing but a reset is heard then."""
+        return any(line.data == HOMING for line in self._out_lines)
+
     def _poll(self, now: float) -> None:
-        if not any(line.data == b"$H\n" for line in self._out_lines):
+        if not self._homes:
             self._write(STATUS)
         self._polled = now
         self._wake(now)
@@ -361,7 +404,8 @@ class GrblConversation(Conversation):
     def _line(self, line: str, now: float) -> None:
         if not line:
             return
-        if self._phase == "greeting" and not _understood(line):
+        stopping = self.state is State.STOPPING
+        if self._phase == "greeting" and not stopping and not _understood(line):
             return  # what a port says that has just been opened
         self._answered = now
         status = _STATUS.fullmatch(line)
@@ -372,10 +416,9 @@ class GrblConversation(Conversation):
         elif line == "ok" or re.fullmatch(r"error:\d+", line):
             self._answer(line, now)
         elif re.fullmatch(r"ALARM:\d+", line):
-            meaning = ALARMS.get(int(line[6:]), "it says no more")
-            self._reset_sent = True
-            self._failing = self._failing or f"{line}: {meaning}"
-            self._end(State.FAILED, self._failing)
+            self._alarm = f"{line}: {ALARMS.get(int(line[6:]), 'it says no more')}"
+            if not (stopping and self._reset_sent):  # else its banner follows
+                self._end(State.FAILED, self._failing or self._alarm)
         elif line.startswith("[GC:") and line.endswith("]"):
             self._reported(now)
         elif _SETTING.fullmatch(line) and self._phase == "settings":
@@ -383,7 +426,7 @@ class GrblConversation(Conversation):
         elif _PUSHED.fullmatch(line):
             if line.startswith("[MSG:") and self.sent:
                 self._tell(f"it says: {line[5:-1]}")
-        elif self.state is not State.STOPPING:
+        elif not stopping:
             self._fail(f"an answer that it cannot have meant: {line[:40]!r}", now)
 
     def _status(self, state: str, fields: str, now: float) -> None:
@@ -393,11 +436,10 @@ class GrblConversation(Conversation):
             self._idle_since = now
         self._holds = self._holds + 1 if state == "Hold:0" else 0
         still = state == "Hold:0" or self._idle >= 2 or state.startswith("Door:1")
-        if self._phase == "greeting":
+        if self.state is State.STOPPING:
+            self._stopping(state, now)
+        elif self._phase == "greeting":
             self._greeted(state, now)
-        elif self.state is State.STOPPING:
-            if still and not self._reset_sent:
-                self._reset(now)
         elif state == "Alarm":
             self._end(
                 State.FAILED, "it is locked: home it, or unlock it with $X from a terminal program"
@@ -419,9 +461,24 @@ class GrblConversation(Conversation):
         elif self._idle >= 2 and self.state is State.SENDING:
             self._at_rest(now)
 
+    def _stopping(self, state: str, now: float) -> None:
+        """It is to stand, and says how far it is: reset it when it does."""
+        if self._reset_sent:
+            return
+        self._moves = self._moves + 1 if state in ("Run", "Jog") else 0
+        if state in STANDING or state == "Home" or self._idle >= 2:
+            self._reset(now)
+        elif state == "Hold:1" or self._slows:
+            self._halted = now
+        elif self._moves >= 2:  # the first such report may be older than the hold
+            self._write(JOG_CANCEL + HOLD if state == "Jog" else HOLD)
+
     def _where(self, fields: str, now: float) -> None:
-        """The place in the work frame, of the fields of a report."""
+        """The place in the work frame, of the fields of a report, and whether it slows down."""
         said = dict(field.split(":", 1) for field in fields.split("|") if field)
+        feed, before = said.get("FS", said.get("F", "")).partition(",")[0], self._feed
+        self._feed = float(feed) if _FEED.fullmatch(feed) else 0.0
+        self._slows = self._feed < before
         for name in ("WCO", "MPos", "WPos"):
             text = said.get(name)
             if text is None:
@@ -445,7 +502,7 @@ class GrblConversation(Conversation):
             if self._resets == 0:
                 self._resets, self._begun = 1, now
                 self._write(RESET)
-        elif state == "Alarm" and (b"$H\n" in self._commands):
+        elif state == "Alarm" and HOMING in self._commands:
             self._ready(now)
         elif state == "Alarm":
             self._end(
@@ -462,18 +519,20 @@ class GrblConversation(Conversation):
             self._end(State.FAILED, f"it is not ready: {state}, {meaning}")
 
     def _banner(self, now: float) -> None:
-        if self._phase == "greeting":
-            if self._resets:
-                self._ready(now)
-            return  # it has begun by itself: the next report says how it stands
         if self.state is State.STOPPING and self._reset_sent:
             if self._failing:
-                self._end(State.FAILED, self._failing)
+                self._end(State.FAILED, "; ".join(filter(None, (self._failing, self._alarm))))
             else:
-                self._end(State.STOPPED)
-        else:
-            self._reset_sent = True
+                self._end(
+                    State.STOPPED, f"stopped: {self._alarm or 'it has begun anew, and stands'}"
+                )
+        elif self._phase != "greeting":
             self._end(State.FAILED, "the controller was reset while it worked")
+        elif self.state is State.STOPPING:
+            self._reset(now)  # a hold that comes behind its banner would last
+        elif self._resets:
+            self._ready(now)
+        # Else it has begun by itself: the next report says how it stands.
 
     def _ready(self, now: float) -> None:
         self._phase, self.why, self._idle = "commands", "", 0
@@ -513,7 +572,7 @@ class GrblConversation(Conversation):
             self._confirm()
         elif head.packet is not None:
             self.acknowledged = head.packet
-        elif head.data == b"$$\n":
+        elif head.data == LISTING:
             self._phase = "commands"
             self._compare(now)
         self._go_on(now)
@@ -544,7 +603,7 @@ class GrblConversation(Conversation):
         if self._commands:
             if not self._out_lines:
                 line = self._commands.popleft()
-                if line == b"$$\n":
+                if line == LISTING:
                     self._phase = "settings"
                 self._put(_Line(line))
             return
@@ -578,6 +637,7 @@ class GrblConversation(Conversation):
         self._put(_Line(PROBE))
 
     def _put(self, line: _Line) -> None:
+        self._acted = self._acted or not (line.is_probe or line.data == LISTING)
         self._out_lines.append(line)
         self._unconfirmed += len(line.data)
         self._idle = 0
@@ -614,6 +674,7 @@ class GrblConversation(Conversation):
     def _reset(self, now: float) -> None:
         self._reset_sent, self._halted = True, now
         self._rest = b""
+        self._out_lines.clear()
         self._write(RESET)
 
     def _stops(self) -> bool:
