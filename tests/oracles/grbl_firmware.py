@@ -9,6 +9,7 @@ import os
 import re
 import shutil
 import subprocess
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,24 +19,43 @@ from camtool.arrays import Floats, Ints
 
 BOARD = Path(__file__).parent / "grbl_board"
 HEADERS = ("avr/io.h", "avr/pgmspace.h", "avr/interrupt.h", "avr/wdt.h", "util/delay.h")
-OURS = {"main.c", "serial.c", "eeprom.c"}
+OURS = {"eeprom.c"}
 """Files of grbl whose part the board plays."""
 
 TICK_S = 1.0 / 16e6
-FLAGS = ("-O1", "-fcommon", "-w", "-fsingle-precision-constant", "-std=gnu99")
+FLAGS = ("-O1", "-Dmain=grbl_main", "-fcommon", "-w", "-fsingle-precision-constant", "-std=gnu99")
 TICK = np.dtype([("at", "<u8"), ("steps", "<i4", 3), ("pwm", "<i4"), ("on", "<i4")])
+TICK_OF_SESSION = np.dtype([*TICK.descr, ("slides", "<i4", 3)])
 
-WAITING = {
+CHANGES: dict[str, tuple[tuple[str, str], ...]] = {
     "motion_control.c": (
-        r"(if \( plan_check_full_buffer\(\) \) \{ protocol_auto_cycle_start\(\);)",
-        r"\1 board_wait();",
+        (
+            r"(if \( plan_check_full_buffer\(\) \) \{ protocol_auto_cycle_start\(\);)",
+            r"\1 board_wait();",
+        ),
+        (r"(if \(sys.abort\) \{ return\(GC_PROBE_ABORT\); \} // Check)", r"board_wait(); \1"),
     ),
     "protocol.c": (
-        r"(protocol_execute_realtime\(\);   // Check and execute run-time commands)",
-        r"\1\n    board_wait();",
+        (
+            r"(protocol_execute_realtime\(\);   // Check and execute run-time commands)",
+            r"\1\n    if (plan_get_current_block() || sys.state == STATE_CYCLE) { board_wait(); }",
+        ),
+        (r"(\} while \(bit_isfalse\(sys_rt_exec_state,EXEC_RESET\)\))", r"board_wait(); \1"),
+        (r"(while \(!\(sys.abort\)\) \{ protocol_exec_rt_system\(\);)", r"\1 board_wait();"),
+        (r"while \(sys\.suspend\) \{", r"\g<0> board_resume();"),
+        (r"(protocol_exec_rt_system\(\);)(\s*\}\s*\}\s*)$", r"\1 board_suspended();\2"),
+    ),
+    "limits.c": (
+        (r"(st_prep_buffer\(\); // Check and prep)", r"board_wait(); \1"),
+        (r"(\} while \( sys.state != STATE_IDLE \))", r"board_wait(); \1"),
+    ),
+    "serial.c": (
+        (r"uint8_t serial_read\(\)", "uint8_t serial_read_ring()"),
+        (r"(UCSR0B \|=  \(1 << UDRIE0\);)", r"\1 board_sent();"),
     ),
 }
-"""Where the main program waits for the motors, time goes on; elsewhere it takes none."""
+"""Where the main program waits, time goes on; elsewhere it takes none. Its answers are sent at
+once."""
 
 
 def source() -> Path | None:
@@ -72,12 +92,9 @@ def built(folder: Path, *, smoothing: bool = True) -> Path:
         (work / header).touch()
     for file in origin.glob("*.[ch]"):
         text = file.read_text(encoding="utf-8")
-        if file.name in WAITING:
-            text, count = re.subn(*WAITING[file.name], text)
-            assert count == 1, file.name
-        if file.name == "protocol.c":
-            text, count = re.subn(r"while \(sys\.suspend\) \{", r"\g<0> board_resume();", text)
-            assert count == 1
+        for pattern, instead in CHANGES.get(file.name, ()):
+            text, count = re.subn(pattern, instead, text)
+            assert count == 1, (file.name, pattern)
         if file.name == "config.h" and not smoothing:
             text = text.replace("#define ADAPTIVE_MULTI_AXIS_STEP_SMOOTHING", "//")
         if file.name not in OURS:
@@ -117,3 +134,89 @@ def run(program: Path, data: bytes, settings: dict[str, float], folder: Path) ->
         errors[skip:],
         np.array(places[skip + 1 :]),
     )
+
+
+# Sessions: bytes that come at their times, switches, and what grbl answers.
+
+
+@dataclass(frozen=True)
+class Sent:
+    """Bytes that come so long after those before them, or (None) when grbl stands and nothing
+    more would happen by itself."""
+
+    data: bytes
+    after_s: float | None = None
+
+
+@dataclass(frozen=True)
+class Switch:
+    """A switch at X, Y, Z or P (the probe): closed while the true position of `axis` is not
+    strictly between these, in steps from where the slides stand when the power comes on."""
+
+    pin: str
+    axis: int
+    least: int = -(2**30)
+    most: int = 2**30
+
+
+@dataclass(frozen=True, eq=False)
+class Played:
+    """What came of a session: for what was sent before the first entry and for each entry, what
+    grbl said until the next one and when that line began, s; positions (N, 3) steps after each
+    tick that changed them, as grbl has them and as the slides truly are, when (N,) s; and the
+    time at the end."""
+
+    said: list[list[tuple[float, str]]]
+    steps: Ints
+    slides: Ints
+    at_s: Floats
+    seconds: float
+
+    def text(self, entry: int) -> str:
+        """All that was said after an entry; −1: before the first."""
+        return "".join(text for _, text in self.said[entry + 1])
+
+
+def factory(program: Path, folder: Path) -> Path:
+    """An image of the memory as it is after the power came on for the first time."""
+    image = folder / "factory"
+    image.unlink(missing_ok=True)
+    (folder / "script").write_text("", encoding="ascii")
+    _run_session(program, image, folder)
+    return image
+
+
+def played(
+    program: Path, image: Path, sent: Sequence[Sent], folder: Path, switches: Sequence[Switch] = ()
+) -> Played:
+    """Play a session from the power's coming on; the image stays as it is."""
+    rows = [f"switch {each.pin} {each.axis} {each.least} {each.most}" for each in switches]
+    for each in sent:
+        when = "w" if each.after_s is None else f"t {round(each.after_s / TICK_S)}"
+        rows.append(f"{when} {each.data.hex()}")
+    (folder / "script").write_text("\n".join(rows) + "\n", encoding="ascii")
+    copy = folder / "image"
+    shutil.copyfile(image, copy)
+    _run_session(program, copy, folder)
+    said: list[list[tuple[float, str]]] = [[] for _ in range(len(sent) + 1)]
+    seconds = 0.0
+    for row in (folder / "answers").read_text(encoding="ascii").splitlines():
+        words = row.split()
+        if words[0] == "end":
+            seconds = int(words[1]) * TICK_S
+        else:
+            text = bytes.fromhex(words[2]).decode("latin-1")
+            said[int(words[0]) + 1].append((int(words[1]) * TICK_S, text))
+    ticks = np.fromfile(folder / "steps", dtype=TICK_OF_SESSION)
+    return Played(
+        said,
+        ticks["steps"].astype(np.int64),
+        ticks["slides"].astype(np.int64),
+        ticks["at"] * TICK_S,
+        seconds,
+    )
+
+
+def _run_session(program: Path, image: Path, folder: Path) -> None:
+    names = [image, folder / "script", folder / "answers", folder / "steps"]
+    subprocess.run([program, *names], check=True, timeout=600)
