@@ -4,42 +4,40 @@ A row stands for the lines of its operation that are nearest to it: a tool that 
 has no other line nearer than that one. What was drawn lies off this line by as much as reading
 says (`Drawing.off_mm`), and so does the wall that the tool leaves from the one that it should.
 
-The edge of a closed contour is the drawn line. Its size, and that of what the tool leaves:
+The edge that a contour or a run cuts is the drawn line. Its size, and that of what is left of it:
 
     tool             nominal     planned
     on the line      drawn       box of the tool's centre
-    within it        drawn       that box and a tool's radius all round; of a V bit its radius at
-                                 the surface, which depth makes
+    within it        drawn       box of all that it removes, as wide as it is at the surface
     round it         drawn       drawn, and the allowance all round; of one below 0 the box of the
                                  wall, which moves farther at a corner than along a side
 
-where a line is cut by one contour alone; of contours that share a line, or that run round several
-ones, both are what the tool leaves. Round a line the box of the centre would not do: sharp joins
-reach farther out than the radius.
+What runs round several lines has all of them as its nominal edge. Round a line the box of the
+centre would not do: sharp joins reach farther out than the radius. Chamfers break the edges that
+other operations cut, and drills make what their own diameter says: they have no edge here.
 """
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest
 from typing import TYPE_CHECKING
 
 import numpy as np
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.measure import extents, path_extents
 from camtool.geometry.nesting import nesting
-from camtool.geometry.polylines import Polylines, reverse
-from camtool.planning.items import Contour, Contours, Fixed, Item, Step
-from camtool.planning.job import Operation
+from camtool.geometry.polylines import Polylines, Segments, reverse
+from camtool.planning.items import Contour, Contours, Runs, Setting, Step
+from camtool.planning.job import Operation, Tool
 from camtool.planning.sides import runs_beside
 from camtool.toolpath.moves import Toolpath
-from camtool.toolpath.wanted import Drawn, Kept
+from camtool.toolpath.wanted import NO_EDGE, Drawn, Kept
 
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
-    from camtool.planning.carve import Cone
 
 
 PLACES = (0.03, 0.25, 0.5, 0.75, 0.97)
@@ -51,6 +49,9 @@ ROWS_AT_ONCE = 1 << 14
 AS_NEAR_MM = 1e-4
 """Lines whose distances differ by no more than this count as equally near."""
 
+OUTWARDS = np.array([-1.0, 1.0])
+"""The signs by which the low and the high side of a box move when it grows."""
+
 SAME_SIZE_MM = 1e-3
 """A contour whose size, without the tool, is that of its line within this runs round that line
 alone."""
@@ -61,8 +62,9 @@ def drawn_of(toolpath: Toolpath, runs: Ints, steps: Sequence[Step], placed: Draw
     counted through all of them; the drawing in the work frame."""
     # One number, seen as many, until there is another.
     off = np.broadcast_to(0.0, (len(toolpath), 2))
-    edge = np.broadcast_to(np.int64(-1), len(toolpath))
-    boxes: list[tuple[Floats, Floats]] = []
+    edge = np.broadcast_to(np.int64(NO_EDGE), len(toolpath))
+    columns = [(*np.empty((2, 0, 2, 2)), *np.empty((2, 0), dtype=np.bool_))]
+    lines = [np.empty(0, dtype=np.int64)]
     first = 0
     for step, later in zip_longest(steps, steps[1:]):
         rows = np.flatnonzero((runs >= first) & (runs < first + len(step.runs)))
@@ -70,16 +72,17 @@ def drawn_of(toolpath: Toolpath, runs: Ints, steps: Sequence[Step], placed: Draw
         for some, values in _off(toolpath, mine, step, placed):
             off = off if off.flags.writeable else off.copy()
             off[some] = values
-        of_item = np.full(len(step.items), -1, dtype=np.int64)
-        for index, box in _edges(step, later, placed):
-            of_item[index] = len(boxes)
-            boxes.append(box)
-        if (of_item >= 0).any():
+        made = _edges(step, later, placed)
+        if len(rows):
             edge = edge if edge.flags.writeable else edge.copy()
-            edge[rows] = of_item[step.owner[runs[rows] - first]]
+            own = made.of_run[runs[rows] - first]
+            edge[rows] = np.where(own >= 0, own + sum(map(len, lines)), own)
+        before = max((int(line.max(initial=-1)) + 1 for line in lines), default=0)
+        lines.append(made.line + before)
+        columns.append((made.nominal, made.planned, made.followed, made.cleared))
         first += len(step.runs)
-    both = np.array(boxes, dtype=np.float64).reshape(-1, 2, 2, 2)
-    return Drawn(off, edge, both[:, 0], both[:, 1])
+    nominal, planned, followed, cleared = map(np.concatenate, zip(*columns, strict=True))
+    return Drawn(off, edge, nominal, planned, np.concatenate(lines), followed, cleared)
 
 
 def _off(
@@ -137,84 +140,98 @@ def _points(toolpath: Toolpath, rows: Ints) -> Floats:
     return np.asarray(points.reshape(-1, 2))
 
 
-def _edges(
-    step: Step, later: Step | None, placed: Drawing
-) -> Iterator[tuple[int, tuple[Floats, Floats]]]:
-    """The indices of items that cut an edge, each with its nominal and its planned box; `later` is
-    the step after this one."""
-    cut = step.owner[_cuts_edge(step)[step.owner]]
-    index = list(dict.fromkeys(cut.tolist()))
-    items = [step.items[k] for k in index]
-    share = Counter(item.source for item in items)
+class _Edges(Struct, frozen=True, eq=False):
+    """The edges that a step cuts, in the columns of `Drawn`, `line` counted from 0; `of_run` (R,):
+    the edge of each of its runs, or NO_EDGE."""
+
+    of_run: Ints
+    nominal: Floats
+    planned: Floats
+    line: Ints
+    followed: Bools
+    cleared: Bools
+
+
+def _edges(step: Step, later: Step | None, placed: Drawing) -> _Edges:
+    """The edges that a step cuts; `later` is the step after this one."""
+    none = np.empty(0, dtype=np.bool_)
+    if step.operation.kind in ("chamfer", "drill") or not len(step.runs):
+        unsized, boxes = np.full(len(step.runs), NO_EDGE), np.empty((0, 2, 2))
+        return _Edges(unsized, boxes, boxes, unsized[:0], none, none)
     drawn = path_extents(placed.paths)
-    boxes = _centre_boxes(items)
-    # Another stage, or what it clears the rest of, makes the edge what it is.
-    if step.operation.stage == "rough" or step.operation.rest_of is not None:
-        finish = later.operation if later is not None else None
-        maker = finish if finish and finish.stage == "finish" else step.operation.rest_of
-        left = 0.0 if maker is None else maker.allowance_mm
-        for k, item, centre in zip(index, items, boxes, strict=True):
-            edge = drawn[item.source]
-            within = isinstance(item, Fixed) or centre[0, 0] > edge[0, 0]
-            yield k, (edge, edge + (-left if within else left) * np.array([-1.0, 1.0]))
-        return
-    for k, item, centre in zip(index, items, boxes, strict=True):
-        nominal, planned = _boxes(item, drawn[item.source], centre)
-        yield k, (nominal if share[item.source] == 1 else planned, planned)
-
-
-def _cuts_edge(step: Step) -> Bools:
-    """Which items of the step follow a closed line whose size they decide: chamfers none."""
-    if step.operation.kind == "chamfer":
-        return np.zeros(len(step.items), dtype=np.bool_)
     if isinstance(step.items, Contours):
-        return step.items.lines.closed
-    return np.full(len(step.items), step.operation.kind in ("pocket", "vcarve", "bore"))
+        return _beside_or_on(step, _left_by_others(step, later), drawn)
+    line = drawn[[item.source for item in step.items]][step.owner]
+    left = _left_by_others(step, later)
+    planned = line - OUTWARDS * (left or 0.0)
+    if left is None:
+        planned = _cleared_boxes(step.runs, step.operation.tool)
+        if step.operation.kind != "vcarve":
+            # Reliefs reach farther into corners than the walls are apart.
+            low, high = np.moveaxis(line - step.operation.allowance_mm * OUTWARDS, 2, 0)
+            planned = np.clip(planned, low[:, :, None], high[:, :, None])
+    every = np.arange(len(step.runs))
+    is_cleared = np.ones(len(every), dtype=np.bool_)
+    return _Edges(every, line, planned, step.owner, ~is_cleared, is_cleared)
 
 
-def _centre_boxes(items: Sequence[Item]) -> Floats:
-    """(E, 2, 2) mm: the box of the tool's centre on each item."""
-    boxes = np.empty((len(items), 2, 2))
-    contours = {k: item.path for k, item in enumerate(items) if isinstance(item, Contour)}
-    boxes[list(contours)] = path_extents(Polylines.of(contours.values()))
-    for k, item in enumerate(items):
-        if isinstance(item, Fixed):
-            points = _points_of(item)[:, :2]
-            boxes[k] = np.column_stack([points.min(axis=0), points.max(axis=0)])
-    return boxes
+def _left_by_others(step: Step, later: Step | None) -> float | None:
+    """What is left on a wall in the end, mm, where another stage, or what this one clears the rest
+    of, makes the edge; None where the step itself does."""
+    if step.operation.stage != "rough" and step.operation.rest_of is None:
+        return None
+    finish = later.operation if later is not None else None
+    maker = finish if finish and finish.stage == "finish" else step.operation.rest_of
+    return 0.0 if maker is None else maker.allowance_mm
 
 
-def _points_of(item: Fixed) -> Floats:
-    """(N, 3) x, y, z of all vertices of its runs."""
-    return np.concatenate([run.vertices[:, :3] for run in item.runs])
+def _beside_or_on(step: Step, left: float | None, drawn: Floats) -> _Edges:
+    """The edges of contours beside their lines, or on them; `drawn` (M, 2, 2): the boxes of what
+    is drawn."""
+    contours = Contours.of_items(step.items)
+    used = np.unique(step.owner).tolist()
+    centres = path_extents(contours.lines.select(used))
+    source = contours.source[used]
+    nominal, planned = drawn[source], centres.copy()
+    followed = np.zeros(len(used), dtype=np.bool_)
+    for row, k in enumerate(used):
+        if contours.material_left[k] is None:
+            followed[row] = _cut_radius(contours.settings[k]) > 0.0
+        elif left is None:
+            nominal[row], planned[row] = _boxes(contours[k], nominal[row], centres[row])
+        else:
+            inside = centres[row, 0, 0] > nominal[row, 0, 0]
+            planned[row] = nominal[row] + (-left if inside else left) * OUTWARDS
+    of_run = np.searchsorted(used, step.owner)
+    return _Edges(of_run, nominal, planned, source, followed, np.zeros_like(followed))
 
 
-def _boxes(item: Item, drawn: Floats, centre: Floats) -> tuple[Floats, Floats]:
-    """Nominal and planned box of the edge that an item cuts, as if its line were its own: those of
-    its line and of the tool's centre."""
-    operation = item.setting.operation
+def _cut_radius(setting: Setting) -> float:
+    """Radius of what the tool cuts at the surface in its deepest pass, mm."""
+    return setting.operation.tool.radius_at(-setting.levels_mm[-1])
+
+
+def _boxes(contour: Contour, drawn: Floats, centre: Floats) -> tuple[Floats, Floats]:
+    """Nominal and planned box of the edge that a contour beside its line cuts, as if the line were
+    its own: those of its line and of the tool's centre."""
+    operation = contour.setting.operation
     radius, allowance = operation.tool.radius_mm, operation.allowance_mm
-    if isinstance(item, Contour) and item.material_left is None:
-        return drawn, centre
-    if isinstance(item, Fixed) and operation.kind == "vcarve":
-        from camtool.planning.carve import Cone
-
-        return drawn, _carved(_points_of(item), Cone.of(operation))
-    wider = np.array([-1.0, 1.0])
+    reach = _cut_radius(contour.setting)
     more = np.diff(centre - drawn)[:, 0] - 2.0 * (radius + allowance)
-    if isinstance(item, Fixed) or more.max() < -SAME_SIZE_MM:
+    if more.max() < -SAME_SIZE_MM:
         # Reliefs reach farther into corners than the walls are apart.
-        low, high = (drawn - allowance * wider).T
-        return drawn, np.clip(centre + radius * wider, low[:, None], high[:, None])
-    wall = drawn + allowance * wider if allowance >= 0.0 else _wall_box(item, drawn)
+        low, high = (drawn - (allowance + radius - reach) * OUTWARDS).T
+        return drawn, np.clip(centre + reach * OUTWARDS, low[:, None], high[:, None])
+    wall = drawn + allowance * OUTWARDS if allowance >= 0.0 else _wall_box(contour, drawn)
+    wall = wall + (radius - reach) * OUTWARDS
     # A sharp join reaches farther out than the tool is wide, as far as its limit lets it.
     spare = 0.0
     if operation.joins != "round":
         spare = 2.0 * (radius + allowance) * (operation.mitre_limit - 1.0)
     if more.max() <= SAME_SIZE_MM + spare:
         return drawn, wall
-    planned = centre - radius * wider if allowance >= 0.0 else wall
-    return centre - (radius + allowance) * wider, planned
+    planned = centre - reach * OUTWARDS if allowance >= 0.0 else wall
+    return centre - (radius + allowance) * OUTWARDS, planned
 
 
 def _wall_box(contour: Contour, drawn: Floats) -> Floats:
@@ -229,14 +246,37 @@ def _wall_box(contour: Contour, drawn: Floats) -> Floats:
     return np.repeat(drawn.mean(axis=1, keepdims=True), 2, axis=1)
 
 
-def _carved(points: Floats, cone: Cone) -> Floats:
-    """(2, 2) mm: the box of what a V bit cuts at the surface, its tip at these points (N, 3). The
-    edge bounds an envelope of discs whose radius is even along each move, so that the widest
-    place of a move is at one of its ends."""
-    reach = np.array([cone.radius_at(-min(z, 0.0)) for z in points[:, 2].tolist()])[:, None]
-    return np.column_stack(
-        [(points[:, :2] - reach).min(axis=0), (points[:, :2] + reach).max(axis=0)]
-    )
+def _cleared_boxes(runs: Runs, tool: Tool) -> Floats:
+    """(R, 2, 2) mm: the box of what the tool removes at the surface in each run, exact with arcs.
+
+    It is that of the discs as wide as the tool is at the surface. Along a move their radius
+    changes evenly, by d over an arc of radius R and sweep s: seen in the direction a, their edge
+    is farthest where the centre stands at the angle  a + arcsin(d / (R s))  of the arc.
+    """
+    vertices, first = runs.vertices, runs.first[:-1]
+    heights, of = np.unique(np.minimum(vertices[:, 2], 0.0), return_inverse=True)
+    reach = np.array([tool.radius_at(-z) for z in heights.tolist()])[of.reshape(-1)]
+    low = np.minimum.reduceat(vertices[:, :2] - reach[:, None], first)
+    high = np.maximum.reduceat(vertices[:, :2] + reach[:, None], first)
+    bent = vertices[:, 3] != 0.0
+    bent[runs.first[1:] - 1] = False
+    rows = np.flatnonzero(bent)
+    arcs = Segments.between(vertices[rows, :2], vertices[rows + 1, :2], vertices[rows, 3])
+    wider = reach[rows + 1] - reach[rows]
+    lean = wider / (arcs.radius * arcs.sweep)
+    lean = np.arcsin(np.where(np.abs(lean) < 1.0, lean, np.nan))
+    run = np.searchsorted(runs.first, rows, side="right") - 1
+    for quarter in range(4):
+        axis, is_high = quarter % 2, quarter < 2
+        turn = np.sign(arcs.sweep) * (0.5 * np.pi * quarter + lean - arcs.start_angle)
+        part = np.mod(turn, 2.0 * np.pi) / np.abs(arcs.sweep)
+        at = np.flatnonzero(part < 1.0)
+        edge = arcs.radius[at] * np.cos(lean[at]) + reach[rows[at]] + part[at] * wider[at]
+        if is_high:
+            np.maximum.at(high[:, axis], run[at], arcs.centre[at, axis] + edge)
+        else:
+            np.minimum.at(low[:, axis], run[at], arcs.centre[at, axis] - edge)
+    return np.stack([low, high], axis=2)
 
 
 def kept_of(steps: Sequence[Step]) -> tuple[Kept, ...]:

@@ -10,21 +10,32 @@ from msgspec.structs import replace
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.polylines import Polylines
 
+UNKNOWN_EDGE = -1
+"""The edge of rows of which only the path of the tool's centre is known."""
+
+NO_EDGE = -2
+"""The edge of rows that make no edge of the part whose size could be said: chamfers, holes."""
+
 
 class Drawn(Struct, frozen=True, eq=False):
     """What was drawn, as far as the N rows of a planned toolpath stand for it.
 
     `off_mm` (N, 2): the largest and the rms distance, mm, between the lines that a row was planned
     along and what was drawn; 0 for rows that stand for nothing drawn. `edge` (N,): the edge of the
-    part that a row cuts, −1 where none is known. Of E edges, [[x low, x high], [y low, y high]] mm
-    in the work frame: `nominal` (E, 2, 2) as drawn, and `planned` (E, 2, 2) as the tool leaves
-    them when it runs exactly as planned.
+    part that a row cuts, UNKNOWN_EDGE or NO_EDGE. Of E edges, [[x low, x high], [y low, y high]]
+    mm in the work frame: `nominal` (E, 2, 2) as drawn, and `planned` (E, 2, 2) as the tool leaves
+    them when it runs exactly as planned. Edges of one `line` (E,) make it together. `followed`
+    (E,): the tool's centre runs on the line, and the edges of the cut lie beside it; `cleared`
+    (E,): the edge bounds all that the tool removes on its way, not one closed pass beside it.
     """
 
     off_mm: Floats
     edge: Ints
     nominal: Floats
     planned: Floats
+    line: Ints
+    followed: Bools
+    cleared: Bools
 
     def picked(self, row: Ints) -> Drawn:
         """Rows (M,) of this one, in that order and as often as they are named."""

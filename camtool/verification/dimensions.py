@@ -1,14 +1,16 @@
 """Sizes of the part and of its closed contours, wanted and predicted; and how contours close.
 
 Of a contour that is cut in several passes, the last and deepest pass counts, without leads and
-ramps: its loop (`camtool.verification.cuts`). The part is all loops and open contours together.
-Sizes are those of the cut edges, and nominal sizes are as drawn, where the plan says which edges
-are cut (`camtool.toolpath.wanted`). The slides move an edge by as much as they move the bounding
-box of the tool centre's path:
+ramps: its loop (`camtool.verification.cuts`); of a pocket, bore or carving all that is cleared.
+The part is all of these and open contours together. Sizes are those of the cut edges, and nominal
+sizes are as drawn, where the plan says which edges are cut (`camtool.toolpath.wanted`); what cuts
+no edge counts in no size. The slides move an edge by as much as they move the bounding box of the
+tool centre's path:
 
     predicted edge = planned edge + (box of the slides − box of the wanted moves)
 
-Where the edges are not known, sizes are those of the tool centre's path.
+Where the edges are not known, and of lines that a tool of some width follows with its centre,
+sizes are those of the tool centre's path.
 
     error_percent = (predicted − nominal) / nominal · 100
 
@@ -28,8 +30,12 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.measure import segment_boxes
 from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.toolpath.moves import ROWS_AT_ONCE
+from camtool.toolpath.wanted import NO_EDGE, UNKNOWN_EDGE
 from camtool.verification.cuts import NO_LOOP, CutMoves, of_loops
 from camtool.verification.matching import Match
+
+SAME_MM = 1e-3
+"""Edges nearer to each other than this are one side of the part."""
 
 
 class Size(Struct, frozen=True):
@@ -121,60 +127,109 @@ def sizes(slides: SlideExtents, goal: LoopedCuts, gap_mm: float) -> Iterator[Siz
     """X and Y of the whole part, then of each closed contour of the wanted moves (`goal`), by the
     extents of the slides.
 
-    Contours to which no row belongs are left out (a finding names them).
+    Contours to which no row belongs are left out (a finding names them), and so is what makes no
+    edge, where edges are known.
     """
-    wanted = goal.cuts
     if not slides.known:
         return
-    closed = goal.loops[:, 0] != NO_LOOP
-    centre, lowest = _extents(wanted, _wanted_rows(goal))
+    centre, lowest = _extents(goal.cuts, _wanted_rows(goal))
     slide = slides.boxes
-    known = wanted.toolpath.drawn is not None
-    nominal, predicted, rough = _edges(wanted, closed, centre, slide)
-    seen = np.isfinite(slide[:, 0, 0]) & np.isfinite(centre[:, 0, 0])
+    edges = _edges(goal, centre, slide)
+    sized = edges.counts & np.isfinite(centre[:, 0, 0])
+    seen = sized & np.isfinite(slide[:, 0, 0])
+    if not seen.any():
+        return
     # Contours that the program does not cut still count in the nominal size of the part.
     yield from _pair(
-        "part", _whole(nominal), _whole(predicted[_finest(nominal, rough, seen)]), known
+        "part",
+        _around(edges.nominal[sized], edges.followed[sized]),
+        _around(edges.predicted[_finest(edges, seen)], edges.followed[_finest(edges, seen)]),
     )
-    final = _final(centre, lowest, gap_mm)
-    for index in np.flatnonzero(closed & final & seen):
-        sizes_mm = np.diff(nominal[index])[:, 0], np.diff(predicted[index])[:, 0]
-        yield from _pair(f"contour {index + 1}", *sizes_mm, known)
+    closed = (goal.loops[:, 0] != NO_LOOP) | edges.cleared
+    for index in np.flatnonzero(closed & _final(centre, lowest, gap_mm) & seen & edges.listed):
+        only = edges.followed[index : index + 1]
+        yield from _pair(
+            f"contour {index + 1}",
+            _around(edges.own[index : index + 1], only),
+            _around(edges.predicted[index : index + 1], only),
+        )
 
 
-def _edges(
-    wanted: CutMoves, closed: Bools, centre: Floats, slide: Floats
-) -> tuple[Floats, Floats, Floats]:
-    """Nominal and predicted boxes (C, 2, 2) of the edges that the contours cut, and the distance
-    (C,) mm that each is planned to keep from its nominal edge. `centre` and `slide` are the boxes
-    of the wanted moves and of the slides; they are returned where a contour cuts no edge."""
-    drawn, rows = wanted.toolpath.drawn, wanted.rows
-    nominal, predicted, rough = centre.copy(), slide.copy(), np.zeros(len(centre))
-    if drawn is not None:
-        edge = np.full(len(centre), -1, dtype=np.int64)
-        np.maximum.at(edge, wanted.contour[rows], drawn.edge[rows])
-        has = np.flatnonzero(closed & (edge >= 0))
+class _Edges(Struct, frozen=True, eq=False):
+    """The edges of C contours: which of them `counts` in sizes (C,), boxes (C, 2, 2) mm of the
+    `nominal` edge and of the `predicted` one, the distance `rough` (C,) mm that the line to which
+    it belongs is planned to keep from its nominal edge, and what `Drawn` says of each. `own`: the
+    nominal box of what the contour cuts of its line; `listed` (C,): it is no ring within that."""
+
+    counts: Bools
+    nominal: Floats
+    predicted: Floats
+    rough: Floats
+    followed: Bools
+    cleared: Bools
+    own: Floats
+    listed: Bools
+
+
+def _edges(goal: LoopedCuts, centre: Floats, slide: Floats) -> _Edges:
+    """The edges that the contours of the wanted moves cut, of which `centre` (C, 2, 2) are the
+    boxes, and `slide` (C, 2, 2) those of the slides; these are the edges where none is known."""
+    wanted, drawn = goal.cuts, goal.cuts.toolpath.drawn
+    count = len(centre)
+    edge = _edge_of(wanted)
+    nominal, predicted, rough = centre.copy(), slide.copy(), np.zeros(count)
+    own = centre.copy()
+    followed, cleared = np.ones(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
+    listed = np.ones(count, dtype=np.bool_)
+    if drawn is not None and (edge >= 0).any():
+        has = np.flatnonzero(edge >= 0)
         of = edge[has]
+        low, high = np.full((2, int(drawn.line.max()) + 1, 2), np.inf)
+        np.minimum.at(low, drawn.line, drawn.planned[:, :, 0])
+        np.minimum.at(high, drawn.line, -drawn.planned[:, :, 1])
+        whole = np.stack([low, -high], axis=2)[drawn.line[of]]
         nominal[has] = drawn.nominal[of]
         predicted[has] = drawn.planned[of] + slide[has] - centre[has]
-        rough[has] = np.abs(drawn.planned[of] - drawn.nominal[of]).max(axis=(1, 2))
-    return nominal, predicted, rough
+        rough[has] = np.abs(whole - drawn.nominal[of]).max(axis=(1, 2))
+        followed[has], cleared[has] = drawn.followed[of], drawn.cleared[of]
+        makes = np.abs(drawn.planned[of] - whole) <= SAME_MM
+        own[has] = np.where(
+            makes.all(axis=(1, 2))[:, None, None], drawn.nominal[of], drawn.planned[of]
+        )
+        listed[has] = makes.any(axis=(1, 2)) | ~drawn.cleared[of]
+    return _Edges(edge >= UNKNOWN_EDGE, nominal, predicted, rough, followed, cleared, own, listed)
 
 
-def _finest(nominal: Floats, rough: Floats, seen: Bools) -> Ints:
-    """The contours that decide a size, of those (C,) that are `seen`: where several cut one edge,
-    as in roughing and finishing, those that come nearest to it."""
+def _edge_of(wanted: CutMoves) -> Ints:
+    """(C,) the edge of each contour: an index, UNKNOWN_EDGE or NO_EDGE."""
+    drawn, rows = wanted.toolpath.drawn, wanted.rows
+    if drawn is None:
+        return np.full(wanted.contour_count, UNKNOWN_EDGE)
+    edge = np.full(wanted.contour_count, NO_EDGE)
+    np.maximum.at(edge, wanted.contour[rows], drawn.edge[rows])
+    return edge
+
+
+def _finest(edges: _Edges, seen: Bools) -> Ints:
+    """The contours that decide a size, of those (C,) that are `seen`: where several lines cut one
+    edge, as in roughing and finishing, those of the line that comes nearest to it."""
     rows = np.flatnonzero(seen)
-    _, line = np.unique(nominal[rows].reshape(len(rows), 4), axis=0, return_inverse=True)
+    boxes = edges.nominal[rows].reshape(len(rows), 4)
+    _, same = np.unique(boxes, axis=0, return_inverse=True)
     least = np.full(len(rows), np.inf)
-    np.minimum.at(least, line.reshape(-1), rough[rows])
-    return rows[rough[rows] <= least[line.reshape(-1)]]
+    np.minimum.at(least, same.reshape(-1), edges.rough[rows])
+    return rows[edges.rough[rows] <= least[same.reshape(-1)]]
 
 
-def _whole(boxes: Floats) -> Floats:
-    """(2,) size in X and Y of all boxes (C, 2, 2) together, without those that are infinite."""
-    known = boxes[np.isfinite(boxes[:, 0, 0])]
-    return np.asarray(known[:, :, 1].max(axis=0) - known[:, :, 0].min(axis=0))
+def _around(boxes: Floats, followed: Bools) -> tuple[Floats, Bools]:
+    """(2,) size in X and Y of all boxes (C, 2, 2) together, and (2,) where it is that of lines
+    which the tool's centre follows."""
+    low, high = boxes[:, :, 0].min(axis=0), boxes[:, :, 1].max(axis=0)
+    walls = boxes[~followed]
+    if not len(walls):
+        return high - low, np.ones(2, dtype=np.bool_)
+    beyond = walls[:, :, 0].min(axis=0) > low, walls[:, :, 1].max(axis=0) < high
+    return high - low, beyond[0] | beyond[1]
 
 
 def _final(boxes: Floats, lowest: Floats, gap_mm: float) -> Bools:
@@ -191,22 +246,30 @@ def _final(boxes: Floats, lowest: Floats, gap_mm: float) -> Bools:
     return np.asarray(lowest == deepest[same.reshape(-1)])
 
 
+def _is_looped(goal: LoopedCuts) -> Bools:
+    """(C,) true for contours whose size is that of their loop, not of all that they clear."""
+    drawn, edge = goal.cuts.toolpath.drawn, _edge_of(goal.cuts)
+    closed = np.asarray(goal.loops[:, 0] != NO_LOOP)
+    if drawn is not None:
+        closed &= ~np.append(drawn.cleared, False)[np.maximum(edge, UNKNOWN_EDGE)]
+    return closed
+
+
 def _wanted_rows(goal: LoopedCuts) -> Bools:
     """(W,) the wanted rows that determine sizes: those of loops, and of contours without one."""
-    wanted, closed = goal.cuts, goal.loops[:, 0] != NO_LOOP
-    in_loop = of_loops(wanted, goal.loops)
-    return np.asarray(wanted.is_cut & (in_loop | ~np.append(closed, False)[wanted.contour]))
+    wanted, looped = goal.cuts, np.append(_is_looped(goal), False)[goal.cuts.contour]
+    return np.asarray(wanted.is_cut & (of_loops(wanted, goal.loops) | ~looped))
 
 
 def _counting(decoded: LoopedCuts, goal: LoopedCuts, match: Match) -> Ints:
-    """The decoded rows that determine the sizes: for closed wanted contours the rows of their
+    """The decoded rows that determine the sizes: for wanted contours with a loop the rows of their
     decoded loops, where there are any; otherwise the rows that follow a wanted row that does."""
     if len(decoded.cuts.rows) == 0 or len(goal.cuts.rows) == 0:
         return np.empty(0, dtype=np.int64)
-    of, closed = match.contour, goal.loops[:, 0] != NO_LOOP
+    of, has_loop = match.contour, np.append(_is_looped(goal), False)
     follow = _wanted_rows(goal)[match.row] & (of >= 0)
-    looped = of_loops(decoded.cuts, decoded.loops) & (of >= 0) & np.append(closed, False)[of]
-    with_loop = np.zeros(len(closed) + 1, dtype=np.bool_)
+    looped = of_loops(decoded.cuts, decoded.loops) & (of >= 0) & has_loop[of]
+    with_loop = np.zeros(len(has_loop), dtype=np.bool_)
     with_loop[of[looped]] = True
     return np.flatnonzero(looped | (follow & ~with_loop[of]))
 
@@ -230,6 +293,11 @@ def _extents(cuts: CutMoves, counts: Bools) -> tuple[Floats, Floats]:
     return np.stack([least, most], axis=2), lowest
 
 
-def _pair(name: str, nominal: Floats, predicted: Floats, of_edge: bool) -> Iterator[Size]:
-    for axis, nominal_mm, predicted_mm in zip("XY", nominal, predicted, strict=True):
-        yield Size(f"{name} {axis}", float(nominal_mm), float(predicted_mm), of_edge)
+def _pair(
+    name: str, nominal: tuple[Floats, Bools], predicted: tuple[Floats, Bools]
+) -> Iterator[Size]:
+    """X and Y of a size, as `_around` gives it; of the tool's centre where either of both is."""
+    of_centre = nominal[1] | predicted[1]
+    for k, axis in enumerate("XY"):
+        sizes_mm = float(nominal[0][k]), float(predicted[0][k])
+        yield Size(f"{name} {axis}", *sizes_mm, of_edge=not of_centre[k])

@@ -61,7 +61,7 @@ from camtool.planning.drill import circle_of
 from camtool.planning.paths import Cuts, MeasuredPaths
 from camtool.planning.paths import cuts as joined_moves
 from camtool.toolpath.moves import Kind, Toolpath, are_arcs
-from camtool.toolpath.wanted import Drawn
+from camtool.toolpath.wanted import UNKNOWN_EDGE, Drawn
 from camtool.verification.coverage import at_point, block_name, holes_of, listed
 from camtool.verification.cuts import CutMoves, cut_moves, loops, moves_across, sample_cuts
 from camtool.verification.nearest import MoveIndex
@@ -1229,12 +1229,12 @@ def _spliced(
         if given is None:
             row = np.arange(rows.start, rows.stop)
             found = (toolpath.kind[row], end[row], toolpath.centre[row], toolpath.feed[row])
-            more = toolpath.value[row], toolpath.source[row], np.full(len(row), -1)
+            more = toolpath.value[row], toolpath.source[row], np.full(len(row), UNKNOWN_EDGE)
         else:
             *found, k = given
             count, on = len(found[0]), int(track[k])
             one = int(chosen.tracks.contour[on])
-            its = one if of.lines.paths.closed[one] else -1
+            its = one if of.lines.paths.closed[one] else UNKNOWN_EDGE
             more = np.full(count, np.nan), np.full(count, texts + on), np.full(count, its)
         for name, column in zip(columns, (*found, *more), strict=True):
             columns[name].append(column)
@@ -1247,6 +1247,7 @@ def _spliced(
     np.maximum.at(worst, path_of, of.drawing.off_mm)
     on_track = whole["source"] - texts
     contour = np.where(on_track >= 0, np.append(chosen.tracks.contour, -1)[on_track], -1)
+    none = np.zeros(len(of.lines.paths), dtype=np.bool_)
     return Toolpath(
         kind=whole["kind"].astype(np.int8),
         end=whole["end"],
@@ -1258,5 +1259,13 @@ def _spliced(
         start=toolpath.start,
         texts=(*toolpath.texts, *names),
         made_from=of.drawing.file,
-        drawn=Drawn(worst[contour], edge, of.lines.boxes, of.lines.boxes),
+        drawn=Drawn(
+            off_mm=worst[contour],
+            edge=edge,
+            nominal=of.lines.boxes,
+            planned=of.lines.boxes,
+            line=np.arange(len(of.lines.paths)),
+            followed=none,
+            cleared=none,
+        ),
     )

@@ -193,8 +193,9 @@ def test_findings_of_all_stages_are_merged_once() -> None:
     )  # fmt: skip
     decoded, wanted = replace(plain, findings=(shared,)), replace(plain, findings=(other, shared))
     off, nothing = np.tile([2e-4, 1e-4], (len(wanted), 1)), np.zeros((0, 2, 2))
-    edge = np.full(len(wanted), -1)
-    wanted = replace(wanted, drawn=Drawn(off, edge, nothing, nothing))
+    edge, none = np.full(len(wanted), -1), np.zeros(0, dtype=np.bool_)
+    drawn_lines = Drawn(off, edge, nothing, nothing, edge[:0], none, none)
+    wanted = replace(wanted, drawn=drawn_lines)
     found = judge(
         Case(decoded, on(MACHINE), wanted, drawing, VerifyOptions()), follow(decoded, 10)
     )

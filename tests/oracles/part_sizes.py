@@ -1,0 +1,98 @@
+"""The size of what a program makes, seen from above: the area that its tool removes, with shapely.
+
+Shares nothing with camtool: moves by the reader of `tests.oracles.stock`, the area as discs and
+the bands between them. A part that is cut out is what is left of the stock about what is drawn; a
+pocket is what is gone. Boxes are exact within `SLACK_MM`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import shapely
+
+from tests.oracles.stock import Cutter, Move, Path, Walls
+
+SAG_MM = 5e-4
+"""Chords of arcs lie so near to them."""
+
+SIDES = 16
+"""A quarter of a disc has so many sides; its box is exact."""
+
+SLACK_MM = 2e-3
+"""How far a box may be off: sagittas, and three decimals of a program."""
+
+Box = tuple[float, float, float, float]
+"""x low, y low, x high, y high."""
+
+
+class Ball(Cutter):
+    """A ball nose."""
+
+    def radius_at(self, depth: Any) -> Any:
+        """How wide it cuts at the surface with its tip so deep."""
+        above = np.clip(self.radius - np.asarray(depth), 0.0, self.radius)
+        return np.where(np.asarray(depth) > 0.0, np.sqrt(self.radius**2 - above**2), 0.0)
+
+
+def removed(moves: Iterable[Move], cutter: Cutter) -> Any:
+    """The area (a shapely geometry) that the tool removes at the surface."""
+    return shapely.union_all([area for move in moves for area in _areas(move, cutter)])
+
+
+def _areas(move: Move, cutter: Cutter) -> list[Any]:
+    """The areas of one move that cuts: of each of its chords the hull of the discs at both ends,
+    which is exact while the radius changes evenly."""
+    if move.rapid or min(move.a[2], move.b[2]) >= 0.0:
+        return []
+    count = 1
+    if move.centre is not None:
+        radius = math.dist(move.a[:2], move.centre)
+        count = math.ceil(abs(move.sweep) / (2.0 * math.acos(max(1.0 - SAG_MM / radius, 0.0))))
+    if move.a[2] != move.b[2]:
+        count = max(count, 64)
+    places = move.at(np.linspace(0.0, 1.0, max(count, 1) + 1))
+    reach = cutter.radius_at(-places[:, 2])
+    if (reach == reach[0]).all():
+        line = shapely.linestrings(places[:, :2])
+        return [shapely.buffer(line, reach[0], quad_segs=SIDES)] if reach[0] else []
+    discs = shapely.buffer(shapely.points(places[:, :2]), reach, quad_segs=SIDES)
+    pairs = [shapely.convex_hull(shapely.union(*two)) for two in pairwise(discs)]
+    return [shapely.union_all(pairs)]
+
+
+def polygon(path: Path, sag: float = SAG_MM) -> Any:
+    """A closed path as a polygon, its arcs as chords."""
+    walls, points = Walls.of([path]), []
+    for k in range(len(walls.a)):
+        sweep = float(walls.sweep[k])
+        begin = (*walls.a[k].tolist(), 0.0)
+        end = (*walls.b[k].tolist(), 0.0)
+        centre = (float(walls.centre[k, 0]), float(walls.centre[k, 1])) if sweep else None
+        count = 1
+        if centre is not None:
+            radius = math.dist(begin[:2], centre)
+            count = math.ceil(abs(sweep) / (2.0 * math.acos(max(1.0 - sag / radius, 0.0))))
+        side = Move(False, begin, end, 0, centre, sweep)
+        points.append(side.at(np.arange(count) / count)[:, :2])
+    return shapely.Polygon(np.concatenate(points))
+
+
+def left_of(area: Any, paths: Sequence[Path]) -> Any:
+    """The pieces of stock, cut by the removed `area`, that hold something within the paths."""
+    x0, y0, x1, y1 = area.bounds
+    rest = shapely.difference(shapely.box(x0 - 1.0, y0 - 1.0, x1 + 1.0, y1 + 1.0), area)
+    cores = [shapely.difference(polygon(path), area) for path in paths]
+    pieces = shapely.get_parts(rest)
+    return shapely.union_all(
+        [piece for piece in pieces if any(piece.intersection(core).area > 0.0 for core in cores)]
+    )
+
+
+def size_of(box: Box) -> tuple[float, float]:
+    """Its width and height."""
+    return box[2] - box[0], box[3] - box[1]
