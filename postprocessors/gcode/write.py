@@ -82,7 +82,8 @@ class Style(Struct, frozen=True, eq=False):
     what a comment for the operator begins with; `mounted`: what the operator is told at a tool
     change, by the toolpath and its row, None where the machine changes tools; `frame`: the line
     around the program that is no block (%), or ""; `path_mode`: the block that asks for a path
-    mode, `own_mode`: that of rows that ask for none; `cycles`: holes are written as cycles.
+    mode, `own_mode`: that of rows that ask for none; `cycles`: holes are written as cycles;
+    `change_first`: nothing moves before the first tool is mounted, whose length counts from then.
     """
 
     dialect: GcodeDialect
@@ -94,6 +95,7 @@ class Style(Struct, frozen=True, eq=False):
     path_mode: Callable[[PathMode], str] | None = None
     own_mode: PathMode | None = None
     cycles: bool = False
+    change_first: bool = False
 
 
 def write_modal(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
@@ -111,7 +113,8 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
         number = NumberStyle(dialect.decimals, strip=dialect.strip_zeros)
         blocks = {**events.blocks, **cycle_blocks(holes, feed_words, number)}
         events = structs.replace(events, blocks=blocks)
-    sent = sent_rows(toolpath, arcs, feeds, events.changes, holes)
+    unmoved = _first_change(toolpath, events) if style.change_first else 0
+    sent = sent_rows(toolpath, arcs, feeds, events.changes, holes, unmoved)
     arc_counts = arcs.counts
     del arcs, feeds
     frame = [style.frame] if style.frame else []
@@ -150,6 +153,16 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
             *_rounded(toolpath, events.rounded),
         ),
     )
+
+
+def _first_change(toolpath: Toolpath, events: Events) -> int:
+    """The row of the first tool change where nothing but rapids straight up is before it; else 0.
+    Behind the change the tool goes to its height anyway."""
+    row = events.changes[0] if events.changes else 0
+    motion = toolpath.is_motion[:row]
+    up = (toolpath.kind[:row] == Kind.RAPID) & (toolpath.end[:row, 2] >= toolpath.start[2])
+    up &= (toolpath.end[:row, :2] == toolpath.start[:2]).all(axis=1)
+    return row if bool((up | ~motion).all()) else 0
 
 
 def _feed_texts(feeds: Ints, holes: Sequence[Hole], decimals: int) -> list[str]:
@@ -331,9 +344,11 @@ def sent_rows(
     feeds: Ints,
     changes: Sequence[int] = (),
     holes: Sequence[Hole] = (),
+    unmoved: int = 0,
 ) -> Sent:
-    """All rows with pieces in place of arcs, without moves that move nothing. `changes`: the rows
-    of tool changes that have a block; of `holes`, which are written as cycles, there is one."""
+    """All rows with pieces in place of arcs, without moves that move nothing, and without motions
+    among the first `unmoved` rows. `changes`: the rows of tool changes that have a block; of
+    `holes`, which are written as cycles, there is one."""
     of, kind, end, offset = np.arange(len(toolpath)), arcs.kind, arcs.end, arcs.offset
     if arcs.pieces:
         many = np.ones(len(toolpath), dtype=np.int64)
@@ -364,8 +379,9 @@ def sent_rows(
         kind[raised] = Kind.RAPID
     motion = kind <= Kind.ARC_CCW
     is_arc = motion & (kind >= Kind.ARC_CW)
+    late = motion & (of < unmoved)
     written = _differ(end, np.zeros(3))
-    written[~motion] = False
+    written[~motion | late] = False
     written[raised, 2] = True
     elsewhere = changed | (kind == CYCLE)
     home_xy, home_z = elsewhere | (kind == Kind.HOME_XY), elsewhere | (kind == Kind.HOME_Z)
@@ -376,8 +392,8 @@ def sent_rows(
     still &= _not_yet_written(flat | still, home_xy)
     both = is_arc | still | (flat & _not_yet_written(flat | still, home_xy))
     written[both, :2] = True
-    kept = ~motion | written.any(axis=1)
-    gone = of[~kept]
+    kept = ~motion | (written.any(axis=1) & ~late)
+    gone = of[~kept & ~late]
     wanted = (toolpath.end[gone] != toolpath.starts_of(gone)).any(axis=1)
     rows = np.flatnonzero(kept)
     of = of[rows]

@@ -44,7 +44,8 @@ class Dialect(GcodeDialect, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     where that is possible ("exact-path": G61), or met with a stop ("exact-stop": G61.1).
     `percent`: a line of % before and after the program. `tool_change`: by "m6", or a second tool
     is refused ("refuse"); `tool_lengths`: each change takes the length of its tool from the tool
-    table (G43 H). `canned_cycles`: holes are drilled by G81, G82 and G83.
+    table (G43 H), else no length is in force (G49). `canned_cycles`: holes are drilled by G81, G82
+    and G83.
 
     What programs that are read may ask of the machine: `tools`, its tool table by number (empty:
     any tool, of which nothing is known); `work_offsets_mm`: where G54 to G59.3 have their zero on
@@ -57,7 +58,7 @@ class Dialect(GcodeDialect, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     blend_tolerance_mm: Tolerance = 0.01
     percent: bool = False
     tool_change: Literal["m6", "refuse"] = "m6"
-    tool_lengths: bool = False
+    tool_lengths: bool = True
     canned_cycles: bool = False
     tools: dict[ToolNumber, Tool] = msgspec.field(default_factory=dict)
     work_offsets_mm: dict[Frame, WorkOffset] = msgspec.field(default_factory=dict)

@@ -27,7 +27,14 @@ VALUE_UNKNOWN = TargetCode(
     "takes what its parameter file has, if it is one of those",
     "set it in the program",
 )
-CODES = (NOT_SIMULATED, PLACE_UNKNOWN, VALUE_UNKNOWN)
+TOOL_LENGTH = TargetCode(
+    "linuxcnc.TOOL_LENGTH",
+    (WARNING, ERROR),
+    "several tools cut, and one of them without its own length in force: with lengths in the tool "
+    "table it cuts too deep, or air (error where `dialect.tools` says the lengths)",
+    "write G43 behind each M6; the post does so unless `dialect.tool_lengths` is false",
+)
+CODES = (NOT_SIMULATED, PLACE_UNKNOWN, VALUE_UNKNOWN, TOOL_LENGTH)
 
 WORDS_PASSED_OVER_OUTPUT = Sentence(
     Code.WORDS_PASSED_OVER,
@@ -80,4 +87,18 @@ VALUE_UNKNOWN_PARAMETER = Sentence(
     VALUE_UNKNOWN,
     "{count:# parameter is|# parameters are} read before the program sets {count:it|them}, first "
     "#{first:g}: taken as 0",
+)
+TOOL_LENGTH_WRONG = Sentence(
+    TOOL_LENGTH,
+    "tool {tool} cuts {measured:.4g} mm higher or lower than the others, by its length in "
+    "dialect.tools: another length is in force, or none; write G43 H{tool} behind its M6",
+    "mm",
+    ERROR,
+)
+TOOL_LENGTH_NOT_USED = Sentence(
+    TOOL_LENGTH,
+    "several tools cut, and no length of their own is in force (G43) for {tools}: that is right "
+    "only where the machine measures each tool at M6; write G43 behind each M6, or give the "
+    "lengths: --set dialect.tools.1.length_mm=…",
+    severity=WARNING,
 )

@@ -301,6 +301,8 @@ class Frames(State, ABC):
         dx, dy = turned(dx, dy, -self._rotation)
         self._shift_position(dx, dy, dz)
         self._tool_offset = new
+        other = "h" in words and int(words["h"]) != self._loaded
+        self._note_length(measured=code != 490 and not other)
 
     def _added_length(self, words: dict[str, float]) -> list[float]:
         axes = any(axis in words for axis in AXES)

@@ -22,7 +22,7 @@ from camtool import bounds
 from camtool.errors import ProgramError
 from camtool.findings import Finding
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.toolpath.moves import Toolpath
+from camtool.toolpath.moves import Kind, Toolpath
 
 from ..gcode.blocks import PlainBlocks, PlainRuns
 from ..gcode.faults import Fault
@@ -43,14 +43,19 @@ from .findings import (
     NOT_SIMULATED_TAP,
     PLACE_UNKNOWN_FRAME,
     PLACE_UNKNOWN_HOME,
+    TOOL_LENGTH_NOT_USED,
+    TOOL_LENGTH_WRONG,
     VALUE_UNKNOWN_PARAMETER,
     WORDS_PASSED_OVER_OUTPUT,
 )
 from .flow import EndOfFile, Flow
 from .interpreter import Interpreter
 from .lines import Line
-from .state import Notes
+from .state import Mounted, Notes
 from .texts import Folder, ProgramText
+
+LENGTHS_EQUAL_MM: Final = 1e-6
+"""Lengths of tools that differ by no more are equal."""
 
 BRANCHES: Final = re.compile(rb"(?im)^[ \t]*/?[ \t]*(?:n[\d. \t]*)?(?:o|m[ \t]*9[ \t]*[89])")
 """A line that may send the reading elsewhere."""
@@ -228,6 +233,7 @@ class _Reader:
             yield NOT_SIMULATED_AXES(where=block(first), axes=", ".join(sorted(notes.axes)))
         for name, index in notes.frames.items():
             yield PLACE_UNKNOWN_FRAME(where=block(index), frame=name)
+        yield from _lengths(notes.mounted, self.path.finish())
         for name, index in notes.homes.items():
             yield PLACE_UNKNOWN_HOME(where=block(index), home=name)
         if self.machine.canon.chords:
@@ -242,6 +248,29 @@ class _Reader:
             yield VALUE_UNKNOWN_PARAMETER(
                 where=f"line {line}", count=len(unset), first=float(index)
             )
+
+
+def _lengths(mounted: list[Mounted], path: Toolpath) -> Iterator[Finding]:
+    """What is said of tools that cut while the length of another one is in force, or none."""
+    feeds = np.flatnonzero((path.kind >= Kind.LINE) & (path.kind <= Kind.ARC_CCW))
+    begins = np.searchsorted(feeds, [each.row for each in mounted])
+    cut = np.diff(np.append(begins, len(feeds))) > 0
+    cutting = [
+        each for each, cuts in zip(mounted, cut.tolist(), strict=True) if cuts and each.tool
+    ]
+    if len({each.tool for each in cutting}) < 2:
+        return
+    # What is off by the same length for all tools is part of where the zero was set.
+    off = [each.own_mm - each.length_mm for each in cutting if each.own_mm is not None]
+    apart = max(off) - min(off) if off else 0.0
+    if apart > LENGTHS_EQUAL_MM:
+        which = next(k for k, each in enumerate(off) if abs(each - off[0]) > LENGTHS_EQUAL_MM)
+        first = [each for each in cutting if each.own_mm is not None][which]
+        yield TOOL_LENGTH_WRONG(where=f"block {first.block + 1}", tool=first.tool, measured=apart)
+    unmeasured = [each for each in cutting if each.own_mm is None and not each.measured]
+    if unmeasured:
+        tools = ", ".join(str(tool) for tool in sorted({each.tool for each in unmeasured}))
+        yield TOOL_LENGTH_NOT_USED(where=f"block {unmeasured[0].block + 1}", tools=tools)
 
 
 def _says(text: str) -> bool:

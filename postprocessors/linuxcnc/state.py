@@ -27,6 +27,19 @@ MM_PER_INCH: Final = 25.4
 """Length of an inch, mm."""
 
 
+class Mounted(Struct, frozen=True):
+    """From a `row` of the path and a `block` on: the tool in the spindle, the length in force and
+    its own in the tool table (None: not known), mm; `measured`: what was last said of lengths was
+    about this tool."""
+
+    row: int
+    block: int
+    tool: int
+    length_mm: float
+    own_mm: float | None
+    measured: bool
+
+
 class Notes(Struct):
     """Blocks (index from 0) at which something was passed over or taken for granted."""
 
@@ -40,6 +53,7 @@ class Notes(Struct):
     axes: dict[str, int] = field(default_factory=dict)
     frames: dict[str, int] = field(default_factory=dict)
     homes: dict[str, int] = field(default_factory=dict)
+    mounted: list[Mounted] = field(default_factory=list)
     feeds: Callable[[int, float], None] = lambda block, feed: None
 
 
@@ -200,6 +214,16 @@ class State:
         lengths = [values[0], *(value / self._user_mm for value in values[1:])]
         for index, value in enumerate(lengths, 5400):
             self.given.set_numbered(index, value)
+        self._note_length(measured=False)
+
+    def _note_length(self, *, measured: bool) -> None:
+        tool = self._tools.get(self._loaded)
+        length = self._tool_offset[2] * self.canon.mm
+        own = None if tool is None else tool.length_mm
+        row = len(self.canon.path)
+        self.notes.mounted.append(
+            Mounted(row, self.block_index, self._loaded, length, own, measured)
+        )
 
     def _not_while_compensating(self, what: str) -> None:
         if self._compensates:

@@ -16,9 +16,9 @@ from ..gcode.format import NumberStyle, format_number
 from ..gcode.write import Event, Style, common_words, tool_number, write_modal
 from .dialect import Dialect, LinuxcncMachine
 
-MODES: Final = "G17 {unit} G40 G49 G54 G80 G90 G91.1 G94"
-"""XY plane, mm or inches, no cutter radius, no tool length, the first work frame, no cycle,
-absolute, I J as offsets, feeds a minute: whatever the last program left."""
+MODES: Final = "G17 {unit} G40{length} G54 G80 G90 G91.1 G94"
+"""XY plane, mm or inches, no cutter radius, no tool length where the machine uses none, the first
+work frame, no cycle, absolute, I J as offsets, feeds a minute: whatever the last program left."""
 
 MOST_TOOL: Final = 99_999
 """Our choice: LinuxCNC's tool tables hold far fewer."""
@@ -30,14 +30,17 @@ TOLERANCE: Final = NumberStyle(6, strip=True)
 def write_program(toolpath: Toolpath, machine: LinuxcncMachine) -> Program:
     """The program; PostError names the move that cannot be written or done."""
     dialect, unit = machine.dialect, UNITS[machine.dialect.units]
+    # The length in force goes with the tool in the spindle, and with a zero set by that tool.
+    no_length = "" if dialect.tool_lengths else " G49"
     style = Style(
         dialect,
-        (MODES.format(unit=unit.word),),
+        (MODES.format(unit=unit.word, length=no_length),),
         lambda event: _words(event, dialect),
         message="MSG,",
         frame="%" if dialect.percent else "",
         path_mode=lambda mode: _path_mode(mode, unit),
         cycles=dialect.canned_cycles,
+        change_first=dialect.tool_lengths and dialect.tool_change == "m6",
         own_mode=PathMode(dialect.path, dialect.blend_tolerance_mm, dialect.blend_tolerance_mm),
     )
     program = write_modal(toolpath, machine, style)

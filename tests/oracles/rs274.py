@@ -23,6 +23,9 @@ from camtool.errors import ProgramError
 from camtool.toolpath.moves import Kind, Toolpath
 
 RS274 = shutil.which("rs274")
+NO_LENGTHS = Path(__file__).parent / "headless" / "tools.tbl"
+"""Tools 1 to 9, 3 mm wide."""
+
 MOST_SECONDS, MOST_BYTES = 10, 30_000_000
 """Of one run of it."""
 
@@ -60,14 +63,17 @@ def _bound() -> None:
     resource.setrlimit(resource.RLIMIT_FSIZE, (MOST_BYTES, MOST_BYTES))
 
 
-def interpreted(data: bytes, folder: Path, home: Path | None = None) -> list[Call]:
+def interpreted(
+    data: bytes, folder: Path, home: Path | None = None, table: Path | None = None
+) -> list[Call]:
     """The canonical calls of a program; ProgramError with LinuxCNC's words when it refuses. `home`
-    is the folder of its subs."""
+    is the folder of its subs, `table` the file of its tools."""
     file = folder / "program.ngc"
     file.write_bytes(data)
     said = folder / "calls.txt"
     # Some faulty programs make it loop without end, and say the same without end.
-    run = run_rs274("-g", str(file), str(said), cwd=home or folder, preexec_fn=_bound)
+    tools = () if table is None else ("-t", str(table))
+    run = run_rs274(*tools, "-g", str(file), str(said), cwd=home or folder, preexec_fn=_bound)
     lines = said.read_text(encoding="latin-1").splitlines() if said.exists() else []
     found = [_CALL.search(line) for line in [*run.stdout.splitlines(), *lines]]
     said.unlink(missing_ok=True)
@@ -122,7 +128,8 @@ def motions_of(path: Toolpath) -> np.ndarray:
 
 
 def compare(path: Toolpath, data: bytes, folder: Path) -> None:
-    """The moves of the toolpath are those that LinuxCNC finds in the program."""
-    ours, theirs = motions_of(path), motions(interpreted(data, folder))
+    """The moves of the toolpath are those that LinuxCNC finds in the program, with tools of length
+    0."""
+    ours, theirs = motions_of(path), motions(interpreted(data, folder, table=NO_LENGTHS))
     assert ours[:, 0].tolist() == theirs[:, 0].tolist()
     np.testing.assert_allclose(ours, theirs, rtol=1e-6, atol=PRINTED_MM)

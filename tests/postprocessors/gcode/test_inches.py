@@ -47,7 +47,7 @@ def test_every_length_and_feed_is_in_inches() -> None:
     lines = lines_of(path.rapid(z=25.4).event(Kind.END).finish(), "linuxcnc")
     assert "(inch and inch/min - part zero at X0 Y0 Z0)" in lines
     assert lines[-9:] == [
-        "G17 G20 G40 G49 G54 G80 G90 G91.1 G94",
+        "G17 G20 G40 G54 G80 G90 G91.1 G94",
         "G64 P0.0003937",
         "G0 Z1.00000",
         "X2.00000 Y0.00000",

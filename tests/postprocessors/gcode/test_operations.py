@@ -20,6 +20,7 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.wanted import OperationNote, ToolNote
 from tests.drawings import drawing_of
+from tests.oracles.rs274 import RS274, interpreted
 from tests.postprocessors.gcode.test_write import EVIL
 from tests.postprocessors.golden import GOLDEN, compare_golden
 
@@ -226,6 +227,38 @@ def test_after_a_change_the_tool_goes_up_before_it_goes_across(
     stops = [each for each in written.findings if each.code == Code.TOOL_BY_HAND]
     assert len(stops) == (name == "grbl" and len(changes) > 0)
     assert not stops or stops[0].measured == len(changes)
+
+
+@pytest.mark.referee
+@pytest.mark.skipif(RS274 is None, reason="rs274 is missing")
+@pytest.mark.parametrize("place", [(), ("defaults.change_mm=[3, 50]", "defaults.change_z_mm=20")])
+def test_no_tool_moves_before_its_length_is_in_force(
+    place: tuple[str, ...], tmp_path: Path
+) -> None:
+    """LinuxCNC's own interpreter with a table of tools 254 and 508 mm long: behind each change the
+    length of that tool, and a rapid straight up to the safe height, before anything else."""
+    data = ("\n".join(program(JOB, "linuxcnc", *place)) + "\n").encode()
+    lengths_in = {1: 10.0, 2: 20.0}
+    table = tmp_path / "tool.tbl"
+    table.write_text("".join(f"T{k} P{k} Z{each:g} D3\n" for k, each in lengths_in.items()))
+    tool, in_force, raised, heights = 0, 0.0, False, []
+    here = [0.0, 0.0]
+    for name, _, values in interpreted(data, tmp_path, table=table):
+        if name == "CHANGE_TOOL":
+            tool, in_force, raised = int(values[0]), 0.0, False
+        elif name == "USE_TOOL_LENGTH_OFFSET":
+            in_force = values[2] / 25.4
+        elif name.startswith(("STRAIGHT_", "ARC_")):
+            assert tool, "a move before the first change"
+            assert in_force == lengths_in[tool]
+            if not raised:
+                assert name == "STRAIGHT_TRAVERSE"
+                assert values[:2] == here
+                heights.append(values[2])
+            raised = True
+            here = values[:2]
+    assert len(heights) == 2
+    assert min(heights) >= JOB.safe_z_mm
 
 
 def test_the_operator_reads_what_to_mount() -> None:

@@ -16,7 +16,7 @@ from camtool.toolpath.program import Program
 TARGETS = ("grbl", "linuxcnc")
 MODES = {
     "grbl": ["G17 G21 G90 G94", "G54"],
-    "linuxcnc": ["G17 G21 G40 G49 G54 G80 G90 G91.1 G94", "G64 P0.01"],
+    "linuxcnc": ["G17 G21 G40 G54 G80 G90 G91.1 G94", "G64 P0.01"],
 }
 
 
@@ -103,7 +103,7 @@ def test_an_empty_toolpath_is_a_program_that_does_nothing(name: str) -> None:
 
 def test_tools() -> None:
     path = ToolpathBuilder().event(Kind.TOOL_CHANGE, 3).finish()
-    assert blocks(path, "linuxcnc") == ["T3 M6", "M2"]
+    assert blocks(path, "linuxcnc") == ["T3 M6", "G43 H3", "M2"]
     assert blocks(path, "grbl", "dialect.tool_change=pause") == ["T3 M0", "M2"]
     assert blocks(path, "grbl") == ["M2"]
     assert [finding.code for finding in write(path, "grbl").findings] == [Code.EVENT_LEFT_OUT]

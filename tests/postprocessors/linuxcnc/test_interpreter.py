@@ -193,6 +193,43 @@ def test_tool_lengths_count_on_the_machine_alone() -> None:
         read("T2 M6\nM2\n", tools)
 
 
+CUTS = "T1 M6\n{0}F9 G0 Z5\nG1 Z-1\nG0 Z5\nT2 M6\n{1}G0 Z5\nG1 Z-1\nG0 Z5\nM2\n"
+TABLE = ("dialect.tools.1.length_mm=40", "dialect.tools.2.length_mm=55.5")
+
+
+@pytest.mark.parametrize(
+    ("lengths", "table", "severity", "block"),
+    [
+        (("G43 H1\n", "G43 H2\n"), (), None, 0),
+        (("", ""), (), Severity.WARNING, 1),
+        (("G43\n", ""), (), Severity.WARNING, 6),
+        (("G43 H1\n", "G43 H1\n"), (), Severity.WARNING, 7),
+        (("G43 H1\n", "G49\n"), (), Severity.WARNING, 7),
+        (("G43.1 Z7\n", "G43.1 Z9\n"), (), None, 0),
+        (("G43 H1\n", "G43 H2\n"), TABLE, None, 0),
+        (("", ""), TABLE, Severity.ERROR, 5),
+        (("G43\n", ""), TABLE, Severity.ERROR, 6),  # M6 leaves the length of tool 1 in force
+        (("G43.1 Z30\n", "G43.1 Z45.5\n"), TABLE, None, 0),  # both 10 mm too low: the zero says so
+        (("", ""), [each.replace("55.5", "40") for each in TABLE], None, 0),
+    ],
+)
+def test_tools_that_cut_without_their_length_are_found(
+    lengths: tuple[str, str], table: tuple[str, ...], severity: Severity | None, block: int
+) -> None:
+    found = [
+        each
+        for each in read(CUTS.format(*lengths), *table).findings
+        if each.code == said.TOOL_LENGTH
+    ]
+    assert [each.severity for each in found] == ([severity] if severity else [])
+    assert all(each.where == f"block {block}" for each in found)
+    assert not found or severity == Severity.WARNING or found[0].measured == 15.5
+
+
+def test_one_tool_needs_no_length() -> None:
+    assert codes(read("T1 M6\nF9 G1 Z-1\nT1 M6\nG1 X3\nT2 M6\nG0 X9\nM2\n")) == []
+
+
 def test_other_findings() -> None:
     path = read("/G0 X1\nG0 X#100\nM62 P1\nG18 F9 G2 I5 K0\nA5 G0\nM2\n")
     names = [name for name, _ in codes(path)]
