@@ -32,10 +32,9 @@ def act(
     *,
     quiet: bool,
 ) -> int:
-    """Hold the conversation of one command; the exit code. Ctrl-C stops the machine."""
-    import signal
-    from types import FrameType
-
+    """Hold the conversation of one command; the exit code. Ctrl-C and q stop the machine, and so
+    does whatever else would end camtool."""
+    from camtool.cli.wishes import Messages, Wishes, keys_of_terminal
     from camtool.sending.drive import Driver, Wish
     from camtool.sending.line import opened_line
     from camtool.sending.prepare import port_of, wire_of
@@ -44,26 +43,17 @@ def act(
     target = machine.load()
     wire = wire_of(target)
     conversation = wire.command(action, target.machine, values, Manner())
-    wishes: list[Wish] = []
-
-    def stop(number: int, frame: FrameType | None) -> None:
-        wishes.append(Wish.CLOSE if wishes or conversation.state is State.STOPPING else Wish.STOP)
-
-    def tell(text: str) -> None:
-        say(f"camtool: {text}", quiet=quiet)
-
-    with opened_line(port_of(name, baud, wire, target)) as line:
-        before = signal.signal(signal.SIGINT, stop)
-        try:
-            Driver(line, wish=lambda: wishes.pop(0) if wishes else None, tell=tell).carry(
-                conversation
-            )
-        finally:
-            signal.signal(signal.SIGINT, before)
+    with opened_line(port_of(name, baud, wire, target)) as line, keys_of_terminal() as key:
+        wishes = Wishes(key, {"q": Wish.STOP})
+        tell = Messages(quiet=quiet)
+        driver = Driver(line, wish=wishes, tell=tell)
+        with wishes.caught():
+            driver.carry(conversation)
+    tell.rest()
     if conversation.state is State.FINISHED:
         say(f"camtool: {action}: done", quiet=quiet)
         return 0
-    why = conversation.why or conversation.state.value
+    why = str(driver.trouble or conversation.why or conversation.state.value)
     say(f"camtool: error: {action}: {why}", quiet=False)
     return 1
 

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import json
-import os
-import select
-import signal
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -25,7 +21,6 @@ from camtool.errors import InputError, OptionError, OutputError
 from camtool.plain import one_line
 
 if TYPE_CHECKING:
-    from camtool.sending.drive import Wish
     from camtool.sending.line import Port
     from camtool.sending.live import LivePage
     from camtool.sending.prepare import Consignment
@@ -76,9 +71,10 @@ def send(
     """Send PROGRAM to its machine, and watch over it.
 
     First the program is verified, and what will be done is said; nothing goes out before --yes or
-    an answer. Without --port that is all. Ctrl-C stops the machine as its protocol can; a second
-    one closes the port at once. On a terminal: p pauses, r goes on, s does a single block, q
-    stops. Exit code 1 when the program was not finished.
+    an answer. Without --port that is all. Ctrl-C stops the machine as its protocol can, and so
+    does all else that would end camtool; a second one does not wait until it stands. On a
+    terminal: p pauses, r goes on, s does a single block, q stops. Exit code 1 when the program
+    was not finished.
     """
     from camtool.sending.prepare import consignment, lines_of, port_of
 
@@ -152,8 +148,7 @@ class _Job:
     more: bool
     as_json: bool
     quiet: bool
-    _signals: int = field(default=0, init=False)
-    _obeyed: int = field(default=0, init=False)
+    _tell: Callable[[str], None] = field(default=lambda text: None, init=False)
     _shown: dict[str, Any] = field(default_factory=dict, init=False)
     _left: list[float] = field(default_factory=list, init=False)
     _page: LivePage | None = field(default=None, init=False)
@@ -161,7 +156,8 @@ class _Job:
 
     def run(self, *, single: bool, home: bool, speed: float, yes: bool) -> int:
         """Send it; the exit code."""
-        from camtool.sending.drive import Driver, counts_of
+        from camtool.cli.wishes import Messages, Wishes, keys_of_terminal
+        from camtool.sending.drive import Driver, Wish, counts_of
         from camtool.sending.journal import Journal
         from camtool.sending.line import opened_line
         from camtool.sending.live import LivePage
@@ -190,22 +186,28 @@ class _Job:
         # The dry run has asked for the first packet.
         packets = [replace(packet, ask="") for packet in one.packets[:1]] + [*one.packets[1:]]
         conversation = one.wire.conversation(packets, self.target.machine, manner)
-        with opened_line(self.port) as line, self._caught(), _keys() as key:
+        keys = {"p": Wish.PAUSE, " ": Wish.PAUSE, "r": Wish.RESUME, "\n": Wish.RESUME}
+        keys |= {"s": Wish.STEP, "q": Wish.STOP}
+        with opened_line(self.port) as line, keys_of_terminal() as key:
             journal = Journal(self.place, self._head(), more=self.more)
-            wishes = _Wishes(key, conversation, self._signal)
-            driver = Driver(line, journal, one.block_of, wishes, self._watch, self._tell, speed)
+            wishes = Wishes(key, keys)
+            self._tell = tell = Messages(quiet=self.quiet)
+            driver = Driver(line, journal, one.block_of, wishes, self._watch, tell, speed)
             try:
-                driver.carry(conversation)
+                with wishes.caught():
+                    driver.carry(conversation)
             finally:
                 counts = counts_of(conversation, one.block_of)
                 with suppress(OSError):
                     journal.close(conversation.state.value, conversation.why, **counts)
+        tell.rest()
         if conversation.state is State.FINISHED and driver.trouble is None:
             say(f"camtool: finished: {len(one.packets)} packets", quiet=self.quiet)
             return 0
         block = one.block_of(conversation.block) if conversation.block >= 0 else -1
         done = f"block {block + 1} is the last that is done" if block >= 0 else "no block is done"
-        why = str(driver.trouble or conversation.why or conversation.state.value)
+        ends = conversation.why or conversation.state.value
+        why = f"{driver.trouble}; {ends}" if driver.trouble else ends
         say(f"camtool: error: {one.run.source}: {why}; {done}; --resume goes on", quiet=False)
         return 1
 
@@ -234,11 +236,9 @@ class _Job:
             "packets": len(one.packets),
         }
 
-    def _tell(self, text: str) -> None:
-        say(f"camtool: {one_line(text)}", quiet=self.quiet)
-
     def _watch(self, conversation: Conversation) -> None:
         """Show where it stands, when that has changed."""
+        from camtool.cli.wishes import takes_more
         from camtool.verification.report import clock
 
         block = (
@@ -257,7 +257,7 @@ class _Job:
             "why": conversation.why,
         }
         self._show_page(conversation, left)
-        if now == self._shown:
+        if now == self._shown or (self.as_json and not takes_more(sys.stdout)):
             return
         before, self._shown = self._shown, now
         if self.as_json:
@@ -292,68 +292,5 @@ class _Job:
         try:
             self._page.write(self._page.html(state, facts, block, place))
         except OSError as error:
-            say(f"camtool: {self.live} cannot be written ({error.strerror})", quiet=False)
+            self._tell(f"{self.live} cannot be written ({error.strerror})")
             self._page = None
-
-    def _signal(self) -> int:
-        """How many signals to end have come that were not obeyed yet."""
-        if self._obeyed == self._signals:
-            return 0
-        self._obeyed += 1
-        return self._obeyed
-
-    @contextmanager
-    def _caught(self) -> Iterator[None]:
-        """Within the block, signals to end are wishes to stop."""
-
-        def count(number: int, frame: FrameType | None) -> None:
-            self._signals += 1
-
-        names = [getattr(signal, name, None) for name in ("SIGINT", "SIGTERM", "SIGHUP")]
-        olds = {each: signal.signal(each, count) for each in names if each is not None}
-        try:
-            yield
-        finally:
-            for each, old in olds.items():
-                signal.signal(each, old)
-
-
-@dataclass
-class _Wishes:
-    """What the user wants next: a key, or a signal."""
-
-    key: Callable[[], str]
-    conversation: Conversation
-    signals: Callable[[], int]
-
-    def __call__(self) -> Wish | None:
-        from camtool.sending.drive import Wish
-
-        count = self.signals()
-        if count:
-            return Wish.STOP if count == 1 else Wish.CLOSE
-        keys = {"p": Wish.PAUSE, "r": Wish.RESUME, "\n": Wish.RESUME, "s": Wish.STEP}
-        return (keys | {"q": Wish.STOP, " ": Wish.PAUSE}).get(self.key())
-
-
-@contextmanager
-def _keys() -> Iterator[Callable[[], str]]:
-    """A function that gives the key that was pressed, "" without one; only on a terminal."""
-    if sys.platform == "win32" or not sys.stdin.isatty():
-        yield lambda: ""
-        return
-    import termios
-    import tty
-
-    handle = sys.stdin.fileno()
-    before = termios.tcgetattr(handle)
-
-    def key() -> str:
-        ready, _, _ = select.select([handle], [], [], 0)
-        return os.read(handle, 1).decode("latin-1") if ready else ""
-
-    try:
-        tty.setcbreak(handle)
-        yield key
-    finally:
-        termios.tcsetattr(handle, termios.TCSADRAIN, before)

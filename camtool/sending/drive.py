@@ -1,7 +1,8 @@
 """A conversation joined to its line, the clock, the journal and the user.
 
 All that decides what is sent is in the conversation; here bytes are carried, and nothing is
-thought. Before bytes go out the journal says so.
+thought. Before bytes go out the journal says so; only what stops the machine waits for nothing.
+Whatever fails here but the port itself stops the machine before it ends the program.
 """
 
 from __future__ import annotations
@@ -10,13 +11,15 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Protocol
+from typing import Any, Protocol
 
 from camtool.errors import OutputError
-from camtool.target.wire import Conversation, Reopen, State, Tell, Write
+from camtool.target.wire import Conversation, State, Tell, Write
 
 TICK_S = 0.05
 """The user's wishes and the signals are looked at so often."""
+
+TOLD = "stopping: waiting until it stands (a second Ctrl-C does not wait)"
 
 REOPEN_S = 60.0
 """A port that is to come back is waited for so long."""
@@ -29,7 +32,7 @@ class Wish(Enum):
     RESUME = "resume"
     STEP = "step"
     STOP = "stop"
-    CLOSE = "close"
+    CLOSE = "close"  # stop as hard as can be, and wait for nothing
 
 
 class Line(Protocol):
@@ -71,7 +74,11 @@ class Driver:
     tell: Callable[[str], None] = lambda text: None
     speed: float = 1.0
     trouble: OutputError | None = field(default=None, init=False)
-    """Why the journal could not be written, if it could not."""
+    """Why the journal or what the user is shown could not be written, if it could not."""
+    _notes: bool = field(default=True, init=False)
+    _shows: bool = field(default=True, init=False)
+    _fault: BaseException | None = field(default=None, init=False)
+    """What else ended it: raised when the machine has been stopped."""
 
     def now(self) -> float:
         """The time of the conversation, s."""
@@ -79,35 +86,73 @@ class Driver:
 
     def carry(self, conversation: Conversation) -> State:
         """Hold the conversation; how it ended."""
-        try:
-            conversation.begin(self.now())
-            while self._act(conversation):
-                self._hear(conversation)
-                self._obey(conversation)
-        except OSError as error:
-            conversation.lost(f"the port is gone ({error.strerror or error})", self.now())
-        except BaseException:
-            conversation.lost("camtool was ended", self.now())
-            raise
+        conversation.begin(self.now())
+        going = True
+        while going:
+            try:
+                going = self._act(conversation)
+                if going:
+                    self._hear(conversation)
+                    self._obey(conversation)
+            except OSError as error:
+                conversation.lost(f"the port is gone ({error.strerror or error})", self.now())
+            except BaseException as error:
+                if self._fault is not None:
+                    conversation.lost("camtool was ended", self.now())
+                else:
+                    self._fault = error
+                    conversation.stop(self.now())
         self._note(conversation)
-        self.watch(conversation)
+        self._shown(conversation, self.watch, conversation)
+        if self._fault is not None:
+            raise self._fault
         return conversation.state
 
     def _act(self, conversation: Conversation) -> bool:
         """Do what the conversation wants; False at its end."""
-        for action in conversation.actions():
+        actions = conversation.actions()
+        for action in actions:
             if isinstance(action, Tell):
-                self.tell(action.text)
                 continue
-            if not self._note(conversation):
+            if conversation.state is not State.STOPPING and not self._note(conversation):
                 break  # what is not noted must not be sent; the stop is
             if isinstance(action, Write):
                 self.line.write(action.data)
-            elif isinstance(action, Reopen):
-                self.line.reopen(REOPEN_S)
+            else:
+                self._reopen(conversation)
         self._note(conversation)
-        self.watch(conversation)
+        for action in actions:
+            if isinstance(action, Tell):
+                self._shown(conversation, self.tell, action.text)
+        self._shown(conversation, self.watch, conversation)
         return not conversation.ended or conversation.has_actions
+
+    def _reopen(self, conversation: Conversation) -> None:
+        """Open the port again as soon as it is there, unless the user stops meanwhile."""
+        end = time.monotonic() + REOPEN_S
+        while not conversation.ended:
+            try:
+                self.line.reopen(0.0)
+            except (OSError, ValueError):
+                if time.monotonic() >= end:
+                    raise
+                self._obey(conversation)
+            else:
+                return
+
+    def _shown(self, conversation: Conversation, show: Callable[[Any], None], what: Any) -> None:
+        """Show it to the user. Where that fails, nobody watches the machine any more."""
+        if not self._shows:
+            return
+        try:
+            show(what)
+        except BaseException as error:
+            self._shows = False
+            if isinstance(error, OSError):
+                self.trouble = OutputError(f"its output is gone ({error.strerror or error})")
+            else:
+                self._fault = error
+            conversation.stop(self.now())
 
     def _hear(self, conversation: Conversation) -> None:
         if conversation.ended or conversation.has_actions:
@@ -132,18 +177,25 @@ class Driver:
             conversation.resume(now)
         elif wish is Wish.STOP:
             conversation.stop(now)
+            if conversation.state is State.STOPPING:
+                self._act(conversation)
+                self._shown(conversation, self.tell, TOLD)
         elif wish is Wish.CLOSE:
+            conversation.hurry(now)
+            for action in conversation.actions():
+                if isinstance(action, Write):
+                    self.line.write(action.data)
             self.line.close()
-            conversation.lost("the port was closed at once: the machine was not told", now)
+            conversation.lost("camtool was ended before the machine said that it stands", now)
 
     def _note(self, conversation: Conversation) -> bool:
         """Say in the journal how the conversation stands; when that fails, it is stopped."""
-        if self.journal is None or self.trouble is not None:
+        if self.journal is None or not self._notes:
             return True
         try:
             self.journal.note(**counts_of(conversation, self.block_of))
         except OutputError as error:
-            self.trouble = error
+            self.trouble, self._notes = error, False
             conversation.stop(self.now())
             return False
         return True

@@ -24,6 +24,9 @@ from camtool.lock import held
 WRITE_S: Final = 10.0
 """A port that takes no more bytes for so long is stuck."""
 
+LEAVES_S: Final = 1.0
+"""What was written last, as what stops a machine, has so long to leave the computer."""
+
 REOPEN_S: Final = 0.1
 """How often a port is looked for that has gone for a while."""
 
@@ -83,7 +86,11 @@ class Line:
                 return
 
     def close(self) -> None:
-        """Close it; what was not sent yet is dropped."""
+        """Close it when what was written has left the computer, after `LEAVES_S` at the latest."""
+        end = time.monotonic() + LEAVES_S
+        with suppress(OSError, ValueError, AttributeError):  # a socket does not say
+            while self._serial.is_open and self._serial.out_waiting and time.monotonic() < end:
+                time.sleep(LEAVES_S / 100.0)
         with suppress(OSError, ValueError):
             self._serial.close()
 

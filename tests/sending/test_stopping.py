@@ -3,8 +3,18 @@ moves any more when "stopped" is said, and the slides come no farther than docs/
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import fcntl
+import os
+import pty
+import signal
+import subprocess
+import sys
+import termios
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from pathlib import Path
 from random import Random
 from typing import Any
 
@@ -18,6 +28,8 @@ from camtool.target.registry import LoadedTarget, load_target
 from camtool.target.twin import Twin
 from camtool.target.wire import Conversation, Manner, State, Write
 from tests.sending.talking import Talking
+from tests.sending.test_ends import hosted
+from tests.waiting import HANG_S
 
 LONG_S = 10_000.0
 """Beyond the end of all that any machine here was told."""
@@ -227,3 +239,208 @@ def test_done_is_said_of_a_jog_only_when_it_stands() -> None:
     assert both.talk.state is State.FINISHED
     assert twin.slides.commanded_mm[0] == pytest.approx(20.0)
     assert both.now > 4.0 - 1e-9
+
+
+# As processes: signals, keys, terminals and pipes.
+
+SLOWLY = ("axes.x.acceleration_mm_s2=0.02",)
+"""Of a machine that slows down for minutes."""
+
+PROGRAM = b"G21G90\nG1X150F30\nG1X0\n"
+
+
+@dataclass
+class Running:
+    """camtool at work on a machine: the process, what the machine was sent, and the machine."""
+
+    process: subprocess.Popen[bytes]
+    sent: bytearray
+    twin: Any
+    keyboard: int | None = None
+
+    def wait_for(self, ready: Callable[[], bool]) -> None:
+        """As long as the process lives."""
+        while not ready():
+            assert self.process.poll() is None, self.process.communicate()
+            time.sleep(0.01)
+
+    def signalled(self, name: str) -> None:
+        self.process.send_signal(getattr(signal, name))
+
+    def ended(self) -> str:
+        """What it has said on stderr when it is over."""
+        _, said = self.process.communicate(timeout=HANG_S)
+        return (said or b"").decode()
+
+
+@contextmanager
+def at_work(
+    words: Sequence[str],
+    work: Work,
+    *,
+    begun: Callable[[Any], bool] = lambda twin: len(twin.slides.trace) > 5,
+    terminal: bool = False,
+    **pipes: Any,
+) -> Iterator[Running]:
+    """camtool, when its machine has begun to move. `terminal`: keys come from one, which is also
+    that of the process's session."""
+    twin: Any = work.loaded().twin(list(work.choices))
+    twin.slides.place(np.array(work.at))
+    sent, receive = bytearray(), twin.receive
+
+    def heard(data: bytes, now: float) -> bytes:
+        sent.extend(data)
+        answer: bytes = receive(data, now)
+        return answer
+
+    twin.receive = heard
+    flags = [each for setting in work.settings for each in ("--set", setting)]
+    master = slave = None
+    if terminal:
+        master, slave = pty.openpty()
+
+        def taken() -> None:
+            os.setsid()
+            fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+
+        pipes = {"stdin": slave, "preexec_fn": taken, **pipes}
+    pipes = {"stdin": subprocess.DEVNULL, "stderr": subprocess.PIPE, **pipes}
+    with hosted(twin, 1.0) as port:
+        command = [sys.executable, "-m", "camtool", *words, "-t", work.target, "--port", port]
+        with subprocess.Popen([*command, "--baud", "9600", *flags], **pipes) as process:
+            if slave is not None:
+                os.close(slave)
+            running = Running(process, sent, twin, master)
+            try:
+                running.wait_for(lambda: begun(twin))
+                yield running
+            finally:
+                process.kill()
+        if running.keyboard is not None:
+            os.close(running.keyboard)
+
+
+JOG = Work("grbl", "jog")
+HOME = Work("grbl", "home", choices=("homing=on",), at=(-150.0, -150.0, -150.0))
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP"])
+def test_every_signal_that_would_end_a_jog_stops_it(name: str) -> None:
+    with at_work(["jog", "X150", "F30"], JOG) as it:
+        it.signalled(name)
+        said = it.ended()
+        assert "error: jog: stopped: it has begun anew, and stands" in said
+        assert it.process.returncode == 1
+        assert b"\x85!" in it.sent
+        assert it.sent.endswith(b"\x18")
+        assert not it.twin.moves
+        assert it.twin.slides.commanded_mm[0] < 149.0
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGHUP"])
+def test_a_signal_resets_a_machine_that_homes(name: str) -> None:
+    with at_work(["home"], HOME) as it:
+        it.signalled(name)
+        assert "stopped" in it.ended()
+        assert it.sent.endswith(b"$H\n\x18")
+        assert not it.twin.moves
+        assert it.twin.slides.commanded_mm[2] < -1.0
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_a_signal_stops_a_program(name: str, tmp_path: Path) -> None:
+    program = tmp_path / "long.nc"
+    program.write_bytes(PROGRAM)
+    with at_work(["send", str(program), "--yes"], Work("grbl", "send")) as it:
+        it.signalled(name)
+        assert "stopped: it has begun anew, and stands; no block is done" in it.ended()
+        assert b"!" in it.sent
+        assert it.sent.endswith(b"\x18")
+        assert not it.twin.moves
+
+
+def test_q_stops_a_jog() -> None:
+    with at_work(["jog", "X150", "F30"], JOG, terminal=True) as it:
+        assert it.keyboard is not None
+        os.write(it.keyboard, b"q")
+        assert "stopped" in it.ended()
+        assert b"\x85!" in it.sent
+
+
+@pytest.mark.parametrize("words", [["jog", "X150", "F30"], ["send", "long.nc", "--yes"]])
+def test_a_terminal_that_is_closed_stops_the_machine(
+    words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("long.nc").write_bytes(PROGRAM)
+    with at_work(words, JOG, terminal=True) as it:
+        assert it.keyboard is not None
+        os.close(it.keyboard)
+        it.keyboard = None
+        assert "stopped" in it.ended()
+        assert it.sent.endswith(b"\x18")
+        assert not it.twin.moves
+
+
+@pytest.mark.parametrize("stream", ["stdout", "stderr"])
+@pytest.mark.parametrize(
+    "words", [["jog", "X150", "F30"], ["send", "long.nc", "--yes", "--json"]], ids=["jog", "send"]
+)
+def test_a_reader_that_goes_away_stops_the_machine(
+    stream: str, words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("long.nc").write_bytes(PROGRAM)
+    with at_work(words, JOG, **{stream: subprocess.PIPE}) as it:
+        pipe = getattr(it.process, stream)
+        pipe.close()
+        setattr(it.process, stream, None)
+        it.ended()
+        assert it.process.returncode not in (0, -signal.SIGKILL)
+        assert it.sent.endswith(b"\x18")
+        assert not it.twin.moves
+
+
+def test_a_reader_that_reads_nothing_keeps_no_machine_waiting(tmp_path: Path) -> None:
+    program = tmp_path / "long.nc"
+    program.write_bytes(b"G21G90\n" + b"G1X1F900\nG1X0\n" * 200 + PROGRAM)
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    with suppress(BlockingIOError):
+        while True:
+            os.write(writer, b"x" * 512)
+    os.set_blocking(writer, True)
+    words = ["send", str(program), "--yes", "--json"]
+    with at_work(words, Work("grbl", "send"), stdout=writer) as it:
+        os.close(writer)
+        it.signalled("SIGINT")
+        assert "stopped: it has begun anew, and stands" in it.ended()
+        assert not it.twin.moves
+    os.close(reader)
+
+
+def test_a_second_interrupt_waits_no_longer_and_still_stops_it() -> None:
+    work = Work("grbl", "jog", settings=SLOWLY)
+    with at_work(["jog", "X150", "F30"], work) as it:
+        it.signalled("SIGINT")
+        it.wait_for(lambda: b"\x85!" in it.sent)
+        time.sleep(0.6)  # sooner, it would be taken for the same
+        it.signalled("SIGINT")
+        said = it.ended()
+        assert "camtool was ended before the machine said that it stands" in said
+        while not it.sent.endswith(b"\x18"):  # on its way when the process ended
+            time.sleep(0.01)
+        assert not it.twin.moves
+
+
+def test_a_sighup_that_nohup_ignores_stops_nothing() -> None:
+    def nohup() -> None:
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)
+
+    with at_work(["jog", "X150", "F30"], JOG, preexec_fn=nohup) as it:
+        it.signalled("SIGHUP")
+        count = len(it.sent)
+        it.wait_for(lambda: len(it.sent) > count + 3)  # it is still asked how it stands
+        assert b"!" not in it.sent
+        it.signalled("SIGTERM")
+        assert "stopped" in it.ended()
