@@ -287,10 +287,13 @@ class _Job:
             "block": f"{self.one.block_of(block) + 1} of {self.one.blocks}",
             "time left": clock(left_s),
             "place": "" if place is None else "X{:.3f} Y{:.3f} Z{:.3f}".format(*place),
-            "": conversation.why,
         }
+        total_s = self._left[0]
+        share = 1.0 - left_s / total_s if total_s else float(state == "finished")
         try:
-            self._page.write(self._page.html(state, facts, block, place))
+            why = conversation.why
+            page = self._page.html(state, facts, block, place, share=share, why=why)
+            self._page.write(page)
         except OSError as error:
             self._tell(f"{self.live} cannot be written ({error.strerror})")
             self._page = None

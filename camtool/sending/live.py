@@ -1,13 +1,14 @@
-"""A page that shows how far a program is: the predicted path, and what of it is acknowledged.
+"""The page of `send --live`: the predicted path, what of it is acknowledged, and how far that is.
 
-One self-contained HTML file, which a browser opens from the disk and which asks to be loaded again
-every second. Nothing listens for it, and whoever writes it needs no more than a list of texts that
-was made beforehand: what is drawn anew is a part of that list.
+It is one self-contained HTML file, which a browser opens from the disk and which asks to be loaded
+again every second; nothing listens on the network for it. The path becomes a list of texts when
+the page is made: what is drawn anew is the beginning of that list.
 """
 
 from __future__ import annotations
 
 import html
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
@@ -15,22 +16,26 @@ from typing import Final
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Floats, Ints
 from camtool.target.wire import Place
-from camtool.toolpath.moves import PolarArcs, Toolpath
+from camtool.toolpath.moves import PolarArcs, Toolpath, toolpath_extents
 
 EVERY_S: Final = 1.0
 """The page is written, and loaded, so often."""
 
-MOST_POINTS: Final = 12_000
-"""Of longer paths only so many points are drawn, evenly spread, so that a page takes
-milliseconds."""
-
-ARC_PARTS: Final = 24
-"""An arc is drawn as so many chords."""
-
 WIDTH: Final = 900
-"""Of the picture, pixels."""
+"""Larger side of the picture, pixels."""
+
+STEPS_PX: Final = (0.25, 0.5, 1.0, 2.0)
+"""A point is left out where the last drawn one is nearer than this, and arcs become chords as near
+to them: the drawn path is at most twice so far from the tool's. The first with which the page has
+no more than MAX_LINES lines is taken, otherwise the last."""
+
+MAX_LINES: Final = 100_000
+"""So many lines make a page of some megabytes."""
+
+WIDEST_CHORD_RAD: Final = math.pi / 6.0
+"""Turn of the longest chord of an arc."""
 
 MARGIN: Final = 0.04
 """Around the path, as a part of its larger side."""
@@ -40,17 +45,30 @@ ENDS: Final = ("finished", "stopped", "failed")
 
 _PAGE: Final = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8">{refresh}<title>{title}</title>
-<style>body{{font:16px sans-serif;margin:1em;color:#222;background:#fff}}
-b{{font-size:1.3em}}.failed,.stopped{{color:#b00020}}
-svg{{border:1px solid #ccc;max-width:100%;height:auto}}
-path{{fill:none;vector-effect:non-scaling-stroke}}.way{{stroke:#bbb;stroke-width:1.2}}
-.rapid{{stroke:#ccc;stroke-width:.8;stroke-dasharray:4 4}}
-.done{{stroke:#0b63b5;stroke-width:2.2}}.place{{fill:#d9480f}}</style></head><body>
-<p><b class="{state}">{state}</b> </p><p>{facts}</p>
-<svg viewBox="{box}" width="{width}" role="img" aria-label="the path of the tool from above">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<style>:root{{color-scheme:light dark;--paper:#fff;--ink:#1b2530;--quiet:#566270;--frame:#aeb8c4;
+--rapid:#8b96a3;--way:#9aa7b5;--done:#0f6ac4;--place:#c2500a;--bad:#b00020}}
+@media screen and (prefers-color-scheme:dark){{:root{{--paper:#12171d;--ink:#e4eaf0;
+--quiet:#9aa7b5;--frame:#4d5a68;--rapid:#76828f;--way:#6b7885;--done:#5cabff;--place:#ffa64d;
+--bad:#ff7a66}}}}
+body{{font:16px/1.4 system-ui,sans-serif;margin:0 auto;padding:1em;max-width:60em;
+color:var(--ink);background:var(--paper)}}
+h1{{font-size:1.3em;margin:0;overflow-wrap:anywhere}}p{{margin:.4em 0;overflow-wrap:anywhere}}
+.failed,.stopped{{color:var(--bad)}}progress{{width:100%;accent-color:var(--done)}}
+dl{{display:flex;flex-wrap:wrap;gap:.2em 1.5em;margin:.4em 0}}dl div{{display:flex;gap:.4em}}
+dt,.key{{color:var(--quiet)}}dd{{margin:0}}
+svg{{display:block;border:1px solid var(--frame);width:100%;max-height:75vh}}
+path{{fill:none;vector-effect:non-scaling-stroke;stroke-linejoin:round;stroke-linecap:round}}
+.way{{stroke:var(--way);stroke-width:1.6}}.done{{stroke:var(--done);stroke-width:2.2}}
+.rapid{{stroke:var(--rapid);stroke-width:1;stroke-dasharray:4 4;stroke-linecap:butt}}
+.place{{fill:var(--place)}}</style></head><body>
+<h1>{name}</h1><p><b class="{state}">{state}</b>, {percent:.0f} %</p>
+<progress max="100" value="{percent:.1f}"></progress><dl>{facts}</dl><p>{why}</p>
+<svg viewBox="{box}" role="img" aria-label="the path of the tool from above">
 <path class="rapid" d="{rapids}"/><path class="way" d="{cuts}"/><path class="done" d="{done}"/>
 {place}</svg>
-<p>grey: predicted; blue: acknowledged; orange: where the machine says that it is</p></body></html>
+<p class="key">dashed: rapids; grey: cuts; blue: acknowledged; orange: where the machine says that
+it is</p></body></html>
 """
 
 
@@ -71,39 +89,61 @@ class LivePage:
     def __init__(self, file: Path, title: str, decoded: Toolpath) -> None:
         self.file, self._title = file, title
         path = decoded.first(decoded.running)
-        points, row = _points(path)
-        low, high = (
-            (points[:, :2].min(axis=0), points[:, :2].max(axis=0))
-            if len(points)
-            else (np.zeros(2), np.zeros(2))
-        )
-        side = max(float((high - low).max()), 1e-3)
-        x, y = (low - MARGIN * side).tolist()
-        w, h = (high - low + 2.0 * MARGIN * side).tolist()
-        self._box = f"{x:.4f} {-y - h:.4f} {w:.4f} {h:.4f}"
-        self._radius = 0.008 * max(w, h)
-        self._cuts = _drawn(path, points, row, path.is_feed)
-        rapids = _drawn(path, points, row, path.is_motion & ~path.is_feed)
+        (left, right), (low, top) = toolpath_extents(path)[:2].tolist()
+        side = max(right - left, top - low, 1e-3)
+        around = MARGIN * side
+        wide, high = right - left + 2.0 * around, top - low + 2.0 * around
+        self._box = f"{left - around:.4f} {-top - around:.4f} {wide:.4f} {high:.4f}"
+        self._radius = 0.008 * max(wide, high)
+        for step_px in STEPS_PX:
+            self._cuts, rapids = _drawn(path, step_px / WIDTH * max(wide, high))
+            if len(self._cuts.pieces) + len(rapids.pieces) <= MAX_LINES:
+                break
         self._ways = "".join(rapids.pieces), "".join(self._cuts.pieces)
+        moves = np.flatnonzero(path.is_motion)
+        self._blocks = np.maximum.accumulate(path.block[moves])
+        self._feeds = path.feed[moves]
+        self._feeds[~path.is_feed[moves]] = math.inf
+
+    def _feed_at(self, block: int) -> str:
+        """The feed of the last move of the blocks up to this one; "" where there is none."""
+        row = int(np.searchsorted(self._blocks, block, side="right")) - 1
+        feed = float(self._feeds[row]) if row >= 0 else math.nan
+        return "rapid" if feed == math.inf else f"{feed:g} mm/min" if feed == feed else ""
 
     def html(
-        self, state: str, facts: Mapping[str, str], block: int, place: Place | None = None
+        self,
+        state: str,
+        facts: Mapping[str, str],
+        block: int,
+        place: Place | None = None,
+        *,
+        share: float = 0.0,
+        why: str = "",
     ) -> str:
-        """The page; `block`: the last of what is sent that is acknowledged; `place` (x, y, z)."""
+        """The page; `block`: the last of what is sent that is acknowledged; `place` (x, y, z);
+        `share`: how much of the time is over, 0 to 1."""
         rapids, cuts = self._ways
         dot = ""
         if place is not None:
             dot = f'<circle class="place" cx="{place[0]:.4f}" cy="{-place[1]:.4f}" '
             dot += f'r="{self._radius:.4f}"/>'
         seconds = f'<meta http-equiv="refresh" content="{EVERY_S:g}">'
-        rows = [f"{html.escape(name)} {html.escape(text)}" for name, text in facts.items() if text]
+        rows = [
+            f"<div><dt>{html.escape(name)}</dt><dd>{html.escape(text)}</dd></div>"
+            for name, text in ({**facts, "feed": self._feed_at(block)}).items()
+            if text
+        ]
+        percent = math.floor(100.0 * share)  # 100 only at the end
         return _PAGE.format(
             refresh="" if state in ENDS else seconds,
-            title=html.escape(f"{self._title}: {state}"),
+            title=html.escape(f"{percent} % {self._title}: {state}"),
+            name=html.escape(self._title),
             state=html.escape(state),
-            facts=" · ".join(rows),
+            percent=percent,
+            facts="".join(rows),
+            why=html.escape(why),
             box=self._box,
-            width=WIDTH,
             rapids=rapids,
             cuts=cuts,
             done=self._cuts.until(block),
@@ -117,33 +157,62 @@ class LivePage:
         new.replace(self.file)
 
 
-def _points(path: Toolpath) -> tuple[Floats, Ints]:
-    """(K, 3) mm: points of the moves in order, and the row (K,) that each ends or belongs to."""
+def _drawn(path: Toolpath, step_mm: float) -> tuple[_Drawn, _Drawn]:
+    """The cuts and the rapids from above, at most 2 × `step_mm` beside the path of the tool.
+    A line is drawn when it is first gone along: lower passes change nothing."""
+    points, row = _points(path, step_mm)
+    is_feed = path.is_feed[row]
+    decimals = max(0, math.ceil(1.0 - math.log10(step_mm)))
+    found: tuple[_Drawn, ...] = ()
+    lines = _lines(path.start[:2].tolist(), points.tolist(), is_feed.tolist(), step_mm)
+    for feed in (True, False):
+        pieces, blocks, seen = [], [], set()
+        latest, at = -1, ""
+        for begin, end, index in lines:
+            if is_feed[index] != feed:
+                continue
+            texts = [f"{x:.{decimals}f} {0.0 - y:.{decimals}f}" for x, y in (begin, end)]
+            key = tuple(sorted(texts))
+            latest = max(latest, int(path.block[row[index]]))
+            # A cut straight down is a dot.
+            if key in seen or (texts[0] == texts[1] and (not feed or at == texts[0])):
+                continue
+            seen.add(key)
+            pieces.append(("" if at == texts[0] else f"M{texts[0]}") + f"L{texts[1]}")
+            blocks.append(latest)
+            at = texts[1]
+        found += (_Drawn(pieces, np.array(blocks, dtype=np.int64)),)
+    return found[0], found[1]
+
+
+def _points(path: Toolpath, step_mm: float) -> tuple[Floats, Ints]:
+    """(K, 2) mm: points of the moves in order, of arcs as many as chords within `step_mm` need;
+    and the row (K,) that each belongs to."""
     arms = PolarArcs(path, path.is_arc)
-    share = np.arange(1, ARC_PARTS) / ARC_PARTS
-    which = np.repeat(np.arange(len(arms.row)), len(share))
-    inner = arms.points(which, np.tile(share, len(arms.row)))
+    radius = np.maximum(arms.radius, arms.end_radius)
+    flat = 1.0 - np.minimum(step_mm / np.maximum(radius, step_mm), 1.0)
+    turn = np.minimum(2.0 * np.arccos(flat), WIDEST_CHORD_RAD)
+    count = np.ceil(np.abs(arms.sweep) / turn).astype(np.int64)
+    inner = np.maximum(count - 1, 0)
+    which = np.repeat(np.arange(len(count)), inner)
+    nth = np.arange(len(which)) - np.repeat(np.cumsum(inner) - inner, inner) + 1
     moves = np.flatnonzero(path.is_motion)
-    points = np.concatenate([inner, path.end[moves]])
+    between = arms.points(which, nth / count[which])
+    points = np.concatenate([between[:, :2], path.end[moves, :2]])
     row = np.concatenate([arms.row[which], moves])
     order = np.argsort(row, kind="stable")
     return points[order], row[order]
 
 
-def _drawn(path: Toolpath, points: Floats, row: Ints, chosen: Bools) -> _Drawn:
-    """The moves of the chosen rows (N,)."""
-    mine = chosen[row]
-    before = np.concatenate([path.start[None, :], points[:-1]]) if len(points) else points
-    stride = max(-(-int(mine.sum()) // MOST_POINTS), 1)
-    pieces, blocks, at = [], [], -1
-    kept = np.flatnonzero(mine)
-    joined = np.diff(kept, prepend=-2) == 1
-    for k, (point, follows) in enumerate(zip(kept.tolist(), joined.tolist(), strict=True)):
-        last = k + 1 == len(kept) or not joined[k + 1]
-        if follows and k % stride and not last:
-            continue
-        begin = "" if follows else f"M{before[point, 0]:.4f} {0.0 - before[point, 1]:.4f}"
-        pieces.append(f"{begin}L{points[point, 0]:.4f} {0.0 - points[point, 1]:.4f}")
-        at = max(at, int(path.block[row[point]]))
-        blocks.append(at)
-    return _Drawn(pieces, np.array(blocks, dtype=np.int64))
+def _lines(
+    start: list[float], points: list[list[float]], is_feed: list[bool], step_mm: float
+) -> list[tuple[list[float], list[float], int]]:
+    """Lines from kept point to kept point, and the number of the latter: those at least `step_mm`
+    from the one before, and all at which cuts or rapids end."""
+    found, last = [], start
+    for index, (point, feed) in enumerate(zip(points, is_feed, strict=True)):
+        ends = index + 1 == len(points) or is_feed[index + 1] != feed
+        if ends or math.dist(point, last) >= step_mm:
+            found.append((last, point, index))
+            last = point
+    return found
