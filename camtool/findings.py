@@ -1162,6 +1162,18 @@ ENTRY_CHANGED = Sentence(
 ENTRY_CHANGED_IN_POCKET = Sentence(
     Code.ENTRY_CHANGED, "the tool goes down by {change}, which does not fit"
 )
+ENTRY_CHANGED_STEEPER = Sentence(
+    Code.ENTRY_CHANGED,
+    "the helix of a bore takes at most {limit} turns: its slope is {measured:.3g}°, not "
+    "{wanted:.3g}°; use a smaller tool, or a steeper entry",
+)
+ENTRY_CHANGED_IN_NARROW_BORE = Sentence(
+    Code.ENTRY_CHANGED,
+    "a hole of {measured:.4g} mm is too narrow for {tool} to go down in a helix: it plunges in "
+    "the middle{pecks}, and goes once round at the bottom; a drill or a smaller tool cuts it more "
+    "easily",
+    "mm",
+)
 DEPTH_LIMITED = Sentence(
     Code.DEPTH_LIMITED,
     "a floor of {measured:.6g} mm² is left: up to {width:.4g} mm wide, bit and depth allow "

@@ -17,6 +17,10 @@ the bottom, and leaves for the centre:
         ╰──→·
 
 CCW the teeth of a spindle that turns CW go with the feed: inside a hole that is climb.
+
+In a hole hardly wider than the tool (ρ below HELIX_LEAST · r) a helix has hundreds of turns, in
+which the axes hardly move and the tool rubs: there the tool plunges in the middle, in pecks no
+deeper than the step down and the tool's diameter, and goes once round at the full depth.
 """
 
 from __future__ import annotations
@@ -29,7 +33,8 @@ import numpy as np
 from camtool.arrays import Floats
 from camtool.errors import OptionError
 from camtool.findings import (
-    ENTRY_CHANGED_IN_POCKET,
+    ENTRY_CHANGED_IN_NARROW_BORE,
+    ENTRY_CHANGED_STEEPER,
     GOUGE_BEYOND,
     GOUGE_MORE,
     NOT_BORED,
@@ -40,13 +45,22 @@ from camtool.findings import (
 )
 from camtool.geometry.distance import near_paths
 from camtool.geometry.polylines import Polyline, Polylines
-from camtool.planning.drill import HOLE_SIZE_MM, SAME_HOLE_MM, Hole, circles_of, named
+from camtool.planning.drill import (
+    HOLE_SIZE_MM,
+    SAME_HOLE_MM,
+    Hole,
+    circles_of,
+    named,
+    peck_depths,
+    pecks,
+    refuse_endless_pecks,
+)
 from camtool.planning.finish import along_walls
 from camtool.planning.items import Chosen, Contours, CutRun, Fixed, Setting, Work
 from camtool.planning.job import Operation
 from camtool.planning.naming import at_place, key_of, operation_name, shortened_list, tool_name
 from camtool.planning.paths import QUARTER
-from camtool.planning.ramps import feeds_along
+from camtool.planning.ramps import HELIX_LEAST, feeds_along
 
 CORE_SHARE = 0.9
 """The innermost ring is no larger than this part of the tool's radius, so that no core stays."""
@@ -82,9 +96,11 @@ def bore(chosen: Chosen, setting: Setting) -> Work:
         findings.append(NOTHING_DRAWN_TO_BORE(where=operation_name(operation)))
     if operation.stage == "finish":
         return Work(_walls(holes, setting), tuple(findings))
+    narrow = [hole for hole in holes if _is_narrow(hole, operation)]
+    refuse_endless_pecks(-setting.levels_mm[-1], _peck_mm(operation), narrow, operation)
     items = []
     for hole in holes:
-        runs, changed = _runs(hole, setting)
+        runs, changed = (_plunged if hole in narrow else _runs)(hole, setting)
         items.append(Fixed(runs, setting, hole.name, hole.source, hole.outline))
         findings += changed
     return Work(tuple(items), tuple(findings))
@@ -129,18 +145,57 @@ def _runs(hole: Hole, setting: Setting) -> tuple[tuple[CutRun, ...], list[Findin
         if wanted > turns and not found:
             angle = math.degrees(math.atan2(depth / turns, 2.0 * math.pi * radius))
             found.append(
-                ENTRY_CHANGED_IN_POCKET(
-                    where=at_place(hole.name, hole.at_mm), change=f"a helix of {angle:.3g}°"
+                ENTRY_CHANGED_STEEPER(
+                    where=at_place(hole.name, hole.at_mm),
+                    measured=angle,
+                    limit=MOST_TURNS,
+                    wanted=math.degrees(operation.entry.angle_rad),
                 )
             )
-        vertices = helix(hole.at_mm, radius, depth, turns)
-        if operation.direction == "conventional":  # mirrored
-            vertices[:, 1] = 2.0 * hole.at_mm[1] - vertices[:, 1]
-            vertices[:, 3] *= -1.0
+        vertices = _turned(helix(hole.at_mm, radius, depth, turns), hole, operation)
         feeds = setting.feeds
         along = feeds_along(vertices, feeds)
         runs.append(CutRun(vertices, along, feeds.plunge_mm_min, hole.name))
     return tuple(runs), found
+
+
+def _turned(vertices: Floats, hole: Hole, operation: Operation) -> Floats:
+    """The vertices of a ring, which runs CCW, in the direction of the operation."""
+    if operation.direction == "conventional":  # mirrored
+        vertices[:, 1] = 2.0 * hole.at_mm[1] - vertices[:, 1]
+        vertices[:, 3] *= -1.0
+    return vertices
+
+
+def _is_narrow(hole: Hole, operation: Operation) -> bool:
+    """True if there is no room for a useful helix: the tool plunges."""
+    wide = 0.5 * _diameter(hole) - operation.away_mm
+    return wide < HELIX_LEAST * operation.tool.radius_mm
+
+
+def _peck_mm(operation: Operation) -> float:
+    """How deep an end mill plunges at a time."""
+    widest = operation.tool.diameter_mm
+    return widest if operation.step_down_mm is None else min(widest, operation.step_down_mm)
+
+
+def _plunged(hole: Hole, setting: Setting) -> tuple[tuple[CutRun, ...], list[Finding]]:
+    """Down in the middle in pecks, once round at the full depth, and back to the middle."""
+    operation, feeds = setting.operation, setting.feeds
+    wide = 0.5 * _diameter(hole) - operation.away_mm
+    depths = peck_depths(-setting.levels_mm[-1], _peck_mm(operation))
+    down, down_feeds = pecks(hole.at_mm, depths, setting)
+    round_ = _turned(helix(hole.at_mm, wide, 0.0, 0), hole, operation)
+    round_[:, 2] = -depths[-1]
+    along = [*down_feeds, *[feeds.cut_mm_min] * len(round_)]
+    vertices = np.concatenate([down, round_])
+    finding = ENTRY_CHANGED_IN_NARROW_BORE(
+        where=at_place(hole.name, hole.at_mm),
+        measured=_diameter(hole),
+        tool=tool_name(operation.tool),
+        pecks=f" in {len(depths)} pecks of {depths[0]:.4g} mm" if len(depths) > 1 else "",
+    )
+    return (CutRun(vertices, np.array(along), feeds.plunge_mm_min, hole.name),), [finding]
 
 
 def _turns(radius_mm: float, depth_mm: float, operation: Operation) -> int:

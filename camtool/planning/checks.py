@@ -332,10 +332,20 @@ def _doubtful(step: Step, starts_spindle: bool) -> Iterator[str]:
     mills = mills and not finishes
     if mills and deepest > tool.diameter_mm + POSITION_EPS_MM:
         yield CUT_DOUBTFUL_DEPTH.words(depth=deepest, width=tool.diameter_mm)
-    plunges = operation.kind in IN_PASSES and operation.entry.kind == "plunge" and not finishes
+    plunges = _plunges(step)
     fast = operation.plunge_feed_mm_min is None and feeds.plunge_mm_min >= feeds.cut_mm_min
     if starts_spindle and plunges and fast:
         yield CUT_DOUBTFUL_PLUNGE.words(feed=feeds.plunge_mm_min)
+
+
+def _plunges(step: Step) -> bool:
+    """True if a mill goes straight down into the stock; a bore does where its hole is narrow."""
+    operation = step.operation
+    if operation.stage == "finish":
+        return False
+    if operation.kind == "bore":
+        return bool((step.runs.vertices[step.runs.first[:-1], 2] < -POSITION_EPS_MM).any())
+    return operation.kind in IN_PASSES and operation.entry.kind == "plunge"
 
 
 def _loose(step: Step, stock: Stock | None, steps: Sequence[Step]) -> Iterator[str]:
@@ -358,12 +368,7 @@ def _beyond_tool(step: Step, stock: Stock | None) -> Iterator[str]:
     length = tool.cutting_length_mm
     if length is not None and depth > length + POSITION_EPS_MM:
         yield CUT_DOUBTFUL_LENGTH.words(depth=depth, length=length)
-    straight_down = operation.kind == "drill" or (
-        operation.kind in IN_PASSES
-        and operation.entry.kind == "plunge"
-        and operation.stage != "finish"
-    )
-    if straight_down and tool.centre_cutting is False:
+    if (operation.kind == "drill" or _plunges(step)) and tool.centre_cutting is False:
         yield CUT_DOUBTFUL_CENTRE.words()
     chip = tool.feed_per_tooth_mm(setting.feeds.cut_mm_min, setting.spindle_rpm)
     speed = tool.edge_speed_m_min(setting.spindle_rpm)

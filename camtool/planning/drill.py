@@ -9,7 +9,7 @@ diameter needs a depth greater by the height of the cone, ½·diameter / tan(½�
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -96,18 +96,26 @@ def drill(chosen: Chosen, setting: Setting) -> Work:
         *_nothing(holes, operation),
     ]
     if operation.peck_mm is not None:
-        pecks = -setting.levels_mm[-1] / operation.peck_mm
-        refuse_endless(
-            MOVES_OF_PECK * pecks * len(holes),
-            key_of(operation, "peck"),
-            f"{len(holes)} holes in pecks of {operation.peck_mm:g} mm",
-            "give a larger peck",
-        )
+        refuse_endless_pecks(-setting.levels_mm[-1], operation.peck_mm, holes, operation)
     items = (
         Fixed((_run(hole, setting),), setting, hole.name, hole.source, hole.outline)
         for hole in holes
     )
     return Work(tuple(items), tuple(findings))
+
+
+def refuse_endless_pecks(
+    depth_mm: float, peck_mm: float, holes: Sequence[Hole], operation: Operation
+) -> None:
+    """OptionError for pecks so small that the holes take too many moves; a bore has its pecks from
+    the step down."""
+    key = "peck" if operation.kind == "drill" else "step_down"
+    refuse_endless(
+        MOVES_OF_PECK * depth_mm / peck_mm * len(holes),
+        key_of(operation, key),
+        f"{len(holes)} holes in pecks of {peck_mm:g} mm",
+        f"give a larger {key}",
+    )
 
 
 def circle_of(path: Polyline) -> tuple[tuple[float, float], float] | None:
@@ -166,17 +174,26 @@ def peck_depths(depth_mm: float, peck_mm: float | None) -> list[float]:
 
 
 def _run(hole: Hole, setting: Setting) -> CutRun:
-    """Down and up in the hole: cut a peck, rapid out, rapid back to just above it, and so on."""
-    operation, feed = setting.operation, setting.feeds.plunge_mm_min
-    top = min(PECK_TOP_MM, setting.safe_z_mm)
+    """Down and up in the hole."""
+    operation = setting.operation
     depths = peck_depths(-setting.levels_mm[-1], operation.peck_mm)
+    vertices, feeds = pecks(hole.at_mm, depths, setting)
+    down = setting.feeds.plunge_mm_min
+    return CutRun(vertices, np.array(feeds), down, hole.name, operation.dwell_s)
+
+
+def pecks(
+    at_mm: tuple[float, float], depths: Sequence[float], setting: Setting
+) -> tuple[Floats, list[float]]:
+    """The vertices (n, 4) of a tool that goes down at a place, and the feeds between them: it cuts
+    a peck, comes out as a rapid, goes back as a rapid to just above it, and so on."""
+    top = min(PECK_TOP_MM, setting.safe_z_mm)
     above = min(PECK_CLEARANCE_MM, 0.5 * depths[0])
-    heights, feeds = [-depths[0]], []
+    heights, feeds = [-depths[0]], list[float]()
     for last, depth in pairwise(depths):
         heights += [top, above - last, -depth]
-        feeds += [RAPID, RAPID, feed]
-    vertices = np.array([(*hole.at_mm, z, 0.0) for z in heights])
-    return CutRun(vertices, np.array(feeds), feed, hole.name, operation.dwell_s)
+        feeds += [RAPID, RAPID, setting.feeds.plunge_mm_min]
+    return np.array([(*at_mm, z, 0.0) for z in heights]), feeds
 
 
 def circles_of(chosen: Chosen) -> tuple[list[Hole], list[str]]:

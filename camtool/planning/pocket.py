@@ -61,7 +61,7 @@ from camtool.planning.items import Chosen, CutRun, Fixed, Setting, Work
 from camtool.planning.job import Operation
 from camtool.planning.naming import at_place, key_of, operation_name, tool_name
 from camtool.planning.paths import MeasuredPath, joined
-from camtool.planning.ramps import feeds_along
+from camtool.planning.ramps import HELIX_LEAST, feeds_along
 from camtool.planning.reach import cut_away_findings, unreached, unreached_findings
 
 MOST_STEPS = 10_000
@@ -69,9 +69,6 @@ MOST_STEPS = 10_000
 
 HELIX_MOST = 0.5
 """Default of the largest radius of a helix, over the tool's radius."""
-
-HELIX_LEAST = 0.1
-"""The smallest useful radius of a helix, over the tool's radius."""
 
 HELIX_MOST_TURNS = 200
 """A helix of more turns than this at one level is not made."""

@@ -38,6 +38,9 @@ from camtool.planning.paths import MeasuredPaths
 
 ZProfile = list[tuple[float, float]]
 
+HELIX_LEAST = 0.1
+"""The smallest useful radius of a helix, over the tool's radius."""
+
 MOST_LAPS = 200.0
 """A ramp longer than this many laps (passes along an open path) is not made."""
 

@@ -17,6 +17,7 @@ from camtool.planning.bore import CORE_SHARE, MOST_TURNS, bore, radii
 from camtool.planning.drill import HOLE_SIZE_MM
 from camtool.planning.items import CutRun, Feeds, Fixed, Setting, Work
 from camtool.planning.job import Entry, Operation, Tool
+from camtool.planning.ramps import HELIX_LEAST
 from tests.oracles.run_sweep import swept
 from tests.planning.test_drill import chosen_of, circle
 
@@ -67,6 +68,8 @@ def test_the_tool_clears_the_hole_and_nothing_else(
     # Dense places and chords of the buffers leave some micrometres.
     assert floor.buffer(-0.02).within(hole)
     assert hole.buffer(-0.02).within(floor)
+    if 0.5 * diameter - allowance - 1.5 < HELIX_LEAST * 1.5:
+        return  # the tool plunges
     for run in runs:
         heights = run.vertices[:, 2]
         assert heights[0] == 0.0
@@ -131,13 +134,46 @@ def test_a_tool_of_no_width_is_refused() -> None:
         bore(chosen_of([circle(0, 0, 8.0)]), setting_of(tool=Tool(0.0)))
 
 
-def test_a_hole_hardly_wider_than_the_tool_gets_so_many_turns_and_no_more() -> None:
-    work = bore(chosen_of([circle(0, 0, 3.03)]), setting_of(20.0))
+def test_a_helix_gets_so_many_turns_and_no_more() -> None:
+    work = bore(chosen_of([circle(0, 0, 4.0)]), setting_of(20.0, step_down_mm=0.01))
     (finding,) = work.findings
     assert finding.code == Code.ENTRY_CHANGED
-    assert "instead" not in finding.message
+    assert "at most 200 turns: its slope is 1.82°, not 3°" in finding.message
     (run,) = runs_of(work)
     assert np.count_nonzero(np.diff(run.vertices[:, 2])) == 4 * MOST_TURNS
+
+
+@pytest.mark.parametrize("direction", ["climb", "conventional"])
+def test_the_tool_plunges_where_a_helix_has_no_room(direction: str) -> None:
+    """As a machinist does it: down in the middle in pecks no deeper than the tool is wide, and one
+    lap at the bottom, which gives the hole its width."""
+    setting = setting_of(7.0, direction=direction)
+    work = bore(chosen_of([circle(5, 6, 3.2)]), setting)
+    (finding,) = work.findings
+    assert finding.code == Code.ENTRY_CHANGED
+    assert "3.2 mm" in finding.message
+    assert "3 pecks of 2.333 mm" in finding.message
+    (run,) = runs_of(work)
+    down = run.vertices[:-6]
+    assert (down[:, :2] == [5.0, 6.0]).all()
+    assert down[:, 2] == pytest.approx([-7 / 3, 0.5, 0.2 - 7 / 3, -14 / 3, 0.5, 0.2 - 14 / 3, -7])
+    # Rapids only where it is cut already; cuts down at the feed of plunges.
+    assert np.isnan(run.feed_mm_min[[0, 1, 3, 4]]).all()
+    assert run.feed_mm_min[[2, 5]].tolist() == [FEEDS.plunge_mm_min] * 2
+    lap = run.vertices[-6:]
+    assert (lap[:, 2] == -7.0).all()
+    assert np.hypot(*(lap[:-1, :2] - [5, 6]).T) == pytest.approx([0.1] * 5)
+    assert (np.sign(lap[:4, 3]) == (1.0 if direction == "climb" else -1.0)).all()
+    assert (run.feed_mm_min[6:] == FEEDS.cut_mm_min).all()
+
+
+def test_pecks_of_a_narrow_bore_are_no_deeper_than_its_step_down() -> None:
+    circles = [circle(5, 6, 3.2)]
+    (run,) = runs_of(bore(chosen_of(circles), setting_of(2.0, step_down_mm=0.5)))
+    cut = run.vertices[run.vertices[:, 2] < 0.0][::2, 2]
+    assert cut[:4] == pytest.approx([-0.5, -1.0, -1.5, -2.0])
+    with pytest.raises(OptionError, match="give a larger step_down"):
+        bore(chosen_of(circles), setting_of(2.0, step_down_mm=2e-6))
 
 
 @pytest.mark.parametrize("turn", [0.0, 1.0, 2.5])

@@ -168,3 +168,16 @@ def test_parts_that_nothing_holds(said: dict[str, object], words: str) -> None:
 
 def test_a_part_without_known_stock_may_be_held_by_it() -> None:
     assert _said("grbl", job_of(**ALL_SAID, depth_mm=3.0, step_down_mm=0.5)) == ""
+
+
+def test_a_bore_that_plunges_is_a_plunge() -> None:
+    """In a hole hardly wider than the tool there is no helix, so that its middle must cut."""
+    said = {}
+    for diameter in (3.2, 5.0):
+        tool = Tool(3.0, centre_cutting=False)
+        job = job_of(kind="bore", tool=tool, spindle_rpm=9000.0, depth_mm=2.0)
+        hole = Polyline(np.array([[0, 0, 1], [diameter, 0, 1.0]]), closed=True)
+        said[diameter] = _said("grbl", job, hole)
+    assert "does not cut at its centre" in said[3.2]
+    assert PLUNGE in said[3.2]
+    assert said[5.0] == ""
