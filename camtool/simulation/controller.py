@@ -12,6 +12,7 @@ from typing import Any, Generic, Protocol
 
 import numpy as np
 
+from camtool.arrays import Floats
 from camtool.findings import Finding
 from camtool.machine.model import ControllerT, DialectT, Machine
 from camtool.simulation.motion import Chunk, Ledger, Options
@@ -59,6 +60,13 @@ class ControllerModel(ABC, Generic[ControllerT, DialectT]):
     def spacing_mm(self, toolpath: Toolpath, machine: Machine[ControllerT, DialectT]) -> float:
         """The approximate distance of samples of the motion in XY, mm; by default a step."""
         return min(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
+
+    def seconds(
+        self, toolpath: Toolpath, machine: Machine[ControllerT, DialectT]
+    ) -> Floats | None:
+        """(N,) s that each row takes, without its motion; None for a model that knows them by
+        that alone. Raises as `run`."""
+        return None
 
     def assumptions(
         self, toolpath: Toolpath, machine: Machine[ControllerT, DialectT]

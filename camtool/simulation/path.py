@@ -42,6 +42,7 @@ from camtool.simulation.samples import (
     SampledRows,
     move_lengths,
     row_chunks,
+    row_seconds,
     sample_spacing_mm,
 )
 from camtool.toolpath.moves import Kind, Toolpath, frozen
@@ -63,12 +64,13 @@ class PathModel(ControllerModel[PathController, Any]):
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
         """The motion; ProgramError, which names the block, for rows that cannot be followed."""
         path = self.quantised(toolpath, machine)
-        spacing_mm = sample_spacing_mm(path, machine)
-        check_rows(path, path.running)
-        blocks = _blocks(path.first(path.running), machine, spacing_mm)
-        return row_chunks(
-            blocks, Mechanics(machine, path.start, options.effects), options.chunk_steps
-        )
+        mechanics = Mechanics(machine, path.start, options.effects)
+        return row_chunks(_sampled(path, machine), mechanics, options.chunk_steps)
+
+    def seconds(self, toolpath: Toolpath, machine: _Machine) -> Floats:
+        """(N,) s that each row takes."""
+        blocks = _sampled(self.quantised(toolpath, machine), machine)
+        return row_seconds(blocks, len(toolpath))
 
     def quantised(self, toolpath: Toolpath, machine: _Machine) -> Toolpath:
         """The moves with their ends on the controller's grid, if it has one."""
@@ -90,6 +92,13 @@ class PathModel(ControllerModel[PathController, Any]):
             "the controller follows every line and arc exactly",
             "speeds change at once: there is no acceleration, and compensation takes no time",
         )
+
+
+def _sampled(path: Toolpath, machine: Machine) -> Iterator[SampledRows]:
+    """The rows up to the end of the program; ProgramError for those that cannot be followed."""
+    spacing_mm = sample_spacing_mm(path, machine)
+    check_rows(path, path.running)
+    return _blocks(path.first(path.running), machine, spacing_mm)
 
 
 def _blocks(path: Toolpath, machine: Machine, spacing_mm: float) -> Iterator[SampledRows]:

@@ -66,6 +66,14 @@ class SampledRows(Struct, frozen=True, eq=False):
     iterates: bool = False
 
 
+def row_seconds(blocks: Iterable[SampledRows], rows: int) -> Floats:
+    """(rows,) s that each row takes, 0 for those behind the end of the program."""
+    seconds = np.zeros(rows)
+    for block in blocks:
+        seconds[block.low : block.high] = block.seconds
+    return seconds
+
+
 def row_chunks(
     blocks: Iterable[SampledRows], mechanics: Mechanics, chunk_steps: int
 ) -> Iterator[Chunk]:

@@ -64,12 +64,14 @@ def comments(
     dialect: GcodeDialect,
     message: str,
     mounted: Mapping[int, Sequence[str]],
+    seconds: Floats | None = None,
 ) -> tuple[Ints, Lines]:
     """All other lines: the block (by index, from 0) that each stands before (C,), ascending, and
     the text of the k-th.
 
     `of_row` (B,): the rows of the blocks; `message`: what a comment for the operator begins with;
-    `mounted`: what the operator is told at the rows where a tool is changed by hand.
+    `mounted`: what the operator is told at the rows where a tool is changed by hand; `seconds`
+    (N,): how long the controller takes for each row, where that is known.
     """
     none = np.empty(0, dtype=np.int64)
     begins, tells = none, np.flatnonzero(toolpath.kind == Kind.MESSAGE)
@@ -79,7 +81,12 @@ def comments(
         begins = motions[(np.diff(named, prepend=-1) != 0) & (named >= 0)]
     own: list[tuple[int, str]] = []
     if dialect.comments in ("contours", "operations") and toolpath.operations is not None:
-        own += _of_operations(toolpath, toolpath.operations, UNITS[dialect.units])
+        unit = UNITS[dialect.units]
+        at_feeds = seconds is None
+        if seconds is None:
+            seconds = _feed_seconds(toolpath) * unit.mm
+        cutting = np.where(toolpath.is_feed, seconds, 0.0)
+        own += _of_operations(toolpath, toolpath.operations, unit, cutting, at_feeds=at_feeds)
     own += [
         (row, f"({message}{comment(line)[1:]}") for row, lines in mounted.items() for line in lines
     ]
@@ -110,9 +117,11 @@ def _message(toolpath: Toolpath, row: int, message: str) -> str:
 
 
 def _of_operations(
-    toolpath: Toolpath, operations: Operations, unit: Unit
+    toolpath: Toolpath, operations: Operations, unit: Unit, cutting_s: Floats, *, at_feeds: bool
 ) -> Iterator[tuple[int, str]]:
-    """(row, comment): what each operation does, where it begins."""
+    """(row, comment): what each operation does, where it begins. `cutting_s` (N,): how long each
+    row cuts; `at_feeds`: if it has its feed from end to end."""
+    how = " at these feeds" if at_feeds else ""
     count, ends = len(operations.notes), [*operations.begin[1:].tolist(), len(toolpath)]
     begins = operations.begin.tolist()
     for number, (note, low, high) in enumerate(
@@ -122,11 +131,11 @@ def _of_operations(
             continue
         of = f"operation {number} of {count}" if count > 1 else "operation"
         speed = [] if note.spindle_rpm is None else [f"{note.spindle_rpm:g} rev/min"]
-        seconds = float(_cutting_s(toolpath.part(low, high)).sum()) * unit.mm
+        cuts = f"cuts {duration(float(cutting_s[low:high].sum()))}{how}"
         for line in (
             f"{of}: {note.name or note.kind}",
             *packed([tool_words(note.tool, unit), *speed]),
-            *packed([*_depth_words(note, unit), f"cuts {duration(seconds)} at these feeds"]),
+            *packed([*_depth_words(note, unit), cuts]),
         ):
             yield low, comment(line)
 
@@ -196,7 +205,7 @@ def duration(seconds: float) -> str:
     return " ".join(f"{count} {unit}" for count, unit in parts if count)
 
 
-def _cutting_s(toolpath: Toolpath) -> Floats:
+def _feed_seconds(toolpath: Toolpath) -> Floats:
     """(N,) s that each row cuts if it has its feed from end to end, 0 for rapids and events, where
     places are in mm."""
 

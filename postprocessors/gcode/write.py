@@ -12,18 +12,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from msgspec import Struct, structs
 
 from camtool.arrays import Bools, Codes, Floats, Ints
 from camtool.bounds import refuse_too_long
-from camtool.errors import PostError
+from camtool.errors import CamtoolError, PostError
 from camtool.findings import Finding
-from camtool.machine.model import Machine
+from camtool.machine.model import Machine, PathController
+from camtool.simulation.controller import ControllerModel
+from camtool.simulation.path import PathModel
 from camtool.toolpath.moves import Kind, PathMode, Toolpath, mounted_before, rows_of
 from camtool.toolpath.program import Program
 from camtool.toolpath.words import Words, texts_of
@@ -84,6 +87,7 @@ class Style(Struct, frozen=True, eq=False):
     around the program that is no block (%), or ""; `path_mode`: the block that asks for a path
     mode, `own_mode`: that of rows that ask for none; `cycles`: holes are written as cycles;
     `change_first`: nothing moves before the first tool is mounted, whose length counts from then.
+    `model`: that of its controller, for the times in comments.
     """
 
     dialect: GcodeDialect
@@ -96,6 +100,7 @@ class Style(Struct, frozen=True, eq=False):
     own_mode: PathMode | None = None
     cycles: bool = False
     change_first: bool = False
+    model: ControllerModel[Any, Any] | None = None
 
 
 def write_modal(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
@@ -103,6 +108,7 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
     check(toolpath, machine)
     unit = UNITS[style.dialect.units]
     feeds, rounded_feeds = feed_units(toolpath, machine, unit)
+    seconds = _seconds(toolpath, machine, style)
     toolpath, dialect = in_units(toolpath, style.dialect, unit)
     arcs = arcs_of(toolpath, dialect)
     events = events_of(toolpath, style.event)
@@ -132,7 +138,7 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
     of_row = order.rows(sent.row)
     tell = style.mounted
     mounted = {} if tell is None else {row: tell(toolpath, row) for row in events.changes}
-    said = comments(toolpath, of_row, dialect, style.message, mounted)
+    said = comments(toolpath, of_row, dialect, style.message, mounted, seconds)
     head = [*frame, *header(toolpath, machine, dialect)]
     refuse_too_long(len(head) + len(of_row) + len(said[0]) + len(frame), "line")
     data = b"".join(
@@ -163,6 +169,18 @@ def _first_change(toolpath: Toolpath, events: Events) -> int:
     up = (toolpath.kind[:row] == Kind.RAPID) & (toolpath.end[:row, 2] >= toolpath.start[2])
     up &= (toolpath.end[:row, :2] == toolpath.start[:2]).all(axis=1)
     return row if bool((up | ~motion).all()) else 0
+
+
+def _seconds(toolpath: Toolpath, machine: Machine, style: Style) -> Floats | None:
+    """(N,) s that the controller takes for each row; None where nobody knows, or nobody asks. What
+    its model cannot follow is told when the program is verified."""
+    exact = isinstance(machine.controller, PathController)
+    model: ControllerModel[Any, Any] | None = PathModel() if exact else style.model
+    if model is None or style.dialect.comments in ("none", "header"):
+        return None
+    with suppress(CamtoolError):
+        return model.seconds(toolpath, machine)
+    return None
 
 
 def _feed_texts(feeds: Ints, holes: Sequence[Hole], decimals: int) -> list[str]:

@@ -32,7 +32,7 @@ from camtool.simulation.legs import coded_steps_mm
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import Chunk, Options
 from camtool.simulation.rows import check_rows
-from camtool.simulation.samples import SampledRows, row_chunks
+from camtool.simulation.samples import SampledRows, row_chunks, row_seconds
 from camtool.simulation.speed_plan import (
     FROM_REST,
     Approach,
@@ -65,14 +65,15 @@ class GrblModel(ControllerModel[GrblController, Dialect]):
 
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
         """The motion, chunk by chunk."""
-        controller = _controller(machine)
         path = self.quantised(toolpath, machine)
-        rows = path.running
-        check_rows(path, rows)
-        path = path.first(rows)
         start_mm = _rounded(path.start.astype(np.float32), machine) * coded_steps_mm(machine)
         mechanics = Mechanics(machine, start_mm, options.effects)
-        return row_chunks(sampled(path, machine, controller), mechanics, options.chunk_steps)
+        return row_chunks(_followed(path, machine), mechanics, options.chunk_steps)
+
+    def seconds(self, toolpath: Toolpath, machine: _Machine) -> Floats:
+        """(N,) s that each row takes."""
+        blocks = _followed(self.quantised(toolpath, machine), machine)
+        return row_seconds(blocks, len(toolpath))
 
     def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
         """Chords, and Bresenham lines."""
@@ -88,6 +89,13 @@ class GrblModel(ControllerModel[GrblController, Dialect]):
             "the sender keeps grbl's buffer full; overrides stand at 100 %",
             *((LASER_ASSUMPTION,) if controller.laser_mode else ()),
         )
+
+
+def _followed(path: Toolpath, machine: _Machine) -> Iterator[SampledRows]:
+    """The rows up to the end of the program; ProgramError for those that cannot be followed."""
+    controller = _controller(machine)
+    check_rows(path, path.running)
+    return sampled(path.first(path.running), machine, controller)
 
 
 def sampled(

@@ -20,6 +20,7 @@ from ..gcode.write import (
     tool_number,
     write_modal,
 )
+from .controller import GrblModel
 from .dialect import MOST_TOOL, Dialect, GrblMachine
 from .findings import EVENT_LEFT_OUT, TOOL_BY_HAND
 
@@ -42,7 +43,13 @@ def write_program(toolpath: Toolpath, machine: GrblMachine) -> Program:
         return [*before, *mounting(path, row, unit)]
 
     header = tuple(block.format(unit=unit.word) for block in HEADER)
-    style = Style(dialect, header, lambda event: _words(event, dialect), mounted=mounted)
+    style = Style(
+        dialect,
+        header,
+        lambda event: _words(event, dialect),
+        mounted=mounted,
+        model=GrblModel(),
+    )
     program = write_modal(toolpath, machine, style)
     return replace(program, findings=(*program.findings, *_by_hand(toolpath, dialect)))
 

@@ -39,6 +39,7 @@ from camtool.simulation.samples import (
     SampledRows,
     move_lengths,
     row_chunks,
+    row_seconds,
     sample_spacing_mm,
     spacing_along,
 )
@@ -74,11 +75,13 @@ class LinuxcncModel(ControllerModel[LinuxcncController, Dialect]):
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
         """The motion, chunk by chunk."""
         path = self.quantised(toolpath, machine)
-        rows = path.running
-        check_rows(path, rows)
-        blocks = _Run(path.first(rows), machine).blocks()
         mechanics = Mechanics(machine, path.start, options.effects)
-        return row_chunks(blocks, mechanics, options.chunk_steps)
+        return row_chunks(_followed(path, machine), mechanics, options.chunk_steps)
+
+    def seconds(self, toolpath: Toolpath, machine: _Machine) -> Floats:
+        """(N,) s that each row takes."""
+        blocks = _followed(self.quantised(toolpath, machine), machine)
+        return row_seconds(blocks, len(toolpath))
 
     def spacing_mm(self, toolpath: Toolpath, machine: _Machine) -> float:
         """A coded step, or what a million samples of the whole program allow."""
@@ -96,6 +99,13 @@ class LinuxcncModel(ControllerModel[LinuxcncController, Dialect]):
             "speeds by trapezoids within the limits of the axes, overrides at 100 %",
             "the step generator may be half a step off on each axis, which is not in the figures",
         )
+
+
+def _followed(path: Toolpath, machine: _Machine) -> Iterator[SampledRows]:
+    """The rows up to the end of the program; ProgramError for those that cannot be followed."""
+    rows = path.running
+    check_rows(path, rows)
+    return _Run(path.first(rows), machine).blocks()
 
 
 def _corners_said(mode: PathMode) -> str:

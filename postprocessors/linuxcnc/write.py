@@ -14,6 +14,7 @@ from ..gcode.dialect import UNITS, Unit
 from ..gcode.findings import EVENT_LEFT_OUT_TOOL
 from ..gcode.format import NumberStyle, format_number
 from ..gcode.write import Event, Style, common_words, tool_number, write_modal
+from .controller import LinuxcncModel
 from .dialect import Dialect, LinuxcncMachine
 
 MODES: Final = "G17 {unit} G40{length} G54 G80 G90 G91.1 G94"
@@ -41,6 +42,7 @@ def write_program(toolpath: Toolpath, machine: LinuxcncMachine) -> Program:
         path_mode=lambda mode: _path_mode(mode, unit),
         cycles=dialect.canned_cycles,
         change_first=dialect.tool_lengths and dialect.tool_change == "m6",
+        model=LinuxcncModel(),
         own_mode=PathMode(dialect.path, dialect.blend_tolerance_mm, dialect.blend_tolerance_mm),
     )
     program = write_modal(toolpath, machine, style)

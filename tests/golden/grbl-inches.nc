@@ -11,7 +11,7 @@ G0 Z0.19685
 (operation 1 of 3: holes)
 (tool 2 pilot: drill 0.1181 inch 118 deg - 8000 rev/min)
 (0.1575 inch deep by 0.05906 inch - plunge 7.874 inch/min)
-(cuts 3 s at these feeds)
+(cuts 3 s)
 M3 S8000
 (0/PATH 1)
 X0.31496 Y0.31496
@@ -27,8 +27,7 @@ M5
 (operation 2 of 3: window)
 (tool 1 end mill 0.125 inch - 12000 rev/min)
 (0.126 inch deep in 3 passes)
-(feed 11.811 plunge 3.5433 inch/min)
-(cuts 20 s at these feeds)
+(feed 11.811 plunge 3.5433 inch/min - cuts 24 s)
 (stop: mount tool 1 end mill 0.125 inch)
 (set its tip to Z 0.1969 inch or zero Z again - then start)
 T1 M0
@@ -54,8 +53,7 @@ G0 Z0.19685
 (operation 3 of 3: profile)
 (tool 1 end mill 0.125 inch - 12000 rev/min)
 (0.1575 inch deep in 3 passes)
-(feed 11.811 plunge 3.5433 inch/min)
-(cuts 1 min 24 s at these feeds)
+(feed 11.811 plunge 3.5433 inch/min - cuts 1 min 25 s)
 (0/PATH 0)
 X0 Y-0.0625
 G1 Z-0.05249 F3.543

@@ -66,10 +66,10 @@ def test_operations_and_stops_speak_inches(name: str) -> None:
     lines = run.program.data.decode().splitlines()
     assert "(tool 1 end mill 0.125 inch - 12000 rev/min)" in lines
     assert "(0.126 inch deep in 3 passes)" in lines
-    assert "(feed 11.811 plunge 3.5433 inch/min)" in lines
+    assert any(line.startswith("(feed 11.811 plunge 3.5433 inch/min - ") for line in lines)
     metric = post_drawing(DRAWING, JOB, load_target(name), check=False)
     assert metric.program is not None
-    times = [re.findall(r"cuts .+ at these feeds", each.program.data.decode())
+    times = [re.findall(r"cuts .+\)", each.program.data.decode())
              for each in (run, metric) if each.program is not None]  # fmt: skip
     assert times[0] == times[1]
     assert len(times[0]) == 3
