@@ -10,6 +10,7 @@ from camtool.errors import OptionError
 from camtool.units import parse_feed, parse_length
 
 PORT = click.option("--port", metavar="PORT", required=True, help="Such as /dev/ttyUSB0.")
+UNLOCK = click.option("--unlock", is_flag=True, help="Unlock a controller that is locked first.")
 BAUD = click.option("--baud", type=click.IntRange(min=1), help="Rate, where not its own.")
 
 
@@ -31,18 +32,19 @@ def act(
     values: dict[str, float],
     *,
     quiet: bool,
+    unlock: bool = False,
 ) -> int:
     """Hold the conversation of one command; the exit code. Ctrl-C and q stop the machine, and so
     does whatever else would end camtool."""
     from camtool.cli.wishes import Messages, Wishes, keys_of_terminal
     from camtool.sending.drive import Driver, Wish
     from camtool.sending.line import opened_line
-    from camtool.sending.prepare import port_of, wire_of
-    from camtool.target.wire import Manner, State
+    from camtool.sending.prepare import manner_of, port_of, wire_of
+    from camtool.target.wire import State
 
     target = machine.load()
     wire = wire_of(target)
-    conversation = wire.command(action, target.machine, values, Manner())
+    conversation = wire.command(action, target.machine, values, manner_of(target, unlock=unlock))
     with opened_line(port_of(name, baud, wire, target)) as line, keys_of_terminal() as key:
         wishes = Wishes(key, {"q": Wish.STOP})
         tell = Messages(quiet=quiet)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from camtool.cli.home import BAUD, PORT, act, axes_of
+from camtool.cli.home import BAUD, PORT, UNLOCK, act, axes_of
 from camtool.cli.options import MachineFlags, machine_options, talk_options
 from camtool.errors import OptionError
 
@@ -16,12 +16,14 @@ from camtool.errors import OptionError
 @machine_options
 @PORT
 @BAUD
+@UNLOCK
 @talk_options
 def jog(
     axes: tuple[str, ...],
     machine: MachineFlags,
     port: str,
     baud: int | None,
+    unlock: bool,
     quiet: bool,
     verbose: bool,
 ) -> int:
@@ -30,4 +32,4 @@ def jog(
     values["feed"] = values.pop("f", 0.0) or machine.load().machine.feed.default_mm_min
     if not values.keys() & set("xyz"):
         raise OptionError("no axis is to move", where="jog", mend="write X1.5")
-    return act("jog", machine, port, baud, values, quiet=quiet)
+    return act("jog", machine, port, baud, values, quiet=quiet, unlock=unlock)

@@ -69,6 +69,7 @@ COMMANDS = (
     "tolerances",
     "tools",
     "twin",
+    "unlock",
     "verify",
     "zero",
 )
@@ -108,7 +109,7 @@ def cli() -> None:
     camtool preview logo.dxf -o logo.svg        picture of a drawing or program
     camtool send    logo.pic -t pic-mmh --port /dev/ttyUSB0
     camtool ports                               where machines may be
-    camtool home, jog, zero                     a machine moved by hand
+    camtool home, jog, zero, unlock             a machine moved by hand
     camtool console grbl /dev/ttyUSB0           type to a controller
     camtool filter  logo.dxf                    LinuxCNC opens the drawing
     camtool stale   drawings/ -t pic-mmh        programs that are out of date

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from camtool.cli.files import read_bytes, shown, write_all
+from camtool.cli.home import UNLOCK
 from camtool.cli.life_signs import progress
 from camtool.cli.messages import say, say_findings, show_facts, show_text
 from camtool.cli.options import MachineFlags, machine_options, talk_options
@@ -41,6 +42,7 @@ NAME_WIDTH = 11
 @click.option("--resume", is_flag=True, help="Go on behind what the journal says is done.")
 @click.option("--single", is_flag=True, help="Wait after every block.")
 @click.option("--home", is_flag=True, help="Home the machine first.")
+@UNLOCK
 @click.option("--journal", metavar="FILE", help="Where it says how far it is  [PROGRAM.journal]")
 @click.option("--live", metavar="FILE", help="A page for a browser that shows how far it is.")
 @click.option("--json", "as_json", is_flag=True, help="Progress on stdout, as JSON lines.")
@@ -61,6 +63,7 @@ def send(
     resume: bool,
     single: bool,
     home: bool,
+    unlock: bool,
     journal: str | None,
     live: str | None,
     as_json: bool,
@@ -105,7 +108,7 @@ def send(
     if not yes and not _agreed():
         return 1
     job = _Job(program, one, target, line, place, live, resume, as_json, quiet)
-    return job.run(single=single, home=home, speed=speed, yes=yes)
+    return job.run(single=single, home=home, unlock=unlock, speed=speed, yes=yes)
 
 
 def _resumed(place: Path, data: bytes, target: LoadedTarget) -> int:
@@ -154,14 +157,15 @@ class _Job:
     _page: LivePage | None = field(default=None, init=False)
     _paged: tuple[float, str] = field(default=(0.0, ""), init=False)
 
-    def run(self, *, single: bool, home: bool, speed: float, yes: bool) -> int:
+    def run(self, *, single: bool, home: bool, unlock: bool, speed: float, yes: bool) -> int:
         """Send it; the exit code."""
         from camtool.cli.wishes import Messages, Wishes, keys_of_terminal
         from camtool.sending.drive import Driver, Wish, counts_of
         from camtool.sending.journal import Journal
         from camtool.sending.line import opened_line
         from camtool.sending.live import LivePage
-        from camtool.target.wire import LATE_S, Manner, State
+        from camtool.sending.prepare import manner_of
+        from camtool.target.wire import LATE_S, State
 
         one = self.one
         left = 0.0
@@ -181,8 +185,15 @@ class _Job:
 
         progress().begin("sending", len(one.packets))
         real = not self.port.is_virtual
-        manner = Manner(single=single, home=home, late_s=LATE_S * speed, paced=real)
-        manner = replace(manner, file=self._laid())
+        manner = manner_of(
+            self.target,
+            single=single,
+            home=home,
+            unlock=unlock,
+            late_s=LATE_S * speed,
+            paced=real,
+            file=self._laid(),
+        )
         # The dry run has asked for the first packet.
         packets = [replace(packet, ask="") for packet in one.packets[:1]] + [*one.packets[1:]]
         conversation = one.wire.conversation(packets, self.target.machine, manner)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from camtool.cli.home import BAUD, PORT, act, axes_of
+from camtool.cli.home import BAUD, PORT, UNLOCK, act, axes_of
 from camtool.cli.options import MachineFlags, machine_options, talk_options
 from camtool.errors import OptionError
 
@@ -14,12 +14,14 @@ from camtool.errors import OptionError
 @machine_options
 @PORT
 @BAUD
+@UNLOCK
 @talk_options
 def zero(
     axes: tuple[str, ...],
     machine: MachineFlags,
     port: str,
     baud: int | None,
+    unlock: bool,
     quiet: bool,
     verbose: bool,
 ) -> int:
@@ -28,4 +30,4 @@ def zero(
     values = axes_of(axes) or dict.fromkeys("xyz", 0.0)
     if "f" in values:
         raise OptionError("nothing moves: a feed means nothing", where="zero")
-    return act("zero", machine, port, baud, values, quiet=quiet)
+    return act("zero", machine, port, baud, values, quiet=quiet, unlock=unlock)

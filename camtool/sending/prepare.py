@@ -23,7 +23,7 @@ from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.pipeline import read_program, verify_program
 from camtool.sending.line import Port
 from camtool.simulation.motion import Options
-from camtool.target.wire import Forecast, NoWire, Packet, Wire
+from camtool.target.wire import Forecast, Manner, NoWire, Packet, Wire
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import COLUMNS, Kind, PolarArcs, Toolpath, toolpath_extents
 from camtool.verification.report import clock
@@ -107,6 +107,17 @@ def wire_of(target: LoadedTarget) -> Wire:
         name = target.machine.target.name
         raise MachineError(f"camtool does not drive {name}: {wire.why}", mend=wire.mend)
     return wire
+
+
+def manner_of(target: LoadedTarget, **how: Any) -> Manner:
+    """How a conversation is held; MachineError for what the controller has no command for."""
+    if how.get("unlock") and not wire_of(target).unlocks:
+        raise MachineError(
+            f"{target.machine.target.name} has no command to unlock over its line",
+            where="--unlock",
+            mend="leave it out",
+        )
+    return Manner(**how)
 
 
 def port_of(name: str, baud: int | None, wire: Wire, target: LoadedTarget) -> Port:

@@ -55,6 +55,10 @@ class Forecast(Struct, frozen=True, eq=False):
     def __len__(self) -> int:
         return len(self.seconds)
 
+    def seconds_of(self, block: int) -> float:
+        """The time of a block, s; blocks behind the last one that does anything take none."""
+        return float(self.seconds[block]) if block < len(self.seconds) else 0.0
+
 
 class Packet(Struct, frozen=True):
     """What goes out in one piece and is acknowledged as one.
@@ -124,13 +128,15 @@ does not answer."""
 
 class Manner(Struct, frozen=True):
     """How a conversation is held. `single`: it waits for `resume` after every packet; `home`: the
-    machine is homed first; `late_s`: how late the line may be, s; `checked`: settings of the
-    controller are compared with the machine file; `paced`: each byte takes the time that the rate
-    of the line gives it, so that a reply that comes sooner is none; `file`: where what is sent
-    lies, for controllers that open it by themselves."""
+    machine is homed first; `unlock`: a controller that is locked is unlocked first; `late_s`: how
+    late the line may be, s; `checked`: settings of the controller are compared with the machine
+    file; `paced`: each byte takes the time that the rate of the line gives it, so that a reply
+    that comes sooner is none; `file`: where what is sent lies, for controllers that open it by
+    themselves."""
 
     single: bool = False
     home: bool = False
+    unlock: bool = False
     late_s: float = LATE_S
     checked: bool = True
     paced: bool = False
@@ -339,6 +345,8 @@ class Wire(ABC):
     ready: ClassVar[tuple[str, ...]] = ()
     opens_file: ClassVar[bool] = False
     """Whether the controller opens the program as a file (`Manner.file`)."""
+    unlocks: ClassVar[bool] = False
+    """True if the controller locks itself and has a command to end that (`Manner.unlock`)."""
     stopping: ClassVar[str] = ""
     """What a stop does, such as "the machine stops at once"."""
 
@@ -363,7 +371,7 @@ class Wire(ABC):
         values: Mapping[str, float],
         manner: Manner,
     ) -> Conversation:
-        """The conversation that makes the machine "home", "zero" or "jog"; `values` are those of
+        """The conversation to "home", "zero", "jog" or "unlock" the machine; `values` are those of
         axes ("x", "y", "z", mm) and the "feed" (mm/min). MachineError where the controller has no
         such command."""
         raise MachineError(

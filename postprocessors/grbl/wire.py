@@ -3,8 +3,8 @@
 grbl answers each line with `ok` or `error:N`, in order. Its serial buffer holds 128 bytes and
 drops what is beyond them without a word; so no more than 127 bytes may be in it. Counting answers
 alone would trust every single one of them: an `ok` that the line doubles would let the buffer
-overflow, and a block would be lost. So a query of its parser state, `$G`, goes along every few
-lines: its answer, `[GC:…]` and an `ok`, stands in the order of the lines, and shows whether
+overflow, and a block would be lost. So a query of its parser state, `$G`, goes along every hundred
+bytes: its answer, `[GC:…]` and an `ok`, stands in the order of the lines, and shows whether
 exactly the answers have come that are due. What has been written since the last such answer never
 exceeds the buffer, whatever happens to the answers.
 
@@ -19,6 +19,8 @@ import re
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
+
+from msgspec.structs import replace
 
 from camtool.errors import MachineError
 from camtool.target.terminal import Terminal
@@ -54,17 +56,33 @@ HELD: Final = 3
 since a ~ was lost."""
 
 PROBE: Final = b"$G\n"
-PROBE_EVERY: Final = 36
-"""After so many bytes of lines: two queries are under way in a full buffer, which never dries."""
+PROBE_EVERY: Final = 100
+"""A query follows after so many bytes of lines. Its answer is as long as ten `ok`, so that queries
+more often than this fill the line back; with fewer the buffer would run dry before the answer."""
 
 HOLD, RESUME, STATUS, RESET, JOG_CANCEL = b"!", b"~", b"?", b"\x18", b"\x85"
 HOMING: Final = b"$H\n"
+UNLOCKING: Final = b"$X\n"
 LISTING: Final = b"$$\n"
 STANDING: Final = frozenset({"Hold:0", "Door:0", "Door:1", "Alarm", "Check", "Sleep"})
 """States in which nothing moves, whatever was sent before; Idle is one when it is said twice."""
 
 MOST_LINE: Final = 1000
 """No answer is longer."""
+
+MOST_HEARD: Final = 200
+"""So many bytes of what is no grbl are kept, to say what it may be."""
+
+MODES: Final = (
+    frozenset({"G54", "G55", "G56", "G57", "G58", "G59"}),
+    frozenset({"G17", "G18", "G19"}),
+    frozenset({"G21", "G20"}),
+    frozenset({"G90", "G91"}),
+    frozenset({"G94", "G93"}),
+)
+"""Groups of modes that a startup line may leave otherwise than programs expect them."""
+BEGINS_IN: Final = frozenset({"G54", "G17", "G21", "G90", "G94"})
+"""The modes after a reset (gcode.c, gc_init)."""
 
 _COMMENT = re.compile(r"\(([^()]*)\)|;(.*)")
 _BLANK = re.compile(r"[ \t]")
@@ -79,6 +97,10 @@ _PLACE = re.compile(r"-?\d+\.\d+(?:,-?\d+\.\d+){2,}")
 _FEED = re.compile(r"\d{1,9}(?:\.\d*)?")
 _SETTING = re.compile(r"\$\d{1,3}=[^\s=]+")
 _PUSHED = re.compile(r"\[[A-Za-z0-9]{1,6}:.*\]")
+_STARTUP = re.compile(r">(.*):(ok|error:(\d+))")
+_BANNER = re.compile(r"Grbl (?:1\.[1-9]|[2-9])")
+_WORD = re.compile(r"G0*(\d+(?:\.\d+)?)", re.IGNORECASE)
+_AXIS = re.compile(r"[XYZ]", re.IGNORECASE)
 
 ERRORS: Final = {
     1: "a letter was expected",
@@ -150,6 +172,7 @@ class GrblWire(Wire):
     """grbl 1.1 over a serial port."""
 
     baud = BAUD
+    unlocks = True
     ready = (
         "opening the port may reset the controller: where it is then, is zero to it until it is "
         "homed or zeroed",
@@ -187,12 +210,14 @@ class GrblWire(Wire):
         values: Mapping[str, float],
         manner: Manner,
     ) -> GrblConversation:
-        """`$H`; the place as zero of G54; `$J=`."""
+        """`$H`; `$X`; the place as zero of G54; `$J=`."""
+        if action == "unlock":
+            return GrblConversation((), machine, replace(manner, unlock=True))
         if action == "home":
             return GrblConversation((), machine, manner, (b"$H",))
         axes = "".join(f"{axis.upper()}{values[axis]:.3f}" for axis in "xyz" if axis in values)
         if action == "zero":
-            return GrblConversation((), machine, manner, (f"G10L20P1{axes}".encode(),))
+            return GrblConversation((), machine, manner, (f"G21G10L20P1{axes}".encode(),))
         line = f"$J=G91G21{axes}F{values['feed']:.1f}"
         return GrblConversation((), machine, manner, (line.encode(),))
 
@@ -208,9 +233,7 @@ def _packets(data: bytes, forecast: Forecast) -> Iterator[Packet]:
             continue
         note = "; ".join(notes) if _PAUSES.search(words) else ""
         notes = []
-        yield Packet(
-            words.encode("latin-1") + b"\n", block, float(forecast.seconds[block]), note=note
-        )
+        yield Packet(words.encode("latin-1") + b"\n", block, forecast.seconds_of(block), note=note)
         block += 1
 
 
@@ -244,9 +267,10 @@ class GrblConversation(Conversation):
         controller = machine.controller
         blocks = controller.buffer_blocks if isinstance(controller, GrblController) else 16
         self._depth = blocks - 1 + SEGMENTS
+        unlocking = (b"$X",) if manner.unlock else ()
         homing = (b"$H",) if manner.home else ()
         asked = (b"$$",) if manner.checked and packets else ()
-        self._commands = deque(each + b"\n" for each in (*asked, *homing, *commands))
+        self._commands = deque(each + b"\n" for each in (*unlocking, *asked, *homing, *commands))
         self._listing: list[str] = []
         self._rest = b""
         self._out_lines: deque[_Line] = deque()  # written, not answered
@@ -265,6 +289,14 @@ class GrblConversation(Conversation):
         self._waiting = False  # a report is asked for that has not come
         self._resets = 0  # banners that are due
         self._begun = 0.0  # since then
+        self._known = False  # whether it has said anything that a grbl says
+        self._fresh = False  # whether it has begun anew since it was asked to
+        self._heard = b""  # what came before that
+        self._locked = False  # whether its settings are asked for to say how to unlock it
+        self._messages: list[str] = []  # what it said of being locked
+        self._closed = ""  # switches, as it reports them
+        self._startup: list[str] = []  # its startup lines
+        self._modes_asked = False
         self._failing = self._alarm = ""
         self._halted = 0.0
         self._reset_sent = self._slows = False
@@ -357,7 +389,7 @@ class GrblConversation(Conversation):
             ):
                 self._reset(now)
         elif self._phase == "greeting" and now - self._answered >= patience:
-            self._end(State.FAILED, "nothing answers: is it a grbl, and is it switched on?")
+            self._end(State.FAILED, self._unknown())
             return
         elif self._phase == "greeting" and self._resets and now - self._begun >= patience:
             self._end(State.FAILED, "it was reset, and does not say that it has begun anew")
@@ -377,6 +409,12 @@ class GrblConversation(Conversation):
         """True while homing is under way: nothing but a reset is heard then."""
         return any(line.data == HOMING for line in self._out_lines)
 
+    @property
+    def _unlocks(self) -> bool:
+        """True until homing or unlocking has been answered."""
+        orders = {*self._commands, *(line.data for line in self._out_lines)}
+        return bool({HOMING, UNLOCKING} & orders)
+
     def _poll(self, now: float) -> None:
         if not self._homes:
             self._write(STATUS)
@@ -393,6 +431,8 @@ class GrblConversation(Conversation):
         """Line by line."""
         if self.ended:
             return
+        if not self._known:
+            self._heard = (self._heard + data)[:MOST_HEARD]
         *lines, self._rest = (self._rest + data).split(b"\n")
         for line in lines:
             if not self.ended:
@@ -406,8 +446,9 @@ class GrblConversation(Conversation):
             return
         stopping = self.state is State.STOPPING
         if self._phase == "greeting" and not stopping and not _understood(line):
-            return  # what a port says that has just been opened
-        self._answered = now
+            self._aside(line)
+            return
+        self._known, self._answered = True, now
         status = _STATUS.fullmatch(line)
         if status:
             self._status(status[1], status[2], now)
@@ -420,14 +461,79 @@ class GrblConversation(Conversation):
             if not (stopping and self._reset_sent):  # else its banner follows
                 self._end(State.FAILED, self._failing or self._alarm)
         elif line.startswith("[GC:") and line.endswith("]"):
-            self._reported(now)
+            self._reported(line, now)
         elif _SETTING.fullmatch(line) and self._phase == "settings":
             self._listing.append(line)
         elif _PUSHED.fullmatch(line):
-            if line.startswith("[MSG:") and self.sent:
+            if line.startswith("[MSG:"):
                 self._tell(f"it says: {line[5:-1]}")
+        elif _STARTUP.fullmatch(line):
+            self._aside(line)
         elif not stopping:
             self._fail(f"an answer that it cannot have meant: {line[:40]!r}", now)
+
+    def _aside(self, line: str) -> None:
+        """Messages and startup lines; in the greeting anything else, which a port may say that
+        has just been opened, unless it names another firmware."""
+        if self._phase == "greeting" and line.startswith("[MSG:") and "unlock" not in line:
+            self._messages.append(line[5:].rstrip("]"))
+        elif self._phase == "greeting" and re.match(r"grbl", line, re.IGNORECASE):
+            self._end(
+                State.FAILED,
+                f"it says {line[:60]!r}, but camtool speaks to grbl 1.1: load that into the board",
+            )
+        startup = _STARTUP.fullmatch(line)
+        if startup is None or startup[1] in self._startup:
+            return
+        if self._phase != "greeting" or self._fresh:
+            self._startup.append(startup[1])
+            said = "it has run its startup line"
+            if startup[3]:
+                meaning = ERRORS.get(int(startup[3]), "it says no more")
+                said = f"{startup[2]}, {meaning}, to its startup line"
+            self._tell(f"{said} {startup[1]}")
+
+    def _unknown(self) -> str:
+        """Why it fails where nothing was understood: what was heard, and what that may be."""
+        text = "".join(chr(octet) if 0x20 <= octet < 0x7F else " " for octet in self._heard)
+        text, strange = (
+            " ".join(text.split())[:60],
+            sum(not 0x20 <= octet < 0x7F and octet not in b"\t\r\n" for octet in self._heard),
+        )
+        if self._known:
+            return "it does not answer any more"
+        if not self._heard:
+            return (
+                "nothing answers: is it a grbl, is it switched on, and is --baud its rate? One "
+                "that has hit a limit is silent until its reset button is pressed"
+            )
+        if 4 * strange > len(self._heard):
+            said = self._heard[:8].hex(" ")
+            return (
+                f"what it says is no text ({said}): its rate may be another, give it with --baud"
+            )
+        if re.search("marlin|echo:", text, re.IGNORECASE):
+            return f"it says {text!r}, as Marlin does: that is another firmware than grbl"
+        return f"it says {text!r}, which is no grbl 1.1: are port and --baud those of the machine?"
+
+    @property
+    def _reasons(self) -> str:
+        """What it said of being locked, and the switches that are closed."""
+        said = [f"it says {each!r}" for each in dict.fromkeys(self._messages)]
+        if self._closed:
+            said.append(f"it reports closed switches: {_switches(self._closed)}")
+        return "".join(f"; {each}" for each in said)
+
+    def _advice(self) -> str:
+        """Why it is locked and what to do, by its settings."""
+        values = dict(each[1:].split("=", 1) for each in self._listing)
+        if set(self._closed) & set("XYZ"):
+            mend = "move it off the switch by hand, or set $5 if it is not pressed, then --unlock"
+        elif float(values.get("22", "0")) == 0.0:
+            mend = "homing is off ($22=0): see why it is locked, then give --unlock"
+        else:
+            mend = "home it (--home), or give --unlock where the tool was placed by hand"
+        return f"it is locked{self._reasons}: {mend}"
 
     def _status(self, state: str, fields: str, now: float) -> None:
         self._where(fields, now)
@@ -440,10 +546,8 @@ class GrblConversation(Conversation):
             self._stopping(state, now)
         elif self._phase == "greeting":
             self._greeted(state, now)
-        elif state == "Alarm":
-            self._end(
-                State.FAILED, "it is locked: home it, or unlock it with $X from a terminal program"
-            )
+        elif state == "Alarm" and not self._locked and not self._unlocks:
+            self._end(State.FAILED, f"it is locked{self._reasons}: home it or unlock it")
         elif self.state is State.PAUSING and still:
             self.state, self._holds = State.PAUSED, 0
             if self._resumes:
@@ -479,6 +583,10 @@ class GrblConversation(Conversation):
         feed, before = said.get("FS", said.get("F", "")).partition(",")[0], self._feed
         self._feed = float(feed) if _FEED.fullmatch(feed) else 0.0
         self._slows = self._feed < before
+        closed = said.get("Pn", "")
+        if closed and closed != self._closed and self._phase != "greeting":
+            self._tell(f"it reports closed switches: {_switches(closed)}")
+        self._closed = closed
         for name in ("WCO", "MPos", "WPos"):
             text = said.get(name)
             if text is None:
@@ -502,14 +610,13 @@ class GrblConversation(Conversation):
             if self._resets == 0:
                 self._resets, self._begun = 1, now
                 self._write(RESET)
-        elif state == "Alarm" and HOMING in self._commands:
+            elif self._fresh:
+                self._ready(now)
+        elif state == "Alarm" and self._unlocks:
             self._ready(now)
         elif state == "Alarm":
-            self._end(
-                State.FAILED,
-                "it is locked, since it has not been homed: give --home, or unlock it with "
-                "$X from a terminal program",
-            )
+            self._phase, self._locked = "settings", True
+            self._put(_Line(LISTING))
         elif state in ("Run", "Home", "Jog"):
             if self.why != "moves":
                 self.why = "moves"
@@ -531,7 +638,8 @@ class GrblConversation(Conversation):
         elif self.state is State.STOPPING:
             self._reset(now)  # a hold that comes behind its banner would last
         elif self._resets:
-            self._ready(now)
+            self._fresh = True
+            self._poll(now)
         # Else it has begun by itself: the next report says how it stands.
 
     def _ready(self, now: float) -> None:
@@ -539,7 +647,7 @@ class GrblConversation(Conversation):
         self.state = State.SENDING
         self._go_on(now)
 
-    def _reported(self, now: float) -> None:
+    def _reported(self, line: str, now: float) -> None:
         """The report of a query: all lines before it must have been answered, and it not."""
         head = self._out_lines[0] if self._out_lines else None
         if self.state is State.STOPPING:
@@ -550,6 +658,28 @@ class GrblConversation(Conversation):
             self._fail("an answer has come twice", now)
         else:
             head.seen = True
+            if not self.sent:
+                self._compare_modes(line)
+
+    def _compare_modes(self, line: str) -> None:
+        """Refuse a program that would begin in other modes than it expects."""
+        said, unset = set(line[4:-1].split()), set(BEGINS_IN)
+        for packet in self.packets:
+            text = packet.data.decode("latin-1")
+            words = {f"G{number}" for number in _WORD.findall(text)}
+            unset -= {each for each in unset for group in MODES if each in group and words & group}
+            if _AXIS.search(text):
+                break
+        for group in MODES:
+            found = group & said
+            if found and group & unset and not found & unset:
+                self._end(
+                    State.FAILED,
+                    f"its startup line leaves {next(iter(found))}, and the program does not say "
+                    f"{next(iter(group & unset))} before it moves: write that there, or empty the "
+                    "line ($N0= or $N1=)",
+                )
+                return
 
     def _answer(self, line: str, now: float) -> None:
         if self.state is State.STOPPING:
@@ -573,6 +703,9 @@ class GrblConversation(Conversation):
         elif head.packet is not None:
             self.acknowledged = head.packet
         elif head.data == LISTING:
+            if self._locked:
+                self._end(State.FAILED, self._advice())
+                return
             self._phase = "commands"
             self._compare(now)
         self._go_on(now)
@@ -609,6 +742,11 @@ class GrblConversation(Conversation):
             return
         if any(line.packet is None and not line.is_probe for line in self._out_lines):
             return
+        if self._startup and not self._modes_asked and self.packets:
+            self._modes_asked = True
+            self._probe()
+        if self._modes_asked and not self.sent and self._out_lines:
+            return
         if self.single:
             if anew or not self.sent:
                 self._next_packet()
@@ -621,8 +759,9 @@ class GrblConversation(Conversation):
             self._next_packet()
             if self._since_probe >= PROBE_EVERY:
                 self._probe()
-        # Behind the last line that fits there is a query, or nothing would ever make room.
-        if self._since_probe:
+        # With no query under way, nothing would ever make room.
+        asked = self.sent < len(self.packets) and any(line.is_probe for line in self._out_lines)
+        if self._since_probe and not asked:
             self._probe()
 
     def _next_packet(self) -> None:
@@ -783,4 +922,19 @@ class GrblTerminal(Terminal):
 
 
 def _understood(line: str) -> bool:
-    return bool(_STATUS.fullmatch(line)) or line.startswith("Grbl ")
+    return bool(_STATUS.fullmatch(line) or _BANNER.match(line))
+
+
+SWITCHES: Final = {
+    "P": "probe",
+    "D": "door",
+    "H": "hold",
+    "R": "reset",
+    "S": "start",
+}
+"""Letters of a report's `Pn:`; others are limit switches of axes (report.c)."""
+
+
+def _switches(letters: str) -> str:
+    """Words for the letters of `Pn:`."""
+    return ", ".join(SWITCHES.get(letter, f"limit of {letter}") for letter in letters)

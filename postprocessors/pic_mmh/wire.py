@@ -56,7 +56,7 @@ class PicMmhWire(Wire):
                     f"has {len(text)} characters, and the controller's buffer {room}",
                     where=f"block {number + 1}",
                 )
-            seconds = float(forecast.seconds[number])
+            seconds = forecast.seconds_of(number)
             counts = (_reports(forecast, number, machine),)
             packets.append(Packet(text, number, seconds, counts))
         return packets

@@ -51,7 +51,7 @@ class ValcncWire(Wire):
                     f"has {len(line)} characters, and the controller takes {BUFFER_CHARS}",
                     where=f"block {block + 1}",
                 )
-            packets.append(Packet(line + b"\n", block, float(forecast.seconds[block])))
+            packets.append(Packet(line + b"\n", block, forecast.seconds_of(block)))
         return packets
 
     def conversation(

@@ -221,11 +221,37 @@ def test_by_hand_goes_the_way_of_programs() -> None:
             line = [sys.executable, "-m", "camtool", *words, "-t", "grbl", "--port", port]
             done = subprocess.run(line, capture_output=True, check=False)
             assert done.returncode == 0, done.stderr
-    assert small.lines == [b"$J=G91G21X-1.500Y2.000F200.0", b"G10L20P1X0.000Y0.000Z0.000", b"$H"]
+        small.locked = True
+        for words in (["jog", "X1"], ["unlock"], ["jog", "X1"], ["zero", "Z0"]):
+            line = [sys.executable, "-m", "camtool", *words, "-t", "grbl", "--port", port]
+            done = subprocess.run(line, capture_output=True, check=False)
+            assert (done.returncode == 0) is (not small.locked), done.stderr
+        small.locked = True
+        done = subprocess.run([*line, "--unlock"], capture_output=True, check=False)
+        assert done.returncode == 0, done.stderr
+    zeroed = b"G21G10L20P1"
+    assert small.lines == [
+        b"$J=G91G21X-1.500Y2.000F200.0",
+        zeroed + b"X0.000Y0.000Z0.000",
+        b"$H",
+        b"$X",
+        b"$J=G91G21X1.000F200.0",
+        zeroed + b"Z0.000",
+        b"$X",
+        zeroed + b"Z0.000",
+    ]
 
 
-def test_no_command_where_the_controller_has_none() -> None:
-    line = [sys.executable, "-m", "camtool", "home", "-t", "valcnc", "--port", "/dev/null"]
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["home", "-t", "valcnc"], b"no command to home"),
+        (["unlock", "-t", "linuxcnc"], b"no command to unlock"),
+        (["jog", "X1", "--unlock", "-t", "pic-mmh", "--baud", "9600"], b"no command to unlock"),
+    ],
+)
+def test_no_command_where_the_controller_has_none(words: list[str], said: bytes) -> None:
+    line = [sys.executable, "-m", "camtool", *words, "--port", "/dev/null"]
     done = subprocess.run(line, capture_output=True, check=False)
     assert done.returncode == 2
-    assert b"no command to home" in done.stderr
+    assert said in done.stderr

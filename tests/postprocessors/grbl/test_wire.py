@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from camtool_postprocessors.grbl.wire import BUFFER_BYTES, GrblWire
 
 from camtool.sending.prepare import forecast_of
 from camtool.target.registry import load_target
-from camtool.target.wire import Conversation, Manner, Packet, State, Write
+from camtool.target.wire import Conversation, Manner, Packet, State, Tell, Write
 
 PLAIN = Manner()
 TARGET = load_target("grbl")
@@ -29,13 +29,25 @@ LISTING = {
 
 
 class Small:
-    """A controller that takes a line every `line_s`, and has a buffer of 127 bytes."""
+    """A controller that takes a line every `line_s`, and has a buffer of 127 bytes. `begins`: what
+    it says behind its banner; `modes`: what it has then; `locked`: until $X or $H; `closed`:
+    switches."""
 
-    def __init__(self, line_s: float = 0.05, settings: dict[int, float] | None = None) -> None:
+    def __init__(
+        self,
+        line_s: float = 0.05,
+        settings: dict[int, float] | None = None,
+        *,
+        begins: Sequence[bytes] = (),
+        modes: bytes = b"G0 G54 G17 G21 G90 G94 M5 M9 T0 F0 S0",
+        locked: bool = False,
+        closed: str = "",
+    ) -> None:
         self.buffer, self.lines = b"", list[bytes]()
         self.line_s, self.next, self.held, self.reset = line_s, 0.0, False, 0
         self.settings = LISTING if settings is None else settings
-        self.after_stop = 0
+        self.begins, self.modes, self.locked, self.closed = begins, modes, locked, closed
+        self.after_stop = self.fullest = 0
 
     def write(self, data: bytes, now: float) -> list[bytes]:
         said = list[bytes]()
@@ -44,16 +56,19 @@ class Small:
             if one == b"?":
                 moving = self.buffer and not self.held
                 state = "Hold:0" if self.held else "Run" if moving else "Idle"
-                said.append(f"<{state}|MPos:0.000,0.000,0.000|FS:0,0>".encode())
+                state = "Alarm" if self.locked else state
+                closed = f"|Pn:{self.closed}" if self.closed else ""
+                said.append(f"<{state}|MPos:0.000,0.000,0.000|FS:0,0{closed}>".encode())
             elif one == b"!":
                 self.held = True
             elif one == b"~":
                 self.held = False
             elif one == b"\x18":
                 self.buffer, self.held, self.reset = b"", False, self.reset + 1
-                said.append(b"Grbl 1.1h ['$' for help]")
+                said += [b"Grbl 1.1h ['$' for help]", *self.begins]
             elif len(self.buffer) < BUFFER_BYTES:
                 self.buffer += one
+                self.fullest = max(self.fullest, len(self.buffer))
         return said
 
     def run(self, now: float) -> list[bytes]:
@@ -62,17 +77,20 @@ class Small:
         self.next = now + self.line_s
         line, _, self.buffer = self.buffer.partition(b"\n")
         if line == b"$G":
-            return [b"[GC:G0 G54 G17 G21 G90 G94 M5 M9 T0 F0 S0]", b"ok"]
+            return [b"[GC:%s]" % self.modes, b"ok"]
         if line == b"$$":
             rows = [b"$%d=%.3f" % each for each in self.settings.items()]
             return [*rows, b"ok"]
+        if self.locked and line not in (b"$X", b"$H"):
+            return [b"error:9"]
+        self.locked = False
         self.lines.append(line)
         return [b"ok"]
 
 
-def packets() -> list[Packet]:
-    decoded = TARGET.target.read(PROGRAM, TARGET.machine)
-    return list(GrblWire().packets(PROGRAM, TARGET.machine, forecast_of(decoded, TARGET)))
+def packets(program: bytes = PROGRAM) -> list[Packet]:
+    decoded = TARGET.target.read(program, TARGET.machine)
+    return list(GrblWire().packets(program, TARGET.machine, forecast_of(decoded, TARGET)))
 
 
 def held(
@@ -80,10 +98,12 @@ def held(
     wish: Callable[[Conversation, float], None] = lambda conversation, now: None,
     small: Small | None = None,
     manner: Manner = PLAIN,
+    talk: Conversation | None = None,
+    told: list[str] | None = None,
 ) -> tuple[Conversation, Small]:
     """A conversation to its end; `fault` makes of a line of the controller what arrives."""
     small = small or Small()
-    talk = GrblWire().conversation(packets(), TARGET.machine, manner)
+    talk = talk or GrblWire().conversation(packets(), TARGET.machine, manner)
     number, now = 0, 0.0
     talk.begin(now)
     while not talk.ended or talk.has_actions:
@@ -91,6 +111,8 @@ def held(
         for action in talk.actions():
             if isinstance(action, Write):
                 said += small.write(action.data, now)
+            elif isinstance(action, Tell) and told is not None:
+                told.append(action.text)
         now += 0.01
         said += small.run(now)
         for line in said:
@@ -109,6 +131,12 @@ def test_packets_are_the_blocks_without_comments_and_blanks() -> None:
     assert [each.data for each in made[:3]] == [b"G21G90\n", b"G0Z5\n", b"G0X1Y1\n"]
     assert [each.block for each in made] == list(range(63))
     assert made[5].seconds > 0.0
+
+
+def test_blocks_behind_the_last_move_are_packets_too() -> None:
+    made = packets(b"G90\nG0X1\nG21\n")
+    assert [each.data for each in made] == [b"G90\n", b"G0X1\n", b"G21\n"]
+    assert made[2].seconds == 0.0
 
 
 def test_every_line_arrives_once_and_in_order() -> None:
@@ -160,6 +188,7 @@ def test_no_fault_of_an_answer_loses_or_doubles_a_block(kind: str, seed: int) ->
 def test_many_doubled_answers_never_overflow_its_buffer() -> None:
     talk, small = held(lambda number, line: [line, line] if line == b"ok" else [line])
     assert talk.state is State.FAILED
+    assert small.fullest < BUFFER_BYTES
     wanted = [each.data.strip() for each in packets()]
     assert small.lines == wanted[: len(small.lines)]
 
@@ -222,3 +251,136 @@ def test_silence_ends_within_bounds() -> None:
     talk, _ = held(lambda number, line: [] if number > 40 else [line])
     assert talk.state is State.FAILED
     assert "not" in talk.why
+
+
+# The greeting: what it says of itself, and what is no grbl.
+
+
+ORDERS = ("home", "zero", "jog", "unlock")
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        (b">G54:ok", "it has run its startup line G54"),
+        (b">G54G90:ok", "it has run its startup line G54G90"),
+        (b">G99:error:20", "error:20, a word that it does not know, to its startup line G99"),
+    ],
+)
+def test_answers_of_startup_lines_are_none_of_the_programs(line: bytes, words: str) -> None:
+    """grbl runs $N0 and $N1 behind its banner and behind homing, and says so (report.c)."""
+    told = list[str]()
+    talk, small = held(small=Small(begins=[line]), told=told)
+    assert talk.state is State.FINISHED, talk.why
+    assert small.lines == [each.data.strip() for each in packets()]
+    assert [each for each in told if "startup" in each] == [words]
+    values = {"x": 1.0, "y": 0.0, "z": 0.0, "feed": 100.0}
+    for order in ORDERS:
+        talk = GrblWire().command(order, TARGET.machine, values, PLAIN)
+        talk, small = held(small=Small(begins=[line]), talk=talk)
+        assert talk.state is State.FINISHED, (order, talk.why)
+        assert len(small.lines) == 1
+
+
+@pytest.mark.parametrize(
+    ("modes", "program", "why"),
+    [
+        (b"G0 G54 G17 G20 G90 G94 M5", b"G90\nG0X1\nG21\n", "leaves G20, and the program does"),
+        (b"G0 G55 G17 G21 G90 G94 M5", PROGRAM, "does not say G54 before it moves"),
+        (b"G0 G54 G17 G20 G91 G94 M5", PROGRAM, ""),
+        (b"G1 G54 G18 G21 G90 G94 M3", b"G17G0X1\n", ""),
+    ],
+)
+def test_startup_lines_that_change_what_a_program_means_are_refused(
+    modes: bytes, program: bytes, why: str
+) -> None:
+    talk = GrblWire().conversation(packets(program), TARGET.machine, PLAIN)
+    talk, small = held(small=Small(begins=[b">G0:ok"], modes=modes), talk=talk)
+    assert talk.state is (State.FAILED if why else State.FINISHED), talk.why
+    assert why in talk.why
+    assert bool(small.lines) != bool(why)
+
+
+@pytest.mark.parametrize(
+    ("homing", "closed", "says", "words"),
+    [
+        (1.0, "", [], ["it is locked: home it (--home), or give --unlock"]),
+        (0.0, "", [], ["homing is off ($22=0)", "--unlock"]),
+        (
+            0.0,
+            "XP",
+            [b"[MSG:Check Limits]", b"[MSG:'$H'|'$X' to unlock]"],
+            ["it says 'Check Limits'; it reports closed switches: limit of X, probe", "--unlock"],
+        ),
+    ],
+)
+def test_a_locked_one_is_advised_by_its_own_settings(
+    homing: float, closed: str, says: list[bytes], words: list[str]
+) -> None:
+    small = Small(settings={**LISTING, 22: homing}, closed=closed, locked=True)
+    talk = GrblWire().conversation(packets(), TARGET.machine, PLAIN)
+    talk.begin(0.0)
+    talk.received(b"".join(line + b"\r\n" for line in (b"Grbl 1.1h ['$' for help]", *says)), 0.0)
+    talk, small = held(small=small, talk=talk)
+    assert talk.state is State.FAILED
+    assert all(each in talk.why for each in words), talk.why
+    assert (homing == 0.0) or "$22" not in talk.why
+    assert "--home" not in talk.why or homing
+    assert small.lines == []
+
+
+def test_one_that_a_reset_locks_is_seen_before_anything_is_sent() -> None:
+    """With hard limits and a closed switch it is locked behind each reset (protocol.c)."""
+
+    class Locking(Small):
+        def write(self, data: bytes, now: float) -> list[bytes]:
+            self.locked = self.locked or b"\x18" in data
+            return super().write(data, now)
+
+    begins = [b"[MSG:Check Limits]", b"[MSG:'$H'|'$X' to unlock]"]
+    small = Locking(settings={**LISTING, 22: 0.0}, begins=begins, closed="Z")
+    talk, small = held(small=small)
+    assert talk.state is State.FAILED
+    assert "Check Limits" in talk.why
+    assert "limit of Z" in talk.why
+    assert small.lines == []
+
+
+def test_a_locked_one_is_unlocked_where_that_is_asked_for() -> None:
+    talk, small = held(small=Small(locked=True), manner=Manner(unlock=True))
+    assert talk.state is State.FINISHED, talk.why
+    assert small.lines == [b"$X", *(each.data.strip() for each in packets())]
+
+
+@pytest.mark.parametrize(
+    ("heard", "words"),
+    [
+        (b"", ["nothing answers", "--baud"]),
+        (b"\x00\xe6\x98\x06\x9e\xf8\x80\xe6" * 9, ["is no text", "00 e6 98", "--baud"]),
+        (b"start\r\necho:Marlin 1.1.9\r\necho: Last Updated\r\n", ["Marlin", "another firmware"]),
+        (b"\r\nGrbl 0.9j ['$' for help]\r\n", ["Grbl 0.9j", "grbl 1.1"]),
+        (b"\r\nGrblHAL 1.1f ['$' or '$HELP' for help]\r\n", ["GrblHAL 1.1f", "grbl 1.1"]),
+        (b"\r\nSmoothie\r\nok\r\n", ["it says 'Smoothie ok'", "--baud"]),
+        (b"\r\nGrbl 1.1h ['$' for help]\r\n", ["it does not answer any more"]),
+    ],
+)
+def test_what_is_no_grbl_is_named(heard: bytes, words: list[str]) -> None:
+    talk = GrblWire().conversation(packets(), TARGET.machine, PLAIN)
+    talk.begin(0.0)
+    talk.received(heard, 0.5)
+    while not talk.ended:
+        talk.elapsed(talk.next_s)
+    assert talk.state is State.FAILED
+    assert all(each in talk.why for each in words), talk.why
+    assert talk.sent == 0
+
+
+def test_switches_that_close_while_it_works_are_told() -> None:
+    small, told = Small(), list[str]()
+
+    def wish(talk: Conversation, now: float) -> None:
+        small.closed = "Z" if talk.acknowledged >= 30 else ""
+
+    talk, _ = held(small=small, wish=wish, told=told)
+    assert talk.state is State.FINISHED
+    assert told.count("it reports closed switches: limit of Z") == 1

@@ -85,3 +85,24 @@ def test_dwells_are_no_missing_answers_and_missing_ones_are_noticed() -> None:
 
     talked(talk, line, wish, latest_s=100.0)
     assert talk.state is State.FAILED
+
+
+def test_short_lines_are_sent_as_fast_as_the_machine_takes_them() -> None:
+    """A raster of a laser, 0.1 mm a line at 4000 mm/min, over a line of 115200 baud: its answers
+    come back over the same line, so what is asked in between costs time."""
+    rates = [f"axes.{axis}.max_rate_mm_min=10000" for axis in "xyz"]
+    accelerations = [f"axes.{axis}.acceleration_mm_s2=1000" for axis in "xyz"]
+    settings = ["controller.laser_mode=true", *rates, *accelerations]
+    program = b"G21G90\nM4S0\nF4000\n" + b"".join(
+        b"G1X%d.%dS%d\n" % (*divmod(k, 10), 100 + 37 * k % 900) for k in range(1, 300)
+    )
+    twin, loaded = made("grbl", (), settings)
+    decoded = loaded.target.read(program, loaded.machine)
+    forecast, wire = forecast_of(decoded, loaded), loaded.target.wire()
+    talk = wire.conversation(
+        tuple(wire.packets(program, loaded.machine, forecast)), loaded.machine, Manner()
+    )
+    talked(talk, Wired(twin, paced=True), latest_s=100.0)
+    assert talk.state is State.FINISHED, talk.why
+    times = twin.slides.trace.time_s
+    assert times[-1] - times[0] < 1.02 * forecast.seconds.sum()
