@@ -24,6 +24,12 @@ QUIET_S = 0.3
 SILENT_S = 1.5
 """A line to which nothing is answered for so long has no answer, s."""
 
+KNOCK_S = 0.5
+"""How often a controller that may be starting is asked whether it is there, s."""
+
+WAKES_S = 10.0
+"""A boot loader takes no longer, s."""
+
 
 @click.command(short_help="Type to a controller.")
 @click.argument("target", metavar="TARGET")
@@ -52,7 +58,8 @@ def console(
     """Type to the controller of TARGET at PORT; its answers are shown, and what they mean.
 
     Ctrl-C stops the machine where its protocol can, and ends it where not; Ctrl-D ends it. Lines
-    from a pipe go out one by one, each when the one before has been answered.
+    from a pipe go out one by one, the first when the controller has started, each other when the
+    one before has been answered. Exit code 1 where an answer that is due does not come.
 
     \b
     camtool console grbl /dev/ttyUSB0
@@ -82,8 +89,8 @@ def console(
             say(f"camtool: {terminal.about}; Ctrl-D ends", quiet=quiet)
         before = signal.signal(signal.SIGINT, interrupted)
         threading.Thread(target=read, daemon=True).start()
-        heard = spoke = time.monotonic()
-        answered, ends = True, False
+        heard = spoke = opened = time.monotonic()
+        knocked, asked, answered, ends = 0.0, "", True, False
         if terminal.hello:
             line.write(terminal.hello)
             answered = False
@@ -103,10 +110,21 @@ def console(
                     line.write(terminal.stop)
                     say("camtool: the machine is told to stop; Ctrl-C again ends", quiet=quiet)
                     ends, spoke = True, now
-                waits = terminal.due and now - spoke < wait_s
-                waits = waits or now - max(heard, spoke) < (QUIET_S if answered else SILENT_S)
-                if waits and not at_terminal:
-                    continue
+                if not at_terminal:
+                    awaits = terminal.due or (terminal.answers and not answered)
+                    if terminal.failed:
+                        return _unanswered(asked, terminal.failed)
+                    if not terminal.ready:
+                        if now - opened >= min(WAKES_S, wait_s):
+                            return _unanswered("", "is it switched on, and is --baud its rate?")
+                        if now - knocked >= KNOCK_S:
+                            line.write(terminal.knock)
+                            knocked = now
+                        continue
+                    if awaits and now - spoke >= wait_s:
+                        return _unanswered(asked, f"none came within {wait_s:g} s (--wait)")
+                    if awaits or now - max(heard, spoke) < (QUIET_S if answered else SILENT_S):
+                        continue
                 try:
                     text = lines.get_nowait()
                 except queue.Empty:
@@ -116,9 +134,16 @@ def console(
                 data = terminal.typed(text)
                 if data:
                     line.write(data)
-                    spoke, answered, ends = now, False, False
+                    asked, spoke, answered, ends = text, now, False, False
         finally:
             signal.signal(signal.SIGINT, before)
+
+
+def _unanswered(asked: str, why: str) -> int:
+    """Say that a line has no answer; the exit code."""
+    what = f"no answer to {asked!r}" if asked else "the controller does not answer"
+    say(f"camtool: error: {what}: {why}; what follows was not sent", quiet=False)
+    return 1
 
 
 def _show(lines: list[str]) -> None:

@@ -25,6 +25,8 @@ class Terminal:
     """What ends a line that is typed."""
     stop: ClassVar[bytes] = b""
     """What stops the machine, for Ctrl-C; b"" where nothing does."""
+    knock: ClassVar[bytes] = b""
+    """What is asked again and again until it is `ready`."""
     about: ClassVar[str] = "each line goes out with a line feed; \\x13 is the byte of that number"
     """How to speak to it."""
 
@@ -32,6 +34,12 @@ class Terminal:
         self.due = 0
         """How many answers it owes, where it owes one for each line; what is piped in waits for
         them."""
+        self.answers = False
+        """True if it answers every line with something, where `due` does not count them."""
+        self.ready = True
+        """False while it may not take lines yet, since the opening of the port has reset it."""
+        self.failed = ""
+        """Why an answer that is due will never come."""
         self.hello = b""
         """What is said when the port is open."""
         self._rest = b""

@@ -879,22 +879,36 @@ FIELDS: Final = {
 """Fields of a status report (report.c)."""
 
 
+LAST_WORDS: Final = ("ALARM:1", "ALARM:2")
+"""Behind these it answers nothing until it is reset (protocol.c, protocol_exec_rt_system)."""
+
+
 class GrblTerminal(Terminal):
     """Lines; ? ! ~ and ^X alone go out as the real-time bytes they are."""
 
     stop = HOLD
+    knock = STATUS
     about = (
         "a line is answered by ok or error:N. Alone on a line: ? how it stands, ! feed hold, "
         "~ go on, ^X reset; $$ settings, $G modes, $X unlock, $H home"
     )
 
+    def __init__(self) -> None:
+        super().__init__()
+        self.ready = False
+        self._typed = self._resets = False
+
+    def heard(self, data: bytes) -> list[str]:
+        """Reports that only the knocking has asked for are not shown."""
+        return [line for line in super().heard(data) if self._typed or not line.startswith("<")]
+
     def typed(self, line: str) -> bytes:
-        """A real-time byte has no end, and no answer of its own."""
-        word = line.strip()
+        """A real-time byte has no end, and no answer of its own but for the banner of a reset."""
+        word, self._typed = line.strip(), True
         if word in ("?", "!", "~"):
             return word.encode()
         if word.upper() == "^X" or word == "\\x18":
-            self.due = 0
+            self.due, self._resets = 1, True
             return RESET
         self.due += 1
         return super().typed(word)
@@ -903,8 +917,13 @@ class GrblTerminal(Terminal):
         """Of errors, alarms, settings and reports."""
         if line == "ok" or line.startswith("error:"):
             self.due = max(self.due - 1, 0)
-        if line.startswith(("Grbl ", "ALARM:")):
-            self.due = 0
+        self.ready = self.ready or _understood(line)
+        if line.startswith("Grbl "):
+            if self.due and not self._resets:
+                self.failed = "the controller has begun anew"
+            self.due, self._resets = 0, False
+        elif line in LAST_WORDS and self.due:
+            self.failed = f"{line}, {ALARMS[int(line[6:])]}; it takes nothing more until a reset"
         if found := re.fullmatch(r"(error|ALARM):(\d+)", line):
             known = ERRORS if found[1] == "error" else ALARMS
             return known.get(int(found[2]), "it says no more")

@@ -494,6 +494,7 @@ class LinuxcncTerminal(Terminal):
 
     def __init__(self, link: LinuxcncLink) -> None:
         super().__init__()
+        self.answers = True
         words = f"hello {link.password} camtool 1.0", "set verbose on", "set echo off"
         orders = [*words, f"set enable {link.enable_password}"]
         self.hello = b"".join(order.encode() + self.end for order in orders)

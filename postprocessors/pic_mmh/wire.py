@@ -263,7 +263,7 @@ class PicMmhTerminal(Terminal):
 
     def __init__(self, link: PicMmhLink) -> None:
         super().__init__()
-        self._link = link
+        self._link, self.answers = link, link.echo == "echo"
         self._steps: list[tuple[str, int]] = []  # kinds of outputs and how many of each
         self._echo = b""  # what is to come back: letters are bytes of steps too
 

@@ -14,7 +14,9 @@ import pytest
 
 from camtool.target.registry import load_target
 from camtool.target.terminal import Terminal
+from tests.postprocessors.grbl.test_wire import Small
 from tests.sending.test_ends import hosted
+from tests.sending.test_send import behind_a_terminal
 from tests.waiting import heard_from
 
 
@@ -91,10 +93,103 @@ def test_any_byte_can_be_typed_and_shown() -> None:
 
 @pytest.mark.parametrize(
     ("line", "data", "due"),
-    [("?", b"?", 0), ("!", b"!", 0), (" ~ ", b"~", 0), ("^x", b"\x18", 0), ("$$", b"$$\n", 1)],
+    [("?", b"?", 0), ("!", b"!", 0), (" ~ ", b"~", 0), ("^x", b"\x18", 1), ("$$", b"$$\n", 1)],
 )
 def test_real_time_bytes_of_grbl_have_no_end(line: str, data: bytes, due: int) -> None:
     loaded = load_target("grbl")
     wire: Any = loaded.target.wire()
     terminal = wire.terminal(loaded.machine)
     assert (terminal.typed(line), terminal.due) == (data, due)
+
+
+class Starting(Small):
+    """A board that its boot loader keeps from hearing anything until it was asked three times, and
+    that may answer no more after some lines."""
+
+    def __init__(self, answers: int = 1000) -> None:
+        super().__init__(line_s=0.001)
+        self.asked, self.answers = 0, answers
+
+    def write(self, data: bytes, now: float) -> list[bytes]:
+        for k, octet in enumerate(data):
+            if self.asked == 3:
+                return super().write(data[k:], now)
+            self.asked += octet == ord("?")
+            if self.asked == 3:
+                return [b"Grbl 1.1h ['$' for help]", *super().write(data[k + 1 :], now)]
+        return []
+
+    def run(self, now: float) -> list[bytes]:
+        said = super().run(now)
+        self.answers -= bool(said)
+        return said if self.answers >= 0 else []
+
+
+def piped(small: Small, text: str, *more: str) -> subprocess.CompletedProcess[str]:
+    with behind_a_terminal(small) as port:
+        return subprocess.run(
+            [sys.executable, "-m", "camtool", "console", "grbl", port, *more],
+            input=text,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+
+
+def test_lines_from_a_pipe_wait_for_the_boot_loader() -> None:
+    small = Starting()
+    done = piped(small, "$$\n$21=1\n")
+    assert done.returncode == 0, done.stderr
+    assert "$100=250.000    X: steps per mm" in done.stdout
+    assert "<" not in done.stdout  # a listing is a file to keep, and holds what was asked for
+    assert small.lines == [b"$21=1"]
+    assert done.stdout.splitlines()[-1] == "ok"
+
+
+def test_an_answer_that_never_comes_is_an_error() -> None:
+    small = Starting(answers=1)
+    done = piped(small, "$1=255\n$21=1\n$22=1\n", "--wait", "3")
+    assert done.returncode == 1
+    assert "error: no answer to '$21=1': none came within 3 s" in done.stderr
+    assert small.lines == [b"$1=255", b"$21=1"]
+
+
+def test_one_that_never_starts_is_an_error() -> None:
+    small = Starting()
+    small.asked = -1000
+    done = piped(small, "$21=1\n", "--wait", "1")
+    assert done.returncode == 1
+    assert "the controller does not answer" in done.stderr
+    assert "--baud" in done.stderr
+    assert small.lines == []
+
+
+@pytest.mark.parametrize(
+    ("said", "why"),
+    [
+        (b"Grbl 1.1h ['$' for help]", "the controller has begun anew"),
+        (b"ALARM:1", "ALARM:1, a limit switch was hit"),
+    ],
+)
+def test_a_reset_or_an_alarm_instead_of_an_answer_is_an_error(said: bytes, why: str) -> None:
+    class Failing(Starting):
+        def run(self, now: float) -> list[bytes]:
+            return [said] if super().run(now) else []
+
+    done = piped(Failing(), "G1X100F600\nG1X0\n")
+    assert done.returncode == 1
+    assert f"no answer to 'G1X100F600': {why}" in done.stderr
+
+
+def test_what_follows_a_reset_waits_for_its_banner() -> None:
+    loaded = load_target("grbl")
+    wire: Any = loaded.target.wire()
+    terminal = wire.terminal(loaded.machine)
+    assert not terminal.ready
+    terminal.heard(b"\r\nGrbl 1.1h ['$' for help]\r\n")
+    assert terminal.ready
+    terminal.typed("^X")
+    assert terminal.due
+    terminal.heard(b"\r\nGrbl 1.1h ['$' for help]\r\n")
+    assert not terminal.due
+    assert not terminal.failed
