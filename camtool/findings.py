@@ -103,10 +103,12 @@ class Code(IntEnum):
     )
     BRANCHED = (
         109,
-        WARNING,
+        (WARNING, ERROR),
         "more than two ends meet at a point, so that lines could be joined in several ways; "
-        "the straightest was taken",
-        "look at the picture of `camtool check --preview`",
+        "the straightest was taken; an error where a contour is cleared, carved or offset that "
+        "encloses something else when they are joined in another way",
+        "look at the picture of `camtool check --preview`; correct the drawing, lower `--gap`, or "
+        "cut it with `--side on`",
     )
     DRAWN_TWICE = (
         110,
@@ -935,9 +937,25 @@ SELF_CROSSING_CARVED = Sentence(
 SELF_CROSSING_NO_REGION = Sentence(
     Code.SELF_CROSSING, "{fault}: its inside cannot be carved; {mend}", severity=ERROR
 )
-BRANCHED = Sentence(Code.BRANCHED, "{measured} ends meet; the straightest were joined")
+BRANCHED = Sentence(
+    Code.BRANCHED, "{measured} ends meet; the straightest were joined", severity=WARNING
+)
 BRANCHED_MORE = Sentence(
-    Code.BRANCHED, "more than two ends meet at {measured:# more place|# more places}"
+    Code.BRANCHED,
+    "more than two ends meet at {measured:# more place|# more places}",
+    severity=WARNING,
+)
+BRANCHED_REGION = Sentence(
+    Code.BRANCHED,
+    "{measured:#} ends meet here on {contour}, and what it encloses depends on which of them are "
+    "joined; correct the drawing here, lower --gap, or cut it with --side on",
+    severity=ERROR,
+)
+BRANCHED_REGION_MORE = Sentence(
+    Code.BRANCHED,
+    "contours pass {measured:# more place|# more places} where what they enclose depends on which "
+    "ends are joined",
+    severity=ERROR,
 )
 DRAWN_TWICE = Sentence(
     Code.DRAWN_TWICE,

@@ -2,9 +2,10 @@
 
     ends ──joints──▶ pairs ──walk──▶ chains ──joined──▶ paths ──open_gaps──▶ what stays open
 
-Each end takes part in one joint only. Where more than two ends meet, the straightest pair is
-joined and the place is reported as a branch. A joint moves a line to meet its neighbour (both
-lines to the middle); arcs stay exact, and two arcs with a gap get a short line between them.
+Each end takes part in one joint only. Ends that meet exactly are joined first, whatever the gap;
+only ends that meet nothing are joined across a gap. Where more than two ends meet, the straightest
+pair is joined and the place is reported as a branch. A joint moves a line to meet its neighbour
+(both lines to the middle); arcs stay exact, and two arcs with a gap get a short line between them.
 """
 
 from __future__ import annotations
@@ -77,7 +78,7 @@ def chain(
     groups: Sequence[Hashable] | None = None,
     kinds: Kinds | None = None,
 ) -> Chained:
-    """Open paths joined where their ends lie within `gap_mm`, nearest ends first.
+    """Open paths joined where their ends meet exactly, then where free ends lie within `gap_mm`.
 
     Paths of different groups (layers) are never joined; `kinds` says more than `groups` alone. A
     chain whose own ends meet becomes closed, unless nothing would lie inside (a line and its
@@ -104,7 +105,7 @@ def chain(
         members=members,
         closed_gaps=tuple(_closed_gaps(lots, paths.layers)),
         open_gaps=tuple(open_gaps(result_ends, path_lengths(result), names, gap_mm)),
-        branches=found.named(paths.ends, paths.layers),
+        branches=found.named(paths.ends, paths.layers, members, result.closed),
     )
 
 
@@ -158,14 +159,24 @@ def _closed_gaps(lots: Sequence[Joined], layers: Sequence[str]) -> list[Gap]:
 
 # Which open ends are joined: near ends are paired, at branches the straightest of them.
 #
-#     ends ──grid──▶ pairs within the gap ──clusters──▶ two ends: joined
-#                                                 └───▶ more ends: a branch, best pairs first
+#     all ends ──within POSITION_EPS_MM──▶ pairs ──clusters──▶ two ends: joined
+#                                                            └──▶ more ends: a branch,
+#                                                                 best pairs first
+#     ends that met none ──within the gap──▶ the same; but two ends whose rivals are all at least
+#                                            CLASS_RATIO times as far apart are joined before
+#
+# So a gap tolerance never changes what meets exactly, however short the segments beside it.
 #
 # The best pair at a branch is, in this order: of the nearest class of distance (a class spans a
 # factor of `CLASS_RATIO`; up to `POSITION_EPS_MM` is one class), of one style (colour, line type),
 # the straightest (turns within `SAME_TURN_RAD` are the same), and then the one that comes first by
 # place, so that the order in which paths were drawn decides nothing. Last, a ring that passes a
 # branch twice becomes two rings: contours touch at corners, they do not run through each other.
+#
+# At a branch of ends that meet exactly and all belong to rings, every choice of pairs encloses the
+# same points (those with an odd number of lines between them and the outside). So it does where
+# the others are strokes of which the other end meets nothing. At any other branch the choice
+# matters, and the paths that pass it are named with it.
 
 CLASS_RATIO = 2.0
 """Distances of ends whose ratio is below this may count as equal at a branch."""
@@ -212,49 +223,168 @@ class Ends(Struct, frozen=True, eq=False):
 
 
 class Joints(Struct, frozen=True, eq=False):
-    """`mates` (2M,): the end that each end is joined to, −1 for none; and where ends branch."""
+    """`mates` (2M,): the end that each end is joined to, −1 for none. `node` (2M,): the number of
+    the branch at which an end lies, −1 for none; `branches` has for each such number the first end
+    by place and how many ends meet there, and `bridged` the numbers of those with gaps. `alone`
+    (2M,): the ends that meet no other one exactly."""
 
     mates: Ints
-    branches: tuple[tuple[int, int], ...]
+    node: Ints
+    branches: dict[int, tuple[int, int]]
+    bridged: frozenset[int]
+    alone: Bools
 
-    def named(self, ends: Ends, layers: Sequence[str]) -> tuple[Branch, ...]:
-        """The branches with their places, in the order of place, layer and size."""
+    def named(
+        self,
+        ends: Ends,
+        layers: Sequence[str],
+        members: Sequence[Sequence[int]],
+        closed: Bools,
+    ) -> tuple[Branch, ...]:
+        """The branches with their places, in the order of place, layer and size.
+
+        `members` are the input paths of each result, `closed` says which results are rings.
+        """
+        if not self.branches:
+            return ()
+        result = np.empty(len(ends.group), dtype=np.int64)
+        for index, paths in enumerate(members):
+            result[list(paths)] = index
+        matters = set(self.bridged)
+        leads_nowhere = np.zeros(len(closed), dtype=np.bool_)
+        leads_nowhere[result[np.flatnonzero(self.alone & (self.mates < 0)) // 2]] = True
+        meeting = np.flatnonzero(self.node >= 0)
+        path = result[meeting // 2]
+        plain = np.where(self.mates[meeting] < 0, leads_nowhere[path], closed[path])
+        matters.update(self.node[meeting[~plain]].tolist())
+        passing: dict[int, set[int]] = {number: set() for number in matters}
+        for end in meeting.tolist():
+            if (number := int(self.node[end])) in passing:
+                passing[number].add(int(result[end // 2]))
         found = [
             Branch(
-                (float(ends.points[end, 0]), float(ends.points[end, 1])), size, layers[end // 2]
+                (float(ends.points[end, 0]), float(ends.points[end, 1])),
+                size,
+                layers[end // 2],
+                tuple(sorted(passing.get(number, ()))),
             )
-            for end, size in self.branches
+            for number, (end, size) in self.branches.items()
         ]
         return tuple(sorted(found, key=lambda branch: (branch.at_mm, branch.layer, branch.ends)))
 
 
 def joints(ends: Ends, reach: float) -> Joints:
     """Which ends are joined, within `reach` and within their group (see the top)."""
-    from camtool.kernels.chaining import join
-
-    mates = np.full(len(ends.points), -1, dtype=np.int64)
-    above = np.arange(len(ends.group))
-    segments, arcs = ends.weights[:, 0].copy(), ends.weights[:, 1].copy()
-    node = np.full(len(mates), -1, dtype=np.int64)
-    branches: dict[int, int] = {}
-    free = np.flatnonzero(np.repeat(ends.is_open, 2))
-    while len(free):
+    joining = _Joining.of(ends)
+    free = every = np.flatnonzero(np.repeat(ends.is_open, 2))
+    alone = np.ones(len(joining.mates), dtype=np.bool_)
+    exact = one, other = _near(ends, every, POSITION_EPS_MM)
+    alone[one], alone[other] = False, False
+    # Of very many ends at one point not all pairs are examined at once.
+    while joining.join_clusters(one, other) and len(one) >= MOST_NEIGHBOURS:
+        free = free[joining.mates[free] < 0]
+        one, other = _near(ends, free, POSITION_EPS_MM)
+    met = frozenset(joining.branches)
+    free = every[alone[every]]
+    while len(free) and reach > POSITION_EPS_MM:
         near = _bearable(ends.points[free], reach)
         one, other = _near(ends, free, near)
-        label, size = _clusters(len(mates), one, other)
-        is_branch = size[label[one]] > 2
-        order = np.argsort(one[~is_branch], kind="stable")
-        simple = one[~is_branch][order], other[~is_branch][order]
-        hard = _ranked(ends, one[is_branch], other[is_branch])
-        made = sum(join(*pair, mates, above, segments, arcs) for pair in (simple, hard))
-        meeting = np.flatnonzero(size[label] > 2)
-        node[meeting] = label[meeting]
-        branches.update(_first_ends(ends, meeting, label))
+        made = joining.join_clear(*joining.possible(one, other), near)
         if near == reach or made == 0:
             break
-        free = free[mates[free] < 0]
-    _split(ends, mates, node, reach)
-    return Joints(mates, tuple(branches.items()))
+        free = free[joining.mates[free] < 0]
+    _split(ends, joining.mates, joining.node, reach)
+    joining.note_left(alone, exact, reach)
+    bridged = frozenset(joining.branches) - met
+    return Joints(joining.mates, joining.node, joining.branches, bridged, alone)
+
+
+class _Joining(Struct, eq=False):
+    """The joints so far: `mates`, `node` and `branches` as of `Joints`; of each set of joined
+    paths the first one (`above`), its `segments` and its `arcs`."""
+
+    ends: Ends
+    mates: Ints
+    node: Ints
+    branches: dict[int, tuple[int, int]]
+    above: Ints
+    segments: Ints
+    arcs: Ints
+
+    @classmethod
+    def of(cls, ends: Ends) -> _Joining:
+        """No joints yet."""
+        none = np.full(len(ends.points), -1, dtype=np.int64)
+        segments, arcs = ends.weights[:, 0].copy(), ends.weights[:, 1].copy()
+        return cls(ends, none, none.copy(), {}, np.arange(len(ends.group)), segments, arcs)
+
+    def join(self, one: Ints, other: Ints) -> int:
+        """Join these pairs in their order, if both ends are free; return how many were."""
+        from camtool.kernels.chaining import join
+
+        return join(one, other, self.mates, self.above, self.segments, self.arcs)
+
+    def possible(self, one: Ints, other: Ints) -> tuple[Ints, Ints]:
+        """The pairs without those of both ends of one path that would enclose nothing."""
+        segments, arcs = self.ends.weights[one // 2].T
+        apart = (one // 2 != other // 2) | (segments > 2) | ((segments == 2) & (arcs > 0))
+        return one[apart], other[apart]
+
+    def join_clusters(self, one: Ints, other: Ints) -> int:
+        """Join the ends that lie in twos, and the best pairs where more meet; return how many."""
+        label, size = _clusters(len(self.mates), one, other)
+        is_branch = size[label[one]] > 2
+        made = self.join(*_in_turn(one[~is_branch], other[~is_branch]))
+        made += self.join(*_ranked(self.ends, one[is_branch], other[is_branch]))
+        meeting = np.flatnonzero(size[label] > 2)
+        self.node[meeting] = label[meeting]
+        self.branches.update(_first_ends(self.ends, meeting, label))
+        return made
+
+    def note_left(self, alone: Bools, exact: tuple[Ints, Ints], reach: float) -> None:
+        """Note a branch where one of the ends that are `alone` at their place (2M,) has stayed
+        free though joined ones lie within reach: it may have been meant to meet these.
+
+        `exact` are the pairs of ends that are not alone.
+        """
+        free = alone & (self.mates < 0) & (self.node < 0)
+        if reach <= POSITION_EPS_MM or not free.any():
+            return
+        every = np.flatnonzero(np.repeat(self.ends.is_open, 2))
+        near = _near(self.ends, every, _bearable(self.ends.points[every], reach))
+        one, other = self.possible(*near)
+        beside = free[one] != free[other]
+        one, other = one[beside], other[beside]
+        joined = np.where(free[one], other, one)
+        joined = joined[self.mates[joined] >= 0]
+        one = np.concatenate([one, joined, exact[0]])
+        other = np.concatenate([other, self.mates[joined], exact[1]])
+        label, size = _clusters(len(self.mates), one, other)
+        has_free = np.zeros(len(label), dtype=np.bool_)
+        has_free[label[free]] = True
+        meeting = np.flatnonzero((size[label] > 2) & has_free[label])
+        for number in np.unique(self.node[meeting]).tolist():
+            self.branches.pop(number, None)  # it is part of a larger one
+        label += len(label)
+        self.node[meeting] = label[meeting]
+        self.branches.update(_first_ends(self.ends, meeting, label))
+
+    def join_clear(self, one: Ints, other: Ints, reach: float) -> int:
+        """Join the ends whose rivals are much farther first (see the top), then the others;
+        return how many. All pairs (J,), (J,) are within `reach`."""
+        apart = np.hypot(*(self.ends.points[one] - self.ends.points[other]).T)
+        made, least = 0, float(apart.min(initial=reach))
+        for k in range(math.ceil(math.log(reach / least, CLASS_RATIO)), -1, -1):
+            scale = reach / CLASS_RATIO**k
+            close = apart <= CLASS_RATIO * scale
+            label, size = _clusters(len(self.mates), one[close], other[close])
+            clear = (apart <= scale) & (size[label[one]] == 2)
+            made += self.join(*_in_turn(one[clear], other[clear]))
+            left = ~clear & (self.mates[one] < 0) & (self.mates[other] < 0)
+            one, other, apart = one[left], other[left], apart[left]
+            if not len(one):
+                return made
+        return made + self.join_clusters(one, other)
 
 
 def _bearable(points: Floats, reach: float) -> float:
@@ -288,6 +418,12 @@ def _near(ends: Ends, free: Ints, reach: float) -> tuple[Ints, Ints]:
 
 
 _WIDER = 1.0 + 1e-9
+
+
+def _in_turn(one: Ints, other: Ints) -> tuple[Ints, Ints]:
+    """Pairs of different ends, sorted by their first ones."""
+    order = np.argsort(one, kind="stable")
+    return one[order], other[order]
 
 
 def _clusters(count: int, one: Ints, other: Ints) -> tuple[Ints, Ints]:
@@ -329,14 +465,15 @@ def _places(ends: Ends, chosen: Ints) -> Ints:
     return rank
 
 
-def _first_ends(ends: Ends, meeting: Ints, label: Ints) -> dict[int, int]:
-    """For each branch its first end by place, and how many ends meet there."""
+def _first_ends(ends: Ends, meeting: Ints, label: Ints) -> dict[int, tuple[int, int]]:
+    """For each branch, by its label, its first end by place and how many ends meet there."""
     if not len(meeting):
         return {}
     rank = _places(ends, meeting)
     order = meeting[np.lexsort((rank[meeting], label[meeting]))]
-    _, begin, count = np.unique(label[order], return_index=True, return_counts=True)
-    return dict(zip(order[begin].tolist(), count.tolist(), strict=True))
+    number, begin, count = np.unique(label[order], return_index=True, return_counts=True)
+    firsts = zip(order[begin].tolist(), count.tolist(), strict=True)
+    return dict(zip(number.tolist(), firsts, strict=True))
 
 
 def _split(ends: Ends, mates: Ints, node: Ints, reach: float) -> None:

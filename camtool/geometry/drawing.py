@@ -52,11 +52,16 @@ class Mark(Struct, frozen=True):
 
 
 class Branch(Struct, frozen=True):
-    """A place (x, y) mm where more than two open ends meet: how many, and the layer of one."""
+    """A place (x, y) mm where more than two open ends meet: how many, and the layer of one.
+
+    `paths`: the indices of the paths that pass it, if these enclose something else when the ends
+    are joined in another way; none if all ways enclose the same.
+    """
 
     at_mm: tuple[float, float]
     ends: int
     layer: str
+    paths: tuple[int, ...] = ()
 
 
 class SelfCrossing(Struct, frozen=True):

@@ -9,16 +9,21 @@ operation, and for those that cross: whoever draws a notch beyond an edge wants 
 An allowance below 0 takes a contour's wall back by as much, whatever cuts it: a tool that comes
 from where that wall is free may come nearer by this. A pocket that is cut beyond its lines is
 looked at like a profile.
+
+A contour that encloses something else when ends that branch are joined in another way is no
+region: to clear it, carve it, or cut beside it is an error.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.findings import (
+    BRANCHED_REGION,
+    BRANCHED_REGION_MORE,
     GOUGE,
     GOUGE_BY_POCKET,
     GOUGE_BY_POCKET_MORE,
@@ -31,6 +36,7 @@ from camtool.findings import (
     Severity,
 )
 from camtool.geometry.distance import approach, near_paths, nearest
+from camtool.geometry.drawing import Branch
 from camtool.geometry.measure import extents, path_lengths, sample
 from camtool.geometry.nesting import inside, nesting
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
@@ -63,6 +69,31 @@ def side_findings(work: Work, chosen: Chosen, sides: Sides, operation: Operation
     if operation.side == "auto":
         found += by_uncut(sides, operation, chosen.source[chosen.lines.closed])
     return found
+
+
+def branch_findings(
+    branches: Sequence[Branch], chosen: Chosen, sides: Sides, operation: Operation
+) -> list[Finding]:
+    """Errors where an operation needs to know what contours enclose that pass `branches` of the
+    placed drawing at which that is a choice: its own, and those that decide its sides."""
+    beside = runs_beside(operation)
+    if not (beside or operation.kind in ("pocket", "bore", "vcarve")):
+        return []
+    asked = np.zeros(len(sides.lines), dtype=np.bool_)
+    asked[chosen.source] = True
+    if beside and operation.side == "auto":
+        asked |= sides.seen_by(operation).bounds
+    found = [
+        BRANCHED_REGION(
+            where=at_place(sides.names[rows[0]], branch.at_mm),
+            measured=branch.ends,
+            limit=2.0,
+            contour=sides.names[rows[0]],
+        )
+        for branch in branches
+        if (rows := [row for row in branch.paths if asked[row]])
+    ]
+    return shortened_list(found, BRANCHED_REGION_MORE)
 
 
 def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> Iterator[Finding]:

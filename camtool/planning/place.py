@@ -380,8 +380,12 @@ def _healing(drawing: Drawing, maps: list[Map], rows: Ints) -> Healing:
     return structs.replace(
         healing,
         branches=tuple(
-            structs.replace(branch, at_mm=where.point(branch.at_mm))
-            for where in maps
+            structs.replace(
+                branch,
+                at_mm=where.point(branch.at_mm),
+                paths=tuple(now[k + n * paths] for k in branch.paths if k + n * paths in now),
+            )
+            for n, where in enumerate(maps)
             for branch in healing.branches
         ),
         crossings=tuple(

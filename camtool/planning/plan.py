@@ -36,7 +36,7 @@ from camtool.planning.drawn import drawn_of
 from camtool.planning.drill import drill
 from camtool.planning.engrave import engrave
 from camtool.planning.finish import in_passes, of_stage
-from camtool.planning.gouges import side_findings
+from camtool.planning.gouges import branch_findings, side_findings
 from camtool.planning.items import Bridge, Chosen, Contours, Items, Runs, Setting, Step, Work
 from camtool.planning.job import Job, Operation, Tool, refuse_endless
 from camtool.planning.leads import KeepOut
@@ -236,10 +236,9 @@ def _step(
         if rough is not None:
             items, more = in_passes(items, setting, rough)
             bare += more
-    findings = of_stage(
-        setting.operation,
-        [*work.findings, *side_findings(work, chosen, sides, setting.operation), *bare],
-    )
+    sided = side_findings(work, chosen, sides, setting.operation)
+    unclear = branch_findings(placed.healing.branches, chosen, sides, setting.operation)
+    findings = of_stage(setting.operation, [*unclear, *work.findings, *sided, *bare])
     choices = choices_of(items)
     before = travel_mm(choices, drawn(choices), *ends)
     if job.minimise == "reversals":

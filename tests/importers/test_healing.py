@@ -315,3 +315,81 @@ def test_segments_are_numbered_alike_however_many_at_a_time(
     turned = vertices.copy()
     turned[end, 2] = -vertices[begin, 2]
     assert healing.segment_numbers(turned, end, begin).tolist() == numbers.tolist()
+
+
+# Exploded outlines: what meets exactly is joined as it was drawn, whatever the gap tolerance.
+
+
+def outline_with_specks(
+    random: Random, radius: float, at: tuple[float, float]
+) -> list[list[float]]:
+    """The vertices (x, y, bulge) of a star-shaped outline, most of whose corners are notches,
+    steps and rounds of 2 to 19 µm."""
+    rows: list[list[float]] = []
+    count = random.randint(3, 9)
+    for k in range(count):
+        angle = (k + 0.4 * random.random()) * 2.0 * math.pi / count
+        reach = radius * random.uniform(0.6, 1.0)
+        x, y = at[0] + reach * math.cos(angle), at[1] + reach * math.sin(angle)
+        rows.append([x, y, random.choice([0.0, 0.0, 0.2, -0.1])])
+        heading = angle + math.pi / 2
+        for _ in range(random.choice([0, 1, 2, 3, 6])):
+            rows[-1][2] = random.choice([0.0, 0.0, 0.4, -0.4])
+            heading += random.uniform(-0.6, 0.9)
+            step = random.uniform(0.002, 0.019)
+            x, y = x + step * math.cos(heading), y + step * math.sin(heading)
+            rows.append([x, y, 0.0])
+    return rows
+
+
+def exploded(rows: list[list[float]], random: Random) -> list[Piece]:
+    """Each line and arc of a ring as a piece of its own, drawn in either direction, its ends less
+    than the equal-position tolerance off."""
+
+    def near(x: float, y: float) -> tuple[float, float]:
+        return x + random.uniform(-2e-7, 2e-7), y + random.uniform(-2e-7, 2e-7)
+
+    pieces = []
+    for (x, y, bulge), (u, v, _) in zip(rows, [*rows[1:], rows[0]], strict=True):
+        one, other = (*near(x, y), bulge), (*near(u, v), 0.0)
+        if random.random() < 0.5:
+            one, other = (*other[:2], -bulge), (*one[:2], 0.0)
+        pieces.append(piece(one, other))
+    return pieces
+
+
+def is_ring(path: Polyline, rows: list[list[float]], within: float) -> bool:
+    """True if the closed path has these vertices, from any start and in either direction."""
+    x, y, bulge = np.array(rows).T
+    ways = [np.column_stack([x, y, bulge])]
+    ways.append(np.column_stack([x[::-1], y[::-1], -np.roll(bulge[::-1], -1)]))
+    if not path.closed or len(path.vertices) != len(rows):
+        return False
+    return any(
+        np.allclose(np.roll(way, shift, axis=0), path.vertices, rtol=0.0, atol=within)
+        for way in ways
+        for shift in range(len(rows))
+    )
+
+
+@pytest.mark.parametrize("gap", [0.0, 1e-5, 0.003, 0.01, 0.05, 0.5])
+@given(seed=st.integers(0, 10**9))
+def test_exploded_outlines_are_joined_as_they_were_drawn(gap: float, seed: int) -> None:
+    random = Random(seed)
+    rings = [outline_with_specks(random, 10.0, (0.0, 0.0))]
+    # An island, and one beside it by less than the gap.
+    rings.append(outline_with_specks(random, 2.0, (0.5, 0.5)))
+    beside = max(x for x, _, _ in rings[0]) + 0.004
+    rings.append([[x + beside, y, b] for x, y, b in outline_with_specks(random, 3.0, (3.0, 0.0))])
+    turn, flip = random.uniform(0.0, 2.0 * math.pi), random.choice([1.0, -1.0])
+    for row in (row for ring in rings for row in ring):
+        x, y = flip * row[0], row[1]
+        row[0] = math.cos(turn) * x - math.sin(turn) * y
+        row[1], row[2] = math.sin(turn) * x + math.cos(turn) * y, flip * row[2]
+    pieces = [one for ring in rings for one in exploded(ring, random)]
+    random.shuffle(pieces)
+    drawing = put(*pieces, gap_mm=gap, tolerance_mm=1e-4)
+    assert len(drawing.paths) == len(rings)
+    for ring in rings:
+        assert sum(is_ring(path, ring, 1e-6) for path in drawing.paths) == 1
+    assert not [f for f in drawing.findings if f.code in (Code.GAP_CLOSED, Code.BRANCHED)]

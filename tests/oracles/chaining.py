@@ -15,11 +15,12 @@ from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, reverse
 
 @dataclass(frozen=True)
 class Result:
-    """(members, path) in order, sizes of closed gaps, and (place, ends) of branches."""
+    """(members, path) in order, sizes of closed gaps, and of branches (place, ends, and the
+    results that pass one at which the choice matters)."""
 
     paths: list[tuple[tuple[int, ...], Polyline]]
     gaps: list[float]
-    branches: list[tuple[tuple[float, float], int]]
+    branches: list[tuple[tuple[float, float], int, tuple[int, ...]]]
 
 
 def chained(paths: list[Polyline], gap: float, groups: list[str], styles: list[str]) -> Result:
@@ -27,6 +28,7 @@ def chained(paths: list[Polyline], gap: float, groups: list[str], styles: list[s
     oracle = _Oracle(paths, max(gap, POSITION_EPS_MM), groups, styles)
     oracle.pair()
     oracle.split()
+    oracle.note_left()
     results: list[tuple[tuple[int, ...], Polyline]] = []
     gaps: list[float] = []
     for members, turned, ring in oracle.walk():
@@ -35,7 +37,7 @@ def chained(paths: list[Polyline], gap: float, groups: list[str], styles: list[s
             gaps.extend(sizes)
     results.extend(((i,), path) for i, path in enumerate(paths) if path.closed)
     results.sort(key=lambda item: min(item[0]))
-    return Result(results, gaps, oracle.branches())
+    return Result(results, gaps, oracle.branches(results))
 
 
 class _Oracle:
@@ -45,17 +47,27 @@ class _Oracle:
         self.paths, self.reach, self.groups, self.styles = paths, reach, groups, styles
         self.ends = [2 * i + side for i, p in enumerate(paths) if not p.closed for side in (0, 1)]
         self.mate: dict[int, int] = {}
-        self.near = [
-            (a, b)
-            for k, a in enumerate(self.ends)
-            for b in self.ends[k + 1 :]
-            if groups[a // 2] == groups[b // 2] and self.apart(a, b) <= reach
-        ]
+        self.set_of = {i: {i} for i in range(len(paths))}
         self.cluster = {end: end for end in self.ends}
-        for _ in self.ends:
-            for a, b in self.near:
-                least = min(self.cluster[a], self.cluster[b])
-                self.cluster[a] = self.cluster[b] = least
+        self.sizes = dict.fromkeys(self.ends, 1)
+        self.bridged: set[int] = set()
+
+    def pairs(self, ends: list[int], reach: float) -> list[tuple[int, int]]:
+        return [
+            (a, b)
+            for k, a in enumerate(ends)
+            for b in ends[k + 1 :]
+            if self.groups[a // 2] == self.groups[b // 2] and self.apart(a, b) <= reach
+        ]
+
+    @staticmethod
+    def met(pairs: list[tuple[int, int]]) -> dict[int, int]:
+        """For each end of the pairs the least end that they connect with it."""
+        least = {end: end for pair in pairs for end in pair}
+        for _ in least:
+            for a, b in pairs:
+                least[a] = least[b] = min(least[a], least[b])
+        return least
 
     def point(self, end: int) -> Floats:
         path = self.paths[end // 2]
@@ -72,7 +84,7 @@ class _Oracle:
         return math.atan2(y1 - y0, x1 - x0) + 2.0 * math.atan(bulge)
 
     def size(self, end: int) -> int:
-        return sum(self.cluster[other] == self.cluster[end] for other in self.ends)
+        return self.sizes[end]
 
     def place(self, end: int) -> tuple[float, ...]:
         """Where an end comes in an order that has nothing to do with the order of drawing."""
@@ -92,18 +104,85 @@ class _Oracle:
         return (max(math.floor(steps), -1), unlike, round(turn / SAME_TURN_RAD), *places)
 
     def pair(self) -> None:
-        simple = [pair for pair in self.near if self.size(pair[0]) == 2]
-        hard = [pair for pair in self.near if self.size(pair[0]) > 2]
-        set_of = {i: {i} for i in range(len(self.paths))}
-        for a, b in [*sorted(simple), *sorted(hard, key=self.rank)]:
+        """Exact ends first; then free ends without rivals; then the rest."""
+        exact = self.pairs(self.ends, POSITION_EPS_MM)
+        self.join_clusters(exact)
+        met = {end for pair in exact for end in pair}
+        free = [end for end in self.ends if end not in met]
+        pairs = [
+            (a, b)
+            for a, b in self.pairs(free, self.reach)
+            if a // 2 != b // 2 or self.encloses({a // 2})
+        ]
+        if self.reach > POSITION_EPS_MM:
+            self.join_clear(pairs)
+
+    def join_clear(self, pairs: list[tuple[int, int]]) -> None:
+        scales = [self.reach]
+        while pairs and scales[-1] > min(self.apart(*pair) for pair in pairs) > 0:
+            scales.append(scales[-1] / CLASS_RATIO)
+        for scale in reversed(scales):
+            least = self.met([p for p in pairs if self.apart(*p) <= CLASS_RATIO * scale])
+            members = list(least.values())
+            clear = [
+                (a, b)
+                for a, b in pairs
+                if self.apart(a, b) <= scale and members.count(least[a]) == 2
+            ]
+            self.join(clear)
+            pairs = [
+                (a, b)
+                for a, b in pairs
+                if (a, b) not in clear and a not in self.mate and b not in self.mate
+            ]
+        before = {end for end in self.ends if self.sizes[end] > 2}
+        self.join_clusters(pairs)
+        self.bridged = {end for end in self.ends if self.sizes[end] > 2} - before
+
+    def note_left(self) -> None:
+        """Free ends near ends that are joined exactly: one of them may have been meant."""
+        exact = self.pairs(self.ends, POSITION_EPS_MM)
+        met = {end for pair in exact for end in pair}
+        free = {
+            end
+            for end in self.ends
+            if end not in met and end not in self.mate and self.sizes[end] <= 2
+        }
+        pairs = list(exact)
+        for a, b in self.pairs(self.ends, self.reach):
+            if (a in free) == (b in free) or (a // 2 == b // 2 and not self.encloses({a // 2})):
+                continue
+            pairs.append((a, b))
+            there = b if a in free else a
+            if there in self.mate:
+                pairs.append((there, self.mate[there]))
+        least = self.met(pairs)
+        members = list(least.values())
+        for end, label in least.items():
+            if members.count(label) > 2 and any(least.get(e) == label for e in free):
+                self.cluster[end] = label + 2 * len(self.paths)
+                self.sizes[end] = members.count(label)
+                self.bridged.add(end)
+
+    def join_clusters(self, pairs: list[tuple[int, int]]) -> None:
+        least = self.met(pairs)
+        members = list(least.values())
+        for end, label in least.items():
+            self.cluster[end], self.sizes[end] = label, members.count(label)
+        simple = [pair for pair in pairs if self.sizes[pair[0]] == 2]
+        hard = [pair for pair in pairs if self.sizes[pair[0]] > 2]
+        self.join([*sorted(simple), *sorted(hard, key=self.rank)])
+
+    def join(self, pairs: list[tuple[int, int]]) -> None:
+        for a, b in pairs:
             if a in self.mate or b in self.mate:
                 continue
-            one, other = set_of[a // 2], set_of[b // 2]
+            one, other = self.set_of[a // 2], self.set_of[b // 2]
             if one is other and not self.encloses(one):
                 continue
             both = one | other
             for path in both:
-                set_of[path] = both
+                self.set_of[path] = both
             self.mate[a], self.mate[b] = b, a
 
     def encloses(self, members: set[int]) -> bool:
@@ -179,12 +258,32 @@ class _Oracle:
             )
         return chains
 
-    def branches(self) -> list[tuple[tuple[float, float], int]]:
+    def is_plain(self, end: int, results: list[tuple[tuple[int, ...], Polyline]]) -> bool:
+        """True for an end at an exact branch that belongs to a ring, or to a stroke to nowhere."""
+        if end in self.bridged:
+            return False
+        of, path = next(each for each in results if end // 2 in each[0])
+        if end in self.mate:
+            return path.closed
+        met = {e for pair in self.pairs(self.ends, POSITION_EPS_MM) for e in pair}
+        ends = {2 * i + side for i in of for side in (0, 1)} - set(self.mate)
+        return not ends <= met
+
+    def branches(
+        self, results: list[tuple[tuple[int, ...], Polyline]]
+    ) -> list[tuple[tuple[float, float], int, tuple[int, ...]]]:
         found = {}
         for end in sorted(self.ends, key=self.place):
-            if self.size(end) > 2:
+            if self.size(end) > 2 and self.cluster[end] not in found:
+                here = [e for e in self.ends if self.cluster[e] == self.cluster[end]]
+                passing = {k for k, (of, _) in enumerate(results) for e in here if e // 2 in of}
+                matters = not all(self.is_plain(e, results) for e in here)
                 x, y = self.point(end).tolist()
-                found.setdefault(self.cluster[end], ((x, y), self.size(end)))
+                found[self.cluster[end]] = (
+                    (x, y),
+                    self.size(end),
+                    tuple(sorted(passing)) if matters else (),
+                )
         return sorted(found.values())
 
 

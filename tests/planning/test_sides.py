@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
+import msgspec
 import numpy as np
 import pytest
 import shapely
@@ -357,3 +359,96 @@ def test_a_stock_is_no_contour() -> None:
     drawing = _read(PLATE, ("CUT",) * 3)
     job = Job(operations=_profiles("CUT"), stock=Stock(3.0, (-5.0, -5.0), (20.0, 20.0)))
     assert _sides(drawing, job) == {"CUT/PATH 0": True, "CUT/PATH 1": False, "CUT/PATH 2": False}
+
+
+# Contours that enclose something else when ends that branch are joined in another way.
+
+FRAME = [(0.0, 0.0), (20.0, 0.0), (20.0, 10.0), (0.0, 10.0), (0.0, 0.0)]
+
+
+def _single_lines(*chains: Sequence[tuple[float, float]], gap_mm: float = 0.01) -> Drawing:
+    """A drawing of single lines, those of each chain end to end."""
+    ends = [pair for chain in chains for pair in itertools.pairwise(chain)]
+    pieces = [
+        Piece(np.array([(*a, 0.0), (*b, 0.0)]), False, "A", "#000000", f"LINE {k}", "")
+        for k, (a, b) in enumerate(ends)
+    ]
+    return assemble(
+        pieces,
+        file="test.dxf",
+        units=Units("mm", 1.0, "in a test"),
+        used={},
+        skipped=[],
+        findings=[],
+        options=ReadOptions(gap_mm=gap_mm),
+    )
+
+
+def _refused(drawing: Drawing, machine: Machine, **more: object) -> list[Finding]:
+    operation = Operation(tool=Tool(D), depth_mm=0.1, layers=("A",), **more)  # type: ignore[arg-type]
+    found = planned(drawing, Job((operation,)), machine).toolpath.findings
+    return [each for each in found if each.code == Code.BRANCHED]
+
+
+DIVIDED = [
+    [(8.0, 0.0), (20.0, 0.0), (20.0, 10.0), (8.0, 10.0), (0.0, 10.0), (0.0, 0.0), (8.0, 0.0)],
+    [(8.0, 0.0), (11.0, 5.0), (8.0, 10.0)],
+]
+
+CHOICES = {
+    "exact": _single_lines(*DIVIDED),
+    # Three ends some micrometres apart at two corners.
+    "bridged": _single_lines(
+        [(8.002, 0.0), (20.0, 0.0), (20.0, 10.0), (8.0, 10.002)],
+        [(7.999, 10.0), (0.0, 10.0), (0.0, 0.0), (7.999, 0.001)],
+        [(8.0, 0.006), (11.0, 5.0), (8.001, 9.995)],
+    ),
+    # A stroke that ends 3 µm beside an exact corner.
+    "beside": _single_lines(FRAME, [(20.002, 10.002), (24.0, 13.0)]),
+}
+
+
+@pytest.mark.parametrize("name", ["exact", "bridged"])
+@pytest.mark.parametrize("kind", ["pocket", "profile"])
+def test_no_region_is_cut_that_depends_on_how_ends_are_joined(
+    name: str, kind: str, machine: Machine
+) -> None:
+    drawing = CHOICES[name]
+    rings = np.flatnonzero(drawing.paths.closed).tolist()
+    assert len(rings) == 1
+    if kind == "pocket":  # which takes no open path
+        branches = [msgspec.structs.replace(each, paths=(0,)) for each in drawing.healing.branches]
+        drawing = Drawing(
+            drawing.paths.select(rings),
+            ("A",),
+            ("",),
+            ("LINE",),
+            "test.dxf",
+            drawing.units,
+            healing=msgspec.structs.replace(drawing.healing, branches=tuple(branches)),
+        )
+    found = _refused(drawing, machine, kind=kind)
+    assert [each.severity for each in found] == [Severity.ERROR] * 2
+    assert not _refused(drawing, machine, kind="profile", side="on")
+    assert not _refused(drawing, machine, kind="engrave")
+
+
+def test_a_stroke_beside_a_corner_makes_the_contour_doubtful(machine: Machine) -> None:
+    (finding,) = _refused(CHOICES["beside"], machine)
+    assert finding.severity == Severity.ERROR
+    assert finding.measured == 3
+    apart = _single_lines(FRAME, [(20.002, 10.002), (24.0, 13.0)], gap_mm=0.001)
+    assert not _refused(apart, machine)
+
+
+def test_branches_that_leave_no_choice_are_cut(machine: Machine) -> None:
+    corners = [(20.0, 10.0), (30.0, 10.0), (30.0, 20.0), (20.0, 20.0), (20.0, 10.0)]
+    touching = _single_lines(FRAME, corners)
+    assert [each.ends for each in touching.healing.branches] == [4]
+    assert touching.paths.closed.tolist() == [True, True]
+    assert not _refused(touching, machine)
+    assert not _refused(touching, machine, kind="pocket")
+    # A centre line that begins at a corner and ends nowhere.
+    stroke = _single_lines(FRAME, [(20.0, 10.0), (16.0, 7.0)])
+    assert [each.ends for each in stroke.healing.branches] == [3]
+    assert not _refused(stroke, machine)
