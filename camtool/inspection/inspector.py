@@ -18,7 +18,17 @@ from camtool.errors import OptionError
 from camtool.findings import DIMENSION_NOT_CUT, Finding
 from camtool.inspection.dimensions import Dimension
 from camtool.inspection.features import Bound, Edge, bind, features_of
-from camtool.inspection.sizes import Cut, Size, Swept, cut_of, edge_at, rows_of, size_of
+from camtool.inspection.sizes import (
+    Cut,
+    Size,
+    Swept,
+    cut_of,
+    distinct_levels,
+    edge_at,
+    rows_of,
+    size_of,
+    sizes_of,
+)
 from camtool.inspection.uncertainty import Variant, edges_of, opposite_edges
 from camtool.machine.model import Machine
 from camtool.planning.job import Job, Tool
@@ -34,6 +44,10 @@ CHORD_MM = 1e-4
 
 MOST_POINTS = 400_000
 """A path has at most about so many points for inspection: 13 MB."""
+
+
+MOST_AT_ONCE = 1_000_000
+"""Edges of drawn parts that are measured together: 8 MB in each array."""
 
 
 class Inspected(Struct, frozen=True, eq=False):
@@ -115,6 +129,34 @@ class Inspector:
         """(3 D,) mm: of each dimension its best fit, its least and its largest local size."""
         sizes = self.sizes(variant)
         return np.array([(each.fit_mm, each.low_mm, each.high_mm) for each in sizes]).reshape(-1)
+
+    def machined(self, variant: Variant) -> Floats:
+        """(T,) mm where the edges of all cuts lie on a variant of the machine, one after the
+        other; NaN where one is not cut."""
+        lies = self._edges(variant).values()
+        return np.concatenate([np.zeros(0), *(each.reshape(-1) for each in lies)])
+
+    def measured(self, nodes: Floats, weights: Floats) -> Floats:
+        """(N, 3 D) mm the values of N parts whose edges are mixed with `weights` (N, M) from those
+        of M parts, `nodes` (M, T), as `machined` returns them."""
+        cuts = {id(cut): cut for each in self.dimensions for cut in each.cuts}
+        own: dict[int, tuple[Floats, Floats]] = {}  # levels, and the nodes' edges there
+        begin = 0
+        for key, cut in cuts.items():
+            edges = nodes[:, begin : begin + cut.seen.size].reshape(len(nodes), *cut.seen.shape)
+            begin += cut.seen.size
+            kept = distinct_levels(edges)
+            own[key] = cut.levels_mm[kept], edges[:, kept]
+        found = np.empty((len(weights), len(self.dimensions), 3))
+        for index, each in enumerate(self.dimensions):
+            levels = [own[id(cut)][0] for cut in each.cuts]
+            simulated = [own[id(cut)][1] for cut in each.cuts]
+            most = max(1, MOST_AT_ONCE // max(one[0].size for one in simulated))
+            for first in range(0, len(weights), most):
+                part = weights[first : first + most]
+                lies = [np.tensordot(part, one, axes=1) for one in simulated]
+                found[first : first + most, index] = sizes_of(each.bound, levels, lies)
+        return found.reshape(len(weights), -1)
 
     @property
     def edges(self) -> Floats:

@@ -35,7 +35,6 @@ from msgspec.structs import replace
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.inspection.features import Bound, Circle, Edge, End, Feature
-from camtool.verification.circles import least_squares_centre
 
 CIRCLE_STATIONS = 360
 """Stations on a whole circle: an even number, so that each has one opposite."""
@@ -405,28 +404,48 @@ def size_of(bound: Bound, cuts: Sequence[Cut], lies: Sequence[Floats]) -> Size |
     """The size of a dimension from how its features are cut and where their machined edges lie
     (L, S), as `edge_at` says, in the order of `bound.features`; None where one is not cut. Below
     the deepest cut of one feature it counts as it is there."""
-    levels = np.unique(np.concatenate([cut.levels_mm for cut in cuts]))[::-1]
-    found: list[Size] = []
+    levels = [cut.levels_mm for cut in cuts]
+    found = sizes_of(bound, levels, [each[None] for each in lies])[0]
+    return Size(*found.tolist()) if np.isfinite(found).all() else None
+
+
+def sizes_of(bound: Bound, levels_mm: Sequence[Floats], lies: Sequence[Floats]) -> Floats:
+    """(N, 3) mm the same of N parts at once: best fit, least and largest local size. `lies`
+    (N, L, S) are where the edges of each feature lie at its depths `levels_mm` (L,); NaN where one
+    is not cut. A station counts if it is cut on all N parts."""
+    every = np.unique(np.concatenate(levels_mm))[::-1]
+    found: list[Floats] = []
     last: list[Floats] = []
-    for level in levels.tolist():
+    for level in every.tolist():
         here = [
-            edges[min(int(np.searchsorted(-cut.levels_mm, -level)), len(edges) - 1)]
-            for cut, edges in zip(cuts, lies, strict=True)
+            edges[:, min(int(np.searchsorted(-own, -level)), edges.shape[1] - 1)]
+            for own, edges in zip(levels_mm, lies, strict=True)
         ]
         if last and all(map(_alike, here, last)):
             continue
         last = here
-        if all(np.isfinite(each).sum() >= FEWEST_STATIONS for each in here):
-            found.append(_size(bound, here))
+        if all(_cut_on_all(each).sum() >= FEWEST_STATIONS for each in here):
+            found.append(_sizes(bound, here))
     if not found:
-        return None
-    return Size(
-        found[0].fit_mm, min(each.low_mm for each in found), max(each.high_mm for each in found)
-    )
+        return np.full((len(lies[0]), 3), math.nan)
+    fit, low, high = found[0].T
+    for each in found[1:]:
+        low, high = np.minimum(low, each[:, 1]), np.maximum(high, each[:, 2])
+    return np.column_stack([fit, low, high])
+
+
+def distinct_levels(nodes: Floats) -> Ints:
+    """The depths of a feature at which its edges are not as they are at the next deeper one that
+    is kept, on any of M parts: `nodes` (M, L, S) mm."""
+    kept = [nodes.shape[1] - 1]
+    for level in range(nodes.shape[1] - 2, -1, -1):
+        if not _alike(nodes[:, level], nodes[:, kept[-1]]):
+            kept.append(level)
+    return np.array(kept[::-1])
 
 
 def _alike(one: Floats, other: Floats) -> bool:
-    """Whether edges lie alike, so that their sizes are."""
+    """True if edges lie alike, so that their sizes are."""
     return bool(np.allclose(one, other, rtol=0.0, atol=SAME_LEVEL_MM, equal_nan=True))
 
 
@@ -434,7 +453,13 @@ FEWEST_STATIONS = 3
 """A size needs at least so many stations."""
 
 
-def _size(bound: Bound, lies: Sequence[Floats]) -> Size:
+def _cut_on_all(off: Floats) -> Bools:
+    """(S,) the stations that are cut on all parts (N, S)."""
+    return np.asarray(np.isfinite(off).all(axis=0))
+
+
+def _sizes(bound: Bound, lies: Sequence[Floats]) -> Floats:
+    """(N, 3) mm of N parts whose features have their edges at `lies` (N, S) each."""
     kind = bound.dimension.kind
     if kind == "distance":
         first, second = (
@@ -442,92 +467,133 @@ def _size(bound: Bound, lies: Sequence[Floats]) -> Size:
         )
         return _between(first, second)
     if kind == "profile":
-        widest = max(float(np.nanmax(np.abs(each))) for each in lies)
-        return _zone(2.0 * widest)
+        return _zones(2.0 * np.nanmax(np.abs(lies[0]), axis=1))
     feature, off = bound.features[0], lies[0]
+    seen = _cut_on_all(off)
     if isinstance(feature, Edge):
-        return _zone(_width(_edge_table(feature, off), off[np.isfinite(off)]))
+        place = np.linspace(-1.0, 1.0, len(seen))[seen]
+        table = np.column_stack([np.ones(len(place)), place])
+        return _zones(_widths(table, off[:, seen]))
     points = _circle_points(feature, off)
-    centre, radius = fitted_circle(points, np.asarray(feature.centre_mm))
+    centre, radius = fitted_circles(points, np.asarray(feature.centre_mm))
     if kind == "position":
-        return _zone(2.0 * math.dist(centre, feature.centre_mm))
-    spoke = points - centre
-    angle, rho = np.arctan2(spoke[:, 1], spoke[:, 0]), np.hypot(spoke[:, 0], spoke[:, 1])
+        away = centre - np.asarray(feature.centre_mm)
+        return _zones(2.0 * np.hypot(away[:, 0], away[:, 1]))
+    spoke = points - centre[:, None]
+    rho = np.hypot(spoke[..., 0], spoke[..., 1])
+    angle = np.arctan2(spoke[0, :, 1], spoke[0, :, 0])
     if kind == "roundness":
         table = np.column_stack([np.ones(len(angle)), np.cos(angle), np.sin(angle)])
-        return _zone(_width(table, rho - radius))
+        return _zones(_widths(table, rho - radius[:, None]))
     if kind == "radius":
-        return Size(radius, float(rho.min()), float(rho.max()))
+        return np.column_stack([radius, rho.min(axis=1), rho.max(axis=1)])
     local = 2.0 * rho
-    if feature.whole and len(rho) >= 0.5 * CIRCLE_STATIONS:
-        opposite = np.interp(angle + math.pi, angle, rho, period=2.0 * math.pi)
-        local = rho + opposite
-    return Size(2.0 * radius, float(local.min()), float(local.max()))
+    if feature.whole and len(angle) >= 0.5 * CIRCLE_STATIONS:
+        local = rho + _interpolated(angle + math.pi, angle, rho, 2.0 * math.pi)
+    return np.column_stack([2.0 * radius, local.min(axis=1), local.max(axis=1)])
 
 
-def _zone(wide_mm: float) -> Size:
-    return Size(wide_mm, wide_mm, wide_mm)
+def _zones(wide_mm: Floats) -> Floats:
+    """(N, 3) of zones so wide (N,): best fit, least and largest are one."""
+    return np.column_stack([wide_mm, wide_mm, wide_mm])
+
+
+def _interpolated(x: Floats, at: Floats, values: Floats, period: float | None = None) -> Floats:
+    """(N, Q) values at x (Q,) by straight lines between those (N, J) at `at` (J,), which may wrap
+    around after a period."""
+    number = np.arange(len(at), dtype=np.float64)
+    if period is not None:
+        at, x = np.mod(at, period), np.mod(x, period)
+    order = np.argsort(at, kind="stable")
+    at, values = at[order], values[:, order]
+    if period is not None:
+        at = np.concatenate([at[-1:] - period, at, at[:1] + period])
+        values = np.concatenate([values[:, -1:], values, values[:, :1]], axis=1)
+        number = np.arange(len(at), dtype=np.float64)
+    place = np.interp(x, at, number)
+    left = np.minimum(place.astype(np.int64), len(at) - 2)
+    share = place - left
+    return np.asarray(values[:, left] * (1.0 - share) + values[:, left + 1] * share)
 
 
 def _circle_points(circle: Circle, off: Floats) -> Floats:
-    """(J, 2) mm points of the machined circle, by angle, where it is cut."""
+    """(N, J, 2) mm points of machined circles, by angle, where they are cut."""
     stations = stations_of(circle, 1)
-    seen = np.isfinite(off)
-    return np.asarray(stations.places[seen] + off[seen, None] * stations.normals[seen])
+    seen = _cut_on_all(off)
+    return np.asarray(stations.places[seen] + off[:, seen, None] * stations.normals[seen])
 
 
-def fitted_circle(points: Floats, near: Floats) -> tuple[Floats, float]:
-    """Centre (2,) and radius, mm, with the least squares of radial distances to points (J, 2);
-    `near` (2,) is a place near the centre."""
-    centre = near + least_squares_centre(points - near)
-    return centre, float(np.hypot(*(points - centre).T).mean())
+CENTRE_ROUNDS = 50
+"""Rounds of a centre at most; three or four are usual."""
+
+CENTRE_MM = 1e-9
+"""A centre that moves by less is found."""
+
+
+def fitted_circles(points: Floats, near: Floats) -> tuple[Floats, Floats]:
+    """Centres (N, 2) and radii (N,), mm, with the least squares of radial distances to points
+    (N, J, 2); `near` (2,) is a place near the centres.
+
+    Gauss-Newton with the derivatives of the first circle about `near`, from which the others
+    differ by micrometres: with d = |p − c| and u = (p − c)/d, [u, 1] (δc, R) = d.
+    """
+    spoke = points[0] - near
+    distance = np.hypot(spoke[:, 0], spoke[:, 1])
+    terms = np.column_stack([spoke / distance[:, None], np.ones(len(spoke))])
+    inverse = np.linalg.pinv(terms)[:2]
+    centre = np.tile(near, (len(points), 1))
+    for _ in range(CENTRE_ROUNDS):
+        spokes = points - centre[:, None]
+        distances = np.hypot(spokes[..., 0], spokes[..., 1])
+        # Sums, not products of matrices, whose last digits may differ from run to run.
+        move = np.stack([(distances * row).sum(axis=1) for row in inverse], axis=1)
+        centre = centre + move
+        if np.abs(move).max() < CENTRE_MM:
+            break
+    spokes = points - centre[:, None]
+    return centre, np.hypot(spokes[..., 0], spokes[..., 1]).mean(axis=1)
 
 
 class _Values(Struct, frozen=True, eq=False):
-    """Where one end of a distance lies: values (J,) mm along the direction of measuring, their
-    places (J,) mm across it (None: it is a point), and the value of its best fit."""
+    """Where one end of a distance lies on N parts: values (N, J) mm along the direction of
+    measuring, their places (J,) mm across it (None: it is a point), and the values (N,) of its
+    best fit."""
 
     values: Floats
     across: Floats | None
-    fit_mm: float
+    fit_mm: Floats
 
 
 def _values(end: End, off: Floats, direction: Floats) -> _Values:
-    feature, seen = end.feature, np.isfinite(off)
+    feature, seen = end.feature, _cut_on_all(off)
     if isinstance(feature, Edge):
         stations = stations_of(feature, 1)
-        points = stations.places[seen] + off[seen, None] * stations.normals[seen]
-        across = points @ np.array([-direction[1], direction[0]])
+        points = stations.places[seen] + off[:, seen, None] * stations.normals[seen]
+        across = points[0] @ np.array([-direction[1], direction[0]])
         values = points @ direction
-        return _Values(values, across, float(values.mean()))
+        return _Values(values, across, values.mean(axis=1))
     points = _circle_points(feature, off)
     if end.how == "centre":
-        middle = float(fitted_circle(points, np.asarray(feature.centre_mm))[0] @ direction)
-        return _Values(np.array([middle]), None, middle)
-    extreme = end.side * float((end.side * (points @ direction)).max())
-    return _Values(np.array([extreme]), None, extreme)
+        middle = fitted_circles(points, np.asarray(feature.centre_mm))[0] @ direction
+        return _Values(middle[:, None], None, middle)
+    extreme = end.side * (end.side * (points @ direction)).max(axis=1)
+    return _Values(extreme[:, None], None, extreme)
 
 
-def _between(first: _Values, second: _Values) -> Size:
-    """The distance of two ends: point by point where both are edges beside each other, otherwise
-    any point of one from any of the other."""
+def _between(first: _Values, second: _Values) -> Floats:
+    """(N, 3) the distance of two ends: point by point where both are edges beside each other,
+    otherwise any point of one from any of the other."""
     fit = second.fit_mm - first.fit_mm
     if first.across is not None and second.across is not None:
-        order = np.argsort(second.across)
-        across, values = second.across[order], second.values[order]
-        beside = (first.across >= across[0]) & (first.across <= across[-1])
+        low, high = second.across.min(), second.across.max()
+        beside = (first.across >= low) & (first.across <= high)
         if beside.any():
-            local = np.interp(first.across[beside], across, values) - first.values[beside]
-            return Size(fit, float(local.min()), float(local.max()))
-    least = float(second.values.min() - first.values.max())
-    most = float(second.values.max() - first.values.min())
-    return Size(fit, least, most)
-
-
-def _edge_table(edge: Edge, off: Floats) -> Floats:
-    """(J, 2) a constant and the place along the edge, −1 to 1, of the stations that are cut."""
-    share = np.linspace(-1.0, 1.0, len(off))
-    return np.column_stack([np.ones(len(off)), share])[np.isfinite(off)]
+            across = first.across[beside]
+            local = _interpolated(across, second.across, second.values) - first.values[:, beside]
+            return np.column_stack([fit, local.min(axis=1), local.max(axis=1)])
+    least = second.values.min(axis=1) - first.values.max(axis=1)
+    most = second.values.max(axis=1) - first.values.min(axis=1)
+    return np.column_stack([fit, least, most])
 
 
 # Minimum zones. With deviations e_i and the functions of a line or a circle in a table T (a
@@ -538,14 +604,14 @@ def _edge_table(edge: Edge, off: Floats) -> Floats:
 # is a linear programme of three or four unknowns, and 2 h is the width of the zone.
 
 
-def _width(table: Floats, off: Floats) -> float:
-    """The width, mm, of the narrowest zone around deviations (J,) by functions (J, K)."""
-    ones = np.ones((len(off), 1))
+def _widths(table: Floats, off: Floats) -> Floats:
+    """(N,) the widths, mm, of the narrowest zones around deviations (N, J) by functions (J, K)."""
+    ones = np.ones((len(table), 1))
     rows = np.vstack([np.hstack([table, ones]), np.hstack([-table, ones])])
-    middle = float(off.mean())
-    bounds = np.concatenate([off - middle, middle - off])
+    middle = off.mean(axis=1, keepdims=True)
+    bounds = np.hstack([off - middle, middle - off])
     goal = np.append(np.zeros(table.shape[1]), 1.0)
-    return max(2.0 * float(least(goal, rows, bounds)[-1]), 0.0)
+    return np.maximum(2.0 * least_many(goal, rows, bounds)[:, -1], 0.0)
 
 
 LEAST_ROUNDS = 500
@@ -556,29 +622,42 @@ LEAST_SLACK = 1e-12
 
 
 def least(goal: Floats, rows: Floats, bounds: Floats) -> Floats:
-    """(K,) the x with the least goal · x for which rows (J, K) x ≥ bounds (J,).
+    """(K,) the x with the least goal · x for which rows (J, K) x ≥ bounds (J,)."""
+    return np.asarray(least_many(goal, rows, bounds[None])[0])
+
+
+def least_many(goal: Floats, rows: Floats, bounds: Floats) -> Floats:
+    """(N, K) the same for N bounds (N, J) of the same rows.
 
     By the dual simplex method, from a wide box: K conditions hold exactly; the one that is broken
     most takes the place of one of them, until none is broken.
     """
-    count = len(goal)
-    wide = 1e3 * (1.0 + float(np.abs(bounds).max(initial=0.0)))
+    count, parts = len(goal), len(bounds)
+    wide = 1e3 * (1.0 + np.abs(bounds).max(axis=1, initial=0.0))
     signs = np.where(goal >= 0.0, 1.0, -1.0)
     every = np.vstack([rows, np.diag(signs)])
-    limits = np.concatenate([bounds, np.full(count, -wide)])
-    active = np.arange(len(rows), len(every))
-    x = np.zeros(count)
+    limits = np.hstack([bounds, np.repeat(-wide[:, None], count, axis=1)])
+    active = np.tile(np.arange(len(rows), len(every)), (parts, 1))
+    found = np.zeros((parts, count))
+    open_ = np.arange(parts)
     for _ in range(LEAST_ROUNDS):
-        basis = every[active]
-        x = np.linalg.solve(basis, limits[active])
-        short = limits - every @ x
-        enters = int(np.argmax(short))
-        if short[enters] <= LEAST_SLACK:
+        own = active[open_]
+        basis = every[own]
+        held = np.take_along_axis(limits[open_], own, axis=1)
+        x = np.linalg.solve(basis, held[..., None])[..., 0]
+        found[open_] = x
+        short = limits[open_] - x @ every.T
+        enters = short.argmax(axis=1)
+        turned = np.swapaxes(basis, 1, 2)
+        price = np.linalg.solve(turned, np.broadcast_to(goal, x.shape)[..., None])[..., 0]
+        change = np.linalg.solve(turned, every[enters][..., None])[..., 0]
+        may = change > LEAST_SLACK
+        ratio = np.divide(price, change, out=np.full_like(price, np.inf), where=may)
+        leaves = ratio.argmin(axis=1)
+        each = np.arange(len(open_))
+        goes_on = (short[each, enters] > LEAST_SLACK) & may.any(axis=1)
+        open_, each = open_[goes_on], each[goes_on]
+        if not len(open_):
             break
-        price = np.linalg.solve(basis.T, goal)
-        change = np.linalg.solve(basis.T, every[enters])
-        may = np.flatnonzero(change > LEAST_SLACK)
-        if not len(may):
-            break
-        active[may[np.argmin(price[may] / change[may])]] = enters
-    return x
+        active[open_, leaves[each]] = enters[each]
+    return found

@@ -38,7 +38,7 @@ from camtool.inspection.dimensions import ZONES, Dimension
 from camtool.inspection.features import Circle, Edge
 from camtool.inspection.inspector import Inspected, Inspector
 from camtool.inspection.sizes import Size
-from camtool.inspection.uncertainty import Budget, inputs_of, probability, propagate
+from camtool.inspection.uncertainty import Budget, inputs_of, propagate
 from camtool.run import Run
 from camtool.units import UM_PER_MM
 from camtool.verification.report import Contribution, InspectedReport, certain, number
@@ -113,7 +113,9 @@ def verdicts_of(inspector: Inspector, run: Run) -> Iterator[InspectedReport | Fi
     if not inspector.dimensions:
         return
     inputs = inputs_of(run.target.machine, inspector.tool_diameter_mm)
-    budget = propagate(inspector.values, inputs, inspector.edges, extremes=True)
+    budget = propagate(
+        inspector.machined, inputs, inspector.edges, measure=inspector.measured, extremes=True
+    )
     sizes = budget.values.reshape(-1, 3)
     measured = np.isfinite([budget.values, budget.standards]).all(axis=0).reshape(-1, 3)
     for index, each in enumerate(inspector.dimensions):
@@ -205,14 +207,12 @@ def _decided(
     verdict; None where that leaves it open."""
     low, high = first + 1, first + 2
     lower, upper = -math.inf if limits[0] is None else limits[0], limits[1]
-    covariance = budget.covariance[np.ix_([low, high], [low, high])]
-    least_mm, most_mm = float(budget.expected[low]), float(budget.expected[high])
     off_low, off_high = (float(budget.at_most[value].sum()) for value in (low, high))
 
     def chance(share: float) -> float:
         """With limits that are wider by a share of all that is not known."""
         wide = lower - share * off_low, upper + share * off_high
-        return probability(least_mm, most_mm, covariance, wide)
+        return budget.probability(low, high, wide)
 
     known = chance(0.0)
     if not off_low and not off_high:
