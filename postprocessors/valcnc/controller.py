@@ -98,6 +98,12 @@ class ValcncModel(ControllerModel[ValcncController, Dialect]):
     def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
         """What the times and the path take for granted."""
         controller = machine.controller
+        between = _Pieces(toolpath, machine).between_steps()
+        midway = "midway between two steps" if controller.rounding == "nearest" else "on a step"
+        open_ends = (
+            f"{between} coordinates lie {midway}: its compiler's binary fractions decide whether "
+            "such an end is one step less (not said, L1226)"
+        )
         pieces = f"pieces of {controller.arc_segment_mm:g} mm (controller.arc_segment_mm)"
         if controller.arc_segments is not None:
             pieces = f"{controller.arc_segments} pieces each (controller.arc_segments)"
@@ -106,6 +112,7 @@ class ValcncModel(ControllerModel[ValcncController, Dialect]):
             "rest (controller.step_rate_hz): no ramps, no steps lost",
             f"arcs are drawn in {pieces}",
             "the controller's own arithmetic takes no time",
+            *((open_ends,) if between else ()),
         )
 
 
@@ -151,6 +158,15 @@ class _Pieces:
             columns = [to_steps(points[..., at], self._step_mm[at]) for at in range(3)]
             return np.stack(columns, axis=-1)
         return np.asarray(np.trunc(points / self._step_mm + self._guard(points)).astype(np.int64))
+
+    def between_steps(self) -> int:
+        """Return how many coordinates of programmed ends lie where the rounding to whole steps
+        changes, within `HALF_STEP_GUARD` of a step."""
+        turns_at = 0.5 if self._controller.rounding == "nearest" else 0.0
+        points = np.unique(self._end, axis=0) / self._step_mm
+        off = points - turns_at
+        near = np.abs(off - np.rint(off)) <= HALF_STEP_GUARD
+        return int((near & (points != 0.0)).sum())
 
     def legs(self) -> Iterator[Legs]:
         """The legs, some thousands at a time."""

@@ -449,6 +449,24 @@ def test_the_page_names_every_option() -> None:
     assert [key for key in sorted(own) if f"`controller.{key}`" not in page] == []
 
 
+def test_it_says_where_the_rounding_to_steps_is_open() -> None:
+    """3.5 mm are 87.5 steps; a PIC's binary fraction of it may be less. Whole steps are open to a
+    controller that cuts off decimals."""
+    path = ToolpathBuilder().line(3.5, 0.0, feed=1.0).line(3.5, 3.48, feed=1.0)
+    path = path.line(1.01, 2.0, feed=1.0).finish()
+
+    def said(*settings: str) -> list[str]:
+        made = machine(*settings)
+        return [
+            each for each in model_of(made).assumptions(path, made) if "coordinates lie" in each
+        ]
+
+    assert [each.split()[0] for each in said()] == ["2"]
+    assert [each.split()[0] for each in said("controller.rounding=truncated")] == ["2"]
+    whole = ToolpathBuilder().line(4.0, 2.0, feed=1.0).finish()
+    assert not any("lie" in one for one in model_of(machine()).assumptions(whole, machine()))
+
+
 def test_what_it_says_of_itself() -> None:
     model = model_of(machine())
     assert model.interpolation(ToolpathBuilder().finish(), machine(), Options()) == "counter"
