@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from msgspec import Struct, field
+from msgspec.structs import replace
 
 NAME = ".camtool-batch.jsonl"
 """The manifest's name in the output folder."""
@@ -24,13 +25,20 @@ NAME = ".camtool-batch.jsonl"
 
 class Entry(Struct, frozen=True):
     """One drawing: the digest of all that its outputs depend on, and the digests of its outputs by
-    name."""
+    name; `earlier` are those of outputs that the last run did not make again, such as those for
+    another machine."""
 
     key: str
     files: Mapping[str, str]
     warnings: int = 0
     figures: Mapping[str, float] = field(default_factory=dict)
     verdicts: Mapping[str, int] = field(default_factory=dict)
+    earlier: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def made(self) -> dict[str, str]:
+        """The digests of all outputs that any run made."""
+        return {**self.earlier, **self.files}
 
 
 class Manifest:
@@ -50,12 +58,27 @@ class Manifest:
 
     def outputs(self) -> frozenset[Path]:
         """All files of all entries, resolved."""
-        names = (name for entry in self._entries.values() for name in entry.files)
+        names = (name for entry in self._entries.values() for name in entry.made)
         places = RealPaths()
         return frozenset(places.of(self._out / name) for name in names)
 
+    def may_replace(self, stem: str, name: str, data: bytes) -> bool:
+        """True if no file is there, or one that a batch made for this drawing and that is
+        unchanged, or one that holds `data` already, as after a run that was killed."""
+        place, entry = self._out / name, self._entries.get(stem)
+        if not os.path.lexists(place):
+            return True
+        known = {} if entry is None else entry.made
+        return self._is(name, content_digest(data)) or (
+            name in known and self._is(name, known[name])
+        )
+
     def add(self, stem: str, entry: Entry) -> None:
         """Append an entry; OSError when the disk does not take it."""
+        before = self._entries.get(stem)
+        if before is not None:
+            left = {name: each for name, each in before.made.items() if name not in entry.files}
+            entry = replace(entry, earlier=left)
         self._entries[stem] = entry
         self._tidy = False
         # The line break comes first too, in case a full disk has cut the line before short.
@@ -77,7 +100,7 @@ class Manifest:
         self._entries, self._tidy = {stem: self._entries[stem] for stem in kept}, True
 
     def _there(self, entry: Entry) -> bool:
-        return any(os.path.lexists(self._out / name) for name in entry.files)
+        return any(os.path.lexists(self._out / name) for name in entry.made)
 
     def _is(self, name: str, digest: str) -> bool:
         try:
@@ -94,6 +117,7 @@ def _line(stem: str, entry: Entry) -> str:
         "warnings": entry.warnings,
         "figures": dict(entry.figures),
         "verdicts": dict(entry.verdicts),
+        "earlier": dict(entry.earlier),
     }
     return json.dumps(row, ensure_ascii=True, sort_keys=True)
 
@@ -113,7 +137,8 @@ def _read(place: Path) -> tuple[dict[str, Entry], bool]:
             entry = Entry(**row)
         except (ValueError, TypeError, KeyError, AttributeError):
             continue
-        if isinstance(stem, str) and isinstance(entry.files, dict):
+        digests = (entry.files, entry.earlier)
+        if isinstance(stem, str) and all(isinstance(each, dict) for each in digests):
             entries[stem] = entry
     return entries, len(lines) == len(entries) and list(entries) == sorted(entries)
 

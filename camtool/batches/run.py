@@ -109,7 +109,8 @@ outputs are up to date."""
 @dataclass(frozen=True)
 class Order:
     """Where outputs go and how they are written; the digest of all that they depend on besides the
-    drawing (`base` for all, `own` for each task by stem); `force` makes all of them again."""
+    drawing (`base` for all, `own` for each task by stem); `force` makes all of them again, and
+    replaces files that no batch made."""
 
     out: Path
     write: Writer
@@ -167,7 +168,7 @@ def _finished(task: Task, made: Made, order: Order, manifest: Manifest) -> Outco
     names: tuple[str, ...] = ()
     if error is None:
         files = {f"{task.stem}{extension}": data for extension, data in made.files.items()}
-        error = _written(task, files, order)
+        error = _written(task, files, order, manifest)
         if error is None:
             names = tuple(files)
             entry = Entry(
@@ -196,8 +197,18 @@ def _finished(task: Task, made: Made, order: Order, manifest: Manifest) -> Outco
     )
 
 
-def _written(task: Task, files: Mapping[str, bytes], order: Order) -> str | None:
+def _written(
+    task: Task, files: Mapping[str, bytes], order: Order, manifest: Manifest
+) -> str | None:
     """Write the files of a drawing; the error, None without one."""
+    for name, data in () if order.force else files.items():
+        if not manifest.may_replace(task.stem, name, data):
+            foreign = OutputError(
+                "is there, and no batch made it, or it was changed since",
+                file=str(order.out / name),
+                mend="move it away, choose another --out, or --force, which replaces it",
+            )
+            return f"{task.source}: {foreign}"
     places = {str(order.out / name): data for name, data in files.items()}
     try:
         (order.out / task.stem).parent.mkdir(parents=True, exist_ok=True)

@@ -52,7 +52,7 @@ _RUN = "How the batch runs"
     metavar="TIME",
     help="Time limit for each drawing, such as 60s.",
 )
-@option(_RUN, "--force", is_flag=True, help="Make programs that are up to date again.")
+@option(_RUN, "--force", is_flag=True, help="Make all again; replace files of others.")
 @option(_RUN, "--fail-fast", is_flag=True, help="Stop at the first that fails.")
 @picture_options
 @gate_options
@@ -85,7 +85,8 @@ def batch(
     """Turn DRAWINGS (files, folders, quoted patterns such as 'parts/**/*.dxf') into programs.
 
     Folders are kept below --out. Drawings that are up to date by content are skipped. A drawing
-    that fails does not stop the others; exit code 1 when any failed. A job file beside a drawing,
+    that fails does not stop the others; exit code 1 when any failed. Files that no batch made, or
+    that were changed since, are replaced only with --force. A job file beside a drawing,
     part.toml for part.dxf, is its job, and part.tolerances.toml has its dimensions; --job and
     --tolerances are for those without one.
     """

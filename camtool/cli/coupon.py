@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, cast
 
 import click
 
-from camtool.cli.files import STDOUT, check_new, check_places, write_all
+from camtool.cli.files import STDOUT, check_new, check_ours, check_places, write_all
 from camtool.cli.life_signs import progress
 from camtool.cli.messages import say
 from camtool.cli.options import MachineFlags, SectionedCommand, machine_options, talk_options
@@ -92,7 +92,7 @@ def coupon(
     from camtool.calibration import coupons
     from camtool.calibration.coupons import sheet, skeleton
 
-    output = output or "coupon.dxf"
+    named, output = output is not None, output or "coupon.dxf"
     if output != STDOUT and PurePath(output).suffix.lower() not in DRAWINGS:
         raise click.UsageError(f"-o {output!r} ends in neither .dxf nor .svg")
     check_places(machine.files(), [output, measurements])
@@ -103,6 +103,8 @@ def coupon(
     draw = coupons.svg if output.lower().endswith(".svg") else coupons.dxf
     progress().begin("drawing the coupons")
     files = {output: draw(made)}
+    if not named:
+        check_ours(output, lambda old: old == files[output])
     if measurements is not None:
         files[measurements] = skeleton(made, known).encode()
     write_all(files)

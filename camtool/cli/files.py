@@ -9,14 +9,16 @@ is gone, Ctrl-C) leaves old files as they were and no new one.
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import io
 import os
 import stat
 import sys
 import tempfile
+import time
 import unicodedata
-from collections.abc import Hashable, Iterable
+from collections.abc import Callable, Hashable, Iterable
 from contextlib import suppress
 from pathlib import Path, PurePath
 
@@ -28,6 +30,12 @@ STDOUT = "-"
 
 KEPT = 40
 """The most characters of a file's name in that of its temporary file: names are limited."""
+
+READER_S = 10.0
+"""A named pipe is refused when nobody has opened it for reading for so long."""
+
+POLL_S = 0.05
+"""A pipe is looked at so often until then."""
 
 
 def write_all(files: dict[str, bytes]) -> None:
@@ -84,6 +92,21 @@ def check_new(name: str, mend: str = "give another name") -> None:
     """OutputError when there is such a file already; streams take whatever comes."""
     if os.path.lexists(name) and not _is_stream(name):
         raise OutputError("exists already", file=name, mend=mend)
+
+
+def check_ours(name: str, is_ours: Callable[[bytes], bool]) -> None:
+    """OutputError when a file whose name nobody gave is there, and is not one that the command
+    wrote before."""
+    if name == STDOUT or not os.path.lexists(name) or _is_stream(name):
+        return
+    try:
+        ours = is_ours(Path(name).read_bytes())
+    except OSError:  # nobody can know
+        ours = False
+    if not ours:
+        raise OutputError(
+            "is there, and camtool did not write it", file=name, mend=f"-o {name} replaces it"
+        )
 
 
 def _check_file(name: str) -> None:
@@ -165,14 +188,38 @@ def _write_stream(name: str, data: bytes) -> None:
             sys.stdout.buffer.write(data)
             sys.stdout.buffer.flush()
             return
-        with Path(name).open("wb") as stream:
+        with _opened(name) as stream:
             stream.write(data)
     except BrokenPipeError:
         if name == STDOUT:
             raise
         raise OutputError("its reader is gone", file=name) from None
+    except OutputError:
+        raise
     except OSError as error:
         raise _refused("<stdout>" if name == STDOUT else name, error) from error
+
+
+def _opened(name: str) -> io.BufferedWriter:
+    """A device or a pipe to write to. OutputError for a named pipe without a reader: opening it
+    would wait for one for ever."""
+    if not stat.S_ISFIFO(Path(name).stat().st_mode):
+        return Path(name).open("wb")
+    last = time.monotonic() + READER_S
+    while True:
+        try:
+            handle = os.open(name, os.O_WRONLY | os.O_NONBLOCK)
+        except OSError as error:
+            if error.errno != errno.ENXIO:
+                raise
+            if time.monotonic() >= last:
+                raise OutputError(
+                    "is a pipe that nobody reads", file=name, mend="open its reader first"
+                ) from None
+            time.sleep(POLL_S)
+        else:
+            os.set_blocking(handle, True)
+            return os.fdopen(handle, "wb")
 
 
 def _refused(name: str, error: OSError) -> OutputError:

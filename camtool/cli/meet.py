@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from camtool.cli.files import STDOUT, check_places, write_all
+from camtool.cli.files import STDOUT, check_ours, check_places, write_all
 from camtool.cli.life_signs import progress
 from camtool.cli.messages import say, say_findings, show_text
 from camtool.cli.options import (
@@ -66,11 +66,12 @@ def meet(
     written, with what it changes. Where none holds, exit code 1, and why: the dimension that
     decides, and how good the machine would have to be.
     """
-    from camtool.inspection.meet import MOST_TRIALS, Case, to_data, to_text
+    from camtool.inspection.meet import MOST_TRIALS, Case, is_proposal, to_data, to_text
     from camtool.inspection.meet import meet as met
     from camtool.inspection.tolerances import dimensions_of
     from camtool.inspection.verdicts import NOT_INSPECTED, Tolerances
 
+    named = output is not None
     if output is None:
         output = STDOUT if source == STDOUT else f"{Path(source).stem}.meet.toml"
     file = None if tolerances == DRAWING else Path(tolerances)
@@ -85,6 +86,8 @@ def meet(
         say_findings((*read.findings, *findings), quiet=quiet, verbose=verbose)
         found = met(Case(read, target, tables, job_of, asked), most or MOST_TRIALS, progress())
     files = {output: found.text.encode()} if found.changed else {}
+    if files and not named:
+        check_ours(output, is_proposal)
     if report is not None:
         files[report] = to_json(to_data(found)).encode()
     write_all(files)

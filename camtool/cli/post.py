@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import click
 
-from camtool.cli.files import STDOUT, check_places, write_all
+from camtool.cli.files import STDOUT, check_ours, check_places, write_all
 from camtool.cli.life_signs import progress, signs_of_command
 from camtool.cli.messages import (
     REPORT_NAMES,
@@ -309,9 +309,20 @@ def finish(run: Run, asked: Asked, *, picture: Painter, quiet: bool, verbose: bo
     # A dialect of several forms (binary, listing) says only now which extension it takes.
     asked.check(run.program.extension, verified=True)
     output = asked.program(run.program.extension)
+    if asked.output is None:
+        _check_ours(run, output)
     write_all({output: run.program.data, **outputs.files(run, picture)})
     _say_written(run, output, quiet=quiet)
     return 0
+
+
+def _check_ours(run: Run, name: str) -> None:
+    """OutputError when a file of a name that nobody gave is no program by camtool, where such
+    programs say so."""
+    made_elsewhere = run.target.target.made_elsewhere
+    assert run.program is not None
+    if not made_elsewhere(run.program.data):
+        check_ours(name, lambda old: not made_elsewhere(old))
 
 
 def _say_written(run: Run, output: str, *, quiet: bool) -> None:
@@ -357,6 +368,7 @@ def finish_parts(
         return 1
     for run, part, name, picture in zip(runs, parts, names, pictures, strict=True):
         assert run.program is not None
+        _check_ours(run, name)
         files |= {name: run.program.data, **part.outputs.files(run, picture)}
     if report is not None:
         files[report] = _listed(runs, parts)

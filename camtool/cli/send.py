@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from camtool.cli.files import read_bytes, shown, write_all
+from camtool.cli.files import read_bytes, refuse_same, shown, write_all
 from camtool.cli.home import UNLOCK
 from camtool.cli.life_signs import progress
 from camtool.cli.messages import say, say_findings, show_facts, show_text
@@ -85,6 +85,7 @@ def send(
         raise click.UsageError("--from and --resume are two beginnings; give one of them")
     target, data = machine.load(), read_bytes(program)
     place = Path(journal or f"{program}.journal")
+    refuse_same([program, *machine.files()], [str(place), live])
     begin = _resumed(place, data, target) if resume else (first or 1) - 1
     one = consignment(data, target, source=shown(program), first=begin, progress=progress())
     say_findings(one.run.findings, quiet=quiet, verbose=verbose)

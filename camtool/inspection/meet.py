@@ -981,14 +981,23 @@ def _verdict_data(each: InspectedReport | None) -> dict[str, Any] | None:
     }
 
 
+ALL_HOLD, NOT_ALL_HOLD = "Every dimension of ", "NOT ALL dimensions of "
+"""The first comment of a job file that is proposed begins with one of these."""
+
+
+def is_proposal(data: bytes) -> bool:
+    """True for a job file that a proposal was written to."""
+    return data.startswith((f"# {ALL_HOLD}".encode(), f"# {NOT_ALL_HOLD}".encode()))
+
+
 def _head(case: Case, best: Trial) -> Iterator[str]:
     """The comments at the top of a job file."""
     name = one_line(PurePath(case.drawing.file).name)
     target = case.target.machine.target.name
     count, short = len(best.verdicts) + best.missing, len(best.short) + best.missing
     if best.holds:
-        yield f"Every dimension of {name} that has limits holds on {target} ({count})."
+        yield f"{ALL_HOLD}{name} that has limits holds on {target} ({count})."
     else:
-        yield f"NOT ALL dimensions of {name} hold on {target}: {short} of {count} do not."
+        yield f"{NOT_ALL_HOLD}{name} hold on {target}: {short} of {count} do not."
     for line in changes_said(best.proposal):
         yield one_line(line)

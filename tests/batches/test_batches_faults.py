@@ -26,8 +26,8 @@ def tasks_of(folder: Path, **contents: str) -> list[Task]:
     return tasks
 
 
-def run(tasks: list[Task], out: Path) -> dict[str, Outcome]:
-    order = Order(out, write_all, "base", {})
+def run(tasks: list[Task], out: Path, *, force: bool = False) -> dict[str, Outcome]:
+    order = Order(out, write_all, "base", {}, force)
     outcomes = run_batch(tasks, order, Manifest(out), HerePool(Obedient()))
     return {each.stem: each for each in outcomes if each is not None}
 
@@ -82,7 +82,7 @@ def test_a_file_that_grows_too_large_is_the_error_of_that_drawing(tmp_path: Path
     (out / "b.out").write_text("old")
     tasks = tasks_of(tmp_path, a="a", b="large 100000", c="c")
     with files_of_at_most(50_000):
-        outcomes = run(tasks, out)
+        outcomes = run(tasks, out, force=True)
     assert states(outcomes) == {"a": "made", "b": "failed", "c": "made"}
     assert "cannot be written (File too large)" in (outcomes["b"].error or "")
     assert files_in(out) == {"a.out", "b.out", "c.out", ".camtool-batch.jsonl"}
@@ -140,7 +140,7 @@ def test_missing_permissions_are_the_error_of_that_drawing(open_path: Path) -> N
     (out / "closed" / "b.out").write_text("old")
     (out / "closed").chmod(0o555)
     with as_nobody():
-        outcomes = run(tasks, out)
+        outcomes = run(tasks, out, force=True)
         again = run(tasks, out)
     (out / "closed").chmod(0o755)
     assert states(outcomes) == {"a": "made", "closed/b": "failed", "secret": "failed", "z": "made"}

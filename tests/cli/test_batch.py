@@ -111,7 +111,7 @@ def test_only_what_has_changed_is_made_again(
     text = (drawings / "letter.svg").read_text()
     (drawings / "letter.svg").write_text(text + "<!-- -->")
     assert asked(camtool, pools) == ["letter"]
-    (tmp_path / "build" / "square.pic").write_text("changed by hand")
+    (tmp_path / "build" / "square.pic").unlink()
     assert asked(camtool, pools) == ["square"]
     for flags in (
         ("--preview", "svg"),
@@ -123,6 +123,44 @@ def test_only_what_has_changed_is_made_again(
     ):
         assert asked(camtool, pools, *flags) == both, flags
         assert asked(camtool, pools, *flags) == [], flags
+
+
+@pytest.mark.usefixtures("pools")
+def test_it_replaces_only_what_it_made_and_nobody_changed(
+    camtool: Run, drawings: Path, tmp_path: Path
+) -> None:
+    (drawings / "junk.dxf").unlink()
+    build = tmp_path / "build"
+    line = ("batch", "drawings", "-o", "build", *QUICK)
+    build.mkdir()
+    for name in ("letter.nc", "letter.png"):
+        (build / name).write_text("by hand")
+        done = camtool(*line, "-t", "grbl", "--preview", "png")
+        assert done.returncode == 1
+        assert f"build/{name}: is there, and no batch made it".encode() in done.stderr
+        assert (build / name).read_text() == "by hand"
+        (build / name).unlink()
+    assert camtool(*line, "-t", "grbl").returncode == 0
+    program = (build / "letter.nc").read_bytes()
+    # Made here, also when a run for another machine came between.
+    assert camtool(*line, "-t", "linuxcnc").returncode == 0
+    letter = drawings / "letter.svg"
+    letter.write_text(letter.read_text().replace("<path", "<path ", 1) + "<!-- -->")
+    assert camtool(*line, "-t", "grbl", "--feed", "100").returncode == 0
+    assert (build / "letter.nc").read_bytes() != program
+    # One byte by hand, and a change of the drawing: nothing of it is written.
+    edited = (build / "letter.nc").read_bytes() + b"\n"
+    (build / "letter.nc").write_bytes(edited)
+    done = camtool(*line, "-t", "grbl", "--feed", "100", "--preview", "png")
+    assert done.returncode == 1
+    assert b"1 made, 1 failed" in done.stderr
+    assert (build / "letter.nc").read_bytes() == edited
+    assert not (build / "letter.png").exists()
+    assert camtool(*line, "-t", "grbl", "--feed", "100", "--force").returncode == 0
+    assert (build / "letter.nc").read_bytes() == edited[:-1]
+    # As after a run that was killed before it could note what it wrote.
+    (build / MANIFEST).unlink()
+    assert camtool(*line, "-t", "grbl", "--feed", "100").returncode == 0
 
 
 def test_a_job_beside_a_drawing_is_its_own(

@@ -95,6 +95,10 @@ TABLES = ("--job", "job.toml", "--machine", "my.toml")
         ("calibrate", "m.toml", "-t", "grbl", "-o", "m.toml"),
         ("calibrate", "m.toml", "--machine", "my.toml", "-o", "my.toml"),
         ("calibrate", "m.toml", "-t", "grbl", "-o", "x.toml", "--json", "./x.toml"),
+        ("send", "a.ngc", "--machine", "my.toml", "--live", "a.ngc"),
+        ("send", "a.ngc", "--machine", "my.toml", "--live", "my.toml"),
+        ("send", "a.ngc", "--machine", "my.toml", "--journal", "./a.ngc"),
+        ("send", "a.ngc", "--machine", "my.toml", "--journal", "x", "--live", "x"),
         ("batch", "w.svg", "-t", "linuxcnc", "-o", ".", "--preview", "svg"),
         ("batch", "w.svg", "-t", "linuxcnc", "-o", "out", "--json", "w.svg"),
         ("batch", "w.svg", "-t", "linuxcnc", "-o", "out", "--json", "out/w.ngc"),
@@ -131,6 +135,37 @@ def test_a_batch_replaces_no_drawing_that_it_does_not_read(camtool: Run, here: P
         done = camtool("batch", *line, "-t", "linuxcnc")
         assert done.returncode == 2, done.stderr.decode()
         assert contents(here) == before, line
+
+
+@pytest.mark.parametrize(
+    ("line", "name"),
+    [
+        (("post", "w.svg", "-t", "grbl", "--no-verify"), "w.nc"),
+        (("post", "w.svg", "-t", "linuxcnc", "--no-verify", "--split", "tool"), "w-1-mill.ngc"),
+        (("convert", "a.ngc", "--from", "linuxcnc", "--to", "grbl", "--no-verify"), "a.nc"),
+        (("coupon", "lines"), "coupon.dxf"),
+    ],
+)
+def test_a_name_that_nobody_gave_replaces_only_what_camtool_wrote(
+    camtool: Run, here: Path, line: tuple[str, ...], name: str
+) -> None:
+    (here / "a.ngc").write_text("G21 G90\nG0 X1\nG1 X2 F100\nM2\n")
+    place = here / name
+    place.write_bytes(b"G21\nG1 X1 F100\nM2\n")
+    before = contents(here)
+    done = camtool(*line)
+    assert done.returncode == 2, done.stderr.decode()
+    assert f"{name}: is there, and camtool did not write it".encode() in done.stderr
+    assert contents(here) == before
+    place.unlink()
+    assert camtool(*line).returncode == 0
+    made = place.read_bytes()
+    assert camtool(*line).returncode == 0
+    assert place.read_bytes() == made
+    if "--split" not in line:
+        place.write_bytes(b"G21\n")
+        assert camtool(*line, "-o", name).returncode == 0
+        assert place.read_bytes() == made
 
 
 def test_a_page_replaces_only_its_own_picture(camtool: Run, here: Path) -> None:

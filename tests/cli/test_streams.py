@@ -249,3 +249,33 @@ click.echo = slow
     assert done.returncode == 128 + signal.SIGINT
     assert done.stderr.strip() == b"camtool: interrupted; written files are complete"
     assert b"went on" not in done.stdout
+
+
+MADE = f"{CAMTOOL} post w.svg -t grbl --no-verify -q"
+
+
+def test_a_pipe_that_nobody_reads_is_refused(
+    camtool: Run, here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("camtool.cli.files.READER_S", 0.2)
+    os.mkfifo(here / "pipe")
+    line = ("post", "w.svg", "-t", "grbl", "--no-verify", "-o", "pipe", "--preview", "w2.svg")
+    done = camtool(*line)
+    assert done.returncode == 2
+    assert b"pipe: is a pipe that nobody reads; open its reader first" in done.stderr
+    assert sorted(path.name for path in here.iterdir()) == ["p.nc", "pipe", "w.svg"]
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        f"mkfifo pipe; cat pipe > got & {MADE} -o pipe; wait",
+        f"mkfifo pipe; {MADE} -o pipe & sleep 0.5; cat pipe > got; wait",
+        f"{MADE} -o >(cat > got); while [ ! -s got ]; do sleep 0.05; done; sleep 0.2",
+        f"{MADE} -o /dev/stdout | cat > got",
+    ],
+)
+def test_pipes_with_a_reader_get_all_of_it(here: Path, line: str) -> None:
+    assert shell(f"{MADE} -o w.nc", here).returncode == 0
+    assert shell(line, here).returncode == 0
+    assert (here / "got").read_bytes() == (here / "w.nc").read_bytes()
