@@ -219,7 +219,9 @@ class Code(IntEnum):
         206,
         (INFO, WARNING, ERROR),
         "info: a cut goes through the stock into what lies below, as far as `spoilboard` in "
-        "`[stock]` allows; error: farther; warning: something is cut wholly beside the stock",
+        "`[stock]` allows; error: farther, or a part or an engraving that goes beyond its edge, "
+        "or what lies wholly beside it; warning: a pocket, a hole or an open line goes beyond the "
+        "edge, or a cut runs wholly beside it",
         "correct `[stock]`, the origin or the depth",
     )
     RAPID_IN_STOCK = (
@@ -1131,6 +1133,30 @@ OUT_OF_STOCK_BESIDE = Sentence(
     "the origin",
     "cuts",
     WARNING,
+)
+OUT_OF_STOCK_PART = Sentence(
+    Code.OUT_OF_STOCK,
+    "the {what} goes {measured:.4g} mm beyond the {edge} edge of the stock, so that it is not "
+    "whole: move the origin or the copies, or correct [stock]",
+    "mm",
+    ERROR,
+)
+OUT_OF_STOCK_WHOLLY = Sentence(
+    Code.OUT_OF_STOCK,
+    "the {what} lies wholly beside the stock, {measured:.4g} mm beyond its {edge} edge: move the "
+    "origin or the copies, or correct [stock]",
+    "mm",
+    ERROR,
+)
+OUT_OF_STOCK_PARTLY = Sentence(
+    Code.OUT_OF_STOCK,
+    "the {what} goes {measured:.4g} mm beyond the {edge} edge of the stock: correct the origin or "
+    "[stock] if that is not meant",
+    "mm",
+    WARNING,
+)
+OUT_OF_STOCK_MORE = Sentence(
+    Code.OUT_OF_STOCK, "{measured:# more contour|# more contours} like this"
 )
 RAPID_IN_STOCK = Sentence(
     Code.RAPID_IN_STOCK,

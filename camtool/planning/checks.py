@@ -36,17 +36,29 @@ from camtool.findings import (
     OUT_OF_STOCK,
     OUT_OF_STOCK_AS_ALLOWED,
     OUT_OF_STOCK_BESIDE,
+    OUT_OF_STOCK_MORE,
+    OUT_OF_STOCK_PART,
+    OUT_OF_STOCK_PARTLY,
+    OUT_OF_STOCK_WHOLLY,
     OUT_OF_TRAVEL,
     RAPID_IN_STOCK,
     TOOL_NOT_SAID,
     TOOL_NOT_SAID_APART,
     Finding,
+    Sentence,
 )
+from camtool.geometry.measure import path_extents
 from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.machine.model import Machine
-from camtool.planning.items import Setting, Step
+from camtool.planning.items import Fixed, Setting, Step
 from camtool.planning.job import MILLS, Job, Stock, Tool
-from camtool.planning.naming import operation_name, own_numbers, range_words
+from camtool.planning.naming import (
+    at_place,
+    operation_name,
+    own_numbers,
+    range_words,
+    shortened_list,
+)
 from camtool.planning.settings import lowered_feeds
 from camtool.planning.sides import runs_beside
 from camtool.toolpath.moves import Kind, Toolpath, toolpath_extents
@@ -65,6 +77,15 @@ BEYOND_MOST = 0.25
 """An allowance that takes a tool farther beyond a line than this part of its radius looks like a
 mistake: corrections of wear and play are hundredths of millimetres."""
 
+OFF_STOCK_MM = 0.01
+"""What is drawn may lie beyond the edge of the stock by this much: nobody measures it finer."""
+
+EDGES = ("left", "right", "lower", "upper")
+"""The edges of the stock, seen from above."""
+
+STOCK_WORDS = {"pocket": "pocket", "engrave": "line", "vcarve": "carving", "chamfer": "edge"}
+"""What an operation of a kind cuts; those that are not here cut parts and holes."""
+
 IN_PASSES = ("profile", "pocket", "engrave", "chamfer")
 """Kinds of operation that go down in passes, each of one depth."""
 
@@ -73,17 +94,22 @@ Box = tuple[float, float, float, float]
 """Left, lower, right and upper edge, mm."""
 
 
-def checked(toolpath: Toolpath, job: Job, machine: Machine) -> tuple[Finding, ...]:
+def checked(
+    toolpath: Toolpath, job: Job, machine: Machine, steps: Sequence[Step] = ()
+) -> tuple[Finding, ...]:
     """What no program may do, and what looks like a mistake; () when all is well.
 
     Errors: an axis beyond its travel, a cut deeper than the stock, a rapid through what is not
     cleared, a feed that the machine cannot make (on slopes: along Z), an operation whose tool the
-    program cannot ask for. A warning: something is cut wholly beside the stock.
+    program cannot ask for; of the `steps` what is drawn beside the stock. A warning: something is
+    cut wholly beside the stock.
     """
+    off = [finding for step in steps for finding in _off_stock(step, job.stock)]
     return (
         *out_of_travel(toolpath, machine),
         *lowered_feeds(job, machine),
-        *_out_of_stock(toolpath, job),
+        *_too_deep(toolpath, job),
+        *(off or _beside_stock(toolpath, job)),
         *_tools_not_said(job),
         *_rapids_in_stock(toolpath, job),
         *_feeds_above_limits(toolpath, machine),
@@ -123,8 +149,8 @@ def _into_travel(toolpath: Toolpath, machine: Machine, name: str) -> str:
     return f"scale the drawing, or cut it in parts; {yours}"
 
 
-def _out_of_stock(toolpath: Toolpath, job: Job) -> Iterator[Finding]:
-    """Cuts through the stock and deeper than may be, and what is cut wholly beside it."""
+def _too_deep(toolpath: Toolpath, job: Job) -> Iterator[Finding]:
+    """Cuts through the stock, and deeper than may be."""
     stock = job.stock
     cuts = _cuts(toolpath)
     if stock is None or not cuts.any():
@@ -151,7 +177,12 @@ def _out_of_stock(toolpath: Toolpath, job: Job) -> Iterator[Finding]:
             thickness=stock.thickness_mm,
             allowed=stock.through_mm,
         )
-    if stock.box_mm is None:
+
+
+def _beside_stock(toolpath: Toolpath, job: Job) -> Iterator[Finding]:
+    """What is cut wholly beside the stock."""
+    stock, cuts = job.stock, _cuts(toolpath)
+    if stock is None or stock.box_mm is None or not cuts.any():
         return
     _, sweeps = _radii(toolpath, job)
     beside = _beside(toolpath, stock.box_mm, sweeps)
@@ -165,6 +196,58 @@ def _out_of_stock(toolpath: Toolpath, job: Job) -> Iterator[Finding]:
             where=f"{_place(toolpath, row)} near ({x:.3f}, {y:.3f}) mm",
             measured=len(np.unique(stay[outside])),
         )
+
+
+def _off_stock(step: Step, stock: Stock | None) -> list[Finding]:
+    """What an operation cuts of the drawing that lies beside the stock.
+
+    An error: a part and an engraving that are not whole then, and what lies wholly beside it. A
+    pocket that is open at the edge, a notch, and a line that runs out of the stock may be meant:
+    a warning. The tool itself may run beside the stock.
+    """
+    again = step.operation.stage == "finish" or step.operation.rest_of is not None
+    if stock is None or stock.box_mm is None or again or not step.runs:
+        return []
+    chosen, kind = step.chosen, step.operation.kind
+    boxes, names = path_extents(chosen.lines), list(chosen.names)
+    whole = chosen.lines.closed & (chosen.rim if kind in ("profile", "chamfer") else True)
+    whole = np.asarray(whole & (kind in ("profile", "chamfer", "engrave", "vcarve")))
+    what = [STOCK_WORDS.get(kind, "hole" if not each else "part") for each in chosen.rim.tolist()]
+    if kind in ("drill", "bore"):
+        items = [item for item in step.items if isinstance(item, Fixed)]
+        mine = np.isin(chosen.source, [item.source for item in items])
+        boxes, names = boxes[mine], [names[row] for row in np.flatnonzero(mine).tolist()]
+        points = chosen.points if kind == "drill" else chosen.points[:0]
+        boxes = np.concatenate([boxes, np.repeat(points[:, :, None], 2, axis=2)])
+        names += chosen.point_names[: len(points)]
+        whole, what = np.zeros(len(boxes), dtype=np.bool_), ["hole"] * len(boxes)
+    left, low, right, high = stock.box_mm
+    beyond = np.column_stack(
+        [
+            left - boxes[:, 0, 0],
+            boxes[:, 0, 1] - right,
+            low - boxes[:, 1, 0],
+            boxes[:, 1, 1] - high,
+        ]
+    )
+    size = np.ptp(boxes, axis=2)[:, [0, 0, 1, 1]]
+    found = defaultdict[Sentence, list[Finding]](list)
+    for row in np.flatnonzero((beyond > OFF_STOCK_MM).any(axis=1)).tolist():
+        # What lies off wholly, to the side on which it lies the farthest; else how much of it.
+        apart = beyond[row] - size[row]
+        off = bool((apart >= np.where(size[row] > 0.0, -POSITION_EPS_MM, OFF_STOCK_MM)).any())
+        edge = int((apart if off else beyond[row]).argmax())
+        sentence = OUT_OF_STOCK_PART if whole[row] else OUT_OF_STOCK_PARTLY
+        sentence = OUT_OF_STOCK_WHOLLY if off else sentence
+        one = sentence(
+            where=at_place(names[row], boxes[row].mean(axis=1)),
+            measured=max(float(apart[edge]), 0.0) if off else float(beyond[row, edge]),
+            limit=OFF_STOCK_MM,
+            what=what[row],
+            edge=EDGES[edge],
+        )
+        found[sentence].append(one)
+    return [each for some in found.values() for each in shortened_list(some, OUT_OF_STOCK_MORE)]
 
 
 def _cuts(toolpath: Toolpath) -> Bools:

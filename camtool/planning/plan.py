@@ -126,7 +126,7 @@ def _linked(
     findings += [finding for step in steps for finding in step.findings]
     findings += _left_over(placed, whole, any(step.runs for step in steps))
     findings += _coarse(drawing, placed)
-    findings += checked(toolpath, job, machine)
+    findings += checked(toolpath, job, machine, steps)
     made_from = PurePath(drawing.file).name
     toolpath = replace(
         toolpath,

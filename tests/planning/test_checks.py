@@ -1,15 +1,24 @@
 """What no program may do: travel, stock, rapids, tools, feeds."""
 
 import math
+from dataclasses import replace
 
+import numpy as np
 import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from camtool.findings import Code, Finding, Severity
+from camtool.geometry.drawing import Mark
+from camtool.geometry.polylines import Polyline
 from camtool.machine.model import Machine
 from camtool.planning.checks import checked
-from camtool.planning.job import Job, Operation, Stock, Tool, job_of
+from camtool.planning.job import Job, Operation, Placement, Stock, Tool, job_of
+from camtool.planning.plan import plan
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind
+from tests.drawings import drawing_of
 from tests.oracles.path_machine import path_machine
 
 STOCK = Stock(2.0, (0.0, 0.0), (10.0, 10.0))
@@ -206,3 +215,93 @@ def test_a_helix_is_as_long_as_it_is() -> None:
     assert codes(turn, None, *LIMITS) == []
     turn.arc(1, 0, -1.4, centre=(0, 0), ccw=True, feed=100)  # 12.6 along Z
     assert codes(turn, None, *LIMITS) == [Code.FEED_ABOVE_LIMIT]
+
+
+def box(x: float, y: float, width: float, height: float) -> Polyline:
+    corners = [(x, y), (x + width, y), (x + width, y + height), (x, y + height)]
+    return Polyline(np.array([(*corner, 0.0) for corner in corners]), closed=True)
+
+
+def off_stock(job: Job, *paths: Polyline) -> list[Finding]:
+    """What planning says of the stock."""
+    findings = plan(drawing_of(paths), job, path_machine()).findings
+    return [each for each in findings if each.code == Code.OUT_OF_STOCK]
+
+
+def job_on(operation: Operation, **more: object) -> Job:
+    return Job((operation,), stock=Stock(2.0, (0.0, 0.0), (40.0, 30.0)), **more)  # type: ignore[arg-type]
+
+
+PROFILE = Operation(tool=Tool(3.0), depth_mm=1.0)
+
+
+@given(
+    x=st.floats(-60.0, 60.0),
+    y=st.floats(-50.0, 50.0),
+    width=st.floats(4.0, 60.0),
+    height=st.floats(4.0, 50.0),
+)
+@settings(max_examples=60)
+def test_a_part_must_lie_within_the_stock(x: float, y: float, width: float, height: float) -> None:
+    part, stock = shapely.box(x, y, x + width, y + height), shapely.box(0, 0, 40, 30)
+    errors = [e for e in off_stock(job_on(PROFILE), box(x, y, width, height))
+              if e.severity is Severity.ERROR]  # fmt: skip
+    beyond = max(-x, -y, x + width - 40.0, y + height - 30.0)
+    if part.within(stock):
+        assert errors == []  # the tool runs beside the edge of the stock there
+    elif beyond > 0.01:
+        (error,) = errors
+        assert ("wholly" in error.message) == (part.intersection(stock).area == 0.0)
+        if "wholly" not in error.message:
+            assert error.measured == pytest.approx(beyond)
+
+
+def test_each_copy_off_the_stock_is_named() -> None:
+    """Three of four parts lie off it: the right ones in part, an upper one wholly."""
+    place = Placement(copies=(2, 2), pitch_mm=(25.0, 32.0))
+    found = off_stock(job_on(PROFILE, placement=place), box(1, 1, 20, 12))
+    assert {each.severity for each in found} == {Severity.ERROR}
+    told = {each.where.split(" at ")[0].split("copy ")[1]: each.message for each in found}
+    assert set(told) == {"2", "3", "4"}
+    assert "6 mm beyond the right edge" in told["2"]
+    assert "wholly beside the stock, 3 mm beyond its upper edge" in told["3"]
+
+
+@pytest.mark.parametrize(
+    ("operation", "path", "severity"),
+    [
+        # A pocket open at the edge, a notch, a line that runs out: they may be meant.
+        (Operation("pocket", tool=Tool(3.0), depth_mm=1.0), box(30, 5, 20, 10), Severity.WARNING),
+        (Operation(tool=Tool(3.0), side="inside", depth_mm=1.0), box(30, 5, 20, 10),
+         Severity.WARNING),
+        (Operation("engrave", depth_mm=0.5), Polyline(np.array([[5, 5, 0], [50, 5, 0.0]])),
+         Severity.WARNING),
+        (Operation("bore", tool=Tool(3.0), depth_mm=1.0),
+         Polyline(np.array([[36, 5, 1], [44, 5, 1.0]]), closed=True), Severity.WARNING),
+        # Half an engraving is none, and nothing is cut in the air.
+        (Operation("engrave", depth_mm=0.5), box(30, 5, 20, 10), Severity.ERROR),
+        (Operation("engrave", depth_mm=0.5), Polyline(np.array([[45, 5, 0], [50, 5, 0.0]])),
+         Severity.ERROR),
+        (Operation("pocket", tool=Tool(3.0), depth_mm=1.0), box(45, 5, 20, 10), Severity.ERROR),
+        (Operation("drill", tool=Tool(8.0, "drill"), depth_mm=1.0),
+         Polyline(np.array([[46, 5, 1], [54, 5, 1.0]]), closed=True), Severity.ERROR),
+    ],
+)  # fmt: skip
+def test_what_may_be_meant_beyond_the_edge_is_a_warning(
+    operation: Operation, path: Polyline, severity: Severity
+) -> None:
+    (finding,) = off_stock(job_on(operation), path)
+    assert finding.severity is severity
+    assert "right edge" in finding.message
+    assert finding.measured is not None
+
+
+def test_a_point_to_drill_beside_the_stock_is_an_error() -> None:
+    drawing = replace(drawing_of([]), marks=(Mark((41.0, 5.0), "0", "", "POINT 1"),
+                                             Mark((39.0, 5.0), "0", "", "POINT 2")))  # fmt: skip
+    drill = Operation("drill", tool=Tool(2.0, "drill"), depth_mm=1.0)
+    findings = plan(drawing, job_on(drill), path_machine()).findings
+    (finding,) = (each for each in findings if each.code == Code.OUT_OF_STOCK)
+    assert finding.severity is Severity.ERROR
+    assert "POINT 1" in finding.where
+    assert finding.measured == pytest.approx(1.0)
