@@ -89,7 +89,7 @@ class State(Enum):
     PAUSED = "paused"
     STOPPING = "stopping"
     FINISHED = "finished"
-    STOPPED = "stopped"
+    STOPPED = "stopped"  # by the user: `why` says whether the machine has said that it stands
     FAILED = "failed"
 
 
@@ -247,6 +247,11 @@ class PacketByPacket(Conversation):
     Pauses are between packets, and so is a stop, unless `_halt` can do more.
     """
 
+    stands = "stopped: it has done what it was sent, and stands"
+    """What is known when it has stopped behind a packet."""
+    goes_on = "it does what it was sent to its end; its switch stops it"
+    """What it does where it cannot be stopped, or nobody speaks to it any more."""
+
     def __init__(self, packets: Sequence[Packet], manner: Manner) -> None:
         super().__init__(packets, manner)
         self._busy = False
@@ -260,9 +265,16 @@ class PacketByPacket(Conversation):
     def _send(self, packet: Packet, now: float) -> None:
         """Write a packet, and set `next_s`."""
 
-    def _halt(self, now: float) -> bool:
-        """Stop the machine within a packet; False where the protocol cannot."""
-        return False
+    def _halt(self, now: float, *, unsent: bool) -> bool:
+        """Stop the machine within a packet; False where the protocol cannot. `unsent`: what was to
+        be written last of it was taken back."""
+        if unsent:
+            self._stopped()
+        return unsent
+
+    @property
+    def _alone(self) -> str:
+        return self.goes_on if self._busy else ""
 
     def begin(self, now: float) -> None:
         """Send the first packet."""
@@ -289,11 +301,13 @@ class PacketByPacket(Conversation):
         """Send nothing more; stopped when the packet that is out is done or has been halted."""
         if self.ended or self.state is State.STOPPING:
             return
+        unsent = self._unwrite()
         self.state = State.STOPPING
         if not self._busy:
             self._stopped()
-        else:
-            self._halt(now)
+        elif not self._halt(now, unsent=unsent):
+            left = self.next_s - now
+            self._tell(self.goes_on + (f" (up to {left:.0f} s more)" if left < NEVER else ""))
 
     def _go_on(self, now: float) -> None:
         """Send the next packet, unless the user is to be waited for."""
@@ -321,18 +335,21 @@ class PacketByPacket(Conversation):
         else:
             self._go_on(now)
 
-    def _stopped(self) -> None:
+    def _stopped(self, known: str = "") -> None:
+        """It stands, as far as anybody knows: `known`, or else `stands`, says how far."""
+        self._busy = False
         if self._failing:
             self._end(State.FAILED, self._failing)
         else:
-            self._end(State.STOPPED)
+            self._end(State.STOPPED, known or self.stands)
 
     def _fail(self, why: str, now: float) -> None:
         """Stop the machine where the protocol can, and fail."""
         if self.ended or self._failing:
             return
         self._failing, self.state = why, State.STOPPING
-        if not self._busy or not self._halt(now):
+        unsent = self._unwrite()
+        if not self._busy or not self._halt(now, unsent=unsent):
             self._end(State.FAILED, why)
 
 

@@ -19,7 +19,7 @@ from msgspec import Struct
 
 from camtool.errors import MachineError
 from camtool.target.terminal import Terminal
-from camtool.target.wire import Forecast, Manner, Packet, PacketByPacket, State, Wire
+from camtool.target.wire import Forecast, Manner, Packet, PacketByPacket, Wire
 
 from .dialect import Dialect, I8751Link, I8751Machine
 from .pulses import PulseTimes
@@ -37,6 +37,8 @@ SLOWER: Final = 1.05
 
 ANY: Final = "?"
 """A reply of which nothing is known, not even whether there is one."""
+
+UNMOVED: Final = "nothing of this packet has moved, and the controller must be reset"
 
 NONE: Final = "-"
 """No reply."""
@@ -191,6 +193,9 @@ def _parts(stream: bytes, machine: I8751Machine) -> Iterator[_Part]:
 class I8751Conversation(PacketByPacket):
     """A byte and its reply."""
 
+    stands = "stopped: it has executed what it was sent, and stands"
+    goes_on = "it executes the packet to its end; its switch stops it"
+
     def __init__(self, packets: Sequence[Packet], machine: I8751Machine, manner: Manner) -> None:
         super().__init__(packets, manner)
         whole = b"".join(packet.data for packet in packets)
@@ -269,15 +274,17 @@ class I8751Conversation(PacketByPacket):
     def _mend(self) -> str:
         if self._executes:
             return "; it may be executing the packet: switch it off"
-        return "; nothing of this packet has moved, and the controller must be reset"
+        return f"; {UNMOVED}"
+
+    @property
+    def _alone(self) -> str:
+        return super()._alone if self._busy and self._executes else ""
 
     def _byte_done(self, now: float) -> None:
         packet = self.packets[self.sent - 1]
         self._at += 1
         if self._at == len(packet.data):
             self._packet_done(now)
-        elif self.state is State.STOPPING:
-            self._halt(now)
         else:
             self._send_byte(now)
 
@@ -290,10 +297,9 @@ class I8751Conversation(PacketByPacket):
         else:
             self._fail(f"no reply, {self._reply} was awaited{self._in_reply}", now)
 
-    def _halt(self, now: float) -> bool:
+    def _halt(self, now: float, *, unsent: bool) -> bool:
         """A packet that is not complete is never executed."""
-        if self._executes:
+        if self._executes and not unsent:
             return False
-        self._busy = False
-        self._stopped()
+        self._stopped(f"stopped: {UNMOVED}")
         return True

@@ -51,6 +51,8 @@ FASTEST: Final = 3.0
 STANDS: Final = 2
 """It stands when so many reports in a row give the same place."""
 
+UNSURE: Final = "it did not confirm the stop: stop it at the machine"
+
 JOINTS: Final = 3
 """X, Y and Z, in the order of its joints and of the places that it reports."""
 
@@ -156,6 +158,8 @@ class LinuxcncConversation(Conversation):
         }
         self._script, self._fresh = self._held(acts[action]), True
         self._rest, self._asked, self._now = b"", "", 0.0
+        self._skips = ""
+        """Answers that begin otherwise are passed over."""
         self._begun = self._aborting = self._pausing = self._going_on = False
         self._why_aborted = ""
         self._said = ""
@@ -184,22 +188,27 @@ class LinuxcncConversation(Conversation):
         """Abort."""
         if self.ended or self.state is State.STOPPING:
             return
-        if not self._begun:
-            self._end(State.STOPPED)
-            return
-        self._abort_at(now)
-
-    def lost(self, why: str, now: float) -> None:
-        """Without its line it goes on."""
         if self._begun:
-            why += "; LinuxCNC goes on with the program: stop it at the machine"
-        super().lost(why, now)
+            self._abort_at(now)
+            return
+        self._unwrite()
+        self._end(State.STOPPED, "stopped before it was told to move")
+
+    @property
+    def _alone(self) -> str:
+        if self._begun and not self._aborting:
+            return "LinuxCNC goes on with what it was told: stop it at the machine"
+        return ""
 
     def _abort_at(self, now: float) -> None:
+        """Abort at once, whatever answer is due: all that come before the one to this are passed
+        over. Another client may have taken the say meanwhile."""
+        self._unwrite()
         self.state, self._aborting = State.STOPPING, True
         self._script, self._fresh = self._abort(), True
-        if not self._asked:
-            self._go(None, now)
+        self._write(f"set enable {self._link.enable_password}\r\n".encode())
+        self._go(None, now)
+        self._skips = "SET ABORT "
 
     # The line and the clock.
 
@@ -210,7 +219,9 @@ class LinuxcncConversation(Conversation):
             text = line.decode("latin-1").strip()
             if not text or self.ended or text == self._asked or not self._asked:
                 continue
-            self._asked = ""
+            if not text.upper().startswith(self._skips):
+                continue
+            self._asked = self._skips = ""
             self._go(text, now)
 
     def elapsed(self, now: float) -> None:
@@ -220,7 +231,7 @@ class LinuxcncConversation(Conversation):
         if not self._asked:
             self._go(None, now)
         elif self._aborting or not self._begun:
-            more = "; it did not confirm the stop: stop it at the machine" if self._begun else ""
+            more = f"; {UNSURE}" if self._begun else ""
             why = self._why_aborted or f"no answer to {_shown(self._asked)!r}"
             self._end(State.FAILED, why + more)
         else:
@@ -241,7 +252,8 @@ class LinuxcncConversation(Conversation):
                 self._why_aborted = str(refused)
                 self._abort_at(now)
             else:
-                self._end(State.FAILED, self._why_aborted or str(refused))
+                more = f"; {UNSURE}" if self._aborting else ""
+                self._end(State.FAILED, (self._why_aborted or str(refused)) + more)
             return
         if isinstance(step, str):
             self._asked = step
@@ -411,8 +423,7 @@ class LinuxcncConversation(Conversation):
         self._end(State.FINISHED)
 
     def _abort(self) -> Script:
-        """Until it is idle, and stands. Another client may have taken the say meanwhile."""
-        yield from self._set(f"enable {self._link.enable_password}")
+        """Until it is idle, and stands."""
         yield from self._set("abort")
         end, last, still = self._now + self.manner.patience_s, None, 0
         while still < STANDS:
@@ -421,11 +432,14 @@ class LinuxcncConversation(Conversation):
             still = still + 1 if place == last and status.upper() == "IDLE" else 0
             last = place
             if self._now > end:
-                why = self._why_aborted or "it was to stop"
+                why = self._why_aborted or "it was told to stop"
                 self._why_aborted = f"{why}; it does not stand: stop it at the machine"
                 break
             yield self._poll_s
-        self._end(State.FAILED if self._why_aborted else State.STOPPED, self._why_aborted)
+        stands = "stopped: it is idle, and gives the same place again"
+        self._end(
+            State.FAILED if self._why_aborted else State.STOPPED, self._why_aborted or stands
+        )
 
     # By hand.
 
@@ -467,6 +481,10 @@ class LinuxcncConversation(Conversation):
                 if self._said or self._now > end:
                     raise _Refused(self._said or f"{axis.upper()} does not arrive")
                 yield self._poll_s
+        last = None
+        while (place := (yield from self._place())) != last:
+            last = place
+            yield self._poll_s
         self._end(State.FINISHED)
 
 

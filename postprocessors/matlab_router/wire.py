@@ -154,6 +154,9 @@ def rest_of(data: bytes, machine: MatlabRouterMachine, first: int) -> tuple[byte
 class MatlabRouterConversation(PacketByPacket):
     """The numbers of a job, one by one, and its time."""
 
+    stands = "nothing more was sent; by the simulated time it stands, and says nothing"
+    goes_on = "it runs the job to its end; its switch stops it"
+
     def __init__(
         self, packets: Sequence[Packet], machine: MatlabRouterMachine, manner: Manner
     ) -> None:
@@ -241,10 +244,14 @@ class MatlabRouterConversation(PacketByPacket):
         else:
             self._next_number(now)
 
-    def _halt(self, now: float) -> bool:
+    def _halt(self, now: float, *, unsent: bool) -> bool:
         """A job whose numbers are not complete is never begun."""
-        if self._moving:
+        if self._moving and not unsent:
             return False
-        self._busy = False
-        self._stopped()
+        self._moving = False
+        self._stopped(f"stopped: {self._mend}")
         return True
+
+    @property
+    def _alone(self) -> str:
+        return super()._alone if self._moving else ""

@@ -14,7 +14,15 @@ from typing import Final
 
 from camtool.errors import MachineError
 from camtool.target.terminal import Terminal
-from camtool.target.wire import Forecast, Manner, Packet, PacketByPacket, State, Wire
+from camtool.target.wire import (
+    PATIENCE,
+    Forecast,
+    Manner,
+    Packet,
+    PacketByPacket,
+    State,
+    Wire,
+)
 
 from .dialect import PicMmhLink, PicMmhMachine
 
@@ -23,8 +31,19 @@ ALTO: Final = b"A;"
 SLOWER: Final = 1.05
 """How much longer than simulated a block may take, beyond what the line is late."""
 
-UNTIL_SILENT: Final = (-1,)
-"""The reports of what nobody can count beforehand, as homing."""
+UNTIL_SILENT: Final = -1
+"""The first of the reports of what nobody can count beforehand, as homing; behind it the fewest
+that there can be."""
+
+BY_HAND_HZ: Final = 166.0
+"""Steps a second of PX and H by the line (L3196)."""
+
+RETREAT_STEPS: Final = 400
+"""Steps of each axis back from its switch (L1700-1705)."""
+
+AGAIN: Final = 10.0
+"""A machine that reports steps so many times the lateness of the line (0.5 s) after A; is told it
+again."""
 
 SILENT: Final = 20
 """It is over when nothing has come for so many times the lateness of the line (1 s)."""
@@ -87,19 +106,24 @@ class PicMmhWire(Wire):
     ) -> PicMmhConversation:
         """`H;`; `Q;`, which is for all axes; `PX+1000;`."""
         if action == "home":
-            packets = [Packet(b"H;", counts=UNTIL_SILENT)]
+            packets = [Packet(b"H;", counts=(UNTIL_SILENT, 3 * RETREAT_STEPS))]
         elif action == "zero" and set("xyz") <= values.keys() and not any(values.values()):
             packets = [Packet(b"Q;")]
         elif action == "jog":
+            hz = _by_hand_hz(machine)
             packets = [
-                Packet(text, counts=UNTIL_SILENT)
+                Packet(text, seconds=count / hz, counts=(UNTIL_SILENT, count))
                 for letter, axis in zip("xyz", machine.axes, strict=True)
                 if letter in values
-                for text in _steps(letter, values[letter], axis.coded_step_mm)
+                for text, count in _steps(letter, values[letter], axis.coded_step_mm)
             ]
         else:
             return super().command(action, machine, values, manner)  # type: ignore[return-value]
         return PicMmhConversation(packets, machine, manner)
+
+
+def _by_hand_hz(machine: PicMmhMachine) -> float:
+    return min(BY_HAND_HZ, machine.limits.max_step_rate_hz or BY_HAND_HZ)
 
 
 def _compensations(machine: PicMmhMachine) -> list[bytes]:
@@ -132,24 +156,37 @@ def _reports(forecast: Forecast, block: int, machine: PicMmhMachine) -> int:
     return count
 
 
-def _steps(letter: str, way_mm: float, step_mm: float) -> list[bytes]:
+def _steps(letter: str, way_mm: float, step_mm: float) -> list[tuple[bytes, int]]:
+    """The strings that move an axis, each with its steps."""
     left, sense = round(abs(way_mm) / step_mm), "-" if way_mm < 0.0 else "+"
     parts = [MOST_STEPS] * (left // MOST_STEPS) + [left % MOST_STEPS] * (left % MOST_STEPS > 0)
-    return [f"P{letter.upper()}{sense}{part:04d};".encode() for part in parts]
+    return [(f"P{letter.upper()}{sense}{part:04d};".encode(), part) for part in parts]
 
 
 class PicMmhConversation(PacketByPacket):
     """A block, its echo, its steps."""
+
+    goes_on = "it makes the string that it has to its end; any character stops it"
 
     def __init__(self, packets: Sequence[Packet], machine: PicMmhMachine, manner: Manner) -> None:
         super().__init__(packets, manner)
         link = machine.link
         assert isinstance(link, PicMmhLink)
         self._link = link
+        if link.step_byte == "none":
+            self.stands = (
+                "nothing more was sent; by the simulated time it stands, and says nothing"
+            )
+        pauses = [axis.compensation_mm / axis.coded_step_mm for axis in machine.axes]
+        reported = link.compensation == "reported" and link.step_byte != "none"
+        self._reverses_s = 0.0 if reported else max(pauses) / _by_hand_hz(machine)
+        """How long it may report nothing by hand, while it makes up for the play of an axis."""
         self._echo = b""
         self._count = 0
         self._over = 0.0  # when the time of the block is over
-        self._halting = self._heard = False
+        self._halting = False
+        self._ends = 0  # how many ; are to come back until A; has
+        self._told = 0.0  # when A; was written last
 
     def _send(self, packet: Packet, now: float) -> None:
         self._write(packet.data)
@@ -163,12 +200,40 @@ class PicMmhConversation(PacketByPacket):
         """The block has been taken: from now on it is executed."""
         packet = self.packets[self.sent - 1]
         self._over = now + packet.seconds
-        if packet.counts == UNTIL_SILENT:
-            self.next_s = now + SILENT * self.manner.late_s
+        if self._is_counted_later:
+            seconds = packet.seconds + self._reverses_s
+            self._over = now + SLOWER * seconds + 2.0 * self.manner.late_s
+            self.next_s = now + self._silence_s
             return
         if self._link.step_byte == "none" or self._link.echo == "none":
             self._over = now + SLOWER * packet.seconds + 2.0 * self.manner.late_s
         self._count_on(now)
+
+    @property
+    def _is_counted_later(self) -> bool:
+        """True if the packet that is out is over when nothing comes any more."""
+        return self.packets[self.sent - 1].counts[:1] == (UNTIL_SILENT,)
+
+    @property
+    def _silence_s(self) -> float:
+        """How long nothing may come until the packet is over: all that a jog reports has come
+        when its steps have, but nobody knows how many homing needs."""
+        packet = self.packets[self.sent - 1]
+        complete = packet.seconds > 0.0 and self._count >= packet.counts[1]
+        return SILENT * self.manner.late_s + (0.0 if complete else self._reverses_s)
+
+    def _silent(self, now: float) -> None:
+        """Nothing has come for long: done, if all can be that was reported."""
+        packet, reports = self.packets[self.sent - 1], self._link.step_byte != "none"
+        least = packet.counts[1]
+        if reports and self._count < least:
+            self._fail(f"it has reported {self._count} of {least} steps", now)
+        elif not reports and not packet.seconds:
+            self._end(State.FAILED, "nothing says when it stands, since link.step_byte is none")
+        elif not reports and now < self._over:
+            self.next_s = self._over
+        else:
+            self._packet_done(now)
 
     def _count_on(self, now: float) -> None:
         """Done when all has been reported and its time is over."""
@@ -189,8 +254,12 @@ class PicMmhConversation(PacketByPacket):
         if self.ended or not data:
             return
         if self._halting:
-            self._heard = True
-            self.next_s = now + 4.0 * self.manner.late_s
+            self._ends -= data.count(b";")
+            if self._ends > 0 and now >= self._told + AGAIN * self.manner.late_s:
+                self._told = now
+                self._write(ALTO)
+            quiet = 4.0 if self._ends <= 0 or self._link.echo == "none" else PATIENCE
+            self.next_s = now + quiet * self.manner.late_s
             return
         if not self._busy:
             self._fail(f"it says {data[:20]!r} without being asked", now)
@@ -206,10 +275,10 @@ class PicMmhConversation(PacketByPacket):
         self._count += len(steps)
         if any(not self._is_report(octet) for octet in steps):
             self._fail(f"it says {steps[:20]!r}, which is no step", now)
-        elif packet.counts == UNTIL_SILENT and not self._echo:
-            self.next_s = now + SILENT * self.manner.late_s
         elif begins:
             self._moves(now)
+        elif self._is_counted_later and not self._echo:
+            self.next_s = now + self._silence_s
         elif not self._echo:
             self._count_on(now)
 
@@ -223,11 +292,14 @@ class PicMmhConversation(PacketByPacket):
         if self.ended or now < self.next_s:
             return
         if self._halting:
-            if self._heard or self._link.echo == "none":
-                self._busy = False
-                self._stopped()
+            if self._ends <= 0:
+                self._stopped("stopped: A; has come back, and no step since")
+            elif self._link.echo == "none" and self._link.step_byte != "none":
+                self._stopped("stopped: A; was sent, and no step is reported any more")
+            elif self._link.echo == "none":
+                self._stopped("it was told to stop (A;); it does not say whether it stands")
             else:
-                why = self._failing or "it was to stop"
+                why = self._failing or "it was told to stop"
                 self._end(State.FAILED, f"{why}; it did not confirm the stop: switch it off")
             return
         if not self._busy:
@@ -236,19 +308,24 @@ class PicMmhConversation(PacketByPacket):
         packet = self.packets[self.sent - 1]
         if self._echo:
             self._fail(f"no echo of {packet.data.decode('latin-1')}", now)
-        elif packet.counts == UNTIL_SILENT:
-            self._packet_done(now)
+        elif self._is_counted_later:
+            self._silent(now)
         elif packet.counts and self._count < packet.counts[0]:
             self._fail(f"it has reported {self._count} of {packet.counts[0]} steps", now)
         else:
             self._count_on(now)
 
-    def _halt(self, now: float) -> bool:
+    def _halt(self, now: float, *, unsent: bool) -> bool:
         """Any character stops it; A; is one that it knows."""
-        self._halting, self._heard = True, False
+        self._halting, self._told = True, now
+        self._ends = 2 if self._echo and not unsent else 1
         self._write(ALTO)
         self.next_s = now + self.manner.patience_s
         return True
+
+    @property
+    def _alone(self) -> str:
+        return "" if self._halting else super()._alone
 
 
 class PicMmhTerminal(Terminal):

@@ -84,6 +84,8 @@ class ValcncTerminal(Terminal):
 class ValcncConversation(PacketByPacket):
     """A block, its time, and its answer where it has one."""
 
+    goes_on = "it draws the block that it has to its end; its switch stops it"
+
     def __init__(self, packets: Sequence[Packet], link: ValcncLink, manner: Manner) -> None:
         super().__init__(packets, manner)
         self._answer = b"".join(link.answer.encode("ascii").split())
@@ -91,6 +93,10 @@ class ValcncConversation(PacketByPacket):
         self._said = b""
         self._awaits = self._answered = False
         self._over = 0.0  # when the time of the block is over
+        if not self._answer:
+            self.stands = (
+                "nothing more was sent; by the simulated time it stands, and says nothing"
+            )
 
     def _send(self, packet: Packet, now: float) -> None:
         self._write(packet.data)

@@ -26,10 +26,15 @@ from camtool.sending.faults import Faults, Wired
 from camtool.sending.prepare import forecast_of
 from camtool.target.registry import LoadedTarget, load_target
 from camtool.target.twin import Twin
-from camtool.target.wire import Conversation, Manner, State, Write
+from camtool.target.wire import Conversation, Manner, State, Tell, Write
+from tests.feeding import logo
 from tests.sending.talking import Talking
+from tests.sending.test_any_order import PROGRAMS, SETTINGS
 from tests.sending.test_ends import hosted
 from tests.waiting import HANG_S
+
+FILE = "/programs/part.ngc"
+"""What LinuxCNC opens."""
 
 LONG_S = 10_000.0
 """Beyond the end of all that any machine here was told."""
@@ -39,8 +44,8 @@ LONG_S = 10_000.0
 class Work:
     """What a machine is doing while it is stopped. `action`: a command by hand with `values`, or
     "send" a `program`. `first`: what must go out first, by the state that the twin is in (""
-    stands for the others); `way_mm`: how far each slide may still move, by the same; `seconds`:
-    the stop comes within these."""
+    stands for the others); `way_mm`: how far each slide may still move, by the same, None: to the
+    end of the blocks that the machine has; `seconds`: the stop comes within these."""
 
     target: str
     action: str
@@ -50,8 +55,8 @@ class Work:
     choices: tuple[str, ...] = ()
     at: tuple[float, float, float] = (0.0, 0.0, 0.0)
     home: bool = False
-    first: dict[str, bytes] = field(default_factory=dict)
-    way_mm: dict[str, float] = field(default_factory=dict)
+    first: dict[str, list[bytes]] = field(default_factory=lambda: {"": []})
+    way_mm: dict[str, float | None] = field(default_factory=lambda: {"": None})
     seconds: float = 20.0
 
     def loaded(self) -> LoadedTarget:
@@ -63,7 +68,8 @@ class Work:
         twin: Any = loaded.twin(list(self.choices))
         twin.slides.place(np.array(self.at))
         wire: Any = loaded.target.wire()
-        manner = Manner(home=self.home)
+        manner = Manner(home=self.home, file=FILE if wire.opens_file else "")
+        twin.read_file = lambda name: self.program
         if self.action == "send":
             decoded = loaded.target.read(self.program, loaded.machine)
             packets = wire.packets(self.program, loaded.machine, forecast_of(decoded, loaded))
@@ -77,10 +83,16 @@ GRBL_STOP_MM = 500.0**2 / 3600.0 / (2.0 * 10.0)
 """From 500 mm/min to rest at 10 mm/s², along the path."""
 
 GRBL: dict[str, Any] = {
-    "first": {"Home": b"\x18", "": b"!"},
+    "first": {"Home": [b"\x18"], "": [b"!", b"?"]},
     "way_mm": {"Home": 0.0, "": GRBL_STOP_MM + 0.004},
 }
-JOGS: dict[str, Any] = {**GRBL, "first": {"": b"\x85!"}}
+JOGS: dict[str, Any] = {**GRBL, "first": {"": [b"\x85!", b"?"]}}
+
+PIC: dict[str, Any] = {"first": {"": [b"A;"]}, "way_mm": {"": 0.0}}
+LINUXCNC: dict[str, Any] = {
+    "first": {"": [b"set enable EMCTOO\r\n", b"set abort\r\n"]},
+    "way_mm": {"": 0.0},  # its twin needs none to slow down
+}
 
 WORKS = {
     "grbl jogs": Work("grbl", "jog", {"x": 80.0, "y": -30.0, "feed": 450.0}, **JOGS),
@@ -104,6 +116,36 @@ WORKS = {
         home=True,
         seconds=14.0,
         **GRBL,
+    ),
+    "pic-mmh cuts": Work("pic-mmh", "send", program=PROGRAMS["pic-mmh"], seconds=30.0, **PIC),
+    "pic-mmh jogs": Work("pic-mmh", "jog", {"x": 0.9, "y": -0.5}, seconds=8.0, **PIC),
+    "pic-mmh homes": Work("pic-mmh", "home", seconds=60.0, **PIC),
+    "linuxcnc cuts, dwells and waits": Work(
+        "linuxcnc",
+        "send",
+        program=b"G21 G90 G61\nF400\nG0 X10\nG4 P3\nG1 X2 Y9\nG2 X6 Y13 I4 J0\nM0\nG1 X0\nM2\n",
+        **LINUXCNC,
+    ),
+    "linuxcnc jogs": Work(
+        "linuxcnc", "jog", {"x": 20.0, "z": -5.0, "feed": 120.0}, seconds=12.0, **LINUXCNC
+    ),
+    "linuxcnc homes": Work(
+        "linuxcnc", "home", choices=("power=on",), at=(40.0, 5.0, 9.0), seconds=4.0, **LINUXCNC
+    ),
+    "i8751 cuts": Work(
+        "i8751", "send", program=PROGRAMS["i8751"], settings=SETTINGS["i8751"], seconds=60.0
+    ),
+    "i8751 jogs": Work(
+        "i8751", "jog", {"x": 12.0, "y": -3.0}, settings=SETTINGS["i8751"], seconds=12.0
+    ),
+    "valcnc cuts": Work("valcnc", "send", program=PROGRAMS["valcnc"], seconds=60.0),
+    "matlab-router cuts": Work(
+        "matlab-router",
+        "send",
+        program=logo("matlab-router", "dialect.format=stream"),
+        settings=("dialect.format=stream", "link.echo=echo", "link.reset=none", "link.margin_s=0"),
+        choices=("echo=characters", "reset=itself"),
+        seconds=300.0,
     ),
 }
 
@@ -134,13 +176,16 @@ def stopped_at(
     if talk.ended:
         return talk, twin
     line.read(moment_s)
-    now, place = moment_s, twin.slides.commanded_mm.copy()
+    now, place, blocks = moment_s, twin.slides.commanded_mm.copy(), len(twin.decoded)
     fault(line)
     first, most_mm = of_state(work.first, twin), of_state(work.way_mm, twin)
     talk.stop(now)
-    out = written(talk)
+    actions = talk.actions()
+    out = [action.data for action in actions if isinstance(action, Write)]
     if not talk.ended:
-        assert out[0] == first, (moment_s, out)
+        assert out == first, moment_s
+    if not talk.ended and not first:
+        assert any("to its end" in action.text for action in actions if isinstance(action, Tell))
     for data in out:
         line.write(data, now)
     both.now = now
@@ -148,12 +193,55 @@ def stopped_at(
     assert talk.ended
     if talk.state is State.STOPPED:
         assert not twin.moves, talk.why
-        assert talk.why.startswith("stopped"), talk.why
+        says = talk.why.startswith("stopped") or talk.why.endswith("says nothing")
+        assert says, talk.why
     count = len(twin.slides.trace)
     line.read(both.now + LONG_S)
     assert len(twin.slides.trace) == count, "it moves again"
-    assert way_since(twin, now, place) <= most_mm + 1e-9
+    if most_mm is None:
+        assert len(twin.decoded) == blocks
+    else:
+        assert way_since(twin, now, place) <= most_mm + 1e-9
     return talk, twin
+
+
+STOPPING = (b"!", b"\x85!", b"?", b"\x18", b"A;", b"set enable ", b"set abort", b"get ")
+"""How all begins that may be written when a stop was asked for."""
+
+
+def stopped_with_lines_to_go(work: Work, which: int) -> tuple[Conversation, Twin, list[bytes]]:
+    """Stop it when it has this many times had something to write; what was written after that."""
+    both, twin = work.begun()
+    after, times, write = list[bytes](), [0], both.line.write
+
+    def written_now(data: bytes, now: float) -> None:
+        if times[0] >= which:
+            after.append(data)
+        write(data, now)
+
+    def wish(talk: Conversation, now: float) -> None:
+        times[0] += talk.has_actions
+        if times[0] == which:
+            times[0] = which + 1
+            talk.stop(now)
+
+    both.line.write = written_now  # type: ignore[method-assign]
+    both.until(work.seconds, wish)
+    if not both.talk.ended and times[0] < which:
+        times[0] = which + 1
+        both.talk.stop(both.now)
+    both.until(LONG_S)
+    return both.talk, twin, after
+
+
+@pytest.mark.parametrize("name", sorted(WORKS))
+def test_what_was_not_written_yet_is_never_written(name: str) -> None:
+    """A stop comes when an answer has just been heard, and the next lines are to go out."""
+    for which in (1, 2, 3, 5, 9, 17):
+        talk, twin, after = stopped_with_lines_to_go(WORKS[name], which)
+        assert talk.state in (State.STOPPED, State.FINISHED)
+        assert all(data.startswith(STOPPING) for data in after)
+        assert not twin.moves
 
 
 def moments(work: Work, count: int, seed: str) -> Sequence[float]:
@@ -233,12 +321,61 @@ def test_a_second_stop_resets_grbl_at_once() -> None:
     assert "its position is lost" in both.talk.why
 
 
-def test_done_is_said_of_a_jog_only_when_it_stands() -> None:
-    both, twin = Work("grbl", "jog", {"x": 20.0, "feed": 300.0}).begun()
+ENDS = {
+    "grbl": Work("grbl", "jog", {"x": 20.0, "feed": 300.0}),
+    "linuxcnc": Work("linuxcnc", "jog", {"x": 20.0, "feed": 300.0}),
+    "i8751": Work("i8751", "jog", {"x": 20.0}, settings=SETTINGS["i8751"]),
+    **{
+        f"pic-mmh, {step} {echo}": Work(
+            "pic-mmh",
+            "jog",
+            {"x": 0.7, "y": 0.2},
+            settings=(f"link.step_byte={step}", f"link.echo={echo}"),
+            choices=(f"step_byte={step}", f"echo={'none' if echo == 'none' else 'string'}"),
+        )
+        for step in ("bits", "letters", "none")
+        for echo in ("echo", "none")
+    },
+}
+
+
+@pytest.mark.parametrize("name", sorted(ENDS))
+def test_done_is_said_of_a_jog_only_when_it_stands(name: str) -> None:
+    """And back again, which pic-mmh begins with steps that it does not report."""
+    work = ENDS[name]
+    both, twin = work.begun()
     both.until(LONG_S)
-    assert both.talk.state is State.FINISHED
-    assert twin.slides.commanded_mm[0] == pytest.approx(20.0)
-    assert both.now > 4.0 - 1e-9
+    wire: Any = work.loaded().target.wire()
+    back = {key: value if key == "feed" else -value for key, value in work.values.items()}
+    talks = [both.talk, wire.command("jog", work.loaded().machine, back, Manner())]
+    for talk, x in zip(talks, (work.values["x"], 0.0), strict=True):
+        if talk is not both.talk:
+            line = Wired(twin)
+            line.read(both.now)
+            talk.begin(both.now)
+            both.talk, both.line = talk, line
+            both.until(2.0 * LONG_S)
+        assert talk.state is State.FINISHED, talk.why
+        assert not twin.moves
+        assert twin.slides.commanded_mm[0] == pytest.approx(x, abs=0.02)
+
+
+@pytest.mark.parametrize("echo", ["echo", "none"])
+@pytest.mark.parametrize("step", ["bits", "none"])
+def test_done_is_said_of_homing_only_when_it_stands(step: str, echo: str) -> None:
+    work = Work(
+        "pic-mmh",
+        "home",
+        settings=(f"link.step_byte={step}", f"link.echo={echo}"),
+        choices=(f"step_byte={step}", f"echo={'none' if echo == 'none' else 'string'}"),
+    )
+    both, twin = work.begun()
+    both.until(LONG_S)
+    if step == "bits":
+        assert both.talk.state is State.FINISHED, both.talk.why
+        assert not twin.moves
+    else:
+        assert both.talk.why == "nothing says when it stands, since link.step_byte is none"
 
 
 # As processes: signals, keys, terminals and pipes.
