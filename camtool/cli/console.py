@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import queue
-import signal
 import sys
 import threading
 import time
-from types import FrameType
+from contextlib import suppress
+from typing import TYPE_CHECKING
 
 import click
 
 from camtool.cli.home import BAUD
 from camtool.cli.messages import say, show_text
 from camtool.cli.options import MachineFlags, talk_options
+
+if TYPE_CHECKING:
+    from camtool.cli.wishes import Wishes
+    from camtool.sending.drive import Wish
+    from camtool.sending.line import Line
+    from camtool.target.terminal import Terminal
 
 TICK_S = 0.05
 """How long is listened before what is typed is looked at, s."""
@@ -26,6 +32,12 @@ SILENT_S = 1.5
 
 KNOCK_S = 0.5
 """How often a controller that may be starting is asked whether it is there, s."""
+
+CONFIRMS_S = 3.0
+"""A machine that was told to stop and says nothing for so long does not say that it stands, s."""
+
+SLOWS_S = 30.0
+"""One that says what it does slows down for no longer, s."""
 
 WAKES_S = 10.0
 """A boot loader takes no longer, s."""
@@ -57,9 +69,11 @@ def console(
 ) -> int:
     """Type to the controller of TARGET at PORT; its answers are shown, and what they mean.
 
-    Ctrl-C stops the machine where its protocol can, and ends it where not; Ctrl-D ends it. Lines
-    from a pipe go out one by one, the first when the controller has started, each other when the
-    one before has been answered. Exit code 1 where an answer that is due does not come.
+    Ctrl-C stops the machine where its protocol can, and ends it where not; so does all else that
+    would end camtool, which then waits until the machine stands. Ctrl-D ends it. Lines from a pipe
+    go out one by one, the first when the controller has started, each other when the one before
+    has been answered; one that stops the machine does not wait. Exit code 1 where an answer that
+    is due does not come.
 
     \b
     camtool console grbl /dev/ttyUSB0
@@ -72,71 +86,177 @@ def console(
     loaded = MachineFlags.of(target if machine is None else None, machine, settings).load()
     wire = wire_of(loaded)
     terminal = wire.terminal(loaded.machine)
-    lines: queue.Queue[str | None] = queue.Queue()
-    interrupts: list[int] = []
-    at_terminal = sys.stdin.isatty()
-
-    def read() -> None:
-        for line in sys.stdin:
-            lines.put(line.rstrip("\r\n"))
-        lines.put(None)
-
-    def interrupted(number: int, frame: FrameType | None) -> None:
-        interrupts.append(number)
-
     with opened_line(port_of(port, baud, wire, loaded)) as line:
-        if at_terminal:
-            say(f"camtool: {terminal.about}; Ctrl-D ends", quiet=quiet)
-        before = signal.signal(signal.SIGINT, interrupted)
-        threading.Thread(target=read, daemon=True).start()
-        heard = spoke = opened = time.monotonic()
-        knocked, asked, answered, ends = 0.0, "", True, False
-        if terminal.hello:
-            line.write(terminal.hello)
-            answered = False
-        try:
-            while True:
-                data = line.read(TICK_S)
-                now = time.monotonic()
-                if data:
-                    heard, answered = now, True
-                    _show(terminal.heard(data))
-                elif now - heard > QUIET_S:
-                    _show(terminal.left())
-                if interrupts:
-                    stopped = interrupts.pop() and terminal.stop and not ends
-                    if not stopped:
-                        return 0
-                    line.write(terminal.stop)
-                    say("camtool: the machine is told to stop; Ctrl-C again ends", quiet=quiet)
-                    ends, spoke = True, now
-                if not at_terminal:
-                    awaits = terminal.due or (terminal.answers and not answered)
-                    if terminal.failed:
-                        return _unanswered(asked, terminal.failed)
-                    if not terminal.ready:
-                        if now - opened >= min(WAKES_S, wait_s):
-                            return _unanswered("", "is it switched on, and is --baud its rate?")
-                        if now - knocked >= KNOCK_S:
-                            line.write(terminal.knock)
-                            knocked = now
-                        continue
-                    if awaits and now - spoke >= wait_s:
-                        return _unanswered(asked, f"none came within {wait_s:g} s (--wait)")
-                    if awaits or now - max(heard, spoke) < (QUIET_S if answered else SILENT_S):
-                        continue
-                try:
-                    text = lines.get_nowait()
-                except queue.Empty:
-                    continue
-                if text is None:
-                    return 0
-                data = terminal.typed(text)
-                if data:
-                    line.write(data)
-                    asked, spoke, answered, ends = text, now, False, False
-        finally:
-            signal.signal(signal.SIGINT, before)
+        return _Talk(terminal, line, wait_s, quiet=quiet).run()
+
+
+class _Talk:
+    """What a person and a controller say to each other."""
+
+    def __init__(self, terminal: Terminal, line: Line, wait_s: float, *, quiet: bool) -> None:
+        self._terminal, self._line, self._wait_s = terminal, line, wait_s
+        from camtool.cli.wishes import Messages
+
+        self._at_terminal = sys.stdin.isatty()
+        self._lines: queue.Queue[str | None] = queue.Queue()
+        self._next: list[str | None] = []  # the line that waits
+        self._say = Messages(quiet=quiet)
+        self._unshown: list[str] = []
+        self._shows = True  # whether anybody reads what is shown
+        self._heard = self._spoke = self._opened = time.monotonic()
+        self._knocked = 0.0
+        self._asked, self._answered = "", True
+        self._told: float | None = None  # since when it is to stop
+        self._stops = False  # whether nothing was typed since
+        self._code: int | None = None  # the exit code, when the machine stands
+
+    def run(self) -> int:
+        """Until one of them ends it; the exit code. Whatever else ends it stops the machine."""
+        from camtool.cli.wishes import Wishes
+
+        if self._at_terminal:
+            self._say(f"{self._terminal.about}; Ctrl-D ends")
+        wishes = Wishes(one_s=0.0)
+        code: int | None = None
+        with wishes.caught():
+            threading.Thread(target=self._read, daemon=True).start()
+            if self._terminal.hello:
+                self._line.write(self._terminal.hello)
+                self._answered = False
+            try:
+                while code is None:
+                    code = self._turn(wishes)
+            except BaseException:
+                with suppress(OSError):
+                    self._line.write(self._terminal.halt())
+                raise
+        self._show([], wait=self._code is None)
+        self._say.rest()
+        return code
+
+    def _read(self) -> None:
+        for text in sys.stdin:
+            self._lines.put(text.rstrip("\r\n"))
+        self._lines.put(None)
+
+    def _turn(self, wishes: Wishes) -> int | None:
+        """Listen for a moment, then do what is to be done; the exit code at the end."""
+        terminal, line = self._terminal, self._line
+        data = line.read(TICK_S)
+        now = time.monotonic()
+        if data:
+            self._heard, self._answered = now, True
+            self._show(terminal.heard(data))
+        elif now - self._heard > QUIET_S:
+            self._show(terminal.left())
+        wish = wishes()
+        if wish is not None:
+            return self._stop(wish, by_hand=wishes.by_hand)
+        if not self._shows and self._code is None:
+            return self._halt(1)
+        if self._told is not None:
+            over = self._stopped(now, self._told)
+            if over or self._code is not None:
+                return self._code if over else None
+        if not self._next:
+            with suppress(queue.Empty):
+                self._next.append(self._lines.get_nowait())
+        if not self._at_terminal:
+            code = self._awaits(now)
+            if code is not None:
+                return code if code >= 0 else None
+        if not self._next:
+            return None
+        text = self._next.pop()
+        if text is None:
+            wish = wishes()  # a terminal that is closed ends its lines too
+            if wish is not None:
+                return self._stop(wish, by_hand=wishes.by_hand)
+            if terminal.runs_on:
+                self._say("it would go on without an end: it is told to stop")
+                return self._halt(1)
+            return 0
+        data = terminal.typed(text)
+        if data:
+            line.write(data)
+            self._asked, self._spoke, self._answered = text, now, False
+            self._stops = False
+        return None
+
+    def _stop(self, wish: Wish, *, by_hand: bool) -> int | None:
+        """Stop the machine; the exit code where nobody waits until it stands."""
+        at_keyboard = self._at_terminal and by_hand
+        if self._stops if at_keyboard else wish.value == "close":
+            self._line.write(self._terminal.halt())
+            return 0 if at_keyboard else 1
+        return self._halt(None if at_keyboard else 1)
+
+    def _halt(self, code: int | None) -> int | None:
+        """Tell it to stop; with a code, all ends with that when it stands."""
+        stop = self._terminal.halt()
+        if not stop:
+            self._say("nothing stops it over its line: its switch does")
+            return code or 0
+        self._line.write(stop)
+        more = "; Ctrl-C again ends" if code is None else ""
+        self._say(f"the machine is told to stop{more}")
+        self._told = self._knocked = time.monotonic()
+        self._stops, self._code = True, code
+        self._line.write(self._terminal.asks)
+        return None
+
+    def _stopped(self, now: float, told: float) -> bool:
+        """True when it stands, or nobody knows."""
+        terminal = self._terminal
+        silent = now - max(told, self._heard) >= CONFIRMS_S
+        if terminal.stands:
+            self._say("it says that it stands")
+            if self._code is not None:
+                self._line.write(terminal.leaves)
+        elif silent or now - told >= SLOWS_S:
+            self._say("it was told to stop, and does not say that it stands")
+        else:
+            if now - self._knocked >= KNOCK_S:
+                self._line.write(terminal.asks or terminal.stop)
+                self._knocked = now
+            return False
+        self._told = None
+        return True
+
+    def _awaits(self, now: float) -> int | None:
+        """What a line from a pipe waits for: −1 while it has to, the exit code where it waits in
+        vain, None when it may go out."""
+        terminal = self._terminal
+        if self._next and self._next[0] is not None and terminal.is_urgent(self._next[0]):
+            return None
+        if terminal.failed:
+            return _unanswered(self._asked, terminal.failed)
+        if not terminal.ready:
+            if now - self._opened >= min(WAKES_S, self._wait_s):
+                return _unanswered("", "is it switched on, and is --baud its rate?")
+            if now - self._knocked >= KNOCK_S:
+                self._line.write(terminal.knock)
+                self._knocked = now
+            return -1
+        awaits = terminal.due or (terminal.answers and not self._answered)
+        since = now - max(self._heard, self._spoke)
+        if awaits and since >= self._wait_s:
+            return _unanswered(self._asked, f"none came within {self._wait_s:g} s (--wait)")
+        quiet_s = QUIET_S if self._answered else SILENT_S
+        if awaits or (since < quiet_s + terminal.rests_s and not terminal.runs_on):
+            return -1
+        return None
+
+    def _show(self, lines: list[str], *, wait: bool = False) -> None:
+        """Lines on stdout. A reader that takes none holds up nothing, unless it is waited for."""
+        from camtool.cli.wishes import takes_more
+
+        self._unshown += lines
+        while self._shows and self._unshown and (wait or takes_more(sys.stdout)):
+            try:
+                show_text(self._unshown.pop(0))
+            except OSError:
+                self._shows = False
 
 
 def _unanswered(asked: str, why: str) -> int:
@@ -144,8 +264,3 @@ def _unanswered(asked: str, why: str) -> int:
     what = f"no answer to {asked!r}" if asked else "the controller does not answer"
     say(f"camtool: error: {what}: {why}; what follows was not sent", quiet=False)
     return 1
-
-
-def _show(lines: list[str]) -> None:
-    for each in lines:
-        show_text(each)

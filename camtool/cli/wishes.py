@@ -37,17 +37,25 @@ SUSPEND = "SIGTSTP"
 
 class Wishes:
     """The next wish each time it is called, None where there is none. `key` gives the key that was
-    pressed, and `keys` what it means."""
+    pressed, and `keys` what it means; interrupts within `one_s` are one."""
 
     def __init__(
-        self, key: Callable[[], str] = lambda: "", keys: Mapping[str, Wish] | None = None
+        self,
+        key: Callable[[], str] = lambda: "",
+        keys: Mapping[str, Wish] | None = None,
+        *,
+        one_s: float = ONE_S,
     ) -> None:
-        self._key, self._keys = key, keys or {}
+        self._key, self._keys, self._one_s = key, keys or {}, one_s
         self._stops = self._closes = self._suspends = 0
+        self._ended = False  # by a signal that no person at the keyboard gives
         self._interrupted: float | None = None
+        self.by_hand = False
+        """Whether the last wish came from a person at the keyboard who is still there."""
         self._watched = {each for each in _streams() if not _is_lost(each)}
 
     def __call__(self) -> Wish | None:
+        self.by_hand = not self._ended
         if self._closes:
             self._closes = self._stops = 0
             return Wish.CLOSE
@@ -59,11 +67,13 @@ class Wishes:
             return self._keys.get("p", Wish.STOP)
         if any(map(_is_lost, self._watched)):
             self._watched.clear()  # said once
+            self.by_hand = False
             return Wish.STOP
         try:
             return self._keys.get(self._key())
         except OSError:  # what a terminal says that has been closed
             self._key = lambda: ""
+            self.by_hand = False
             return Wish.STOP
 
     @contextmanager
@@ -90,8 +100,10 @@ class Wishes:
             now, last = time.monotonic(), self._interrupted
             self._interrupted = now
             if last is not None:
-                self._closes += now - last >= ONE_S
+                self._closes += now - last >= self._one_s
                 return
+        else:
+            self._ended = True
         self._stops += 1
 
 

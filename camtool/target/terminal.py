@@ -23,8 +23,12 @@ class Terminal:
 
     end: ClassVar[bytes] = b"\n"
     """What ends a line that is typed."""
-    stop: ClassVar[bytes] = b""
-    """What stops the machine, for Ctrl-C; b"" where nothing does."""
+    stop: bytes = b""
+    """What stops the machine now, for Ctrl-C; b"" where nothing does."""
+    asks: ClassVar[bytes] = b""
+    """What is asked again and again behind that, until it `stands`."""
+    leaves: ClassVar[bytes] = b""
+    """What is sent to one that stands when nobody is there any more."""
     knock: ClassVar[bytes] = b""
     """What is asked again and again until it is `ready`."""
     about: ClassVar[str] = "each line goes out with a line feed; \\x13 is the byte of that number"
@@ -40,6 +44,12 @@ class Terminal:
         """False while it may not take lines yet, since the opening of the port has reset it."""
         self.failed = ""
         """Why an answer that is due will never come."""
+        self.stands = False
+        """True if it has said, since it was told to stop, that it stands."""
+        self.runs_on = False
+        """True if what was typed last ends only with the next thing that is typed."""
+        self.rests_s = 0.0
+        """How long it may be silent while it does what was typed last."""
         self.hello = b""
         """What is said when the port is open."""
         self._rest = b""
@@ -47,6 +57,15 @@ class Terminal:
     def typed(self, line: str) -> bytes:
         """The bytes of a line that was typed; `\\x13` in it is the byte of that number."""
         return self.unescaped(line) + self.end
+
+    def halt(self) -> bytes:
+        """What stops the machine, which is told it now."""
+        self.stands = self.runs_on = False
+        return self.stop
+
+    def is_urgent(self, line: str) -> bool:
+        """True if a line stops the machine, or lets it go on, and waits for no answer."""
+        return False
 
     def heard(self, data: bytes) -> list[str]:
         """What is to be shown of what has come; an answer that is not whole is kept."""

@@ -886,8 +886,9 @@ LAST_WORDS: Final = ("ALARM:1", "ALARM:2")
 class GrblTerminal(Terminal):
     """Lines; ? ! ~ and ^X alone go out as the real-time bytes they are."""
 
-    stop = HOLD
-    knock = STATUS
+    stop = JOG_CANCEL + HOLD
+    asks = knock = STATUS
+    leaves = RESET
     about = (
         "a line is answered by ok or error:N. Alone on a line: ? how it stands, ! feed hold, "
         "~ go on, ^X reset; $$ settings, $G modes, $X unlock, $H home"
@@ -897,6 +898,20 @@ class GrblTerminal(Terminal):
         super().__init__()
         self.ready = False
         self._typed = self._resets = False
+        self._homes = 0  # the answers that are due up to that of homing
+
+    def halt(self) -> bytes:
+        """Homing hears nothing but a reset."""
+        stop = super().halt()
+        self._typed = True  # the reports that follow are to be seen
+        if not self._homes:
+            return stop
+        self.due, self._resets, self._homes = 1, True, 0
+        return RESET
+
+    def is_urgent(self, line: str) -> bool:
+        """Holds, resets and the word to go on."""
+        return line.strip().lower() in ("!", "~", "^x", r"\x18", r"\x84", r"\x85")
 
     def heard(self, data: bytes) -> list[str]:
         """Reports that only the knocking has asked for are not shown."""
@@ -908,20 +923,24 @@ class GrblTerminal(Terminal):
         if word in ("?", "!", "~"):
             return word.encode()
         if word.upper() == "^X" or word == "\\x18":
-            self.due, self._resets = 1, True
+            self.due, self._resets, self._homes = 1, True, 0
             return RESET
+        if word.lower() in (r"\x84", r"\x85"):
+            return self.unescaped(word)
         self.due += 1
+        if word.upper() == "$H":
+            self._homes = self.due
         return super().typed(word)
 
     def meaning(self, line: str) -> str:
         """Of errors, alarms, settings and reports."""
         if line == "ok" or line.startswith("error:"):
-            self.due = max(self.due - 1, 0)
+            self.due, self._homes = max(self.due - 1, 0), max(self._homes - 1, 0)
         self.ready = self.ready or _understood(line)
         if line.startswith("Grbl "):
             if self.due and not self._resets:
                 self.failed = "the controller has begun anew"
-            self.due, self._resets = 0, False
+            self.due, self._resets, self._homes, self.stands = 0, False, 0, True
         elif line in LAST_WORDS and self.due:
             self.failed = f"{line}, {ALARMS[int(line[6:])]}; it takes nothing more until a reset"
         if found := re.fullmatch(r"(error|ALARM):(\d+)", line):
@@ -934,6 +953,7 @@ class GrblTerminal(Terminal):
                 return f"{'XYZ'[axis]}: {OF_AXES[first]}"
             return SETTINGS.get(number, "")
         if found := _STATUS.fullmatch(line):
+            self.stands = found[1] == "Idle" or found[1] in STANDING
             fields = [each.split(":", 1) for each in found[2].split("|") if each]
             said = [f"{FIELDS.get(name, name)} {value}" for name, value in fields]
             return "; ".join([STATES[found[1]], *said])

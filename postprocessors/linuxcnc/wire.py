@@ -505,6 +505,7 @@ class LinuxcncTerminal(Terminal):
 
     end = b"\r\n"
     stop = b"set abort\r\n"
+    asks = b"get program_status\r\nget rel_act_pos\r\n"
     about = (
         "get program_status, get rel_act_pos, get error, set mode mdi, set mdi G0 X1, set abort; "
         "help lists them all"
@@ -513,12 +514,27 @@ class LinuxcncTerminal(Terminal):
     def __init__(self, link: LinuxcncLink) -> None:
         super().__init__()
         self.answers = True
+        self._idle, self._place = False, ""
         words = f"hello {link.password} camtool 1.0", "set verbose on", "set echo off"
         orders = [*words, f"set enable {link.enable_password}"]
         self.hello = b"".join(order.encode() + self.end for order in orders)
 
+    def halt(self) -> bytes:
+        """Abort; where it is then is asked until it says the same twice."""
+        self._idle, self._place = False, ""
+        return super().halt()
+
+    def is_urgent(self, line: str) -> bool:
+        """What stops it."""
+        return line.lower().split() in (["set", "abort"], ["set", "estop", "on"])
+
     def meaning(self, line: str) -> str:
-        """Of refusals."""
+        """Of refusals; of reports, whether it stands."""
+        if line.upper().startswith("PROGRAM_STATUS"):
+            self._idle = line.upper().endswith(" IDLE")
+        if line.upper().startswith("REL_ACT_POS"):
+            self.stands = self._idle and line == self._place
+            self._place = line
         if line.endswith(" NAK"):
             return "refused: not enabled, switched off, or unknown"
         return ""

@@ -9,6 +9,7 @@ come as the simulation makes outputs, and its time is over. The controller says 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Final
 
@@ -27,6 +28,8 @@ from camtool.target.wire import (
 from .dialect import PicMmhLink, PicMmhMachine
 
 ALTO: Final = b"A;"
+
+_STEPS = re.compile(rb"P[XYZ][+-](\d{4});")
 
 SLOWER: Final = 1.05
 """How much longer than simulated a block may take, beyond what the line is late."""
@@ -94,8 +97,7 @@ class PicMmhWire(Wire):
 
     def terminal(self, machine: PicMmhMachine) -> PicMmhTerminal:
         """Strings, their echo, and steps by the dozen."""
-        assert isinstance(machine.link, PicMmhLink)
-        return PicMmhTerminal(machine.link)
+        return PicMmhTerminal(machine)
 
     def command(
         self,
@@ -124,6 +126,15 @@ class PicMmhWire(Wire):
 
 def _by_hand_hz(machine: PicMmhMachine) -> float:
     return min(BY_HAND_HZ, machine.limits.max_step_rate_hz or BY_HAND_HZ)
+
+
+def _reverses_s(machine: PicMmhMachine) -> float:
+    """How long it may report nothing by hand, while it makes up for the play of an axis, s."""
+    assert isinstance(machine.link, PicMmhLink)
+    if machine.link.compensation == "reported" and machine.link.step_byte != "none":
+        return 0.0
+    steps = [axis.compensation_mm / axis.coded_step_mm for axis in machine.axes]
+    return max(steps) / _by_hand_hz(machine)
 
 
 def _compensations(machine: PicMmhMachine) -> list[bytes]:
@@ -177,10 +188,7 @@ class PicMmhConversation(PacketByPacket):
             self.stands = (
                 "nothing more was sent; by the simulated time it stands, and says nothing"
             )
-        pauses = [axis.compensation_mm / axis.coded_step_mm for axis in machine.axes]
-        reported = link.compensation == "reported" and link.step_byte != "none"
-        self._reverses_s = 0.0 if reported else max(pauses) / _by_hand_hz(machine)
-        """How long it may report nothing by hand, while it makes up for the play of an axis."""
+        self._reverses_s = _reverses_s(machine)
         self._echo = b""
         self._count = 0
         self._over = 0.0  # when the time of the block is over
@@ -338,9 +346,14 @@ class PicMmhTerminal(Terminal):
         "PX+0100; steps, JX+; until a character comes, BX204; compensation, G…; blocks"
     )
 
-    def __init__(self, link: PicMmhLink) -> None:
+    def __init__(self, machine: PicMmhMachine) -> None:
         super().__init__()
+        link = machine.link
+        assert isinstance(link, PicMmhLink)
         self._link, self.answers = link, link.echo == "echo"
+        self._reverses_s, self._hz = _reverses_s(machine), _by_hand_hz(machine)
+        self._left = 0  # steps of PX that are still to be reported
+        self._ends = 0  # how many ; are to come back until A; has
         self._steps: list[tuple[str, int]] = []  # kinds of outputs and how many of each
         self._echo = b""  # what is to come back: letters are bytes of steps too
 
@@ -350,7 +363,29 @@ class PicMmhTerminal(Terminal):
         if data and not data.endswith(self.end):
             data += self.end
         self._echo = data if self._link.echo == "echo" else b""
+        self._ends, self.runs_on = 0, data[:1] in (b"J", b"&", b"F")
+        found, reports = _STEPS.fullmatch(data), self._link.step_byte != "none"
+        self._left = int(found[1]) if found and reports else 0
+        self.due = int(self._left > 0)
+        # In front of steps in the other sense there are those of compensation.
+        self.rests_s = self._reverses_s if data[:1] in (b"G", b"H", b"P") else 0.0
+        if found and reports:
+            self.rests_s = 0.0
+        elif found:
+            self.rests_s += int(found[1]) / self._hz
         return data
+
+    def halt(self) -> bytes:
+        """Any character stops it; A; has come back when it stands."""
+        stop = super().halt()
+        self._ends = 1 + self._echo.count(self.end)
+        self._echo += stop if self._link.echo == "echo" else b""
+        self._left, self.due, self.rests_s = 0, 0, 0.0
+        return stop
+
+    def is_urgent(self, line: str) -> bool:
+        """What stops it."""
+        return line.strip().rstrip(";") == "A"
 
     def heard(self, data: bytes) -> list[str]:
         """The echo as it is; outputs as many at a time as have come."""
@@ -359,6 +394,11 @@ class PicMmhTerminal(Terminal):
             echoed = self._echo[:1] == bytes([octet])
             self._echo = self._echo[1:] if echoed else self._echo
             step = "" if echoed else self._output(octet)
+            self._left = max(self._left - bool(step), 0)
+            self.due = int(self._left > 0)
+            if self._ends and octet == ord(";"):
+                self._ends -= 1
+                self.stands = not self._ends
             if step and self._steps and self._steps[-1][0] == step:
                 self._steps[-1] = step, self._steps[-1][1] + 1
             elif step:

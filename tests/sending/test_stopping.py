@@ -417,6 +417,7 @@ def at_work(
     *,
     begun: Callable[[Any], bool] = lambda twin: len(twin.slides.trace) > 5,
     terminal: bool = False,
+    started: Callable[[Any], None] = lambda process: None,
     **pipes: Any,
 ) -> Iterator[Running]:
     """camtool, when its machine has begun to move. `terminal`: keys come from one, which is also
@@ -443,11 +444,13 @@ def at_work(
         pipes = {"stdin": slave, "preexec_fn": taken, **pipes}
     pipes = {"stdin": subprocess.DEVNULL, "stderr": subprocess.PIPE, **pipes}
     with hosted(twin, 1.0) as port:
-        command = [sys.executable, "-m", "camtool", *words, "-t", work.target, "--port", port]
+        of = [work.target, port] if words[0] == "console" else ["-t", work.target, "--port", port]
+        command = [sys.executable, "-m", "camtool", *words, *of]
         with subprocess.Popen([*command, "--baud", "9600", *flags], **pipes) as process:
             if slave is not None:
                 os.close(slave)
             running = Running(process, sent, twin, master)
+            started(process)
             try:
                 running.wait_for(lambda: begun(twin))
                 yield running
@@ -581,3 +584,127 @@ def test_a_sighup_that_nohup_ignores_stops_nothing() -> None:
         assert b"!" not in it.sent
         it.signalled("SIGTERM")
         assert "stopped" in it.ended()
+
+
+# At a console.
+
+
+def at_console(name: str, text: str, speed: float = 1.0, *more: str) -> tuple[Any, str, int]:
+    """The machine behind a console that was given this by a pipe; what was said, and the code."""
+    twin: Any = load_target(name).twin([])
+    with hosted(twin, speed) as port:
+        command = [sys.executable, "-m", "camtool", "console", name, port, "--baud", "9600", *more]
+        done = subprocess.run(command, input=text, capture_output=True, text=True, check=False)
+    return twin, done.stdout + done.stderr, done.returncode
+
+
+def test_a_stop_in_a_pipe_waits_for_nothing() -> None:
+    twin, said, code = at_console("pic-mmh", "JX+;\nA;\nPX+0003;\n")
+    assert code == 0, said
+    assert not twin.moves
+    assert twin.commands == [b"JX+;", b"A;", b"PX+0003;"]
+    twin, said, code = at_console("grbl", "G4P900\n!\n^X\n$G\n")
+    assert code == 0, said
+    assert "[GC:G0" in said
+
+
+def test_what_would_go_on_for_ever_is_stopped_at_the_end_of_a_pipe() -> None:
+    twin, said, code = at_console("pic-mmh", "JX+;\n")
+    assert code == 1
+    assert "it would go on without an end: it is told to stop" in said
+    assert "it says that it stands" in said
+    assert not twin.moves
+
+
+def test_steps_that_are_not_reported_are_no_rest() -> None:
+    twin, said, code = at_console("pic-mmh", "PX+0100\nPX-0100\nPX+0003\n", 20.0)
+    assert code == 0, said
+    assert twin.slides.commanded_mm[0] == pytest.approx(3 * 0.00014, rel=0.1)
+    assert "100 × X-" in said
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "first", "how"),
+    [
+        ("grbl", b"G1X150F30\n", b"\x85!", "SIGTERM"),
+        ("grbl", b"$J=G91X150F30\n", b"\x85!", "closed"),
+        ("pic-mmh", b"PX+9999;\n", b"A;", "SIGINT"),
+        ("pic-mmh", b"JX+;\n", b"A;", "SIGHUP"),
+    ],
+)
+def test_what_ends_a_console_stops_the_machine(
+    name: str, text: bytes, first: bytes, how: str
+) -> None:
+    work = Work(name, "console")
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    feeds: list[Any] = []
+
+    def begun(twin: Any) -> bool:
+        if feeds and len(feeds) < 2:
+            feeds.append(feeds[0].stdin.write(text))
+            feeds[0].stdin.flush()
+        return len(twin.slides.trace) > 5
+
+    with at_work(["console"], work, begun=begun, started=feeds.append, **pipes) as it:
+        if how == "closed":
+            it.process.stdout.close()  # type: ignore[union-attr]
+            it.process.stdout = None
+        else:
+            it.signalled(how)
+        said = it.ended()
+        assert "the machine is told to stop" in said
+        assert "it says that it stands" in said
+        assert it.process.returncode == 1
+        assert first in it.sent
+        assert not it.twin.moves
+        if name == "grbl":
+            assert it.sent.endswith(b"\x18")
+
+
+def test_a_console_resets_a_machine_that_homes() -> None:
+    loaded = load_target("grbl")
+    wire: Any = loaded.target.wire()
+    terminal = wire.terminal(loaded.machine)
+    terminal.heard(b"\r\nGrbl 1.1h ['$' for help]\r\n")
+    terminal.typed("$G")
+    terminal.typed("$H")
+    assert terminal.halt() == b"\x18"
+    terminal.heard(b"ALARM:6\r\n\r\nGrbl 1.1h ['$' for help]\r\n")
+    assert terminal.stands
+    terminal.typed("$H")
+    terminal.heard(b"ok\r\n")
+    terminal.typed("G1X9")
+    assert terminal.halt() == b"\x85!"
+    terminal.heard(b"<Hold:1|MPos:1.000,0.000,0.000|FS:9,0>\r\n")
+    assert not terminal.stands
+    terminal.heard(b"<Hold:0|MPos:1.000,0.000,0.000|FS:0,0>\r\n")
+    assert terminal.stands
+
+
+def test_a_console_of_linuxcnc_asks_until_the_place_is_the_same() -> None:
+    loaded = load_target("linuxcnc")
+    wire: Any = loaded.target.wire()
+    terminal = wire.terminal(loaded.machine)
+    assert terminal.halt() == b"set abort\r\n"
+    for x, status, stands in ((1, "RUNNING", False), (2, "IDLE", False), (3, "IDLE", False)):
+        terminal.heard(b"PROGRAM_STATUS %s\r\nREL_ACT_POS %d 0 0\r\n" % (status.encode(), x))
+        assert terminal.stands == stands
+    terminal.heard(b"PROGRAM_STATUS IDLE\r\nREL_ACT_POS 3 0 0\r\n")
+    assert terminal.stands
+
+
+def test_a_machine_that_nothing_stops_is_said_to_be_one() -> None:
+    work = Work("valcnc", "console")
+    feeds: list[Any] = []
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+
+    def begun(twin: Any) -> bool:
+        if feeds and len(feeds) < 2:
+            feeds.append(feeds[0].stdin.write(b"G01X1Y0Z0\n"))
+            feeds[0].stdin.flush()
+        return len(twin.slides.trace) > 5
+
+    with at_work(["console"], work, begun=begun, started=feeds.append, **pipes) as it:
+        it.signalled("SIGTERM")
+        assert "nothing stops it over its line: its switch does" in it.ended()
+        assert it.process.returncode == 1
