@@ -350,6 +350,15 @@ class Code(IntEnum):
         "without tabs",
         "the flag that is named, or none if that is meant",
     )
+    TOOL_CHANGE_NOT_STATED = (
+        231,
+        WARNING,
+        "tools are changed in the program, and the machine file does not state where: the tool is "
+        "lifted to five times the safe height, as far as the travel of Z allows, and goes to "
+        "where the machine parks",
+        "`change_mm` and `change_z_mm` in `[defaults]` of the machine file, where the hand and "
+        "the longest tool have room ([machines.md](machines.md))",
+    )
     TAB_SHARED = (
         225,
         (INFO, WARNING),
@@ -1300,6 +1309,12 @@ TOOL_NOT_SAID_APART = Sentence(
     Code.TOOL_NOT_SAID,
     "the operation has another tool than the one before it and the same number {number}, so the "
     "program cannot ask for it: number the tools, or write a program for each (--split tool)",
+)
+TOOL_CHANGE_NOT_STATED = Sentence(
+    Code.TOOL_CHANGE_NOT_STATED,
+    "{count:a tool is|# tools are} changed {measured:.4g} mm above the stock here, because the "
+    "file of {machine} states no place: give {keys} in its [defaults]",
+    "mm",
 )
 SIDE_BY_UNCUT = Sentence(
     Code.SIDE_BY_UNCUT,

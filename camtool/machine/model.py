@@ -115,7 +115,8 @@ class Defaults(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     down to which the tool comes as a rapid (None: it plunges from `safe_z_mm` on).
     `plunge_share`: the feed of a plunge as a part of that of the cut (None: the same). `park_mm`:
     where the tool goes when all is cut, in the work frame; `change_mm` and `change_z_mm`: where
-    it goes between two operations to be changed (None: it stays, at `safe_z_mm`)."""
+    it goes between two operations to be changed (None: to `park_mm`, and up some times
+    `safe_z_mm`)."""
 
     safe_z_mm: Length
     cut_depth_mm: Depth

@@ -42,6 +42,7 @@ from camtool.findings import (
     OUT_OF_STOCK_WHOLLY,
     OUT_OF_TRAVEL,
     RAPID_IN_STOCK,
+    TOOL_CHANGE_NOT_STATED,
     TOOL_NOT_SAID,
     TOOL_NOT_SAID_APART,
     Finding,
@@ -61,7 +62,7 @@ from camtool.planning.naming import (
 )
 from camtool.planning.settings import lowered_feeds
 from camtool.planning.sides import runs_beside
-from camtool.toolpath.moves import Kind, Toolpath, toolpath_extents
+from camtool.toolpath.moves import Kind, Toolpath, mounted_before, toolpath_extents
 from camtool.toolpath.rapids import STOCK_TOP_MM, Reach, rapids_through_stock
 
 LIMIT_SLACK = 1e-6
@@ -111,6 +112,7 @@ def checked(
         *_too_deep(toolpath, job),
         *(off or _beside_stock(toolpath, job)),
         *_tools_not_said(job),
+        *_change_not_stated(toolpath, machine),
         *_rapids_in_stock(toolpath, job),
         *_feeds_above_limits(toolpath, machine),
     )
@@ -280,6 +282,23 @@ def _tools_not_said(job: Job) -> Iterator[Finding]:
             yield TOOL_NOT_SAID(where=where)
         else:
             yield TOOL_NOT_SAID_APART(where=where, number=other.number)
+
+
+def _change_not_stated(toolpath: Toolpath, machine: Machine) -> Iterator[Finding]:
+    """The first change of tools on a machine that does not state where they are changed."""
+    changes = (toolpath.kind == Kind.TOOL_CHANGE) & ~mounted_before(toolpath)
+    keys = [key for key in ("change_mm", "change_z_mm") if getattr(machine.defaults, key) is None]
+    if not keys or not changes.any():
+        return
+    row = int(changes.argmax())
+    x, y, z = toolpath.end[row].tolist()
+    yield TOOL_CHANGE_NOT_STATED(
+        where=f"{_place(toolpath, row)} at X {x:.3f} Y {y:.3f}",
+        measured=z,
+        count=int(changes.sum()),
+        machine=machine.target.name,
+        keys=" and ".join(keys),
+    )
 
 
 def _shape(tool: Tool) -> tuple[object, ...]:

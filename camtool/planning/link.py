@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
@@ -20,6 +21,10 @@ from camtool.toolpath.wanted import OperationNote, ToolNote
 ROUNDED_DECIMALS = 10
 """Positions are rounded to this many decimals of a mm: far coarser than the noise of doubles, and
 far finer than any machine or tolerance."""
+
+CHANGE_HEIGHTS = 5.0
+"""Where a machine states no height for changes of tools, it lifts them so many times its safe
+height above the stock, or as far as its travel goes: a hand must get between."""
 
 VERTICES_AT_ONCE = 1 << 15
 """So many vertices of runs become moves together: some 10 MB."""
@@ -59,6 +64,7 @@ def link(
     tool: Tool | None = None
     speed: float | None = None
     cooled, done = "off", 0
+    lowest = min((float(runs.vertices[:, 2].min()) for _, runs in worked if runs), default=0.0)
     for setting, runs in worked:
         operation = setting.operation
         if not runs:
@@ -69,7 +75,7 @@ def link(
             cooled = _cool(builder, cooled, "off")
             speed = _spin(builder, speed, None, spindle)
             if tool is not None:
-                _to_change(builder, machine)
+                _to_change(builder, machine, lowest)
         builder.operation(_note(setting))
         if changes:
             builder.event(Kind.TOOL_CHANGE, float(operation.tool.number or 0))
@@ -93,13 +99,20 @@ def _changes(before: Tool | None, tool: Tool) -> bool:
     return tool.number is not None and (before is None or before.number != tool.number)
 
 
-def _to_change(builder: ToolpathBuilder, machine: Machine) -> None:
-    """To where the machine changes tools, up first, if it has such a place."""
+def _to_change(builder: ToolpathBuilder, machine: Machine, lowest_mm: float) -> None:
+    """To where the machine changes tools, up first; where it states none, up as far as a hand
+    needs and to where it parks. `lowest_mm`: the lowest Z of the program."""
     x, y, z = builder.position
     height, place = machine.defaults.change_z_mm, machine.defaults.change_mm
-    if height is not None and height > z:
-        builder.rapid(z=height)
-    if place is not None and place != (x, y):
+    if height is None:
+        travel = machine.axes.z.travel_mm
+        top = math.inf if travel is None else lowest_mm + travel
+        height = min(CHANGE_HEIGHTS * machine.defaults.safe_z_mm, top)
+    if place is None:
+        place = machine.defaults.park_mm
+    if height > z:
+        builder.rapid(z=float(_rounded(np.array(height))))
+    if place != (x, y):
         builder.rapid(*place)
 
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from camtool.findings import Code, Severity
+from camtool.findings import Code, Finding, Severity
 from camtool.geometry.polylines import Polyline
 from camtool.pipeline import post_drawing, verify_program
 from camtool.planning.job import Job, Operation, Tool
@@ -302,8 +302,8 @@ def test_the_operator_reads_what_to_mount() -> None:
     lines = program(JOB, "grbl")
     at = lines.index("T1 M0")
     assert lines[at - 2] == "(stop: mount tool 1 end mill 3.175 mm)"
-    assert lines[at - 1] == "(set its tip to Z 5 mm or zero Z again - then start)"
-    assert lines[at + 1] == "G0 Z5.000"
+    assert lines[at - 1] == "(set its tip to Z 25 mm or zero Z again - then start)"
+    assert lines[at + 1] == "G0 Z25.000"
     assert "T2 M0" not in lines
     quiet = program(JOB, "grbl", "dialect.comments=none")
     assert quiet[quiet.index("T1 M0") - 2] == lines[at - 2]
@@ -353,3 +353,40 @@ def test_the_spindle_is_at_speed_before_anything_goes_down(name: str) -> None:
 
 def test_the_goldens_are_there() -> None:
     assert all(Path(GOLDEN / case).exists() for case in CASES)
+
+
+def places_of_changes(name: str, *given: str) -> tuple[list[tuple[float, ...]], list[Finding]]:
+    """Where the axes stand at each change between cuts, by the words of the program alone; and
+    what is said of it."""
+    run = post_drawing(DRAWING, JOB, target(name, *given), check=False)
+    assert run.program is not None
+    here, places, has_cut = {"X": 0.0, "Y": 0.0, "Z": 0.0}, [], False
+    for line in blocks(run.program.data.decode().splitlines()):
+        if re.match(r"T\d+ M", line) and has_cut:
+            places.append(tuple(here.values()))
+        has_cut |= here["Z"] < 0.0
+        here |= {axis: float(value) for axis, value in re.findall(r"([XYZ])(-?[\d.]+)", line)}
+    found = [each for each in run.findings if each.code == Code.TOOL_CHANGE_NOT_STATED]
+    return places, found
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_tools_are_changed_where_a_hand_has_room(name: str) -> None:
+    """Not a few millimetres above the part where the tool happens to come up."""
+    places, (said,) = places_of_changes(name)
+    assert places == [(0.0, 0.0, 25.0)]
+    assert "give change_mm and change_z_mm in its [defaults]" in said.message
+    assert "X 0.000 Y 0.000" in said.where
+    # Where it parks, and no higher than Z can go from the deepest cut, 4 mm below the stock.
+    parked, (said,) = places_of_changes(
+        name, "defaults.park_mm=[7, 60]", "defaults.change_z_mm=18"
+    )
+    assert parked == [(7.0, 60.0, 18.0)]
+    assert "give change_mm in its [defaults]" in said.message
+    low, _ = places_of_changes(name, "axes.z.travel_mm=20")
+    assert low == [(0.0, 0.0, 16.0)]
+    # A machine that states both is not told about it.
+    assert places_of_changes(name, "defaults.change_mm=[3, 50]", "defaults.change_z_mm=20") == (
+        [(3.0, 50.0, 20.0)],
+        [],
+    )
