@@ -53,6 +53,16 @@ class LifeSigns:
             self._begun = None
             self.hide()
 
+    @contextmanager
+    def hidden(self) -> Iterator[None]:
+        """Show nothing within the block, where the user is asked."""
+        begun, self._begun = self._begun, None
+        self.hide()
+        try:
+            yield
+        finally:
+            self._begun = begun
+
     def show(self) -> None:
         """Write the line, once the command takes long."""
         begun, progress = self._begun, self.progress

@@ -15,18 +15,19 @@ import click
 
 from camtool.cli.files import read_bytes, refuse_same, shown, write_all
 from camtool.cli.home import UNLOCK
-from camtool.cli.life_signs import progress
+from camtool.cli.life_signs import progress, signs_of_command
 from camtool.cli.messages import say, say_findings, show_facts, show_text
 from camtool.cli.options import MachineFlags, machine_options, talk_options
 from camtool.errors import InputError, OptionError, OutputError
 from camtool.plain import one_line
 
 if TYPE_CHECKING:
+    from camtool.sending.journal import Place as Left
     from camtool.sending.line import Port
     from camtool.sending.live import LivePage
     from camtool.sending.prepare import Consignment
     from camtool.target.registry import LoadedTarget
-    from camtool.target.wire import Conversation
+    from camtool.target.wire import Conversation, ToolAt, Wire
 
 NAME_WIDTH = 11
 """Columns before the words of a dry run."""
@@ -40,6 +41,12 @@ NAME_WIDTH = 11
 @click.option("--yes", is_flag=True, help="Begin without asking.")
 @click.option("--from", "first", type=click.IntRange(min=1), metavar="BLOCK", help="Begin there.")
 @click.option("--resume", is_flag=True, help="Go on behind what the journal says is done.")
+@click.option(
+    "--tool-at",
+    type=click.Choice(["journal", "zero", "known"]),
+    callback=lambda context, option, value: value or "",
+    help="With --resume: where it was left, at part zero, or as the controller says.",
+)
 @click.option("--single", is_flag=True, help="Wait after every block.")
 @click.option("--home", is_flag=True, help="Home the machine first.")
 @UNLOCK
@@ -61,6 +68,7 @@ def send(
     yes: bool,
     first: int | None,
     resume: bool,
+    tool_at: ToolAt,
     single: bool,
     home: bool,
     unlock: bool,
@@ -79,15 +87,42 @@ def send(
     terminal: p pauses, r goes on, s does a single block, q stops. Exit code 1 when the program
     was not finished.
     """
-    from camtool.sending.prepare import consignment, lines_of, port_of
+    from camtool.sending.prepare import consignment, lines_of, port_of, wire_of
 
     if first is not None and resume:
         raise click.UsageError("--from and --resume are two beginnings; give one of them")
     target, data = machine.load(), read_bytes(program)
     place = Path(journal or f"{program}.journal")
     refuse_same([program, *machine.files()], [str(place), live])
-    begin = _resumed(place, data, target) if resume else (first or 1) - 1
-    one = consignment(data, target, source=shown(program), first=begin, progress=progress())
+    left = _resumed(place, data, target) if resume else _unfinished(place, data)
+    begin = left.block if left and resume else (first or 1) - 1
+    if first is None and not resume:
+        if tool_at:
+            raise click.UsageError("--tool-at is for a program that goes on: give --resume")
+        if left is not None and left.last >= 0 and not quiet:
+            say(
+                f"camtool: {place} is of this program, of which {left.block} blocks are done: "
+                "--resume would go on there, and this begins anew",
+                quiet=False,
+            )
+        left = None
+    elif left is not None:
+        tool_at = _tool_at(wire_of(target), left, tool_at, target)
+    elif tool_at:
+        raise OptionError(
+            "no journal says where this program was left",
+            where=f"--tool-at {tool_at}",
+            mend="leave it out; the tool must stand at part zero",
+        )
+    one = consignment(
+        data,
+        target,
+        source=shown(program),
+        first=begin,
+        left=left,
+        tool_at=tool_at,
+        progress=progress(),
+    )
     say_findings(one.run.findings, quiet=quiet, verbose=verbose)
     if one.run.failed:
         say(
@@ -112,28 +147,65 @@ def send(
     return job.run(single=single, home=home, unlock=unlock, speed=speed, yes=yes)
 
 
-def _resumed(place: Path, data: bytes, target: LoadedTarget) -> int:
-    """The block (from 0) on which a journal goes on; InputError for one of another program."""
+def _unfinished(place: Path, data: bytes) -> Left | None:
+    """What the journal of this program says, None where there is none or it is finished."""
+    from camtool.sending.journal import read_journal
+    from camtool.sending.prepare import digest
+
+    with suppress(InputError):
+        found = read_journal(place)
+        if found.sha256 == digest(data) and not found.finished:
+            return found
+    return None
+
+
+def _tool_at(wire: Wire, left: Left, said: ToolAt, target: LoadedTarget) -> ToolAt:
+    """Where the tool is, if need be by the user's answer."""
+    from camtool.sending.prepare import tool_at_of
+
+    tool_at, asked = tool_at_of(wire, left, said, target.machine.target.name)
+    if not asked:
+        return tool_at
+    if sys.stdin.isatty():
+        with signs_of_command().hidden():
+            agreed = click.confirm(f"{asked[0].upper()}{asked[1:]}?", err=True, default=False)
+        if agreed:
+            return tool_at
+    raise OptionError(
+        asked,
+        where="--tool-at",
+        mend=f"give --tool-at {tool_at} if so; else bring the tool to part zero and give zero",
+    )
+
+
+def _resumed(place: Path, data: bytes, target: LoadedTarget) -> Left:
+    """What a journal says; InputError for one of another program."""
     from camtool.sending.journal import read_journal
     from camtool.sending.prepare import digest
 
     found = read_journal(place)
     if found.sha256 != digest(data):
-        raise InputError("is the journal of another program", file=str(place))
+        raise InputError(
+            "is the journal of another program, or this one was changed since",
+            file=str(place),
+            mend="give the journal of this program with --journal, or begin with --from",
+        )
     if found.machine != target.machine.digest:
         raise InputError(
             "the machine file has changed since", file=str(place), mend="begin with --from"
         )
     if found.finished:
         raise OptionError("the program was finished", where="--resume", mend="leave it out")
-    return found.block
+    return found
 
 
 def _agreed() -> bool:
     """Whether the user, at a terminal, says yes."""
     if not sys.stdin.isatty():
         raise click.UsageError("nobody can be asked here: give --yes")
-    if click.confirm("Begin?", err=True, default=False):
+    with signs_of_command().hidden():
+        agreed = click.confirm("Begin?", err=True, default=False)
+    if agreed:
         return True
     say("camtool: nothing was sent", quiet=False)
     return False
@@ -194,6 +266,7 @@ class _Job:
             late_s=LATE_S * speed,
             paced=real,
             file=self._laid(),
+            standing=one.standing if one.wire.place == "told" else None,
         )
         # The dry run has asked for the first packet.
         packets = [replace(packet, ask="") for packet in one.packets[:1]] + [*one.packets[1:]]
@@ -204,19 +277,28 @@ class _Job:
             journal = Journal(self.place, self._head(), more=self.more)
             wishes = Wishes(key, keys)
             self._tell = tell = Messages(quiet=self.quiet)
-            driver = Driver(line, journal, one.block_of, wishes, self._watch, tell, speed)
+            driver = Driver(
+                line, journal, one.block_of, wishes, self._watch, tell, speed, one.place_of
+            )
             try:
                 with wishes.caught():
                     driver.carry(conversation)
             finally:
                 counts = counts_of(conversation, one.block_of)
                 with suppress(OSError):
-                    journal.close(conversation.state.value, conversation.why, **counts)
+                    journal.close(
+                        conversation.state.value,
+                        conversation.why,
+                        still=conversation.is_still,
+                        place=one.place_of(conversation),
+                        **counts,
+                    )
         tell.rest()
         if conversation.state is State.FINISHED and driver.trouble is None:
             say(f"camtool: finished: {len(one.packets)} packets", quiet=self.quiet)
             return 0
         block = one.block_of(conversation.block) if conversation.block >= 0 else -1
+        block = max(block, one.first - 1)
         done = f"block {block + 1} is the last that is done" if block >= 0 else "no block is done"
         ends = conversation.why or conversation.state.value
         why = f"{driver.trouble}; {ends}" if driver.trouble else ends

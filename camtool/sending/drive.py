@@ -14,7 +14,7 @@ from enum import Enum
 from typing import Any, Protocol
 
 from camtool.errors import OutputError
-from camtool.target.wire import Conversation, State, Tell, Write
+from camtool.target.wire import Conversation, Place, State, Tell, Write
 
 TICK_S = 0.05
 """The user's wishes and the signals are looked at so often."""
@@ -50,7 +50,7 @@ class Line(Protocol):
 class Record(Protocol):
     """Where counts are kept (`camtool.sending.journal.Journal`)."""
 
-    def note(self, **counts: object) -> None: ...
+    def note(self, place: Place | None = None, **counts: object) -> None: ...
 
 
 def _nothing(_: Conversation) -> None:
@@ -73,6 +73,7 @@ class Driver:
     watch: Callable[[Conversation], None] = _nothing
     tell: Callable[[str], None] = lambda text: None
     speed: float = 1.0
+    place_of: Callable[[Conversation], Place | None] = lambda conversation: conversation.at_mm
     trouble: OutputError | None = field(default=None, init=False)
     """Why the journal or what the user is shown could not be written, if it could not."""
     _notes: bool = field(default=True, init=False)
@@ -193,7 +194,8 @@ class Driver:
         if self.journal is None or not self._notes:
             return True
         try:
-            self.journal.note(**counts_of(conversation, self.block_of))
+            counts = counts_of(conversation, self.block_of)
+            self.journal.note(place=self.place_of(conversation), **counts)
         except OutputError as error:
             self.trouble, self._notes = error, False
             conversation.stop(self.now())
@@ -202,11 +204,14 @@ class Driver:
 
 
 def counts_of(conversation: Conversation, block_of: Callable[[int], int]) -> dict[str, int]:
-    """How far a conversation has come: packets, and the last block of the program that is done."""
-    block = conversation.block
+    """How far a conversation has come: packets, and the last blocks of the program that are done
+    and that were sent."""
+    block, sent = conversation.block, conversation.packets[: conversation.sent]
+    last = max((packet.block for packet in sent[-1:]), default=-1)
     return {
         "sent": conversation.sent,
         "acknowledged": conversation.acknowledged,
         "done": conversation.done,
         "block": block_of(block) if block >= 0 else -1,
+        "last": block_of(last) if last >= 0 else -1,
     }

@@ -1,13 +1,16 @@
 """The journal of a program that is sent: how far it has come, as JSON lines that survive a crash.
 
 The first line says what is sent, by what and where to; each further line how many packets were
-sent, acknowledged and done, and the last block that is done for certain, with the seconds since
-the beginning. A line is written before the bytes that it speaks of go out, and before the next
-ones do. After a crash, the last whole line holds.
+sent, acknowledged and done, the last block that is done for certain and the last one that was
+sent, and the place of the tool (work frame, mm): where the machine says that it is, or else where
+the last block that is done has ended. A line is written before the bytes that it speaks of go out,
+and before the next ones do. After a crash, the last whole line holds. `still` in the last line:
+true if the machine is known to stand at its place. What an earlier program has left is kept until
+something of the new one goes out.
 
     {"journal": 1, "program": "logo.nc", "sha256": "…", "machine": "…", "first": 0, "at": "…"}
-    {"s": 1.25, "sent": 12, "acknowledged": 9, "done": 0, "block": -1}
-    {"s": 60.1, "end": "finished", "why": "", "sent": 340, …}
+    {"s": 1.25, "sent": 12, "acknowledged": 9, "done": 0, "block": -1, "last": 11, …}
+    {"s": 9.1, "end": "stopped", "why": "", "sent": 34, …, "place": [1, 2, 0.5], "still": true}
 """
 
 from __future__ import annotations
@@ -16,6 +19,7 @@ import json
 import os
 import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -31,15 +35,23 @@ SYNC_S = 1.0
 """What it says is brought to the disk itself once in so many seconds, and at the end."""
 
 
+Point = tuple[float, float, float]
+
+
 class Place(Struct, frozen=True):
     """Where a journal stands: the digest of the program, that of the machine, the target, the
-    first block that is not done for certain (from 0), and whether the program is finished."""
+    first block that is not done for certain (from 0), and whether the program is finished; the
+    last block that was sent (−1: none), the place of the tool (mm, None where the journal does not
+    say) and whether it is known to stand there."""
 
     sha256: str
     machine: str
     target: str
     block: int
     finished: bool
+    last: int = -1
+    tool_mm: Point | None = None
+    is_still: bool = False
 
 
 class Journal:
@@ -54,33 +66,47 @@ class Journal:
         more: bool = False,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """A new one; with `more`, behind what an earlier one says."""
+        """A new one, which takes the place of an earlier one when something has been sent; with
+        `more`, behind what an earlier one says."""
         self.file, self._clock = file, clock
+        self._replaces = not more
         self._begun = self._synced = clock()
         self._last: dict[str, Any] = {}
         try:
-            flags = os.O_RDWR | os.O_CREAT | (0 if more else os.O_TRUNC)
-            self._handle = os.open(file, flags, 0o666)
+            self._handle = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)
             self._end_line()
         except OSError as error:
             raise self._refused(error) from error
         at = time.strftime("%Y-%m-%dT%H:%M:%S%z")
-        self._add({"journal": VERSION, **head, "at": at}, sync=True)
+        self._head = {"journal": VERSION, **head, "at": at}
+        self._add(self._head, sync=True)
 
-    def note(self, **counts: Any) -> None:
-        """These counts, unless they are what was said last."""
-        if counts != self._last:
-            self._last = counts
-            now = self._clock()
-            self._add(
-                {"s": round(now - self._begun, 3), **counts}, sync=now - self._synced >= SYNC_S
-            )
+    def note(self, place: Point | None = None, **counts: Any) -> None:
+        """These counts, with the place of the tool, unless they are what was said last; nothing
+        before something is sent."""
+        if counts == self._last or not counts.get("sent"):
+            return
+        self._last = counts
+        now = self._clock()
+        line = {"s": round(now - self._begun, 3), **counts, "place": place}
+        if self._replaces:
+            self._replaces = False
+            self._begin_anew()
+        self._add(line, sync=now - self._synced >= SYNC_S)
 
-    def close(self, end: str, why: str, **counts: Any) -> None:
-        """The end, and what was reached."""
+    def _begin_anew(self) -> None:
+        """Drop what an earlier program has left."""
+        with suppress(OSError):  # what is no file has nothing to drop
+            os.lseek(self._handle, 0, os.SEEK_SET)
+            os.ftruncate(self._handle, 0)
+        self._add(self._head, sync=False)
+
+    def close(self, end: str, why: str, *, still: bool = False, **counts: Any) -> None:
+        """The end, and what was reached; `still`: the machine stands at the place that is said."""
         seconds = round(self._clock() - self._begun, 3)
         try:
-            self._add({"s": seconds, "end": end, "why": why, **counts}, sync=True)
+            line = {"s": seconds, "end": end, "why": why, **counts, "still": still}
+            self._add(line, sync=True)
         finally:
             os.close(self._handle)
 
@@ -119,32 +145,55 @@ class _Head(msgspec.Struct):
 
 
 class _Line(msgspec.Struct):
+    sent: int = 0
     block: int = -1
+    last: int = -1
     end: str = ""
+    place: Point | None = None
+    still: bool = False
 
 
 def read_journal(file: Path) -> Place:
     """Where a journal stands; InputError for a file that is none."""
+    if file.exists() and not file.is_file():
+        raise InputError("is no file that could hold a journal", file=str(file))
     try:
         rows = file.read_bytes().split(b"\n")
     except OSError as error:
         raise InputError(
             f"cannot be read ({error.strerror})", file=str(file), mend="nothing was sent from here"
         ) from error
-    head, block, finished = _head(rows[0]), -1, False
+    head = _head(rows[0])
     if head is None:
         raise InputError("is no journal of camtool send", file=str(file))
+    place, new = Place(head.sha256, head.machine, head.target, head.first, False), head
     for row in rows:
         again = _head(row)
         if again is not None:
-            head, block, finished = again, max(block, again.first - 1), False
+            new = again
             continue
         try:
             line = msgspec.json.decode(row, type=_Line)
         except msgspec.DecodeError:
             continue  # was being written when all ended
-        block, finished = max(block, line.block), line.end == "finished"
-    return Place(head.sha256, head.machine, head.target, block + 1, finished)
+        if not line.sent and line.end != "finished":
+            continue  # nothing has gone out: what was left before holds
+        block = max(line.block + 1, new.first)
+        if new is head:
+            block = max(block, place.block)
+        head = new
+        last, tool = max(line.last, new.first - 1), line.place
+        place = Place(
+            head.sha256,
+            head.machine,
+            head.target,
+            block,
+            line.end == "finished",
+            last,
+            tool,
+            line.still,
+        )
+    return place
 
 
 def _head(row: bytes) -> _Head | None:

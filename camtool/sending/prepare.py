@@ -21,9 +21,21 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import MachineError, OptionError, PostError, ProgramError
 from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.pipeline import read_program, verify_program
+from camtool.sending.journal import Place as Left
 from camtool.sending.line import Port
 from camtool.simulation.motion import Options
-from camtool.target.wire import Forecast, Manner, NoWire, Packet, Wire
+from camtool.target.wire import (
+    Conversation,
+    Forecast,
+    Manner,
+    NoWire,
+    Packet,
+    Place,
+    Standing,
+    ToolAt,
+    Wire,
+    place_words,
+)
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import COLUMNS, Kind, PolarArcs, Toolpath, toolpath_extents
 from camtool.verification.report import clock
@@ -61,6 +73,7 @@ class Consignment(Struct, frozen=True, eq=False):
     forecast: Forecast
     packets: tuple[Packet, ...]
     rest: Rest | None = None
+    standing: Standing | None = None
 
     @property
     def first(self) -> int:
@@ -88,6 +101,16 @@ class Consignment(Struct, frozen=True, eq=False):
     def seconds(self) -> float:
         """How long the machine works on what is sent, s."""
         return float(sum(packet.seconds for packet in self.packets))
+
+    def place_of(self, conversation: Conversation) -> Place | None:
+        """Where the machine says that it is, or else where the last block that is done has
+        ended, in the work frame in which the program begins."""
+        if self.wire.place == "told":
+            return conversation.at_mm
+        path = self.forecast.decoded
+        rows = np.flatnonzero((path.block <= conversation.block) & (path.block >= 0))
+        x, y, z = (path.end[rows[-1]] if len(rows) else path.start).tolist()
+        return x, y, z
 
     def block_of(self, sent: int) -> int:
         """The last block of the program that is done with a block (from 0) of what is sent; −1
@@ -150,10 +173,13 @@ def consignment(
     *,
     source: str,
     first: int = 0,
+    left: Left | None = None,
+    tool_at: ToolAt = "",
     progress: Progress | None = None,
 ) -> Consignment:
     """The program, verified and cut into packets; with `first` (a block, from 0) its rest from
-    there on. ProgramError for a program with errors, or for another machine's."""
+    there on. `left`: where its journal says that it was left; `tool_at`: where the user says that
+    the tool is then. ProgramError for a program with errors, or for another machine's."""
     wire = wire_of(target)
     check_settings(data, target, source)
     run = verify_program(data, target, source=source, progress=progress)
@@ -161,16 +187,81 @@ def consignment(
         return Consignment(run, wire, _no_forecast(run), ())
     decoded, rest = run.decoded, None
     assert decoded is not None
-    if first:
-        rest = rest_of(decoded, target, first, data)
+    standing = None if left is None else _standing(left, decoded, tool_at)
+    begin_mm = None
+    if (
+        standing is not None
+        and wire.place in ("kept", "steps")
+        and tool_at in ("journal", "known")
+    ):
+        begin_mm = standing.place_mm
+    if first or begin_mm is not None:
+        rest = rest_of(decoded, target, first, data, begin_mm=begin_mm)
         data = rest.data
         decoded = read_program(data, target, source=source).decoded
         assert decoded is not None
+        decoded = _begun_at(decoded, begin_mm, wire)
     if progress is not None:
         progress.begin(f"simulating {PurePath(source).name}")
     forecast = forecast_of(decoded, target)
     packets = tuple(wire.packets(data, target.machine, forecast))
-    return Consignment(run, wire, forecast, packets, rest)
+    return Consignment(run, wire, forecast, packets, rest, standing)
+
+
+def _standing(left: Left, decoded: Toolpath, tool_at: ToolAt) -> Standing:
+    """Where the program was left: when it was not stopped, it has done some of what was sent."""
+    under_way = (decoded.block >= left.block - 1) & (decoded.block <= left.last)
+    return Standing(left.tool_mm, left.is_still, decoded.end[under_way], tool_at)
+
+
+def _begun_at(path: Toolpath, begin_mm: Place | None, wire: Wire) -> Toolpath:
+    """A path that was read as if it began at part zero, as it is from another place: a controller
+    that knows only steps goes the same ways, others to the same places."""
+    if begin_mm is None:
+        return path
+    by = np.array(begin_mm) - path.start
+    if wire.place != "steps":
+        return replace(path, start=path.start + by)
+    return replace(path, start=path.start + by, end=path.end + by, centre=path.centre + by[:2])
+
+
+def tool_at_of(wire: Wire, left: Left, said: ToolAt, name: str) -> tuple[ToolAt, str]:
+    """Where the tool is when a program goes on that was left: what the user has said, or what
+    follows from the journal, and what is to be asked, "" where nothing is. MachineError and
+    OptionError for what the controller or the journal does not allow."""
+    where = f"--tool-at {said}" if said else "--tool-at"
+    if wire.place == "homed":
+        if said:
+            raise MachineError(f"{name} homes before each piece", where=where, mend="leave it out")
+        return "", ""
+    unknown = OptionError(
+        "the journal does not say where the tool stands: it was not stopped at a known place",
+        where=where,
+        mend="bring the tool to part zero, where the program begins, and give --tool-at zero",
+    )
+    sure = left.is_still and left.tool_mm is not None
+    if wire.place == "told":
+        if said == "journal" and not sure:
+            raise unknown
+        return said, ""
+    wrong: ToolAt = "journal" if wire.place == "kept" else "known"
+    right: ToolAt = "known" if wire.place == "kept" else "journal"
+    if said == wrong:
+        why = "has no command to set its place" if wrong == "journal" else "knows only steps"
+        raise MachineError(
+            f"{name} {why}",
+            where=where,
+            mend=f"say --tool-at {right} if the tool stands where the program was left, zero if "
+            "you have brought it to part zero",
+        )
+    if said == "zero" or (not said and left.last < 0):
+        return "zero", ""
+    if not sure:
+        raise unknown
+    asked = f"the program was left at {place_words(left.tool_mm)} by the simulation, and is to go "
+    asked += "on from there: has the tool stayed there"
+    asked += ", and the controller on" if wire.place == "kept" else ""
+    return right, "" if said else asked
 
 
 def _no_forecast(run: Run) -> Forecast:
@@ -203,15 +294,20 @@ def forecast_of(decoded: Toolpath, target: LoadedTarget) -> Forecast:
 
 
 def rest_of(
-    decoded: Toolpath, target: LoadedTarget, first: int, data: bytes | None = None
+    decoded: Toolpath,
+    target: LoadedTarget,
+    first: int,
+    data: bytes | None = None,
+    *,
+    begin_mm: Place | None = None,
 ) -> Rest:
     """The program (`data`, where it is at hand) from a block (from 0) on, behind an entry, which
     is the target's own where it has one.
 
-    It begins as the program does, at part zero: up, tool, spindle and coolant on as they are
-    there, across above the place, down to it at the feed of plunges. Behind that come the same
-    moves, which are read back and compared. OptionError for a block that is none, and for one in
-    which nothing moves any more.
+    It begins as the program does, at part zero, or at `begin_mm`, where part zero is known: up,
+    tool, spindle and coolant on as they are there, across above the place, down to it at the feed
+    of plunges. Behind that come the same moves, which are read back and compared. OptionError for
+    a block that is none, and for one in which nothing moves any more.
     """
     rows = np.flatnonzero(decoded.block >= first)
     blocks = int(decoded.block.max(initial=-1)) + 1
@@ -226,7 +322,12 @@ def rest_of(
         done = np.arange(first - own[1], blocks)
         done[: own[1]] = -1
         return Rest(own[0], first, own[1], done)
-    entry = _entry(decoded, low, target)
+    if begin_mm is not None and (decoded.kind[low:high] == Kind.SET_ZERO).any():
+        raise OptionError(
+            f"the program sets part zero behind block {first + 1}",
+            mend="bring the tool to part zero, and give --tool-at zero",
+        )
+    entry = _entry(decoded, low, target, begin_mm)
     count = len(entry)
     columns: dict[str, Any] = {
         name: np.concatenate([getattr(entry, name), getattr(decoded, name)[low:high]])
@@ -235,9 +336,12 @@ def rest_of(
     }
     columns["source"] = np.concatenate([np.full(count, -1), decoded.source[low:high]])
     columns["mode"] = np.concatenate([np.full(count, -1), decoded.mode[low:high]])
-    whole = replace(decoded, **columns, findings=(), drawn=None, operations=None)
+    start = decoded.start if begin_mm is None else np.array(begin_mm)
+    whole = replace(decoded, **columns, start=start, findings=(), drawn=None, operations=None)
     program = target.target.write(whole, machine)
     again = target.target.read(program.data, machine)
+    if begin_mm is not None:
+        again = _begun_at(again, begin_mm, wire_of(target))
     wanted = decoded.part(low, high)
     found = _Pairs(wanted, again, target).found()
     if found is None:
@@ -261,18 +365,21 @@ def _goes_on(path: Toolpath) -> bool:
     return bool((path.is_motion & somewhere).any())
 
 
-def _entry(decoded: Toolpath, low: int, target: LoadedTarget) -> Toolpath:
-    """The moves and events that bring the machine from the beginning of the program to the begin
-    of a row."""
+def _entry(
+    decoded: Toolpath, low: int, target: LoadedTarget, begin_mm: Place | None = None
+) -> Toolpath:
+    """The moves and events that bring the machine from the beginning of the program, or from
+    `begin_mm`, to the begin of a row."""
     machine = target.machine
     x, y, z = decoded.starts_of(np.array([low]))[0].tolist()
     before = decoded.part(0, low)
     top = float(toolpath_extents(decoded.first(decoded.running))[2, 1])
     safe = max(top, z, float(decoded.start[2]))
-    path = ToolpathBuilder(start=(decoded.start[0], decoded.start[1], decoded.start[2]))
+    x0, y0, z0 = decoded.start.tolist() if begin_mm is None else begin_mm
+    path = ToolpathBuilder(start=(x0, y0, z0))
     kinds = before.kind
     zeros = np.flatnonzero(kinds == Kind.SET_ZERO)
-    if len(zeros):
+    if len(zeros) and begin_mm is None:
         path.event(Kind.SET_ZERO)
     tools = np.flatnonzero(kinds == Kind.TOOL_CHANGE)
     path.rapid(z=safe)
@@ -430,7 +537,7 @@ def lines_of(one: Consignment, target: LoadedTarget) -> Sequence[tuple[str, str]
         ("sent", f"{size_bytes} bytes in {len(one.packets)} packets"),
         ("time", f"{clock(one.seconds)} by the simulation"),
         ("travel", f"{size} mm"),
-        ("begin", _stand(decoded, target)),
+        ("begin", _stand(one)),
     ]
     if one.rest is not None:
         x, y, z = decoded.starts_of(
@@ -451,9 +558,23 @@ def lines_of(one: Consignment, target: LoadedTarget) -> Sequence[tuple[str, str]
     return lines
 
 
-def _stand(decoded: Toolpath, target: LoadedTarget) -> str:
-    x, y, z = decoded.start.tolist()
-    return f"the tool stands at part zero: X{x:.3f} Y{y:.3f} Z{z:.3f}"
+def _stand(one: Consignment) -> str:
+    """Where the tool is to stand when the program begins, or goes on."""
+    standing, told = one.standing, one.wire.place == "told"
+    tool_at = "zero" if standing is None else standing.tool_at
+    if tool_at == "zero":
+        x, y, z = one.forecast.decoded.start.tolist()
+        more = ", and the controller is told so" if standing is not None and told else ""
+        return f"the tool stands at part zero: {place_words((x, y, z))}{more}"
+    if one.wire.place == "homed":
+        return "it homes first"
+    if tool_at == "known" and told:
+        return "the controller knows where the tool stands"
+    assert standing is not None
+    left = place_words(standing.place_mm) or "a place that nobody knows"
+    if not tool_at:
+        return f"the program was left at {left}; the controller must say the same"
+    return f"the tool stands where the program was left, at {left}"
 
 
 def _spindle(decoded: Toolpath, target: LoadedTarget) -> list[str]:

@@ -23,7 +23,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from enum import Enum
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from msgspec import Struct
 
@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     from camtool.toolpath.moves import Toolpath
 
 Place = tuple[float, float, float]
+
+ToolAt = Literal["", "journal", "zero", "known"]
 
 
 class Forecast(Struct, frozen=True, eq=False):
@@ -126,13 +128,72 @@ PATIENCE = 60
 does not answer."""
 
 
+NEAR_MM = 0.02
+"""A place that is reported is one that is wanted when it lies so near: steps, and rounding."""
+
+
+class Standing(Struct, frozen=True, eq=False):
+    """Where a program was left that is to go on, by its journal. `place_mm`: the place of the
+    tool, None where that is not known; `is_still`: it was known to stand there; `ends_mm` (K, 3):
+    where it may stand otherwise, having done what it had. `tool_at`: what the user says: the tool
+    stands at the place of the "journal", or at part "zero", and the controller is to take it so;
+    or the controller's own place is "known" to be right; "" for nothing."""
+
+    place_mm: Place | None
+    is_still: bool
+    ends_mm: Floats
+    tool_at: ToolAt = ""
+
+    @property
+    def said_mm(self) -> Place | None:
+        """The place at which the controller is to take the tool to stand, None for its own."""
+        return {"journal": self.place_mm, "zero": (0.0, 0.0, 0.0)}.get(self.tool_at)
+
+    def refusal(self, at_mm: Place | None, *, restarted: bool) -> str:
+        """Why the program cannot go on where the controller takes the tool to stand at a place;
+        "" where it can."""
+        if self.tool_at:
+            return ""
+        if at_mm is not None:
+            places = [] if self.place_mm is None else [self.place_mm]
+            if not restarted and not self.is_still:
+                places += [tuple(each) for each in self.ends_mm.tolist()]
+            if (self.is_still or not restarted) and any(
+                math.dist(at_mm, x) < NEAR_MM for x in places
+            ):
+                return ""
+        stands = f"takes its place for {place_words(at_mm)}"
+        if at_mm is None:
+            stands = "does not say where it stands"
+        left, ways = "nobody knows where the program was left", ""
+        if self.place_mm is not None:
+            left = f"the program was left at {place_words(self.place_mm)}"
+            if self.is_still:
+                ways = "journal (where it was left), "
+            else:
+                left = (
+                    f"the program was not stopped, and last seen at {place_words(self.place_mm)}"
+                )
+        anew = "has begun anew, and " if restarted else ""
+        return (
+            f"the controller {anew}{stands}, but {left}: home it (--home), or say where the tool "
+            f"is by --tool-at: {ways}zero (brought to part zero) or known (it is right there)"
+        )
+
+
+def place_words(place_mm: Place | None) -> str:
+    """A place as `X1.000 Y2.000 Z3.000`."""
+    return "" if place_mm is None else "X{:.3f} Y{:.3f} Z{:.3f}".format(*place_mm)
+
+
 class Manner(Struct, frozen=True):
     """How a conversation is held. `single`: it waits for `resume` after every packet; `home`: the
     machine is homed first; `unlock`: a controller that is locked is unlocked first; `late_s`: how
     late the line may be, s; `checked`: settings of the controller are compared with the machine
     file; `paced`: each byte takes the time that the rate of the line gives it, so that a reply
     that comes sooner is none; `file`: where what is sent lies, for controllers that open it by
-    themselves."""
+    themselves; `standing`: where the program was left that goes on, for controllers that say where
+    they are."""
 
     single: bool = False
     home: bool = False
@@ -141,6 +202,7 @@ class Manner(Struct, frozen=True):
     checked: bool = True
     paced: bool = False
     file: str = ""
+    standing: Standing | None = None
 
     @property
     def patience_s(self) -> float:
@@ -178,6 +240,18 @@ class Conversation(ABC):
         """What is to be done now, in order; each is given once."""
         out, self._out = self._out, []
         return out
+
+    @property
+    def at_mm(self) -> Place | None:
+        """Where the machine says that it is, in the work frame in which the program began; None
+        where it does not say."""
+        return self.place_mm
+
+    @property
+    def is_still(self) -> bool:
+        """True if it has ended and the machine is known to stand: at the place that it says, or
+        where the packets that are done have brought it."""
+        return self.state in (State.FINISHED, State.STOPPED)
 
     @property
     def has_actions(self) -> bool:
@@ -251,6 +325,14 @@ class PacketByPacket(Conversation):
     """What is known when it has stopped behind a packet."""
     goes_on = "it does what it was sent to its end; its switch stops it"
     """What it does where it cannot be stopped, or nobody speaks to it any more."""
+    halts_within: ClassVar[bool] = False
+    """True if a stop may leave the machine somewhere within a packet."""
+
+    @property
+    def is_still(self) -> bool:
+        """True behind a packet, and where a packet that was stopped has never begun."""
+        behind = self.ended and self.done == self.sent and not self._busy
+        return behind or (self.state is State.STOPPED and not self.halts_within)
 
     def __init__(self, packets: Sequence[Packet], manner: Manner) -> None:
         super().__init__(packets, manner)
@@ -362,6 +444,10 @@ class Wire(ABC):
     ready: ClassVar[tuple[str, ...]] = ()
     opens_file: ClassVar[bool] = False
     """Whether the controller opens the program as a file (`Manner.file`)."""
+    place: ClassVar[Literal["told", "kept", "steps", "homed"]] = "kept"
+    """What the controller knows of its place: it is "told" by reports; "kept" while it is switched
+    on, and not told; it knows "steps" only, and takes where it stands for the beginning; or each
+    piece of a program begins with homing ("homed")."""
     unlocks: ClassVar[bool] = False
     """True if the controller locks itself and has a command to end that (`Manner.unlock`)."""
     stopping: ClassVar[str] = ""

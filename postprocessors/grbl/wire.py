@@ -30,6 +30,7 @@ from camtool.target.wire import (
     Forecast,
     Manner,
     Packet,
+    Place,
     State,
     Wire,
 )
@@ -172,6 +173,7 @@ class GrblWire(Wire):
     """grbl 1.1 over a serial port."""
 
     baud = BAUD
+    place = "told"
     unlocks = True
     ready = (
         "opening the port may reset the controller: where it is then, is zero to it until it is "
@@ -279,7 +281,12 @@ class GrblConversation(Conversation):
         self._confirmed = 0  # packets before the last query that was answered
         self._probed = 0  # packets before the last query that was sent
         self._phase = "greeting"
-        self._offset = (0.0, 0.0, 0.0)
+        self._offset: Place | None = None  # its work zero, once it has said so
+        self._machine_mm: Place | None = None
+        self._frame: Place | None = None  # the work zero with which the program begins
+        self._standing = None if manner.home else manner.standing
+        self._restarted = False  # whether it has begun anew with the port
+        self._stood = False  # whether it was seen to stand before it was reset
         self._idle = 0  # idle reports in a row
         self._idle_since = 0.0  # the first of them
         self._holds = 0  # reports in a row that it is held, while it should work
@@ -304,6 +311,18 @@ class GrblConversation(Conversation):
         self._feed = 0.0
         self._moves = 0  # reports in a row that it moves, while it should stop
         self._jogs = any(each.startswith(b"$J=") for each in commands)
+
+    @property
+    def at_mm(self) -> Place | None:
+        """By its machine position, so that frames that the program sets do not matter."""
+        if self._frame is None or self._machine_mm is None:
+            return None
+        return _less(self._machine_mm, self._frame)
+
+    @property
+    def is_still(self) -> bool:
+        """True behind a hold that it has confirmed."""
+        return self.state is State.FINISHED or (self._stood and self.ended and not self._alarm)
 
     # What the user wants.
 
@@ -392,7 +411,8 @@ class GrblConversation(Conversation):
             self._end(State.FAILED, self._unknown())
             return
         elif self._phase == "greeting" and self._resets and now - self._begun >= patience:
-            self._end(State.FAILED, "it was reset, and does not say that it has begun anew")
+            said = "where its work zero is" if self._fresh else "that it has begun anew"
+            self._end(State.FAILED, f"it was reset, and does not say {said}")
             return
         if self._phase != "greeting" and not self._homes and now - self._answered >= patience:
             self._answered = now
@@ -571,6 +591,7 @@ class GrblConversation(Conversation):
             return
         self._moves = self._moves + 1 if state in ("Run", "Jog") else 0
         if state in STANDING or state == "Home" or self._idle >= 2:
+            self._stood = state not in ("Home", "Alarm")
             self._reset(now)
         elif state == "Hold:1" or self._slows:
             self._halted = now
@@ -595,13 +616,15 @@ class GrblConversation(Conversation):
                 self._fail(f"a report with a place that is none: {text[:40]!r}", now)
                 return
             x, y, z = (float(each) for each in text.split(",")[:3])
+            offset = self._offset or (0.0, 0.0, 0.0)
             if name == "WCO":
                 self._offset = (x, y, z)
             elif name == "WPos":
                 self.place_mm = (x, y, z)
+                self._machine_mm = _less(self.place_mm, _less((0.0, 0.0, 0.0), offset))
             else:
-                a, b, c = self._offset
-                self.place_mm = (x - a, y - b, z - c)
+                self._machine_mm = (x, y, z)
+                self.place_mm = _less(self._machine_mm, offset)
 
     def _greeted(self, state: str, now: float) -> None:
         """Its first report: only a controller at rest is begun with, and anew, so that nothing of
@@ -610,7 +633,7 @@ class GrblConversation(Conversation):
             if self._resets == 0:
                 self._resets, self._begun = 1, now
                 self._write(RESET)
-            elif self._fresh:
+            elif self._fresh and (self._offset or self._standing is None):
                 self._ready(now)
         elif state == "Alarm" and self._unlocks:
             self._ready(now)
@@ -638,11 +661,26 @@ class GrblConversation(Conversation):
         elif self.state is State.STOPPING:
             self._reset(now)  # a hold that comes behind its banner would last
         elif self._resets:
-            self._fresh = True
+            self._fresh, self._offset = True, None
             self._poll(now)
-        # Else it has begun by itself: the next report says how it stands.
+        else:  # it has begun by itself: the next report says how it stands
+            self._restarted = True
 
     def _ready(self, now: float) -> None:
+        """Begin, unless the program is to go on where the controller does not take it to stand."""
+        if self._standing is not None:
+            at, said = self._machine_mm, self._standing.said_mm
+            place = _less(at, self._offset) if at and self._offset else None
+            why = self._standing.refusal(place, restarted=self._restarted)
+            if at is None or why:
+                self._end(State.FAILED, why or "it does not say where it stands")
+                return
+            if said is not None:  # until the next reset: what it remembers stays as it is
+                self._frame = _less(at, said)
+                words = "".join(
+                    f"{axis}{value:.4f}" for axis, value in zip("XYZ", said, strict=True)
+                )
+                self._commands.append(f"G21G92{words}\n".encode())
         self._phase, self.why, self._idle = "commands", "", 0
         self.state = State.SENDING
         self._go_on(now)
@@ -766,6 +804,7 @@ class GrblConversation(Conversation):
 
     def _next_packet(self) -> None:
         if self.sent < len(self.packets):
+            self._frame = self._frame or self._offset
             packet = self.packets[self.sent]
             self.sent += 1
             self._since_probe += len(packet.data)
@@ -958,6 +997,11 @@ class GrblTerminal(Terminal):
             said = [f"{FIELDS.get(name, name)} {value}" for name, value in fields]
             return "; ".join([STATES[found[1]], *said])
         return ""
+
+
+def _less(one: Place, other: Place) -> Place:
+    (a, b, c), (x, y, z) = one, other
+    return a - x, b - y, c - z
 
 
 def _understood(line: str) -> bool:

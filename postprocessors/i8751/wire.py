@@ -55,6 +55,7 @@ class I8751Wire(Wire):
     """The controller over RS-232."""
 
     baud = 2400
+    place = "steps"
     ready = (
         "the controller knows only steps: wherever the tool stands is part zero to it",
         "the controller has just been reset: it waits for its key",

@@ -74,6 +74,7 @@ class LinuxcncWire(Wire):
     """linuxcncrsh at a TCP port (socket://HOST:5007)."""
 
     opens_file = True
+    place = "told"
     ready = (
         "it must be switched on, homed and idle; its own limits and offsets hold",
         "LinuxCNC runs the program by itself: without this line it goes on, and is stopped at the "
@@ -110,6 +111,12 @@ class LinuxcncWire(Wire):
         if link.folder is not None:
             name = re.split(r"[/\\]", manner.file)[-1]
             manner = replace(manner, file=f"{link.folder.rstrip('/')}/{name}")
+        if manner.standing is not None and manner.standing.said_mm is not None:
+            raise MachineError(
+                "LinuxCNC keeps its own place, which homing makes right",
+                where=f"--tool-at {manner.standing.tool_at}",
+                mend="home it, or say --tool-at known",
+            )
         if re.search(r"\s", manner.file):
             raise MachineError(
                 f"linuxcncrsh takes no blanks in the name of a file: {manner.file!r}",
@@ -322,6 +329,11 @@ class LinuxcncConversation(Conversation):
             yield from self._homing()
         if act != self._home and not (yield from self._homed()):
             raise _Refused("it is not homed: give --home, or home it by camtool home")
+        standing = self.manner.standing
+        if act == self._run and standing is not None and not self.manner.home:
+            why = standing.refusal((yield from self._place()), restarted=False)
+            if why:
+                raise _Refused(why)
         yield from act()
 
     def _homed(self) -> Generator[str | float, str, bool]:

@@ -56,6 +56,7 @@ class MatlabRouterWire(Wire):
     """The master over USB; the rate of the port means nothing."""
 
     baud = 9600
+    place = "homed"
     ready = (
         "the master has just been reset, and the stock lies as controller.machine_zero_mm says",
         "nothing is acknowledged: camtool waits for the simulated times, and keep a hand at the "

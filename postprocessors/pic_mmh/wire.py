@@ -178,6 +178,7 @@ class PicMmhConversation(PacketByPacket):
     """A block, its echo, its steps."""
 
     goes_on = "it makes the string that it has to its end; any character stops it"
+    halts_within = True
 
     def __init__(self, packets: Sequence[Packet], machine: PicMmhMachine, manner: Manner) -> None:
         super().__init__(packets, manner)

@@ -116,8 +116,15 @@ def killed_and_resumed(name: str, folder: Path, seed: int) -> bool:
     assert begin <= len(done)  # what is said to be done is done
     second: Any = loaded.twin([])  # somebody has brought it to part zero
     with hosted(second, SPEED[name]) as port:
+        words = command(name, program, port, "--resume")
+        if place.last >= 0 and begin < len(whole):
+            refused = subprocess.run(words, capture_output=True, text=True, check=False)
+            assert refused.returncode in (1, 2)
+            assert "--tool-at" in refused.stderr
+            assert not len(second.slides.trace)
+            assert read_journal(Path(f"{program}.journal")) == place
         again = subprocess.run(
-            command(name, program, port, "--resume"), capture_output=True, text=True, check=False
+            [*words, "--tool-at", "zero"], capture_output=True, text=True, check=False
         )
         at_rest(second)
     if begin == len(whole):
@@ -148,7 +155,7 @@ def test_fifty_kills(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(SPEED))
-@pytest.mark.parametrize("room", [700, 1100])
+@pytest.mark.parametrize("room", [900, 1300])
 def test_a_full_disk_stops_the_machine(name: str, room: int, tmp_path: Path) -> None:
     program = tmp_path / "part.txt"
     program.write_bytes(PARTS[name])

@@ -22,7 +22,7 @@ import pytest
 
 from camtool.errors import InputError, OptionError
 from camtool.sending.journal import Journal, read_journal
-from camtool.sending.prepare import consignment, rest_of
+from camtool.sending.prepare import consignment, digest, rest_of
 from camtool.target.registry import load_target
 from tests.postprocessors.grbl.test_wire import PROGRAM, Small
 from tests.waiting import heard_from
@@ -255,3 +255,152 @@ def test_no_command_where_the_controller_has_none(words: list[str], said: bytes)
     done = subprocess.run(line, capture_output=True, check=False)
     assert done.returncode == 2
     assert said in done.stderr
+
+
+# A program that goes on: the place of the tool.
+
+
+def left_at(program: Path, place: tuple[float, float, float], *, still: bool = True) -> Path:
+    """The journal of a program that was left at a place, with blocks 1 to 20 done and 30 sent."""
+    head = {"sha256": digest(PROGRAM), "machine": TARGET.machine.digest, "target": "grbl"}
+    journal = Journal(Path(f"{program}.journal"), head)
+    journal.note(place, sent=30, acknowledged=25, done=20, block=19, last=29)
+    if still:
+        counts = {"sent": 30, "acknowledged": 25, "done": 20, "block": 19, "last": 29}
+        journal.close("stopped", "", still=True, place=place, **counts)
+    return journal.file
+
+
+class Restarting(Small):
+    """A board that its port has reset: it says its banner when it is asked for the first time, and
+    does not remember its place; what it was told of its place it believes."""
+
+    banner = True
+
+    def write(self, data: bytes, now: float) -> list[bytes]:
+        said = [b"Grbl 1.1h ['$' for help]"] if self.banner and data else []
+        self.banner = False
+        return said + super().write(data, now)
+
+
+@pytest.mark.parametrize(
+    ("board", "place", "still", "more", "said"),
+    [
+        # The board was reset: its zero is not that of the program.
+        (
+            Restarting,
+            (1.5, -2.0, -1.0),
+            True,
+            [],
+            "has begun anew, and takes its place for X0.000",
+        ),
+        (Restarting, (0.0, 0.0, 0.0), True, [], ""),
+        (Restarting, (0.0, 0.0, 0.0), False, [], "was not stopped"),
+        (Restarting, (1.5, -2.0, -1.0), True, ["--tool-at", "journal"], ""),
+        (Restarting, (1.5, -2.0, -1.0), False, ["--tool-at", "journal"], "bring the tool to part"),
+        (Restarting, (1.5, -2.0, -1.0), False, ["--tool-at", "zero"], ""),
+        (Restarting, (1.5, -2.0, -1.0), False, ["--tool-at", "known"], ""),
+        (Restarting, (1.5, -2.0, -1.0), True, ["--home"], ""),
+        # It was not, and stands elsewhere than the journal says, or there.
+        (Small, (1.5, -2.0, -1.0), True, [], "takes its place for X0.000 Y0.000 Z0.000, but the"),
+        (Small, (1.5, -2.0, -1.0), True, ["--tool-at", "known"], ""),
+        (Small, (0.0, 0.0, 0.0), True, [], ""),
+    ],
+)
+def test_a_program_goes_on_only_from_a_place_that_is_known(
+    program: Path,
+    board: type[Small],
+    place: tuple[float, float, float],
+    still: bool,
+    more: list[str],
+    said: str,
+) -> None:
+    file = left_at(program, place, still=still)
+    before, small = read_journal(file), board(line_s=0.001)
+    with behind_a_terminal(small) as port:
+        line = command(str(program), "-t", "grbl", "--port", port, "--yes", "--resume", *more)
+        done = subprocess.run(line, capture_output=True, text=True, check=False)
+    if said:
+        assert done.returncode in (1, 2)
+        assert said in done.stderr
+        assert small.lines == []
+        assert read_journal(file) == before  # what was left can still be gone on with
+        return
+    assert done.returncode == 0, done.stderr
+    assert read_journal(file).finished
+    words = {"journal": b"G21G92X1.5000Y-2.0000Z-1.0000", "zero": b"G21G92X0.0000Y0.0000Z0.0000"}
+    told = [each for each in small.lines if b"G92" in each]
+    assert told == [words[each] for each in more[-1:] if each in words]
+    assert small.lines[0] in (*told, b"$H") or not (told or "--home" in more)
+
+
+def test_one_that_was_killed_may_have_done_what_it_had(program: Path) -> None:
+    """It goes on with what is in its buffer, and stands at the end of a block that was sent."""
+    whole = TARGET.target.read(PROGRAM, TARGET.machine)
+    for block, good in ((29, True), (24, True), (45, False), (10, False)):
+        left_at(program, (0.3, 0.3, 0.3), still=False)
+        small = Small(line_s=0.001)
+        small.place = tuple(whole.end[whole.block == block][-1].tolist())
+        small.place = (small.place[0] + 7.0, small.place[1], small.place[2] - 2.0)
+        small.zero = (7.0, 0.0, -2.0)
+        with behind_a_terminal(small) as port:
+            line = command(str(program), "-t", "grbl", "--port", port, "--yes", "--resume")
+            done = subprocess.run(line, capture_output=True, text=True, check=False)
+        assert (done.returncode == 0) is good, (block, done.stderr)
+        assert bool(small.lines) is good
+
+
+def test_a_beginning_that_is_refused_leaves_the_journal_of_an_unfinished_program(
+    program: Path,
+) -> None:
+    file = left_at(program, (1.0, 2.0, 3.0))
+    before, small = read_journal(file), Small(locked=True)
+    with behind_a_terminal(small) as port:
+        for more in ([], ["--from", "5", "--tool-at", "known"]):
+            line = command(str(program), "-t", "grbl", "--port", port, "--yes", *more)
+            done = subprocess.run(line, capture_output=True, text=True, check=False)
+            assert done.returncode == 1
+            assert "it is locked" in done.stderr
+            assert read_journal(file) == before
+        small.locked = False
+        done = subprocess.run(line[:-4], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "20 blocks are done" in done.stderr  # what would be lost is said before
+    assert read_journal(file).finished
+    assert len(file.read_bytes().split(b'"journal"')) == 2  # nothing is left of the earlier one
+
+
+def test_a_program_from_a_block_looks_at_its_journal_too(program: Path) -> None:
+    left_at(program, (1.5, -2.0, -1.0))
+    small = Restarting()
+    with behind_a_terminal(small) as port:
+        line = command(str(program), "-t", "grbl", "--port", port, "--yes", "--from", "5")
+        done = subprocess.run(line, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "has begun anew" in done.stderr
+    assert small.lines == []
+
+
+def test_where_the_tool_is_means_nothing_for_a_program_that_begins(program: Path) -> None:
+    for more in ([], ["--from", "3"]):
+        line = command(str(program), "-t", "grbl", "--tool-at", "zero", *more)
+        done = subprocess.run(line, capture_output=True, text=True, check=False)
+        assert done.returncode == 2, done.stderr
+
+
+def test_the_journal_says_where_it_stopped(program: Path) -> None:
+    """In the work frame in which the program began, though a frame was set since."""
+    small = Small(line_s=0.02)
+    small.place, small.zero = (10.0, 20.0, 30.0), (7.0, 8.0, 9.0)
+    with behind_a_terminal(small) as port:
+        line = command(str(program), "-t", "grbl", "--port", port, "--yes", "--json")
+        with subprocess.Popen(
+            line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        ) as running:
+            heard_from(running, '"packet": 10,')
+            running.send_signal(signal.SIGINT)
+            running.communicate()
+    place = read_journal(Path(f"{program}.journal"))
+    assert place.tool_mm == (3.0, 12.0, 21.0)
+    assert place.is_still
+    assert place.block <= 11 <= place.last + 1

@@ -28,6 +28,10 @@ LISTING = {
 }
 
 
+def _words(place: tuple[float, float, float]) -> str:
+    return "{:.3f},{:.3f},{:.3f}".format(*place)
+
+
 class Small:
     """A controller that takes a line every `line_s`, and has a buffer of 127 bytes. `begins`: what
     it says behind its banner; `modes`: what it has then; `locked`: until $X or $H; `closed`:
@@ -48,6 +52,8 @@ class Small:
         self.settings = LISTING if settings is None else settings
         self.begins, self.modes, self.locked, self.closed = begins, modes, locked, closed
         self.after_stop = self.fullest = 0
+        self.place = self.zero = (0.0, 0.0, 0.0)
+        self.told = False  # whether it has said its work zero since it began
 
     def write(self, data: bytes, now: float) -> list[bytes]:
         said = list[bytes]()
@@ -58,13 +64,16 @@ class Small:
                 state = "Hold:0" if self.held else "Run" if moving else "Idle"
                 state = "Alarm" if self.locked else state
                 closed = f"|Pn:{self.closed}" if self.closed else ""
-                said.append(f"<{state}|MPos:0.000,0.000,0.000|FS:0,0{closed}>".encode())
+                zero = "" if self.told else f"|WCO:{_words(self.zero)}"
+                self.told = True
+                said.append(f"<{state}|MPos:{_words(self.place)}|FS:0,0{zero}{closed}>".encode())
             elif one == b"!":
                 self.held = True
             elif one == b"~":
                 self.held = False
             elif one == b"\x18":
                 self.buffer, self.held, self.reset = b"", False, self.reset + 1
+                self.told = False
                 said += [b"Grbl 1.1h ['$' for help]", *self.begins]
             elif len(self.buffer) < BUFFER_BYTES:
                 self.buffer += one
