@@ -6,7 +6,9 @@ On the forge such links lead to the file; in the site there is no such page.
 
 import posixpath
 import re
+import sys
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import click
@@ -31,6 +33,8 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
 
 def commands() -> str:
     """Every command under a heading of its own, with its help."""
+    # Help needs no compiled loops: the sources beside docs/ will do where nothing is installed.
+    sys.path.append(str(Path(__file__).parents[1]))
     from camtool.cli.main import cli
 
     context = click.Context(cli, info_name="camtool", terminal_width=WIDTH, **cli.context_settings)

@@ -138,7 +138,7 @@ def check(
     if preview is not None and against is not None:
         from camtool.cli.preview import Seen
 
-        scene, _ = Seen(machine, False, flags, drawing, preview).scene(against)
+        scene, _ = Seen(machine, False, True, flags, drawing, preview).scene(against)
         files[preview] = PictureFlags().painter(lambda: [scene], quiet=quiet)(preview)
     if report is not None:
         facts["findings"] = [

@@ -17,6 +17,7 @@ import threading
 import traceback
 from contextlib import suppress
 from importlib import import_module
+from pathlib import Path
 from typing import NoReturn, TextIO
 
 import click
@@ -26,6 +27,7 @@ from camtool.cli import COMPLETE
 from camtool.cli.life_signs import LifeSigns, life_signs
 from camtool.cli.messages import say, say_error
 from camtool.errors import CamtoolError, InputError, OutputError
+from camtool.plain import one_line
 
 EXIT_BAD_INPUT = 2
 EXIT_FAULT = 3
@@ -166,12 +168,28 @@ def _code(*, debug: bool) -> int:
         return EXIT_PIPE
     except Exception as error:
         _trace(debug)
+        if isinstance(error, ImportError) and not _is_built():
+            folder = Path(__file__).parents[2]
+            say(
+                f"camtool: error: {one_line(str(folder))}: camtool is taken from this folder, "
+                "where its compiled loops are not built; run camtool (not python -m camtool), or "
+                "leave the folder, or run pip install --editable . there",
+                quiet=False,
+            )
+            return EXIT_BAD_INPUT
         say(
             f"camtool: fault in camtool itself ({type(error).__name__}: {error}); "
             "please report it with the output of the same command with --debug",
             quiet=False,
         )
         return EXIT_FAULT
+
+
+def _is_built() -> bool:
+    """True if the compiled loops lie beside their sources, as where camtool was installed."""
+    from importlib.util import find_spec
+
+    return find_spec("camtool.kernels._memoryviews") is not None
 
 
 def _run(signs: LifeSigns) -> int:

@@ -526,6 +526,12 @@ class JobFlags:
     given: Mapping[str, Any] = field(default_factory=dict)
     project: Project | None = None
 
+    @property
+    def is_given(self) -> bool:
+        """True if a flag says something of the job."""
+        own = None if self.project is None or self.project.job is None else str(self.project.job)
+        return bool(self.operations or self.given) or self.file not in (None, own)
+
     def job(self, drawing: DrawingFlags) -> Job:
         """The job of the file, with the given flags over it.
 

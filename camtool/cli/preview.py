@@ -86,10 +86,11 @@ def preview(
     if beside is not None:
         check_beside("--beside", [output])
     check_places([*sources, *machine.files(), *job.files()], [output])
+    asks_for_path = simulate or not machine.by_default or bool(machine.settings) or job.is_given
     # A viewer plays the program, which needs the times of the machine's model.
     simulate = simulate or (is_viewer(output) and machine.name() is not None)
 
-    seen = Seen(machine, simulate, job, drawing, output)
+    seen = Seen(machine, simulate, asks_for_path, job, drawing, output)
     found = [seen.scene(name) for name in sources]
     painted = picture.painter(lambda: [scene for scene, _ in found], quiet=quiet)
     write_all({output: painted(output)})
@@ -109,10 +110,12 @@ def _canvas(machine: MachineFlags, *, simulate: bool) -> Canvas:
 @dataclass(frozen=True)
 class Seen:
     """How files are made into scenes, each with the findings of its drawing, or with those of the
-    program where no part can be made of it."""
+    program where no part can be made of it. `asks_for_path`: a drawing is shown with its toolpath,
+    for a flag says something of it; a machine by default is for programs."""
 
     machine: MachineFlags
     simulate: bool
+    asks_for_path: bool
     job: JobFlags
     drawing: DrawingFlags
     output: str
@@ -126,7 +129,7 @@ class Seen:
             source
         ):
             return self._of_program(source, target), ()
-        return self._of_job(source, target)
+        return self._of_job(source, target) if self.asks_for_path else self._of_drawing(source)
 
     def _is_no_drawing(self, source: str) -> bool:
         """Whether a file's content says that it is none: then it is a program of the target."""

@@ -29,6 +29,7 @@ from camtool.findings import (
     DIMENSION_NOT_CUT_THERE,
     DIMENSION_NOT_IN_OUT,
     DIMENSION_NOT_IN_UNDECIDED,
+    ENTITY_SKIPPED,
     NOTHING_REQUIRED,
     Code,
     Finding,
@@ -90,10 +91,25 @@ def inspect(run: Run, tolerances: Tolerances) -> Run:
     )
     if gate and not any(each.upper_mm is not None for each in verdicts):
         left_out = (*left_out, NOTHING_REQUIRED(where="tolerances"))
-    findings = tuple(dict.fromkeys((*run.findings, *left_out, *wrong)))
+    findings = tuple(dict.fromkeys((*_without_read(run.findings, run), *left_out, *wrong)))
     verification = run.verification.with_findings(findings)
     report = msgspec.structs.replace(verification.report, inspection=verdicts)
     return replace(run, verification=replace(verification, report=report), findings=findings)
+
+
+def _without_read(findings: Iterable[Finding], run: Run) -> list[Finding]:
+    """The findings but those that dimensions, whose sizes are inspected, were left out."""
+    from camtool.importers.dxf.dimensions import CALLOUTS
+
+    skipped = () if run.drawing is None else run.drawing.skipped
+    read = [
+        ENTITY_SKIPPED(
+            severity=Severity.WARNING, measured=each.count, kind=each.kind, reason=each.reason
+        )
+        for each in skipped
+        if each.kind in CALLOUTS
+    ]
+    return [each for each in findings if each not in read]
 
 
 NOT_INSPECTED = (Code.DIMENSION_UNBOUND, Code.DIMENSION_NOT_CUT, Code.CALLOUT_TEXT)

@@ -256,7 +256,9 @@ def _refuse_too_large(placed: Drawing, placement: Placement) -> None:
             f"what is cut is {size:.4g} mm long, more than {MOST_SIZE_MM:g} mm",
             file=placed.file,
             where=f"key {key}" if key else None,
-            mend=f"give a smaller {key}" if key else "give --units, or a scale",
+            mend=f"give a smaller {key}"
+            if key
+            else "give --units, a scale, or with --layer what is to be cut",
         )
     away = float(np.abs(places).max())
     if away > MOST_AWAY_MM:

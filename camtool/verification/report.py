@@ -484,7 +484,7 @@ class Report(msgspec.Struct, frozen=True):
         """Two short lines beside a picture: target, time and reversals; the error."""
         total = self.error_um.total
         return (
-            f"{self.target}: {clock(self.time_s)} h, {self.cutting_reversals} reversals",
+            f"{self.target}: {duration(self.time_s)}, {self.cutting_reversals} reversals",
             f"predicted error {um(total.max)} µm at most, rms {um(total.rms)} µm{to_what(self)}",
         )
 
@@ -580,6 +580,17 @@ def clock(seconds: float) -> str:
     """
     whole = round(seconds)
     return f"{whole // 3600}:{whole // 60 % 60:02d}:{whole % 60:02d}"
+
+
+def duration(seconds: float) -> str:
+    """Seconds as words, rounded to the second.
+
+    >>> duration(216.0), duration(3725.4), duration(7.2)
+    ('3 min 36 s', '1 h 2 min 5 s', '7 s')
+    """
+    whole = round(seconds)
+    parts = (whole // 3600, "h"), (whole // 60 % 60, "min"), (whole % 60, "s")
+    return " ".join(f"{count} {unit}" for count, unit in parts if count) or "0 s"
 
 
 def facts(report: Report) -> Iterator[tuple[str, str]]:

@@ -233,6 +233,24 @@ def test_names_that_become_alike_keep_their_own_pages(tmp_path: Path, recorder: 
     assert "passed over, for it is called like another file: a_.svg" in ran.log
 
 
+def test_limits_beside_a_drawing_are_inspected(tmp_path: Path, recorder: str) -> None:
+    folder = tmp_path / "repository"
+    names = ("a.dxf", "b.dxf", "in/c.svg", "c.nc", "d.nc")
+    committed(folder, dict.fromkeys(names, HOLE))
+    for name in ("a", "in/c", "c", "d"):
+        committed(folder, {f"{name}.tolerances.toml": ""})
+    committed(folder, {"c.svg": HOLE})
+    ran = run_step(folder, {}, path=recorder, target="grbl")
+    said = {call[1]: call[call.index("-o") + 2 :] for call in ran.calls}
+    assert said["./a.dxf"] == ["--tolerances", "./a.tolerances.toml"]
+    assert said["./b.dxf"] == []
+    assert said["./in/c.svg"] == ["--tolerances", "./in/c.tolerances.toml"]
+    ran = run_step(folder, {}, path=recorder, target="grbl", mode="verify", files="*.nc")
+    said = {call[1]: call[6:] for call in ran.calls}
+    limits = ["--tolerances", "./c.tolerances.toml"]
+    assert said == {"./c.nc": ["--against", "./c.svg", *limits], "./d.nc": []}
+
+
 def test_flags_are_taken_as_a_shell_takes_them(tmp_path: Path, recorder: str) -> None:
     folder = tmp_path / "repository"
     base = committed(folder, {"a.dxf": HOLE})

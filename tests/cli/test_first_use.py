@@ -1,11 +1,15 @@
 """The first use of a controller of machines of any size: what is said, and that it helps."""
 
+import re
+import shutil
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
 import pytest
 
-from tests.cli.conftest import Run
+from tests.cli.conftest import ROOT, Run
 
 GRBL = ("-t", "grbl", "--no-verify", "-o", "a.nc")
 
@@ -80,3 +84,34 @@ def test_a_new_machine_file_asks_for_the_backlash_of_every_axis(camtool: Run, ta
     if target in ("grbl", "linuxcnc"):
         rows = [row[2:] if row.startswith("# backlash_mm") else row for row in text.splitlines()]
         assert tomllib.loads("\n".join(rows))["axes"]["x"]["backlash_mm"] == 0.0
+
+
+def test_a_drawing_is_shown_as_it_is_though_there_is_a_machine(
+    camtool: Run, tmp_path: Path
+) -> None:
+    _drawn(tmp_path / "a.csv", 30, 20)
+    (tmp_path / "camtool.toml").write_text('target = "grbl"\n')
+
+    def groups(*flags: str) -> set[str]:
+        assert camtool("preview", *flags, "-o", "a.svg").returncode == 0
+        return set(re.findall(r'<g id="([a-z]+)"', (tmp_path / "a.svg").read_text()))
+
+    assert "drawing" in groups("a.csv")
+    assert "feeds" not in groups("a.csv")
+    for flags in (("-t", "grbl"), ("--depth", "1mm"), ("--set", "axes.x.travel_mm=300")):
+        assert "feeds" in groups("a.csv", *flags)
+    assert "feeds" in groups("a.csv", "--simulate")
+    assert camtool("post", "a.csv", "-o", "a.nc").returncode == 0
+    assert "feeds" in groups("a.nc")
+
+
+def test_a_checkout_that_is_not_built_says_so(camtool: Run, tmp_path: Path) -> None:
+    _drawn(tmp_path / "a.csv", 3, 2)
+    left_out = shutil.ignore_patterns("*.so", "*.pyd", "__pycache__")
+    shutil.copytree(ROOT / "camtool", tmp_path / "camtool", ignore=left_out)
+    line = [sys.executable, "-m", "camtool", "post", "a.csv", "-t", "grbl", "-o", "a.nc"]
+    done = subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 2, done.stderr
+    assert f"{tmp_path}: camtool is taken from this folder, where its compiled" in done.stderr
+    assert "pip install --editable ." in done.stderr
+    assert "fault" not in done.stderr

@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import ezdxf
 import pytest
 
 from tests.cli.conftest import Run
@@ -125,3 +126,23 @@ def test_contradictions(
     assert done.returncode == 2
     assert words in done.stderr
     assert not (folder / "p.ngc").exists()
+
+
+def test_dimensions_that_are_inspected_are_not_left_out(camtool: Run, tmp_path: Path) -> None:
+    drawn = ezdxf.new(units=4, setup=True)
+    space = drawn.modelspace()
+    space.add_lwpolyline([(0, 0), (40, 0), (40, 20), (0, 20)], close=True)
+    said = {"dimlfac": 1.0}
+    space.add_linear_dim(base=(0, -5), p1=(0, 0), p2=(40, 0), override=said).render()
+    space.add_leader([(0, 0), (5, 5)])
+    drawn.saveas(tmp_path / "d.dxf")
+    line = ("post", "d.dxf", "-t", "grbl", "--tool-diameter", "3mm", "-o", "d.nc", "-v")
+    told = camtool(*line)
+    assert b"1 DIMENSION left out" in told.stderr
+    assert b"1 LEADER left out" in told.stderr
+    told = camtool(*line, "--tolerances", "drawing", "--report", "d.md")
+    assert told.returncode == 0
+    for words in (told.stderr, (tmp_path / "d.md").read_bytes()):
+        assert b"DIMENSION left out" not in words
+        assert b"1 LEADER left out" in words
+    assert b"predicted" in told.stderr

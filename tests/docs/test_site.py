@@ -6,6 +6,7 @@ import importlib.util
 import re
 import subprocess
 import sys
+import textwrap
 import threading
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -70,6 +71,18 @@ def test_the_page_of_commands_has_their_help(hooks: ModuleType) -> None:
     assert max(map(len, text.splitlines())) <= 100
     page = SimpleNamespace(file=SimpleNamespace(src_uri=hooks.COMMANDS))
     assert hooks.on_page_markdown("# Commands\n", page=page) == f"# Commands\n\n{text}"
+
+
+def test_the_help_of_commands_needs_no_camtool_that_is_installed() -> None:
+    lines = """
+        import runpy, sys
+        sys.meta_path = [each for each in sys.meta_path if "editable" not in repr(each).lower()]
+        sys.path = [each for each in sys.path if "camtool" not in each]
+        print(runpy.run_path(sys.argv[1])["commands"]()[:60])
+    """
+    script = [sys.executable, "-I", "-c", textwrap.dedent(lines), "docs/site_hooks.py"]
+    done = subprocess.run(script, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.stdout.startswith("## camtool\n"), done.stderr
 
 
 def test_the_reference_has_every_name() -> None:
