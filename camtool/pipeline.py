@@ -219,6 +219,7 @@ def _posted(
         return replace(run, program=program, decoded=decoded, findings=findings)
     from camtool.planning.drawn import kept_of
     from camtool.verification.case import TRACE_POINTS, nose_of, tool_mm
+    from camtool.verification.cuts import rapids_mm
     from camtool.verification.report import Planned, certain
     from camtool.verification.verify import VerifyOptions
 
@@ -243,9 +244,11 @@ def _posted(
         written_from=written,
         row_from=_row_from(program, decoded),
     )
+    saved = sum(step.rapid_drawn_mm - step.rapid_mm for step in judged.steps)
+    rapid = rapids_mm(written)
     figures = Planned(
-        rapid_drawn_mm=certain(sum(step.rapid_drawn_mm for step in judged.steps)),
-        rapid_mm=certain(sum(step.rapid_mm for step in judged.steps)),
+        rapid_drawn_mm=certain(rapid + saved),
+        rapid_mm=certain(rapid),
         operations=_operations(judged.steps),
         tools=_tools(judged.steps),
         stock=_stock(job),

@@ -54,11 +54,13 @@ OF_WALLS = (
 
 
 def of_stage(operation: Operation, findings: Iterable[Finding]) -> list[Finding]:
-    """Those of the findings that this stage of an operation has to say."""
+    """Those of the findings that this stage of an operation has to say. A profile that is roughed
+    runs farther from its own wall than it is finished, and so nearer to its neighbours."""
     if not operation.stage:
         return list(findings)
     if operation.stage == "rough":
-        return [each for each in findings if each.code not in OF_WALLS]
+        own = {Code.GOUGE} if operation.kind == "profile" else set()
+        return [each for each in findings if each.code in own or each.code not in OF_WALLS]
     return [each for each in findings if each.code in (*OF_WALLS, Code.LEAD_LEFT_OUT)]
 
 

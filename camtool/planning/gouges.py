@@ -100,6 +100,8 @@ def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> I
     """Where the tool, beside one contour, comes over another one, or into the allowance that its
     operation leaves on that."""
     radius, allowance = operation.wall_radius_mm, operation.allowance_mm
+    if operation.stage == "rough":
+        allowance = 0.0  # what roughing takes of it is not missed
     bevel = operation.chamfer_mm or 0.0  # edges of others are not to be broken
     items = Contours.of_items(work.items)
     beside = [k for k, left in enumerate(items.material_left) if left is not None]

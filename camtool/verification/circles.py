@@ -126,18 +126,29 @@ def circle_figures(bins: Floats, radius_mm: float) -> CircleFigures:
     seen = bins[bins[:, 0] > 0.0]
     if len(seen) < FEWEST_BINS:
         return UNSEEN
-    mean = mean_points(seen)
+    least, largest = np.sqrt(seen[:, 3]), np.sqrt(seen[:, 6])
+    # The points of a bin that does not reach from edge to edge make a shorter arc.
+    mean = np.clip(mean_radii(bins)[bins[:, 0] > 0.0], least, largest)
     return CircleFigures(
         circular_mm=circular_error(seen),
-        radial_max_mm=math.sqrt(seen[:, 6].max()) - radius_mm,
-        radial_min_mm=math.sqrt(seen[:, 3].min()) - radius_mm,
-        radial_mean_mm=float(np.hypot(mean[:, 0], mean[:, 1]).mean()) - radius_mm,
+        radial_max_mm=float(largest.max()) - radius_mm,
+        radial_min_mm=float(least.min()) - radius_mm,
+        radial_mean_mm=float(mean.mean()) - radius_mm,
     )
 
 
 def mean_points(seen: Floats) -> Floats:
     """(J, 2) mean points about the programmed centre, of bins (J, 9) that are not empty."""
     return np.asarray(seen[:, 1:3] / seen[:, :1])
+
+
+def mean_radii(bins: Floats) -> Floats:
+    """(B,) mean radius of each of the bins (B, 9) that make a whole turn, NaN for empty ones: the
+    mean point of an arc of angle w lies at sin(w/2)/(w/2) of the radius."""
+    half = np.pi / len(bins)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = bins[:, 1:3] / bins[:, :1]
+        return np.asarray(np.hypot(mean[:, 0], mean[:, 1]) * (half / math.sin(half)))
 
 
 def circular_error(seen: Floats) -> float:
@@ -227,12 +238,9 @@ class BothWays(Struct, frozen=True):
 
 def reversing(bins: Floats, ccw: bool) -> Reversing:
     """The reversals of one circle from its bins (B, 9) about the programmed centre."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        mean = bins[:, 1:3] / bins[:, :1]
+    radius = mean_radii(bins)
+    with np.errstate(invalid="ignore"):
         least, largest = np.sqrt(bins[:, 3]), np.sqrt(bins[:, 6])
-    # The mean point of an arc of angle w lies at sin(w/2)/(w/2) of the radius.
-    half = np.pi / len(bins)
-    radius = np.hypot(mean[:, 0], mean[:, 1]) * (half / math.sin(half))
     steps, spikes = _steps(radius, least, largest, 1 if ccw else -1)
     return Reversing(
         (steps[0], steps[1], steps[2], steps[3]),

@@ -125,6 +125,11 @@ def _lengths(toolpath: Toolpath) -> Floats:
     return length
 
 
+def rapids_mm(toolpath: Toolpath) -> float:
+    """How far the rapids of a toolpath go in XY, mm."""
+    return float(moved_lengths(toolpath)[toolpath.kind == Kind.RAPID].sum())
+
+
 def is_flat(toolpath: Toolpath) -> bool:
     """True when the toolpath never moves in Z."""
     return bool(np.all(toolpath.end[:, 2] == toolpath.start[2]))

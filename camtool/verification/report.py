@@ -393,8 +393,8 @@ class PlannedStock(msgspec.Struct, frozen=True):
 
 
 class Planned(msgspec.Struct, frozen=True):
-    """The length of rapids in XY, mm, in the order and from the starts of the drawing and as
-    planned; how the operations cut, their tools, and the stock, if the job says it."""
+    """The length of rapids in XY, mm: of the program, and what it would be in the order and from
+    the starts of the drawing; how the operations cut, their tools, and the stock, if the job says it."""
 
     rapid_drawn_mm: float
     rapid_mm: float
@@ -806,17 +806,26 @@ def _by_source(error: Errors) -> dict[str, _MaxRmsP95]:
 
 def um(value: float | None) -> str:
     """Micrometres with two decimals, a dash for an unknown value."""
-    return "–" if value is None else f"{value:.2f}"
+    return "–" if value is None else _fixed(value, 2)
 
 
 def mm(value: float) -> str:
     """Millimetres with three decimals."""
-    return f"{value:.3f}".replace("-", "−")
+    return _fixed(value, 3)
 
 
 def percent(value: float | None) -> str:
     """Per cent with sign, a dash for an unknown value."""
-    return "–" if value is None else f"{value:+.2f} %".replace("-", "−")
+    if value is None:
+        return "–"
+    text = _fixed(value, 2)
+    return f"{text} %" if text.startswith("−") else f"+{text} %"
+
+
+def _fixed(value: float, places: int) -> str:
+    """A number with so many decimals and a true minus; what is rounded to zero has no sign."""
+    text = f"{abs(value):.{places}f}"
+    return f"−{text}" if value < 0.0 and float(text) else text
 
 
 # The contents of a page about a program, for Markdown, HTML and JSON.

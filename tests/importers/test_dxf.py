@@ -22,7 +22,7 @@ from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import signed_area
 from camtool.geometry.polylines import Segments
 from camtool.importers.dxf.reader import read
-from camtool.importers.dxf.walk import MAX_INSERTED
+from camtool.importers.dxf.walk import MAX_INSERTED, BlockSizes
 from camtool.importers.options import ReadOptions
 from camtool.importers.read import read_drawing
 from tests.oracles import arcs
@@ -530,6 +530,21 @@ def test_endless_arrays_and_nests_are_refused_quickly():
     doc.modelspace().add_blockref("B8", (0, 0))
     with pytest.raises(DrawingError, match=f"more than {MAX_INSERTED} entities"):
         drawn(doc)
+
+
+def test_an_array_of_blocks_stands_for_all_that_it_holds():
+    doc = document()
+    inner, outer = doc.blocks.new("INNER"), doc.blocks.new("OUTER")
+    for k in range(3):
+        inner.add_line((0, k), (1, k))
+    for k in range(4):
+        outer.add_line((0, k), (1, k))
+    outer.add_blockref("INNER", (0, 0), dxfattribs={"column_count": 2, "column_spacing": 9})
+    array = {"column_count": 3, "row_count": 5, "column_spacing": 9, "row_spacing": 9}
+    insert = doc.modelspace().add_blockref("OUTER", (0, 0), dxfattribs=array)
+    held = 4 + 2 * (1 + 3)
+    assert BlockSizes(doc.blocks).inserted(insert) == 3 * 5 * (1 + held)
+    assert drawn(doc).used["LINE"] == 15 * (4 + 2 * 3)
 
 
 def test_an_array_without_spacing_stands_once():

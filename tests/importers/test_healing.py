@@ -124,6 +124,17 @@ def test_contours_that_cross_themselves_are_told() -> None:
     assert [c.at_mm for c in drawing.healing.crossings] == [pytest.approx((2.5, 2.5))]
 
 
+def test_of_several_crossings_of_a_contour_the_first_is_named() -> None:
+    zigzag = piece((0, 0), (9, 0), (9, 4), (6, -4), (3, 4), (0, -4), closed=True)
+    drawing = put(zigzag)
+    crossings = drawing.healing.crossings
+    assert len({crossing.at_mm for crossing in crossings}) > 1
+    (finding,) = [f for f in drawing.findings if f.code == Code.SELF_CROSSING]
+    x, y = crossings[0].at_mm
+    assert finding.where == f"layer 0, x {x:.4f} y {y:.4f} mm"
+    assert finding.measured == len(crossings)
+
+
 def test_many_places_end_in_one_count() -> None:
     ties = [
         piece((0, 6 * k), (5, 6 * k + 5), (5, 6 * k), (0, 6 * k + 5), closed=True)

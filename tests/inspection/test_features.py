@@ -111,13 +111,14 @@ def test_several_that_differ_are_a_finding_unless_a_nominal_value_chooses() -> N
     turn=st.floats(-7.0, 7.0),
     flip=st.booleans(),
     shift=st.tuples(st.floats(-99, 99), st.floats(-99, 99)),
+    scale=st.sampled_from([1.0, 0.1, 25.4]),
 )
 def test_placed_features_lie_where_the_drawing_comes_to_lie(
-    turn: float, flip: bool, shift: Place
+    turn: float, flip: bool, shift: Place, scale: float
 ) -> None:
-    cos, sin = math.cos(turn), math.sin(turn)
+    cos, sin = scale * math.cos(turn), scale * math.sin(turn)
     matrix = np.array([[cos, -sin], [sin, cos]]) @ np.diag([-1.0 if flip else 1.0, 1.0])
-    where = Map(matrix, np.array(shift), 1.0)
+    where = Map(matrix, np.array(shift), scale)
     moved = plate()
     vertices = where.vertices(moved.vertices)
     there = features_of(Polylines(vertices, moved.offsets, moved.closed))
@@ -126,6 +127,7 @@ def test_placed_features_lie_where_the_drawing_comes_to_lie(
         if isinstance(here, Circle):
             assert isinstance(other, Circle)
             assert here.centre_mm == pytest.approx(other.centre_mm, abs=1e-9)
+            assert here.radius_mm == pytest.approx(other.radius_mm, abs=1e-9)
             angles = np.arange(0.01, 6.28, 0.1)
             assert (here.has(angles, 1e-6) == other.has(angles, 1e-6)).all()
         else:

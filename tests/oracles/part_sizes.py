@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import shapely
 
+from camtool.arrays import Floats
 from tests.oracles.stock import Cutter, Move, Path, Walls
 
 SAG_MM = 5e-4
@@ -41,28 +42,44 @@ class Ball(Cutter):
 
 def removed(moves: Iterable[Move], cutter: Cutter) -> Any:
     """The area (a shapely geometry) that the tool removes at the surface."""
-    return shapely.union_all([area for move in moves for area in _areas(move, cutter)])
+    tracks = [
+        (places, cutter.radius_at(-places[:, 2])) for places in map(_places, moves) if len(places)
+    ]
+    return swept(tracks)
 
 
-def _areas(move: Move, cutter: Cutter) -> list[Any]:
-    """The areas of one move that cuts: of each of its chords the hull of the discs at both ends,
-    which is exact while the radius changes evenly."""
+def _places(move: Move) -> Floats:
+    """(J, 3) the ends of the chords of a move, none of one that does not cut."""
     if move.rapid or min(move.a[2], move.b[2]) >= 0.0:
-        return []
+        return np.empty((0, 3))
     count = 1
     if move.centre is not None:
         radius = math.dist(move.a[:2], move.centre)
         count = math.ceil(abs(move.sweep) / (2.0 * math.acos(max(1.0 - SAG_MM / radius, 0.0))))
     if move.a[2] != move.b[2]:
         count = max(count, 64)
-    places = move.at(np.linspace(0.0, 1.0, max(count, 1) + 1))
-    reach = cutter.radius_at(-places[:, 2])
-    if (reach == reach[0]).all():
-        line = shapely.linestrings(places[:, :2])
-        return [shapely.buffer(line, reach[0], quad_segs=SIDES)] if reach[0] else []
-    discs = shapely.buffer(shapely.points(places[:, :2]), reach, quad_segs=SIDES)
-    pairs = [shapely.convex_hull(shapely.union(*two)) for two in pairwise(discs)]
-    return [shapely.union_all(pairs)]
+    return move.at(np.linspace(0.0, 1.0, max(count, 1) + 1))
+
+
+def swept(tracks: Iterable[tuple[Floats, Floats]]) -> Any:
+    """The area of discs of a radius (J,) along places (J, 3), for each of the tracks: where the
+    radius is even, that beside the lines, else the hulls of neighbours, which are exact while it
+    changes evenly."""
+    lines: dict[float, list[Any]] = {}
+    areas = []
+    for places, reach in tracks:
+        if len(places) == 1:
+            areas.append(shapely.buffer(shapely.points(places[0, :2]), reach[0], quad_segs=SIDES))
+        elif (reach == reach[0]).all():
+            if reach[0]:
+                lines.setdefault(float(reach[0]), []).append(shapely.linestrings(places[:, :2]))
+            continue
+        discs = shapely.buffer(shapely.points(places[:, :2]), reach, quad_segs=SIDES)
+        areas += [shapely.convex_hull(shapely.union(*two)) for two in pairwise(discs)]
+    for radius, each in lines.items():
+        whole = shapely.line_merge(shapely.multilinestrings(each))
+        areas.append(shapely.buffer(whole, radius, quad_segs=SIDES))
+    return shapely.union_all(areas)
 
 
 def polygon(path: Path, sag: float = SAG_MM) -> Any:

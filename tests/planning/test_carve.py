@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,7 +21,10 @@ from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.importers.read import read_drawing
 from camtool.planning.carve import CARVE_TOLERANCE_MM, vcarve
 from camtool.planning.items import Chosen, CutRun, Feeds, Fixed, Setting, Work
-from camtool.planning.job import Operation, Tool
+from camtool.planning.job import Job, Operation, Tool
+from camtool.planning.plan import plan
+from camtool.target.registry import load_target
+from tests.drawings import drawing_of
 from tests.oracles import contours as shapes
 from tests.oracles.carved import area_of, dense, swept
 from tests.strategies import contours
@@ -287,6 +291,19 @@ def test_tools_that_carve_nothing_are_refused_with_the_mend(tool: Tool) -> None:
         vcarve(chosen_of([shapes.SQUARE]), setting)
     assert caught.value.where == "operation 'letters', key tool"
     assert "tip_angle" in caught.value.mend
+
+
+def test_what_reading_moved_and_what_carving_leaves_add_up() -> None:
+    machine = load_target("linuxcnc").machine
+    drawing = drawing_of(RING)
+    bit = Tool(6.0, "v", math.radians(60.0))
+    job = Job((Operation(kind="vcarve", tool=bit, depth_mm=1.0),))
+    moved = dataclasses.replace(drawing, off_mm=np.full((len(drawing.paths.vertices), 2), 0.02))
+    for made, off in ((drawing, 0.0), (moved, 0.02)):
+        toolpath = plan(made, job, machine)
+        assert toolpath.drawn is not None
+        cuts = toolpath.is_feed & (toolpath.end[:, 2] < 0.0)
+        assert toolpath.drawn.off_mm[cuts] == pytest.approx(off + CARVE_TOLERANCE_MM)
 
 
 def test_an_open_path_is_refused_by_name() -> None:

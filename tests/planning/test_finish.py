@@ -105,6 +105,20 @@ def _as_run(path: Polyline) -> object:
     return CutRun(vertices, np.ones(len(rows) - 1), 1.0, "path")
 
 
+@pytest.mark.parametrize(("gap", "told"), [(2.3, False), (2.15, True), (1.9, True)])
+def test_roughing_into_a_neighbour_is_told(machine: Machine, gap: float, told: bool) -> None:
+    """The tool of 2 mm has room between the parts, but not while it leaves 0.2 mm on one."""
+    parts = [box(0.0, 0.0, 10.0, 10.0), box(10.0 + gap, 0.0, 20.0 + gap, 10.0)]
+    cut = Operation(side="outside", tool=Tool(2.0), finish_mm=0.2, depth_mm=1.0)
+    steps = planned(drawing_of(parts), Job((cut,)), machine).steps
+    found = [each for step in steps for each in step.findings if each.code is Code.GOUGE]
+    assert bool(found) is told
+    solid = shapely.union_all([shapely.Polygon(path.vertices[:, :2]) for path in parts])
+    for step in steps:
+        deep = shapely.intersection(swept(step.runs, 1.0), solid).area
+        assert (deep > 1e-3) == any(each.code is Code.GOUGE for each in step.findings)
+
+
 def test_a_bore_is_finished_along_its_wall(machine: Machine) -> None:
     circle = Polyline(np.array([[1, 2, 1.0], [3, 2, 1.0]]), closed=True)
     rough, done = stages(machine, [circle], kind="bore", finish_mm=0.05, depth_mm=0.5)

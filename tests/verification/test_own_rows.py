@@ -189,6 +189,25 @@ def test_an_arc_that_ends_beside_its_start_is_no_full_circle(short: bool) -> Non
     assert bool(own.findings) == short
 
 
+@pytest.mark.parametrize("beside", [0.0, 0.4])
+@pytest.mark.parametrize("apart", [0.1, 0.5, 0.9, 1.3])
+def test_ends_beside_their_circles_leave_less_room_for_rows_to_be_alike(
+    beside: float, apart: float
+) -> None:
+    """Two quarters of a circle whose ends lie beside it by a part of the limit, `apart` by another
+    part of it."""
+    paths = []
+    for y in (0.0, apart * LIMIT_MM):
+        path = ToolpathBuilder().rapid(z=1.0).rapid(10.0, y).line(z=-1.0, feed=100.0)
+        end = 10.0 + beside * LIMIT_MM + y
+        path.arc(0.0, end, centre=(0.0, y), ccw=True, feed=200.0)
+        paths.append(cut_moves(path.finish(), flat_cuts=False))
+    one, other = paths
+    rows = coverage._rows_alike(other, one, (LIMIT_MM, DEPTH_MM), np.arange(4))
+    # Both arcs lie beside their circles, and their centres are as far apart as their ends.
+    assert (len(rows) == 1) == (apart <= 1.0 - 2.0 * apart - 2.0 * beside)
+
+
 @given(
     st.floats(0.01, 30.0),
     st.floats(-3.1, 3.1),

@@ -7,6 +7,7 @@ cut in passes or led into.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -16,6 +17,7 @@ from typing import Any
 import ezdxf
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import Polygon
@@ -357,6 +359,31 @@ def test_the_wanted_path_is_the_drawing_s() -> None:
         point = Point(*(wanted.end[row, :2] - shift))
         near = min(each.distance(point) for each in segments_of)
         assert near == pytest.approx(radius, abs=1e-4)
+
+
+def test_the_wanted_path_begins_where_its_rapids_and_plunges_end() -> None:
+    """Moves before a contour come to its first wanted point, though the program lies beside it."""
+    made = Made(shift=(5.0, 5.0))
+    result = found(made)
+    wanted, radius = result.wanted, 0.5 * result.report.tools[0].diameter_mm
+    named = np.array([wanted.text(row) != "" for row in range(len(wanted))])
+    begins = np.flatnonzero(named[1:] & ~named[:-1]) + 1
+    starts = wanted.starts[begins, :2]
+    assert len(begins) > 3
+    program = decoded(made.text())
+    beside = [np.hypot(*(program.end[:, :2] - start).T).min() for start in starts]
+    assert max(beside) > 1e-4
+    lines = [Polygon(sample(path, 0.001)).exterior for path in mount().paths]
+    for start in shapely.points(starts - np.array(result.shift_mm)):
+        near = min(each.distance(start) for each in lines)
+        assert near == pytest.approx(radius, abs=2e-6)
+    # They come straight down there, and places on the way are left as they are.
+    assert (wanted.end[begins - 2, :2] == starts).all()
+    path = decoded(re.sub(r"(?m)^G0 X", "G0 X55.5 Y66.25\nG0 X", made.text()))
+    limits = {"tool_diameter_mm": None, "limit_mm": 0.02, "flat_cuts": False}
+    on_the_way = register(path, mount(), align=True, **limits).wanted
+    ways = [(each.end[:, :2] == (55.5, 66.25)).all(axis=1).sum() for each in (path, on_the_way)]
+    assert ways[0] == ways[1] > 3
 
 
 def test_the_report_has_the_distance_from_the_drawing() -> None:

@@ -11,7 +11,16 @@ import pytest
 from camtool import __version__
 from camtool.findings import Code, Finding, Severity
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.verification.report import Report, certain, clock, number
+from camtool.verification.report import (
+    Planned,
+    PlannedOperation,
+    PlannedTool,
+    Report,
+    certain,
+    clock,
+    number,
+    setup_sheets,
+)
 from camtool.verification.verify import Case, VerifyOptions, judge
 from tests.oracles.dense_moves import circle, follow, pic_mmh, square
 from tests.targets import on
@@ -143,6 +152,28 @@ def test_the_text_says_what_matters() -> None:
     assert not text.endswith("\n")
     assert all(len(line) <= 120 for line in report.to_text(findings=False).splitlines())
     assert 1 <= len(report.notes()) <= 3
+
+
+def test_tools_are_called_by_number_and_name_and_operations_by_theirs() -> None:
+    tools = (
+        PlannedTool(None, "", "end mill 2 mm", 3.0),
+        PlannedTool(4, "bit", "V bit", 3.0),
+        PlannedTool(7, "", "drill 3 mm", 3.0),
+        PlannedTool(None, "saw", "end mill 1 mm", 3.0),
+    )
+    cut = PlannedOperation("", "pocket", 0, "", 2.0, "", None, None, None, 300.0, 100.0, 3.0)
+    names = ["", "rim", "holes", ""]
+    operations = tuple(
+        msgspec.structs.replace(cut, name=name, tool=row) for row, name in enumerate(names)
+    )
+    shown, done = setup_sheets(Planned(0.0, 0.0, operations, tools))
+    assert [row[0] for row in shown.rows] == ["(1)", "T4 bit", "T7", "saw"]
+    assert [row[:3] for row in done.rows] == [
+        ("pocket", "pocket", "(1)"),
+        ("rim", "pocket", "T4 bit"),
+        ("holes", "pocket", "T7"),
+        ("pocket", "pocket", "saw"),
+    ]
 
 
 def test_markdown_takes_names_from_drawings_as_words() -> None:

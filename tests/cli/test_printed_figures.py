@@ -1,0 +1,340 @@
+"""Every printed figure of random jobs against the program itself: in the summary, JSON, Markdown,
+HTML and the picture."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import ezdxf
+import numpy as np
+import pytest
+import shapely
+
+from tests.cli.conftest import Done, Run
+from tests.oracles.part_sizes import Ball, left_of, polygon, size_of
+from tests.oracles.printed_figures import (
+    Form,
+    contradictions,
+    read_html,
+    read_markdown,
+    read_summary,
+    wrong_lines,
+    wrong_tables,
+)
+from tests.oracles.program_figures import Axis, Program
+from tests.oracles.stock import Cutter, Walls
+from tests.oracles.stock import Path as Line
+from tests.oracles.stock_jobs import Asked, circle, described, random_job
+
+DEFAULT_JOBS, SLOW_JOBS = 12, 300
+FAST = 1e6
+"""mm/s²: a machine that is at its feed at once."""
+RAPID_MM_MIN = 1828.8
+EXACT = (
+    "--set", "dialect.path=exact-path",
+    *(part for axis in "xyz" for part in ("--set", f"axes.{axis}.acceleration_mm_s2={FAST}")),
+)  # fmt: skip
+AXES = [Axis(), Axis(), Axis(), Axis(1.0005), Axis(0.999, 0.03), Axis(1.0, 0.05)]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A job, its axes, and what its kind is called when it is not that of the stock jobs."""
+
+    asked: Asked
+    x: Axis
+    y: Axis
+    finish: float = 0.0
+    ball: bool = False
+
+
+def case_of(seed: int) -> Case:
+    rng = np.random.default_rng([7, seed])
+    kind = int(rng.integers(8))
+    if kind == 0:
+        asked = _bores(rng)
+    elif kind == 1:
+        asked = _chamfers(rng)
+    else:
+        asked = random_job(rng)
+    settings = dict(asked.settings)
+    if asked.kind == "profile" and settings.get("tabs") is not None and settings["tabs"].ramped:
+        settings["tabs"] = replace(settings["tabs"], ramped=False)
+    asked = replace(asked, settings=settings)
+    x, y = (AXES[int(k)] for k in rng.integers(len(AXES), size=2))
+    beside = asked.kind in ("profile", "pocket") and asked.side != "on"
+    finish = 0.2 * asked.cutter.radius if beside and rng.random() < 0.25 else 0.0
+    ball = beside and not finish and bool(rng.random() < 0.2)
+    return Case(asked, x, y, finish, ball)
+
+
+def _bores(rng: np.random.Generator) -> Asked:
+    radius = [float(each) for each in rng.uniform(2.2, 9.0, 3)]
+    paths = tuple(
+        circle(20.0 * k, round(float(rng.uniform(0, 9)), 3), round(r, 3))
+        for k, r in enumerate(radius)
+    )
+    return Asked("bore", paths, Cutter(2.0), 4.0, step=float(rng.choice([0.5, 1.0, 3.0])))
+
+
+def _chamfers(rng: np.random.Generator) -> Asked:
+    asked = replace(random_job(np.random.default_rng(int(rng.integers(1 << 30)))), kind="chamfer")
+    return Asked("chamfer", asked.paths, Cutter(6.0, 1.0), 0.0, side="outside")
+
+
+def toml_of(case: Case) -> str:
+    """The job file."""
+    asked, lines = case.asked, []
+    cutter, own = asked.cutter, asked.settings
+    lines += [f'kind = "{asked.kind}"', f"tool_diameter = {2.0 * cutter.radius}"]
+    if cutter.slope:
+        angle = math.degrees(2.0 * math.atan(cutter.slope))
+        lines += ['tool_kind = "v"', f"tool_tip_angle = {angle}"]
+        lines += [f"tool_tip_diameter = {2.0 * cutter.tip}"] if cutter.tip else []
+    elif asked.kind == "drill":
+        lines += ['tool_kind = "drill"', "tool_tip_angle = 118"]
+    if case.ball:
+        lines += ['tool_kind = "ball"']
+    if asked.kind == "chamfer":
+        lines += ["chamfer = 0.5"]
+    else:
+        lines += [f"depth = {asked.depth}"]
+    if asked.step is not None:
+        lines += [f"step_down = {asked.step}"]
+    if asked.kind in ("profile", "chamfer"):
+        lines += [f'side = "{asked.side}"']
+    if asked.kind in ("profile", "pocket"):
+        lines += [f"allowance = {asked.allowance}"]
+    if case.finish:
+        lines += [f"finish = {case.finish}"]
+    lines += [line for key, value in own.items() for line in _key(key, value)]
+    return "\n".join(lines) + "\n"
+
+
+def _key(key: str, value: Any) -> Iterator[str]:
+    if key in ("lead_in", "lead_out"):
+        yield f'{key} = {{ kind = "{value.kind}", length = {value.length_mm} }}'
+    elif key == "entry":
+        yield f'entry = {{ kind = "{value.kind}", angle = "{math.degrees(value.angle_rad)}deg" }}'
+    elif key == "tabs":
+        sizes = f"width = {value.width_mm}, height = {value.height_mm}"
+        yield f"tabs = {{ count = {value.count}, {sizes} }}"
+    elif key == "angle_rad":
+        yield f"angle = {math.degrees(value)}"
+    elif isinstance(value, str):
+        yield f'{key} = "{value}"'
+    else:
+        yield f"{key.removesuffix('_mm')} = {value}"
+
+
+def draw(paths: tuple[Line, ...], folder: Path) -> None:
+    document = ezdxf.new()
+    document.header["$INSUNITS"] = 4
+    for path in paths:
+        document.modelspace().add_lwpolyline(path, format="xyb", close=True)
+    document.saveas(folder / "a.dxf")
+
+
+@dataclass(frozen=True)
+class Made:
+    """What came of a job: the report, its printed forms, and the program."""
+
+    report: dict[str, Any]
+    forms: dict[str, tuple[Form, int]]
+    picture: str
+    program: Program
+
+
+def made_of(case: Case, camtool: Run, folder: Path) -> Made | None:
+    """All forms of a job; None where it is refused."""
+    draw(case.asked.paths, folder)
+    (folder / "a.toml").write_text(toml_of(case))
+    axes = [
+        part
+        for name, axis in (("x", case.x), ("y", case.y))
+        for part in (
+            "--set", f"axes.{name}.real_step_mm={0.005 * axis.scale}",
+            "--set", f"axes.{name}.backlash_mm={axis.play}",
+        )
+    ]  # fmt: skip
+    base = ("post", "a.dxf", "--job", "a.toml", "-t", "linuxcnc", *EXACT, *axes, "-o", "a.ngc")
+    first = camtool(*base, "--json", "a.json", "--report", "a.md", "--preview", "a.svg")
+    if first.returncode == 1:
+        return None
+    assert first.returncode == 0, first.stderr
+    second = camtool(*base, "--report", "a.html", "-q")
+    assert second.returncode == 0, second.stderr
+    return Made(
+        json.loads((folder / "a.json").read_text()),
+        {
+            "summary": (read_summary(_shown(first)), 0),
+            "markdown": (read_markdown((folder / "a.md").read_text()), 12),
+            "html": (read_html((folder / "a.html").read_text()), 500),
+        },
+        (folder / "a.svg").read_text(),
+        Program((folder / "a.ngc").read_text(), case.x, case.y),
+    )
+
+
+def _shown(done: Done) -> str:
+    return (done.stdout + done.stderr).decode()
+
+
+# ----- the program against the report ----------------------------------------------------------
+
+
+def complaints(case: Case, made: Made) -> Iterator[str]:
+    for name, (form, most) in made.forms.items():
+        yield from (f"{name}: {each}" for each in wrong_lines(made.report, form))
+        if most:
+            yield from (f"{name}: {each}" for each in wrong_tables(made.report, form, most))
+    yield from contradictions(made.report)
+    yield from _counts(made)
+    yield from _times(made)
+    yield from _depths(case, made)
+    yield from _sizes(case, made)
+    yield from _errors(case, made)
+
+
+def _counts(made: Made) -> Iterator[str]:
+    report, program = made.report, made.program
+    pairs = {
+        "moves": (report["moves"], len(program.moves)),
+        "blocks": (report["blocks"], program.blocks),
+        "bytes": (report["bytes"], len(program.text.encode())),
+        "contours": (report["contours"], program.contours()),
+    }
+    every, cutting = program.reversals()
+    for k, axis in enumerate("xyz"):
+        pairs[f"reversals {axis}"] = (report["reversals"][axis], every[k])
+        pairs[f"cutting reversals {axis}"] = (report["reversals"]["cutting"][axis], cutting[k])
+    for name, (said, seen) in pairs.items():
+        if said != seen:
+            yield f"{name}: {said} are {seen}"
+    for axis, seen in zip("xyz", program.extents(), strict=True):
+        said = report["extents_mm"][axis]
+        if said != pytest.approx(list(seen), abs=1.5e-3):
+            yield f"travel {axis}: {said} is {seen}"
+    rapid = report["planned"]["rapid_mm"]
+    if rapid != pytest.approx(program.rapid_mm(), abs=0.002 * len(program.moves) + 0.01):
+        yield f"rapids: {rapid} mm are {program.rapid_mm()}"
+    for axis, way in zip("xyz", program.way(), strict=True):
+        if abs(report["steps"][axis] - way / 0.005) > 1.0 + len(program.moves):
+            yield f"steps {axis}: {report['steps'][axis]} are {way / 0.005:.0f}"
+
+
+def _times(made: Made) -> Iterator[str]:
+    total, cutting = made.program.seconds(made.program.feeds(), RAPID_MM_MIN / 60.0)
+    split = made.report["time_split_s"]
+    slack = 0.003 * len(made.program.moves) + 0.01
+    if not total - slack <= made.report["time_s"] - split["dwell"] <= 1.005 * total + slack:
+        yield f"time: {made.report['time_s']} s are {total}"
+    if not cutting - slack <= split["cutting"] <= 1.005 * cutting + slack:
+        yield f"cutting: {split['cutting']} s are {cutting}"
+
+
+def _depths(case: Case, made: Made) -> Iterator[str]:
+    operations = made.report["planned"]["operations"]
+    deepest = max(each["depth_mm"] for each in operations)
+    if deepest != pytest.approx(made.program.deepest(), abs=1e-3):
+        yield f"depth: {deepest} mm are {made.program.deepest()}"
+    levels = made.program.levels()
+    plain = case.asked.tabs is None and case.asked.kind in ("profile", "pocket", "engrave")
+    if not plain or "entry" in case.asked.settings:
+        return
+    passes = max(each["passes"] for each in operations)
+    if passes != len(levels):
+        yield f"passes: {passes} are {len(levels)} at {levels}"
+    most = max(each["deepest_pass_mm"] for each in operations)
+    steps = -np.diff([0.0, *levels])
+    if most != pytest.approx(steps.max(), abs=2e-3):
+        yield f"deepest pass: {most} mm are {steps.max()}"
+
+
+def _cutter(case: Case) -> Cutter:
+    return Ball(case.asked.cutter.radius) if case.ball else case.asked.cutter
+
+
+def _sizes(case: Case, made: Made) -> Iterator[str]:
+    asked, part = case.asked, made.report["dimensions"][:2]
+    if asked.kind in ("drill", "chamfer"):
+        if part:
+            yield f"a {asked.kind} has the sizes {part}"
+        return
+    of = "centre" if asked.kind == "engrave" or asked.side == "on" else "edge"
+    if {each["of"] for each in part} != {of}:
+        yield f"sizes are of {[each['of'] for each in part]} instead of {of}"
+    drawn = shapely.union_all([polygon(path) for path in asked.paths]).bounds
+    nominal = [each["nominal_mm"] for each in part]
+    if nominal != pytest.approx(size_of(drawn), abs=1.5e-3):
+        yield f"nominal size: {nominal} is {size_of(drawn)}"
+    if asked.settings.get("corners", "none") != "none":
+        return
+    if of == "centre":
+        if max(asked.leads) == 0.0:
+            places, _ = made.program.cut_slides()
+            places = places[places[:, 2] < 1e-3 - made.program.deepest()]
+            seen = places[:, :2].max(axis=0) - places[:, :2].min(axis=0)
+        else:
+            return
+    else:
+        area = made.program.removed(_cutter(case))
+        if asked.kind == "profile" and asked.side != "inside":
+            area = left_of(area, asked.paths)
+        seen = size_of(area.bounds)
+    predicted = [each["predicted_mm"] for each in part]
+    # The last pass counts; play is taken up in the passes before it.
+    slack = 2.5e-3 + (max(case.x.play, case.y.play) if of == "edge" else 0.0)
+    if predicted != pytest.approx(list(seen), abs=slack):
+        yield f"size: {predicted} is {list(seen)}"
+
+
+def _errors(case: Case, made: Made) -> Iterator[str]:
+    """The headline is no smaller than what is seen, by the edges of the tool."""
+    asked, claimed = case.asked, made.report["error_um"]["total"]["max"]
+    if asked.kind in ("drill", "chamfer", "vcarve"):
+        return
+    codes = {each["code"] for each in made.report["findings"]}
+    walls = Walls.of(asked.paths)
+    places, _ = made.program.cut_slides()
+    flat = places[:, :2]
+    if asked.kind == "engrave" or asked.side == "on":
+        true = 0.0 if max(asked.leads) else float(walls.distance(flat).max())
+    elif "GOUGE" in codes or asked.settings.get("corners", "none") != "none":
+        return
+    else:
+        within = walls.within(flat)
+        stays = within if asked.kind == "profile" and asked.side != "inside" else ~within
+        free = np.where(stays, -1.0, 1.0) * walls.distance(flat)
+        true = float((asked.away - free).max())
+    if 1000.0 * true > claimed + 1.0:  # an arc's ends are rounded to 0.5 µm
+        yield f"error: {claimed} µm at most, and {1000.0 * true:.2f} are seen"
+    bound = 1000.0 * sum(
+        axis.play + abs(axis.scale - 1.0) * max(abs(flat).max(), 1.0) for axis in (case.x, case.y)
+    )
+    if claimed > bound + 10.0:
+        yield f"error: {claimed} µm where the machine makes {bound:.2f}"
+
+
+@pytest.mark.parametrize("seed", range(DEFAULT_JOBS))
+def test_every_printed_figure_is_that_of_the_program(
+    seed: int, camtool: Run, tmp_path: Path
+) -> None:
+    case = case_of(seed)
+    made = made_of(case, camtool, tmp_path)
+    if made is not None:
+        assert list(complaints(case, made)) == [], described(case.asked)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(DEFAULT_JOBS, DEFAULT_JOBS + SLOW_JOBS))
+def test_every_printed_figure_of_many_jobs(seed: int, camtool: Run, tmp_path: Path) -> None:
+    case = case_of(seed)
+    made = made_of(case, camtool, tmp_path)
+    if made is not None:
+        assert list(complaints(case, made)) == [], described(case.asked)
