@@ -478,7 +478,7 @@ def _repeated(program: Program, decoded: Toolpath) -> set[Finding]:
 def _operations(steps: Sequence[Step]) -> tuple[PlannedOperation, ...]:
     """How the operations that cut something do it, for the report."""
     from camtool.planning.checks import IN_PASSES, deepest_pass
-    from camtool.verification.report import PlannedOperation
+    from camtool.verification.report import PlannedOperation, certain
 
     cutting = [step for step in steps if step.runs]
     tools = list(dict.fromkeys(step.operation.tool for step in cutting))
@@ -501,7 +501,7 @@ def _operations(steps: Sequence[Step]) -> tuple[PlannedOperation, ...]:
                 spindle_rpm=setting.spindle_rpm,
                 feed_mm_min=setting.feeds.cut_mm_min,
                 plunge_mm_min=setting.feeds.plunge_mm_min,
-                depth_mm=-setting.levels_mm[-1],
+                depth_mm=certain(_deepest_mm(step)),
                 passes=len(setting.levels_mm) if in_passes else None,
                 deepest_pass_mm=deepest_pass(setting) if in_passes else None,
                 coolant=operation.coolant,
@@ -510,15 +510,20 @@ def _operations(steps: Sequence[Step]) -> tuple[PlannedOperation, ...]:
     return tuple(found)
 
 
+def _deepest_mm(step: Step) -> float:
+    """How deep an operation goes; a carving may end above the depth that it is allowed."""
+    return -float(step.runs.vertices[:, 2].min())
+
+
 def _tools(steps: Sequence[Step]) -> tuple[PlannedTool, ...]:
     """The tools of the operations that cut something, in the order of first use."""
     from camtool.planning.naming import tool_words
-    from camtool.verification.report import PlannedTool
+    from camtool.verification.report import PlannedTool, certain
 
     deepest: dict[Tool, float] = {}
     for step in steps:
         if step.runs:
-            tool, depth = step.operation.tool, -step.setting.levels_mm[-1]
+            tool, depth = step.operation.tool, certain(_deepest_mm(step))
             deepest[tool] = max(depth, deepest.get(tool, 0.0))
     return tuple(
         PlannedTool(tool.number, tool.name, tool_words(tool), depth, tool.cutting_length_mm)

@@ -394,7 +394,8 @@ class PlannedStock(msgspec.Struct, frozen=True):
 
 class Planned(msgspec.Struct, frozen=True):
     """The length of rapids in XY, mm: of the program, and what it would be in the order and from
-    the starts of the drawing; how the operations cut, their tools, and the stock, if the job says it."""
+    the starts of the drawing; how the operations cut, their tools, and the stock, if the job says
+    it."""
 
     rapid_drawn_mm: float
     rapid_mm: float

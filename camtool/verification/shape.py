@@ -88,13 +88,14 @@ class Cutter(Struct, frozen=True):
         return min(SHAPE_TOLERANCE_MM, TOLERANCE_SHARE * 0.5 * self.diameter_mm)
 
     def radius_mm(self, z: Floats) -> Floats:
-        """(J,) mm: the radius of the cut at the surface, with the tip at the heights `z` (J,)."""
+        """(J,) mm: the radius of the cut at the surface, with the tip at the heights `z` (J,); at
+        the surface itself that of the tip, with which a cut ends there."""
         most = 0.5 * self.diameter_mm
         if self.nose is None:
             return np.full(len(z), most)
         heights, which = np.unique(np.minimum(z, 0.0), return_inverse=True)
         wide = np.array([self.nose.radius_at(-height) for height in heights.tolist()])
-        return np.where(z < 0.0, np.minimum(wide[which], most), 0.0)
+        return np.where(z <= 0.0, np.minimum(wide[which], most), 0.0)
 
     @property
     def quarter(self) -> int:

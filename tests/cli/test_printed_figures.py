@@ -199,6 +199,7 @@ def complaints(case: Case, made: Made) -> Iterator[str]:
     yield from _depths(case, made)
     yield from _sizes(case, made)
     yield from _errors(case, made)
+    yield from _shapes(case, made)
 
 
 def _counts(made: Made) -> Iterator[str]:
@@ -247,10 +248,10 @@ def _depths(case: Case, made: Made) -> Iterator[str]:
     plain = case.asked.tabs is None and case.asked.kind in ("profile", "pocket", "engrave")
     if not plain or "entry" in case.asked.settings:
         return
-    passes = max(each["passes"] for each in operations)
+    passes = operations[0]["passes"]  # a finishing pass goes down at once
     if passes != len(levels):
         yield f"passes: {passes} are {len(levels)} at {levels}"
-    most = max(each["deepest_pass_mm"] for each in operations)
+    most = operations[0]["deepest_pass_mm"]
     steps = -np.diff([0.0, *levels])
     if most != pytest.approx(steps.max(), abs=2e-3):
         yield f"deepest pass: {most} mm are {steps.max()}"
@@ -290,8 +291,31 @@ def _sizes(case: Case, made: Made) -> Iterator[str]:
     predicted = [each["predicted_mm"] for each in part]
     # The last pass counts; play is taken up in the passes before it.
     slack = 2.5e-3 + (max(case.x.play, case.y.play) if of == "edge" else 0.0)
+    slack *= 2.0 if asked.kind == "vcarve" else 1.0  # it goes along its corners there and back
     if predicted != pytest.approx(list(seen), abs=slack):
         yield f"size: {predicted} is {list(seen)}"
+
+
+def _shapes(case: Case, made: Made) -> Iterator[str]:
+    """What is removed beside the program's own area, and what is left of it, by the slides."""
+    shape = made.report["shape"]
+    codes = {each["code"] for each in made.report["findings"]}
+    if shape is None or codes & {"GOUGE", "OVERCUT"}:  # what must stay is never wanted
+        return
+    cutter, program = _cutter(case), made.program
+    if shape["tool_diameter_mm"] != 2.0 * cutter.radius:
+        yield f"shape: of a tool of {shape['tool_diameter_mm']} mm"
+    exact, seen = Program(program.text).removed(cutter), program.removed(cutter)
+    for name, one, other in (("overcut", seen, exact), ("undercut", exact, seen)):
+        rest = shapely.difference(one, other)
+        dense = shapely.points(shapely.get_coordinates(shapely.segmentize(rest, 0.05)))
+        deep = 1000.0 * float(shapely.distance(dense, other).max(initial=0.0))
+        said = shape[f"{name}_um"]
+        if not deep - 3.0 <= said <= deep + 3.0:
+            yield f"shape: {name} {said} µm is {deep:.2f}"
+        slack = 0.003 * shapely.length(exact)
+        if not rest.area - slack <= shape[f"{name}_mm2"] <= rest.area + slack:
+            yield f"shape: {name} {shape[f'{name}_mm2']} mm² is {rest.area:.4f}"
 
 
 def _errors(case: Case, made: Made) -> Iterator[str]:

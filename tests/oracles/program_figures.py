@@ -71,12 +71,12 @@ class Program:
 
     @cached_property
     def track(self) -> tuple[Floats, Any]:
-        """(J, 3) places along all moves, and (J,) the move of each: lines by their ends, where no
-        axis has play, and arcs by points."""
+        """(J, 3) places along all moves, and (J,) the move of each: level lines by their ends,
+        where no axis has play, and all else by points."""
         is_exact = self.x.play == self.y.play == 0.0
         places, rows = [], []
         for k, move in enumerate(self.moves):
-            if move.centre is None and is_exact:
+            if move.centre is None and is_exact and move.a[2] == move.b[2]:
                 along = move.at(np.array([0.0, 1.0]))
             else:
                 along = move.points(STEP_MM)

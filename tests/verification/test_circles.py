@@ -43,6 +43,13 @@ def test_a_perfect_circle_has_no_error() -> None:
     assert found.radial_min_mm == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.parametrize("count", [300, 1440, 5000, 200_000])
+def test_the_mean_radius_is_no_smaller_than_the_least(count: int) -> None:
+    """Points of a bin lie on an arc, whose mean point lies within it."""
+    found = figures(ring(count))
+    assert found.radial_mean_mm == pytest.approx(0.0, abs=1e-11 * RADIUS + 1e-12)
+
+
 def test_a_moved_circle_has_radial_errors_but_stays_round() -> None:
     found = figures(ring(20_000) + np.array([0.003, -0.004]))
     assert found.radial_max_mm == pytest.approx(0.005, rel=1e-3)

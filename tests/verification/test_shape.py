@@ -185,6 +185,14 @@ def test_a_v_bit_is_as_wide_as_it_is_deep() -> None:
     assert shape.undercut_mm == 0.0
 
 
+def test_a_cut_that_comes_up_to_the_surface_ends_as_wide_as_the_flat_tip() -> None:
+    bit = Tool(6.0, "v", 2.0 * math.atan(1.0), tip_diameter_mm=0.4)
+    cuts = cut_moves(carved((0, 0, -1), (10, 0, 0)), flat_cuts=False)
+    wanted = wanted_shape(cuts, Cutter(6.0, bit))
+    assert wanted is not None
+    assert shapely.bounds(wanted.region) == pytest.approx([-1.2, -1.2, 10.2, 1.2], abs=1e-3)
+
+
 def test_a_bit_of_unknown_width_is_as_wide_as_it_must_be() -> None:
     cuts = cut_moves(carved((0, 0, -1), (10, 0, -3)), flat_cuts=False)
     bit = Tool(kind="v", tip_angle_rad=2.0 * math.atan(0.5), tip_diameter_mm=0.4)
