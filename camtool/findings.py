@@ -359,6 +359,14 @@ class Code(IntEnum):
         "`change_mm` and `change_z_mm` in `[defaults]` of the machine file, where the hand and "
         "the longest tool have room ([machines.md](machines.md))",
     )
+    LOOSE_PIECE = (
+        232,
+        WARNING,
+        "a closed contour within a part is cut through the stock without tabs, so that the piece "
+        "within it comes loose beside the running tool, which may throw it or jam; place and size "
+        "are given. What the tool mills away leaves no piece",
+        "tabs in an operation of its own, a pocket that clears it, or tape below",
+    )
     TAB_SHARED = (
         225,
         (INFO, WARNING),
@@ -1226,6 +1234,15 @@ ENTRY_CHANGED_IN_NARROW_BORE = Sentence(
     "the middle{pecks}, and goes once round at the bottom; a drill or a smaller tool cuts it more "
     "easily",
     "mm",
+)
+LOOSE_PIECE = Sentence(
+    Code.LOOSE_PIECE,
+    "a piece of {width:.4g} by {height:.4g} mm comes loose within this contour beside the running "
+    "tool, because nothing holds it: {mend}",
+    "mm2",
+)
+LOOSE_PIECE_MORE = Sentence(
+    Code.LOOSE_PIECE, "{measured:# more piece comes|# more pieces come} loose like this"
 )
 DEPTH_LIMITED = Sentence(
     Code.DEPTH_LIMITED,

@@ -30,7 +30,7 @@ from camtool.findings import (
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import path_lengths
 from camtool.machine.model import Machine
-from camtool.planning.checks import checked
+from camtool.planning.checks import checked, with_loose_pieces
 from camtool.planning.contours import runs_of, with_starts
 from camtool.planning.drawn import drawn_of
 from camtool.planning.drill import drill
@@ -105,7 +105,8 @@ def planned(drawing: Drawing, job: Job, machine: Machine, *, undivided: bool = F
             step = _step(placed, plain, setting, machine, (here, there), sides, before)
         here = end
         steps.append(step)
-    found = Plan(job, placed, tuple(_rested(_sparing(steps))), ToolpathBuilder().finish())
+    steps = with_loose_pieces(_rested(_sparing(steps)), job.stock)
+    found = Plan(job, placed, tuple(steps), ToolpathBuilder().finish())
     return _linked(found, drawing, job, machine, undivided=undivided)
 
 
