@@ -236,19 +236,23 @@ class LinuxcncSamples(CountedSamples):
     ) -> None:
         """`passed_mm`: the lengths of all rows and of all moves before these, so that positions do
         not depend, in their last bits, on where a block begins."""
-        path, moves, reach = planned.tangents.path, planned.moves, planned.corners.reach
+        path, moves, corners = planned.tangents.path, planned.moves, planned.corners
         super().__init__(path, machine, spacing_mm)
         self._origin = planned.origin
         halves = np.searchsorted(self._origin, np.arange(int(self._origin[-1]) + 2))
         self.first = self.first[halves]
         self._tangents = planned.tangents
-        self._row_of, self._row, self._reach = moves.row_of, moves.row, np.append(reach, 0.0)
-        corners = planned.corners
+        self._row_of, self._row = moves.row_of, moves.row
+        self._reach, self._reach_on = (
+            np.append(corners.reach, 0.0),
+            np.append(corners.reach_on, 0.0),
+        )
+        self._shape = corners.shape
         self._before = np.append(corners.before, 0.0)
         self._behind = np.append(corners.behind, 0.0)
         self._ramp = np.append(corners.ramp, 1.0)
         self._turn = _turn_of(self._before, self._behind, self._ramp)
-        self._blends = bool(reach.any() or corners.before.any())
+        self._blends = bool(corners.reach.any() or corners.before.any())
         self._length = moves.length
         self._row_length = move_lengths(path)
         lengths = np.where(moves.row_of >= 0, self._row_length, 0.0)
@@ -273,21 +277,19 @@ class LinuxcncSamples(CountedSamples):
         return points
 
     def _blend(self, points: Floats, row: Ints, share: Floats) -> None:
-        """Move points (K, 3) near blended corners inward.
-
-        On the tangent at s from the corner P stands Q = P ∓ s t_±; the blend's point there is
-        B = P + h n + R (−n cos α ∓ t sin α), with α = (π/2 − θ) s / d, n inward, t onward, and
-        h = d / cos θ. What lies between them, B − Q, is added to the point of the move itself.
-        """
+        """Put points (K, 3) near blended corners on the blends. Their first half stands for the
+        end of the move before, their second half for the start of the move behind."""
         if not self._blends:
             return
         move = self._row_of[row]
         along = self._into[row] + share * self._row_length[row]
         left = np.maximum(self._length[move] - along, 0.0)
         ahead = np.flatnonzero(left < self._reach[move + 1])
-        behind = np.flatnonzero(along < self._reach[move])
-        self._inward(points, ahead, move[ahead] + 1, left[ahead], -1.0)
-        self._inward(points, behind, move[behind], along[behind], 1.0)
+        behind = np.flatnonzero(along < self._reach_on[move])
+        corner = move[ahead] + 1
+        self._on_blends(points, ahead, corner, 0.5 - 0.5 * left[ahead] / self._reach[corner])
+        corner = move[behind]
+        self._on_blends(points, behind, corner, 0.5 + 0.5 * along[behind] / self._reach_on[corner])
         ahead = np.flatnonzero(left < self._before[move + 1])
         behind = np.flatnonzero(along < self._behind[move])
         corner = move[ahead] + 1
@@ -320,18 +322,15 @@ class LinuxcncSamples(CountedSamples):
         found[~arc] = self._tangents.path.starts_of(row) + straight * self._tangents.at_starts(row)
         return found
 
-    def _inward(self, points: Floats, on: Ints, corner: Ints, s: Floats, side: float) -> None:
-        corners, of = np.unique(corner, return_inverse=True)
-        before = self._tangents.at_ends(self._row[corners - 1])
-        bends = Bends(before, self._tangents.at_starts(self._row[corners]))
-        d, theta = self._reach[corner], bends.theta[of]
-        alpha = (0.5 * np.pi - theta) * s / d
-        radius, height = d * np.tan(theta), d / np.cos(theta)
-        # n and t parts of B − P and of Q − P = s (n cos θ ± t sin θ)
-        inward = height - radius * np.cos(alpha) - s * np.cos(theta)
-        onward = side * (radius * np.sin(alpha) - s * np.sin(theta))
-        points[on] += inward[:, None] * bends.inward[of]
-        points[on] += onward[:, None] * bends.onward[of]
+    def _on_blends(self, points: Floats, on: Ints, corner: Ints, share: Floats) -> None:
+        """Put points at shares (K,) of the ways of blends: both spokes, turned into each other."""
+        centre, first, last = self._shape[:, corner]
+        angle = _angle_between(first, last)
+        turned = share * angle
+        whole = np.sin(angle)
+        points[on] = centre
+        points[on] += (np.sin(angle - turned) / whole)[:, None] * first
+        points[on] += (np.sin(turned) / whole)[:, None] * last
 
 
 def _speeds(
@@ -341,20 +340,24 @@ def _speeds(
     before a move, then the move: which of them last and lie in `places`, and these.
 
     In the mode "blend" the last move before a wait accelerates by half: it was kept ready for a
-    blend that never came (`tcGetOverallMaxAccel`). So do moves that overlap.
+    blend that never came (`tcGetOverallMaxAccel`). So do moves that overlap. In all modes it is
+    entered no faster than it could stop within its half, for a blend could have taken the other
+    half (`tpCalculateOptimizationInitialVel`).
     """
     moves, corners = planned.moves, planned.corners
-    own = moves.length - corners.reach
+    own = moves.length - corners.reach_on
     own -= np.append(corners.reach[1:], 0.0)
     ways = _in_turns(corners.way, np.maximum(own, 0.0, out=own))
     lasting = np.zeros(len(ways), dtype=np.bool_)
     lasting[places] = ways[places] > LEAST_WAY_MM
     along, fastest = _along_moves(moves, modes, corners)
+    met = np.where(corners.way > 0.0, np.inf, corners.speed)
+    entered = np.minimum(met, np.where(moves.last, np.sqrt(along * own), np.inf))
     return lasting, SpeedPlan(
         ways[lasting],
         _in_turns(corners.speed, np.minimum(moves.speed, fastest))[lasting],
         _in_turns(corners.acceleration, along)[lasting],
-        _in_turns(np.inf, np.where(corners.reach > 0.0, np.inf, corners.speed))[lasting],
+        _in_turns(np.inf, entered)[lasting],
         before,
     )
 
@@ -386,7 +389,7 @@ def _along_moves(moves: Moves, modes: Modes, corners: Corners) -> tuple[Floats, 
     mm/s, how fast arcs may be with that. An arc before a wait was never finished for its next
     move, and keeps half for turning."""
     lost = np.maximum(corners.lost, np.append(corners.lost[1:], 0.0))
-    last = np.append(moves.waits[1:], np.ones(min(len(lost), 1), dtype=np.bool_))
+    last = moves.last
     overlapped = corners.overlap > 0.0
     overlapped |= np.append(overlapped[1:], False)
     spared = np.where(overlapped | (last & modes.blend(moves.mode)), LAST_PART, 1.0)
@@ -593,6 +596,11 @@ class Moves(Struct, frozen=True, eq=False):
     waits: Bools
     like: Bools
 
+    @property
+    def last(self) -> Bools:
+        """(M,) true for moves behind which the machine waits."""
+        return np.append(self.waits[1:], np.ones(min(len(self.waits), 1), dtype=np.bool_))
+
     def tangential(self, which: Ints, overall: Floats) -> tuple[Floats, Floats]:
         """(K,) mm/s² along moves (K,) that accelerate by `overall` (K,) in all, and (K,) mm/s, the
         highest speed with that: what turning at it leaves, where that is more than half, else
@@ -753,9 +761,16 @@ def _turning_radius(r: Floats, growth: Floats, rise: Floats) -> Floats:
 #     R = d tan θ,   T = R (1/sin θ − 1) = d (1 − sin θ)/cos θ,   v² ≤ √¾ a R
 #
 # T is at most the tolerance and a quarter of the shorter move; d at most half a line, the last two
-# thirds of an arc, and its first third. No blend is wider than its speed needs, v²/(√¾ a), or than
-# as long a time at that speed as half the acceleration would need to reach it. Where arcs meet
-# other moves LinuxCNC bends theirs a little, within the same tolerance.
+# thirds of an arc (or, if less, a radian and a half), and its first third. No blend is wider than
+# its speed needs, v²/(√¾ a), or than as long a time at that speed as half the acceleration would
+# need to reach it.
+#
+# An arc that curves towards the other move counts as its chord, and θ becomes less by a quarter of
+# what may be used of it. R is then laid against the arcs themselves, and given up where that
+# leaves the corner by more than T, or uses more of an arc than it may.
+#
+# Where no arc is possible the moves overlap, or the corner is met slowly, as if it were none: of
+# the three the planner takes the one that it thinks the fastest (`tpChooseBestBlend`).
 
 STRAIGHT_BACK_RAD = np.deg2rad(2.0)
 """A way back within this angle is a stop (SHARP_CORNER_DEG)."""
@@ -782,17 +797,21 @@ LEAST_BEND_RAD = 1e-3
 
 class Corners(Struct, frozen=True, eq=False):
     """What happens at the start of each of M moves: `speed` (M,) mm/s, 0 for a stop; `lost` (M,):
-    the part of the acceleration that a bend takes from the moves on both sides; `reach` (M,) mm:
-    how far from the corner a blend begins and ends, 0 without one; `acceleration` (M,) mm/s²
-    along blends; `way` (M,) mm along them. Where moves overlap: `before` and `behind` (M,) mm, how
-    far from the corner they do, `overlap` (M,) s, for how long, and `ramp` (M,), in which part of
-    that time the second of them speeds up; 0 elsewhere."""
+    the part of the acceleration that a bend takes from the moves on both sides; `reach` and
+    `reach_on` (M,) mm: how far from the corner a blend begins on the move before, and ends on the
+    move behind, 0 without one; `acceleration` (M,) mm/s² along blends; `way` (M,) mm along them;
+    `shape` (3, M, 3): their centres, and from there to where they begin and end. Where moves
+    overlap: `before` and `behind` (M,) mm, how far from the corner they do, `overlap` (M,) s, for
+    how long, and `ramp` (M,), in which part of that time the second of them speeds up; 0
+    elsewhere."""
 
     speed: Floats
     lost: Floats
     reach: Floats
+    reach_on: Floats
     acceleration: Floats
     way: Floats
+    shape: Floats
     before: Floats
     behind: Floats
     overlap: Floats
@@ -839,21 +858,34 @@ class Bends(Struct, frozen=True, eq=False):
 
 def corners_of(moves: Moves, tangents: Tangents, rules: CornerRules) -> Corners:
     """What happens at the start of each move."""
-    count = len(moves.length)
-    corners = Corners(*(np.zeros(count) for _ in range(9)))
     bends = Bends(
         tangents.at_ends(np.roll(moves.row, 1)),  # nothing comes of that before the first
         tangents.at_starts(moves.row),
     )
-    _meet(corners, moves, tangents, bends, rules)
+    used = np.zeros(len(moves.length))  # of each move, by the blend at its start
+    for _ in range(MOST_ROUNDS):
+        corners = _meet(moves, tangents, bends, used, rules)
+        if not moves.is_arc.any() or (corners.reach_on == used).all():
+            break
+        used = corners.reach_on
     return corners
 
 
+MOST_ROUNDS = 4
+"""So often corners are planned anew with what the blend before leaves of a move."""
+
+
 def _meet(
-    corners: Corners, moves: Moves, tangents: Tangents, bends: Bends, rules: CornerRules
-) -> None:
-    """Fill in all corners."""
-    at = np.arange(len(moves.length))
+    moves: Moves, tangents: Tangents, bends: Bends, used: Floats, rules: CornerRules
+) -> Corners:
+    """All corners, where blends at the starts of moves use so much (M,) mm of them."""
+    count = len(moves.length)
+    none = [np.zeros(count) for _ in range(10)]
+    corners = Corners(
+        none[0], none[1], none[2], none[3], none[4], none[5], np.zeros((3, count, 3)),
+        none[6], none[7], none[8], none[9],
+    )  # fmt: skip
+    at = np.arange(count)
     before = moves.mode[at - 1]
     turn = bends.after - bends.before
     back = np.linalg.norm(bends.after + bends.before, axis=1) < STRAIGHT_BACK_RAD
@@ -871,98 +903,381 @@ def _meet(
     blends = free & ~smooth & rules.modes.blend(before)
     normal = np.cross(bends.before, bends.after)
     flat = np.hypot(normal[:, 0], normal[:, 1]) <= COPLANAR * np.linalg.norm(normal, axis=1)
-    rounded = np.flatnonzero(blends & (flat | ~curved))
-    _blend(corners, moves, rounded, bends.picked(rounded), rules)
-    loose = np.flatnonzero(blends & ~flat & curved)
-    worth = _overlap(corners, moves, tangents, loose, rules)
-    # A bend that passes for straight at low speed, where that is faster than the blend.
-    blended = np.flatnonzero(blends)
-    kink = highest[blended] * rules.kink_ratio / part[blended]
-    against = corners.speed[blended]
-    against[np.searchsorted(blended, loose)] = worth
-    faster = kink > against
-    on = blended[faster]
-    corners.speed[on] = kink[faster]
-    corners.lost[on] = rules.kink_ratio
-    for none in (corners.reach, corners.before, corners.behind, corners.overlap):
-        none[on] = 0.0
-    theta = bends.picked(rounded).theta
-    corners.way[rounded] = corners.reach[rounded] * np.tan(theta) * (np.pi - 2.0 * theta)
+    straight = np.flatnonzero(blends & ~curved)
+    _round_lines(corners, moves, tangents, straight, bends.picked(straight), used, rules)
+    bent = np.flatnonzero(blends & curved & flat)
+    _round_arcs(corners, moves, tangents, bent, bends.picked(bent), used, rules)
+    on = np.flatnonzero(blends)
+    kink = highest[on] * rules.kink_ratio / part[on]
+    _choose(corners, moves, tangents, on, kink, used, rules)
+    return corners
 
 
-def _overlap(
-    corners: Corners, moves: Moves, tangents: Tangents, on: Ints, rules: CornerRules
-) -> Floats:
-    """Fill in how moves overlap at the corners `on` (K,); (K,) mm/s, what that is worth against
-    the speed of a bend."""
-    one, _ = moves.tangential(on - 1, LAST_PART * moves.acceleration[on - 1])
-    other, _ = moves.tangential(on, LAST_PART * moves.acceleration[on])
+def _choose(
+    corners: Corners,
+    moves: Moves,
+    tangents: Tangents,
+    on: Ints,
+    kink: Floats,
+    used: Floats,
+    rules: CornerRules,
+) -> None:
+    """Let moves overlap at the corners `on` (K,), or meet at the speed that passes for straight
+    `kink` (K,), or be rounded, as it seems the fastest, the first of equals
+    (`tpChooseBestBlend`)."""
+    arc = corners.speed[on]
+    overlap = _worth(moves, tangents, on, used, rules)
+    overlaps = (overlap >= kink) & (overlap >= arc)
+    bends = ~overlaps & (kink >= arc)
+    for none in (corners.reach, corners.reach_on, corners.way):
+        none[on[overlaps | bends]] = 0.0
+    corners.speed[on[overlaps]] = 0.0
+    _overlap(corners, moves, tangents, on[overlaps], rules)
+    corners.speed[on[bends]] = kink[bends]
+    corners.lost[on[bends]] = rules.kink_ratio
+
+
+class _Overlaps(Struct, frozen=True, eq=False):
+    """Speeds mm/s of both moves while they overlap, their accelerations mm/s², and half the angle
+    between them, each (K,)."""
+
+    first: Floats
+    second: Floats
+    slowing: Floats
+    speeding: Floats
+    theta: Floats
+
+
+def _overlaps(
+    moves: Moves,
+    tangents: Tangents,
+    on: Ints,
+    rates: tuple[Floats, Floats],
+    lengths: tuple[Floats, Floats],
+    overall: Floats,
+    modes: Modes,
+) -> _Overlaps:
+    """How moves overlap at corners (`tpComputeBlendVelocity`) with these accelerations along them,
+    where so much of them counts; `overall` (K,) is that of the second, with what turns it."""
+    one, other = rates
     reachable = [
-        np.minimum(np.sqrt(acceleration * moves.length[k]), moves.speed[k])
-        for k, acceleration in ((on - 1, one), (on, other))
+        np.minimum(np.sqrt(rate * length), moves.speed[k])
+        for k, rate, length in ((on - 1, one, lengths[0]), (on, other, lengths[1]))
     ]
     lasting = np.minimum(moves.length[on - 1] / reachable[0], moves.length[on] / reachable[1])
     blend_s = np.minimum(lasting, np.maximum(reachable[0] / one, reachable[1] / other))
     first = np.minimum(reachable[0], blend_s * one)
     second = np.minimum(reachable[1], blend_s * other)
     before = tangents.at_ends(moves.row[on - 1], level=True)
-    push = LAST_PART * moves.acceleration[on]
-    after = tangents.pushed_at_starts(moves.row[on], push, moves.speed[on])
+    after = tangents.pushed_at_starts(moves.row[on], overall, moves.speed[on])
     theta = Bends(before, after).theta
-    asked, cosine = rules.modes.tolerance_mm(moves.mode[on - 1]), np.cos(theta)
+    asked, cosine = modes.tolerance_mm(moves.mode[on - 1]), np.cos(theta)
     bends = cosine > 0.5 * LEAST_BEND_RAD
     within = 2.0 * np.sqrt(one * asked / np.where(bends, cosine, 1.0))
-    worth = np.minimum(first, np.where(bends, within, np.inf))
-    worth = 0.25 * np.sin(theta) * (worth + np.minimum(second, np.where(bends, within, np.inf)))
-    first = np.minimum(first, np.where(bends, within, np.inf))
+    within = np.where(bends, within, np.inf)
+    return _Overlaps(np.minimum(first, within), np.minimum(second, within), one, other, theta)
+
+
+def _worth(moves: Moves, tangents: Tangents, on: Ints, used: Floats, rules: CornerRules) -> Floats:
+    """(K,) mm/s that the planner thinks an overlap is worth, before it knows the next corner: half
+    of each move may be gone by then, bends take their part, and arcs keep half for turning."""
+    rates = [
+        LAST_PART * (1.0 - rules.kink_ratio) * moves.acceleration[k]
+        * np.where(moves.is_arc[k], TANGENT_RATIO, 1.0)
+        for k in (on - 1, on)
+    ]  # fmt: skip
+    lengths = 0.5 * (moves.length[on - 1] - used[on - 1]), 0.5 * moves.length[on]
+    overall = LAST_PART * (1.0 - rules.kink_ratio) * moves.acceleration[on]
+    found = _overlaps(moves, tangents, on, (rates[0], rates[1]), lengths, overall, rules.modes)
+    return np.asarray(0.25 * np.sin(found.theta) * (found.first + found.second))
+
+
+def _overlap(
+    corners: Corners, moves: Moves, tangents: Tangents, on: Ints, rules: CornerRules
+) -> None:
+    """Fill in how moves overlap at the corners `on` (K,)."""
+    one, _ = moves.tangential(on - 1, LAST_PART * moves.acceleration[on - 1])
+    other, _ = moves.tangential(on, LAST_PART * moves.acceleration[on])
+    lengths = moves.length[on - 1], moves.length[on]
+    overall = LAST_PART * moves.acceleration[on]
+    found = _overlaps(moves, tangents, on, (one, other), lengths, overall, rules.modes)
     # While the first comes to rest, the second begins as from rest, whatever its share was.
-    seconds = first / one
+    seconds = found.first / one
     reached = np.minimum(moves.speed[on], seconds * other)
     corners.overlap[on], corners.ramp[on] = seconds, reached / other / seconds
-    corners.before[on] = 0.5 * first * seconds
+    corners.before[on] = 0.5 * found.first * seconds
     corners.behind[on] = reached * (seconds - 0.5 * reached / other)
-    return np.asarray(worth)
 
 
-def _blend(corners: Corners, moves: Moves, on: Ints, bends: Bends, rules: CornerRules) -> None:
-    """Fill in speed, reach and acceleration of the blends at the corners `on`.
+class _Rounds(Struct, frozen=True, eq=False):
+    """Blends as they are wanted, each (K,): `theta` of the corners as the planner takes it; the
+    `tolerance` mm; radius mm; speed mm/s; and the acceleration `whole` mm/s² in their plane."""
 
-    In the plane of both tangents, with unit normal m, no axis exceeds its limit when the whole is
-    limited to min(limit / √(1 − m²)).
+    theta: Floats
+    tolerance: Floats
+    radius: Floats
+    speed: Floats
+    whole: Floats
+
+
+def _rounds(
+    moves: Moves,
+    on: Ints,
+    normal: Floats,
+    theta: Floats,
+    longest: Floats,
+    planar: Floats,
+    rules: CornerRules,
+) -> _Rounds:
+    """The blends at the corners `on` (K,) in planes of the unit normals (K, 3), which use at most
+    `longest` (K,) mm of either move; `planar` (K,) mm/s: no faster than that, or than the axes in
+    that plane, whichever is more (`blendParamKinematics`, `blendComputeParameters`).
+
+    In the plane no axis exceeds its limit when the whole is limited to min(limit / √(1 − m²)).
     """
-    theta = bends.theta
-    normal = _unit(np.cross(bends.before, bends.after))
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):
         share = np.sqrt(np.maximum(1.0 - normal**2, 0.0))
         whole = (rules.acceleration / share).min(axis=1, initial=np.inf)
-        rate = (rules.rate / share).min(axis=1, initial=np.inf)
-    across = NORMAL_RATIO * whole
-    reach = _most_reach(moves, on, theta, rules.modes)
-    widest = reach * np.tan(theta)
-    wanted = np.maximum(moves.speed[on - 1], moves.speed[on])
-    planned = np.minimum(np.minimum(wanted, rate), np.sqrt(across * widest))
-    half = 0.5 * whole
-    by_time = np.minimum(np.sqrt(2.0 * half * reach), planned) / half * planned
-    turned = np.pi - 2.0 * theta
-    by_time /= np.maximum(turned, LEAST_BEND_RAD)
-    radius = np.maximum(planned**2 / across, np.minimum(by_time, widest))
-    lasting = radius * turned / (LEAST_PERIODS * rules.period_s)
-    corners.speed[on] = np.minimum(planned, lasting)
-    corners.reach[on] = radius / np.tan(theta)
-    corners.acceleration[on] = TANGENT_RATIO * whole
+        rate = np.maximum((rules.rate / share).min(axis=1, initial=np.inf), planar)
+        shorter = np.minimum(moves.length[on], moves.length[on - 1])
+        modes = rules.modes
+        asked = np.minimum(
+            modes.tolerance_mm(moves.mode[on]), modes.tolerance_mm(moves.mode[on - 1])
+        )
+        tolerance = np.minimum(asked, TOLERANCE_PART * shorter)
+        by_tolerance = tolerance * np.cos(theta) / (1.0 - np.sin(theta))
+        reach = np.minimum(longest, by_tolerance)
+        widest = reach * np.tan(theta)
+        across = NORMAL_RATIO * whole
+        wanted = np.maximum(moves.speed[on - 1], moves.speed[on])
+        speed = np.minimum(np.minimum(wanted, rate), np.sqrt(across * widest))
+        half = 0.5 * whole
+        by_time = np.minimum(np.sqrt(2.0 * half * reach), speed) / half * speed
+        by_time /= np.pi - 2.0 * theta
+        radius = np.maximum(speed**2 / across, np.minimum(by_time, widest))
+    return _Rounds(theta, tolerance, radius, speed, whole)
 
 
-def _most_reach(moves: Moves, on: Ints, theta: Floats, modes: Modes) -> Floats:
-    """The largest d at the corners `on`; 0 where the moves hardly bend."""
-    shorter = np.minimum(moves.length[on], moves.length[on - 1])
-    asked = np.minimum(modes.tolerance_mm(moves.mode[on]), modes.tolerance_mm(moves.mode[on - 1]))
-    leaves = np.minimum(asked, TOLERANCE_PART * shorter)
-    flat = np.pi - 2.0 * theta < LEAST_BEND_RAD
-    by_tolerance = leaves * np.cos(theta) / np.where(flat, 1.0, 1.0 - np.sin(theta))
-    end_part = np.where(moves.is_arc[on - 1], ARC_END_PART, LINE_PART)
-    start_part = np.where(moves.is_arc[on], ARC_START_PART, LINE_PART)
-    by_length = np.minimum(end_part * moves.length[on - 1], start_part * moves.length[on])
-    return np.asarray(np.where(flat, 0.0, np.minimum(by_tolerance, by_length)))
+def _fill(
+    corners: Corners,
+    on: Ints,
+    rounds: _Rounds,
+    reach: tuple[Floats, Floats],
+    shape: Floats,
+    good: Bools,
+    rules: CornerRules,
+) -> None:
+    """Fill in blends that reach so far on both moves, with centre and spokes `shape` (3, K, 3),
+    where they are `good` (K,)."""
+    on, shape = on[good], shape[:, good]
+    way = np.linalg.norm(shape[1], axis=1) * _angle_between(shape[1], shape[2])
+    lasting = way / (LEAST_PERIODS * rules.period_s)
+    corners.speed[on] = np.minimum(rounds.speed[good], lasting)
+    corners.reach[on], corners.reach_on[on] = reach[0][good], reach[1][good]
+    corners.acceleration[on] = TANGENT_RATIO * rounds.whole[good]
+    corners.way[on] = way
+    corners.shape[:, on] = shape
+
+
+def _round_lines(
+    corners: Corners,
+    moves: Moves,
+    tangents: Tangents,
+    on: Ints,
+    bends: Bends,
+    used: Floats,
+    rules: CornerRules,
+) -> None:
+    """Fill in the blends between lines at the corners `on`."""
+    theta = bends.theta
+    bent = np.pi - 2.0 * theta
+    longest = np.minimum(moves.length[on - 1] - used[on - 1], LINE_PART * moves.length[on - 1])
+    longest = np.minimum(longest, LINE_PART * moves.length[on])
+    # The height of the triangle of both highest speeds.
+    clipped = np.cos(np.minimum(bent, CLIPPED_RAD))
+    one, other = moves.highest[on - 1], moves.highest[on]
+    one, other = np.minimum(one, other / clipped), np.minimum(other, one / clipped)
+    across = other[:, None] * bends.after - one[:, None] * bends.before
+    with np.errstate(divide="ignore", invalid="ignore"):
+        planar = one * other * np.sin(bent) / np.linalg.norm(across, axis=1)
+        normal = _unit(np.cross(bends.before, bends.after))
+        rounds = _rounds(moves, on, normal, theta, longest, planar, rules)
+        reach = rounds.radius / np.tan(theta)
+        far = rounds.radius / np.sin(theta)
+    inward = far[:, None] * bends.inward
+    shape = np.stack(
+        [
+            tangents.path.starts_of(moves.row[on]) + inward,
+            -reach[:, None] * bends.before - inward,
+            reach[:, None] * bends.after - inward,
+        ]
+    )
+    good = (bent > LEAST_BEND_RAD) & (rounds.radius * bent > LEAST_WAY_MM)
+    _fill(corners, on, rounds, (reach, reach), shape, good, rules)
+
+
+CLIPPED_RAD = 0.49 * np.pi
+"""The planner takes no corner for sharper, where it compares the speeds of two lines."""
+
+LEAST_THETA_RAD = np.pi / 12.0
+"""No arc is laid between two arcs where θ is less (`blendInit3FromArcArc`)."""
+
+
+class _Side(Struct, frozen=True, eq=False):
+    """One of the two moves at K corners, in the plane as complex numbers: its tangent there, and
+    of arcs the circle that touches it (`centre`, `radius`), the `sign` by which a blend's radius
+    counts where it touches it from inside (−1) or outside (1), and the angle `most` that a blend
+    may use; so much of the move counts, `longest` mm, and by so much θ is `less`."""
+
+    is_arc: Bools
+    tangent: Floats
+    centre: Floats
+    radius: Floats
+    sign: Floats
+    most: Floats
+    longest: Floats
+    less: Floats
+
+
+def _side(
+    moves: Moves,
+    tangents: Tangents,
+    which: Ints,
+    corner: Floats,
+    tangent: Floats,
+    other: Floats,
+    theta: Floats,
+    used: Floats,
+    *,
+    ends: bool,
+) -> _Side:
+    """The moves `which` (K,) at corners (K,), which end there, or begin."""
+    is_arc, arms = moves.is_arc[which], tangents.arms
+    on = np.flatnonzero(is_arc)
+    arm = tangents.arm_of(moves.row[which[on]])
+    own = corner[on], tangent[on], other[on]
+    growth = (arms.end_radius - arms.radius)[arm] / np.abs(arms.sweep[arm])
+    centre = arms.centre[arm, 0] + 1j * arms.centre[arm, 1] + growth * own[1]
+    spoke = own[0] - centre
+    towards = (spoke * own[2].conj()).real
+    convex = towards < 0.0 if ends else towards >= 0.0
+    sweep = np.abs(arms.sweep[arm])
+    left = sweep * (1.0 - used[which[on]] / moves.length[which[on]]) if ends else sweep
+    part = ARC_END_PART if ends else ARC_START_PART
+    most = np.minimum(part * left, np.where(convex, theta[on], 0.5 * np.pi))
+    radius = np.abs(spoke)
+    count = len(which)
+    side = _Side(
+        is_arc=is_arc,
+        tangent=tangent,
+        centre=np.zeros(count, dtype=np.complex128),
+        radius=np.zeros(count),
+        sign=np.zeros(count),
+        most=np.zeros(count),
+        longest=LINE_PART * moves.length[which],
+        less=np.zeros(count),
+    )
+    if ends:
+        side.longest[:] = np.minimum(side.longest, moves.length[which] - used[which])
+    side.centre[on], side.radius[on], side.most[on] = centre, radius, most
+    side.sign[on] = np.where(convex, -1.0, 1.0)
+    side.longest[on] = np.where(convex, np.sin(0.25 * most), most) * radius
+    side.less[on] = np.where(convex, 0.25 * most, 0.0)
+    return side
+
+
+def _round_arcs(
+    corners: Corners,
+    moves: Moves,
+    tangents: Tangents,
+    on: Ints,
+    bends: Bends,
+    used: Floats,
+    rules: CornerRules,
+) -> None:
+    """Fill in the blends at corners with arcs, all in XY, at the corners `on`."""
+    if len(on) == 0:
+        return
+    theta_tan = bends.theta
+    starts = tangents.path.starts_of(moves.row[on])
+    corner, height = starts[:, 0] + 1j * starts[:, 1], starts[:, 2]
+    one, other = (each[:, 0] + 1j * each[:, 1] for each in (bends.before, bends.after))
+    first = _side(moves, tangents, on - 1, corner, one, other, theta_tan, used, ends=True)
+    last = _side(moves, tangents, on, corner, other, one, theta_tan, used, ends=False)
+    theta = theta_tan - np.maximum(first.less, last.less)
+    left = np.sign((one.conj() * other).imag)
+    normal = np.column_stack([0.0 * left, 0.0 * left, left])
+    longest = np.minimum(first.longest, last.longest)
+    rounds = _rounds(moves, on, normal, theta, longest, np.zeros(len(on)), rules)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        centre = _centre_of(corner, left, rounds.radius, first, last)
+        strays = np.abs(centre - corner) - rounds.radius
+        turned = [
+            np.where(
+                side.is_arc,
+                np.abs(np.angle((corner - side.centre) * (centre - side.centre).conj())),
+                np.abs(((centre - corner) * side.tangent.conj()).real),
+            )
+            for side in (first, last)
+        ]
+    both = first.is_arc & last.is_arc
+    good = np.isfinite(centre) & (strays <= rounds.tolerance) & (theta > 0.0)
+    good &= (np.pi - 2.0 * theta_tan > LEAST_BEND_RAD) & ~(both & (theta < LEAST_THETA_RAD))
+    good &= rounds.radius * (np.pi - 2.0 * theta) > LEAST_WAY_MM
+    reach, spokes = [], []
+    for side, which, turn, ends in (
+        (first, on - 1, turned[0], True),
+        (last, on, turned[1], False),
+    ):
+        good &= ~side.is_arc | (turn <= side.most)
+        far, point = turn.copy(), corner + (-turn if ends else turn) * side.tangent
+        arcs = np.flatnonzero(side.is_arc)
+        arm = tangents.arm_of(moves.row[which[arcs]])
+        share = np.where(good[arcs], turn[arcs], 0.0) / np.abs(tangents.arms.sweep[arm])
+        good[arcs] &= share < 1.0
+        touched = tangents.arms.points(arm, 1.0 - share if ends else share)
+        point[arcs] = touched[:, 0] + 1j * touched[:, 1]
+        far[arcs] = share * moves.length[which[arcs]]
+        reach.append(far)
+        spokes.append(point - centre)
+    shape = np.stack(
+        [np.column_stack([centre.real, centre.imag, height])]
+        + [np.column_stack([each.real, each.imag, 0.0 * height]) for each in spokes]
+    )
+    _fill(corners, on, rounds, (reach[0], reach[1]), shape, good, rules)
+
+
+def _centre_of(corner: Floats, left: Floats, radius: Floats, first: _Side, last: _Side) -> Floats:
+    """(K,) the centres of circles of a radius (K,) that touch both sides, those nearest to the
+    corners; NaN where there are none."""
+    distance = [side.sign * radius + side.radius for side in (first, last)]
+    # A line and an arc: at `radius` beside the line, `distance` from the arc's centre.
+    line_first = ~first.is_arc
+    along = np.where(line_first, first.tangent, last.tangent)
+    arc = np.where(line_first, last.centre, first.centre)
+    far = np.where(line_first, distance[1], distance[0])
+    beside = 1j * left * along
+    to_arc = arc - corner
+    u, n = (to_arc * along.conj()).real, (to_arc * beside.conj()).real
+    root = np.sqrt(far**2 - (radius - n) ** 2)
+    step = np.minimum(np.abs(u + root), np.abs(u - root))
+    by_line = corner + np.where(line_first, -step, step) * along + radius * beside
+    # Two arcs: a triangle.
+    between = last.centre - first.centre
+    apart = np.abs(between)
+    x = (distance[0] ** 2 - distance[1] ** 2 + apart**2) / (2.0 * apart)
+    y = np.sqrt(np.maximum(distance[0] ** 2 - x**2, 0.0))
+    direction = between / apart
+    found = [first.centre + (x + 1j * sign * y) * direction for sign in (1.0, -1.0)]
+    near = np.abs(found[0] - corner) <= np.abs(found[1] - corner)
+    by_arcs = np.where(near, found[0], found[1])
+    return np.asarray(np.where(first.is_arc & last.is_arc, by_arcs, by_line))
+
+
+def _angle_between(one: Floats, other: Floats) -> Floats:
+    """(K,) rad between vectors (K, 3)."""
+    across = np.linalg.norm(np.cross(one, other), axis=-1)
+    return np.asarray(np.arctan2(across, (one * other).sum(axis=-1)))
 
 
 def _unit(vectors: Floats) -> Floats:

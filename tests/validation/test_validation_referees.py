@@ -113,7 +113,7 @@ def test_grbl(bless: bool) -> None:
 
 
 def test_linuxcnc(bless: bool) -> None:
-    assert len(LINUXCNC) == 7
+    assert len(LINUXCNC) == 12
     rows = []
     for file in LINUXCNC:
         recorded = np.loadtxt(file.with_suffix(".csv"), delimiter=",")
