@@ -47,6 +47,12 @@ NOT_SIMULATED_SPINDLE = Sentence(
     "simulated at the feed that the programmed speed makes of them, or at the F in force",
     severity=WARNING,
 )
+NOT_SIMULATED_INPUT = Sentence(
+    NOT_SIMULATED,
+    "{count:# block reads|# blocks read} an input of the machine (M66): it is taken to come at "
+    "once, and #5399 to be 0; what the program does when it does not come is not simulated",
+    severity=WARNING,
+)
 NOT_SIMULATED_AGAIN = Sentence(
     NOT_SIMULATED,
     "M99 begins the program again and again: it is simulated once",

@@ -25,7 +25,8 @@ from .state import MM_PER_INCH
 
 SPINDLE: Final = {3: Kind.SPINDLE_CW, 4: Kind.SPINDLE_CCW}
 
-REFUSED_M: Final = {66: "waits for an input of the machine, which cannot be simulated"}
+INPUT_VALUE: Final = 5399
+"""The parameter of what M66 has read."""
 
 
 class Interpreter(Moves):
@@ -122,13 +123,14 @@ class Interpreter(Moves):
         m, words = block.m, block.words
         io = m.get("input and output")
         if io is not None:
-            if io in REFUSED_M:
-                raise Fault(f"M{io} {REFUSED_M[io]}", "m")
-            needed = "p" if io < 66 else "e"
-            if words.get(needed, -1.0) < 0.0:
-                raise Fault(f"M{io} without {needed.upper()}", "m")
-            self._not_while_compensating("an output")
-            self.notes.outputs.append(self.block_index)
+            if io == 66:
+                self._wait_for_input(words)
+            else:
+                needed = "p" if io < 66 else "e"
+                if words.get(needed, -1.0) < 0.0:
+                    raise Fault(f"M{io} without {needed.upper()}", "m")
+                self._not_while_compensating("an output")
+                self.notes.outputs.append(self.block_index)
         tool = m.get("tool")
         if tool == 6:
             self._change_tool()
@@ -148,6 +150,23 @@ class Interpreter(Moves):
         if "user" in m:
             name = f"M{m['user']}"
             raise Fault(f"{name} runs a program of the machine, which only it knows", "m")
+
+    def _wait_for_input(self, words: dict[str, float]) -> None:
+        """M66: the input comes at once, and is 0."""
+        digital, analog = words.get("p", -1.0), words.get("e", -1.0)
+        kind = round(words.get("l", 0.0))
+        if "p" in words and "e" in words:
+            raise Fault("M66 with both P and E", "e", "an input is digital (P) or analog (E)")
+        if max(round(digital), round(analog)) < 0:
+            raise Fault("M66 without P or E", "m", "write the number of the input")
+        if kind > 0 and words.get("q", -1.0) <= 0.0:
+            raise Fault("M66 that waits (L above 0) without a time Q above 0", "m")
+        if "e" in words and kind:
+            raise Fault("M66 E reads at once, and has no L but L0", "l")
+        self._not_while_compensating("M66")
+        self.canon.event(Kind.DWELL, 0.0)
+        self.given.set_numbered(INPUT_VALUE, 0.0)
+        self.notes.inputs.append(self.block_index)
 
     def _spindle_word(self, code: int, block: Block) -> None:
         words = block.words

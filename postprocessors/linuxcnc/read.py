@@ -39,6 +39,7 @@ from .findings import (
     NOT_SIMULATED_AXES,
     NOT_SIMULATED_CHORDS,
     NOT_SIMULATED_DELETED,
+    NOT_SIMULATED_INPUT,
     NOT_SIMULATED_SPINDLE,
     NOT_SIMULATED_TAP,
     PLACE_UNKNOWN_FRAME,
@@ -221,6 +222,7 @@ class _Reader:
             (WORDS_PASSED_OVER_COOLANT, notes.coolant),
             (WORDS_PASSED_OVER_PAUSE, notes.pauses),
             (WORDS_PASSED_OVER_OUTPUT, notes.outputs),
+            (NOT_SIMULATED_INPUT, notes.inputs),
             (NOT_SIMULATED_SPINDLE, notes.tapping),
             (NOT_SIMULATED_TAP, notes.swapped),
         ):

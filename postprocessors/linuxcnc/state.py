@@ -46,6 +46,7 @@ class Notes(Struct):
     coolant: list[int] = field(default_factory=list)
     pauses: list[int] = field(default_factory=list)
     outputs: list[int] = field(default_factory=list)
+    inputs: list[int] = field(default_factory=list)
     speedless: list[int] = field(default_factory=list)
     tapping: list[int] = field(default_factory=list)
     swapped: list[int] = field(default_factory=list)

@@ -286,7 +286,7 @@ def test_refused_by_grbl(text: str, line: int, column: int, message: str) -> Non
         ("G92\n", 1, 1, "G92 without an axis"),
         ("G10 L3 P1\n", 1, 1, "G10 wants L0"),
         ("G10 L2 P10\n", 1, 8, "from 0 to 9"),
-        ("M66 P0\n", 1, 1, "waits for an input"),
+        ("M66 P0 L3\n", 1, 1, "without a time Q"),
         ("M101\n", 1, 1, "runs a program of the machine"),
         ("G0 U1\n", 1, 4, "the letter U is no word"),
         ("G71 X1\n", 1, 1, "does not know|lathe's cycle"),

@@ -209,7 +209,7 @@ TABLE = ("dialect.tools.1.length_mm=40", "dialect.tools.2.length_mm=55.5")
         (("G43 H1\n", "G43 H2\n"), TABLE, None, 0),
         (("", ""), TABLE, Severity.ERROR, 5),
         (("G43\n", ""), TABLE, Severity.ERROR, 6),  # M6 leaves the length of tool 1 in force
-        (("G43.1 Z30\n", "G43.1 Z45.5\n"), TABLE, None, 0),  # both 10 mm too low: the zero says so
+        (("G43.1 Z30\n", "G43.1 Z45.5\n"), TABLE, None, 0),  # both 10 mm low
         (("", ""), [each.replace("55.5", "40") for each in TABLE], None, 0),
     ],
 )
@@ -224,6 +224,53 @@ def test_tools_that_cut_without_their_length_are_found(
     assert [each.severity for each in found] == ([severity] if severity else [])
     assert all(each.where == f"block {block}" for each in found)
     assert not found or severity == Severity.WARNING or found[0].measured == 15.5
+
+
+@pytest.mark.parametrize(
+    ("second", "centre", "radius"),
+    [("G3 X12 Y12 I0 J-8", (20.0, 12.0), 7.0), ("G2 X20 Y36 I0 J8", (20.0, 28.0), 9.0)],
+)
+def test_compensated_arcs_end_where_their_offsets_meet(
+    second: str, centre: tuple[float, float], radius: float
+) -> None:
+    """A cutter 2 mm wide on the left, at X20 Y20, where the path turns left: the end of the first
+    arc is on both offset circles, and of their two meetings the one at the corner."""
+    path = read(f"F9\nG41.1 D2\nG1 X10 Y10\nG3 X20 Y20 I0 J10\n{second}\nG40 G1 X0\nM2\n")
+    arcs = np.flatnonzero(path.is_arc)
+    x, y = path.end[arcs[-2], :2].tolist()  # behind the small arc about X10 Y10
+    assert math.dist((x, y), (10.0, 20.0)) == pytest.approx(9.0, abs=1e-9)
+    assert math.dist((x, y), centre) == pytest.approx(radius, abs=1e-9)
+    assert math.dist((x, y), (20.0, 20.0)) < 2.0
+
+
+def test_compensated_arcs_about_one_centre_are_refused() -> None:
+    with pytest.raises(ProgramError, match="about one centre"):
+        read("F9\nG41.1 D2\nG1 X10 Y10\nG3 X20 Y20 I0 J10\nG2 X10 Y30 I-10 J0\nM2\n")
+
+
+def test_an_input_of_the_machine_comes_at_once() -> None:
+    text = "G0 X1\nM66 P0 L3 Q2\no1 if [#5399 eq 0]\nG0 X2\no1 endif\nM66 E1 L0\nM66 P2\nM2\n"
+    path = read(text)
+    assert path.end[path.is_motion, 0].tolist() == [1, 2]
+    assert codes(path) == [("linuxcnc.NOT_SIMULATED", Severity.WARNING)]
+    assert "3 blocks read an input" in str(path.findings[0])
+
+
+@pytest.mark.parametrize("words", ["", "P-1", "P1 E1", "P1 L3", "P1 L3 Q0", "E1 L3 Q1", "E-1"])
+def test_an_input_that_linuxcnc_refuses(words: str) -> None:
+    with pytest.raises(ProgramError, match="M66"):
+        read(f"M66 {words}\nM2\n")
+
+
+def test_a_known_machine_zero_places_the_first_frame() -> None:
+    """Though it is 0 on some axes: G55 is then where `work_offsets_mm` says."""
+    zero = "controller.machine_zero_mm=[0,-2,0]"
+    offset = "dialect.work_offsets_mm={G55=[7,0,0]}"
+    path = read("G0 X1 Y1\nG55 G0 X1 Y1\nM2\n", zero, offset)
+    assert path.end[:2].tolist() == [[1, 1, 0], [8, -1, 0]]
+    assert codes(path) == []
+    path = read("G0 X1 Y1\nG55 G0 X1 Y1\nM2\n", offset)
+    assert codes(path) == [("linuxcnc.PLACE_UNKNOWN", Severity.ERROR)]
 
 
 def test_one_tool_needs_no_length() -> None:
