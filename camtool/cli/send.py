@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     from camtool.target.registry import LoadedTarget
     from camtool.target.wire import Conversation, ToolAt, Wire
 
+MOST_NAMED = 5
+"""So many blocks that stop are named."""
+
 NAME_WIDTH = 11
 """Columns before the words of a dry run."""
 
@@ -135,9 +138,8 @@ def send(
         show_facts(facts, NAME_WIDTH, {}, err=as_json)
     if port is None:
         return 0
-    asks = sum(bool(packet.ask) for packet in one.packets[1:])
-    if asks and not sys.stdin.isatty():
-        raise click.UsageError(f"it waits for an answer {asks} times: run it at a terminal")
+    if not sys.stdin.isatty():
+        _refuse_waiting(one, single=single)
     line = port_of(port, baud, one.wire, target)
     if speed != 1.0 and not line.is_virtual:
         raise OptionError("a real machine has only its own speed", where="--speed")
@@ -174,7 +176,8 @@ def _tool_at(wire: Wire, left: Left, said: ToolAt, target: LoadedTarget) -> Tool
     raise OptionError(
         asked,
         where="--tool-at",
-        mend=f"give --tool-at {tool_at} if so; else bring the tool to part zero and give zero",
+        mend=f"give --tool-at {tool_at} if so; else bring the tool to part zero first, then give "
+        "--tool-at zero",
     )
 
 
@@ -197,6 +200,26 @@ def _resumed(place: Path, data: bytes, target: LoadedTarget) -> Left:
     if found.finished:
         raise OptionError("the program was finished", where="--resume", mend="leave it out")
     return found
+
+
+def _refuse_waiting(one: Consignment, *, single: bool) -> None:
+    """Refuse, where nobody can answer, what would wait for an answer for ever."""
+    asks = sum(bool(packet.ask) for packet in one.packets[1:])
+    if asks:
+        raise click.UsageError(f"it waits for an answer {asks} times: run it at a terminal")
+    if single:
+        raise click.UsageError("--single waits behind every block: run it at a terminal")
+    stops = [packet for packet in one.packets if packet.waits]
+    if stops:
+        named = ", ".join(
+            f"block {one.block_of(packet.block) + 1} ({packet.data.strip().decode('latin-1')})"
+            for packet in stops[:MOST_NAMED]
+        )
+        more = f" and {len(stops) - MOST_NAMED} more" if len(stops) > MOST_NAMED else ""
+        raise click.UsageError(
+            f"the program stops until somebody lets it go on, in {named}{more}: run it at a "
+            "terminal, or take the stops out"
+        )
 
 
 def _agreed() -> bool:

@@ -14,7 +14,7 @@ from enum import Enum
 from typing import Any, Protocol
 
 from camtool.errors import OutputError
-from camtool.target.wire import Conversation, Place, State, Tell, Write
+from camtool.target.wire import Conversation, Place, State, Tell, Write, port_fault
 
 TICK_S = 0.05
 """The user's wishes and the signals are looked at so often."""
@@ -96,7 +96,8 @@ class Driver:
                     self._hear(conversation)
                     self._obey(conversation)
             except OSError as error:
-                conversation.lost(f"the port is gone ({error.strerror or error})", self.now())
+                why, _ = port_fault(error)
+                conversation.lost(f"the port is gone ({why})", self.now())
             except BaseException as error:
                 if self._fault is not None:
                     conversation.lost("camtool was ended", self.now())

@@ -20,6 +20,7 @@ from msgspec import Struct
 
 from camtool.errors import InputError
 from camtool.lock import held
+from camtool.target.wire import port_fault
 
 WRITE_S: Final = 10.0
 """A port that takes no more bytes for so long is stuck."""
@@ -110,10 +111,9 @@ def opened_line(port: Port) -> Iterator[Line]:
         try:
             line = Line(port)
         except (OSError, ValueError) as error:
+            why, mend = port_fault(error)
             raise InputError(
-                f"the port cannot be opened ({_words(error)})",
-                file=port.name,
-                mend="camtool ports lists them; close other programs that use it",
+                f"the port cannot be opened ({why})", file=port.name, mend=mend
             ) from error
         try:
             yield line
@@ -139,11 +139,6 @@ def _opened(port: Port) -> Any:
         settings |= {"bytesize": int(bits), "parity": parity, "stopbits": int(stops)}
         settings["exclusive"] = None if sys.platform == "win32" else True
     return serial.serial_for_url(port.name, **settings)
-
-
-def _words(error: Exception) -> str:
-    strerror = getattr(error, "strerror", None)
-    return str(strerror or error)
 
 
 class FoundPort(Struct, frozen=True):

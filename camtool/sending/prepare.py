@@ -195,12 +195,15 @@ def consignment(
         and tool_at in ("journal", "known")
     ):
         begin_mm = standing.place_mm
-    if first or begin_mm is not None:
+    midway = standing is not None and standing.place_mm is not None
+    midway = midway and wire.place in ("told", "steps") and tool_at != "zero"
+    if first or midway:
         rest = rest_of(decoded, target, first, data, begin_mm=begin_mm)
         data = rest.data
         decoded = read_program(data, target, source=source).decoded
         assert decoded is not None
-        decoded = _begun_at(decoded, begin_mm, wire)
+        if begin_mm is not None:
+            decoded = _shifted(decoded, np.array(begin_mm))
     if progress is not None:
         progress.begin(f"simulating {PurePath(source).name}")
     forecast = forecast_of(decoded, target)
@@ -214,15 +217,14 @@ def _standing(left: Left, decoded: Toolpath, tool_at: ToolAt) -> Standing:
     return Standing(left.tool_mm, left.is_still, decoded.end[under_way], tool_at)
 
 
-def _begun_at(path: Toolpath, begin_mm: Place | None, wire: Wire) -> Toolpath:
-    """A path that was read as if it began at part zero, as it is from another place: a controller
-    that knows only steps goes the same ways, others to the same places."""
-    if begin_mm is None:
-        return path
-    by = np.array(begin_mm) - path.start
-    if wire.place != "steps":
-        return replace(path, start=path.start + by)
-    return replace(path, start=path.start + by, end=path.end + by, centre=path.centre + by[:2])
+def _shifted(path: Toolpath, by_mm: Floats) -> Toolpath:
+    """The same path elsewhere; `by_mm` (3,)."""
+    return replace(
+        path,
+        start=path.start + by_mm,
+        end=path.end + by_mm,
+        centre=path.centre + by_mm[:2],
+    )
 
 
 def tool_at_of(wire: Wire, left: Left, said: ToolAt, name: str) -> tuple[ToolAt, str]:
@@ -244,24 +246,30 @@ def tool_at_of(wire: Wire, left: Left, said: ToolAt, name: str) -> tuple[ToolAt,
         if said == "journal" and not sure:
             raise unknown
         return said, ""
-    wrong: ToolAt = "journal" if wire.place == "kept" else "known"
-    right: ToolAt = "known" if wire.place == "kept" else "journal"
-    if said == wrong:
-        why = "has no command to set its place" if wrong == "journal" else "knows only steps"
-        raise MachineError(
-            f"{name} {why}",
-            where=where,
-            mend=f"say --tool-at {right} if the tool stands where the program was left, zero if "
-            "you have brought it to part zero",
-        )
     if said == "zero" or (not said and left.last < 0):
         return "zero", ""
+    stood = f"the program was left at {place_words(left.tool_mm)} by the simulation"
+    if wire.place == "kept":
+        if said:
+            raise MachineError(
+                f"{name} does not say where it stands, and has no command to set its place",
+                where=where,
+                mend="bring the tool to part zero, where the program begins, and give --tool-at "
+                "zero",
+            )
+        stood = stood if sure else "nobody knows where the program was left"
+        return "zero", f"{stood}, and it goes on from part zero: does the tool stand there now"
+    if said == "known":
+        raise MachineError(
+            f"{name} knows only steps",
+            where=where,
+            mend="give --tool-at journal where the tool has stayed, zero where you have brought "
+            "it to part zero",
+        )
     if not sure:
         raise unknown
-    asked = f"the program was left at {place_words(left.tool_mm)} by the simulation, and is to go "
-    asked += "on from there: has the tool stayed there"
-    asked += ", and the controller on" if wire.place == "kept" else ""
-    return right, "" if said else asked
+    asked = f"{stood}, and goes on from there: has the tool stayed there"
+    return "journal", "" if said else asked
 
 
 def _no_forecast(run: Run) -> Forecast:
@@ -327,21 +335,7 @@ def rest_of(
             f"the program sets part zero behind block {first + 1}",
             mend="bring the tool to part zero, and give --tool-at zero",
         )
-    entry = _entry(decoded, low, target, begin_mm)
-    count = len(entry)
-    columns: dict[str, Any] = {
-        name: np.concatenate([getattr(entry, name), getattr(decoded, name)[low:high]])
-        for name in COLUMNS
-        if name not in ("source", "mode")
-    }
-    columns["source"] = np.concatenate([np.full(count, -1), decoded.source[low:high]])
-    columns["mode"] = np.concatenate([np.full(count, -1), decoded.mode[low:high]])
-    start = decoded.start if begin_mm is None else np.array(begin_mm)
-    whole = replace(decoded, **columns, start=start, findings=(), drawn=None, operations=None)
-    program = target.target.write(whole, machine)
-    again = target.target.read(program.data, machine)
-    if begin_mm is not None:
-        again = _begun_at(again, begin_mm, wire_of(target))
+    data, again = _written(decoded, low, high, target, begin_mm)
     wanted = decoded.part(low, high)
     found = _Pairs(wanted, again, target).found()
     if found is None:
@@ -356,7 +350,28 @@ def rest_of(
     done = np.full(int(again.block.max()) + 1, -1)
     np.maximum.at(done, again.block[ends[last]], wanted.block[moves[last]])
     done[: again.block[into]] = -1
-    return Rest(program.data, first, int(again.block[into]), np.maximum.accumulate(done))
+    return Rest(data, first, int(again.block[into]), np.maximum.accumulate(done))
+
+
+def _written(
+    decoded: Toolpath, low: int, high: int, target: LoadedTarget, begin_mm: Place | None
+) -> tuple[bytes, Toolpath]:
+    """The program of an entry and of the rows from `low` to `high`, and that as it is read."""
+    entry = _entry(decoded, low, target, begin_mm)
+    count = len(entry)
+    columns: dict[str, Any] = {
+        name: np.concatenate([getattr(entry, name), getattr(decoded, name)[low:high]])
+        for name in COLUMNS
+        if name not in ("source", "mode")
+    }
+    columns["source"] = np.concatenate([np.full(count, -1), decoded.source[low:high]])
+    columns["mode"] = np.concatenate([np.full(count, -1), decoded.mode[low:high]])
+    whole = replace(decoded, **columns, findings=(), drawn=None, operations=None)
+    if begin_mm is not None:
+        whole = replace(_shifted(whole, -np.array(begin_mm)), start=decoded.start)
+    program = target.target.write(whole, target.machine)
+    again = target.target.read(program.data, target.machine)
+    return program.data, again if begin_mm is None else _shifted(again, np.array(begin_mm))
 
 
 def _goes_on(path: Toolpath) -> bool:
@@ -365,9 +380,7 @@ def _goes_on(path: Toolpath) -> bool:
     return bool((path.is_motion & somewhere).any())
 
 
-def _entry(
-    decoded: Toolpath, low: int, target: LoadedTarget, begin_mm: Place | None = None
-) -> Toolpath:
+def _entry(decoded: Toolpath, low: int, target: LoadedTarget, begin_mm: Place | None) -> Toolpath:
     """The moves and events that bring the machine from the beginning of the program, or from
     `begin_mm`, to the begin of a row."""
     machine = target.machine
@@ -375,8 +388,9 @@ def _entry(
     before = decoded.part(0, low)
     top = float(toolpath_extents(decoded.first(decoded.running))[2, 1])
     safe = max(top, z, float(decoded.start[2]))
-    x0, y0, z0 = decoded.start.tolist() if begin_mm is None else begin_mm
-    path = ToolpathBuilder(start=(x0, y0, z0))
+    start = decoded.start.tolist() if begin_mm is None else begin_mm
+    safe = max(safe, start[2])
+    path = ToolpathBuilder(start=(start[0], start[1], start[2]))
     kinds = before.kind
     zeros = np.flatnonzero(kinds == Kind.SET_ZERO)
     if len(zeros) and begin_mm is None:

@@ -19,7 +19,10 @@ Three counts of packets say where it stands: those that were `sent`, those that 
 
 from __future__ import annotations
 
+import errno
 import math
+import os
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from enum import Enum
@@ -68,7 +71,8 @@ class Packet(Struct, frozen=True):
     `block`: the last block of the program that is done when it is done, −1 before the first;
     `seconds`: how long the machine is busy with it, by the simulation. `counts`: how many reports
     of it the controller may give, where it gives any. `ask`: what the user must do or allow before
-    it goes out. `note`: what the user must know while the machine waits in it. `end_mm`: where it
+    it goes out. `note`: what the user must know while the machine waits in it; `waits`: true if it
+    does so until somebody lets it go on. `end_mm`: where it
     ends, in the work frame, where the conversation looks at that.
     """
 
@@ -78,6 +82,7 @@ class Packet(Struct, frozen=True):
     counts: tuple[int, ...] = ()
     ask: str = ""
     note: str = ""
+    waits: bool = False
     end_mm: Place | None = None
 
 
@@ -487,6 +492,33 @@ class Wire(ABC):
         from camtool.target.terminal import Terminal
 
         return Terminal()
+
+
+# Ports that fail.
+
+_MENDS = {
+    errno.ENOENT: "plug the machine in; camtool ports lists the ports",
+    errno.ENODEV: "plug the machine in; camtool ports lists the ports",
+    errno.EACCES: "ask for the right to use it: on Linux, be a member of its group (dialout)",
+    errno.EBUSY: "close other programs that use it",
+    errno.EAGAIN: "close other programs that use it",
+    errno.ECONNREFUSED: "start what is to listen there",
+}
+
+
+def port_fault(error: Exception) -> tuple[str, str]:
+    """What is wrong with a port, and what to do about it, of an OSError or of what pyserial
+    raises, whose own words are for programmers."""
+    text = str(error)
+    said = re.search(r"\[Errno (\d+)\]", text)
+    number = getattr(error, "errno", None) or (int(said[1]) if said else None)
+    if number is not None:
+        mend = _MENDS.get(number, "camtool ports lists the ports")
+        return os.strerror(number), mend
+    if "returned no data" in text or "disconnected" in text:
+        mend = "plug it in again, and close other programs that read from it"
+        return "it was unplugged, or another program reads from it", mend
+    return text, "camtool ports lists the ports"
 
 
 class NoWire(Struct, frozen=True):

@@ -15,6 +15,7 @@ from msgspec import structs
 
 from camtool.errors import MachineError
 from camtool.target.contract import Setting
+from camtool.target.wire import port_fault
 
 from .dialect import GrblController, GrblMachine
 
@@ -204,10 +205,11 @@ def asked(port: str) -> str:
             line.write(b"$$\n")
             rows = _lines(line, ANSWER_S, "ok", "error")
     except (OSError, ValueError) as error:  # serial.SerialException is an OSError
+        why, mend = port_fault(error)
         raise MachineError(
-            f"the port cannot be used ({error})",
+            f"the port cannot be used ({why})",
             where=f"--port {port}",
-            mend="close other programs that use it, or give the listing as a file",
+            mend=f"{mend}; or give the listing as a file",
         ) from error
     if not rows or rows[-1] != "ok":
         raise MachineError(

@@ -61,6 +61,9 @@ PROBE_EVERY: Final = 100
 """A query follows after so many bytes of lines. Its answer is as long as ten `ok`, so that queries
 more often than this fill the line back; with fewer the buffer would run dry before the answer."""
 
+MOST_DUE: Final = 3
+"""So many reports at most are taken to be on their way: others were lost."""
+
 HOLD, RESUME, STATUS, RESET, JOG_CANCEL = b"!", b"~", b"?", b"\x18", b"\x85"
 HOMING: Final = b"$H\n"
 UNLOCKING: Final = b"$X\n"
@@ -90,6 +93,8 @@ _BLANK = re.compile(r"[ \t]")
 _NUMBER = re.compile(r"N\d+(?:\.\d*)?", re.IGNORECASE)
 _DWELLS = re.compile(r"G0*4(?![\d.])", re.IGNORECASE)
 _PAUSES = re.compile(r"M0*[01](?![\d.])", re.IGNORECASE)
+_WAITS = re.compile(r"M0+(?![\d.])", re.IGNORECASE)
+"""grbl passes over M1 (gcode.c)."""
 
 _STATUS = re.compile(
     r"<(Idle|Run|Hold:[01]|Jog|Alarm|Door:[0-3]|Check|Home|Sleep)((?:\|[A-Za-z]+:[^|<>]*)*)>"
@@ -235,7 +240,9 @@ def _packets(data: bytes, forecast: Forecast) -> Iterator[Packet]:
             continue
         note = "; ".join(notes) if _PAUSES.search(words) else ""
         notes = []
-        yield Packet(words.encode("latin-1") + b"\n", block, forecast.seconds_of(block), note=note)
+        data = words.encode("latin-1") + b"\n"
+        waits = bool(_WAITS.search(words))
+        yield Packet(data, block, forecast.seconds_of(block), note=note, waits=waits)
         block += 1
 
 
@@ -290,6 +297,7 @@ class GrblConversation(Conversation):
         self._idle = 0  # idle reports in a row
         self._idle_since = 0.0  # the first of them
         self._holds = 0  # reports in a row that it is held, while it should work
+        self._due = self._stale = 0  # reports that are due; those of them that are of before a ~
         self._resumes = False  # whether it is to go on as soon as it stands
         self._polled = self._answered = 0.0
         self._waits_since = 0.0  # when the answer that is due began to be due
@@ -347,6 +355,7 @@ class GrblConversation(Conversation):
             held = self.why != SINGLE
             self.state, self.why, self._idle, self._holds = State.SENDING, "", 0, 0
             if held:
+                self._stale = self._due
                 self._write(RESUME)
             self._go_on(now, anew=True)
 
@@ -437,6 +446,7 @@ class GrblConversation(Conversation):
 
     def _poll(self, now: float) -> None:
         if not self._homes:
+            self._due = min(self._due + 1, MOST_DUE)
             self._write(STATUS)
         self._polled = now
         self._wake(now)
@@ -560,7 +570,9 @@ class GrblConversation(Conversation):
         self._idle = self._idle + 1 if state == "Idle" else 0
         if self._idle == 1:
             self._idle_since = now
-        self._holds = self._holds + 1 if state == "Hold:0" else 0
+        stale, self._stale = self._stale > 0, max(self._stale - 1, 0)
+        self._due = max(self._due - 1, 0)
+        self._holds = self._holds + 1 if state == "Hold:0" and not stale else 0
         still = state == "Hold:0" or self._idle >= 2 or state.startswith("Door:1")
         if self.state is State.STOPPING:
             self._stopping(state, now)
@@ -575,6 +587,8 @@ class GrblConversation(Conversation):
         elif state.startswith("Door") and self.state is State.SENDING:
             self.state, self.why = State.WAITING, "its door is open: close it and go on"
         elif self.state is State.SENDING and state == "Hold:0":
+            if stale:
+                return
             if self._stops():
                 self.state, self.why = State.WAITING, self._stop_note()
             elif self._holds >= HELD:

@@ -59,6 +59,10 @@ JOINTS: Final = 3
 _FRAMES = re.compile(rb"G0*(?:10|52|5[5-9]|92)(?!\d)", re.IGNORECASE)
 """Words behind which a place is told in another frame than it is programmed in."""
 
+_WAITS = re.compile(r"M0*(?:[01]|60)(?![\d.])", re.IGNORECASE)
+"""M1 does so where the switch of optional stops is on, which the program cannot know."""
+_COMMENT = re.compile(r"\([^()]*\)|;.*|\s")
+
 _ENDS = re.compile(rb"[\r\n]+")
 _LINES = re.compile(r"\r\n|\n|\r")
 
@@ -94,7 +98,8 @@ class LinuxcncWire(Wire):
                 seconds = float(forecast.seconds[block])
                 # Where lines are executed again, none is done for certain before the end.
                 counts = (number if steady else 0,)
-                packets.append(Packet(line.encode("latin-1"), block, seconds, counts))
+                waits = bool(_WAITS.search(_COMMENT.sub("", line)))
+                packets.append(Packet(line.encode("latin-1"), block, seconds, counts, waits=waits))
         if not packets:
             raise MachineError("the program has no blocks")
         ends = forecast.end_mm[~np.isnan(forecast.end_mm).any(axis=1)]

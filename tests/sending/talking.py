@@ -17,8 +17,10 @@ class Talking:
     """A conversation, its line, and the time, s. `coarse`: reports of steps come all at once, when
     a travel is over, which is faster and on a line without faults the same."""
 
-    def __init__(self, talk: Conversation, line: Wired, *, coarse: bool = False) -> None:
-        self.talk, self.line, self.now = talk, line, 0.0
+    def __init__(
+        self, talk: Conversation, line: Wired, *, coarse: bool = False, now: float = 0.0
+    ) -> None:
+        self.talk, self.line, self.now = talk, line, now
         self.coarse = coarse
         line.connect(self.now)
         talk.begin(self.now)

@@ -21,12 +21,16 @@ from hypothesis.stateful import (
 )
 
 from camtool.arrays import Floats
+from camtool.errors import MachineError, OptionError
+from camtool.sending.drive import counts_of
 from camtool.sending.faults import Faults, Wired
-from camtool.sending.prepare import forecast_of, rest_of
+from camtool.sending.journal import Place as Left
+from camtool.sending.prepare import consignment, forecast_of, rest_of, tool_at_of
 from camtool.target.registry import LoadedTarget, load_target
 from camtool.target.twin import Twin
-from camtool.target.wire import Forecast, Manner, Packet, State
+from camtool.target.wire import Conversation, Forecast, Manner, Packet, State, ToolAt
 from camtool.toolpath.moves import Toolpath
+from tests.feeding import motion
 from tests.sending.talking import Talking
 
 PROGRAMS = {
@@ -305,3 +309,103 @@ def test_some_orders(name: str) -> None:
 @pytest.mark.parametrize("name", sorted(PROGRAMS))
 def test_two_thousand_orders(name: str) -> None:
     run(name, 2000)
+
+
+# Stopped at any time, and gone on with where it stands.
+
+ARC = b"G02X00009.00Y00005.00I00006.00J00005.00F08;"
+"""It may end beside its end, where the rest of a program does not begin."""
+STAYS: dict[str, ToolAt] = {"grbl": "", "pic-mmh": "zero", "i8751": "journal", "valcnc": "zero"}
+"""What the user says of a machine that nobody has touched since, where it can go on; or that the
+tool was brought to part zero."""
+
+
+def stopped_and_gone_on(name: str, seed: int) -> str:
+    """What happened, after all that must hold has been asserted."""
+    chance, target = np.random.default_rng(seed), loaded(name)
+    program = PROGRAMS[name].replace(ARC, b"G01X00009.00Y00005.00F08;")
+    one = consignment(program, target, source=name)
+    choices = [*CHOICES.get(name, []), *(["opening=reset"] if name == "i8751" else [])]
+    twin: Any = target.twin(choices)
+    stop_s = float(chance.uniform(0.0, one.seconds))
+
+    def stopping(talk: Conversation, now: float) -> None:
+        if now > stop_s and (seed % 2 or talk.state is State.PAUSED):
+            talk.stop(now)
+        elif now > stop_s:
+            talk.pause(now)
+
+    talk = one.wire.conversation(one.packets, target.machine, Manner())
+    Talking(talk, Wired(twin), coarse=name != "pic-mmh").until(1e5, stopping)
+    if talk.state is State.FINISHED:
+        return "finished"
+    counts, tool = counts_of(talk, one.block_of), one.place_of(talk)
+    left = Left(
+        one.sha256, "", name, counts["block"] + 1, False, counts["last"], tool, talk.is_still
+    )
+    step = np.array([axis.coded_step_mm for axis in target.machine.axes])
+    if left.is_still and tool is not None:
+        assert (np.abs(twin.slides.commanded_mm - tool) <= 0.51 * step + 1e-3).all()
+    said = STAYS[name] if left.is_still else "zero"
+    if said == "zero":
+        twin = target.twin(choices)
+    tool_at, asked = tool_at_of(one.wire, left, said, name)
+    try:
+        second = consignment(
+            program, target, source=name, first=left.block, left=left, tool_at=tool_at
+        )
+    except OptionError as refused:
+        if "nothing moves" not in str(refused):
+            raise
+        return "done"
+    assert not asked
+    before = len(twin.slides.trace)
+    standing = second.standing if one.wire.place == "told" else None
+    again = one.wire.conversation(second.packets, target.machine, Manner(standing=standing))
+    Talking(again, Wired(twin), coarse=True, now=twin.now).until(2e5)
+    assert again.state is State.FINISHED, (again.why, left, said)
+    trace = motion(program, target)
+    of = target.target.read(program, target.machine).block[trace.block]
+    whole = trace.commanded[int(np.searchsorted(of, left.block)) :]
+    made = twin.slides.trace.commanded[before:]
+    assert len(made) >= len(whole)
+    np.testing.assert_allclose(made[len(made) - len(whole) :], whole, atol=step.max() * 1.01)
+    return "went on"
+
+
+@pytest.mark.parametrize("name", sorted(STAYS))
+def test_a_stopped_program_goes_on_where_it_stands(name: str) -> None:
+    happened = {stopped_and_gone_on(name, seed) for seed in range(8)}
+    assert "went on" in happened
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(STAYS))
+def test_a_thousand_stopped_programs_go_on(name: str) -> None:
+    for seed in range(100, 1100):
+        stopped_and_gone_on(name, seed)
+
+
+@pytest.mark.parametrize("name", sorted(STAYS))
+def test_where_a_machine_stands_that_does_not_say_is_asked(name: str) -> None:
+    """And refused where the answer would mean nothing."""
+    wire: Any = loaded(name).target.wire()
+    left = Left("", "", name, 3, False, 5, (1.0, 2.0, 3.0), True)
+    lost = Left("", "", name, 3, False, 5, (1.0, 2.0, 3.0), False)
+    new = Left("", "", name, 0, False, -1, None, True)
+    tool_at, asked = tool_at_of(wire, left, "", name)
+    assert tool_at == STAYS[name]
+    assert tool_at_of(wire, new, "", name)[1] == ""
+    if name == "grbl":  # it says where it is, and is compared
+        assert asked == ""
+        assert tool_at_of(wire, lost, "", name) == ("", "")
+        assert tool_at_of(wire, lost, "known", name) == ("known", "")
+    else:
+        assert "X1.000 Y2.000 Z3.000" in asked
+        with pytest.raises(MachineError, match="--tool-at"):
+            tool_at_of(wire, left, "known", name)
+    with pytest.raises((OptionError, MachineError), match="part zero"):
+        tool_at_of(wire, lost, "journal", name)
+    assert tool_at_of(wire, lost, "zero", name) == ("zero", "")
+    router: Any = loaded("matlab-router").target.wire()
+    assert tool_at_of(router, lost, "", "matlab-router") == ("", "")

@@ -3,6 +3,7 @@ program."""
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import pty
@@ -19,11 +20,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from serial import SerialException
 
+from camtool.cli.life_signs import LifeSigns
 from camtool.errors import InputError, OptionError
+from camtool.progress import Progress
 from camtool.sending.journal import Journal, read_journal
 from camtool.sending.prepare import consignment, digest, rest_of
 from camtool.target.registry import load_target
+from camtool.target.wire import port_fault
 from tests.postprocessors.grbl.test_wire import PROGRAM, Small
 from tests.waiting import heard_from
 
@@ -404,3 +409,91 @@ def test_the_journal_says_where_it_stopped(program: Path) -> None:
     assert place.tool_mm == (3.0, 12.0, 21.0)
     assert place.is_still
     assert place.block <= 11 <= place.last + 1
+
+
+# What nobody could answer, and what is said of ports.
+
+
+@pytest.mark.parametrize(
+    ("program", "more", "said"),
+    [
+        (b"G0X1\nM0\nG0X2\n(swap)\nN7 G4P1 M00\nM1\n", [], b"block 2 (M0), block 4 (N7G4P1M00):"),
+        (b"M0\n" * 9, [], b"block 5 (M0) and 4 more"),
+        (b"G0X1\nG0X2\n", ["--single"], b"--single waits behind every block"),
+    ],
+)
+def test_what_waits_for_somebody_is_refused_where_nobody_is(
+    tmp_path: Path, program: bytes, more: list[str], said: bytes
+) -> None:
+    file, small = tmp_path / "part.nc", Small()
+    file.write_bytes(program)
+    with behind_a_terminal(small) as port:
+        line = command(str(file), "-t", "grbl", "--port", port, "--yes", *more)
+        done = subprocess.run(line, capture_output=True, stdin=subprocess.DEVNULL, check=False)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert small.lines == []
+    assert small.reset == 0
+    assert not Path(f"{file}.journal").exists()
+
+
+def test_what_is_done_is_said_though_going_on_fails(program: Path) -> None:
+    left_at(program, (0.0, 0.0, 0.0))
+    with behind_a_terminal(Small(locked=True)) as port:
+        line = command(str(program), "-t", "grbl", "--port", port, "--yes", "--resume")
+        done = subprocess.run(line, capture_output=True, check=False)
+    assert done.returncode == 1
+    assert b"block 20 is the last that is done" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("error", "why", "mend"),
+    [
+        (
+            SerialException(2, "could not open port /dev/x: [Errno 2] No such file: '/dev/x'"),
+            "No such file or directory",
+            "plug the machine in",
+        ),
+        (SerialException("could not open port /dev/x: [Errno 13] denied"), "denied", "group"),
+        (
+            SerialException("Could not exclusively lock port /dev/x: [Errno 11] Resource"),
+            "unavailable",
+            "close other programs",
+        ),
+        (
+            SerialException("device reports readiness to read but returned no data (device ..."),
+            "it was unplugged, or another program reads from it",
+            "plug it in again",
+        ),
+        (SerialException("write failed: [Errno 5] Input/output error"), "Input/output error", ""),
+        (ConnectionRefusedError(111, "Connection refused"), "Connection refused", "listen there"),
+        (OSError("strange"), "strange", ""),
+    ],
+)
+def test_a_port_that_fails_is_told_in_words_for_its_user(
+    error: Exception, why: str, mend: str
+) -> None:
+    said, advice = port_fault(error)
+    assert why in said
+    assert mend in advice
+    assert "Errno" not in said
+
+
+def test_a_port_that_is_not_there_is_no_reason_to_close_programs(program: Path) -> None:
+    line = command(str(program), "-t", "grbl", "--port", "/dev/ttyNONE9", "--yes")
+    done = subprocess.run(line, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "the port cannot be opened (No such file or directory); plug" in done.stderr
+    assert "close other programs" not in done.stderr
+
+
+def test_nothing_is_written_over_a_question(program: Path) -> None:
+    """The sign of life stands still while the user is asked."""
+    stream = io.StringIO()
+    signs = LifeSigns(stream, Progress())
+    signs._begun = time.monotonic() - 10.0
+    with signs.hidden():
+        signs.show()
+        assert stream.getvalue() == ""
+    signs.show()
+    assert "s\r" in stream.getvalue()

@@ -393,3 +393,33 @@ def test_switches_that_close_while_it_works_are_told() -> None:
     talk, _ = held(small=small, wish=wish, told=told)
     assert talk.state is State.FINISHED
     assert told.count("it reports closed switches: limit of Z") == 1
+
+
+def test_a_stop_of_the_program_is_said_once_though_reports_are_late() -> None:
+    """A report that was asked for before ~ may say Hold behind it."""
+
+    class Stopping(Small):
+        def run(self, now: float) -> list[bytes]:
+            said = super().run(now)
+            self.held = self.held or (self.lines[-1:] == [b"M0"] and bool(said))
+            return said
+
+    program = b"G1X1F200\n(swap)\nM0\nG1X2\nG1X3\n"
+    talk = GrblWire().conversation(packets(program), TARGET.machine, PLAIN)
+    late, waits = list[bytes](), list[str]()
+
+    def fault(number: int, line: bytes) -> list[bytes]:
+        if not line.startswith(b"<") or not talk.sent:
+            return [line]
+        late.append(line)  # each report comes when the next one is due
+        return [late.pop(0)] if len(late) > 1 else []
+
+    def wish(talk: Conversation, now: float) -> None:
+        if talk.state is State.WAITING:
+            waits.append(talk.why)
+            talk.resume(now)
+
+    talk, small = held(fault, wish, small=Stopping(), talk=talk)
+    assert talk.state is State.FINISHED, talk.why
+    assert small.lines == [b"G1X1F200", b"M0", b"G1X2", b"G1X3"]
+    assert waits == ["the program waits: swap"]

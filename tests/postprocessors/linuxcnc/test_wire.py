@@ -12,7 +12,7 @@ from camtool.errors import MachineError
 from camtool.sending.faults import Wired
 from camtool.sending.prepare import forecast_of
 from camtool.target.registry import LoadedTarget, load_target
-from camtool.target.wire import Conversation, Manner, State
+from camtool.target.wire import Conversation, Manner, Standing, State
 from tests.feeding import logo, same_motion
 from tests.sending.talking import talked
 
@@ -230,3 +230,35 @@ def test_by_hand(action: str, values: dict[str, float]) -> None:
 
 def _text(*mm: float) -> str:
     return " ".join(f"{value:.6f}" for value in [*mm, 0.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("place", "still", "ends", "tool_at", "said"),
+    [
+        ((0.0, 0.0, 0.0), True, [], "", ""),
+        ((1.0, 0.0, 0.0), True, [(0.0, 0.0, 0.0)], "", "takes its place for X0.000 Y0.000 Z0.000"),
+        ((1.0, 0.0, 0.0), False, [(0.0, 0.0, 0.0)], "", ""),
+        (
+            (1.0, 0.0, 0.0),
+            False,
+            [(0.0, 5.0, 0.0)],
+            "",
+            "was not stopped, and last seen at X1.000",
+        ),
+        ((1.0, 0.0, 0.0), False, [], "known", ""),
+    ],
+)
+def test_it_goes_on_only_where_the_program_was_left(
+    place: Any, still: bool, ends: list[Any], tool_at: Any, said: str
+) -> None:
+    standing = Standing(place, still, np.array(ends).reshape(-1, 3), tool_at)
+    twin, talk, _ = met(PROGRAM, standing=standing)
+    assert (talk.state is State.FINISHED) is not bool(said), talk.why
+    assert said in talk.why
+    assert bool(twin.decoded) is not bool(said)
+
+
+def test_it_cannot_be_told_where_it_stands() -> None:
+    standing = Standing((1.0, 0.0, 0.0), True, np.zeros((0, 3)), "journal")
+    with pytest.raises(MachineError, match="keeps its own place"):
+        met(PROGRAM, standing=standing)
