@@ -423,8 +423,7 @@ class GrblConversation(Conversation):
             said = "where its work zero is" if self._fresh else "that it has begun anew"
             self._end(State.FAILED, f"it was reset, and does not say {said}")
             return
-        if self._phase != "greeting" and not self._homes and now - self._answered >= patience:
-            self._answered = now
+        elif self._phase != "greeting" and not self._homes and now - self._answered >= patience:
             self._fail("it does not answer any more", now)
         if now >= self._polled + POLLS * self.manner.late_s:  # as `_wake` reckons it
             if self.state is State.PAUSING and now - self._halted >= patience / 2.0:

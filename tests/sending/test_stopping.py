@@ -6,6 +6,8 @@ from __future__ import annotations
 import fcntl
 import os
 import pty
+import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -13,7 +15,7 @@ import termios
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -27,7 +29,8 @@ from camtool.sending.prepare import forecast_of
 from camtool.target.registry import LoadedTarget, load_target
 from camtool.target.twin import Twin
 from camtool.target.wire import Conversation, Manner, State, Tell, Write
-from tests.feeding import logo
+from tests.feeding import ROOT, logo
+from tests.oracles.grbl_firmware import Sent, Switch, built, factory, played, source
 from tests.sending.talking import Talking
 from tests.sending.test_any_order import PROGRAMS, SETTINGS
 from tests.sending.test_ends import hosted
@@ -43,9 +46,10 @@ LONG_S = 10_000.0
 @dataclass(frozen=True)
 class Work:
     """What a machine is doing while it is stopped. `action`: a command by hand with `values`, or
-    "send" a `program`. `first`: what must go out first, by the state that the twin is in (""
-    stands for the others); `way_mm`: how far each slide may still move, by the same, None: to the
-    end of the blocks that the machine has; `seconds`: the stop comes within these."""
+    "send" a `program`; `before`: what another sender has told the machine; `paced`: bytes take
+    their time. `first`: what must go out first, by the state that the twin is in ("" stands for
+    the others); `way_mm`: how far each slide may still move, by the same, None: to the end of the
+    blocks that the machine has; `seconds`: the stop comes within these."""
 
     target: str
     action: str
@@ -55,6 +59,8 @@ class Work:
     choices: tuple[str, ...] = ()
     at: tuple[float, float, float] = (0.0, 0.0, 0.0)
     home: bool = False
+    before: bytes = b""
+    paced: bool = False
     first: dict[str, list[bytes]] = field(default_factory=lambda: {"": []})
     way_mm: dict[str, float | None] = field(default_factory=lambda: {"": None})
     seconds: float = 20.0
@@ -62,11 +68,15 @@ class Work:
     def loaded(self) -> LoadedTarget:
         return load_target(self.target, settings=self.settings)
 
-    def begun(self) -> tuple[Talking, Twin]:
-        """The conversation, and the machine that it is held with."""
+    def begun(self, line: Any = None) -> tuple[Talking, Twin]:
+        """The conversation, and the machine that it is held with: its twin, or what is at the end
+        of a line."""
         loaded = self.loaded()
         twin: Any = loaded.twin(list(self.choices))
         twin.slides.place(np.array(self.at))
+        if self.before:
+            twin.connected = twin.advance  # its board is not reset when the port is opened
+            twin.receive(self.before, 0.0)
         wire: Any = loaded.target.wire()
         manner = Manner(home=self.home, file=FILE if wire.opens_file else "")
         twin.read_file = lambda name: self.program
@@ -75,8 +85,9 @@ class Work:
             packets = wire.packets(self.program, loaded.machine, forecast_of(decoded, loaded))
             talk = wire.conversation(packets, loaded.machine, manner)
         else:
-            talk = wire.command(self.action, loaded.machine, self.values, manner)
-        return Talking(talk, Wired(twin)), twin
+            values = {"feed": 300.0, **self.values}
+            talk = wire.command(self.action, loaded.machine, values, manner)
+        return Talking(talk, line or Wired(twin, paced=self.paced)), twin
 
 
 GRBL_STOP_MM = 500.0**2 / 3600.0 / (2.0 * 10.0)
@@ -279,6 +290,18 @@ def test_a_stop_whose_answer_is_lost_is_one_and_is_not_said_to_be(
     talk, twin = stopped_at(WORKS[name], moment, all_answers_lost)
     assert talk.state is State.FAILED
     assert "did not confirm the stop: switch it off" in talk.why
+    assert not twin.moves
+
+
+@pytest.mark.parametrize("name", ["grbl jogs", "grbl homes", "pic-mmh homes", "linuxcnc jogs"])
+def test_a_stop_whose_answer_is_late_is_one(name: str) -> None:
+    """As grbl's is that was reset while it homed; it has been silent for long before."""
+
+    def late(line: Wired) -> None:
+        line.back.faults = Faults(late=1.0, late_s=0.4)
+
+    talk, twin = stopped_at(WORKS[name], 7.0, late)
+    assert talk.state is State.STOPPED, talk.why
     assert not twin.moves
 
 
@@ -708,3 +731,201 @@ def test_a_machine_that_nothing_stops_is_said_to_be_one() -> None:
         it.signalled("SIGTERM")
         assert "nothing stops it over its line: its switch does" in it.ended()
         assert it.process.returncode == 1
+
+
+# grbl's own firmware, which is told what the conversation writes, byte for byte.
+
+
+class FirmwareLine:
+    """The firmware of grbl at the end of a line. With each thing that is written its session is
+    played anew from the beginning, so that its answers come at its own times."""
+
+    def __init__(
+        self, program: Path, image: Path, folder: Path, switches: Sequence[Switch]
+    ) -> None:
+        self._made = program, image, folder, switches
+        self._sent: list[tuple[float, bytes]] = []
+        self._read = 0
+        self._play()
+
+    def _play(self) -> None:
+        program, image, folder, switches = self._made
+        entries, last = [Sent(b"", 0.0)], 0.0
+        for at, data in self._sent:
+            entries.append(Sent(data, max(at - last, 0.0)))
+            last = max(at, last) + (len(data) - 1) * BYTE_S
+        self.played = played(program, image, entries, folder, switches)
+        self._said = [
+            (at, text.encode("latin-1")) for entry in self.played.said for at, text in entry
+        ]
+
+    def connect(self, now: float) -> None:
+        """The power has just come on."""
+
+    def unplugged(self, now: float) -> bool:
+        return False
+
+    def write(self, data: bytes, now: float) -> None:
+        self._sent.append((now, data))
+        self._play()
+
+    def read(self, now: float) -> bytes:
+        come = [text for at, text in self._said[self._read :] if at <= now]
+        self._read += len(come)
+        return b"".join(come)
+
+    def next_s(self) -> float | None:
+        return self._said[self._read][0] if self._read < len(self._said) else None
+
+    turn_s = next_s
+
+    def wrote(self, data: bytes) -> bool:
+        return any(data == each for _, each in self._sent)
+
+    def heard(self, start: bytes) -> bool:
+        return any(text.startswith(start) for _, text in self._said[: self._read])
+
+    def way_mm(self, since: float) -> float:
+        """The longest way of a slide from then on."""
+        at, slides = self.played.at_s, self.played.slides
+        begin = int(np.searchsorted(at, since, side="right"))
+        before = slides[begin - 1] if begin else np.zeros(3, dtype=np.int64)
+        steps = np.abs(np.diff(slides[begin:], axis=0, prepend=before[None, :]))
+        return float(steps.sum(axis=0).max(initial=0.0)) / STEPS_PER_MM
+
+    def stood_s(self) -> float:
+        """When its last step was."""
+        return float(self.played.at_s[-1]) if len(self.played.at_s) else 0.0
+
+
+BYTE_S = 1389 / 16e6
+"""What a byte takes on the line, in ticks of the board."""
+STEPS_PER_MM = 250
+AHEAD_MM = 500.0 / 60.0 * 0.06
+"""What the firmware has in its step buffer is done first: five pieces of 10 ms, and the one that
+runs."""
+AT_TEN_MM = tuple(Switch(pin, axis, most=10 * STEPS_PER_MM) for axis, pin in enumerate("XYZ"))
+FIRMWARE = {
+    "grbl jogs": 11.0,
+    "grbl homes": 10.0,
+    "grbl cuts, dwells and waits": 25.0,
+    "grbl homes before a program": 18.0,
+}
+"""Works that the firmware does, and how long they take it."""
+
+
+@pytest.fixture(scope="module")
+def firmware(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., FirmwareLine]:
+    if source() is None or shutil.which("gcc") is None:
+        pytest.skip("GRBL_SOURCE names no sources of grbl, or there is no gcc")
+    folder = tmp_path_factory.mktemp("grbl")
+    program = built(folder)
+    images = [factory(program, folder).rename(folder / "plain")]
+    images.append(Path(shutil.copyfile(images[0], folder / "homes")))
+    # Its homing may take no longer than a second or two at each switch.
+    (folder / "script").write_text(f"w {b'$22=1'.hex()}0a\n", encoding="ascii")
+    names = [images[1], folder / "script", folder / "answers", folder / "steps"]
+    subprocess.run([program, *names], check=True)
+
+    def line(work: Work) -> FirmwareLine:
+        homes = work.home or work.action == "home"
+        return FirmwareLine(program, images[homes], folder, AT_TEN_MM if homes else ())
+
+    return line
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(FIRMWARE))
+def test_a_stop_of_the_firmware_at_any_moment(
+    name: str, firmware: Callable[..., FirmwareLine]
+) -> None:
+    work = WORKS[name]
+    for moment in moments(work, 9, f"{name} of the firmware")[1:]:
+        moment *= FIRMWARE[name] / work.seconds
+        line = firmware(work)
+        both, _ = work.begun(line)
+        talk = both.talk
+        both.until(moment)
+        assert not talk.ended, (moment, talk.why)
+        homes = line.wrote(b"$H\n") and not line.heard(b"ok")
+        before = both.now = max(moment, both.now)
+        talk.stop(before)
+        both.until(LONG_S)
+        assert talk.state is State.STOPPED, (moment, talk.why)
+        most = 0.1 if homes else GRBL_STOP_MM + AHEAD_MM
+        assert line.way_mm(before + 10 * BYTE_S) <= most, moment
+        assert line.stood_s() <= both.now
+        if homes:  # between two moves of its homing it makes some steps of the next one
+            assert talk.why.startswith("stopped: ALARM:"), moment
+
+
+# The tables of docs/sending.md.
+
+LINES = b"G21G90\nG1F500\n" + b"".join(b"X%d\n" % x for x in range(1, 150))
+STATES = {
+    "grbl jogs": (Work("grbl", "jog", {"x": 80.0, "feed": 500.0}), 4.0),
+    "grbl homes": (WORKS["grbl homes"], 2.0),
+    "grbl cuts": (Work("grbl", "send", program=LINES), 6.0),
+    "grbl moves fast": (Work("grbl", "send", program=b"G21G90\nG0X150\n"), 6.0),
+    "grbl dwells": (Work("grbl", "send", program=b"G21G90\nG1X1F500\nG4P20\nG1X5\n"), 6.0),
+    "grbl waits at M0": (Work("grbl", "send", program=b"G21G90\nG1X1F500\nM0\nG1X5\n"), 6.0),
+    "grbl moves on from before": (Work("grbl", "jog", {"x": 1.0}, before=b"G1X80F500\n"), 4.0),
+    "pic-mmh jogs, homes or cuts": (WORKS["pic-mmh cuts"], 9.0),
+    "linuxcnc jogs, homes or cuts": (WORKS["linuxcnc cuts, dwells and waits"], 1.0),
+    "i8751 takes a packet": (replace(WORKS["i8751 cuts"], paced=True), 0.05),
+    "matlab-router takes a job": (WORKS["matlab-router cuts"], 0.05),
+}
+"""What the tables name by machine and state, and when it is stopped."""
+
+
+def rows(title: str) -> dict[str, list[str]]:
+    """Those of the table whose third column is so called."""
+    text = (ROOT / "docs" / "sending.md").read_text(encoding="utf-8")
+    table = re.search(rf"\| machine \| it \| {title}.*\n\|---.*\n((?:\|.*\n)+)", text)
+    assert table
+    cells = [[cell.strip() for cell in row.split("|")[1:-1]] for row in table[1].splitlines()]
+    return {f"{machine} {state}": more for machine, state, *more in cells}
+
+
+def measured(work: Work, moment_s: float, line: Any = None, *, stop: bool) -> str:
+    """How far a machine still moves, and how long, when it is stopped or camtool is killed."""
+    both, twin = work.begun(line)
+    both.until(moment_s)
+    both.line.read(moment_s)
+    place = twin.slides.commanded_mm.copy()
+    both.now = moment_s
+    if stop:
+        both.talk.stop(moment_s)
+        both.until(LONG_S)
+        assert both.talk.state is State.STOPPED, both.talk.why
+    both.line.read(both.now + LONG_S)
+    if line is None:
+        way, times = way_since(twin, moment_s, place), twin.slides.trace.time_s
+    else:
+        way, times = line.way_mm(moment_s), line.played.at_s
+    last = max(float(times[-1]) - moment_s, 0.0) if len(times) else 0.0
+    return f"{way:.1f} mm, {last:.1f} s"
+
+
+@pytest.mark.parametrize("name", sorted(STATES))
+def test_the_tables_say_how_far_the_twins_go(name: str) -> None:
+    work, moment = STATES[name]
+    said = rows("goes out at once")[name]
+    assert said[2].startswith(measured(work, moment, stop=True))
+    killed = rows("goes on").get(name)
+    if killed is not None and "mm" in killed[1]:
+        assert killed[1].startswith(measured(work, moment, stop=False))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(STATES))
+def test_the_tables_say_how_far_the_firmware_goes(
+    name: str, firmware: Callable[..., FirmwareLine]
+) -> None:
+    work, moment = STATES[name]
+    said = rows("goes out at once")[name][3]
+    if said:
+        assert said == measured(work, moment, firmware(work), stop=True)
+    killed = rows("goes on").get(name)
+    if killed is not None and "mm" in killed[2]:
+        assert killed[2] == measured(work, moment, firmware(work), stop=False)
