@@ -290,6 +290,7 @@ class _Job:
             paced=real,
             file=self._laid(),
             standing=one.standing if one.wire.place == "told" else None,
+            reach_mm=one.reach_mm,
         )
         # The dry run has asked for the first packet.
         packets = [replace(packet, ask="") for packet in one.packets[:1]] + [*one.packets[1:]]

@@ -112,6 +112,19 @@ class Consignment(Struct, frozen=True, eq=False):
         x, y, z = (path.end[rows[-1]] if len(rows) else path.start).tolist()
         return x, y, z
 
+    @property
+    def reach_mm(self) -> tuple[Place, Place] | None:
+        """The lowest and the highest place that its moves reach, in the work frame; None where
+        nothing moves. Where the first move begins is not counted: the tool may stand anywhere."""
+        path = self.forecast.decoded
+        path = path.first(path.running)
+        moves = np.flatnonzero(path.is_motion)
+        if not len(moves):
+            return None
+        first = int(moves[0]) + (not path.is_arc[moves[0]])
+        (x, x1), (y, y1), (z, z1) = toolpath_extents(path.part(first, len(path))).tolist()
+        return (x, y, z), (x1, y1, z1)
+
     def block_of(self, sent: int) -> int:
         """The last block of the program that is done with a block (from 0) of what is sent; −1
         within the entry."""

@@ -198,7 +198,8 @@ class Manner(Struct, frozen=True):
     file; `paced`: each byte takes the time that the rate of the line gives it, so that a reply
     that comes sooner is none; `file`: where what is sent lies, for controllers that open it by
     themselves; `standing`: where the program was left that goes on, for controllers that say where
-    they are."""
+    they are; `reach_mm`: the lowest and the highest place of what is sent, in the work frame, for
+    those that watch over their travel."""
 
     single: bool = False
     home: bool = False
@@ -208,6 +209,7 @@ class Manner(Struct, frozen=True):
     paced: bool = False
     file: str = ""
     standing: Standing | None = None
+    reach_mm: tuple[Place, Place] | None = None
 
     @property
     def patience_s(self) -> float:

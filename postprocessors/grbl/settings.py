@@ -15,7 +15,7 @@ from msgspec import structs
 
 from camtool.errors import MachineError
 from camtool.target.contract import Setting
-from camtool.target.wire import port_fault
+from camtool.target.wire import Place, port_fault
 
 from .dialect import GrblController, GrblMachine
 
@@ -164,6 +164,29 @@ def differences(text: str, machine: GrblMachine) -> tuple[list[str], list[str]]:
     if float(numbers.get(REPORT_INCHES, "0")) != 0.0:
         errors.append("$13 reports inches: set $13=0, so that places can be followed")
     return errors, remarks
+
+
+NEAR_MM = 0.005
+"""What leaves the travel by less may be rounding."""
+
+
+def beyond_travel(text: str, zero_mm: Place, reach_mm: tuple[Place, Place]) -> str:
+    """Why a program is certain to end in ALARM:2, by a listing and the work zero on the machine;
+    "" where it is not. With soft limits ($20) grbl stays between −travel and 0 of each axis."""
+    numbers = {int(number): float(value) for number, value in _SETTING.findall(text)}
+    if not numbers.get(20):
+        return ""
+    for k, letter in enumerate("XYZ"):
+        low, high = (each[k] + zero_mm[k] for each in reach_mm)
+        travel = numbers[_AXES["travel_mm"] + k]
+        if low < -travel - NEAR_MM or high > NEAR_MM:
+            worst = low if low < -travel - NEAR_MM else high
+            return (
+                f"{letter} would go to {worst:.3f} on the machine (part zero is at "
+                f"{zero_mm[k]:.3f}), beyond the soft limits of {-travel:g} to 0: move part zero, "
+                f"or set ${_AXES['travel_mm'] + k} or $20"
+            )
+    return ""
 
 
 def _difference(found: Setting, wanted: float | None, inverse: bool = False) -> list[str]:

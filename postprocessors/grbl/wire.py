@@ -36,7 +36,7 @@ from camtool.target.wire import (
 )
 
 from .dialect import GrblController, GrblMachine
-from .settings import BAUD, differences
+from .settings import BAUD, beyond_travel, differences
 
 BUFFER_BYTES: Final = 127
 """128 bytes (RX_BUFFER_SIZE, serial.h), of which the ring leaves one empty."""
@@ -68,6 +68,7 @@ HOLD, RESUME, STATUS, RESET, JOG_CANCEL = b"!", b"~", b"?", b"\x18", b"\x85"
 HOMING: Final = b"$H\n"
 UNLOCKING: Final = b"$X\n"
 LISTING: Final = b"$$\n"
+BUILD: Final = b"$I\n"
 STANDING: Final = frozenset({"Hold:0", "Door:0", "Door:1", "Alarm", "Check", "Sleep"})
 """States in which nothing moves, whatever was sent before; Idle is one when it is said twice."""
 
@@ -107,6 +108,10 @@ _STARTUP = re.compile(r">(.*):(ok|error:(\d+))")
 _BANNER = re.compile(r"Grbl (?:1\.[1-9]|[2-9])")
 _WORD = re.compile(r"G0*(\d+(?:\.\d+)?)", re.IGNORECASE)
 _AXIS = re.compile(r"[XYZ]", re.IGNORECASE)
+_ELSEWHERE = re.compile(r"G0*(?:10|28|30|43|53|5[5-9]|92)(?!\d)", re.IGNORECASE)
+"""Words behind which places are told in another frame than that of the beginning."""
+_ORIGIN = re.compile(r"\[OPT:[^,\]]*Z")
+"""Built so that zero of the machine is where the switches are (HOMING_FORCE_SET_ORIGIN)."""
 
 ERRORS: Final = {
     1: "a letter was expected",
@@ -311,6 +316,7 @@ class GrblConversation(Conversation):
         self._messages: list[str] = []  # what it said of being locked
         self._closed = ""  # switches, as it reports them
         self._startup: list[str] = []  # its startup lines
+        self._beyond = ""  # why the program would leave its travel, if it is built as usual
         self._modes_asked = False
         self._failing = self._alarm = ""
         self._halted = 0.0
@@ -496,6 +502,8 @@ class GrblConversation(Conversation):
         elif _PUSHED.fullmatch(line):
             if line.startswith("[MSG:"):
                 self._tell(f"it says: {line[5:-1]}")
+            elif _ORIGIN.match(line):
+                self._beyond = ""
         elif _STARTUP.fullmatch(line):
             self._aside(line)
         elif not stopping:
@@ -759,6 +767,8 @@ class GrblConversation(Conversation):
                 return
             self._phase = "commands"
             self._compare(now)
+        elif head.data == BUILD and self._beyond:
+            self._fail(self._beyond, now)
         self._go_on(now)
 
     def _confirm(self) -> None:
@@ -777,6 +787,13 @@ class GrblConversation(Conversation):
             self._tell(remark)
         if errors:
             self._fail("; ".join(errors), now)
+        zero, reach = self._frame or self._offset, self.manner.reach_mm
+        if zero is None or reach is None or errors:
+            return
+        if not any(_ELSEWHERE.search(each.data.decode("latin-1")) for each in self.packets):
+            self._beyond = beyond_travel("\n".join(self._listing), zero, reach)
+        if self._beyond:
+            self._commands.appendleft(BUILD)
 
     # Sending.
 
@@ -828,7 +845,7 @@ class GrblConversation(Conversation):
         self._put(_Line(PROBE))
 
     def _put(self, line: _Line) -> None:
-        self._acted = self._acted or not (line.is_probe or line.data == LISTING)
+        self._acted = self._acted or not (line.is_probe or line.data in (LISTING, BUILD))
         self._out_lines.append(line)
         self._unconfirmed += len(line.data)
         self._idle = 0

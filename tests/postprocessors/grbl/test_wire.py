@@ -9,7 +9,7 @@ import pytest
 from camtool_postprocessors.grbl.settings import differences
 from camtool_postprocessors.grbl.wire import BUFFER_BYTES, GrblWire
 
-from camtool.sending.prepare import forecast_of
+from camtool.sending.prepare import consignment, forecast_of
 from camtool.target.registry import load_target
 from camtool.target.wire import Conversation, Manner, Packet, State, Tell, Write
 
@@ -423,3 +423,53 @@ def test_a_stop_of_the_program_is_said_once_though_reports_are_late() -> None:
     assert talk.state is State.FINISHED, talk.why
     assert small.lines == [b"G1X1F200", b"M0", b"G1X2", b"G1X3"]
     assert waits == ["the program waits: swap"]
+
+
+class Limited(Small):
+    """With soft limits; `build` is its answer to $I."""
+
+    build = b"[OPT:V,15,128]"
+
+    def __init__(self, zero: tuple[float, float, float]) -> None:
+        super().__init__(settings={**LISTING, 20: 1.0, 22: 1.0})
+        self.zero, self.locked = zero, True
+
+    def run(self, now: float) -> list[bytes]:
+        if self.buffer.startswith(b"$I\n") and now >= self.next and not self.held:
+            self.buffer = self.buffer[3:]
+            return [b"[VER:1.1h.20190830:]", self.build, b"ok"]
+        return super().run(now)
+
+
+@pytest.mark.parametrize(
+    ("zero", "build", "why"),
+    [
+        # The program goes to X 8.125, Y 6.375 and Z 5 from part zero; the travel is 200 mm.
+        ((-9.0, -9.0, -9.0), b"[OPT:V,15,128]", ""),
+        ((-8.125, -7.0, -5.0), b"[OPT:V,15,128]", ""),
+        ((-8.0, -9.0, -9.0), b"[OPT:V,15,128]", "X would go to 0.125 on the machine"),
+        ((-9.0, -9.0, -3.0), b"[OPT:V,15,128]", "Z would go to 2.000"),
+        ((-9.0, -201.0, -9.0), b"[OPT:V,15,128]", "Y would go to -200.625"),
+        ((1.0, 1.0, 1.0), b"[OPT:VZ,15,128]", ""),
+    ],
+)
+def test_soft_limits_that_are_certain_are_found_before_anything_moves(
+    zero: tuple[float, float, float], build: bytes, why: str
+) -> None:
+    reach = (0.125, 0.375, 5.0), (8.125, 6.375, 5.0)
+    talk = GrblWire().conversation(packets(), TARGET.machine, Manner(home=True, reach_mm=reach))
+    small = Limited(zero)
+    small.build = build
+    talk, small = held(small=small, talk=talk)
+    assert talk.state is (State.FAILED if why else State.FINISHED), talk.why
+    assert why in talk.why
+    assert (b"$H" in small.lines) is not bool(why)
+
+
+def test_the_reach_of_a_program_is_that_of_its_moves() -> None:
+    """Where it begins is not among it, and arcs bulge."""
+    program = b"G21G90\nM3S900\nG0X10Y10Z5\nG1Z-1F100\nG2X20Y10I5J0F200\nG0Z5\n"
+    one = consignment(program, TARGET, source="a")
+    low, high = one.reach_mm or ((), ())
+    assert low == pytest.approx((10.0, 10.0, -1.0), abs=1e-9)
+    assert high == pytest.approx((20.0, 15.0, 5.0), abs=1e-9)
