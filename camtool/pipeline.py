@@ -11,6 +11,7 @@ Nothing here reads or writes a file.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 from functools import cache, partial
@@ -213,6 +214,7 @@ def _posted(
     compensation = _compensated(wanted, target.machine) if job.compensate else None
     written = wanted if compensation is None else compensation.toolpath
     program, decoded = _written(written, target, drawing.file, progress)
+    decoded = _with_operations(decoded, written, program)
     repeated = _repeated(program, decoded)
     findings = _merged(findings, program.findings, decoded.findings, without=repeated)
     if judged is None:
@@ -252,6 +254,8 @@ def _posted(
         operations=_operations(judged.steps),
         tools=_tools(judged.steps),
         stock=_stock(job),
+        zero=job.placement.origin,
+        cut_mm=_cut_mm(wanted),
     )
     del judged, whole  # the paths of the stages are not needed any more
     verification = _judged(program.data, decoded, target, goal, options, progress)
@@ -554,6 +558,34 @@ def _timed(
     return structs.replace(planned, operations=tuple(operations))
 
 
+def _cut_mm(wanted: Toolpath) -> tuple[float, float, float, float] | None:
+    """Left, lower, right and upper end of what the tools cut; V bits as wide as at their depth.
+    None where nothing is cut, or nobody knows by which operation."""
+    import numpy as np
+
+    from camtool.toolpath.moves import toolpath_extents
+
+    operations = wanted.operations
+    if operations is None:
+        return None
+    begins = operations.begin.tolist()
+    boxes, ends = [], [*begins[1:], len(wanted)]
+    for note, low, high in zip(operations.notes, begins, ends, strict=True):
+        part = wanted.part(low, high)
+        if not part.is_feed.any():
+            continue
+        reach = 0.5 * note.tool.diameter_mm
+        if note.tool.kind == "v" and note.tool.tip_angle_rad is not None:
+            deep = note.depth_mm * math.tan(0.5 * note.tool.tip_angle_rad)
+            reach = min(deep, reach or math.inf)
+        boxes.append(toolpath_extents(part, cuts=True)[:2] + np.array([-reach, reach]))
+    if not boxes:
+        return None
+    every = np.array(boxes)
+    (left, lowest), (right, top) = every[:, :, 0].min(axis=0), every[:, :, 1].max(axis=0)
+    return float(left), float(lowest), float(right), float(top)
+
+
 def _stock(job: Job) -> PlannedStock | None:
     from camtool.verification.report import PlannedStock
 
@@ -627,6 +659,18 @@ def _judged(
         registration=goal.registration,
         progress=progress,
     )
+
+
+def _with_operations(decoded: Toolpath, written: Toolpath, program: Program) -> Toolpath:
+    """The decoded toolpath with the operations by which it is cut, as it was written."""
+    import numpy as np
+
+    operations = written.operations
+    if operations is None:
+        return decoded
+    row = np.maximum.accumulate(_row_from(program, decoded).clip(min=0))
+    begin = np.searchsorted(row, operations.begin).astype(operations.begin.dtype)
+    return replace(decoded, operations=structs.replace(operations, begin=begin))
 
 
 def _row_from(program: Program, decoded: Toolpath) -> Indices:

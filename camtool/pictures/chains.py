@@ -392,13 +392,19 @@ def _signs(lengths: Floats) -> Ints:
     return up.astype(np.int64) - down.astype(np.int64)
 
 
-def tapers(toolpath: Toolpath, radius_at: Callable[[float], float]) -> tuple[Chain, ...]:
-    """What each feed below the stock top cuts at the surface with a tool that is as wide as it is
-    deep, `radius_at` mm at a depth mm: the hull of the discs at its ends, CCW. () for more moves
-    than MOST_TAPERS."""
-    rows = np.flatnonzero(
-        toolpath.is_feed & (np.minimum(toolpath.starts[:, 2], toolpath.end[:, 2]) < 0.0)
-    )
+def cuts_of(toolpath: Toolpath, chosen: Bools) -> tuple[Chain, ...]:
+    """The chosen ones of the rows (N,) that cut in XY, each line or arc once."""
+    return _chains(toolpath, chosen & toolpath.by_parts(_how_drawn)[:, 0])
+
+
+def tapers(
+    toolpath: Toolpath, radius_at: Callable[[float], float], chosen: Bools | None = None
+) -> tuple[Chain, ...]:
+    """What each feed below the stock top, of the `chosen` rows (N,) alone, cuts at the surface
+    with a tool that is as wide as it is deep, `radius_at` mm at a depth mm: the hull of the discs
+    at its ends, CCW. () for more moves than MOST_TAPERS."""
+    below = toolpath.is_feed & (np.minimum(toolpath.starts[:, 2], toolpath.end[:, 2]) < 0.0)
+    rows = np.flatnonzero(below if chosen is None else below & chosen)
     if len(rows) > MOST_TAPERS:
         return ()
     starts, ends = toolpath.starts_of(rows), toolpath.end[rows]

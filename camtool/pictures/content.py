@@ -19,6 +19,7 @@ from camtool.pictures.chains import (
     chains_between,
     chains_box,
     chains_of,
+    cuts_of,
     moves_of,
     reversals_of,
     tapers,
@@ -44,6 +45,14 @@ class Group(Struct, frozen=True):
 
     name: str
     colour: str
+    chains: tuple[Chain, ...]
+
+
+class Swept(Struct, frozen=True, eq=False):
+    """What a tool of a constant width cuts along `chains`; where the width is None these are the
+    outlines of what it cuts."""
+
+    width_mm: float | None
     chains: tuple[Chain, ...]
 
 
@@ -115,14 +124,25 @@ class Content(Struct, frozen=True, eq=False, dict=True):
         return [str(k + 1) for k in chosen], [starts[k] for k in chosen]
 
     @cached_property
-    def swept(self) -> tuple[Chain, ...]:
-        """The moves that cut, where the diameter of the tool is known; what each of them cuts at
-        the surface, where that changes with its depth."""
-        if self.scene.tool_mm:
-            return (*self.moves.feeds, *self.moves.ramps)
-        if self.scene.nose is None or self.scene.toolpath is None:
-            return ()
-        return tapers(self.scene.toolpath, self.scene.nose.radius_at)
+    def swept(self) -> tuple[Swept, ...]:
+        """What is cut, as wide as each tool cuts it at the surface, where that is known."""
+        scene, toolpath = self.scene, self.scene.toolpath
+        found: list[Swept] = []
+        if scene.tool_mm:
+            found.append(Swept(scene.tool_mm, (*self.moves.feeds, *self.moves.ramps)))
+        elif toolpath is not None and scene.nose is not None:
+            found.append(Swept(None, tapers(toolpath, scene.nose.radius_at)))
+        elif toolpath is not None and scene.turns:
+            begins = [row for row, _ in scene.turns]
+            turn = np.searchsorted(begins, np.arange(len(toolpath)), side="right") - 1
+            for tool in dict.fromkeys(tool for _, tool in scene.turns):
+                mine = [k for k, (_, each) in enumerate(scene.turns) if each == tool]
+                chosen = np.isin(turn.clip(min=0), mine)
+                if tool.nose_mm or tool.kind in ("v", "drill"):
+                    found.append(Swept(None, tapers(toolpath, tool.radius_at, chosen)))
+                elif tool.diameter_mm:
+                    found.append(Swept(tool.diameter_mm, cuts_of(toolpath, chosen)))
+        return tuple(each for each in found if each.chains)
 
     @property
     def stock(self) -> tuple[Chain, ...]:
@@ -173,7 +193,8 @@ def content_of(scene: Scene, options: Options = AS_USUAL) -> Content:
         places = _places(scene.drawing)
     shown = options.layers
     # Layers that are not shown do not change the window.
-    tool_mm = scene.tool_mm if shown is None or "swept" in shown else None
+    widest = max((tool.diameter_mm for _, tool in scene.turns), default=None)
+    tool_mm = (scene.tool_mm or widest) if shown is None or "swept" in shown else None
     stock = scene.stock_mm if shown is None or "stock" in shown else None
     return Content(
         scene=scene,

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from camtool.pictures.chains import Chain
     from camtool.pictures.content import Content, Place
     from camtool.pictures.plot import Plot
+    from camtool.pictures.scene import Scene
     from camtool.pictures.view import View
     from camtool.verification.report import InspectedReport
 
@@ -281,18 +282,31 @@ def _noted(content: Content) -> list[Part]:
 
 def _swept(content: Content, plot: Plot) -> str:
     """The cuts at the true width of the tool."""
-    width = content.scene.tool_mm
-    if width is None:
-        return plot.lines("swept", content.swept, {"fill": SWEPT, "stroke": "none"})
-    line: Look = {"fill": "none", "stroke": SWEPT, "stroke-width": width}
     ends: Look = {"stroke-linecap": "round", "stroke-linejoin": "round"}
-    return plot.lines("swept", content.swept, {**line, **ends})
+    groups = []
+    for index, each in enumerate(content.swept):
+        look: Look = {"fill": SWEPT, "stroke": "none"}
+        if each.width_mm is not None:
+            look = {"fill": "none", "stroke": SWEPT, "stroke-width": each.width_mm, **ends}
+        groups.append(plot.lines(f"swept-{index + 1}" if index else "swept", each.chains, look))
+    return "\n".join(groups)
 
 
 def _swept_legend(content: Content, view: View) -> Iterator[Entry]:
-    wide = content.scene.tool_mm
-    words = "tool, as wide as it is deep" if wide is None else f"tool {wide:.4g} mm wide"
-    yield Entry(line_swatch(SWEPT, 9.0), words)
+    yield Entry(line_swatch(SWEPT, 9.0), swept_words(content.scene))
+
+
+def swept_words(scene: Scene) -> str:
+    """How wide the cuts are, of one tool or of several; "" where nobody knows."""
+    if scene.tool_mm:
+        return f"tool {scene.tool_mm:.4g} mm wide"
+    if scene.nose is not None:
+        return "tool, as wide as it is deep"
+    tools = [tool for _, tool in scene.turns]
+    widths = {tool.diameter_mm for tool in tools if tool.kind != "v" and tool.diameter_mm}
+    words = [f"{wide:.4g} mm" for wide in sorted(widths)]
+    words += ["V bit"] * any(tool.kind == "v" for tool in tools)
+    return f"width of cuts: {', '.join(words)}" if words else ""
 
 
 def _travel(content: Content, plot: Plot) -> str:

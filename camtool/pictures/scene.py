@@ -47,7 +47,8 @@ class Scene:
     `wanted` are the lines and arcs with which the trace
     was compared, `worst` the places of its largest errors, mm, the largest first; `tool_mm` is the
     diameter of the tool, if there is only one, and `nose` a tool that is as wide as it is deep,
-    where that changes along the path; `rounds` are full circles with their errors.
+    where that changes along the path; `turns` are the tools of several, each with the row of the
+    toolpath from which on it cuts; `rounds` are full circles with their errors.
     `tabs` are the places of tabs, mm; `inspected` the dimensions with their verdicts. `playback`
     gives how the toolpath runs; only the viewer calls it.
 
@@ -67,6 +68,7 @@ class Scene:
     worst: tuple[tuple[float, float], ...] = ()
     tool_mm: float | None = None
     nose: Tool | None = None
+    turns: tuple[tuple[int, Tool], ...] = ()
     rounds: tuple[Round, ...] = ()
     playback: Callable[[], Playback] | None = None
     stock_mm: tuple[float, float, float, float] | None = None
@@ -212,6 +214,8 @@ def scene_of(
 
     trace = verification.trace if verification is not None else None
     width = None if job is None else _width_mm(job, toolpath)
+    nose = None if job is None or width is not None else nose_of(job)
+    several = job is not None and toolpath is not None and width is None and nose is None
     worst = () if verification is None else verification.report.worst
     return Scene(
         title=title,
@@ -226,7 +230,8 @@ def scene_of(
         wanted=verification.wanted.segments if verification is not None else None,
         worst=tuple(one.at_mm for one in worst),
         tool_mm=width,
-        nose=None if job is None or width is not None else nose_of(job),
+        nose=nose,
+        turns=_turns(job, toolpath) if several and job and toolpath else (),
         rounds=() if verification is None else rounds_of(verification),
         tabs=tabs,
         inspected=() if verification is None else verification.report.inspection,
@@ -283,6 +288,21 @@ def _width_mm(job: Job, toolpath: Toolpath | None) -> float | None:
     if not len(rows) or (toolpath.starts_of(rows)[:, 2] != z).any() or z.min() >= 0.0:
         return None
     return 2.0 * tool.radius_at(-float(z.min()))
+
+
+def _turns(job: Job, toolpath: Toolpath) -> tuple[tuple[int, Tool], ...]:
+    """The tools that cut in turn, each with the first row of its turn; () where the toolpath does
+    not say which operation cuts."""
+    from camtool.planning.link import tool_note
+
+    if toolpath.operations is None:
+        return ()
+    tools = {tool_note(each.tool): each.tool for each in job.operations}
+    notes = [note.tool for note in toolpath.operations.notes]
+    if not all(note in tools for note in notes):
+        return ()
+    begins = toolpath.operations.begin.tolist()
+    return tuple((row, tools[note]) for row, note in zip(begins, notes, strict=True))
 
 
 def _travel(toolpath: Toolpath | None, machine: Machine | None) -> tuple[float, float] | None:

@@ -116,13 +116,18 @@ def _to_change(builder: ToolpathBuilder, machine: Machine, lowest_mm: float) -> 
         builder.rapid(*place)
 
 
+def tool_note(tool: Tool) -> ToolNote:
+    """A tool as a program names it."""
+    return ToolNote(tool.number, tool.name, tool.kind, tool.diameter_mm, tool.tip_angle_rad)
+
+
 def _note(setting: Setting) -> OperationNote:
     """What the program may say of an operation."""
     operation, tool = setting.operation, setting.operation.tool
     return OperationNote(
         kind=operation.kind,
         name=operation.name,
-        tool=ToolNote(tool.number, tool.name, tool.kind, tool.diameter_mm, tool.tip_angle_rad),
+        tool=tool_note(tool),
         feed_mm_min=setting.feeds.cut_mm_min,
         plunge_mm_min=setting.feeds.plunge_mm_min,
         depth_mm=-setting.levels_mm[-1],

@@ -395,13 +395,17 @@ class PlannedStock(msgspec.Struct, frozen=True):
 class Planned(msgspec.Struct, frozen=True):
     """The length of rapids in XY, mm: of the program, and what it would be in the order and from
     the starts of the drawing; how the operations cut, their tools, and the stock, if the job says
-    it."""
+    it. `zero`: where part zero is on the drawing, "drawing" for its own, "lower-left" or "centre"
+    of what is cut, or a place (x, y) mm of it; `cut_mm`: left, lower, right and upper end of what
+    the tools cut."""
 
     rapid_drawn_mm: float
     rapid_mm: float
     operations: tuple[PlannedOperation, ...] = ()
     tools: tuple[PlannedTool, ...] = ()
     stock: PlannedStock | None = None
+    zero: str | tuple[float, float] = "drawing"
+    cut_mm: tuple[float, float, float, float] | None = None
 
 
 class Before(msgspec.Struct, frozen=True):
@@ -1072,7 +1076,12 @@ def mounting(report: Report) -> Iterator[tuple[str, str]]:
     stock = None if planned is None else planned.stock
     if stock is not None:
         yield "stock", _stock_words(stock)
-    yield "zero", _zero_words(stock)
+    if planned is not None and planned.cut_mm and (stock is None or stock.size_mm is None):
+        left, low, right, top = planned.cut_mm
+        ends = f"X {mm(left)} to {mm(right)}, Y {mm(low)} to {mm(top)}"
+        size = f"{mm(right - left)} × {mm(top - low)} mm"
+        yield "blank", f"at least {size}, for the tools cut {ends}"
+    yield "zero", _zero_words(stock, "drawing" if planned is None else planned.zero)
     if planned is not None and len(planned.tools) > 1:
         rows = [key for key, _ in groupby(each.tool for each in planned.operations)]
         yield "mounted", ", then ".join(_tool_called(planned, row) for row in rows)
@@ -1089,16 +1098,26 @@ def _stock_words(stock: PlannedStock) -> str:
     return f"{thick}; on a board that may be cut {stock.through_mm:g} mm deep"
 
 
-def _zero_words(stock: PlannedStock | None) -> str:
-    """Where X0 Y0 and Z0 are, as seen from the stock."""
+def _zero_words(stock: PlannedStock | None, zero: str | tuple[float, float] = "drawing") -> str:
+    """Where X0 Y0 and Z0 are, as seen from the stock and on the drawing."""
+    places = {
+        "drawing": "is the drawing's own zero",
+        "lower-left": "is the lower left corner of the contours that are cut",
+        "centre": "is the centre of the contours that are cut",
+    }
+    if isinstance(zero, str):
+        drawn = places[zero]
+    else:
+        drawn = f"is at X{zero[0]:g} Y{zero[1]:g} of the drawing"
     if stock is None or stock.corner_mm is None:
-        return "X0 Y0 where the drawing has part zero; Z0 is the top of the stock"
+        return f"X0 Y0 {drawn}; Z0 is the top of the stock"
     x, y = (-place + 0.0 for place in stock.corner_mm)
+    too = "" if zero == "drawing" else f", and {drawn}"
     if x == y == 0.0:
-        return "X0 Y0 is the lower left corner of the stock; Z0 is its top"
+        return f"X0 Y0 is the lower left corner of the stock{too}; Z0 is its top"
     across = f"{abs(x):g} mm {'right' if x >= 0.0 else 'left'} of"
     along = f"{abs(y):g} mm {'above' if y >= 0.0 else 'below'}"
-    return f"X0 Y0 is {across} and {along} the lower left corner of the stock; Z0 is its top"
+    return f"X0 Y0 is {across} and {along} the lower left corner of the stock{too}; Z0 is its top"
 
 
 def setup_sheets(planned: Planned) -> Iterator[Sheet]:
@@ -1271,15 +1290,25 @@ th, td { border-bottom: 1px solid #8886; padding: .2rem .7rem; text-align: left;
   vertical-align: top; }
 td.number, th.number { text-align: right; }
 th, td { overflow-wrap: break-word; max-width: 40rem; }
+.wide { overflow-x: auto; } .pairs td { overflow-wrap: anywhere; }
 img { max-width: 100%; height: auto; background: #fff; }
 figure { margin: 1rem 0; } figcaption { opacity: .7; }
 .error { color: #c5221f; } .warning { color: #a56300; } .fine { color: #2c7a32; }
 @media (prefers-color-scheme: dark) {
   .error { color: #ff8a80; } .warning { color: #ffc266; } .fine { color: #8fd694; } }
+@media screen and (max-width: 40rem) {
+  body { margin-top: 1rem; padding: 0 .7rem; } th, td { padding: .2rem .4rem; }
+  .setup thead { display: none; } .setup .rows, .setup .rows tbody { display: block; }
+  .setup .rows tr { display: block; padding: .4rem 0; border-bottom: 1px solid #8886; }
+  .setup .rows td { display: flex; justify-content: space-between; gap: 1rem; border: 0;
+    padding: .1rem 0; text-align: right; }
+  .setup .rows td::before { content: attr(data-head); opacity: .7; text-align: left; }
+  .setup .rows td:first-child { font-weight: bold; } }
 @media print {
   @page { size: A4; margin: 12mm; }
   :root { font-size: 11px; } body { margin: 0; max-width: none; padding: 0; }
-  .setup { break-after: page; } .setup img { max-height: 85mm; } table { margin: .5rem 0; } }
+  .wide { overflow: visible; } .setup { break-after: page; } .setup img { max-height: 85mm; }
+  table { margin: .5rem 0; } }
 """
 
 
@@ -1329,7 +1358,7 @@ def _html_setup(page: Page, report: Report) -> Iterator[str]:
     if page.stock:
         yield f'<img src="{escape(page.stock, quote=True)}" alt="the stock and part zero">'
     for sheet in setup_sheets(report.planned):
-        yield from _html_table(sheet)
+        yield from _html_table(sheet, with_heads=True)
     grave = gravest(page)
     if grave:
         yield "<ul>"
@@ -1344,7 +1373,7 @@ def _html_setup(page: Page, report: Report) -> Iterator[str]:
 
 
 def _html_pairs(rows: tuple[tuple[str, str], ...]) -> Iterator[str]:
-    yield "<table>"
+    yield '<table class="pairs">'
     for name, value in rows:
         yield f'<tr><th scope="row">{_safe(name)}</th><td>{_safe(value)}</td></tr>'
     yield "</table>"
@@ -1362,16 +1391,22 @@ def _html_findings(page: Page) -> Iterator[str]:
     yield from _html_more(len(page.findings), "findings")
 
 
-def _html_table(sheet: Sheet) -> Iterator[str]:
+def _html_table(sheet: Sheet, *, with_heads: bool = False) -> Iterator[str]:
+    """The table; `with_heads`: each cell knows its heading, for windows too narrow for columns."""
     kinds = ["" if n < sheet.words else ' class="number"' for n in range(len(sheet.heads))]
     heads = zip(kinds, sheet.heads, strict=True)
-    yield "<table>\n<thead><tr>"
+    yield '<div class="wide"><table class="rows">\n<thead><tr>'
     yield "".join(f'<th scope="col"{kind}>{_safe(head)}</th>' for kind, head in heads)
     yield "</tr></thead>\n<tbody>"
+    if with_heads:
+        kinds = [
+            f'{kind} data-head="{_safe(head)}"'
+            for kind, head in zip(kinds, sheet.heads, strict=True)
+        ]
     for row in sheet.rows[:HTML_ROWS]:
         cells = zip(kinds, row, strict=True)
         yield f"<tr>{''.join(f'<td{kind}>{_safe(cell)}</td>' for kind, cell in cells)}</tr>"
-    yield "</tbody>\n</table>"
+    yield "</tbody>\n</table></div>"
     yield from _html_more(len(sheet.rows), sheet.noun)
 
 

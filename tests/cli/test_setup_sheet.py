@@ -6,9 +6,12 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
+import shapely
 
 from camtool.verification.report import SETUP, PlannedStock, _zero_words
 from tests.cli.conftest import Run
+from tests.oracles.page_paths import program_paths
+from tests.pictures.viewer_browser import FLAGS
 
 CHROMIUM = Path("/usr/bin/chromium")
 
@@ -115,12 +118,67 @@ def test_a_program_that_was_only_read_has_none(
         ((-0.0, 0.0), "X0 Y0 is the lower left corner of the stock"),
         ((-8.0, 3.0), "8 mm right of and 3 mm below"),
         ((8.0, -3.5), "8 mm left of and 3.5 mm above"),
-        (None, "where the drawing has part zero"),
+        (None, "X0 Y0 is the drawing's own zero; Z0 is the top of the stock"),
     ],
 )
 def test_zero_as_seen_from_the_stock(corner: tuple[float, float] | None, words: str) -> None:
     size = None if corner is None else (10.0, 10.0)
     assert words in _zero_words(PlannedStock(3.0, corner, size, 1.0))
+
+
+PATH = "M12 7 L40 7 L40 20 L26 29 L12 20 Z"
+"""In a drawing 60 mm high: from X12 Y31 to X40 Y53, Y up."""
+
+
+@pytest.mark.parametrize(
+    ("origin", "zero", "box"),
+    [
+        ("drawing", "is the drawing's own zero", (12.0, 31.0, 40.0, 53.0)),
+        ("lower-left", "is the lower left corner of the contours that", (0.0, 0.0, 28.0, 22.0)),
+        ("centre", "is the centre of the contours that", (-14.0, -11.0, 14.0, 11.0)),
+        ("5,6", "is at X5 Y6 of the drawing", (7.0, 25.0, 35.0, 47.0)),
+    ],
+)
+def test_the_blank_holds_what_the_tool_cuts_and_zero_is_where_the_job_says(
+    camtool: Run, tmp_path: Path, origin: str, zero: str, box: tuple[float, ...]
+) -> None:
+    svg = '<svg xmlns="http://www.w3.org/2000/svg" width="60mm" height="60mm" viewBox="0 0 60 60">'
+    (tmp_path / "a.svg").write_text(f'{svg}<path d="{PATH}" fill="none" stroke="#000"/></svg>')
+    line = ("post", "a.svg", "-t", "grbl", "--tool-diameter", "4mm", "--depth", "1mm")
+    done = camtool(*line, "-o", "a.nc", "--report", "a.html", "-q", "--origin", origin)
+    assert done.returncode == 0, done.stderr
+    told = dict(Tables((tmp_path / "a.html").read_text(encoding="utf-8")).tables[0])
+    assert told["zero"].startswith(f"X0 Y0 {zero}")
+    numbers = [float(each.replace("−", "-")) for each in re.findall(r"[−\d.]+\d", told["blank"])]
+    # The middle of the tool is half of it outside, and its edge as far again.
+    left, low, right, top = (
+        limit + sign * 4.0 for limit, sign in zip(box, (-1, -1, 1, 1), strict=True)
+    )
+    assert numbers == pytest.approx([right - left, top - low, left, right, low, top], abs=2e-3)
+    program = program_paths((tmp_path / "a.nc").read_text())
+    ends = shapely.union_all(
+        [shapely.LineString(path).buffer(2.0) for path in program.cuts if len(path) > 1]
+    ).bounds
+    assert ends == pytest.approx((left, low, right, top), abs=2e-3)
+
+
+@pytest.mark.xdist_group("chromium")
+@pytest.mark.skipif(not CHROMIUM.exists(), reason="Chromium is not installed")
+def test_it_is_readable_on_a_phone(camtool: Run, samples: Path, tmp_path: Path) -> None:
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    plate(camtool, samples, "plate.html")
+    with playwright.sync_playwright() as tool:
+        browser = tool.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
+        page = browser.new_page(viewport={"width": 390, "height": 844}, is_mobile=True)
+        page.goto((tmp_path / "plate.html").as_uri())
+        assert page.evaluate("() => document.documentElement.scrollWidth") == 390
+        beyond = """() => [...document.querySelectorAll(".setup *")].filter(
+            (each) => each.getBoundingClientRect().right > 390).length"""
+        assert page.evaluate(beyond) == 0
+        named = """() => [...document.querySelectorAll(".setup .rows td")].map(
+            (each) => getComputedStyle(each, "::before").content)"""
+        assert '"plunge mm/min"' in page.evaluate(named)
+        browser.close()
 
 
 @pytest.mark.xdist_group("chromium")

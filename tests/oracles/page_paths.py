@@ -30,6 +30,8 @@ class Paths:
     rapids: list[Floats] = field(default_factory=list)
     z: list[tuple[float, float]] = field(default_factory=list)
     """Of each of the cuts, where it begins and ends."""
+    tools: list[int] = field(default_factory=list)
+    """Of each of the cuts, the number of the last T with an M6."""
 
     def box(self) -> tuple[float, float, float, float]:
         """left, low, right, top of all moves."""
@@ -41,13 +43,15 @@ def program_paths(text: str) -> Paths:
     """The moves of a program in plain G-code: G0 to G3 with I and J from the start, G90 or G91,
     millimetres or inches, from (0, 0)."""
     found, at, word = Paths(), [0.0, 0.0, 0.0], 0
-    unit, absolute = 1.0, True
+    unit, absolute, tool = 1.0, True, 0
     for line in text.splitlines():
         words = _WORD.findall(re.sub(r"\([^)]*\)|;.*", "", line.upper()))
         codes = [float(number) for letter, number in words if letter == "G"]
         unit = 25.4 if 20.0 in codes else 1.0 if 21.0 in codes else unit
         absolute = (absolute or 90.0 in codes) and 91.0 not in codes
         word = next((int(code) for code in codes if code in (0.0, 1.0, 2.0, 3.0)), word)
+        if ("M", "6") in words:
+            tool = next(int(number) for letter, number in words if letter == "T")
         said = {letter: float(number) * unit for letter, number in words if letter in "XYZIJ"}
         assert not any(letter == "R" for letter, _ in words), "an arc by its radius"
         if not said or not {4.0, 10.0, 28.0, 43.0, 53.0, 92.0}.isdisjoint(codes):
@@ -67,6 +71,7 @@ def program_paths(text: str) -> Paths:
         else:
             found.cuts.append(points)
             found.z.append((at[2], to[2]))
+            found.tools.append(tool)
         at = to
     return found
 
@@ -123,16 +128,20 @@ def live_paths(page: str, name: str) -> list[Floats]:
     return svg_paths(path, flipped=True)
 
 
-def viewer_paths(page: str) -> Paths:
-    """The moves of the viewer's page, from its columns of numbers."""
-    head = json.loads(_of(page, "head"))
-    data = base64.b64decode(_of(page, "columns"))
+def viewer_column(page: str, name: str) -> Floats:
+    """A column of numbers of the viewer's page."""
+    kind, offset, count = json.loads(_of(page, "head"))["columns"][name]
     types = {"u1": "u1", "i2": "<i2", "i4": "<i4", "f4": "<f4", "d1": "i1"}
+    data = base64.b64decode(_of(page, "columns"))
+    numbers = np.frombuffer(data, types[kind], count, offset).astype(float)
+    return np.cumsum(numbers) if kind == "d1" else numbers
+
+
+def viewer_paths(page: str) -> Paths:
+    """The moves of the viewer's page."""
 
     def column(name: str) -> Floats:
-        kind, offset, count = head["columns"][name]
-        numbers = np.frombuffer(data, types[kind], count, offset).astype(float)
-        return np.cumsum(numbers) if kind == "d1" else numbers
+        return viewer_column(page, name)
 
     found = Paths()
     at = column("move_start").tolist()

@@ -1,6 +1,7 @@
 """How wide pictures draw a tool: as it cuts at the surface."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,13 +12,16 @@ from hypothesis import strategies as st
 from camtool.geometry.polylines import Polyline
 from camtool.pictures.chains import Chain, tapers
 from camtool.pictures.content import content_of
-from camtool.pictures.draw import render
+from camtool.pictures.draw import draw, render
 from camtool.pictures.scene import scene_of
+from camtool.pictures.viewer.page import viewer_page
 from camtool.pipeline import post_drawing
 from camtool.planning.job import Job, Operation, Tool
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from tests.drawings import drawing_of
+from tests.oracles import svg_page
+from tests.oracles.page_paths import program_paths, svg_paths, viewer_column
 
 CORNERS = [[0, 0, 0], [10, 0, 0], [10, 10, 0], [0, 10, 0.0]]
 SQUARE = Polyline(np.array(CORNERS), closed=True)
@@ -97,7 +101,66 @@ def test_a_carving_is_drawn_as_wide_as_it_cuts() -> None:
     job, target = Job((Operation("vcarve", tool=BIT, depth_mm=2.0),)), load_target("linuxcnc")
     run = post_drawing(drawing_of([SQUARE]), job, target, check=False)
     scene = scene_of(title="", drawing=drawing_of([SQUARE]), job=job, toolpath=run.decoded)
-    swept = shapely.union_all([outline(each).buffer(0) for each in content_of(scene).swept])
+    swept = shapely.union_all(
+        [outline(each).buffer(0) for each in content_of(scene).swept[0].chains]
+    )
     square = shapely.box(0, 0, 10, 10)
     assert swept.difference(square.buffer(0.01)).is_empty
     assert b"as wide as it is deep" in render(scene, "sign.svg")
+
+
+FINE, WIDE = Tool(1.0, number=1), Tool(3.0, number=2)
+SEVERAL = Job(
+    (
+        Operation("profile", "inner", tool=FINE, depth_mm=1.0, side="inside"),
+        Operation("profile", "outer", tool=WIDE, depth_mm=2.0, side="outside"),
+        Operation("vcarve", "sign", tool=replace(BIT, number=3), depth_mm=0.5),
+    )
+)
+RADII = {1: lambda depth: 0.5, 2: lambda depth: 1.5, 3: lambda depth: depth}
+"""Of the tools, by their numbers, at a depth."""
+
+
+def cut_by(text: str) -> shapely.Geometry:
+    """What a program cuts at the surface, from its words alone."""
+    found, discs = program_paths(text), []
+    for path, (first, last), tool in zip(found.cuts, found.z, found.tools, strict=True):
+        for (x, y), z in zip(path, np.linspace(first, last, len(path)), strict=True):
+            if z < -1e-3:
+                discs.append(shapely.Point(x, y).buffer(RADII[tool](-z), quad_segs=32))
+    return shapely.union_all(discs)
+
+
+def test_cuts_of_several_tools_are_as_wide_as_each_cuts() -> None:
+    run = post_drawing(drawing_of([SQUARE]), SEVERAL, load_target("linuxcnc"))
+    cut, scene = cut_by(run.program.data.decode()), run.scene()
+    group = svg_page.parse(draw(scene))
+    shown = []
+    for each in group.iter(f"{svg_page.SVG}g"):
+        if not (each.get("id") or "").startswith("swept"):
+            continue
+        wide = 0.5 * float(each.get("stroke-width", 0.0))
+        for path in each.iter(f"{svg_page.SVG}path"):
+            for piece in path.attrib["d"].split("M")[1:]:
+                path.attrib["d"] = f"M{piece}"
+                line = shapely.LineString(np.concatenate(svg_paths(path)))
+                shown.append(line.buffer(wide) if wide else shapely.Polygon(line).buffer(0))
+    swept = shapely.union_all(shown)
+    assert cut.difference(swept.buffer(0.02)).is_empty
+    assert swept.difference(cut.buffer(0.02)).is_empty
+    assert "width of cuts: 1 mm, 3 mm, V bit" in draw(scene)
+
+
+def test_the_viewer_knows_the_width_of_each_of_several_tools() -> None:
+    run = post_drawing(drawing_of([SQUARE]), SEVERAL, load_target("linuxcnc"))
+    page = viewer_page(run.scene()).decode()
+    found = program_paths(run.program.data.decode())
+    wide = viewer_column(page, "move_wide").reshape(-1, 2)
+    kinds = viewer_column(page, "move_kind")
+    shown = wide[(kinds >= 1) & (kinds <= 3)].tolist()
+    expected = [
+        [RADII[tool](max(-z, 0.0)) for z in ends] if min(ends) < 0.0 else [0.0, 0.0]
+        for ends, tool in zip(found.z, found.tools, strict=True)
+    ]
+    assert shown == pytest.approx(np.array(expected), abs=1e-4)
+    assert '"swept":"width of cuts: 1 mm, 3 mm, V bit"' in page

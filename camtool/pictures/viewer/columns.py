@@ -7,8 +7,6 @@ number before, the first from 0). Floats of 32 bits hold a place on a table of 8
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import numpy.typing as npt
 from msgspec import Struct
@@ -23,9 +21,6 @@ from camtool.pictures.scene import Playback, Scene
 from camtool.pictures.trace import Trace, bins_of, nearest_points
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.units import UM_PER_MM
-
-if TYPE_CHECKING:
-    from camtool.planning.job import Tool
 
 Columns = dict[str, npt.NDArray[np.generic]]
 
@@ -47,7 +42,7 @@ def columns_of(content: Content, run: Playback | None) -> Columns:
     }
     return {
         **_drawing(scene.drawing),
-        **_moves(scene.toolpath, run, scene.nose),
+        **_moves(scene, run),
         **{name: points.astype(FLOAT) for name, points in places.items()},
         **_wanted(scene.wanted if run is not None else None),
     }
@@ -123,7 +118,8 @@ def _drawing(drawing: Drawing | None) -> Columns:
     }
 
 
-def _moves(toolpath: Toolpath | None, run: Playback | None, nose: Tool | None) -> Columns:
+def _moves(scene: Scene, run: Playback | None) -> Columns:
+    toolpath = scene.toolpath
     if toolpath is None or run is None:
         none = np.empty(0)
         floats = (
@@ -148,20 +144,26 @@ def _moves(toolpath: Toolpath | None, run: Playback | None, nose: Tool | None) -
         "move_block": toolpath.block.astype(INT),
         "move_source": toolpath.source.astype(INT),
         "move_kind": toolpath.kind.astype(BYTE),
-        "move_wide": _wide(toolpath, nose),
+        "move_wide": _wide(scene, toolpath),
         "move_sort": _sorts(toolpath),
     }
 
 
-def _wide(toolpath: Toolpath, nose: Tool | None) -> npt.NDArray[np.generic]:
+def _wide(scene: Scene, toolpath: Toolpath) -> npt.NDArray[np.generic]:
     """(N, 2) mm: how wide the tool cuts on each side at the start and the end of each feed, where
-    that changes with its depth; (0, 2) where it does not."""
-    if nose is None:
+    that changes with its depth or from tool to tool; (0, 2) where it does not."""
+    turns = scene.turns if scene.nose is None else ((0, scene.nose),)
+    if not turns:
         return np.empty((0, 2), dtype=FLOAT)
     wide = np.zeros((len(toolpath), 2))
-    for row in np.flatnonzero(toolpath.is_feed).tolist():
-        ends = toolpath.starts[row, 2], toolpath.end[row, 2]
-        wide[row] = [nose.radius_at(max(-float(z), 0.0)) for z in ends]
+    ends = [row for row, _ in turns[1:]] + [len(toolpath)]
+    for (begin, tool), end in zip(turns, ends, strict=True):
+        rows = begin + np.flatnonzero(toolpath.is_feed[begin:end])
+        deep: Floats = -np.column_stack([toolpath.starts_of(rows)[:, 2], toolpath.end[rows, 2]])
+        # What lies above the stock cuts nothing.
+        for row, ends_mm in zip(rows.tolist(), deep.tolist(), strict=True):
+            if max(ends_mm) > 0.0:
+                wide[row] = [tool.radius_at(max(each, 0.0)) for each in ends_mm]
     return wide.astype(FLOAT)
 
 

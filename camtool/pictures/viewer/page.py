@@ -36,7 +36,7 @@ from camtool.pictures.colours import (
     on_dark,
 )
 from camtool.pictures.content import Content, content_of
-from camtool.pictures.layers import Lines, Part, Texts, from_the_ground_up
+from camtool.pictures.layers import Lines, Part, Texts, from_the_ground_up, swept_words
 from camtool.pictures.polar import ROOM, dial_of, notes, plot, shown
 from camtool.pictures.scene import Playback, Scene, Table, by_feed
 from camtool.pictures.svg import Look, element, number
@@ -84,7 +84,7 @@ def viewer_page(scene: Scene) -> bytes:
         "style": style,
         "script": script,
         "circles": circles_of(scene),
-        "head": _json({"columns": named, **_head(scene, run, traced), "rows": rows}),
+        "head": _json({"columns": named, **_head(content, run, traced), "rows": rows}),
         "columns": base64.b64encode(data).decode("ascii"),
     }
     # One pass: the contents of a slot are not searched for slots.
@@ -98,8 +98,8 @@ def _run(scene: Scene) -> Playback | None:
     return by_feed(scene.toolpath, np.inf) if scene.playback is None else scene.playback()
 
 
-def _head(scene: Scene, run: Playback | None, traced: Traced) -> dict[str, object]:
-    drawing, toolpath = scene.drawing, scene.toolpath
+def _head(content: Content, run: Playback | None, traced: Traced) -> dict[str, object]:
+    scene, drawing, toolpath = content.scene, content.scene.drawing, content.scene.toolpath
     names = [] if drawing is None else drawing_layers(drawing)
     blocks = None if run is None or run.blocks is None else run.blocks
     return {
@@ -112,6 +112,7 @@ def _head(scene: Scene, run: Playback | None, traced: Traced) -> dict[str, objec
         "blocks": None if blocks is None else "\n".join(map(_one_line, blocks)),
         "hex": run is not None and run.binary,
         "tool_mm": scene.tool_mm,
+        "swept": swept_words(scene),
         "top_um": _top_um(scene, run),
         "map": {"light": bin_colours(), "dark": bin_colours(dark=True)},
         "tables": [] if run is None else [_table(table) for table in run.tables],

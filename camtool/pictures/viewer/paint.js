@@ -151,7 +151,9 @@ function paintTapers(ctx, view, track, rows, wide, colour) {
     const first = wide[2 * row] * view.scale, last = wide[2 * row + 1] * view.scale;
     if (!first && !last) continue;
     const arc = track.arc(row);
-    const pieces = arc ? Math.max(1, Math.ceil(Math.abs(arc.sweep) / TAPER_TURN)) : 1;
+    // A chord of this turn is a quarter of a pixel off its arc.
+    const turn = arc ? Math.min(TAPER_TURN, Math.sqrt(2 / Math.max(arc.radius * view.scale, 1))) : 0;
+    const pieces = arc ? Math.max(1, Math.ceil(Math.abs(arc.sweep) / turn)) : 1;
     let from = track.at(row, 0), radius = first;
     for (let piece = 1; piece <= pieces; piece++) {
       const share = piece / pieces, to = track.at(row, share);

@@ -90,7 +90,7 @@ class Layers {
     const moves = columns.move_kind.length > 0, travel = head.travel_mm;
     const width = head.tool_mm === null ? "" : Number(head.tool_mm.toPrecision(4));
     if (moves && width) this.add("swept", `tool's width, ${width} mm`, "s");
-    if (columns.move_wide.length) this.add("swept", "tool, as wide as it is deep", "s");
+    if (columns.move_wide.length && head.swept) this.add("swept", head.swept, "s");
     if (travel) this.add("travel", `travel, ${travel[0]} × ${travel[1]} mm`, "t");
     if (moves) {
       this.add("rapid", "rapids", "r");
