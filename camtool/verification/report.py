@@ -1308,7 +1308,7 @@ figure { margin: 1rem 0; } figcaption { opacity: .7; }
   @page { size: A4; margin: 12mm; }
   :root { font-size: 11px; } body { margin: 0; max-width: none; padding: 0; }
   .wide { overflow: visible; } .setup { break-after: page; } .setup img { max-height: 85mm; }
-  table { margin: .5rem 0; } }
+  table { margin: .5rem 0; } .setup .rows :is(th, td) { padding: .15rem .35rem; } }
 """
 
 
