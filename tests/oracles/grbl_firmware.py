@@ -220,3 +220,66 @@ def played(
 def _run_session(program: Path, image: Path, folder: Path) -> None:
     names = [image, folder / "script", folder / "answers", folder / "steps"]
     subprocess.run([program, *names], check=True, timeout=600)
+
+
+class Line:
+    """The firmware at the other end of a line, as `camtool.sending.faults.Wired` is a twin: a
+    session that is played again from its beginning with all bytes that have come since. `before`:
+    lines that it has been told already."""
+
+    def __init__(
+        self,
+        program: Path,
+        folder: Path,
+        before: Sequence[str] = (),
+        switches: Sequence[Switch] = (),
+    ) -> None:
+        self._program, self._folder, self._switches = program, folder, switches
+        self._image = factory(program, folder)
+        self._sent = [Sent(b"\n"), *(Sent(f"{line}\n".encode()) for line in before)]
+        self._answers: list[tuple[float, str]] = []
+        self._taken = self._before = 0
+        self._last: float | None = None  # when the last byte has come
+        self.played = self._play()
+        self._before = len(self._answers)
+        self._begun_s = self.played.seconds - LATE_S  # bytes come later than they are told
+        self._answers = []
+
+    def connect(self, now: float) -> None:
+        """The port resets nothing: what it was told before holds."""
+
+    def write(self, data: bytes, now: float) -> None:
+        """Send bytes to it."""
+        at = self._begun_s + now
+        self._sent.append(Sent(data, None if self._last is None else max(at - self._last, 0.0)))
+        self._last = max(at, self._last or at) + len(data) * BYTE_S
+        self.played = self._play()
+
+    def read(self, now: float) -> bytes:
+        """What has come from it by now, since the last call."""
+        text = ""
+        while (at := self.next_s()) is not None and at <= now:
+            text += self._answers[self._taken][1]
+            self._taken += 1
+        return text.encode("latin-1")
+
+    def next_s(self) -> float | None:
+        """When it says something next by itself."""
+        left = self._answers[self._taken : self._taken + 1]
+        return left[0][0] + LATE_S - self._begun_s if left else None
+
+    turn_s = next_s
+
+    def unplugged(self, now: float) -> bool:
+        """Never."""
+        return False
+
+    def _play(self) -> Played:
+        done = played(self._program, self._image, self._sent, self._folder, self._switches)
+        self._answers = [each for said in done.said for each in said][self._before :]
+        return done
+
+
+BYTE_S = 10.0 / 115200.0
+LATE_S = 0.001
+"""What it says is heard so much later."""

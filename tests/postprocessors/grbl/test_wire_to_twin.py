@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import shutil
 from functools import cache
+from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from camtool.sending.faults import Faults, Wired
 from camtool.sending.prepare import forecast_of
-from camtool.target.wire import Conversation, Manner, Packet, State
+from camtool.target.registry import load_target
+from camtool.target.wire import Conversation, Manner, Packet, Standing, State
 from tests.feeding import logo, made, same_motion
+from tests.oracles.grbl_firmware import Line, Switch, built, source
 from tests.sending.talking import talked
 
 
@@ -106,3 +113,67 @@ def test_short_lines_are_sent_as_fast_as_the_machine_takes_them() -> None:
     assert talk.state is State.FINISHED, talk.why
     times = twin.slides.trace.time_s
     assert times[-1] - times[0] < 1.02 * forecast.seconds.sum()
+
+
+# The firmware itself instead of the twin (GRBL_SOURCE names its sources).
+
+SQUARE = b"G21G90\nG0Z5\nG1X3F500\nG1Y2\nG0Z6\n"
+LEFT = Standing((1.5, -2.0, -1.0), True, np.zeros((0, 3)), "journal")
+CLOSED = [Switch("X", 0, 5)]
+"""The limit switch of X is closed until it has gone 5 steps."""
+BESIDE = Manner(reach_mm=((0.0, 0.0, 0.0), (3.0, 2.0, 6.0)))
+
+
+@pytest.fixture(scope="module")
+def firmware(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    if source() is None or shutil.which("gcc") is None:
+        pytest.skip("GRBL_SOURCE names no sources of grbl, or there is no gcc")
+    return built(tmp_path_factory.mktemp("grbl"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("before", "switches", "manner", "program", "why", "steps"),
+    [
+        ([], [], Manner(), SQUARE, "", (750, 500, 1500)),
+        (["$N0=G54"], [], Manner(), SQUARE, "", (750, 500, 1500)),
+        (["$N0=G20"], [], Manner(), SQUARE, "", (750, 500, 1500)),
+        (["$N0=G20"], [], Manner(), b"G90\nG0Z5\n", "leaves G20", None),
+        (["$22=1", "\x18"], [], Manner(unlock=True), SQUARE, "", (750, 500, 1500)),
+        (["$21=1"], CLOSED, Manner(), SQUARE, "'Check Limits'; it reports closed", None),
+        # It is told where it stands, and goes from there: 3 − 1.5, 2 + 2 and 6 + 1 mm.
+        ([], [], Manner(standing=LEFT), SQUARE, "", (375, 1000, 1750)),
+        ([], [], Manner(standing=replace(LEFT, tool_at="")), SQUARE, "but the program was", None),
+        (
+            ["G10L20P1X1.5Y-2Z-1"],
+            [],
+            Manner(standing=replace(LEFT, tool_at="")),
+            SQUARE,
+            "",
+            (375, 1000, 1750),
+        ),
+        (["$22=1", "$20=1", "$X"], [], BESIDE, SQUARE, "X would go to 3.000", None),
+        (["$22=1", "$20=1", "$X", "G10L20P1X3Y5Z9"], [], BESIDE, SQUARE, "", (0, -750, -750)),
+    ],
+)
+def test_conversations_with_the_firmware(
+    firmware: Path,
+    tmp_path: Path,
+    before: list[str],
+    switches: list[Switch],
+    manner: Manner,
+    program: bytes,
+    why: str,
+    steps: tuple[int, int, int] | None,
+) -> None:
+    loaded = load_target("grbl", settings=["spindle.max_rpm=1000"])
+    wire: Any = loaded.target.wire()
+    decoded = loaded.target.read(program, loaded.machine)
+    made = tuple(wire.packets(program, loaded.machine, forecast_of(decoded, loaded)))
+    talk = wire.conversation(made, loaded.machine, manner)
+    line: Any = Line(firmware, tmp_path, before, switches)
+    talked(talk, line, latest_s=100.0)
+    assert talk.state is (State.FAILED if why else State.FINISHED), talk.why
+    assert why in talk.why
+    went = line.played.steps[-1].tolist() if len(line.played.steps) else None
+    assert went == (None if steps is None else list(steps))
