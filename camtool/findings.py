@@ -367,6 +367,22 @@ class Code(IntEnum):
         "are given. What the tool mills away leaves no piece",
         "tabs in an operation of its own, a pocket that clears it, or tape below",
     )
+    LINES_RUN_TOGETHER = (
+        233,
+        WARNING,
+        "lines of an engraving are nearer to each other than the tool cuts wide at its depth, so "
+        "that what is between them vanishes: the counters of letters, or letters that join; the "
+        "narrowest place is given, and the widest tool that fits all",
+        "a finer tool, a V bit, or larger letters",
+    )
+    TEXT_AS_EDGE = (
+        234,
+        WARNING,
+        "outlines of text are cut as edges of parts and holes, and the tool has no room beside "
+        "some of them",
+        'engrave text: `kind = "engrave"`, `select = ["text"]`; `select = ["not text"]` where '
+        "parts are cut",
+    )
     TAB_SHARED = (
         225,
         (INFO, WARNING),
@@ -1332,6 +1348,20 @@ TOOL_CHANGE_NOT_STATED = Sentence(
     "{count:a tool is|# tools are} changed {measured:.4g} mm above the stock here, because the "
     "file of {machine} states no place: give {keys} in its [defaults]",
     "mm",
+)
+LINES_RUN_TOGETHER = Sentence(
+    Code.LINES_RUN_TOGETHER,
+    "the tool cuts {measured:.4g} mm wide at this depth, and lines lie {limit:.4g} mm apart here"
+    "{more:| (and at # more place)| (and at # more places)}, so that what is between them is cut "
+    "away: take a tool of less than {limit:.4g} mm, or a V bit less deep",
+    "mm",
+)
+TEXT_AS_EDGE = Sentence(
+    Code.TEXT_AS_EDGE,
+    "{measured:# contour is an outline|# contours are outlines} of text, cut as edges of parts: "
+    'engrave text in an operation of its own (select = ["text"]), and leave it out here (select = '
+    '["not text"])',
+    "contours",
 )
 SIDE_BY_UNCUT = Sentence(
     Code.SIDE_BY_UNCUT,

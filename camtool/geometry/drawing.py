@@ -16,6 +16,14 @@ from camtool.findings import Finding
 from camtool.geometry.measure import segment_lengths
 from camtool.geometry.polylines import Polylines, Segments, segment_rows
 
+TEXT_KINDS = frozenset(("text", "mtext", "attrib", "attdef"))
+"""Kinds of entities that are text, in small letters."""
+
+
+def is_text(source: str) -> bool:
+    """True if a path of this source (`TEXT 2F`) is a part of a letter."""
+    return source.partition(" ")[0].casefold() in TEXT_KINDS
+
 
 class Units(Struct, frozen=True):
     """The unit of the file: its name, mm per unit, and where both come from (one phrase)."""

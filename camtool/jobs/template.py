@@ -2,9 +2,9 @@
 
 One operation for each layer, or for each colour when there is one layer: drilled where it holds
 small circles and points alone, engraved where every path is open or its name says so, else a
-profile; what is open, closed or a point gets an operation of its own. Where the tool is known,
-holes, inner and outer contours do, too. What is larger comes later, so that parts are cut free
-last. Every other key stands there as a comment, with an example.
+profile; what is open, closed, text or a point gets an operation of its own. Where the tool is
+known, holes, inner and outer contours do, too. What is larger comes later, so that parts are cut
+free last. Every other key stands there as a comment, with an example.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from camtool.arrays import Ints
+from camtool.geometry.drawing import is_text
 from camtool.geometry.facts import drawing_extents
 from camtool.geometry.measure import extents, path_lengths
 from camtool.jobs.keys import OPERATION, PLACE, TOOL, WHOLE, Key
@@ -44,6 +45,9 @@ BREAKTHROUGH_MM = 0.3
 
 MOST_TABS = 4
 """So many tabs are proposed for an outline."""
+
+TEXT_MM = 0.2
+"""Text is proposed to be engraved so deep."""
 
 LEAST_TAB_MM = 0.5
 """Lower tabs than this are not proposed."""
@@ -200,8 +204,21 @@ class _Part(Struct, frozen=True):
 
 def _parts(drawing: Drawing, group: _Group, size_mm: float, proposal: Proposal) -> list[_Part]:
     """The operations that a group is cut by."""
-    lines, rows = drawing.paths, np.array(group.paths, dtype=np.int64)
-    marks = len(group.marks)
+    lines, marks = drawing.paths, len(group.marks)
+    is_letter = [is_text(drawing.sources[row]) for row in group.paths]
+    text = tuple(row for row, yes in zip(group.paths, is_letter, strict=True) if yes)
+    if text:
+        rest = tuple(row for row, yes in zip(group.paths, is_letter, strict=True) if not yes)
+        keys = (
+            ("select", '["text"]', ""),
+            ("depth", f'"{TEXT_MM:g}mm"', "a V bit makes finer letters"),
+        )
+        letters = _Part(f"{group.called} text", "engrave", text, 0, keys)
+        if not rest and not marks:
+            return [letters]
+        others = _parts(drawing, replace(group, paths=rest), size_mm, proposal)
+        return [letters, *(_without_text(part) for part in others)]
+    rows = np.array(group.paths, dtype=np.int64)
     closed = lines.closed[rows]
     small = all(_is_hole(lines[row], SMALL_HOLE * size_mm) for row in group.paths)
     if any(word in group.name.casefold() for word in ENGRAVED) or (len(rows) and not closed.any()):
@@ -222,6 +239,16 @@ def _parts(drawing: Drawing, group: _Group, size_mm: float, proposal: Proposal) 
         found.append(_Part(group.called, "profile", tuple(contours.tolist()), 0, select))
         return found
     return found + _cut_parts(drawing, group, contours, proposal)
+
+
+def _without_text(part: _Part) -> _Part:
+    """The part, which selects no text."""
+    said = {key: value for key, value, _ in part.keys}.get("select")
+    if said == '["point"]':
+        return part
+    words = "" if said is None else f"{said[1:-1]}, "
+    keys = (("select", f'[{words}"not text"]', ""), *(k for k in part.keys if k[0] != "select"))
+    return replace(part, keys=keys)
 
 
 def _cut_parts(drawing: Drawing, group: _Group, contours: Ints, proposal: Proposal) -> list[_Part]:

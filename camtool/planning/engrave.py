@@ -6,9 +6,32 @@ are drawn and may begin anywhere. The material stays on both sides.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from camtool.arrays import Bools, Floats
 from camtool.errors import OptionError
+from camtool.findings import LINES_RUN_TOGETHER, Finding
+from camtool.geometry.measure import point_at
+from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, Segments
 from camtool.planning.items import Chosen, Contours, Setting, Work
-from camtool.planning.naming import key_of
+from camtool.planning.naming import at_place, key_of
+
+CHORD_RAD = math.pi / 18.0
+"""Arcs are chords of this angle where the distance of lines is measured: 0.4 % of the radius."""
+
+LEAST_BETWEEN = 0.1
+"""Lines nearer to each other than this part of the groove touch."""
+
+LEAST_FROM_END = 0.5
+"""... and so do those of which one ends so near to the other: strokes of letters are drawn so."""
+
+
+WIDTH_SLACK = 0.01
+"""A tool fits between lines that are nearer than it is wide by this part of that."""
 
 
 def engrave(chosen: Chosen, setting: Setting) -> Work:
@@ -24,4 +47,111 @@ def engrave(chosen: Chosen, setting: Setting) -> Work:
             where=key_of(operation, "direction"),
             mend='leave it out, or write "drawn"',
         )
-    return Work(Contours.along(chosen.lines, setting, chosen.names, chosen.source))
+    items = Contours.along(chosen.lines, setting, chosen.names, chosen.source)
+    return Work(items, tuple(run_together(chosen, setting)))
+
+
+def run_together(chosen: Chosen, setting: Setting) -> Iterator[Finding]:
+    """One finding for the lines on which the tool runs, and that are nearer to each other than it
+    is wide at the depth of its tip: lines that do not touch, and what touching lines enclose."""
+    width = 2.0 * setting.operation.tool.radius_at(-setting.levels_mm[-1])
+    if width == 0.0 or not len(chosen.lines):
+        return
+    lines = np.array([*_chords(chosen.lines)], dtype=object)
+    found = narrow = _narrow_places(lines, chosen.lines.closed, width)
+    fits = place = None
+    while narrow:  # what touches in a wide groove may be apart in a narrower one
+        fits, place, row = min(narrow, key=lambda each: each[0])
+        narrow = _narrow_places(lines, chosen.lines.closed, fits)
+    if fits is None or place is None:
+        return
+    yield LINES_RUN_TOGETHER(
+        where=at_place(chosen.names[row], (place.x, place.y)),
+        measured=width,
+        limit=fits,
+        more=len(found) - 1,
+    )
+
+
+def _narrow_places(lines: Any, closed: Bools, width: float) -> list[tuple[float, Any, int]]:
+    """Where a groove of this width takes away what lies between lines: how wide that is, mm, its
+    middle, and the row of one of them."""
+    import shapely
+
+    near, other = shapely.STRtree(lines).query(lines, predicate="dwithin", distance=width)
+    once = near < other
+    near, other = near[once], other[once]
+    gaps = shapely.distance(lines[near], lines[other])
+    spans = shapely.shortest_line(lines[near], lines[other])
+    ends = np.stack([shapely.get_point(lines, 0), shapely.get_point(lines, -1)], axis=1)
+    ends[closed] = None
+    at_end = np.zeros(len(near), dtype=np.bool_)
+    for rows in (near, other):
+        for end in (0, 1):
+            away = shapely.distance(ends[rows, end], spans)
+            at_end |= np.where(np.isnan(away), False, away < POSITION_EPS_MM)
+    at_end &= gaps < LEAST_FROM_END * width
+    beside = [
+        shapely.length(
+            shapely.intersection(lines[a], shapely.buffer(lines[b], 1.5 * gaps[at_end]))
+        )
+        for a, b in ((near[at_end], other[at_end]), (other[at_end], near[at_end]))
+    ]
+    # A line that ends there leaves at once; parallel ones stay beside each other.
+    at_end[at_end] = np.minimum(*beside) <= 2.0 * gaps[at_end]
+    touching = at_end | (gaps < LEAST_BETWEEN * width)
+    group = _connected(len(lines), near[touching], other[touching])
+    apart = (group[near] != group[other]) & (gaps < width * (1.0 - WIDTH_SLACK))
+    found = [
+        (float(gap), shapely.centroid(span), int(row))
+        for gap, span, row in zip(gaps[apart], spans[apart], near[apart].tolist(), strict=True)
+    ]
+    for row in np.unique(group).tolist():
+        found += [(*each, row) for each in _enclosed(lines[group == row], width)]
+    return found
+
+
+def _enclosed(lines: Any, width: float) -> Iterator[tuple[float, Any]]:
+    """How wide each place is that touching lines enclose, mm, and its middle, where a groove of
+    this width fills it."""
+    import shapely
+
+    least = LEAST_BETWEEN * width
+    thin = shapely.buffer(shapely.multilinestrings(list(lines)), 0.5 * least)
+    rings = [hole for part in shapely.get_parts(thin) for hole in shapely.get_rings(part)[1:]]
+    faces = shapely.polygons(rings) if rings else np.empty(0, dtype=object)
+    # A disc of radius r fits into every face whose area is r times the length of its edge.
+    slim = shapely.area(faces) < 0.5 * (width - least) * shapely.length(faces)
+    for face in faces[slim]:
+        spoke = shapely.maximum_inscribed_circle(face, tolerance=0.005 * width)
+        wide = 2.0 * float(shapely.length(spoke)) + least
+        if 2.0 * least < wide < width * (1.0 - WIDTH_SLACK):
+            yield wide, shapely.get_point(spoke, 0)
+
+
+def _connected(count: int, one: Any, other: Any) -> Any:
+    """(N,) the least index of what is connected with each of N things, by pairs of these."""
+    label = np.arange(count)
+    while True:
+        least = label.copy()
+        np.minimum.at(least, one, label[other])
+        np.minimum.at(least, other, label[one])
+        least = least[least]
+        if (least == label).all():
+            return label
+        label = least
+
+
+def _chords(lines: Polylines) -> Iterator[Any]:
+    """Each path as a line of shapely."""
+    import shapely
+
+    for path in lines:
+        segments = Segments.of(path)
+        count = np.maximum(1, np.ceil(np.abs(segments.sweep) / CHORD_RAD)).astype(np.int64)
+        count = np.where(segments.is_arc, count, 1)
+        row = np.repeat(np.arange(len(segments)), count)
+        first = np.repeat(np.cumsum(count) - count, count)
+        share: Floats = (np.arange(len(row)) - first + 1.0) / count[row]
+        points = point_at(segments, row, share)
+        yield shapely.linestrings(np.concatenate([path.vertices[:1, :2], points]))

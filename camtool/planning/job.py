@@ -50,15 +50,27 @@ STARTS = ("nearest", "longest-line", "corner")
 ORIGINS = ("drawing", "lower-left", "centre")
 """Where part zero lies: at the drawing's own zero, or at a place of the paths that are cut."""
 
-SELECTED = ("closed", "open", "outer", "inner", "circle", "not circle", "point")
+SELECTED = (
+    "closed",
+    "open",
+    "outer",
+    "inner",
+    "circle",
+    "not circle",
+    "point",
+    "text",
+    "not text",
+)
 """What an operation may take by: closed or open paths; closed ones within no other or an even
-number of others, or within an odd number; full circles, or all but these; single points."""
+number of others, or within an odd number; full circles, or all but these; single points; what was
+written as text, or all but that."""
 
 _APART = (
     ("open", ("closed", "outer", "inner", "circle", "point")),
     ("outer", ("inner",)),
     ("circle", ("not circle",)),
-    ("point", ("closed", "open", "outer", "inner", "circle", "not circle")),
+    ("point", ("closed", "open", "outer", "inner", "circle", "not circle", "text")),
+    ("text", ("not text",)),
 )
 """Words that cannot be true of one thing."""
 

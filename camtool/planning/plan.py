@@ -24,10 +24,11 @@ from camtool.findings import (
     MARKS_NOT_CUT,
     NOTHING_DRAWN,
     NOTHING_DRAWN_BUT_PATHS,
+    TEXT_AS_EDGE,
     Code,
     Finding,
 )
-from camtool.geometry.drawing import Drawing
+from camtool.geometry.drawing import Drawing, is_text
 from camtool.geometry.measure import path_lengths
 from camtool.machine.model import Machine
 from camtool.planning.checks import checked, with_loose_pieces
@@ -41,7 +42,7 @@ from camtool.planning.items import Bridge, Chosen, Contours, Items, Runs, Settin
 from camtool.planning.job import Job, Operation, Tool, refuse_endless
 from camtool.planning.leads import KeepOut
 from camtool.planning.link import link
-from camtool.planning.naming import key_of
+from camtool.planning.naming import key_of, operation_name
 from camtool.planning.order import (
     Point,
     best_order,
@@ -54,7 +55,7 @@ from camtool.planning.order import (
 from camtool.planning.place import SCALE_SHARE, collapsed, place
 from camtool.planning.profile import profile
 from camtool.planning.settings import setting_of
-from camtool.planning.sides import Sides, choose, takes_mark
+from camtool.planning.sides import Sides, choose, runs_beside, takes_mark
 from camtool.planning.tabs import between, raised_over_bridges, with_tabs
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
@@ -240,6 +241,7 @@ def _step(
     sided = side_findings(work, chosen, sides, setting.operation)
     unclear = branch_findings(placed.healing.branches, chosen, sides, setting.operation)
     findings = of_stage(setting.operation, [*unclear, *work.findings, *sided, *bare])
+    findings = [*_text_as_edge(placed, chosen, setting.operation, findings), *findings]
     choices = choices_of(items)
     before = travel_mm(choices, drawn(choices), *ends)
     if job.minimise == "reversals":
@@ -272,6 +274,25 @@ def _step(
         rapid_mm=travel_mm(choices, rows, *ends),
         bridges=bridges,
     )
+
+
+def _text_as_edge(
+    placed: Drawing, chosen: Chosen, operation: Operation, findings: Sequence[Finding]
+) -> Iterator[Finding]:
+    """Outlines of text that are cut as edges, where the tool has no room beside some of them."""
+    if not runs_beside(operation):
+        return
+    text = [
+        name
+        for name, source, closed in zip(
+            chosen.names, chosen.source.tolist(), chosen.lines.closed.tolist(), strict=True
+        )
+        if closed and is_text(placed.sources[source])
+    ]
+    spoilt = (Code.GOUGE, Code.CONTOUR_TOO_SMALL)
+    places = [each.where or "" for each in findings if each.code in spoilt]
+    if any(place.startswith(f"{name} at ") for name in set(text) for place in places):
+        yield TEXT_AS_EDGE(where=operation_name(operation), measured=len(text))
 
 
 def _is_divided(job: Job, operation: Operation) -> bool:

@@ -40,6 +40,7 @@ from camtool.geometry.polylines import (
     Segments,
     lines_reversed,
 )
+from camtool.planning.engrave import run_together
 from camtool.planning.items import NO_STARTS, Chosen, Contours, Setting, Work
 from camtool.planning.naming import at_place, shortened_list, tool_name, width_name
 from camtool.planning.paths import joints, midpoints
@@ -89,6 +90,8 @@ def profile(chosen: Chosen, setting: Setting) -> Work:
     else:
         _each(chosen, closed, setting, found)
         found.findings += (_no_side(chosen, k, operation.side) for k in opens)
+    if not runs_beside(operation):
+        found.findings += run_together(chosen, setting)
     if operation.joins != "round":
         found.findings += shortened_list(list(_far(chosen, setting, found.lines)), CORNER_FAR_MORE)
     if operation.corners != "none":

@@ -29,7 +29,7 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import OptionError
 from camtool.geometry.boxes import box_pairs
 from camtool.geometry.distance import nearest
-from camtool.geometry.drawing import Drawing, Mark
+from camtool.geometry.drawing import Drawing, Mark, is_text
 from camtool.geometry.measure import path_extents, signed_areas
 from camtool.geometry.nesting import nesting
 from camtool.geometry.polylines import Polyline, Polylines, Segments
@@ -251,6 +251,9 @@ class Traits:
         if word in ("circle", "not circle"):
             found = circles(self._lines, rows)
             return found if word == "circle" else ~found
+        if word in ("text", "not text"):
+            text = np.array([is_text(source) for source in self._sources], dtype=np.bool_)
+            return text if word == "text" else ~text
         if word == "point":
             return np.zeros(len(rows), dtype=np.bool_)
         if word in ("outer", "inner"):

@@ -4,6 +4,7 @@ import re
 import tomllib
 from pathlib import Path
 
+import ezdxf
 import pytest
 
 from camtool.jobs.build import JobTables, build_job, read_job_file
@@ -116,3 +117,59 @@ def test_check_draws_what_is_cut(camtool: Run, tmp_path: Path, samples: Path) ->
     assert (tmp_path / "p.svg").read_bytes() == (tmp_path / "q.svg").read_bytes()
     assert b"--preview needs" in camtool(*check, "--preview", "r.svg").stderr
     assert not (tmp_path / "r.svg").exists()
+
+
+@pytest.fixture
+def labelled(tmp_path: Path) -> Path:
+    """A plate with a window, a hole and a text on one layer."""
+    drawing = ezdxf.new(units=4)
+    drawing.styles.add("A", font="arial.ttf")
+    space = drawing.modelspace()
+    space.add_lwpolyline([(0, 0), (100, 0), (100, 60), (0, 60)], close=True)
+    space.add_lwpolyline([(60, 25), (90, 25), (90, 45), (60, 45)], close=True)
+    space.add_circle((90, 10), 5)
+    text = space.add_text("BRASS 80", height=5.7, dxfattribs={"style": "A"})
+    text.set_placement((10, 45))
+    drawing.saveas(tmp_path / "plate.dxf")
+    return tmp_path / "plate.dxf"
+
+
+@pytest.mark.parametrize("mode", ["stroke", "outline"])
+@pytest.mark.parametrize("target", ["grbl", "linuxcnc"])
+def test_text_is_no_window(camtool: Run, labelled: Path, mode: str, target: str) -> None:
+    """Closed strokes and counters of letters are nothing to cut out, and take no tabs away."""
+    given = ("--text", mode)
+    tool = ("--tool-diameter", "3.175mm", "--thickness", "3mm", "-o", "job.toml")
+    begun = camtool("job", "new", labelled, *given, *tool)
+    assert begun.returncode == 0
+    if b"no outline font is installed" in begun.stderr:
+        pytest.skip("no outline font is installed")
+    whole = tomllib.loads((labelled.parent / "job.toml").read_text())
+    text, *others = whole["operations"]
+    assert (text["kind"], text["select"], text["depth"]) == ("engrave", ["text"], "0.2mm")
+    assert all("not text" in each["select"] for each in others)
+    assert [each["kind"] for each in others] == ["bore", "profile", "profile"]
+    assert "tabs" in others[-1]
+    done = camtool("post", labelled, "-t", target, *given, "--job", "job.toml", "-o", "a.nc",
+                   "--no-verify")  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    # Letters 5.7 mm high are too small for this tool, which is said with one that fits.
+    told = done.stderr.decode()
+    assert "LINES_RUN_TOGETHER" in told
+    assert re.search(r"take a tool of less than [01]\.\d+ mm", told)
+    assert "TEXT " in told.split("LINES_RUN_TOGETHER")[1].split("]")[0]
+    assert "GOUGE" not in told
+
+
+def test_text_that_is_cut_as_parts_is_named(camtool: Run, labelled: Path) -> None:
+    """Gouges alone say nothing of the text that they come from."""
+    cut = ("post", labelled, "-t", "grbl", "--tool-diameter", "3.175mm", "--depth", "1mm",
+           "-o", "-", "--no-verify")  # fmt: skip
+    told = camtool(*cut, "--text", "outline").stderr.decode()
+    if "no outline font is installed" in told:
+        pytest.skip("no outline font is installed")
+    assert "TEXT_AS_EDGE" in told
+    assert 'select = ["not text"]' in told
+    without = camtool(*cut, "--text", "outline", "--select", "not text")
+    assert without.returncode == 0, without.stderr
+    assert b"TEXT_AS_EDGE" not in without.stderr

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from camtool.errors import OptionError
+from camtool.findings import Finding, Severity
+from camtool.geometry.measure import sample
 from camtool.geometry.polylines import Polyline, Polylines
 from camtool.planning.engrave import engrave
 from camtool.planning.items import Chosen, Contour, Feeds, Setting
-from camtool.planning.job import Operation
+from camtool.planning.job import Operation, Tool
 from tests.oracles import contours as shapes
 
 PATHS = [shapes.SLOT, shapes.opened((0, 0), (5, 0, 1), (9, 0)), shapes.NOTCH]
@@ -61,3 +68,81 @@ def test_a_groove_has_no_side_to_climb_on(direction: str) -> None:
 
 def test_nothing_chosen_is_no_work() -> None:
     assert not len(engrave(chosen_of([]), setting_of()).items)
+
+
+def lines_at(*starts: tuple[float, float], along: tuple[float, float]) -> list[Polyline]:
+    """Lines from these places, all of one direction and length."""
+    return [shapes.opened(start, tuple(np.add(start, along))) for start in starts]
+
+
+def narrow(paths: list[Polyline], tool: Tool, depth: float = 0.5) -> list[Finding]:
+    operation = Operation(kind="engrave", tool=tool)
+    setting = Setting(operation, Feeds(100.0, 40.0), (-depth,), 5.0)
+    return list(engrave(chosen_of(paths), setting).findings)
+
+
+RING = Polyline(np.array([[-2.0, 0, 1], [2.0, 0, 1.0]]), closed=True)
+TRIANGLE = [shapes.opened((0, 0), (6, 0)), shapes.opened((6, 0), (3, 3 * math.sqrt(3.0))),
+            shapes.opened((3, 3 * math.sqrt(3.0)), (0, 0))]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("paths", "fits"),
+    [
+        (lines_at((0, 0), (0, 1.7), along=(10, 0)), 1.7),
+        # Beside each other in part, and slanted.
+        (lines_at((0, 0), (6, 1.3), along=(10, 2)), None),
+        ([RING], 4.0),
+        # The circle within a triangle that three lines make has the radius a / (2·√3).
+        (TRIANGLE, 6.0 / math.sqrt(3.0)),
+        ([shapes.SLOT], None),
+    ],
+)
+@given(share=st.floats(0.3, 3.0))
+@settings(max_examples=30)
+def test_lines_nearer_than_the_tool_is_wide_run_together(
+    paths: list[Polyline], fits: float | None, share: float
+) -> None:
+    """Shapely tells what a groove of the tool's width leaves: the ground between the lines is in
+    pieces, or none, when they run together."""
+    if fits is None:
+        fits = free_width(paths)
+    found = narrow(paths, Tool(share * fits))
+    if share <= 1.0:
+        assert found == []
+    elif share > 1.05:
+        (finding,) = found
+        assert finding.severity is Severity.WARNING
+        assert finding.measured == pytest.approx(share * fits)
+        assert finding.limit == pytest.approx(fits, rel=0.02)
+        assert narrow(paths, Tool(0.97 * (finding.limit or 0.0))) == []
+
+
+def free_width(paths: list[Polyline]) -> float:
+    """The least distance of two lines, or the widest disc in one that is closed, by dense
+    points."""
+    if len(paths) == 2:
+        one, other = (sample(path, 0.01) for path in paths)
+        return float(np.hypot(*(one[:, None] - other[None]).transpose(2, 0, 1)).min())
+    outline = shapely.Polygon(sample(paths[0], 0.01))
+    return 2.0 * float(shapely.length(shapely.maximum_inscribed_circle(outline)))
+
+
+def test_what_crosses_or_ends_beside_another_line_does_not_run_together() -> None:
+    cross = [shapes.opened((-5, 0), (5, 0)), shapes.opened((0, -5), (0, 5))]
+    assert narrow(cross, Tool(3.0)) == []
+    # The crossbar of a letter that is drawn a little beside its leg.
+    bar = [shapes.opened((0, -5), (0, 5)), shapes.opened((0.1, 0), (4, 0))]
+    assert narrow(bar, Tool(0.3)) == []
+    far = [shapes.opened((0, -5), (0, 5)), shapes.opened((1.0, 0), (4, 0))]
+    assert len(narrow(far, Tool(1.2))) == 1
+    assert narrow(far, Tool(0.0)) == []
+
+
+def test_a_v_bit_cuts_as_wide_as_it_is_deep() -> None:
+    paths = lines_at((0, 0), (0, 1.0), along=(10, 0))
+    bit = Tool(6.0, "v", math.radians(90.0), 0.1)
+    assert narrow(paths, bit, 0.4) == []  # 0.9 mm wide
+    (finding,) = narrow(paths, bit, 0.6)
+    assert finding.measured == pytest.approx(1.3)
+    assert "PATH 0 at" in str(finding.where)
