@@ -39,11 +39,18 @@ class Canon(PartMoves):
     def __init__(self, path: ToolpathBuilder, full_turn_rad: float) -> None:
         super().__init__(path, full_turn_rad)
         self.queue: list[Queued | Callable[[], None]] = []
+        self._events = 0
         self.nose: tuple[float, float] = (0.0, 0.0)
         """Where the controlled point of a lathe tool lies from the centre of its nose: X, Z."""
 
+    @property
+    def moves(self) -> int:
+        """Rows so far that are no events."""
+        return len(self.path) - self._events
+
     def event(self, kind: Kind, value: float | None = None) -> None:
         """A row of an event, when it is due."""
+        self._events += 1
         block = self.path.block
         if not self.queue:
             self.path.event(kind, value)

@@ -95,7 +95,9 @@ class Frames(State, ABC):
         self._replace()
 
     def _replace(self) -> None:
-        """The canon's coordinates are of the frame as it is now."""
+        """The canon's coordinates are of the frame as it is now, which the machine learns at
+        rest."""
+        self.come_to_rest()
         mm = self.canon.mm
         x, y, z = (each * mm for each in self._origin)
         dx, dy, dz = (each * mm for each in self._axis_offset)
@@ -286,6 +288,7 @@ class Frames(State, ABC):
     def _set_length(self, code: int, words: dict[str, float]) -> None:
         """G43, G43.1, G43.2, G49: the tip moves away from the point that was controlled."""
         self._not_while_compensating("another tool length")
+        self.come_to_rest()
         new = [0.0, 0.0, 0.0]
         mm = self.canon.mm
         if code == 430:

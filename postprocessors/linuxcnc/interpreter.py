@@ -25,6 +25,9 @@ from .state import MM_PER_INCH
 
 SPINDLE: Final = {3: Kind.SPINDLE_CW, 4: Kind.SPINDLE_CCW}
 
+OUTPUTS_AT_ONCE: Final = (64, 65, 68)
+"""The machine comes to rest before these; the others go with the next move."""
+
 INPUT_VALUE: Final = 5399
 """The parameter of what M66 has read."""
 
@@ -130,6 +133,8 @@ class Interpreter(Moves):
                 if words.get(needed, -1.0) < 0.0:
                     raise Fault(f"M{io} without {needed.upper()}", "m")
                 self._not_while_compensating("an output")
+                if io in OUTPUTS_AT_ONCE:
+                    self.come_to_rest()
                 self.notes.outputs.append(self.block_index)
         tool = m.get("tool")
         if tool == 6:
@@ -164,7 +169,7 @@ class Interpreter(Moves):
         if "e" in words and kind:
             raise Fault("M66 E reads at once, and has no L but L0", "l")
         self._not_while_compensating("M66")
-        self.canon.event(Kind.DWELL, 0.0)
+        self.come_to_rest()
         self.given.set_numbered(INPUT_VALUE, 0.0)
         self.notes.inputs.append(self.block_index)
 
@@ -198,6 +203,7 @@ class Interpreter(Moves):
         if self._cools:
             self.canon.event(kinds[code])
         else:
+            self.come_to_rest()
             self.notes.coolant.append(self.block_index)
 
     def _stop(self, code: int) -> None:

@@ -129,6 +129,8 @@ class State:
         self._set_here: set[int] = set()
         """Frames that the program has placed from where it stood."""
         self._homed: set[int] = set()
+        self._waited = 0
+        """So many moves are surely done."""
 
     # Parts that only some programs need
 
@@ -195,6 +197,12 @@ class State:
     def dwell(self, seconds: float) -> None:
         """Wait."""
         self.canon.event(Kind.DWELL, seconds)
+
+    def come_to_rest(self) -> None:
+        """Wait for the last move, where one is under way: what changes now counts behind it."""
+        if self.canon.moves > self._waited:
+            self.dwell(0.0)
+        self._waited = self.canon.moves
 
     def _tool_of(self, number: int, letter: str) -> Tool:
         """A tool of the table; where there is no table, any tool, of which nothing is known."""

@@ -154,7 +154,7 @@ def codes(path: Toolpath) -> list[tuple[str, Severity]]:
 def test_frames_that_the_program_places() -> None:
     text = "G54 G0 X1 Y0\nG10 L20 P2 X0 Y0 Z0\nG55 G0 X5\nG10 L2 P2 R90\nX7 Y0\nM2\n"
     path = read(text)
-    assert path.end[:3].round(9).tolist() == [[1, 0, 0], [6, 0, 0], [1, 7, 0]]
+    assert path.end[path.is_motion].round(9).tolist() == [[1, 0, 0], [6, 0, 0], [1, 7, 0]]
     assert codes(path) == []
 
 
@@ -165,8 +165,25 @@ def test_frames_that_only_the_machine_knows() -> None:
     assert finding.where == "block 2"
     known = "dialect.work_offsets_mm={G54=[10,0,0], G55=[30,5,0,90]}"
     path = read("G54 G0 X1\nG55 X2 Y0\nM2\n", known)
-    assert path.end[1].round(9).tolist() == [20, 7, 0]
+    assert path.end[path.is_motion][1].round(9).tolist() == [20, 7, 0]
     assert path.findings == ()
+
+
+@pytest.mark.parametrize(
+    ("words", "waits"),
+    [
+        *((word, True) for word in ("G55", "G92 X1", "G92.1", "G52 X1", "G43 H1", "G49")),
+        *((word, True) for word in ("G10 L2 P1 X1", "M8", "M64 P0", "M68 E0 Q1", "M66 P0")),
+        *((word, False) for word in ("G54", "G10 L2 P2 X1", "M62 P0", "M67 E0 Q1", "G20")),
+    ],
+)
+def test_the_machine_rests_before_what_changes_where_it_is(words: str, waits: bool) -> None:
+    """LinuxCNC's task waits for the motion before it sets an offset or switches coolant or an
+    output: the corner there is not rounded (emcTaskCheckPreconditions)."""
+    path = read(f"F9 G1 X1\n{words}\nG1 Y1\nM2\n", "dialect.work_offsets_mm={G55=[1,0,0]}")
+    assert (Kind.DWELL in path.kind.tolist()) == waits
+    alone = read(f"{words}\n{words}\nF9 G1 X1\nM2\n", "dialect.work_offsets_mm={G55=[1,0,0]}")
+    assert Kind.DWELL not in alone.kind.tolist()
 
 
 def test_offsets_move_the_frame() -> None:
@@ -267,7 +284,7 @@ def test_a_known_machine_zero_places_the_first_frame() -> None:
     zero = "controller.machine_zero_mm=[0,-2,0]"
     offset = "dialect.work_offsets_mm={G55=[7,0,0]}"
     path = read("G0 X1 Y1\nG55 G0 X1 Y1\nM2\n", zero, offset)
-    assert path.end[:2].tolist() == [[1, 1, 0], [8, -1, 0]]
+    assert path.end[path.is_motion].tolist() == [[1, 1, 0], [8, -1, 0]]
     assert codes(path) == []
     path = read("G0 X1 Y1\nG55 G0 X1 Y1\nM2\n", offset)
     assert codes(path) == [("linuxcnc.PLACE_UNKNOWN", Severity.ERROR)]
