@@ -173,12 +173,13 @@ def _tool_at(wire: Wire, left: Left, said: ToolAt, target: LoadedTarget) -> Tool
             agreed = click.confirm(f"{asked[0].upper()}{asked[1:]}?", err=True, default=False)
         if agreed:
             return tool_at
-    raise OptionError(
-        asked,
-        where="--tool-at",
-        mend=f"give --tool-at {tool_at} if so; else bring the tool to part zero first, then give "
-        "--tool-at zero",
-    )
+    mend = "bring the tool there, and give --tool-at zero"
+    if tool_at == "journal":
+        mend = (
+            "give --tool-at journal if it has stayed there; else bring it to part zero, and give "
+            "--tool-at zero"
+        )
+    raise OptionError(asked.partition(": ")[0], where="--resume", mend=mend)
 
 
 def _resumed(place: Path, data: bytes, target: LoadedTarget) -> Left:

@@ -332,6 +332,8 @@ def rest_of(
     """
     rows = np.flatnonzero(decoded.block >= first)
     blocks = int(decoded.block.max(initial=-1)) + 1
+    if first == blocks:
+        raise OptionError("nothing moves behind its last block", mend="it is finished")
     if not 0 <= first < blocks or not len(rows):
         raise OptionError(f"there is no block {first + 1}", mend=f"blocks are 1 to {blocks}")
     low, high = int(rows[0]), decoded.running

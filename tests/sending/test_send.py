@@ -30,6 +30,7 @@ from camtool.sending.prepare import consignment, digest, rest_of
 from camtool.target.registry import load_target
 from camtool.target.wire import port_fault
 from tests.postprocessors.grbl.test_wire import PROGRAM, Small
+from tests.sending.test_any_order import PROGRAMS, SETTINGS
 from tests.waiting import heard_from
 
 TARGET = load_target("grbl")
@@ -165,6 +166,8 @@ def test_the_rest_begins_above_the_place_and_makes_the_same_moves() -> None:
     assert np.allclose(moves.end[-1], place)
     with pytest.raises(OptionError, match="no block 900"):
         rest_of(whole, TARGET, 899)
+    with pytest.raises(OptionError, match="nothing moves behind its last block"):
+        rest_of(whole, TARGET, BLOCKS)  # all is done but its end
 
 
 def test_the_rest_of_arcs_and_dwells_says_which_block_is_done_when() -> None:
@@ -497,3 +500,34 @@ def test_nothing_is_written_over_a_question(program: Path) -> None:
         assert stream.getvalue() == ""
     signs.show()
     assert "s\r" in stream.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("target", "said"),
+    [
+        ("valcnc", "goes on from part zero; bring the tool there, and give --tool-at zero"),
+        (
+            "i8751",
+            "goes on from there; give --tool-at journal if it has stayed there",
+        ),
+    ],
+)
+def test_a_machine_that_says_no_place_is_not_gone_on_with_unasked(
+    tmp_path: Path, target: str, said: str
+) -> None:
+    settings = [each for each in SETTINGS[target] if "link." not in each]
+    loaded, file = load_target(target, settings=settings), tmp_path / "part"
+    file.write_bytes(PROGRAMS[target])
+    head = {"sha256": digest(PROGRAMS[target]), "machine": loaded.machine.digest, "target": target}
+    counts = {"sent": 2, "acknowledged": 2, "done": 2, "block": 4, "last": 4}
+    journal = Journal(Path(f"{file}.journal"), head)
+    journal.note((1.0, 2.0, 3.0), **counts)
+    journal.close("stopped", "", still=True, place=(1.0, 2.0, 3.0), **counts)
+    words = [word for setting in settings for word in ("--set", setting)]
+    line = command(str(file), "-t", target, *words, "--port", "/dev/null", "--yes", "--resume")
+    done = subprocess.run(
+        line, capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL
+    )
+    assert done.returncode == 2
+    assert "left at X1.000 Y2.000 Z3.000 by the simulation" in done.stderr
+    assert said in done.stderr
