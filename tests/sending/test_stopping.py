@@ -22,8 +22,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from camtool.arrays import Floats
+from camtool.sending.drive import Driver, Wish
 from camtool.sending.faults import Faults, Wired
 from camtool.sending.prepare import forecast_of
 from camtool.target.registry import LoadedTarget, load_target
@@ -31,6 +33,7 @@ from camtool.target.twin import Twin
 from camtool.target.wire import Conversation, Manner, State, Tell, Write
 from tests.feeding import ROOT, logo
 from tests.oracles.grbl_firmware import Sent, Switch, built, factory, played, source
+from tests.postprocessors.grbl.test_wire import Small
 from tests.sending.talking import Talking
 from tests.sending.test_any_order import PROGRAMS, SETTINGS
 from tests.sending.test_ends import hosted
@@ -61,12 +64,29 @@ class Work:
     home: bool = False
     before: bytes = b""
     paced: bool = False
+    checked: bool = True
     first: dict[str, list[bytes]] = field(default_factory=lambda: {"": []})
     way_mm: dict[str, float | None] = field(default_factory=lambda: {"": None})
     seconds: float = 20.0
 
     def loaded(self) -> LoadedTarget:
         return load_target(self.target, settings=self.settings)
+
+    def conversation(self) -> Conversation:
+        """One that nobody has begun; whoever sends has allowed the first packet."""
+        loaded = self.loaded()
+        wire: Any = loaded.target.wire()
+        manner = Manner(home=self.home, file=FILE if wire.opens_file else "", checked=self.checked)
+        if self.action == "send":
+            decoded = loaded.target.read(self.program, loaded.machine)
+            packets = wire.packets(self.program, loaded.machine, forecast_of(decoded, loaded))
+            packets = [structs.replace(packets[0], ask=""), *packets[1:]]
+            talk = wire.conversation(packets, loaded.machine, manner)
+        else:
+            values = {"feed": 300.0, **self.values}
+            talk = wire.command(self.action, loaded.machine, values, manner)
+        assert isinstance(talk, Conversation)
+        return talk
 
     def begun(self, line: Any = None) -> tuple[Talking, Twin]:
         """The conversation, and the machine that it is held with: its twin, or what is at the end
@@ -77,16 +97,8 @@ class Work:
         if self.before:
             twin.connected = twin.advance  # its board is not reset when the port is opened
             twin.receive(self.before, 0.0)
-        wire: Any = loaded.target.wire()
-        manner = Manner(home=self.home, file=FILE if wire.opens_file else "")
+        talk = self.conversation()
         twin.read_file = lambda name: self.program
-        if self.action == "send":
-            decoded = loaded.target.read(self.program, loaded.machine)
-            packets = wire.packets(self.program, loaded.machine, forecast_of(decoded, loaded))
-            talk = wire.conversation(packets, loaded.machine, manner)
-        else:
-            values = {"feed": 300.0, **self.values}
-            talk = wire.command(self.action, loaded.machine, values, manner)
         return Talking(talk, line or Wired(twin, paced=self.paced)), twin
 
 
@@ -269,7 +281,7 @@ def check(name: str, count: int) -> None:
 
 @pytest.mark.parametrize("name", sorted(WORKS))
 def test_a_stop_at_any_moment(name: str) -> None:
-    check(name, 12)
+    check(name, 6)
 
 
 @pytest.mark.slow
@@ -487,7 +499,17 @@ JOG = Work("grbl", "jog")
 HOME = Work("grbl", "home", choices=("homing=on",), at=(-150.0, -150.0, -150.0))
 
 
-@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP"])
+SLOW = pytest.mark.slow
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "SIGTERM",
+        "SIGTSTP",
+        *(pytest.param(each, marks=SLOW) for each in ("SIGINT", "SIGHUP", "SIGQUIT")),
+    ],
+)
 def test_every_signal_that_would_end_a_jog_stops_it(name: str) -> None:
     with at_work(["jog", "X150", "F30"], JOG) as it:
         it.signalled(name)
@@ -500,7 +522,7 @@ def test_every_signal_that_would_end_a_jog_stops_it(name: str) -> None:
         assert it.twin.slides.commanded_mm[0] < 149.0
 
 
-@pytest.mark.parametrize("name", ["SIGINT", "SIGHUP"])
+@pytest.mark.parametrize("name", ["SIGINT", pytest.param("SIGHUP", marks=SLOW)])
 def test_a_signal_resets_a_machine_that_homes(name: str) -> None:
     with at_work(["home"], HOME) as it:
         it.signalled(name)
@@ -510,7 +532,9 @@ def test_a_signal_resets_a_machine_that_homes(name: str) -> None:
         assert it.twin.slides.commanded_mm[2] < -1.0
 
 
-@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+@pytest.mark.parametrize(
+    "name", ["SIGHUP", *(pytest.param(each, marks=SLOW) for each in ("SIGINT", "SIGTERM"))]
+)
 def test_a_signal_stops_a_program(name: str, tmp_path: Path) -> None:
     program = tmp_path / "long.nc"
     program.write_bytes(PROGRAM)
@@ -607,6 +631,100 @@ def test_a_sighup_that_nohup_ignores_stops_nothing() -> None:
         assert b"!" not in it.sent
         it.signalled("SIGTERM")
         assert "stopped" in it.ended()
+
+
+# The driver, whatever fails around it.
+
+
+LINES = b"G21G90\nG1F500\n" + b"".join(b"X%d\n" % x for x in range(1, 150))
+SMALL = Work("grbl", "send", program=LINES, checked=False)
+
+
+class Recorded:
+    """A line to a grbl of few words, that fails where it is told to."""
+
+    def __init__(self, read: Callable[[], bytes | None] = lambda: None) -> None:
+        self.small, self.waiting, self.wrote, self.opens = Small(), list[bytes](), b"", 0
+        self._reads = read
+
+    def read(self, wait_s: float) -> bytes:
+        said = self._reads()
+        self.waiting += self.small.run(time.monotonic())
+        come, self.waiting = self.waiting, []
+        return b"".join(each + b"\r\n" for each in come) if said is None else said
+
+    def write(self, data: bytes) -> None:
+        self.wrote += data
+        self.waiting += self.small.write(data, time.monotonic())
+
+    def reopen(self, wait_s: float) -> None:
+        self.opens += 1
+        raise OSError("it is not there")
+
+    def close(self) -> None:
+        self.wrote += b"(closed)"
+
+
+@pytest.mark.parametrize(
+    "error", [BrokenPipeError(), RuntimeError("a fault"), KeyboardInterrupt()], ids=repr
+)
+@pytest.mark.parametrize("where", ["watch", "tell", "read"])
+def test_whatever_fails_around_a_conversation_stops_the_machine(
+    error: BaseException, where: str
+) -> None:
+    talk = SMALL.conversation()
+    failed: list[int] = []
+
+    def fail(what: Any = None) -> None:
+        if talk.acknowledged > 3 and not failed:
+            failed.append(1)
+            raise error
+
+    line = Recorded(fail if where == "read" else lambda: None)
+    driver = Driver(line)
+    if where == "tell":
+        driver.tell = lambda text: fail()
+        driver.wish = lambda: Wish.STOP if talk.acknowledged > 3 else None
+    elif where == "watch":
+        driver.watch = fail
+    if isinstance(error, OSError) and where != "read":
+        driver.carry(talk)
+        assert driver.trouble is not None
+    elif isinstance(error, OSError):  # of the port: nobody can be told anything
+        assert driver.carry(talk) is State.FAILED
+        assert "the port is gone" in talk.why
+        assert "it goes on with the lines that it has" in talk.why
+        return
+    else:
+        with pytest.raises(type(error)):
+            driver.carry(talk)
+    assert failed
+    assert talk.state is State.STOPPED
+    assert b"!" in line.wrote
+    assert line.wrote.endswith(b"\x18")
+    assert line.small.buffer == b""
+
+
+def test_a_second_stop_closes_the_port_when_all_is_written() -> None:
+    """Of a machine that does not say that it stands."""
+    line, talk = Recorded(), SMALL.conversation()
+    wishes, write = [Wish.STOP, Wish.CLOSE], line.small.write
+    line.small.write = lambda data, now: write(data, now) if len(wishes) == 2 else []  # type: ignore[method-assign]
+    driver = Driver(line, wish=lambda: wishes.pop(0) if talk.acknowledged > 3 and wishes else None)
+    assert driver.carry(talk) is State.FAILED
+    assert talk.why.startswith("camtool was ended before the machine said that it stands")
+    assert line.wrote.endswith(b"!?\x18(closed)")
+
+
+def test_a_port_that_does_not_come_back_holds_up_no_stop() -> None:
+    settings = ("dialect.format=stream", "link.echo=none", "link.reset=opening")
+    work = replace(WORKS["matlab-router cuts"], settings=settings)
+    talk, line = work.conversation(), Recorded()
+    line.small.write = lambda data, now: []  # type: ignore[method-assign]
+    driver = Driver(line, wish=lambda: Wish.STOP if line.opens > 1 else None, speed=1e6)
+    assert driver.carry(talk) is State.STOPPED
+    assert line.opens == 2
+    assert talk.done == 1
 
 
 # At a console.
@@ -861,7 +979,6 @@ def test_a_stop_of_the_firmware_at_any_moment(
 
 # The tables of docs/sending.md.
 
-LINES = b"G21G90\nG1F500\n" + b"".join(b"X%d\n" % x for x in range(1, 150))
 STATES = {
     "grbl jogs": (Work("grbl", "jog", {"x": 80.0, "feed": 500.0}), 4.0),
     "grbl homes": (WORKS["grbl homes"], 2.0),
@@ -873,7 +990,7 @@ STATES = {
     "pic-mmh jogs, homes or cuts": (WORKS["pic-mmh cuts"], 9.0),
     "linuxcnc jogs, homes or cuts": (WORKS["linuxcnc cuts, dwells and waits"], 1.0),
     "i8751 takes a packet": (replace(WORKS["i8751 cuts"], paced=True), 0.05),
-    "matlab-router takes a job": (WORKS["matlab-router cuts"], 0.05),
+    "matlab-router takes a job": (WORKS["matlab-router cuts"], 0.005),
 }
 """What the tables name by machine and state, and when it is stopped."""
 
