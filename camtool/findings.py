@@ -1707,6 +1707,11 @@ ABOVE_GATE_UNKNOWN = Sentence(
     "no error is known, because nothing was compared, so the limit is not met",
     "um",
 )
+ABOVE_GATE_GOUGED = Sentence(
+    Code.ABOVE_GATE,
+    "what stays is gouged by {measured:.2f} µm or more (see GOUGE); {limit:.2f} µm is allowed",
+    "um",
+)
 ABOVE_GATE_REVERSALS = Sentence(
     Code.ABOVE_GATE,
     "X and Y reverse {measured:once|# times} while cutting; {limit} are allowed",

@@ -12,7 +12,7 @@ Nothing here reads or writes a file.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path, PurePath
@@ -260,7 +260,7 @@ def _posted(
     del judged, whole  # the paths of the stages are not needed any more
     verification = _judged(program.data, decoded, target, goal, options, progress)
     figures = _timed(figures, written, goal, verification)
-    beyond = _beyond(verification, how.gates)
+    beyond = _beyond(verification, how.gates, findings)
     findings = _merged(findings, verification.findings, beyond, without=repeated)
     verification = verification.with_planning(figures, _before(plain))
     return replace(
@@ -595,13 +595,15 @@ def _stock(job: Job) -> PlannedStock | None:
     return PlannedStock(stock.thickness_mm, stock.corner_mm, stock.size_mm, stock.through_mm)
 
 
-def _beyond(verification: Verification, gates: Gates | None) -> tuple[Finding, ...]:
+def _beyond(
+    verification: Verification, gates: Gates | None, findings: Iterable[Finding] = ()
+) -> tuple[Finding, ...]:
     """A finding for each of the limits that is exceeded."""
     if gates is None:
         return ()
     from camtool.verification.report import gate_findings
 
-    return tuple(gate_findings(verification.report, gates))
+    return tuple(gate_findings(verification.report, gates, findings))
 
 
 def _compensated(wanted: Toolpath, machine: Machine) -> Compensated:

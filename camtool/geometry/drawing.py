@@ -154,7 +154,8 @@ class Drawing:
     are). `off_mm` (N, 2): the largest and the rms distance, mm, between the segment that leaves
     each vertex of `paths` and what was drawn there: curves to the arcs fitted to them, and all
     that was joined, merged, recognised or left out on reading; left out, zeros. `made_for`: the
-    scale of the part that it was read for (`ReadOptions.scale`). `used` counts the entities of
+    scale of the part that it was read for (`ReadOptions.scale`). `datum_off_mm`: how far all of it may
+    lie, in the work frame, from where the box of what was drawn would have put it. `used` counts the entities of
     each kind that became geometry; `skipped` the others, with the reason. `marks` are single
     points; a drawing of marks alone has no paths. `gaps` stay open, `closed_gaps` were bridged.
     `unchosen`: the closed contours that were left out by choice. `callouts`: its dimensions.
@@ -178,6 +179,7 @@ class Drawing:
     off_mm: Floats = field(default_factory=lambda: np.zeros((0, 2)))
     made_for: float = 1.0
     callouts: tuple[Callout, ...] = ()
+    datum_off_mm: float = 0.0
 
     def __post_init__(self) -> None:
         count = len(self.paths)

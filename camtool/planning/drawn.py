@@ -2,7 +2,8 @@
 
 A row stands for the lines of its operation that are nearest to it: a tool that runs beside a line
 has no other line nearer than that one. What was drawn lies off this line by as much as reading
-says (`Drawing.off_mm`), and so does the wall that the tool leaves from the one that it should.
+says (`Drawing.off_mm`), and so does the wall that the tool leaves from the one that it should; and
+all of it by as much as placing says (`Drawing.datum_off_mm`).
 
 The edge that a contour or a run cuts is the drawn line. Its size, and that of what is left of it:
 
@@ -96,6 +97,8 @@ def _off(
 
         made = CARVE_TOLERANCE_MM
     lines, of = step.chosen.lines, placed.off_mm
+    if placed.datum_off_mm:
+        of = of + placed.datum_off_mm
     if of.any() and lines.vertices is not placed.paths.vertices:
         of = of[_vertex_rows(placed.paths, step.chosen.source)]
     if not len(rows) or not of.any():

@@ -19,8 +19,16 @@ from camtool.arrays import Floats, Ints
 from camtool.errors import GeometryError, OptionError
 from camtool.findings import POINTS_MERGED, Finding, Severity
 from camtool.geometry.drawing import Drawing, Gap, Healing, Unchosen
-from camtool.geometry.measure import extents
-from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, encloses, without_repeats
+from camtool.geometry.measure import extents, segment_boxes
+from camtool.geometry.polylines import (
+    POSITION_EPS_MM,
+    SEGMENTS_AT_ONCE,
+    Polylines,
+    Segments,
+    encloses,
+    segment_rows,
+    without_repeats,
+)
 from camtool.planning.job import Job, Placement
 
 MOST_SIZE_MM = 1e5
@@ -83,9 +91,10 @@ def _placed(drawing: Drawing, job: Job) -> Drawing:
     placement = job.placement
     _refuse_too_many(drawing, placement)
     maps = placements(drawing, job)
-    if len(maps) == 1 and _is_identity(maps[0]):
+    off = datum_off(drawing, job, maps[0])
+    if len(maps) == 1 and _is_identity(maps[0]) and not off:
         return drawing
-    return _repeated(drawing, maps)
+    return replace(_repeated(drawing, maps), datum_off_mm=off)
 
 
 def placements(drawing: Drawing, job: Job) -> list[Map]:
@@ -128,14 +137,74 @@ def collapsed(drawing: Drawing, placed: Drawing, job: Job) -> list[Finding]:
 
 def _first_map(drawing: Drawing, job: Job) -> Map:
     """Mirror, rotation and scale about the drawing's zero."""
-    placement = job.placement
-    cosine, sine = _cosine_and_sine(placement.rotate_rad)
-    flip = np.diag([-1.0 if placement.mirror == axis else 1.0 for axis in ("x", "y")])
-    turned = Map(np.array([[cosine, -sine], [sine, cosine]]) @ flip, np.zeros(2), 1.0)
+    placement, turned = job.placement, _turned(job.placement)
     scale = placement.scale
     if placement.fit_mm is not None:
         scale = _fitting_scale(placement.fit_mm, _box(drawing, job, turned), drawing.file)
     return Map(scale * turned.matrix, turned.shift, scale)
+
+
+def _turned(placement: Placement) -> Map:
+    """Mirror and rotation about the drawing's zero."""
+    cosine, sine = _cosine_and_sine(placement.rotate_rad)
+    flip = np.diag([-1.0 if placement.mirror == axis else 1.0 for axis in ("x", "y")])
+    return Map(np.array([[cosine, -sine], [sine, cosine]]) @ flip, np.zeros(2), 1.0)
+
+
+# The box by which a drawing is placed and fitted is that of the arcs that stand for its curves. A
+# side of it lies off that of what was drawn by no more than the segments that reach so far do.
+
+
+def datum_off(drawing: Drawing, job: Job, placed: Map) -> float:
+    """Upper bound of the distance, mm in the work frame, of the drawing that is `placed` from
+    where the box of what was drawn would have put it; 0 where no box is asked for."""
+    placement = job.placement
+    by_box = placement.origin in ("lower-left", "centre")
+    if not (by_box or placement.fit_mm) or not drawing.off_mm.any():
+        return 0.0
+    turned = _turned(placement)
+    box, slack = _box(drawing, job, turned), _box_slack(drawing, job, turned)
+    if box is None:
+        return 0.0
+    off = far = 0.0
+    size = box[:, 1] - box[:, 0]
+    if placement.origin == "lower-left":
+        off, far = math.hypot(*slack[:, 0]), math.hypot(*size)
+    elif placement.origin == "centre":
+        off, far = 0.5 * math.hypot(*slack.sum(axis=1)), 0.5 * math.hypot(*size)
+    else:
+        far = math.hypot(*np.abs(box).max(axis=1))
+    if placement.fit_mm is not None:
+        room = np.array(placement.fit_mm)
+        asked = (room > 0.0) & (size > 0.0)
+        share = slack.sum(axis=1)[asked] / size[asked]
+        scales = room[asked] / size[asked]
+        least = scales.min() * (1.0 + share[scales.argmin()])
+        off += far * float(share[scales * (1.0 - share) <= least].max())
+    return float(placed.scale * off)
+
+
+def _box_slack(drawing: Drawing, job: Job, where: Map) -> Floats:
+    """(2, 2) how far each side of `_box` may lie from that of what was drawn, mm."""
+    paths, marks = taken(drawing, job)
+    lines, off = drawing.paths.select(paths), drawing.off_mm[:, 0]
+    if len(paths) < len(drawing.paths):
+        chosen = np.zeros(len(drawing.paths), dtype=np.bool_)
+        chosen[paths] = True
+        off = off[np.repeat(chosen, np.diff(drawing.paths.offsets))]
+    lines = Polylines(where.vertices(lines.vertices), lines.offsets, lines.closed)
+    low = np.full((3, 2), np.inf)  # of what is there, and of what may have been drawn
+    high = -low
+    every = segment_rows(lines)
+    for first in range(0, len(every), SEGMENTS_AT_ONCE):
+        rows = every[first : first + SEGMENTS_AT_ONCE]
+        boxes, about = segment_boxes(Segments.leaving(lines, rows)), off[rows][:, None]
+        low = np.minimum(low, [(boxes[:, :2] + k * about).min(axis=0) for k in (0, -1, 1)])
+        high = np.maximum(high, [(boxes[:, 2:] + k * about).max(axis=0) for k in (0, -1, 1)])
+    if marks:
+        points = where.points(np.array([drawing.marks[index].at_mm for index in marks]))
+        low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
+    return np.asarray(np.abs(np.array([low[1:] - low[0], high[1:] - high[0]])).max(axis=1).T)
 
 
 def _cosine_and_sine(angle_rad: float) -> tuple[float, float]:

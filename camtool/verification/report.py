@@ -25,9 +25,11 @@ from msgspec.structs import asdict
 
 from camtool.findings import (
     ABOVE_GATE,
+    ABOVE_GATE_GOUGED,
     ABOVE_GATE_REVERSALS,
     ABOVE_GATE_TIME,
     ABOVE_GATE_UNKNOWN,
+    Code,
     Finding,
 )
 from camtool.plain import one_line, to_json
@@ -490,7 +492,7 @@ class Report(msgspec.Struct, frozen=True):
         total = self.error_um.total
         return (
             f"{self.target}: {duration(self.time_s)}, {self.cutting_reversals} reversals",
-            f"predicted error {um(total.max)} µm at most, rms {um(total.rms)} µm{to_what(self)}",
+            f"predicted error {um(total.max)} µm at most, rms {um(total.rms)} µm{besides(self)}",
         )
 
     @property
@@ -544,10 +546,18 @@ class Gates:
     time_s: float | None = None
 
 
-def gate_findings(report: Report, gates: Gates) -> Iterator[Finding]:
-    """ABOVE_GATE for each limit that the report exceeds, or whose figure is not known."""
+def gate_findings(
+    report: Report, gates: Gates, findings: Iterable[Finding] = ()
+) -> Iterator[Finding]:
+    """ABOVE_GATE for each limit that the report, or a gouge among the findings of planning,
+    exceeds, or whose figure is not known."""
     if gates.error_mm is not None:
         yield from _error_gate(report.error_um.total.max, gates.error_mm * UM_PER_MM)
+        deep = gouged_mm(findings)
+        if deep > gates.error_mm:
+            yield ABOVE_GATE_GOUGED(
+                where="--max-error", measured=deep * UM_PER_MM, limit=gates.error_mm * UM_PER_MM
+            )
     count = report.cutting_reversals
     if gates.reversals is not None and count > gates.reversals:
         yield ABOVE_GATE_REVERSALS(where="--max-reversals", measured=count, limit=gates.reversals)
@@ -644,7 +654,7 @@ def facts(report: Report) -> Iterator[tuple[str, str]]:
     error = report.error_um.total
     yield (
         "error",
-        f"{um(error.max)} µm at most, rms {um(error.rms)}, p95 {um(error.p95)}{to_what(report)}",
+        f"{um(error.max)} µm at most, rms {um(error.rms)}, p95 {um(error.p95)}{besides(report)}",
     )
     yield "by source", _error_sources(report)
     if report.error_um.depth_max:
@@ -761,9 +771,31 @@ def _operation_words(operations: Sequence[PlannedOperation]) -> Iterator[str]:
         yield f"and {len(operations) - MOST_OPERATIONS} operations more"
 
 
-def to_what(report: Report) -> str:
-    """A remark on the reference of the errors where it is not the drawing, else ""."""
-    return "" if report.against == "drawing" else "; to the program's moves: no drawing is known"
+def besides(report: Report) -> str:
+    """Remarks on the largest error: its reference where it is not the drawing, and gouges, which
+    it does not count."""
+    words = "" if report.against == "drawing" else "; to the program's moves: no drawing is known"
+    gouges = [each for each in report.findings if each.code == Code.GOUGE.name]
+    if gouges:
+        deep = gouged_mm(gouges)
+        size = f" of {deep:.4g} mm or more" if deep else ""
+        words += f"; gouges{size} come on top (see GOUGE)"
+    return words
+
+
+def gouged_mm(findings: Iterable[Finding | FindingReport]) -> float:
+    """Lower bound of how deep the tool cuts into what stays, mm, by the findings GOUGE; 0 when
+    none says. Each has the distance from a wall that was found, and that which was needed."""
+    return max(
+        (
+            each.limit - each.measured
+            for each in findings
+            if each.code in (Code.GOUGE, Code.GOUGE.name)
+            and each.measured is not None
+            and each.limit is not None
+        ),
+        default=0.0,
+    )
 
 
 def _shape_words(shape: ShapeReport) -> str:

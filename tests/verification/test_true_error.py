@@ -17,6 +17,7 @@ from camtool.findings import Code
 from camtool.jobs.drawing import read_to_scale
 from camtool.pipeline import post_drawing
 from camtool.planning.job import Job, Tool, job_of
+from camtool.planning.place import place
 from camtool.run import Run
 from camtool.target.registry import load_target
 from tests.oracles.true_curves import distances, drawn, slides_cutting
@@ -139,6 +140,64 @@ def test_the_total_is_the_distance_from_the_true_curves(
     check(random_file(kind, 1, tmp_path), target, scale)
 
 
+PLACINGS: dict[str, dict[str, object]] = {
+    "lower-left": {"origin": "lower-left", "scale": 2.0},
+    "centre": {"origin": "centre", "mirror": "x"},
+    "turned": {"origin": "lower-left", "rotate_rad": 0.4},
+    "fit": {"fit_mm": (9.0, 0.0)},
+    "fit both": {"fit_mm": (12.0, 40.0), "origin": "lower-left", "rotate_rad": 0.5 * math.pi},
+    "fit centre": {"fit_mm": (0.0, 14.0), "origin": "centre", "rotate_rad": -1.1, "mirror": "y"},
+}
+
+
+def placed_truth(file: Path, placing: dict[str, object]) -> list[Floats]:
+    """The true curves where the box of what was drawn puts them."""
+    turn = float(placing.get("rotate_rad", 0.0))  # type: ignore[arg-type]
+    cosine, sine = math.cos(turn), math.sin(turn)
+    flip = {"x": (-1.0, 1.0), "y": (1.0, -1.0)}.get(str(placing.get("mirror")), (1.0, 1.0))
+    matrix = np.array([[cosine, -sine], [sine, cosine]]) @ np.diag(flip)
+    curves = [points @ matrix.T for points in drawn(file)]
+    low = np.concatenate(curves).min(axis=0)
+    high = np.concatenate(curves).max(axis=0)
+    scale = float(placing.get("scale", 1.0))  # type: ignore[arg-type]
+    if room := placing.get("fit_mm"):
+        sides = zip(room, (high - low).tolist(), strict=True)  # type: ignore[call-overload]
+        scale = min(side / size for side, size in sides if side)
+    zero = {"lower-left": low, "centre": 0.5 * (low + high)}.get(str(placing.get("origin")), 0.0)
+    return [scale * (points - zero) for points in curves]
+
+
+def check_placed(file: Path, target: str, placing: dict[str, object], *settings: str) -> None:
+    """The report's total is never below the distance from where the true box puts the curves."""
+    made = posted(file, target, job_of(**placing), *settings)
+    assert made.verification is not None, made.findings
+    assert made.decoded is not None
+    loaded = load_target(target, settings=[*(LARGE.format(axis) for axis in "xy"), *settings])
+    slides = slides_cutting(made.decoded, loaded.machine)
+    truth = 1000.0 * distances(slides, placed_truth(file, placing))
+    error = made.verification.report.error_um
+    assert error.total.max is not None
+    assert error.total.p95 is not None
+    assert truth.max() <= error.total.max + ORACLE_UM
+    assert float(np.quantile(truth, 0.95)) <= error.total.p95 * 1.005 + ORACLE_UM
+
+
+@pytest.mark.parametrize("placing", PLACINGS.values(), ids=PLACINGS)
+def test_placing_by_a_box_is_in_the_total(placing: dict[str, object], tmp_path: Path) -> None:
+    check_placed(random_file(".svg", 1, tmp_path), "grbl", placing)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(2, 10))
+@pytest.mark.parametrize("kind", WRITERS)
+@pytest.mark.parametrize("placing", PLACINGS.values(), ids=PLACINGS)
+@pytest.mark.parametrize("target", TARGETS)
+def test_placing_more_curves(
+    target: str, placing: dict[str, object], kind: str, seed: int, tmp_path: Path
+) -> None:
+    check_placed(random_file(kind, seed, tmp_path), target, placing)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2, 8))
 @pytest.mark.parametrize("scale", SCALES)
@@ -176,10 +235,13 @@ def test_the_tolerance_is_of_the_part_whatever_brings_it_to_its_size(tmp_path: P
     assert plain.program.data == other.program.data
     size = plain.verification.report.dimensions[0].nominal_mm
     fitted = made(job_of(fit_mm=(size, 0.0)))
-    for one in (other, fitted):
+    # The box of the arcs says the scale: that may be off by both of its sides.
+    placed = place(fitted.drawing, job_of(fit_mm=(size, 0.0)))
+    apart = {other: 0.0, fitted: 1000.0 * placed.datum_off_mm}
+    for one, more in apart.items():
         for name in ("fit", "total"):
             ours = getattr(one.verification.report.error_um, name).max
-            assert ours == pytest.approx(
+            assert ours - more == pytest.approx(
                 getattr(plain.verification.report.error_um, name).max, rel=0.05
             )
 
