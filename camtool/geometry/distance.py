@@ -41,6 +41,9 @@ NEAREST_SPARE = 1e-9
 PAIRS_AT_A_TIME = 1 << 18
 """How many pairs of segments `approach` holds at a time: it bounds the memory."""
 
+FEW_PAIRS = 256
+"""So few distances are computed one by one: an index of the segments would take longer."""
+
 
 class Nearest(Struct, frozen=True, eq=False):
     """For P points: `distance` (P,) mm to the nearest segment and its row, `segment` (P,)."""
@@ -100,7 +103,10 @@ def approach(a: Polyline, b: Polyline) -> Approach:
     """Where two paths come nearest to each other, and how near; 0 where they cross."""
     first, second = Segments.of(a), Segments.of(b)
     boxes, others = segment_boxes(first), segment_boxes(second)
-    from_vertices = nearest(a.vertices[:, :2], second).distance
+    if len(a.vertices) * len(second) <= FEW_PAIRS:
+        from_vertices = points_to_segments(a.vertices[:, :2], second).min(axis=1)
+    else:
+        from_vertices = nearest(a.vertices[:, :2], second).distance
     best = _approach(from_vertices, a.vertices[:, :2])
     step = max(1, PAIRS_AT_A_TIME // len(second))
     for begin in range(0, len(first), step):

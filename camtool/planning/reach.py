@@ -85,23 +85,30 @@ def unreached(region: Polylines, tool_radius_mm: float) -> list[Unreached]:
         return []
     reached = opened(region, tool_radius_mm)
     least = LEAST_FOOT * np.pi * tool_radius_mm**2
-    found = []
     parting = PARTING * math.sqrt(2.0 * tool_radius_mm * TOGETHER_MM)
-    for piece in regions(_without(region, reached, least, parting)):
-        area = float(signed_areas(piece).sum())
-        if area >= least:
-            found.append(Unreached(area, _far_place(piece, reached), piece))
+    pieces = regions(_without(region, reached, least, parting))
+    areas = [float(signed_areas(piece).sum()) for piece in pieces]
+    large = [(area, piece) for area, piece in zip(areas, pieces, strict=True) if area >= least]
+    places = _far_places([piece for _, piece in large], reached)
+    found = [Unreached(area, at, piece) for (area, piece), at in zip(large, places, strict=True)]
     return sorted(found, key=lambda piece: (-piece.area_mm2, piece.at_mm))
 
 
-def _far_place(piece: Polylines, reached: Polylines) -> tuple[float, float]:
-    """The vertex of the piece farthest from what is reached; its centre when nothing is."""
-    if len(reached) == 0:
-        x, y = extents(piece).mean(axis=1).tolist()
-        return x, y
-    points = piece.vertices[:, :2]
-    x, y = points[nearest(points, Segments.of(reached)).distance.argmax()].tolist()
-    return x, y
+def _far_places(pieces: Sequence[Polylines], reached: Polylines) -> list[tuple[float, float]]:
+    """The vertex of each piece farthest from what is reached; its centre when nothing is."""
+    if len(reached) == 0 or not pieces:
+        centres = [extents(piece).mean(axis=1).tolist() for piece in pieces]
+        return [(x, y) for x, y in centres]
+    points = np.concatenate([piece.vertices[:, :2] for piece in pieces])
+    away = nearest(points, Segments.of(reached)).distance
+    found = []
+    begin = 0
+    for piece in pieces:
+        end = begin + len(piece.vertices)
+        x, y = points[begin + int(away[begin:end].argmax())].tolist()
+        found.append((x, y))
+        begin = end
+    return found
 
 
 def _without(

@@ -17,6 +17,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator, Sequence
+from itertools import groupby
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -315,10 +317,13 @@ def _solid(kept: Kept, swept: Any, tolerance: float) -> Any:
     wide = (high_x - low_x) + (high_y - low_y)
     box = shapely.box(low_x - wide, low_y - wide, high_x + wide, high_y + wide)
     region = box if kept.beyond else shapely.Polygon()
-    for path, stays in zip(kept.lines, kept.stays.tolist(), strict=True):
-        segments = Segments.of(path)
-        ring = _chords(segments, np.zeros((len(segments), 2)), KEPT_SHARE * tolerance)
-        area = shapely.make_valid(shapely.Polygon(ring.points))
+    for stays, lines in groupby(zip(kept.stays.tolist(), kept.lines, strict=True), itemgetter(0)):
+        areas = []
+        for _, path in lines:
+            segments = Segments.of(path)
+            ring = _chords(segments, np.zeros((len(segments), 2)), KEPT_SHARE * tolerance)
+            areas.append(shapely.make_valid(shapely.Polygon(ring.points)))
+        area = shapely.union_all(areas)
         region = shapely.union(region, area) if stays else shapely.difference(region, area)
     return shapely.buffer(region, -kept.into_mm - KEPT_SLACK_MM)
 

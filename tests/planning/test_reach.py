@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camtool.errors import GeometryError
+from camtool.geometry.distance import nearest
 from camtool.geometry.measure import signed_areas
 from camtool.geometry.polylines import Polyline, Polylines, reverse, rotated
 from camtool.planning import reach
@@ -192,3 +193,28 @@ def test_a_letter() -> None:
     pieces = unreached(region_of(LETTER_B), 0.9)
     assert all(piece.area_mm2 < 0.9 for piece in pieces)
     assert 4 <= len(pieces) <= 12
+
+
+def test_many_pieces_are_looked_at_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each piece by itself would index all that is reached anew: quadratic in a halftone."""
+    calls = []
+
+    def counted(*arguments: object) -> object:
+        calls.append(arguments)
+        return nearest(*arguments)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(reach, "nearest", counted)
+    found, times = {}, {}
+    for count in (2, 12):
+        squares = [
+            Polyline(np.array([(x, 0, 0), (x + 4, 0, 0), (x + 4, 4, 0), (x, 4, 0.0)]), True)
+            for x in range(0, 5 * count, 5)
+        ]
+        calls.clear()
+        pieces = unreached(Polylines.of(squares), 1.0)
+        found[count], times[count] = len(pieces), len(calls)
+        # The corners: of each, the vertex farthest from what is reached.
+        corners = {(float(x), float(y)) for each in squares for x, y, _ in each.vertices.tolist()}
+        assert {(round(x, 6), round(y, 6)) for x, y in (p.at_mm for p in pieces)} == corners
+    assert found == {2: 8, 12: 48}
+    assert times[12] == times[2]
