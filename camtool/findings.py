@@ -644,17 +644,17 @@ class Code(IntEnum):
     )
     END_DIFFERS = (
         418,
-        (INFO, WARNING, ERROR),
-        "the program lacks its end, or the tool ends lower than it should; a remark where it "
+        (WARNING, ERROR),
+        "the program lacks its end, or the tool ends lower than it should; a warning where it "
         "ends at another place in XY",
         "end the program, with the tool up",
     )
     SETTING_DIFFERS = (
         419,
-        (INFO, ERROR),
+        (INFO, WARNING, ERROR),
         "moves cut with another tool or other coolant than the job asks for, the tool waits less "
-        "than it asks for, or corners are rounded farther than the machine file lets them "
-        "(`G64 P`)",
+        "than it asks for (longer is a warning in the stock, a remark in the air), or corners are "
+        "rounded farther than the machine file lets them (`G64 P`)",
         "post again; give `camtool verify` the flags of the post",
     )
     DRAWING_PLACE = (
@@ -699,6 +699,14 @@ class Code(IntEnum):
         "drawing and the other cuts along that contour have it: a lead on the wrong side, a link "
         "in the stock",
         "lead in from the other side, or lift before the link; none for reliefs of corners",
+    )
+    MOVES_CHANGED = (
+        426,
+        WARNING,
+        "the program has the blocks that camtool writes, and some of them end elsewhere by less "
+        "than the tolerance of this comparison: it was changed after it was posted, or posted by "
+        "another version",
+        "post again, unless the change is meant",
     )
     DIMENSION_UNBOUND = (
         501,
@@ -1747,6 +1755,13 @@ FEED_DIFFERS_OWN = Sentence(
     "mm_min",
     WARNING,
 )
+FEED_DIFFERS_IN_AIR = Sentence(
+    Code.FEED_DIFFERS,
+    "{moves:# move runs|# moves run} at a feed in the air, {measured:g} mm/min, where a rapid is "
+    "meant: slow, and harmless",
+    "mm_min",
+    WARNING,
+)
 SPINDLE_DIFFERS = Sentence(
     Code.SPINDLE_DIFFERS,
     "{moves:# move runs|# moves run} with {turning}, where {wanted} is asked for",
@@ -1775,6 +1790,12 @@ CLEARANCE_LOW_OWN = Sentence(
     "{measured:g} mm",
     "mm",
 )
+MOVES_CHANGED = Sentence(
+    Code.MOVES_CHANGED,
+    "{moves:# move ends|# moves end} elsewhere than in the program that camtool writes, by "
+    "{measured:.4g} mm at most; all others are the same",
+    "mm",
+)
 END_DIFFERS = Sentence(
     Code.END_DIFFERS,
     "the tool ends at Z {measured:g} mm, where Z {limit:g} mm is asked for",
@@ -1784,7 +1805,13 @@ END_DIFFERS_NO_END = Sentence(
     Code.END_DIFFERS, "the program has no block that ends it", severity=ERROR
 )
 END_DIFFERS_PLACE = Sentence(
-    Code.END_DIFFERS, "the tool ends at {end}; camtool would end at {wanted}", severity=INFO
+    Code.END_DIFFERS, "the tool ends at {end}; camtool would end at {wanted}", severity=WARNING
+)
+SETTING_DIFFERS_WAIT = Sentence(
+    Code.SETTING_DIFFERS,
+    "the tool stands still {where_it} for {measured:g} s at {places:# place|# places}, where "
+    "{limit:g} s is asked for",
+    "s",
 )
 SETTING_DIFFERS_TOOL = Sentence(
     Code.SETTING_DIFFERS,

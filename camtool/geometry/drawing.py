@@ -154,11 +154,12 @@ class Drawing:
     are). `off_mm` (N, 2): the largest and the rms distance, mm, between the segment that leaves
     each vertex of `paths` and what was drawn there: curves to the arcs fitted to them, and all
     that was joined, merged, recognised or left out on reading; left out, zeros. `made_for`: the
-    scale of the part that it was read for (`ReadOptions.scale`). `datum_off_mm`: how far all of it may
-    lie, in the work frame, from where the box of what was drawn would have put it. `used` counts the entities of
-    each kind that became geometry; `skipped` the others, with the reason. `marks` are single
-    points; a drawing of marks alone has no paths. `gaps` stay open, `closed_gaps` were bridged.
-    `unchosen`: the closed contours that were left out by choice. `callouts`: its dimensions.
+    scale of the part that it was read for (`ReadOptions.scale`). `datum_off_mm`: how far all of it
+    may lie, in the work frame, from where the box of what was drawn would have put it. `used`
+    counts the entities of each kind that became geometry; `skipped` the others, with the reason.
+    `marks` are single points; a drawing of marks alone has no paths. `gaps` stay open,
+    `closed_gaps` were bridged. `unchosen`: the closed contours that were left out by choice.
+    `callouts`: its dimensions.
     """
 
     paths: Polylines

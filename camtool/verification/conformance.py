@@ -35,7 +35,9 @@ from camtool.findings import (
     EXTRA_CUT_OTHER_DEPTH,
     EXTRA_CUT_PLUNGE,
     FEED_DIFFERS,
+    FEED_DIFFERS_IN_AIR,
     FEED_DIFFERS_OWN,
+    MOVES_CHANGED,
     SETTING_DIFFERS_COOLANT,
     SETTING_DIFFERS_COOLANT_UNASKED,
     SETTING_DIFFERS_CORNERS,
@@ -43,6 +45,7 @@ from camtool.findings import (
     SETTING_DIFFERS_NO_CORNERS,
     SETTING_DIFFERS_TOOL,
     SETTING_DIFFERS_TOOL_UNASKED,
+    SETTING_DIFFERS_WAIT,
     SPINDLE_DIFFERS,
     SPINDLE_DIFFERS_UNASKED,
     Code,
@@ -254,7 +257,24 @@ def compare_places(
         *_repeated_cuts(mine, other, alike, limits),
         *(other_way(there, turns) if len(turns) else other_way(back, turns_back)),
     )
+    findings = findings or tuple(_changed(mine.toolpath, other.toolpath))
     return PlaceComparison(findings, max(there.off_mm, back.off_mm), there.rows_along())
+
+
+def _changed(decoded: Toolpath, written: Toolpath) -> Iterator[Finding]:
+    """MOVES_CHANGED for the same moves as written, some of which end a little elsewhere."""
+    if not np.array_equal(decoded.kind, written.kind):
+        return
+    off = np.linalg.norm(decoded.end - written.end, axis=1)
+    arcs = np.flatnonzero(decoded.is_arc)
+    off[arcs] += np.linalg.norm(decoded.centre[arcs] - written.centre[arcs], axis=1)
+    rows = np.flatnonzero(decoded.is_motion & (off > POSITION_EPS_MM))
+    if len(rows):
+        yield MOVES_CHANGED(
+            where=block_name(decoded, int(rows[0])),
+            measured=float(off[rows].max()),
+            moves=len(rows),
+        )
 
 
 def _near_wanted(there: Compared, wanted: MoveIndex, limits: Limits) -> None:
@@ -399,9 +419,10 @@ def compare_settings(
 ) -> tuple[Finding, ...]:
     """Compare feeds, spindle, tool, coolant, corners, dwells, clearance and end; `pairs` (P, 2)
     are rows of both sides that lie on each other, besides those that are alike."""
-    both = _Both.of(mine, other, alike, pairs)
+    both = _Both.of(mine, other, alike, pairs, asked.limits_mm)
     return (
         *_feeds(both, asked),
+        *_feeds_in_air(mine.toolpath, other.toolpath),
         *_spindle(both),
         *_tools(both),
         *_coolant(both),
@@ -422,9 +443,10 @@ class _Both(Struct, frozen=True, eq=False):
     pairs: Ints
 
     @classmethod
-    def of(cls, mine: Side, other: Side, alike: Alike, pairs: Ints) -> _Both:
-        """The given pairs, all rows that are alike, and each plunge that is not alike with every
-        written plunge."""
+    def of(cls, mine: Side, other: Side, alike: Alike, pairs: Ints, limits: Limits) -> _Both:
+        """The given pairs, all rows that are alike, each plunge that is not alike with every
+        written plunge, and each cut without any of these with the written moves at its middle,
+        whatever their direction."""
         at_work, there = mine.cuts.is_cut | mine.plunges, other.cuts.is_cut | other.plunges
         rows, written = np.flatnonzero(at_work), np.flatnonzero(there)
         # One of several written rows that are alike, with the same settings, is enough.
@@ -441,7 +463,15 @@ class _Both(Struct, frozen=True, eq=False):
         plunges = written[other.plunges[written]]
         feeds = plunges[np.unique(other.toolpath.feed[plunges], return_index=True)[1]]
         entered = np.column_stack([np.repeat(lone, len(feeds)), np.tile(feeds, len(lone))])
-        return cls(mine.toolpath, other.toolpath, rows, np.concatenate([same, pairs, entered]))
+        paired = np.concatenate([same, pairs, entered])
+        alone = np.flatnonzero(mine.cuts.is_cut & ~np.isin(np.arange(len(at_work)), paired[:, 0]))
+        segment = mine.cuts.first[alone].astype(np.int64)
+        middle = point_at(mine.cuts.segments, segment, np.full(len(alone), 0.5))
+        z = mine.cuts.heights(segment).mean(axis=1)
+        point, move, _ = other.moves.within(middle, z, limits)
+        beside = np.column_stack([alone[point], other.cuts.row[move]])
+        every = np.concatenate([paired, np.unique(beside, axis=0)])
+        return cls(mine.toolpath, other.toolpath, rows, every)
 
     def unlike(self, same: Bools) -> tuple[Ints, Ints]:
         """Rows without a pair that is the `same` (P,), each with the written row of one pair."""
@@ -501,6 +531,25 @@ def _feeds(both: _Both, asked: Asked) -> Iterator[Finding]:
                 limit=both.written.feed[of][which][0],
                 moves=int(which.sum()),
             )
+
+
+def _feeds_in_air(decoded: Toolpath, written: Toolpath) -> Iterator[Finding]:
+    """FEED_DIFFERS, a warning, for moves at a feed where a rapid was written."""
+    rapids = np.flatnonzero(written.kind == Kind.RAPID)
+    feeds = np.flatnonzero(written.is_feed)
+    lines = np.flatnonzero(decoded.is_feed & ~decoded.is_arc)
+    both = [(written, rapids), (written, feeds), (decoded, lines)]
+    places = [np.column_stack([each.starts_of(rows), each.end[rows]]) for each, rows in both]
+    whole = np.rint(np.concatenate(places) / POSITION_EPS_MM).astype(np.int64)
+    number = np.unique(whole, axis=0, return_inverse=True)[1].reshape(-1)
+    rapid, feed, line = np.split(number, np.cumsum([len(rapids), len(feeds)]))
+    rows = lines[np.isin(line, np.setdiff1d(rapid, feed))]
+    if len(rows):
+        yield FEED_DIFFERS_IN_AIR(
+            where=block_name(decoded, int(rows[0])),
+            measured=decoded.feed[rows[0]],
+            moves=len(rows),
+        )
 
 
 def _slant(toolpath: Toolpath) -> Floats:
@@ -596,7 +645,8 @@ def _corner_tolerances(toolpath: Toolpath) -> Floats:
 
 
 def _dwells(decoded: Toolpath, written: Toolpath, asked: Asked) -> Iterator[Finding]:
-    """SETTING_DIFFERS where the tool dwells for less than was asked."""
+    """SETTING_DIFFERS where the tool dwells for less than was asked, and where it dwells for
+    longer: a warning in the stock, where it rubs, else a remark."""
     wanted, found = (np.flatnonzero(each.kind == Kind.DWELL) for each in (written, decoded))
     limits = np.array([asked.limits_mm[0], asked.limits_mm[0], asked.limits_mm[1]])
     short = []
@@ -613,6 +663,39 @@ def _dwells(decoded: Toolpath, written: Toolpath, asked: Asked) -> Iterator[Find
             limit=written.value[row],
             places=len(short),
         )
+    yield from _waits(decoded, written, found, wanted, limits)
+
+
+def _waits(
+    decoded: Toolpath, written: Toolpath, found: Ints, wanted: Ints, limits: Floats
+) -> Iterator[Finding]:
+    """SETTING_DIFFERS where the tool dwells for longer than was asked; `found` and `wanted` are
+    the rows of dwells."""
+    one, other = found, wanted
+    longer: dict[bool, list[tuple[int, float, float]]] = {True: [], False: []}
+    seen: set[int] = set()
+    for row in one.tolist():
+        if row in seen:
+            continue
+        here = one[(np.abs(decoded.end[one] - decoded.end[row]) <= limits).all(axis=1)]
+        seen.update(here.tolist())
+        waited = float(decoded.value[here].sum())
+        near = (np.abs(written.end[other] - decoded.end[row]) <= limits).all(axis=1)
+        asked = float(written.value[other[near]].sum())
+        if waited > asked + DWELL_S:
+            deep = bool(decoded.end[row, 2] < STOCK_TOP_MM - limits[2])
+            longer[deep].append((row, waited, asked))
+    for deep, places in longer.items():
+        if places:
+            row, waited, asked = places[0]
+            yield SETTING_DIFFERS_WAIT(
+                severity=Severity.WARNING if deep else Severity.INFO,
+                where=f"{block_name(decoded, row)} at {at_point(decoded.end[row])}",
+                measured=waited,
+                limit=asked,
+                places=len(places),
+                where_it="in the stock" if deep else "in the air",
+            )
 
 
 def _clearance(mine: Side, other: Side, alike: Alike, asked: Asked) -> Iterator[Finding]:

@@ -195,7 +195,7 @@ def _records(whole: Whole, kind: str, random: Random) -> bytes | None:
     if kind in ("shifted", "turned"):
         at = random.choice(moves)
         block = bytearray(blocks[at])
-        places = list(_motors(block))
+        places = list(motors(block))
         if not places:
             return None
         place = random.choice(places)
@@ -213,7 +213,7 @@ def _records(whole: Whole, kind: str, random: Random) -> bytes | None:
     return None if done is None else b"".join(done)
 
 
-def _motors(block: bytearray) -> list[int]:
+def motors(block: bytearray) -> list[int]:
     """Where the motors that move begin in a record: X, Y, a wait, Z, a wait."""
     places, at = [], block.index(0x01)
     for motor in (1, 2, 0, 3, 0):

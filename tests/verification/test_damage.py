@@ -6,6 +6,7 @@ own errors.
 """
 
 import math
+import re
 from collections import Counter
 from functools import cache
 from pathlib import Path
@@ -15,14 +16,14 @@ import numpy as np
 import pytest
 
 from camtool.errors import CamtoolError, ProgramError
-from camtool.findings import Severity, worst
+from camtool.findings import Code, Severity, worst
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.polylines import Polyline
 from camtool.pipeline import post_drawing, verify_program
 from camtool.planning.job import Job, job_of
 from camtool.target.registry import LoadedTarget, load_target
 from tests.drawings import drawing_of
-from tests.fuzz.program_damage import KINDS, Whole, damaged
+from tests.fuzz.program_damage import KINDS, MOTION, Whole, damaged, motors
 from tests.oracles.changed import makes_a_difference
 
 SAMPLE = Path(__file__).parents[2] / "samples" / "i8751-sample.toml"
@@ -146,6 +147,100 @@ def _changed(before: bytes, after: bytes) -> str:
     )
     low = max(at - 30, 0)
     return f"{before[low : at + 40]!r} became {after[low : at + 40]!r}"
+
+
+# Damage that spoils no part, or perhaps not: a warning at least.
+
+
+@pytest.mark.parametrize("kind", ["home deleted", "home at a feed", "retract at a feed"])
+@pytest.mark.parametrize("name", ["grbl", "linuxcnc", "flashcut"])
+def test_what_spoils_no_part_is_a_warning(name: str, kind: str) -> None:
+    """In the dialects that say a rapid: others have no word for these."""
+    whole = sound(name)[0]
+    text = whole.data.decode()
+    blocks = text.splitlines(keepends=True)
+    feed = "G01" if name == "flashcut" else "G1"
+    moving = [k for k, block in enumerate(blocks) if MOTION.match(block)]
+    if kind == "retract at a feed":
+        up = [k for k in moving if re.match(r"G0?0 Z(?!-)", blocks[k])]
+        at = Random(name).choice(up[1:])
+        after = [*blocks[:at], re.sub("0 Z", "1 Z", blocks[at]), *blocks[at + 1 :]]
+    else:
+        at = max(k for k in moving if re.search("X", blocks[k]))
+        home = "" if kind == "home deleted" else re.sub("^(G0?0 )?", f"{feed} ", blocks[at])
+        after = [*blocks[:at], home, *blocks[at + 1 :]]
+    new = _new_findings(name, "".join(after).encode())
+    assert max(severity for _, severity in new) == Severity.WARNING, new
+
+
+def _new_findings(name: str, data: bytes) -> list[tuple[Code, Severity]]:
+    """Code and severity of what `verify --against` says of a program, and not of the sound one."""
+    said = []
+    whole, drawing, job = sound(name)
+    for each in (whole.data, data):
+        run = verify_program(each, whole.target, source="damaged", drawing=drawing, job=job)
+        said.append(Counter((finding.code, finding.severity) for finding in run.findings))
+    return list((said[1] - said[0]).elements())
+
+
+LEAST = {
+    "grbl": (r"(?<=\nX)\d+\.\d{3}", 0.001),
+    "linuxcnc": (r"(?<=\nX)\d+\.\d{3}", 0.001),
+    "flashcut": (r"(?<=\nG01 X)\d+\.\d+", 0.001),
+}
+"""A coordinate of a cut, and the least by which it can differ."""
+
+
+@pytest.mark.parametrize("name", LEAST)
+def test_the_last_digit_of_a_cut_is_a_warning(name: str) -> None:
+    text, (what, by) = sound(name)[0].data.decode(), LEAST[name]
+    place = Random(name).choice(list(re.finditer(what, text)))
+    other = f"{float(place[0]) + by:.3f}"
+    data = (text[: place.start()] + other + text[place.end() :]).encode()
+    assert (Code.MOVES_CHANGED, Severity.WARNING) in _new_findings(name, data)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_bytes_of_packets_are_reported(seed: int) -> None:
+    """Of the 8751: a motor by one step, and a wait where none is."""
+    whole, random = sound("i8751")[0], Random(seed)
+    listing = whole.target.target.listing(whole.data, whole.target.machine)  # type: ignore[attr-defined]
+    blocks = [bytearray.fromhex(block) for block in listing.blocks]
+    records = [k for k, block in enumerate(blocks) if len(block) > 6 and list(motors(block))]
+    for change in ("step", "wait"):
+        done = [bytearray(block) for block in blocks]
+        block = done[random.choice(records[len(records) // 4 : -len(records) // 4])]
+        if change == "step":
+            block[random.choice(list(motors(block))) + 3] ^= 1
+        else:
+            block[12 if block[-1] != 0x45 else len(block) - 2] = random.choice((1, 16, 240))
+        try:
+            new = _new_findings("i8751", b"".join(map(bytes, done)))
+        except ProgramError:
+            continue
+        assert max((severity for _, severity in new), default=Severity.INFO) >= Severity.WARNING
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_speed_of_one_slave_is_reported(seed: int) -> None:
+    """Of the router, also where the job names no feed."""
+    whole, drawing, job = sound("matlab-router")
+    unasked = job_of(tool_diameter_mm=2.0)
+    posted = post_drawing(drawing, unasked, whole.target, check=False).program
+    assert posted is not None
+    for data, asked in ((whole.data, job), (posted.data, unasked)):
+        text, random = data.decode(), Random(seed)
+        table = random.choice(list(re.finditer(r"velxy = \[\n([^\]]*)\];", text)))
+        speeds = [each for each in re.finditer(r"-?\d+", table[1]) if abs(int(each[0])) > 60]
+        speed = random.choice(speeds)
+        slower = int(speed[0]) + (-40 if int(speed[0]) > 0 else 40)
+        at = table.start(1) + speed.start()
+        other = text[:at] + str(slower) + text[at + len(speed[0]) :]
+        found = verify_program(
+            other.encode(), whole.target, source="damaged", drawing=drawing, job=asked
+        ).findings
+        codes = {Code.FEED_DIFFERS, Code.EXTRA_CUT, Code.CONTOUR_MISSING}
+        assert codes & {each.code for each in found if each.severity >= Severity.WARNING}
 
 
 @pytest.mark.parametrize("name", CASES)
