@@ -75,6 +75,9 @@ SIGNS: Final = {",": "a decimal comma", "#": "a parameter", "%": "a %", "[": "an
 NONE, NON_MODAL, MOTION, LENGTH = range(4)
 """What uses the coordinates of a block."""
 
+PROBES: Final = 140
+"""The motion of G38.2; those of G38.3 to G38.5 follow."""
+
 MODAL: Final = {
     **{code: ("plane", code) for code in (17, 18, 19)},
     **{code: ("feed mode", code) for code in (93, 94)},
@@ -275,7 +278,10 @@ class Parser:
             block.once = f"G{whole}" + (".1" if hundredths else "")
             return "one block"
         if whole == 38:
-            raise Fault("G38 probes, which cannot be simulated", at)
+            self._use(block, MOTION, at)
+            if hundredths not in (20, 30, 40, 50):
+                raise error(20, at, name)
+            return self._probe_word(block, hundredths, at)
         if whole in (43, 49):
             self._use(block, LENGTH, at)
             if whole == 43 and hundredths != 10:
@@ -302,6 +308,10 @@ class Parser:
         elif group == "work frame":
             modes.frame = value
         return group
+
+    def _probe_word(self, block: Block, hundredths: int, at: int) -> str:
+        """Set what G38.2 to G38.5 say; its group."""
+        raise Fault("G38 probes, which cannot be simulated", at)
 
     def _plain_g_word(self, block: Block, whole: int, name: str, at: int) -> tuple[str, int]:
         """The group of a G word without decimals, and what it sets."""
@@ -369,6 +379,8 @@ class Parser:
                     raise error(22, None, mend="write F first")
                 if modes.motion == 1:
                     block.uses = MOTION if axes else NONE
+                elif modes.motion >= PROBES:
+                    self._check_probe(target, axes)
                 else:
                     centre = self._arc(block, target, axes, mm, unused)
         unused -= set("NF") if jogs else set("NFST")
@@ -381,6 +393,12 @@ class Parser:
             self._jog(block, target, feed)
         else:
             self._execute(block, target, centre, feed)
+
+    def _check_probe(self, target: list[float], axes: list[int]) -> None:
+        if not axes:
+            raise error(26, None, "a probing move", "write a coordinate of its end")
+        if target == self.position:
+            raise error(33, None, "a probing move that ends where it starts")
 
     def _feed_of(self, block: Block, mm: float, *, jogs: bool) -> float:
         """The feed of the block: mm/min, or in G93 turns of its move a minute."""
@@ -491,10 +509,10 @@ class Parser:
         """A line at its own feed, which changes no mode."""
         if block.groups - {"distance", "units", "one block"} or block.once not in ("", "G53"):
             raise error(16, block.at.get("G"))
-        if block.uses != MOTION:
-            raise error(16, None)
         self.notes.jogs.append(self.index)
-        if feed == 0.0:
+        if block.uses == NONE:  # its coordinates are those with which it begins a block: 0
+            target = list(self._zero)
+        elif feed == 0.0:
             raise error(22, None)
         self._go(Kind.LINE, target, feed)
 

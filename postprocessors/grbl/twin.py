@@ -1,17 +1,21 @@
 """A grbl 1.1 at the other end of its serial line, as docs/wires/grbl.md describes it.
 
-Bytes above 0x7F and `?`, `!`, `~`, 0x18 act at once; all others go to the receive buffer and from
-there, line by line, to the parser. A line is answered when it is *planned*: where the ring of
-blocks is full the parser waits, and the receive buffer fills. Blocks become steps by the model of
-the controller, and are planned anew with each that comes, as in grbl: a sender that is too slow
-costs speed, never steps.
+Bytes above 0x7F and `?`, `!`, `~`, 0x18 set flags at once; all others go to the receive buffer and
+from there, line by line, to the parser. The main program is one generator that yields where grbl's
+waits: None until something happens, or a time until which it is in a delay and looks at no flag. A
+line is answered when it is *planned*: where the ring of blocks is full the parser waits, and the
+receive buffer fills. Blocks become steps by the model of the controller, and are planned anew with
+each that comes, as in grbl: a sender that is too slow costs speed, never steps.
+
+Places on the machine are those that grbl counts in its own steps; `_origin` is where its zero lies
+among the steps of the slides, which homing and a new start of the board change.
 """
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Callable, Generator
-from itertools import pairwise
+from collections.abc import Generator, Mapping, Sequence
 from typing import Any, Final, Literal
 
 import msgspec
@@ -19,7 +23,7 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from camtool.arrays import Floats, Ints
+from camtool.arrays import Bools, Floats, Ints
 from camtool.machine.model import Machine
 from camtool.simulation.legs import coded_steps_mm
 from camtool.simulation.speed_plan import FROM_REST, allowed_along, axis_limits
@@ -30,10 +34,8 @@ from camtool.toolpath.moves import Kind, Toolpath
 from ..gcode.faults import Fault
 from .controller import (
     ALWAYS_ON,
-    COOLANT,
+    LEAST_SPEED_MM_S,
     NO_BLOCKS,
-    SPINDLE,
-    WAITS,
     blocks_from,
     dwell_s,
     joined,
@@ -41,17 +43,19 @@ from .controller import (
     stops_of,
 )
 from .dialect import Dialect, GrblController
-from .parser import Notes, Parser
+from .parser import LENGTH, MM_PER_INCH, MOTION, PROBES, Block, Modes, Notes, Parser
 from .steps import step_lines_fill
 
 RX_BYTES: Final = 128
 """The receive buffer (RX_BUFFER_SIZE, serial.h); what comes beyond it is lost without a word."""
 
-BANNER: Final = b"\r\nGrbl 1.1h ['$' for help]\r\n"
+BANNER: Final = "\r\nGrbl 1.1h ['$' for help]\r\n"
 """What it says when it begins."""
 
-LOCKED: Final = b"[MSG:'$H'|'$X' to unlock]\r\n"
-"""What it says besides while it is locked."""
+BUILD: Final = "1.1h.20190830"
+"""Its version in `$I` (grbl.h)."""
+
+HELP: Final = "[HLP:$$ $# $G $I $N $x=val $Nx=line $J=line $SLP $C $X $H ~ ! ? ctrl-x]\r\n"
 
 STATUS, HOLD, RESUME, RESET = ord("?"), ord("!"), ord("~"), 0x18
 DOOR, JOG_CANCEL = 0x84, 0x85
@@ -66,14 +70,62 @@ RAPID_OVERRIDES: Final = {0x95: 100, 0x96: 50, 0x97: 25}
 SPINDLE_OVERRIDES: Final = {0x99: None, 0x9A: 10, 0x9B: -10, 0x9C: 1, 0x9D: -1}
 """What real-time bytes add to the override of the spindle, in percent; None: 100 % again."""
 
+SPINDLE_STOP, TOGGLE_FLOOD, TOGGLE_MIST = 0x9E, 0xA0, 0xA1
+"""Real-time bytes that stop the spindle of a held machine, and switch its coolant."""
+
 LEAST_OVERRIDE, MOST_OVERRIDE = 10, 200
 """Overrides of feed and spindle stay between these, in percent (config.h)."""
 
-ABORTED: Final = 3
-"""The alarm of a reset while something moves (alarm_codes_en_US.csv)."""
+HARD_LIMIT, SOFT_LIMIT, ABORTED = 1, 2, 3
+PROBE_TOUCHES, PROBE_MISSED = 4, 5
+HOMING_RESET, HOMING_DOOR, HOMING_STUCK, HOMING_MISSED = 6, 7, 8, 9
+"""Alarms (alarm_codes_en_US.csv)."""
 
-CODES: Final = {"locked": 9, "not idle": 8, "statement": 3, "number": 2, "homing": 5}
-"""grbl's codes for lines with $ that cannot be done, and for lines while it is locked."""
+OK, BAD_NUMBER, BAD_STATEMENT, NEGATIVE, NO_HOMING = 0, 2, 3, 4, 5
+SHORT_PULSE, READ_FAILED, NOT_IDLE, LOCKED, NO_SOFT_LIMITS = 6, 7, 8, 9, 10
+TOO_LONG, BEYOND_TRAVEL = 11, 15
+"""Answers to lines that its parser does not give (error_codes_en_US.csv)."""
+
+ALARM_S: Final = 0.5
+"""It waits so long after it has said an alarm (`report_alarm_message`)."""
+
+DWELL_STEP_S: Final = 0.05
+"""It looks at its flags so often in a dwell (DWELL_TIME_STEP)."""
+
+DOOR_SPINDLE_S, DOOR_COOLANT_S = 4.0, 1.0
+"""What comes back after the door was open (SAFETY_DOOR_…_DELAY, config.h)."""
+
+SEGMENT_S: Final = 0.01
+"""The length of a piece of a block (ACCELERATION_TICKS_PER_SECOND, config.h)."""
+
+SEGMENTS: Final = 5
+"""The steps of so many pieces are fixed already: a hold or another override begins behind them
+(SEGMENT_BUFFER_SIZE − 1, stepper.h)."""
+
+SEARCH, LOCATE = 1.5, 5.0
+"""How far homing searches: times the travel, then times the pull-off (limits.c)."""
+
+INCHES_PER_MM: Final = 0.0393701
+"""As it stands in nuts_bolts.h."""
+
+WORDS: Final = {None: "M5", Kind.SPINDLE_CW: "M3", Kind.SPINDLE_CCW: "M4"}
+
+TEXT_BYTES: Final = 80
+"""A line in its memory (LINE_BUFFER_SIZE)."""
+
+START_LINES: Final = 2
+"""`$N0` and `$N1` (N_STARTUP_LINE)."""
+
+FRAMES: Final = 6
+"""G54 to G59."""
+
+WHOLE: Final = (0, 1, 2, 3, 10, 23, 26)
+SWITCHES: Final = (4, 5, 6, 13, 20, 21, 22, 32)
+REALS: Final = (11, 12, 24, 25, 27, 30, 31)
+"""Settings that belong to no axis: bytes, bits, and floats."""
+
+RPM: Final = (30, 31)
+"""They are shown without decimals."""
 
 AXIS_SETTINGS: Final = {
     100: "coded_step_mm",
@@ -83,40 +135,55 @@ AXIS_SETTINGS: Final = {
 }
 """Settings of X and their keys in a machine file; Y and Z follow."""
 
-PULL_OFF_MM: Final = 1.0
-"""How far homing goes back from the switches ($27, defaults.h)."""
+DEFAULTS: Final = {
+    0: 10.0,
+    1: 25.0,
+    10: 1.0,
+    11: 0.01,
+    12: 0.002,
+    24: 25.0,
+    25: 500.0,
+    26: 250.0,
+    27: 1.0,
+    30: 1000.0,
+    100: 250.0,
+    110: 500.0,
+    120: 10.0,
+    130: 200.0,
+}
+"""Those that are not 0 (DEFAULTS_GENERIC, defaults.h)."""
 
-SEEK_MM_S: Final = 500.0 / 60.0
-"""The speed of homing ($25, defaults.h); its slow second search is not simulated."""
-
-PAUSE: Final = re.compile(r"M0*0(?![\d.])")
-"""M0, which waits for the operator; grbl passes over M1."""
-
-SYNCHRONISED: Final = frozenset(WAITS)
-
-SPINDLES: Final = {Kind.SPINDLE_CW: "M3", Kind.SPINDLE_CCW: "M4", Kind.SPINDLE_OFF: "M5"}
-
-COOLANTS: Final = {Kind.COOLANT_MIST: "M7", Kind.COOLANT_FLOOD: "M8", Kind.COOLANT_OFF: "M9"}
+NEVER_CLOSED: Final = -1e6
+"""No slide comes down to this height, mm."""
 
 
 class Choices(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """How this grbl is set up. `homing`: "on" locks it until `$H` or `$X` ($22)."""
+    """How this grbl is set up. `homing`: "on" has switches at both ends of the travel, and locks
+    it until `$H` or `$X` ($22). `probe_mm`: at or below this height on the machine, as it is when
+    the power comes on, the probe is closed."""
 
     homing: Literal["off", "on"] = "off"
+    probe_mm: float = NEVER_CLOSED
 
 
 class _Planned(Struct, eq=False):
-    """A block in the ring: its start and way (3,) steps, length, speed without overrides, the
-    highest that its axes allow, acceleration, highest speed at its start; mm and s."""
+    """A block in the ring: its start and way (3,) steps, length, the speed that the program asks
+    for, that which it gets without overrides, the highest that its axes allow, acceleration,
+    highest speed at its start; mm and s. `rapid` and `fixed` say which override counts, `spindle`
+    and `rpm` what its first segment asks for."""
 
     start: Ints
     way: Ints
     length: float
+    asked: float
     speed: float
     highest: float
     acceleration: float
     corner: float
     rapid: bool
+    fixed: bool
+    spindle: Kind | None
+    rpm: float
     block: int
 
     @property
@@ -127,9 +194,317 @@ class _Planned(Struct, eq=False):
 Phase = tuple[float, float, float]
 """A part of a block at one acceleration: seconds, speed at its start, acceleration."""
 
-Ready = Callable[[], bool]
-Job = Generator[Ready, None, int]
-"""A line at work: yields what it waits for, returns its error, 0 for ok."""
+Wait = Generator[float | None, None, None]
+"""What waits: for anything (None), or until a time."""
+
+Line = Generator[float | None, None, int]
+"""A line at work; returns its error, 0 for ok."""
+
+
+class _Abort(Exception):
+    """A reset: whatever the main program does, it ends, and begins anew."""
+
+
+# Numbers as grbl has them: 32-bit floats.
+
+
+def _single(value: float | np.float32) -> float:
+    return float(np.float32(value))
+
+
+def _shown(value: float, decimals: int) -> str:
+    """A float as `printFloat` (print.c) shows it."""
+    single = np.float32
+    sign, rest = ("-", -single(value)) if value < 0.0 else ("", single(value))
+    for factor in (100.0,) * (decimals // 2) + (10.0,) * (decimals % 2):
+        rest = single(rest * single(factor))
+    rest = single(rest + single(0.5))
+    digits = str(int(rest) % (1 << 32) if np.isfinite(rest) else 0).rjust(decimals + 1, "0")
+    return sign + (f"{digits[:-decimals]}.{digits[-decimals:]}" if decimals else digits)
+
+
+def _read(text: str, at: int) -> tuple[float, int] | None:
+    """A number at a place of a line as `read_float` (nuts_bolts.c) reads it, and where it ends."""
+    found = re.compile(r"([+-]?)(\d*)(\.?)(\d*)").match(text, at)
+    assert found is not None
+    whole, decimals = found[2], found[4]
+    if not whole and not decimals:
+        return None
+    digits = (whole + decimals)[:8]
+    exponent = max(len(whole) - 8, 0) - min(len(decimals), max(8 - len(whole), 0))
+    single = np.float32
+    value = single(int(digits))
+    while exponent <= -2:
+        value, exponent = single(value * single(0.01)), exponent + 2
+    if exponent < 0:
+        value = single(value * single(0.1))
+    for _ in range(max(exponent, 0)):
+        value = single(value * single(10.0))
+    return (-float(value) if found[1] == "-" else float(value)), found.end()
+
+
+def _byte(value: float) -> int:
+    return math.trunc(value) % 256
+
+
+# Its memory, which outlives the power.
+
+
+class _Memory:
+    """Settings, frames (6 of 3 mm), places of G28 and G30, and lines of text."""
+
+    def __init__(self, machine: Machine[GrblController, Dialect], *, homing: bool) -> None:
+        controller, spindle, dialect = machine.controller, machine.spindle, machine.dialect
+        values = self.defaults()
+        values |= {1: controller.idle_delay_ms, 22: float(homing)}
+        values |= {11: controller.junction_deviation_mm, 12: controller.arc_tolerance_mm}
+        values |= {30: spindle.max_rpm or 1000.0, 31: spindle.min_rpm}
+        values[32] = float(controller.laser_mode)
+        for first, key in AXIS_SETTINGS.items():
+            for k, axis in enumerate(machine.axes):
+                value = getattr(axis, key)
+                values[first + k] = 1.0 / value if first == 100 else value or 0.0
+        self.settings = {number: _single(value) for number, value in sorted(values.items())}
+        self.frames = [[0.0] * 3 for _ in range(FRAMES)]
+        self.frames[0] = [0.0 - value for value in controller.machine_zero_mm]
+        for name, place in dialect.work_offsets_mm.items():
+            self.frames[int(str(name)[1:]) - 54] = [_single(value) for value in place]
+        self.homes = {"G28": [0.0] * 3, "G30": [0.0] * 3}
+        for home, place in dialect.homes_mm.items():
+            self.homes[str(home)] = [_single(value) for value in place]
+        self._texts = [bytearray(TEXT_BYTES) for _ in range(START_LINES + 1)]
+        self._sums = [_checksum(text) for text in self._texts]
+
+    @staticmethod
+    def defaults() -> dict[int, float]:
+        """Those of a new board."""
+        values = dict.fromkeys((*WHOLE, *SWITCHES, *REALS), 0.0)
+        axes = [first + k for first in AXIS_SETTINGS for k in range(3)]
+        return (
+            values
+            | {n: DEFAULTS[n - n % 10] for n in axes}
+            | {number: value for number, value in DEFAULTS.items() if number < 100}
+        )
+
+    def text(self, which: int, line: bytearray) -> bool:
+        """Read a text into the line; False, and it is emptied, where its sum is wrong."""
+        line[:] = self._texts[which]
+        if self._sums[which] == _checksum(line):
+            return True
+        line[0] = 0
+        self.keep(which, line)
+        return False
+
+    def keep(self, which: int, line: bytearray) -> None:
+        """Write a text: all of the line's bytes, what is left behind its end too."""
+        self._texts[which][:] = line
+        self._sums[which] = _checksum(line)
+
+    def restore(self, what: str) -> None:
+        """$RST: `$` settings, `#` frames and places, `*` all. Of the texts only two bytes become
+        0, and not the one of their sum."""
+        if what in "$*":
+            self.settings = {n: _single(value) for n, value in sorted(self.defaults().items())}
+        if what in "#*":
+            for place in (*self.frames, *self.homes.values()):
+                place[:] = [0.0] * 3
+        if what == "*":
+            for text in self._texts:
+                text[:2] = b"\0\0"
+
+    def shown(self, number: int) -> str:
+        """A setting as `$$` shows it."""
+        value = self.settings[number]
+        if number in WHOLE or number in SWITCHES:
+            return f"{int(value)}"
+        return _shown(value, 0 if number in RPM else 3)
+
+
+def _checksum(text: bytes | bytearray) -> int:
+    """The sum of eeprom.c, which forgets all but whether it was 0."""
+    total = 0
+    for octet in text:
+        total = ((1 if total else 0) + octet) % 256
+    return total
+
+
+# Its parser: places on the machine, in 32-bit floats.
+
+
+class _Parser(Parser):
+    """grbl's parser with its own frames and lengths. What a line does is left behind: `actions`
+    in their order, then the moves of the path, a probing move among them, then `flow`."""
+
+    def __init__(
+        self, machine: Machine[GrblController, Dialect], path: ToolpathBuilder, memory: _Memory
+    ) -> None:
+        super().__init__(machine, path, Notes())
+        self._memory, self._rows = memory, path
+        self._zero = (0.0, 0.0, 0.0)
+        self.places = list(memory.frames[0])
+        """(3,) the zero of the frame in force."""
+        self.offset = [0.0, 0.0, 0.0]
+        self.length = 0.0
+        self.rpm = 0.0
+        self.tool = 0
+        self.actions: list[tuple[Any, ...]] = []
+        self.flow: int | None = None
+        self.probes = 0
+        """The motion of the line, if it probes: 140 for G38.2 to 143."""
+        self.jogs = False
+        self.power = 0.0
+        """The speed of the spindle that goes with the moves of the line."""
+        self.checking = False
+
+    def line(self, text: str) -> None:
+        """Parse a line; Fault where grbl refuses it."""
+        self.actions, self.flow, self.probes, self.jogs = [], None, 0, False
+        super().line(text)
+
+    def at(self, place: Sequence[float]) -> None:
+        """The parser stands there."""
+        self.position[:] = [_single(value) for value in place]
+        self._rows.moved_to(*self.position)
+        self._rows.drained()
+
+    def shifted(self, axis: int) -> float:
+        """Where the coordinates of an axis have their zero on the machine."""
+        value = _single(self.places[axis] + self.offset[axis])
+        return _single(value + self.length) if axis == 2 else value
+
+    def _word(self, block: Block, letter: str, value: float, said: str, at: int) -> None:
+        read = _read(said, 0)
+        super()._word(block, letter, value if read is None else read[0], said, at)
+
+    def _probe_word(self, block: Block, hundredths: int, at: int) -> str:
+        block.modes.motion = PROBES + (hundredths - 20) // 10
+        return "motion"
+
+    def _words(self, block: Block) -> dict[int, float]:
+        mm = MM_PER_INCH if block.modes.inches else 1.0
+        said = {k: block.numbers["XYZ"[k]] for k in range(3) if "XYZ"[k] in block.numbers}
+        return {k: _single(value * np.float32(mm)) for k, value in said.items()}
+
+    def _frame_of(self, block: Block) -> list[float]:
+        if block.modes.frame == self.modes.frame:
+            return self.places
+        return self._memory.frames[block.modes.frame]
+
+    def _target(self, block: Block, words: dict[int, float], unused: set[str]) -> list[float]:
+        super()._target(block, words, unused)  # for what it refuses
+        target = list(self.position)
+        if block.once in ("G10", "G92") or block.uses == LENGTH:
+            return target
+        frame = self._frame_of(block)
+        for k, value in self._words(block).items():
+            if block.once == "G53":
+                target[k] = value
+            elif block.modes.absolute:
+                target[k] = _single(value + _single(frame[k] + self.offset[k]))
+                target[k] = _single(target[k] + self.length) if k == 2 else target[k]
+            else:
+                target[k] = _single(value + self.position[k])
+        return target
+
+    def _place(self) -> None:
+        """Moves are written in coordinates of the machine."""
+
+    def _shift(self) -> list[float]:
+        return [0.0, 0.0, 0.0]
+
+    def _homing(self, block: Block, target: list[float]) -> bool:
+        return False
+
+    def _jog(self, block: Block, target: list[float], feed: float) -> None:
+        self.jogs, self.power = True, self.rpm
+        super()._jog(block, target, feed)
+
+    def _execute(
+        self,
+        block: Block,
+        target: list[float],
+        centre: tuple[float, float] | None,
+        feed: float,
+    ) -> None:
+        numbers, modes, before, do = block.numbers, block.modes, self.modes, self.actions.append
+        words = self._words(block)
+        self.modes, self.feed = modes, feed
+        rpm = numbers.get("S", self.rpm)
+        moves = block.uses == MOTION and bool(words)
+        dark = self.laser and modes.motion not in (1, 2, 3)
+        relit = self.laser and not moves and self._relights(block, before)
+        if (
+            (rpm != self.rpm or relit)
+            and before.spindle is not None
+            and not (self.laser and moves)
+        ):
+            do(("spindle", before.spindle, 0.0 if dark else rpm))
+        self.rpm, self.power = rpm, 0.0 if dark else rpm
+        self.tool = int(numbers.get("T", 0.0))
+        if modes.spindle != before.spindle:
+            do(("spindle", modes.spindle, self.power))
+        if (modes.mist, modes.flood) != (before.mist, before.flood):
+            do(("coolant", modes.mist, modes.flood))
+        if block.once == "G4":
+            do(("dwell", numbers["P"]))
+        if block.uses == LENGTH:
+            length = words.get(2, 0.0) if block.length == "set" else 0.0
+            if length != self.length:
+                self.length = length
+                do(("offsets",))
+        if modes.frame != before.frame:
+            self.places = list(self._memory.frames[modes.frame])
+            do(("offsets",))
+        self._once(block, words, target)
+        if moves and modes.motion != 80 and block.once not in ("G28", "G30"):
+            self.probes = modes.motion if modes.motion >= PROBES else 0
+            if self.probes:
+                self._go(Kind.LINE, target, feed)
+            else:
+                self._move(block, target, centre, feed)
+        self.flow = block.flow if block.flow != 1 else None
+
+    def _once(self, block: Block, words: dict[int, float], target: list[float]) -> None:
+        once, do = block.once, self.actions.append
+        if once == "G10":
+            number = math.trunc(block.numbers.get("P", 0.0))
+            index = number - 1 if number > 0 else block.modes.frame
+            values = list(self._memory.frames[index])
+            for k, value in words.items():
+                if block.numbers["L"] == 20:
+                    value = _single(_single(self.position[k] - self.offset[k]) - value)
+                    value = _single(value - self.length) if k == 2 else value
+                values[k] = value
+            do(("store", self._memory.frames[index], values))
+            if block.modes.frame == index:
+                self.places = values
+                do(("offsets",))
+        elif once in ("G28", "G30"):
+            self._go_home(once, words, target)
+        elif once in ("G28.1", "G30.1"):
+            do(("store", self._memory.homes[once[:3]], list(self.position)))
+        elif once == "G92":
+            frame = self._frame_of(block)
+            for k, value in words.items():
+                value = _single(_single(self.position[k] - frame[k]) - value)
+                self.offset[k] = _single(value - self.length) if k == 2 else value
+            do(("offsets",))
+        elif once == "G92.1":
+            self.offset = [0.0, 0.0, 0.0]
+            do(("offsets",))
+
+    def _go_home(self, once: str, words: dict[int, float], target: list[float]) -> None:
+        home = list(self._memory.homes[once])
+        if words:
+            self._go(Kind.RAPID, target, 0.0)
+            home = [home[k] if k in words else target[k] for k in range(3)]
+        self._go(Kind.RAPID, home, 0.0)
+
+    def rewind(self) -> None:
+        """M2 and M30 set most modes back; in check mode the zero of the frame stays."""
+        self.modes = Modes(motion=1, inches=self.modes.inches)
+        if not self.checking:
+            self.places = list(self._memory.frames[0])
 
 
 class GrblTwin(Twin):
@@ -138,293 +513,750 @@ class GrblTwin(Twin):
     wire = "115200 8N1"
     byte_s = 10.0 / 115200.0
 
+    _alarm: int
+    _turn_at_s: float | None
+    _holding: bool
+    _ended: bool
+    _probing: int | None
+
     def __init__(self, machine: Machine[GrblController, Dialect], choices: Choices) -> None:
         super().__init__(Slides(machine))
         self._machine, self._choices = machine, choices
-        self._settings = _settings(machine, homing=choices.homing == "on")
-        self._alarm = choices.homing == "on"
-        self._check = self._asleep = False
-        self._last_feed = 0.0
+        self._memory = _Memory(machine, homing=choices.homing == "on")
+        self._slide_step_mm = coded_steps_mm(machine)
+        zero = np.rint(np.array(machine.controller.machine_zero_mm) / self._slide_step_mm)
+        self._first = -zero.astype(np.int64)
+        self._ends_mm = self._travel_ends(machine, zero * self._slide_step_mm)
+        self._signs: Ints = np.ones(3, dtype=np.int64)
+        self._origin: Ints = zero.astype(np.int64)
+        self._others = {*SPINDLE_OVERRIDES, SPINDLE_STOP, TOGGLE_FLOOD}
+        self._others |= {TOGGLE_MIST} if machine.coolant.mist else set()
+        self._greeted = False
+        self._power_up()
+        self._go_on()
+        self._out.clear()
+
+    def _travel_ends(
+        self, machine: Machine[GrblController, Dialect], zero: Floats
+    ) -> tuple[Floats, Floats] | None:
+        """Where slides close the switches: beyond machine zero and beyond their travel, mm."""
+        if self._choices.homing == "off":
+            return None
+        travel = [axis.travel_mm or DEFAULTS[130] for axis in machine.axes]
+        return zero - np.array(travel), zero
+
+    def _power_up(self) -> None:
         self._clear()
-
-    def _clear(self) -> None:
-        """What a reset forgets."""
-        self._rx, self._line, self._overflow = bytearray(), bytearray(), False
-        self._job: Job | None = None
-        self._ready: Ready = lambda: True
-        self._ring: list[_Planned] = []
-        self._last = NO_BLOCKS
-        self._phases: list[Phase] = []
-        self._begun_s, self._done_mm, self._speed, self._events = 0.0, 0.0, 0.0, 0
-        self._running = self._stopping = self._held = self._jogging = self._homing = False
-        self._stale = False  # the plan of the block that runs is not that of the ring
-        self._rest_s: float | None = None  # until then a stop or a dwell holds what comes next
-        self._left_s: float | None = None  # so much of it is left behind a hold
-        self._feed_percent = self._rapid_percent = self._spindle_percent = 100
-        self._wco_in = self._ov_in = 0
-        self._spindle, self._rpm, self._coolant, self._tool = "M5", 0.0, "M9", 0
-        self._planned: Ints = np.zeros((1, 3), dtype=np.int64)
-        self._path, self._notes = ToolpathBuilder(), Notes()
-        self._parser = Parser(self._machine, self._path, self._notes)
-        self._stand()
-
-    def _stand(self) -> None:
-        """Planner and parser begin where the slides are."""
-        step_mm = coded_steps_mm(self._machine)
-        steps = np.rint(self.slides.commanded_mm / step_mm)
-        self._planned = steps.astype(np.int64)[None, :]
-        x, y, z = (steps * step_mm).tolist()
-        self._parser.position[:] = x, y, z
-        self._path.moved_to(x, y, z)
-        self._path.drained()
+        self._state = "Alarm" if self._memory.settings[22] else "Idle"
+        self._probe_steps: Ints = np.zeros(3, dtype=np.int64)
+        self._until_s = self.now
+        self._motor_s: float | None = None
+        self._main = self._forever()
 
     def connected(self, now: float) -> bytes:
-        """DTR resets the board: as if the power came on (the slides stay where they are)."""
+        """DTR resets the board: as if the power came on. The slides stay where they are, and the
+        place where they are is what it counts from, as when the twin was made."""
         sent = self.advance(now)
         self.slides.stop(now)
-        self._alarm, self._check, self._asleep = self._choices.homing == "on", False, False
-        self._clear()
-        self._greet()
+        self._stands_at(self._first)
+        self._greeted = True
+        self._power_up()
+        self._go_on()
         return sent + self._sent()
 
-    def _greet(self) -> None:
-        self._out += BANNER
-        if self._alarm:
-            self._out += LOCKED
+    def _slide_steps(self) -> Ints:
+        return np.rint(self.slides.commanded_mm / self._slide_step_mm).astype(np.int64)
+
+    @property
+    def _steps(self) -> Ints:
+        """(3,) where it takes itself to stand (`sys_position`)."""
+        return np.asarray(self._signs * (self._slide_steps() - self._origin))
+
+    def _stands_at(self, steps: Ints) -> None:
+        """From now on it takes itself to stand there; nothing moves."""
+        self._origin = self._slide_steps() - self._signs * steps
+
+    def _mm(self, steps: Ints) -> list[float]:
+        """Steps as places on the machine, as it computes them."""
+        pairs = zip(steps.tolist(), self._steps_per_mm(), strict=True)
+        return [_single(np.float32(n) / np.float32(per)) if per else 0.0 for n, per in pairs]
+
+    def _steps_per_mm(self) -> list[float]:
+        return [self._memory.settings[100 + k] for k in range(3)]
+
+    def _is_set(self, number: int) -> bool:
+        return self._memory.settings[number] != 0.0
+
+    def _say(self, text: str) -> None:
+        self._out += text.encode("latin-1")
+
+    def _message(self, text: str) -> None:
+        self._say(f"[MSG:{text}]\r\n")
 
     @property
     def moves(self) -> bool:
         """Whether slides move now, or a dwell runs; not while it is held."""
-        return self.slides.ends_s is not None or self._rest_s is not None or self._running
+        return self.slides.ends_s is not None or self._running or self._dwells
 
     @property
     def state(self) -> str:
-        """As the status report says it."""
-        if self._asleep:
-            return "Sleep"
-        if self._alarm:
-            return "Alarm"
-        if self._check:
-            return "Check"
-        if self._held:
-            return "Hold:0"
-        if self._stopping and self._running:
-            return "Hold:1"
-        if self._homing:
-            return "Home"
-        if self._running or self._ring:
-            return "Jog" if self._jogging else "Run"
-        return "Idle"
+        """As the status report says it; Start while it begins anew and reports nothing."""
+        if self._starting:
+            return "Start"
+        if self._state == "Hold":
+            if "jog" in self._suspend:
+                return "Jog"
+            return "Hold:0" if "held" in self._suspend else "Hold:1"
+        if self._state != "Door":
+            return self._state
+        if "restoring" in self._suspend:
+            return "Door:3"
+        if "retracted" not in self._suspend:
+            return "Door:2"
+        return "Door:1" if "ajar" in self._suspend else "Door:0"
 
-    # Bytes.
+    # Interrupts: bytes, the motors, the switches.
 
     def _take(self, octet: int) -> None:
-        if octet == STATUS:
-            self._report()
-        elif octet == RESET:
-            self._reset()
-        elif octet == HOLD:
-            self._hold()
-        elif octet == RESUME:
-            self._resume()
-        elif octet > 0x7F:
-            self._real_time(octet)
-        elif len(self._rx) < RX_BYTES and not self._asleep:
+        named = {STATUS: "report", RESUME: "start", HOLD: "hold", DOOR: "door"}
+        if octet == RESET:
+            self._kill()
+        elif octet in named:
+            self._flags.add(named[octet])
+        elif octet == JOG_CANCEL:
+            if self._state == "Jog":
+                self._flags.add("cancel")
+        elif octet in FEED_OVERRIDES or octet in RAPID_OVERRIDES:
+            self._motion_overrides.add(octet)
+        elif octet in self._others:
+            self._other_overrides.add(octet)
+        elif octet <= 0x7F and len(self._rx) < RX_BYTES:
             self._rx.append(octet)
 
-    def _real_time(self, octet: int) -> None:
-        if octet == DOOR or (octet == JOG_CANCEL and self._jogging):
-            self._hold()
-        elif octet in FEED_OVERRIDES:
-            self._feed_percent = _percent(self._feed_percent, FEED_OVERRIDES[octet])
-            self._stale = True
-        elif octet in RAPID_OVERRIDES:
-            self._rapid_percent, self._stale = RAPID_OVERRIDES[octet], True
-        elif octet in SPINDLE_OVERRIDES:
-            self._spindle_percent = _percent(self._spindle_percent, SPINDLE_OVERRIDES[octet])
-        else:
+    def _kill(self) -> None:
+        """A reset (`mc_reset`): spindle and coolant stop, and the motors too where they run."""
+        if "reset" in self._flags:
             return
-        self._ov_in = 0
+        self._flags.add("reset")
+        self._lit = self._flood = self._mist = False
+        if self._state in ("Run", "Home", "Jog") or self._holding:
+            if self._state == "Home":
+                self._alarm = self._alarm or HOMING_RESET
+            else:
+                self._alarm = ABORTED
+            self.slides.stop(self.now)
+            self._running = False
+            self._go_idle()
 
-    def _hold(self) -> None:
-        """A feed hold: slow down along the path, then stand; what dwells stops to count
-        (`protocol_exec_rt_system`)."""
-        if self._alarm or self._check or self._asleep or self._homing or self._held:
-            return
-        if self._running:
-            self._stale = self._stale or not self._stopping
-            self._stopping = True
-            return
-        self._held = True
-        if self._rest_s is not None:
-            self._left_s, self._rest_s = self._rest_s - self.now, None
-
-    def _resume(self) -> None:
-        if self._held:
-            self._held = self._stopping = False
-            if self._left_s is not None:
-                self._rest_s, self._left_s = self.now + self._left_s, None
-
-    def _reset(self) -> None:
-        moving = self._running
-        self.slides.stop(self.now)
-        if moving:
-            self._out += f"ALARM:{ABORTED}\r\n".encode()
-            self._alarm = True
-        self._asleep = self._check = False
-        self._clear()
-        self._greet()
-
-    # The main loop.
+    def _go_idle(self) -> None:
+        """The motors end (`st_go_idle`): unless they stay on, nothing else happens for `$1`."""
+        delay = self._memory.settings[1]
+        if (delay != ALWAYS_ON or self._alarm or self._state == "Sleep") and self._state != "Home":
+            self._motor_s = self.now + delay / 1000.0
 
     def next_s(self) -> float | None:
         """It says nothing at an output."""
         return self.turn_s()
 
     def turn_s(self) -> float | None:
-        times = [at for at in (self.slides.ends_s, self._rest_s) if at is not None]
-        return min(times, default=None)
+        times = [self.slides.ends_s, self._motor_s, self._turn_at_s, *self._touches[:1]]
+        if self._until_s > self.now:
+            times.append(self._until_s)
+        return min((at for at in times if at is not None), default=None)
 
     def _due(self) -> None:
-        if self._rest_s is not None and self.now >= self._rest_s:
-            self._rest_s = None
+        if self._touches and self.now >= self._touches[0]:
+            self._touches.pop(0)
+            self._touched()
+        if self._turn_at_s is not None and self.now >= self._turn_at_s:
+            self._turn_at_s, self._stopping = None, self._holding
+            if self._running:
+                self._aim()
         if self._running and self.slides.ends_s is None:
             self._block_over()
-        self._work()
+        if self._motor_s is not None and self.now >= self._motor_s:
+            self._motor_s = None
+        self._go_on()
 
     def _pass(self) -> None:
         self.slides.until(self.now)
         if not (self._running and self.slides.ends_s is None):
-            self._work()
+            self._go_on()
 
-    def _work(self) -> None:
-        """Do lines until one has to wait, and begin to move where grbl begins."""
-        while True:
-            if self._job is None:
-                line = self._next_line()
-                if line is None:
-                    break
-                self._job, self._ready = self._execute(line), lambda: True
-            if not self._ready():
+    def _go_on(self) -> None:
+        """Let the main program run until it waits again."""
+        while self._motor_s is None and self.now >= self._until_s:
+            if self._ended:
+                self._ended = False
+                self._flags.add("stop")
+            wait = next(self._main)
+            if wait is None:
                 break
+            self._until_s = wait
+
+    # The main program.
+
+    def _forever(self) -> Wait:
+        """Begin, work until a reset, and begin anew (main.c)."""
+        while True:
+            self._clear()
+            self._starting = False
+            if self._greeted:
+                self._say(BANNER)
             try:
-                self._ready = next(self._job)
-            except StopIteration as end:
-                self._job = None
-                self._out += f"error:{end.value}\r\n".encode() if end.value else b"ok\r\n"
-        if self._ring and not self._running and not self._held and self._rest_s is None:
-            self._running, self._phases = True, []
-            self._stale = True
-        if self._stale and self._running:
-            self._aim()
+                yield from self._work()
+            except _Abort:
+                self._greeted = self._starting = True
+            self._ended = self._running = False
+            self.slides.stop(self.now)
+            if self._memory.settings[1] != ALWAYS_ON or self._alarm or self._state == "Sleep":
+                yield self.now + self._memory.settings[1] / 1000.0
 
-    def _next_line(self) -> bytes | None:
-        """The next whole line out of the receive buffer, without its end."""
-        if self._held or self._asleep:
-            return None
-        for count, octet in enumerate(self._rx, 1):
-            if octet in b"\r\n":
-                line = bytes(self._line + self._rx[: count - 1])
-                del self._rx[:count]
-                self._line.clear()
-                return line
-        self._line += self._rx
-        self._rx.clear()
-        return None
+    def _clear(self) -> None:
+        """What a reset forgets."""
+        self._rx, self._line = bytearray(), bytearray(TEXT_BYTES)
+        self._flags: set[str] = set()
+        self._motion_overrides: set[int] = set()
+        self._other_overrides: set[int] = set()
+        self._suspend: set[str] = set()
+        self._alarm = 0
+        self._ring: list[_Planned] = []
+        self._last = NO_BLOCKS
+        self._phases: list[Phase] = []
+        self._begun_s, self._done_mm, self._speed, self._events = 0.0, 0.0, 0.0, 0
+        self._running = self._holding = self._stopping = self._ended = self._dwells = False
+        self._stale = False  # the plan of the block that runs is not that of the ring
+        self._turn_at_s = None
+        self._touches: list[float] = []
+        self._probing = None
+        self._probed = self._away = self._soft = False
+        self._probe_steps = np.zeros(3, dtype=np.int64)
+        self._feed_percent = self._rapid_percent = self._spindle_percent = 100
+        self._wco_in = self._ov_in = 0
+        self._stop_override = ""
+        self._lit = self._ccw = self._flood = self._mist = False
+        self._rpm, self._fresh_rpm = 0.0, False
+        self._piece_s, self._felt, self._ending = self.now, [False] * 3, ""
+        self._path = ToolpathBuilder()
+        self._parser = _Parser(self._machine, self._path, self._memory)
+        self._parser.laser = self._is_set(32)
+        self._stand()
 
-    def _execute(self, raw: bytes) -> Job:
-        """A line, from its bytes to its answer."""
+    def _stand(self) -> None:
+        """Planner and parser begin where the slides are."""
+        self._planned: Ints = self._steps[None, :]
+        self._parser.at(self._mm(self._steps))
+
+    def _work(self) -> Wait:
+        """Lines, one after another (`protocol_main_loop`)."""
+        if self._is_set(21) and any(self._limits()):
+            self._state = "Alarm"
+            self._message("Check Limits")
+        if self._state in ("Alarm", "Sleep"):
+            self._message("'$H'|'$X' to unlock")
+            self._state = "Alarm"
+        else:
+            self._state = "Idle"
+            yield from self._startup()
+        self._raw = bytearray()
+        while True:
+            while self._rx:
+                octet = self._rx.pop(0)
+                if octet not in b"\r\n":
+                    self._raw.append(octet)
+                    continue
+                raw, self._raw = bytes(self._raw), bytearray()
+                yield from self._realtime()
+                yield from self._answered(raw)
+            self._start_cycle()
+            yield from self._realtime()
+            if not self._flags and not self._rx:
+                yield None
+
+    def _answered(self, raw: bytes) -> Wait:
+        """A line, from its bytes to its answer. A reset in the midst of it leaves what it does,
+        and its answer is ok."""
+        self._ending = ""
+        try:
+            code = yield from self._execute(raw)
+        except _Abort:
+            self._say(f"{self._ending}ok\r\n")
+            raise
+        self._answer(code)
+
+    def _answer(self, code: int) -> None:
+        self._say(f"error:{code}\r\n" if code else "ok\r\n")
+
+    def _execute(self, raw: bytes) -> Line:
         text = _stripped(raw)
-        if len(text) > self._machine.dialect.line_chars:
-            return 11
+        most = self._machine.dialect.line_chars
+        kept = text[:most].encode("latin-1")
+        self._line[: len(kept) + 1] = kept + b"\0"
+        if len(text) > most:
+            return TOO_LONG
         if not text:
             if raw.strip():
                 self.decoded.append(raw)
-            return 0
+            return OK
         if text[0] == "$":
             code = yield from self._command(text)
             if not code:
                 self.commands.append(raw)
             return code
-        if self._alarm or self._jogging:
-            return CODES["locked"]
+        if self._state in ("Alarm", "Jog"):
+            return LOCKED
+        return (yield from self._block(text, raw))
+
+    def _startup(self) -> Wait:
+        """The lines that it does when it begins or was homed."""
+        for which in range(START_LINES):
+            if not self._memory.text(which, self._line):
+                self._say(">:")
+                self._answer(READ_FAILED)
+                continue
+            text = self._line_text()
+            if text:
+                try:
+                    code = yield from self._block(text, None)
+                except _Abort:
+                    self._say(f">{text}:ok\r\n")
+                    raise
+                self._say(f">{text}:")
+                self._answer(code)
+
+    def _line_text(self) -> str:
+        return self._line.split(b"\0")[0].decode("latin-1")
+
+    # Waiting.
+
+    def _realtime(self) -> Wait:
+        """A place where it looks at its flags (`protocol_execute_realtime`)."""
+        yield from self._system()
+        if self._suspend:
+            yield from self._suspended()
+
+    def _delay(self, seconds: float) -> Wait:
+        until = self.now + seconds
+        while self.now < until:
+            yield until
+
+    def _synchronise(self) -> Wait:
+        """Wait until the ring is empty and the motors stand (`protocol_buffer_synchronize`)."""
+        self._start_cycle()
+        while True:
+            yield from self._realtime()
+            if not self._ring and self._state != "Run":
+                return
+            yield None
+
+    def _start_cycle(self) -> None:
+        if self._ring:
+            self._flags.add("start")
+
+    def _dwell(self, seconds: float, *, held: bool = True) -> Wait:
+        for _ in range(round(dwell_s(seconds) / DWELL_STEP_S)):
+            if held:
+                yield from self._realtime()
+            else:
+                yield from self._system()
+                if "again" in self._suspend:
+                    break
+            self._dwells = True
+            yield from self._delay(DWELL_STEP_S)
+            self._dwells = False
+
+    # Flags (`protocol_exec_rt_system`).
+
+    def _system(self) -> Wait:
+        if self._alarm:
+            code, self._state = self._alarm, "Alarm"
+            self._say(f"ALARM:{code}\r\n")
+            yield from self._delay(ALARM_S)
+            if code in (HARD_LIMIT, SOFT_LIMIT):
+                self._message("Reset to continue")
+                self._flags.discard("reset")
+                while "reset" not in self._flags:
+                    yield None
+            self._alarm = 0
+        flags = set(self._flags)
+        if "reset" in flags:
+            raise _Abort
+        if "report" in flags:
+            self._report()
+            self._flags.discard("report")
+        if flags & {"cancel", "hold", "door", "sleep"}:
+            self._hold(flags)
+            self._flags -= {"cancel", "hold", "door", "sleep"}
+        if "start" in flags:
+            if not flags & {"hold", "cancel", "door"}:
+                self._resume()
+            self._flags.discard("start")
+        if "stop" in flags:
+            self._stopped()
+            self._flags.discard("stop")
+        self._override_motion()
+        self._override_others()
+        if self._stale and self._running and self._turn_at_s is None:
+            self._aim_later()
+
+    def _hold(self, flags: set[str]) -> None:
+        """What stops the machine, each in its manner."""
+        if self._state not in ("Alarm", "Check"):
+            if self._state in ("Run", "Jog") and not self._suspend & {"cancel", "jog"}:
+                self._holding = self._stale = True
+                if self._state == "Jog" and "sleep" not in flags:
+                    self._suspend.add("jog")
+            if self._state == "Idle":
+                self._suspend = {"held"}
+            if "cancel" in flags and self._state != "Jog":
+                self._suspend.add("cancel")
+            if "hold" in flags and self._state not in ("Door", "Jog", "Sleep"):
+                self._state = "Hold"
+            if "door" in flags:
+                self._message("Check Door")
+                if "jog" not in self._suspend:
+                    if self._state == "Door" and "restoring" in self._suspend:
+                        self._suspend -= {"retracted", "restoring", "restored"}
+                        self._suspend.add("again")
+                    if self._state != "Sleep":
+                        self._state = "Door"
+                self._suspend.add("ajar")
+        if "sleep" in flags:
+            if self._state == "Alarm":
+                self._suspend |= {"retracted", "held"}
+            self._state = "Sleep"
+
+    def _resume(self) -> None:
+        """Cycle start: begin to move, or go on."""
+        if self._state == "Door" and "ajar" not in self._suspend:
+            if "restored" in self._suspend:
+                self._state = "Idle"
+            elif "retracted" in self._suspend:
+                self._suspend.add("restoring")
+        held = self._state == "Hold" and "held" in self._suspend
+        if self._state != "Idle" and not held:
+            return
+        if held and self._stop_override:
+            self._stop_override = "cycle"
+            return
+        self._holding = self._stopping = False
+        begins = bool(self._ring) and "cancel" not in self._suspend
+        self._suspend = set()
+        self._state = "Run" if begins else "Idle"
+        if begins:
+            self._set_out()
+
+    def _set_out(self) -> None:
+        """The first segments are made, and the motors wake."""
+        self._running, self._phases, self._speed = True, [], 0.0
+        self._fresh_rpm = True
+        self._light(self._ring[0])
+        self._aim()
+
+    def _stopped(self) -> None:
+        """The motors have come to rest."""
+        if (
+            self._state in ("Hold", "Door", "Sleep")
+            and not self._soft
+            and "jog" not in self._suspend
+        ):
+            if self._holding:
+                self._suspend.add("held")
+            self._holding = False
+            return
+        if "jog" in self._suspend:
+            self._holding = self._stopping = False
+            self._forget_blocks()
+            self._stand()
+            if self._memory.settings[1] != ALWAYS_ON:
+                self._until_s = self.now + self._memory.settings[1] / 1000.0
+        if "ajar" in self._suspend:
+            self._suspend.discard("jog")
+            self._suspend.add("held")
+            self._state = "Door"
+        else:
+            self._suspend, self._state = set(), "Idle"
+
+    def _forget_blocks(self) -> None:
+        self._ring.clear()
+        self._last = NO_BLOCKS
+        self._done_mm, self._events, self._phases, self._speed = 0.0, 0, [], 0.0
+        self._running = self._stale = self._stopping = False
+
+    def _override_motion(self) -> None:
+        asked, self._motion_overrides = self._motion_overrides, set()
+        if not asked:
+            return
+        feed, rapid = _percent(self._feed_percent, FEED_OVERRIDES, asked), self._rapid_percent
+        for octet, percent in RAPID_OVERRIDES.items():
+            rapid = percent if octet in asked else rapid
+        if (feed, rapid) != (self._feed_percent, self._rapid_percent):
+            self._feed_percent, self._rapid_percent = feed, rapid
+            self._ov_in, self._stale = 0, True
+
+    def _override_others(self) -> None:
+        asked, self._other_overrides = self._other_overrides, set()
+        percent = _percent(self._spindle_percent, SPINDLE_OVERRIDES, asked)
+        if percent != self._spindle_percent:
+            self._spindle_percent = percent
+            if self._state == "Idle":
+                self._spin(self._parser.modes.spindle, self._parser.rpm)
+            else:
+                self._fresh_rpm = True
+            self._ov_in = 0
+        if SPINDLE_STOP in asked and self._state == "Hold":
+            if not self._stop_override:
+                self._stop_override = "begin"
+            elif self._stop_override == "on":
+                self._stop_override = "restore"
+        toggled = asked & {TOGGLE_FLOOD, TOGGLE_MIST}
+        if toggled and self._state in ("Idle", "Run", "Hold", "Jog"):
+            modes = self._parser.modes
+            modes.flood ^= TOGGLE_FLOOD in toggled
+            modes.mist ^= TOGGLE_MIST in toggled
+            self._cool(mist=modes.mist, flood=modes.flood)
+
+    # While it is held, its door is open, or it sleeps (`protocol_exec_rt_suspend`).
+
+    def _suspended(self) -> Wait:
+        block = self._ring[0] if self._ring else None
+        spindle = block.spindle if block else self._parser.modes.spindle
+        rpm = block.rpm if block else self._parser.rpm
+        cooled = (self._mist, self._flood) if block else _cooled(self._parser.modes)
+        if self._is_set(32):
+            self._other_overrides.add(SPINDLE_STOP)
+        while self._suspend:
+            before = self._snapshot()
+            if "held" in self._suspend:
+                if self._state in ("Door", "Sleep"):
+                    yield from self._retracted(spindle, rpm, cooled)
+                else:
+                    self._spindle_while_held(spindle, rpm)
+            yield from self._system()
+            if self._suspend and not self._flags and before == self._snapshot():
+                yield None
+
+    def _snapshot(self) -> tuple[Any, ...]:
+        return self._state, frozenset(self._suspend), self._stop_override, self._fresh_rpm
+
+    def _retracted(self, spindle: Kind | None, rpm: float, cooled: tuple[bool, bool]) -> Wait:
+        """Stop spindle and coolant; sleep for ever; or wait at the open door, and go on."""
+        if "retracted" not in self._suspend:
+            self._stop_override = ""
+            self._spin(None, 0.0)
+            self._cool(mist=False, flood=False)
+            self._suspend.discard("again")
+            self._suspend.add("retracted")
+            return
+        if self._state == "Sleep":
+            self._message("Sleeping")
+            self._spin(None, 0.0)
+            self._cool(mist=False, flood=False)
+            yield from self._delay(self._memory.settings[1] / 1000.0)
+            while True:
+                yield from self._system()
+                yield None
+        self._suspend.discard("ajar")  # no door is wired
+        if "restoring" not in self._suspend:
+            return
+        if self._parser.modes.spindle is not None and "again" not in self._suspend:
+            if self._is_set(32):
+                self._fresh_rpm = True
+            else:
+                self._spin(spindle, rpm)
+                yield from self._dwell(DOOR_SPINDLE_S, held=False)
+        if any(_cooled(self._parser.modes)) and "again" not in self._suspend:
+            self._cool(mist=cooled[0], flood=cooled[1])
+            yield from self._dwell(DOOR_COOLANT_S, held=False)
+        if "again" not in self._suspend:
+            self._suspend.add("restored")
+            self._flags.add("start")
+
+    def _spindle_while_held(self, spindle: Kind | None, rpm: float) -> None:
+        """The spindle's stop of a held machine, and its end."""
+        if self._stop_override == "begin":
+            if self._parser.modes.spindle is not None:
+                self._spin(None, 0.0)
+                self._stop_override = "on"
+            else:
+                self._stop_override = ""
+        elif self._stop_override in ("restore", "cycle"):
+            if self._parser.modes.spindle is not None:
+                self._message("Restoring spindle")
+                if self._is_set(32):
+                    self._fresh_rpm = True
+                else:
+                    self._spin(spindle, rpm)
+            if self._stop_override == "cycle":
+                self._flags.add("start")
+            self._stop_override = ""
+        elif not self._stop_override and self._fresh_rpm:
+            self._spin(spindle, rpm)
+            self._fresh_rpm = False
+
+    # Spindle and coolant.
+
+    def _speed_of(self, rpm: float) -> tuple[float, bool]:
+        """The speed that it says, and whether its output is on (`spindle_compute_pwm_value`)."""
+        least, most = self._memory.settings[31], self._memory.settings[30]
+        percent = np.float32(0.010) * np.float32(self._spindle_percent)
+        asked = _single(np.float32(rpm) * percent)
+        if least >= most or asked >= most:
+            return most, True
+        if asked <= least:
+            return (0.0, False) if asked == 0.0 else (least, True)
+        return asked, True
+
+    def _spin(self, spindle: Kind | None, rpm: float) -> None:
+        """Set the spindle at once (`spindle_set_state`)."""
+        if spindle is None:
+            self._rpm, self._lit = 0.0, False
+        else:
+            self._ccw = spindle == Kind.SPINDLE_CCW
+            if self._is_set(32) and self._ccw:
+                rpm = 0.0
+            self._rpm, self._lit = self._speed_of(rpm)
+        self._ov_in = 0
+
+    def _cool(self, *, mist: bool, flood: bool) -> None:
+        self._mist, self._flood = mist, flood
+        self._ov_in = 0
+
+    def _spin_at_rest(self, spindle: Kind | None, rpm: float) -> Wait:
+        if self._state != "Check":
+            yield from self._synchronise()
+            self._spin(spindle, rpm)
+
+    def _light(self, block: _Planned) -> None:
+        """The spindle's output goes with the segments of a block; in laser mode that of M4 with
+        its speed, so that it is off when the block is over."""
+        adjusted = self._is_set(32) and block.spindle == Kind.SPINDLE_CCW
+        if block.spindle is None:
+            self._rpm, self._lit = 0.0, False
+        else:
+            self._rpm, self._lit = self._speed_of(0.0 if adjusted else block.rpm)
+        self._fresh_rpm = False
+
+    # A block of a program.
+
+    def _block(self, text: str, raw: bytes | None) -> Line:
+        parser = self._parser
+        parser.checking, parser.laser = self._state == "Check", self._is_set(32)
+        stood = list(parser.position)
         try:
-            self._parser.line(text)
+            parser.line(text)
         except Fault as fault:
             return _code(fault)
-        self.decoded.append(raw)
         path = self._path.drained()
-        if not self._check:
-            yield from self._carry_out(path, len(self.decoded) - 1)
-        if self._parser.ended:
-            self._parser.rewind()
-        if PAUSE.search(text) and not self._check:
-            yield self._idle
-            self._held = True
-            yield lambda: not self._held
-        return 0
+        if parser.jogs:
+            return (yield from self._jogged(path, stood))
+        if raw is not None:
+            self.decoded.append(raw)
+        if parser.flow in (2, 30):
+            self._ending = "[MSG:Pgm End]\r\n"
+        power, flow, probes = parser.power, parser.flow, parser.probes
+        for action in parser.actions:
+            yield from self._act(*action)
+        if probes:
+            yield from self._probe(path, probes, stood)
+        else:
+            for row in range(len(path)):
+                yield from self._line_to(path, row, power, len(self.decoded) - 1)
+        if flow is not None:
+            yield from self._flow(flow)
+        return OK
 
-    def _idle(self) -> bool:
-        return not self._ring and not self._running and self._rested()
+    def _act(self, what: str, *values: Any) -> Wait:
+        """What a block does besides moving."""
+        if what == "spindle":
+            yield from self._spin_at_rest(*values)
+        elif what == "coolant":
+            if self._state != "Check":
+                yield from self._synchronise()
+                self._cool(mist=values[0], flood=values[1])
+        elif what == "dwell":
+            if self._state != "Check":
+                yield from self._synchronise()
+                yield from self._dwell(values[0])
+        elif what == "store":
+            place, written = values
+            yield from self._synchronise()
+            place[:] = written
+        else:
+            yield from self._offsets_changed()
 
-    def _rested(self) -> bool:
-        return self._rest_s is None and self._left_s is None
+    def _offsets_changed(self) -> Wait:
+        yield from self._synchronise()
+        self._wco_in = 0
 
-    def _carry_out(self, path: Toolpath, owner: int) -> Generator[Ready, None, None]:
-        """The rows of a line, each to the planner or at once."""
-        if path.running and (path.kind[: path.running] == Kind.END).any():
-            path = path.first(path.running)
+    def _flow(self, flow: int) -> Wait:
+        """M0, M2 and M30."""
+        yield from self._synchronise()
+        if flow == 0:
+            if self._state != "Check":
+                self._flags.add("hold")
+                yield from self._realtime()
+            return
+        self._parser.rewind()
+        self._feed_percent = self._rapid_percent = self._spindle_percent = 100
+        if self._state != "Check":
+            yield from self._offsets_changed()
+            self._spin(None, 0.0)
+            self._cool(mist=False, flood=False)
+        self._message("Pgm End")
+        self._ending = ""
+
+    def _jogged(self, path: Toolpath, stood: list[float]) -> Line:
+        if self._is_set(20) and self._beyond(self._parser.position):
+            self._parser.at(stood)
+            return BEYOND_TRAVEL
         for row in range(len(path)):
-            kind = Kind(int(path.kind[row]))
-            if kind in SYNCHRONISED:
-                value = float(path.value[row])
-                if self._changes_nothing(kind, value):
-                    self._event(kind, value)
-                    continue
-                yield self._idle
-                self._last = NO_BLOCKS
-                self._event(kind, value)
-                yield self._rested
-            else:
-                yield from self._plan(path, row, owner)
+            yield from self._line_to(path, row, self._parser.rpm, -1, jogs=True)
+        if self._state == "Idle" and self._ring:
+            self._state = "Jog"
+            self._set_out()
+        return OK
 
-    def _changes_nothing(self, kind: Kind, value: float) -> bool:
-        """Whether an event says what holds already, or in laser mode another power: that comes
-        with the move behind it."""
-        if kind in COOLANT:
-            return COOLANTS[kind] == self._coolant
-        if kind not in SPINDLE or SPINDLES[kind] != self._spindle:
-            return False
-        same = kind == Kind.SPINDLE_OFF or not abs(value - self._rpm) > 0.0  # NaN: none is said
-        return same or self._machine.controller.laser_mode
+    def _beyond(self, target: Sequence[float]) -> bool:
+        """True if a place is beyond the travel, which begins at machine zero and goes down."""
+        travel = [self._memory.settings[130 + k] for k in range(3)]
+        return any(
+            value > 0.0 or value < -most for value, most in zip(target, travel, strict=True)
+        )
 
-    def _event(self, kind: Kind, value: float) -> None:
-        if kind == Kind.DWELL:
-            self._rest_s = self.now + dwell_s(value)
-        elif kind in SPINDLE:
-            self._spindle = SPINDLES[kind]
-            self._rpm = value if value == value else self._rpm  # NaN: none is said
-        elif kind in COOLANT:
-            self._coolant = COOLANTS[kind]
-        elif kind == Kind.TOOL_CHANGE:
-            self._tool = int(value)
-        elif kind == Kind.END:
-            self._spindle, self._coolant = "M5", "M9"
-            self._out += b"[MSG:Pgm End]\r\n"
+    def _soft_check(self, target: Sequence[float]) -> Wait:
+        """A target beyond the travel: hold, then an alarm that only a reset ends."""
+        if not self._beyond(target):
+            return
+        self._soft = True
+        if self._state == "Run":
+            self._flags.add("hold")
+            while self._state != "Idle":
+                yield from self._realtime()
+                if self._state != "Idle":
+                    yield None
+        self._kill()
+        self._alarm = SOFT_LIMIT
+        yield from self._realtime()
 
-    # The planner.
-
-    def _plan(self, path: Toolpath, row: int, owner: int) -> Generator[Ready, None, None]:
-        """A move into the ring, block by block; waits where the ring is full."""
+    def _line_to(
+        self, path: Toolpath, row: int, power: float, owner: int, *, jogs: bool = False
+    ) -> Wait:
+        """A move into the ring, block by block; waits where the ring is full (`mc_line`)."""
+        if self._is_set(20) and not jogs:
+            yield from self._soft_check(path.end[row].tolist())
+        if self._state == "Check":
+            return
+        yield from self._realtime()
         machine, controller = self._machine, self._machine.controller
         rows = np.array([row])
         own, self._planned, asked = blocks_from(self._planned, path, rows, machine, controller)
-        if len(own) < asked and controller.laser_mode and self._spindle == "M3":
-            yield self._idle
-            self._last = NO_BLOCKS
+        spindle = self._parser.modes.spindle
+        if len(own) < asked and self._is_set(32) and spindle == Kind.SPINDLE_CW:
+            yield from self._spin_at_rest(spindle, power)
         if not len(own):
             return
-        last = self._last
+        last = self._last if self._ring or self._running else NO_BLOCKS
         last = replace(last, row=np.full(len(last), row, np.int32))
         own = replace(own, row=np.full(len(own), row, np.int32))
         stops = stops_of(path, controller)
@@ -435,28 +1267,489 @@ class GrblTwin(Twin):
         self._last = own.part(len(own) - 1, len(own))
         for k in range(len(own)):
             while len(self._ring) >= controller.buffer_blocks - 1:
-                yield lambda: len(self._ring) < controller.buffer_blocks - 1
+                self._start_cycle()
+                yield from self._realtime()
+                if len(self._ring) >= controller.buffer_blocks - 1:
+                    yield None
             self._ring.append(
                 _Planned(
                     own.start[k].astype(np.int64),
                     own.way[k].astype(np.int64),
                     float(plan.length_mm[k]),
+                    float(path.feed[row]) / 60.0 if path.is_feed[row] else float(highest[k]),
                     float(plan.speed_mm_s[k]),
                     float(highest[k]),
                     float(plan.acceleration_mm_s2[k]),
                     float(plan.corner_mm_s[k]),
                     not path.is_feed[row],
+                    jogs or bool(self._probing),
+                    spindle,
+                    power,
                     owner,
                 )
             )
             self._stale = True
+            if self._running and self._turn_at_s is None:
+                self._aim()
+
+    # The probe and the switches.
+
+    def _limits(self) -> list[bool]:
+        """Which switches of the travel are closed, as it reads its pins."""
+        if self._ends_mm is None:
+            closed = [False] * 3
+        else:
+            low, high = self._ends_mm
+            here, eps = self.slides.commanded_mm, 0.5 * self._slide_step_mm
+            closed = ((here > high + eps) | (here < low - eps)).tolist()
+        return [each != self._is_set(5) for each in closed]
+
+    def _touches_probe(self) -> bool:
+        """True if the probe counts as touching; $6, and G38.4 and G38.5, invert it."""
+        height = self._choices.probe_mm + self._machine.controller.machine_zero_mm[2]
+        closed = self.slides.commanded_mm[2] <= height + 0.5 * self._slide_step_mm[2]
+        return (bool(closed) != self._is_set(6)) != self._away
+
+    def _has_touched(self) -> bool:
+        """True once the probing move under way has ended at the probe."""
+        return self._probing is None
+
+    def _probe(self, path: Toolpath, motion: int, stood: list[float]) -> Wait:
+        """G38.2 to G38.5 (`mc_probe_cycle`)."""
+        if self._state == "Check":
+            return
+        target = list(self._parser.position)
+        self._parser.at(stood)
+        yield from self._synchronise()
+        self._probed, self._away = False, motion >= PROBES + 2
+        if self._touches_probe():
+            self._alarm = PROBE_TOUCHES
+            yield from self._realtime()
+            self._away = False
+            return
+        self._probing = motion
+        owner = len(self.decoded) - 1
+        for row in range(len(path)):
+            yield from self._line_to(path, row, self._parser.power, owner)
+        self._start_cycle()
+        while True:
+            yield from self._realtime()
+            if self._state == "Idle":
+                break
+            yield None
+        if self._has_touched():
+            self._probed = True
+        elif motion in (PROBES + 1, PROBES + 3):
+            self._probe_steps = self._steps
+        else:
+            self._alarm = PROBE_MISSED
+        self._probing, self._away = None, False
+        yield from self._realtime()
+        if self._memory.settings[1] != ALWAYS_ON:
+            yield from self._delay(self._memory.settings[1] / 1000.0)
+        self._forget_blocks()
+        self._planned = self._steps[None, :]
+        self._say(self._probe_report())
+        self._parser.at(self._mm(self._steps) if self._probed else target)
+
+    def _probe_report(self) -> str:
+        return f"[PRB:{self._places(self._mm(self._probe_steps))}:{int(self._probed)}]\r\n"
+
+    def _touched(self) -> None:
+        """The slides have come to where the probe or a switch changes."""
+        if self._probing is not None and self._touches_probe():
+            self._probing = None
+            self._probe_steps = self._steps
+            self._flags.add("cancel")
+        limits = self._limits()
+        if limits != self._felt:
+            self._felt = limits
+            if self._is_set(21) and self._state != "Alarm" and not self._alarm:
+                self._kill()
+                self._alarm = HARD_LIMIT
+
+    def _touches_on(self, commanded: Floats, seconds: Floats) -> list[float]:
+        """When, of a travel, the probe or a switch changes: the first time of each."""
+        here, found = self.slides.commanded_mm, list[float]()
+        path = np.concatenate([here[None, :], commanded])
+        eps = 0.5 * self._slide_step_mm
+        masks = list[Bools]()
+        if self._probing is not None:
+            height = self._choices.probe_mm + self._machine.controller.machine_zero_mm[2]
+            masks.append(path[:, 2] <= height + eps[2])
+        if self._ends_mm is not None and self._is_set(21):
+            low, high = self._ends_mm
+            masks += list(((path > high + eps) | (path < low - eps)).T)
+        for mask in masks:
+            changes = np.flatnonzero(mask[1:] != mask[:-1])
+            found += (self.now + seconds[changes]).tolist()
+        self._felt = self._limits()
+        return sorted(found)
+
+    # Lines that begin with $ (`system_execute_line`).
+
+    def _command(self, text: str) -> Line:
+        head, rest = text[1:2], text[2:]
+        if head == "":
+            self._say(HELP)
+        elif head == "J":
+            if self._state not in ("Idle", "Jog"):
+                return NOT_IDLE
+            if not rest.startswith("="):
+                return BAD_STATEMENT
+            return (yield from self._block(text, b""))
+        elif head in "$GCX":
+            return self._show_or_switch(head) if not rest else BAD_STATEMENT
+        elif self._state not in ("Idle", "Alarm"):
+            return NOT_IDLE
+        elif head == "#":
+            if rest:
+                return BAD_STATEMENT
+            self._say(self._frames())
+        elif head == "H":
+            return (yield from self._home(rest))
+        elif head == "S":
+            if rest != "LP":
+                return BAD_STATEMENT
+            self._flags.add("sleep")
+        elif head == "I":
+            return self._build(rest)
+        elif head == "R":
+            return (yield from self._restore(rest))
+        elif head == "N":
+            return (yield from self._start_lines(rest))
+        else:
+            return self._assign(text)
+        return OK
+
+    def _show_or_switch(self, head: str) -> int:
+        if head == "$":
+            if self._state in ("Run", "Hold"):
+                return NOT_IDLE
+            for number in self._memory.settings:
+                self._say(f"${number}={self._memory.shown(number)}\r\n")
+        elif head == "G":
+            self._say(f"[GC:{self._modes()}]\r\n")
+        elif head == "X":
+            if self._state == "Alarm":
+                self._message("Caution: Unlocked")
+                self._state = "Idle"
+        elif self._state == "Check":
+            self._kill()
+            self._message("Disabled")
+        elif self._state != "Idle":
+            return NOT_IDLE
+        else:
+            self._state = "Check"
+            self._message("Enabled")
+        return OK
+
+    def _modes(self) -> str:
+        """The modes in force as `$G` shows them."""
+        parser = self._parser
+        modes = parser.modes
+        motion = f"38.{modes.motion - PROBES + 2}" if modes.motion >= PROBES else f"{modes.motion}"
+        words = [f"G{motion}", f"G{54 + modes.frame}", f"G{modes.plane}"]
+        words += ["G20" if modes.inches else "G21", "G90" if modes.absolute else "G91"]
+        words += [f"G{modes.feed_mode}", WORDS[modes.spindle]]
+        words += ["M7"] * modes.mist + ["M8"] * modes.flood
+        words += [] if modes.mist or modes.flood else ["M9"]
+        words += [f"T{parser.tool}", f"F{self._rate(parser.feed)}", f"S{_shown(parser.rpm, 0)}"]
+        return " ".join(words)
+
+    def _build(self, rest: str) -> int:
+        """`$I` and `$I=`."""
+        if rest and not rest.startswith("="):
+            return BAD_STATEMENT
+        if rest:
+            self._shift_line(rest[1:])
+            self._memory.keep(START_LINES, self._line)
+            return OK
+        self._memory.text(START_LINES, self._line)
+        options = "VM" if self._machine.coolant.mist else "V"
+        blocks = self._machine.controller.buffer_blocks - 1
+        self._say(f"[VER:{BUILD}:{self._line_text()}]\r\n[OPT:{options},{blocks},{RX_BYTES}]\r\n")
+        return OK
+
+    def _shift_line(self, text: str) -> None:
+        """What stands in the line is moved to its begin."""
+        self._line[: len(text) + 1] = text.encode("latin-1") + b"\0"
+
+    def _restore(self, rest: str) -> Line:
+        if rest[:3] != "ST=" or len(rest) != 4 or rest[3] not in "$#*":
+            return BAD_STATEMENT
+        yield from self._synchronise()
+        self._memory.restore(rest[3])
+        self._use_settings()
+        self._message("Restoring defaults")
+        self._kill()
+        return OK
+
+    def _start_lines(self, rest: str) -> Line:
+        """`$N` and `$Nx=`, which does the line before it keeps it."""
+        if not rest:
+            for which in range(START_LINES):
+                if self._memory.text(which, self._line):
+                    self._say(f"$N{which}={self._line_text()}\r\n")
+                else:
+                    self._answer(READ_FAILED)
+            return OK
+        if self._state != "Idle":
+            return NOT_IDLE
+        found = _read(rest, 0)
+        if found is None:
+            return BAD_NUMBER
+        value, end = found
+        if rest[end : end + 1] != "=":
+            return BAD_STATEMENT
+        text = rest[end + 1 :]
+        self._shift_line(text)
+        code = yield from self._block(text, None)
+        if code:
+            return code
+        yield from self._synchronise()
+        if _byte(value) < START_LINES:  # beyond, grbl writes over what else is in its memory
+            self._memory.keep(_byte(value), self._line)
+        return OK
+
+    def _assign(self, text: str) -> int:
+        """`$x=value` (`settings_store_global_setting`)."""
+        name = _read(text, 1)
+        if name is None:
+            return BAD_NUMBER
+        if text[name[1] : name[1] + 1] != "=":
+            return BAD_STATEMENT
+        given = _read(text, name[1] + 1)
+        if given is None:
+            return BAD_NUMBER
+        value, end = given
+        if end != len(text) or name[0] > 255.0:
+            return BAD_STATEMENT
+        if value < 0.0:
+            return NEGATIVE
+        number = _byte(name[0])
+        if number not in self._memory.settings:
+            return BAD_STATEMENT
+        return self._set(number, value)
+
+    def _set(self, number: int, value: float) -> int:
+        settings = self._memory.settings
+        if number == 0 and _byte(value) < 3:
+            return SHORT_PULSE
+        if number == 20 and _byte(value) and not settings[22]:
+            return NO_SOFT_LIMITS
+        if number in SWITCHES:
+            value = float(_byte(value) != 0)
+        elif number in WHOLE:
+            value = float(_byte(value))
+        settings[number] = value
+        if number == 13:
+            self._wco_in = 0
+        if number == 22 and not value:
+            settings[20] = 0.0
+        if number in RPM:
+            self._lit = False
+        self._use_settings()
+        return OK
+
+    def _use_settings(self) -> None:
+        """What the model uses of the settings. Steps of a mm and accelerations of 0, with which
+        grbl divides by 0, are not used."""
+        settings, stood = self._memory.settings, self._steps
+        turned = [int(settings[3]) >> axis & 1 for axis in range(3)]
+        self._signs = 1 - 2 * np.array(turned, dtype=np.int64)  # as it was wired for $3=0
+        self._stands_at(stood)
+        axes: dict[str, Any] = {}
+        for k, name in enumerate("xyz"):
+            given: dict[str, Any] = {"max_rate_mm_min": settings[110 + k]}
+            if settings[100 + k] > 0.0:
+                given["coded_step_mm"] = 1.0 / settings[100 + k]
+            if settings[120 + k] > 0.0:
+                given["acceleration_mm_s2"] = settings[120 + k]
+            axes[name] = msgspec.structs.replace(getattr(self._machine.axes, name), **given)
+        controller = msgspec.structs.replace(
+            self._machine.controller,
+            idle_delay_ms=int(settings[1]),
+            junction_deviation_mm=settings[11],
+            arc_tolerance_mm=settings[12],
+            laser_mode=bool(settings[32]),
+        )
+        axes_now = msgspec.structs.replace(self._machine.axes, **axes)
+        self._machine = msgspec.structs.replace(
+            self._machine, axes=axes_now, controller=controller
+        )
+
+    # Homing (`limits_go_home`).
+
+    def _home(self, rest: str) -> Line:
+        if not self._is_set(22):
+            return NO_HOMING
+        self._state = "Home"
+        if rest:
+            return BAD_STATEMENT  # and it stays in this state, as grbl does
+        for axes in ([2], [0, 1]):
+            yield from self._find_switches(axes)
+        yield from self._realtime()
+        self._stand()
+        self._state = "Idle"
+        if self._memory.settings[1] != ALWAYS_ON:
+            yield from self._delay(self._memory.settings[1] / 1000.0)
+        yield from self._startup()
+        return OK
+
+    def _find_switches(self, axes: list[int]) -> Wait:
+        """To the switches of these axes and back, twice, the second time slowly."""
+        settings = self._memory.settings
+        sign = [-1 if int(settings[23]) >> axis & 1 else 1 for axis in range(3)]
+        search = SEARCH * max(settings[130 + axis] for axis in axes)
+        pull_off, seek, feed = settings[27], settings[25], settings[24]
+        there, back = (1, search, seek), (-1, pull_off, seek)
+        for turn, far, rate in (there, back, (1, LOCATE * pull_off, feed), back):
+            start = self._steps
+            for axis in axes:
+                start[axis] = 0
+            self._stands_at(start)
+            yield from self._home_to(axes, [turn * each for each in sign], far, rate, turn > 0)
+            yield from self._delay(settings[26] / 1000.0)
+        placed = self._steps
+        for axis in axes:
+            per_mm = settings[100 + axis]
+            mm = -pull_off if sign[axis] > 0 else pull_off - settings[130 + axis]
+            placed[axis] = int(math.copysign(math.floor(abs(mm) * per_mm + 0.5), mm))
+        self._stands_at(placed)
+
+    def _home_to(
+        self, axes: list[int], sign: list[int], far_mm: float, rate: float, approaches: bool
+    ) -> Wait:
+        """Move all axes alike, in an approach each until its switch closes."""
+        step_mm = self._slide_step_mm
+        counts = [round(far_mm * self._memory.settings[100 + axis]) for axis in axes]
+        whole = max(counts)
+        speed = max(rate, 1.0) / 60.0
+        ramps = [axis.acceleration_mm_s2 or 1.0 for axis in self._machine.axes]
+        ramp = min(ramps[axis] for axis in axes)
+        events = np.arange(1, whole + 1)
+        begin, moved = self._slide_steps(), np.zeros((whole, 3), dtype=np.int64)
+        lasts = list[int]()
+        for axis, count in zip(axes, counts, strict=True):
+            own = np.minimum(events, count)
+            until = self._closes(axis, sign[axis], count) if approaches else None
+            lasts.append(count if until is None else until)
+            moved[:, axis] = sign[axis] * np.minimum(own, lasts[-1])
+            if approaches and until is None:
+                lasts[-1] = whole
+        missed = approaches and any(
+            self._closes(axis, sign[axis], count) is None
+            for axis, count in zip(axes, counts, strict=True)
+        )
+        last = max(lasts)
+        phases = _trapezoid(far_mm, 0.0, speed, ramp, 0.0)
+        at = far_mm * events[:last] / max(whole, 1)
+        seconds = _times(phases, at)
+        total = float(seconds[-1]) if last else 0.0
+        travel = Travel(
+            (begin + self._signs * moved[:last]) * step_mm, seconds, np.zeros(last), total
+        )
+        self.slides.begin(travel, self.now, -1)
+        while self.slides.ends_s is not None and not self._flags & {"door", "reset"}:
+            yield None
+        done = self.slides.done
+        self.slides.stop(self.now)
+        if missed or self._flags & {"door", "reset"}:
+            counted = self._steps
+            for axis, count in zip(axes, counts, strict=True):
+                counted[axis] = sign[axis] * min(done, count)
+            self._stands_at(counted)
+        closed = self._limits()
+        if "reset" in self._flags:
+            self._alarm = HOMING_RESET
+        if "door" in self._flags:
+            self._alarm = HOMING_DOOR
+        if not approaches and any(closed[axis] for axis in axes):
+            self._alarm = HOMING_STUCK
+        if missed and not self._alarm:
+            self._alarm = HOMING_MISSED
+        if self._alarm:
+            self._kill()
+            yield from self._realtime()
+
+    def _closes(self, axis: int, sign: int, count: int) -> int | None:
+        """After how many steps the switch of an axis closes, which it is asked before each."""
+        if self._ends_mm is None:
+            return 0 if self._is_set(5) else None
+        way = int(self._signs[axis]) * sign
+        at = self._slide_steps()[axis] + way * np.arange(count + 1)
+        eps, (low, high) = 0.5 * self._slide_step_mm[axis], self._ends_mm
+        mm = at * self._slide_step_mm[axis]
+        closed = (mm > high[axis] + eps) | (mm < low[axis] - eps)
+        found = np.flatnonzero(closed != self._is_set(5))
+        return int(found[0]) if len(found) else None
+
+    # Reports.
+
+    def _place(self, mm: float) -> str:
+        if self._is_set(13):
+            return _shown(_single(np.float32(mm) * np.float32(INCHES_PER_MM)), 4)
+        return _shown(mm, 3)
+
+    def _places(self, mm: Sequence[float]) -> str:
+        return ",".join(self._place(value) for value in mm)
+
+    def _rate(self, mm_min: float) -> str:
+        if self._is_set(13):
+            return _shown(_single(np.float32(mm_min) * np.float32(INCHES_PER_MM)), 1)
+        return _shown(mm_min, 0)
+
+    def _frames(self) -> str:
+        """`$#`: what the frames and places are, and the last probe."""
+        memory = self._memory
+        rows = {f"G{54 + k}": place for k, place in enumerate(memory.frames)}
+        rows |= memory.homes | {"G92": self._parser.offset, "TLO": [self._parser.length]}
+        text = "".join(f"[{name}:{self._places(place)}]\r\n" for name, place in rows.items())
+        return text + self._probe_report()
+
+    def _report(self) -> None:
+        """The status report (`report_realtime_status`)."""
+        busy = self._state in ("Home", "Run", "Hold", "Jog", "Door")
+        mask = int(self._memory.settings[10])
+        offsets = [self._parser.shifted(k) for k in range(3)]
+        here = self._mm(self._steps)
+        if not mask & 1:
+            here = [_single(a - b) for a, b in zip(here, offsets, strict=True)]
+        fields = [self.state, f"{'MPos' if mask & 1 else 'WPos'}:{self._places(here)}"]
+        if mask & 2:
+            blocks = self._machine.controller.buffer_blocks - 1 - len(self._ring)
+            fields.append(f"Bf:{blocks},{RX_BYTES - len(self._rx)}")
+        speed = self._speed_ahead() * 60.0 if self._running and self._phases and busy else 0.0
+        fields.append(f"FS:{self._rate(speed)},{_shown(self._rpm, 0)}")
+        pins = "P" * self._touches_probe()
+        pins += "".join(axis for axis, on in zip("XYZ", self._limits(), strict=True) if on)
+        fields += [f"Pn:{pins}"] if pins else []
+        if self._wco_in > 0:
+            self._wco_in -= 1
+        else:
+            self._wco_in = 29 if busy else 9
+            self._ov_in = max(self._ov_in, 1)
+            fields.append(f"WCO:{self._places(offsets)}")
+        if self._ov_in > 0:
+            self._ov_in -= 1
+        else:
+            self._ov_in = 19 if busy else 9
+            percents = self._feed_percent, self._rapid_percent, self._spindle_percent
+            fields.append("Ov:" + ",".join(map(str, percents)))
+            on = ("C" if self._ccw else "S") * self._lit
+            on += "F" * self._flood + "M" * self._mist
+            fields += [f"A:{on}"] if on else []
+        self._say(f"<{'|'.join(fields)}>\r\n")
+
+    # The planner and the steps.
 
     def _nominal(self, block: _Planned) -> float:
-        percent = self._rapid_percent if block.rapid else self._feed_percent
+        percent = 100 if block.fixed else self._feed_percent
+        percent = self._rapid_percent if block.rapid else percent
         if percent == 100:
             return block.speed
-        wished = (block.highest if block.rapid else block.speed) * percent / 100.0
-        return min(wished, block.highest)
+        return max(min(block.asked * percent / 100.0, block.highest), LEAST_SPEED_MM_S)
 
     def _exit_speed(self) -> float:
         """How fast the block that runs may be at its end, for those behind it in the ring."""
@@ -467,13 +1760,20 @@ class GrblTwin(Twin):
             square = min(most * most, square + 2.0 * block.acceleration * block.length)
         return float(np.sqrt(square))
 
+    def _aim_later(self) -> None:
+        """Plan anew behind the pieces of the block that are fixed already."""
+        done = math.floor((self.now - self._piece_s) / SEGMENT_S + SEGMENT_S / 100.0)
+        self._turn_at_s = self._piece_s + (done + SEGMENTS) * SEGMENT_S
+
     def _aim(self) -> None:
         """Plan the rest of the block that runs, from where it is and as fast as it is."""
         self._stale = False
         block = self._ring[0]
         if self._phases:
-            self._done_mm, self._speed = self._where()
+            self._done_mm, self._speed = self._where(self.now)
             self._events += self.slides.done
+        else:
+            self._piece_s = self.now
         left = max(block.length - self._done_mm, 0.0)
         a, v = block.acceleration, self._speed
         if self._stopping:
@@ -483,8 +1783,8 @@ class GrblTwin(Twin):
         self._begun_s = self.now
         count = block.events
         commanded = np.empty((count, 3))
-        lines = block.start[None, :], block.way[None, :]
-        step_lines_fill(lines, (0, 0), coded_steps_mm(self._machine), commanded)
+        start, way = self._origin + self._signs * block.start, self._signs * block.way
+        step_lines_fill((start[None, :], way[None, :]), (0, 0), self._slide_step_mm, commanded)
         at = block.length * np.arange(1, count + 1) / count - self._done_mm
         whole = sum(seconds for seconds, _, _ in self._phases)
         reach = _distance(self._phases, whole)
@@ -498,10 +1798,11 @@ class GrblTwin(Twin):
             whole,
         )
         self.slides.begin(travel, self.now, block.block)
+        self._touches = self._touches_on(travel.commanded, travel.seconds)
 
-    def _where(self) -> tuple[float, float]:
+    def _where(self, now: float) -> tuple[float, float]:
         """How much of the block that runs is done, mm, and how fast it is."""
-        since, done = self.now - self._begun_s, self._done_mm
+        since, done = now - self._begun_s, self._done_mm
         for seconds, v, a in self._phases:
             t = min(seconds, since)
             done, since = done + v * t + 0.5 * a * t * t, since - t
@@ -509,196 +1810,31 @@ class GrblTwin(Twin):
                 return done, max(v + a * t, 0.0)
         return done, _end_speed(self._phases)
 
+    def _speed_ahead(self) -> float:
+        """The speed that it reports: that at the end of the pieces that are fixed."""
+        return self._where(self.now + (SEGMENTS - 0.5) * SEGMENT_S)[1]
+
     def _block_over(self) -> None:
         """The travel is over: the block, or with a hold only its slowing down."""
         block = self._ring[0]
         self._events += self.slides.done
         self._done_mm += _distance(self._phases, sum(each[0] for each in self._phases))
         self._speed = _end_speed(self._phases)
-        self._phases = []
+        self._phases, self._touches = [], []
         if self._events >= block.events:
             self._ring.pop(0)
             self._done_mm, self._events = 0.0, 0
-        if self._stopping and (self._speed <= 0.0 or not self._ring):
-            self._running, self._speed, self._held = False, 0.0, True
-            if self._jogging:
-                self._ring.clear()
-                self._done_mm, self._events = 0.0, 0
-                self._stand()
-                self._held = self._stopping = self._jogging = False
-        elif not self._ring:
-            self._running = self._jogging = self._homing = False
-            self._speed = 0.0
-            delay = self._machine.controller.idle_delay_ms
-            if delay not in (0, ALWAYS_ON):
-                self._rest_s = self.now + delay / 1000.0
+        if not self._ring or (self._stopping and self._speed <= 0.0):
+            self._running = self._stopping = False
+            self._speed, self._turn_at_s = 0.0, None
+            self._ended = True
+            if self._is_set(32) and block.spindle == Kind.SPINDLE_CCW:
+                self._lit = False
+            self._go_idle()
         else:
+            if self._ring[0] is not block:
+                self._light(self._ring[0])
             self._aim()
-
-    # Lines that begin with $.
-
-    def _command(self, text: str) -> Job:
-        rest = text[1:]
-        moving = not self._idle() or self._held
-        if rest in ("$", "C", "X") and moving and not self._alarm:  # not "" and G: system.c
-            return CODES["not idle"]
-        if rest == "":
-            self._out += (
-                b"[HLP:$$ $# $G $I $N $x=val $Nx=line $J=line $SLP $C $X $H ~ ! ? ctrl-x]\r\n"
-            )
-        elif rest == "$":
-            for number, value in self._settings.items():
-                self._out += f"${number}={value}\r\n".encode()
-        elif rest == "G":
-            self._out += f"[GC:{self._modes()}]\r\n".encode()
-        elif rest == "C":
-            self._toggle_check()
-        elif rest == "X":
-            if self._alarm:
-                self._alarm = False
-                self._out += b"[MSG:Caution: Unlocked]\r\n"
-        elif rest.startswith("J="):
-            return (yield from self._jog(rest[2:]))
-        elif moving:
-            return CODES["not idle"]
-        elif rest == "H":
-            return (yield from self._home())
-        elif rest == "#":
-            self._out += self._frames()
-        elif rest == "I":
-            self._out += b"[VER:1.1h.20190825:]\r\n[OPT:V,15,128]\r\n"
-        elif rest == "N":
-            self._out += b"$N0=\r\n$N1=\r\n"
-        elif rest == "SLP":
-            self._asleep = True
-            self._out += b"[MSG:Sleeping]\r\n"
-        elif found := re.fullmatch(r"(\d+)=(.*)", rest):
-            return self._set(int(found[1]), found[2])
-        else:
-            return CODES["statement"]
-        return 0
-
-    def _toggle_check(self) -> None:
-        """$C; leaving it resets."""
-        self._check = not self._check
-        self._out += b"[MSG:Enabled]\r\n" if self._check else b"[MSG:Disabled]\r\n"
-        if not self._check:
-            self._parser = Parser(self._machine, self._path, self._notes)
-            self._stand()
-            self._greet()
-
-    def _jog(self, text: str) -> Job:
-        """$J=: a move at a feed of its own, which changes no mode."""
-        if self._alarm:
-            return CODES["locked"]
-        if self._ring and not self._jogging:
-            return CODES["not idle"]
-        try:
-            self._parser.line(f"$J={text}")
-        except Fault as fault:
-            return _code(fault)
-        path = self._path.drained()
-        self._jogging = True
-        for row in range(len(path)):
-            yield from self._plan(path, row, -1)
-        self._jogging = bool(self._ring)
-        return 0
-
-    def _modes(self) -> str:
-        """The modes in force as `$G` shows them."""
-        modes = self._parser.modes
-        words = [f"G{modes.motion}", f"G{54 + modes.frame}", f"G{modes.plane}"]
-        words += ["G20" if modes.inches else "G21", "G90" if modes.absolute else "G91"]
-        words += [f"G{modes.feed_mode}", self._spindle, self._coolant, f"T{self._tool}"]
-        feed = self._parser.feed / (25.4 if modes.inches else 1.0)
-        return " ".join([*words, f"F{feed:g}", f"S{self._rpm:g}"])
-
-    def _home(self) -> Job:
-        """$H: Z, then X and Y, to their switches at machine zero, and back from these."""
-        if self._choices.homing == "off":
-            return CODES["homing"]
-        zero = np.array(self._machine.controller.machine_zero_mm)
-        here, self._alarm, self._homing = self.slides.commanded_mm, False, True
-        corners = [here, [here[0], here[1], zero[2]], zero, zero - PULL_OFF_MM]
-        travel = _straight(np.array(corners), coded_steps_mm(self._machine))
-        self.slides.begin(travel, self.now, -1)
-        yield lambda: self.slides.ends_s is None
-        self._homing = False
-        self._stand()
-        return 0
-
-    def _set(self, number: int, text: str) -> int:
-        """$x=value; what the model uses changes with it."""
-        if number not in self._settings:
-            return CODES["statement"]
-        try:
-            value = float(text)
-        except ValueError:
-            return CODES["number"]
-        if not value >= 0.0 or value == float("inf"):
-            return 4
-        self._settings[number] = _shown(number, value)
-        machine, controller = self._machine, self._machine.controller
-        axis, first = number % 10, number - number % 10
-        if first in AXIS_SETTINGS and axis < 3:
-            if value == 0.0:
-                return 4
-            given: dict[str, Any] = {AXIS_SETTINGS[first]: 1.0 / value if first == 100 else value}
-            if first == 100:
-                given["real_step_mm"] = given["coded_step_mm"]
-            name = "xyz"[axis]
-            changed = msgspec.structs.replace(getattr(machine.axes, name), **given)
-            axes = msgspec.structs.replace(machine.axes, **{name: changed})
-            self._machine = msgspec.structs.replace(machine, axes=axes)
-        elif number in (1, 11, 12, 32):
-            changes: dict[int, dict[str, Any]] = {
-                1: {"idle_delay_ms": int(value)},
-                11: {"junction_deviation_mm": value},
-                12: {"arc_tolerance_mm": value},
-                32: {"laser_mode": bool(int(value))},
-            }
-            given = changes[number]
-            self._parser.laser = given.get("laser_mode", self._parser.laser)
-            controller = msgspec.structs.replace(controller, **given)
-            self._machine = msgspec.structs.replace(machine, controller=controller)
-        return 0
-
-    def _frames(self) -> bytes:
-        x, y, z = (0.0 - value for value in self._machine.controller.machine_zero_mm)
-        rows = [f"[G54:{x:.3f},{y:.3f},{z:.3f}]"]
-        rows += [f"[G{frame}:0.000,0.000,0.000]" for frame in (55, 56, 57, 58, 59, 28, 30, 92)]
-        return "".join(f"{row}\r\n" for row in [*rows, "[TLO:0.000]"]).encode()
-
-    # The status report.
-
-    def _report(self) -> None:
-        zero = np.array(self._machine.controller.machine_zero_mm)
-        busy = self._running or self._homing
-        mask = int(float(self._settings[10]))
-        here = self.slides.commanded_mm if not mask & 1 else self.slides.commanded_mm - zero
-        fields = [self.state, f"{'MPos' if mask & 1 else 'WPos'}:{_mm(here)}"]
-        if mask & 2:
-            blocks = self._machine.controller.buffer_blocks - 1 - len(self._ring)
-            fields.append(f"Bf:{blocks},{RX_BYTES - len(self._rx)}")
-        speed = self._where()[1] * 60.0 if self._running and self._phases else 0.0
-        rpm = self._rpm * self._spindle_percent / 100.0 if self._spindle != "M5" else 0.0
-        fields.append(f"FS:{speed:.0f},{rpm:.0f}")
-        if self._wco_in > 0:
-            self._wco_in -= 1
-        else:
-            self._wco_in = 29 if busy else 9
-            self._ov_in = max(self._ov_in, 1)
-            fields.append(f"WCO:{_mm(0.0 - zero)}")
-        if self._ov_in > 0:
-            self._ov_in -= 1
-        else:
-            self._ov_in = 19 if busy else 9
-            percents = self._feed_percent, self._rapid_percent, self._spindle_percent
-            fields.append("Ov:" + ",".join(map(str, percents)))
-            on = {"M3": "S", "M4": "C"}.get(self._spindle, "")
-            on += {"M8": "F", "M7": "M"}.get(self._coolant, "")
-            fields += [f"A:{on}"] if on else []
-        self._out += f"<{'|'.join(fields)}>\r\n".encode()
 
 
 LENGTH_EPS_MM: Final = 1e-9
@@ -717,48 +1853,16 @@ def _code(fault: Fault) -> int:
     return int(found[1]) if found else 20
 
 
-def _percent(now: int, change: int | None) -> int:
-    return 100 if change is None else max(LEAST_OVERRIDE, min(MOST_OVERRIDE, now + change))
+def _cooled(modes: Modes) -> tuple[bool, bool]:
+    return modes.mist, modes.flood
 
 
-def _mm(values: Floats) -> str:
-    return ",".join(f"{value + 0.0:.3f}" for value in values.tolist())
-
-
-def _shown(number: int, value: float) -> str:
-    """A setting as `$$` shows it: whole numbers below $11 and masks, three decimals otherwise."""
-    whole = number < 11 or number in (13, 20, 21, 22, 23, 26, 30, 31, 32)
-    return f"{value:.0f}" if whole else f"{value:.3f}"
-
-
-def _settings(machine: Machine[GrblController, Dialect], *, homing: bool) -> dict[int, str]:
-    """Numbers and values of `$$` (settings_codes_en_US.csv, defaults.h)."""
-    controller, spindle = machine.controller, machine.spindle
-    values: dict[int, float] = dict.fromkeys((2, 3, 4, 5, 6, 13, 20, 21, 23, 31), 0.0)
-    values[32] = float(controller.laser_mode)
-    values |= {0: 10.0, 1: controller.idle_delay_ms, 10: 1.0, 22: float(homing)}
-    values |= {11: controller.junction_deviation_mm, 12: controller.arc_tolerance_mm}
-    values |= {24: 25.0, 25: SEEK_MM_S * 60.0, 26: 250.0, 27: PULL_OFF_MM}
-    values |= {30: spindle.max_rpm or 1000.0, 31: spindle.min_rpm}
-    for first, key in AXIS_SETTINGS.items():
-        for k, axis in enumerate(machine.axes):
-            value = getattr(axis, key)
-            values[first + k] = 1.0 / value if first == 100 else value or 0.0
-    return {number: _shown(number, value) for number, value in sorted(values.items())}
-
-
-def _straight(corners: Floats, step_mm: Floats) -> Travel:
-    """Lines through corners (C, 3) mm at the speed of homing, a sample a step."""
-    parts, seconds, begin = [np.empty((0, 3))], [np.empty(0)], 0.0
-    for start, stop in pairwise(corners):
-        count = int(np.ceil((np.abs(stop - start) / step_mm).max()))
-        share = np.arange(1, count + 1)[:, None] / max(count, 1)
-        parts.append(np.rint((start + share * (stop - start)) / step_mm) * step_mm)
-        duration = float(np.linalg.norm(stop - start)) / SEEK_MM_S
-        seconds.append(begin + duration * share[:, 0])
-        begin += duration
-    commanded = np.concatenate(parts)
-    return Travel(commanded, np.concatenate(seconds), np.zeros(len(commanded)), begin)
+def _percent(now: int, changes: Mapping[int, int | None], asked: set[int]) -> int:
+    """An override after those real-time bytes that were asked for."""
+    for octet, change in changes.items():
+        if octet in asked:
+            now = 100 if change is None else now + change
+    return max(LEAST_OVERRIDE, min(MOST_OVERRIDE, now))
 
 
 # Speeds within a block: phases of one acceleration each.

@@ -14,6 +14,8 @@ from camtool.target.twin import Twin
 from tests.feeding import at_rest, logo, made, motion, same_motion
 
 BANNER = b"\r\nGrbl 1.1h ['$' for help]\r\n"
+M2_ENDS = b"[MSG:Pgm End]\r\nok\r\n"
+"""What grbl says of an M2 that waits for the slides, also where a reset ends its waiting."""
 SQUARE = b"G21 G90\nG1 X10 F500\nY10\nX0\nY0\nM2\n"
 
 
@@ -111,7 +113,7 @@ def test_what_goes_beyond_the_receive_buffer_is_lost() -> None:
         ("$10=x", 2),
         ("$99=1", 3),
         ("$H", 5),
-        ("$Q", 3),
+        ("$Q", 2),
         ("G0 X" + "1" * 90, 11),
     ],
 )
@@ -165,12 +167,13 @@ def test_a_hold_that_ends_behind_a_corner() -> None:
 def test_a_hold_in_a_dwell_stops_its_clock() -> None:
     twin, _ = made("grbl")
     twin.receive(b"G4P2\nG1X1F500\n", 0.0)
-    assert report(twin, 0.5).startswith("<Idle|")  # as grbl says of a dwell
-    twin.receive(b"!", 0.5)
+    twin.receive(b"?", 0.49)  # it looks at its flags every 50 ms
+    assert twin.advance(0.51).startswith(b"<Idle|")  # as grbl says of a dwell
+    twin.receive(b"!", 0.51)
     assert report(twin, 30.0).startswith("<Hold:0|")
     assert len(twin.slides.trace) == 0
     twin.receive(b"~", 30.0)
-    twin.advance(31.4)
+    twin.advance(31.39)
     assert len(twin.slides.trace) == 0
     at_rest(twin, 31.4)
     assert twin.slides.commanded_mm[0] == pytest.approx(1.0)
@@ -179,25 +182,27 @@ def test_a_hold_in_a_dwell_stops_its_clock() -> None:
 def test_a_reset_in_motion_is_an_alarm_until_it_is_unlocked() -> None:
     twin, _ = made("grbl")
     twin.receive(SQUARE, 0.0)
-    sent = twin.receive(b"\x18", 0.5)
-    assert sent.startswith(b"ALARM:3\r\n" + BANNER + b"[MSG:'$H'|'$X' to unlock]")
-    assert twin.next_s() is None
-    assert report(twin, 0.5).startswith("<Alarm|")
-    assert reply(twin, "G0 X1", 0.5) == "error:9"
-    assert reply(twin, "$X", 0.5) == "[MSG:Caution: Unlocked]\r\nok"
-    assert reply(twin, "G0 X1", 0.5) == "ok"
-    at_rest(twin, 0.5)
+    assert twin.receive(b"\x18", 0.5) == b""
+    sent, now = at_rest(twin, 0.5)
+    assert sent == b"ALARM:3\r\n" + M2_ENDS + BANNER + b"[MSG:'$H'|'$X' to unlock]\r\n"
+    assert now == pytest.approx(0.5 + 0.5 + 2 * 0.025)  # it says an alarm slowly, and $1 twice
+    assert report(twin, now).startswith("<Alarm|")
+    assert reply(twin, "G0 X1", now) == "error:9"
+    assert reply(twin, "$X", now) == "[MSG:Caution: Unlocked]\r\nok"
+    assert reply(twin, "G0 X1", now) == "ok"
+    at_rest(twin, now)
     assert twin.slides.commanded_mm[0] == pytest.approx(1.0)
 
 
 def test_a_reset_at_rest_is_none() -> None:
     twin, _ = made("grbl")
-    assert twin.receive(b"\x18", 0.0) == BANNER
-    twin.receive(SQUARE, 0.0)
-    twin.receive(b"!", 0.5)
+    assert twin.receive(b"\x18", 0.0) + at_rest(twin, 0.0)[0] == BANNER
+    twin.receive(SQUARE, 0.1)
+    twin.receive(b"!", 0.6)
     twin.advance(3.0)
-    assert twin.receive(b"\x18", 3.0) == BANNER  # held: nothing moves
-    assert report(twin, 3.0).startswith("<Idle|")
+    ended = twin.receive(b"\x18", 3.0) + at_rest(twin, 3.0)[0]
+    assert ended == M2_ENDS + BANNER  # held: nothing moves
+    assert report(twin, 3.1).startswith("<Idle|")
 
 
 def test_homing_locks_until_it_is_done() -> None:
@@ -233,7 +238,8 @@ def test_check_mode_moves_nothing_and_its_end_is_a_reset() -> None:
     assert set(stream(twin, SQUARE)[0]) == {"ok"}
     assert reply(twin, "G1 X1 X2") == "error:25"
     assert report(twin, 0.0).startswith("<Check|MPos:0.000,0.000,0.000")
-    assert BANNER in twin.receive(b"$C\n", 0.0)
+    assert twin.receive(b"$C\n", 0.0) == b"[MSG:Disabled]\r\nok\r\n"
+    assert at_rest(twin, 0.0)[0] == BANNER
     assert len(twin.slides.trace) == 0
 
 
