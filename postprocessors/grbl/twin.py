@@ -159,10 +159,12 @@ NEVER_CLOSED: Final = -1e6
 
 class Choices(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """How this grbl is set up. `homing`: "on" has switches at both ends of the travel, and locks
-    it until `$H` or `$X` ($22). `probe_mm`: at or below this height on the machine, as it is when
-    the power comes on, the probe is closed."""
+    it until `$H` or `$X` ($22). `opening`: whether DTR resets the board when its port is opened,
+    as that of an Uno, which then forgets its place. `probe_mm`: at or below this height on the
+    machine, as it is when the power comes on, the probe is closed."""
 
     homing: Literal["off", "on"] = "off"
+    opening: Literal["reset", "nothing"] = "reset"
     probe_mm: float = NEVER_CLOSED
 
 
@@ -557,6 +559,8 @@ class GrblTwin(Twin):
         """DTR resets the board: as if the power came on. The slides stay where they are, and the
         place where they are is what it counts from, as when the twin was made."""
         sent = self.advance(now)
+        if self._choices.opening == "nothing":
+            return sent
         self.slides.stop(now)
         self._stands_at(self._first)
         self._greeted = True

@@ -325,7 +325,8 @@ def stopped_and_gone_on(name: str, seed: int) -> str:
     chance, target = np.random.default_rng(seed), loaded(name)
     program = PROGRAMS[name].replace(ARC, b"G01X00009.00Y00005.00F08;")
     one = consignment(program, target, source=name)
-    choices = [*CHOICES.get(name, []), *(["opening=reset"] if name == "i8751" else [])]
+    opening = {"i8751": ["opening=reset"], "grbl": ["opening=nothing"]}.get(name, [])
+    choices = [*CHOICES.get(name, []), *opening]
     twin: Any = target.twin(choices)
     stop_s = float(chance.uniform(0.0, one.seconds))
 
