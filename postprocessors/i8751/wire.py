@@ -275,6 +275,8 @@ class I8751Conversation(PacketByPacket):
     def _mend(self) -> str:
         if self._executes:
             return "; it may be executing the packet: switch it off"
+        if not self.done and not self._at:
+            return f"; {UNMOVED}; is it switched on, and is --baud its rate?"
         return f"; {UNMOVED}"
 
     @property

@@ -277,7 +277,7 @@ class PicMmhConversation(PacketByPacket):
         count = min(len(self._echo), len(data))
         if data[:count] != self._echo[:count]:
             sent = packet.data.decode("latin-1")
-            self._fail(f"the echo of {sent} is another: {data[:count]!r}", now)
+            self._fail(f"the echo of {sent} is another: {data[:count]!r}{self._rate}", now)
             return
         begins = bool(self._echo) and count == len(self._echo)
         self._echo, steps = self._echo[count:], data[count:]
@@ -290,6 +290,11 @@ class PicMmhConversation(PacketByPacket):
             self.next_s = now + self._silence_s
         elif not self._echo:
             self._count_on(now)
+
+    @property
+    def _rate(self) -> str:
+        """What may be wrong where nothing has been understood yet."""
+        return "; is it switched on, and is --baud its rate?" if not self.done else ""
 
     def _is_report(self, octet: int) -> bool:
         if self._link.step_byte == "letters":
@@ -316,7 +321,7 @@ class PicMmhConversation(PacketByPacket):
             return
         packet = self.packets[self.sent - 1]
         if self._echo:
-            self._fail(f"no echo of {packet.data.decode('latin-1')}", now)
+            self._fail(f"no echo of {packet.data.decode('latin-1')}{self._rate}", now)
         elif self._is_counted_later:
             self._silent(now)
         elif packet.counts and self._count < packet.counts[0]:

@@ -159,3 +159,11 @@ def test_what_a_person_types_and_reads() -> None:
     assert terminal.heard(b"BMMM") == ["B M M M    a datum was stored"]
     assert terminal.heard(b"\r\n") == []
     assert terminal.heard(b"OTRO") == ["OTRO    this is not the key"]
+
+
+def test_one_that_says_nothing_at_first_may_have_another_rate() -> None:
+    talk = conversation(SHORT)
+    talk.begin(0.0)
+    talk.elapsed(talk.next_s)
+    assert talk.state is State.FAILED
+    assert "is --baud its rate?" in talk.why

@@ -10,7 +10,7 @@ from camtool_postprocessors.pic_mmh.wire import PicMmhWire
 from camtool.errors import MachineError
 from camtool.sending.faults import Faults, Wired
 from camtool.sending.prepare import forecast_of
-from camtool.target.registry import LoadedTarget
+from camtool.target.registry import LoadedTarget, load_target
 from camtool.target.wire import Conversation, Manner, Packet, State
 from tests.feeding import logo, made, same_motion
 from tests.sending.talking import talked
@@ -119,3 +119,16 @@ def test_what_the_controller_cannot_take_is_refused() -> None:
         packets(SHORT, "dialect.buffer_chars=35")
     with pytest.raises(MachineError, match="whole µm"):
         packets(SHORT, "axes.x.compensation_mm=0.20004")
+
+
+@pytest.mark.parametrize("heard", [b"", b"\xff\x80\x00"])
+def test_one_that_is_not_understood_at_first_may_have_another_rate(heard: bytes) -> None:
+    loaded = load_target("pic-mmh")
+    packets = [Packet(b"BX204;"), Packet(b"BY178;")]
+    talk = PicMmhWire().conversation(packets, loaded.machine, Manner())
+    talk.begin(0.0)
+    talk.received(heard, 0.1)
+    while not talk.ended:
+        talk.elapsed(talk.next_s)
+    assert talk.state is State.FAILED
+    assert "is --baud its rate?" in talk.why
