@@ -1,7 +1,7 @@
 """Toolpaths and drawings seen from above: chains of lines and arcs, places, and path data.
 
-A chain is an unbroken run of moves of one kind. Arcs stay arcs in the SVG; one of more than 3/4
-turn is written as two, since a nearly full circle is ill-defined by its end points.
+A chain is an unbroken run of moves of one kind. Arcs stay arcs in the SVG; longer ones are written
+as several, since the centre of a nearly half or full circle is ill-defined by its end points.
 """
 
 from __future__ import annotations
@@ -29,8 +29,9 @@ they are 5 µm off."""
 LEAST_TAPER_MM = 1e-6
 """A tool that cuts less than this at the surface is a point there."""
 
-LONGEST_ARC_RAD = 1.5 * math.pi
-"""A longer arc is written as two."""
+LONGEST_ARC_RAD = 0.75 * math.pi
+"""A longer arc is written as several: a half circle whose end lies δ beside its circle of radius
+r, as rounded numbers do, would have its centre √(2 r δ) off."""
 
 MOVES_AT_ONCE = 1 << 14
 """So many moves of a chain are looked at, or written, together."""
@@ -257,9 +258,10 @@ def _is_flat(chain: Chain, index: int, sweep: float) -> bool:
 def _arc(data: PathData, chain: Chain, index: int, sweep: float) -> None:
     begin, centre = chain.points[index], chain.centre[index]
     radius = math.hypot(*(begin - centre).tolist())
-    if abs(sweep) > LONGEST_ARC_RAD:
-        sweep /= 2.0
-        data.arc(*chain.at(index, 0.5)[0], radius=radius, sweep_rad=sweep)
+    count = max(math.ceil(abs(sweep) / LONGEST_ARC_RAD), 1)
+    sweep /= count
+    for k in range(1, count):
+        data.arc(*chain.at(index, k / count)[0], radius=radius, sweep_rad=sweep)
     data.arc(*chain.points[index + 1].tolist(), radius=radius, sweep_rad=sweep)
 
 

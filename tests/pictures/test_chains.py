@@ -48,9 +48,9 @@ def test_arcs_come_back_as_the_same_arcs(
     found = pieces(path_data([chain]))
     assert all(isinstance(arc, Arc) for arc in found)
     arcs = [arc for arc in found if isinstance(arc, Arc)]
-    assert len(arcs) == (2 if abs(chain.sweep[0]) > 1.5 * math.pi else 1)
-    # Half circles are the worst case: their centre lies off by √(2 · radius · 1e-9 mm).
-    near = 3.0 * math.sqrt(radius * 1e-9) + 1e-6 / turn
+    assert len(arcs) == math.ceil(abs(chain.sweep[0]) / (0.75 * math.pi))
+    # No half circle is one arc: its centre would lie off by √(2 · radius · 1e-9 mm).
+    near = 1e-8 + 1e-6 / turn
     for arc in arcs:
         assert arc.centre == pytest.approx((1.0, -1.0), abs=near)
         assert arc.radius == pytest.approx(radius, abs=near)
@@ -58,13 +58,21 @@ def test_arcs_come_back_as_the_same_arcs(
     assert sum(arc.sweep for arc in arcs) == pytest.approx(sweep, abs=4.0 * near / radius)
 
 
-def test_a_full_circle_is_two_half_circles() -> None:
+def test_a_full_circle_is_three_arcs() -> None:
     for sweep in (FULL, -FULL):
-        first, second = pieces(path_data([toolpath_arc(sweep)]))
-        assert isinstance(first, Arc)
-        assert isinstance(second, Arc)
-        assert first.begin == second.end
-        assert first.sweep == pytest.approx(sweep / 2.0, abs=1e-4)
+        arcs = [arc for arc in pieces(path_data([toolpath_arc(sweep)])) if isinstance(arc, Arc)]
+        assert len(arcs) == 3
+        assert arcs[0].begin == arcs[2].end
+        assert [arc.sweep for arc in arcs] == pytest.approx([sweep / 3.0] * 3, abs=1e-6)
+
+
+def test_a_half_circle_of_rounded_numbers_stays_where_it_is() -> None:
+    radius = 40.0005
+    points = np.array([[0.0, 40.001], [0.0, -40.0]])
+    chain = Chain(points, np.array([[0.0, 0.0]]), np.array([-math.pi]))
+    arcs = [arc for arc in pieces(path_data([chain])) if isinstance(arc, Arc)]
+    assert [math.dist(arc.centre, (0.0, 0.0)) < 2e-3 for arc in arcs] == [True, True]
+    assert [arc.radius for arc in arcs] == pytest.approx([radius] * 2, abs=2e-3)
 
 
 def test_mirroring_a_path_flips_the_flag_of_its_arcs() -> None:
