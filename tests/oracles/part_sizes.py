@@ -66,20 +66,37 @@ def swept(tracks: Iterable[tuple[Floats, Floats]]) -> Any:
     radius is even, that beside the lines, else the hulls of neighbours, which are exact while it
     changes evenly."""
     lines: dict[float, list[Any]] = {}
-    areas = []
+    areas, seen = [], set[bytes]()
     for places, reach in tracks:
+        # The turns of a helix lie above each other.
+        key = np.round(np.column_stack([places[:, :2], reach]), 4).tobytes()
+        if key in seen:
+            continue
+        seen.add(key)
         if len(places) == 1:
             areas.append(shapely.buffer(shapely.points(places[0, :2]), reach[0], quad_segs=SIDES))
         elif (reach == reach[0]).all():
             if reach[0]:
-                lines.setdefault(float(reach[0]), []).append(shapely.linestrings(places[:, :2]))
+                line = shapely.simplify(shapely.linestrings(places[:, :2]), 0.2 * SAG_MM)
+                lines.setdefault(float(reach[0]), []).append(line)
             continue
         discs = shapely.buffer(shapely.points(places[:, :2]), reach, quad_segs=SIDES)
         areas += [shapely.convex_hull(shapely.union(*two)) for two in pairwise(discs)]
     for radius, each in lines.items():
-        whole = shapely.line_merge(shapely.multilinestrings(each))
-        areas.append(shapely.buffer(whole, radius, quad_segs=SIDES))
+        whole = shapely.get_parts(shapely.line_merge(shapely.multilinestrings(each)))
+        areas += [
+            shapely.buffer(piece, radius, quad_segs=SIDES)
+            for line in whole
+            for piece in _short(line)
+        ]
     return shapely.union_all(areas)
+
+
+def _short(line: Any) -> list[Any]:
+    """Pieces of a line: a long one crosses itself too often to be widened at once."""
+    points = shapely.get_coordinates(line)
+    ends = [*range(0, len(points) - 1, 400), len(points) - 1]
+    return [shapely.linestrings(points[low : high + 1]) for low, high in pairwise(ends)]
 
 
 def polygon(path: Path, sag: float = SAG_MM) -> Any:

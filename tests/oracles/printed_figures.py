@@ -11,6 +11,7 @@ import math
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from html import unescape
 from html.parser import HTMLParser
 from typing import Any
 
@@ -107,12 +108,9 @@ def read_html(text: str) -> Form:
     return parser.form
 
 
-def read_svg_notes(text: str) -> Form:
-    """The lines of text in the margin of a picture, by what they begin with."""
-    form = Form()
-    for words in re.findall(r"<desc>(.*?)</desc>|<title>(.*?)</title>|aria-label=\"(.*?)\"", text):
-        form.lines += [("picture", each) for each in words if each]
-    return form
+def read_picture(text: str) -> Form:
+    """The labels of a picture, in its order: they are strokes, with their words as titles."""
+    return Form([("label", unescape(each)) for each in re.findall(r"<title>(.*?)</title>", text)])
 
 
 def numbers(words: str) -> list[tuple[float, int]]:
@@ -156,6 +154,13 @@ def _clock(words: str) -> float:
     if minutes > 59 or seconds > 59:
         return math.nan
     return 3600.0 * hours + 60.0 * minutes + seconds
+
+
+def _in_words(words: str) -> float:
+    """Seconds of "1 h 2 min 5 s"."""
+    each = {"h": 3600.0, "min": 60.0, "s": 1.0}
+    found = re.findall(r"(\d+) (h|min|s)\b", words)
+    return sum(int(count) * each[unit] for count, unit in found) if found else math.nan
 
 
 def _times(words: str, values: Sequence[float]) -> str:
@@ -320,6 +325,32 @@ def wrong_lines(report: Json, form: Form) -> Iterator[str]:
             yield f"no line of {name}"
     if bool(report["dimensions"]) != ("size" in seen):
         yield "a size and no line of it, or the other way round"
+
+
+def wrong_picture(report: Json, form: Form) -> Iterator[str]:
+    """What of the words in the margin of a picture, and on its scale of errors, is not so."""
+    labels = form.values("label")
+    words = " ".join(labels)
+    total = report["error_um"]["total"]
+    error = re.search(r"predicted error (.*?) µm at most, rms (.*?) µm", words)
+    if error is None:
+        yield "picture: no error"
+    elif wrong := differ(f"{error[1]} {error[2]}", [total["max"], total["rms"]]):
+        yield f"picture: {wrong}"
+    head = re.search(rf"{report['target']}: ([\dhmins ]+), (\d+) reversals", words)
+    turns = report["reversals"]["cutting"]
+    if head is None:
+        yield "picture: no time"
+    elif (
+        abs(_in_words(head[1]) - report["time_s"]) > HALF
+        or int(head[2]) != turns["x"] + turns["y"]
+    ):
+        yield f"picture: {head[0]} of {report['time_s']} s and {turns}"
+    if "error (µm)" in labels and total["max"]:
+        top = labels[labels.index("error (µm)") - 1]
+        shown = numbers(top)
+        if not shown or shown[0][0] < total["max"] - HALF * 10.0 ** -shown[0][1]:
+            yield f"picture: a scale up to {top} µm for {total['max']}"
 
 
 # The tables of a page.

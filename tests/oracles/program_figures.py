@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -54,11 +54,19 @@ class Program:
     text: str
     x: Axis = Axis()
     y: Axis = Axis()
+    areas: dict[Cutter, Any] = field(default_factory=dict)
 
     @cached_property
     def moves(self) -> list[Move]:
         """Its moves, without those that go nowhere."""
         return moves_of(self.text)
+
+    def tool_of(self, row: int) -> int | None:
+        """The number of the tool that makes a move, None before the first T word."""
+        lines = self.text.splitlines()[: self.moves[row].line]
+        said = [re.search(r"\bT(\d+)", re.sub(r"\(.*?\)", "", line)) for line in lines]
+        numbers = [int(match[1]) for match in said if match]
+        return numbers[-1] if numbers else None
 
     @cached_property
     def cuts(self) -> list[int]:
@@ -193,8 +201,18 @@ class Program:
                 inside = inside and move.a == move.b
         return count
 
+    @cached_property
+    def exact(self) -> Program:
+        """The same on a machine without faults."""
+        return Program(self.text)
+
     def removed(self, cutter: Cutter) -> Any:
         """The area that the tool removes at the surface, by the slides."""
+        if cutter not in self.areas:
+            self.areas[cutter] = self._removed(cutter)
+        return self.areas[cutter]
+
+    def _removed(self, cutter: Cutter) -> Any:
         if self.x == self.y == Axis():
             return removed([self.moves[k] for k in self.cuts], cutter)
         places, rows = self.cut_slides()

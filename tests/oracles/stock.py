@@ -107,7 +107,7 @@ def moves_of(program: str) -> list[Move]:
         for code in codes:
             if code in (0, 1, 2, 3):
                 mode = int(code)
-            elif code not in (4, 17, 21, 40, 49, 54, 61, 64, 80, 90, 91.1, 94):
+            elif code not in (4, 17, 21, 40, 43, 49, 54, 61, 64, 80, 90, 91.1, 94):
                 raise ValueError(f"line {number}: G{code:g} is not known here")
         if 4.0 in codes:
             continue
