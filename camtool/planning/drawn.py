@@ -67,7 +67,8 @@ def drawn_of(toolpath: Toolpath, runs: Ints, steps: Sequence[Step], placed: Draw
     columns = [(*np.empty((2, 0, 2, 2)), *np.empty((2, 0), dtype=np.bool_))]
     lines = [np.empty(0, dtype=np.int64)]
     first = 0
-    for step, later in zip_longest(steps, steps[1:]):
+    before_of: dict[str | int, int] = {}
+    for number, (step, later) in enumerate(zip_longest(steps, steps[1:])):
         rows = np.flatnonzero((runs >= first) & (runs < first + len(step.runs)))
         mine = rows[toolpath.is_feed[rows]]
         for some, values in _off(toolpath, mine, step, placed):
@@ -78,7 +79,9 @@ def drawn_of(toolpath: Toolpath, runs: Ints, steps: Sequence[Step], placed: Draw
             edge = edge if edge.flags.writeable else edge.copy()
             own = made.of_run[runs[rows] - first]
             edge[rows] = np.where(own >= 0, own + sum(map(len, lines)), own)
+        # What clears the rest of another one makes its lines with it.
         before = max((int(line.max(initial=-1)) + 1 for line in lines), default=0)
+        before = before_of.setdefault(step.operation.rest or step.operation.name or number, before)
         lines.append(made.line + before)
         columns.append((made.nominal, made.planned, made.followed, made.cleared))
         first += len(step.runs)
@@ -156,39 +159,29 @@ class _Edges(Struct, frozen=True, eq=False):
 
 
 def _edges(step: Step, later: Step | None, placed: Drawing) -> _Edges:
-    """The edges that a step cuts; `later` is the step after this one."""
+    """The edges that a step cuts; `later` is the step after this one. What is finished behind it
+    is made by that."""
     none = np.empty(0, dtype=np.bool_)
-    if step.operation.kind in ("chamfer", "drill") or not len(step.runs):
+    operation = step.operation
+    is_finished = operation.stage == "rough" and later and later.operation.stage == "finish"
+    if operation.kind in ("chamfer", "drill") or is_finished or not len(step.runs):
         unsized, boxes = np.full(len(step.runs), NO_EDGE), np.empty((0, 2, 2))
         return _Edges(unsized, boxes, boxes, unsized[:0], none, none)
     drawn = path_extents(placed.paths)
     if isinstance(step.items, Contours):
-        return _beside_or_on(step, _left_by_others(step, later), drawn)
-    line = drawn[[item.source for item in step.items]][step.owner]
-    left = _left_by_others(step, later)
-    planned = line - OUTWARDS * (left or 0.0)
-    if left is None:
-        planned = _cleared_boxes(step.runs, step.operation.tool)
-        if step.operation.kind != "vcarve":
-            # Reliefs reach farther into corners than the walls are apart.
-            low, high = np.moveaxis(line - step.operation.allowance_mm * OUTWARDS, 2, 0)
-            planned = np.clip(planned, low[:, :, None], high[:, :, None])
+        return _beside_or_on(step, drawn)
+    source = np.array([item.source for item in step.items])[step.owner]
+    line, planned = drawn[source], _cleared_boxes(step.runs, operation.tool)
+    if operation.kind != "vcarve":
+        # Reliefs reach farther into corners than the walls are apart.
+        low, high = np.moveaxis(line - operation.allowance_mm * OUTWARDS, 2, 0)
+        planned = np.clip(planned, low[:, :, None], high[:, :, None])
     every = np.arange(len(step.runs))
     is_cleared = np.ones(len(every), dtype=np.bool_)
-    return _Edges(every, line, planned, step.owner, ~is_cleared, is_cleared)
+    return _Edges(every, line, planned, source, ~is_cleared, is_cleared)
 
 
-def _left_by_others(step: Step, later: Step | None) -> float | None:
-    """What is left on a wall in the end, mm, where another stage, or what this one clears the rest
-    of, makes the edge; None where the step itself does."""
-    if step.operation.stage != "rough" and step.operation.rest_of is None:
-        return None
-    finish = later.operation if later is not None else None
-    maker = finish if finish and finish.stage == "finish" else step.operation.rest_of
-    return 0.0 if maker is None else maker.allowance_mm
-
-
-def _beside_or_on(step: Step, left: float | None, drawn: Floats) -> _Edges:
+def _beside_or_on(step: Step, drawn: Floats) -> _Edges:
     """The edges of contours beside their lines, or on them; `drawn` (M, 2, 2): the boxes of what
     is drawn."""
     contours = Contours.of_items(step.items)
@@ -200,11 +193,8 @@ def _beside_or_on(step: Step, left: float | None, drawn: Floats) -> _Edges:
     for row, k in enumerate(used):
         if contours.material_left[k] is None:
             followed[row] = _cut_radius(contours.settings[k]) > 0.0
-        elif left is None:
-            nominal[row], planned[row] = _boxes(contours[k], nominal[row], centres[row])
         else:
-            inside = centres[row, 0, 0] > nominal[row, 0, 0]
-            planned[row] = nominal[row] + (-left if inside else left) * OUTWARDS
+            nominal[row], planned[row] = _boxes(contours[k], nominal[row], centres[row])
     of_run = np.searchsorted(used, step.owner)
     return _Edges(of_run, nominal, planned, source, followed, np.zeros_like(followed))
 

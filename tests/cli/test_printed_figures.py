@@ -21,6 +21,7 @@ from tests.oracles.part_sizes import Ball, left_of, polygon, removed, size_of
 from tests.oracles.printed_figures import (
     Form,
     contradictions,
+    numbers,
     read_html,
     read_markdown,
     read_picture,
@@ -218,6 +219,7 @@ def complaints(case: Case, made: Made) -> Iterator[str]:
     yield from _sizes(case, made)
     yield from _errors(case, made)
     yield from _shapes(case, made)
+    yield from _blank(case, made)
 
 
 def _counts(made: Made) -> Iterator[str]:
@@ -312,6 +314,18 @@ def _sizes(case: Case, made: Made) -> Iterator[str]:
     slack *= 2.0 if asked.kind == "vcarve" else 1.0  # it goes along its corners there and back
     if predicted != pytest.approx(list(seen), abs=slack):
         yield f"size: {predicted} is {list(seen)}"
+
+
+def _blank(case: Case, made: Made) -> Iterator[str]:
+    """How large the blank must be: as far as the tool cuts."""
+    if case.asked.kind in ("drill", "chamfer", "vcarve") or case.ball:
+        return
+    low_x, low_y, high_x, high_y = made.program.exact.removed(case.asked.cutter).bounds
+    wanted = [high_x - low_x, high_y - low_y, low_x, high_x, low_y, high_y]
+    for words in made.forms["html"][0].values("blank"):
+        said = [number for number, _ in numbers(words)]
+        if said != pytest.approx(wanted, abs=3e-3):
+            yield f"blank: {words} is {wanted}"
 
 
 def _shapes(case: Case, made: Made) -> Iterator[str]:

@@ -80,7 +80,8 @@ def swept(tracks: Iterable[tuple[Floats, Floats]]) -> Any:
                 line = shapely.simplify(shapely.linestrings(places[:, :2]), 0.2 * SAG_MM)
                 lines.setdefault(float(reach[0]), []).append(line)
             continue
-        discs = shapely.buffer(shapely.points(places[:, :2]), reach, quad_segs=SIDES)
+        wide = np.maximum(reach, 1e-6)  # a point has no area, and a tip ends in one
+        discs = shapely.buffer(shapely.points(places[:, :2]), wide, quad_segs=SIDES)
         areas += [shapely.convex_hull(shapely.union(*two)) for two in pairwise(discs)]
     for radius, each in lines.items():
         whole = shapely.get_parts(shapely.line_merge(shapely.multilinestrings(each)))

@@ -273,7 +273,17 @@ LINES: dict[str, Callable[[Json, str], str]] = {
     "ends": _ends,
     "shape": _shape,
 }
-PROSE = ("cut", "machine", "stock", "zero", "mounted", "program", "not known", "dimension")
+PROSE = (
+    "blank",
+    "cut",
+    "machine",
+    "stock",
+    "zero",
+    "mounted",
+    "program",
+    "not known",
+    "dimension",
+)
 
 
 def _cut(operation: Json, words: str) -> str:

@@ -130,6 +130,7 @@ MADE: dict[str, tuple[tuple[Path, ...], Operation]] = {
                                               step_down_mm=1.0, allowance_mm=0.2)),
     "pocket with a neck": (DUMBBELL, Operation(kind="pocket", tool=Tool(3.0))),
     "pocket of a leaf": (LEAF, Operation(kind="pocket", tool=Tool(2.0))),
+    "pocket of a leaf, finished": (LEAF, Operation(kind="pocket", tool=Tool(2.0), finish_mm=0.2)),
     "shallow pocket by a ball": (ROUND, Operation(kind="pocket", tool=BALL, depth_mm=1.0)),
     "bore": (ROUND, Operation(kind="bore", tool=Tool(6.0), depth_mm=4.0)),
     "carved disc": (ROUND, Operation(kind="vcarve", tool=BIT, depth_mm=2.0)),
