@@ -225,7 +225,16 @@ def _error(report: Json, words: str) -> str:
     remark = "no drawing is known" in words
     if remark != (report["against"] == "program"):
         return f"{words!r} against {report['against']}"
-    return differ(words, [total["max"], total["rms"], total["p95"]])
+    figures, _, gouges = words.partition("; gouges of ")
+    if bool(gouges) and all(each["code"] != "GOUGE" for each in report["findings"]):
+        return f"{words!r} and no finding of it"
+    return differ(figures.partition(";")[0], [total["max"], total["rms"], total["p95"]])
+
+
+def gouges_mm(form: Form) -> float:
+    """The gouges that come on top of the error, 0.0 where none are told, mm."""
+    found = re.search(rf"; gouges of ({NUMBER}) mm", " ".join(form.values("error")))
+    return float(found[1]) if found else 0.0
 
 
 def _source(report: Json, words: str) -> str:
