@@ -14,6 +14,9 @@ from pathlib import Path
 
 import linuxcnc
 
+RESET = ("G10 L2 P1 X0 Y0 Z0 R0", "G54 G92.1 G49")
+"""What a program may have left in the machine's parameters."""
+
 command, status = linuxcnc.command(), linuxcnc.stat()
 
 
@@ -52,7 +55,7 @@ for program in os.environ["CNC_PROGRAMS"].split():
         sampler = subprocess.Popen(["halsampler", "-t"], stdout=out)
         time.sleep(0.3)
         mode(linuxcnc.MODE_MDI)
-        for block in ("G21 G17 G90 G94", "G64 P0.01", "G0 X0 Y0 Z0"):
+        for block in ("G21 G17 G90 G94", *RESET, "G64 P0.01", "G0 X0 Y0 Z0"):
             command.mdi(block)
             command.wait_complete(30)
         wait(idle, 60)

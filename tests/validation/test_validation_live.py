@@ -3,6 +3,9 @@
     pytest -m slow tests/validation/test_validation_live.py            (about fifteen minutes)
     pytest -m slow --bless tests/validation/test_validation_live.py    writes docs/validation.md
 
+With CAMTOOL_TRAJECTORY, the folder `tests/trajectory-planner/circular-arcs/nc_files` of LinuxCNC's
+sources, its own programs for its planner are run too (an hour).
+
 `live.py` runs them within Debian's linuxcnc-uspace. CAMTOOL_LIVE names a folder in which the
 recordings are kept; those that are there already are not made again.
 """
@@ -54,6 +57,67 @@ CAUSES = {
     "3dtest": "arcs in XZ and YZ are chords in a toolpath; each chord is a move of its own",
 }
 """Why programs are off by more than is aimed at."""
+
+CHORDS = "arcs in XZ and YZ are chords in a toolpath"
+SHORT = "moves of one to ten periods: LinuxCNC joins lines to blends, and speeds up evenly"
+OF_PLANNER = {
+    "arc-feed/arc_time": CHORDS,
+    "arc-intersections/arc-arc-planeswitch": CHORDS,
+    "arc-intersections/linearc-end-overrun": CHORDS,
+    "arc-intersections/linearc-stellabee": CHORDS,
+    "arc-intersections/tort-sam-mach3": CHORDS,
+    "performance/test_12mmflat": CHORDS,
+    "quick-tests/cradek_accel_issue": CHORDS,
+    "quick-tests/sam-tolerance-issue": CHORDS,
+    "violation_checks/arc_vel_violation2": CHORDS,
+    "violation_checks/maxvel_violation_helical": CHORDS,
+    "violation_checks/maxvel_violation_helical2": CHORDS,
+    "violation_checks/sam_violation1": CHORDS,
+    "violation_checks/sam_violation2_verbatim": CHORDS,
+    "violation_checks/stellabee-kink-test": CHORDS,
+    "violation_checks/stellabee-violation-spirals": CHORDS,
+    "performance/circle_small_segments_ncd": SHORT,
+    "performance/contour": SHORT,
+    "performance/random_lines_0.001in": SHORT,
+    "performance/wheels": SHORT,
+    "diagnostic/lineno-test": "a dwell before the first move, which the recording leaves out",
+    "interp_state/sloc_testing": "stops, each of them late on a busy computer",
+    "performance/cap": "not found; at rapids of some tenths of a millimetre",
+    "quick-tests/axis_letter": "0.08 s lost at the first stop, on a busy computer",
+    "quick-tests/zero_length_move": "0.3 s in all: two stops, 6 ms",
+}
+"""Why LinuxCNC's own programs for its planner are off by more, by folder and name."""
+
+NOT_RUN = {
+    "arc-feed/full_xy": "a frame that the program places: the recording is of the axes",
+    "arc-feed/full_xz": "the same",
+    "arc-feed/full_yz": "the same",
+    "diagnostic/abc_tangent": "rotary axes, which the machine does not have",
+    "diagnostic/bad_spirals_1": "refused by both: an arc of two radii",
+    "diagnostic/bad_spirals_comp": "refused by both: an arc of two radii",
+    "diagnostic/bad_spirals_lathe": "refused by both: an arc of two radii",
+    "diagnostic/spiral_aggressive": "refused by both: an arc of two radii",
+    "diagnostic/rgh": "the live machine stops in it",
+    "interp_state/sloc_toolchange": "no moves",
+    "quick-tests/tolerance_parabolic_check2": "lines with /, which the live machine leaves out",
+    "spindle/g33_blend": "follows a spindle, which the machine does not have",
+    "spindle/g33_simple": "follows a spindle",
+    "spindle/g95_blend": "follows a spindle",
+    "spindle/rigidtap_test": "follows a spindle",
+    "spindle/tapping": "follows a spindle",
+    "violation_checks/tap-discrimant-error-orig": "follows a spindle",
+    "violation_checks/machinekit_412": "a rotary axis",
+    "violation_checks/sam_vel_violation": "a frame that the program turns",
+    "violation_checks/sam_zero_length_move": "tool 15, which the table of the test does not have",
+    "violation_checks/tkalcevic_realtime_error": "a rotary axis",
+    "wz-tests/130207L": "M111, a program of the machine",
+    "wz-tests/130207LZW": "an axis W",
+    "wz-tests/xw": "an axis W",
+}
+"""Those that are not compared."""
+
+LONGEST_S = 100.0
+"""Longer programs are left out."""
 
 SCATTER_PLACES = 15.0
 """No two runs of a real-time process are the same: paths differ by 1 µm, times by some periods."""
@@ -183,3 +247,45 @@ def test_linuxcnc_live(bless: bool, tmp_path: Path) -> None:
     check("live-linuxcnc", heads, rows, bless, SCATTER_PLACES, LATE)
     assert len(misses) <= MOST_MISSES, misses
     assert set(misses) <= set(CAUSES), misses
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("linuxcnc") is None, reason="LinuxCNC is not installed")
+@pytest.mark.skipif(not os.environ.get("CAMTOOL_TRAJECTORY"), reason="CAMTOOL_TRAJECTORY is unset")
+def test_programs_of_linuxcnc_s_planner(bless: bool, tmp_path: Path) -> None:
+    """All that run, each text once: within the aim, or with a cause that stands here."""
+    source = Path(os.environ["CAMTOOL_TRAJECTORY"])
+    folder = Path(os.environ.get("CAMTOOL_LIVE", tmp_path)).absolute()
+    programs, models, seen = {}, {}, set()
+    for file in sorted(source.rglob("*.ngc")):
+        name = file.relative_to(source).with_suffix("").as_posix()
+        data = file.read_bytes()
+        if name.startswith("auto-test") or name in NOT_RUN or data in seen:
+            continue
+        seen.add(data)
+        programs[name] = folder / f"{name.replace('/', '__')}.ngc"
+        programs[name].write_bytes(data)
+        models[name] = predicted(programs[name])
+        if models[name].seconds[-1] > LONGEST_S:
+            del programs[name], models[name]
+    left = [file for file in programs.values() if not Path(f"{file}.samples").exists()]
+    if left:
+        record(left, folder, [folder, *tmp_path.parents[:2]])
+    rows, misses = [], []
+    for name, program in programs.items():
+        try:
+            live = recorded(program)
+        except IndexError:  # the sampler came too late on a busy computer
+            rows.append([name, "", "", "", "", "not recorded"])
+            continue
+        model = models[name]
+        wanted_s, found_s = float(live.seconds[-1]), float(model.seconds[-1])
+        beside = UM * max(off(live, model), off(model, live))
+        part = found_s / wanted_s - 1.0
+        missed = beside > PATH_UM or abs(part) > TIME_PART
+        misses += [name] if missed else []
+        cells = [mm(wanted_s, 2), mm(found_s, 2), signed(100.0 * part, 2), mm(beside, 1)]
+        rows.append([name, *cells, OF_PLANNER.get(name, "") if missed else ""])
+    heads = ["program", "LinuxCNC, s", "model, s", "%", "paths apart, µm", "cause of a miss"]
+    check("live-planner", heads, rows, bless, SCATTER_PLACES)
+    assert set(misses) <= set(OF_PLANNER), misses
