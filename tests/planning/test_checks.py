@@ -14,9 +14,11 @@ from camtool.findings import Code, Finding, Severity
 from camtool.geometry.drawing import Mark
 from camtool.geometry.polylines import Polyline
 from camtool.machine.model import Machine
+from camtool.pipeline import post_drawing
 from camtool.planning.checks import checked
 from camtool.planning.job import Job, Operation, Placement, Stock, Tabs, Tool, job_of
 from camtool.planning.plan import plan
+from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind
 from tests.drawings import drawing_of
@@ -398,3 +400,27 @@ def test_what_a_pocket_cleared_before_comes_not_loose() -> None:
     bore = Operation("bore", tool=Tool(3.0), depth_mm=3.2)
     circle = Polyline(np.array([[0, 0, 1], [30, 0, 1.0]]), closed=True)
     assert loose(Job((bore,), stock=SHEET), circle) == []
+
+
+@pytest.mark.parametrize("side", ["auto", "inside"])
+@pytest.mark.parametrize("target", ["grbl", "linuxcnc", "pic-mmh"])
+def test_what_shrinks_to_nothing_is_named_and_the_rest_is_cut(side: str, target: str) -> None:
+    """The program is that of the drawing without these contours."""
+    kept = [box(0, 0, 4, 3), box(0.5, 0.5, 1, 1)]
+    circle = Polyline(np.array([[2.0, 2.0, 1], [2.4, 2.0, 1.0]]), closed=True)
+    sliver = Polyline(np.array([[3.0, 0.5, 0], [3.5, 0.5, 0], [3.25, 0.501, 0.0]]), closed=True)
+    job = Job((Operation(tool=Tool(0.5), depth_mm=0.1, side=side),))
+    machine = load_target(target)
+    texts, found = [], list[Finding]()
+    for paths in (kept, [*kept, circle, sliver]):
+        run = post_drawing(drawing_of(paths), job, machine, check=False)
+        assert run.program is not None, run.findings
+        texts.append([line for line in run.program.data.splitlines() if b"(" not in line])
+        found = [each for each in run.findings if each.code == Code.CONTOUR_TOO_SMALL]
+    assert texts[0] == texts[1]
+    assert {each.severity for each in found} == {Severity.WARNING}
+    told = {str(each.where): each.measured for each in found}
+    assert told == {
+        "0/PATH 2 at X 2.2000 Y 2.0000": pytest.approx(math.pi * 0.2**2),
+        "0/PATH 3 at X 3.2500 Y 0.5005": pytest.approx(0.5 * 0.5 * 0.001),
+    }
