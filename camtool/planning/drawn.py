@@ -86,7 +86,10 @@ def drawn_of(toolpath: Toolpath, runs: Ints, steps: Sequence[Step], placed: Draw
         columns.append((made.nominal, made.planned, made.followed, made.cleared))
         first += len(step.runs)
     nominal, planned, followed, cleared = map(np.concatenate, zip(*columns, strict=True))
-    return Drawn(off, edge, nominal, planned, np.concatenate(lines), followed, cleared)
+    line = np.concatenate(lines)
+    return Drawn(
+        off, edge, nominal, planned, line, followed, cleared, datum_off_mm=placed.datum_off_mm
+    )
 
 
 def _off(

@@ -27,6 +27,8 @@ class Drawn(Struct, frozen=True, eq=False):
     them when it runs exactly as planned. Edges of one `line` (E,) make it together. `followed`
     (E,): the tool's centre runs on the line, and the edges of the cut lie beside it; `cleared`
     (E,): the edge bounds all that the tool removes on its way, not one closed pass beside it.
+    `datum_off_mm`: the part of `off_mm` that comes of placing the drawing by a box, the same for
+    all rows.
     """
 
     off_mm: Floats
@@ -36,6 +38,7 @@ class Drawn(Struct, frozen=True, eq=False):
     line: Ints
     followed: Bools
     cleared: Bools
+    datum_off_mm: float = 0.0
 
     def picked(self, row: Ints) -> Drawn:
         """Rows (M,) of this one, in that order and as often as they are named."""

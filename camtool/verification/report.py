@@ -78,9 +78,10 @@ class Errors(msgspec.Struct, frozen=True):
     drawing. rounding: of the moves as the controller rounds them (digits of the dialect, whole
     steps) from the wanted moves. interpolation: of the commanded positions from the rounded moves.
     mechanics: of the slides from the commanded positions. total: of the slides from the wanted
-    moves, plus the fit there, so never less than their distance from the drawing; without wanted
-    moves, from the rounded moves. Its mean is without the fit. depth_max: difference in height of
-    the slide from the rounded moves, while cutting."""
+    moves, plus the fit there and what placing by the box of fitted curves may be off, so never
+    less than their distance from the drawing; without wanted moves, from the rounded moves. Its
+    mean is without the fit. depth_max: difference in height of the slide from the rounded moves,
+    while cutting."""
 
     fit: MaxRms = MaxRms()
     rounding: MaxRms = MaxRms()

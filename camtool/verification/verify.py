@@ -356,12 +356,12 @@ class Result(Struct, frozen=True, eq=False):
         )
 
     def _fit(self) -> record.MaxRms:
-        """The distance of the drawing from the wanted cutting moves; the rms is over the moves
-        that are not exact."""
+        """The distance of the drawing from the wanted cutting moves, without that of placing it;
+        the rms is over the moves that are not exact."""
         drawn, rows = self.goal.cuts.toolpath.drawn, self.goal.cuts.rows
         if self.case.wanted is None or drawn is None or not len(rows):
             return record.MaxRms()
-        largest, rms = drawn.off_mm[rows].T
+        largest, rms = np.maximum(drawn.off_mm[rows] - drawn.datum_off_mm, 0.0).T
         length = np.where(largest > 0.0, moved_lengths(self.goal.cuts.toolpath)[rows], 0.0)
         mean = float((length * rms**2).sum()) / (float(length.sum()) or 1.0)
         return record.MaxRms(
