@@ -40,6 +40,7 @@ DEFAULT_JOBS = (0, 1, 2, 5, 6, 11, 13, 25, 34, 38, 48, 58)
 """Small ones of all kinds."""
 SLOW_JOBS = 300
 SHAPE_OFF = {
+    67: "7 µm of undercut at the tips of a carving where 13 are seen",
     135: "10 µm of overcut where there is none",
     231: "heights along a V bit's slide that waits in its backlash",
     269: "69 µm of overcut where 50 are seen",
