@@ -34,8 +34,21 @@ TOOL_LENGTH = TargetCode(
     "table it cuts too deep, or air (error where `dialect.tools` says the lengths)",
     "write G43 behind each M6; the post does so unless `dialect.tool_lengths` is false",
 )
-CODES = (NOT_SIMULATED, PLACE_UNKNOWN, VALUE_UNKNOWN, TOOL_LENGTH)
+NO_END = TargetCode(
+    "linuxcnc.NO_END",
+    (ERROR,),
+    "the file ends without an end of the program: LinuxCNC reports an error when it reads so far, "
+    "and may stop within the last moves; all of them are judged",
+    "end with M2, or put a line of % before and behind the program",
+)
+CODES = (NO_END, NOT_SIMULATED, PLACE_UNKNOWN, VALUE_UNKNOWN, TOOL_LENGTH)
 
+NO_END_OF_FILE = Sentence(
+    NO_END,
+    "the file ends without an end of the program, which LinuxCNC reports as an error; end with "
+    "M2, or put a line of % before and behind the program",
+    severity=ERROR,
+)
 WORDS_PASSED_OVER_OUTPUT = Sentence(
     Code.WORDS_PASSED_OVER,
     "{count:# block switches|# blocks switch} an output of the machine (M62 to M68), which moves "

@@ -229,10 +229,7 @@ class Flow:
             raise Fault(f"the file ends, and o<{_own(self._seeking)}> was not found")
         if self.level:
             raise Fault(f"the file ends within o<{self.calls[-1].sub}>", mend="end it with endsub")
-        raise EndOfFile(
-            "the file ends without an end of the program, which LinuxCNC reports as an error",
-            mend="end with M2, or put a line of % before and behind the program",
-        )
+        raise EndOfFile("the file ends without an end of the program")
 
     # O words
 

@@ -35,6 +35,7 @@ from ..gcode.findings import (
 from ..gcode.plain_moves import ArcRule, FastFeeds, PlainMoves, PlainState
 from .dialect import Dialect, LinuxcncMachine
 from .findings import (
+    NO_END_OF_FILE,
     NOT_SIMULATED_AGAIN,
     NOT_SIMULATED_AXES,
     NOT_SIMULATED_CHORDS,
@@ -104,7 +105,7 @@ class _Reader:
         self._runs = PlainRuns(self.text, dialect.line_chars, free=True)
         self._blocks = 0
         """Blocks so far, of a program whose lines are read once and in order."""
-        self._empty = True
+        self._empty, self._cut_off = True, False
 
     def read(self) -> Toolpath:
         """The moves, with the findings."""
@@ -118,13 +119,15 @@ class _Reader:
                 if line is None:
                     break
                 self._execute(line)
-        except Fault as fault:
-            if isinstance(fault, EndOfFile) and self._empty:
+        except EndOfFile:
+            if self._empty:
                 raise _nothing() from None
+            self._cut_off = True
+        except Fault as fault:
             flow.fail(fault)
         if self._empty and not flow.percent:
             raise _nothing()
-        if flow.percent and not self.machine.ended:
+        if not self.machine.ended:
             self.machine.end_of_file()
         return self.path.finish(self._findings())
 
@@ -213,6 +216,10 @@ class _Reader:
             return f"block {index + 1}"
 
         yield from self._fast.findings()
+        if self._cut_off:
+            last = max(self.text.count - 1, 0)
+            place = f"block {self.text.blocks_before(last) + 1}, line {last + 1}"
+            yield NO_END_OF_FILE(where=place)
         if notes.speedless:
             yield SPINDLE_SPEED_NOT_SAID(where=block(notes.speedless[0]))
         behind = self._behind_end()

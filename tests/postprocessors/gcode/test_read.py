@@ -333,8 +333,6 @@ def test_refused_by_linuxcnc(text: str, line: int, column: int, message: str) ->
         ("F9 G2 X1 I1 P1.5", "a whole number from 1"),
         ("F9 G2 X2 I1 P99999", "an arc of more than 10000 turns"),
         ("G0 X1 P2", "uses the P word"),
-        ("G0 X1", "the file ends without an end of the program"),
-        ("%\nG0 X1", "the file ends without an end of the program"),
         ("G0 X1\n%\n", "frames no program"),
         ("(c)\n%\nG0 X1\nM2\n%\n", "frames no program"),
         ("% foo\nG0 X1\n%\n", "frames no program"),
@@ -344,6 +342,17 @@ def test_refused_by_linuxcnc(text: str, line: int, column: int, message: str) ->
 def test_linuxcnc_refuses(text: str, message: str) -> None:
     with pytest.raises(ProgramError, match=message):
         read(text, "linuxcnc")
+
+
+@pytest.mark.parametrize("text", ["G0 X1\nX2", "%\nG0 X1\nX2\n", "G0 X1\nX2\n(c)\n\n"])
+def test_linuxcnc_reads_what_has_no_end_and_says_so(text: str) -> None:
+    path = read(text, "linuxcnc")
+    assert ends(path) == [(1.0, 0.0, 0.0), (2.0, 0.0, 0.0)]
+    errors = [each for each in path.findings if each.severity is Severity.ERROR]
+    assert [each.code.name for each in errors] == ["linuxcnc.NO_END"]
+    assert read_part("G0 X1\nX2", "linuxcnc").findings == ()
+    with pytest.raises(ProgramError, match="the program is empty"):
+        read("%\n\n", "linuxcnc")
 
 
 def test_grbl_stops_at_its_end_and_drops_comments() -> None:
