@@ -77,7 +77,7 @@ class SpeedPlan(Struct, frozen=True, eq=False):
 
 def allowed_along(limit: Floats, unit: Floats) -> Floats:
     """(B,) the largest value along unit vectors (B, 3) within the limits of three axes (3,)."""
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", over="ignore"):
         return np.asarray((limit / np.abs(unit)).min(axis=1, initial=np.inf))
 
 

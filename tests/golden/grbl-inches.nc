@@ -4,7 +4,7 @@
 (inch and inch/min - part zero at X0 Y0 Z0)
 (X -0.06250 to 1.63730)
 (Y -0.06250 to 0.84990)
-(Z -0.15748 to 0.19685)
+(Z -0.15748 to 0.98425)
 G17 G20 G90 G94
 G54
 G0 Z0.19685
@@ -24,17 +24,20 @@ Z-0.09711
 G1 Z-0.15748
 G0 Z0.19685
 M5
+Z0.98425
+X0 Y0
 (operation 2 of 3: window)
 (tool 1 end mill 0.125 inch - 12000 rev/min)
 (0.126 inch deep in 3 passes)
 (feed 11.811 plunge 3.5433 inch/min - cuts 24 s)
 (stop: mount tool 1 end mill 0.125 inch)
-(set its tip to Z 0.1969 inch or zero Z again - then start)
+(set its tip to Z 0.9843 inch or zero Z again - then start)
 T1 M0
-G0 Z0.19685
+G0 Z0.98425
 M3 S12000
-(0/PATH 2)
 X1.22608 Y0.3937
+(0/PATH 2)
+Z0.19685
 G1 Z-0.04199 F3.543
 G3 X1.22608 Y0.3937 I-0.04498 J0 F11.811
 G1 X1.27608

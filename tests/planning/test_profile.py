@@ -220,7 +220,8 @@ def test_no_gouge(paths: list[Polyline]) -> None:
 
 def test_on_the_line_nothing_is_a_gouge() -> None:
     paths = [_circle(0, 0, 1), _circle(2.1, 0, 1)]
-    assert contours(drawing_of(paths), job_of(tool_diameter_mm=0.5, side="on")).findings == ()
+    found = contours(drawing_of(paths), job_of(tool_diameter_mm=0.5, side="on")).findings
+    assert [finding.code for finding in found] == [Code.LINES_RUN_TOGETHER]
 
 
 @pytest.mark.parametrize("width", [0.5, 0.5 - 4e-4])

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 
 from camtool.errors import ProgramError
+from camtool.findings import Severity
 from camtool.importers.read import read_drawing
 from camtool.planning.job import job_of
 from camtool.planning.plan import plan
@@ -135,19 +136,23 @@ EDGES = [
 
 
 def judged(text: str, folder: Path) -> tuple[bool, bool]:
-    """Whether our reader takes the program, and whether LinuxCNC does."""
+    """True each if our reader takes the program without an error, and if LinuxCNC does."""
     target = load_target("linuxcnc")
+
+    def ours() -> bool:
+        found = target.target.read(text.encode(), target.machine).findings
+        return all(each.severity is not Severity.ERROR for each in found)
+
+    def theirs() -> bool:
+        interpreted(text.encode(), folder)
+        return True
+
     verdicts = []
-    for judge in (
-        lambda: target.target.read(text.encode(), target.machine),
-        lambda: interpreted(text.encode(), folder),
-    ):
+    for judge in (ours, theirs):
         try:
-            judge()
+            verdicts.append(judge())
         except ProgramError:
             verdicts.append(False)
-        else:
-            verdicts.append(True)
     return verdicts[0], verdicts[1]
 
 
