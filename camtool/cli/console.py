@@ -31,13 +31,13 @@ SILENT_S = 1.5
 """A line to which nothing is answered for so long has no answer, s."""
 
 KNOCK_S = 0.5
-"""How often a controller that may be starting is asked whether it is there, s."""
+"""Time between two questions to a controller that may be starting, s."""
 
 CONFIRMS_S = 3.0
 """A machine that was told to stop and says nothing for so long does not say that it stands, s."""
 
 SLOWS_S = 30.0
-"""One that says what it does slows down for no longer, s."""
+"""Longest time for which a machine that reports its state slows down, s."""
 
 WAKES_S = 10.0
 """A boot loader takes no longer, s."""
@@ -91,7 +91,7 @@ def console(
 
 
 class _Talk:
-    """What a person and a controller say to each other."""
+    """The dialogue of a person, or a pipe, with a controller."""
 
     def __init__(self, terminal: Terminal, line: Line, wait_s: float, *, quiet: bool) -> None:
         self._terminal, self._line, self._wait_s = terminal, line, wait_s
@@ -224,8 +224,8 @@ class _Talk:
         return True
 
     def _awaits(self, now: float) -> int | None:
-        """What a line from a pipe waits for: −1 while it has to, the exit code where it waits in
-        vain, None when it may go out."""
+        """Return −1 while a line from a pipe has to wait, the exit code if it waits in vain, and
+        None when it may go out."""
         terminal = self._terminal
         if self._next and self._next[0] is not None and terminal.is_urgent(self._next[0]):
             return None

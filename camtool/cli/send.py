@@ -150,7 +150,7 @@ def send(
 
 
 def _unfinished(place: Path, data: bytes) -> Left | None:
-    """What the journal of this program says, None where there is none or it is finished."""
+    """Return the state in the journal of this program, None if there is none or it is finished."""
     from camtool.sending.journal import read_journal
     from camtool.sending.prepare import digest
 
@@ -162,7 +162,7 @@ def _unfinished(place: Path, data: bytes) -> Left | None:
 
 
 def _tool_at(wire: Wire, left: Left, said: ToolAt, target: LoadedTarget) -> ToolAt:
-    """Where the tool is, if need be by the user's answer."""
+    """Return where the tool is; ask the user if the machine does not say it."""
     from camtool.sending.prepare import tool_at_of
 
     tool_at, asked = tool_at_of(wire, left, said, target.machine.target.name)
@@ -183,7 +183,7 @@ def _tool_at(wire: Wire, left: Left, said: ToolAt, target: LoadedTarget) -> Tool
 
 
 def _resumed(place: Path, data: bytes, target: LoadedTarget) -> Left:
-    """What a journal says; InputError for one of another program."""
+    """Return the state in a journal; InputError for that of another program."""
     from camtool.sending.journal import read_journal
     from camtool.sending.prepare import digest
 

@@ -1,4 +1,4 @@
-"""What the user wants while a machine works: keys, signals, and a terminal or a pipe that is lost.
+"""Wishes of the user while a machine works: keys, signals, a terminal or a pipe that is lost.
 
 Nothing here may leave a machine alone: every signal that would end camtool, a terminal that is
 closed, and a reader of its output that goes away are wishes to stop. Only kill -9 is not seen.
@@ -51,7 +51,7 @@ class Wishes:
         self._ended = False  # by a signal that no person at the keyboard gives
         self._interrupted: float | None = None
         self.by_hand = False
-        """Whether the last wish came from a person at the keyboard who is still there."""
+        """True if the last wish came from a person at the keyboard who is still there."""
         self._watched = {each for each in _streams() if not _is_lost(each)}
 
     def __call__(self) -> Wish | None:

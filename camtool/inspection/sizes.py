@@ -555,7 +555,7 @@ def fitted_circles(points: Floats, near: Floats) -> tuple[Floats, Floats]:
 
 
 class _Values(Struct, frozen=True, eq=False):
-    """Where one end of a distance lies on N parts: values (N, J) mm along the direction of
+    """The places of one end of a distance on N parts: values (N, J) mm along the direction of
     measuring, their places (J,) mm across it (None: it is a point), and the values (N,) of its
     best fit."""
 

@@ -402,9 +402,9 @@ def cuts_of(toolpath: Toolpath, chosen: Bools) -> tuple[Chain, ...]:
 def tapers(
     toolpath: Toolpath, radius_at: Callable[[float], float], chosen: Bools | None = None
 ) -> tuple[Chain, ...]:
-    """What each feed below the stock top, of the `chosen` rows (N,) alone, cuts at the surface
-    with a tool that is as wide as it is deep, `radius_at` mm at a depth mm: the hull of the discs
-    at its ends, CCW. () for more moves than MOST_TAPERS."""
+    """Return the outline, CCW, of each cut at the surface for feeds below the stock top (of the
+    `chosen` rows (N,) alone), with a tool of `radius_at(depth)` mm: the hull of the discs at its
+    ends. () for more moves than MOST_TAPERS."""
     below = toolpath.is_feed & (np.minimum(toolpath.starts[:, 2], toolpath.end[:, 2]) < 0.0)
     rows = np.flatnonzero(below if chosen is None else below & chosen)
     if len(rows) > MOST_TAPERS:

@@ -49,8 +49,8 @@ class Group(Struct, frozen=True):
 
 
 class Swept(Struct, frozen=True, eq=False):
-    """What a tool of a constant width cuts along `chains`; where the width is None these are the
-    outlines of what it cuts."""
+    """The cut of a tool of a constant width along `chains`; where the width is None these are the
+    outlines of the cut."""
 
     width_mm: float | None
     chains: tuple[Chain, ...]
