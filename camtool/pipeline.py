@@ -515,7 +515,7 @@ def _operations(steps: Sequence[Step]) -> tuple[PlannedOperation, ...]:
 
 
 def _deepest_mm(step: Step) -> float:
-    """How deep an operation goes; a carving may end above the depth that it is allowed."""
+    """Return the depth (mm) of an operation; a carving may end above its allowed depth."""
     return -float(step.runs.vertices[:, 2].min())
 
 

@@ -125,7 +125,7 @@ class Content(Struct, frozen=True, eq=False, dict=True):
 
     @cached_property
     def swept(self) -> tuple[Swept, ...]:
-        """What is cut, as wide as each tool cuts it at the surface, where that is known."""
+        """The cuts, each as wide as its tool cuts at the surface, where that is known."""
         scene, toolpath = self.scene, self.scene.toolpath
         found: list[Swept] = []
         if scene.tool_mm:

@@ -297,7 +297,7 @@ def _swept_legend(content: Content, view: View) -> Iterator[Entry]:
 
 
 def swept_words(scene: Scene) -> str:
-    """How wide the cuts are, of one tool or of several; "" where nobody knows."""
+    """Describe the width of the cuts, of one tool or of several; "" if it is not known."""
     if scene.tool_mm:
         return f"tool {scene.tool_mm:.4g} mm wide"
     if scene.nose is not None:

@@ -174,7 +174,7 @@ def _is_narrow(hole: Hole, operation: Operation) -> bool:
 
 
 def _peck_mm(operation: Operation) -> float:
-    """How deep an end mill plunges at a time."""
+    """Return the depth (mm) of one peck of an end mill."""
     widest = operation.tool.diameter_mm
     return widest if operation.step_down_mm is None else min(widest, operation.step_down_mm)
 

@@ -83,17 +83,17 @@ BEYOND_MOST = 0.25
 mistake: corrections of wear and play are hundredths of millimetres."""
 
 LEAST_PIECE = 0.25
-"""What the tool leaves within a contour is a piece where it is larger than this part of the tool's
-disc; what is smaller goes away with the chips."""
+"""The smallest piece that comes loose within a contour, as a share of the area of the tool's disc:
+smaller ones go away with the chips."""
 
 OFF_STOCK_MM = 0.01
-"""What is drawn may lie beyond the edge of the stock by this much: nobody measures it finer."""
+"""A drawing may lie beyond the edge of the stock by this much: nobody measures it finer."""
 
 EDGES = ("left", "right", "lower", "upper")
 """The edges of the stock, seen from above."""
 
 STOCK_WORDS = {"pocket": "pocket", "engrave": "line", "vcarve": "carving", "chamfer": "edge"}
-"""What an operation of a kind cuts; those that are not here cut parts and holes."""
+"""The words for the cuts of a kind of operation; kinds that are not here cut parts and holes."""
 
 IN_PASSES = ("profile", "pocket", "engrave", "chamfer")
 """Kinds of operation that go down in passes, each of one depth."""
@@ -190,7 +190,7 @@ def _too_deep(toolpath: Toolpath, job: Job) -> Iterator[Finding]:
 
 
 def _beside_stock(toolpath: Toolpath, job: Job) -> Iterator[Finding]:
-    """What is cut wholly beside the stock."""
+    """Yield a finding for each cut that lies wholly beside the stock."""
     stock, cuts = job.stock, _cuts(toolpath)
     if stock is None or stock.box_mm is None or not cuts.any():
         return
@@ -209,7 +209,7 @@ def _beside_stock(toolpath: Toolpath, job: Job) -> Iterator[Finding]:
 
 
 def _off_stock(step: Step, stock: Stock | None) -> list[Finding]:
-    """What an operation cuts of the drawing that lies beside the stock.
+    """Return findings for drawn contours of an operation that lie beside the stock.
 
     An error: a part and an engraving that are not whole then, and what lies wholly beside it. A
     pocket that is open at the edge, a notch, and a line that runs out of the stock may be meant:

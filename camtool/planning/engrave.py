@@ -52,8 +52,8 @@ def engrave(chosen: Chosen, setting: Setting) -> Work:
 
 
 def run_together(chosen: Chosen, setting: Setting) -> Iterator[Finding]:
-    """One finding for the lines on which the tool runs, and that are nearer to each other than it
-    is wide at the depth of its tip: lines that do not touch, and what touching lines enclose."""
+    """Yield one finding for the lines under the tool that are nearer to each other than it is
+    wide at the depth of its tip: lines that do not touch, and what touching lines enclose."""
     width = 2.0 * setting.operation.tool.radius_at(-setting.levels_mm[-1])
     if width == 0.0 or not len(chosen.lines):
         return
@@ -74,8 +74,8 @@ def run_together(chosen: Chosen, setting: Setting) -> Iterator[Finding]:
 
 
 def _narrow_places(lines: Any, closed: Bools, width: float) -> list[tuple[float, Any, int]]:
-    """Where a groove of this width takes away what lies between lines: how wide that is, mm, its
-    middle, and the row of one of them."""
+    """Return the places where a groove of this width takes away what is between two lines: the
+    width of that, mm, its middle, and the row of one of the lines."""
     import shapely
 
     near, other = shapely.STRtree(lines).query(lines, predicate="dwithin", distance=width)
@@ -112,8 +112,8 @@ def _narrow_places(lines: Any, closed: Bools, width: float) -> list[tuple[float,
 
 
 def _enclosed(lines: Any, width: float) -> Iterator[tuple[float, Any]]:
-    """How wide each place is that touching lines enclose, mm, and its middle, where a groove of
-    this width fills it."""
+    """Yield the places that touching lines enclose and a groove of this width fills: the width of
+    each, mm, and its middle."""
     import shapely
 
     least = LEAST_BETWEEN * width
