@@ -564,6 +564,8 @@ def _cut_mm(wanted: Toolpath) -> tuple[float, float, float, float] | None:
     import numpy as np
 
     from camtool.toolpath.moves import toolpath_extents
+    from camtool.toolpath.rapids import feeds_below_top
+    from camtool.verification.cuts import is_flat
 
     operations = wanted.operations
     if operations is None:
@@ -572,13 +574,14 @@ def _cut_mm(wanted: Toolpath) -> tuple[float, float, float, float] | None:
     boxes, ends = [], [*begins[1:], len(wanted)]
     for note, low, high in zip(operations.notes, begins, ends, strict=True):
         part = wanted.part(low, high)
-        if not part.is_feed.any():
+        cuts = part.is_feed if is_flat(part) else feeds_below_top(part)
+        if not cuts.any():
             continue
         reach = 0.5 * note.tool.diameter_mm
         if note.tool.kind == "v" and note.tool.tip_angle_rad is not None:
             deep = note.depth_mm * math.tan(0.5 * note.tool.tip_angle_rad)
             reach = min(deep, reach or math.inf)
-        boxes.append(toolpath_extents(part, cuts=True)[:2] + np.array([-reach, reach]))
+        boxes.append(toolpath_extents(part, rows=cuts)[:2] + np.array([-reach, reach]))
     if not boxes:
         return None
     every = np.array(boxes)

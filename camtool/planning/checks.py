@@ -67,7 +67,7 @@ from camtool.planning.naming import (
 from camtool.planning.settings import lowered_feeds
 from camtool.planning.sides import runs_beside
 from camtool.toolpath.moves import Kind, Toolpath, mounted_before, toolpath_extents
-from camtool.toolpath.rapids import STOCK_TOP_MM, Reach, rapids_through_stock
+from camtool.toolpath.rapids import STOCK_TOP_MM, Reach, feeds_below_top, rapids_through_stock
 
 LIMIT_SLACK = 1e-6
 """A chip load or surface speed may be beyond its limits by this part of them, by rounding."""
@@ -151,7 +151,8 @@ def _into_travel(toolpath: Toolpath, machine: Machine, name: str) -> str:
     if name == "Z":
         return f"lower safe_z or the depth; {yours}"
     room = [each.travel_mm or math.inf for each in machine.axes]
-    spans = np.ptp(toolpath_extents(toolpath, cuts=True), axis=1)
+    feeds = toolpath.is_feed
+    spans = np.ptp(toolpath_extents(toolpath, rows=feeds if feeds.any() else None), axis=1)
     if spans[axis] <= room[axis]:
         return f"use --origin lower-left; {yours}"
     if spans[0] <= room[1] and spans[1] <= room[0]:
@@ -162,7 +163,7 @@ def _into_travel(toolpath: Toolpath, machine: Machine, name: str) -> str:
 def _too_deep(toolpath: Toolpath, job: Job) -> Iterator[Finding]:
     """Cuts through the stock, and deeper than may be."""
     stock = job.stock
-    cuts = _cuts(toolpath)
+    cuts = feeds_below_top(toolpath)
     if stock is None or not cuts.any():
         return
     rows = np.flatnonzero(cuts)
@@ -191,7 +192,7 @@ def _too_deep(toolpath: Toolpath, job: Job) -> Iterator[Finding]:
 
 def _beside_stock(toolpath: Toolpath, job: Job) -> Iterator[Finding]:
     """Yield a finding for each cut that lies wholly beside the stock."""
-    stock, cuts = job.stock, _cuts(toolpath)
+    stock, cuts = job.stock, feeds_below_top(toolpath)
     if stock is None or stock.box_mm is None or not cuts.any():
         return
     _, sweeps = _radii(toolpath, job)
@@ -258,12 +259,6 @@ def _off_stock(step: Step, stock: Stock | None) -> list[Finding]:
         )
         found[sentence].append(one)
     return [each for some in found.values() for each in shortened_list(some, OUT_OF_STOCK_MORE)]
-
-
-def _cuts(toolpath: Toolpath) -> Bools:
-    """(N,) true for moves at a feed that reach below the stock top."""
-    low = np.minimum(toolpath.starts[:, 2], toolpath.end[:, 2])
-    return np.asarray(toolpath.is_feed & (low < STOCK_TOP_MM - POSITION_EPS_MM))
 
 
 def _beside(toolpath: Toolpath, box: Box, radius: Floats) -> Bools:

@@ -359,32 +359,33 @@ class PolarArcs:
         )
 
 
-def toolpath_extents(toolpath: Toolpath, *, cuts: bool = False) -> Floats:
+def toolpath_extents(toolpath: Toolpath, *, rows: Bools | None = None) -> Floats:
     """(3, 2) mm: lowest and highest X, Y and Z that any move reaches, exact with its arcs, the
-    start included; with `cuts` those that moves at a feed reach.
+    start included; with `rows` (N,) those that these moves reach.
 
     An arc reaches centre ± radius where its sweep passes the direction of an axis.
     """
-    points = [toolpath.start[None, :], toolpath.end]
-    if cuts and toolpath.is_feed.any():
-        rows = np.flatnonzero(toolpath.is_feed)
-        points = [toolpath.starts_of(rows), toolpath.end[rows]]
+    if rows is None:
+        points, arcs = [toolpath.start[None, :], toolpath.end], toolpath.is_arc
+    else:
+        chosen = np.flatnonzero(rows)
+        points, arcs = [toolpath.starts_of(chosen), toolpath.end[chosen]], toolpath.is_arc & rows
     low = high = points[0][0]
     for ends in points:
         for first in range(0, len(ends), ROWS_AT_ONCE):
             some = ends[first : first + ROWS_AT_ONCE]
             low = np.concatenate([low[None, :], some]).min(axis=0)
             high = np.concatenate([high[None, :], some]).max(axis=0)
-    tops = _arc_extremes(toolpath)
+    tops = _arc_extremes(toolpath, np.flatnonzero(arcs))
     if len(tops):
         low[:2] = np.minimum(low[:2], tops.min(axis=0))
         high[:2] = np.maximum(high[:2], tops.max(axis=0))
     return np.column_stack([low, high])
 
 
-def _arc_extremes(toolpath: Toolpath) -> Floats:
-    """(J, 2) the points of arcs that lie straight right, above, left or below of the centre."""
-    arcs = np.flatnonzero(toolpath.is_arc)
+def _arc_extremes(toolpath: Toolpath, arcs: Ints) -> Floats:
+    """(J, 2) the points of these arcs that lie straight right, above, left or below of the
+    centre."""
     centre, begin = toolpath.centre[arcs], toolpath.starts_of(arcs)[:, :2]
     arm = begin - centre
     radius = np.hypot(arm[:, 0], arm[:, 1])

@@ -127,14 +127,23 @@ def _pieces(toolpath: Toolpath, row: int) -> Iterator[tuple[Floats, Floats]]:
     yield from pairwise(points)
 
 
+def feeds_below_top(toolpath: Toolpath) -> Bools:
+    """(N,) true for moves at a feed that begin or end below the stock top."""
+    return toolpath.is_feed & toolpath.by_parts(_is_low)
+
+
+def _is_low(toolpath: Toolpath) -> Bools:
+    lowest = np.minimum(toolpath.starts[:, 2], toolpath.end[:, 2])
+    return np.asarray(lowest < STOCK_TOP_MM - HEIGHT_EPS_MM)
+
+
 class _Swarf:
     """What the cuts of a toolpath have cleared, queried rapid by rapid."""
 
     def __init__(self, toolpath: Toolpath, reach: Reach, tolerance_mm: float) -> None:
         import shapely
 
-        low = np.minimum(toolpath.starts[:, 2], toolpath.end[:, 2])
-        cuts = toolpath.is_feed & (low < STOCK_TOP_MM - HEIGHT_EPS_MM)
+        cuts = feeds_below_top(toolpath)
         chords = arcs_to_lines(toolpath, cuts, CHORD_SHARE * tolerance_mm)
         kept = np.flatnonzero(cuts[chords.row])
         self._row: Ints = chords.row[kept]

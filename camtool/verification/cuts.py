@@ -22,7 +22,7 @@ from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.geometry.measure import point_at, segment_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
 from camtool.toolpath.moves import ROWS_AT_ONCE, Kind, Toolpath, are_arcs
-from camtool.toolpath.rapids import STOCK_TOP_MM
+from camtool.toolpath.rapids import feeds_below_top
 
 FEWEST_SAMPLES = 4
 """Each line and arc is sampled in at least this many parts, so that short moves are sampled
@@ -139,9 +139,8 @@ def cutting_rows(toolpath: Toolpath, *, flat_cuts: bool, across: Bools | None = 
     """(N,) true for the rows that cut, by the rule of this module; false after the END. `across`
     (N,): the rows that move in XY, where these are known."""
     across = moves_across(toolpath) if across is None else across
-    cutting = toolpath.is_feed & across
-    if not (flat_cuts and is_flat(toolpath)):
-        cutting &= toolpath.by_parts(_is_low)
+    is_drawn_flat = flat_cuts and is_flat(toolpath)
+    cutting = across & (toolpath.is_feed if is_drawn_flat else feeds_below_top(toolpath))
     cutting[toolpath.running :] = False
     return cutting
 
@@ -149,12 +148,6 @@ def cutting_rows(toolpath: Toolpath, *, flat_cuts: bool, across: Bools | None = 
 def moves_across(toolpath: Toolpath) -> Bools:
     """(N,) true for the rows that move in XY."""
     return toolpath.by_parts(lambda part: _lengths(part) > POSITION_EPS_MM)
-
-
-def _is_low(toolpath: Toolpath) -> Bools:
-    """(N,) true for rows that begin or end below the stock top."""
-    lowest = np.minimum(toolpath.starts[:, 2], toolpath.end[:, 2])
-    return np.asarray(lowest < STOCK_TOP_MM - POSITION_EPS_MM)
 
 
 def cut_moves(toolpath: Toolpath, *, flat_cuts: bool) -> CutMoves:
@@ -225,7 +218,7 @@ def _leaves_stock(toolpath: Toolpath) -> Bools:
     flat = _lengths(toolpath) > POSITION_EPS_MM
     moves = toolpath.is_motion & (flat | rises)
     homes = (toolpath.kind == Kind.HOME_XY) | (toolpath.kind == Kind.HOME_Z)
-    sinks = toolpath.is_feed & ~flat & _is_low(toolpath)
+    sinks = ~flat & feeds_below_top(toolpath)
     return np.asarray((moves | homes) & ~sinks)
 
 

@@ -84,10 +84,10 @@ def swept(tracks: Iterable[tuple[Floats, Floats]]) -> Any:
         discs = shapely.buffer(shapely.points(places[:, :2]), wide, quad_segs=SIDES)
         areas += [shapely.convex_hull(shapely.union(*two)) for two in pairwise(discs)]
     for radius, each in lines.items():
-        whole = shapely.get_parts(shapely.line_merge(shapely.multilinestrings(each)))
+        # Not merged: GEOS widens a line that goes there and back without its far end.
         areas += [
             shapely.buffer(piece, radius, quad_segs=SIDES)
-            for line in whole
+            for line in each
             for piece in _short(line)
         ]
     return shapely.union_all(areas)
