@@ -26,7 +26,7 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import GeometryError
 
 POSITION_EPS_MM = 1e-6
-"""Two positions nearer than this are equal (docs/numerics.md)."""
+"""Two positions nearer than this are equal."""
 
 SEGMENTS_AT_ONCE = 1 << 16
 """So many segments are looked at a time where each stands alone: some 10 MB."""

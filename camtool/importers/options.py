@@ -36,10 +36,10 @@ TEXT_SKIPPED = "is text: read it with --text outline, or --text stroke for engra
 """Why text is left out."""
 
 TOLERANCE_MM = 0.0005
-"""Largest distance between a curve and the arcs that stand for it (docs/numerics.md)."""
+"""Largest distance between a curve and the arcs that stand for it."""
 
 GAP_MM = 0.01
-"""Open ends that lie nearer than this are joined (docs/numerics.md)."""
+"""Open ends that lie nearer than this are joined."""
 
 DPI = 96.0
 """Pixels per inch, as in CSS."""

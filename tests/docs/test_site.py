@@ -15,6 +15,7 @@ import pytest
 
 import camtool
 from camtool.cli.main import COMMANDS
+from camtool.geometry.polylines import POSITION_EPS_MM
 
 ROOT = Path(__file__).parents[2]
 CHROMIUM = "/usr/bin/chromium"
@@ -44,10 +45,26 @@ def hooks() -> ModuleType:
     return module
 
 
-def test_every_page_of_the_site_exists() -> None:
+def test_every_page_of_the_site_exists(hooks: ModuleType) -> None:
     pages = re.findall(r"- (?:[^:\n]+: )?([\w./-]+\.md)$", SETTINGS, re.MULTILINE)
     assert len(pages) > 30
-    assert [page for page in pages if not (ROOT / "docs" / page).exists()] == []
+    assert [page for page in pages if not (ROOT / "docs" / page).exists()] == [hooks.NUMERICS]
+
+
+def test_the_page_of_constants_has_those_of_the_code(hooks: ModuleType) -> None:
+    source = (
+        'A_MM = 1e-6\n"""Least gap |."""\nB: int = 2 * N\nC = "text"\nd = 3\nE = True\nF = -1\n'
+    )
+    assert list(hooks.constants(source)) == [
+        ("A_MM", "1e-06", "Least gap \\|."),
+        ("B", "2 * N", ""),
+        ("F", "-1", ""),
+    ]
+    assert list(hooks.constants("cdef int a = 1\nB = 2\n")) == []
+    page = hooks.numerics()
+    assert "\n## camtool/geometry/polylines.py\n" in page
+    assert f"| `POSITION_EPS_MM` | `{POSITION_EPS_MM!r}` |" in page
+    assert page.count("\n| `") > 400
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from tests.paths import mirrored
 
 FULL = 2.0 * math.pi
 EQUAL_MM = 1e-6
-"""Positions are equal within this (docs/numerics.md): so far an arc may bend beside its box."""
+"""Positions are equal within this: so far an arc may bend beside its box."""
 
 BULGES = st.just(0.0) | st.floats(1e-9, 1.0) | st.floats(-1.0, -1e-9)
 
