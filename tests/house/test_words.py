@@ -1,0 +1,105 @@
+"""Plain words: docstrings that begin with a verb, one name for one class, MAX_ and MIN_.
+
+The bounds are what the code has today. They only go down: whoever improves the code lowers them.
+"""
+
+import ast
+import functools
+import re
+from collections import Counter
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+QUESTION = re.compile(r"\s*(?:What|Whether|How|Some|One|Which|Where)\b")
+SUPERLATIVE = re.compile(
+    r"_?(?:MOST|LARGEST|LEAST|SMALLEST|FEWEST|GREATEST|HIGHEST|LOWEST|LONGEST|SHORTEST)(?:_|$)"
+)
+FUNCTION = ast.FunctionDef | ast.AsyncFunctionDef
+CYTHON_DOCSTRING = re.compile(
+    r'^[ \t]*(?:def|cdef|cpdef) (?!class)[^"]*?:\n\s*[rf]?"""(.*?)"""', re.MULTILINE | re.DOTALL
+)
+CYTHON_CONSTANT = re.compile(r"^(?:cdef )?(?:[\w ]+ )?([A-Z_]+)\s*=", re.MULTILINE)
+
+MAX_QUESTIONS = 626
+MAX_SHARED_CLASS_NAMES = 83
+MAX_SUPERLATIVES = 199
+
+
+@functools.cache
+def nodes_of(source: str) -> list[ast.AST]:
+    """Return all nodes of a module's syntax tree."""
+    return list(ast.walk(ast.parse(source)))
+
+
+@functools.cache
+def sources() -> dict[str, str]:
+    """Return the text of each module of the product, by its path."""
+    found = sorted([*ROOT.glob("camtool/**/*.py*"), *ROOT.glob("postprocessors/**/*.py*")])
+    texts = {
+        path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8")
+        for path in found
+        if path.suffix in (".py", ".pyx")
+    }
+    assert len(texts) > 100
+    return texts
+
+
+def questions(path: str, source: str) -> list[str]:
+    """Return the first lines of the functions' docstrings that begin like a question."""
+    if path.endswith(".pyx"):
+        texts = CYTHON_DOCSTRING.findall(source)
+    else:
+        functions = [node for node in nodes_of(source) if isinstance(node, FUNCTION)]
+        texts = [ast.get_docstring(node) or "" for node in functions]
+    return [f"{path}: {text.splitlines()[0]}" for text in texts if QUESTION.match(text)]
+
+
+def superlatives(path: str, source: str) -> list[str]:
+    """Return the constants of a module or class whose names begin with a superlative."""
+    names: list[str] = []
+    if path.endswith(".pyx"):
+        names = CYTHON_CONSTANT.findall(source)
+    else:
+        for node in nodes_of(source):
+            match node:
+                case ast.Assign(targets=[ast.Name(name)]) | ast.AnnAssign(target=ast.Name(name)):
+                    names.append(name)
+    return [f"{path}: {name}" for name in names if SUPERLATIVE.match(name)]
+
+
+def shared_class_names(texts: dict[str, str]) -> list[str]:
+    """Return the names that two public classes or more have."""
+    counts = Counter(
+        node.name
+        for path, source in texts.items()
+        if path.endswith(".py")
+        for node in nodes_of(source)
+        if isinstance(node, ast.ClassDef) and not node.name.startswith("_")
+    )
+    return [name for name, count in counts.items() if count > 1]
+
+
+def test_docstrings_of_functions_say_what_is_computed() -> None:
+    found = [line for each in sources().items() for line in questions(*each)]
+    assert len(found) <= MAX_QUESTIONS, "\n".join(found)
+
+
+def test_no_two_public_classes_share_a_name() -> None:
+    found = shared_class_names(sources())
+    assert len(found) <= MAX_SHARED_CLASS_NAMES, found
+
+
+def test_bounds_are_called_max_and_min() -> None:
+    found = [line for each in sources().items() for line in superlatives(*each)]
+    assert len(found) <= MAX_SUPERLATIVES, "\n".join(found)
+
+
+def test_the_rules_can_be_broken() -> None:
+    text = 'def f():\n    """Which one."""\n\n\ndef g():\n    """Return one."""\n'
+    assert questions("a.py", text) == ["a.py: Which one."]
+    assert questions("a.pyx", "cdef int x\n" + text) == ["a.pyx: Which one."]
+    text = "MOST_MM = 1\nMAX_MM = 1\n_LEAST: int = 2\nLEASTWISE = 3\n"
+    assert superlatives("a.py", text) == ["a.py: MOST_MM", "a.py: _LEAST"]
+    assert superlatives("a.pyx", "cdef double MOST_MM = 1\n") == ["a.pyx: MOST_MM"]
+    same = "class A:\n    pass\n\n\nclass _B:\n    pass\n"
+    assert shared_class_names({"a.py": same, "b.py": same}) == ["A"]
