@@ -12,7 +12,8 @@ from camtool.cli.files import STDOUT, check_new, check_places, write_all
 from camtool.cli.life_signs import progress
 from camtool.cli.messages import say, say_findings, show_text
 from camtool.cli.options import DrawingFlags, SectionedCommand, drawing_options, talk_options
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import Finding, Severity
+from camtool.importers.findings import DrawingCode
 from camtool.plain import one_line, to_json
 
 if TYPE_CHECKING:
@@ -110,7 +111,7 @@ def _told(findings: Sequence[Finding]) -> Iterator[Finding]:
     """Those of reading the drawing, but not that the lines of its dimensions are left out: the
     dimensions themselves are read here."""
     for each in findings:
-        if each.code != Code.ENTITY_SKIPPED or " DIMENSION left out" not in each.message:
+        if each.code != DrawingCode.ENTITY_SKIPPED or " DIMENSION left out" not in each.message:
             yield each
 
 

@@ -21,7 +21,21 @@ from dataclasses import replace
 import numpy as np
 
 from camtool.errors import DrawingError
-from camtool.findings import (
+from camtool.findings import Finding, Severity
+from camtool.geometry.drawing import (
+    Callout,
+    Drawing,
+    Gap,
+    Healing,
+    Mark,
+    SelfCrossing,
+    Skipped,
+    Unchosen,
+    Units,
+)
+from camtool.geometry.facts import drawing_extents
+from camtool.geometry.polylines import POSITION_EPS_MM
+from camtool.importers.findings import (
     ARCS_RECOGNISED,
     BRANCHED,
     BRANCHED_MORE,
@@ -36,22 +50,7 @@ from camtool.findings import (
     SELF_CROSSING,
     SELF_CROSSING_MORE,
     TINY_MERGED,
-    Finding,
-    Severity,
 )
-from camtool.geometry.drawing import (
-    Callout,
-    Drawing,
-    Gap,
-    Healing,
-    Mark,
-    SelfCrossing,
-    Skipped,
-    Unchosen,
-    Units,
-)
-from camtool.geometry.facts import drawing_extents
-from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.importers.healing import IS_DRAWN_TWICE, cleaned, gap_of, healed, is_placed, off_drawn
 from camtool.importers.options import ReadOptions, Selection
 from camtool.importers.pieces import MAX_COORDINATE_MM, Piece, selected

@@ -17,10 +17,11 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from camtool.arrays import Bools, Floats
-from camtool.findings import DIMENSION_UNBOUND, Finding
+from camtool.findings import Finding
 from camtool.geometry.boxes import BoxIndex
 from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.inspection.dimensions import Dimension, Place
+from camtool.inspection.findings import DIMENSION_UNBOUND
 from camtool.planning.place import Map
 
 BIND_MM = 0.01

@@ -15,9 +15,10 @@ from msgspec import Struct
 
 from camtool.arrays import Floats, Ints
 from camtool.errors import OptionError
-from camtool.findings import DIMENSION_NOT_CUT, Finding
+from camtool.findings import Finding
 from camtool.inspection.dimensions import Dimension
 from camtool.inspection.features import Bound, Edge, bind, features_of
+from camtool.inspection.findings import DIMENSION_NOT_CUT
 from camtool.inspection.sizes import (
     Cut,
     Size,

@@ -21,18 +21,18 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from camtool.errors import DrawingError, InputError, OptionError
-from camtool.findings import (
+from camtool.findings import Finding
+from camtool.geometry.drawing import Callout, Drawing
+from camtool.inspection.dimensions import ZONES, Dimension, Kind, Limits
+from camtool.inspection.features import BIND_MM, Bound, Circle, Features, bind, features_of
+from camtool.inspection.findings import (
     CALLOUT_TEXT,
     COUNT_DIFFERS,
     DIMENSION_DIFFERS,
     DIMENSION_DIFFERS_VIEW,
     DIMENSION_TWICE,
     DIMENSION_TWICE_DIFFERS,
-    Finding,
 )
-from camtool.geometry.drawing import Callout, Drawing
-from camtool.inspection.dimensions import ZONES, Dimension, Kind, Limits
-from camtool.inspection.features import BIND_MM, Bound, Circle, Features, bind, features_of
 from camtool.inspection.limits import (
     NotUnderstood,
     Words,

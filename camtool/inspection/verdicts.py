@@ -25,18 +25,17 @@ import msgspec
 import numpy as np
 from msgspec import Struct
 
-from camtool.findings import (
+from camtool.findings import Finding, Severity
+from camtool.importers.findings import ENTITY_SKIPPED
+from camtool.inspection.dimensions import ZONES, Dimension
+from camtool.inspection.features import Circle, Edge
+from camtool.inspection.findings import (
     DIMENSION_NOT_CUT_THERE,
     DIMENSION_NOT_IN_OUT,
     DIMENSION_NOT_IN_UNDECIDED,
-    ENTITY_SKIPPED,
     NOTHING_REQUIRED,
-    Code,
-    Finding,
-    Severity,
+    InspectionCode,
 )
-from camtool.inspection.dimensions import ZONES, Dimension
-from camtool.inspection.features import Circle, Edge
 from camtool.inspection.inspector import Inspected, Inspector
 from camtool.inspection.sizes import Size
 from camtool.inspection.uncertainty import Budget, inputs_of, propagate
@@ -112,7 +111,11 @@ def _without_read(findings: Iterable[Finding], run: Run) -> list[Finding]:
     return [each for each in findings if each not in read]
 
 
-NOT_INSPECTED = (Code.DIMENSION_UNBOUND, Code.DIMENSION_NOT_CUT, Code.CALLOUT_TEXT)
+NOT_INSPECTED = (
+    InspectionCode.DIMENSION_UNBOUND,
+    InspectionCode.DIMENSION_NOT_CUT,
+    InspectionCode.CALLOUT_TEXT,
+)
 """Errors where something is required of every dimension with limits: nobody knows whether these
 hold."""
 

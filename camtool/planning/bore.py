@@ -32,17 +32,7 @@ import numpy as np
 
 from camtool.arrays import Floats
 from camtool.errors import OptionError
-from camtool.findings import (
-    ENTRY_CHANGED_IN_NARROW_BORE,
-    ENTRY_CHANGED_STEEPER,
-    GOUGE_BEYOND,
-    GOUGE_MORE,
-    NOT_BORED,
-    NOT_BORED_TOO_SMALL,
-    NOT_BORED_WITHIN,
-    NOTHING_DRAWN_TO_BORE,
-    Finding,
-)
+from camtool.findings import Finding
 from camtool.geometry.distance import near_paths
 from camtool.geometry.polylines import Polyline, Polylines
 from camtool.planning.drill import (
@@ -54,6 +44,16 @@ from camtool.planning.drill import (
     peck_depths,
     pecks,
     refuse_endless_pecks,
+)
+from camtool.planning.findings import (
+    ENTRY_CHANGED_IN_NARROW_BORE,
+    ENTRY_CHANGED_STEEPER,
+    GOUGE_BEYOND,
+    GOUGE_MORE,
+    NOT_BORED,
+    NOT_BORED_TOO_SMALL,
+    NOT_BORED_WITHIN,
+    NOTHING_DRAWN_TO_BORE,
 )
 from camtool.planning.finish import along_walls
 from camtool.planning.items import Chosen, Contours, CutRun, Fixed, Setting, Work

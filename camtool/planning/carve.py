@@ -34,14 +34,7 @@ from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import GeometryError, OptionError
-from camtool.findings import (
-    CONTOUR_TOO_SMALL_FOR_TIP,
-    DEPTH_LIMITED,
-    SELF_CROSSING_CARVED,
-    SELF_CROSSING_NO_REGION,
-    UNREACHED_BY_TIP,
-    Finding,
-)
+from camtool.findings import Finding
 from camtool.geometry.boxes import touching_boxes
 from camtool.geometry.distance import points_to_segments
 from camtool.geometry.intersect import MOST_PAIRS, meetings
@@ -58,6 +51,13 @@ from camtool.geometry.medial import (
 from camtool.geometry.nesting import nesting, regions
 from camtool.geometry.offset import merge_points
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
+from camtool.planning.findings import (
+    CONTOUR_TOO_SMALL_FOR_TIP,
+    DEPTH_LIMITED,
+    SELF_CROSSING_CARVED,
+    SELF_CROSSING_NO_REGION,
+    UNREACHED_BY_TIP,
+)
 from camtool.planning.items import Chosen, CutRun, Fixed, Setting, Work
 from camtool.planning.job import Operation
 from camtool.planning.naming import at_place, key_of

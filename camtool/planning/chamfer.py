@@ -20,8 +20,9 @@ from __future__ import annotations
 import numpy as np
 from msgspec.structs import replace
 
-from camtool.findings import NOT_CHAMFERED, NOTHING_DRAWN_TO_CHAMFER, Finding
+from camtool.findings import Finding
 from camtool.planning.drill import named
+from camtool.planning.findings import NOT_CHAMFERED, NOTHING_DRAWN_TO_CHAMFER
 from camtool.planning.items import Chosen, Setting, Work
 from camtool.planning.naming import operation_name
 from camtool.planning.profile import profile

@@ -16,7 +16,12 @@ import numpy as np
 from msgspec import structs
 
 from camtool.arrays import Bools, Floats
-from camtool.findings import (
+from camtool.findings import Finding, Sentence
+from camtool.geometry.measure import extents, path_extents, signed_areas
+from camtool.geometry.nesting import nesting
+from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, lines_reversed
+from camtool.machine.model import Machine
+from camtool.planning.findings import (
     CUT_DOUBTFUL,
     CUT_DOUBTFUL_BEYOND,
     CUT_DOUBTFUL_CENTRE,
@@ -48,13 +53,7 @@ from camtool.findings import (
     TOOL_CHANGE_NOT_STATED,
     TOOL_NOT_SAID,
     TOOL_NOT_SAID_APART,
-    Finding,
-    Sentence,
 )
-from camtool.geometry.measure import extents, path_extents, signed_areas
-from camtool.geometry.nesting import nesting
-from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, lines_reversed
-from camtool.machine.model import Machine
 from camtool.planning.items import Contours, Fixed, Setting, Step
 from camtool.planning.job import MILLS, Job, Stock, Tool
 from camtool.planning.naming import (

@@ -17,8 +17,9 @@ import numpy as np
 from msgspec import Struct
 
 from camtool.arrays import Floats, Ints
-from camtool.findings import ENTRY_CHANGED, Finding
+from camtool.findings import Finding
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines
+from camtool.planning.findings import ENTRY_CHANGED
 from camtool.planning.items import RAPID, Bridge, Contour, Contours, Feeds, Runs
 from camtool.planning.leads import NO_LEADS, KeepOut, Leads, leads_of
 from camtool.planning.naming import at_place

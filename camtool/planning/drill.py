@@ -16,15 +16,15 @@ import numpy as np
 from msgspec import Struct
 
 from camtool.arrays import Bools, Floats
-from camtool.findings import (
+from camtool.findings import Finding
+from camtool.geometry.measure import path_extents, sample
+from camtool.geometry.polylines import Polyline, Polylines, Segments
+from camtool.planning.findings import (
     HOLE_SIZE,
     NOT_DRILLED,
     NOT_DRILLED_TOO_LARGE,
     NOTHING_DRAWN_TO_DRILL,
-    Finding,
 )
-from camtool.geometry.measure import path_extents, sample
-from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.planning.items import RAPID, Chosen, CutRun, Fixed, Setting, Work
 from camtool.planning.job import Operation, refuse_endless
 from camtool.planning.naming import key_of, operation_name

@@ -14,9 +14,10 @@ import numpy as np
 
 from camtool.arrays import Bools, Floats
 from camtool.errors import OptionError
-from camtool.findings import LINES_RUN_TOGETHER, Finding
+from camtool.findings import Finding
 from camtool.geometry.measure import point_at
 from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, Segments
+from camtool.planning.findings import LINES_RUN_TOGETHER
 from camtool.planning.items import Chosen, Contours, Setting, Work
 from camtool.planning.naming import at_place, key_of
 

@@ -19,7 +19,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from camtool.errors import OptionError
-from camtool.findings import FINISH_IN_PASSES, FINISH_IN_PASSES_WHOLE, Code, Finding
+from camtool.findings import Finding
 from camtool.geometry.distance import nearest
 from camtool.geometry.measure import sample
 from camtool.geometry.polylines import (
@@ -29,10 +29,12 @@ from camtool.geometry.polylines import (
     Segments,
     lines_reversed,
 )
+from camtool.planning.findings import FINISH_IN_PASSES, FINISH_IN_PASSES_WHOLE, PlanningCode
 from camtool.planning.items import NO_STARTS, Contours, Setting, Step
 from camtool.planning.job import Operation
 from camtool.planning.naming import at_place, key_of
 from camtool.planning.settings import levels
+from camtool.toolpath.findings import ProgramCode
 
 ENGAGED_MOST = 0.5
 """What a finishing pass meets, in a corner too, is no more than this part of its diameter: all
@@ -42,13 +44,13 @@ SAMPLES_PER_TOOL = 8.0
 """So many places of a finishing pass are looked at in a length of its tool's diameter."""
 
 OF_WALLS = (
-    Code.UNREACHED,
-    Code.SLOT_AS_WIDE,
-    Code.CONTOUR_TOO_SMALL,
-    Code.GOUGE,
-    Code.NOT_RELIEVED,
-    Code.CORNER_FAR,
-    Code.FINISH_IN_PASSES,
+    PlanningCode.UNREACHED,
+    PlanningCode.SLOT_AS_WIDE,
+    PlanningCode.CONTOUR_TOO_SMALL,
+    ProgramCode.GOUGE,
+    PlanningCode.NOT_RELIEVED,
+    PlanningCode.CORNER_FAR,
+    PlanningCode.FINISH_IN_PASSES,
 )
 """What is said of the wall: by the stage that cuts it. All else is said by the first one."""
 
@@ -59,9 +61,9 @@ def of_stage(operation: Operation, findings: Iterable[Finding]) -> list[Finding]
     if not operation.stage:
         return list(findings)
     if operation.stage == "rough":
-        own = {Code.GOUGE} if operation.kind == "profile" else set()
+        own = {ProgramCode.GOUGE} if operation.kind == "profile" else set()
         return [each for each in findings if each.code in own or each.code not in OF_WALLS]
-    return [each for each in findings if each.code in (*OF_WALLS, Code.LEAD_LEFT_OUT)]
+    return [each for each in findings if each.code in (*OF_WALLS, PlanningCode.LEAD_LEFT_OUT)]
 
 
 def along_walls(

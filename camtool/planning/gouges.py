@@ -21,7 +21,13 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
-from camtool.findings import (
+from camtool.findings import Finding, Severity
+from camtool.geometry.distance import approach, near_paths, nearest
+from camtool.geometry.drawing import Branch
+from camtool.geometry.measure import extents, path_lengths, sample
+from camtool.geometry.nesting import inside, nesting
+from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
+from camtool.planning.findings import (
     BRANCHED_REGION,
     BRANCHED_REGION_MORE,
     GOUGE,
@@ -32,14 +38,7 @@ from camtool.findings import (
     GOUGE_OF_UNCUT,
     SIDE_BY_UNCUT,
     SIDE_BY_UNCUT_FRAME,
-    Finding,
-    Severity,
 )
-from camtool.geometry.distance import approach, near_paths, nearest
-from camtool.geometry.drawing import Branch
-from camtool.geometry.measure import extents, path_lengths, sample
-from camtool.geometry.nesting import inside, nesting
-from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
 from camtool.planning.items import Chosen, Contours, Work
 from camtool.planning.job import Operation
 from camtool.planning.naming import at_place, operation_name, shortened_list, tool_name

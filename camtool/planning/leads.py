@@ -20,12 +20,13 @@ import numpy as np
 from msgspec import Struct
 
 from camtool.arrays import Bools, Floats
-from camtool.findings import LEAD_LEFT_OUT, LEAD_LEFT_OUT_IN_PART, Finding
+from camtool.findings import Finding
 from camtool.geometry.distance import nearest, paired_distances, points_to_segments
 from camtool.geometry.intersect import crossings
 from camtool.geometry.measure import Frames, dot, point_at, signed_area
 from camtool.geometry.nesting import inside
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
+from camtool.planning.findings import LEAD_LEFT_OUT, LEAD_LEFT_OUT_IN_PART
 from camtool.planning.items import Contour
 from camtool.planning.job import Lead
 from camtool.planning.naming import at_place

@@ -17,7 +17,7 @@ from msgspec import Struct, structs
 
 from camtool.arrays import Floats, Ints
 from camtool.errors import GeometryError, OptionError
-from camtool.findings import POINTS_MERGED, Finding, Severity
+from camtool.findings import Finding, Severity
 from camtool.geometry.drawing import Drawing, Gap, Healing, Unchosen
 from camtool.geometry.measure import extents, segment_boxes
 from camtool.geometry.polylines import (
@@ -29,6 +29,7 @@ from camtool.geometry.polylines import (
     segment_rows,
     without_repeats,
 )
+from camtool.planning.findings import POINTS_MERGED
 from camtool.planning.job import Job, Placement
 
 MOST_SIZE_MM = 1e5

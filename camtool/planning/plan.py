@@ -19,15 +19,7 @@ import numpy as np
 from msgspec import Struct, structs
 
 from camtool.errors import OptionError
-from camtool.findings import (
-    FIT_COARSE,
-    MARKS_NOT_CUT,
-    NOTHING_DRAWN,
-    NOTHING_DRAWN_BUT_PATHS,
-    TEXT_AS_EDGE,
-    Code,
-    Finding,
-)
+from camtool.findings import Finding
 from camtool.geometry.drawing import Drawing, is_text
 from camtool.geometry.measure import path_lengths
 from camtool.machine.model import Machine
@@ -36,6 +28,14 @@ from camtool.planning.contours import runs_of, with_starts
 from camtool.planning.drawn import drawn_of
 from camtool.planning.drill import drill
 from camtool.planning.engrave import engrave
+from camtool.planning.findings import (
+    FIT_COARSE,
+    MARKS_NOT_CUT,
+    NOTHING_DRAWN,
+    NOTHING_DRAWN_BUT_PATHS,
+    TEXT_AS_EDGE,
+    PlanningCode,
+)
 from camtool.planning.finish import in_passes, of_stage
 from camtool.planning.gouges import branch_findings, side_findings
 from camtool.planning.items import Bridge, Chosen, Contours, Items, Runs, Setting, Step, Work
@@ -58,6 +58,7 @@ from camtool.planning.settings import setting_of
 from camtool.planning.sides import Sides, choose, runs_beside, takes_mark
 from camtool.planning.tabs import between, raised_over_bridges, with_tabs
 from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Toolpath
 
 HOME: Point = (0.0, 0.0)
@@ -289,7 +290,7 @@ def _text_as_edge(
         )
         if closed and is_text(placed.sources[source])
     ]
-    spoilt = (Code.GOUGE, Code.CONTOUR_TOO_SMALL)
+    spoilt = (ProgramCode.GOUGE, PlanningCode.CONTOUR_TOO_SMALL)
     places = [each.where or "" for each in findings if each.code in spoilt]
     if any(place.startswith(f"{name} at ") for name in set(text) for place in places):
         yield TEXT_AS_EDGE(where=operation_name(operation), measured=len(text))
@@ -320,7 +321,7 @@ def _sparing(steps: list[Step]) -> list[Step]:
 def _rested(steps: list[Step]) -> list[Step]:
     """The steps; what one of them leaves for another to clear is said by that one alone."""
     left = [step.operation.rest for step in steps if step.operation.rest_of is not None]
-    codes = (Code.UNREACHED, Code.DEPTH_LIMITED)
+    codes = (PlanningCode.UNREACHED, PlanningCode.DEPTH_LIMITED)
     return [
         structs.replace(
             step, findings=tuple(each for each in step.findings if each.code not in codes)

@@ -24,13 +24,7 @@ from msgspec import Struct
 
 from camtool.arrays import Floats
 from camtool.errors import OptionError
-from camtool.findings import (
-    CONTOUR_TOO_SMALL_POCKET,
-    ENTRY_CHANGED_IN_POCKET,
-    NO_REST,
-    SLOT_AS_WIDE_IN_POCKET,
-    Finding,
-)
+from camtool.findings import Finding
 from camtool.geometry.distance import points_to_segments
 from camtool.geometry.intersect import meetings, self_crossings
 from camtool.geometry.measure import extents, signed_areas
@@ -55,6 +49,12 @@ from camtool.planning.clearing import (
     route,
     slot_paths,
     zigzag_paths,
+)
+from camtool.planning.findings import (
+    CONTOUR_TOO_SMALL_POCKET,
+    ENTRY_CHANGED_IN_POCKET,
+    NO_REST,
+    SLOT_AS_WIDE_IN_POCKET,
 )
 from camtool.planning.finish import along_walls
 from camtool.planning.items import Chosen, CutRun, Fixed, Setting, Work

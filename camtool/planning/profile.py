@@ -17,19 +17,7 @@ from msgspec import Struct, field
 from msgspec.structs import replace
 
 from camtool.arrays import Ints
-from camtool.findings import (
-    CONTOUR_TOO_SMALL,
-    CONTOUR_TOO_SMALL_ROUND,
-    CORNER_FAR,
-    CORNER_FAR_MORE,
-    NOT_RELIEVED,
-    OPEN_CONTOUR_ON_LINE,
-    SLOT_AS_WIDE,
-    UNREACHED_BETWEEN,
-    UNREACHED_BETWEEN_MORE,
-    Code,
-    Finding,
-)
+from camtool.findings import Finding
 from camtool.geometry.distance import approach, near_paths, nearest
 from camtool.geometry.measure import extents, signed_areas
 from camtool.geometry.nesting import nesting
@@ -41,6 +29,18 @@ from camtool.geometry.polylines import (
     lines_reversed,
 )
 from camtool.planning.engrave import run_together
+from camtool.planning.findings import (
+    CONTOUR_TOO_SMALL,
+    CONTOUR_TOO_SMALL_ROUND,
+    CORNER_FAR,
+    CORNER_FAR_MORE,
+    NOT_RELIEVED,
+    OPEN_CONTOUR_ON_LINE,
+    SLOT_AS_WIDE,
+    UNREACHED_BETWEEN,
+    UNREACHED_BETWEEN_MORE,
+    PlanningCode,
+)
 from camtool.planning.items import NO_STARTS, Chosen, Contours, Setting, Work
 from camtool.planning.naming import at_place, shortened_list, tool_name, width_name
 from camtool.planning.paths import joints, midpoints
@@ -140,7 +140,7 @@ def _shape(chosen: Chosen, of: list[int], setting: Setting, found: _Found) -> No
     found.findings += cut_away_findings(shape, setting.operation)
     if setting.operation.beyond_mm:  # it reaches where it is to cut beyond the lines
         free = offset_shape(free, -setting.operation.beyond_mm)
-    as_wide = any(finding.code == Code.SLOT_AS_WIDE for finding in found.findings)
+    as_wide = any(finding.code == PlanningCode.SLOT_AS_WIDE for finding in found.findings)
     hair_mm = 2.0 * SLOT_TOLERANCE_MM if as_wide else 0.0
     found.findings += unreached_findings(free, setting, hair_mm=hair_mm)
 

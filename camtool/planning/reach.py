@@ -18,20 +18,20 @@ import numpy as np
 from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
-from camtool.findings import (
-    GOUGE_BEYOND,
-    GOUGE_MORE,
-    UNREACHED,
-    UNREACHED_CORNERS,
-    UNREACHED_MORE,
-    Finding,
-)
+from camtool.findings import Finding
 from camtool.geometry.boxes import Curves
 from camtool.geometry.distance import nearest
 from camtool.geometry.measure import Frames, extents, point_at, segment_lengths, signed_areas
 from camtool.geometry.nesting import regions
 from camtool.geometry.offset import merge_points, offset_shape
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments, reverse
+from camtool.planning.findings import (
+    GOUGE_BEYOND,
+    GOUGE_MORE,
+    UNREACHED,
+    UNREACHED_CORNERS,
+    UNREACHED_MORE,
+)
 from camtool.planning.items import Setting
 from camtool.planning.job import Operation
 from camtool.planning.naming import MOST_PLACES, shortened_list, tool_name, width_name

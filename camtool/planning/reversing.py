@@ -28,16 +28,16 @@ from msgspec import Struct, field
 from msgspec.structs import replace
 
 from camtool.arrays import Floats, Ints
-from camtool.findings import (
-    PLAY_NOT_KNOWN_TO_SAVE,
-    REVERSALS_IN_AIR,
-    REVERSALS_IN_AIR_NOT,
-    Finding,
-)
+from camtool.findings import Finding
 from camtool.geometry.distance import point_to_segment
 from camtool.geometry.measure import point_at, segment_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Segments, reverse
 from camtool.machine.model import Axis, Machine, PlayCells, SlideStart
+from camtool.planning.findings import (
+    PLAY_NOT_KNOWN_TO_SAVE,
+    REVERSALS_IN_AIR,
+    REVERSALS_IN_AIR_NOT,
+)
 from camtool.planning.items import Contour, Contours, CutRun, Fixed, Item, Items
 from camtool.planning.job import Operation
 from camtool.planning.paths import flat

@@ -9,8 +9,9 @@ from itertools import pairwise
 import numpy as np
 
 from camtool.errors import OptionError
-from camtool.findings import FEED_ABOVE_LIMIT_IN_JOB, Finding
+from camtool.findings import Finding
 from camtool.machine.model import FEED_TOLERANCE, Machine, exceeds
+from camtool.planning.findings import FEED_ABOVE_LIMIT_IN_JOB
 from camtool.planning.items import Feeds, Setting
 from camtool.planning.job import Job, Operation
 from camtool.planning.naming import key_of, operation_name, own_numbers

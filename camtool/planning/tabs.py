@@ -30,20 +30,20 @@ from msgspec import Struct, structs
 
 from camtool.arrays import Bools, Floats
 from camtool.errors import OptionError
-from camtool.findings import (
-    TAB_LEFT_OUT,
-    TAB_LEFT_OUT_DRILLED,
-    TAB_LEFT_OUT_OF_ALL,
-    TAB_SHARED,
-    TAB_SHARED_WITH_OWN,
-    Finding,
-)
+from camtool.findings import Finding
 from camtool.geometry.boxes import BoxIndex
 from camtool.geometry.distance import nearest, points_to_segments
 from camtool.geometry.intersect import crossings
 from camtool.geometry.measure import path_lengths, point_at, segment_boxes, signed_areas
 from camtool.geometry.nesting import inside
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
+from camtool.planning.findings import (
+    TAB_LEFT_OUT,
+    TAB_LEFT_OUT_DRILLED,
+    TAB_LEFT_OUT_OF_ALL,
+    TAB_SHARED,
+    TAB_SHARED_WITH_OWN,
+)
 from camtool.planning.items import Bridge, Contour, Contours, CutRun, Feeds, Runs
 from camtool.planning.job import Operation, Tool, refuse_endless
 from camtool.planning.naming import at_place, key_of, operation_name

@@ -25,8 +25,8 @@ from msgspec import Struct, structs
 
 from camtool.arrays import Bools, Codes, Floats, Ints
 from camtool.errors import OptionError, PostError
-from camtool.findings import EVENT_LEFT_OUT_COOLANT, FEED_ABOVE_LIMIT_LOWERED
 from camtool.machine.model import Machine
+from camtool.toolpath.findings import EVENT_LEFT_OUT_COOLANT, FEED_ABOVE_LIMIT_LOWERED
 from camtool.toolpath.moves import Kind, PolarArcs, Toolpath, frozen
 
 MAX_CHORD_SWEEP_RAD = 0.5 * math.pi

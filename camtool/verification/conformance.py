@@ -20,7 +20,29 @@ import numpy as np
 from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
-from camtool.findings import (
+from camtool.findings import Code, Finding, Sentence, Severity
+from camtool.geometry.boxes import near_points
+from camtool.geometry.measure import point_at
+from camtool.geometry.polylines import POSITION_EPS_MM
+from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.rapids import STOCK_TOP_MM
+from camtool.verification.coverage import (
+    Compared,
+    Holes,
+    Limits,
+    at_point,
+    block_name,
+    compared,
+    contours_drilled,
+    hole_findings,
+    holes_of,
+    listed,
+    other_way,
+    round_trips,
+    turned,
+)
+from camtool.verification.cuts import CutMoves, cut_moves, is_flat
+from camtool.verification.findings import (
     CLEARANCE_LOW,
     CLEARANCE_LOW_OWN,
     CONTOUR_MISSING_ELSEWHERE,
@@ -48,32 +70,8 @@ from camtool.findings import (
     SETTING_DIFFERS_WAIT,
     SPINDLE_DIFFERS,
     SPINDLE_DIFFERS_UNASKED,
-    Code,
-    Finding,
-    Sentence,
-    Severity,
+    VerificationCode,
 )
-from camtool.geometry.boxes import near_points
-from camtool.geometry.measure import point_at
-from camtool.geometry.polylines import POSITION_EPS_MM
-from camtool.toolpath.moves import Kind, Toolpath
-from camtool.toolpath.rapids import STOCK_TOP_MM
-from camtool.verification.coverage import (
-    Compared,
-    Holes,
-    Limits,
-    at_point,
-    block_name,
-    compared,
-    contours_drilled,
-    hole_findings,
-    holes_of,
-    listed,
-    other_way,
-    round_trips,
-    turned,
-)
-from camtool.verification.cuts import CutMoves, cut_moves, is_flat
 from camtool.verification.matching import nearest_at_height
 from camtool.verification.nearest import MoveIndex
 
@@ -250,8 +248,8 @@ def compare_places(
     written = other.moves.contour_of(back.samples.segment[back.point])
     turns_back = turned(back, trips[written], limits)
     findings = (
-        *_place_findings(back, undrilled, limits, Code.CONTOUR_MISSING),
-        *_place_findings(there, drilled, limits, Code.EXTRA_CUT),
+        *_place_findings(back, undrilled, limits, VerificationCode.CONTOUR_MISSING),
+        *_place_findings(there, drilled, limits, VerificationCode.EXTRA_CUT),
         *hole_findings(mine.holes, other.holes, limits, (mine_stand, other_stand)),
         *_plunges(mine, (other, wanted), alike, limits),
         *_repeated_cuts(mine, other, alike, limits),
@@ -316,7 +314,7 @@ def _place_findings(
     first = order[np.flatnonzero(np.diff(contour[bad][order], prepend=-1))]
     for worst, more in listed(first.tolist()):
         sample, nearest = int(bad[worst]), int(near.segment[worst])
-        extra, known = code == Code.EXTRA_CUT, nearest >= 0
+        extra, known = code == VerificationCode.EXTRA_CUT, nearest >= 0
         one, which = (cuts, samples.segment[sample]) if extra else (found.others, nearest)
         at = at_point(samples.points[sample])
         block = block_name(one.toolpath, int(one.row[which])) if extra or known else ""
@@ -329,7 +327,7 @@ def _place_findings(
 
 
 def _away(distance: float, wrong_depth: bool, code: Code) -> Sentence:
-    extra = code == Code.EXTRA_CUT
+    extra = code == VerificationCode.EXTRA_CUT
     if not np.isfinite(distance):
         return EXTRA_CUT_NOTHING_ASKED if extra else CONTOUR_MISSING_NOTHING_CUT
     if wrong_depth:

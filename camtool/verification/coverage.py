@@ -17,21 +17,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from camtool.arrays import Bools, Floats, Indices, Ints
-from camtool.findings import (
-    CONTOUR_MISSING,
-    CONTOUR_MISSING_AT_DEPTH,
-    CONTOUR_MISSING_HOLE,
-    CONTOUR_MISSING_HOLE_DEPTH,
-    CONTOUR_MISSING_NO_CUTS,
-    CUT_OTHER_WAY,
-    EXTRA_CUT,
-    EXTRA_CUT_AT_DEPTH,
-    EXTRA_CUT_HOLE,
-    EXTRA_CUT_HOLE_DEPTH,
-    EXTRA_CUT_NONE_WANTED,
-    Finding,
-    Sentence,
-)
+from camtool.findings import Finding, Sentence
 from camtool.geometry.boxes import near_points
 from camtool.geometry.measure import point_at, segment_boxes, segment_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
@@ -49,6 +35,19 @@ from camtool.verification.cuts import (
     samples_by_parts,
 )
 from camtool.verification.figures import Figure
+from camtool.verification.findings import (
+    CONTOUR_MISSING,
+    CONTOUR_MISSING_AT_DEPTH,
+    CONTOUR_MISSING_HOLE,
+    CONTOUR_MISSING_HOLE_DEPTH,
+    CONTOUR_MISSING_NO_CUTS,
+    CUT_OTHER_WAY,
+    EXTRA_CUT,
+    EXTRA_CUT_AT_DEPTH,
+    EXTRA_CUT_HOLE,
+    EXTRA_CUT_HOLE_DEPTH,
+    EXTRA_CUT_NONE_WANTED,
+)
 from camtool.verification.matching import (
     LEAST_MM,
     Goal,

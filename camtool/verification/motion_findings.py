@@ -8,7 +8,17 @@ from collections.abc import Iterator
 import numpy as np
 
 from camtool.arrays import Floats
-from camtool.findings import (
+from camtool.findings import Finding, Severity
+from camtool.machine.model import Machine
+from camtool.planning.naming import own_numbers
+from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.rapids import CLEARED_MM, Reach, Through, low_rapids, rapids_through_stock
+from camtool.units import UM_PER_MM
+from camtool.verification.case import Case
+from camtool.verification.coverage import at_point, block_name, holes_of, listed
+from camtool.verification.cuts import CutMoves
+from camtool.verification.figures import RowFigures, Tally
+from camtool.verification.findings import (
     ARC_MISSES_END,
     ARC_MISSES_END_FAR,
     END_NOT_REACHED,
@@ -19,18 +29,7 @@ from camtool.findings import (
     PLAY_NOT_KNOWN,
     RAPID_IN_STOCK_IN_PROGRAM,
     RETURN_TO_MACHINE_ZERO,
-    Finding,
-    Severity,
 )
-from camtool.machine.model import Machine
-from camtool.planning.naming import own_numbers
-from camtool.toolpath.moves import Kind, Toolpath
-from camtool.toolpath.rapids import CLEARED_MM, Reach, Through, low_rapids, rapids_through_stock
-from camtool.units import UM_PER_MM
-from camtool.verification.case import Case
-from camtool.verification.coverage import at_point, block_name, holes_of, listed
-from camtool.verification.cuts import CutMoves
-from camtool.verification.figures import RowFigures, Tally
 
 AXES = "XYZ"
 CLEARED_COVERAGES = 2.0

@@ -26,22 +26,7 @@ from msgspec.structs import replace
 
 from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.errors import DrawingError
-from camtool.findings import (
-    CUT_INTO_PART,
-    CUTS_BESIDE,
-    DRAWING_PLACE_AMBIGUOUS,
-    DRAWING_PLACE_ELSEWHERE,
-    DRAWING_PLACE_MOVED,
-    DRAWING_PLACE_NOWHERE,
-    DRAWING_PLACE_OTHERWISE,
-    NOT_CUT,
-    NOT_CUT_PART,
-    OFF_DRAWING,
-    TOOL_FOUND_OTHER,
-    TOOL_FOUND_SEVERAL,
-    Finding,
-    Severity,
-)
+from camtool.findings import Finding, Severity
 from camtool.geometry.boxes import near_points
 from camtool.geometry.distance import nearest
 from camtool.geometry.drawing import Drawing
@@ -64,6 +49,20 @@ from camtool.toolpath.moves import Kind, Toolpath, are_arcs
 from camtool.toolpath.wanted import UNKNOWN_EDGE, Drawn
 from camtool.verification.coverage import at_point, block_name, holes_of, listed
 from camtool.verification.cuts import CutMoves, cut_moves, loops, moves_across, sample_cuts
+from camtool.verification.findings import (
+    CUT_INTO_PART,
+    CUTS_BESIDE,
+    DRAWING_PLACE_AMBIGUOUS,
+    DRAWING_PLACE_ELSEWHERE,
+    DRAWING_PLACE_MOVED,
+    DRAWING_PLACE_NOWHERE,
+    DRAWING_PLACE_OTHERWISE,
+    NOT_CUT,
+    NOT_CUT_PART,
+    OFF_DRAWING,
+    TOOL_FOUND_OTHER,
+    TOOL_FOUND_SEVERAL,
+)
 from camtool.verification.nearest import MoveIndex
 from camtool.verification.report import FoundReport, FoundTool
 

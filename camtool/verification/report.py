@@ -23,17 +23,17 @@ import msgspec
 from msgspec import Struct
 from msgspec.structs import asdict
 
-from camtool.findings import (
+from camtool.findings import Finding
+from camtool.plain import one_line, to_json
+from camtool.toolpath.findings import ProgramCode
+from camtool.units import UM_PER_MM
+from camtool.verification.findings import (
     ABOVE_GATE,
     ABOVE_GATE_GOUGED,
     ABOVE_GATE_REVERSALS,
     ABOVE_GATE_TIME,
     ABOVE_GATE_UNKNOWN,
-    Code,
-    Finding,
 )
-from camtool.plain import one_line, to_json
-from camtool.units import UM_PER_MM
 
 DECIMALS = 6
 """Decimal places of all numbers of the report (mm, µm, s, per cent)."""
@@ -776,7 +776,7 @@ def besides(report: Report) -> str:
     """Remarks on the largest error: its reference where it is not the drawing, and gouges, which
     it does not count."""
     words = "" if report.against == "drawing" else "; to the program's moves: no drawing is known"
-    gouges = [each for each in report.findings if each.code == Code.GOUGE.name]
+    gouges = [each for each in report.findings if each.code == ProgramCode.GOUGE.name]
     if gouges:
         deep = gouged_mm(gouges)
         size = f" of {deep:.4g} mm or more" if deep else ""
@@ -791,7 +791,7 @@ def gouged_mm(findings: Iterable[Finding | FindingReport]) -> float:
         (
             each.limit - each.measured
             for each in findings
-            if each.code in (Code.GOUGE, Code.GOUGE.name)
+            if each.code in (ProgramCode.GOUGE, ProgramCode.GOUGE.name)
             and each.measured is not None
             and each.limit is not None
         ),

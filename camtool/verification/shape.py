@@ -25,15 +25,17 @@ import numpy as np
 from msgspec import Struct
 
 from camtool.arrays import Floats, Ints
-from camtool.findings import OVERCUT, Code, Finding, TargetCode
+from camtool.findings import Code, Finding, TargetCode
 from camtool.geometry.measure import point_at
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
 from camtool.planning.job import Tool
+from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Toolpath
 from camtool.toolpath.rapids import STOCK_TOP_MM
 from camtool.toolpath.wanted import Kept
 from camtool.verification.case import VerifyOptions
 from camtool.verification.cuts import CutMoves, moved_lengths
+from camtool.verification.findings import OVERCUT
 from camtool.verification.slides import Trace
 
 SHAPE_TOLERANCE_MM = 5e-4
@@ -177,7 +179,7 @@ def overcut_findings(
 ) -> Iterator[Finding]:
     """OVERCUT for a plan that cuts into what must stay, unless GOUGE is among the codes of its
     findings already."""
-    if wanted is None or wanted.beyond_mm <= OVERCUT_MM or Code.GOUGE in planned:
+    if wanted is None or wanted.beyond_mm <= OVERCUT_MM or ProgramCode.GOUGE in planned:
         return
     x, y = wanted.at_mm
     yield OVERCUT(where=f"near ({x:.3f}, {y:.3f}) mm", measured=wanted.beyond_mm, limit=OVERCUT_MM)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from camtool.findings import WARNING, Code, Sentence
+from camtool.findings import WARNING, Sentence
+from camtool.toolpath.findings import ProgramCode
 
 FEED_ABOVE_LIMIT = Sentence(
-    Code.FEED_ABOVE_LIMIT,
+    ProgramCode.FEED_ABOVE_LIMIT,
     "{count:# block has|# blocks have} a feed above what the machine's shortest half period "
     "gives, up to {measured:g} mm/min where {limit:.4g} is the limit: the controller "
     "runs them at the limit, and so does the simulation",
@@ -13,23 +14,23 @@ FEED_ABOVE_LIMIT = Sentence(
     WARNING,
 )
 VALUE_ROUNDED = Sentence(
-    Code.VALUE_ROUNDED,
+    ProgramCode.VALUE_ROUNDED,
     "{speeds:# spindle speed|# spindle speeds} and {tools:# tool number|# tool numbers} cannot "
     "be written: the spindle turns with the feed, and M00 waits for the tool",
 )
 EVENT_LEFT_OUT_DWELL = Sentence(
-    Code.EVENT_LEFT_OUT,
+    ProgramCode.EVENT_LEFT_OUT,
     "{count:# event was|# events were} left out ({kinds}): this controller has no dwell",
     severity=WARNING,
 )
 EVENT_LEFT_OUT_STOP = Sentence(
-    Code.EVENT_LEFT_OUT,
+    ProgramCode.EVENT_LEFT_OUT,
     "{count:# event was|# events were} left out ({kinds}): M05 is written, but this machine's "
     "spindle turns with every move",
     severity=WARNING,
 )
 EXECUTED_OTHERWISE = Sentence(
-    Code.EXECUTED_OTHERWISE,
+    ProgramCode.EXECUTED_OTHERWISE,
     "{count:# straight move|# straight moves} of both axes {count:makes its|make their} shorter "
     "one too long, by up to {steps:# step|# steps} ({measured:.1f} µm), because each axis has a "
     "timer of its own{stays:|; it stays in all that follows|}. To lower it, use longer half "
@@ -38,7 +39,7 @@ EXECUTED_OTHERWISE = Sentence(
     "um",
 )
 FEED_HELD = Sentence(
-    Code.FEED_HELD,
+    ProgramCode.FEED_HELD,
     "{count:# cut is slower than its F|# cuts are slower than their F}: F{limit:g} becomes "
     "{measured:.3g} mm/min of both axes, because of the shortest half "
     "period (controller.half_period_ms, controller.single_axis_half_period_ms); a shorter one "
@@ -46,7 +47,7 @@ FEED_HELD = Sentence(
     "mm_min",
 )
 FEED_HELD_ALONE = Sentence(
-    Code.FEED_HELD,
+    ProgramCode.FEED_HELD,
     "{count:# cut is slower than its F|# cuts are slower than their F}: F{limit:g} becomes "
     "{measured:.3g} mm/min along one axis, because of the shortest half period "
     "(controller.half_period_ms, controller.single_axis_half_period_ms); a shorter one makes "

@@ -2,50 +2,51 @@
 
 from __future__ import annotations
 
-from camtool.findings import INFO, WARNING, Code, Sentence, TargetCode
+from camtool.findings import INFO, WARNING, Sentence, TargetCode
+from camtool.toolpath.findings import ProgramCode
 
 FEED_ROUNDED = Sentence(
-    Code.FEED_ROUNDED,
+    ProgramCode.FEED_ROUNDED,
     "{count:# feed was|# feeds were} rounded down to a whole {whole:g} mm/min",
     "mm_min",
     INFO,
 )
 ARC_MENDED = Sentence(
-    Code.ARC_MENDED,
+    ProgramCode.ARC_MENDED,
     "{measured:# arc|# arcs} would have been refused by the controller after rounding: "
     "{recentred} re-centred, {split} split in two, {lines} written as lines",
     "arcs",
 )
 ARC_MENDED_PLAIN = Sentence(
-    Code.ARC_MENDED,
+    ProgramCode.ARC_MENDED,
     "{recentred:# arc|# arcs} got another centre, so that start and end lie on the arc with the "
     "numbers of the program; {lines} too small or too large {lines:was|were} written as {lines:a "
     "line|lines}",
     "moves",
 )
 MOVE_COLLAPSED = Sentence(
-    Code.MOVE_COLLAPSED,
+    ProgramCode.MOVE_COLLAPSED,
     "{dropped:# move|# moves} of less than the last decimal {dropped:was|were} left out, {flat:# "
     "arc|# arcs} flatter than half of it became {flat:a line|lines}",
     "moves",
     INFO,
 )
 MOVE_COLLAPSED_PLAIN = Sentence(
-    Code.MOVE_COLLAPSED,
+    ProgramCode.MOVE_COLLAPSED,
     "{dropped:# move|# moves} of less than the last decimal {dropped:was|were} left out, {flat:# "
     "arc|# arcs} flatter than half of it became {flat:a line|lines}",
     "moves",
     INFO,
 )
 MOVE_SPLIT = Sentence(
-    Code.MOVE_SPLIT,
+    ProgramCode.MOVE_SPLIT,
     "{count:# feed move|# feed moves} in XY and Z became steps of at most {measured:g} mm, flat "
     "and then down, or up and then flat: nowhere deeper than the slope",
     "mm",
     WARNING,
 )
 FEED_ABOVE_LIMIT_IN_WORDS = Sentence(
-    Code.FEED_ABOVE_LIMIT,
+    ProgramCode.FEED_ABOVE_LIMIT,
     "{count:# F word is|# F words are} above the machine's highest feed, up to {measured:g} "
     "mm/min where {limit:g} is the limit: the controller runs each move as fast as its axes "
     "can, and so does the simulation",
@@ -53,31 +54,31 @@ FEED_ABOVE_LIMIT_IN_WORDS = Sentence(
     WARNING,
 )
 VALUE_ROUNDED = Sentence(
-    Code.VALUE_ROUNDED,
+    ProgramCode.VALUE_ROUNDED,
     "{count:# dwell or spindle speed was|# dwells or spindle speeds were} rounded to three "
     "decimals",
 )
 WORDS_PASSED_OVER_COOLANT = Sentence(
-    Code.WORDS_PASSED_OVER,
+    ProgramCode.WORDS_PASSED_OVER,
     "{count:# block switches|# blocks switch} coolant, which moves nothing and is skipped",
 )
 WORDS_PASSED_OVER_PAUSE = Sentence(
-    Code.WORDS_PASSED_OVER,
+    ProgramCode.WORDS_PASSED_OVER,
     "{count:# block waits|# blocks wait} for the operator (M0, M1), which moves nothing and is "
     "skipped",
 )
 SPINDLE_SPEED_NOT_SAID = Sentence(
-    Code.SPINDLE_SPEED_NOT_SAID,
+    ProgramCode.SPINDLE_SPEED_NOT_SAID,
     "the spindle is started before any S word: a controller that sets the speed turns it at 0; "
     "write S",
 )
 EVENT_LEFT_OUT_TOOL = Sentence(
-    Code.EVENT_LEFT_OUT,
+    ProgramCode.EVENT_LEFT_OUT,
     "the program names no tool, because the machine changes none: mount it before the program",
     severity=INFO,
 )
 NEVER_READ = Sentence(
-    Code.NEVER_READ,
+    ProgramCode.NEVER_READ,
     "{measured:# line stands|# lines stand} behind the end of the program, which the controller "
     "never reads",
     "lines",

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from camtool.findings import ERROR, INFO, WARNING, Code, Sentence, TargetCode
+from camtool.findings import ERROR, INFO, WARNING, Sentence, TargetCode
+from camtool.toolpath.findings import ProgramCode
 
 from ..gcode.findings import simulated_as_chords
 
@@ -54,12 +55,12 @@ PLACE_UNKNOWN_HOME = Sentence(
 )
 
 EVENT_LEFT_OUT = Sentence(
-    Code.EVENT_LEFT_OUT,
+    ProgramCode.EVENT_LEFT_OUT,
     "the program names no tool, because grbl has no tool change: mount it before the program",
     severity=INFO,
 )
 TOOL_BY_HAND = Sentence(
-    Code.TOOL_BY_HAND,
+    ProgramCode.TOOL_BY_HAND,
     "the program stops {measured:# time|# times} for another tool ({tools}): mount it so that its "
     "tip is where that of the last one was, or set Z zero again; grbl does not jog while it "
     "stops, so either your sender holds M0 back, or write a program for each tool with --split "
@@ -68,7 +69,7 @@ TOOL_BY_HAND = Sentence(
     WARNING,
 )
 FEED_TOO_SLOW = Sentence(
-    Code.FEED_TOO_SLOW,
+    ProgramCode.FEED_TOO_SLOW,
     "{count:# cut is|# cuts are} slower than the controller can step (it makes no less than "
     "{least_hz:g} steps a second): F{measured:g} runs at {limit:.3g} mm/min, and is simulated so",
     "mm_min",

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from camtool.findings import ERROR, INFO, WARNING, Code, Sentence, TargetCode
+from camtool.findings import ERROR, INFO, WARNING, Sentence, TargetCode
+from camtool.toolpath.findings import ProgramCode
 
 from ..gcode.findings import simulated_as_chords
 
@@ -50,7 +51,7 @@ NO_END_OF_FILE = Sentence(
     severity=ERROR,
 )
 WORDS_PASSED_OVER_OUTPUT = Sentence(
-    Code.WORDS_PASSED_OVER,
+    ProgramCode.WORDS_PASSED_OVER,
     "{count:# block switches|# blocks switch} an output of the machine (M62 to M68), which moves "
     "nothing and is skipped",
 )

@@ -10,6 +10,7 @@ import pytest
 
 from camtool.cli.messages import REPORT_NAMES, report_marks, show_compared, show_facts
 from camtool.findings import Code, Finding, Severity
+from camtool.verification.findings import VerificationCode
 from tests.waiting import all_written
 
 RED = b"\x1b[31m"
@@ -70,8 +71,8 @@ error      14.95 µm at most, rms 6.33, p95 11.44
 reversals  X 1, Y 2, Z 3 (while cutting X 1, Y 2)"""
 
 
-def above(flag: str, code: Code = Code.ABOVE_GATE) -> Finding:
-    severity = Severity.ERROR if code is Code.ABOVE_GATE else Severity.WARNING
+def above(flag: str, code: Code = VerificationCode.ABOVE_GATE) -> Finding:
+    severity = Severity.ERROR if code is VerificationCode.ABOVE_GATE else Severity.WARNING
     return Finding(code, severity, "too much", flag)
 
 
@@ -84,7 +85,7 @@ def coloured(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 
 
 def test_what_exceeds_a_limit_is_red(coloured: None, capsys: pytest.CaptureFixture[str]) -> None:
-    many = above("", Code.MANY_REVERSALS)
+    many = above("", VerificationCode.MANY_REVERSALS)
     marks = report_marks([above("--max-error"), many, above("--max-reversals"), many])
     assert marks == {"error": "error", "reversals": "error"}
     show_facts(PLAIN, REPORT_NAMES, {**marks, "time": "warning"})

@@ -9,7 +9,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import Finding, Severity
+from camtool.importers.findings import DrawingCode
 from camtool.verification.report import (
     HTML_ROWS,
     PAGE_BYTES,
@@ -57,7 +58,9 @@ def drawing(tmp_path: Path) -> Path:
 
 def sly_page(count: int = 3) -> Page:
     """A page full of names that want to be more than words."""
-    findings = [Finding(Code.UNITLESS, Severity.ERROR, f"{SLY}{n}", SLY) for n in range(count)]
+    findings = [
+        Finding(DrawingCode.UNITLESS, Severity.ERROR, f"{SLY}{n}", SLY) for n in range(count)
+    ]
     setup = Setup("m: " + SLY, "0" * 64, None, (Changed(SLY, SLY, SLY),), ((SLY, SLY),))
     return Page(SLY, None, reported(findings), setup, ((SLY, "a b).svg"),))
 

@@ -8,6 +8,7 @@ import ast
 import importlib
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from string import Formatter
 
@@ -21,21 +22,48 @@ SHORTEST_MEANING = 10
 GIVEN = {"where", "measured", "limit", "severity"}
 
 
-def catalogues() -> dict[str, dict[str, Sentence]]:
-    """The sentences by name, of camtool ("") and of each machine that has some."""
-    own = sorted(ROOT.glob("postprocessors/*/findings.py"))
-    modules = {"": "camtool.findings"}
-    modules |= {p.parent.name: f"camtool_postprocessors.{p.parent.name}.findings" for p in own}
-    return {
-        machine: {
-            name: value
-            for name, value in vars(importlib.import_module(module)).items()
-            if isinstance(value, Sentence)
-        }
-        for machine, module in modules.items()
+ROOMS = ("geometry", "importers", "planning", "toolpath", "verification", "inspection")
+"""The rooms that have codes and sentences, in the order of the page."""
+HUNDREDS = (1, 2, 3, 4, 5)
+"""Drawing, planning, program, motion and result, inspection."""
+
+
+def modules() -> dict[str, list[str]]:
+    """The modules of codes and sentences by machine; those of camtool's rooms by ""."""
+    rooms = sorted(path.parent.name for path in ROOT.glob("camtool/*/findings.py"))
+    assert rooms == sorted(ROOMS)
+    machines = sorted(path.parent.name for path in ROOT.glob("postprocessors/*/findings.py"))
+    return {"": [f"camtool.{room}.findings" for room in ROOMS]} | {
+        machine: [f"camtool_postprocessors.{machine}.findings"] for machine in machines
     }
 
 
+def catalogues() -> dict[str, dict[str, Sentence]]:
+    """The sentences by name, of camtool ("") and of each machine that has some."""
+    return {
+        machine: {
+            name: value
+            for module in names
+            for name, value in vars(importlib.import_module(module)).items()
+            if isinstance(value, Sentence)
+        }
+        for machine, names in modules().items()
+    }
+
+
+def codes() -> list[Code]:
+    """Every numbered code of every room, by number."""
+    enums = [
+        value
+        for names in modules().values()
+        for module in names
+        for value in vars(importlib.import_module(module)).values()
+        if isinstance(value, type) and issubclass(value, Code) and value is not Code
+    ]
+    return sorted(code for enum in dict.fromkeys(enums) for code in enum)
+
+
+@cache
 def sources() -> dict[str, ast.Module]:
     """All of the code but the catalogues."""
     files = [*ROOT.glob("camtool/**/*.py"), *ROOT.glob("postprocessors/**/*.py")]
@@ -51,7 +79,7 @@ def tables() -> str:
     made = (
         "\n## Codes\n\n| number | code | severity | means | what to do |\n|---|---|---|---|---|\n"
     )
-    for code in Code:
+    for code in codes():
         grave = _listed([severity.name.lower() for severity in code.severities])
         made += f"| {int(code)} | `{code.name}` | {grave} | {code.means} | {code.mend} |\n"
     for machine, sentences in catalogues().items():
@@ -97,20 +125,32 @@ def test_the_page_has_every_code_and_every_sentence(bless: bool) -> None:
 
 def test_tables_can_be_wrong() -> None:
     rows = re.findall(r"^\| \d+ \| `\w+` \| (?:info|warning|error)", tables(), re.MULTILINE)
-    assert len(rows) == len(Code) > 70
+    assert len(rows) == len(codes()) > 70
     assert len(catalogues()[""]) > 100
 
 
-@pytest.mark.parametrize("code", Code, ids=lambda code: code.name)
+@pytest.mark.parametrize("code", codes(), ids=lambda code: code.name)
 def test_every_code_is_explained(code: Code) -> None:
     assert len(code.means) > SHORTEST_MEANING
     assert code.mend
     assert code.severities
 
 
+def test_numbers_and_names_are_taken_once() -> None:
+    numbers = [int(code) for code in codes()]
+    assert numbers == sorted(set(numbers))
+    assert {number // 100 for number in numbers} == set(HUNDREDS)
+    assert len({code.name for code in codes()}) == len(numbers)
+    rooms = [vars(importlib.import_module(module)) for module in modules()[""]]
+    named = [name for room in rooms for name, value in room.items() if isinstance(value, Sentence)]
+    assert len(named) == len(set(named)) == len(catalogues()[""])
+    for enum in {type(code) for code in codes()}:
+        assert len(enum) == len(enum.__members__), "an alias is a second name for one number"
+
+
 def test_every_code_and_every_sentence_is_said_somewhere() -> None:
     every = [each for catalogue in catalogues().values() for each in catalogue.values()]
-    assert [code.name for code in Code if code not in {each.code for each in every}] == []
+    assert [code.name for code in codes() if code not in {each.code for each in every}] == []
     named = {node.id for tree in sources().values() for node in ast.walk(tree) if _is_name(node)}
     unsaid = [name for each in catalogues().values() for name in each if name not in named]
     assert unsaid == []

@@ -117,6 +117,14 @@ def test_a_command_loads_no_other_command(arguments: tuple[str, ...], wanted: se
     assert loaded & set(COMMANDS) == wanted
 
 
+def test_a_command_that_does_not_plan_loads_no_findings_of_planning(output: str) -> None:
+    verified = ("verify", "samples/circle-30-steps.pic", "-t", "pic-mmh", "-q")
+    for arguments in (("check", "samples/logo.dxf", "-q"), verified):
+        assert "camtool.planning.findings" not in modules_of(*arguments)
+    posted = modules_of("post", "samples/logo.dxf", *PIC, "-o", output, "--no-verify")
+    assert "camtool.planning.findings" in posted
+
+
 def test_a_short_run_does_not_look_for_garbage() -> None:
     code = (
         "import sys, gc; sys.argv = ['camtool', 'targets', '--json']; "

@@ -13,6 +13,7 @@ from camtool.geometry.drawing import Drawing, Skipped, Units
 from camtool.geometry.measure import signed_areas
 from camtool.importers import healing
 from camtool.importers.assemble import LARGEST_MM, MAX_GAP_FINDINGS, SMALLEST_MM, assemble
+from camtool.importers.findings import DrawingCode
 from camtool.importers.healing import cleaned
 from camtool.importers.options import ReadOptions
 from camtool.importers.pieces import Piece
@@ -68,7 +69,7 @@ def test_layers_are_never_joined() -> None:
 def test_closed_gaps_are_told_with_place_and_size() -> None:
     drawing = put(piece((0, 0), (10, 0)), piece((10, 0.004), (10, 10)))
     (finding,) = drawing.findings
-    assert (finding.code, finding.severity) == (Code.GAP_CLOSED, Severity.INFO)
+    assert (finding.code, finding.severity) == (DrawingCode.GAP_CLOSED, Severity.INFO)
     assert finding.measured == pytest.approx(0.004)
     assert finding.where == "layer 0, x 10.0000 y 0.0020 mm"
     assert len(drawing.paths) == 1
@@ -77,7 +78,7 @@ def test_closed_gaps_are_told_with_place_and_size() -> None:
 def test_open_gaps_are_told_and_stay_open() -> None:
     drawing = put(piece((0, 0), (10, 0)), piece((10, 0.05), (10, 10)))
     assert len(drawing.paths) == 2
-    assert found(drawing, Code.GAP_OPEN) == ["two open ends are 50 µm apart and stay open"]
+    assert found(drawing, DrawingCode.GAP_OPEN) == ["two open ends are 50 µm apart and stay open"]
     (gap,) = drawing.gaps
     assert gap.size_mm == pytest.approx(0.05)
     assert [f.severity for f in drawing.findings] == [Severity.WARNING]
@@ -87,7 +88,7 @@ def test_gaps_stay_when_chaining_is_off_but_equal_ends_join() -> None:
     pieces = (piece((0, 0), (10, 0)), piece((10, 0.004), (10, 10)), piece((10, 10), (0, 10)))
     drawing = put(*pieces, chain_gaps=False)
     assert [len(path.vertices) for path in drawing.paths] == [2, 3]
-    assert not found(drawing, Code.GAP_CLOSED)
+    assert not found(drawing, DrawingCode.GAP_CLOSED)
 
 
 def test_many_gaps_end_in_one_count() -> None:
@@ -97,7 +98,7 @@ def test_many_gaps_end_in_one_count() -> None:
         pieces.append(piece((0, row), (10, row)))
         pieces.append(piece((10.001 + 1e-5 * row, row), (20, row)))
     drawing = put(*pieces)
-    messages = found(drawing, Code.GAP_CLOSED)
+    messages = found(drawing, DrawingCode.GAP_CLOSED)
     assert len(messages) == MAX_GAP_FINDINGS + 1
     assert messages[0] == "a gap of 1.26 µm was closed"
     assert messages[-1] == "7 more gaps were closed, of 1 to 1.06 µm"
@@ -111,7 +112,7 @@ def test_pieces_without_length_are_counted() -> None:
         piece((5, 5, 0.5), (5, 5 + 1e-7, 0.5), closed=True),
     )
     assert drawing.skipped == (Skipped("LINE", 3, "has no length"),)
-    assert found(drawing, Code.ENTITY_SKIPPED) == ["3 LINE left out: has no length"]
+    assert found(drawing, DrawingCode.ENTITY_SKIPPED) == ["3 LINE left out: has no length"]
 
 
 @pytest.mark.parametrize("turn", [0, 1, 2])
@@ -153,7 +154,7 @@ def test_there_and_back_is_one_line() -> None:
 )  # fmt: skip
 def test_implausible_sizes(size: float, told: bool) -> None:
     drawing = put(piece((0, 0), (size, 0)), gap_mm=0.0)
-    messages = found(drawing, Code.IMPLAUSIBLE_SIZE)
+    messages = found(drawing, DrawingCode.IMPLAUSIBLE_SIZE)
     assert bool(messages) == told
     assert all("--units" in message for message in messages)
 
@@ -164,7 +165,7 @@ def test_skipped_entities_are_told_once_a_kind() -> None:
         skipped=(Skipped("TEXT", 2, "no outline"), Skipped("TEXT", 3, "no outline")),
     )
     assert drawing.skipped == (Skipped("TEXT", 5, "no outline"),)
-    assert found(drawing, Code.ENTITY_SKIPPED) == ["5 TEXT left out: no outline"]
+    assert found(drawing, DrawingCode.ENTITY_SKIPPED) == ["5 TEXT left out: no outline"]
 
 
 def test_nothing_to_draw_says_what_there_was() -> None:

@@ -23,6 +23,7 @@ from camtool.geometry.measure import signed_area
 from camtool.geometry.polylines import Segments
 from camtool.importers.dxf.reader import read
 from camtool.importers.dxf.walk import MAX_INSERTED, BlockSizes
+from camtool.importers.findings import DrawingCode
 from camtool.importers.options import ReadOptions
 from camtool.importers.read import read_drawing
 from tests.oracles import arcs
@@ -227,7 +228,7 @@ def test_an_ellipse_whose_end_is_rounded_to_six_digits_is_closed():
         "42 6.283185",
     )
     assert found.paths.closed.tolist() == [True]
-    assert Code.GAP_CLOSED not in codes(found)
+    assert DrawingCode.GAP_CLOSED not in codes(found)
 
 
 def test_a_spline_is_fitted_within_the_tolerance():
@@ -462,7 +463,7 @@ def test_hidden_layers_are_counted_with_their_state():
         ("INSERT", "layer ICE is frozen"): 1,
         ("LINE", "is invisible"): 1,
     }
-    assert codes(found).count(Code.ENTITY_SKIPPED) == 4
+    assert codes(found).count(DrawingCode.ENTITY_SKIPPED) == 4
 
 
 def test_what_is_no_line_is_counted_by_kind():
@@ -503,7 +504,7 @@ def test_attributes_of_inserts_are_counted():
 def test_a_circle_without_a_radius_is_counted(radius):
     found = words(f"CIRCLE 8 0 10 0 20 0 40 {radius}", "LINE 8 0 10 0 20 0 11 1 21 0")
     assert found.used == {"LINE": 1}
-    assert found.skipped or Code.FILE_REPAIRED in codes(found)
+    assert found.skipped or DrawingCode.FILE_REPAIRED in codes(found)
 
 
 def test_endless_arrays_and_nests_are_refused_quickly():
@@ -577,7 +578,7 @@ def test_units_of_the_file(code, name, mm):
     assert (found.units.name, found.units.mm_per_unit) == (name, mm)
     assert found.units.why == f"$INSUNITS {code}"
     assert Segments.of(found.paths).radius == pytest.approx(mm)
-    assert Code.UNITLESS not in codes(found)
+    assert DrawingCode.UNITLESS not in codes(found)
 
 
 @pytest.mark.parametrize(
@@ -592,7 +593,7 @@ def test_units_of_the_file(code, name, mm):
 def test_a_file_without_a_unit_is_taken_as_mm_with_a_warning(header, said):
     found = read(text("CIRCLE 8 0 10 2 20 0 40 1", header=header), "a.dxf", OPTIONS)
     assert found.units.mm_per_unit == 1.0
-    [finding] = [one for one in found.findings if one.code is Code.UNITLESS]
+    [finding] = [one for one in found.findings if one.code is DrawingCode.UNITLESS]
     assert finding.severity is Severity.WARNING
     assert said in finding.message
     assert "--units" in finding.message
@@ -609,10 +610,10 @@ def test_without_a_unit_the_system_of_measurement_is_the_hint(
     header = f"9 $ACADVER 1 AC1009 {code}9 $MEASUREMENT 70 {measurement}"
     found = read(text("CIRCLE 8 0 10 2 20 0 40 1", header=header), "a.dxf", OPTIONS)
     assert (found.units.name, found.units.mm_per_unit) == (name, mm)
-    [finding] = [one for one in found.findings if one.code is Code.UNIT_GUESSED]
+    [finding] = [one for one in found.findings if one.code is DrawingCode.UNIT_GUESSED]
     assert finding.severity is severity
     assert "--units" in finding.message
-    assert Code.UNITLESS not in codes(found)
+    assert DrawingCode.UNITLESS not in codes(found)
 
 
 def test_the_callers_unit_wins():
@@ -620,7 +621,7 @@ def test_the_callers_unit_wins():
     found = read(text("LINE 8 0 10 0 20 0 11 1 21 0", header=MM), "a.dxf", options)
     assert points(found)[1, 0] == 25.4
     assert found.units.why == "as asked; the file says $INSUNITS 4"
-    assert Code.UNITLESS not in codes(found)
+    assert DrawingCode.UNITLESS not in codes(found)
 
 
 def test_scaling_by_units_scales_the_tolerance_of_nothing():
@@ -646,7 +647,7 @@ def test_all_versions_ascii_and_binary(version, fmt, tmp_path):
     assert found.layers == ("Größe",)
     assert found.units.name == "mm"
     assert found.file == str(tmp_path / "a.dxf")
-    assert Code.FILE_REPAIRED not in codes(found)
+    assert DrawingCode.FILE_REPAIRED not in codes(found)
 
 
 @pytest.mark.parametrize(
@@ -714,7 +715,7 @@ def test_repairs_are_told_the_first_few_in_full():
     whole = text("LINE 8 0 10 0 20 0 11 1 21 0", header=MM)
     trash = b"".join(b"0\nTRASH%d\n" % k for k in range(5))
     found = read(whole.replace(b"0\nEOF", trash + b"0\nEOF"), "test.dxf", OPTIONS)
-    [finding] = [one for one in found.findings if one.code is Code.FILE_REPAIRED]
+    [finding] = [one for one in found.findings if one.code is DrawingCode.FILE_REPAIRED]
     assert len(found.paths) == 1
     assert finding.severity is Severity.WARNING
     assert finding.measured >= 5.0
@@ -725,7 +726,7 @@ def test_repairs_are_told_the_first_few_in_full():
 def test_a_missing_section_end_is_repaired_and_told():
     data = text("LINE 8 0 10 0 20 0 11 1 21 0", header=MM).replace(b"0\nENDSEC\n0\nEOF", b"0\nEOF")
     found = read(data, "part.dxf", OPTIONS)
-    [finding] = [one for one in found.findings if one.code is Code.FILE_REPAIRED]
+    [finding] = [one for one in found.findings if one.code is DrawingCode.FILE_REPAIRED]
     assert "section ENTITIES has no end (ENDSEC)" in finding.message
 
 
@@ -733,7 +734,7 @@ def test_a_file_that_ends_behind_its_entities_is_whole_enough():
     data = text("LINE 8 0 10 0 20 0 11 1 21 0", header=MM)
     for end in (b"0\nEOF", b"0\nSECTION\n2\nOBJECTS\n0\nDICTIONARY\n5\n3"):
         found = read(data.replace(b"0\nEOF\n", end[:-1]), "part.dxf", OPTIONS)
-        [finding] = [one for one in found.findings if one.code is Code.FILE_REPAIRED]
+        [finding] = [one for one in found.findings if one.code is DrawingCode.FILE_REPAIRED]
         assert "end mark EOF is missing" in finding.message
         assert len(found.paths) == 1
     with pytest.raises(DrawingError, match="cut off"):
@@ -777,7 +778,7 @@ def test_a_file_that_is_cut_off_is_refused(end):
 def test_a_file_that_is_cut_off_behind_its_entities_has_all_of_them(end):
     found = read(SAMPLE[:end], "part.dxf", OPTIONS)
     assert found.used == read(SAMPLE, "part.dxf", OPTIONS).used
-    assert Code.FILE_REPAIRED in codes(found)
+    assert DrawingCode.FILE_REPAIRED in codes(found)
 
 
 LINES = SAMPLE.split(b"\n")

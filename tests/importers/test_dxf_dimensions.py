@@ -10,10 +10,10 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from camtool.errors import DrawingError
-from camtool.findings import Code
 from camtool.geometry.drawing import Callout, Drawing
 from camtool.importers.dxf.mtext import plain_text
 from camtool.importers.dxf.reader import read
+from camtool.importers.findings import DrawingCode
 from camtool.importers.options import ReadOptions, Selection
 from camtool.importers.pieces import Unusable
 from tests.importers.test_dxf import OPTIONS, R2000, document, drawn
@@ -27,7 +27,7 @@ def only(drawing: Drawing) -> Callout:
 
 
 def unread(drawing: Drawing) -> list[str]:
-    return [f.message for f in drawing.findings if f.code == Code.CALLOUT_NOT_READ]
+    return [f.message for f in drawing.findings if f.code == DrawingCode.CALLOUT_NOT_READ]
 
 
 def plate(units: int = 4, version: str = "R2000"):
@@ -473,6 +473,6 @@ def test_damaged_dimensions_are_read_named_or_one_line(code, value):
     except DrawingError as error:
         assert "\n" not in str(error)  # noqa: PT017
         return
-    named = sum(f.measured for f in found.findings if f.code == Code.CALLOUT_NOT_READ)
+    named = sum(f.measured for f in found.findings if f.code == DrawingCode.CALLOUT_NOT_READ)
     hidden = sum(each.count for each in found.skipped if each.kind == "DIMENSION")
     assert len(found.callouts) + named == 2 == hidden

@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camtool.errors import DrawingError
-from camtool.findings import Code
 from camtool.geometry.drawing import Drawing
 from camtool.importers.dxf import load as dxf_load
 from camtool.importers.dxf import walk as dxf_walk
 from camtool.importers.dxf.reader import read
+from camtool.importers.findings import DrawingCode
 from camtool.importers.options import ReadOptions
 
 OPTIONS = ReadOptions(tolerance_mm=0.01, text="stroke", dimensions=True)
@@ -135,7 +135,7 @@ def used(content: bytes) -> dict[str, int]:
 
 
 def repairs(found: Drawing) -> str:
-    return " ".join(f.message for f in found.findings if f.code is Code.FILE_REPAIRED)
+    return " ".join(f.message for f in found.findings if f.code is DrawingCode.FILE_REPAIRED)
 
 
 def lines_of(text: str) -> bytes:

@@ -14,9 +14,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camtool.errors import DrawingError
-from camtool.findings import Code, Severity
+from camtool.findings import Severity
 from camtool.geometry.drawing import Drawing
 from camtool.importers.dxf.reader import read
+from camtool.importers.findings import DrawingCode
 from camtool.importers.options import ReadOptions
 from tests.oracles import arcs
 
@@ -297,7 +298,7 @@ def test_the_width_of_a_polyline_is_told_and_its_middle_is_the_path(widths):
     doc.modelspace().add_lwpolyline([(0, 9), (5, 9)])
     found = drawn(doc)
     assert len(found.paths) == 3
-    told = [one for one in found.findings if one.code is Code.NOT_APPLIED]
+    told = [one for one in found.findings if one.code is DrawingCode.NOT_APPLIED]
     assert [one.severity for one in told] == [Severity.WARNING] * 2
     assert ["1 LWPOLYLINE" in told[0].message, "1 POLYLINE" in told[1].message] == [True, True]
 

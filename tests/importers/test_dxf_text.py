@@ -13,9 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.arrays import Floats
-from camtool.findings import Code
 from camtool.importers import text as text_fonts
 from camtool.importers.dxf.text import TextShape, text_strokes
+from camtool.importers.findings import DrawingCode
 from camtool.importers.options import ReadOptions
 from camtool.importers.pieces import Unusable
 from camtool.importers.read import read_drawing
@@ -421,7 +421,7 @@ def test_the_importer_reads_text_when_asked(mode: str, tmp_path: Path) -> None:
     drawing = read_drawing(file, options=ReadOptions(text=mode))
     assert len(drawing.paths) == (2 if mode == "outline" else 4)
     assert (drawing.paths.closed == (mode == "outline")).all()
-    notes = [f.message for f in drawing.findings if f.code is Code.FONT_SUBSTITUTED]
+    notes = [f.message for f in drawing.findings if f.code is DrawingCode.FONT_SUBSTITUTED]
     assert [note.endswith("has no U+E123: left blank") for note in notes] == [True]
 
 

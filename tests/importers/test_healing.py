@@ -18,10 +18,12 @@ from camtool.errors import DrawingError
 from camtool.findings import Code, Severity
 from camtool.geometry.drawing import Drawing, Mark, Skipped, Units
 from camtool.geometry.facts import drawing_facts
+from camtool.geometry.findings import ContourCode
 from camtool.geometry.measure import path_lengths, signed_areas
 from camtool.geometry.polylines import Polyline
 from camtool.importers import healing
 from camtool.importers.assemble import MAX_PLACES, assemble
+from camtool.importers.findings import DrawingCode
 from camtool.importers.healing import cleaned
 from camtool.importers.options import ReadOptions, Selection
 from camtool.importers.pieces import Piece
@@ -65,10 +67,10 @@ def test_what_lies_twice_is_one_finding_with_its_length() -> None:
     healed = drawing.healing
     assert (healed.duplicates, healed.duplicates_mm) == (1, pytest.approx(40.0))
     assert (healed.overlaps, healed.overlaps_mm) == (2, pytest.approx(5.0))
-    (finding,) = [f for f in drawing.findings if f.code == Code.DRAWN_TWICE]
+    (finding,) = [f for f in drawing.findings if f.code == DrawingCode.DRAWN_TWICE]
     assert finding.severity == Severity.INFO
     assert finding.measured == pytest.approx(45.0)
-    assert not found(drawing, Code.ENTITY_SKIPPED)
+    assert not found(drawing, DrawingCode.ENTITY_SKIPPED)
 
 
 def test_a_contour_drawn_over_with_lines_stays_one_contour() -> None:
@@ -100,7 +102,7 @@ def test_ends_of_other_layers_join_when_asked() -> None:
 def test_branches_are_told_with_place_and_number_of_ends() -> None:
     tee = [piece((0, 0), (5, 0)), piece((5, 0), (9, 0)), piece((5, 0), (5, 7))]
     drawing = put(*tee)
-    (finding,) = [f for f in drawing.findings if f.code == Code.BRANCHED]
+    (finding,) = [f for f in drawing.findings if f.code == ContourCode.BRANCHED]
     assert (finding.severity, finding.measured) == (Severity.WARNING, 3.0)
     assert finding.where == "layer 0, x 5.0000 y 0.0000 mm"
     assert sorted(len(path) for path in drawing.paths) == [1, 2]
@@ -118,7 +120,7 @@ def test_at_a_branch_lines_of_one_kind_are_joined() -> None:
 
 def test_contours_that_cross_themselves_are_told() -> None:
     drawing = put(piece((0, 0), (5, 5), (5, 0), (0, 5), closed=True))
-    (finding,) = [f for f in drawing.findings if f.code == Code.SELF_CROSSING]
+    (finding,) = [f for f in drawing.findings if f.code == ContourCode.SELF_CROSSING]
     assert finding.severity == Severity.WARNING
     assert finding.where == "layer 0, x 2.5000 y 2.5000 mm"
     assert [c.at_mm for c in drawing.healing.crossings] == [pytest.approx((2.5, 2.5))]
@@ -129,7 +131,7 @@ def test_of_several_crossings_of_a_contour_the_first_is_named() -> None:
     drawing = put(zigzag)
     crossings = drawing.healing.crossings
     assert len({crossing.at_mm for crossing in crossings}) > 1
-    (finding,) = [f for f in drawing.findings if f.code == Code.SELF_CROSSING]
+    (finding,) = [f for f in drawing.findings if f.code == ContourCode.SELF_CROSSING]
     x, y = crossings[0].at_mm
     assert finding.where == f"layer 0, x {x:.4f} y {y:.4f} mm"
     assert finding.measured == len(crossings)
@@ -140,14 +142,14 @@ def test_many_places_end_in_one_count() -> None:
         piece((0, 6 * k), (5, 6 * k + 5), (5, 6 * k), (0, 6 * k + 5), closed=True)
         for k in range(MAX_PLACES + 3)
     ]
-    messages = found(put(*ties), Code.SELF_CROSSING)
+    messages = found(put(*ties), ContourCode.SELF_CROSSING)
     assert len(messages) == MAX_PLACES + 1
     assert messages[-1] == "3 more closed contours cross themselves"
     tees = [
         piece((0, 6 * k), end) for k in range(MAX_PLACES + 3) for end in
         ((-2, 6 * k), (2, 6 * k), (0.5, 6 * k + 2))
     ]  # fmt: skip
-    messages = found(put(*tees), Code.BRANCHED)
+    messages = found(put(*tees), ContourCode.BRANCHED)
     assert len(messages) == MAX_PLACES + 1
     assert messages[-1] == "more than two ends meet at 3 more places"
 
@@ -156,9 +158,9 @@ def test_specks_are_merged_within_the_tolerance() -> None:
     drawing = put(piece((0, 0), (5, 0), (5, 0.004), (5, 5)), tolerance_mm=0.01)
     assert [len(path) for path in drawing.paths] == [2]
     assert drawing.healing.tiny_merged == 1
-    assert found(drawing, Code.TINY_MERGED)
+    assert found(drawing, DrawingCode.TINY_MERGED)
     assert not found(put(piece((0, 0), (5, 0), (5, 0.006), (5, 5)), tolerance_mm=0.01),
-                     Code.TINY_MERGED)  # fmt: skip
+                     DrawingCode.TINY_MERGED)  # fmt: skip
 
 
 def test_arcs_are_recognised_when_asked_after_loose_chords_were_joined(
@@ -179,7 +181,7 @@ def test_arcs_are_recognised_when_asked_after_loose_chords_were_joined(
     assert seen == []
     drawing = put(*lines, recognise_arcs=True, tolerance_mm=0.002)
     assert (seen, drawing.healing.arcs_recognised) == ([4], 2)
-    assert found(drawing, Code.ARCS_RECOGNISED)
+    assert found(drawing, DrawingCode.ARCS_RECOGNISED)
 
 
 HOLES = (Mark((1.0, 2.0), "holes", "", "POINT 1"), Mark((5.0, 2.0), "pins", "", "POINT 2"))
@@ -207,7 +209,7 @@ def test_a_hole_is_drilled_once() -> None:
     drawing = put(marks=(*HOLES, Mark((1.0 + 1e-9, 2.0), "holes", "", "POINT 3")))
     assert drawing.marks == HOLES
     assert drawing.skipped == (Skipped("POINT", 1, "is drawn twice"),)
-    assert found(drawing, Code.ENTITY_SKIPPED) == ["1 POINT left out: is drawn twice"]
+    assert found(drawing, DrawingCode.ENTITY_SKIPPED) == ["1 POINT left out: is drawn twice"]
 
 
 @pytest.mark.parametrize("wrong", [math.nan, math.inf, 2e9])
@@ -403,4 +405,6 @@ def test_exploded_outlines_are_joined_as_they_were_drawn(gap: float, seed: int) 
     assert len(drawing.paths) == len(rings)
     for ring in rings:
         assert sum(is_ring(path, ring, 1e-6) for path in drawing.paths) == 1
-    assert not [f for f in drawing.findings if f.code in (Code.GAP_CLOSED, Code.BRANCHED)]
+    assert not [
+        f for f in drawing.findings if f.code in (DrawingCode.GAP_CLOSED, ContourCode.BRANCHED)
+    ]

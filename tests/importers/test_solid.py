@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from camtool.errors import DrawingError
-from camtool.findings import Code
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import extents, path_lengths
 from camtool.geometry.polylines import Segments
+from camtool.importers.findings import DrawingCode
 from camtool.importers.options import ReadOptions
 from camtool.importers.read import read_bytes, read_drawing
 from camtool.importers.solid import reader as solid
@@ -101,7 +101,7 @@ def test_a_box_gives_its_rectangle_from_every_format(tmp_path: Path) -> None:
             found = {tuple(row) for row in np.round(drawing.paths.vertices, 9).tolist()}
             assert found == {(x, y, 0.0) for x in (-10.0, 10.0) for y in (-5.0, 5.0)}
             note = drawing.findings[0]
-            assert note.code == Code.SECTION_CHOSEN
+            assert note.code == DrawingCode.SECTION_CHOSEN
             assert "z = -3 to 3 mm" in note.message
             assert note.measured == pytest.approx(3.0 if height is None else height)
 
@@ -376,7 +376,9 @@ def test_damaged_files_are_refused_or_read_without_a_word(tmp_path: Path, capfd:
         except DrawingError as error:
             said.append(str(error))
         else:
-            said.append("" if Code.FILE_REPAIRED in {f.code for f in drawing.findings} else "!")
+            said.append(
+                "" if DrawingCode.FILE_REPAIRED in {f.code for f in drawing.findings} else "!"
+            )
     assert "!" not in said
     assert capfd.readouterr() == ("", "")
 

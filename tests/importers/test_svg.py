@@ -8,11 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import DrawingError
-from camtool.findings import Code
 from camtool.geometry.distance import points_to_segments
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import extents, path_lengths, signed_areas
 from camtool.geometry.polylines import Segments
+from camtool.importers.findings import DrawingCode
 from camtool.importers.options import ReadOptions
 from camtool.importers.svg import shapes
 from camtool.importers.svg.reader import read
@@ -218,7 +218,7 @@ def test_shapes_with_wrong_numbers_are_left_out_and_named(body: str, message: st
     assert item.reason.startswith(f"cannot be read ({item.kind} at line 1: ")
     assert message in item.reason
     (finding,) = rest.findings
-    assert finding.code == Code.ENTITY_SKIPPED
+    assert finding.code == DrawingCode.ENTITY_SKIPPED
 
 
 @pytest.mark.parametrize(
@@ -311,7 +311,7 @@ def test_path_data_are_drawn_up_to_their_fault(rest: str, sign: int, message: st
     assert (item.kind, item.count) == ("rest of path", 1)
     assert f"path data at sign {sign}: " in item.reason
     assert message in item.reason
-    assert [finding.code for finding in drawing.findings] == [Code.ENTITY_SKIPPED]
+    assert [finding.code for finding in drawing.findings] == [DrawingCode.ENTITY_SKIPPED]
 
 
 def test_whole_sets_before_a_fault_are_drawn() -> None:
@@ -474,7 +474,7 @@ def test_units_of_the_page(size: str, wanted_mm: float) -> None:
         '<rect width="50" height="50"/>', f'width="{size}" height="{size}" viewBox="0 0 50 50"'
     )
     np.testing.assert_allclose(extents(drawing.paths), [[0, wanted_mm]] * 2, atol=NEAR_MM)
-    unitless = [f.code for f in drawing.findings] == [Code.UNITLESS]
+    unitless = [f.code for f in drawing.findings] == [DrawingCode.UNITLESS]
     assert unitless == (size == "96")
 
 
@@ -483,7 +483,7 @@ def test_without_any_size_units_are_px_and_said_to_be() -> None:
     np.testing.assert_allclose(extents(drawing.paths), [[25.4, 50.8], [-50.8, -25.4]])
     assert drawing.units.name == "px"
     (finding,) = drawing.findings
-    assert finding.code == Code.UNITLESS
+    assert finding.code == DrawingCode.UNITLESS
     assert "--units" in finding.message
     assert "--dpi" in finding.message
 
@@ -698,7 +698,7 @@ def test_what_is_hidden_is_counted_not_cut(attributes: str) -> None:
     )
     assert len(drawing.paths) == 1
     assert skipped(drawing) == {"line": 2}
-    assert [finding.code for finding in drawing.findings] == [Code.ENTITY_SKIPPED]
+    assert [finding.code for finding in drawing.findings] == [DrawingCode.ENTITY_SKIPPED]
 
 
 def test_what_is_shown_again_is_drawn() -> None:
@@ -714,7 +714,7 @@ def test_what_cannot_be_cut_is_counted() -> None:
     )
     assert len(drawing.paths) == 1
     assert skipped(drawing) == {"text": 1, "image": 1}
-    told = [finding for finding in drawing.findings if finding.code == Code.NOT_APPLIED]
+    told = [finding for finding in drawing.findings if finding.code == DrawingCode.NOT_APPLIED]
     assert [str(finding.message) for finding in told] == [
         "1 clip-path of line is not applied: it is drawn whole"
     ]

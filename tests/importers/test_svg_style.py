@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from camtool.errors import DrawingError
-from camtool.findings import Code
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import extents
+from camtool.importers.findings import DrawingCode
 from camtool.importers.options import ReadOptions, Selection
 from camtool.importers.svg.colours import parse_colour
 from camtool.importers.svg.reader import read
@@ -20,7 +20,7 @@ def drawn(body: str, **options: object) -> Drawing:
 
 
 def told(drawing: Drawing) -> list[str]:
-    return [f.message for f in drawing.findings if f.code == Code.NOT_APPLIED]
+    return [f.message for f in drawing.findings if f.code == DrawingCode.NOT_APPLIED]
 
 
 @pytest.mark.parametrize(

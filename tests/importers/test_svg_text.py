@@ -10,11 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camtool.errors import DrawingError
-from camtool.findings import Code
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import extents
 from camtool.importers import text as text_fonts
 from camtool.importers.dxf.reader import read as read_dxf
+from camtool.importers.findings import DrawingCode
 from camtool.importers.options import TEXT_SKIPPED, ReadOptions
 from camtool.importers.svg import reader
 from camtool.importers.svg.reader import read
@@ -287,16 +287,16 @@ def test_weight_slope_and_families() -> None:
     assert not same(plain, bold)
     assert same(bold, drawn("<text y='9' style='font-weight: 700'>O</text>", "outline"))
     assert same(plain, drawn(f"<text y='9' font-family=\"'{FAMILY}', x\">O</text>", "outline"))
-    assert not any(f.code is Code.FONT_SUBSTITUTED for f in plain.findings)
+    assert not any(f.code is DrawingCode.FONT_SUBSTITUTED for f in plain.findings)
     for family in (f"Nowhere Grotesk, {FAMILY}", "Nowhere Grotesk"):
         other = drawn(f'<text y="9" font-family="{family}">O</text>', "outline")
-        (told,) = [f.message for f in other.findings if f.code is Code.FONT_SUBSTITUTED]
+        (told,) = [f.message for f in other.findings if f.code is DrawingCode.FONT_SUBSTITUTED]
         assert told.startswith("1 text: font Nowhere Grotesk is not installed: drawn with ")
 
 
 def test_a_letter_that_the_font_lacks_is_named() -> None:
     found = drawn("<text y='9'>A\ue123A</text>")
-    (told,) = [f.message for f in found.findings if f.code is Code.FONT_SUBSTITUTED]
+    (told,) = [f.message for f in found.findings if f.code is DrawingCode.FONT_SUBSTITUTED]
     assert told.endswith("has no U+E123: left blank")
 
 
@@ -381,7 +381,7 @@ def test_weights_that_fonts_are_not_asked_for_are_told() -> None:
     if not text_fonts.installed_fonts():
         pytest.skip("no outline font is installed")
     found = drawn('<text y="9" font-weight="300">A</text>', "outline")
-    assert [f.message for f in found.findings if f.code is Code.NOT_APPLIED] == [
+    assert [f.message for f in found.findings if f.code is DrawingCode.NOT_APPLIED] == [
         "1 font-weight 300 of text is not applied: 600 and more is bold"
     ]
 
@@ -406,5 +406,5 @@ def test_any_text_is_drawn_or_counted(words: str, name: str, value: str) -> None
         return
     found = drawn(f"{LINE}<text y='9' {name}={quoteattr(value)}>{escape(words)}</text>")
     assert np.isfinite(found.paths.vertices).all()
-    told = [f for f in found.findings if f.code is Code.FONT_SUBSTITUTED]
+    told = [f for f in found.findings if f.code is DrawingCode.FONT_SUBSTITUTED]
     assert found.used.get("text") or found.skipped or told

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import DrawingError
-from camtool.findings import Code
 from camtool.geometry.drawing import Drawing
+from camtool.importers.findings import DrawingCode
 from camtool.importers.options import ReadOptions
 from camtool.importers.svg import css as svg_css
 from camtool.importers.svg import reader as svg_walk
@@ -186,7 +186,7 @@ def test_programs_with_other_pixels_are_told(head: str, page: str, dpi: str | No
     told = [
         finding
         for finding in read_in((head + svg(LINE, page)).encode()).findings
-        if finding.code == Code.UNIT_GUESSED
+        if finding.code == DrawingCode.UNIT_GUESSED
     ]
     assert len(told) == (dpi is not None)
     assert not told or f"took {dpi} px an inch, and it was read so" in told[0].message
@@ -195,7 +195,7 @@ def test_programs_with_other_pixels_are_told(head: str, page: str, dpi: str | No
     assert read_so.paths.vertices.tolist() == asked.paths.vertices.tolist()
     assert read_so.units == asked.units
     asked = read((head + svg(LINE, page)).encode(), "a.svg", ReadOptions(dpi=90.0))
-    assert not [finding for finding in asked.findings if finding.code == Code.UNIT_GUESSED]
+    assert not [finding for finding in asked.findings if finding.code == DrawingCode.UNIT_GUESSED]
 
 
 # ---- damage

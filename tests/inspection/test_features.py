@@ -7,10 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from camtool.findings import Code, Finding
+from camtool.findings import Finding
 from camtool.geometry.polylines import Polyline, Polylines
 from camtool.inspection.dimensions import Dimension, Kind, Place
 from camtool.inspection.features import Bound, Circle, Edge, bind, features_of
+from camtool.inspection.findings import InspectionCode
 from camtool.planning.place import Map
 
 QUARTER = math.tan(math.pi / 8)
@@ -92,7 +93,7 @@ def test_what_fits_nothing_is_a_finding(
 ) -> None:
     found = bound(kind, *places, direction=direction)
     assert isinstance(found, Finding)
-    assert found.code == Code.DIMENSION_UNBOUND
+    assert found.code == InspectionCode.DIMENSION_UNBOUND
     assert "plate.dxf" in found.where
 
 

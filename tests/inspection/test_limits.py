@@ -14,8 +14,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError
-from camtool.findings import Code
 from camtool.inspection.dimensions import Dimension, Limits
+from camtool.inspection.findings import InspectionCode
 from camtool.inspection.limits import (
     deviation_words,
     general_class,
@@ -335,7 +335,7 @@ def test_what_the_standard_has_no_value_for_has_no_limits_and_is_said(words, kin
     bare = Dimension("a", kind, ((0.0, 0.0),), "dimension 1", general=words)
     known, findings = limited(bare, nominal_mm)
     assert known.limits is None
-    assert [found.code for found in findings] == [Code.NO_GENERAL_TOLERANCE]
+    assert [found.code for found in findings] == [InspectionCode.NO_GENERAL_TOLERANCE]
     assert findings[0].where == "dimension 1"
 
 

@@ -13,9 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import CamtoolError
-from camtool.findings import Code, Severity
+from camtool.findings import Severity
 from camtool.geometry.drawing import Callout
 from camtool.inspection.dimensions import Limits
+from camtool.inspection.findings import InspectionCode
 from camtool.inspection.limits import limits_of
 from camtool.inspection.tolerances import dimensions_of, read_text, read_tolerances
 from tests.importers.test_dxf import document, drawn
@@ -150,23 +151,23 @@ def test_a_count_is_for_all_of_that_size_if_there_are_as_many():
     dimension.dimension.dxf.text = "3x %%c5 H7"
     found, findings = dimensions_of(drawn(doc))
     assert len(found) == 1
-    assert [each.code for each in findings] == [Code.COUNT_DIFFERS]
+    assert [each.code for each in findings] == [InspectionCode.COUNT_DIFFERS]
 
 
 def test_a_text_that_is_not_what_is_drawn_is_an_error_with_its_place():
     found, (finding,) = dimensions_of(drawn(with_text(part(), "6.5 H7")))
     assert not found
-    assert (finding.code, finding.severity) == (Code.DIMENSION_DIFFERS, Severity.ERROR)
+    assert (finding.code, finding.severity) == (InspectionCode.DIMENSION_DIFFERS, Severity.ERROR)
     assert (finding.measured, finding.limit) == (6.0, 6.5)
     assert re.search(r"test\.dxf, DIMENSION \w+, at \(17\.402, 8\.500\) mm", finding.where)
 
 
 def test_what_is_not_understood_or_of_another_scale_is_named_and_not_inspected():
     for text, override, code in [
-        ("see note 3", {}, Code.CALLOUT_TEXT),
-        ("6 min", {}, Code.CALLOUT_TEXT),
-        ("\x1b[2J", {}, Code.CALLOUT_TEXT),
-        ("6 H7", {"dimlfac": 0.5}, Code.DIMENSION_DIFFERS),
+        ("see note 3", {}, InspectionCode.CALLOUT_TEXT),
+        ("6 min", {}, InspectionCode.CALLOUT_TEXT),
+        ("\x1b[2J", {}, InspectionCode.CALLOUT_TEXT),
+        ("6 H7", {"dimlfac": 0.5}, InspectionCode.DIMENSION_DIFFERS),
     ]:
         found, (finding,) = dimensions_of(drawn(with_text(part(), text, **override)))
         assert not found
@@ -197,14 +198,14 @@ def test_limits_of_a_callout_that_are_wrong_are_one_line_unless_the_file_says_ot
     mended = '[[dimension]]\nkind = "diameter"\nat = [20, 10]\nlimits = "+0.1/-0.1"\n'
     (bore,), (finding,) = dimensions_of(drawing, write(tmp_path, mended))
     assert bore.limits == Limits(-0.1, 0.1, "±0.1")
-    assert finding.code == Code.DIMENSION_TWICE
+    assert finding.code == InspectionCode.DIMENSION_TWICE
 
 
 def test_two_callouts_of_one_bore():
     doc = with_text(with_text(part(), "6"), "6 H7")
     (bore,), (finding,) = dimensions_of(drawn(doc))
     assert bore.limits == Limits(0.0, 0.012, "H7")
-    assert (finding.code, finding.severity) == (Code.DIMENSION_TWICE, Severity.INFO)
+    assert (finding.code, finding.severity) == (InspectionCode.DIMENSION_TWICE, Severity.INFO)
     (bore,), findings = dimensions_of(drawn(with_text(doc, "6 H8")))
     assert bore.limits == Limits(0.0, 0.012, "H7")
     (finding,) = [each for each in findings if each.severity == Severity.WARNING]
@@ -308,7 +309,7 @@ def test_the_file_holds_where_a_callout_measures_the_same(tmp_path):
     assert found[0].limits == Limits(0.0, 0.012, "H7")
     assert len(found) == 5
     (finding,) = findings
-    assert finding.code == Code.DIMENSION_TWICE
+    assert finding.code == InspectionCode.DIMENSION_TWICE
     assert "tolerances.toml, dimension 1, which holds" in finding.message
 
 
@@ -317,7 +318,7 @@ def test_two_dimensions_of_a_file_that_measure_the_same(tmp_path):
     for limits, severity in (("+0.012/0", Severity.INFO), ("H8", Severity.WARNING)):
         said, (finding,) = dimensions_of(drawn(part()), write(tmp_path, text.format(limits)))
         assert [each.limits.said for each in said] == ["H7"]
-        assert (finding.code, finding.severity) == (Code.DIMENSION_TWICE, severity)
+        assert (finding.code, finding.severity) == (InspectionCode.DIMENSION_TWICE, severity)
         assert "tolerances.toml, dimension 2" in finding.where
 
 
@@ -332,7 +333,7 @@ def test_a_nominal_size_that_is_not_drawn_is_an_error(tmp_path):
     wrong = '[[dimension]]\nkind = "diameter"\nat = [20, 10]\nnominal = "6in"\n'
     found, (finding,) = dimensions_of(drawn(part()), write(tmp_path, wrong))
     assert not found
-    assert (finding.code, finding.severity) == (Code.DIMENSION_DIFFERS, Severity.ERROR)
+    assert (finding.code, finding.severity) == (InspectionCode.DIMENSION_DIFFERS, Severity.ERROR)
 
 
 BORE = '[[dimension]]\nkind = "diameter"\nat = [20, 10]\n'

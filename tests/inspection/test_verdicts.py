@@ -11,8 +11,9 @@ import pytest
 import camtool
 from camtool.arrays import Floats
 from camtool.errors import OptionError
-from camtool.findings import Code, Severity
+from camtool.findings import Severity
 from camtool.inspection.dimensions import Dimension, Kind, Limits, Place
+from camtool.inspection.findings import InspectionCode
 from camtool.inspection.inspector import Inspector
 from camtool.inspection.sizes import edge_at, rows_of, size_of
 from camtool.inspection.uncertainty import DRAWS, Variant
@@ -271,7 +272,7 @@ def test_words_of_what_is_not_known(plate: Path) -> None:
     assert done.report is not None
     assert list(facts(done.report))[-1] == ("not known", f"temperature_k: if {WITHIN}")
     assert inspected_words(done.report.inspection[0]).endswith("; say part_expansion_per_k")
-    (finding,) = [each for each in done.findings if each.code == Code.DIMENSION_NOT_IN]
+    (finding,) = [each for each in done.findings if each.code == InspectionCode.DIMENSION_NOT_IN]
     assert "does not say part_expansion_per_k, machine_expansion_per_k" in finding.message
 
 
@@ -280,7 +281,7 @@ def test_what_is_required(plate: Path, require: str) -> None:
     run = posted(plate)
     hole = dimension("diameter", (15.0, 20.0), limits=(-0.01, 0.01))
     done = inspect(run, Tolerances((hole,), (), require))  # type: ignore[arg-type]
-    mine = [each for each in done.findings if each.code == Code.DIMENSION_NOT_IN]
+    mine = [each for each in done.findings if each.code == InspectionCode.DIMENSION_NOT_IN]
     assert [each.severity for each in mine] == [
         Severity.ERROR if require == "in" else Severity.WARNING
     ]
@@ -290,7 +291,7 @@ def test_what_is_required(plate: Path, require: str) -> None:
 def test_what_is_not_cut_and_what_fits_nothing_are_findings(plate: Path) -> None:
     run = posted(plate)
     done = inspect(run, Tolerances((dimension("diameter", (1.0, 1.0)), HOLE)))
-    assert Code.DIMENSION_UNBOUND in {each.code for each in done.findings}
+    assert InspectionCode.DIMENSION_UNBOUND in {each.code for each in done.findings}
     assert done.report is not None
     assert [each.kind for each in done.report.inspection] == ["diameter"]
     some = camtool.post(
@@ -299,7 +300,7 @@ def test_what_is_not_cut_and_what_fits_nothing_are_findings(plate: Path) -> None
         job=camtool.job_of(tool_diameter_mm=2.0, select=("outer",)),
     )
     done = inspect(some, Tolerances((HOLE, WIDTH)))
-    assert Code.DIMENSION_NOT_CUT in {each.code for each in done.findings}
+    assert InspectionCode.DIMENSION_NOT_CUT in {each.code for each in done.findings}
     assert done.report is not None
     assert [each.kind for each in done.report.inspection] == ["distance"]
 
@@ -394,7 +395,7 @@ def test_a_chamfer_alone_makes_no_dimension(plate: Path) -> None:
     done = inspect(cut_deep(plate, RIMS), Tolerances(ALL))
     assert done.report is not None
     assert done.report.inspection == ()
-    assert Code.DIMENSION_NOT_CUT in {each.code for each in done.findings}
+    assert InspectionCode.DIMENSION_NOT_CUT in {each.code for each in done.findings}
 
 
 def test_every_depth_counts(plate: Path) -> None:

@@ -13,15 +13,17 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError
-from camtool.findings import Code, Severity
+from camtool.findings import Severity
 from camtool.geometry.distance import nearest
 from camtool.geometry.measure import sample
 from camtool.geometry.offset import offset_shape
 from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.pipeline import post_drawing
+from camtool.planning.findings import PlanningCode
 from camtool.planning.job import Entry, Job, Lead, Operation, Tabs, Tool, job_of
 from camtool.run import Run
 from camtool.target.registry import load_target
+from camtool.toolpath.findings import ProgramCode
 from tests.drawings import drawing_of
 from tests.oracles.swept import FINE_CHORD_RAD, area_of, complaints
 from tests.oracles.swept import swept as covered
@@ -106,7 +108,7 @@ def test_random_pockets_grow(paths: list[Polyline], diameter_mm: float, share: f
     work = work_of(paths, diameter_mm, allowance_mm=-beyond)
     runs = runs_of(work)
     assume(runs)
-    assume(not any(each.code == Code.GOUGE for each in work.findings))
+    assume(not any(each.code == ProgramCode.GOUGE for each in work.findings))
     wanted = offset_shape(region_of(paths), -beyond)
     assert complaints(runs, wanted, 0.5 * diameter_mm, -1.0) == []
 
@@ -177,7 +179,7 @@ def test_what_is_asked_for_is_no_overcut(kind: str) -> None:
     assert run.report.shape.overcut_um < 2.0
     assert run.report.shape.undercut_um < 2.0
     told = {each.code for each in run.findings if each.severity >= Severity.WARNING}
-    assert told <= {Code.CUT_DOUBTFUL}
+    assert told <= {PlanningCode.CUT_DOUBTFUL}
 
 
 def test_leads_and_tabs_are_as_ever() -> None:
@@ -192,7 +194,7 @@ def test_leads_and_tabs_are_as_ever() -> None:
         entry=Entry("ramp"),
     )
     codes = {each.code for each in run.findings}
-    assert not codes & {Code.LEAD_LEFT_OUT, Code.TAB_LEFT_OUT, Code.GOUGE}
+    assert not codes & {PlanningCode.LEAD_LEFT_OUT, PlanningCode.TAB_LEFT_OUT, ProgramCode.GOUGE}
 
 
 @pytest.mark.parametrize("kind", ["dogbone", "overcut"])
@@ -232,7 +234,7 @@ def test_own_walls_are_no_gouges_and_what_is_nearer_is(side: str) -> None:
     fits = contours(drawing_of(two(2 * R - 0.098)), job_of(**drawn))
     assert _codes(fits) == []
     tight = contours(drawing_of(two(2 * R - 0.12)), job_of(**drawn))
-    (found,) = (Code.UNREACHED,) if side == "auto" else (Code.GOUGE,)
+    (found,) = (PlanningCode.UNREACHED,) if side == "auto" else (ProgramCode.GOUGE,)
     assert set(_codes(tight)) == {found}
 
 
@@ -248,7 +250,7 @@ def test_of_other_operations_the_allowance_counts_too() -> None:
 
     def gouges(*operations: Operation) -> list[float]:
         found = post_drawing(drawing, Job(operations), target, check=False).findings
-        return [each.measured or 0.0 for each in found if each.code == Code.GOUGE]
+        return [each.measured or 0.0 for each in found if each.code == ProgramCode.GOUGE]
 
     assert gouges(*both) == []
     # The second part keeps its size: what is cut beside the first takes of it.
@@ -264,11 +266,11 @@ def test_what_is_thinner_than_two_allowances_is_told() -> None:
         ([_box(0, 0, 4, thin)], {"side": "outside"}),
     ):
         found = contours(drawing_of(paths), job_of(**settings, **more))
-        told = [each for each in found.findings if each.code == Code.GOUGE]
+        told = [each for each in found.findings if each.code == ProgramCode.GOUGE]
         assert len(told) == 1
         assert "cut away from both sides" in str(told[0])
         wider = contours(drawing_of(paths), job_of(**{**settings, "allowance_mm": -0.03}, **more))
-        assert Code.GOUGE not in _codes(wider)
+        assert ProgramCode.GOUGE not in _codes(wider)
     walls = [_circle(0, 0, 2), _circle(4 + thin, 0, 2)]
     for kind, some in (
         ("pocket", windows),
@@ -276,7 +278,7 @@ def test_what_is_thinner_than_two_allowances_is_told() -> None:
         ("bore", walls),
     ):
         run = posted(some, kind=kind, tool_diameter_mm=0.5, allowance_mm=-0.05, depth_mm=1.0)
-        assert [each.severity for each in run.findings if each.code == Code.GOUGE] == [
+        assert [each.severity for each in run.findings if each.code == ProgramCode.GOUGE] == [
             Severity.WARNING
         ]
 
@@ -291,7 +293,7 @@ def test_a_pocket_that_comes_over_a_contour_beside_it_is_told() -> None:
         found = post_drawing(
             drawing_of(paths, layers), Job((own, outline)), load_target("linuxcnc"), check=False
         ).findings
-        return [str(each) for each in found if each.code == Code.GOUGE]
+        return [str(each) for each in found if each.code == ProgramCode.GOUGE]
 
     assert gouges([plate, pocket], ["O", "P"]) == []
     (told,) = gouges([plate, pocket, hole], ["O", "P", "O"])
@@ -324,5 +326,5 @@ def test_what_no_tool_can_do_is_refused(asked: dict[str, Any], words: str) -> No
 def test_a_large_one_is_doubted() -> None:
     for beyond, doubted in ((0.2, False), (0.3, True)):
         run = posted([_box(0, 0, 30, 20)], tool_diameter_mm=2.0, allowance_mm=-beyond, depth_mm=1)
-        words = [str(each) for each in run.findings if each.code == Code.CUT_DOUBTFUL]
+        words = [str(each) for each in run.findings if each.code == PlanningCode.CUT_DOUBTFUL]
         assert any("mm are cut beyond the lines" in each for each in words) is doubted

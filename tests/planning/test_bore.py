@@ -11,10 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError
-from camtool.findings import Code, Severity
+from camtool.findings import Severity
 from camtool.geometry.polylines import Polyline
 from camtool.planning.bore import CORE_SHARE, MOST_TURNS, bore, radii
 from camtool.planning.drill import HOLE_SIZE_MM
+from camtool.planning.findings import PlanningCode
 from camtool.planning.items import CutRun, Feeds, Fixed, Setting, Work
 from camtool.planning.job import Entry, Operation, Tool
 from camtool.planning.ramps import HELIX_LEAST
@@ -116,7 +117,7 @@ def test_what_is_no_bore_is_named() -> None:
     work = bore(chosen_of(paths), setting_of())
     assert [item.name for item in work.items] == ["PATH 0"]
     others, small, within = work.findings
-    assert {each.code for each in work.findings} == {Code.NOT_BORED}
+    assert {each.code for each in work.findings} == {PlanningCode.NOT_BORED}
     assert (others.where, others.severity) == ("PATH 5", Severity.WARNING)
     assert (small.where, small.severity) == ("PATH 1, PATH 2", Severity.WARNING)
     assert "circles wider than 3 mm: 2 circles of 2 mm" in small.message
@@ -125,7 +126,7 @@ def test_what_is_no_bore_is_named() -> None:
 
 def test_nothing_to_bore_is_an_error() -> None:
     (small, nothing) = bore(chosen_of([circle(0, 0, 3.0)]), setting_of()).findings
-    assert (small.code, nothing.code) == (Code.NOT_BORED, Code.NOTHING_DRAWN)
+    assert (small.code, nothing.code) == (PlanningCode.NOT_BORED, PlanningCode.NOTHING_DRAWN)
     assert nothing.severity == Severity.ERROR
 
 
@@ -137,7 +138,7 @@ def test_a_tool_of_no_width_is_refused() -> None:
 def test_a_helix_gets_so_many_turns_and_no_more() -> None:
     work = bore(chosen_of([circle(0, 0, 4.0)]), setting_of(20.0, step_down_mm=0.01))
     (finding,) = work.findings
-    assert finding.code == Code.ENTRY_CHANGED
+    assert finding.code == PlanningCode.ENTRY_CHANGED
     assert "at most 200 turns: its slope is 1.82°, not 3°" in finding.message
     (run,) = runs_of(work)
     assert np.count_nonzero(np.diff(run.vertices[:, 2])) == 4 * MOST_TURNS
@@ -150,7 +151,7 @@ def test_the_tool_plunges_where_a_helix_has_no_room(direction: str) -> None:
     setting = setting_of(7.0, direction=direction)
     work = bore(chosen_of([circle(5, 6, 3.2)]), setting)
     (finding,) = work.findings
-    assert finding.code == Code.ENTRY_CHANGED
+    assert finding.code == PlanningCode.ENTRY_CHANGED
     assert "3.2 mm" in finding.message
     assert "3 pecks of 2.333 mm" in finding.message
     (run,) = runs_of(work)

@@ -15,11 +15,13 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from camtool.errors import OptionError
-from camtool.findings import Code, Severity
+from camtool.findings import Severity
 from camtool.geometry.distance import nearest
+from camtool.geometry.findings import ContourCode
 from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.importers.read import read_drawing
 from camtool.planning.carve import CARVE_TOLERANCE_MM, vcarve
+from camtool.planning.findings import PlanningCode
 from camtool.planning.items import Chosen, CutRun, Feeds, Fixed, Setting, Work
 from camtool.planning.job import Job, Operation, Tool
 from camtool.planning.plan import plan
@@ -193,7 +195,7 @@ def test_limited_depth_leaves_a_floor_that_is_the_inner_offset(depth: float) -> 
     work = vcarve(chosen_of(OBLONG_WITH_ISLANDS), setting)
     assert min(run.vertices[:, 2].min() for run in runs_of(work)) == pytest.approx(-depth)
     (finding,) = work.findings
-    assert finding.code is Code.DEPTH_LIMITED
+    assert finding.code is PlanningCode.DEPTH_LIMITED
     floor = area_of(Polylines.of(OBLONG_WITH_ISLANDS), CHORD_MM).buffer(-depth, quad_segs=200)
     assert finding.measured == pytest.approx(floor.area, rel=2e-3)
     assert gouge(work, OBLONG_WITH_ISLANDS, setting) <= CARVE_TOLERANCE_MM
@@ -204,7 +206,7 @@ def test_limited_depth_leaves_a_floor_that_is_the_inner_offset(depth: float) -> 
 def test_the_width_of_the_bit_limits_as_depth_does() -> None:
     by_width = vcarve(chosen_of([shapes.OBLONG]), setting_of(diameter_mm=4.0))
     by_depth = vcarve(chosen_of([shapes.OBLONG]), setting_of(-2.0))
-    assert [f.code for f in by_width.findings] == [Code.DEPTH_LIMITED]
+    assert [f.code for f in by_width.findings] == [PlanningCode.DEPTH_LIMITED]
     assert by_width.findings[0].measured == pytest.approx(16.0 * 6.0)
     for one, other in zip(runs_of(by_width), runs_of(by_depth), strict=True):
         assert one.vertices == pytest.approx(other.vertices, abs=1e-9)
@@ -226,7 +228,10 @@ def test_a_flat_tip_leaves_corners_and_stays_out_of_narrow_places() -> None:
     setting = setting_of(tip_diameter_mm=1.0)
     thin = shapes.closed((30, 0), (39, 0), (39, 0.9), (30, 0.9))
     work = vcarve(chosen_of([shapes.SQUARE, thin]), setting)
-    assert [f.code for f in work.findings] == [Code.UNREACHED, Code.CONTOUR_TOO_SMALL]
+    assert [f.code for f in work.findings] == [
+        PlanningCode.UNREACHED,
+        PlanningCode.CONTOUR_TOO_SMALL,
+    ]
     corners = 4.0 * 0.25 * (1.0 - 0.25 * math.pi)
     assert work.findings[0].measured == pytest.approx(corners, rel=1e-6)
     assert work.findings[1].measured == pytest.approx(0.9)
@@ -277,7 +282,7 @@ def test_paths_that_cross_are_an_error_that_names_the_place() -> None:
     for paths in ([eight], [shapes.SQUARE, turned(shapes.SQUARE, 0.3)]):
         work = vcarve(chosen_of(paths), setting_of())
         assert not work.items
-        assert {f.code for f in work.findings} == {Code.SELF_CROSSING}
+        assert {f.code for f in work.findings} == {ContourCode.SELF_CROSSING}
         assert all(f.severity is Severity.ERROR for f in work.findings)
     (first, *_) = vcarve(chosen_of([eight]), setting_of()).findings
     assert "X 5.0000 Y 5.0000" in first.where
@@ -317,7 +322,7 @@ def test_an_open_path_is_refused_by_name() -> None:
 def test_random_contours_are_never_gouged(path: Polyline, depth: float, tip: float) -> None:
     setting = setting_of(-depth, tip_diameter_mm=tip)
     work = vcarve(chosen_of([path]), setting)
-    if any(f.code is Code.SELF_CROSSING for f in work.findings):
+    if any(f.code is ContourCode.SELF_CROSSING for f in work.findings):
         return
     assert gouge(work, [path], setting) <= CARVE_TOLERANCE_MM
 
@@ -340,4 +345,4 @@ def test_paths_that_share_a_side_enclose_nothing_there_and_are_an_error() -> Non
     work = vcarve(chosen_of([inner, outer]), setting_of(-0.4))
     assert work.items == ()
     (finding,) = work.findings
-    assert (finding.code, finding.severity) == (Code.SELF_CROSSING, Severity.ERROR)
+    assert (finding.code, finding.severity) == (ContourCode.SELF_CROSSING, Severity.ERROR)

@@ -14,13 +14,14 @@ from hypothesis import strategies as st
 
 from camtool.arrays import Floats
 from camtool.errors import OptionError
-from camtool.findings import Code
 from camtool.geometry.polylines import Polyline
 from camtool.machine.model import Machine
 from camtool.pipeline import post_drawing
+from camtool.planning.findings import PlanningCode
 from camtool.planning.job import Job, Operation, Placement, Stock, Tool
 from camtool.planning.plan import Plan, planned
 from camtool.target.registry import load_target
+from camtool.toolpath.findings import ProgramCode
 from tests.drawings import drawing_of
 from tests.oracles.run_sweep import dense
 from tests.planning.test_drill import circle
@@ -92,7 +93,7 @@ def test_the_bevel_is_as_wide_as_wanted_and_ends_at_the_drawn_line(
     job = Job((operation,), Placement(rotate_rad=turn))
     plan = planned(drawing_of(paths), job, machine)
     assert [
-        finding for finding in plan.toolpath.findings if finding.code != Code.CUT_DOUBTFUL
+        finding for finding in plan.toolpath.findings if finding.code != PlanningCode.CUT_DOUBTFUL
     ] == []
     part = shapely.Polygon(plate.vertices[:, :2]).difference(
         shapely.Point(8, 6).buffer(2.5, quad_segs=512)
@@ -137,7 +138,7 @@ def test_no_edge_of_another_contour_is_broken(machine: Machine) -> None:
     def gouges(width: float) -> list[float]:
         job = Job((chamfer_of(width, layers=("part",), name="edge"), other))
         found = planned(drawing, job, machine).toolpath.findings
-        return [float(each.measured or 0.0) for each in found if each.code == Code.GOUGE]
+        return [float(each.measured or 0.0) for each in found if each.code == ProgramCode.GOUGE]
 
     assert gouges(0.5) == []
     assert gouges(1.0) == pytest.approx([0.7])
@@ -147,11 +148,11 @@ def test_open_paths_are_left_out_and_said(machine: Machine) -> None:
     line = Polyline(np.array([[30.0, 0, 0], [40, 0, 0]]))
     job = Job((chamfer_of(0.5),))
     toolpath = planned(drawing_of([circle(0, 0, 10), line]), job, machine).toolpath
-    (said,) = [each for each in toolpath.findings if each.code == Code.NOT_CHAMFERED]
+    (said,) = [each for each in toolpath.findings if each.code == PlanningCode.NOT_CHAMFERED]
     assert said.measured == 1
     assert toolpath.end[toolpath.is_feed, 0].max() < 6.0
     nothing = planned(drawing_of([line]), job, machine).toolpath
-    assert Code.NOTHING_DRAWN in {finding.code for finding in nothing.findings}
+    assert PlanningCode.NOTHING_DRAWN in {finding.code for finding in nothing.findings}
 
 
 @pytest.mark.parametrize(

@@ -16,10 +16,12 @@ from camtool.geometry.polylines import Polyline
 from camtool.machine.model import Machine
 from camtool.pipeline import post_drawing
 from camtool.planning.checks import checked
+from camtool.planning.findings import PlanningCode
 from camtool.planning.job import Job, Operation, Placement, Stock, Tabs, Tool, job_of
 from camtool.planning.plan import plan
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Kind
 from tests.drawings import drawing_of
 from tests.oracles.path_machine import path_machine
@@ -57,7 +59,7 @@ def test_travel_counts_part_zero_and_the_bulge_of_arcs() -> None:
     path = ToolpathBuilder().rapid(4, 0).arc(4, 2, centre=(4, 1), ccw=True, feed=10)
     assert codes(path, None, "axes.x.travel_mm=5.0") == []
     (finding,) = found(path, None, path_machine("axes.x.travel_mm=4.9"))
-    assert (finding.code, finding.measured, finding.limit) == (Code.OUT_OF_TRAVEL, 5.0, 4.9)
+    assert (finding.code, finding.measured, finding.limit) == (ProgramCode.OUT_OF_TRAVEL, 5.0, 4.9)
 
 
 @pytest.mark.parametrize(
@@ -77,7 +79,9 @@ def test_only_what_helps_is_advised(
     machine = path_machine(
         "axes.x.travel_mm=12.0", "axes.y.travel_mm=8.0", "axes.z.travel_mm=12.0"
     )
-    (finding,) = (each for each in found(path, None, machine) if each.code == Code.OUT_OF_TRAVEL)
+    (finding,) = (
+        each for each in found(path, None, machine) if each.code == ProgramCode.OUT_OF_TRAVEL
+    )
     assert f": {advice}" in finding.message
     axis = finding.where.split()[1].rstrip(",").lower()
     assert f"--set axes.{axis}.travel_mm=" in finding.message
@@ -88,7 +92,7 @@ def test_a_stock_of_which_only_the_thickness_is_known_is_as_large_as_the_job_nee
     job = job_of(stock=Stock(2.0), tool_diameter_mm=1.0)
     assert codes(down(500, 500, -2).line(600, 1, feed=10), job) == []
     (finding,) = found(down(1, 1, -2).line(2, 1, -3.5, feed=10), job)
-    assert finding.code == Code.OUT_OF_STOCK
+    assert finding.code == PlanningCode.OUT_OF_STOCK
     assert finding.limit == pytest.approx(3.0)
 
 
@@ -112,7 +116,7 @@ def test_cuts_may_go_through_the_stock_as_far_as_the_spoilboard_lets_them(
     assert codes(down(1, 1, -thickness).line(2, 1, feed=10), job) == []
     path = down(1, 1, -thickness).line(2, 1, -thickness - through, feed=10)
     (finding,) = found(path, job)
-    assert finding.code == Code.OUT_OF_STOCK
+    assert finding.code == PlanningCode.OUT_OF_STOCK
     assert finding.severity == (Severity.ERROR if allowed is None else Severity.INFO)
     assert finding.measured == pytest.approx(thickness + through)
     assert finding.where == "move 3"
@@ -127,11 +131,11 @@ def test_leads_may_begin_in_the_air_but_no_cut_lies_there_alone() -> None:
     assert codes(down(-3, 5).line(5, 5, feed=10), job) == []
     path = square(square(square(ToolpathBuilder(), 1, 1), 12, 1), 1, -2)
     (finding,) = found(path, job)
-    assert (finding.code, finding.severity) == (Code.OUT_OF_STOCK, Severity.WARNING)
+    assert (finding.code, finding.severity) == (PlanningCode.OUT_OF_STOCK, Severity.WARNING)
     assert finding.message.startswith("2 cuts lie wholly beside")
     assert "near (12.000, 1.000)" in finding.where
     assert codes(square(ToolpathBuilder(), 10.4, 1), job) == []  # half a tool still cuts
-    assert codes(square(ToolpathBuilder(), 10.6, 1), job) == [Code.OUT_OF_STOCK]
+    assert codes(square(ToolpathBuilder(), 10.6, 1), job) == [PlanningCode.OUT_OF_STOCK]
 
 
 def test_arcs_reach_into_the_stock_by_their_bulge() -> None:
@@ -147,7 +151,7 @@ def test_rapids_below_the_top_need_room_for_the_tool() -> None:
     slot.source = "CUT/LINE 1"
     slot.rapid(1, 2)
     (finding,) = found(slot, job)
-    assert (finding.code, finding.severity) == (Code.RAPID_IN_STOCK, Severity.ERROR)
+    assert (finding.code, finding.severity) == (ProgramCode.RAPID_IN_STOCK, Severity.ERROR)
     assert finding.where.startswith("move 6 (CUT/LINE 1) near (")
     assert finding.message == "a rapid runs through the stock, 0.5 mm below its top"
 
@@ -156,7 +160,7 @@ def test_a_v_bit_clears_but_its_tip() -> None:
     path = down(1, 1).line(5, 1, feed=10).rapid(1, 1)
     bit = {"tool_diameter_mm": 3.0, "tool_kind": "v", "tool_tip_angle_rad": 1.0}
     assert codes(path, job_of(tool_diameter_mm=3.0)) == []
-    assert codes(path, job_of(**bit)) == [Code.RAPID_IN_STOCK]
+    assert codes(path, job_of(**bit)) == [ProgramCode.RAPID_IN_STOCK]
 
 
 def test_many_rapids_are_counted() -> None:
@@ -180,15 +184,15 @@ def test_rapids_are_those_of_the_tool_that_is_in() -> None:
     assert codes(path, two(2)) == []
     path.event(Kind.TOOL_CHANGE, 1).rapid(1, 1).rapid(z=-1)
     stated = ("defaults.change_mm=[0, 0]", "defaults.change_z_mm=9")
-    assert codes(path, two(2), *stated) == [Code.RAPID_IN_STOCK]
-    assert codes(path, two(2)) == [Code.TOOL_CHANGE_NOT_STATED, Code.RAPID_IN_STOCK]
+    assert codes(path, two(2), *stated) == [ProgramCode.RAPID_IN_STOCK]
+    assert codes(path, two(2)) == [PlanningCode.TOOL_CHANGE_NOT_STATED, ProgramCode.RAPID_IN_STOCK]
 
 
 def test_a_tool_without_a_number_of_its_own_cannot_be_asked_for() -> None:
     assert codes(ToolpathBuilder(), two(2)) == []
     for number in (None, 1):
         (finding,) = found(ToolpathBuilder(), two(number))
-        assert (finding.code, finding.where) == (Code.TOOL_NOT_SAID, "operation 'fine'")
+        assert (finding.code, finding.where) == (PlanningCode.TOOL_NOT_SAID, "operation 'fine'")
     same = Operation(tool=Tool(1.0, name="a"))
     assert codes(ToolpathBuilder(), Job(operations=(same, Operation(tool=Tool(1.0))))) == []
 
@@ -200,7 +204,7 @@ def test_feeds_keep_to_the_machine() -> None:
     path = ToolpathBuilder().line(10, 0, feed=100)
     assert codes(path, None, *LIMITS) == []
     (finding,) = found(path.line(0, 0, feed=101), None, path_machine(*LIMITS))
-    assert (finding.code, finding.where) == (Code.FEED_ABOVE_LIMIT, "move 1")
+    assert (finding.code, finding.where) == (ProgramCode.FEED_ABOVE_LIMIT, "move 1")
     assert (finding.measured, finding.limit) == (101.0, 100.0)
     assert codes(path) == []
 
@@ -211,7 +215,9 @@ def test_slopes_keep_to_what_z_can() -> None:
     (finding,) = found(steep.line(6, 0, -0.9, feed=75), None, path_machine(*LIMITS))
     assert finding.measured == pytest.approx(75.0 * 0.5 / math.hypot(3.0, 0.5))
     assert "or slope less" in finding.message
-    assert codes(ToolpathBuilder().line(z=-1, feed=11), None, *LIMITS) == [Code.FEED_ABOVE_LIMIT]
+    assert codes(ToolpathBuilder().line(z=-1, feed=11), None, *LIMITS) == [
+        ProgramCode.FEED_ABOVE_LIMIT
+    ]
 
 
 def test_a_helix_is_as_long_as_it_is() -> None:
@@ -219,7 +225,7 @@ def test_a_helix_is_as_long_as_it_is() -> None:
     turn.arc(1, 0, -0.6, centre=(0, 0), ccw=True, feed=100)  # 6.28 round: 9.5 along Z
     assert codes(turn, None, *LIMITS) == []
     turn.arc(1, 0, -1.4, centre=(0, 0), ccw=True, feed=100)  # 12.6 along Z
-    assert codes(turn, None, *LIMITS) == [Code.FEED_ABOVE_LIMIT]
+    assert codes(turn, None, *LIMITS) == [ProgramCode.FEED_ABOVE_LIMIT]
 
 
 def box(x: float, y: float, width: float, height: float) -> Polyline:
@@ -230,7 +236,7 @@ def box(x: float, y: float, width: float, height: float) -> Polyline:
 def off_stock(job: Job, *paths: Polyline) -> list[Finding]:
     """What planning says of the stock."""
     findings = plan(drawing_of(paths), job, path_machine()).findings
-    return [each for each in findings if each.code == Code.OUT_OF_STOCK]
+    return [each for each in findings if each.code == PlanningCode.OUT_OF_STOCK]
 
 
 def job_on(operation: Operation, **more: object) -> Job:
@@ -306,7 +312,7 @@ def test_a_point_to_drill_beside_the_stock_is_an_error() -> None:
                                              Mark((39.0, 5.0), "0", "", "POINT 2")))  # fmt: skip
     drill = Operation("drill", tool=Tool(2.0, "drill"), depth_mm=1.0)
     findings = plan(drawing, job_on(drill), path_machine()).findings
-    (finding,) = (each for each in findings if each.code == Code.OUT_OF_STOCK)
+    (finding,) = (each for each in findings if each.code == PlanningCode.OUT_OF_STOCK)
     assert finding.severity is Severity.ERROR
     assert "POINT 1" in finding.where
     assert finding.measured == pytest.approx(1.0)
@@ -314,7 +320,7 @@ def test_a_point_to_drill_beside_the_stock_is_an_error() -> None:
 
 def loose(job: Job, *paths: Polyline, layers: list[str] | None = None) -> list[Finding]:
     findings = plan(drawing_of(paths, layers), job, path_machine()).findings
-    return [each for each in findings if each.code == Code.LOOSE_PIECE]
+    return [each for each in findings if each.code == PlanningCode.LOOSE_PIECE]
 
 
 SHEET = Stock(3.0)
@@ -416,7 +422,7 @@ def test_what_shrinks_to_nothing_is_named_and_the_rest_is_cut(side: str, target:
         run = post_drawing(drawing_of(paths), job, machine, check=False)
         assert run.program is not None, run.findings
         texts.append([line for line in run.program.data.splitlines() if b"(" not in line])
-        found = [each for each in run.findings if each.code == Code.CONTOUR_TOO_SMALL]
+        found = [each for each in run.findings if each.code == PlanningCode.CONTOUR_TOO_SMALL]
     assert texts[0] == texts[1]
     assert {each.severity for each in found} == {Severity.WARNING}
     told = {str(each.where): each.measured for each in found}

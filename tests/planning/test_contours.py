@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from camtool.findings import Code
 from camtool.geometry.measure import length, sample
 from camtool.geometry.polylines import Polyline, Polylines, reverse, rolled, rotated
 from camtool.planning import contours as module
+from camtool.planning.findings import PlanningCode
 from camtool.planning.items import Contour, Contours, CutRun, Feeds, Runs, Setting
 from camtool.planning.job import Entry, Lead, Operation, Tabs, Tool
 from camtool.planning.leads import KeepOut
@@ -269,7 +269,7 @@ def test_the_way_it_is_cut_decides_the_side_of_the_leads(path: Polyline, start: 
 def test_a_ramp_too_flat_for_a_small_contour_is_a_plunge() -> None:
     small = scaled(ROUND, 1e-3)
     runs, findings = runs_of(contour(small, entry=ramp(1.0)), small)
-    assert [each.code for each in findings] == [Code.ENTRY_CHANGED]
+    assert [each.code for each in findings] == [PlanningCode.ENTRY_CHANGED]
     assert "part/LINE 1" in findings[0].where
     assert findings[0].measured is not None
     assert findings[0].measured > (findings[0].limit or math.inf)

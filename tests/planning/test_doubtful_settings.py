@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from camtool.findings import Code, Severity
+from camtool.findings import Severity
 from camtool.geometry.polylines import Polyline
 from camtool.pipeline import post_drawing
 from camtool.planning.checks import ridge_mm
+from camtool.planning.findings import PlanningCode
 from camtool.planning.job import Entry, Job, Operation, Stock, Tabs, Tool, job_of
 from camtool.target.registry import load_target
 from tests.drawings import drawing_of
@@ -27,7 +28,7 @@ def _said(target: str, job: Job, *paths: Polyline) -> str:
     found = post_drawing(
         drawing_of(paths or [BOX]), job, load_target(target), check=False
     ).findings
-    doubtful_settings = [each for each in found if each.code == Code.CUT_DOUBTFUL]
+    doubtful_settings = [each for each in found if each.code == PlanningCode.CUT_DOUBTFUL]
     assert len(doubtful_settings) <= 1
     assert all(each.severity == Severity.WARNING for each in doubtful_settings)
     return doubtful_settings[0].message if doubtful_settings else ""

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from camtool.findings import Code, Severity
+from camtool.findings import Severity
 from camtool.geometry.polylines import Polyline, Polylines
 from camtool.planning.drill import (
     HOLE_SIZE_MM,
@@ -21,6 +21,7 @@ from camtool.planning.drill import (
     drill,
     peck_depths,
 )
+from camtool.planning.findings import PlanningCode
 from camtool.planning.items import Chosen, CutRun, Feeds, Fixed, Setting, Work
 from camtool.planning.job import Operation, Tool
 from tests.oracles import contours as shapes
@@ -130,7 +131,7 @@ def test_larger_circles_are_named_and_not_drilled() -> None:
     work = drill(chosen_of(paths), setting_of())
     assert holes_of(work) == [(0, 0)]
     (finding,) = work.findings
-    assert (finding.code, finding.severity) == (Code.NOT_DRILLED, Severity.WARNING)
+    assert (finding.code, finding.severity) == (PlanningCode.NOT_DRILLED, Severity.WARNING)
     assert finding.where == "PATH 1, PATH 2"
     assert finding.measured == pytest.approx(6.0)
     assert finding.limit == 1.0
@@ -140,7 +141,10 @@ def test_the_largest_hole_may_be_wider_than_the_drill_and_both_sizes_are_told() 
     paths = [circle(0, 0, 4.0), circle(9, 0, 6.0)]
     work = drill(chosen_of(paths), setting_of(max_hole_mm=5.0))
     assert holes_of(work) == [(0, 0)]
-    assert [finding.code for finding in work.findings] == [Code.NOT_DRILLED, Code.HOLE_SIZE]
+    assert [finding.code for finding in work.findings] == [
+        PlanningCode.NOT_DRILLED,
+        PlanningCode.HOLE_SIZE,
+    ]
     size = work.findings[1]
     assert "4 mm" in size.message
     assert "1 mm" in size.message
@@ -165,9 +169,9 @@ def test_other_paths_are_named_and_nothing_to_drill_is_an_error() -> None:
     work = drill(chosen_of(paths), setting_of())
     assert not work.items
     others, nothing = work.findings
-    assert others.code is Code.NOT_DRILLED
+    assert others.code is PlanningCode.NOT_DRILLED
     assert others.where == "PATH 0, PATH 1, PATH 2 and 1 more"
-    assert (nothing.code, nothing.severity) == (Code.NOTHING_DRAWN, Severity.ERROR)
+    assert (nothing.code, nothing.severity) == (PlanningCode.NOTHING_DRAWN, Severity.ERROR)
     assert "holes" in nothing.where
 
 

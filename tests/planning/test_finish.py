@@ -12,12 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError
-from camtool.findings import Code
 from camtool.geometry.polylines import Polyline
 from camtool.machine.model import Machine
+from camtool.planning.findings import PlanningCode
 from camtool.planning.items import Step
 from camtool.planning.job import Job, Operation, Stock, Tabs, Tool
 from camtool.planning.plan import planned
+from camtool.toolpath.findings import ProgramCode
 from tests.drawings import drawing_of
 from tests.oracles.run_sweep import dense, swept
 
@@ -111,12 +112,12 @@ def test_roughing_into_a_neighbour_is_told(machine: Machine, gap: float, told: b
     parts = [box(0.0, 0.0, 10.0, 10.0), box(10.0 + gap, 0.0, 20.0 + gap, 10.0)]
     cut = Operation(side="outside", tool=Tool(2.0), finish_mm=0.2, depth_mm=1.0)
     steps = planned(drawing_of(parts), Job((cut,)), machine).steps
-    found = [each for step in steps for each in step.findings if each.code is Code.GOUGE]
+    found = [each for step in steps for each in step.findings if each.code is ProgramCode.GOUGE]
     assert bool(found) is told
     solid = shapely.union_all([shapely.Polygon(path.vertices[:, :2]) for path in parts])
     for step in steps:
         deep = shapely.intersection(swept(step.runs, 1.0), solid).area
-        assert (deep > 1e-3) == any(each.code is Code.GOUGE for each in step.findings)
+        assert (deep > 1e-3) == any(each.code is ProgramCode.GOUGE for each in step.findings)
 
 
 def test_a_bore_is_finished_along_its_wall(machine: Machine) -> None:
@@ -144,13 +145,13 @@ def test_where_roughing_does_not_get_the_wall_is_cut_in_passes(machine: Machine)
     )  # fmt: skip
     settings = {"kind": "pocket", "finish_mm": 0.05, "depth_mm": 0.5, "step_down_mm": 0.1}
     done = stages(machine, [path], **settings)[1]
-    (finding,) = (each for each in done.findings if each.code == Code.FINISH_IN_PASSES)
+    (finding,) = (each for each in done.findings if each.code == PlanningCode.FINISH_IN_PASSES)
     assert "in 5 passes" in finding.message
     assert finding.measured == pytest.approx(2.0, abs=0.4)
     heights = np.unique(done.runs.vertices[:, 2])
     assert heights == pytest.approx([-0.5, -0.4, -0.3, -0.2, -0.1])
     plain = stages(machine, [box(0, 0, 2, 2)], **settings)[1]
-    assert not [each for each in plain.findings if each.code == Code.FINISH_IN_PASSES]
+    assert not [each for each in plain.findings if each.code == PlanningCode.FINISH_IN_PASSES]
 
 
 def test_tabs_of_the_first_stage_stay(machine: Machine) -> None:

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from camtool.findings import Code
 from camtool.geometry.distance import points_to_segments
 from camtool.geometry.polylines import Polyline, Polylines, Segments, reverse, rolled
+from camtool.planning.findings import PlanningCode
 from camtool.planning.items import Contour, Feeds, Setting
 from camtool.planning.job import Lead, Operation, Tool
 from camtool.planning.leads import (
@@ -87,7 +87,7 @@ def test_inside_a_corner_a_line_would_cut_the_part_and_is_left_out() -> None:
     made = leads(SQUARE, False, lead_in=LINE, lead_out=Lead())
     assert len(made.to) == 0
     (finding,) = made.findings
-    assert finding.code == Code.LEAD_LEFT_OUT
+    assert finding.code == PlanningCode.LEAD_LEFT_OUT
     assert finding.measured == 0.0
     assert finding.limit == 2.0
     assert "part/LINE 1 at X 0.0000 Y 0.0000" in finding.where
@@ -189,7 +189,7 @@ def test_no_point_of_a_lead_does_harm(
         halvings = math.log2(size / length)
         assert halvings == pytest.approx(round(halvings), abs=1e-6)
         assert 0 <= round(halvings) <= LEAD_HALVINGS
-    short = sum(each.code == Code.LEAD_LEFT_OUT for each in made.findings)
+    short = sum(each.code == PlanningCode.LEAD_LEFT_OUT for each in made.findings)
     assert short == len(made.findings)
     if not clear:
         assert len(made.to) == len(made.away) == 0

@@ -12,11 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError
-from camtool.findings import Code, Severity
+from camtool.findings import Severity
 from camtool.geometry.drawing import Branch, Drawing, Gap, Healing, Mark, SelfCrossing
 from camtool.geometry.measure import extents, path_lengths, signed_areas
 from camtool.geometry.polylines import Polyline, Segments
 from camtool.planning import place as module
+from camtool.planning.findings import PlanningCode
 from camtool.planning.job import Job, Operation, Placement, job_of
 from camtool.planning.place import collapsed, place, taken
 from tests.drawings import drawing_of
@@ -357,7 +358,7 @@ def test_paths_that_become_a_point_are_left_out_and_told() -> None:
     assert placed.sources[2].endswith("copy 2")
     assert [each.path for each in placed.healing.crossings] == [1, 3]
     (told,) = collapsed(made, placed, job)
-    assert (told.code, told.severity) == (Code.POINTS_MERGED, Severity.WARNING)
+    assert (told.code, told.severity) == (PlanningCode.POINTS_MERGED, Severity.WARNING)
     assert "2 paths" in told.message
 
 

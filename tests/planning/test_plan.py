@@ -16,8 +16,10 @@ from camtool.geometry.drawing import Mark
 from camtool.geometry.measure import path_lengths
 from camtool.geometry.polylines import Polyline, reverse
 from camtool.machine.model import Machine
+from camtool.planning.findings import PlanningCode
 from camtool.planning.job import Job, Lead, Operation, Tool, job_of
 from camtool.planning.plan import plan, planned
+from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.drawings import drawing_of
 from tests.strategies import contours, open_contours
@@ -114,7 +116,7 @@ def test_a_feed_above_the_highest_is_refused_with_one_that_works(
 
 def test_a_part_beyond_the_travel_is_an_error_with_a_mend(machine: Machine) -> None:
     toolpath = plan(drawing_of([_circle(9, 6, 2)]), job_of(), machine)
-    assert _errors(toolpath) == [Code.OUT_OF_TRAVEL, Code.OUT_OF_TRAVEL]
+    assert _errors(toolpath) == [ProgramCode.OUT_OF_TRAVEL, ProgramCode.OUT_OF_TRAVEL]
     first = toolpath.findings[0]
     assert (first.limit, first.unit) == (10.0, "mm")
     assert first.measured == pytest.approx(11.0)
@@ -128,29 +130,29 @@ def test_a_part_beyond_the_travel_is_an_error_with_a_mend(machine: Machine) -> N
 def test_part_zero_belongs_to_the_travel(machine: Machine) -> None:
     # 2 mm wide, but 12 mm from where the tool starts.
     assert _errors(plan(drawing_of([_circle(11, 1, 1)]), job_of(), machine)) == [
-        Code.OUT_OF_TRAVEL
+        ProgramCode.OUT_OF_TRAVEL
     ]
 
 
 def test_a_part_as_large_as_the_travel_fits(machine: Machine) -> None:
     assert _errors(plan(drawing_of([_box(0, 0, 10, 7)]), job_of(), machine)) == []
     assert _errors(plan(drawing_of([_box(0, 0, 10, 7.001)]), job_of(), machine)) == [
-        Code.OUT_OF_TRAVEL
+        ProgramCode.OUT_OF_TRAVEL
     ]
 
 
 def test_arcs_count_with_their_extremes(machine: Machine) -> None:
     # Its vertices lie within 10 mm, but the left of its half circle is at −3.5.
     bow = Polyline(np.array([[0.0, 0, -1], [0, 7, 0], [6.6, 7, 0]]))
-    assert _errors(plan(drawing_of([bow]), job_of(), machine)) == [Code.OUT_OF_TRAVEL]
+    assert _errors(plan(drawing_of([bow]), job_of(), machine)) == [ProgramCode.OUT_OF_TRAVEL]
 
 
 def test_when_no_contour_is_left_that_is_an_error(machine: Machine) -> None:
     job = job_of(tool_diameter_mm=3.0, side="inside")
     toolpath = plan(drawing_of([_circle(2, 1, 1)]), job, machine)
     codes = [finding.code for finding in toolpath.findings]
-    assert codes == [Code.CONTOUR_TOO_SMALL, Code.NOTHING_DRAWN]
-    assert _errors(toolpath) == [Code.NOTHING_DRAWN]
+    assert codes == [PlanningCode.CONTOUR_TOO_SMALL, PlanningCode.NOTHING_DRAWN]
+    assert _errors(toolpath) == [PlanningCode.NOTHING_DRAWN]
 
 
 def test_an_empty_drawing_gives_no_cuts(machine: Machine) -> None:
@@ -162,7 +164,7 @@ def test_an_empty_drawing_gives_no_cuts(machine: Machine) -> None:
 def test_findings_of_the_contours_are_kept(machine: Machine) -> None:
     job = job_of(tool_diameter_mm=0.5)
     toolpath = plan(drawing_of([_circle(2, 2, 1), _circle(4.3, 2, 1)]), job, machine)
-    assert Code.UNREACHED in [finding.code for finding in toolpath.findings]
+    assert PlanningCode.UNREACHED in [finding.code for finding in toolpath.findings]
 
 
 @given(st.lists(st.one_of(contours(), open_contours()), min_size=1, max_size=4))
@@ -193,9 +195,11 @@ def test_every_contour_is_cut_once_at_depth_and_rapids_stay_up(
 def test_single_points_are_named_and_alone_they_are_nothing_to_cut(machine: Machine) -> None:
     point = Mark((1.0, 2.0), "DRILL", "", "POINT 1")
     circle = replace(drawing_of([_circle(2, 1, 1)], ["CUT"]), marks=(point,))
-    assert [f.code for f in plan(circle, job_of(), machine).findings] == [Code.MARKS_NOT_CUT]
+    assert [f.code for f in plan(circle, job_of(), machine).findings] == [
+        PlanningCode.MARKS_NOT_CUT
+    ]
     alone = replace(drawing_of([], []), marks=(point,))
-    assert _errors(plan(alone, job_of(), machine)) == [Code.NOTHING_DRAWN]
+    assert _errors(plan(alone, job_of(), machine)) == [PlanningCode.NOTHING_DRAWN]
 
 
 def test_leads_keep_out_of_what_other_operations_leave(machine: Machine) -> None:
@@ -207,7 +211,7 @@ def test_leads_keep_out_of_what_other_operations_leave(machine: Machine) -> None
     made = drawing_of([_box(1, 1, 2, 3), _box(1, 3.3, 2, 4)], ["A", "B"])
     for operations, told in (((round_it,), False), ((round_it, near), True)):
         codes = [f.code for f in plan(made, Job(operations), machine).findings]
-        assert (Code.LEAD_LEFT_OUT in codes) is told
+        assert (PlanningCode.LEAD_LEFT_OUT in codes) is told
 
 
 def test_rapids_are_counted_through_all_operations(machine: Machine) -> None:

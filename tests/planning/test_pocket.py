@@ -12,11 +12,12 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError
-from camtool.findings import Code, Severity
+from camtool.findings import Severity
 from camtool.geometry.measure import length, signed_area
 from camtool.geometry.offset import offset_shape
 from camtool.geometry.polylines import Polyline, Polylines, Segments, reverse, rotated
 from camtool.planning.clearing import Cell, Steps, parts_of, ring_cells
+from camtool.planning.findings import PlanningCode
 from camtool.planning.items import CutRun, Fixed
 from camtool.planning.job import Entry
 from camtool.planning.pocket import pocket
@@ -225,7 +226,7 @@ def test_a_helix_is_as_large_as_it_may_be() -> None:
     (run,) = runs_of(work := work_of([SQUARE], 2.0, entry=Entry("helix", radius_mm=20.0)))
     helix = Segments.between(run.vertices[:1, :2], run.vertices[1:2, :2], run.vertices[:1, 3])
     assert 3.8 < helix.radius[0] <= 4.0
-    (changed,) = [f for f in work.findings if f.code == Code.ENTRY_CHANGED]
+    (changed,) = [f for f in work.findings if f.code == PlanningCode.ENTRY_CHANGED]
     assert "instead of 20 mm" in changed.message
 
 
@@ -241,7 +242,7 @@ def test_a_helix_is_as_large_as_it_may_be() -> None:
 )
 def test_entries_that_do_not_fit_are_told(width: float, entry: Entry, said: str | None) -> None:
     work = work_of([closed((0, 0), (20, 0), (20, width), (0, width))], 2.0, entry=entry)
-    changes = [f.message for f in work.findings if f.code == Code.ENTRY_CHANGED]
+    changes = [f.message for f in work.findings if f.code == PlanningCode.ENTRY_CHANGED]
     assert [said in change for change in changes] == ([True] if said else [])
     assert (
         gouges(runs_of(work), region_of([closed((0, 0), (20, 0), (20, width), (0, width))]), 1)
@@ -262,19 +263,19 @@ def test_a_slot_as_wide_as_the_tool_is_cut_along_its_middle(
     paths: list[Polyline], middle_mm: float
 ) -> None:
     work = work_of(paths, 2.0, step_down_mm=0.5)
-    (slot,) = [f for f in work.findings if f.code == Code.SLOT_AS_WIDE]
+    (slot,) = [f for f in work.findings if f.code == PlanningCode.SLOT_AS_WIDE]
     assert slot.severity == Severity.INFO
     (run,) = runs_of(work)
     (last,) = at_depth([run], -1.0)
     assert length(last) == pytest.approx(middle_mm, abs=1e-3)
     assert gouges([run], region_of(paths), 1.0 - 1e-4) == []
-    assert not [f for f in work.findings if f.code == Code.CONTOUR_TOO_SMALL]
+    assert not [f for f in work.findings if f.code == PlanningCode.CONTOUR_TOO_SMALL]
 
 
 def test_a_neck_as_wide_as_the_tool_is_cut_too() -> None:
     work = work_of([DUMBBELL], 2.0)
     assert len(runs_of(work)) == 3
-    assert [f.code for f in work.findings].count(Code.SLOT_AS_WIDE) == 1
+    assert [f.code for f in work.findings].count(PlanningCode.SLOT_AS_WIDE) == 1
     assert all(f.severity == Severity.INFO for f in work.findings)
 
 
@@ -287,14 +288,14 @@ def test_what_is_a_hair_too_narrow_is_a_slot_and_more_is_not() -> None:
 def test_a_pocket_too_small_is_listed_with_its_area() -> None:
     work = work_of([SQUARE, moved(scaled(SQUARE, 0.1), 20.0, 0.0)], 2.0)
     assert len(work.items) == 1
-    (finding,) = [f for f in work.findings if f.code == Code.CONTOUR_TOO_SMALL]
+    (finding,) = [f for f in work.findings if f.code == PlanningCode.CONTOUR_TOO_SMALL]
     assert finding.measured == pytest.approx(1.0)
     assert "PATH 1" in finding.where
 
 
 def test_what_stays_uncut_is_told_in_few_lines() -> None:
     work = work_of([comb(30)], 1.2)
-    uncut = [f for f in work.findings if f.code == Code.UNREACHED]
+    uncut = [f for f in work.findings if f.code == PlanningCode.UNREACHED]
     assert 1 <= len(uncut) <= 15
     assert sum(f.measured or 0.0 for f in uncut) > 30 * 5.8
 

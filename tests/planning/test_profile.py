@@ -16,11 +16,13 @@ from camtool.geometry.distance import nearest
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import sample, signed_areas
 from camtool.geometry.polylines import Polyline, Polylines, Segments, reverse
+from camtool.planning.findings import PlanningCode
 from camtool.planning.gouges import side_findings
 from camtool.planning.items import Contour, Feeds, Setting
 from camtool.planning.job import Job, job_of
 from camtool.planning.profile import profile
 from camtool.planning.sides import Sides, choose
+from camtool.toolpath.findings import ProgramCode
 from tests.drawings import drawing_of
 from tests.paths import moved, scaled
 from tests.strategies import contours as star_contours
@@ -107,7 +109,9 @@ def test_all_layers_nest_whichever_is_chosen() -> None:
     found = contours(made, job_of(tool_diameter_mm=2 * R, layers=("HOLES",)))
     assert found.source.tolist() == [0]
     assert _areas(found) == [pytest.approx(math.pi * (1 - R) ** 2)]
-    assert _codes(found) == [Code.SIDE_BY_UNCUT]  # nobody cuts the rim: it might be a frame
+    assert _codes(found) == [
+        PlanningCode.SIDE_BY_UNCUT
+    ]  # nobody cuts the rim: it might be a frame
     later = contours(made, job_of(tool_diameter_mm=2 * R, layers=("RI*",)))
     assert later.source.tolist() == [1]
     assert _areas(later) == [pytest.approx(math.pi * (3 + R) ** 2)]
@@ -131,7 +135,7 @@ def test_open_paths_are_cut_on_the_line(side: str, count: int) -> None:
     path = _line(1, 1, 2, 1)
     found = contours(drawing_of([path]), job_of(tool_diameter_mm=1.0, side=side))
     assert np.array_equal(found.lines.vertices, path.vertices)
-    assert _codes(found) == [Code.OPEN_CONTOUR_ON_LINE] * count
+    assert _codes(found) == [PlanningCode.OPEN_CONTOUR_ON_LINE] * count
     assert all(f.where == "0/PATH 0 at X 1.0000 Y 1.0000" for f in found.findings)
 
 
@@ -142,7 +146,7 @@ def test_a_contour_that_the_tool_does_not_fit_into_is_named() -> None:
     )
     assert found.source.tolist() == [1]
     (finding,) = found.findings
-    assert (finding.code, finding.severity) == (Code.CONTOUR_TOO_SMALL, Severity.WARNING)
+    assert (finding.code, finding.severity) == (PlanningCode.CONTOUR_TOO_SMALL, Severity.WARNING)
     assert finding.measured == pytest.approx(math.pi)
     assert finding.where == "0/PATH 0 at X 3.0000 Y 4.0000"
 
@@ -176,7 +180,7 @@ def test_a_contour_may_fall_apart() -> None:
 def test_parts_nearer_than_the_tool_is_wide_are_gouged_when_cut_one_by_one() -> None:
     paths = [_circle(0, 0, 1), _circle(2.3, 0, 1)]
     found = contours(drawing_of(paths), job_of(tool_diameter_mm=0.5, side="outside"))
-    assert _codes(found) == [Code.GOUGE, Code.GOUGE]
+    assert _codes(found) == [ProgramCode.GOUGE, ProgramCode.GOUGE]
     first = found.findings[0]
     assert first.severity == Severity.WARNING
     # Round the left circle the tool centre reaches x = 1.25; the other begins at 1.3.
@@ -195,7 +199,7 @@ def test_one_line_runs_round_parts_that_are_too_near(apart: float, count: int) -
     joined = [finding for finding in found.findings if "stay joined" in finding.message]
     assert len(joined) == 2 - count
     for finding in joined:
-        assert finding.code == Code.UNREACHED
+        assert finding.code == PlanningCode.UNREACHED
         assert finding.measured == pytest.approx(apart - 2.0, abs=1e-9)
         assert "0/PATH 0" in finding.message
         assert "0/PATH 1" in finding.message
@@ -221,7 +225,7 @@ def test_no_gouge(paths: list[Polyline]) -> None:
 def test_on_the_line_nothing_is_a_gouge() -> None:
     paths = [_circle(0, 0, 1), _circle(2.1, 0, 1)]
     found = contours(drawing_of(paths), job_of(tool_diameter_mm=0.5, side="on")).findings
-    assert [finding.code for finding in found] == [Code.LINES_RUN_TOGETHER]
+    assert [finding.code for finding in found] == [PlanningCode.LINES_RUN_TOGETHER]
 
 
 @pytest.mark.parametrize("width", [0.5, 0.5 - 4e-4])
@@ -235,7 +239,7 @@ def test_a_hole_as_wide_as_the_tool_is_cut_along_its_middle(width: float) -> Non
         found = contours(drawing_of([slot, outer]), job)
         (at,) = [place for place, k in enumerate(found.source.tolist()) if k == 0]
         assert found.lines[at].vertices[:, 1] == pytest.approx(0.5 * width, abs=6e-4)
-        assert Code.SLOT_AS_WIDE in _codes(found)
+        assert PlanningCode.SLOT_AS_WIDE in _codes(found)
 
 
 @pytest.mark.parametrize("turned", [False, True])
@@ -273,7 +277,7 @@ def test_the_tool_just_touches_the_contour_and_never_crosses_it(path: Polyline) 
             away = nearest(sample(line, 0.2), Segments.of(path)).distance
             assert away == pytest.approx(R, abs=1e-5)
         if len(found.lines) == 0:
-            assert _codes(found) == [Code.CONTOUR_TOO_SMALL]
+            assert _codes(found) == [PlanningCode.CONTOUR_TOO_SMALL]
         else:
             bigger = sum(_areas(found)) > abs(signed_areas(made.paths)[0])
             assert bigger == (side == "outside")
@@ -298,15 +302,15 @@ def test_a_corner_without_room_for_a_relief_is_told() -> None:
     paths = [_box(0, 0, 4, 3), _box(4.02, 0.0, 6, 3)]
     job = job_of(tool_diameter_mm=2 * R, side="inside", corners="dogbone")
     found = contours(drawing_of(paths), job)
-    assert set(_codes(found)) <= {Code.NOT_RELIEVED, Code.GOUGE}
-    assert Code.NOT_RELIEVED in _codes(found)
+    assert set(_codes(found)) <= {PlanningCode.NOT_RELIEVED, ProgramCode.GOUGE}
+    assert PlanningCode.NOT_RELIEVED in _codes(found)
 
 
 def test_many_places_of_a_kind_are_counted() -> None:
     paths = [_circle(2.3 * k, 0, 1) for k in range(30)]
     for side, named, counted in (("auto", 12, 17), ("outside", 12, 46)):
         job = job_of(tool_diameter_mm=0.5, side=side)
-        codes = {"auto": Code.UNREACHED, "outside": Code.GOUGE}
+        codes = {"auto": PlanningCode.UNREACHED, "outside": ProgramCode.GOUGE}
         found = [f for f in contours(drawing_of(paths), job).findings if f.code == codes[side]]
         found = [f for f in found if f.unit != "mm2"]
         assert len(found) == named + 1
@@ -319,7 +323,7 @@ def test_a_gap_narrower_than_the_tool_is_not_cut_at_all() -> None:
     paths = [_circle(0, 0, 3), _circle(0, 0, 2), _circle(0, 0, 1.7)]
     found = contours(drawing_of(paths), job_of(tool_diameter_mm=0.5))
     assert found.source.tolist() == [0]
-    small = [f for f in found.findings if f.code == Code.CONTOUR_TOO_SMALL]
+    small = [f for f in found.findings if f.code == PlanningCode.CONTOUR_TOO_SMALL]
     assert [f.where.split(" at ")[0] for f in small] == ["0/PATH 1", "0/PATH 2"]
     assert "into" in small[0].message
     assert "round" in small[1].message
@@ -332,19 +336,19 @@ def test_a_ring_as_wide_as_the_tool_is_cut_along_its_middle() -> None:
     assert radii[-1] == pytest.approx(3.25)
     assert radii[:-1] == pytest.approx([1.75] * (len(radii) - 1), abs=6e-4)
     assert len(radii) > 1
-    assert Code.SLOT_AS_WIDE in _codes(found)
+    assert PlanningCode.SLOT_AS_WIDE in _codes(found)
 
 
 def test_a_round_hole_as_wide_as_the_tool_leaves_nothing_uncut() -> None:
     found = contours(
         drawing_of([_box(-3, -3, 3, 3), _circle(0, 0, 0.5)]), job_of(tool_diameter_mm=1.0)
     )
-    assert Code.SLOT_AS_WIDE in _codes(found)
-    assert Code.UNREACHED not in _codes(found)
+    assert PlanningCode.SLOT_AS_WIDE in _codes(found)
+    assert PlanningCode.UNREACHED not in _codes(found)
     small = contours(
         drawing_of([_box(-3, -3, 3, 3), _circle(0, 0, 0.4)]), job_of(tool_diameter_mm=1.0)
     )
-    assert Code.UNREACHED in _codes(small)
+    assert PlanningCode.UNREACHED in _codes(small)
 
 
 @settings(max_examples=60)

@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError
-from camtool.findings import Code
 from camtool.geometry.polylines import Polyline
 from camtool.machine.model import Machine
+from camtool.planning.findings import PlanningCode
 from camtool.planning.items import Step
 from camtool.planning.job import Job, Operation, Tool
 from camtool.planning.plan import planned
@@ -84,13 +84,13 @@ def test_both_together_clear_what_the_smaller_one_alone_does(
     overlapped = 0.5 * (1.0 + REST_OVERLAP)
     cleared = region.buffer(-overlapped, quad_segs=64).buffer(overlapped, quad_segs=64)
     assert not shapely.contains(cleared.buffer(-0.2 - SLACK), centres).any()
-    assert not [each for each in wide.findings if each.code == Code.UNREACHED]
+    assert not [each for each in wide.findings if each.code == PlanningCode.UNREACHED]
 
 
 def test_a_rest_of_nothing_says_so(machine: Machine) -> None:
     circle = Polyline(np.array([[0, 0, 1.0], [5, 0, 1.0]]), closed=True)
     _, fine = steps_of(machine, circle, *pockets())
-    assert [each.code for each in fine.findings] == [Code.NO_REST]
+    assert [each.code for each in fine.findings] == [PlanningCode.NO_REST]
     assert not len(fine.runs)
 
 
@@ -111,7 +111,7 @@ def test_the_flat_floor_of_a_carving_is_cleared_beside_its_slopes(
     assert done.within(flat.buffer(SLACK))
     assert flat.buffer(-0.5).buffer(0.5 - SLACK).within(done.buffer(SLACK))
     assert cleared.setting.levels_mm == pytest.approx([-0.4, -0.8])
-    assert not [each for each in carved.findings if each.code == Code.DEPTH_LIMITED]
+    assert not [each for each in carved.findings if each.code == PlanningCode.DEPTH_LIMITED]
 
 
 def test_a_bit_that_is_not_wide_enough_for_the_depth_has_a_higher_floor(machine: Machine) -> None:

@@ -12,17 +12,19 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from camtool.findings import Code, Severity
+from camtool.findings import Severity
 from camtool.geometry.distance import points_to_segments
 from camtool.geometry.measure import length, sample
 from camtool.geometry.polylines import Polyline, Segments, reverse, rolled, rotated
 from camtool.importers.read import read_drawing
 from camtool.machine.model import Machine
 from camtool.pipeline import post_drawing
+from camtool.planning.findings import PlanningCode
 from camtool.planning.items import Contour, Fixed, Item
 from camtool.planning.job import Entry, Lead, Tabs, job_of
 from camtool.planning.order import must_precede
 from camtool.planning.reversing import fewer_reversals
+from camtool.toolpath.findings import ProgramCode
 from tests.oracles.reversals import fewest_runs
 from tests.paths import mirrored, moved, scaled
 from tests.planning.reversal_parts import (
@@ -194,7 +196,7 @@ def test_the_sample_logo(machine: Machine) -> None:
     assert cutting_reversals(before) > 200
     assert cutting_reversals(after) <= cutting_reversals(before) / 20
     assert (after.error_um.total.max or 0.0) <= (before.error_um.total.max or 0.0)
-    assert [finding.code for finding in findings] == [Code.REVERSALS_IN_AIR]
+    assert [finding.code for finding in findings] == [PlanningCode.REVERSALS_IN_AIR]
     assert findings[0].measured == 0.0
     assert findings[0].limit == sum(sum(reversals_of(path, machine)) for path in paths)
 
@@ -287,7 +289,7 @@ def test_an_axis_without_play_may_turn(machine: Machine) -> None:
     items, findings = fewer_reversals([item], none)
     assert items == [item]
     assert [(each.code, each.severity) for each in findings] == [
-        (Code.PLAY_NOT_KNOWN, Severity.WARNING)
+        (ProgramCode.PLAY_NOT_KNOWN, Severity.WARNING)
     ]
 
 
@@ -309,7 +311,7 @@ def test_what_only_a_whole_contour_can_have_keeps_it_whole(
     (item,) = items
     assert isinstance(item, Contour)
     assert item.path.closed
-    assert [each.code for each in findings] == [Code.REVERSALS_IN_AIR] * 2
+    assert [each.code for each in findings] == [PlanningCode.REVERSALS_IN_AIR] * 2
     assert "in one piece" in findings[1].message
     starts = item.starts.tolist()
     assert starts == ([] if "start" in operation else [0, 1, 2, 3])
@@ -399,5 +401,5 @@ def test_a_letter_from_drawing_to_report() -> None:
     assert report.before.total_max_um == pytest.approx(14.84, abs=0.3)
     assert report.error_um.total.max == pytest.approx(9.5, abs=0.3)
     assert "10 reversals while cutting become 0" in str(
-        next(each for each in posted.findings if each.code == Code.REVERSALS_IN_AIR)
+        next(each for each in posted.findings if each.code == PlanningCode.REVERSALS_IN_AIR)
     )

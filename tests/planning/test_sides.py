@@ -14,16 +14,19 @@ from hypothesis import strategies as st
 
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.drawing import Drawing, Unchosen, Units
+from camtool.geometry.findings import ContourCode
 from camtool.geometry.measure import extents, sample
 from camtool.geometry.polylines import Polyline, Polylines
 from camtool.importers.assemble import assemble
 from camtool.importers.options import ReadOptions, Selection
 from camtool.importers.pieces import Piece
 from camtool.machine.model import Machine
+from camtool.planning.findings import PlanningCode
 from camtool.planning.items import Contour
 from camtool.planning.job import Job, Operation, Stock, Tool, job_of
 from camtool.planning.plan import planned
 from camtool.planning.sides import Sides, choose
+from camtool.toolpath.findings import ProgramCode
 
 LAYERS = ("A", "B", "C", "D")
 D = 0.5
@@ -156,14 +159,14 @@ def test_a_window_of_its_own_layer_is_cut_inside(machine: Machine) -> None:
     for order in (("RIM", "HOLES"), ("HOLES", "RIM")):
         job = Job(operations=_profiles(*order))
         assert _rims(drawing, job, machine) == pytest.approx([6 + D, 2 - D, 2 - D])
-        assert _noticed(drawing, job, machine, Code.SIDE_BY_UNCUT) == []
+        assert _noticed(drawing, job, machine, PlanningCode.SIDE_BY_UNCUT) == []
 
 
 def test_a_side_by_what_nobody_cuts_is_told(machine: Machine) -> None:
     drawing = _read(PLATE, ("RIM", "HOLES", "HOLES"), layers=("HOLES",))
     job = job_of(tool_diameter_mm=D)
     assert _rims(drawing, job, machine) == pytest.approx([2 - D, 2 - D])
-    (finding,) = _noticed(drawing, job, machine, Code.SIDE_BY_UNCUT)
+    (finding,) = _noticed(drawing, job, machine, PlanningCode.SIDE_BY_UNCUT)
     assert (finding.severity, finding.measured) == (Severity.WARNING, 2.0)
     assert "RIM/PATH 0" in finding.message
     for said in ({"side": "outside"}, {"frames": ("RIM",)}):
@@ -180,7 +183,7 @@ def test_a_frame_turns_nothing_inside_out(machine: Machine) -> None:
         drawing = _read(framed, ("CUT", "CUT", "CUT", name), layers=("CUT",))
         job = job_of(tool_diameter_mm=D)
         assert _rims(drawing, job, machine) == pytest.approx(widths)
-        (finding,) = _noticed(drawing, job, machine, Code.SIDE_BY_UNCUT)
+        (finding,) = _noticed(drawing, job, machine, PlanningCode.SIDE_BY_UNCUT)
         assert finding.severity == severity
         assert f"{name}/PATH 3" in finding.message
     # Where a frame is cut it is a part like another.
@@ -232,18 +235,18 @@ def test_engraving_holds_nothing_and_a_pocket_holds_what_is_no_deeper(machine: M
 def test_a_cut_into_what_another_operation_keeps_is_an_error(machine: Machine) -> None:
     drawing = _read((_box(0, 0, 2, 2), _box(2.2, 0, 4, 2)), ("A", "B"))
     job = Job(operations=_profiles("A", "B"))
-    found = _noticed(drawing, job, machine, Code.GOUGE)
+    found = _noticed(drawing, job, machine, ProgramCode.GOUGE)
     assert [(each.severity, _amount(each)) for each in found] == [
         (Severity.ERROR, pytest.approx(0.3))
     ] * 2
     assert "B/PATH 1" in found[0].message
     assert "A/PATH 0" in found[0].where
     wide = Job(operations=_profiles("A", "B", side="outside"))
-    assert _noticed(drawing, wide, machine, Code.GOUGE) == found
+    assert _noticed(drawing, wide, machine, ProgramCode.GOUGE) == found
     # Of one operation, one line runs round both; where nobody cuts the neighbour, who knows.
-    assert _noticed(drawing, job_of(tool_diameter_mm=D), machine, Code.GOUGE) == []
+    assert _noticed(drawing, job_of(tool_diameter_mm=D), machine, ProgramCode.GOUGE) == []
     alone = _read((_box(0, 0, 2, 2), _box(2.2, 0, 4, 2)), ("A", "B"), layers=("A",))
-    (finding,) = _noticed(alone, job_of(tool_diameter_mm=D), machine, Code.GOUGE)
+    (finding,) = _noticed(alone, job_of(tool_diameter_mm=D), machine, ProgramCode.GOUGE)
     assert finding.severity == Severity.WARNING
     assert "which is not cut itself" in finding.message
 
@@ -267,7 +270,9 @@ def test_gouges_are_as_deep_as_shapely_says(
     )
     swept = mine.buffer(D, 64).difference(mine).intersection(wall)
     found = [
-        each for each in _noticed(drawing, job, machine, Code.GOUGE) if "A/PATH 0" in each.where
+        each
+        for each in _noticed(drawing, job, machine, ProgramCode.GOUGE)
+        if "A/PATH 0" in each.where
     ]
     assert bool(found) == (swept.area > 1e-6)
     # The deepest place of the sweep is on its edge, or or where the tool's centre goes.
@@ -284,10 +289,10 @@ def test_gouges_are_as_deep_as_shapely_says(
 def test_a_notch_drawn_beyond_an_edge_may_be_cut_by_saying_inside(machine: Machine) -> None:
     drawing = _read((_box(0, 0, 6, 4), _box(2, -1, 4, 1)), ("RIM", "NOTCH"))
     rim, notch = _profiles("RIM", "NOTCH")
-    (auto, _) = _noticed(drawing, Job(operations=(notch, rim)), machine, Code.GOUGE)
+    (auto, _) = _noticed(drawing, Job(operations=(notch, rim)), machine, ProgramCode.GOUGE)
     assert auto.severity == Severity.ERROR
     said = Operation(layers=("NOTCH",), tool=Tool(D), side="inside")
-    found = _noticed(drawing, Job(operations=(said, rim)), machine, Code.GOUGE)
+    found = _noticed(drawing, Job(operations=(said, rim)), machine, ProgramCode.GOUGE)
     assert found[0].severity == Severity.WARNING
 
 
@@ -296,7 +301,7 @@ def test_the_edge_of_the_stock_may_be_cut_over(machine: Machine) -> None:
         (_box(0, 0, 4, 4), _box(-0.1, -0.1, 4.1, 4.1)), ("CUT", "BLANK"), layers=("CUT",)
     )
     job = job_of(tool_diameter_mm=D, side="outside")
-    assert _noticed(drawing, job, machine, Code.GOUGE) == []
+    assert _noticed(drawing, job, machine, ProgramCode.GOUGE) == []
 
 
 def test_a_pocket_that_clears_away_what_is_kept_is_an_error(machine: Machine) -> None:
@@ -310,7 +315,7 @@ def test_a_pocket_that_clears_away_what_is_kept_is_an_error(machine: Machine) ->
             Operation(layers=("BOSS",), tool=tool, side=side, depth_mm=deep),
             Operation(layers=("RIM",), tool=tool, depth_mm=deep),
         )
-        return _noticed(drawing, Job(operations=operations), machine, Code.GOUGE)
+        return _noticed(drawing, Job(operations=operations), machine, ProgramCode.GOUGE)
 
     (finding,) = found(("POCKET",), "auto", 0.02)
     assert finding.severity == Severity.ERROR
@@ -387,7 +392,7 @@ def _single_lines(*chains: Sequence[tuple[float, float]], gap_mm: float = 0.01) 
 def _refused(drawing: Drawing, machine: Machine, **more: object) -> list[Finding]:
     operation = Operation(tool=Tool(D), depth_mm=0.1, layers=("A",), **more)  # type: ignore[arg-type]
     found = planned(drawing, Job((operation,)), machine).toolpath.findings
-    return [each for each in found if each.code == Code.BRANCHED]
+    return [each for each in found if each.code == ContourCode.BRANCHED]
 
 
 DIVIDED = [

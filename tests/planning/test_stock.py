@@ -13,11 +13,13 @@ import numpy as np
 import pytest
 
 from camtool.errors import OptionError
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import Finding, Severity
 from camtool.pipeline import post_drawing, verify_program
+from camtool.planning.findings import PlanningCode
 from camtool.planning.job import Entry, Job, Lead, Operation, Tabs, Tool
 from camtool.planning.plan import plan
 from camtool.target.registry import LoadedTarget, load_target
+from camtool.toolpath.findings import ProgramCode
 from tests.drawings import drawing_of
 from tests.oracles.contours import closed
 from tests.oracles.stock import Cutter, Path, moves_of
@@ -113,7 +115,7 @@ def test_their_programs_are_accepted_by_their_own_verifier(seed: int) -> None:
     assert errors == [], described(asked)
     assert posted.verification is not None
     shape = posted.verification.report.shape
-    gouges = any(each.code is Code.GOUGE for each in posted.findings)
+    gouges = any(each.code is ProgramCode.GOUGE for each in posted.findings)
     if shape is not None and not gouges:
         assert shape.overcut_um <= 1000.0 * GOUGE_MM
 
@@ -126,9 +128,9 @@ def test_the_report_sees_a_gouge_that_is_a_warning() -> None:
     posted = post_drawing(
         drawing_of([closed(*path) for path in paths]), Job((operation_of(asked),)), linuxcnc()
     )
-    assert {Code.GOUGE} == {f.code for f in posted.findings if f.severity > Severity.INFO} - {
-        Code.CUT_DOUBTFUL
-    }
+    assert {ProgramCode.GOUGE} == {
+        f.code for f in posted.findings if f.severity > Severity.INFO
+    } - {PlanningCode.CUT_DOUBTFUL}
     assert posted.verification is not None
     shape = posted.verification.report.shape
     assert shape is not None

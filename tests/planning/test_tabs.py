@@ -12,9 +12,9 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError
-from camtool.findings import Code
 from camtool.geometry.measure import length
 from camtool.geometry.polylines import Polyline, reverse, rolled
+from camtool.planning.findings import PlanningCode
 from camtool.planning.items import Contour, Feeds, Setting
 from camtool.planning.job import Entry, Lead, Operation, Tabs, Tool
 from camtool.planning.paths import MeasuredPath
@@ -179,7 +179,7 @@ def test_tabs_on_any_contour(path: Polyline, count: int, ramped: bool) -> None:
     made = contour(path, tabs, tool=Tool(0.2))
     found, findings = tabs_of(made, MeasuredPath.of(path))
     assert len(found) + len(findings) == count
-    assert all(each.code == Code.TAB_LEFT_OUT for each in findings)
+    assert all(each.code == PlanningCode.TAB_LEFT_OUT for each in findings)
     total, along = length(path), MeasuredPath.of(path)
     for which, tab in enumerate(found):
         ends = along.at(np.array([tab.begin, tab.end]))
@@ -201,7 +201,7 @@ def test_a_tab_in_a_slot_hardly_wider_than_the_tool_holds_nothing() -> None:
         contour(narrow, Tabs(count=2, width_mm=WIDTH)), MeasuredPath.of(narrow)
     )
     assert found == []
-    assert [each.code for each in findings] == [Code.TAB_LEFT_OUT] * 2
+    assert [each.code for each in findings] == [PlanningCode.TAB_LEFT_OUT] * 2
     assert "part/LINE 1" in findings[0].where
 
 
@@ -212,7 +212,7 @@ def test_a_circle_too_small_for_the_width_gets_no_tab() -> None:
         contour(small, Tabs(count=1, width_mm=WIDTH)), MeasuredPath.of(small)
     )
     assert found == []
-    assert [each.code for each in findings] == [Code.TAB_LEFT_OUT]
+    assert [each.code for each in findings] == [PlanningCode.TAB_LEFT_OUT]
 
 
 @pytest.mark.parametrize(

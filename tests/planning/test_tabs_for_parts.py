@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from camtool.errors import OptionError
-from camtool.findings import Code, Finding
+from camtool.findings import Finding
 from camtool.geometry.polylines import Polyline
+from camtool.planning.findings import PlanningCode
 from camtool.planning.job import Job, Tabs, job_of
 from camtool.planning.plan import planned
 from camtool.target.registry import load_target
@@ -38,7 +39,9 @@ def _tabbed(job: Job, *paths: Polyline) -> tuple[dict[str, int], list[Finding]]:
             z = run.vertices[:, 2]
             up = np.count_nonzero((z[1:] == top) & (z[:-1] < top - 1e-9))
             found[run.name] = found.get(run.name, 0) + int(up)
-    return found, [each for each in plan.toolpath.findings if each.code == Code.TAB_LEFT_OUT]
+    return found, [
+        each for each in plan.toolpath.findings if each.code == PlanningCode.TAB_LEFT_OUT
+    ]
 
 
 def _job(**more: object) -> Job:
@@ -127,7 +130,7 @@ def test_no_tab_of_a_polygon_lies_across_a_corner(
     plan = planned(drawing_of([path]), job, load_target("grbl").machine)
     bridges = [bridge for step in plan.steps for bridge in step.bridges]
     assert len(bridges) == count
-    assert not [each for each in plan.toolpath.findings if each.code == Code.TAB_LEFT_OUT]
+    assert not [each for each in plan.toolpath.findings if each.code == PlanningCode.TAB_LEFT_OUT]
     reach = 1.5 + 1.5875 + (1.0 if ramped else 0.0)
     for bridge in bridges:
         # Seen along its wall, no corner is as near as the tab and its slopes are long.

@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from camtool.findings import Code, Severity
+from camtool.findings import Severity
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import extents, path_lengths, sample, signed_area
 from camtool.geometry.polylines import Polyline, Segments
+from camtool.importers.findings import DrawingCode
 from camtool.importers.read import read_drawing
 
 SAMPLES = Path(__file__).parents[2] / "samples"
@@ -163,4 +164,4 @@ def test_the_coupon_has_two_parallel_lines_for_each_axis():
     assert (box[:, 0] > 0.0).all()
     assert (box[:, 1] < [10.0, 7.0]).all()
     assert [one for one in coupon.findings if one.severity > Severity.INFO] == []
-    assert Code.GAP_CLOSED not in [one.code for one in coupon.findings]
+    assert DrawingCode.GAP_CLOSED not in [one.code for one in coupon.findings]

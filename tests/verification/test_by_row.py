@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from camtool.findings import Code
 from camtool.simulation.motion import one_row
 from camtool.toolpath.builder import ToolpathBuilder
+from camtool.verification.findings import VerificationCode
 from camtool.verification.verify import Case, VerifyOptions, judge
 from tests.oracles.dense_moves import circle, cut, follow, pic_mmh, square
 from tests.oracles.judged import MACHINE, judged
@@ -81,7 +81,7 @@ def test_ends_that_the_controller_does_not_reach() -> None:
     assert made.report.unreached is not None
     assert made.report.unreached.moves == 2
     assert made.report.unreached.max_um == pytest.approx(30.0, abs=0.15)
-    (finding,) = [one for one in made.findings if one.code == Code.END_NOT_REACHED]
+    (finding,) = [one for one in made.findings if one.code == VerificationCode.END_NOT_REACHED]
     assert finding.measured == pytest.approx(30.0, abs=0.15)
     assert finding.where.startswith("move 5,")
     whole = judged(decoded, decoded).report.unreached

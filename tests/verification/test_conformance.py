@@ -11,6 +11,8 @@ from camtool.geometry.polylines import Polyline
 from camtool.pipeline import post_drawing, verify_program
 from camtool.planning.job import Job, Operation, Tool, job_of
 from camtool.target.registry import LoadedTarget, load_target
+from camtool.toolpath.findings import ProgramCode
+from camtool.verification.findings import VerificationCode
 from camtool.verification.verify import Verification
 from tests.drawings import drawing_of
 
@@ -63,7 +65,7 @@ def told(verification: Verification) -> list[Code]:
     return [
         each.code
         for each in verification.findings
-        if each.severity < Severity.ERROR and each.code >= Code.FEED_DIFFERS
+        if each.severity < Severity.ERROR and each.code >= VerificationCode.FEED_DIFFERS
     ]
 
 
@@ -92,18 +94,30 @@ def without(*lines: str) -> Callable[[str], str]:
 
 
 FAULTS: dict[str, tuple[Callable[[str], str], Code]] = {
-    "feeds × 3": (times("F", 3), Code.FEED_DIFFERS),
-    "one feed": (lambda text: text.replace("F120", "F121", 1), Code.FEED_DIFFERS),
-    "the plunge's feed": (lambda text: text.replace("F60", "F120", 1), Code.FEED_DIFFERS),
-    "no M3": (lambda text: re.sub(r"M3 S1000\n|S1000 M3\n", "", text), Code.SPINDLE_DIFFERS),
-    "M4": (lambda text: text.replace("M3", "M4"), Code.SPINDLE_DIFFERS),
-    "S × 20": (times("S", 20), Code.SPINDLE_DIFFERS),
-    "no M2": (without("M2"), Code.END_DIFFERS),
-    "rapids on the stock": (lambda text: text.replace("Z5.000", "Z0.000"), Code.CLEARANCE_LOW),
-    "rapids too low": (lambda text: text.replace("Z5.000", "Z4.900"), Code.CLEARANCE_LOW),
+    "feeds × 3": (times("F", 3), VerificationCode.FEED_DIFFERS),
+    "one feed": (lambda text: text.replace("F120", "F121", 1), VerificationCode.FEED_DIFFERS),
+    "the plunge's feed": (
+        lambda text: text.replace("F60", "F120", 1),
+        VerificationCode.FEED_DIFFERS,
+    ),
+    "no M3": (
+        lambda text: re.sub(r"M3 S1000\n|S1000 M3\n", "", text),
+        VerificationCode.SPINDLE_DIFFERS,
+    ),
+    "M4": (lambda text: text.replace("M3", "M4"), VerificationCode.SPINDLE_DIFFERS),
+    "S × 20": (times("S", 20), VerificationCode.SPINDLE_DIFFERS),
+    "no M2": (without("M2"), VerificationCode.END_DIFFERS),
+    "rapids on the stock": (
+        lambda text: text.replace("Z5.000", "Z0.000"),
+        VerificationCode.CLEARANCE_LOW,
+    ),
+    "rapids too low": (
+        lambda text: text.replace("Z5.000", "Z4.900"),
+        VerificationCode.CLEARANCE_LOW,
+    ),
     "one rapid on the stock": (
         lambda text: "Z0.000".join(text.rsplit("Z5.000", 1)),
-        Code.CLEARANCE_LOW,
+        VerificationCode.CLEARANCE_LOW,
     ),
 }
 
@@ -115,7 +129,7 @@ def test_a_setting_that_the_job_names_is_held(target: LoadedTarget, fault: str) 
     text = program(target)
     damaged = damage(text)
     assert damaged != text
-    if code is Code.END_DIFFERS and target.machine.target.name == "linuxcnc":
+    if code is VerificationCode.END_DIFFERS and target.machine.target.name == "linuxcnc":
         names = {each.code.name for each in held(damaged, target).findings}
         assert {"linuxcnc.NO_END", "END_DIFFERS"} <= names
         damaged = f"%\n{damaged}%\n"  # an end, and yet no M2
@@ -123,7 +137,7 @@ def test_a_setting_that_the_job_names_is_held(target: LoadedTarget, fault: str) 
     assert found
     assert found[0].severity is Severity.ERROR
     assert "block" in found[0].where
-    if code is not Code.END_DIFFERS:
+    if code is not VerificationCode.END_DIFFERS:
         assert found[0].measured != found[0].limit
         assert found[0].unit
 
@@ -136,12 +150,12 @@ def test_corners_are_rounded_no_farther_than_asked() -> None:
     def under(mode: str) -> list[Code]:
         return errors(held(re.sub(r"G64 P\S+", mode, text), target))
 
-    assert under("G64 P1") == under("G64") == [Code.SETTING_DIFFERS]
+    assert under("G64 P1") == under("G64") == [VerificationCode.SETTING_DIFFERS]
     assert under("G64 P0.005") == under("G61") == under("") == []
     exact = load_target("linuxcnc", settings=["dialect.path=exact-path"])
     assert "G61\n" in program(exact)
     damaged = program(exact).replace("G61\n", "G64 P0.01\n")
-    assert errors(held(damaged, exact)) == [Code.SETTING_DIFFERS]
+    assert errors(held(damaged, exact)) == [VerificationCode.SETTING_DIFFERS]
 
 
 def test_the_tool_and_the_wait_at_the_bottom_of_a_hole() -> None:
@@ -156,9 +170,9 @@ def test_the_tool_and_the_wait_at_the_bottom_of_a_hole() -> None:
     assert "T2 M6\n" in text
     assert "G4 P0.5\n" in text
     for wrong in (text.replace("T2 M6", "T3 M6"), text.replace("T2 M6\n", "")):
-        assert Code.SETTING_DIFFERS in errors(held(wrong, target, job))
+        assert VerificationCode.SETTING_DIFFERS in errors(held(wrong, target, job))
     for wrong in (text.replace("G4 P0.5", "G4 P0.4", 1), text.replace("G4 P0.5\n", "", 1)):
-        assert errors(held(wrong, target, job)) == [Code.SETTING_DIFFERS]
+        assert errors(held(wrong, target, job)) == [VerificationCode.SETTING_DIFFERS]
     assert errors(held(text.replace("G4 P0.5", "G4 P0.7"), target, job)) == []
 
 
@@ -171,11 +185,11 @@ def test_coolant_that_is_asked_for_runs() -> None:
     alone = Job((each[0],))
     ours = program(cooled, alone)
     for wrong in (ours.replace("M8\n", ""), ours.replace("M8\n", "M7\n")):
-        assert errors(held(wrong, cooled, alone)) == [Code.SETTING_DIFFERS]
+        assert errors(held(wrong, cooled, alone)) == [VerificationCode.SETTING_DIFFERS]
     dry = Job((each[2],))
     wet = program(cooled, dry).replace("G0 Z5.000", "M7\nG0 Z5.000", 1)
     assert errors(held(wet, cooled, dry)) == []
-    assert told(held(wet, cooled, dry)) == [Code.SETTING_DIFFERS]
+    assert told(held(wet, cooled, dry)) == [VerificationCode.SETTING_DIFFERS]
 
 
 @both
@@ -185,15 +199,15 @@ def test_what_nobody_asked_for_is_told(target: LoadedTarget) -> None:
     assert told(held(text, target, plain)) == []
     faster = held(times("F", 2)(text), target, plain)
     assert errors(faster) == []
-    assert told(faster) == [Code.FEED_DIFFERS]
+    assert told(faster) == [VerificationCode.FEED_DIFFERS]
     lower = held(text.replace("Z5.000", "Z2.000"), target, plain)
     assert errors(lower) == []
-    assert Code.CLEARANCE_LOW in told(lower)
+    assert VerificationCode.CLEARANCE_LOW in told(lower)
     on_stock = held(text.replace("Z5.000", "Z0.000"), target, plain)
-    assert Code.CLEARANCE_LOW in errors(on_stock)
+    assert VerificationCode.CLEARANCE_LOW in errors(on_stock)
     turning = held(text.replace("G0 Z5.000", "M3 S500\nG0 Z5.000", 1), target, plain)
     assert errors(turning) == []
-    assert told(turning) == [Code.SPINDLE_DIFFERS]
+    assert told(turning) == [VerificationCode.SPINDLE_DIFFERS]
 
 
 @both
@@ -204,7 +218,9 @@ def test_the_other_way_round(target: LoadedTarget) -> None:
         for way in ("climb", "conventional")
     )
     judged = held(program(target, climb), target, conventional)
-    assert errors(judged) == [Code.CUT_OTHER_WAY] * 2  # the open line may run either way
+    assert (
+        errors(judged) == [VerificationCode.CUT_OTHER_WAY] * 2
+    )  # the open line may run either way
     text = program(target)
     (arc,) = re.findall(r"^G[23] .*\n", text, re.MULTILINE)[:1]
     turned = text.replace(arc, arc.replace("G3", "G4").replace("G2", "G3").replace("G4", "G2"), 1)
@@ -221,9 +237,9 @@ def test_a_shift_of_a_few_units_is_found(target: LoadedTarget) -> None:
     assert near.report.asked is not None
     assert 0.9 < near.report.asked.off_um < 1.1
     far = held(text.replace("X20.500 ", "X20.503 "), target)
-    assert errors(far) == [Code.EXTRA_CUT]
+    assert errors(far) == [VerificationCode.EXTRA_CUT]
     deeper = held(text.replace("Z-1.000", "Z-1.003", 1), target)
-    assert set(errors(deeper)) == {Code.CONTOUR_MISSING, Code.EXTRA_CUT}
+    assert set(errors(deeper)) == {VerificationCode.CONTOUR_MISSING, VerificationCode.EXTRA_CUT}
 
 
 @both
@@ -232,9 +248,9 @@ def test_a_plunge_as_a_rapid_runs_through_the_stock(target: LoadedTarget, tool: 
     job = job_of(tool_diameter_mm=tool, depth_mm=1.0)
     text = program(target, job)
     down = re.findall(r"^G1 Z-1.000 F\d+$", text, re.MULTILINE)
-    assert Code.RAPID_IN_STOCK not in errors(held(text, target, job))
+    assert ProgramCode.RAPID_IN_STOCK not in errors(held(text, target, job))
     damaged = text.replace(down[0], "G0 Z-1.000", 1).replace("\nG3 X", "\nG3 F200 X", 1)
-    assert Code.RAPID_IN_STOCK in errors(held(damaged, target, job))
+    assert ProgramCode.RAPID_IN_STOCK in errors(held(damaged, target, job))
 
 
 @both
@@ -243,7 +259,7 @@ def test_a_circle_cut_twice(target: LoadedTarget) -> None:
     circles = re.findall(r"^G[23] X\S+ Y\S+ I\S+ J0.000 F120\n", text, re.MULTILINE)
     assert len(circles) == 1
     twice = held(text.replace(circles[0], circles[0] * 2), target)
-    assert errors(twice) == [Code.EXTRA_CUT]
+    assert errors(twice) == [VerificationCode.EXTRA_CUT]
     assert "cut 2 times" in next(each.message for each in twice.findings if each.severity > 1)
 
 
@@ -282,4 +298,4 @@ M30
     header = re.sub(r"M3.*\n|S1000.*\n", "", head)
     found = held(header + own, target)
     assert errors(found) == []
-    assert set(told(found)) <= {Code.END_DIFFERS}  # it does not go home
+    assert set(told(found)) <= {VerificationCode.END_DIFFERS}  # it does not go home

@@ -9,21 +9,28 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from camtool.errors import CamtoolError
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import Finding, Severity
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.polylines import Polyline
+from camtool.inspection.findings import InspectionCode
 from camtool.pipeline import post_drawing, verify_program
 from camtool.planning.job import Job, Placement, job_of
 from camtool.run import Run
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
+from camtool.verification.findings import VerificationCode
 from camtool.verification.verify import Verification
 from tests.drawings import drawing_of
 from tests.paths import moved, scaled
 from tests.strategies import contours, open_contours
 from tests.verification.test_damage import CASES, NAMES, sound
 
-AGAINST = (Code.CONTOUR_MISSING, Code.EXTRA_CUT, *(c for c in Code if c >= Code.FEED_DIFFERS))
+AGAINST = (
+    VerificationCode.CONTOUR_MISSING,
+    VerificationCode.EXTRA_CUT,
+    *InspectionCode,
+    *(c for c in VerificationCode if c >= VerificationCode.FEED_DIFFERS),
+)
 
 
 @st.composite

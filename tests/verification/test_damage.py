@@ -22,6 +22,7 @@ from camtool.geometry.polylines import Polyline
 from camtool.pipeline import post_drawing, verify_program
 from camtool.planning.job import Job, job_of
 from camtool.target.registry import LoadedTarget, load_target
+from camtool.verification.findings import VerificationCode
 from tests.drawings import drawing_of
 from tests.fuzz.program_damage import KINDS, MOTION, Whole, damaged, motors
 from tests.oracles.changed import makes_a_difference
@@ -197,7 +198,7 @@ def test_the_last_digit_of_a_cut_is_a_warning(name: str) -> None:
     place = Random(name).choice(list(re.finditer(what, text)))
     other = f"{float(place[0]) + by:.3f}"
     data = (text[: place.start()] + other + text[place.end() :]).encode()
-    assert (Code.MOVES_CHANGED, Severity.WARNING) in _new_findings(name, data)
+    assert (VerificationCode.MOVES_CHANGED, Severity.WARNING) in _new_findings(name, data)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -239,7 +240,11 @@ def test_the_speed_of_one_slave_is_reported(seed: int) -> None:
         found = verify_program(
             other.encode(), whole.target, source="damaged", drawing=drawing, job=asked
         ).findings
-        codes = {Code.FEED_DIFFERS, Code.EXTRA_CUT, Code.CONTOUR_MISSING}
+        codes = {
+            VerificationCode.FEED_DIFFERS,
+            VerificationCode.EXTRA_CUT,
+            VerificationCode.CONTOUR_MISSING,
+        }
         assert codes & {each.code for each in found if each.severity >= Severity.WARNING}
 
 

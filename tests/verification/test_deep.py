@@ -9,9 +9,11 @@ import pytest
 from camtool.findings import Code, Severity
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.verification.coverage import holes_of
 from camtool.verification.cuts import cut_moves, loops
+from camtool.verification.findings import VerificationCode
 from camtool.verification.verify import Verification, VerifyOptions
 from tests.oracles.deep_moves import Shop, everything
 from tests.oracles.path_machine import path_machine
@@ -54,7 +56,7 @@ def test_each_dialect_cuts_all_of_it(name: str) -> None:
     options = VerifyOptions(tool_diameter_mm=0.3 * size)
     found = verify(decoded, target.machine, wanted=wanted, options=options)
     assert errors(found) == []
-    split = Code.MOVE_SPLIT in {finding.code for finding in program.findings}
+    split = ProgramCode.MOVE_SPLIT in {finding.code for finding in program.findings}
     assert split == (name not in ("grbl", "linuxcnc"))
     nominal = {size_.name: size_.nominal_mm for size_ in found.report.dimensions}
     # The pocket is contour 3, and deeper contour 4.
@@ -102,7 +104,7 @@ def test_a_lost_pass_is_missing() -> None:
     assert errors(judged(wanted, wanted)) == []
     upper = wanted.end[:, 2] == -1.5
     lost = judged(moved(wanted, upper, (0.0, 0.0, -1.5)), wanted)
-    assert errors(lost) == [Code.CONTOUR_MISSING]
+    assert errors(lost) == [VerificationCode.CONTOUR_MISSING]
     assert "none is at its depth" in lost.findings[0].message
 
 
@@ -113,7 +115,7 @@ def test_a_slope_at_another_height_is_missing_and_extra(off: float) -> None:
     wanted = made.finish()
     carved = wanted.is_feed & (wanted.end[:, 2] < 0.0)
     found = judged(moved(wanted, carved, (0.0, 0.0, off)), wanted)
-    assert set(errors(found)) == {Code.CONTOUR_MISSING, Code.EXTRA_CUT}
+    assert set(errors(found)) == {VerificationCode.CONTOUR_MISSING, VerificationCode.EXTRA_CUT}
     assert errors(judged(moved(wanted, carved, (0.0, 0.0, 0.1 * off)), wanted)) == []
 
 
@@ -121,7 +123,7 @@ def test_a_slope_the_other_way_round_is_another_slope() -> None:
     there = ToolpathBuilder().rapid(z=1).rapid(5, 5).line(z=-1, feed=9).line(9, 5, -3, feed=9)
     back = ToolpathBuilder().rapid(z=1).rapid(5, 5).line(z=-3, feed=9).line(9, 5, -1, feed=9)
     found = judged(there.rapid(z=1).finish(), back.rapid(z=1).finish())
-    assert set(errors(found)) == {Code.CONTOUR_MISSING, Code.EXTRA_CUT}
+    assert set(errors(found)) == {VerificationCode.CONTOUR_MISSING, VerificationCode.EXTRA_CUT}
     share = [float(one.message.split("%")[0]) for one in found.findings if "%" in one.message]
     assert min(share) > 90.0
 
@@ -132,7 +134,10 @@ def test_a_helix_of_the_wrong_pitch_is_found() -> None:
         return b.arc(7, 5, -depth, centre=(5, 5), ccw=True, feed=9).rapid(z=1).finish()
 
     assert errors(judged(bore(1.0), bore(1.0))) == []
-    assert set(errors(judged(bore(1.0), bore(1.1)))) == {Code.CONTOUR_MISSING, Code.EXTRA_CUT}
+    assert set(errors(judged(bore(1.0), bore(1.1)))) == {
+        VerificationCode.CONTOUR_MISSING,
+        VerificationCode.EXTRA_CUT,
+    }
 
 
 def test_a_slope_in_steps_of_a_hair_is_that_slope() -> None:
@@ -165,7 +170,7 @@ def test_holes_are_found_and_no_contour_begins_as_one() -> None:
 def test_a_program_that_only_drills_is_judged_and_has_no_false_alarm() -> None:
     found = judged(drilled(2.0, 3.0), drilled(2.0, 3.0), tool=1.0)
     assert errors(found) == []
-    assert Code.NO_MOTION not in {finding.code for finding in found.findings}
+    assert VerificationCode.NO_MOTION not in {finding.code for finding in found.findings}
 
 
 def ring(radius: float, depth: float) -> Toolpath:
@@ -187,7 +192,7 @@ def test_a_plunge_stands_for_a_contour_smaller_than_a_dialect_can_say() -> None:
     def found(decoded: Toolpath, wanted: Toolpath) -> set[Code]:
         return set(errors(verify(decoded, path_machine(), wanted=wanted)))
 
-    both = {Code.CONTOUR_MISSING, Code.EXTRA_CUT}
+    both = {VerificationCode.CONTOUR_MISSING, VerificationCode.EXTRA_CUT}
     for x in (5.0, 5.0005, 5.01):
         assert found(plunge(x, 1.0), tiny) == set()
         assert found(tiny, plunge(x, 1.0)) == set()
@@ -203,12 +208,12 @@ def test_a_plunge_stands_for_a_contour_smaller_than_a_dialect_can_say() -> None:
 
 def test_lost_added_and_shallow_holes() -> None:
     missing = judged(drilled(2.0), drilled(2.0, 3.0))
-    assert errors(missing) == [Code.CONTOUR_MISSING]
-    (finding,) = [one for one in missing.findings if one.code == Code.CONTOUR_MISSING]
+    assert errors(missing) == [VerificationCode.CONTOUR_MISSING]
+    (finding,) = [one for one in missing.findings if one.code == VerificationCode.CONTOUR_MISSING]
     assert finding.where == "move 13 at (10.000, 5.000) mm"
-    assert errors(judged(drilled(2.0, 3.0), drilled(2.0))) == [Code.EXTRA_CUT]
+    assert errors(judged(drilled(2.0, 3.0), drilled(2.0))) == [VerificationCode.EXTRA_CUT]
     shallow = judged(drilled(2.0, 2.9), drilled(2.0, 3.0))
-    assert errors(shallow) == [Code.CONTOUR_MISSING, Code.EXTRA_CUT]
+    assert errors(shallow) == [VerificationCode.CONTOUR_MISSING, VerificationCode.EXTRA_CUT]
     assert "another depth" in shallow.findings[0].message
 
 
@@ -218,10 +223,10 @@ def test_rapids_may_run_where_the_tool_has_been() -> None:
     made.path.rapid(20.0, 20.0)
     inside = made.finish()
     assert errors(judged(inside, inside, tool=3.0)) == []
-    assert errors(judged(inside, inside)) == [Code.RAPID_IN_STOCK]
+    assert errors(judged(inside, inside)) == [ProgramCode.RAPID_IN_STOCK]
     made.path.rapid(20.0, 20.0).line(z=-3.0, feed=9).rapid(30.0, 20.0)
     beyond = made.finish()
-    assert errors(judged(beyond, beyond, tool=3.0)) == [Code.RAPID_IN_STOCK]
+    assert errors(judged(beyond, beyond, tool=3.0)) == [ProgramCode.RAPID_IN_STOCK]
 
 
 def test_loops_of_leads_passes_and_ways_there_and_back() -> None:

@@ -7,12 +7,16 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import Finding, Severity
 from camtool.geometry.drawing import Drawing, Units
 from camtool.geometry.polylines import Polyline, Polylines
+from camtool.importers.findings import DrawingCode
+from camtool.planning.findings import PlanningCode
 from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Kind
 from camtool.toolpath.wanted import Drawn
+from camtool.verification.findings import VerificationCode
 from camtool.verification.verify import Case, VerifyOptions, judge
 from tests.oracles.dense_moves import (
     circle,
@@ -30,12 +34,12 @@ def test_a_dropped_contour_is_missing() -> None:
     decoded = b.finish()
     wanted = circle(b, grid(2.0), grid(2.2), grid(0.1)).finish()
     found = judged(decoded, wanted)
-    (missing,) = [f for f in found.findings if f.code == Code.CONTOUR_MISSING]
+    (missing,) = [f for f in found.findings if f.code == VerificationCode.CONTOUR_MISSING]
     assert missing.severity == Severity.ERROR
     assert "100% of contour 4" in missing.message
     assert missing.measured is not None
     assert missing.measured > 0.05
-    assert Code.EXTRA_CUT not in codes(found)
+    assert VerificationCode.EXTRA_CUT not in codes(found)
 
 
 def test_an_added_contour_is_extra() -> None:
@@ -43,8 +47,8 @@ def test_an_added_contour_is_extra() -> None:
     wanted = b.finish()
     decoded = circle(b, grid(2.0), grid(2.2), grid(0.1)).finish()
     found = judged(decoded, wanted)
-    assert Code.CONTOUR_MISSING not in codes(found)
-    (extra,) = [f for f in found.findings if f.code == Code.EXTRA_CUT]
+    assert VerificationCode.CONTOUR_MISSING not in codes(found)
+    (extra,) = [f for f in found.findings if f.code == VerificationCode.EXTRA_CUT]
     assert "move 22 near (2." in extra.where
 
 
@@ -53,7 +57,7 @@ def test_a_short_missing_line_is_found() -> None:
     decoded = b.finish()
     wanted = b.line(2.0, 1.012, feed=1).finish()
     found = judged(decoded, wanted)
-    (missing,) = [f for f in found.findings if f.code == Code.CONTOUR_MISSING]
+    (missing,) = [f for f in found.findings if f.code == VerificationCode.CONTOUR_MISSING]
     assert missing.measured == pytest.approx(0.012, rel=0.02)
 
 
@@ -64,19 +68,19 @@ def test_a_circle_the_other_way_round(radius: float) -> None:
     same = square(ToolpathBuilder(), 1, 1, 1)
     cut(same, 3, 3 + radius).arc(3, 3 - radius, centre=(3, 3), ccw=True, feed=1)
     same.arc(3, 3 + radius, centre=(3, 3), ccw=True, feed=1)
-    assert Code.CUT_OTHER_WAY not in codes(judged(same.finish(), wanted))
+    assert VerificationCode.CUT_OTHER_WAY not in codes(judged(same.finish(), wanted))
     other = square(ToolpathBuilder(), 1, 1, 1)
     cut(other, 3, 3 + radius).arc(3, 3 + radius, centre=(3, 3), ccw=False, feed=1)
     found = judged(other.finish(), wanted)
-    (turned,) = [f for f in found.findings if f.code == Code.CUT_OTHER_WAY]
+    (turned,) = [f for f in found.findings if f.code == VerificationCode.CUT_OTHER_WAY]
     assert turned.severity == Severity.ERROR
-    assert not {Code.CONTOUR_MISSING, Code.EXTRA_CUT} & set(codes(found))
+    assert not {VerificationCode.CONTOUR_MISSING, VerificationCode.EXTRA_CUT} & set(codes(found))
 
 
 def test_an_open_line_may_run_either_way() -> None:
     wanted = cut(ToolpathBuilder(), 1, 1).line(2, 1, feed=1).line(2, 2, feed=1).finish()
     back = cut(ToolpathBuilder(), 2, 2).line(2, 1, feed=1).line(1, 1, feed=1).finish()
-    assert Code.CUT_OTHER_WAY not in codes(judged(back, wanted))
+    assert VerificationCode.CUT_OTHER_WAY not in codes(judged(back, wanted))
 
 
 def test_the_wrong_depth_is_a_missing_and_an_extra_cut() -> None:
@@ -84,8 +88,8 @@ def test_the_wrong_depth_is_a_missing_and_an_extra_cut() -> None:
     z = np.where(wanted.end[:, 2] < 0, -0.05, wanted.end[:, 2])
     decoded = replace(wanted, end=np.column_stack([wanted.end[:, :2], z]))
     found = judged(decoded, wanted)
-    assert codes(found).count(Code.CONTOUR_MISSING) == 3
-    assert codes(found).count(Code.EXTRA_CUT) == 3
+    assert codes(found).count(VerificationCode.CONTOUR_MISSING) == 3
+    assert codes(found).count(VerificationCode.EXTRA_CUT) == 3
     assert "at its depth" in found.findings[0].message
     assert found.report.error_um.rounding.max == pytest.approx(0.0, abs=1e-6)
 
@@ -94,8 +98,8 @@ def test_a_program_that_lost_its_plunges_cuts_nothing() -> None:
     wanted = sample_part().finish()
     decoded = replace(wanted, end=np.column_stack([wanted.end[:, :2], np.zeros(len(wanted))]))
     found = judged(decoded, wanted)
-    assert codes(found).count(Code.CONTOUR_MISSING) == 3
-    assert Code.NO_MOTION in codes(found)
+    assert codes(found).count(VerificationCode.CONTOUR_MISSING) == 3
+    assert VerificationCode.NO_MOTION in codes(found)
     assert found.report.error_um.total.max is None
 
 
@@ -113,12 +117,12 @@ def test_reversals_are_told_apart_and_too_many_are_a_warning() -> None:
     assert found.report.reversals.x == len(decoded)
     assert found.report.reversals.cutting.x == cutting
     assert found.report.reversals.air.x == len(decoded) - cutting
-    assert Code.MANY_REVERSALS not in codes(found)
+    assert VerificationCode.MANY_REVERSALS not in codes(found)
     # Their errors do not grow with the part: the thesis's larger ones bore as many.
-    assert Code.MANY_REVERSALS not in codes(judge(case, chunks(2)))
+    assert VerificationCode.MANY_REVERSALS not in codes(judge(case, chunks(2)))
     machine = pic_mmh("limits.small_part_mm=5")
     many = judge(structs.replace(case, target=on(machine)), chunks(2))
-    (warning,) = [f for f in many.findings if f.code == Code.MANY_REVERSALS]
+    (warning,) = [f for f in many.findings if f.code == VerificationCode.MANY_REVERSALS]
     assert (warning.measured, warning.limit) == (18.0, 16.0)
     assert warning.severity == Severity.WARNING
 
@@ -141,7 +145,7 @@ def test_an_arc_that_never_ends_is_an_error_with_its_block() -> None:
                 yield piece
 
     found = judge(Case(decoded, on(MACHINE), None, None, VerifyOptions()), chunks())
-    (finding,) = [f for f in found.findings if f.code == Code.ARC_MISSES_END]
+    (finding,) = [f for f in found.findings if f.code == ProgramCode.ARC_MISSES_END]
     assert finding.severity == Severity.ERROR
     assert finding.where.startswith("block 12,")
     assert finding.measured == pytest.approx(math.sqrt(2.0))
@@ -152,14 +156,14 @@ def test_an_arc_that_never_ends_is_an_error_with_its_block() -> None:
 def test_travel_play_homing_and_rapids_in_stock() -> None:
     b = cut(ToolpathBuilder(), -1.0, 1.0).line(9.5, 1.0, feed=1).rapid(9.5, 2.0).rapid(z=0.2)
     found = judged(b.event(Kind.HOME_Z).finish())
-    (travel,) = [f for f in found.findings if f.code == Code.OUT_OF_TRAVEL]
+    (travel,) = [f for f in found.findings if f.code == ProgramCode.OUT_OF_TRAVEL]
     assert (travel.measured, travel.limit) == (pytest.approx(10.5), 10.0)
     assert travel.where.startswith("axis X")
-    (play,) = [f for f in found.findings if f.code == Code.PLAY_NOT_KNOWN]
+    (play,) = [f for f in found.findings if f.code == ProgramCode.PLAY_NOT_KNOWN]
     assert play.where == "axis Z"
-    (rapid,) = [f for f in found.findings if f.code == Code.RAPID_IN_STOCK]
+    (rapid,) = [f for f in found.findings if f.code == ProgramCode.RAPID_IN_STOCK]
     assert rapid.where.startswith("move 5")
-    assert codes(found).count(Code.RETURN_TO_MACHINE_ZERO) == 1
+    assert codes(found).count(VerificationCode.RETURN_TO_MACHINE_ZERO) == 1
 
 
 @pytest.mark.parametrize(
@@ -174,7 +178,7 @@ def test_travel_play_homing_and_rapids_in_stock() -> None:
 )
 def test_programs_that_cut_nothing_are_told_so(b: ToolpathBuilder) -> None:
     found = judged(b.finish())
-    (finding,) = [f for f in found.findings if f.code == Code.NO_MOTION]
+    (finding,) = [f for f in found.findings if f.code == VerificationCode.NO_MOTION]
     assert finding.severity == Severity.WARNING
     assert found.report.dimensions == ()
     assert found.report.error_um.total.max is None
@@ -182,9 +186,9 @@ def test_programs_that_cut_nothing_are_told_so(b: ToolpathBuilder) -> None:
 
 
 def test_findings_of_all_stages_are_merged_once() -> None:
-    shared = Finding(Code.FEED_ABOVE_LIMIT, Severity.ERROR, "too fast", where="block 4")
-    other = Finding(Code.CONTOUR_TOO_SMALL, Severity.WARNING, "lost")
-    drawn = Finding(Code.UNITLESS, Severity.WARNING, "no unit")
+    shared = Finding(ProgramCode.FEED_ABOVE_LIMIT, Severity.ERROR, "too fast", where="block 4")
+    other = Finding(PlanningCode.CONTOUR_TOO_SMALL, Severity.WARNING, "lost")
+    drawn = Finding(DrawingCode.UNITLESS, Severity.WARNING, "no unit")
     plain = sample_part().finish()
     paths = Polylines.of([Polyline(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]))])
     drawing = Drawing(
@@ -199,8 +203,12 @@ def test_findings_of_all_stages_are_merged_once() -> None:
     found = judge(
         Case(decoded, on(MACHINE), wanted, drawing, VerifyOptions()), follow(decoded, 10)
     )
-    assert codes(found)[:3] == [Code.UNITLESS, Code.FEED_ABOVE_LIMIT, Code.CONTOUR_TOO_SMALL]
-    assert codes(found).count(Code.FEED_ABOVE_LIMIT) == 1
+    assert codes(found)[:3] == [
+        DrawingCode.UNITLESS,
+        ProgramCode.FEED_ABOVE_LIMIT,
+        PlanningCode.CONTOUR_TOO_SMALL,
+    ]
+    assert codes(found).count(ProgramCode.FEED_ABOVE_LIMIT) == 1
     assert [item.code for item in found.report.findings] == [code.name for code in codes(found)]
     assert found.report.error_um.fit.max == pytest.approx(0.2)
     assert found.report.error_um.fit.rms == pytest.approx(0.1)
@@ -215,6 +223,6 @@ def test_many_findings_of_a_kind_are_cut_short() -> None:
         square(wanted, grid(1 + 0.1 * number), 1, grid(0.05))
     decoded = square(ToolpathBuilder(), 1, 2, grid(0.05)).finish()
     found = judged(decoded, wanted.finish())
-    missing = [f for f in found.findings if f.code == Code.CONTOUR_MISSING]
+    missing = [f for f in found.findings if f.code == VerificationCode.CONTOUR_MISSING]
     assert len(missing) == 20
     assert missing[-1].message.endswith("and 10 more contours")

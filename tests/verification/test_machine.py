@@ -5,11 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from camtool.findings import Code, Severity
+from camtool.findings import Severity
 from camtool.simulation.motion import Options
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Toolpath
+from camtool.verification.findings import VerificationCode
 from camtool.verification.verify import VerifyOptions
 from tests.oracles.dense_moves import circle, cut, dense_distance, pic_mmh, points_of, square
 from tests.oracles.motion_rows import rows_of
@@ -137,7 +139,7 @@ def test_arcs_that_miss_their_end_are_exactly_those_that_the_simulation_gave_up(
         for number, row in enumerate(rows_of(simulate(decoded, machine)))
         if not row.ended
     }
-    found = [f for f in verify(decoded, machine).findings if f.code == Code.ARC_MISSES_END]
+    found = [f for f in verify(decoded, machine).findings if f.code == ProgramCode.ARC_MISSES_END]
     assert 3 <= len(missed) <= 20
     assert {f.where.split(",")[0] for f in found} == missed
     for finding in found:
@@ -177,12 +179,12 @@ def test_a_program_of_our_own_post_is_within_the_steps_of_its_machine(form: str)
 def test_the_string_of_the_thesis_alone_is_judged() -> None:
     """Its arc starts at part zero, so start and end radius differ: it cannot meet its end."""
     for reading, code in (
-        ("equal", Code.ARC_MISSES_END),
-        ("final-quadrant", Code.END_NOT_REACHED),
+        ("equal", ProgramCode.ARC_MISSES_END),
+        ("final-quadrant", VerificationCode.END_NOT_REACHED),
     ):
         target = load_target("pic-mmh", settings=[f"controller.arc_end={reading}"])
         data = b"G02X02969.00Y03400.00I03012.00J03040.00F08;"
         decoded = target.target.read(data, target.machine)
         found = verify(decoded, target.machine)
-        assert {code, Code.ARC_END_UNSURE} <= {f.code for f in found.findings}
+        assert {code, ProgramCode.ARC_END_UNSURE} <= {f.code for f in found.findings}
         assert found.report.contours == 1

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from camtool.findings import Code
 from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.findings import ProgramCode
 from camtool.verification.verify import Verification
 from tests.oracles.dense_moves import circle, square
 from tests.oracles.path_machine import both, path_machine
@@ -35,7 +35,7 @@ def test_a_part_has_the_play_of_its_place(at: float, play_um: float) -> None:
 def test_a_play_that_the_map_says_is_known() -> None:
     for settings, want in ((MAP, ["axis Y", "axis Z"]), (MAP[1:], ["axis X", "axis Y", "axis Z"])):
         found = judged_square(1.0, *settings).findings
-        assert [f.where for f in found if f.code == Code.PLAY_NOT_KNOWN] == want
+        assert [f.where for f in found if f.code == ProgramCode.PLAY_NOT_KNOWN] == want
 
 
 @pytest.mark.parametrize("lean", [0.001, -0.02])

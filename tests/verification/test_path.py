@@ -11,9 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError
-from camtool.findings import Code
 from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Kind, Toolpath
+from camtool.verification.findings import VerificationCode
 from camtool.verification.report import Report
 from camtool.verification.verify import VerifyOptions
 from tests.oracles.dense_moves import circle, cut, pic_mmh, square
@@ -204,10 +205,12 @@ def test_travel_and_play_are_noticed_and_homing_told() -> None:
     b = square(ToolpathBuilder(), 1.0, 1.0, 2.0).event(Kind.HOME_XY)
     machine = path_machine("axes.x.travel_mm=2.5", "axes.y.backlash_mm=0.1")
     codes = {f.code: f for f in verify(b.finish(), machine).findings}
-    assert codes[Code.OUT_OF_TRAVEL].where.startswith("axis X")
-    assert Code.RETURN_TO_MACHINE_ZERO in codes
+    assert codes[ProgramCode.OUT_OF_TRAVEL].where.startswith("axis X")
+    assert VerificationCode.RETURN_TO_MACHINE_ZERO in codes
     unknown = [
-        f.where for f in verify(b.finish(), machine).findings if f.code == Code.PLAY_NOT_KNOWN
+        f.where
+        for f in verify(b.finish(), machine).findings
+        if f.code == ProgramCode.PLAY_NOT_KNOWN
     ]
     assert unknown == ["axis X", "axis Z"]
 

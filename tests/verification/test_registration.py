@@ -33,6 +33,7 @@ from camtool.planning.job import Job, Operation, Tool
 from camtool.run import Run
 from camtool.target.registry import load_target
 from camtool.toolpath.moves import Kind, Toolpath
+from camtool.verification.findings import VerificationCode
 from camtool.verification.registration import Registration, register
 
 SAMPLES = Path(__file__).parents[2] / "samples"
@@ -129,7 +130,7 @@ def test_place_tool_and_sides_are_found() -> None:
     result = found(made)
     assert_all_found(result, made)
     assert result.report.followed == pytest.approx(1.0)
-    assert codes(result) == {Code.DRAWING_PLACE: Severity.INFO}
+    assert codes(result) == {VerificationCode.DRAWING_PLACE: Severity.INFO}
 
 
 @settings(max_examples=8)
@@ -150,7 +151,7 @@ def test_it_does_not_matter_how_the_program_goes(made: Made) -> None:
 
 def test_a_program_that_lies_elsewhere_is_not_guessed_at() -> None:
     result = found(Made(shift=(10.0, 3.5)), align=False)
-    assert codes(result) == {Code.DRAWING_PLACE: Severity.ERROR}
+    assert codes(result) == {VerificationCode.DRAWING_PLACE: Severity.ERROR}
     assert "X10.000 Y3.500" in result.findings[0].message.replace("10.001", "10.000")
     assert "--align" in result.findings[0].message
     assert result.report.followed == 0.0
@@ -172,7 +173,7 @@ def test_scale_mirror_and_turn_are_named(
     matrix: tuple[tuple[float, float], tuple[float, float]], flag: str
 ) -> None:
     result = found(Made(matrix=matrix, shift=(2.0, 5.0)))
-    assert codes(result) == {Code.DRAWING_PLACE: Severity.ERROR}
+    assert codes(result) == {VerificationCode.DRAWING_PLACE: Severity.ERROR}
     assert flag in result.findings[0].message
 
 
@@ -202,20 +203,20 @@ def test_another_drawing_is_followed_nowhere() -> None:
         decoded(Made().text()), other, tool_diameter_mm=None, align=True,
         limit_mm=0.02, flat_cuts=False,
     )  # fmt: skip
-    assert codes(result) == {Code.DRAWING_PLACE: Severity.ERROR}
+    assert codes(result) == {VerificationCode.DRAWING_PLACE: Severity.ERROR}
 
 
 def test_a_part_that_fits_in_several_places_is_ambiguous() -> None:
     """One of the four equal holes alone."""
     result = found(Made(order=(0,), shift=(1.0, 1.0)))
-    assert codes(result)[Code.DRAWING_PLACE] == Severity.ERROR
+    assert codes(result)[VerificationCode.DRAWING_PLACE] == Severity.ERROR
     assert "as well at" in result.findings[0].message
     assert "--origin" in result.findings[0].message
 
 
 def test_what_is_not_cut_is_named() -> None:
     result = found(Made(order=(0, 1, 2, 4, 6)))
-    missing = [each for each in result.findings if each.code == Code.NOT_CUT]
+    missing = [each for each in result.findings if each.code == VerificationCode.NOT_CUT]
     assert len(missing) == 2
     assert result.report.not_cut == 2
 
@@ -239,9 +240,9 @@ def test_leads_are_counted_and_one_into_the_part_is_a_warning() -> None:
     """From without a lead comes through what is waste round the outline, and what is part round a
     hole."""
     outside = found(Made(order=(OUTLINE,), lead=3.0))
-    assert Code.CUT_INTO_PART not in codes(outside)
+    assert VerificationCode.CUT_INTO_PART not in codes(outside)
     inside = found(Made(order=(0, OUTLINE), lead=3.0), align=False)
-    warned = [each for each in inside.findings if each.code == Code.CUT_INTO_PART]
+    warned = [each for each in inside.findings if each.code == VerificationCode.CUT_INTO_PART]
     assert warned
     assert warned[0].severity == Severity.WARNING
     assert warned[0].measured == pytest.approx(3.0, abs=0.05)
@@ -251,10 +252,10 @@ def test_leads_are_counted_and_one_into_the_part_is_a_warning() -> None:
 
 def test_a_tool_that_is_given_is_what_the_path_is_measured_for() -> None:
     result = found(Made(), align=False, tool_diameter_mm=2.9)
-    assert codes(result)[Code.TOOL_FOUND] == Severity.WARNING
+    assert codes(result)[VerificationCode.TOOL_FOUND] == Severity.WARNING
     assert result.report.tools[0].given
     assert result.report.off_max_um == pytest.approx(50.0, abs=10.0)
-    assert codes(result)[Code.OFF_DRAWING] == Severity.WARNING
+    assert codes(result)[VerificationCode.OFF_DRAWING] == Severity.WARNING
 
 
 def test_two_distances_from_the_drawing_are_ambiguous() -> None:
@@ -264,7 +265,7 @@ def test_two_distances_from_the_drawing_are_ambiguous() -> None:
     result = register(
         decoded(text), mount(), tool_diameter_mm=None, align=False, limit_mm=0.02, flat_cuts=False
     )
-    assert codes(result)[Code.TOOL_FOUND] == Severity.ERROR
+    assert codes(result)[VerificationCode.TOOL_FOUND] == Severity.ERROR
     assert any("--tool-diameter" in each.message for each in result.findings)
 
 
@@ -315,7 +316,7 @@ def test_a_program_that_cuts_nothing() -> None:
         decoded("G21 G90\nG0 X1 Y1\nM2\n"), mount(), tool_diameter_mm=None, align=True,
         limit_mm=0.02, flat_cuts=False,
     )  # fmt: skip
-    assert codes(result) == {Code.DRAWING_PLACE: Severity.ERROR}
+    assert codes(result) == {VerificationCode.DRAWING_PLACE: Severity.ERROR}
 
 
 def test_a_drawing_of_points_alone_has_nothing_to_follow(tmp_path: Path) -> None:
@@ -342,7 +343,7 @@ def test_moves_that_go_on_beyond_their_line_are_left_as_they_are(tmp_path: Path)
     )
     assert result.wanted.end.tolist() == path.end.tolist()
     assert result.report.followed == 0.0
-    assert codes(result)[Code.DRAWING_PLACE] == Severity.ERROR
+    assert codes(result)[VerificationCode.DRAWING_PLACE] == Severity.ERROR
 
 
 def test_the_wanted_path_is_the_drawing_s() -> None:

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from camtool import __version__
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import Finding, Severity
+from camtool.importers.findings import DrawingCode
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.verification.report import (
     Planned,
@@ -177,7 +178,7 @@ def test_tools_are_called_by_number_and_name_and_operations_by_theirs() -> None:
 
 
 def test_markdown_takes_names_from_drawings_as_words() -> None:
-    sly = Finding(Code.UNITLESS, Severity.WARNING, "a|b <script> `c`\n# d", where="[x](y)")
+    sly = Finding(DrawingCode.UNITLESS, Severity.WARNING, "a|b <script> `c`\n# d", where="[x](y)")
     report = some_report().with_findings([sly, sly])
     assert len(report.findings) == 1
     lines = report.to_markdown().splitlines()

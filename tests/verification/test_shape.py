@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
-from camtool.findings import Code, Severity
+from camtool.findings import Severity
 from camtool.geometry.polylines import Polyline, Polylines
 from camtool.planning.drawn import kept_of
 from camtool.planning.job import Tool, job_of
@@ -16,6 +16,7 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
 from camtool.toolpath.wanted import Kept
 from camtool.verification.cuts import CutMoves, cut_moves
+from camtool.verification.findings import VerificationCode
 from camtool.verification.shape import (
     MOST_MOVES,
     Cutter,
@@ -209,7 +210,7 @@ def test_a_plan_that_cuts_beyond_the_wall_is_no_less_wrong_for_being_followed() 
     found = verified(gouging, kept_of_run(gouging, closed(*ROUNDED)), CONE)
     assert found.report.shape is not None
     assert found.report.shape.overcut_um == pytest.approx(1000.0, abs=5.0)
-    (error,) = (each for each in found.findings if each.code is Code.OVERCUT)
+    (error,) = (each for each in found.findings if each.code is VerificationCode.OVERCUT)
     assert error.severity is Severity.ERROR
     assert error.measured == pytest.approx(1.0, abs=5e-3)
     assert "(18.560, 8.700)" in error.where
@@ -217,14 +218,14 @@ def test_a_plan_that_cuts_beyond_the_wall_is_no_less_wrong_for_being_followed() 
     found = verified(good, kept_of_run(good, closed(*ROUNDED)), CONE)
     assert found.report.shape is not None
     assert found.report.shape.overcut_um < 20.0
-    assert Code.OVERCUT not in {each.code for each in found.findings}
+    assert VerificationCode.OVERCUT not in {each.code for each in found.findings}
 
 
 @pytest.mark.parametrize(("y", "into"), [(-3.0, 0.0), (-2.95, 0.05)])
 def test_an_end_mill_beside_a_part(y: float, into: float) -> None:
     path = carved((0.0, y, -1.0), (17.0, y, -1.0))
     found = verified(path, kept_of_run(path, closed(*ROUNDED), stays=True), None)
-    over = [each for each in found.findings if each.code is Code.OVERCUT]
+    over = [each for each in found.findings if each.code is VerificationCode.OVERCUT]
     assert len(over) == (1 if into else 0)
     assert found.report.shape is not None
     assert found.report.shape.overcut_um == pytest.approx(1000.0 * into, abs=3.0)

@@ -13,9 +13,9 @@ import pytest
 
 from camtool.api import as_drawing, read_drawing, verify
 from camtool.arrays import Floats
-from camtool.findings import Code
 from camtool.jobs.drawing import read_to_scale
 from camtool.pipeline import post_drawing
+from camtool.planning.findings import PlanningCode
 from camtool.planning.job import Job, Tool, job_of
 from camtool.planning.place import place
 from camtool.run import Run
@@ -305,10 +305,10 @@ def test_a_drawing_that_was_read_for_a_smaller_part_says_so(tmp_path: Path) -> N
     read = read_drawing(file, target="linuxcnc")
     loaded = load_target("linuxcnc", settings=[LARGE.format(axis) for axis in "xy"])
     coarse = post_drawing(read, job_of(scale=40.0), loaded)
-    assert Code.FIT_COARSE in {finding.code for finding in coarse.findings}
+    assert PlanningCode.FIT_COARSE in {finding.code for finding in coarse.findings}
     report = coarse.verification.report
     assert report.error_um.fit.max == pytest.approx(40.0 * 1000.0 * read.fit.max_mm)
     assert report.error_um.total.max >= report.error_um.fit.max
     fine = read_drawing(file, target="linuxcnc", scale=40.0)
     found = post_drawing(fine, job_of(scale=40.0), loaded).findings
-    assert Code.FIT_COARSE not in {finding.code for finding in found}
+    assert PlanningCode.FIT_COARSE not in {finding.code for finding in found}

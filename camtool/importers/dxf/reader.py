@@ -13,19 +13,18 @@ from collections.abc import Mapping
 from typing import Any
 
 from camtool.errors import DrawingError
-from camtool.findings import (
+from camtool.findings import Finding, Severity
+from camtool.geometry.drawing import Drawing, Skipped, Units
+from camtool.importers.assemble import assemble, font_findings
+from camtool.importers.dxf.load import load, quiet, without_collector
+from camtool.importers.dxf.walk import Walk
+from camtool.importers.findings import (
     CALLOUT_NOT_READ,
     FILE_REPAIRED,
     NOT_APPLIED_TO_ENTITY,
     UNIT_GUESSED,
     UNITLESS,
-    Finding,
-    Severity,
 )
-from camtool.geometry.drawing import Drawing, Skipped, Units
-from camtool.importers.assemble import assemble, font_findings
-from camtool.importers.dxf.load import load, quiet, without_collector
-from camtool.importers.dxf.walk import Walk
 from camtool.importers.options import ReadOptions
 
 REPAIRS_NAMED = 3

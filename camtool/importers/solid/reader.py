@@ -28,16 +28,16 @@ import numpy as np
 from msgspec import Struct
 
 from camtool.errors import DrawingError
-from camtool.findings import (
+from camtool.findings import Finding
+from camtool.geometry.drawing import Drawing, Skipped, Units
+from camtool.geometry.polylines import POSITION_EPS_MM
+from camtool.importers.assemble import assemble
+from camtool.importers.findings import (
     FILE_REPAIRED_BODIES,
     FILE_REPAIRED_IN_PART,
     SECTION_CHOSEN,
     SECTION_CHOSEN_FACES,
-    Finding,
 )
-from camtool.geometry.drawing import Drawing, Skipped, Units
-from camtool.geometry.polylines import POSITION_EPS_MM
-from camtool.importers.assemble import assemble
 from camtool.importers.formats import is_brep, is_step, text_head
 from camtool.importers.options import ReadOptions
 from camtool.importers.pieces import Piece

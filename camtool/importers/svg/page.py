@@ -14,8 +14,9 @@ from dataclasses import replace
 from msgspec import Struct, structs
 
 from camtool.errors import DrawingError
-from camtool.findings import UNIT_GUESSED_BY_PROGRAM, UNITLESS_PX, Finding
+from camtool.findings import Finding
 from camtool.geometry.drawing import Units
+from camtool.importers.findings import UNIT_GUESSED_BY_PROGRAM, UNITLESS_PX
 from camtool.importers.options import DPI, ReadOptions
 from camtool.importers.svg.css import declared
 from camtool.importers.svg.shapes import FONT_UNITS, split_length

@@ -15,12 +15,13 @@ from msgspec import Struct, field
 
 from camtool.arrays import Floats
 from camtool.errors import DrawingError, GeometryError
-from camtool.findings import NOT_APPLIED, Finding
+from camtool.findings import Finding
 from camtool.geometry.curves import BezierCurve, Curve, EllipseCurve
 from camtool.geometry.drawing import Drawing, Skipped
 from camtool.geometry.fit import arc_vertices, fit_curve
 from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.importers.assemble import assemble, font_findings
+from camtool.importers.findings import NOT_APPLIED
 from camtool.importers.options import TEXT_SKIPPED, ReadOptions
 from camtool.importers.pieces import MAX_COORDINATE_MM, Piece, Unusable
 from camtool.importers.svg.page import Page, page_of

@@ -10,9 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camtool.errors import MachineError, PostError, ProgramError
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import Finding, Severity
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.rs274 import compare, needs_rs274
 from tests.postprocessors.gcode.plain_parts import FLASHCUT, on_grid, part
@@ -139,14 +140,14 @@ def test_rapids_above_the_stock_go_along_one_axis_at_a_time() -> None:
 
 def too_long(program: bytes, *settings: str) -> list[Finding]:
     found = read(program, *settings).findings
-    return [one for one in found if one.code == Code.EXECUTED_OTHERWISE]
+    return [one for one in found if one.code == ProgramCode.EXECUTED_OTHERWISE]
 
 
 def test_what_the_timers_make_too_long_is_found() -> None:
     program = b"G00 X1.9 Y0.95\nG01 X0.0 Y0.0 F3.0\nG01 X1.9 Y0.0\nG01 X1.928 Y0.028\nM30\n"
     (finding,) = too_long(program)
     # At 20 ms ⌊1000·21 / (20·1000/500 + 1)⌋ = 512 steps instead of 500; F3.0 would be 18 ms.
-    assert (finding.code, finding.severity) == (Code.EXECUTED_OTHERWISE, Severity.WARNING)
+    assert (finding.code, finding.severity) == (ProgramCode.EXECUTED_OTHERWISE, Severity.WARNING)
     assert finding.message.startswith("2 straight moves of both axes")
     assert (finding.where, finding.measured) == ("block 1", pytest.approx(12 * 1.9))
     assert "it stays in all that follows" in finding.message
@@ -164,7 +165,9 @@ def test_what_a_feed_becomes_is_said() -> None:
     """14.25 mm/min at 3 ms along one axis, 2.71 at 20 ms along two; Z is one axis."""
 
     def held(program: bytes, *settings: str) -> list[tuple[Severity, str, float | None]]:
-        found = [one for one in read(program, *settings).findings if one.code == Code.FEED_HELD]
+        found = [
+            one for one in read(program, *settings).findings if one.code == ProgramCode.FEED_HELD
+        ]
         return [(one.severity, one.where, one.measured) for one in found]
 
     square = b"G01 X1.0 Y0.0 F14.1\nG01 X1.0 Y1.0\nG01 Z-0.1\nG00 X3.0 Y3.0\n"
@@ -206,7 +209,7 @@ def test_the_spindle_may_not_stop() -> None:
     program = target.target.write(path, target.machine)
     assert program.data == b"M03\nM05\nM30\n"
     (finding,) = program.findings
-    assert (finding.code, finding.severity) == (Code.EVENT_LEFT_OUT, Severity.WARNING)
+    assert (finding.code, finding.severity) == (ProgramCode.EVENT_LEFT_OUT, Severity.WARNING)
     assert "turns with every move" in finding.message
 
 
@@ -353,8 +356,8 @@ def test_settings_let_more_be_taken() -> None:
 def test_feeds_above_the_limit_are_found() -> None:
     path = read(b"M03\nG01 X1.0 Y1.0 F14.1\nG01 X2.0 Y1.0 F15.0\nG01 X3.0 Y1.0 F20")
     finding, held = path.findings
-    assert (finding.code, finding.severity) == (Code.FEED_ABOVE_LIMIT, Severity.WARNING)
-    assert (held.code, held.measured) == (Code.FEED_HELD, pytest.approx(2.714, abs=1e-3))
+    assert (finding.code, finding.severity) == (ProgramCode.FEED_ABOVE_LIMIT, Severity.WARNING)
+    assert (held.code, held.measured) == (ProgramCode.FEED_HELD, pytest.approx(2.714, abs=1e-3))
     assert path.feed[path.is_feed].tolist() == [14.1, 15.0, 20.0]  # as programmed
     assert (finding.where, finding.measured, finding.limit) == ("block 3", 20.0, 14.1)
 

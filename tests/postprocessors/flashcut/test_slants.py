@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import PostError
-from camtool.findings import Code
 from camtool.target.registry import LoadedTarget, load_target
 from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.targets import simulate
 
@@ -51,7 +51,7 @@ def test_pieces_are_made_exactly(half_period: int, clock: str) -> None:
     whole, split = target(*fast), target(*fast, SPLIT)
     back = decoded(star(), split)
     assert misses_um(back, split) < 7.0  # what is left is the rounding of whole rows
-    assert Code.EXECUTED_OTHERWISE not in {one.code for one in back.findings}
+    assert ProgramCode.EXECUTED_OTHERWISE not in {one.code for one in back.findings}
     if half_period == 20:
         assert misses_um(decoded(star(), whole), whole) > 500.0
     fine = target(*fast, SPLIT, "dialect.decimals=4")
@@ -76,8 +76,8 @@ def test_pieces_end_on_whole_steps_beside_the_line() -> None:
 def test_only_lines_that_need_it_are_split(x: float, y: float, feed: float) -> None:
     path = ToolpathBuilder().rapid(0.5, 0.5).line(0.5 + x, 0.5 + y, feed=feed).finish()
     whole, split = decoded(path, target()), decoded(path, target(SPLIT))
-    assert Code.EXECUTED_OTHERWISE not in {one.code for one in split.findings}
-    too_long = Code.EXECUTED_OTHERWISE in {one.code for one in whole.findings}
+    assert ProgramCode.EXECUTED_OTHERWISE not in {one.code for one in split.findings}
+    too_long = ProgramCode.EXECUTED_OTHERWISE in {one.code for one in whole.findings}
     if not too_long and min(abs(x), abs(y)) < 0.019:
         assert split.end.tolist() == whole.end.tolist()
     assert split.end[-1].tolist() == whole.end[-1].tolist()

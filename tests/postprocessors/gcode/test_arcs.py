@@ -9,9 +9,9 @@ from camtool_postprocessors.grbl.dialect import Dialect
 from hypothesis import given
 from hypothesis import strategies as st
 
-from camtool.findings import Code
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.gcode_paths import farthest_mm
 
@@ -122,7 +122,7 @@ def test_absurd_radii_become_lines() -> None:
     program = target.target.write(path, target.machine)
     decoded = target.target.read(program.data, target.machine)
     assert b"I" not in program.data.replace(b"IN", b"").split(b"G54")[1]
-    (finding,) = [note for note in program.findings if note.code == Code.ARC_MENDED]
+    (finding,) = [note for note in program.findings if note.code == ProgramCode.ARC_MENDED]
     assert "1 written as lines" in finding.message
     move = list(path)[1]
     rows = np.flatnonzero(decoded.kind == Kind.LINE)
@@ -136,7 +136,7 @@ def test_a_crooked_arc_is_mended_and_told() -> None:
     path = ToolpathBuilder().rapid(1.0, 0.0).arc(-1.007, 0.0, centre=(0.0, 0.0), ccw=True, feed=9)
     target = load_target("grbl")
     program = target.target.write(path.finish(), target.machine)
-    assert any(note.code == Code.ARC_MENDED for note in program.findings)
+    assert any(note.code == ProgramCode.ARC_MENDED for note in program.findings)
     decoded = target.target.read(program.data, target.machine)
     assert decoded.end[-2].tolist() == [-1.007, 0.0, 0.0]
     assert decoded.is_arc.any()

@@ -10,15 +10,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from camtool.findings import Code, Finding, Severity
+from camtool.findings import Finding, Severity
 from camtool.geometry.polylines import Polyline
 from camtool.pipeline import post_drawing, verify_program
+from camtool.planning.findings import PlanningCode
 from camtool.planning.job import Job, Operation, Tool
 from camtool.planning.plan import plan
 from camtool.target.registry import LoadedTarget, load_target
 from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.wanted import OperationNote, ToolNote
+from camtool.verification.findings import VerificationCode
 from tests.drawings import drawing_of
 from tests.oracles.rs274 import RS274, interpreted
 from tests.postprocessors.gcode.test_write import EVIL
@@ -261,7 +264,7 @@ def test_after_a_change_the_tool_goes_up_before_it_goes_across(
     if name == "grbl":
         changes = changes[1:]
     assert [each.value for each in read if each.kind == Kind.TOOL_CHANGE] == changes
-    stops = [each for each in written.findings if each.code == Code.TOOL_BY_HAND]
+    stops = [each for each in written.findings if each.code == ProgramCode.TOOL_BY_HAND]
     assert len(stops) == (name == "grbl" and len(changes) > 0)
     assert not stops or stops[0].measured == len(changes)
 
@@ -339,7 +342,7 @@ def test_such_programs_are_verified_and_hold_against_their_job(name: str) -> Non
         text.replace(change, f"T7{change[2:]}").encode(), machine, source="a.nc",
         drawing=DRAWING, job=JOB,
     )  # fmt: skip
-    assert Code.SETTING_DIFFERS in [
+    assert VerificationCode.SETTING_DIFFERS in [
         each.code for each in wrong.findings if each.severity == Severity.ERROR
     ]
 
@@ -366,7 +369,7 @@ def places_of_changes(name: str, *given: str) -> tuple[list[tuple[float, ...]], 
             places.append(tuple(here.values()))
         has_cut |= here["Z"] < 0.0
         here |= {axis: float(value) for axis, value in re.findall(r"([XYZ])(-?[\d.]+)", line)}
-    found = [each for each in run.findings if each.code == Code.TOOL_CHANGE_NOT_STATED]
+    found = [each for each in run.findings if each.code == PlanningCode.TOOL_CHANGE_NOT_STATED]
     return places, found
 
 

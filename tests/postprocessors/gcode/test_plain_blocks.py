@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import ProgramError
-from camtool.findings import Code
 from camtool.target.registry import load_target
+from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import COLUMNS, Toolpath
 
 TARGETS = ["grbl", "linuxcnc", "flashcut", "valcnc"]
@@ -153,6 +153,6 @@ def test_feeds_above_the_limit_are_counted_in_rows_of_moves_and_alone(name: str)
         "\n".join([row + " (a)" for row in rows] + end).encode(), target.machine
     )
     assert plain.findings == alone.findings
-    (found,) = (one for one in plain.findings if one.code == Code.FEED_ABOVE_LIMIT)
+    (found,) = (one for one in plain.findings if one.code == ProgramCode.FEED_ABOVE_LIMIT)
     assert (found.where, found.measured) == ("block 2", 2.0 * most)
     assert "61" in found.message

@@ -8,9 +8,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from msgspec import structs
 
-from camtool.findings import Code
 from camtool.target.registry import LoadedTarget, load_target
 from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.postprocessors.gcode.plain_parts import KINDS, anywhere, judge, on_grid, part
 
@@ -27,7 +27,7 @@ ROW_BY_ROW = LOADED | {"flashcut": load_target("flashcut", settings=["dialect.ra
 def check_same(name: str, wanted: Toolpath) -> None:
     target = ROW_BY_ROW[name]
     program = target.target.write(wanted, target.machine)
-    assert {finding.code for finding in program.findings} <= {Code.COORDINATES_SCALED}
+    assert {finding.code for finding in program.findings} <= {ProgramCode.COORDINATES_SCALED}
     read = target.target.read(program.data, target.machine)
     assert read.kind.tolist() == wanted.kind.tolist()
     np.testing.assert_allclose(read.end, wanted.end, rtol=0.0, atol=1e-12)
@@ -120,7 +120,7 @@ def test_random_arcs_stay_arcs(name: str) -> None:
     program = target.target.write(wanted, target.machine)
     read = target.target.read(program.data, target.machine)
     assert (read.is_arc == read.is_feed).all()
-    (mended,) = (f for f in program.findings if f.code == Code.ARC_MENDED)
+    (mended,) = (f for f in program.findings if f.code == ProgramCode.ARC_MENDED)
     assert mended.measured is not None
     assert mended.measured > 100
     assert "0 too small or too large" in mended.message
@@ -151,21 +151,21 @@ def test_findings_count_what_was_lost() -> None:
     wanted = part(3.0, 8.0)
     found = {f.code: f for f in target.target.write(wanted, target.machine).findings}
     assert set(found) == {
-        Code.MOVE_SPLIT,
-        Code.EVENT_LEFT_OUT,
-        Code.VALUE_ROUNDED,
+        ProgramCode.MOVE_SPLIT,
+        ProgramCode.EVENT_LEFT_OUT,
+        ProgramCode.VALUE_ROUNDED,
     }
-    assert "1 feed move in" in found[Code.MOVE_SPLIT].message
-    assert "DWELL" in found[Code.EVENT_LEFT_OUT].message
+    assert "1 feed move in" in found[ProgramCode.MOVE_SPLIT].message
+    assert "DWELL" in found[ProgramCode.EVENT_LEFT_OUT].message
     valcnc = LOADED["valcnc"]
     found = {f.code: f for f in valcnc.target.write(wanted, valcnc.machine).findings}
     assert set(found) >= {
-        Code.COORDINATES_SCALED,
-        Code.MOVE_SPLIT,
-        Code.EVENT_LEFT_OUT,
-        Code.FEED_ROUNDED,
+        ProgramCode.COORDINATES_SCALED,
+        ProgramCode.MOVE_SPLIT,
+        ProgramCode.EVENT_LEFT_OUT,
+        ProgramCode.FEED_ROUNDED,
     }
-    assert "6 events" in found[Code.EVENT_LEFT_OUT].message
+    assert "6 events" in found[ProgramCode.EVENT_LEFT_OUT].message
 
 
 def test_specks_are_counted() -> None:
@@ -174,9 +174,9 @@ def test_specks_are_counted() -> None:
     path.arc(1.0002, 0.004, centre=(1.0002, 0.002), ccw=True, feed=3.0)
     path.arc(1.5, 0.004, centre=(1.25, 200.0), ccw=True, feed=3.0)
     found = {f.code: f for f in target.target.write(path.finish(), target.machine).findings}
-    assert found[Code.MOVE_COLLAPSED].measured == 2.0
-    assert found[Code.ARC_MENDED].message.startswith("0 arcs got another centre")
-    assert found[Code.ARC_MENDED].where == "move 2"
+    assert found[ProgramCode.MOVE_COLLAPSED].measured == 2.0
+    assert found[ProgramCode.ARC_MENDED].message.startswith("0 arcs got another centre")
+    assert found[ProgramCode.ARC_MENDED].where == "move 2"
 
 
 @pytest.mark.parametrize("name", TARGETS)

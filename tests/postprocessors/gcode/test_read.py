@@ -10,8 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import ProgramError
-from camtool.findings import Code, Severity
+from camtool.findings import Severity
 from camtool.target.registry import load_target
+from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.lower import carried_over
 from camtool.toolpath.moves import Kind, PathMode, Toolpath
 from tests.postprocessors.gcode.parts import part
@@ -102,8 +103,8 @@ def test_events() -> None:
         (Kind.END, None),
     ]
     assert [(note.code, note.where) for note in path.findings] == [
-        (Code.WORDS_PASSED_OVER, "block 7"),
-        (Code.WORDS_PASSED_OVER, "block 9"),
+        (ProgramCode.WORDS_PASSED_OVER, "block 7"),
+        (ProgramCode.WORDS_PASSED_OVER, "block 9"),
     ]
 
 
@@ -187,7 +188,7 @@ def test_the_rule_for_arcs_is_grbl_s(radius: float, difference: float, fine: boo
 def test_feeds_above_the_limit_are_a_finding(name: str) -> None:
     path = read_part("G1 F9999 X1\nF100 X2\nF8888 X3\n", name)
     (finding,) = path.findings
-    assert (finding.code, finding.severity) == (Code.FEED_ABOVE_LIMIT, Severity.WARNING)
+    assert (finding.code, finding.severity) == (ProgramCode.FEED_ABOVE_LIMIT, Severity.WARNING)
     assert path.feed.tolist() == [9999.0, 100.0, 8888.0]  # as programmed
     assert (finding.where, finding.measured) == ("block 1", 9999.0)
 
@@ -524,7 +525,7 @@ def test_a_spindle_may_start_before_its_speed_is_said(name: str) -> None:
         (Kind.END, None),
     ]
     found = [(one.code, one.severity, one.where) for one in path.findings]
-    assert found == [(Code.SPINDLE_SPEED_NOT_SAID, Severity.WARNING, "block 1")]
+    assert found == [(ProgramCode.SPINDLE_SPEED_NOT_SAID, Severity.WARNING, "block 1")]
     for other in (*TARGETS, "valcnc"):
         target = loaded(other, ())
         text = target.target.write(carried_over(path), target.machine).data.decode()
@@ -581,5 +582,7 @@ def test_p_tells_the_turns_of_an_arc(
 def test_where_a_program_of_linuxcnc_ends(text: str, behind: tuple[str, float] | None) -> None:
     path = read(text, "linuxcnc")
     assert ends(path) == [(1, 0, 0)]
-    found = [(one.where, one.measured) for one in path.findings if one.code == Code.NEVER_READ]
+    found = [
+        (one.where, one.measured) for one in path.findings if one.code == ProgramCode.NEVER_READ
+    ]
     assert found == ([behind] if behind else [])

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from camtool.findings import Code
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Program
 from tests.oracles.gcode_paths import farthest_mm
@@ -69,7 +69,7 @@ def check_random(path: Toolpath, name: str, *options: str) -> None:
         assert stray <= MOST_STRAY_UNITS * UNIT_MM
     again, twice = there_and_back(decoded, name, *options)
     assert columns(twice) == columns(decoded)
-    assert not {finding.code for finding in again.findings} & {Code.ARC_MENDED}
+    assert not {finding.code for finding in again.findings} & {ProgramCode.ARC_MENDED}
 
 
 @pytest.mark.parametrize("name", TARGETS)

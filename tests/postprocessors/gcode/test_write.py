@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import MachineError, PostError
-from camtool.findings import Code
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Program
 
@@ -106,7 +106,9 @@ def test_tools() -> None:
     assert blocks(path, "linuxcnc") == ["T3 M6", "G43 H3", "M2"]
     assert blocks(path, "grbl", "dialect.tool_change=pause") == ["T3 M0", "M2"]
     assert blocks(path, "grbl") == ["M2"]
-    assert [finding.code for finding in write(path, "grbl").findings] == [Code.EVENT_LEFT_OUT]
+    assert [finding.code for finding in write(path, "grbl").findings] == [
+        ProgramCode.EVENT_LEFT_OUT
+    ]
     second = (
         ToolpathBuilder().event(Kind.TOOL_CHANGE, 3).line(1, feed=9).event(Kind.TOOL_CHANGE, 4)
     )
@@ -116,7 +118,9 @@ def test_tools() -> None:
         with pytest.raises(PostError, match=rf"move 2: .*{words}; .*--split tool"):
             blocks(second.finish(), name, setting)
         assert blocks(path, name, setting) == ["M2"]
-        assert Code.EVENT_LEFT_OUT in [each.code for each in write(path, name, setting).findings]
+        assert ProgramCode.EVENT_LEFT_OUT in [
+            each.code for each in write(path, name, setting).findings
+        ]
 
 
 EVIL = [
@@ -186,9 +190,9 @@ def test_rounding_is_told() -> None:
     path.rapid(2.0001, 2)
     program = write(path.finish())
     assert [note.code for note in program.findings] == [
-        Code.FEED_ROUNDED,
-        Code.MOVE_COLLAPSED,
-        Code.VALUE_ROUNDED,
+        ProgramCode.FEED_ROUNDED,
+        ProgramCode.MOVE_COLLAPSED,
+        ProgramCode.VALUE_ROUNDED,
     ]
     assert b" F33.3\n" in program.data
     assert b"G4 P0.333\n" in program.data

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from camtool.errors import MachineError, ProgramError
-from camtool.findings import Code, Severity
+from camtool.findings import Severity
 from camtool.machine.model import Machine
 from camtool.simulation.motion import CHUNK_STEPS, Options
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.gcode_machines import grbl_machine
 from tests.oracles.grbl_run import F, chord_ends, nearest_step, number_as_read, ticks
@@ -305,7 +306,7 @@ def test_a_feed_that_is_too_slow_is_found() -> None:
     target = load_target("grbl")
     read = target.target.read
     (found,) = read(b"G1 X1 F5\nX2 Y1 F9\nM2\n", target.machine).findings
-    assert (found.code, found.severity) == (Code.FEED_TOO_SLOW, Severity.WARNING)
+    assert (found.code, found.severity) == (ProgramCode.FEED_TOO_SLOW, Severity.WARNING)
     assert found.message.startswith("2 cuts are slower")
     assert (found.measured, found.limit) == (5.0, pytest.approx(7.324, abs=1e-3))
     assert read(b"G1 X1 F7.33\nX2 Y1 F10.36\nG2 X0 I-1 F7.33\nM2\n", target.machine).findings == ()

@@ -7,9 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import ProgramError
-from camtool.findings import Code, Severity
+from camtool.findings import Severity
 from camtool.target.registry import LoadedTarget
 from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import COLUMNS, Kind, Toolpath
 from tests.oracles import i8751_packets
 from tests.postprocessors.i8751.machines import OPTIONS, STEP_MM, loaded
@@ -56,7 +57,7 @@ def rows(path: Toolpath) -> list[tuple[object, ...]]:
 
 def test_a_high_byte_is_told_where_nobody_knows_its_worth() -> None:
     (found,) = read(ONE).findings
-    assert (found.code, found.severity) == (Code.READ_TWO_WAYS, Severity.WARNING)
+    assert (found.code, found.severity) == (ProgramCode.READ_TWO_WAYS, Severity.WARNING)
     assert (found.where, found.measured) == ("record 1", 1.0)
     assert "up to 1 step elsewhere" in found.message
     assert read(ONE, "long_runs=true").findings == ()
@@ -300,7 +301,7 @@ def test_distances_that_are_no_steps_are_rounded_and_counted() -> None:
     path = read(b"X+1.0060 Y+1.0005 T0 Z-0.0070 T0\nEND\n", "format=listing")
     assert rows(path)[-1][1:4] == (80, 80, -1)
     (finding,) = path.findings
-    assert (finding.code, finding.measured) == (Code.VALUE_ROUNDED, pytest.approx(0.48))
+    assert (finding.code, finding.measured) == (ProgramCode.VALUE_ROUNDED, pytest.approx(0.48))
     assert finding.message.startswith("2 distances")
 
 

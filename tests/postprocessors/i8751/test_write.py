@@ -10,6 +10,7 @@ from camtool.errors import MachineError, PostError
 from camtool.findings import Code, Severity
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Program
 from tests.postprocessors.i8751.machines import STEP_MM, loaded
@@ -72,7 +73,7 @@ def test_the_most_steps_of_a_record(steps: int, setting: str, count: int, first:
     for path in (line(-steps, 0), ToolpathBuilder().line(z=-steps * STEP_MM, feed=30)):
         program = write(path, setting, "long_runs=true")
         assert len(program.row_of_block) == count + 1
-        assert (Code.MOVE_SPLIT in codes(program)) == (count > 1)
+        assert (ProgramCode.MOVE_SPLIT in codes(program)) == (count > 1)
         assert bytes.fromhex("04 " + first) in program.data
 
 
@@ -90,7 +91,7 @@ def test_no_run_needs_a_high_byte(steps: int, setting: str) -> None:
         there, here = (made.target.read(program.data, made.machine) for made in (as_256, as_255))
         np.testing.assert_array_equal(there.end, here.end)
         np.testing.assert_allclose(there.end[-1], path.finish().end[-1], atol=1e-9)
-        assert Code.READ_TWO_WAYS not in {one.code for one in there.findings}
+        assert ProgramCode.READ_TWO_WAYS not in {one.code for one in there.findings}
     assert len(write(line(-steps, 0), setting).row_of_block) == -(-steps // most) + 1
 
 
@@ -109,7 +110,7 @@ def test_waits() -> None:
     path = line(5, 0).event(Kind.DWELL, 3).event(Kind.DWELL, 0.2)
     program = write(path)
     assert records(program) == bytes.fromhex("01 03 00 05 02 05 00 00 03 05 00 04")
-    assert Code.VALUE_ROUNDED in codes(program)
+    assert ProgramCode.VALUE_ROUNDED in codes(program)
     still = "01 05 02 05 00 00 03 05 00 "
     program = write(ToolpathBuilder().event(Kind.DWELL, 300).line(STEP_MM, feed=30))
     move = "01 03 00 01 02 05 00 00 03 05 00 00"
@@ -146,7 +147,7 @@ def test_rapids_are_not_cut_for_their_dog_leg() -> None:
     cut = write(line(400, 160))
     # e = 160·240/430.8 = 89 steps, the tolerance is 4: n = (89/4 + 1)/2 = 11.6
     assert len(cut.row_of_block) == 13
-    (finding,) = (f for f in cut.findings if f.code == Code.MOVE_SPLIT)
+    (finding,) = (f for f in cut.findings if f.code == ProgramCode.MOVE_SPLIT)
     assert finding.measured == 12
     assert finding.severity == Severity.INFO
 
@@ -182,18 +183,20 @@ def test_what_cannot_be_said_is_told() -> None:
     by_code = {}
     for finding in program.findings:
         by_code.setdefault(finding.code, finding)
-    assert by_code[Code.EVENT_LEFT_OUT].message.startswith("2 spindle events")
-    assert by_code[Code.EVENT_LEFT_OUT].severity == Severity.WARNING
-    assert by_code[Code.MOVE_COLLAPSED].measured == 1
-    assert by_code[Code.FEED_ROUNDED].severity == Severity.INFO
-    assert by_code[Code.MOVE_SPLIT].message.startswith("1 feed move in XY and Z became steps")
-    assert by_code[Code.MOVE_SPLIT].severity == Severity.WARNING
+    assert by_code[ProgramCode.EVENT_LEFT_OUT].message.startswith("2 spindle events")
+    assert by_code[ProgramCode.EVENT_LEFT_OUT].severity == Severity.WARNING
+    assert by_code[ProgramCode.MOVE_COLLAPSED].measured == 1
+    assert by_code[ProgramCode.FEED_ROUNDED].severity == Severity.INFO
+    assert by_code[ProgramCode.MOVE_SPLIT].message.startswith(
+        "1 feed move in XY and Z became steps"
+    )
+    assert by_code[ProgramCode.MOVE_SPLIT].severity == Severity.WARNING
 
 
 def test_the_first_tool_is_mounted_by_hand() -> None:
     program = write(ToolpathBuilder().event(Kind.TOOL_CHANGE, 2).line(1, feed=30))
     assert program.data == write(ToolpathBuilder().line(1, feed=30)).data
-    assert Code.EVENT_LEFT_OUT in codes(program)
+    assert ProgramCode.EVENT_LEFT_OUT in codes(program)
 
 
 def nan_arc() -> ToolpathBuilder:

@@ -16,9 +16,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import ProgramError
-from camtool.findings import Code, Severity
+from camtool.findings import Severity
 from camtool.pipeline import read_program
 from camtool.target.registry import load_target
+from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Kind, Toolpath
 
 
@@ -304,7 +305,7 @@ def test_other_findings() -> None:
         "linuxcnc.NOT_SIMULATED",
         "linuxcnc.VALUE_UNKNOWN",
     ]
-    assert path.findings[0].code == Code.WORDS_PASSED_OVER
+    assert path.findings[0].code == ProgramCode.WORDS_PASSED_OVER
     assert len(read("/G0 X1\nG0 Y1\nM2\n", "dialect.block_delete=true")) == 2
 
 

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import ProgramError
-from camtool.findings import Code, Severity
+from camtool.findings import Severity
+from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.postprocessors.matlab_router.parts import (
     STAR,
@@ -108,7 +109,7 @@ def test_odd_distances_are_cut_short() -> None:
     assert (drift[:, 0] + 1).tolist() == [0, -1, -1, 0, 0, 0, 1, 1, 1, 1, 2]
     assert drift[:, 1].tolist() == [0, -1, 0, -1, -1, -2, -3, -3, -3, -2, -2]
     (finding,) = path.findings
-    assert (finding.code, finding.severity) == (Code.EXECUTED_OTHERWISE, Severity.WARNING)
+    assert (finding.code, finding.severity) == (ProgramCode.EXECUTED_OTHERWISE, Severity.WARNING)
     assert finding.measured == pytest.approx(0.3)
 
 
@@ -135,17 +136,19 @@ def test_speeds_that_bend_a_line_are_seen() -> None:
 def test_limits_are_findings() -> None:
     outside = read(SQUARE.replace(b"140", b"2140").replace(b" 40 ", b"2040 "))
     assert [(f.code, f.severity) for f in outside.findings] == [
-        (Code.OUT_OF_TRAVEL, Severity.ERROR)
+        (ProgramCode.OUT_OF_TRAVEL, Severity.ERROR)
     ]
     fast = read(SQUARE.replace(b"480     0", b"481     0"))
-    assert [(f.code, f.where) for f in fast.findings] == [(Code.FEED_ABOVE_LIMIT, "job 1, line 1")]
+    assert [(f.code, f.where) for f in fast.findings] == [
+        (ProgramCode.FEED_ABOVE_LIMIT, "job 1, line 1")
+    ]
 
 
 def test_a_line_of_no_length_is_passed_over() -> None:
     data = SQUARE.replace(b"   100   200", b"   100   100").replace(b"    0   100", b"    0     0")
     path = read(data)
     assert cut_points(path) == [[(10.0, 10.0), (14.0, 10.0)]]
-    assert [f.code for f in path.findings] == [Code.MOVE_COLLAPSED]
+    assert [f.code for f in path.findings] == [ProgramCode.MOVE_COLLAPSED]
 
 
 FORMS = [

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from camtool.errors import MachineError, PostError
 from camtool.findings import Code, Severity
 from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.matlab_router import gui_arrays, off_line, run_line
 from tests.postprocessors.matlab_router.parts import (
@@ -97,7 +98,7 @@ def test_long_strokes_become_jobs(settings: tuple[str, ...], most: int) -> None:
     assert max(counts) == most
     for job, following in pairwise(jobs):
         assert [row[-1] for row in job["xy"]] == [row[0] for row in following["xy"]]
-    assert Code.MOVE_SPLIT in codes(strokes(zigzag), *settings)
+    assert ProgramCode.MOVE_SPLIT in codes(strokes(zigzag), *settings)
 
 
 def test_no_job_begins_on_an_axis() -> None:
@@ -116,7 +117,7 @@ def test_a_start_at_home_moves_to_the_first_chunk() -> None:
     )
     (job,) = arrays(written.data)
     assert job["xy"] == [[2, 100, 100, 0, 0], [2, 0, 100, 100, 0]]
-    (snapped,) = [f for f in written.findings if f.code == Code.PLACES_SNAPPED]
+    (snapped,) = [f for f in written.findings if f.code == ProgramCode.PLACES_SNAPPED]
     assert snapped.severity == Severity.WARNING
     assert snapped.measured == pytest.approx(0.2 * math.sqrt(2.0))
     assert "1 stroke begins at least 0.2 mm from home" in snapped.message
@@ -132,7 +133,7 @@ def test_a_stroke_below_the_grid_is_told() -> None:
     (finding,) = [
         finding
         for finding in router().target.write(toolpath, router().machine).findings
-        if finding.code == Code.MOVE_COLLAPSED and finding.unit == "strokes"
+        if finding.code == ProgramCode.MOVE_COLLAPSED and finding.unit == "strokes"
     ]
     assert (finding.severity, finding.measured) == (Severity.WARNING, 1.0)
     with pytest.raises(PostError, match=r"nothing is left to cut on a grid of 0\.2 mm"):
@@ -154,7 +155,7 @@ def test_the_two_meanings_of_a_feed() -> None:
     line = strokes([(10, 10), (40, 50)], feed=100.0)
     assert arrays(program(line))[0]["velxy"] == [[160], [213]]
     assert arrays(program(line, "speed=path"))[0]["velxy"] == [[128], [171]]
-    assert Code.FEED_ROUNDED in codes(line)
+    assert ProgramCode.FEED_ROUNDED in codes(line)
 
 
 @pytest.mark.parametrize("speed", ["axis", "path"])
@@ -163,7 +164,7 @@ def test_feeds_may_be_limited(speed: str) -> None:
     settings = (f"speed={speed}", "too_fast=limited")
     assert arrays(program(line, *settings))[0]["velxy"] == [[360], [480]]
     findings = router(*settings).target.write(line, router(*settings).machine).findings
-    assert (findings[0].code, findings[0].severity) == (Code.FEED_ROUNDED, Severity.WARNING)
+    assert (findings[0].code, findings[0].severity) == (ProgramCode.FEED_ROUNDED, Severity.WARNING)
 
 
 @given(
@@ -290,14 +291,14 @@ def test_events_that_the_master_has_and_has_not() -> None:
     path.event(Kind.SPINDLE_CW, 9000).event(Kind.DWELL, 2).message("(M3)\nG0").rapid(10, 10)
     path.line(z=-1, feed=99).line(20, 10, feed=99).event(Kind.SPINDLE_OFF).rapid(z=9)
     toolpath = path.event(Kind.END).finish()
-    assert codes(toolpath).count(Code.EVENT_LEFT_OUT) == 3
+    assert codes(toolpath).count(ProgramCode.EVENT_LEFT_OUT) == 3
     assert b"M3" not in program(toolpath)
     assert program(toolpath) == program(strokes([(10, 10), (20, 10)], feed=99))
 
 
 def test_moves_of_xy_and_z_are_parted() -> None:
     path = builder().line(10.4, 10, -1, feed=99).line(20, 10, feed=99).rapid(20, 20, 9)
-    assert Code.MOVE_SPLIT in codes(path.event(Kind.END).finish())
+    assert ProgramCode.MOVE_SPLIT in codes(path.event(Kind.END).finish())
     # A ramp down from the top and its way back: travel, then all of it at the one depth.
     assert program(path.finish()) == program(strokes([(10.4, 10), (20, 10)], feed=99))
 

@@ -12,6 +12,7 @@ from camtool.kernels.lattice import to_steps
 from camtool.simulation.motion import IDEAL, Options
 from camtool.target.registry import LoadedTarget, load_target
 from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Kind, Move, Toolpath
 from camtool.toolpath.program import Program
 from tests.oracles import arc_ends
@@ -216,7 +217,7 @@ def test_a_foreign_program_is_told_what_each_reading_does_to_it() -> None:
     data = foreign(np.random.default_rng(SEED), 40)
     decoded = target.target.read(data, target.machine)
     (told,) = target.model.findings(decoded, target.machine, Options())
-    assert (told.code, told.severity) == (Code.ARC_END_UNSURE, Severity.WARNING)
+    assert (told.code, told.severity) == (ProgramCode.ARC_END_UNSURE, Severity.WARNING)
     fates = [
         {arc_ends.stop(start, end, False, 0, reading).met for reading in arc_ends.READINGS}
         for _, start, end in oracle.arcs(data, "example")
@@ -317,7 +318,7 @@ def test_an_arc_of_no_step_is_nothing_and_no_full_circle() -> None:
     path = ToolpathBuilder().line(0.0126, 0, feed=1)
     blocks, found = mend_of(path.arc(0.0126, 0.00001, centre=(0, 0), ccw=True, feed=1))
     assert blocks == ["G01X00012.60Y00000.00F10;"]
-    assert Code.MOVE_COLLAPSED in found
+    assert ProgramCode.MOVE_COLLAPSED in found
 
 
 def test_an_arc_that_lacks_less_than_a_step_is_a_full_circle() -> None:
@@ -325,7 +326,7 @@ def test_an_arc_that_lacks_less_than_a_step_is_a_full_circle() -> None:
     blocks, found = mend_of(path.arc(0.0126, -0.00001, centre=(0, 0), ccw=True, feed=1))
     assert blocks[1] == "G03X00012.60Y00000.00I00000.00J00000.00F10;"
     assert len(blocks) == 2
-    assert Code.ARC_MENDED not in found
+    assert ProgramCode.ARC_MENDED not in found
 
 
 def test_an_arc_about_its_own_start_is_written_as_lines() -> None:
@@ -333,7 +334,7 @@ def test_an_arc_about_its_own_start_is_written_as_lines() -> None:
     blocks, found = mend_of(path)
     assert all(block.startswith("G01") for block in blocks)
     assert blocks[-1] == "G01X00000.20Y00000.00F10;"
-    assert "1 arc too small" in found[Code.MOVE_COLLAPSED]
+    assert "1 arc too small" in found[ProgramCode.MOVE_COLLAPSED]
 
 
 def test_mends_are_counted_once_and_go_on_the_same_way() -> None:
@@ -341,7 +342,7 @@ def test_mends_are_counted_once_and_go_on_the_same_way() -> None:
     wanted = random_path(rng, 600, 0.1, 0.5)
     target = load_target("pic-mmh")
     program = target.target.write(wanted, target.machine)
-    (finding,) = [f for f in program.findings if f.code == Code.ARC_MENDED]
+    (finding,) = [f for f in program.findings if f.code == ProgramCode.ARC_MENDED]
     decoded = target.target.read(program.data, target.machine)
     rows = program.row_of_block[decoded.block]
     mends = [
@@ -387,5 +388,5 @@ def test_an_arc_up_or_down_is_split() -> None:
     wanted = path.arc(-1, 0, centre=(0, 0), ccw=True, feed=1)
     blocks, found = mend_of(wanted)
     assert [block[:4] for block in blocks[:3]] == ["G00X", "G01Z", "G03X"]
-    assert Code.MOVE_SPLIT in found
+    assert ProgramCode.MOVE_SPLIT in found
     assert Kind.ARC_CCW in wanted.finish().kind

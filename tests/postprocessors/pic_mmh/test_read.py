@@ -8,9 +8,10 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from camtool.errors import ProgramError
-from camtool.findings import Code, Severity
+from camtool.findings import Severity
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Kind, Move, Toolpath
 
 THESIS = b"G02X02969.00Y03400.00I03012.00J03040.00F08;"
@@ -174,7 +175,7 @@ def test_a_plus_is_no_other_sense_than_none() -> None:
 def test_a_feed_above_the_link_is_decoded_and_found() -> None:
     path = read(b"G01X00001.00Y00001.00F13;G01X00002.00Y00001.00F14;G01X00003.00Y00001.00F99;")
     (finding,) = path.findings
-    assert (finding.code, finding.severity) == (Code.FEED_ABOVE_LIMIT, Severity.WARNING)
+    assert (finding.code, finding.severity) == (ProgramCode.FEED_ABOVE_LIMIT, Severity.WARNING)
     assert finding.where == "block 2"
     assert finding.measured == 9.9
     assert finding.limit == pytest.approx(1.3944)
@@ -183,7 +184,7 @@ def test_a_feed_above_the_link_is_decoded_and_found() -> None:
 
 def test_long_blocks_are_one_finding() -> None:
     (finding,) = read(b"G90;" + THESIS + THESIS, "dialect.buffer_chars=35").findings
-    assert (finding.code, finding.severity) == (Code.BLOCK_TOO_LONG, Severity.WARNING)
+    assert (finding.code, finding.severity) == (ProgramCode.BLOCK_TOO_LONG, Severity.WARNING)
     assert (finding.measured, finding.limit, finding.where) == (43.0, 35.0, "block 2")
     assert "2 blocks" in finding.message
     assert read(b"G90;" + THESIS + THESIS).findings == ()

@@ -9,6 +9,7 @@ from camtool.errors import MachineError, PostError
 from camtool.findings import Code, Severity
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Kind, Toolpath
 
 
@@ -99,7 +100,7 @@ def test_up_comes_first_and_down_last() -> None:
     path.line(3, 0, -1, feed=1).arc(3, 2, centre=(3, 1), ccw=True, feed=1)
     assert (
         "1 feed move in XY and Z became steps of at most 0.0005 mm"
-        in (findings(path)[Code.MOVE_SPLIT])
+        in (findings(path)[ProgramCode.MOVE_SPLIT])
     )
 
 
@@ -116,7 +117,7 @@ def test_slopes_and_helices_become_small_steps() -> None:
         "G01Z-00001.00F10;",
         "G03X00900.00Y00000.00I00500.00J00000.00F10;",
     ]
-    assert "2 feed moves" in findings(path)[Code.MOVE_SPLIT]
+    assert "2 feed moves" in findings(path)[ProgramCode.MOVE_SPLIT]
 
 
 def test_errors_name_the_given_move_behind_a_slope() -> None:
@@ -128,20 +129,20 @@ def test_errors_name_the_given_move_behind_a_slope() -> None:
 def test_feeds_are_rounded_down_and_told() -> None:
     path = ToolpathBuilder().line(1, 0, feed=0.19).line(2, 0, feed=0.3).line(3, 0, feed=1.394)
     assert [block[-4:] for block in written(path)] == ["F01;", "F03;", "F13;"]
-    assert "2 moves" in findings(path)[Code.FEED_ROUNDED]
+    assert "2 moves" in findings(path)[ProgramCode.FEED_ROUNDED]
     assert findings(ToolpathBuilder().line(1, 0, feed=0.7)) == {}
 
 
 def test_dwells_are_split_and_rounded_up() -> None:
     path = ToolpathBuilder().event(Kind.DWELL, 200.25).event(Kind.DWELL, 0)
     assert written(path) == ["G04P99;", "G04P99;", "G04P03;"]
-    assert Code.VALUE_ROUNDED in findings(path)
+    assert ProgramCode.VALUE_ROUNDED in findings(path)
 
 
 def test_moves_of_less_than_a_step_are_left_out() -> None:
     path = ToolpathBuilder().line(0.00001, 0, feed=1).line(0, 0, feed=1).rapid(0, 0, 0.00006)
     assert written(path) == []
-    assert "3 moves" in findings(path)[Code.MOVE_COLLAPSED]
+    assert "3 moves" in findings(path)[ProgramCode.MOVE_COLLAPSED]
 
 
 def test_no_coordinate_lies_half_way_between_two_steps() -> None:
@@ -159,13 +160,13 @@ def test_long_blocks_are_one_finding() -> None:
     ):
         target = load_target("pic-mmh", settings=setting)
         found = target.target.write(path.finish(), target.machine).findings
-        (finding,) = [each for each in found if each.code == Code.BLOCK_TOO_LONG]
+        (finding,) = [each for each in found if each.code == ProgramCode.BLOCK_TOO_LONG]
         assert finding.severity == severity
         assert (finding.measured, finding.limit) == (44.0, 35.0)
         assert "2 blocks" in finding.message
         assert "dialect.form=annex" in finding.message
-    assert Code.BLOCK_TOO_LONG not in findings(path, "dialect.form=annex")
-    assert Code.BLOCK_TOO_LONG not in findings(path, "dialect.buffer_chars=44")
+    assert ProgramCode.BLOCK_TOO_LONG not in findings(path, "dialect.form=annex")
+    assert ProgramCode.BLOCK_TOO_LONG not in findings(path, "dialect.buffer_chars=44")
 
 
 def builder() -> ToolpathBuilder:

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from camtool.errors import MachineError, PostError, ProgramError
-from camtool.findings import Code, Severity
+from camtool.findings import Severity
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.rs274 import compare, needs_rs274
 from tests.postprocessors.gcode.plain_parts import part
@@ -74,7 +75,10 @@ def test_the_scale() -> None:
 
 def test_the_scale_is_warned_of_until_it_was_measured() -> None:
     path = ToolpathBuilder().rapid(1.0, 2.0).finish()
-    for settings, codes in (((), [Code.COORDINATES_SCALED]), (("coord_scale_checked=true",), [])):
+    for settings, codes in (
+        ((), [ProgramCode.COORDINATES_SCALED]),
+        (("coord_scale_checked=true",), []),
+    ):
         target = load_target("valcnc", settings=[f"dialect.{one}" for one in settings])
         program = target.target.write(path, target.machine)
         assert [finding.code for finding in program.findings] == codes
@@ -101,7 +105,7 @@ def test_circles_on_axes_of_unequal_steps_become_lines() -> None:
     assert np.abs(radii - 10.0).max() < 0.001
     middles = (decoded.end[:-1, :2] + decoded.end[1:, :2]) / 2.0
     assert np.abs(np.hypot(*middles.T) - 10.0).max() < 0.006
-    (mended,) = (f for f in program.findings if f.code == Code.ARC_MENDED)
+    (mended,) = (f for f in program.findings if f.code == ProgramCode.ARC_MENDED)
     assert "ellipses" in mended.message
     with pytest.raises(ProgramError, match="this arc is an ellipse"):
         target.target.read(b"G00X1Y0Z0\nG03X0Y1Z0I-1J0", target.machine)
@@ -121,9 +125,9 @@ def test_feeds_and_events_that_have_no_word_are_found() -> None:
     target = load_target("valcnc")
     path = ToolpathBuilder().event(Kind.SPINDLE_CW, 1000).line(1.0, 0.0, feed=100.0).finish()
     found = {f.code: f for f in target.target.write(path, target.machine).findings}
-    assert found[Code.FEED_ROUNDED].severity == Severity.WARNING
-    assert found[Code.FEED_ROUNDED].limit == 14400.0
-    assert "SPINDLE_CW" in found[Code.EVENT_LEFT_OUT].message
+    assert found[ProgramCode.FEED_ROUNDED].severity == Severity.WARNING
+    assert found[ProgramCode.FEED_ROUNDED].limit == 14400.0
+    assert "SPINDLE_CW" in found[ProgramCode.EVENT_LEFT_OUT].message
 
 
 def test_nothing_stops_for_another_tool() -> None:
@@ -268,12 +272,12 @@ def test_half_circles_miss_their_end_by_the_firmware_s_arcsine() -> None:
     """A chord of 1.9998 on a diameter of 2: 2·arcsin(C/2R) is 178.4°, with the end where 180°
     would be; below 90° the arcsine does no harm."""
     path = read(b"G00X1Y0Z0\nG03X-0.9998Y0Z0I-1J0")
-    (finding,) = (f for f in path.findings if f.code == Code.ARC_MISSES_END)
+    (finding,) = (f for f in path.findings if f.code == ProgramCode.ARC_MISSES_END)
     assert finding.measured == pytest.approx(8.0 * 2.0 * math.acos(0.9999), rel=1e-6)
     assert finding.where == "block 2"
-    assert Code.ARC_MISSES_END not in {f.code for f in read(ARC + b"I-1J0").findings}
+    assert ProgramCode.ARC_MISSES_END not in {f.code for f in read(ARC + b"I-1J0").findings}
     exact = read(b"G00X1Y0Z0\nG03X-1Y0Z0I-1J0")
-    assert Code.ARC_MISSES_END not in {f.code for f in exact.findings}
+    assert ProgramCode.ARC_MISSES_END not in {f.code for f in exact.findings}
 
 
 class TestReferee:

@@ -1,0 +1,712 @@
+"""Codes and sentences of planning: what a tool cannot cut, and what planning changed."""
+
+from __future__ import annotations
+
+from camtool.findings import ERROR, INFO, WARNING, Code, Sentence, and_more
+from camtool.geometry.findings import ContourCode
+from camtool.toolpath.findings import ProgramCode
+
+
+class PlanningCode(Code):
+    """Codes of planning."""
+
+    NOTHING_DRAWN = (
+        107,
+        ERROR,
+        "nothing in the drawing can be cut",
+        "look at what was not used: `camtool check`",
+    )
+    POINTS_MERGED = (
+        117,
+        (INFO, WARNING),
+        "the scale brings points together that were apart in the drawing: they became one; a "
+        "warning where whole paths became a point and are left out",
+        "none, or a larger scale",
+    )
+    CONTOUR_TOO_SMALL = (
+        201,
+        WARNING,
+        "the tool does not fit into a contour, which is left uncut; place and area are given",
+        "use a smaller tool",
+    )
+    OPEN_CONTOUR_ON_LINE = (
+        202,
+        WARNING,
+        "an open contour has no inside: it is cut on the line",
+        "close it, or give `--side on`",
+    )
+    UNREACHED = (
+        205,
+        (INFO, WARNING),
+        "part of the shape is narrower than the tool, or is the foot of a corner: it stays "
+        "uncut, with its place and area",
+        "use a smaller tool, or reliefs (`corners`)",
+    )
+    OUT_OF_STOCK = (
+        206,
+        (INFO, WARNING, ERROR),
+        "info: a cut goes through the stock into what lies below, as far as `spoilboard` in "
+        "`[stock]` allows; error: farther, or a part or an engraving that goes beyond its edge, "
+        "or what lies wholly beside it; warning: a pocket, a hole or an open line goes beyond the "
+        "edge, or a cut runs wholly beside it",
+        "correct `[stock]`, the origin or the depth",
+    )
+    SLOT_AS_WIDE = (
+        208,
+        INFO,
+        "a slot is as wide as the tool: it is cut along its middle",
+        "none",
+    )
+    TAB_LEFT_OUT = (
+        209,
+        WARNING,
+        "a tab does not fit where it should stand, or a hole is drilled through it; or "
+        "(counted, in one) holes, open paths and contours that are too short get no tabs "
+        "although other parts have them",
+        "use fewer or narrower tabs, or another operation for what needs its own",
+    )
+    LEAD_LEFT_OUT = (
+        210,
+        WARNING,
+        "a lead-in or lead-out would cut into material that is wanted, and was shortened or "
+        "left out",
+        "a shorter lead, or another start",
+    )
+    ENTRY_CHANGED = (
+        211,
+        WARNING,
+        "a ramp or helix does not fit: it is steeper, smaller, or a plunge",
+        "a smaller tool, or a plunge",
+    )
+    DEPTH_LIMITED = (
+        212,
+        WARNING,
+        "carving with a V bit would go deeper than allowed: the bottom is flat there",
+        "a greater depth, or a wider bit",
+    )
+    REVERSALS_IN_AIR = (
+        213,
+        INFO,
+        "reversals were moved from cuts into the air, with the predicted error before and "
+        "after; or contours that turn back stay in one piece, and why",
+        "none ([reversals.md](reversals.md))",
+    )
+    NOT_RELIEVED = (
+        214,
+        WARNING,
+        "an inner corner got no relief because it would cut into material that is wanted",
+        "a smaller tool",
+    )
+    MARKS_NOT_CUT = (
+        215,
+        WARNING,
+        "single points are drawn, and no operation drills them",
+        "an operation of the kind `drill`",
+    )
+    NOT_DRILLED = (
+        216,
+        WARNING,
+        "a path chosen for `drill` is not a circle, or is larger than `max_hole`: it is left out",
+        "another operation for it, or a larger `max_hole`",
+    )
+    HOLE_SIZE = (
+        217,
+        WARNING,
+        "circles are drawn with another diameter than that of the drill",
+        "the right drill, or none if that is meant",
+    )
+    TOOL_NOT_SAID = (
+        218,
+        ERROR,
+        "an operation has another tool than the one before it, and no number of its own by "
+        "which the program could ask for it",
+        "number the tools, or write a program for each",
+    )
+    SIDE_BY_UNCUT = (
+        219,
+        (WARNING, INFO),
+        "contours are cut inside, or outside, because they lie in a contour that is not cut; "
+        "or (info) although they lie in one on the layer of a frame",
+        "name the layers that are no edges of parts (`--frames`), or give the side "
+        "([toolpaths.md](toolpaths.md))",
+    )
+    CUT_DOUBTFUL = (
+        220,
+        WARNING,
+        "a setting of the cut looks forgotten or too high, but is used: no spindle speed, a "
+        "tool of no width on closed contours, a plunge at the feed of the cut (these "
+        "where the program starts the spindle), a pass deeper than the tool is wide, a cut "
+        "deeper than its edges are long, a plunge of a tool that does not cut at its centre, "
+        "a chip load or a surface speed beyond the tool's limits, walls and floors that a "
+        "round nose does not reach, presets without a material, parts cut out of the stock "
+        "without tabs",
+        "the flag that is named, or none if that is meant",
+    )
+    TAB_SHARED = (
+        225,
+        (INFO, WARNING),
+        "a cut was raised over the bridge of a tab that it would have cut away: round a "
+        "neighbour, on the other side of a narrow contour, on a lead; a warning where the "
+        "operation has no tabs itself, because it leaves material there",
+        "none, or a wider spacing of the parts",
+    )
+    CORNER_FAR = (
+        226,
+        WARNING,
+        "sharp or mitred joins take the tool more than five times its distance from the wall "
+        "beyond a needle-like corner",
+        '`joins = "round"`, or `"mitre"` with a low `mitre_limit`',
+    )
+    NOT_BORED = (
+        227,
+        (WARNING, INFO),
+        "a path chosen for `bore` is not a circle, or has no room for the tool: it is left out; a "
+        "remark where it lies within another circle, with which it is bored",
+        "`drill` for circles as wide as the tool, a smaller tool for the others",
+    )
+    FINISH_IN_PASSES = (
+        228,
+        INFO,
+        "a finishing pass meets more at some places than is left on the wall, because the tool "
+        "that roughs does not get so far: it is cut in passes of `step_down` there, not at the "
+        "full depth at once",
+        "none, or a smaller tool for the roughing",
+    )
+    NO_REST = (
+        229,
+        INFO,
+        "there is nothing in a region that the tool of a `rest` reaches and what was cut before "
+        "it has left",
+        "none",
+    )
+    NOT_CHAMFERED = (
+        230,
+        WARNING,
+        "a path chosen for `chamfer` is open: it has no side on which an edge would be, and is "
+        "left out",
+        'choose closed contours (`select = ["closed"]`), or close the path',
+    )
+    TOOL_CHANGE_NOT_STATED = (
+        231,
+        WARNING,
+        "tools are changed in the program, and the machine file does not state where: the tool is "
+        "lifted to five times the safe height, as far as the travel of Z allows, and goes to "
+        "where the machine parks",
+        "`change_mm` and `change_z_mm` in `[defaults]` of the machine file, where the hand and "
+        "the longest tool have room ([machines.md](machines.md))",
+    )
+    LOOSE_PIECE = (
+        232,
+        WARNING,
+        "a closed contour within a part is cut through the stock without tabs, so that the piece "
+        "within it comes loose beside the running tool, which may throw it or jam; place and size "
+        "are given. What the tool mills away leaves no piece",
+        "tabs in an operation of its own, a pocket that clears it, or tape below",
+    )
+    LINES_RUN_TOGETHER = (
+        233,
+        WARNING,
+        "lines of an engraving are nearer to each other than the tool cuts wide at its depth, so "
+        "that what is between them vanishes: the counters of letters, or letters that join; the "
+        "narrowest place is given, and the widest tool that fits all",
+        "a finer tool, a V bit, or larger letters",
+    )
+    TEXT_AS_EDGE = (
+        234,
+        WARNING,
+        "outlines of text are cut as edges of parts and holes, and the tool has no room beside "
+        "some of them",
+        'engrave text: `kind = "engrave"`, `select = ["text"]`; `select = ["not text"]` where '
+        "parts are cut",
+    )
+    FIT_COARSE = (
+        410,
+        WARNING,
+        "from Python: a drawing was read for a smaller part than the job makes of it, so its "
+        "curves were fitted more coarsely than the tolerance asks; how far they lie off is "
+        "given, and is in the error",
+        "read it with `scale=…`, or give its file instead of the drawing",
+    )
+
+
+NOTHING_DRAWN = Sentence(PlanningCode.NOTHING_DRAWN, "no contour is left to cut")
+NOTHING_DRAWN_BUT_PATHS = Sentence(
+    PlanningCode.NOTHING_DRAWN, "no contour is left to cut: use a smaller tool, or --side on"
+)
+NOTHING_DRAWN_TO_DRILL = Sentence(
+    PlanningCode.NOTHING_DRAWN,
+    "there is no hole to drill: no single point, and no circle that is small enough",
+)
+NOTHING_DRAWN_TO_CHAMFER = Sentence(
+    PlanningCode.NOTHING_DRAWN, "there is no edge to chamfer: no closed contour"
+)
+NOTHING_DRAWN_TO_BORE = Sentence(
+    PlanningCode.NOTHING_DRAWN, "there is no hole to bore: no circle that is wider than the tool"
+)
+SELF_CROSSING_CARVED = Sentence(
+    ContourCode.SELF_CROSSING,
+    "{contour} crosses {other}: it is not clear what is inside; correct the drawing, or carve "
+    "without it",
+    severity=ERROR,
+)
+SELF_CROSSING_NO_REGION = Sentence(
+    ContourCode.SELF_CROSSING, "{fault}: its inside cannot be carved; {mend}", severity=ERROR
+)
+BRANCHED_REGION = Sentence(
+    ContourCode.BRANCHED,
+    "{measured:#} ends meet here on {contour}, and what it encloses depends on which of them are "
+    "joined; correct the drawing here, lower --gap, or cut it with --side on",
+    severity=ERROR,
+)
+BRANCHED_REGION_MORE = Sentence(
+    ContourCode.BRANCHED,
+    "contours pass {measured:# more place|# more places} where what they enclose depends on which "
+    "ends are joined",
+    severity=ERROR,
+)
+POINTS_MERGED = Sentence(
+    PlanningCode.POINTS_MERGED,
+    "at this scale {measured:# point lies|# points lie} within {near_nm:g} nm of the one before "
+    "and {measured:was|were} merged{paths:|; # path is no longer than that and is left out|; # "
+    "paths are no longer than that and are left out}",
+)
+CONTOUR_TOO_SMALL = Sentence(
+    PlanningCode.CONTOUR_TOO_SMALL,
+    "{tool} does not fit into this contour of {measured:.6g} mm²: it is not cut",
+    "mm2",
+)
+CONTOUR_TOO_SMALL_ROUND = Sentence(
+    PlanningCode.CONTOUR_TOO_SMALL,
+    "{tool} does not fit round this contour of {measured:.6g} mm²: it is not cut",
+    "mm2",
+)
+CONTOUR_TOO_SMALL_POCKET = Sentence(
+    PlanningCode.CONTOUR_TOO_SMALL,
+    "{tool} does not fit into this pocket of {measured:.6g} mm²: it is not cut",
+    "mm2",
+)
+CONTOUR_TOO_SMALL_FOR_TIP = Sentence(
+    PlanningCode.CONTOUR_TOO_SMALL,
+    "a flat tip of {limit:g} mm does not fit into this contour, which is {measured:.4g} mm wide: "
+    "it is not carved",
+    "mm",
+)
+OPEN_CONTOUR_ON_LINE = Sentence(
+    PlanningCode.OPEN_CONTOUR_ON_LINE, "an open contour has no {side}: the tool runs on the line"
+)
+GOUGE = Sentence(
+    ProgramCode.GOUGE, "{tool} beside {contour} cuts {amount:.4g} mm into {other}", "mm"
+)
+GOUGE_OF_UNCUT = Sentence(
+    ProgramCode.GOUGE,
+    "{tool} beside {contour} cuts {amount:.4g} mm into {other}, which is not cut itself",
+    "mm",
+)
+GOUGE_OF_ALLOWANCE = Sentence(
+    ProgramCode.GOUGE,
+    "{tool} beside {contour} cuts {amount:.4g} mm into the allowance on {other}",
+    "mm",
+)
+GOUGE_BEYOND = Sentence(
+    ProgramCode.GOUGE,
+    "{tool} cuts {amount:.4g} mm beyond the lines, and what is to stay is less than "
+    "{measured:.4g} mm wide here: it is cut away from both sides",
+    "mm",
+    WARNING,
+)
+GOUGE_MORE = Sentence(ProgramCode.GOUGE, "{measured:# more place|# more places} like this")
+GOUGE_BY_POCKET = Sentence(
+    ProgramCode.GOUGE,
+    "the pocket {pocket} clears away {contour}, {measured:.4g} mm wide, which another operation "
+    "keeps: let the pocket take its layer too, as an island",
+    "mm",
+    ERROR,
+)
+GOUGE_BY_POCKET_MORE = Sentence(
+    ProgramCode.GOUGE, "{measured:# more contour|# more contours} like this"
+)
+OUT_OF_TRAVEL = Sentence(
+    ProgramCode.OUT_OF_TRAVEL,
+    "{axis} spans {measured:.4f} mm with part zero, more than its travel of {limit:g} mm: {mend}",
+    "mm",
+)
+UNREACHED = Sentence(
+    PlanningCode.UNREACHED,
+    "{tool} is too wide for this place: {measured:.4g} mm² stay uncut",
+    "mm2",
+    WARNING,
+)
+UNREACHED_MORE = Sentence(
+    PlanningCode.UNREACHED,
+    "{tool} is too wide for {places:# more place|# more places}: {measured:.4g} mm² stay uncut",
+    "mm2",
+    WARNING,
+)
+UNREACHED_CORNERS = Sentence(
+    PlanningCode.UNREACHED,
+    "{corners:an inner corner keeps|# inner corners keep} {measured:.4g} mm² that {tool} does "
+    "not reach",
+    "mm2",
+    INFO,
+)
+UNREACHED_BY_TIP = Sentence(
+    PlanningCode.UNREACHED,
+    "a flat tip of {tip:g} mm leaves {places:# corner or narrow place|# corners or narrow "
+    "places} uncut, {measured:.4g} mm² in all: use a bit with a smaller tip",
+    "mm2",
+    WARNING,
+)
+UNREACHED_BETWEEN = Sentence(
+    PlanningCode.UNREACHED,
+    "{tool} does not fit between {one} and {other}, {measured:.4g} mm apart: they stay joined",
+    "mm",
+    WARNING,
+)
+UNREACHED_BETWEEN_MORE = Sentence(
+    PlanningCode.UNREACHED,
+    "{measured:# more pair|# more pairs} of contours that {measured:stays|stay} joined",
+    severity=WARNING,
+)
+OUT_OF_STOCK = Sentence(
+    PlanningCode.OUT_OF_STOCK,
+    "the tool cuts {measured:.4g} mm deep into a stock of {thickness:g} mm, more than "
+    "{allowed:g} mm into what lies below: cut less deep, or allow more with spoilboard in "
+    "[stock]",
+    "mm",
+    ERROR,
+)
+OUT_OF_STOCK_AS_ALLOWED = Sentence(
+    PlanningCode.OUT_OF_STOCK,
+    "the tool goes {through:.4g} mm through the stock of {thickness:g} mm into what lies below; "
+    "up to {allowed:g} mm are allowed",
+    "mm",
+    INFO,
+)
+OUT_OF_STOCK_BESIDE = Sentence(
+    PlanningCode.OUT_OF_STOCK,
+    "{measured:# cut lies|# cuts lie} wholly beside the stock: check its corner, its size and "
+    "the origin",
+    "cuts",
+    WARNING,
+)
+OUT_OF_STOCK_PART = Sentence(
+    PlanningCode.OUT_OF_STOCK,
+    "the {what} goes {measured:.4g} mm beyond the {edge} edge of the stock, so that it is not "
+    "whole: move the origin or the copies, or correct [stock]",
+    "mm",
+    ERROR,
+)
+OUT_OF_STOCK_WHOLLY = Sentence(
+    PlanningCode.OUT_OF_STOCK,
+    "the {what} lies wholly beside the stock, {measured:.4g} mm beyond its {edge} edge: move the "
+    "origin or the copies, or correct [stock]",
+    "mm",
+    ERROR,
+)
+OUT_OF_STOCK_PARTLY = Sentence(
+    PlanningCode.OUT_OF_STOCK,
+    "the {what} goes {measured:.4g} mm beyond the {edge} edge of the stock: correct the origin or "
+    "[stock] if that is not meant",
+    "mm",
+    WARNING,
+)
+OUT_OF_STOCK_MORE = Sentence(
+    PlanningCode.OUT_OF_STOCK, "{measured:# more contour|# more contours} like this"
+)
+RAPID_IN_STOCK = Sentence(
+    ProgramCode.RAPID_IN_STOCK,
+    "a rapid runs through the stock, {depth:.4g} mm below its top" + and_more("rapids"),
+    "mm",
+)
+SLOT_AS_WIDE = Sentence(
+    PlanningCode.SLOT_AS_WIDE, "{tool} is as wide as this contour: it runs in its middle"
+)
+SLOT_AS_WIDE_IN_POCKET = Sentence(
+    PlanningCode.SLOT_AS_WIDE, "a slot as wide as {tool} is cut along its middle", "mm"
+)
+TAB_LEFT_OUT = Sentence(
+    PlanningCode.TAB_LEFT_OUT, "there is no room for a tab of this width: the contour has one less"
+)
+TAB_LEFT_OUT_DRILLED = Sentence(
+    PlanningCode.TAB_LEFT_OUT, "a hole is drilled through this tab of {contour}: it may not hold"
+)
+TAB_LEFT_OUT_OF_ALL = Sentence(
+    PlanningCode.TAB_LEFT_OUT,
+    "{measured:# contour gets|# contours get} no tabs: {kinds}; cut them in an operation "
+    "of their own if they need tabs",
+    "contours",
+)
+LEAD_LEFT_OUT = Sentence(
+    PlanningCode.LEAD_LEFT_OUT,
+    "the {lead} is left out instead of {limit:g} mm: there is no room for it beside what is to "
+    "stay",
+    "mm",
+)
+LEAD_LEFT_OUT_IN_PART = Sentence(
+    PlanningCode.LEAD_LEFT_OUT,
+    "the {lead} is {measured:.4g} mm instead of {limit:g} mm: there is no room for it beside "
+    "what is to stay",
+    "mm",
+)
+ENTRY_CHANGED = Sentence(
+    PlanningCode.ENTRY_CHANGED,
+    "a ramp of {measured:.4g} mm is too long for a contour of {length:.4g} mm: the tool plunges",
+    "mm",
+)
+ENTRY_CHANGED_IN_POCKET = Sentence(
+    PlanningCode.ENTRY_CHANGED, "the tool goes down by {change}, which does not fit"
+)
+ENTRY_CHANGED_STEEPER = Sentence(
+    PlanningCode.ENTRY_CHANGED,
+    "the helix of a bore takes at most {limit} turns: its slope is {measured:.3g}°, not "
+    "{wanted:.3g}°; use a smaller tool, or a steeper entry",
+)
+ENTRY_CHANGED_IN_NARROW_BORE = Sentence(
+    PlanningCode.ENTRY_CHANGED,
+    "a hole of {measured:.4g} mm is too narrow for {tool} to go down in a helix: it plunges in "
+    "the middle{pecks}, and goes once round at the bottom; a drill or a smaller tool cuts it more "
+    "easily",
+    "mm",
+)
+LOOSE_PIECE = Sentence(
+    PlanningCode.LOOSE_PIECE,
+    "a piece of {width:.4g} by {height:.4g} mm comes loose within this contour beside the running "
+    "tool, because nothing holds it: {mend}",
+    "mm2",
+)
+LOOSE_PIECE_MORE = Sentence(
+    PlanningCode.LOOSE_PIECE, "{measured:# more piece comes|# more pieces come} loose like this"
+)
+DEPTH_LIMITED = Sentence(
+    PlanningCode.DEPTH_LIMITED,
+    "a floor of {measured:.6g} mm² is left: up to {width:.4g} mm wide, bit and depth allow "
+    "{allowed:.4g} mm; clear it with a pocket and a flat tool",
+    "mm2",
+)
+REVERSALS_IN_AIR = Sentence(
+    PlanningCode.REVERSALS_IN_AIR,
+    "{limit:# reversal|# reversals} while cutting {limit:becomes|become} {measured}: "
+    "{runs_before:# run is|# runs are} cut as {runs_after}; what backlash leaves over is at most "
+    "{after_um:.3g} µm, not {before_um:.3g} µm",
+)
+REVERSALS_IN_AIR_NOT = Sentence(
+    PlanningCode.REVERSALS_IN_AIR,
+    "{measured:# contour that turns back is|# contours that turn back are} cut in one piece: "
+    "{reason}",
+)
+NOT_RELIEVED = Sentence(
+    PlanningCode.NOT_RELIEVED, "{tool} has no room for a relief at this corner"
+)
+MARKS_NOT_CUT = Sentence(
+    PlanningCode.MARKS_NOT_CUT,
+    "{measured:# single point is|# single points are} not cut: drill "
+    "them with an operation of the kind drill",
+)
+NOT_DRILLED = Sentence(
+    PlanningCode.NOT_DRILLED,
+    "only full circles and single points are drilled: {measured:# other path is|# other paths "
+    "are} left out",
+)
+NOT_DRILLED_TOO_LARGE = Sentence(
+    PlanningCode.NOT_DRILLED,
+    "circles of more than {limit:g} mm are not drilled: {count}, up to {measured:.6g} mm",
+    "mm",
+)
+NO_REST = Sentence(PlanningCode.NO_REST, "{other} leaves nothing that {tool} can clear")
+FINISH_IN_PASSES = Sentence(
+    PlanningCode.FINISH_IN_PASSES,
+    "up to {measured:.4g} mm are left beside the wall where the tool that roughs does not get: "
+    "the wall is finished in {passes} passes",
+    "mm",
+)
+FINISH_IN_PASSES_WHOLE = Sentence(
+    PlanningCode.FINISH_IN_PASSES,
+    "nothing is roughed: the wall is cut in {passes} passes",
+)
+NOT_BORED = Sentence(
+    PlanningCode.NOT_BORED,
+    "only full circles are bored: {measured:# other path is|# other paths are} left out",
+    severity=WARNING,
+)
+NOT_CHAMFERED = Sentence(
+    PlanningCode.NOT_CHAMFERED,
+    "only edges of closed contours are chamfered: {measured:# open path is|# open paths are} left "
+    "out",
+)
+NOT_BORED_TOO_SMALL = Sentence(
+    PlanningCode.NOT_BORED,
+    "{tool} bores circles wider than {limit:g} mm: {count:# circle|# circles} of {measured:.6g} "
+    "mm or more {count:is|are} left out; drill {count:it|them}, or take a smaller tool",
+    "mm",
+    WARNING,
+)
+NOT_BORED_WITHIN = Sentence(
+    PlanningCode.NOT_BORED,
+    "{measured:# circle lies|# circles lie} within another one, with which "
+    "{measured:it is|they are} bored",
+    severity=INFO,
+)
+HOLE_SIZE = Sentence(
+    PlanningCode.HOLE_SIZE,
+    "{count:# circle|# circles} of {limit:g} mm {count:is|are} drilled with a drill of "
+    "{measured:g} mm",
+    "mm",
+)
+TOOL_NOT_SAID = Sentence(
+    PlanningCode.TOOL_NOT_SAID,
+    "the operation has another tool than the one before it and no number, so the program cannot "
+    "ask for it: number the tools, or write a program for each (--split tool)",
+)
+TOOL_NOT_SAID_APART = Sentence(
+    PlanningCode.TOOL_NOT_SAID,
+    "the operation has another tool than the one before it and the same number {number}, so the "
+    "program cannot ask for it: number the tools, or write a program for each (--split tool)",
+)
+TOOL_CHANGE_NOT_STATED = Sentence(
+    PlanningCode.TOOL_CHANGE_NOT_STATED,
+    "{count:a tool is|# tools are} changed {measured:.4g} mm above the stock here, because the "
+    "file of {machine} states no place: give {keys} in its [defaults]",
+    "mm",
+)
+LINES_RUN_TOGETHER = Sentence(
+    PlanningCode.LINES_RUN_TOGETHER,
+    "the tool cuts {measured:.4g} mm wide at this depth, and lines lie {limit:.4g} mm apart here"
+    "{more:| (and at # more place)| (and at # more places)}, so that what is between them is cut "
+    "away: take a tool of less than {limit:.4g} mm, or a V bit less deep",
+    "mm",
+)
+TEXT_AS_EDGE = Sentence(
+    PlanningCode.TEXT_AS_EDGE,
+    "{measured:# contour is an outline|# contours are outlines} of text, cut as edges of parts: "
+    'engrave text in an operation of its own (select = ["text"]), and leave it out here (select = '
+    '["not text"])',
+    "contours",
+)
+SIDE_BY_UNCUT = Sentence(
+    PlanningCode.SIDE_BY_UNCUT,
+    "{measured:# contour|# contours} would be cut on the other side without {uncut}, which "
+    "is not cut: {first} is cut {side}; if {uncut} is not the edge of a part, give --frames "
+    "{layer!r}, or the side",
+    "contours",
+    WARNING,
+)
+SIDE_BY_UNCUT_FRAME = Sentence(
+    PlanningCode.SIDE_BY_UNCUT,
+    "{measured:# contour|# contours} would be cut on the other side if {uncut}, on the layer of "
+    "a frame, were the edge of a part: {first} is cut {side}; --frames lists the layers of frames",
+    "contours",
+    INFO,
+)
+CUT_DOUBTFUL = Sentence(PlanningCode.CUT_DOUBTFUL, "{reasons}")
+CUT_DOUBTFUL_SPEED = Sentence(
+    PlanningCode.CUT_DOUBTFUL, "no spindle speed is given, so the spindle stays off (--spindle)"
+)
+CUT_DOUBTFUL_WIDTH = Sentence(
+    PlanningCode.CUT_DOUBTFUL,
+    "the tool has no width, so it runs on the line of closed contours (--tool-diameter, or "
+    "--side on)",
+)
+CUT_DOUBTFUL_DEPTH = Sentence(
+    PlanningCode.CUT_DOUBTFUL,
+    "a pass of {depth:.4g} mm is deeper than the tool of {width:g} mm is wide (--step-down)",
+)
+CUT_DOUBTFUL_BEYOND = Sentence(
+    PlanningCode.CUT_DOUBTFUL,
+    "{beyond:g} mm are cut beyond the lines, more than a quarter of the tool's radius "
+    "(--allowance)",
+)
+CUT_DOUBTFUL_PLUNGE = Sentence(
+    PlanningCode.CUT_DOUBTFUL,
+    "the tool plunges at the feed of the cut, {feed:g} mm/min (--plunge-feed)",
+)
+CUT_DOUBTFUL_LENGTH = Sentence(
+    PlanningCode.CUT_DOUBTFUL,
+    "the cut is {depth:.4g} mm deep, and the edges of the tool are {length:g} mm long (--depth)",
+)
+CUT_DOUBTFUL_CENTRE = Sentence(
+    PlanningCode.CUT_DOUBTFUL, "the tool plunges, and does not cut at its centre (--entry ramp)"
+)
+CUT_DOUBTFUL_CHIP = Sentence(
+    PlanningCode.CUT_DOUBTFUL,
+    "a chip load of {chip:.3g} mm, where {limits} mm are meant for the tool (--feed, --spindle)",
+)
+CUT_DOUBTFUL_EDGE = Sentence(
+    PlanningCode.CUT_DOUBTFUL,
+    "a surface speed of {speed:.4g} m/min, where {limits} m/min are meant for the tool "
+    "(--spindle)",
+)
+CUT_DOUBTFUL_NOSE = Sentence(
+    PlanningCode.CUT_DOUBTFUL,
+    "the round nose of the tool leaves {nose:g} mm at the foot of walls (a deeper cut, or a flat "
+    "tool)",
+)
+CUT_DOUBTFUL_RIDGES = Sentence(
+    PlanningCode.CUT_DOUBTFUL,
+    "the round nose of the tool leaves ridges of {ridge:.3g} mm on floors (--step-over)",
+)
+CUT_DOUBTFUL_LOOSE = Sentence(
+    PlanningCode.CUT_DOUBTFUL, "parts are cut out of the stock, and nothing holds them (--tabs 4)"
+)
+CUT_DOUBTFUL_LOOSE_FINISH = Sentence(
+    PlanningCode.CUT_DOUBTFUL,
+    "parts are cut out of the stock before their finishing pass, and nothing holds them "
+    "(--tabs 4)",
+)
+CUT_DOUBTFUL_PRESET = Sentence(
+    PlanningCode.CUT_DOUBTFUL,
+    "the tool has presets for {materials}, and none is taken (--material)",
+)
+TAB_SHARED = Sentence(
+    PlanningCode.TAB_SHARED,
+    "cuts are raised over {measured:# tab|# tabs}, which they would have cut away: the first "
+    "over one of {contour}",
+    "tabs",
+    WARNING,
+)
+TAB_SHARED_WITH_OWN = Sentence(
+    PlanningCode.TAB_SHARED,
+    "cuts are raised over {measured:# tab|# tabs} of its own and its neighbours, which they "
+    "would have cut away: the first over one of {contour}",
+    "tabs",
+    INFO,
+)
+CORNER_FAR = Sentence(
+    PlanningCode.CORNER_FAR,
+    "{joins} joins take the tool {measured:.4g} mm beyond a needle-like corner: use joins = "
+    '"round", or "mitre" with a low limit',
+    "mm",
+)
+CORNER_FAR_MORE = Sentence(PlanningCode.CORNER_FAR, "{measured:# more corner|# more corners}")
+FEED_ABOVE_LIMIT = Sentence(
+    ProgramCode.FEED_ABOVE_LIMIT,
+    "the tool moves at {measured:.4g} mm/min {direction}, {limit:.4g} is the highest of "
+    "{machine}: lower the feed",
+    "mm_min",
+    ERROR,
+)
+FEED_ABOVE_LIMIT_ON_SLOPE = Sentence(
+    ProgramCode.FEED_ABOVE_LIMIT,
+    "the tool moves at {measured:.4g} mm/min {direction}, {limit:.4g} is the highest of "
+    "{machine}: lower the feed, or slope less",
+    "mm_min",
+    ERROR,
+)
+FEED_ABOVE_LIMIT_IN_JOB = Sentence(
+    ProgramCode.FEED_ABOVE_LIMIT,
+    "the {feed} of {measured:g} mm/min becomes {lowered:g}, the rate of the axes in the file of "
+    "{machine}: {mend}",
+    "mm_min",
+    WARNING,
+)
+PLAY_NOT_KNOWN_TO_SAVE = Sentence(
+    ProgramCode.PLAY_NOT_KNOWN,
+    "no backlash is known of X and Y of {machine}, so that fewer reversals would gain nothing: "
+    "give it with --set axes.x.backlash_mm=...",
+    severity=WARNING,
+)
+FIT_COARSE = Sentence(
+    PlanningCode.FIT_COARSE,
+    "the drawing was read for a part {read:.4g} times its size and is scaled {scale:.4g} times: "
+    "its curves lie up to {off_um:.4g} µm off; read it with scale={scale:.6g}",
+    "mm",
+)
