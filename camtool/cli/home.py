@@ -40,7 +40,7 @@ def act(
     from camtool.sending.drive import Driver, Wish
     from camtool.sending.line import opened_line
     from camtool.sending.prepare import manner_of, port_of, wire_of
-    from camtool.target.wire import State
+    from camtool.target.wire import WireState
 
     target = machine.load()
     wire = wire_of(target)
@@ -52,7 +52,7 @@ def act(
         with wishes.caught():
             driver.carry(conversation)
     tell.rest()
-    if conversation.state is State.FINISHED:
+    if conversation.state is WireState.FINISHED:
         say(f"camtool: {action}: done", quiet=quiet)
         return 0
     why = str(driver.trouble or conversation.why or conversation.state.value)

@@ -17,7 +17,7 @@ from camtool.errors import MachineError, OptionError
 from camtool.units import parse_feed, parse_length
 
 if TYPE_CHECKING:
-    from camtool.target.contract import Setting
+    from camtool.target.contract import ControllerSetting
 
 PROPOSED = "my-machine"
 """The name that is proposed for a machine."""
@@ -53,9 +53,9 @@ AXES: dict[str, tuple[str, Callable[[str], float], str]] = {
 """Flag: key of an axis, how its values are read, meaning."""
 
 
-def axis_settings(flag: str, text: str) -> list[Setting]:
+def axis_settings(flag: str, text: str) -> list[ControllerSetting]:
     """`300x180x45`, or one value for X, Y and Z. OptionError for other text."""
-    from camtool.target.contract import Setting
+    from camtool.target.contract import ControllerSetting
 
     key, parse, _ = AXES[flag]
     values = [parse(part) for part in re.split(r"[x×]", text)]
@@ -66,33 +66,39 @@ def axis_settings(flag: str, text: str) -> list[Setting]:
     said = FLAG.format(flag)
     values = values * 3 if len(values) == 1 else values
     return [
-        Setting(f"axes.{axis}.{key}", value, said, f"--{flag} {text}")
+        ControllerSetting(f"axes.{axis}.{key}", value, said, f"--{flag} {text}")
         for axis, value in zip("xyz", values, strict=True)
     ]
 
 
-def spindle_setting(text: str) -> Setting:
+def spindle_setting(text: str) -> ControllerSetting:
     """`10000`, `hand` or `none`."""
-    from camtool.target.contract import Setting
+    from camtool.target.contract import ControllerSetting
 
     said, where = FLAG.format("spindle"), f"--spindle {text}"
     if text in ("hand", "none"):
-        return Setting("spindle.switched", text, said, where)
-    return Setting("spindle.default_rpm", _number(text), said, where)
+        return ControllerSetting("spindle.switched", text, said, where)
+    return ControllerSetting("spindle.default_rpm", _number(text), said, where)
 
 
-def proposals(target: str, *, switches: bool) -> list[Setting]:
+def proposals(target: str, *, switches: bool) -> list[ControllerSetting]:
     """What camtool proposes for machines that mill, and their target does not say; `switches`: the
     program switches the spindle."""
-    from camtool.target.contract import Setting
+    from camtool.target.contract import ControllerSetting
     from camtool.target.registry import find_target
 
     if not find_target(target)[0].starts_spindle:
         return []
     return [
-        Setting("defaults.feed_z_mm", 2.0, "ours: rapids end here, above warped stock"),
-        Setting("defaults.plunge_share", 0.3, "ours: end mills plunge slower than they cut"),
-        *([Setting("spindle.spin_up_s", 2.0, "ours: until it has its speed")] if switches else []),
+        ControllerSetting("defaults.feed_z_mm", 2.0, "ours: rapids end here, above warped stock"),
+        ControllerSetting(
+            "defaults.plunge_share", 0.3, "ours: end mills plunge slower than they cut"
+        ),
+        *(
+            [ControllerSetting("spindle.spin_up_s", 2.0, "ours: until it has its speed")]
+            if switches
+            else []
+        ),
     ]
 
 
@@ -260,7 +266,7 @@ def settings_text(name: str) -> str:
 
 def _of_controller(
     target: str | None, settings: str | None, port: str | None, questions: Questions
-) -> tuple[str, Sequence[Setting]]:
+) -> tuple[str, Sequence[ControllerSetting]]:
     """The name of the target, and what its controller says of the machine."""
     from camtool.target.registry import each_target, find_target, target_names
 
@@ -296,7 +302,7 @@ def _of_controller(
     )
 
 
-def machine_text(name: str, target: str, given: Sequence[Setting], source: str) -> str:
+def machine_text(name: str, target: str, given: Sequence[ControllerSetting], source: str) -> str:
     """The text of the machine file. MachineError, which names what says it, for a value that no
     machine has."""
     from camtool.tables import parsed_table

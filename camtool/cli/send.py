@@ -262,7 +262,7 @@ class _Job:
         from camtool.sending.line import opened_line
         from camtool.sending.live import LivePage
         from camtool.sending.prepare import manner_of
-        from camtool.target.wire import LATE_S, State
+        from camtool.target.wire import LATE_S, WireState
 
         one = self.one
         left = 0.0
@@ -319,7 +319,7 @@ class _Job:
                         **counts,
                     )
         tell.rest()
-        if conversation.state is State.FINISHED and driver.trouble is None:
+        if conversation.state is WireState.FINISHED and driver.trouble is None:
             say(f"camtool: finished: {len(one.packets)} packets", quiet=self.quiet)
             return 0
         block = one.block_of(conversation.block) if conversation.block >= 0 else -1

@@ -15,7 +15,7 @@ from camtool.cli.options import MachineFlags, talk_options
 from camtool.errors import OptionError, OutputError
 
 if TYPE_CHECKING:
-    from camtool.target.twin import Trace, Twin
+    from camtool.target.twin import SlideTrace, Twin
 
 MOST = "max"
 """The speed of a clock that keeps to nothing."""
@@ -153,7 +153,7 @@ class _Journal:
         self._shown = len(self._twin.decoded)
 
 
-def rows(trace: Trace) -> str:
+def rows(trace: SlideTrace) -> str:
     """A trace as CSV."""
     columns = zip(
         trace.time_s.tolist(),

@@ -95,7 +95,7 @@ class Feed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     unit_mm_min: FeedRate
 
 
-class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class MotionLimits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What bounds motion; None where it is not known.
 
     `max_step_rate_hz` bounds feed / coded step, `max_feed_mm_min` the feed itself; rapids run at
@@ -418,7 +418,7 @@ class Machine(
     target: TargetNames
     axes: Axes
     feed: Feed
-    limits: Limits
+    limits: MotionLimits
     defaults: Defaults
     spindle: Spindle = Spindle()
     coolant: Coolant = Coolant()

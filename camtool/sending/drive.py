@@ -14,7 +14,7 @@ from enum import Enum
 from typing import Any, Protocol
 
 from camtool.errors import OutputError
-from camtool.target.wire import Conversation, Place, State, Tell, Write, port_fault
+from camtool.target.wire import Conversation, Place, Tell, WireState, Write, port_fault
 
 TICK_S = 0.05
 """The user's wishes and the signals are looked at so often."""
@@ -85,7 +85,7 @@ class Driver:
         """The time of the conversation, s."""
         return time.monotonic() * self.speed
 
-    def carry(self, conversation: Conversation) -> State:
+    def carry(self, conversation: Conversation) -> WireState:
         """Hold the conversation; how it ended."""
         conversation.begin(self.now())
         going = True
@@ -116,7 +116,7 @@ class Driver:
         for action in actions:
             if isinstance(action, Tell):
                 continue
-            if conversation.state is not State.STOPPING and not self._note(conversation):
+            if conversation.state is not WireState.STOPPING and not self._note(conversation):
                 break  # what is not noted must not be sent; the stop is
             if isinstance(action, Write):
                 self.line.write(action.data)
@@ -179,7 +179,7 @@ class Driver:
             conversation.resume(now)
         elif wish is Wish.STOP:
             conversation.stop(now)
-            if conversation.state is State.STOPPING:
+            if conversation.state is WireState.STOPPING:
                 self._act(conversation)
                 self._shown(conversation, self.tell, TOLD)
         elif wish is Wish.CLOSE:

@@ -31,7 +31,7 @@ from camtool.target.wire import (
     NoWire,
     Packet,
     Place,
-    Standing,
+    ResumePoint,
     ToolAt,
     Wire,
     place_words,
@@ -73,7 +73,7 @@ class Consignment(Struct, frozen=True, eq=False):
     forecast: Forecast
     packets: tuple[Packet, ...]
     rest: Rest | None = None
-    standing: Standing | None = None
+    standing: ResumePoint | None = None
 
     @property
     def first(self) -> int:
@@ -224,10 +224,10 @@ def consignment(
     return Consignment(run, wire, forecast, packets, rest, standing)
 
 
-def _standing(left: Left, decoded: Toolpath, tool_at: ToolAt) -> Standing:
+def _standing(left: Left, decoded: Toolpath, tool_at: ToolAt) -> ResumePoint:
     """Where the program was left: when it was not stopped, it has done some of what was sent."""
     under_way = (decoded.block >= left.block - 1) & (decoded.block <= left.last)
-    return Standing(left.tool_mm, left.is_still, decoded.end[under_way], tool_at)
+    return ResumePoint(left.tool_mm, left.is_still, decoded.end[under_way], tool_at)
 
 
 def _shifted(path: Toolpath, by_mm: Floats) -> Toolpath:

@@ -36,11 +36,11 @@ class NoDialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The `[dialect]` of a target without options of its own."""
 
 
-class NoChoices(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The choices of a twin whose wire is known completely."""
+class NoTwinSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The settings of a virtual controller whose wire is known completely."""
 
 
-class Setting(Struct, frozen=True):
+class ControllerSetting(Struct, frozen=True):
     """A value of a machine file that a controller's own settings say: its key, such as
     "axes.x.travel_mm", what says it, such as "$130", and where that stands. `doubt`: why it is no
     value of this machine; it becomes a comment of the file then."""
@@ -107,7 +107,7 @@ class Target(ABC):
         """The model of its controllers; needed only where `controllers` names any."""
         raise NotImplementedError(f"{self.name} has no model of its controllers")
 
-    def settings_from(self, text: str) -> Sequence[Setting] | None:
+    def settings_from(self, text: str) -> Sequence[ControllerSetting] | None:
         """The values of a machine file that the controller's own settings say; None for a text
         that is none of these settings. MachineError for what is missing or cannot be used."""
         return None
@@ -154,11 +154,11 @@ class Target(ABC):
         cannot be."""
         return None
 
-    def twin_choices(self) -> type[msgspec.Struct]:
-        """What the sources of its wire leave open, as a record whose defaults are ours."""
-        return NoChoices
+    def twin_settings(self) -> type[msgspec.Struct]:
+        """Return the record of what the sources of its wire leave open; its defaults are ours."""
+        return NoTwinSettings
 
-    def twin(self, machine: Machine[Any, Any], choices: msgspec.Struct | None = None) -> Twin:
-        """The virtual controller, with `choices` of `twin_choices`; MachineError, which says why,
-        for a target that has none."""
+    def twin(self, machine: Machine[Any, Any], settings: Any) -> Twin:
+        """Return the virtual controller, set up as `twin_settings` say; MachineError, which
+        says why, for a target that has none."""
         raise MachineError(f"{self.name} has no virtual controller: {self.no_twin}")

@@ -117,7 +117,7 @@ class LoadedTarget:
                 where="table [controller], key model",
                 mend=f'leave model = "path" out: its own is {self.target.name}',
             )
-        record = self.target.twin_choices()
+        record = self.target.twin_settings()
         given = dict(choice.partition("=")[::2] for choice in choices)
         try:
             chosen = msgspec.convert(given, record, strict=False)

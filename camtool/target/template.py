@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from camtool.errors import OptionError
 from camtool.project import NAME
-from camtool.target.contract import Setting
+from camtool.target.contract import ControllerSetting
 
 _TABLE = re.compile(r"\[([\w.-]+)\]")
 _KEY = re.compile(r"(#\s*)?([\w-]+)\s*=")
@@ -62,7 +62,7 @@ def machine_template(
     base: str,
     base_text: str,
     needs: Iterable[str] = (),
-    given: Sequence[Setting] = (),
+    given: Sequence[ControllerSetting] = (),
 ) -> str:
     """TOML text of the machine `name`, which extends the target `base`.
 
@@ -112,7 +112,7 @@ def machine_template(
 
 
 def _rows(
-    table: str, rows: Iterable[str], said: dict[str, Setting], needs: set[str]
+    table: str, rows: Iterable[str], said: dict[str, ControllerSetting], needs: set[str]
 ) -> Iterator[str]:
     """The lines of one table; what is said of it is taken out of `said`."""
     backlash = table not in _AXES or f"{table}.backlash_mm" in said
@@ -132,7 +132,7 @@ def _rows(
         yield _BACKLASH
 
 
-def _line(setting: Setting, key: str) -> str:
+def _line(setting: ControllerSetting, key: str) -> str:
     text = f"{key} = {json.dumps(setting.value)}"
     if setting.doubt:
         return f"{f'# {text}':<28}# {setting.said}: {setting.doubt}"

@@ -34,7 +34,7 @@ COMMANDED: Final = Options(effects=Effects(False, False, False, False, False))
 which outlive a block."""
 
 
-class Trace(Struct, frozen=True, eq=False):
+class SlideTrace(Struct, frozen=True, eq=False):
     """What the slides did, K outputs in order: `time_s` (K,), the index (K,) in `Twin.decoded` of
     the block that asked for it (−1: a command), the position (K, 3) mm that the controller
     commanded and that of the slides (K, 3) mm, both in the work frame of when the power came
@@ -108,7 +108,7 @@ class Slides:
         self.done = 0
         """How many outputs of the last travel were made."""
         self._block = -1
-        self._pieces: list[Trace] = []
+        self._pieces: list[SlideTrace] = []
 
     def begin(self, travel: Travel, now: float, block: int) -> None:
         """Set out on a travel, which is that of the block of this index; whatever was under way is
@@ -143,7 +143,9 @@ class Slides:
         if high > low:
             self.done, self.commanded_mm = high, made[-1]
             owner = np.full(high - low, self._block, dtype=np.int64)
-            self._pieces.append(Trace(self._times[low:high], owner, made, self._slide[low:high]))
+            self._pieces.append(
+                SlideTrace(self._times[low:high], owner, made, self._slide[low:high])
+            )
         if self.ends_s is not None and now >= self.ends_s:
             self.ends_s = None
             if self._travel.left_at is not None:
@@ -172,22 +174,24 @@ class Slides:
         self._mechanics.axes[axis, 3] = steps * self._step_mm[axis]
 
     @property
-    def trace(self) -> Trace:
+    def trace(self) -> SlideTrace:
         """All that they have done, or since `drained`."""
         if len(self._pieces) != 1:
             self._pieces = [_joined(self._pieces)]
         return self._pieces[0]
 
-    def drained(self) -> Trace:
+    def drained(self) -> SlideTrace:
         """What they have done since the last call, which they then forget."""
         trace, self._pieces = self.trace, []
         return trace
 
 
-def _joined(pieces: Sequence[Trace]) -> Trace:
-    empty = Trace(np.empty(0), np.empty(0, dtype=np.int64), np.empty((0, 3)), np.empty((0, 3)))
+def _joined(pieces: Sequence[SlideTrace]) -> SlideTrace:
+    empty = SlideTrace(
+        np.empty(0), np.empty(0, dtype=np.int64), np.empty((0, 3)), np.empty((0, 3))
+    )
     pieces = [empty, *pieces]
-    return Trace(
+    return SlideTrace(
         np.concatenate([piece.time_s for piece in pieces]),
         np.concatenate([piece.block for piece in pieces]),
         np.concatenate([piece.commanded for piece in pieces]),

@@ -86,7 +86,7 @@ class Packet(Struct, frozen=True):
     end_mm: Place | None = None
 
 
-class State(Enum):
+class WireState(Enum):
     """How a conversation stands."""
 
     OPENING = "opening"
@@ -100,8 +100,8 @@ class State(Enum):
     FAILED = "failed"
 
 
-ENDS = frozenset({State.FINISHED, State.STOPPED, State.FAILED})
-HALTS = frozenset({State.WAITING, State.PAUSED})
+ENDS = frozenset({WireState.FINISHED, WireState.STOPPED, WireState.FAILED})
+HALTS = frozenset({WireState.WAITING, WireState.PAUSED})
 
 
 class Write(Struct, frozen=True):
@@ -137,7 +137,7 @@ NEAR_MM = 0.02
 """A place that is reported is one that is wanted when it lies so near: steps, and rounding."""
 
 
-class Standing(Struct, frozen=True, eq=False):
+class ResumePoint(Struct, frozen=True, eq=False):
     """Where a program was left that is to go on, by its journal. `place_mm`: the place of the
     tool, None where that is not known; `is_still`: it was known to stand there; `ends_mm` (K, 3):
     where it may stand otherwise, having done what it had. `tool_at`: what the user says: the tool
@@ -208,7 +208,7 @@ class Manner(Struct, frozen=True):
     checked: bool = True
     paced: bool = False
     file: str = ""
-    standing: Standing | None = None
+    standing: ResumePoint | None = None
     reach_mm: tuple[Place, Place] | None = None
 
     @property
@@ -225,7 +225,7 @@ class Conversation(ABC):
         self.packets = tuple(packets)
         self.manner = manner
         self.single = manner.single
-        self.state = State.OPENING
+        self.state = WireState.OPENING
         self.why = ""
         self.sent = self.acknowledged = self.done = 0
         self.place_mm: Place | None = None
@@ -258,7 +258,7 @@ class Conversation(ABC):
     def is_still(self) -> bool:
         """True if it has ended and the machine is known to stand: at the place that it says, or
         where the packets that are done have brought it."""
-        return self.state in (State.FINISHED, State.STOPPED)
+        return self.state in (WireState.FINISHED, WireState.STOPPED)
 
     @property
     def has_actions(self) -> bool:
@@ -299,7 +299,7 @@ class Conversation(ABC):
         """The port is gone: nobody can be told anything any more."""
         if not self.ended:
             self._out.clear()
-            self._end(State.FAILED, "; ".join(filter(None, (why, self._alone))))
+            self._end(WireState.FAILED, "; ".join(filter(None, (why, self._alone))))
 
     @property
     def _alone(self) -> str:
@@ -318,7 +318,7 @@ class Conversation(ABC):
     def _tell(self, text: str) -> None:
         self._out.append(Tell(text))
 
-    def _end(self, state: State, why: str = "") -> None:
+    def _end(self, state: WireState, why: str = "") -> None:
         self.state, self.why, self.next_s = state, why, NEVER
 
 
@@ -339,7 +339,7 @@ class PacketByPacket(Conversation):
     def is_still(self) -> bool:
         """True behind a packet, and where a packet that was stopped has never begun."""
         behind = self.ended and self.done == self.sent and not self._busy
-        return behind or (self.state is State.STOPPED and not self.halts_within)
+        return behind or (self.state is WireState.STOPPED and not self.halts_within)
 
     def __init__(self, packets: Sequence[Packet], manner: Manner) -> None:
         super().__init__(packets, manner)
@@ -367,31 +367,31 @@ class PacketByPacket(Conversation):
 
     def begin(self, now: float) -> None:
         """Send the first packet."""
-        self.state = State.SENDING
+        self.state = WireState.SENDING
         self._go_on(now)
 
     def pause(self, now: float) -> None:
         """Come to rest when the packet that is out is done."""
-        if self.state is State.SENDING:
-            self.state = State.PAUSING
+        if self.state is WireState.SENDING:
+            self.state = WireState.PAUSING
             if not self._busy:
-                self.state = State.PAUSED
+                self.state = WireState.PAUSED
 
     def resume(self, now: float) -> None:
         """Go on with the next packet."""
-        if self.state is State.PAUSING:
-            self.state = State.SENDING
+        if self.state is WireState.PAUSING:
+            self.state = WireState.SENDING
         elif self.state in HALTS:
-            self._asked = self.state is State.WAITING
-            self.state, self.why = State.SENDING, ""
+            self._asked = self.state is WireState.WAITING
+            self.state, self.why = WireState.SENDING, ""
             self._go_on(now)
 
     def stop(self, now: float) -> None:
         """Send nothing more; stopped when the packet that is out is done or has been halted."""
-        if self.ended or self.state is State.STOPPING:
+        if self.ended or self.state is WireState.STOPPING:
             return
         unsent = self._unwrite()
-        self.state = State.STOPPING
+        self.state = WireState.STOPPING
         if not self._busy:
             self._stopped()
         elif not self._halt(now, unsent=unsent):
@@ -401,11 +401,11 @@ class PacketByPacket(Conversation):
     def _go_on(self, now: float) -> None:
         """Send the next packet, unless the user is to be waited for."""
         if self.done == len(self.packets):
-            self._end(State.FINISHED)
+            self._end(WireState.FINISHED)
             return
         packet = self.packets[self.done]
         if packet.ask and not self._asked:
-            self.state, self.why, self.next_s = State.WAITING, packet.ask, NEVER
+            self.state, self.why, self.next_s = WireState.WAITING, packet.ask, NEVER
             return
         self._asked, self._busy = False, True
         self.sent = self.done + 1
@@ -415,12 +415,12 @@ class PacketByPacket(Conversation):
         """The packet that is out has been executed."""
         self._busy, self.next_s = False, NEVER
         self.done = self.acknowledged = self.sent
-        if self.state is State.STOPPING:
+        if self.state is WireState.STOPPING:
             self._stopped()
-        elif self.state is State.PAUSING:
-            self.state = State.PAUSED
+        elif self.state is WireState.PAUSING:
+            self.state = WireState.PAUSED
         elif self.single and self.done < len(self.packets):
-            self.state, self.why = State.PAUSED, "single block"
+            self.state, self.why = WireState.PAUSED, "single block"
         else:
             self._go_on(now)
 
@@ -428,18 +428,18 @@ class PacketByPacket(Conversation):
         """It stands, as far as anybody knows: `known`, or else `stands`, says how far."""
         self._busy = False
         if self._failing:
-            self._end(State.FAILED, self._failing)
+            self._end(WireState.FAILED, self._failing)
         else:
-            self._end(State.STOPPED, known or self.stands)
+            self._end(WireState.STOPPED, known or self.stands)
 
     def _fail(self, why: str, now: float) -> None:
         """Stop the machine where the protocol can, and fail."""
         if self.ended or self._failing:
             return
-        self._failing, self.state = why, State.STOPPING
+        self._failing, self.state = why, WireState.STOPPING
         unsent = self._unwrite()
         if not self._busy or not self._halt(now, unsent=unsent):
-            self._end(State.FAILED, why)
+            self._end(WireState.FAILED, why)
 
 
 class Wire(ABC):

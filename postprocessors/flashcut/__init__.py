@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from camtool.target.contract import Target
 
-from .dialect import Dialect, FlashcutController, FlashcutMachine, check
+from .dialect import FlashcutController, FlashcutDialect, FlashcutMachine, check
 
 if TYPE_CHECKING:
     from camtool.machine.model import Axis
@@ -30,7 +30,7 @@ class Flashcut(Target):
         "wire to listen to"
     )
     controllers = (FlashcutController,)
-    dialect = Dialect
+    dialect = FlashcutDialect
 
     def check(self, machine: FlashcutMachine) -> None:
         """Raise MachineError where values of the dialect do not go with the machine."""

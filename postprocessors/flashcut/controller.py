@@ -35,7 +35,7 @@ from camtool.simulation.motion import NO_SAMPLES, Chunk, Ledger, Options
 from camtool.simulation.rows import check_positions, check_rows, placed, refuse
 from camtool.toolpath.moves import Kind, Toolpath
 
-from .dialect import Dialect, FlashcutController
+from .dialect import FlashcutController, FlashcutDialect
 from .steps import (
     HOME_X,
     HOME_Y,
@@ -50,13 +50,13 @@ from .steps import (
 )
 from .timers import feeds_of, half_periods_ms, shortest_ms
 
-_Machine = Machine[FlashcutController, Dialect]
+_Machine = Machine[FlashcutController, FlashcutDialect]
 
 MOVES_AT_ONCE = 1 << 14
 """Chords and other moves that are computed together: some 100 bytes each."""
 
 
-class FlashcutModel(ControllerModel[FlashcutController, Dialect]):
+class FlashcutModel(ControllerModel[FlashcutController, FlashcutDialect]):
     """The PC of the parallel-port machine: a timer for each axis."""
 
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:

@@ -19,7 +19,7 @@ STOP_TEXT: Final = "programmed stop"
 """The message that stands for M00 in a toolpath: the machine waits for the operator."""
 
 
-class Dialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class FlashcutDialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Points on which the thesis leaves a choice; docs/dialects/flashcut.md says why.
 
     `decimals` of a coordinate; `trailing_zeros` says 1.000 for 1.0; `feed_words`: F only where
@@ -73,7 +73,7 @@ class FlashcutController(SlideStart, frozen=True, tag_field="model", tag="flashc
     chords_per_turn: Annotated[int, Meta(ge=4, le=10_000)] = 72
 
 
-FlashcutMachine = Machine[SlideStart, Dialect]
+FlashcutMachine = Machine[SlideStart, FlashcutDialect]
 """Any machine with this dialect."""
 
 

@@ -23,8 +23,8 @@ from camtool.machine.model import exceeds
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 
-from ..gcode.blocks import SURE_PART, Block, Lexing, PlainBlocks, blocks_of, filled, form_of
-from .dialect import MOST_MM, STOP_TEXT, Dialect, FlashcutController, FlashcutMachine
+from ..gcode.blocks import SURE_PART, Lexing, PlainBlocks, WordBlock, blocks_of, filled, form_of
+from .dialect import MOST_MM, STOP_TEXT, FlashcutController, FlashcutDialect, FlashcutMachine
 from .findings import EXECUTED_OTHERWISE, FEED_ABOVE_LIMIT, FEED_HELD, FEED_HELD_ALONE
 from .timers import feeds_of, half_periods_ms, shortest_ms, steps_too_many
 
@@ -96,7 +96,7 @@ class _Reader:
     def __init__(self, machine: FlashcutMachine) -> None:
         self.path = ToolpathBuilder()
         self.blocks = 0
-        self._dialect: Dialect = machine.dialect
+        self._dialect: FlashcutDialect = machine.dialect
         self._max_feed = machine.max_feed_mm_min
         self._sign = 1.0 if self._dialect.z_up == "+" else -1.0
         self._templates = {code: set(forms) for code, forms in TEMPLATES.items()}
@@ -115,7 +115,7 @@ class _Reader:
         self._ended = ""
         self._fast = _Excess()
 
-    def block(self, block: Block) -> None:
+    def block(self, block: WordBlock) -> None:
         """One block."""
         self.blocks += 1
         if self._ended:
@@ -143,7 +143,7 @@ class _Reader:
         it; how many were decoded."""
         if self._ended:
             return 0
-        moves = PlainMoves(
+        moves = DecodedMoves(
             plain, self._plain_keys, (*self.path.position, self._feed), self._dialect
         )
         count = moves.count
@@ -175,7 +175,7 @@ class _Reader:
                 count=self._fast.count,
             )
 
-    def _motion(self, block: Block, code: str, form: str, numbers: list[float]) -> None:
+    def _motion(self, block: WordBlock, code: str, form: str, numbers: list[float]) -> None:
         """G00 to G03: X Y Z from part zero, I J from where the arc begins (L1000, L1016)."""
         if not max(map(abs, numbers)) <= MOST_MM:
             at = next(at for at, number in enumerate(numbers, 1) if not abs(number) <= MOST_MM)
@@ -198,14 +198,14 @@ class _Reader:
             # A G01 with F to where the tool is sets the feed, no more.
             self.path.line(x, y, z, feed=self._feed)
 
-    def _set_feed(self, block: Block, feed: float, word: int) -> None:
+    def _set_feed(self, block: WordBlock, feed: float, word: int) -> None:
         if feed <= 0.0:
             block.fail("a feed must be above 0", word=word, mend="write F3.0")
         if exceeds(feed, self._max_feed):
             self._fast.add(block.index, feed)
         self._feed = feed
 
-    def _arc(self, block: Block, code: str, numbers: list[float]) -> None:
+    def _arc(self, block: WordBlock, code: str, numbers: list[float]) -> None:
         x, y, i, j = numbers
         at_x, at_y, _ = self.path.position
         centre = at_x + i, at_y + j
@@ -227,7 +227,7 @@ class _Reader:
             )
         self.path.arc(x, y, centre=centre, ccw=code == "G03", feed=self._feed)
 
-    def _refuse(self, block: Block, code: str, form: str) -> None:
+    def _refuse(self, block: WordBlock, code: str, form: str) -> None:
         """Why a block fits no template."""
         forms = self._templates.get(code)
         if code in NOT_INCHES:
@@ -246,7 +246,7 @@ class _Reader:
         block.fail(f"{code} lacks a word", word=len(form), mend=f"write {wanted}")
 
 
-class PlainMoves:
+class DecodedMoves:
     """N plain blocks: kind (N,), where the tool stands behind each (N, 3) mm, centre (N, 2) mm,
     feed in force (N,) mm/min, which are arcs, and which move (N,). `count`: so many, from the
     first on, are surely what `_Reader.block` would make of them; the others are not to be used."""
@@ -256,7 +256,7 @@ class PlainMoves:
         plain: PlainBlocks,
         keys: Ints,
         state: tuple[float, float, float, float],
-        dialect: Dialect,
+        dialect: FlashcutDialect,
     ) -> None:
         *position, feed = state
         numbers, facts = plain.numbers, plain.facts
@@ -295,7 +295,7 @@ class PlainMoves:
         self.count = len(sure) if sure.all() else int(sure.argmin())
 
 
-def _refuse_spacing(block: Block) -> None:
+def _refuse_spacing(block: WordBlock) -> None:
     block.fail("words are not parted by exactly one space", mend="write G00 X1.0 Y1.0")
 
 

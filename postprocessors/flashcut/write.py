@@ -35,7 +35,7 @@ from ..gcode.plain import (
     plain_rows,
     split_z,
 )
-from .dialect import MOST_MM, STOP_TEXT, Dialect, FlashcutController, FlashcutMachine
+from .dialect import MOST_MM, STOP_TEXT, FlashcutController, FlashcutDialect, FlashcutMachine
 from .findings import EVENT_LEFT_OUT_DWELL, EVENT_LEFT_OUT_STOP, VALUE_ROUNDED
 from .timers import half_periods_ms
 
@@ -133,7 +133,9 @@ def _cut(toolpath: Toolpath, count: Ints, steps: Ints, q_mm: Floats) -> Lowered:
     return Lowered(toolpath.picked(row, end=end), row)
 
 
-def _check_reach(toolpath: Toolpath, rows: PlainRows, of_row: Ints, dialect: Dialect) -> None:
+def _check_reach(
+    toolpath: Toolpath, rows: PlainRows, of_row: Ints, dialect: FlashcutDialect
+) -> None:
     far = (np.abs(rows.end) > MOST_MM * 10**dialect.decimals).any(axis=1)
     refuse(
         toolpath,
@@ -156,7 +158,7 @@ def _event_words(toolpath: Toolpath) -> dict[int, str]:
     return words
 
 
-def _event_findings(toolpath: Toolpath, dialect: Dialect) -> Iterator[Finding]:
+def _event_findings(toolpath: Toolpath, dialect: FlashcutDialect) -> Iterator[Finding]:
     """What the events lose."""
     yield from left_out(toolpath, [Kind.DWELL], EVENT_LEFT_OUT_DWELL)
     kinds = toolpath.kind
@@ -173,7 +175,7 @@ class _Blocks:
     """The P blocks of all moves: `row` (P,) of the table, and what of it a block has. `events`
     (E,): before which of them each event of the table stands."""
 
-    def __init__(self, table: PlainRows, feeds: Ints, dialect: Dialect) -> None:
+    def __init__(self, table: PlainRows, feeds: Ints, dialect: FlashcutDialect) -> None:
         """`feeds` (M,) of the rows of the table in units of F."""
         self._table, self._feeds = table, feeds
         begin, end, moves = table.starts, table.end, table.moves
@@ -197,7 +199,7 @@ class _Blocks:
         self._flat = self._corner | self._ahead | (in_xy | arc)[self.row]
         self._feed = self._ahead | ((changes & ~ahead)[self.row] & last)
 
-    def words(self, dialect: Dialect, decimals: int) -> list[Words]:
+    def words(self, dialect: FlashcutDialect, decimals: int) -> list[Words]:
         """The words of the blocks; `decimals` of a feed."""
         table, row = self._table, self.row
         kept = None if dialect.trailing_zeros else 1

@@ -43,7 +43,7 @@ RULE_MARGIN: Final = 0.9
 """Arcs are kept within this part of the controller's tolerance: it may compute in 32 bits."""
 
 
-class Piece(Struct, frozen=True):
+class ReplacementRow(Struct, frozen=True):
     """One row in place of an arc: its kind, end (x, y) and offset of the centre (i, j), units.
     `share`: the part of a helix's rise that is made at its end."""
 
@@ -65,27 +65,27 @@ class ArcCounts(Struct):
     """Row of the first that was re-centred, split or written as lines."""
 
 
-class Arcs(Struct, frozen=True, eq=False):
+class RowArcs(Struct, frozen=True, eq=False):
     """All rows' ends (N, 3) and offsets (N, 2) in units, one row, seen as many, where there are no
     arcs; and `pieces` in place of some rows."""
 
     end: Ints
     offset: Ints
     kind: Codes
-    pieces: dict[int, list[Piece]]
+    pieces: dict[int, list[ReplacementRow]]
     counts: ArcCounts = field(default_factory=ArcCounts)
 
 
-def arcs_of(toolpath: Toolpath, dialect: GcodeDialect) -> Arcs:
+def arcs_of(toolpath: Toolpath, dialect: GcodeDialect) -> RowArcs:
     """The toolpath's rows in units, arcs as this controller takes them."""
     unit = 10.0**-dialect.decimals
     end = units_of(toolpath.end, dialect.decimals)
     kind = np.array(toolpath.kind)
     rows = np.flatnonzero(toolpath.is_arc)
     if not len(rows):
-        return Arcs(end, np.broadcast_to(np.int64(0), (len(toolpath), 2)), kind, {})
+        return RowArcs(end, np.broadcast_to(np.int64(0), (len(toolpath), 2)), kind, {})
     offset = np.zeros((len(toolpath), 2), dtype=np.int64)
-    arcs = Arcs(end, offset, kind, {})
+    arcs = RowArcs(end, offset, kind, {})
     sweep = toolpath.sweeps()[rows]
     arm = toolpath.starts[rows, :2] - toolpath.centre[rows]
     radius = np.hypot(arm[:, 0], arm[:, 1])
@@ -149,7 +149,9 @@ def turns_of(out: Floats, back: Floats, clockwise: Bools) -> Floats:
     return np.where(angle == 0.0, 2.0 * math.pi, angle)
 
 
-def _repair(arcs: Arcs, toolpath: Toolpath, row: int, sweep: float, dialect: GcodeDialect) -> None:
+def _repair(
+    arcs: RowArcs, toolpath: Toolpath, row: int, sweep: float, dialect: GcodeDialect
+) -> None:
     """Replace one arc by pieces: re-centred, split, or lines."""
     begin = arcs.end[row - 1, :2] if row else units_of(toolpath.start[:2], dialect.decimals)
     stop, kind = arcs.end[row, :2], Kind(int(toolpath.kind[row]))
@@ -158,7 +160,7 @@ def _repair(arcs: Arcs, toolpath: Toolpath, row: int, sweep: float, dialect: Gco
     if (begin == stop).all() and abs(sweep) < math.pi:
         rises = toolpath.end[row, 2] != toolpath.starts[row, 2]
         counts.dropped += not rises
-        arcs.pieces[row] = [Piece(Kind.LINE, _pair(stop))] if rises else []
+        arcs.pieces[row] = [ReplacementRow(Kind.LINE, _pair(stop))] if rises else []
         return
     whole = bool((wanted.start == wanted.end).all())
     huge = math.dist(wanted.start, wanted.centre) > dialect.arc_most_radius_mm
@@ -202,7 +204,7 @@ class _Wanted(Struct, frozen=True, eq=False):
 
 def _recentred(
     wanted: _Wanted, ends: tuple[Ints, Ints], kind: Kind, dialect: GcodeDialect
-) -> Piece | None:
+) -> ReplacementRow | None:
     """The arc about the nearest centre that the controller takes; None when there is none close.
 
     The centre from which both rounded ends are equally far and which is nearest to c is
@@ -228,12 +230,12 @@ def _recentred(
     holds = arcs_accepted(sweeps, points, np.full(len(tried), int(kind)), dialect)
     if not holds.any():
         return None
-    return Piece(kind, _pair(stop), _pair(tried[int(np.argmax(holds))] - begin))
+    return ReplacementRow(kind, _pair(stop), _pair(tried[int(np.argmax(holds))] - begin))
 
 
 def _halves(
     wanted: _Wanted, ends: tuple[Ints, Ints], kind: Kind, dialect: GcodeDialect
-) -> list[Piece] | None:
+) -> list[ReplacementRow] | None:
     """Two arcs that meet at the middle; None when the controller would refuse one of them."""
     begin, stop = ends
     mid_mm = wanted.at(np.array([0.5]))[0]
@@ -254,7 +256,7 @@ def _halves(
 
 def _unchanged(
     wanted: _Wanted, ends: tuple[Ints, Ints], kind: Kind, dialect: GcodeDialect
-) -> Piece | None:
+) -> ReplacementRow | None:
     """The arc with its own centre, if the controller takes it."""
     begin, stop = ends
     centre = units_of(wanted.centre, dialect.decimals)
@@ -262,10 +264,12 @@ def _unchanged(
     sweep = np.array([abs(wanted.sweep)])
     if not arcs_accepted(sweep, points, np.array([kind]), dialect)[0]:
         return None
-    return Piece(kind, _pair(stop), _pair(centre - begin))
+    return ReplacementRow(kind, _pair(stop), _pair(centre - begin))
 
 
-def _chords(wanted: _Wanted, begin: Ints, stop: Ints, dialect: GcodeDialect) -> list[Piece]:
+def _chords(
+    wanted: _Wanted, begin: Ints, stop: Ints, dialect: GcodeDialect
+) -> list[ReplacementRow]:
     """The fewest equal chords within a unit of the arc: a chord over the angle a strays by
     R (1 − cos(a/2)) = 2 R sin²(a/4)."""
     radius = math.dist(wanted.start, wanted.centre)
@@ -277,10 +281,10 @@ def _chords(wanted: _Wanted, begin: Ints, stop: Ints, dialect: GcodeDialect) -> 
     pieces, at = [], begin
     for point, share in zip(inner, shares.tolist(), strict=True):
         if (point != at).any():
-            pieces.append(Piece(Kind.LINE, _pair(point), share=share))
+            pieces.append(ReplacementRow(Kind.LINE, _pair(point), share=share))
             at = point
     # Moves nothing when the last chord was too small, but for the rest of a helix's rise.
-    return [*pieces, Piece(Kind.LINE, _pair(stop))]
+    return [*pieces, ReplacementRow(Kind.LINE, _pair(stop))]
 
 
 def _pair(point: Ints) -> tuple[int, int]:

@@ -6,7 +6,7 @@ LF, CR LF or CR, also mixed.
 
 Blocks of moves alone, thousands in a row, are offered by columns (`PlainRuns`, `PlainBlocks`) to
 readers that want them so. All other lines are read one by one: by an interpreter of the dialect's
-own over `Lines`, or, where blocks are rows of words and nothing else, by `blocks_of`:
+own over `ProgramLines`, or, where blocks are rows of words and nothing else, by `blocks_of`:
 
     for block in blocks_of(data, Lexing(letters="GMXYZIJF")):
         for letter, number in block.words: ...           # ("X", "-1.50")
@@ -76,7 +76,7 @@ _SIGNS: Final = {
 }
 
 
-class Lines:
+class ProgramLines:
     """The lines of a program, counted from 0; CR alone ends one too."""
 
     def __init__(self, data: bytes) -> None:
@@ -139,7 +139,7 @@ class PlainRuns:
     it is asked less and less often; and twice as many are offered at most as were taken before.
     `most_chars` and `free` are those of `words.plain_lines`."""
 
-    def __init__(self, lines: Lines, most_chars: int, *, free: bool) -> None:
+    def __init__(self, lines: ProgramLines, most_chars: int, *, free: bool) -> None:
         self._lines, self._most_chars, self._free = lines, most_chars, free
         self._numbers = np.zeros((0, 7))
         self._facts = np.empty((0, words.FACT_COLUMNS), dtype=np.int64)
@@ -184,7 +184,7 @@ class Lexing(Struct, frozen=True):
     line_chars: int = LINE_CHARS
 
 
-class Block:
+class WordBlock:
     """One block: `words` [(letter, number text)], and where it stands."""
 
     __slots__ = ("index", "line", "text", "words")
@@ -205,7 +205,7 @@ class Block:
         raise _error(message, self.index, self.line, self.column(word or 0), mend)
 
 
-def blocks_of(data: bytes, lexing: Lexing, take: Take | None = None) -> Iterator[Block]:
+def blocks_of(data: bytes, lexing: Lexing, take: Take | None = None) -> Iterator[WordBlock]:
     """The blocks of a program one by one, but for those that `take` has taken; ProgramError at the
     first that is none, and for more lines than a program may have.
 
@@ -215,7 +215,7 @@ def blocks_of(data: bytes, lexing: Lexing, take: Take | None = None) -> Iterator
     """
     check_count(max(data.count(b"\n"), data.count(b"\r")), "line")
     check_ascii(data)
-    lines = Lines(data)
+    lines = ProgramLines(data)
     runs = PlainRuns(lines, lexing.line_chars, free=False)
     row_of_words, word = _patterns(lexing)
     number, index = 0, 0
@@ -237,7 +237,7 @@ def blocks_of(data: bytes, lexing: Lexing, take: Take | None = None) -> Iterator
             raise _fault(text, index, number, lexing)
         found: list[tuple[str, str]] = word.findall(packed)
         if found:
-            yield Block(index, number, text, found)
+            yield WordBlock(index, number, text, found)
             index += 1
 
 

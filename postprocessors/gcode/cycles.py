@@ -26,7 +26,7 @@ CYCLE: Final = 100
 """Stands for the kind of a row that is written as a cycle: it is no motion of the program."""
 
 
-class Hole(Struct, frozen=True):
+class CycleHole(Struct, frozen=True):
     """Rows first:last + 1 of a toolpath, of which `cut` is the first at a feed, and lengths in its
     units: the place, the height from which it feeds, the bottom, the deepest bite of pecks (None:
     it is drilled in one go), and the seconds at the bottom (None: none)."""
@@ -46,7 +46,7 @@ class Hole(Struct, frozen=True):
         return self.height, self.bottom, self.bite, self.dwell_s
 
 
-def holes_of(toolpath: Toolpath) -> list[Hole]:
+def holes_of(toolpath: Toolpath) -> list[CycleHole]:
     """The holes that the drilling operations of a plan make, as far as a cycle can say them."""
     operations = toolpath.operations
     if operations is None:
@@ -60,7 +60,7 @@ def holes_of(toolpath: Toolpath) -> list[Hole]:
     ]
 
 
-def _holes(toolpath: Toolpath, low: int, high: int) -> Iterator[Hole]:
+def _holes(toolpath: Toolpath, low: int, high: int) -> Iterator[CycleHole]:
     """Those of the rows low:high."""
     rows = _Rows(
         toolpath.kind[low:high].tolist(),
@@ -92,7 +92,7 @@ class _Rows(Struct, frozen=True):
     end: list[list[float]]
     feed: list[float]
 
-    def hole(self, first: int, above: float) -> Hole | None:
+    def hole(self, first: int, above: float) -> CycleHole | None:
         """The hole that begins with a row, which comes from a height; without its dwell."""
         x, y, z = self.end[first]
         if self.kind[first] != Kind.RAPID or z != above:
@@ -120,11 +120,11 @@ class _Rows(Struct, frozen=True):
         if dwells and len(cuts) > 1:  # no cycle pecks and waits
             return None
         bite = float(bites.max()) if len(cuts) > 1 else None
-        return Hole(first, cut, last, (x, y), height, depths[-1], bite, None)
+        return CycleHole(first, cut, last, (x, y), height, depths[-1], bite, None)
 
 
 def cycle_blocks(
-    holes: Sequence[Hole], feed_words: Sequence[str], style: NumberStyle
+    holes: Sequence[CycleHole], feed_words: Sequence[str], style: NumberStyle
 ) -> dict[int, tuple[str, ...]]:
     """The blocks of each hole by its first row at a feed, whose F words are `feed_words`. Holes
     that follow each other and look alike are one cycle with several places; behind the last of
@@ -159,7 +159,7 @@ def _no_deeper(bite: float, style: NumberStyle) -> float:
     return max(float(np.floor(bite / unit + 1e-6)), 1.0) * unit
 
 
-def rows_kept(count: int, holes: Sequence[Hole]) -> Ints:
+def rows_kept(count: int, holes: Sequence[CycleHole]) -> Ints:
     """Of so many rows those that are no part of a hole, and the first row at a feed of each."""
     kept = np.ones(count, dtype=np.bool_)
     for hole in holes:

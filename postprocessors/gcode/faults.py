@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 
-class Fault(Exception):
+class LineFault(Exception):
     """Why a controller stops at a line; `at`: where in its text without blanks, or the letter of
     the word, None for the line as a whole. The reader makes a ProgramError of it, which has the
     place."""

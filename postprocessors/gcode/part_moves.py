@@ -18,7 +18,7 @@ from camtool.arrays import Floats
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind
 
-from .faults import Fault
+from .faults import LineFault
 
 Point = tuple[float, float, float]
 
@@ -34,7 +34,7 @@ PLANES: Final = {170: (0, 1, 2), 180: (2, 0, 1), 190: (1, 2, 0)}
 """First axis, second axis and normal of G17, G18 and G19, tenfold."""
 
 
-class Frame(Struct, frozen=True):
+class ProgramFrame(Struct, frozen=True):
     """Where the program's coordinates p lie on the machine, mm and degrees: R(p + shift) + origin,
     with a turn R about Z."""
 
@@ -57,7 +57,7 @@ class PartMoves:
         """How many arcs became chords."""
         self.moved = False
         self._full_turn_rad = full_turn_rad
-        self._frame = self._base = Frame()
+        self._frame = self._base = ProgramFrame()
         self._turn = (1.0, 0.0)
         self._shift = (0.0, 0.0, 0.0)
         self._same = True
@@ -69,7 +69,7 @@ class PartMoves:
         """Whether the coordinates of the program are those of the part."""
         return self._same
 
-    def place(self, frame: Frame) -> None:
+    def place(self, frame: ProgramFrame) -> None:
         """From here on coordinates are of this frame."""
         self._frame = frame
         if not self.moved:
@@ -128,7 +128,7 @@ class PartMoves:
         are (first, second, normal) and (first, second) of the plane."""
         self.moved = True
         if len(self.path) + abs(turn) > bounds.MAX_MOVES:
-            raise Fault(too_many("the turns of this arc"), "p", bounds.SPLIT_PROGRAM)
+            raise LineFault(too_many("the turns of this arc"), "p", bounds.SPLIT_PROGRAM)
         if self.plane == 170:
             self._flat_arc((end[0], end[1], end[2]), centre, turn)
         else:
@@ -191,7 +191,7 @@ class PartMoves:
         chord = 4.0 * math.asin(math.sqrt(min(CHORD_MM / (2.0 * largest), 0.5)))
         count = max(math.ceil(abs(sweep) / chord), 1)
         if len(self.path) + count > bounds.MAX_MOVES:
-            raise Fault(too_many("the chords of this arc"), "p", bounds.SPLIT_PROGRAM)
+            raise LineFault(too_many("the chords of this arc"), "p", bounds.SPLIT_PROGRAM)
         share = np.arange(1, count + 1) / count
         radius = radii[0] + share * (radii[1] - radii[0])
         angle = alpha + share * sweep

@@ -31,10 +31,10 @@ from camtool.toolpath.moves import Kind, PathMode, Toolpath, mounted_before, row
 from camtool.toolpath.program import Program
 from camtool.toolpath.words import Words, texts_of
 
-from .arcs import ArcCounts, Arcs, arcs_of
+from .arcs import ArcCounts, RowArcs, arcs_of
 from .checks import check, feed_units
 from .comments import comments, header
-from .cycles import CYCLE, Hole, cycle_blocks, holes_of, rows_kept
+from .cycles import CYCLE, CycleHole, cycle_blocks, holes_of, rows_kept
 from .dialect import UNITS, GcodeDialect, Unit, feed_decimals
 from .findings import ARC_MENDED, MOVE_COLLAPSED, VALUE_ROUNDED
 from .format import (
@@ -78,7 +78,7 @@ SWITCHES: Final = {
 EventWords = Callable[["Event"], Sequence[str]]
 
 
-class Style(Struct, frozen=True, eq=False):
+class ProgramStyle(Struct, frozen=True, eq=False):
     """A dialect's own part of a program.
 
     `header`: its first blocks, which say the unit; `event`: the blocks of an event; `message`:
@@ -103,7 +103,7 @@ class Style(Struct, frozen=True, eq=False):
     model: ControllerModel[Any, Any] | None = None
 
 
-def write_modal(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
+def write_modal(toolpath: Toolpath, machine: Machine, style: ProgramStyle) -> Program:
     """The program of a toolpath; PostError names the move that cannot be written or done."""
     check(toolpath, machine)
     unit = UNITS[style.dialect.units]
@@ -126,7 +126,7 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: Style) -> Program:
     frame = [style.frame] if style.frame else []
     first_mode, changes = _path_modes(toolpath, sent, style)
     ended = len(toolpath) > 0 and toolpath.kind[-1] == Kind.END
-    order = Order(sent.is_motion)
+    order = BlockOrder(sent.is_motion)
     order.add(0, [*style.header, *first_mode, *dialect.start_blocks])
     for at, row in sent.others(events):
         order.add(at, events.blocks[row], row)
@@ -171,7 +171,7 @@ def _first_change(toolpath: Toolpath, events: Events) -> int:
     return row if bool((up | ~motion).all()) else 0
 
 
-def _seconds(toolpath: Toolpath, machine: Machine, style: Style) -> Floats | None:
+def _seconds(toolpath: Toolpath, machine: Machine, style: ProgramStyle) -> Floats | None:
     """(N,) s that the controller takes for each row; None where nobody knows, or nobody asks. What
     its model cannot follow is told when the program is verified."""
     exact = isinstance(machine.controller, PathController)
@@ -183,7 +183,7 @@ def _seconds(toolpath: Toolpath, machine: Machine, style: Style) -> Floats | Non
     return None
 
 
-def _feed_texts(feeds: Ints, holes: Sequence[Hole], decimals: int) -> list[str]:
+def _feed_texts(feeds: Ints, holes: Sequence[CycleHole], decimals: int) -> list[str]:
     """The number of the F word of each hole."""
     cut = feeds[[hole.cut for hole in holes]]
     return format_column(values_of(cut, decimals), NumberStyle(decimals, strip=True))
@@ -205,7 +205,7 @@ def in_units(
 
 
 def _path_modes(
-    toolpath: Toolpath, sent: Sent, style: Style
+    toolpath: Toolpath, sent: Sent, style: ProgramStyle
 ) -> tuple[tuple[str, ...], dict[int, str]]:
     """The path mode to begin with, and the blocks that change it, by the place among the rows
     that are sent; none for dialects that know no such thing."""
@@ -220,7 +220,7 @@ def _path_modes(
     return (written[asked[0]],), {int(moving[k]): written[asked[k]] for k in turns.tolist()}
 
 
-class Order:
+class BlockOrder:
     """The blocks of motions, which are texts by columns, and all others between them."""
 
     def __init__(self, is_motion: Bools) -> None:
@@ -358,10 +358,10 @@ class Sent(Struct, frozen=True, eq=False):
 
 def sent_rows(
     toolpath: Toolpath,
-    arcs: Arcs,
+    arcs: RowArcs,
     feeds: Ints,
     changes: Sequence[int] = (),
-    holes: Sequence[Hole] = (),
+    holes: Sequence[CycleHole] = (),
     unmoved: int = 0,
 ) -> Sent:
     """All rows with pieces in place of arcs, without moves that move nothing, and without motions

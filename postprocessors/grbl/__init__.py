@@ -6,12 +6,10 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-import msgspec
-
-from camtool.target.contract import Setting, Target
+from camtool.target.contract import ControllerSetting, Target
 
 from ..gcode.dialect import check_blocks, feed_decimals, last_decimal_mm
-from .dialect import Dialect, GrblController, GrblMachine
+from .dialect import GrblController, GrblDialect, GrblMachine
 from .findings import CODES
 
 if TYPE_CHECKING:
@@ -20,7 +18,7 @@ if TYPE_CHECKING:
     from camtool.toolpath.program import Listing, Program
 
     from .controller import GrblModel
-    from .twin import Choices, GrblTwin
+    from .twin import GrblTwin, GrblTwinSettings
     from .wire import GrblWire
 
 
@@ -29,7 +27,7 @@ class Grbl(Target):
 
     name = "grbl"
     controllers = (GrblController,)
-    dialect = Dialect
+    dialect = GrblDialect
     starts_spindle = True
     switches_coolant = True
     any_machine = True
@@ -64,7 +62,7 @@ class Grbl(Target):
         """The last decimal of a coordinate."""
         return last_decimal_mm(machine.dialect)
 
-    def settings_from(self, text: str) -> list[Setting] | None:
+    def settings_from(self, text: str) -> list[ControllerSetting] | None:
         """The values that grbl's answer to `$$` says; None for another text."""
         from .settings import settings_of
 
@@ -94,19 +92,19 @@ class Grbl(Target):
 
         return listing(data)
 
-    def twin_choices(self) -> type[Choices]:
+    def twin_settings(self) -> type[GrblTwinSettings]:
         """How a virtual grbl is set up."""
-        from .twin import Choices
+        from .twin import GrblTwinSettings
 
-        return Choices
+        return GrblTwinSettings
 
     def twin(
-        self, machine: Machine[GrblController, Dialect], choices: msgspec.Struct | None = None
+        self, machine: Machine[GrblController, GrblDialect], settings: GrblTwinSettings
     ) -> GrblTwin:
         """The virtual controller; docs/wires/grbl.md."""
-        from .twin import Choices, GrblTwin
+        from .twin import GrblTwin
 
-        return GrblTwin(machine, choices if isinstance(choices, Choices) else Choices())
+        return GrblTwin(machine, settings)
 
 
 POST = Grbl()

@@ -42,10 +42,10 @@ from camtool.simulation.speed_plan import (
 )
 from camtool.toolpath.moves import Kind, Toolpath, are_arcs
 
-from .dialect import Dialect, GrblController
+from .dialect import GrblController, GrblDialect
 from .steps import step_lines_fill, steps_taken
 
-_Machine = Machine[GrblController, Dialect]
+_Machine = Machine[GrblController, GrblDialect]
 
 ALWAYS_ON = 255
 """The $1 that leaves the motors on, and causes no delay at a stop."""
@@ -60,7 +60,7 @@ LASER_ASSUMPTION = (
 )
 
 
-class GrblModel(ControllerModel[GrblController, Dialect]):
+class GrblModel(ControllerModel[GrblController, GrblDialect]):
     """grbl 1.1: chords, whole steps, trapezoids planned ahead."""
 
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:

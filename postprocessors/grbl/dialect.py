@@ -23,7 +23,7 @@ Home = Literal["G28", "G30"]
 Spot = tuple[Place, Place, Place]
 
 
-class Dialect(GcodeDialect, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class GrblDialect(GcodeDialect, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """`tool_change`: grbl knows no M6, so between cuts the program says the tool and stops until
     the operator goes on ("stop": `T2 M0`), stops so for the first tool too ("pause"), or is
     refused ("refuse"). `most_dwell_s`: grbl counts longer dwells wrong. What a program that is
@@ -58,5 +58,5 @@ class GrblController(SlideStart, frozen=True, tag_field="model", tag="grbl"):
     laser_mode: bool = False
 
 
-GrblMachine = Machine[SlideStart, Dialect]
+GrblMachine = Machine[SlideStart, GrblDialect]
 """Any machine with this dialect."""

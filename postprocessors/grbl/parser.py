@@ -19,9 +19,9 @@ from msgspec.structs import replace
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind
 
-from ..gcode.faults import Fault
-from ..gcode.part_moves import PLANES, Frame, PartMoves
-from .dialect import MOST_TOOL, Dialect, GrblController, GrblMachine
+from ..gcode.faults import LineFault
+from ..gcode.part_moves import PLANES, PartMoves, ProgramFrame
+from .dialect import MOST_TOOL, GrblController, GrblDialect, GrblMachine
 
 MM_PER_INCH: Final = 25.4
 """Length of an inch, mm."""
@@ -100,12 +100,12 @@ VALUES: Final = frozenset("FIJKLNPRSTXYZ")
 SPINDLE: Final = {3: Kind.SPINDLE_CW, 4: Kind.SPINDLE_CCW, 5: None}
 
 
-def error(number: int, at: int | str | None, what: str = "", mend: str = "") -> Fault:
+def error(number: int, at: int | str | None, what: str = "", mend: str = "") -> LineFault:
     """A line that grbl answers with this error."""
-    return Fault(f"{WHY[number].format(what)} (error:{number})", at, mend)
+    return LineFault(f"{WHY[number].format(what)} (error:{number})", at, mend)
 
 
-class Modes(Struct):
+class ParserModes(Struct):
     """What is in force from line to line."""
 
     motion: int = 0
@@ -119,11 +119,11 @@ class Modes(Struct):
     flood: bool = False
 
 
-class Block(Struct):
+class GrblBlock(Struct):
     """The words of a line: numbers, the modes that they make, the command of this line alone
     ("G4", "G92.1" …), what uses the coordinates, and where the words stand."""
 
-    modes: Modes
+    modes: ParserModes
     numbers: dict[str, float] = field(default_factory=dict)
     groups: set[str] = field(default_factory=set)
     once: str = ""
@@ -133,7 +133,7 @@ class Block(Struct):
     at: dict[str, int] = field(default_factory=dict)
 
 
-class Notes(Struct):
+class ParserNotes(Struct):
     """Blocks (index from 0) at which something was passed over or taken for granted."""
 
     coolant: list[int] = field(default_factory=list)
@@ -145,12 +145,12 @@ class Notes(Struct):
     feeds: list[tuple[int, float]] = field(default_factory=list)
 
 
-class Parser:
+class GrblParser:
     """The state of the parser, and what lines make of it."""
 
-    def __init__(self, machine: GrblMachine, path: ToolpathBuilder, notes: Notes) -> None:
-        dialect: Dialect = machine.dialect
-        self.modes = Modes()
+    def __init__(self, machine: GrblMachine, path: ToolpathBuilder, notes: ParserNotes) -> None:
+        dialect: GrblDialect = machine.dialect
+        self.modes = ParserModes()
         self.moves = PartMoves(path, dialect.arc_full_turn_rad)
         self.notes = notes
         self.index = 0
@@ -208,7 +208,7 @@ class Parser:
     def rewind(self) -> None:
         """M2 and M30 set most modes back; units, feed and offsets stay (`gc_execute_line`)."""
         self.ended = False
-        self.modes = Modes(motion=1, inches=self.modes.inches)
+        self.modes = ParserModes(motion=1, inches=self.modes.inches)
         self._place()
 
     # Steps 1 and 2: the words
@@ -218,7 +218,7 @@ class Parser:
         jogs = text.startswith("$")
         if jogs and not text.startswith("$J="):
             raise error(3, 0, mend="send it before the program")
-        block = Block(replace(self.modes))
+        block = GrblBlock(replace(self.modes))
         if jogs:
             block.modes.motion, block.modes.feed_mode = 1, 94
         at = 3 if jogs else 0
@@ -235,7 +235,7 @@ class Parser:
             block.uses = MOTION
         self._check_and_execute(block, jogs=jogs)
 
-    def _word(self, block: Block, letter: str, value: float, said: str, at: int) -> None:
+    def _word(self, block: GrblBlock, letter: str, value: float, said: str, at: int) -> None:
         whole = math.trunc(value) % 256 if abs(value) < MOST_COUNTED else 255
         hundredths = round(100.0 * (value - whole)) % 65536
         name = f"{letter}{said}"
@@ -267,7 +267,7 @@ class Parser:
             return
         block.at[letter] = at
 
-    def _g_word(self, block: Block, whole: int, hundredths: int, name: str, at: int) -> str:
+    def _g_word(self, block: GrblBlock, whole: int, hundredths: int, name: str, at: int) -> str:
         """Set what a G word says; its group."""
         modes = block.modes
         if whole in (10, 28, 30, 92) and hundredths == 0:
@@ -309,11 +309,11 @@ class Parser:
             modes.frame = value
         return group
 
-    def _probe_word(self, block: Block, hundredths: int, at: int) -> str:
+    def _probe_word(self, block: GrblBlock, hundredths: int, at: int) -> str:
         """Set what G38.2 to G38.5 say; its group."""
-        raise Fault("G38 probes, which cannot be simulated", at)
+        raise LineFault("G38 probes, which cannot be simulated", at)
 
-    def _plain_g_word(self, block: Block, whole: int, name: str, at: int) -> tuple[str, int]:
+    def _plain_g_word(self, block: GrblBlock, whole: int, name: str, at: int) -> tuple[str, int]:
         """The group of a G word without decimals, and what it sets."""
         if whole in (4, 10, 53):
             block.once = f"G{whole}"
@@ -331,12 +331,12 @@ class Parser:
             raise error(20, at, name)
         return MODAL[whole]
 
-    def _use(self, block: Block, what: int, at: int) -> None:
+    def _use(self, block: GrblBlock, what: int, at: int) -> None:
         if block.uses != NONE:
             raise error(24, at)
         block.uses = what
 
-    def _m_word(self, block: Block, code: int, name: str, at: int) -> str:
+    def _m_word(self, block: GrblBlock, code: int, name: str, at: int) -> str:
         if code in (0, 1, 2, 30):
             block.flow = code
             return "stop"
@@ -351,7 +351,7 @@ class Parser:
 
     # Step 3: checks
 
-    def _check_and_execute(self, block: Block, *, jogs: bool) -> None:
+    def _check_and_execute(self, block: GrblBlock, *, jogs: bool) -> None:
         numbers, modes = block.numbers, block.modes
         unused = set(numbers)
         if numbers.get("N", 0.0) > MOST_LINE_NUMBER:
@@ -400,7 +400,7 @@ class Parser:
         if target == self.position:
             raise error(33, None, "a probing move that ends where it starts")
 
-    def _feed_of(self, block: Block, mm: float, *, jogs: bool) -> float:
+    def _feed_of(self, block: GrblBlock, mm: float, *, jogs: bool) -> float:
         """The feed of the block: mm/min, or in G93 turns of its move a minute."""
         numbers, modes = block.numbers, block.modes
         if jogs:
@@ -415,7 +415,7 @@ class Parser:
             return numbers["F"] * mm if "F" in numbers else self.feed
         return numbers.get("F", 0.0)  # the block that leaves G93, as it stands
 
-    def _target(self, block: Block, words: dict[int, float], unused: set[str]) -> list[float]:
+    def _target(self, block: GrblBlock, words: dict[int, float], unused: set[str]) -> list[float]:
         """Where the block goes, on the machine."""
         if block.once == "G10":
             self._check_g10(block, words)
@@ -438,7 +438,7 @@ class Parser:
                 target[k] = value + self.position[k]
         return target
 
-    def _check_g10(self, block: Block, words: dict[int, float]) -> None:
+    def _check_g10(self, block: GrblBlock, words: dict[int, float]) -> None:
         numbers, at = block.numbers, block.at["G"]
         if not words:
             raise error(26, at, "G10")
@@ -450,7 +450,7 @@ class Parser:
             raise error(20, at, f"G10 L{numbers.get('L', 0.0):g}")
 
     def _arc(
-        self, block: Block, target: list[float], axes: list[int], mm: float, unused: set[str]
+        self, block: GrblBlock, target: list[float], axes: list[int], mm: float, unused: set[str]
     ) -> tuple[float, float]:
         """The centre of an arc on the machine, in the order of its plane."""
         numbers, modes = block.numbers, block.modes
@@ -475,7 +475,7 @@ class Parser:
         return self.position[first] + offset[0], self.position[second] + offset[1]
 
     def _by_radius(
-        self, block: Block, x: float, y: float, radius: float, target: list[float]
+        self, block: GrblBlock, x: float, y: float, radius: float, target: list[float]
     ) -> tuple[float, float]:
         """The offset of the centre: on the left of the chord for a counter-clockwise arc of at
         most half a turn, on the other side for a negative R."""
@@ -488,7 +488,7 @@ class Parser:
             raise error(34, at)
         if chord == 0.0:
             message = "an arc by its radius that ends above where it starts: grbl finds no centre"
-            raise Fault(message, at)
+            raise LineFault(message, at)
         aside = math.sqrt(inside) / chord
         if (block.modes.motion == 2) == (radius > 0.0):
             aside = -aside
@@ -505,7 +505,7 @@ class Parser:
 
     # Step 4: execution
 
-    def _jog(self, block: Block, target: list[float], feed: float) -> None:
+    def _jog(self, block: GrblBlock, target: list[float], feed: float) -> None:
         """A line at its own feed, which changes no mode."""
         if block.groups - {"distance", "units", "one block"} or block.once not in ("", "G53"):
             raise error(16, block.at.get("G"))
@@ -518,7 +518,7 @@ class Parser:
 
     def _execute(
         self,
-        block: Block,
+        block: GrblBlock,
         target: list[float],
         centre: tuple[float, float] | None,
         feed: float,
@@ -551,7 +551,7 @@ class Parser:
         waits for its buffer to run empty (`protocol_buffer_synchronize`)."""
         self._path.event(Kind.DWELL, 0.0)
 
-    def _spindle(self, block: Block, before: Modes) -> None:
+    def _spindle(self, block: GrblBlock, before: ParserModes) -> None:
         """Spindle or laser. In laser mode another power goes with the move of its block; in a
         block that moves nothing grbl waits, and sets it at once."""
         speed = block.numbers.get("S", self._speed)
@@ -569,7 +569,7 @@ class Parser:
             self._path.event(now, speed)
 
     @staticmethod
-    def _relights(block: Block, before: Modes) -> bool:
+    def _relights(block: GrblBlock, before: ParserModes) -> bool:
         """In laser mode: whether a block that moves nothing goes from cuts to rapids, or back,
         under constant power (M3), which is switched with that."""
         cuts = (1, 2, 3)
@@ -577,7 +577,7 @@ class Parser:
             (before.motion in cuts) != (block.modes.motion in cuts)
         )
 
-    def _switch_coolant(self, before: Modes) -> None:
+    def _switch_coolant(self, before: ParserModes) -> None:
         kind, now = _cooling(before), _cooling(self.modes)
         changed = (before.mist, before.flood) != (self.modes.mist, self.modes.flood)
         if not self._coolant.kinds:
@@ -597,7 +597,7 @@ class Parser:
         """The frame in force, for the moves that follow: the tip of the tool counts."""
         frame = self._frames[self.modes.frame]
         x, y, z = (a + b for a, b in zip(frame, self._offset, strict=True))
-        self.moves.place(Frame((x, y, z)))
+        self.moves.place(ProgramFrame((x, y, z)))
 
     def _change_frame(self) -> None:
         self._rest()
@@ -607,7 +607,7 @@ class Parser:
         if self._first_frame not in (None, frame) and not known:
             self.notes.frames.setdefault(f"G{54 + frame}", self.index)
 
-    def _do_once(self, block: Block, target: list[float]) -> None:
+    def _do_once(self, block: GrblBlock, target: list[float]) -> None:
         mm = MM_PER_INCH if block.modes.inches else 1.0
         words = {k: block.numbers["XYZ"[k]] * mm for k in range(3) if "XYZ"[k] in block.numbers}
         once = block.once
@@ -629,7 +629,7 @@ class Parser:
             self._offset = [0.0, 0.0, 0.0]
             self._place()
 
-    def _set_frame(self, block: Block, words: dict[int, float]) -> None:
+    def _set_frame(self, block: GrblBlock, words: dict[int, float]) -> None:
         """G10 L2: its zero lies there; L20: the tool stands there in it."""
         number = math.trunc(block.numbers.get("P", 0.0))
         frame = number - 1 if number > 0 else self.modes.frame
@@ -659,7 +659,7 @@ class Parser:
 
     def _move(
         self,
-        block: Block,
+        block: GrblBlock,
         target: list[float],
         centre: tuple[float, float] | None,
         feed: float,
@@ -701,7 +701,7 @@ class Parser:
         rise = target[axes[2]] - self.position[axes[2]]
         return math.hypot(math.hypot(*out) * turn, rise)
 
-    def _homing(self, block: Block, target: list[float]) -> bool:
+    def _homing(self, block: GrblBlock, target: list[float]) -> bool:
         """G53 G0 to machine zero: the machine has an event of it; whether it was that."""
         named = tuple(axis for axis in "XYZ" if axis in block.numbers)
         kind = {("X", "Y"): Kind.HOME_XY, ("Z",): Kind.HOME_Z}.get(named)
@@ -746,13 +746,13 @@ class Parser:
                 self._rest()
 
 
-def _cooling(modes: Modes) -> Kind:
+def _cooling(modes: ParserModes) -> Kind:
     if modes.flood:
         return Kind.COOLANT_FLOOD
     return Kind.COOLANT_MIST if modes.mist else Kind.COOLANT_OFF
 
 
-def target_length(block: Block, mm: float) -> float:
+def target_length(block: GrblBlock, mm: float) -> float:
     """The length of the tool that G43.1 and G49 set, mm."""
     return block.numbers["Z"] * mm if block.length == "set" else 0.0
 

@@ -21,15 +21,15 @@ from camtool.findings import Finding
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 
-from ..gcode.blocks import Lines, PlainBlocks, PlainRuns, check_ascii, has_words
-from ..gcode.faults import Fault
+from ..gcode.blocks import PlainBlocks, PlainRuns, ProgramLines, check_ascii, has_words
+from ..gcode.faults import LineFault
 from ..gcode.findings import (
     SPINDLE_SPEED_NOT_SAID,
     WORDS_PASSED_OVER_COOLANT,
     WORDS_PASSED_OVER_PAUSE,
 )
 from ..gcode.plain_moves import ArcRule, FastFeeds, PlainMoves, PlainState
-from .dialect import Dialect, GrblController, GrblMachine
+from .dialect import GrblController, GrblDialect, GrblMachine
 from .findings import (
     FEED_TOO_SLOW,
     NOT_SIMULATED_CHORDS,
@@ -39,7 +39,7 @@ from .findings import (
     PLACE_UNKNOWN_FRAME,
     PLACE_UNKNOWN_HOME,
 )
-from .parser import Notes, Parser
+from .parser import GrblParser, ParserNotes
 
 SLOW_GUARD: Final = 1e-6
 """Part of a feed: one below the slowest by less counts as the slowest."""
@@ -62,11 +62,11 @@ class _Reader:
     """One reading of one program."""
 
     def __init__(self, data: bytes, machine: GrblMachine) -> None:
-        dialect: Dialect = machine.dialect
+        dialect: GrblDialect = machine.dialect
         self.path = ToolpathBuilder()
-        self.notes = Notes()
-        self.parser = Parser(machine, self.path, self.notes)
-        self._lines = Lines(data)
+        self.notes = ParserNotes()
+        self.parser = GrblParser(machine, self.path, self.notes)
+        self._lines = ProgramLines(data)
         self._fast = FastFeeds(machine.max_feed_mm_min)
         self._rule = ArcRule(
             gap_mm=min(dialect.arc_difference_mm, dialect.arc_most_difference_mm),
@@ -109,20 +109,20 @@ class _Reader:
         if len(text) > self._most:
             where = self._most
             message = f"the line has more than {self._most} characters (error:11)"
-            self._fail(Fault(message, where, "shorten it"), raw, number)
+            self._fail(LineFault(message, where, "shorten it"), raw, number)
         self.parser.index = self.path.block = self._blocks
         is_block = has_words(raw)
         if is_block and self.parser.ended:
             self._fail(
-                Fault("a block after the end of the program", None, "remove it"), raw, number
+                LineFault("a block after the end of the program", None, "remove it"), raw, number
             )
         try:
             self.parser.line(text)
-        except Fault as fault:
+        except LineFault as fault:
             self._fail(fault, raw, number)
         self._blocks += is_block
 
-    def _fail(self, fault: Fault, raw: str, number: int) -> NoReturn:
+    def _fail(self, fault: LineFault, raw: str, number: int) -> NoReturn:
         columns = _columns(raw)
         at = fault.at
         if not isinstance(at, int):  # the first word behind a block number

@@ -14,7 +14,7 @@ from typing import Any
 from msgspec import structs
 
 from camtool.errors import MachineError
-from camtool.target.contract import Setting
+from camtool.target.contract import ControllerSetting
 from camtool.target.wire import Place, port_fault
 
 from .dialect import GrblController, GrblMachine
@@ -57,7 +57,7 @@ _MORE = {
 """... and what it may say besides."""
 
 
-def settings_of(text: str) -> list[Setting] | None:
+def settings_of(text: str) -> list[ControllerSetting] | None:
     """The values of a machine file that a listing says, None for a text without settings;
     MachineError for a setting that is missing, doubled, or no number."""
     said: dict[int, tuple[str, int]] = {}
@@ -91,14 +91,14 @@ def settings_of(text: str) -> list[Setting] | None:
     return made
 
 
-def _doubt(setting: Setting) -> str:
+def _doubt(setting: ControllerSetting) -> str:
     """Why a setting of a machine with a spindle says nothing of it; "" where it does. Of a laser
     the same number is the usual full power."""
     never_set = setting.said == f"${FULL_SPEED}" and setting.value == FACTORY_FULL_SPEED
     return NEVER_SET if never_set else ""
 
 
-def _setting(key: str, number: int, text: str, line: int) -> Setting:
+def _setting(key: str, number: int, text: str, line: int) -> ControllerSetting:
     where = f"line {line}, ${number}"
     try:
         value = float(text)
@@ -107,10 +107,10 @@ def _setting(key: str, number: int, text: str, line: int) -> Setting:
     if key.endswith("coded_step_mm"):
         if value <= 0.0:
             raise MachineError(f"{text} steps/mm are none", where=where)
-        return Setting(key, 1.0 / value, f"${number} = {text} steps/mm", where)
+        return ControllerSetting(key, 1.0 / value, f"${number} = {text} steps/mm", where)
     if number == LASER:
-        return Setting(key, value != 0.0, f"${number}", where)
-    return Setting(key, int(value) if value.is_integer() else value, f"${number}", where)
+        return ControllerSetting(key, value != 0.0, f"${number}", where)
+    return ControllerSetting(key, int(value) if value.is_integer() else value, f"${number}", where)
 
 
 # Comparing with the machine file, before a program is sent.
@@ -189,7 +189,9 @@ def beyond_travel(text: str, zero_mm: Place, reach_mm: tuple[Place, Place]) -> s
     return ""
 
 
-def _difference(found: Setting, wanted: float | None, inverse: bool = False) -> list[str]:
+def _difference(
+    found: ControllerSetting, wanted: float | None, inverse: bool = False
+) -> list[str]:
     """A sentence where a setting is not what the machine file says, if it says anything."""
     value = float(found.value)
     shown = 1.0 / value if inverse else value

@@ -31,7 +31,7 @@ from camtool.target.twin import Slides, Travel, Twin
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 
-from ..gcode.faults import Fault
+from ..gcode.faults import LineFault
 from .controller import (
     ALWAYS_ON,
     LEAST_SPEED_MM_S,
@@ -42,8 +42,17 @@ from .controller import (
     speeds_of,
     stops_of,
 )
-from .dialect import Dialect, GrblController
-from .parser import LENGTH, MM_PER_INCH, MOTION, PROBES, Block, Modes, Notes, Parser
+from .dialect import GrblController, GrblDialect
+from .parser import (
+    LENGTH,
+    MM_PER_INCH,
+    MOTION,
+    PROBES,
+    GrblBlock,
+    GrblParser,
+    ParserModes,
+    ParserNotes,
+)
 from .steps import step_lines_fill
 
 RX_BYTES: Final = 128
@@ -157,7 +166,7 @@ NEVER_CLOSED: Final = -1e6
 """No slide comes down to this height, mm."""
 
 
-class Choices(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class GrblTwinSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """How this grbl is set up. `homing`: "on" has switches at both ends of the travel, and locks
     it until `$H` or `$X` ($22). `opening`: whether DTR resets the board when its port is opened,
     as that of an Uno, which then forgets its place. `probe_mm`: at or below this height on the
@@ -255,7 +264,7 @@ def _byte(value: float) -> int:
 class _Memory:
     """Settings, frames (6 of 3 mm), places of G28 and G30, and lines of text."""
 
-    def __init__(self, machine: Machine[GrblController, Dialect], *, homing: bool) -> None:
+    def __init__(self, machine: Machine[GrblController, GrblDialect], *, homing: bool) -> None:
         controller, spindle, dialect = machine.controller, machine.spindle, machine.dialect
         values = self.defaults()
         values |= {1: controller.idle_delay_ms, 22: float(homing)}
@@ -333,14 +342,14 @@ def _checksum(text: bytes | bytearray) -> int:
 # Its parser: places on the machine, in 32-bit floats.
 
 
-class _Parser(Parser):
+class _Parser(GrblParser):
     """grbl's parser with its own frames and lengths. What a line does is left behind: `actions`
     in their order, then the moves of the path, a probing move among them, then `flow`."""
 
     def __init__(
-        self, machine: Machine[GrblController, Dialect], path: ToolpathBuilder, memory: _Memory
+        self, machine: Machine[GrblController, GrblDialect], path: ToolpathBuilder, memory: _Memory
     ) -> None:
-        super().__init__(machine, path, Notes())
+        super().__init__(machine, path, ParserNotes())
         self._memory, self._rows = memory, path
         self._zero = (0.0, 0.0, 0.0)
         self.places = list(memory.frames[0])
@@ -374,25 +383,25 @@ class _Parser(Parser):
         value = _single(self.places[axis] + self.offset[axis])
         return _single(value + self.length) if axis == 2 else value
 
-    def _word(self, block: Block, letter: str, value: float, said: str, at: int) -> None:
+    def _word(self, block: GrblBlock, letter: str, value: float, said: str, at: int) -> None:
         read = _read(said, 0)
         super()._word(block, letter, value if read is None else read[0], said, at)
 
-    def _probe_word(self, block: Block, hundredths: int, at: int) -> str:
+    def _probe_word(self, block: GrblBlock, hundredths: int, at: int) -> str:
         block.modes.motion = PROBES + (hundredths - 20) // 10
         return "motion"
 
-    def _words(self, block: Block) -> dict[int, float]:
+    def _words(self, block: GrblBlock) -> dict[int, float]:
         mm = MM_PER_INCH if block.modes.inches else 1.0
         said = {k: block.numbers["XYZ"[k]] for k in range(3) if "XYZ"[k] in block.numbers}
         return {k: _single(value * np.float32(mm)) for k, value in said.items()}
 
-    def _frame_of(self, block: Block) -> list[float]:
+    def _frame_of(self, block: GrblBlock) -> list[float]:
         if block.modes.frame == self.modes.frame:
             return self.places
         return self._memory.frames[block.modes.frame]
 
-    def _target(self, block: Block, words: dict[int, float], unused: set[str]) -> list[float]:
+    def _target(self, block: GrblBlock, words: dict[int, float], unused: set[str]) -> list[float]:
         super()._target(block, words, unused)  # for what it refuses
         target = list(self.position)
         if block.once in ("G10", "G92") or block.uses == LENGTH:
@@ -414,16 +423,16 @@ class _Parser(Parser):
     def _shift(self) -> list[float]:
         return [0.0, 0.0, 0.0]
 
-    def _homing(self, block: Block, target: list[float]) -> bool:
+    def _homing(self, block: GrblBlock, target: list[float]) -> bool:
         return False
 
-    def _jog(self, block: Block, target: list[float], feed: float) -> None:
+    def _jog(self, block: GrblBlock, target: list[float], feed: float) -> None:
         self.jogs, self.power = True, self.rpm
         super()._jog(block, target, feed)
 
     def _execute(
         self,
-        block: Block,
+        block: GrblBlock,
         target: list[float],
         centre: tuple[float, float] | None,
         feed: float,
@@ -466,7 +475,7 @@ class _Parser(Parser):
                 self._move(block, target, centre, feed)
         self.flow = block.flow if block.flow != 1 else None
 
-    def _once(self, block: Block, words: dict[int, float], target: list[float]) -> None:
+    def _once(self, block: GrblBlock, words: dict[int, float], target: list[float]) -> None:
         once, do = block.once, self.actions.append
         if once == "G10":
             number = math.trunc(block.numbers.get("P", 0.0))
@@ -504,7 +513,7 @@ class _Parser(Parser):
 
     def rewind(self) -> None:
         """M2 and M30 set most modes back; in check mode the zero of the frame stays."""
-        self.modes = Modes(motion=1, inches=self.modes.inches)
+        self.modes = ParserModes(motion=1, inches=self.modes.inches)
         if not self.checking:
             self.places = list(self._memory.frames[0])
 
@@ -521,7 +530,9 @@ class GrblTwin(Twin):
     _ended: bool
     _probing: int | None
 
-    def __init__(self, machine: Machine[GrblController, Dialect], choices: Choices) -> None:
+    def __init__(
+        self, machine: Machine[GrblController, GrblDialect], choices: GrblTwinSettings
+    ) -> None:
         super().__init__(Slides(machine))
         self._machine, self._choices = machine, choices
         self._memory = _Memory(machine, homing=choices.homing == "on")
@@ -539,7 +550,7 @@ class GrblTwin(Twin):
         self._out.clear()
 
     def _travel_ends(
-        self, machine: Machine[GrblController, Dialect], zero: Floats
+        self, machine: Machine[GrblController, GrblDialect], zero: Floats
     ) -> tuple[Floats, Floats] | None:
         """Where slides close the switches: beyond machine zero and beyond their travel, mm."""
         if self._choices.homing == "off":
@@ -1149,7 +1160,7 @@ class GrblTwin(Twin):
         stood = list(parser.position)
         try:
             parser.line(text)
-        except Fault as fault:
+        except LineFault as fault:
             return _code(fault)
         path = self._path.drained()
         if parser.jogs:
@@ -1851,13 +1862,13 @@ def _stripped(raw: bytes) -> str:
     return "".join(sign for sign in text if sign > " " and sign != "/").upper()
 
 
-def _code(fault: Fault) -> int:
+def _code(fault: LineFault) -> int:
     """grbl's number of an error; 20, unsupported, for what only this twin does not do."""
     found = re.search(r"\(error:(\d+)\)", fault.message)
     return int(found[1]) if found else 20
 
 
-def _cooled(modes: Modes) -> tuple[bool, bool]:
+def _cooled(modes: ParserModes) -> tuple[bool, bool]:
     return modes.mist, modes.flood
 
 

@@ -31,8 +31,8 @@ from camtool.target.wire import (
     Manner,
     Packet,
     Place,
-    State,
     Wire,
+    WireState,
 )
 
 from .dialect import GrblController, GrblMachine
@@ -336,7 +336,7 @@ class GrblConversation(Conversation):
     @property
     def is_still(self) -> bool:
         """True behind a hold that it has confirmed."""
-        return self.state is State.FINISHED or (self._stood and self.ended and not self._alarm)
+        return self.state is WireState.FINISHED or (self._stood and self.ended and not self._alarm)
 
     # What the user wants.
 
@@ -348,18 +348,18 @@ class GrblConversation(Conversation):
     def pause(self, now: float) -> None:
         """Feed hold."""
         self._resumes = False
-        if self.state is State.SENDING:
-            self.state, self._halted = State.PAUSING, now
+        if self.state is WireState.SENDING:
+            self.state, self._halted = WireState.PAUSING, now
             self._idle = 0
             self._write(HOLD)
 
     def resume(self, now: float) -> None:
         """Go on where it was held; behind a single block, the next one."""
-        if self.state is State.PAUSING:  # grbl passes over ~ until it stands
+        if self.state is WireState.PAUSING:  # grbl passes over ~ until it stands
             self._resumes = True
         elif self.state in HALTS:
             held = self.why != SINGLE
-            self.state, self.why, self._idle, self._holds = State.SENDING, "", 0, 0
+            self.state, self.why, self._idle, self._holds = WireState.SENDING, "", 0, 0
             if held:
                 self._stale = self._due
                 self._write(RESUME)
@@ -367,13 +367,13 @@ class GrblConversation(Conversation):
 
     def stop(self, now: float) -> None:
         """Feed hold, and a reset when it stands; homing hears nothing but the reset."""
-        if self.ended or self.state is State.STOPPING:
+        if self.ended or self.state is WireState.STOPPING:
             return
         self._unwrite()
         if self._phase != "greeting" and not self._acted:
-            self._end(State.STOPPED, "stopped before it was told to move")
+            self._end(WireState.STOPPED, "stopped before it was told to move")
             return
-        self.state, self._halted, self._idle = State.STOPPING, now, 0
+        self.state, self._halted, self._idle = WireState.STOPPING, now, 0
         if self._homes or (self._phase == "greeting" and self._resets):
             self._reset(now)
         else:
@@ -392,8 +392,8 @@ class GrblConversation(Conversation):
         if not self.ended and not self._failing:
             self._failing = why
             self.stop(now)
-        if self.state is State.STOPPED:
-            self._end(State.FAILED, why)
+        if self.state is WireState.STOPPED:
+            self._end(WireState.FAILED, why)
 
     @property
     def _alone(self) -> str:
@@ -410,11 +410,11 @@ class GrblConversation(Conversation):
         if self.ended:
             return
         patience = self.manner.patience_s
-        if self.state is State.STOPPING:
+        if self.state is WireState.STOPPING:
             since = now - self._halted
             if self._reset_sent and since >= patience:
                 why = self._failing or "it was told to stop"
-                self._end(State.FAILED, f"{why}; it did not confirm the stop: switch it off")
+                self._end(WireState.FAILED, f"{why}; it did not confirm the stop: switch it off")
                 return
             # One that homes since before the port was opened hears nothing else, and says nothing.
             homes = self._phase == "greeting" and self._answered <= self._halted
@@ -423,16 +423,16 @@ class GrblConversation(Conversation):
             ):
                 self._reset(now)
         elif self._phase == "greeting" and now - self._answered >= patience:
-            self._end(State.FAILED, self._unknown())
+            self._end(WireState.FAILED, self._unknown())
             return
         elif self._phase == "greeting" and self._resets and now - self._begun >= patience:
             said = "where its work zero is" if self._fresh else "that it has begun anew"
-            self._end(State.FAILED, f"it was reset, and does not say {said}")
+            self._end(WireState.FAILED, f"it was reset, and does not say {said}")
             return
         elif self._phase != "greeting" and not self._homes and now - self._answered >= patience:
             self._fail("it does not answer any more", now)
         if now >= self._polled + POLLS * self.manner.late_s:  # as `_wake` reckons it
-            if self.state is State.PAUSING and now - self._halted >= patience / 2.0:
+            if self.state is WireState.PAUSING and now - self._halted >= patience / 2.0:
                 self._write(HOLD)
                 self._halted = now
             self._poll(now)
@@ -479,7 +479,7 @@ class GrblConversation(Conversation):
     def _line(self, line: str, now: float) -> None:
         if not line:
             return
-        stopping = self.state is State.STOPPING
+        stopping = self.state is WireState.STOPPING
         if self._phase == "greeting" and not stopping and not _understood(line):
             self._aside(line)
             return
@@ -494,7 +494,7 @@ class GrblConversation(Conversation):
         elif re.fullmatch(r"ALARM:\d+", line):
             self._alarm = f"{line}: {ALARMS.get(int(line[6:]), 'it says no more')}"
             if not (stopping and self._reset_sent):  # else its banner follows
-                self._end(State.FAILED, self._failing or self._alarm)
+                self._end(WireState.FAILED, self._failing or self._alarm)
         elif line.startswith("[GC:") and line.endswith("]"):
             self._reported(line, now)
         elif _SETTING.fullmatch(line) and self._phase == "settings":
@@ -516,7 +516,7 @@ class GrblConversation(Conversation):
             self._messages.append(line[5:].rstrip("]"))
         elif self._phase == "greeting" and re.match(r"grbl", line, re.IGNORECASE):
             self._end(
-                State.FAILED,
+                WireState.FAILED,
                 f"it says {line[:60]!r}, but camtool speaks to grbl 1.1: load that into the board",
             )
         startup = _STARTUP.fullmatch(line)
@@ -581,29 +581,32 @@ class GrblConversation(Conversation):
         self._due = max(self._due - 1, 0)
         self._holds = self._holds + 1 if state == "Hold:0" and not stale else 0
         still = state == "Hold:0" or self._idle >= 2 or state.startswith("Door:1")
-        if self.state is State.STOPPING:
+        if self.state is WireState.STOPPING:
             self._stopping(state, now)
         elif self._phase == "greeting":
             self._greeted(state, now)
         elif state == "Alarm" and not self._locked and not self._unlocks:
-            self._end(State.FAILED, f"it is locked{self._reasons}: home it or unlock it")
-        elif self.state is State.PAUSING and still:
-            self.state, self._holds = State.PAUSED, 0
+            self._end(WireState.FAILED, f"it is locked{self._reasons}: home it or unlock it")
+        elif self.state is WireState.PAUSING and still:
+            self.state, self._holds = WireState.PAUSED, 0
             if self._resumes:
                 self.resume(now)
-        elif state.startswith("Door") and self.state is State.SENDING:
-            self.state, self.why = State.WAITING, "its door is open: close it and go on"
-        elif self.state is State.SENDING and state == "Hold:0":
+        elif state.startswith("Door") and self.state is WireState.SENDING:
+            self.state, self.why = WireState.WAITING, "its door is open: close it and go on"
+        elif self.state is WireState.SENDING and state == "Hold:0":
             if stale:
                 return
             if self._stops():
-                self.state, self.why = State.WAITING, self._stop_note()
+                self.state, self.why = WireState.WAITING, self._stop_note()
             elif self._holds >= HELD:
-                self.state, self.why = State.WAITING, "it is held"
-        elif self.state is State.WAITING and state in ("Run", "Idle"):
-            self.state, self.why = State.SENDING, ""  # somebody has let it go on at the machine
+                self.state, self.why = WireState.WAITING, "it is held"
+        elif self.state is WireState.WAITING and state in ("Run", "Idle"):
+            self.state, self.why = (
+                WireState.SENDING,
+                "",
+            )  # somebody has let it go on at the machine
             self._go_on(now)
-        elif self._idle >= 2 and self.state is State.SENDING:
+        elif self._idle >= 2 and self.state is WireState.SENDING:
             self._at_rest(now)
 
     def _stopping(self, state: str, now: float) -> None:
@@ -667,19 +670,19 @@ class GrblConversation(Conversation):
                 self._tell("it still moves: waiting until it stands")
         else:
             meaning = STATES.get(state, "")
-            self._end(State.FAILED, f"it is not ready: {state}, {meaning}")
+            self._end(WireState.FAILED, f"it is not ready: {state}, {meaning}")
 
     def _banner(self, now: float) -> None:
-        if self.state is State.STOPPING and self._reset_sent:
+        if self.state is WireState.STOPPING and self._reset_sent:
             if self._failing:
-                self._end(State.FAILED, "; ".join(filter(None, (self._failing, self._alarm))))
+                self._end(WireState.FAILED, "; ".join(filter(None, (self._failing, self._alarm))))
             else:
                 self._end(
-                    State.STOPPED, f"stopped: {self._alarm or 'it has begun anew, and stands'}"
+                    WireState.STOPPED, f"stopped: {self._alarm or 'it has begun anew, and stands'}"
                 )
         elif self._phase != "greeting":
-            self._end(State.FAILED, "the controller was reset while it worked")
-        elif self.state is State.STOPPING:
+            self._end(WireState.FAILED, "the controller was reset while it worked")
+        elif self.state is WireState.STOPPING:
             self._reset(now)  # a hold that comes behind its banner would last
         elif self._resets:
             self._fresh, self._offset = True, None
@@ -694,7 +697,7 @@ class GrblConversation(Conversation):
             place = _less(at, self._offset) if at and self._offset else None
             why = self._standing.refusal(place, restarted=self._restarted)
             if at is None or why:
-                self._end(State.FAILED, why or "it does not say where it stands")
+                self._end(WireState.FAILED, why or "it does not say where it stands")
                 return
             if said is not None:  # until the next reset: what it remembers stays as it is
                 self._frame = _less(at, said)
@@ -703,13 +706,13 @@ class GrblConversation(Conversation):
                 )
                 self._commands.append(f"G21G92{words}\n".encode())
         self._phase, self.why, self._idle = "commands", "", 0
-        self.state = State.SENDING
+        self.state = WireState.SENDING
         self._go_on(now)
 
     def _reported(self, line: str, now: float) -> None:
         """The report of a query: all lines before it must have been answered, and it not."""
         head = self._out_lines[0] if self._out_lines else None
-        if self.state is State.STOPPING:
+        if self.state is WireState.STOPPING:
             return
         if head is None or not head.is_probe:
             self._fail("an answer is missing: a line of the program may be lost", now)
@@ -733,7 +736,7 @@ class GrblConversation(Conversation):
             found = group & said
             if found and group & unset and not found & unset:
                 self._end(
-                    State.FAILED,
+                    WireState.FAILED,
                     f"its startup line leaves {next(iter(found))}, and the program does not say "
                     f"{next(iter(group & unset))} before it moves: write that there, or empty the "
                     "line ($N0= or $N1=)",
@@ -741,7 +744,7 @@ class GrblConversation(Conversation):
                 return
 
     def _answer(self, line: str, now: float) -> None:
-        if self.state is State.STOPPING:
+        if self.state is WireState.STOPPING:
             return
         if not self._out_lines:
             self._fail("an answer more than lines were sent", now)
@@ -763,7 +766,7 @@ class GrblConversation(Conversation):
             self.acknowledged = head.packet
         elif head.data == LISTING:
             if self._locked:
-                self._end(State.FAILED, self._advice())
+                self._end(WireState.FAILED, self._advice())
                 return
             self._phase = "commands"
             self._compare(now)
@@ -799,7 +802,7 @@ class GrblConversation(Conversation):
 
     def _go_on(self, now: float, *, anew: bool = False) -> None:
         """Write what may be written now."""
-        if self.state is not State.SENDING or self._phase in ("greeting", "settings"):
+        if self.state is not WireState.SENDING or self._phase in ("greeting", "settings"):
             return
         if self._commands:
             if not self._out_lines:
@@ -864,9 +867,9 @@ class GrblConversation(Conversation):
             return
         self.done = self._confirmed
         if self.done == len(self.packets):
-            self._end(State.FINISHED)
+            self._end(WireState.FINISHED)
         elif self.single and self.sent == self.done:
-            self.state, self.why = State.PAUSED, SINGLE
+            self.state, self.why = WireState.PAUSED, SINGLE
         else:  # it was to do single blocks, and need not any more
             self._go_on(now)
 

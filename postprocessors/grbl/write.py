@@ -15,13 +15,13 @@ from ..gcode.write import (
     COOLANT_OFF,
     SPINDLE_OFF,
     Event,
-    Style,
+    ProgramStyle,
     common_words,
     tool_number,
     write_modal,
 )
 from .controller import GrblModel
-from .dialect import MOST_TOOL, Dialect, GrblMachine
+from .dialect import MOST_TOOL, GrblDialect, GrblMachine
 from .findings import EVENT_LEFT_OUT, TOOL_BY_HAND
 
 HEADER = ("G17 {unit} G90 G94", "G54")
@@ -43,7 +43,7 @@ def write_program(toolpath: Toolpath, machine: GrblMachine) -> Program:
         return [*before, *mounting(path, row, unit)]
 
     header = tuple(block.format(unit=unit.word) for block in HEADER)
-    style = Style(
+    style = ProgramStyle(
         dialect,
         header,
         lambda event: _words(event, dialect),
@@ -54,7 +54,7 @@ def write_program(toolpath: Toolpath, machine: GrblMachine) -> Program:
     return replace(program, findings=(*program.findings, *_by_hand(toolpath, dialect)))
 
 
-def _by_hand(toolpath: Toolpath, dialect: Dialect) -> Iterator[Finding]:
+def _by_hand(toolpath: Toolpath, dialect: GrblDialect) -> Iterator[Finding]:
     """What the operator has to do about tools: mount one before the program, and some in it."""
     first = mounted_before(toolpath)
     if dialect.tool_change != "pause" and first.any():
@@ -67,7 +67,7 @@ def _by_hand(toolpath: Toolpath, dialect: Dialect) -> Iterator[Finding]:
         )
 
 
-def _words(event: Event, dialect: Dialect) -> tuple[str, ...]:
+def _words(event: Event, dialect: GrblDialect) -> tuple[str, ...]:
     """The blocks of an event."""
     if event.kind == Kind.TOOL_CHANGE:
         return _change(event, dialect)
@@ -81,7 +81,7 @@ def _words(event: Event, dialect: Dialect) -> tuple[str, ...]:
     return blocks
 
 
-def _change(event: Event, dialect: Dialect) -> tuple[str, ...]:
+def _change(event: Event, dialect: GrblDialect) -> tuple[str, ...]:
     """A stop for another tool, spindle and coolant off; nothing for the tool that is mounted
     before the program."""
     if event.mounted_before and dialect.tool_change != "pause":

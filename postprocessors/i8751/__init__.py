@@ -10,17 +10,15 @@ from typing import TYPE_CHECKING
 
 from camtool.target.contract import Target
 
-from .dialect import Dialect, I8751Controller, I8751Link, I8751Machine, check
+from .dialect import I8751Controller, I8751Dialect, I8751Link, I8751Machine, check
 
 if TYPE_CHECKING:
-    import msgspec
-
     from camtool.machine.model import Machine
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
 
     from .controller import I8751Model
-    from .twin import Choices, I8751Twin
+    from .twin import I8751Twin, I8751TwinSettings
     from .wire import I8751Wire
 
 
@@ -29,7 +27,7 @@ class I8751(Target):
 
     name = "i8751"
     controllers = (I8751Controller,)
-    dialect = Dialect
+    dialect = I8751Dialect
     link = I8751Link
 
     def check(self, machine: I8751Machine) -> None:
@@ -64,19 +62,19 @@ class I8751(Target):
 
         return I8751Wire()
 
-    def twin_choices(self) -> type[Choices]:
+    def twin_settings(self) -> type[I8751TwinSettings]:
         """What its thesis leaves open of the wire."""
-        from .twin import Choices
+        from .twin import I8751TwinSettings
 
-        return Choices
+        return I8751TwinSettings
 
     def twin(
-        self, machine: Machine[I8751Controller, Dialect], choices: msgspec.Struct | None = None
+        self, machine: Machine[I8751Controller, I8751Dialect], settings: I8751TwinSettings
     ) -> I8751Twin:
         """The virtual controller; docs/wires/i8751.md."""
-        from .twin import Choices, I8751Twin
+        from .twin import I8751Twin
 
-        return I8751Twin(machine, choices if isinstance(choices, Choices) else Choices())
+        return I8751Twin(machine, settings)
 
     def line_bytes(self, data: bytes, machine: I8751Machine) -> int:
         """The bytes of the packets, whatever the form of the file."""

@@ -27,16 +27,16 @@ from camtool.simulation.motion import Chunk, Options
 from camtool.simulation.rows import refuse, with_ends
 from camtool.toolpath.moves import Toolpath
 
-from .dialect import Dialect, I8751Controller
+from .dialect import I8751Controller, I8751Dialect
 from .pulses import PulseTimes
 
-_Machine = Machine[I8751Controller, Dialect]
+_Machine = Machine[I8751Controller, I8751Dialect]
 
 ROWS_AT_ONCE = 1 << 14
 """Rows whose legs are computed together: some 5 MB."""
 
 
-class I8751Model(ControllerModel[I8751Controller, Dialect]):
+class I8751Model(ControllerModel[I8751Controller, I8751Dialect]):
     """The Intel 8751: a dog-leg of X and Y, then Z."""
 
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:

@@ -26,7 +26,7 @@ MOST_LOW_BYTE: Final = 255
 """Pulses that PL alone can hold."""
 
 
-class Dialect(Firmware, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class I8751Dialect(Firmware, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """How programs look, how near lines are followed, and one reading for each open question.
 
     `tolerance_mm`: how far the dog-leg of a line may stray from it; `arc_tolerance_mm`: how far
@@ -99,7 +99,7 @@ class I8751Link(Link, frozen=True, forbid_unknown_fields=True, kw_only=True):
     packet_end: Literal["F", "M F"] = "F"
 
 
-I8751Machine = Machine[SlideStart, Dialect]
+I8751Machine = Machine[SlideStart, I8751Dialect]
 """Any machine with this dialect."""
 
 

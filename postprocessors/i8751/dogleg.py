@@ -60,7 +60,7 @@ def elbows(steps: Ints) -> Ints:
     return np.asarray(short * (size.max(axis=1, initial=0) - short))
 
 
-class Line(Struct, frozen=True):
+class StepLine(Struct, frozen=True):
     """A line of dx, dy steps; `reach` as `reaches` gives it, or FREE."""
 
     dx: int

@@ -31,7 +31,7 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 
 from . import packets
-from .dialect import MOST_DWELL_BYTE_S, RECORDS_PER_PACKET, Dialect, I8751Machine
+from .dialect import MOST_DWELL_BYTE_S, RECORDS_PER_PACKET, I8751Dialect, I8751Machine
 from .findings import READ_TWO_WAYS, VALUE_ROUNDED
 from .pulses import PulseTimes
 
@@ -102,7 +102,7 @@ def decoded_records(data: bytes, machine: I8751Machine) -> Decoded:
     return _read_packets(data, dialect)
 
 
-def _read_packets(data: bytes, dialect: Dialect) -> Decoded:
+def _read_packets(data: bytes, dialect: I8751Dialect) -> Decoded:
     try:
         return PacketReader(data, dialect).read()
     except ByteFault as fault:
@@ -177,7 +177,7 @@ def _feeds(steps: Ints, step_mm: Floats, times: PulseTimes) -> list[Floats]:
         ]
 
 
-def _two_ways(decoded: Decoded, dialect: Dialect) -> Iterator[Finding]:
+def _two_ways(decoded: Decoded, dialect: I8751Dialect) -> Iterator[Finding]:
     """READ_TWO_WAYS: runs with a high byte, whose unit is 256 steps or 255."""
     if dialect.long_runs:
         return
@@ -215,7 +215,7 @@ def _findings(decoded: Decoded) -> tuple[Finding, ...]:
 class PacketReader:
     """Bytes in, records out; ByteFault at the first byte that does not fit."""
 
-    def __init__(self, data: bytes, dialect: Dialect) -> None:
+    def __init__(self, data: bytes, dialect: I8751Dialect) -> None:
         self._data = data
         self._dialect = dialect
         self._parts: list[Shorts] = []
@@ -331,7 +331,7 @@ class PacketReader:
         return ByteFault(at, self._records, message, mend)
 
 
-def replies(data: bytes, decoded: Decoded, dialect: Dialect) -> list[str]:
+def replies(data: bytes, decoded: Decoded, dialect: I8751Dialect) -> list[str]:
     """What the controller is expected to answer to each byte of a stream that was read."""
     to_wait = dialect.dwell_replies
     standing = [dialect.motor_reply, "M"]
@@ -379,7 +379,7 @@ _RECORD: Final = re.compile(_BETWEEN.join(letter + value for letter, value, _ in
 class ListingReader:
     """Lines in, records out; ProgramError with record, line and column."""
 
-    def __init__(self, machine: I8751Machine, dialect: Dialect) -> None:
+    def __init__(self, machine: I8751Machine, dialect: I8751Dialect) -> None:
         self._step_mm = [axis.coded_step_mm for axis in machine.axes]
         self._most = dialect.encodable_steps
         self._numbers = array("i")
@@ -493,7 +493,7 @@ class _Run(NamedTuple):
     comment: str
 
 
-def read_dump(data: bytes, dialect: Dialect) -> Decoded:
+def read_dump(data: bytes, dialect: I8751Dialect) -> Decoded:
     """The records of a hex dump; ProgramError with record, byte, line and column."""
     check_count(_line_ends(data) // LINES_OF_RECORD, "record")
     lines = text_lines(data)

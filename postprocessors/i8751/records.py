@@ -20,8 +20,8 @@ from camtool.toolpath.lower import arcs_to_lines, helices_to_steps, slope_step_m
 from camtool.toolpath.moves import Kind, Toolpath, mounted_before
 from camtool.toolpath.refusals import refuse, refuse_start, refuse_two_radii
 
-from .dialect import MOST_DWELL_BYTE_S, Dialect, I8751Machine
-from .dogleg import FREE, Line, elbows, reaches
+from .dialect import MOST_DWELL_BYTE_S, I8751Dialect, I8751Machine
+from .dogleg import FREE, StepLine, elbows, reaches
 
 MOST_STEPS: Final = 10_000_000
 """A coordinate of more steps is taken for a mistake: 26 hours at the machine's speed."""
@@ -39,7 +39,7 @@ REFUSED: Final = {
 """Homing was proposed and not built (L5267-5273)."""
 
 
-def check_toolpath(toolpath: Toolpath, machine: I8751Machine, dialect: Dialect) -> None:
+def check_toolpath(toolpath: Toolpath, machine: I8751Machine, dialect: I8751Dialect) -> None:
     """PostError for the first row that this machine cannot do."""
     refuse_start(toolpath)
     _check_events(toolpath)
@@ -142,7 +142,7 @@ class Records(Struct, frozen=True, eq=False):
         return len(self.steps)
 
 
-def records_of(toolpath: Toolpath, machine: I8751Machine, dialect: Dialect) -> Records:
+def records_of(toolpath: Toolpath, machine: I8751Machine, dialect: I8751Dialect) -> Records:
     """The records of a checked toolpath; PostError when it moves nothing, or far too much."""
     counts = Counts()
     lowered, row = _lowered(toolpath, slope_step_mm(machine), dialect, counts)
@@ -180,7 +180,7 @@ def records_of(toolpath: Toolpath, machine: I8751Machine, dialect: Dialect) -> R
 
 
 def _lowered(
-    toolpath: Toolpath, step_mm: float, dialect: Dialect, counts: Counts
+    toolpath: Toolpath, step_mm: float, dialect: I8751Dialect, counts: Counts
 ) -> tuple[Toolpath, Ints]:
     """Lines of XY or Z only, and the row of the toolpath that each came from."""
     two = helices_to_steps(toolpath, step_mm)
@@ -202,7 +202,7 @@ def _rounded(toolpath: Toolpath, machine: I8751Machine) -> Ints:
 
 
 def _cut_rows(
-    toolpath: Toolpath, deltas: Ints, machine: I8751Machine, dialect: Dialect, counts: Counts
+    toolpath: Toolpath, deltas: Ints, machine: I8751Machine, dialect: I8751Dialect, counts: Counts
 ) -> dict[int, Ints]:
     """The rows that need more than one record, each with the steps (k, 3) of its records."""
     xy = deltas[:, :2]
@@ -222,7 +222,7 @@ def _cut_rows(
         if dz:
             parts = [(0, 0, part) for part in _chopped(dz, most)]
         else:
-            line = Line(dx, dy, int(reach[row]))
+            line = StepLine(dx, dy, int(reach[row]))
             parts = [(*part, 0) for part in line.pieces(most)]
         pieces[row] = np.array(parts, dtype=np.int64)
         counts.cut_pieces += len(parts) if strays[row] else 0

@@ -19,7 +19,7 @@ from camtool.machine.model import Machine
 from camtool.target.twin import COMMANDED, Slides, Travel, Twin, travel_of
 
 from .controller import I8751Model
-from .dialect import RECORDS_PER_PACKET, Dialect, I8751Controller
+from .dialect import RECORDS_PER_PACKET, I8751Controller, I8751Dialect
 from .read import ACCESS, DATA_END, PACKET_END, STANDS, read_packet
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ LINE_ENDS: Final = {"none": b"", "cr": b"\r", "lf": b"\n", "crlf": b"\r\n"}
 """What may stand behind LISTO and OTRO."""
 
 
-class Choices(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class I8751TwinSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """What the thesis leaves open.
 
     `key`: 13H opens the acquisition "once", or stands before "each-packet". `line_end`: behind
@@ -64,7 +64,9 @@ class I8751Twin(Twin):
     wire = "2400 8N1"
     byte_s = 10.0 / 2400.0
 
-    def __init__(self, machine: Machine[I8751Controller, Dialect], choices: Choices) -> None:
+    def __init__(
+        self, machine: Machine[I8751Controller, I8751Dialect], choices: I8751TwinSettings
+    ) -> None:
         super().__init__(Slides(machine))
         self._machine, self._choices = machine, choices
         self._model = I8751Model()

@@ -21,7 +21,7 @@ from camtool.errors import MachineError
 from camtool.target.terminal import Terminal
 from camtool.target.wire import Forecast, Manner, Packet, PacketByPacket, Wire
 
-from .dialect import Dialect, I8751Link, I8751Machine
+from .dialect import I8751Dialect, I8751Link, I8751Machine
 from .pulses import PulseTimes
 from .stream import stream_of
 from .write import END_OF_DATA, END_OF_PACKET, KEY, STOPPED, packet_bytes
@@ -167,7 +167,7 @@ class _Part(Struct, frozen=True):
 
 def _parts(stream: bytes, machine: I8751Machine) -> Iterator[_Part]:
     """The packets of a stream that its reader accepts, or that the writer has made."""
-    dialect: Dialect = machine.dialect
+    dialect: I8751Dialect = machine.dialect
     assert isinstance(machine.link, I8751Link)
     begin = at = records = 0
     replies: list[str] = []

@@ -37,7 +37,7 @@ from camtool.findings import Finding
 from camtool.toolpath.moves import Toolpath
 from camtool.toolpath.program import Program
 
-from .dialect import RECORDS_PER_PACKET, Dialect, I8751Machine
+from .dialect import RECORDS_PER_PACKET, I8751Dialect, I8751Machine
 from .findings import (
     EVENT_LEFT_OUT_SPINDLE,
     EVENT_LEFT_OUT_TOOL,
@@ -121,7 +121,7 @@ def write_program(toolpath: Toolpath, machine: I8751Machine) -> Program:
     )
 
 
-def packet_bytes(steps: Ints, waits: Ints, dialect: Dialect) -> bytes:
+def packet_bytes(steps: Ints, waits: Ints, dialect: I8751Dialect) -> bytes:
     """The whole stream that the computer sends for records of steps (R, 3) and waits (R, 2)."""
     parts = []
     for low in range(0, len(steps), RECORDS_AT_ONCE):
@@ -132,7 +132,7 @@ def packet_bytes(steps: Ints, waits: Ints, dialect: Dialect) -> bytes:
     return b"".join([*parts, bytes([END_OF_DATA])])
 
 
-def byte_table(steps: Ints, waits: Ints, dialect: Dialect) -> tuple[Bytes, Bools]:
+def byte_table(steps: Ints, waits: Ints, dialect: I8751Dialect) -> tuple[Bytes, Bools]:
     """(R, COLUMNS) bytes of records of steps (R, 3) and waits (R, 2), and which are sent."""
     count = len(steps)
     table = np.zeros((count, COLUMNS), dtype=np.uint8)
@@ -158,7 +158,7 @@ def byte_table(steps: Ints, waits: Ints, dialect: Dialect) -> tuple[Bytes, Bools
     return table, used
 
 
-def _high_low(steps: Ints, dialect: Dialect) -> tuple[Ints, Ints]:
+def _high_low(steps: Ints, dialect: I8751Dialect) -> tuple[Ints, Ints]:
     """PH and PL of each motor's pulses; where PH counts 255, 255 pulses are PL alone."""
     pulses = np.abs(steps) + dialect.lost_pulses
     unit = dialect.high_byte_steps
@@ -195,7 +195,7 @@ def listing_text(records: Records, machine: I8751Machine) -> str:
     return "\n".join([head, *lines, "END"]) + "\n"
 
 
-def dump_text(records: Records, machine: I8751Machine, dialect: Dialect) -> str:
+def dump_text(records: Records, machine: I8751Machine, dialect: I8751Dialect) -> str:
     """The hex dump of the packets: offset, bytes, meaning, expected replies."""
     lines = ["; i8751 packets: offset, bytes, meaning <- expected replies"]
     offset = 0
@@ -211,7 +211,7 @@ def dump_text(records: Records, machine: I8751Machine, dialect: Dialect) -> str:
 class _Dump:
     """Runs of bytes with their meaning and replies; no bytes for a line of comment alone."""
 
-    def __init__(self, records: Records, machine: I8751Machine, dialect: Dialect) -> None:
+    def __init__(self, records: Records, machine: I8751Machine, dialect: I8751Dialect) -> None:
         self._records = records
         self._steps_mm = [axis.coded_step_mm for axis in machine.axes]
         self._digits = decimals_of(machine)
@@ -256,7 +256,7 @@ class _Dump:
         return row[column : column + 4], f"{meaning} <- {self._moving_reply}"
 
 
-def _findings(counts: Counts, dialect: Dialect) -> Iterator[Finding]:
+def _findings(counts: Counts, dialect: I8751Dialect) -> Iterator[Finding]:
     """One finding for each kind of change that was made."""
     if counts.slopes:
         yield MOVE_SPLIT(

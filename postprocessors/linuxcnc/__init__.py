@@ -6,23 +6,21 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-from camtool.target.contract import Setting, Target
+from camtool.target.contract import ControllerSetting, Target
 
 from ..gcode.dialect import check_blocks, feed_decimals, last_decimal_mm
-from .dialect import Dialect, LinuxcncController, LinuxcncLink, LinuxcncMachine
+from .dialect import LinuxcncController, LinuxcncDialect, LinuxcncLink, LinuxcncMachine
 from .findings import CODES
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-    import msgspec
 
     from camtool.machine.model import Axis, Machine
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
 
     from .controller import LinuxcncModel
-    from .twin import Choices, LinuxcncTwin
+    from .twin import LinuxcncTwin, LinuxcncTwinSettings
     from .wire import LinuxcncWire
 
 
@@ -31,7 +29,7 @@ class Linuxcnc(Target):
 
     name = "linuxcnc"
     controllers = (LinuxcncController,)
-    dialect = Dialect
+    dialect = LinuxcncDialect
     link = LinuxcncLink
     ways = {"dialect.path": ("exact-path", "exact-stop", "blend")}  # noqa: RUF012
     starts_spindle = True
@@ -75,27 +73,25 @@ class Linuxcnc(Target):
 
         return LinuxcncWire()
 
-    def twin_choices(self) -> type[Choices]:
+    def twin_settings(self) -> type[LinuxcncTwinSettings]:
         """How it is set up."""
-        from .twin import Choices
+        from .twin import LinuxcncTwinSettings
 
-        return Choices
+        return LinuxcncTwinSettings
 
     def twin(
-        self,
-        machine: Machine[LinuxcncController, Dialect],
-        choices: msgspec.Struct | None = None,
+        self, machine: Machine[LinuxcncController, LinuxcncDialect], settings: LinuxcncTwinSettings
     ) -> LinuxcncTwin:
         """The virtual controller; docs/wires/linuxcnc.md."""
-        from .twin import Choices, LinuxcncTwin
+        from .twin import LinuxcncTwin
 
-        return LinuxcncTwin(machine, choices if isinstance(choices, Choices) else Choices())
+        return LinuxcncTwin(machine, settings)
 
     def unit_mm(self, machine: LinuxcncMachine, axis: Axis) -> float:
         """The last decimal of a coordinate."""
         return last_decimal_mm(machine.dialect)
 
-    def settings_from(self, text: str) -> list[Setting] | None:
+    def settings_from(self, text: str) -> list[ControllerSetting] | None:
         """The values that LinuxCNC's INI file says; None for another text."""
         from .ini import settings_of
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from typing import Final
 
-from ..gcode.faults import Fault
+from ..gcode.faults import LineFault
 from .parameters import DEBUG, MOST_PARAMETERS, Parameters
 
 NEAR_ZERO: Final = 1e-4
@@ -27,9 +27,9 @@ def obeyed(text: str, given: Parameters) -> str | None:
     if word == "debug":
         return expanded(rest, given) if given.stored(DEBUG) > 0.0 else None
     if word == "abort":
-        raise Fault(f"the program stops itself: {expanded(rest, given)}")
+        raise LineFault(f"the program stops itself: {expanded(rest, given)}")
     if word in ("py", "pyrun"):
-        raise Fault("Python of the machine's own, which only it can run")
+        raise LineFault("Python of the machine's own, which only it can run")
     return None
 
 
@@ -57,5 +57,5 @@ def _value(found: re.Match[str], given: Parameters) -> float | None:
             index = int(found[2])
             return given.numbered(index, 0) if 0 < index < MOST_PARAMETERS else None
         return given.named("".join(found[3].split()).lower(), 0)
-    except Fault:
+    except LineFault:
         return None

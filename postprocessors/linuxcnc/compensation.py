@@ -15,7 +15,7 @@ from msgspec import Struct
 
 from camtool.toolpath.moves import Kind
 
-from ..gcode.faults import Fault
+from ..gcode.faults import LineFault
 from .canon import Canon, Queued
 
 CORNER_RAD: Final = 0.05
@@ -36,7 +36,7 @@ _GOUGES: Final = "the tool does not reach a corner without cutting into the part
 Flat = tuple[float, float]
 
 
-class Arc(Struct):
+class ProgrammedArc(Struct):
     """An arc as it is programmed: end, centre, and turns begun, above 0 counter-clockwise."""
 
     end: list[float]
@@ -94,7 +94,9 @@ class Compensation:
     def _entry_line(self, kind: Kind, to: list[float], at: list[float]) -> list[float]:
         way = to[0] - at[0], to[1] - at[1]
         if math.hypot(*way) <= self.radius:
-            raise Fault("the move onto the compensated path is no longer than the tool's radius")
+            raise LineFault(
+                "the move onto the compensated path is no longer than the tool's radius"
+            )
         normal = math.atan2(way[1], way[0]) + self.side * _HALF
         aside = math.cos(normal), math.sin(normal)
         end = [to[0] + self.radius * aside[0], to[1] + self.radius * aside[1], to[2]]
@@ -125,7 +127,7 @@ class Compensation:
         elif concave:
             half = (beta + math.pi) / 2.0
             if half == 0.0:
-                raise Fault("a corner inside of which the path turns straight back")
+                raise LineFault("a corner inside of which the path turns straight back")
             back = radius / math.tan(half)
             angle = theta + side * _HALF
             self._end_at(at[0] + back * math.cos(angle), at[1] + back * math.sin(angle))
@@ -165,19 +167,21 @@ class Compensation:
         d = own * math.cos(theta - phi)
         part = (d - self.radius if inside else d + self.radius) / old if old else 2.0
         if not -1.0 <= part <= 1.0:
-            raise Fault(_GOUGES)
+            raise LineFault(_GOUGES)
         beside = math.acos(part)
         angle = theta + math.pi + (-beside if (arc.turn > 0) == inside else beside)
         return cx + old * math.cos(angle), cy + old * math.sin(angle)
 
-    def arc(self, arc: Arc, at: list[float], spread: float) -> list[float]:
+    def arc(self, arc: ProgrammedArc, at: list[float], spread: float) -> list[float]:
         """An arc, from where the centre stands."""
         return self._entry_arc(arc, at, spread) if self.first else self._arc(arc, at)
 
-    def _entry_arc(self, arc: Arc, at: list[float], spread: float) -> list[float]:
+    def _entry_arc(self, arc: ProgrammedArc, at: list[float], spread: float) -> list[float]:
         """Onto the path along another arc, which ends beside the end."""
         if math.hypot(arc.end[0] - at[0], arc.end[1] - at[1]) <= self.radius:
-            raise Fault("the arc onto the compensated path is no larger than the tool's radius")
+            raise LineFault(
+                "the arc onto the compensated path is no larger than the tool's radius"
+            )
         inside = arc.turn * self.side > 0
         sign = 1.0 if inside else -1.0
         out = sign * (arc.centre[1] - arc.end[1]), sign * (arc.centre[0] - arc.end[0])
@@ -188,18 +192,18 @@ class Compensation:
         to_centre = math.atan2(arc.centre[1] - y, arc.centre[0] - x)
         angle = math.atan2(at[1] - y, at[0] - x) - to_centre
         if abs(math.cos(angle)) < 1e-4:
-            raise Fault("the arc onto the compensated path is smaller than the tool")
+            raise LineFault("the arc onto the compensated path is smaller than the tool")
         reach = math.hypot(at[1] - y, at[0] - x) / 2.0 / math.cos(angle)
         cx, cy = x + reach * math.cos(to_centre), y + reach * math.sin(to_centre)
         if abs(math.hypot(cx - x, cy - y) - math.hypot(cx - at[0], cy - at[1])) > spread:
-            raise Fault("no arc leads onto the compensated path here")
+            raise LineFault("no arc leads onto the compensated path here")
         self._canon.flush()
         end = [x, y, arc.end[2]]
         sweep = swept((at[0], at[1]), (cx, cy), arc.turn, (x, y))
         self._canon.wait(Queued(Kind.ARC_CW, list(end), (cx, cy), arc.turn, sweep=sweep))
         return end
 
-    def _arc(self, arc: Arc, at: list[float]) -> list[float]:
+    def _arc(self, arc: ProgrammedArc, at: list[float]) -> list[float]:
         op, radius, side, (cx, cy) = self.programmed, self.radius, self.side, arc.centre
         own = math.hypot(cx - arc.end[0], cy - arc.end[1])
         inside = arc.turn * side > 0
@@ -212,7 +216,7 @@ class Compensation:
         elif beta < -_HALF:
             beta += 2.0 * math.pi
         if inside and own <= radius:
-            raise Fault("an arc whose radius is no larger than the tool's")
+            raise LineFault("an arc whose radius is no larger than the tool's")
         sign = 1.0 if inside else -1.0
         gamma = math.atan2(sign * (cy - arc.end[1]), sign * (cx - arc.end[0]))
         end = [
@@ -244,27 +248,27 @@ class Compensation:
         self.programmed = list(arc.end)
         return end
 
-    def _line_then_arc(self, arc: Arc, theta: float, across: float, new: float) -> Flat:
+    def _line_then_arc(self, arc: ProgrammedArc, theta: float, across: float, new: float) -> Flat:
         """Where the offset of a line meets the offset, of radius `new`, of the arc behind it."""
         inside = arc.turn * self.side > 0
         part = (across + self.radius if inside else across - self.radius) / new if new else 2.0
         if not -1.0 <= part <= 1.0:
-            raise Fault(_GOUGES)
+            raise LineFault(_GOUGES)
         beside = math.asin(part)
         angle = theta + (0.0 if inside else math.pi)
         angle += beside if (arc.turn > 0) == inside else -beside
         return arc.centre[0] + new * math.cos(angle), arc.centre[1] + new * math.sin(angle)
 
-    def _arc_then_arc(self, before: Queued, arc: Arc, new: float) -> Flat:
+    def _arc_then_arc(self, before: Queued, arc: ProgrammedArc, new: float) -> Flat:
         """Where two offset arcs meet: a triangle of both radii and the distance of the centres."""
         (px, py), (cx, cy) = before.centre, arc.centre
         old = math.hypot(py - before.end[1], px - before.end[0])
         apart = math.hypot(py - cy, px - cx)
         if old == 0.0 or apart == 0.0:
-            raise Fault("two arcs about one centre cannot be compensated")
+            raise LineFault("two arcs about one centre cannot be compensated")
         part = (old * old + apart * apart - new * new) / (2.0 * old * apart)
         if not -1.0 <= part <= 1.0:
-            raise Fault(_GOUGES)
+            raise LineFault(_GOUGES)
         inside = before.turn * self.side > 0
         back = math.acos(part)
         angle = math.atan2(cy - py, cx - px)
@@ -294,18 +298,18 @@ class Compensation:
             if start is not None:
                 way = x - start[0], y - start[1]
                 if way[0] * move.direction[0] + way[1] * move.direction[1] < 0.0:
-                    raise Fault(_GOUGES)
+                    raise LineFault(_GOUGES)
             move.end[:2] = x, y
             return
         cx, cy = move.centre
         before, after = math.hypot(move.end[0] - cx, move.end[1] - cy), math.hypot(x - cx, y - cy)
         move.end[:2] = x, y
         if abs(before - after) > SPREAD:
-            raise Fault("compensation makes an arc of two radii here")
+            raise LineFault("compensation makes an arc of two radii here")
         if move.sweep and start is not None:
             longer = LONGER_MM if self._canon.mm == 1.0 else LONGER_MM / 25.4
             if abs(swept(start, move.centre, move.turn, (x, y))) > abs(move.sweep) + longer:
-                raise Fault(_GOUGES)
+                raise LineFault(_GOUGES)
 
 
 def swept(start: Flat, centre: Flat, turn: int, end: Flat) -> float:

@@ -52,10 +52,10 @@ from camtool.simulation.speed_plan import (
 )
 from camtool.toolpath.moves import Kind, PathMode, PolarArcs, Toolpath, are_arcs, frozen
 
-from .dialect import Dialect, LinuxcncController
+from .dialect import LinuxcncController, LinuxcncDialect
 from .steps import MOST_IN_CHAIN, merge_lines
 
-_Machine = Machine[LinuxcncController, Dialect]
+_Machine = Machine[LinuxcncController, LinuxcncDialect]
 
 LEAST_WAY_MM = 1e-9
 """The rest of a move between blends counts as nothing when it is shorter."""
@@ -69,7 +69,7 @@ REST_PERIODS = 2.0
 number: 1 to 3 in all, by where the last of them ends (measured on 278 stops)."""
 
 
-class LinuxcncModel(ControllerModel[LinuxcncController, Dialect]):
+class LinuxcncModel(ControllerModel[LinuxcncController, LinuxcncDialect]):
     """LinuxCNC: the path itself, its corners as the path mode says."""
 
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
@@ -118,7 +118,7 @@ def _corners_said(mode: PathMode) -> str:
     return f"corners are blended within {mode.tolerance_mm:g} mm (G64 P), as the speed needs"
 
 
-class Planned(Struct, frozen=True, eq=False):
+class PlannedWindow(Struct, frozen=True, eq=False):
     """The moves of some rows of a program, and the corners at their starts. Where more of the
     program lies before or behind them, the first corner and the last move miss their neighbours.
     `origin` (N,): the row that each row of `tangents.path` is, or is half of.
@@ -126,8 +126,8 @@ class Planned(Struct, frozen=True, eq=False):
 
     origin: Ints
     tangents: Tangents
-    moves: Moves
-    corners: Corners
+    moves: PlannerMoves
+    corners: PlannerCorners
 
 
 class _Run:
@@ -190,7 +190,7 @@ class _Run:
         begins = self._begins
         return int(begins[max(move, 0)]) if move < len(begins) else 2 * len(self._path)
 
-    def _planned(self, low: int, high: int) -> Planned:
+    def _planned(self, low: int, high: int) -> PlannedWindow:
         """What lies between two places."""
         part, modes = self._path.part(low // 2, (high + 1) // 2), self._rules.modes
         part, origin = halved(part, modes.merging_mm(part.mode))
@@ -199,7 +199,7 @@ class _Run:
         part, chain = merged(part, modes.merging_mm(part.mode))
         tangents = Tangents(part)
         moves = moves_of(tangents, chain, self._rules)
-        return Planned(origin, tangents, moves, corners_of(moves, tangents, self._rules))
+        return PlannedWindow(origin, tangents, moves, corners_of(moves, tangents, self._rules))
 
     def _in_periods(self, plan: SpeedPlan, overlaps: Floats, done: int) -> Floats:
         """(N,) s of each block, less its overlap (N,) with the next; from rest to rest it takes
@@ -229,7 +229,7 @@ class LinuxcncSamples(CountedSamples):
 
     def __init__(
         self,
-        planned: Planned,
+        planned: PlannedWindow,
         machine: _Machine,
         spacing_mm: float,
         passed_mm: tuple[float, float],
@@ -334,7 +334,7 @@ class LinuxcncSamples(CountedSamples):
 
 
 def _speeds(
-    planned: Planned, places: slice, modes: Modes, before: Approach
+    planned: PlannedWindow, places: slice, modes: CornerModes, before: Approach
 ) -> tuple[Bools, SpeedPlan]:
     """Blends and moves as blocks of their own. At even places of all (2 M,) stands the blend
     before a move, then the move: which of them last and lie in `places`, and these.
@@ -362,7 +362,7 @@ def _speeds(
     )
 
 
-def _seconds(planned: Planned, taken: Floats) -> Floats:
+def _seconds(planned: PlannedWindow, taken: Floats) -> Floats:
     """(N,) s of each row, with what each blend and move takes, `taken` (2 M + 1,).
 
     Half of a blend belongs to the row on either side; the rows of a merged line share its time by
@@ -384,7 +384,9 @@ def _in_turns(blends: Floats | float, moves: Floats) -> Floats:
     return both
 
 
-def _along_moves(moves: Moves, modes: Modes, corners: Corners) -> tuple[Floats, Floats]:
+def _along_moves(
+    moves: PlannerMoves, modes: CornerModes, corners: PlannerCorners
+) -> tuple[Floats, Floats]:
     """(M,) mm/s² along the moves, less what bends at their ends and a last stop take; and (M,)
     mm/s, how fast arcs may be with that. An arc before a wait was never finished for its next
     move, and keeps half for turning."""
@@ -400,7 +402,7 @@ def _along_moves(moves: Moves, modes: Modes, corners: Corners) -> tuple[Floats, 
     return along, fastest
 
 
-class Modes(Struct, frozen=True, eq=False):
+class CornerModes(Struct, frozen=True, eq=False):
     """How rows of a mode (an index, as in `Toolpath.mode`) meet the corners behind them: `table`
     has a row for each, of numbers: whether they blend, whether they stop (neither: the path is
     kept without a stop), the tolerance of blends in mm, inf: none, and that of merging, 0: none.
@@ -425,9 +427,9 @@ class Modes(Struct, frozen=True, eq=False):
         return np.asarray(self.table[:, 3][mode])
 
 
-def _modes(path: Toolpath, machine: _Machine) -> Modes:
+def _modes(path: Toolpath, machine: _Machine) -> CornerModes:
     """What the program says of each row, and where it says nothing, the machine file."""
-    return Modes(
+    return CornerModes(
         np.array(
             [
                 (mode.corners == "blend", mode.corners == "exact-stop",
@@ -445,7 +447,7 @@ def _asked(path: Toolpath, machine: _Machine) -> tuple[PathMode, ...]:
     return (*path.modes, _machine_mode(machine)) if silent else path.modes
 
 
-def _rules(modes: Modes, machine: _Machine) -> CornerRules:
+def _rules(modes: CornerModes, machine: _Machine) -> CornerRules:
     controller = machine.controller
     return CornerRules(
         modes=modes,
@@ -547,7 +549,7 @@ def merged(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Ints]:
     return replace(path, end=frozen(moved)), chain
 
 
-def begins_of(path: Toolpath, modes: Modes) -> tuple[Ints, Floats]:
+def begins_of(path: Toolpath, modes: CornerModes) -> tuple[Ints, Floats]:
     """The places where moves begin (M,), the first at 0, and the length of each row with its end
     where `merged` leaves it (N,)."""
     length, begins = np.zeros(len(path)), [np.zeros(1, dtype=np.int32)]
@@ -575,7 +577,7 @@ def begins_of(path: Toolpath, modes: Modes) -> tuple[Ints, Floats]:
     return np.concatenate([found[:1], found[2:]]), length
 
 
-class Moves(Struct, frozen=True, eq=False):
+class PlannerMoves(Struct, frozen=True, eq=False):
     """M moves in order. row_of (N,): the move of each row of the program, −1 for rows that do not
     move; row (M,): the first of each, and mode (M,) its mode. length mm, speed mm/s (as
     programmed, within the limits), acceleration mm/s² (of the whole machine in that direction),
@@ -614,7 +616,7 @@ class Moves(Struct, frozen=True, eq=False):
         return along, np.where(steep, slower, np.inf)
 
 
-def moves_of(tangents: Tangents, chain: Ints, rules: CornerRules) -> Moves:
+def moves_of(tangents: Tangents, chain: Ints, rules: CornerRules) -> PlannerMoves:
     """The moves of merged rows."""
     path, period_s = tangents.path, rules.period_s
     row_length = move_lengths(path)
@@ -639,7 +641,9 @@ def moves_of(tangents: Tangents, chain: Ints, rules: CornerRules) -> Moves:
     waits = np.diff(np.cumsum(np.isin(path.kind, WAITS))[lead], prepend=-1) > 0
     like = cuts == np.roll(cuts, 1)
     mode = path.mode[lead]
-    return Moves(row_of, lead, mode, length, speed, along, is_arc, highest, bend, waits, like)
+    return PlannerMoves(
+        row_of, lead, mode, length, speed, along, is_arc, highest, bend, waits, like
+    )
 
 
 class Tangents:
@@ -795,7 +799,7 @@ LEAST_BEND_RAD = 1e-3
 """Moves that bend by less have no arc between them (TP_MIN_ARC_ANGLE)."""
 
 
-class Corners(Struct, frozen=True, eq=False):
+class PlannerCorners(Struct, frozen=True, eq=False):
     """What happens at the start of each of M moves: `speed` (M,) mm/s, 0 for a stop; `lost` (M,):
     the part of the acceleration that a bend takes from the moves on both sides; `reach` and
     `reach_on` (M,) mm: how far from the corner a blend begins on the move before, and ends on the
@@ -822,7 +826,7 @@ class CornerRules(Struct, frozen=True):
     """`modes`: how corners are met; `kink_ratio`; `period_s` of the servo; limits (3,) of the
     axes, mm/s and mm/s²."""
 
-    modes: Modes
+    modes: CornerModes
     kink_ratio: float
     period_s: float
     rate: Floats
@@ -856,7 +860,7 @@ class Bends(Struct, frozen=True, eq=False):
         return Bends(self.before[which], self.after[which])
 
 
-def corners_of(moves: Moves, tangents: Tangents, rules: CornerRules) -> Corners:
+def corners_of(moves: PlannerMoves, tangents: Tangents, rules: CornerRules) -> PlannerCorners:
     """What happens at the start of each move."""
     bends = Bends(
         tangents.at_ends(np.roll(moves.row, 1)),  # nothing comes of that before the first
@@ -876,12 +880,12 @@ MOST_ROUNDS = 4
 
 
 def _meet(
-    moves: Moves, tangents: Tangents, bends: Bends, used: Floats, rules: CornerRules
-) -> Corners:
+    moves: PlannerMoves, tangents: Tangents, bends: Bends, used: Floats, rules: CornerRules
+) -> PlannerCorners:
     """All corners, where blends at the starts of moves use so much (M,) mm of them."""
     count = len(moves.length)
     none = [np.zeros(count) for _ in range(10)]
-    corners = Corners(
+    corners = PlannerCorners(
         none[0], none[1], none[2], none[3], none[4], none[5], np.zeros((3, count, 3)),
         none[6], none[7], none[8], none[9],
     )  # fmt: skip
@@ -914,8 +918,8 @@ def _meet(
 
 
 def _choose(
-    corners: Corners,
-    moves: Moves,
+    corners: PlannerCorners,
+    moves: PlannerMoves,
     tangents: Tangents,
     on: Ints,
     kink: Floats,
@@ -949,13 +953,13 @@ class _Overlaps(Struct, frozen=True, eq=False):
 
 
 def _overlaps(
-    moves: Moves,
+    moves: PlannerMoves,
     tangents: Tangents,
     on: Ints,
     rates: tuple[Floats, Floats],
     lengths: tuple[Floats, Floats],
     overall: Floats,
-    modes: Modes,
+    modes: CornerModes,
 ) -> _Overlaps:
     """How moves overlap at corners (`tpComputeBlendVelocity`) with these accelerations along them,
     where so much of them counts; `overall` (K,) is that of the second, with what turns it."""
@@ -978,7 +982,9 @@ def _overlaps(
     return _Overlaps(np.minimum(first, within), np.minimum(second, within), one, other, theta)
 
 
-def _worth(moves: Moves, tangents: Tangents, on: Ints, used: Floats, rules: CornerRules) -> Floats:
+def _worth(
+    moves: PlannerMoves, tangents: Tangents, on: Ints, used: Floats, rules: CornerRules
+) -> Floats:
     """(K,) mm/s that the planner thinks an overlap is worth, before it knows the next corner: half
     of each move may be gone by then, bends take their part, and arcs keep half for turning."""
     rates = [
@@ -993,7 +999,7 @@ def _worth(moves: Moves, tangents: Tangents, on: Ints, used: Floats, rules: Corn
 
 
 def _overlap(
-    corners: Corners, moves: Moves, tangents: Tangents, on: Ints, rules: CornerRules
+    corners: PlannerCorners, moves: PlannerMoves, tangents: Tangents, on: Ints, rules: CornerRules
 ) -> None:
     """Fill in how moves overlap at the corners `on` (K,)."""
     one, _ = moves.tangential(on - 1, LAST_PART * moves.acceleration[on - 1])
@@ -1021,7 +1027,7 @@ class _Rounds(Struct, frozen=True, eq=False):
 
 
 def _rounds(
-    moves: Moves,
+    moves: PlannerMoves,
     on: Ints,
     normal: Floats,
     theta: Floats,
@@ -1059,7 +1065,7 @@ def _rounds(
 
 
 def _fill(
-    corners: Corners,
+    corners: PlannerCorners,
     on: Ints,
     rounds: _Rounds,
     reach: tuple[Floats, Floats],
@@ -1080,8 +1086,8 @@ def _fill(
 
 
 def _round_lines(
-    corners: Corners,
-    moves: Moves,
+    corners: PlannerCorners,
+    moves: PlannerMoves,
     tangents: Tangents,
     on: Ints,
     bends: Bends,
@@ -1140,7 +1146,7 @@ class _Side(Struct, frozen=True, eq=False):
 
 
 def _side(
-    moves: Moves,
+    moves: PlannerMoves,
     tangents: Tangents,
     which: Ints,
     corner: Floats,
@@ -1187,8 +1193,8 @@ def _side(
 
 
 def _round_arcs(
-    corners: Corners,
-    moves: Moves,
+    corners: PlannerCorners,
+    moves: PlannerMoves,
     tangents: Tangents,
     on: Ints,
     bends: Bends,

@@ -17,10 +17,10 @@ from msgspec import Struct
 from camtool import bounds
 from camtool.toolpath.moves import Kind, PathMode
 
-from ..gcode.faults import Fault
+from ..gcode.faults import LineFault
 from ..gcode.part_moves import PLANES, too_many
-from .lines import AXES, Block
-from .state import Series, State
+from .lines import AXES, LinuxcncBlock
+from .state import InterpreterState, Series
 
 BACK_MM: Final = 0.254
 """Between two pecks of G73 and G83 the drill comes back to this above where it was: 0.010 inch."""
@@ -45,15 +45,15 @@ class _Hole(Struct):
     bottom: float
 
 
-def drill(machine: State, block: Block, motion: int) -> None:
+def drill(machine: InterpreterState, block: LinuxcncBlock, motion: int) -> None:
     """Carry out a cycle."""
     words = block.words
     if machine.feed_mm == 0.0:
-        raise Fault("a cycle, and no feed yet", mend="write F first")
+        raise LineFault("a cycle, and no feed yet", mend="write F first")
     if machine.feed_mode == 930:
-        raise Fault("a cycle with feeds of inverse time (G93)")
+        raise LineFault("a cycle with feeds of inverse time (G93)")
     if machine.compensation.side:
-        raise Fault("a cycle while the cutter's radius is compensated")
+        raise LineFault("a cycle while the cutter's radius is compensated")
     again = machine.motion == motion
     if machine.series is None:
         machine.series = Series()
@@ -65,7 +65,7 @@ def drill(machine: State, block: Block, motion: int) -> None:
     depth = _word(words, kept, names[2], f"the depth {names[2].upper()}", key="depth")
     times = int(words.get("l", 1.0))
     if times == 0:
-        raise Fault("a cycle repeated 0 times", "l")
+        raise LineFault("a cycle repeated 0 times", "l")
     here = [machine.position[axis] for axis in axes]
     height = series.height if series.height is not None else here[2]
     series.height = height
@@ -80,7 +80,9 @@ def drill(machine: State, block: Block, motion: int) -> None:
         top = r + height
         bottom = top + depth
     if top < bottom:
-        raise Fault(f"R {r:g} lies below {names[2].upper()} {depth:g}", "r", "write a higher R")
+        raise LineFault(
+            f"R {r:g} lies below {names[2].upper()} {depth:g}", "r", "write a higher R"
+        )
     hole = _Hole(at, top, top if machine.to_r else max(height, top), bottom)
     run, kept_now = _motion_of(machine, block, motion, again, hole)
     _bound(machine, times, hole, motion, kept_now)
@@ -109,7 +111,7 @@ def drill(machine: State, block: Block, motion: int) -> None:
     machine.motion = motion
 
 
-def _kept(machine: State) -> dict[str, float]:
+def _kept(machine: InterpreterState) -> dict[str, float]:
     return machine.series.words if machine.series is not None else {}
 
 
@@ -119,12 +121,12 @@ def _word(
     """The number of a word, or of the last block that had it."""
     value = words.get(letter, kept.get(key or letter))
     if value is None:
-        raise Fault(f"a cycle without {name}", "g", f"write {letter.upper()}")
+        raise LineFault(f"a cycle without {name}", "g", f"write {letter.upper()}")
     return value
 
 
 def _place(
-    machine: State, words: dict[str, float], names: list[str], here: list[float]
+    machine: InterpreterState, words: dict[str, float], names: list[str], here: list[float]
 ) -> list[float]:
     """Where an absolute cycle has its (first) hole."""
     if "@" in words or "^" in words:
@@ -138,13 +140,15 @@ def _place(
 def _turned(at: list[float], radius: float, angle: float) -> None:
     """A step in polar coordinates."""
     if at[0] == 0.0 and at[1] == 0.0:
-        raise Fault("a polar step from zero, which has no direction", "@")
+        raise LineFault("a polar step from zero, which has no direction", "@")
     length = math.hypot(at[1], at[0]) + radius
     angle += math.atan2(at[1], at[0])
     at[:2] = length * math.cos(angle), length * math.sin(angle)
 
 
-def _bound(machine: State, times: int, hole: _Hole, motion: int, kept: dict[str, float]) -> None:
+def _bound(
+    machine: InterpreterState, times: int, hole: _Hole, motion: int, kept: dict[str, float]
+) -> None:
     """Fault where the holes would be more moves than a program may have."""
     pecks = 1.0
     if motion in WANTS_PECK:
@@ -153,10 +157,10 @@ def _bound(machine: State, times: int, hole: _Hole, motion: int, kept: dict[str,
         by_pecks = pecks > times
         what = "its pecks" if by_pecks else "the repeats of this cycle"
         mend = "write a larger Q" if by_pecks else bounds.SPLIT_PROGRAM
-        raise Fault(too_many(what), "q" if by_pecks else "l", mend)
+        raise LineFault(too_many(what), "q" if by_pecks else "l", mend)
     strokes = int(times * pecks)  # each takes as long as a line
     if strokes > machine.most_lines:
-        raise Fault(
+        raise LineFault(
             f"a cycle of more than {machine.most_lines} strokes",
             "g",
             "if that is meant, raise --set dialect.most_lines=…",
@@ -165,7 +169,7 @@ def _bound(machine: State, times: int, hole: _Hole, motion: int, kept: dict[str,
 
 
 def _motion_of(
-    machine: State, block: Block, motion: int, again: bool, hole: _Hole
+    machine: InterpreterState, block: LinuxcncBlock, motion: int, again: bool, hole: _Hole
 ) -> tuple[Callable[[_Hole], None], dict[str, float]]:
     """What makes a hole, from R to where the tool comes out, and what is kept for the next."""
     words, series = block.words, _kept(machine)
@@ -184,18 +188,18 @@ def _motion_of(
     elif motion in TAPS:
         dwell = kept["p"] = words.get("p", series.get("p", 0.0))
     if dwell < 0.0:
-        raise Fault("a dwell below 0 s", "p")
+        raise LineFault("a dwell below 0 s", "p")
     if motion in WANTS_PECK:
         peck = kept["q"] = _word(words, series if again else {}, "q", "the depth of a peck, Q")
         if peck <= 0.0:
-            raise Fault("a peck that is not above 0", "q")
+            raise LineFault("a peck that is not above 0", "q")
     spindle = machine.spindle
     if motion in (*WANTS_SPINDLE, *TAPS) and spindle is None:
-        raise Fault(f"G{motion // 10} while the spindle stands", "g", "start it with M3 or M4")
+        raise LineFault(f"G{motion // 10} while the spindle stands", "g", "start it with M3 or M4")
     if motion in TAPS:
         wanted = Kind.SPINDLE_CCW if motion == 740 else Kind.SPINDLE_CW
         if spindle != wanted:
-            raise Fault(f"the spindle turns the wrong way for G{motion // 10}", "g")
+            raise LineFault(f"the spindle turns the wrong way for G{motion // 10}", "g")
         machine.notes.tapping.append(machine.block_index)
 
     def simple(hole: _Hole) -> None:
@@ -253,7 +257,7 @@ def _motion_of(
 
 
 def _back_bore(
-    machine: State, words: dict[str, float], again: bool, kept: dict[str, float]
+    machine: InterpreterState, words: dict[str, float], again: bool, kept: dict[str, float]
 ) -> Callable[[_Hole], None]:
     """G87: beside the hole down through it, over, and up with the spindle turning."""
     series = _kept(machine) if again else {}
@@ -284,7 +288,9 @@ def _back_bore(
 # Threads
 
 
-def follow_spindle(machine: State, block: Block, end: list[float], motion: int) -> None:
+def follow_spindle(
+    machine: InterpreterState, block: LinuxcncBlock, end: list[float], motion: int
+) -> None:
     """G33, and G33.1 there and back: a move whose feed is K for each turn of the spindle."""
     canon = machine.canon
     _need_spindle(machine, motion)
@@ -298,15 +304,15 @@ def follow_spindle(machine: State, block: Block, end: list[float], motion: int) 
     canon.feed = feed
 
 
-def thread(machine: State, block: Block, end: list[float]) -> None:
+def thread(machine: InterpreterState, block: LinuxcncBlock, end: list[float]) -> None:
     """G76: passes along Z, each deeper in X, at the angle Q and with the tapers E of L."""
     words, canon, mm = block.words, machine.canon, machine.canon.mm
     _need_spindle(machine, 760)
     if machine.compensation.side:
-        raise Fault("G76 while the cutter's radius is compensated", "g")
+        raise LineFault("G76 while the cutter's radius is compensated", "g")
     peak, first, full = words["i"], words["j"], words["k"]
     if peak == 0.0 or first <= 0.0 or full <= first:
-        raise Fault("G76 wants an I that is not 0, J above 0, and K above J", "g")
+        raise LineFault("G76 wants an I that is not 0, J above 0, and K above J", "g")
     if machine.diameters:
         peak, first, full = peak / 2.0, first / 2.0, full / 2.0
     start = list(machine.position)
@@ -350,7 +356,7 @@ def thread(machine: State, block: Block, end: list[float]) -> None:
         one(depth)
         number += 1
         if number > MOST_PASSES:
-            raise Fault(f"a thread of more than {MOST_PASSES} passes", "j", "write a larger J")
+            raise LineFault(f"a thread of more than {MOST_PASSES} passes", "j", "write a larger J")
         depth = offset + first * number ** (1.0 / degression)
     for _ in range(min(max(int(words.get("h", 0.0)), 0), MOST_PASSES) + 1):
         one(deepest)
@@ -359,14 +365,14 @@ def thread(machine: State, block: Block, end: list[float]) -> None:
     machine.position[:] = end
 
 
-def _need_spindle(machine: State, motion: int) -> None:
+def _need_spindle(machine: InterpreterState, motion: int) -> None:
     machine.notes.tapping.append(machine.block_index)
     if machine.spindle is None:
         name = f"G{motion / 10:g}"
-        raise Fault(f"{name} while the spindle stands", "g", "start it with M3 or M4")
+        raise LineFault(f"{name} while the spindle stands", "g", "start it with M3 or M4")
 
 
-def _need_feed(machine: State, motion: int) -> None:
+def _need_feed(machine: InterpreterState, motion: int) -> None:
     if machine.canon.feed <= 0.0:
         name = f"G{motion / 10:g}"
-        raise Fault(f"{name} at a speed of the spindle of 0, which never ends", "g", "write S")
+        raise LineFault(f"{name} at a speed of the spindle of 0, which never ends", "g", "write S")

@@ -23,7 +23,7 @@ WorkOffset = Annotated[tuple[Place, ...], Meta(min_length=3, max_length=4)]
 ToolNumber = Annotated[str, Meta(pattern=r"^[0-9]{1,5}$")]
 
 
-class Tool(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class ToolTableEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A line of the tool table, in mm: its offsets (`length_mm` along Z), its diameter (None: not
     known), and the orientation of a lathe tool."""
 
@@ -39,7 +39,7 @@ class Tool(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return self.x_mm, self.y_mm, self.length_mm
 
 
-class Dialect(GcodeDialect, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class LinuxcncDialect(GcodeDialect, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """`path`: corners are rounded within `blend_tolerance_mm` ("blend": G64 P), met without a stop
     where that is possible ("exact-path": G61), or met with a stop ("exact-stop": G61.1).
     `percent`: a line of % before and after the program. `tool_change`: by "m6", or a second tool
@@ -60,7 +60,7 @@ class Dialect(GcodeDialect, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     tool_change: Literal["m6", "refuse"] = "m6"
     tool_lengths: bool = True
     canned_cycles: bool = False
-    tools: dict[ToolNumber, Tool] = msgspec.field(default_factory=dict)
+    tools: dict[ToolNumber, ToolTableEntry] = msgspec.field(default_factory=dict)
     work_offsets_mm: dict[Frame, WorkOffset] = msgspec.field(default_factory=dict)
     homes_mm: dict[Home, tuple[Place, Place, Place]] = msgspec.field(default_factory=dict)
     linear_units: Literal["mm", "in"] = "mm"
@@ -96,5 +96,5 @@ class LinuxcncLink(Link, frozen=True, forbid_unknown_fields=True, kw_only=True):
     folder: Word | None = None
 
 
-LinuxcncMachine = Machine[SlideStart, Dialect]
+LinuxcncMachine = Machine[SlideStart, LinuxcncDialect]
 """Any machine with this dialect."""

@@ -16,7 +16,7 @@ from typing import Final
 
 import numpy as np
 
-from ..gcode.faults import Fault
+from ..gcode.faults import LineFault
 from .parameters import MOST_PARAMETERS, Parameters
 
 Function = Callable[[Parameters], float]
@@ -72,7 +72,7 @@ class Scanner:
         assert found is not None  # it matches nothing too
         text = found[0]
         if _PLAIN.fullmatch(text) is None:
-            raise Fault(f"{text!r} is no number" if text else "no number", self.at)
+            raise LineFault(f"{text!r} is no number" if text else "no number", self.at)
         self.at = found.end()
         return float(text)
 
@@ -91,7 +91,7 @@ class Scanner:
         self.at += 1
         self._depth += 1
         if self._depth > MOST_NESTED:
-            raise Fault("brackets are nested too deeply", begin)
+            raise LineFault("brackets are nested too deeply", begin)
         found = self._ranked(self.value(), 1)
         self._operator_at(self.at)  # the bracket
         self.at += 1
@@ -117,8 +117,8 @@ class Scanner:
             if self.text.startswith(name, at):
                 return name
         if at >= len(self.text):
-            raise Fault("an expression without its closing bracket", at)
-        raise Fault(f"{self.text[at]!r} is no operator", at)
+            raise LineFault("an expression without its closing bracket", at)
+        raise LineFault(f"{self.text[at]!r} is no operator", at)
 
     def parameter(self) -> Value:
         """#5, #[…], ##5 or #<name>."""
@@ -138,7 +138,7 @@ class Scanner:
         """What stands between < and >."""
         end = self.text.find(">", self.at)
         if end < 0:
-            raise Fault("a name without its closing >", self.at)
+            raise LineFault("a name without its closing >", self.at)
         name = self.text[self.at + 1 : end]
         self.at = end + 1
         return name
@@ -149,16 +149,16 @@ class Scanner:
             if self.text.startswith(name, begin):
                 break
         else:
-            raise Fault(f"no function begins with {self.text[begin]!r}", begin)
+            raise LineFault(f"no function begins with {self.text[begin]!r}", begin)
         self.at += len(name)
         if self.text[self.at : self.at + 1] != "[":
-            raise Fault(f"{name} without its [", self.at)
+            raise LineFault(f"{name} without its [", self.at)
         if name == "exists":
             return self._exists()
         first = self.expression()
         if name == "atan":
             if self.text[self.at : self.at + 2] != "/[":
-                raise Fault("atan wants two expressions: atan[y]/[x]", self.at)
+                raise LineFault("atan wants two expressions: atan[y]/[x]", self.at)
             self.at += 1
             return _joined(_atan, first, self.expression(), begin)
         return _applied(FUNCTIONS[name], first, begin)
@@ -167,7 +167,7 @@ class Scanner:
         """exists[#<name>]"""
         self.at += 1
         if self.text[self.at : self.at + 1] != "#":
-            raise Fault("exists wants a parameter", self.at)
+            raise LineFault("exists wants a parameter", self.at)
         begin = self.at
         self.at += 1
         if self.text[self.at : self.at + 1] == "<":
@@ -178,7 +178,7 @@ class Scanner:
             computed = index if callable(index) else lambda given, fixed=index: fixed
             found = lambda given: float(1 <= computed(given) < MOST_PARAMETERS)  # noqa: E731
         if self.text[self.at : self.at + 1] != "]":
-            raise Fault("exists wants a closing bracket behind its parameter", self.at)
+            raise LineFault("exists wants a closing bracket behind its parameter", self.at)
         self.at += 1
         return found
 
@@ -191,7 +191,7 @@ def evaluated(value: Value, given: Parameters) -> float:
 def finite(value: float, at: int) -> float:
     """The number; Fault for one that is none."""
     if value - value != 0.0:
-        raise Fault("the result of a calculation is no number", at)
+        raise LineFault("the result of a calculation is no number", at)
     return value
 
 
@@ -201,14 +201,14 @@ def whole(value: float, at: int) -> int:
     if value - low > 1.0 - WHOLE:
         return low + 1
     if value - low > WHOLE:
-        raise Fault(f"{value:g} is no whole number", at)
+        raise LineFault(f"{value:g} is no whole number", at)
     return low
 
 
 def check_index(index: int, at: int) -> int:
     """The number of a parameter; Fault where there is none of it."""
     if not 1 <= index < MOST_PARAMETERS:
-        raise Fault(f"there is no parameter #{index} (1 to {MOST_PARAMETERS - 1})", at)
+        raise LineFault(f"there is no parameter #{index} (1 to {MOST_PARAMETERS - 1})", at)
     return index
 
 
@@ -239,7 +239,7 @@ def _applied(function: Callable[[float, int], float], inner: Value, at: int) -> 
 
 def _divided(left: float, right: float, at: int) -> float:
     if right == 0.0:
-        raise Fault("a division by zero", at)
+        raise LineFault("a division by zero", at)
     return left / right
 
 
@@ -252,7 +252,7 @@ def _modulo(left: float, right: float, _: int) -> float:
 
 def _power(left: float, right: float, at: int) -> float:
     if left < 0.0 and math.floor(right) != right:
-        raise Fault("a negative number to a power that is not whole", at)
+        raise LineFault("a negative number to a power that is not whole", at)
     try:
         return math.pow(left, right)
     except (OverflowError, ValueError):
@@ -282,7 +282,7 @@ def _of_degrees(
 def _arc(name: str, function: Callable[[float], float]) -> Callable[[float, int], float]:
     def applied(value: float, at: int) -> float:
         if not -1.0 <= value <= 1.0:
-            raise Fault(f"{name} of {value:g}, which is not from -1 to 1", at)
+            raise LineFault(f"{name} of {value:g}, which is not from -1 to 1", at)
         return _degrees(function(value))
 
     return applied
@@ -290,13 +290,13 @@ def _arc(name: str, function: Callable[[float], float]) -> Callable[[float, int]
 
 def _ln(value: float, at: int) -> float:
     if value <= 0.0:
-        raise Fault(f"ln of {value:g}, which is not above 0", at)
+        raise LineFault(f"ln of {value:g}, which is not above 0", at)
     return math.log(value)
 
 
 def _sqrt(value: float, at: int) -> float:
     if value < 0.0:
-        raise Fault(f"sqrt of {value:g}, which is below 0", at)
+        raise LineFault(f"sqrt of {value:g}, which is below 0", at)
     return math.sqrt(value)
 
 
@@ -304,13 +304,13 @@ def _exp(value: float, at: int) -> float:
     try:
         return math.exp(value)
     except OverflowError:
-        raise Fault("the result of a calculation is no number", at) from None
+        raise LineFault("the result of a calculation is no number", at) from None
 
 
 def _round(value: float, at: int) -> float:
     """To the nearest whole number, halves away from zero."""
     if abs(value) >= MOST_ROUNDED:
-        raise Fault(f"round of {value:g}, which is too large", at)
+        raise LineFault(f"round of {value:g}, which is too large", at)
     return float(math.trunc(value + (-0.5 if value < 0.0 else 0.5)))
 
 

@@ -18,8 +18,8 @@ from msgspec import Struct
 
 from camtool.errors import ProgramError
 
-from ..gcode.faults import Fault
-from .lines import Line, column_of
+from ..gcode.faults import LineFault
+from .lines import ParsedLine, column_of
 from .parameters import ARGUMENTS, Parameters
 from .texts import Folder, ProgramText
 
@@ -44,23 +44,23 @@ CONDITIONS: Final = ("while", "repeat", "if", "elseif")
 """Words that are followed by an expression."""
 
 
-class EndOfFile(Fault):
+class EndOfFile(LineFault):
     """The file ends, and the program has not."""
 
 
-class Place(Struct):
+class TextPosition(Struct):
     """A line of a text, counted from 0."""
 
     text: ProgramText
     line: int
 
 
-class Label(Struct):
+class FlowLabel(Struct):
     """Where a label was seen first, by which word; and how often a `repeat` is still to run, −1:
     it has not begun."""
 
     kind: str
-    place: Place
+    place: TextPosition
     left: int = -1
 
 
@@ -72,8 +72,8 @@ class Call(Struct):
 
     sub: str = ""
     kind: str = ""
-    back: Place | None = None
-    called: Place | None = None
+    back: TextPosition | None = None
+    called: TextPosition | None = None
     before: dict[int, float | None] | None = None
     saved: Any = None
     restores: bool = False
@@ -87,7 +87,7 @@ class _Word(Struct):
     label: Any
     rest: int
     condition: Any = None
-    words: Line | None = None
+    words: ParsedLine | None = None
 
 
 @dataclass
@@ -105,16 +105,16 @@ class Flow:
     percent: bool = False
     calls: list[Call] = field(default_factory=lambda: [Call()])
     returned: float | None = None
-    current: Line | None = None
+    current: ParsedLine | None = None
     """The line that was read last, at `here`."""
-    here: Place = field(init=False)
+    here: TextPosition = field(init=False)
     deleted: dict[int, None] = field(default_factory=dict)
     """Lines of the program that begin with /, counted from 1."""
     branches: bool = False
     """Whether there has been an O word."""
     keep: bool = True
     """Whether lines may be read again."""
-    _labels: dict[str, Label] = field(default_factory=dict)
+    _labels: dict[str, FlowLabel] = field(default_factory=dict)
     _seeking: str | None = None
     _seeking_sub: str | None = None
     _defining: str | None = None
@@ -123,7 +123,7 @@ class Flow:
     _continuing: bool = False
 
     def __post_init__(self) -> None:
-        self.here = Place(self.text, 0)
+        self.here = TextPosition(self.text, 0)
         self.given.show(
             {
                 "_value": lambda: self.returned or 0.0,
@@ -134,16 +134,16 @@ class Flow:
 
     # Reading
 
-    def step(self) -> Line | None:
+    def step(self) -> ParsedLine | None:
         """The next line of words; None at the % that ends the program."""
         while True:
             if self.at >= self.text.count:
                 self._end_of_file()
-            self.here = Place(self.text, self.at)
+            self.here = TextPosition(self.text, self.at)
             self.current = None
             self.lines_read += 1
             if self.lines_read > self.most_lines:
-                raise Fault(
+                raise LineFault(
                     f"the program executes more than {self.most_lines} lines that are read one by "
                     "one: it may loop without end",
                     mend="if it ends, raise --set dialect.most_lines=…",
@@ -154,7 +154,9 @@ class Flow:
             text = line.text
             if text == "%" and self.percent:
                 if self._seeking is not None:
-                    raise Fault(f"the program ends, and o<{_own(self._seeking)}> was not found")
+                    raise LineFault(
+                        f"the program ends, and o<{_own(self._seeking)}> was not found"
+                    )
                 return None
             if line.delete:
                 self.deleted[self.block_line + 1] = None
@@ -197,7 +199,7 @@ class Flow:
         own = [call.called for call in self.calls if call.called and not call.called.text.name]
         return own[-1].line if own else 0
 
-    def fail(self, fault: Fault) -> NoReturn:
+    def fail(self, fault: LineFault) -> NoReturn:
         """ProgramError with the place of the line that was read last."""
         text, number = self.here.text, min(self.here.line, max(self.here.text.count - 1, 0))
         begin, end = int(text.begins[number]), None
@@ -219,27 +221,29 @@ class Flow:
         raise ProgramError(fault.message, where=where + caller, mend=fault.mend) from None
 
     def _end_of_file(self) -> NoReturn:
-        self.here = Place(self.text, max(self.text.count - 1, 0))
+        self.here = TextPosition(self.text, max(self.text.count - 1, 0))
         self.current = None
         if self._seeking_sub is not None:
             call = self.calls.pop()
             self.here = call.called or self.here
-            raise Fault(f"there is no sub o<{self._seeking_sub}>", mend=self.folder.mend)
+            raise LineFault(f"there is no sub o<{self._seeking_sub}>", mend=self.folder.mend)
         if self._seeking is not None:
-            raise Fault(f"the file ends, and o<{_own(self._seeking)}> was not found")
+            raise LineFault(f"the file ends, and o<{_own(self._seeking)}> was not found")
         if self.level:
-            raise Fault(f"the file ends within o<{self.calls[-1].sub}>", mend="end it with endsub")
+            raise LineFault(
+                f"the file ends within o<{self.calls[-1].sub}>", mend="end it with endsub"
+            )
         raise EndOfFile("the file ends without an end of the program")
 
     # O words
 
-    def _is_of_flow(self, line: Line) -> bool:
+    def _is_of_flow(self, line: ParsedLine) -> bool:
         """Whether the O word, M98 or M99 in front is of the flow: M99 of the program itself is
         not, it ends the program."""
         assert line.flow is not None
         return not line.text.startswith("m99", line.flow) or self.level > 0
 
-    def _obey(self, line: Line) -> None:
+    def _obey(self, line: ParsedLine) -> None:
         if line.word is None:
             line.word = _word_of(line)
         word: _Word = line.word
@@ -247,7 +251,7 @@ class Flow:
         own = self._label(word)
         label = own if word.kind in OF_THE_PROGRAM else f"{self._scope()}#{own}"
         if word.kind in ("sub", "program") and self._defining is not None:
-            raise Fault("a sub within a sub", line.flow)
+            raise LineFault("a sub within a sub", line.flow)
         skips = self._seeking is not None and self._seeking != label
         value = 0.0
         if word.kind in ("endsub", "return", "M99"):
@@ -257,7 +261,7 @@ class Flow:
         elif self._defining is not None:
             return
         elif word.kind == "":
-            raise Fault("no word of O lines", word.rest)
+            raise LineFault("no word of O lines", word.rest)
         elif word.kind == "call" and self._seeking is not None:
             return
         elif word.kind in CONDITIONS:
@@ -306,39 +310,41 @@ class Flow:
             return self._m98_label(word)
         return label if isinstance(label, str) else str(label(self.given))
 
-    def _save(self, kind: str, label: str) -> Label:
+    def _save(self, kind: str, label: str) -> FlowLabel:
         if label in self._labels:
             before = self._labels[label].place
-            raise Fault(f"o<{_own(label)}> is defined a second time: {_of_place(before)} has it")
-        self._labels[label] = Label(kind, Place(self.here.text, self.here.line))
+            raise LineFault(
+                f"o<{_own(label)}> is defined a second time: {_of_place(before)} has it"
+            )
+        self._labels[label] = FlowLabel(kind, TextPosition(self.here.text, self.here.line))
         return self._labels[label]
 
-    def _known(self, label: str) -> Label:
+    def _known(self, label: str) -> FlowLabel:
         found = self._labels.get(label)
         if found is None:
-            raise Fault(f"no word with the label o<{_own(label)}> has come before")
+            raise LineFault(f"no word with the label o<{_own(label)}> has come before")
         return found
 
-    def _once(self, kind: str, label: str, *, after_do: bool = False) -> Label:
+    def _once(self, kind: str, label: str, *, after_do: bool = False) -> FlowLabel:
         """The label of a word that stands in one place only."""
         found = self._labels.get(label)
         if found is None:
             return self._save(kind, label)
         other = found.place.line != self.here.line
         if other and not (after_do and found.kind == "do"):
-            raise Fault(f"the label o<{_own(label)}> is also that of {_of_place(found.place)}")
+            raise LineFault(f"the label o<{_own(label)}> is also that of {_of_place(found.place)}")
         return found
 
     def _go_to(self, label: str) -> None:
         place = self._labels[label].place
         self.text, self.at = place.text, place.line
 
-    def _condition(self, line: Line, word: _Word) -> float:
+    def _condition(self, line: ParsedLine, word: _Word) -> float:
         from .expressions import Scanner, evaluated
 
         if word.condition is None:
             if line.text[word.rest : word.rest + 1] != "[":
-                raise Fault(f"{word.kind} without its [condition]", word.rest)
+                raise LineFault(f"{word.kind} without its [condition]", word.rest)
             scanner = Scanner(line.text, word.rest)
             word.condition = scanner.expression()
             word.rest = scanner.at
@@ -349,9 +355,9 @@ class Flow:
     def _begin_sub(self, kind: str, label: str) -> None:
         how = self.calls[-1].kind
         if kind == "program" and how == "call":
-            raise Fault("a sub of O and a number alone is called by M98")
+            raise LineFault("a sub of O and a number alone is called by M98")
         if kind == "sub" and how == "M98":
-            raise Fault("a sub is called by o… call, not by M98")
+            raise LineFault("a sub is called by o… call, not by M98")
         if self._seeking is not None:
             self._save(kind, label)
             self._seeking = None
@@ -364,11 +370,11 @@ class Flow:
     def _end_sub(self, kind: str) -> None:
         call = self.calls[-1]
         if not self.level and self._defining is None:
-            raise Fault(f"{kind} outside of a sub")
+            raise LineFault(f"{kind} outside of a sub")
         if call.kind == "M98" and kind != "M99":
-            raise Fault("a sub that M98 has called ends with M99")
+            raise LineFault("a sub that M98 has called ends with M99")
         if call.kind == "call" and kind == "M99":
-            raise Fault("a sub that o… call has called ends with endsub")
+            raise LineFault("a sub that o… call has called ends with endsub")
         if kind == "endsub":
             self._seeking = None
         if not self.level:
@@ -387,12 +393,12 @@ class Flow:
 
     def _call(self, word: _Word, label: str) -> None:
         if len(self.calls) >= MOST_LEVELS:
-            raise Fault(
+            raise LineFault(
                 f"{MOST_LEVELS} calls within calls, more than LinuxCNC takes: "
                 f"o<{label}> may call itself without end"
             )
         caller = self.calls[-1]
-        back = Place(self.text, self.at)
+        back = TextPosition(self.text, self.at)
         go_on = self._way_to(label)
         if word.kind == "M98":
             self.calls.append(Call(label, "M98", back, self.here))
@@ -440,14 +446,16 @@ class Flow:
                     scanner.at = line.text.find(")", scanner.at) + 1
                     continue
                 if len(values) >= len(ARGUMENTS):
-                    raise Fault(f"a call with more than {len(ARGUMENTS)} arguments", scanner.at)
+                    raise LineFault(
+                        f"a call with more than {len(ARGUMENTS)} arguments", scanner.at
+                    )
                 values.append(scanner.expression())
             word.rest = scanner.at
             _check_rest(line, word)
             word.condition = values
         return [evaluated(value, self.given) for value in word.condition]
 
-    def _take_result(self, line: Line, word: _Word) -> None:
+    def _take_result(self, line: ParsedLine, word: _Word) -> None:
         """The value of `endsub [value]` and `return [value]`."""
         if self._defining is not None:
             return
@@ -472,7 +480,7 @@ class Flow:
         assert word.words is not None
         words = word.words.block(self.given).words
         if "p" not in words:
-            raise Fault("M98 without the P of its sub", None)
+            raise LineFault("M98 without the P of its sub", None)
         return str(whole(words["p"], 0))
 
     def _times(self, word: _Word) -> int | None:
@@ -489,7 +497,7 @@ class Flow:
             self._seeking = None if self._executed_if else label
             return
         if self._known(label).kind != "if":
-            raise Fault(f"{kind} without its if: o<{_own(label)}> is another word")
+            raise LineFault(f"{kind} without its if: o<{_own(label)}> is another word")
         if kind == "endif":
             self._seeking = None
             self._executed_if = True
@@ -525,7 +533,7 @@ class Flow:
 
     def _leave_loop(self, kind: str, label: str) -> None:
         if self._known(label).kind not in ("while", "do"):
-            raise Fault(f"{kind} without its while or do: o<{_own(label)}> is another word")
+            raise LineFault(f"{kind} without its while or do: o<{_own(label)}> is another word")
         if kind == "continue" and self._seeking == label:
             return
         self._seeking = label
@@ -537,7 +545,7 @@ class Flow:
     def _end_loop(self, kind: str, label: str) -> None:
         begun = "repeat" if kind == "endrepeat" else "while"
         if self._known(label).kind != begun:
-            raise Fault(f"{kind} without its {begun}: o<{_own(label)}> is another word")
+            raise LineFault(f"{kind} without its {begun}: o<{_own(label)}> is another word")
         if self._seeking == label:
             self._seeking = None
             if not self._continuing:
@@ -546,21 +554,21 @@ class Flow:
         self._go_to(label)
 
 
-def _word_of(line: Line) -> _Word:
+def _word_of(line: ParsedLine) -> _Word:
     """The O word, M98 or M99 with which a line begins."""
     text, at = line.text, line.flow
     assert at is not None
     if text[at] == "m":
         if text.startswith("m99", at):
             return _Word("M99", None, at + 3)
-        rest = Line(text[at + 3 :])
+        rest = ParsedLine(text[at + 3 :])
         return _Word("M98", None, len(text), words=rest)
     at += 1
     label: Any
     if text[at : at + 1] == "<":
         end = text.find(">", at)
         if end < 0:
-            raise Fault("a name without its closing >", at)
+            raise LineFault("a name without its closing >", at)
         label, at = text[at + 1 : end], end + 1
     else:
         digits = at
@@ -583,12 +591,12 @@ def _word_of(line: Line) -> _Word:
     return _Word("", label, at)
 
 
-def _check_rest(line: Line, word: _Word) -> None:
+def _check_rest(line: ParsedLine, word: _Word) -> None:
     """Fault where more than comments stands behind an O word."""
     at = word.rest
     while at < len(line.text) and line.text[at] != ";":
         if line.text[at] != "(":
-            raise Fault("more than comments behind an O word", at)
+            raise LineFault("more than comments behind an O word", at)
         at = line.text.find(")", at) + 1
 
 
@@ -597,6 +605,6 @@ def _own(label: str) -> str:
     return label.rsplit("#", 1)[-1]
 
 
-def _of_place(place: Place) -> str:
+def _of_place(place: TextPosition) -> str:
     line = f"line {place.line + 1}"
     return f"{line} of {place.text.name}" if place.text.name else line

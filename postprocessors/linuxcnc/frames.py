@@ -14,12 +14,12 @@ from typing import Final
 
 from camtool.toolpath.builder import ToolpathBuilder
 
-from ..gcode.faults import Fault
-from ..gcode.part_moves import Frame, turned
-from .dialect import LinuxcncMachine, Tool
+from ..gcode.faults import LineFault
+from ..gcode.part_moves import ProgramFrame, turned
+from .dialect import LinuxcncMachine, ToolTableEntry
 from .lines import AXES
 from .parameters import Parameters
-from .state import Notes, State
+from .state import InterpreterNotes, InterpreterState
 
 FRAMES: Final = {
     **{540 + 10 * k: k + 1 for k in range(6)},
@@ -34,10 +34,12 @@ OFFSETS: Final = 5211
 """The parameters of G92 begin here, behind the one that says whether it is in force."""
 
 
-class Frames(State, ABC):
+class FrameCodes(InterpreterState, ABC):
     """The state, and what moves its frame."""
 
-    def __init__(self, machine: LinuxcncMachine, path: ToolpathBuilder, notes: Notes) -> None:
+    def __init__(
+        self, machine: LinuxcncMachine, path: ToolpathBuilder, notes: InterpreterNotes
+    ) -> None:
         super().__init__(machine, path, notes)
         self.given = Parameters(
             self._known_parameters(),
@@ -101,7 +103,7 @@ class Frames(State, ABC):
         mm = self.canon.mm
         x, y, z = (each * mm for each in self._origin)
         dx, dy, dz = (each * mm for each in self._axis_offset)
-        self.canon.place(Frame((x, y, z), self._rotation, (dx, dy, dz)))
+        self.canon.place(ProgramFrame((x, y, z), self._rotation, (dx, dy, dz)))
 
     def _on_machine(self) -> list[float]:
         """The position of the tip on the machine, without the tool's length."""
@@ -172,21 +174,21 @@ class Frames(State, ABC):
         elif kind:
             self._g10_tool(kind, words)
         elif self._loaded:
-            raise Fault("G10 L0 while a tool is loaded", "g")
+            raise LineFault("G10 L0 while a tool is loaded", "g")
 
     def _g10_frame(self, kind: int, words: dict[str, float]) -> None:
         """G10 L2: a frame lies there; L20: its coordinates are these where the tool stands."""
         if "i" in words or "j" in words:
-            raise Fault("I and J beside G10 L2", "i" if "i" in words else "j")
+            raise LineFault("I and J beside G10 L2", "i" if "i" in words else "j")
         number = int(words.get("p", -1.0) + 1e-4) or self._frame
         if self._compensates and number == self._frame:
-            raise Fault("another work frame while the cutter's radius is compensated", "g")
+            raise LineFault("another work frame while the cutter's radius is compensated", "g")
         first = 5201 + 20 * number
         here, origin = self._on_machine(), self._stored_place(first)
         rotation = self.given.stored(first + 9)
         if kind == 20:
             if "r" in words:
-                raise Fault("R beside G10 L20", "r")
+                raise LineFault("R beside G10 L20", "r")
             self._place_here(number, words, here, origin, rotation)
         else:
             rotation = words.get("r", rotation)
@@ -245,7 +247,7 @@ class Frames(State, ABC):
         number = int(words["p"] + 0.5)
         tool = self._tool_of(number, "p")
         if not any(letter in words for letter in (*AXES, "r", "q", "i", "j")):
-            raise Fault(f"G10 L{kind} without what it sets", "g")
+            raise LineFault(f"G10 L{kind} without what it sets", "g")
         mm = self.canon.mm
         offset = [each / mm for each in tool.offset_mm]
         if kind == 1:
@@ -256,10 +258,10 @@ class Frames(State, ABC):
         if words.get("q", -1.0) != -1.0:
             orientation = int(words["q"] + 0.5)
             if abs(orientation - words["q"]) >= 1e-4 or orientation > 9:
-                raise Fault("the Q of G10 is the orientation of a tool, 0 to 9", "q")
+                raise LineFault("the Q of G10 is the orientation of a tool, 0 to 9", "q")
         diameter = 2.0 * words["r"] * mm if "r" in words else tool.diameter_mm
         x, y, z = (each * mm for each in offset)
-        self._tools[number] = Tool(
+        self._tools[number] = ToolTableEntry(
             x_mm=x, y_mm=y, length_mm=z, diameter_mm=diameter, orientation=orientation
         )
         if number == self._loaded:
@@ -310,7 +312,7 @@ class Frames(State, ABC):
     def _added_length(self, words: dict[str, float]) -> list[float]:
         axes = any(axis in words for axis in AXES)
         if ("h" in words) == axes:
-            raise Fault("G43.2 wants either H or axes", "g")
+            raise LineFault("G43.2 wants either H or axes", "g")
         added = [words.get(axis, 0.0) for axis in "xyz"]
         if "h" in words:
             tool = self._tool_of(int(words["h"]), "h")

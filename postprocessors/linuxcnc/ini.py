@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 
 from camtool.errors import MachineError
-from camtool.target.contract import Setting
+from camtool.target.contract import ControllerSetting
 from camtool.units import MM_PER_UNIT
 
 _SECTION = re.compile(r"\s*\[([^\]]+)\]")
@@ -71,14 +71,14 @@ class _Ini:
         return float(found[0])
 
 
-def settings_of(text: str) -> list[Setting] | None:
+def settings_of(text: str) -> list[ControllerSetting] | None:
     """The values of a machine file that an INI file says, None for a text that is none;
     MachineError for what is missing or cannot be used."""
     ini = _Ini(text)
     if not ini.includes and not any(section in _SECTIONS for section, _ in ini.entries):
         return None
     unit, joints = _unit_mm(ini), _joints(ini)
-    found: list[Setting] = []
+    found: list[ControllerSetting] = []
     for letter in "XYZ":
         if letter not in joints:
             raise MachineError(
@@ -97,7 +97,9 @@ def settings_of(text: str) -> list[Setting] | None:
         value = ini.number(section, key)
         if value is not None:
             value = int(value) if name.endswith("_moves") else value * factor
-            found.append(Setting(name, value, f"[{section}] {key}", ini.where(section, key)))
+            found.append(
+                ControllerSetting(name, value, f"[{section}] {key}", ini.where(section, key))
+            )
     return found
 
 
@@ -134,14 +136,14 @@ def _joints(ini: _Ini) -> dict[str, int]:
     return {letter: letters.index(letter) for letter in letters if letter in used}
 
 
-def _axis(ini: _Ini, letter: str, joint: str, unit: float) -> list[Setting]:
+def _axis(ini: _Ini, letter: str, joint: str, unit: float) -> list[ControllerSetting]:
     """What is said of one axis."""
-    axis, found = f"AXIS_{letter}", list[Setting]()
+    axis, found = f"AXIS_{letter}", list[ControllerSetting]()
 
     def add(key: str, value: float, section: str, entry: str) -> None:
         said = f"{entry} of [{section}]" + (", from inches" if unit == _INCH_MM else "")
         place = ini.where(section, entry)
-        found.append(Setting(f"axes.{letter.lower()}.{key}", _clean(value), said, place))
+        found.append(ControllerSetting(f"axes.{letter.lower()}.{key}", _clean(value), said, place))
 
     scale = "SCALE" if ini.text(joint, "SCALE") is not None else "INPUT_SCALE"
     steps = ini.number(joint, scale)

@@ -15,11 +15,11 @@ from typing import Final
 
 from camtool.toolpath.moves import Kind, PathMode
 
-from ..gcode.faults import Fault
-from .dialect import Tool
+from ..gcode.faults import LineFault
+from .dialect import ToolTableEntry
 from .frames import FRAMES, HOMES
-from .lines import Block
-from .moves import REFUSED, Moves
+from .lines import LinuxcncBlock
+from .moves import REFUSED, BlockMoves
 from .needs import check, motion_of
 from .state import MM_PER_INCH
 
@@ -32,7 +32,7 @@ INPUT_VALUE: Final = 5399
 """The parameter of what M66 has read."""
 
 
-class Interpreter(Moves):
+class Interpreter(BlockMoves):
     """Carries out blocks."""
 
     def _names(self) -> dict[str, Callable[[], float]]:
@@ -40,7 +40,7 @@ class Interpreter(Moves):
 
         return names_of(self)
 
-    def execute(self, block: Block) -> None:
+    def execute(self, block: LinuxcncBlock) -> None:
         """Carry out a block; Fault where LinuxCNC would refuse it."""
         motion = motion_of(self, block)
         check(self, block, motion)
@@ -101,7 +101,7 @@ class Interpreter(Moves):
         if self.feed_mode == 940 and value > 0.0:
             self.notes.feeds(self.block_index, self.feed_mm)
 
-    def _set_speed(self, value: float, block: Block) -> None:
+    def _set_speed(self, value: float, block: LinuxcncBlock) -> None:
         self.speed = value
         self._said_speed = True
         if self.spindle is not None and "spindle" not in block.m:
@@ -113,16 +113,16 @@ class Interpreter(Moves):
 
     def _change_tool(self) -> None:
         if self._tool is None:
-            raise Fault("a tool change before any T word", "m")
+            raise LineFault("a tool change before any T word", "m")
         if self._compensates:
-            raise Fault("a tool change while the cutter's radius is compensated", "m")
+            raise LineFault("a tool change while the cutter's radius is compensated", "m")
         self.spindle = None
         self._load(self._tool)
         self.canon.event(Kind.TOOL_CHANGE, float(self._tool))
 
     # M words
 
-    def _m_words(self, block: Block) -> None:
+    def _m_words(self, block: LinuxcncBlock) -> None:
         m, words = block.m, block.words
         io = m.get("input and output")
         if io is not None:
@@ -131,7 +131,7 @@ class Interpreter(Moves):
             else:
                 needed = "p" if io < 66 else "e"
                 if words.get(needed, -1.0) < 0.0:
-                    raise Fault(f"M{io} without {needed.upper()}", "m")
+                    raise LineFault(f"M{io} without {needed.upper()}", "m")
                 self._not_while_compensating("an output")
                 if io in OUTPUTS_AT_ONCE:
                     self.come_to_rest()
@@ -142,7 +142,7 @@ class Interpreter(Moves):
         elif tool == 61:
             number = round(words.get("q", -1.0))
             if number < 0:
-                raise Fault("M61 without the Q of its tool", "m")
+                raise LineFault("M61 without the Q of its tool", "m")
             self._load(number)
         spindle = m.get("spindle")
         if spindle is not None:
@@ -154,29 +154,29 @@ class Interpreter(Moves):
             self._not_while_compensating("an override")
         if "user" in m:
             name = f"M{m['user']}"
-            raise Fault(f"{name} runs a program of the machine, which only it knows", "m")
+            raise LineFault(f"{name} runs a program of the machine, which only it knows", "m")
 
     def _wait_for_input(self, words: dict[str, float]) -> None:
         """M66: the input comes at once, and is 0."""
         digital, analog = words.get("p", -1.0), words.get("e", -1.0)
         kind = round(words.get("l", 0.0))
         if "p" in words and "e" in words:
-            raise Fault("M66 with both P and E", "e", "an input is digital (P) or analog (E)")
+            raise LineFault("M66 with both P and E", "e", "an input is digital (P) or analog (E)")
         if max(round(digital), round(analog)) < 0:
-            raise Fault("M66 without P or E", "m", "write the number of the input")
+            raise LineFault("M66 without P or E", "m", "write the number of the input")
         if kind > 0 and words.get("q", -1.0) <= 0.0:
-            raise Fault("M66 that waits (L above 0) without a time Q above 0", "m")
+            raise LineFault("M66 that waits (L above 0) without a time Q above 0", "m")
         if "e" in words and kind:
-            raise Fault("M66 E reads at once, and has no L but L0", "l")
+            raise LineFault("M66 E reads at once, and has no L but L0", "l")
         self._not_while_compensating("M66")
         self.come_to_rest()
         self.given.set_numbered(INPUT_VALUE, 0.0)
         self.notes.inputs.append(self.block_index)
 
-    def _spindle_word(self, code: int, block: Block) -> None:
+    def _spindle_word(self, code: int, block: LinuxcncBlock) -> None:
         words = block.words
         if words.get("$", 0.0) not in (0.0, -1.0):
-            raise Fault("a spindle that the machine does not have", "$")
+            raise LineFault("a spindle that the machine does not have", "$")
         if code in SPINDLE:
             self.turn(SPINDLE[code])
         elif code == 5:
@@ -187,9 +187,9 @@ class Interpreter(Moves):
                 1,
                 2,
             ):
-                raise Fault("M19 wants R from 0 to 360 and P from 0 to 2", "m")
+                raise LineFault("M19 wants R from 0 to 360 and P from 0 to 2", "m")
             if words.get("q", 1.0) <= 0.0:
-                raise Fault("M19 with a Q that is not above 0", "q")
+                raise LineFault("M19 with a Q that is not above 0", "q")
             self.spindle = None
         else:
             from .modes import obey
@@ -219,7 +219,7 @@ class Interpreter(Moves):
 
     # G words
 
-    def _g_words(self, block: Block, words: dict[str, float]) -> None:
+    def _g_words(self, block: LinuxcncBlock, words: dict[str, float]) -> None:
         """All but the motion."""
         g = block.g
         once = g.get("one block")
@@ -253,9 +253,9 @@ class Interpreter(Moves):
 
     def _set_plane(self, code: int) -> None:
         if code in REFUSED:
-            raise Fault(f"G{code / 10:g} {REFUSED[code]}", "g")
+            raise LineFault(f"G{code / 10:g} {REFUSED[code]}", "g")
         if self._compensates and (code != self.plane or code == 190):
-            raise Fault("another plane while the cutter's radius is compensated", "g")
+            raise LineFault("another plane while the cutter's radius is compensated", "g")
         self.plane = self.canon.plane = code
 
     def _set_units(self, code: int) -> None:
@@ -292,24 +292,24 @@ class Interpreter(Moves):
             return
         compensation = self.compensation
         if self.plane == 190:
-            raise Fault("cutter compensation in the plane of G19", "g")
+            raise LineFault("cutter compensation in the plane of G19", "g")
         if compensation.side:
-            raise Fault("cutter compensation on, and it is on", "g", "write G40 first")
+            raise LineFault("cutter compensation on, and it is on", "g", "write G40 first")
         orientation = 0
         if code in (411, 421):
             if "d" not in words:
-                raise Fault(f"G{code / 10:g} without D", "g", "write the tool's diameter")
+                raise LineFault(f"G{code / 10:g} without D", "g", "write the tool's diameter")
             radius = words["d"] / 2.0
             if "l" in words:
                 if self.plane != 180:
-                    raise Fault(f"the L of G{code / 10:g} wants the plane of G18", "l")
+                    raise LineFault(f"the L of G{code / 10:g} wants the plane of G18", "l")
                 orientation = int(words["l"])
         else:
             tool = self._tool_for_radius(words)
             assert tool.diameter_mm is not None
             radius, orientation = tool.diameter_mm / 2.0 / self.canon.mm, tool.orientation
             if self.plane != 180 and orientation not in (0, 9):
-                raise Fault("a lathe tool wants the plane of G18", "g")
+                raise LineFault("a lathe tool wants the plane of G18", "g")
         side = 1 if code in (410, 411) else -1
         compensation.side = side if radius >= 0.0 else -side
         compensation.radius = abs(radius)
@@ -317,17 +317,17 @@ class Interpreter(Moves):
         self.canon.nose = _nose(orientation, compensation.radius)
         self._orientation = orientation
 
-    def _tool_for_radius(self, words: dict[str, float]) -> Tool:
+    def _tool_for_radius(self, words: dict[str, float]) -> ToolTableEntry:
         number = self._loaded
         if "d" in words:
             number = int(words["d"] + 0.5)
             if abs(number - words["d"]) >= 1e-4 or number < 0:
-                raise Fault("the D of G41 and G42 is the number of a tool", "d")
+                raise LineFault("the D of G41 and G42 is the number of a tool", "d")
         tool = self._tool_of(number, "d")
         if tool.diameter_mm is None:
             if number == 0:
-                return Tool(diameter_mm=0.0)
-            raise Fault(
+                return ToolTableEntry(diameter_mm=0.0)
+            raise LineFault(
                 f"cutter compensation with tool {number}, whose diameter only the tool table "
                 "knows",
                 "g",

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from msgspec import Struct
 
-from ..gcode.faults import Fault
+from ..gcode.faults import LineFault
 
 if TYPE_CHECKING:
     from .expressions import Value
@@ -98,7 +98,7 @@ def closed(text: str) -> str:
         end = text.find(")", begin)
         inner = text.find("(", begin + 1)
         if 0 <= inner < (end if end >= 0 else len(text)) or end < 0:
-            raise Fault(
+            raise LineFault(
                 "a comment that is nested or not closed",
                 len("".join(parts)),
                 "write one ( and one ) for each comment",
@@ -123,7 +123,7 @@ def column_of(text: str, at: int) -> int:
     return column + (seen <= at and bool(text))
 
 
-class Block(Struct, frozen=True):
+class LinuxcncBlock(Struct, frozen=True):
     """What a line asks for: numbers by letter, G codes (tenfold) and M codes by group, the last
     comment, and the parameters that it sets."""
 
@@ -144,7 +144,7 @@ class Item(Struct, frozen=True):
     name: Any = None
 
 
-class Line:
+class ParsedLine:
     """One line. `delete`: it begins with /; `flow`: where its O word begins, None for a line of
     words; `begin`: where it begins behind / and N."""
 
@@ -160,7 +160,7 @@ class Line:
         if text[at : at + 1] == "n":
             found = _BLOCK_NUMBER.match(text, at)
             if found is None:
-                raise Fault("no number after N", at + 1)
+                raise LineFault("no number after N", at + 1)
             at = found.end()
         self.begin = at
         self.flow = at if text[at : at + 1] in ("o", "m") and _FLOW.match(text, at) else None
@@ -168,7 +168,7 @@ class Line:
         """Its O word, which flow has read."""
         self.comment: str | None = None
         self._items: list[Item] = []
-        self._block: Block | None = None
+        self._block: LinuxcncBlock | None = None
         self._compiled = False
 
     @property
@@ -179,7 +179,7 @@ class Line:
             rest = rest[rest.find(")") + 1 :]
         return bool(rest) and rest[0] != ";"
 
-    def block(self, given: Parameters) -> Block:
+    def block(self, given: Parameters) -> LinuxcncBlock:
         """Its words; Fault where LinuxCNC would stop while it reads them."""
         if self._block is not None:
             return self._block
@@ -195,7 +195,7 @@ class Line:
         found = [item.at for item in self._items if item.letter == letter]
         return found[-1] if found else None
 
-    def _evaluated(self, given: Parameters) -> Block:
+    def _evaluated(self, given: Parameters) -> LinuxcncBlock:
         words: list[Item] = []
         settings: list[tuple[int | str, float]] = []
         for item in self._items:
@@ -212,7 +212,7 @@ class Line:
             value = item.value
             settings.append((name, value if isinstance(value, float) else value(given)))
         block = grouped(words, self.comment)
-        return Block(block.words, block.g, block.m, block.comment, tuple(settings))
+        return LinuxcncBlock(block.words, block.g, block.m, block.comment, tuple(settings))
 
     def _compile(self) -> None:
         """Find its words."""
@@ -238,14 +238,14 @@ class Line:
             elif letter == ";":
                 break
             elif letter == "[":
-                raise Fault("an expression without the letter of its word", at)
+                raise LineFault("an expression without the letter of its word", at)
             elif letter == "/":
-                raise Fault("a / that does not begin its line", at)
+                raise LineFault("a / that does not begin its line", at)
             elif letter.isascii() and letter.isalpha():
-                raise Fault(f"the letter {letter.upper()} is no word here", at)
+                raise LineFault(f"the letter {letter.upper()} is no word here", at)
             else:
                 message = _MESSAGES.get(letter, f"the sign {letter!r} belongs to no word")
-                raise Fault(message, at)
+                raise LineFault(message, at)
         self._compiled = True
 
 
@@ -253,17 +253,17 @@ def _compiled(text: str, at: int, letter: str) -> tuple[Value, int]:
     """A value that is no plain number, and where it ends."""
     sign = text[at : at + 1]
     if not (sign.isalpha() or (sign and sign in "[#+-")):
-        raise Fault(f"no number after {letter.upper()}", at - 1)
+        raise LineFault(f"no number after {letter.upper()}", at - 1)
     if letter == "$" and sign.isalpha():
-        raise Fault(_MESSAGES["$"], at - 1)
+        raise LineFault(_MESSAGES["$"], at - 1)
     from .expressions import Scanner
 
     scanner = Scanner(text, at)
     try:
         return scanner.value(), scanner.at
-    except Fault as fault:
+    except LineFault as fault:
         if fault.message == "no number" and fault.at == at:
-            raise Fault(f"no number after {letter.upper()}", at - 1) from None
+            raise LineFault(f"no number after {letter.upper()}", at - 1) from None
         raise
 
 
@@ -277,7 +277,7 @@ def _setting(text: str, at: int) -> tuple[Item, int]:
     def settable(index: int) -> int:
         check_index(index, at)
         if index in READ_ONLY:
-            raise Fault(f"#{index} cannot be set", at)
+            raise LineFault(f"#{index} cannot be set", at)
         return index
 
     name: str | Callable[[Parameters], int]
@@ -292,13 +292,13 @@ def _setting(text: str, at: int) -> tuple[Item, int]:
             computed = index
             name = lambda given: settable(computed(given))  # noqa: E731
     if text[scanner.at : scanner.at + 1] != "=":
-        raise Fault("a parameter without =: only a word's number may be one", scanner.at)
+        raise LineFault("a parameter without =: only a word's number may be one", scanner.at)
     scanner.at += 1
     value = scanner.value()
     return Item("#", value, at, name), scanner.at
 
 
-def grouped(items: list[Item], comment: str | None) -> Block:
+def grouped(items: list[Item], comment: str | None) -> LinuxcncBlock:
     """Words by letter, codes by group; Fault where LinuxCNC refuses them together."""
     words: dict[str, float] = {}
     g: dict[str, int] = {}
@@ -312,27 +312,27 @@ def grouped(items: list[Item], comment: str | None) -> Block:
             if before is not None and code == 800:
                 continue  # G80 beside another motion word counts for nothing
             if before not in (None, 800):
-                raise Fault(f"two G words of one group ({group})", item.at)
+                raise LineFault(f"two G words of one group ({group})", item.at)
             g[group] = code
         elif letter == "m":
             code = m_code(value, item.at)
             group = M_GROUPS[code]
             if group in m:
-                raise Fault(f"two M words of one group ({group})", item.at)
+                raise LineFault(f"two M words of one group ({group})", item.at)
             m[group] = code
         else:
             if letter in words:
-                raise Fault(f"two {letter.upper()} words in one block", item.at)
+                raise LineFault(f"two {letter.upper()} words in one block", item.at)
             if letter in NEVER_NEGATIVE and value < 0.0:
-                raise Fault(f"{NEVER_NEGATIVE[letter]} below 0", item.at)
+                raise LineFault(f"{NEVER_NEGATIVE[letter]} below 0", item.at)
             if letter in WHOLE_WORDS:
                 value = float(_whole(value, item.at))
                 if letter == "h" and value < -1:
-                    raise Fault("a tool below 0", item.at)
+                    raise LineFault("a tool below 0", item.at)
             words[letter] = value
     if len(m) > MOST_M_WORDS:
-        raise Fault(f"more than {MOST_M_WORDS} M words", "m")
-    return Block(words, g, m, comment)
+        raise LineFault(f"more than {MOST_M_WORDS} M words", "m")
+    return LinuxcncBlock(words, g, m, comment)
 
 
 def g_code(value: float, at: int) -> int:
@@ -343,9 +343,9 @@ def g_code(value: float, at: int) -> int:
     if rest > 1.0 - TENTHS:
         code += 1
     elif rest > TENTHS:
-        raise Fault(f"the controller does not know G{value:g}", at)
+        raise LineFault(f"the controller does not know G{value:g}", at)
     if code not in G_GROUPS:
-        raise Fault(f"the controller does not know G{value:g}", at)
+        raise LineFault(f"the controller does not know G{value:g}", at)
     return code
 
 
@@ -353,10 +353,10 @@ def m_code(value: float, at: int) -> int:
     """The code of an M word."""
     try:
         code = _whole(value, at)
-    except Fault:
+    except LineFault:
         code = -1
     if code not in M_GROUPS:
-        raise Fault(f"the controller does not know M{value:g}", at)
+        raise LineFault(f"the controller does not know M{value:g}", at)
     return code
 
 

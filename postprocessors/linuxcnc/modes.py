@@ -16,15 +16,15 @@ from msgspec import Struct
 
 from camtool.toolpath.moves import Kind
 
-from ..gcode.faults import Fault
-from .frames import FRAMES, Frames
-from .lines import Block, Line
-from .state import State
+from ..gcode.faults import LineFault
+from .frames import FRAMES, FrameCodes
+from .lines import LinuxcncBlock, ParsedLine
+from .state import InterpreterState
 
-Execute = Callable[[Block], None]
+Execute = Callable[[LinuxcncBlock], None]
 
 
-class Modes(Struct, frozen=True):
+class ActiveModes(Struct, frozen=True):
     """G codes (tenfold) in force by group, M words, feed, speed and tolerances of the path."""
 
     g: dict[str, int]
@@ -34,7 +34,7 @@ class Modes(Struct, frozen=True):
     tolerances: tuple[float, float]
 
 
-def obey(machine: State, code: int, execute: Execute) -> None:
+def obey(machine: InterpreterState, code: int, execute: Execute) -> None:
     """M70 saves, M71 forgets, M72 brings back, M73 saves for the end of the sub."""
     call = machine.calls[-1]
     if code in (70, 73):
@@ -43,12 +43,12 @@ def obey(machine: State, code: int, execute: Execute) -> None:
     elif code == 71:
         call.saved = None
     elif call.saved is None:
-        raise Fault("M72 without M70 before it", "m")
+        raise LineFault("M72 without M70 before it", "m")
     else:
         restore(machine, call.saved, execute)
 
 
-def restore(machine: State, saved: Modes, execute: Execute) -> None:
+def restore(machine: InterpreterState, saved: ActiveModes, execute: Execute) -> None:
     """Execute the blocks that bring saved modes back."""
     units = saved.g["units"]
     if modes_of(machine).g["units"] != units:
@@ -72,8 +72,8 @@ def restore(machine: State, saved: Modes, execute: Execute) -> None:
         execute(_block(machine, " ".join([*words, text]) if k == 0 else text))
 
 
-def _block(machine: State, text: str) -> Block:
-    return Line(text).block(machine.given)
+def _block(machine: InterpreterState, text: str) -> LinuxcncBlock:
+    return ParsedLine(text).block(machine.given)
 
 
 def spindle_word(kind: Kind | None) -> int:
@@ -81,7 +81,7 @@ def spindle_word(kind: Kind | None) -> int:
     return 5 if kind is None else 3 if kind == Kind.SPINDLE_CW else 4
 
 
-def modes_of(state: State) -> Modes:
+def modes_of(state: InterpreterState) -> ActiveModes:
     """The modes in force."""
     side = state._compensation.side if state._compensation is not None else 0
     frame = next(code for code, number in FRAMES.items() if number == state._frame)
@@ -105,10 +105,10 @@ def modes_of(state: State) -> Modes:
         "mist": 7 if state._mist else None if state._flood else 9,
         "flood": 8 if state._flood else None,
     }
-    return Modes(g, m, state.feed_mm / state.canon.mm, state.speed, state._tolerances)
+    return ActiveModes(g, m, state.feed_mm / state.canon.mm, state.speed, state._tolerances)
 
 
-def names_of(state: Frames) -> dict[str, Callable[[], float]]:
+def names_of(state: FrameCodes) -> dict[str, Callable[[], float]]:
     """The names that show the modes (interp_namedparams.cc)."""
 
     def is_(name: str, value: Any) -> Callable[[], float]:

@@ -13,10 +13,10 @@ from typing import Final
 from camtool import bounds
 from camtool.toolpath.moves import Kind
 
-from ..gcode.faults import Fault
+from ..gcode.faults import LineFault
 from ..gcode.part_moves import PLANES, too_many
-from .frames import HOMES, Frames
-from .lines import AXES, Block
+from .frames import HOMES, FrameCodes
+from .lines import AXES, LinuxcncBlock
 from .needs import LATHE_CYCLES
 
 INCH_SLACK: Final = 2.54
@@ -50,7 +50,7 @@ REFUSED: Final = {
 """G codes that LinuxCNC knows and that are not read."""
 
 
-class Moves(Frames):
+class BlockMoves(FrameCodes):
     """The state, its frames, and the moves of blocks."""
 
     def _go_home(self, code: int, words: dict[str, float], g: Mapping[str, int]) -> None:
@@ -74,9 +74,9 @@ class Moves(Frames):
 
     # Motion
 
-    def _move(self, motion: int, block: Block, words: dict[str, float]) -> None:
+    def _move(self, motion: int, block: LinuxcncBlock, words: dict[str, float]) -> None:
         if motion in REFUSED:
-            raise Fault(f"G{motion / 10:g} {REFUSED[motion]}", "g")
+            raise LineFault(f"G{motion / 10:g} {REFUSED[motion]}", "g")
         if self._first_frame is None and motion != 800:
             self._first_frame = self._frame
         if motion == 800:
@@ -90,12 +90,12 @@ class Moves(Frames):
         if self.series is not None and not _is_cycle(motion):
             self.series.height = None
 
-    def _other(self, motion: int, block: Block, words: dict[str, float]) -> None:
+    def _other(self, motion: int, block: LinuxcncBlock, words: dict[str, float]) -> None:
         if _is_cycle(motion):
             from .cycles import drill
 
             self.canon.feed = self._rate(block)
-            drill(self, Block(words, block.g, block.m, None), motion)
+            drill(self, LinuxcncBlock(words, block.g, block.m, None), motion)
         elif motion in (330, 331, 760):
             from .cycles import follow_spindle, thread
 
@@ -111,24 +111,24 @@ class Moves(Frames):
         else:
             self._spline_move(motion, block, words)
 
-    def _rate(self, block: Block, length: Callable[[], float] | None = None) -> float:
+    def _rate(self, block: LinuxcncBlock, length: Callable[[], float] | None = None) -> float:
         """The feed of a move, mm/min; Fault where none is in force."""
         mm = self.canon.mm
         if self.feed_mode == 930:
             if "f" not in block.words:
-                raise Fault("a feed move of inverse time (G93) without F")
+                raise LineFault("a feed move of inverse time (G93) without F")
             rate = max(LEAST_RATE, length() * block.words["f"]) if length else 0.0
             self.feed_mm = rate * mm
             return self.feed_mm
         if self.feed_mm == 0.0:
-            raise Fault(NO_FEED, mend="write F first")
+            raise LineFault(NO_FEED, mend="write F first")
         if self.feed_mode == 950:
             if self.speed == 0.0:
-                raise Fault("a feed for each turn (G95) of a spindle at speed 0")
+                raise LineFault("a feed for each turn (G95) of a spindle at speed 0")
             return self.feed_mm * self.speed
         return self.feed_mm
 
-    def _straight(self, motion: int, block: Block, words: dict[str, float]) -> None:
+    def _straight(self, motion: int, block: LinuxcncBlock, words: dict[str, float]) -> None:
         self._arc_refused = False
         self.motion = motion
         end = self._ends(words, block.g)
@@ -140,7 +140,7 @@ class Moves(Frames):
             return
         if self._compensation is not None and self._compensation.active:
             if block.g.get("one block") == 530:
-                raise Fault("G53 while the cutter's radius is compensated", "g")
+                raise LineFault("G53 while the cutter's radius is compensated", "g")
             kind = Kind.RAPID if motion == 0 else Kind.LINE
             self.effort += BESIDE_EFFORT
             at = self._compensation.straight(kind, self._flat(end), self._flat())
@@ -191,7 +191,7 @@ class Moves(Frames):
         radius, angle = math.hypot(y, x), math.atan2(y, x)
         lost = x == 0.0 and y == 0.0 and not (self.absolute and "^" in words)
         if lost:
-            raise Fault("polar coordinates at zero, which has no direction", "@")
+            raise LineFault("polar coordinates at zero, which has no direction", "@")
         if self.absolute:
             radius = words.get("@", radius)
             angle = math.radians(words["^"]) if "^" in words else angle
@@ -203,34 +203,40 @@ class Moves(Frames):
     def _ends_on_machine(self, words: dict[str, float]) -> list[float]:
         """G53: coordinates of the machine, for the point that carries the tool."""
         if "@" in words or "^" in words:
-            raise Fault("polar coordinates beside G53", "@")
+            raise LineFault("polar coordinates beside G53", "@")
         place = self._on_machine()
         for axis, letter in enumerate("xyz"):
             if letter in words:
                 place[axis] = words[letter] - self._tool_offset[axis]
         return self._in_frame(place)
 
-    def _arc(self, motion: int, block: Block, words: dict[str, float]) -> None:
+    def _arc(self, motion: int, block: LinuxcncBlock, words: dict[str, float]) -> None:
         """G2 and G3, by centre or by radius, flat or helical."""
         if self._arc_refused:
-            raise Fault("an arc as the first move behind cutter compensation", "g", "write a line")
+            raise LineFault(
+                "an arc as the first move behind cutter compensation", "g", "write a line"
+            )
         offsets = {letter: words[letter] for letter in "ijk" if letter in words}
         names = [AXES[axis] for axis in PLANES[self.plane]]
         if "r" in words and offsets:
-            raise Fault("an arc with both R and a centre (I, J)", "r")
+            raise LineFault("an arc with both R and a centre (I, J)", "r")
         if "r" not in words and not offsets:
-            raise Fault("an arc without I, J or R", mend="write I and J of its centre, or R")
+            raise LineFault("an arc without I, J or R", mend="write I and J of its centre, or R")
         centres = ["ijk"["xyz".index(name)] for name in names]
         if centres[2] in offsets:
-            raise Fault(f"{centres[2].upper()} of an arc in the plane of G17 to G19", centres[2])
+            raise LineFault(
+                f"{centres[2].upper()} of an arc in the plane of G17 to G19", centres[2]
+            )
         polar = "@" in words or "^" in words
         if not offsets and not polar and not any(name in words for name in names[:2]):
             axes = " or ".join(name.upper() for name in names[:2])
-            raise Fault(f"an arc by its radius without {axes}", mend=f"write {axes} of its end")
+            raise LineFault(
+                f"an arc by its radius without {axes}", mend=f"write {axes} of its end"
+            )
         missing = [letter for letter in centres[:2] if letter not in offsets]
         if self.absolute_centres and offsets and missing:
             both = " and ".join(letter.upper() for letter in centres[:2])
-            raise Fault(f"with G90.1 an arc needs both {both}", mend=f"write {both}")
+            raise LineFault(f"with G90.1 an arc needs both {both}", mend=f"write {both}")
         if self.feed_mode != 930:
             self._rate(block)
         end = self._flat(self._ends(words, block.g))
@@ -258,15 +264,15 @@ class Moves(Frames):
             self.canon.arc(end, centre, turn)
             self._put(end)
             return
-        from .compensation import Arc
+        from .compensation import ProgrammedArc
 
         self.effort += BESIDE_EFFORT
         inside = turn * compensation.side > 0
         radius = abs(words["r"]) if "r" in words else math.dist(begin[:2], centre)
         if inside and compensation.first and radius <= compensation.radius:
-            raise Fault("an arc whose radius is no larger than the tool's")
+            raise LineFault("an arc whose radius is no larger than the tool's")
         spread = self._dialect.arc_difference_mm / self.canon.mm
-        self._put(compensation.arc(Arc(end, centre, turn), self._flat(), spread))
+        self._put(compensation.arc(ProgrammedArc(end, centre, turn), self._flat(), spread))
 
     def _centre(
         self,
@@ -288,14 +294,14 @@ class Moves(Frames):
         least, most = dialect.arc_difference_mm * looser, dialect.arc_most_difference_mm * looser
         letter = next(letter for letter in letters if letter in offsets)
         if min(r1, r2) < dialect.arc_least_radius_mm:
-            raise Fault(f"an arc of radius {min(r1, r2):.5f} mm is none for LinuxCNC", letter)
+            raise LineFault(f"an arc of radius {min(r1, r2):.5f} mm is none for LinuxCNC", letter)
         gap = abs(r1 - r2)
         wide = gap > least and gap > dialect.arc_difference_part * max(r1, r2)
         if gap > most or wide:
             message = (
                 f"the radius is {r1:.4f} mm at the start and {r2:.4f} mm at the end of the arc"
             )
-            raise Fault(message, letter)
+            raise LineFault(message, letter)
         return x, y
 
     def _centre_of_radius(
@@ -306,11 +312,11 @@ class Moves(Frames):
         whose centre is on the other side."""
         dx, dy = end[0] - begin[0], end[1] - begin[1]
         if dx == 0.0 and dy == 0.0:
-            raise Fault("an arc by its radius that ends where it starts has no centre", "r")
+            raise LineFault("an arc by its radius that ends where it starts has no centre", "r")
         size, half = abs(radius), math.hypot(dx, dy) / 2.0
         if half - size > self._dialect.arc_chord_slack_mm / self.canon.mm:
             message = f"half the chord is {half * self.canon.mm:.4f} mm, more than the radius"
-            raise Fault(message, "r")
+            raise LineFault(message, "r")
         aside = 0.0
         if half < size * (1.0 - EQUAL_TO_ONE):
             aside = math.sqrt((size - half) * (size + half))
@@ -323,28 +329,28 @@ class Moves(Frames):
 
     # Splines
 
-    def _spline_move(self, motion: int, block: Block, words: dict[str, float]) -> None:
+    def _spline_move(self, motion: int, block: LinuxcncBlock, words: dict[str, float]) -> None:
         """G5 (cubic) and G5.1 (quadratic)."""
         if self._compensates:
-            raise Fault("a spline while the cutter's radius is compensated", "g")
+            raise LineFault("a spline while the cutter's radius is compensated", "g")
         if self.feed_mode == 930:
-            raise Fault("a spline with feeds of inverse time (G93), which is not read", "g")
+            raise LineFault("a spline with feeds of inverse time (G93), which is not read", "g")
         feed = self._rate(block)
         if self.plane != 170:
-            raise Fault("a spline in another plane than XY", "g")
+            raise LineFault("a spline in another plane than XY", "g")
         for letter in "zabc":
             if letter in words:
-                raise Fault(f"a spline with a {letter.upper()} word", letter)
+                raise LineFault(f"a spline with a {letter.upper()} word", letter)
         both = ("i" in words) + ("j" in words)
         if both == 1 or (motion == 51 and not both):
-            raise Fault("a spline wants both I and J", "g")
+            raise LineFault("a spline wants both I and J", "g")
         x, y, _ = self.position
         lead = (words["i"], words["j"]) if both else self._leaving
         points = [(x, y, 1.0), (x + lead[0], y + lead[1], 1.0)]
         end = self._ends(words, block.g)
         if motion == 50:
             if "p" not in words or "q" not in words:
-                raise Fault("G5 wants both P and Q", "g")
+                raise LineFault("G5 wants both P and Q", "g")
             points.append((end[0] + words["p"], end[1] + words["q"], 1.0))
             self._leaving = -words["p"], -words["q"]
         points.append((end[0], end[1], 1.0))
@@ -353,20 +359,20 @@ class Moves(Frames):
         self.motion = motion if self.motion is None else self.motion
         self.position[:] = end
 
-    def _control_point(self, block: Block, words: dict[str, float]) -> None:
+    def _control_point(self, block: LinuxcncBlock, words: dict[str, float]) -> None:
         """G5.2: a control point of a NURBS."""
         if self.motion != 52:
             self._spline = []
         if ("x" in words) != ("y" in words):
-            raise Fault("a control point wants both X and Y", "g")
+            raise LineFault("a control point wants both X and Y", "g")
         weight = words.get("p", -1.0)
         placed = "x" in words
         if self._spline and not placed and weight > 0.0:
-            raise Fault("P without X and Y is for the first control point", "p")
+            raise LineFault("P without X and Y is for the first control point", "p")
         if self._spline and weight <= 0.0:
-            raise Fault("a control point without a weight P above 0", "g")
+            raise LineFault("a control point without a weight P above 0", "g")
         if self.feed_mode == 940 and self.feed_mm == 0.0:
-            raise Fault(NO_FEED, mend="write F first")
+            raise LineFault(NO_FEED, mend="write F first")
         if not self._spline:
             first = weight if not placed and weight > 0.0 else 1.0
             self._spline = [(self.position[0], self.position[1], first)]
@@ -381,14 +387,16 @@ class Moves(Frames):
     def _end_spline(self) -> None:
         """G5.3: the NURBS of the control points."""
         if self.motion != 52:
-            raise Fault("G5.3 without G5.2 before it", "g")
+            raise LineFault("G5.3 without G5.2 before it", "g")
         points = self._spline
         if len(points) < self._order:
-            raise Fault(f"a NURBS of order {self._order} with {len(points)} control points", "g")
+            raise LineFault(
+                f"a NURBS of order {self._order} with {len(points)} control points", "g"
+            )
         if any(weight <= 0.0 for _, _, weight in points):
-            raise Fault("a control point without a weight P above 0", "g")
+            raise LineFault("a control point without a weight P above 0", "g")
         if self.feed_mm == 0.0:
-            raise Fault(NO_FEED, mend="write F first")
+            raise LineFault(NO_FEED, mend="write F first")
         if self._first_frame is None:
             self._first_frame = self._frame
         self.canon.feed = self.feed_mm * (self.speed if self.feed_mode == 950 else 1.0)
@@ -401,7 +409,7 @@ class Moves(Frames):
 
         canon, z = self.canon, self.position[2]
         if len(canon.path) + 2 * PIECES * len(points) > bounds.MAX_MOVES:
-            raise Fault(too_many("this spline"))
+            raise LineFault(too_many("this spline"))
         self.effort += EFFORT * len(points)
         for piece in pieces_of(points, order):
             if piece.centre is None:

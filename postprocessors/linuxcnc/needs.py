@@ -8,9 +8,9 @@ import math
 from collections.abc import Mapping
 from typing import Final
 
-from ..gcode.faults import Fault
-from .lines import AXES, Block
-from .state import State
+from ..gcode.faults import LineFault
+from .lines import AXES, LinuxcncBlock
+from .state import InterpreterState
 
 TURNS_TOLERANCE: Final = 1e-3
 """A P of turns that differs from a whole number by no more counts as it (rs274 takes 2.001)."""
@@ -50,41 +50,41 @@ USES: Final[Mapping[str, tuple[Codes, Codes, Codes, Codes]]] = {
 }
 
 
-def motion_of(state: State, block: Block) -> int | None:
+def motion_of(state: InterpreterState, block: LinuxcncBlock) -> int | None:
     """The motion that a block asks for (enhance_block)."""
     words, g = block.words, block.g
     polar = "@" in words or "^" in words
     axes = any(letter in words for letter in AXES)
     if polar and ("x" in words or "y" in words):
-        raise Fault("both polar coordinates and X or Y", "@")
+        raise LineFault("both polar coordinates and X or Y", "@")
     if polar and state.plane != 170:
-        raise Fault("polar coordinates in a plane other than that of G17", "@")
+        raise LineFault("polar coordinates in a plane other than that of G17", "@")
     once, own = g.get("one block"), g.get("motion")
     covets = once in AXIS_MODES
     if once in (520, 920) and not axes and (own is None or own == 800):
-        raise Fault(f"G{once // 10} without an axis", "g", "write the axes that it sets")
+        raise LineFault(f"G{once // 10} without an axis", "g", "write the axes that it sets")
     if own is not None:
         if own == 800:
             if (axes or polar) and not covets:
-                raise Fault("coordinates beside G80", "g")
+                raise LineFault("coordinates beside G80", "g")
         elif covets:
-            raise Fault("two G words that both use the coordinates", "g")
+            raise LineFault("two G words that both use the coordinates", "g")
         elif not axes and not polar and own not in WITHOUT_AXES:
-            raise Fault(f"G{own / 10:g} without coordinates", "g")
+            raise LineFault(f"G{own / 10:g} without coordinates", "g")
         return own
     if covets:
         return None
     if axes or polar:
         length = g.get("tool length")
         if state.motion in (None, 800) and length not in (431, 432):
-            raise Fault("coordinates, but no motion word in force", mend="write G0 or G1")
+            raise LineFault("coordinates, but no motion word in force", mend="write G0 or G1")
         return None if length == 431 or state.motion == 800 else state.motion
     if state.motion in (20, 30) and ("i" in words or "j" in words or "k" in words):
         return state.motion
     return None
 
 
-def check(state: State, block: Block, motion: int | None) -> None:
+def check(state: InterpreterState, block: LinuxcncBlock, motion: int | None) -> None:
     """What words need (check_g_codes, check_other_codes)."""
     words, g, m = block.words, block.g, block.m
     once = g.get("one block")
@@ -98,58 +98,60 @@ def check(state: State, block: Block, motion: int | None) -> None:
     if motion is not None and 700 <= motion < 900 and motion != 760:
         for letter in "abc":
             if letter in words and motion >= 730 and motion != 800:
-                raise Fault(f"a cycle with a {letter.upper()} word", letter)
+                raise LineFault(f"a cycle with a {letter.upper()} word", letter)
     if "p" in words and (motion in (20, 30) or m.get("spindle") == 19):
         _check_turns(words["p"], motion)
     if g.get("spindle mode") == 960 and "s" not in words:
-        raise Fault("G96 without S", "g")
+        raise LineFault("G96 without S", "g")
     if motion in (330, 331):
         if "k" not in words:
-            raise Fault(f"G{motion / 10:g} without K", "g")
+            raise LineFault(f"G{motion / 10:g} without K", "g")
         if "f" in words:
-            raise Fault(f"F beside G{motion / 10:g}", "f")
+            raise LineFault(f"F beside G{motion / 10:g}", "f")
     if motion == 760:
         for letter in "pijk":
             if letter not in words or (letter == "p" and words["p"] == -1.0):
-                raise Fault(f"G76 without {letter.upper()}", "g")
+                raise LineFault(f"G76 without {letter.upper()}", "g")
 
 
-def _check_once(state: State, block: Block, once: int, motion: int | None) -> None:
+def _check_once(
+    state: InterpreterState, block: LinuxcncBlock, once: int, motion: int | None
+) -> None:
     words = block.words
     if once == 40:
         if words.get("p", -1.0) == -1.0:
-            raise Fault("a dwell without P", "g", "write G4 P1.5 for 1.5 s")
+            raise LineFault("a dwell without P", "g", "write G4 P1.5 for 1.5 s")
         if block.g.get("motion") in (20, 30):
-            raise Fault("a dwell beside an arc: both use P", "g")
+            raise LineFault("a dwell beside an arc: both use P", "g")
         if words["p"] < 0.0:
-            raise Fault("a dwell below 0 s", "p")
+            raise LineFault("a dwell below 0 s", "p")
     elif once == 53:
         if block.g.get("motion") not in (None, 52):
-            raise Fault("another motion between G5.2 and G5.3", "g")
+            raise LineFault("another motion between G5.2 and G5.3", "g")
     elif once == 100:
         _check_g10(words)
     elif once == 530:
         if motion not in (0, 10):
-            raise Fault("G53 without G0 or G1", "g")
+            raise LineFault("G53 without G0 or G1", "g")
         distance = block.g.get("distance", 900 if state.absolute else 910)
         if distance == 910:
-            raise Fault("G53 with G91", "g", "write G90")
+            raise LineFault("G53 with G91", "g", "write G90")
 
 
 def _check_g10(words: dict[str, float]) -> None:
     kind, value = words.get("l", -1.0), words.get("p", -1.0)
     if kind not in (0, 1, 2, 10, 11, 20):
-        raise Fault("G10 wants L0, L1, L2, L10, L11 or L20", "g")
+        raise LineFault("G10 wants L0, L1, L2, L10, L11 or L20", "g")
     number = math.trunc(value + (0.5 if value >= 0 else -0.5))
     if value + 1e-4 - number > 2e-4:
-        raise Fault("the P of G10 is a whole number", "p")
+        raise LineFault("the P of G10 is a whole number", "p")
     if kind in (2, 20) and not 0 <= number <= 9:
-        raise Fault("the P of G10 L2 and L20 is from 0 to 9", "p")
+        raise LineFault("the P of G10 L2 and L20 is from 0 to 9", "p")
     if kind in (1, 10, 11) and number < 1:
-        raise Fault("the P of G10 is the number of a tool", "p")
+        raise LineFault("the P of G10 is the number of a tool", "p")
 
 
-def _check_use(letter: str, block: Block, motion: int | None) -> None:
+def _check_use(letter: str, block: LinuxcncBlock, motion: int | None) -> None:
     """Fault where nothing in the block uses a letter."""
     motions, once, m, others = USES[letter]
     used = (
@@ -160,12 +162,12 @@ def _check_use(letter: str, block: Block, motion: int | None) -> None:
         or (letter == "$" and "s" in block.words)
     )
     if not used:
-        raise Fault(f"nothing in the block uses the {letter.upper()} word", letter)
+        raise LineFault(f"nothing in the block uses the {letter.upper()} word", letter)
 
 
 def _check_turns(value: float, motion: int | None) -> None:
     turns = round(value)
     if abs(value - turns) > TURNS_TOLERANCE or (motion in (20, 30) and turns < 1):
-        raise Fault("the turns of an arc are a whole number from 1", "p")
+        raise LineFault("the turns of an arc are a whole number from 1", "p")
     if turns > MOST_TURNS:
-        raise Fault(f"an arc of more than {MOST_TURNS} turns", "p")
+        raise LineFault(f"an arc of more than {MOST_TURNS} turns", "p")

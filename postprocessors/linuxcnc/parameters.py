@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
 from typing import Final
 
-from ..gcode.faults import Fault
+from ..gcode.faults import LineFault
 
 MOST_PARAMETERS: Final = 5602
 """Numbers of parameters are below this (RS274NGC_MAX_PARAMETERS)."""
@@ -77,10 +77,10 @@ class Parameters:
         if index in CURRENT:
             if self.compensating:
                 message = "the position cannot be read while the cutter's radius is compensated"
-                raise Fault(message, at)
+                raise LineFault(message, at)
             return list(self._position())[index - CURRENT.start]
         if index in UNKNOWN:
-            raise Fault(f"#{index} is {UNKNOWN[index]}, which only the machine knows", at)
+            raise LineFault(f"#{index} is {UNKNOWN[index]}, which only the machine knows", at)
         self.unset.setdefault(index, self.line)
         return 0.0
 
@@ -96,9 +96,11 @@ class Parameters:
         if value is None:
             if name.startswith(("_ini[", "_hal[")):
                 where = "the machine's INI file" if name[1] == "i" else "HAL"
-                raise Fault(f"#<{name}> is a value of {where}, which only the machine knows", at)
+                raise LineFault(
+                    f"#<{name}> is a value of {where}, which only the machine knows", at
+                )
             mend = "set it first" if name[:1] == "_" else "names without _ are known in one sub"
-            raise Fault(f"nobody has set #<{name}>", at, mend)
+            raise LineFault(f"nobody has set #<{name}>", at, mend)
         return value
 
     def has(self, name: str, at: int) -> float:
@@ -110,7 +112,7 @@ class Parameters:
     def declare(self, name: str, at: int) -> None:
         """A line that sets a name makes it exist while the line is still read."""
         if name in self._state:
-            raise Fault(f"#<{name}> cannot be set", at)
+            raise LineFault(f"#<{name}> cannot be set", at)
         self._of(name).setdefault(name, 0.0)
 
     def set_named(self, name: str, value: float) -> None:

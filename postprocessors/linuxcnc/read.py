@@ -25,7 +25,7 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 
 from ..gcode.blocks import PlainBlocks, PlainRuns
-from ..gcode.faults import Fault
+from ..gcode.faults import LineFault
 from ..gcode.findings import (
     NEVER_READ,
     SPINDLE_SPEED_NOT_SAID,
@@ -33,7 +33,7 @@ from ..gcode.findings import (
     WORDS_PASSED_OVER_PAUSE,
 )
 from ..gcode.plain_moves import ArcRule, FastFeeds, PlainMoves, PlainState
-from .dialect import Dialect, LinuxcncMachine
+from .dialect import LinuxcncDialect, LinuxcncMachine
 from .findings import (
     NO_END_OF_FILE,
     NOT_SIMULATED_AGAIN,
@@ -52,8 +52,8 @@ from .findings import (
 )
 from .flow import EndOfFile, Flow
 from .interpreter import Interpreter
-from .lines import Line
-from .state import Mounted, Notes
+from .lines import ParsedLine
+from .state import InterpreterNotes, Mounted
 from .texts import Folder, ProgramText
 
 LENGTHS_EQUAL_MM: Final = 1e-6
@@ -80,9 +80,9 @@ class _Reader:
     """One reading of one program."""
 
     def __init__(self, data: bytes, machine: LinuxcncMachine, folder: Path | None) -> None:
-        dialect: Dialect = machine.dialect
+        dialect: LinuxcncDialect = machine.dialect
         self.path = ToolpathBuilder()
-        self.notes = Notes()
+        self.notes = InterpreterNotes()
         self._fast = fast = FastFeeds(machine.max_feed_mm_min)
         self.notes.feeds = lambda block, feed: fast.note(block, np.array([feed]))
         self.machine = Interpreter(machine, self.path, self.notes)
@@ -123,7 +123,7 @@ class _Reader:
             if self._empty:
                 raise _nothing() from None
             self._cut_off = True
-        except Fault as fault:
+        except LineFault as fault:
             flow.fail(fault)
         if self._empty and not flow.percent:
             raise _nothing()
@@ -140,7 +140,7 @@ class _Reader:
                 self.flow.at = number + 1 if self.flow.percent else 0
                 return
 
-    def _execute(self, line: Line) -> None:
+    def _execute(self, line: ParsedLine) -> None:
         machine, flow = self.machine, self.flow
         if self._branches:
             index = self.text.blocks_before(flow.block_line)
@@ -159,9 +159,9 @@ class _Reader:
         machine.effort = 0
 
     def _restore(self, saved: object) -> None:
-        from .modes import Modes, restore
+        from .modes import ActiveModes, restore
 
-        assert isinstance(saved, Modes)
+        assert isinstance(saved, ActiveModes)
         restore(self.machine, saved, self.machine.execute)
 
     # By columns
@@ -206,7 +206,7 @@ class _Reader:
     def _raw(self, number: int) -> str:
         try:
             return self.text.raw(number)
-        except Fault:
+        except LineFault:
             return "longer than a line may be"
 
     def _findings(self) -> Iterator[Finding]:

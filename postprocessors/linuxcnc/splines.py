@@ -16,7 +16,7 @@ from msgspec import Struct
 
 from camtool.arrays import Floats
 
-from ..gcode.faults import Fault
+from ..gcode.faults import LineFault
 
 PIECES: Final = 4
 """Pieces for each control point."""
@@ -33,7 +33,7 @@ MOST_CONTROL_POINTS: Final = 1000
 Flat = tuple[float, float]
 
 
-class Piece(Struct, frozen=True):
+class SplinePiece(Struct, frozen=True):
     """A piece of the path: its end, and the centre and the direction of an arc (None: a line)."""
 
     end: Flat
@@ -41,10 +41,10 @@ class Piece(Struct, frozen=True):
     ccw: bool = False
 
 
-def pieces_of(points: Sequence[tuple[float, float, float]], order: int) -> Iterator[Piece]:
+def pieces_of(points: Sequence[tuple[float, float, float]], order: int) -> Iterator[SplinePiece]:
     """The lines and arcs of a spline with control points (x, y, weight)."""
     if len(points) > MOST_CONTROL_POINTS:
-        raise Fault(f"a spline of more than {MOST_CONTROL_POINTS} control points")
+        raise LineFault(f"a spline of more than {MOST_CONTROL_POINTS} control points")
     count = PIECES * len(points)
     most = len(points) - 1 - order + 2
     where = most * np.arange(count + 1) / count
@@ -83,7 +83,7 @@ def _places(points: Floats, order: int, at: Floats) -> Floats:
     return np.asarray(weighted @ points[:, :2] / weighted.sum(axis=1)[:, None])
 
 
-def _two_arcs(start: Flat, leaving: Flat, end: Flat, arriving: Flat) -> Iterator[Piece]:
+def _two_arcs(start: Flat, leaving: Flat, end: Flat, arriving: Flat) -> Iterator[SplinePiece]:
     """Two arcs that leave and arrive along these directions (unit vectors), and meet as one.
 
     The legs of both tangent polygons are of one length b, where the polygon's middle leg is 2b:
@@ -99,7 +99,7 @@ def _two_arcs(start: Flat, leaving: Flat, end: Flat, arriving: Flat) -> Iterator
     elif a < 0.0:
         leg = (-b - root) / 2.0 / a
     else:
-        raise Fault("a spline that turns back on itself")
+        raise LineFault("a spline that turns back on itself")
     p1 = start[0] + leg * leaving[0], start[1] + leg * leaving[1]
     p3 = end[0] - leg * arriving[0], end[1] - leg * arriving[1]
     middle = (p1[0] + p3[0]) / 2.0, (p1[1] + p3[1]) / 2.0
@@ -109,11 +109,11 @@ def _two_arcs(start: Flat, leaving: Flat, end: Flat, arriving: Flat) -> Iterator
     yield _arc(middle, end, (mx / length, my / length))
 
 
-def _arc(start: Flat, end: Flat, way: Flat) -> Piece:
+def _arc(start: Flat, end: Flat, way: Flat) -> SplinePiece:
     """The arc from here to there that leaves along a direction."""
     x, y = end[0] - start[0], end[1] - start[1]
     across = 2.0 * (y * way[0] - x * way[1])
     if abs(across) <= STRAIGHT:
-        return Piece(end)
+        return SplinePiece(end)
     radius = -(x * x + y * y) / across
-    return Piece(end, (start[0] + way[1] * radius, start[1] - way[0] * radius), radius < 0.0)
+    return SplinePiece(end, (start[0] + way[1] * radius, start[1] - way[0] * radius), radius < 0.0)

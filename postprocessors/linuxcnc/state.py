@@ -13,10 +13,10 @@ from msgspec import Struct, field
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind
 
-from ..gcode.faults import Fault
+from ..gcode.faults import LineFault
 from ..gcode.part_moves import PLANES
 from .canon import Canon
-from .dialect import Dialect, LinuxcncMachine, Tool
+from .dialect import LinuxcncDialect, LinuxcncMachine, ToolTableEntry
 from .flow import Call
 from .parameters import Parameters
 
@@ -40,7 +40,7 @@ class Mounted(Struct, frozen=True):
     measured: bool
 
 
-class Notes(Struct):
+class InterpreterNotes(Struct):
     """Blocks (index from 0) at which something was passed over or taken for granted."""
 
     coolant: list[int] = field(default_factory=list)
@@ -66,13 +66,15 @@ class Series(Struct):
     words: dict[str, float] = field(default_factory=dict)
 
 
-class State:
+class InterpreterState:
     """The modes, the position, and the moves and events that follow from them."""
 
     given: Parameters
 
-    def __init__(self, machine: LinuxcncMachine, path: ToolpathBuilder, notes: Notes) -> None:
-        dialect: Dialect = machine.dialect
+    def __init__(
+        self, machine: LinuxcncMachine, path: ToolpathBuilder, notes: InterpreterNotes
+    ) -> None:
+        dialect: LinuxcncDialect = machine.dialect
         self.notes = notes
         self.block_index = 0
         self.ended = False
@@ -204,16 +206,16 @@ class State:
             self.dwell(0.0)
         self._waited = self.canon.moves
 
-    def _tool_of(self, number: int, letter: str) -> Tool:
+    def _tool_of(self, number: int, letter: str) -> ToolTableEntry:
         """A tool of the table; where there is no table, any tool, of which nothing is known."""
         if number == 0:
-            return Tool()
+            return ToolTableEntry()
         tool = self._tools.get(number)
         if tool is None:
             if self._dialect.tools:
                 mend = f"add it: [dialect.tools.{number}]"
-                raise Fault(f"tool {number} is not in the tool table", letter, mend)
-            return Tool()
+                raise LineFault(f"tool {number} is not in the tool table", letter, mend)
+            return ToolTableEntry()
         return tool
 
     def _load(self, number: int) -> None:
@@ -236,7 +238,7 @@ class State:
 
     def _not_while_compensating(self, what: str) -> None:
         if self._compensates:
-            raise Fault(f"{what} while the cutter's radius is compensated")
+            raise LineFault(f"{what} while the cutter's radius is compensated")
 
     def go(self, kind: Kind, axes: tuple[int, int, int], place: list[float]) -> None:
         """A straight move to a place in the order of a plane."""

@@ -16,9 +16,9 @@ from camtool import bounds
 from camtool.arrays import Ints
 from camtool.errors import ProgramError
 
-from ..gcode.blocks import Lines, has_words
-from ..gcode.faults import Fault
-from .lines import Line
+from ..gcode.blocks import ProgramLines, has_words
+from ..gcode.faults import LineFault
+from .lines import ParsedLine
 
 MOST_FILES: Final = 100
 """Files of subs that one program may call."""
@@ -31,7 +31,7 @@ SUFFIX: Final = ".ngc"
 _CONTROL: Final = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")
 
 
-class ProgramText(Lines):
+class ProgramText(ProgramLines):
     """The lines of one file; `name` "" is the program itself."""
 
     def __init__(self, data: bytes, name: str, line_chars: int) -> None:
@@ -39,7 +39,7 @@ class ProgramText(Lines):
         super().__init__(data)
         self.name = name
         self._line_chars = line_chars
-        self._lines: dict[int, Line] = {}
+        self._lines: dict[int, ParsedLine] = {}
         self._before: Ints | None = None
 
     def raw(self, number: int) -> str:
@@ -47,14 +47,14 @@ class ProgramText(Lines):
         text = self.text(number)
         if len(text) > self._line_chars:
             message = f"the line has more than {self._line_chars} characters"
-            raise Fault(message, self._line_chars, "shorten it")
+            raise LineFault(message, self._line_chars, "shorten it")
         return text.rstrip(" \t\v\f")
 
-    def line(self, number: int, *, keep: bool) -> Line:
+    def line(self, number: int, *, keep: bool) -> ParsedLine:
         """A line, compiled once where it may be read again (`keep`)."""
         line = self._lines.get(number)
         if line is None:
-            line = Line(self.raw(number))
+            line = ParsedLine(self.raw(number))
             if keep:
                 self._lines[number] = line
         return line
@@ -81,7 +81,7 @@ class Folder:
         if label in self._found:
             return self._found[label]
         if len(self._found) >= MOST_FILES:
-            raise Fault(f"the program calls more than {MOST_FILES} files")
+            raise LineFault(f"the program calls more than {MOST_FILES} files")
         self._found[label] = found = self._opened(label)
         return found
 
@@ -96,19 +96,19 @@ class Folder:
         name = f"{label}{SUFFIX}"
         parts = PurePosixPath(name)
         if parts.is_absolute() or ".." in parts.parts:
-            raise Fault(f"{name} lies outside of the program's folder", mend=self.mend)
+            raise LineFault(f"{name} lies outside of the program's folder", mend=self.mend)
         if self._folder is None:
             return None
         try:
             root = self._folder.resolve()
             file = (root / parts).resolve()
             if not file.is_relative_to(root):
-                raise Fault(f"{name} lies outside of the program's folder", mend=self.mend)
+                raise LineFault(f"{name} lies outside of the program's folder", mend=self.mend)
             data = bounds.file_bytes(file, MOST_FILE_BYTES)
         except (OSError, ValueError):
             return None
         if data is None:
-            raise Fault(f"{name} is larger than {MOST_FILE_BYTES // 1_000_000} MB")
+            raise LineFault(f"{name} is larger than {MOST_FILE_BYTES // 1_000_000} MB")
         return ProgramText(data, name, self._line_chars)
 
 

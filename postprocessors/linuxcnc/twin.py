@@ -24,7 +24,7 @@ from camtool.target.twin import COMMANDED, Slides, Travel, Twin, travel_of
 from camtool.toolpath.moves import Toolpath
 
 from .controller import LinuxcncModel
-from .dialect import Dialect, LinuxcncController, LinuxcncLink
+from .dialect import LinuxcncController, LinuxcncDialect, LinuxcncLink
 from .read import read_program
 
 HOMING_MM_S: Final = 10.0
@@ -39,7 +39,7 @@ PAUSES: Final = re.compile(rb"^[^(;]*M0*[01](?![\d.])", re.IGNORECASE)
 BLOCK: Final = re.compile(rb"[A-Za-z#]")
 
 
-class Choices(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class LinuxcncTwinSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """How it is found. `power`: "ready" (switched on and homed), "on" (not homed), or "estop"."""
 
     power: Literal["ready", "on", "estop"] = "ready"
@@ -50,7 +50,9 @@ class LinuxcncTwin(Twin):
 
     wire = "linuxcncrsh, TCP"
 
-    def __init__(self, machine: Machine[LinuxcncController, Dialect], choices: Choices) -> None:
+    def __init__(
+        self, machine: Machine[LinuxcncController, LinuxcncDialect], choices: LinuxcncTwinSettings
+    ) -> None:
         super().__init__(Slides(machine))
         self._machine = machine
         assert isinstance(machine.link, LinuxcncLink)

@@ -28,8 +28,8 @@ from camtool.target.wire import (
     Manner,
     Packet,
     Place,
-    State,
     Wire,
+    WireState,
 )
 
 from ..gcode.blocks import has_words
@@ -187,24 +187,24 @@ class LinuxcncConversation(Conversation):
 
     def pause(self, now: float) -> None:
         """Hold the program; PAUSED when the slides stand."""
-        if self.state is State.SENDING:
-            self.state, self._pausing = State.PAUSING, True
+        if self.state is WireState.SENDING:
+            self.state, self._pausing = WireState.PAUSING, True
 
     def resume(self, now: float) -> None:
         """Go on, or with the next line where single blocks are wanted."""
-        if self.state in HALTS or self.state is State.PAUSING:
+        if self.state in HALTS or self.state is WireState.PAUSING:
             self._pausing, self._going_on = False, True
-            self.state, self.why = State.SENDING, ""
+            self.state, self.why = WireState.SENDING, ""
 
     def stop(self, now: float) -> None:
         """Abort."""
-        if self.ended or self.state is State.STOPPING:
+        if self.ended or self.state is WireState.STOPPING:
             return
         if self._begun:
             self._abort_at(now)
             return
         self._unwrite()
-        self._end(State.STOPPED, "stopped before it was told to move")
+        self._end(WireState.STOPPED, "stopped before it was told to move")
 
     @property
     def _alone(self) -> str:
@@ -216,7 +216,7 @@ class LinuxcncConversation(Conversation):
         """Abort at once, whatever answer is due: all that come before the one to this are passed
         over. Another client may have taken the say meanwhile."""
         self._unwrite()
-        self.state, self._aborting = State.STOPPING, True
+        self.state, self._aborting = WireState.STOPPING, True
         self._script, self._fresh = self._abort(), True
         self._write(f"set enable {self._link.enable_password}\r\n".encode())
         self._go(None, now)
@@ -245,7 +245,7 @@ class LinuxcncConversation(Conversation):
         elif self._aborting or not self._begun:
             more = f"; {UNSURE}" if self._begun else ""
             why = self._why_aborted or f"no answer to {_shown(self._asked)!r}"
-            self._end(State.FAILED, why + more)
+            self._end(WireState.FAILED, why + more)
         else:
             self._why_aborted, self._asked = f"no answer to {_shown(self._asked)!r}", ""
             self._abort_at(now)
@@ -265,7 +265,7 @@ class LinuxcncConversation(Conversation):
                 self._abort_at(now)
             else:
                 more = f"; {UNSURE}" if self._aborting else ""
-                self._end(State.FAILED, (self._why_aborted or str(refused)) + more)
+                self._end(WireState.FAILED, (self._why_aborted or str(refused)) + more)
             return
         if isinstance(step, str):
             self._asked = step
@@ -366,7 +366,7 @@ class LinuxcncConversation(Conversation):
         if (yield from self._get("program")) != file:
             said = yield from self._get("error")
             raise _Refused(f"it cannot open {file}{'' if said == 'OK' else f' ({said})'}")
-        self._begun, self.state, self.sent = True, State.SENDING, len(self.packets)
+        self._begun, self.state, self.sent = True, WireState.SENDING, len(self.packets)
         yield from self._set("step" if self.single else "run")
         yield from self._watch()
 
@@ -402,14 +402,17 @@ class LinuxcncConversation(Conversation):
             self._going_on = False
             yield from self._set("step" if self.single else "resume")
         elif status == "PAUSED" and stands:
-            if self.state is State.PAUSING:
-                self.state = State.PAUSED
-            elif self.state is State.SENDING and self.single:
-                self.state, self.why = State.PAUSED, "single block"
-            elif self.state is State.SENDING:
-                self.state, self.why = State.WAITING, "the program waits"
+            if self.state is WireState.PAUSING:
+                self.state = WireState.PAUSED
+            elif self.state is WireState.SENDING and self.single:
+                self.state, self.why = WireState.PAUSED, "single block"
+            elif self.state is WireState.SENDING:
+                self.state, self.why = WireState.WAITING, "the program waits"
         elif status == "RUNNING" and self.state in HALTS:
-            self.state, self.why = State.SENDING, ""  # somebody has let it go on at the machine
+            self.state, self.why = (
+                WireState.SENDING,
+                "",
+            )  # somebody has let it go on at the machine
 
     def _reached(self, text: str, ran: float) -> None:
         """Count what lies before the line that it is at, as far as the time allows it."""
@@ -437,7 +440,7 @@ class LinuxcncConversation(Conversation):
         if elsewhere or early or left > self.manner.patience_s:
             raise _Refused("it has stopped before the end of the program")
         self.acknowledged = self.done = len(self.packets)
-        self._end(State.FINISHED)
+        self._end(WireState.FINISHED)
 
     def _abort(self) -> Script:
         """Until it is idle, and stands."""
@@ -455,14 +458,15 @@ class LinuxcncConversation(Conversation):
             yield self._poll_s
         stands = "stopped: it is idle, and gives the same place again"
         self._end(
-            State.FAILED if self._why_aborted else State.STOPPED, self._why_aborted or stands
+            WireState.FAILED if self._why_aborted else WireState.STOPPED,
+            self._why_aborted or stands,
         )
 
     # By hand.
 
     def _home(self) -> Script:
         yield from self._homing()
-        self._end(State.FINISHED)
+        self._end(WireState.FINISHED)
 
     def _zero(self) -> Script:
         words = "".join(f" {axis.upper()}{self._values[axis]:.6f}" for axis in self._axes)
@@ -475,7 +479,7 @@ class LinuxcncConversation(Conversation):
         off = [abs(place["xyz".index(axis)] - self._values[axis]) for axis in self._axes]
         if self._said or max(off) > NEAR_MM:
             raise _Refused(f"it has not taken it {self._said}".strip())
-        self._end(State.FINISHED)
+        self._end(WireState.FINISHED)
 
     @property
     def _axes(self) -> list[str]:
@@ -502,7 +506,7 @@ class LinuxcncConversation(Conversation):
         while (place := (yield from self._place())) != last:
             last = place
             yield self._poll_s
-        self._end(State.FINISHED)
+        self._end(WireState.FINISHED)
 
 
 def _whole(text: str) -> int:

@@ -13,9 +13,9 @@ from camtool.toolpath.program import Program
 from ..gcode.dialect import UNITS, Unit
 from ..gcode.findings import EVENT_LEFT_OUT_TOOL
 from ..gcode.format import NumberStyle, format_number
-from ..gcode.write import Event, Style, common_words, tool_number, write_modal
+from ..gcode.write import Event, ProgramStyle, common_words, tool_number, write_modal
 from .controller import LinuxcncModel
-from .dialect import Dialect, LinuxcncMachine
+from .dialect import LinuxcncDialect, LinuxcncMachine
 
 MODES: Final = "G17 {unit} G40{length} G54 G80 G90 G91.1 G94"
 """XY plane, mm or inches, no cutter radius, no tool length where the machine uses none, the first
@@ -33,7 +33,7 @@ def write_program(toolpath: Toolpath, machine: LinuxcncMachine) -> Program:
     dialect, unit = machine.dialect, UNITS[machine.dialect.units]
     # The length in force goes with the tool in the spindle, and with a zero set by that tool.
     no_length = "" if dialect.tool_lengths else " G49"
-    style = Style(
+    style = ProgramStyle(
         dialect,
         (MODES.format(unit=unit.word, length=no_length),),
         lambda event: _words(event, dialect),
@@ -65,7 +65,7 @@ def _path_mode(mode: PathMode, unit: Unit) -> str:
     return "G64" + (f" P{corner}" if mode.tolerance_mm else "") + (f" Q{merging}" if apart else "")
 
 
-def _words(event: Event, dialect: Dialect) -> tuple[str, ...]:
+def _words(event: Event, dialect: LinuxcncDialect) -> tuple[str, ...]:
     """The blocks of an event."""
     if event.kind != Kind.TOOL_CHANGE:
         return common_words(event)

@@ -12,22 +12,20 @@ from typing import TYPE_CHECKING
 from camtool.target.contract import Target
 
 from .dialect import (
-    Dialect,
     MatlabRouterController,
+    MatlabRouterDialect,
     MatlabRouterLink,
     MatlabRouterMachine,
     dialect_of,
 )
 
 if TYPE_CHECKING:
-    import msgspec
-
     from camtool.machine.model import Machine
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
 
     from .controller import MatlabRouterModel
-    from .twin import Choices, MatlabRouterTwin
+    from .twin import MatlabRouterTwin, MatlabRouterTwinSettings
     from .wire import MatlabRouterWire
 
 
@@ -36,7 +34,7 @@ class MatlabRouter(Target):
 
     name = "matlab-router"
     controllers = (MatlabRouterController,)
-    dialect = Dialect
+    dialect = MatlabRouterDialect
     link = MatlabRouterLink
 
     def check(self, machine: MatlabRouterMachine) -> None:
@@ -75,21 +73,21 @@ class MatlabRouter(Target):
 
         return rest_of(data, machine, first)
 
-    def twin_choices(self) -> type[Choices]:
+    def twin_settings(self) -> type[MatlabRouterTwinSettings]:
         """What its thesis leaves open of the wire."""
-        from .twin import Choices
+        from .twin import MatlabRouterTwinSettings
 
-        return Choices
+        return MatlabRouterTwinSettings
 
     def twin(
         self,
-        machine: Machine[MatlabRouterController, Dialect],
-        choices: msgspec.Struct | None = None,
+        machine: Machine[MatlabRouterController, MatlabRouterDialect],
+        settings: MatlabRouterTwinSettings,
     ) -> MatlabRouterTwin:
         """The virtual controller; docs/wires/matlab-router.md."""
-        from .twin import Choices, MatlabRouterTwin
+        from .twin import MatlabRouterTwin
 
-        return MatlabRouterTwin(machine, choices if isinstance(choices, Choices) else Choices())
+        return MatlabRouterTwin(machine, settings)
 
     def listing(self, data: bytes, machine: MatlabRouterMachine) -> Listing:
         """The columns of the arrays that each block is."""

@@ -33,7 +33,7 @@ from camtool.simulation.motion import NO_SAMPLES, Chunk, Ledger, Options
 from camtool.simulation.rows import placed, refuse
 from camtool.toolpath.moves import Kind, Toolpath
 
-from .dialect import Dialect, MatlabRouterController, dialect_of
+from .dialect import MatlabRouterController, MatlabRouterDialect, dialect_of
 from .steps import (
     COUNT,
     HOME_AMOUNT,
@@ -50,7 +50,7 @@ from .steps import (
     slaves_fill,
 )
 
-_Machine = Machine[MatlabRouterController, Dialect]
+_Machine = Machine[MatlabRouterController, MatlabRouterDialect]
 
 FARTHEST_UNITS = 32767
 """Distances from home are an int16 of tenths of a millimetre (L4625-4635)."""
@@ -59,7 +59,7 @@ UNIT_MM = 0.1
 """The unit of the program (L3202-3204)."""
 
 
-class MatlabRouterModel(ControllerModel[MatlabRouterController, Dialect]):
+class MatlabRouterModel(ControllerModel[MatlabRouterController, MatlabRouterDialect]):
     """The slaves of the Matlab router: a servo for each axis."""
 
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
@@ -119,7 +119,7 @@ class _Run:
 
     def __init__(self, path: Toolpath, machine: _Machine, options: Options) -> None:
         self._rows = path.running
-        self._lines: Lines = lines_of(path, self._rows, machine)
+        self._lines: MasterOrders = lines_of(path, self._rows, machine)
         self._program = program_of(self._lines.orders, self._lines.pauses_s, machine)
         self._state = state_of(path.start, machine)
         self._account = account_of(self._rows)
@@ -227,7 +227,7 @@ TEXT_FACTORS = ((10.0, 1), (100.0, 10), (1100.0, 100), (math.inf, 1000))
 equal parts."""
 
 
-class Lines(Struct, frozen=True, eq=False):
+class MasterOrders(Struct, frozen=True, eq=False):
     """L orders of the master.
 
     orders (L, 11): `Program.lines` of the kernel; pauses_s (L,) behind each, negative where the
@@ -240,7 +240,7 @@ class Lines(Struct, frozen=True, eq=False):
     extra_s: Floats
 
 
-def lines_of(path: Toolpath, rows: int, machine: _Machine) -> Lines:
+def lines_of(path: Toolpath, rows: int, machine: _Machine) -> MasterOrders:
     """The orders for the first `rows` rows of a quantised toolpath.
 
     Raises ProgramError for a line without a feed above 0, a dwell without its seconds, and part
@@ -274,7 +274,9 @@ def lines_of(path: Toolpath, rows: int, machine: _Machine) -> Lines:
         header[some] |= way[:, 2] != 0.0
     extra = np.where(kind == Kind.DWELL, path.value[:rows], 0.0)
     ends = _ends(header, homes[first], machine)
-    return Lines(orders, _pauses(header, ends, router), extra + _link(header, first, rows, router))
+    return MasterOrders(
+        orders, _pauses(header, ends, router), extra + _link(header, first, rows, router)
+    )
 
 
 def _narrow(orders: Ints) -> Indices:

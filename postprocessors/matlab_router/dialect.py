@@ -37,7 +37,7 @@ MOST_NUMBER: Final = 32767
 LineCount = Annotated[int, Meta(ge=1, le=255)]
 
 
-class Dialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class MatlabRouterDialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The `[dialect]` table as written; None leaves the choice to the profile."""
 
     profile: Literal["safe", "listing", "text"] = "safe"
@@ -97,7 +97,7 @@ PROFILES: Final[dict[str, dict[str, Any]]] = {
 }
 
 
-class Choices(Struct, frozen=True):
+class ResolvedDialect(Struct, frozen=True):
     """Every choice made, by the table or by its profile.
 
     `format` "m": the arrays as a Matlab file; "stream": the bytes of the serial line.
@@ -193,11 +193,11 @@ class MatlabRouterLink(Link, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     margin_s: Annotated[float, Meta(ge=0.0, le=600.0)] = 2.0
 
 
-MatlabRouterMachine = Machine[SlideStart, Dialect]
+MatlabRouterMachine = Machine[SlideStart, MatlabRouterDialect]
 """Any machine with this dialect."""
 
 
-def dialect_of(machine: MatlabRouterMachine) -> Choices:
+def dialect_of(machine: MatlabRouterMachine) -> ResolvedDialect:
     """Every choice that the machine's `[dialect]` makes; MachineError where it makes none."""
     table = machine.dialect
     chosen = {
@@ -215,9 +215,9 @@ def dialect_of(machine: MatlabRouterMachine) -> Choices:
             where="table [dialect], key grid_mm",
             mend="use 0.2, the chunk that the slaves execute, or 0.1",
         )
-    return Choices(grid_units=units, **chosen)
+    return ResolvedDialect(grid_units=units, **chosen)
 
 
-def cut_z_mm(machine: MatlabRouterMachine, dialect: Choices) -> float:
+def cut_z_mm(machine: MatlabRouterMachine, dialect: ResolvedDialect) -> float:
     """Z of every cut, mm in the work frame: the plunge always starts from home."""
     return machine.controller.machine_zero_mm[2] - dialect.plunge_mm

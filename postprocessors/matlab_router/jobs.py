@@ -21,7 +21,14 @@ from camtool.bounds import check_count as check_size
 from camtool.errors import ProgramError
 from camtool.toolpath.program import Listing
 
-from .dialect import CHUNK_UNITS, MOST_NUMBER, UNIT_MM, Choices, MatlabRouterMachine, dialect_of
+from .dialect import (
+    CHUNK_UNITS,
+    MOST_NUMBER,
+    UNIT_MM,
+    MatlabRouterMachine,
+    ResolvedDialect,
+    dialect_of,
+)
 
 TABLES: Final = ("xy", "lxy", "velxy")
 NAMES: Final = (*TABLES, "size_of_array", "first_pointx", "first_pointy")
@@ -78,7 +85,7 @@ def fail(where: str, message: str, mend: str = "") -> NoReturn:
     raise ProgramError(message, where=where, mend=mend)
 
 
-def check_count(count: int, where: Where, dialect: Choices) -> None:
+def check_count(count: int, where: Where, dialect: ResolvedDialect) -> None:
     """The master's arrays hold so many lines, and it does not look (L4625-4635)."""
     if not 1 <= count <= dialect.max_lines:
         fail(
@@ -88,7 +95,7 @@ def check_count(count: int, where: Where, dialect: Choices) -> None:
         )
 
 
-def check_job(job: ReadJob, dialect: Choices) -> None:
+def check_job(job: ReadJob, dialect: ResolvedDialect) -> None:
     """ProgramError for the first number with which the machine would run away or stop."""
     for name, table in (("lxy", job.length), ("velxy", job.speed)):
         _refuse(job, name, np.abs(table) > MOST_NUMBER, "is beyond an int16")
@@ -139,7 +146,7 @@ class _Value(Struct, frozen=True, eq=False):
     offset: int
 
 
-def read_text(data: bytes, dialect: Choices) -> Iterator[ReadJob]:
+def read_text(data: bytes, dialect: ResolvedDialect) -> Iterator[ReadJob]:
     """The jobs of a .m file, checked; ProgramError naming line and column."""
     text = _Text(data)
     values: dict[str, _Value] = {}
@@ -170,7 +177,7 @@ def read_text(data: bytes, dialect: Choices) -> Iterator[ReadJob]:
 
 
 def _job_of_arrays(
-    text: _Text, number: int, values: dict[str, _Value], dialect: Choices
+    text: _Text, number: int, values: dict[str, _Value], dialect: ResolvedDialect
 ) -> ReadJob:
     """The six values as one job, once they agree."""
     scalar = {name: int(values[name].table[0, 0]) for name in NAMES if name not in TABLES}
@@ -358,7 +365,7 @@ class _Text:
 # Jobs follow one another; a master takes one and must be reset for the next.
 
 
-def read_stream(data: bytes, dialect: Choices) -> Iterator[ReadJob]:
+def read_stream(data: bytes, dialect: ResolvedDialect) -> Iterator[ReadJob]:
     """The jobs of a stream, checked; ProgramError naming job, number and byte."""
     if not data:
         raise ProgramError("the stream is empty", mend="a stream begins with the count of lines")
@@ -381,7 +388,9 @@ def read_stream(data: bytes, dialect: Choices) -> Iterator[ReadJob]:
         first += len(HEADER) + 2 * job.length.size
 
 
-def _job_of_words(words: list[bytes], first: int, number: int, dialect: Choices) -> ReadJob:
+def _job_of_words(
+    words: list[bytes], first: int, number: int, dialect: ResolvedDialect
+) -> ReadJob:
     """The job whose header begins at this word."""
 
     def place(word: int) -> str:
@@ -425,7 +434,7 @@ def _fail_number(word: bytes, where: str) -> NoReturn:
     )
 
 
-def _first_y(word: bytes, place: Callable[[int], str], dialect: Choices) -> int:
+def _first_y(word: bytes, place: Callable[[int], str], dialect: ResolvedDialect) -> int:
     """y of the first point; sent as a character, the master's atol makes its digit or 0 of it."""
     if dialect.first_y == "character":
         if len(word) != 1:

@@ -23,7 +23,14 @@ from camtool.errors import PostError
 from camtool.findings import Finding
 from camtool.toolpath.moves import Toolpath
 
-from .dialect import CHUNK_UNITS, MOST_NUMBER, UNIT_MM, UNITS_PER_MM, Choices, MatlabRouterMachine
+from .dialect import (
+    CHUNK_UNITS,
+    MOST_NUMBER,
+    UNIT_MM,
+    UNITS_PER_MM,
+    MatlabRouterMachine,
+    ResolvedDialect,
+)
 from .findings import (
     FEED_ROUNDED,
     FEED_ROUNDED_TO_LIMIT,
@@ -36,7 +43,7 @@ from .findings import (
     PLACES_SNAPPED_AND_STARTS,
     PLACES_SNAPPED_FROM_ONE,
 )
-from .strokes import Cuts
+from .strokes import CutLines
 
 TIE_TOLERANCE: Final = 1e-6
 """A coordinate within this part of the grid of half-way between two of its lines counts as
@@ -56,7 +63,7 @@ SNAP_NOTICE_MM: Final = 1e-6
 """A vertex that is moved by less lies on the grid already."""
 
 
-class Lines(Struct, frozen=True, eq=False):
+class SlaveLines(Struct, frozen=True, eq=False):
     """L lines that the slaves can run: `start`, `end` (L, 2) units from home; `feed` (L,) mm/min;
     `row` (L,) of the toolpath; `stroke` (L,) ascending."""
 
@@ -66,9 +73,9 @@ class Lines(Struct, frozen=True, eq=False):
     row: Ints
     stroke: Ints
 
-    def chosen(self, keep: Bools) -> Lines:
+    def chosen(self, keep: Bools) -> SlaveLines:
         """The lines where `keep` (L,) is true."""
-        return Lines(
+        return SlaveLines(
             self.start[keep], self.end[keep], self.feed[keep], self.row[keep], self.stroke[keep]
         )
 
@@ -77,14 +84,14 @@ class Jobs(Struct, frozen=True, eq=False):
     """All jobs in columns: their lines, the signed speeds (L, 2) of these in counts in 5 ms, and
     `offsets` (J+1,): job j has the lines offsets[j]:offsets[j+1]."""
 
-    lines: Lines
+    lines: SlaveLines
     speed: Ints
     offsets: list[int]
 
 
 def jobs_of(
-    cuts: Cuts, toolpath: Toolpath, machine: MatlabRouterMachine, dialect: Choices
-) -> tuple[Jobs, Changes]:
+    cuts: CutLines, toolpath: Toolpath, machine: MatlabRouterMachine, dialect: ResolvedDialect
+) -> tuple[Jobs, LineChanges]:
     """The jobs, and what was changed for them.
 
     PostError for what lies outside of the area or has a feed that cannot be written.
@@ -97,8 +104,10 @@ def jobs_of(
 class _Maker:
     """One run over all lines; `changes` counts what it changes."""
 
-    def __init__(self, toolpath: Toolpath, machine: MatlabRouterMachine, dialect: Choices) -> None:
-        self.changes = Changes()
+    def __init__(
+        self, toolpath: Toolpath, machine: MatlabRouterMachine, dialect: ResolvedDialect
+    ) -> None:
+        self.changes = LineChanges()
         self._toolpath = toolpath
         self._dialect = dialect
         self._machine = machine
@@ -109,11 +118,11 @@ class _Maker:
             FASTEST_COUNTS, int(machine.max_feed_mm_min / self._unit + FEED_TOLERANCE)
         )
 
-    def lines(self, cuts: Cuts) -> Lines:
+    def lines(self, cuts: CutLines) -> SlaveLines:
         """The cuts as lines that the slaves can run."""
         return self._straight(self._mended(self._on_grid(cuts)))
 
-    def _on_grid(self, cuts: Cuts) -> Lines:
+    def _on_grid(self, cuts: CutLines) -> SlaveLines:
         """Vertices at the nearest point of the grid, the first one of a stroke not nearer to home
         than a chunk; PostError for those outside the area."""
         grid, count = self._dialect.grid_units, len(cuts.row)
@@ -130,7 +139,7 @@ class _Maker:
             row = int(rows[int(np.argmax(moved))])
             self.changes.snapped(float(moved.max()) * UNIT_MM, self._toolpath.place(row))
         whole = units.astype(np.int64)
-        return Lines(whole[:count], whole[count:], cuts.feed, cuts.row, cuts.stroke)
+        return SlaveLines(whole[:count], whole[count:], cuts.feed, cuts.row, cuts.stroke)
 
     def _refuse_outside(self, rows: Ints, units: Floats) -> None:
         for axis, name in enumerate("XY"):
@@ -158,7 +167,7 @@ class _Maker:
         place = ",".join(f"{value:g}" for value in zero)
         return f"use --origin lower-left, or --set controller.machine_zero_mm=[{place}]"
 
-    def _mended(self, lines: Lines) -> Lines:
+    def _mended(self, lines: SlaveLines) -> SlaveLines:
         """No distance of 1 and no line of no length."""
         if (np.abs(lines.end - lines.start) == 1).any():
             lines = self._without_ones(lines)
@@ -170,7 +179,7 @@ class _Maker:
             self.changes.lost(self._toolpath.place(row))
         return lines.chosen(keep)
 
-    def _without_ones(self, lines: Lines) -> Lines:
+    def _without_ones(self, lines: SlaveLines) -> SlaveLines:
         """A vertex one unit from the one before it (in X or Y) moves there; each vertex is moved
         from its own place, so no error adds up."""
         starts, ends, strokes = lines.start.tolist(), lines.end.tolist(), lines.stroke.tolist()
@@ -183,7 +192,7 @@ class _Maker:
                     self.changes.ones += 1
         return replace(lines, start=np.array(starts), end=np.array(ends))
 
-    def _majors(self, lines: Lines) -> tuple[Ints, Floats, Ints]:
+    def _majors(self, lines: SlaveLines) -> tuple[Ints, Floats, Ints]:
         """Distances (L, 2); the larger of each line as a float (L,); its speed in counts (L,)."""
         distance = np.abs(lines.end - lines.start)
         larger = distance.max(axis=1).astype(np.float64)
@@ -205,7 +214,7 @@ class _Maker:
             self.changes.faster = max(self.changes.faster, float(slant.max(initial=1.0)))
         return distance, larger, counts
 
-    def _refuse_feed(self, lines: Lines, bad: Bools, what: str) -> None:
+    def _refuse_feed(self, lines: SlaveLines, bad: Bools, what: str) -> None:
         if bad.any():
             line = int(np.argmax(bad))
             raise PostError(
@@ -215,7 +224,7 @@ class _Maker:
                 " mm/min; --set dialect.too_fast=limited takes the highest",
             )
 
-    def speeds(self, lines: Lines) -> Ints:
+    def speeds(self, lines: SlaveLines) -> Ints:
         """(L, 2) signed counts: the larger distance at its speed, the other one in proportion,
         by the same operations as the listing (L4444-4515) so that ties fall alike."""
         distance, larger, counts = self._majors(lines)
@@ -226,10 +235,10 @@ class _Maker:
             raise PostError("internal fault: a line that the slaves would never end")
         return np.asarray(np.where(lines.end < lines.start, -speed, speed))
 
-    def _straight(self, lines: Lines) -> Lines:
+    def _straight(self, lines: SlaveLines) -> SlaveLines:
         """Lines that whole speeds would bend too much, or stop, in pieces."""
         distance, larger, counts = self._majors(lines)
-        limits = Limits(
+        limits = LineLimits(
             self._dialect.bend_tolerance_mm * UNITS_PER_MM, self._dialect.grid_units, self._least
         )
         bad = np.flatnonzero(bends(larger, distance.min(axis=1), counts, limits.tolerance))
@@ -250,9 +259,9 @@ class _Maker:
         start = lines.start[source]
         again = np.diff(source, prepend=-1) == 0
         start[again] = end[np.flatnonzero(again) - 1]
-        return Lines(start, end, lines.feed[source], lines.row[source], lines.stroke[source])
+        return SlaveLines(start, end, lines.feed[source], lines.row[source], lines.stroke[source])
 
-    def offsets(self, lines: Lines) -> list[int]:
+    def offsets(self, lines: SlaveLines) -> list[int]:
         """Where each job begins, and the end of the last one."""
         count = len(lines.row)
         if count == 0:
@@ -267,7 +276,7 @@ class _Maker:
                 self.changes.more_jobs += begin < last
         return [*offsets, count]
 
-    def _cut_at(self, lines: Lines, first: int, last: int) -> int:
+    def _cut_at(self, lines: SlaveLines, first: int, last: int) -> int:
         """Where the job that begins with this line ends: at most `max_lines` on, and at a vertex
         from which the next job can begin."""
         most = first + self._dialect.max_lines
@@ -296,7 +305,7 @@ class _Maker:
 # across with v = 1 (d · V long), along again.
 
 
-class Limits(Struct, frozen=True):
+class LineLimits(Struct, frozen=True):
     """How far a line may bend, the grid of its ends, and the least distance; all in units."""
 
     tolerance: float
@@ -315,7 +324,9 @@ def bends(larger: Floats, smaller: Ints, counts: Ints, tolerance: float) -> Bool
     return np.asarray(slanted & ((whole == 0.0) | (bend > tolerance)))
 
 
-def split_line(start: list[int], end: list[int], counts: int, limits: Limits) -> list[list[int]]:
+def split_line(
+    start: list[int], end: list[int], counts: int, limits: LineLimits
+) -> list[list[int]]:
     """The ends of the pieces of one line from `start` to `end` (x, y), its own end last."""
     way = (end[0] - start[0], end[1] - start[1])
     major = 0 if abs(way[0]) >= abs(way[1]) else 1
@@ -339,7 +350,7 @@ def _bend(longer: int, shorter: int, counts: int) -> float:
     return shorter * (1.0 - min(whole / wanted, wanted / whole))
 
 
-def _pieces(longer: int, shorter: int, counts: int, limits: Limits) -> list[tuple[int, int]]:
+def _pieces(longer: int, shorter: int, counts: int, limits: LineLimits) -> list[tuple[int, int]]:
     """A line of these distances as pieces (along, across) that do not bend too much."""
     bend = _bend(longer, shorter, counts)
     if bend <= limits.tolerance:
@@ -360,7 +371,7 @@ def _pieces(longer: int, shorter: int, counts: int, limits: Limits) -> list[tupl
     return [part for part in parts if part != (0, 0)]
 
 
-class Changes(Struct):
+class LineChanges(Struct):
     """What one run of the writer changed; places name the worst or the first of each kind."""
 
     snap_mm: float = 0.0
@@ -386,7 +397,7 @@ class Changes(Struct):
         self.lost_strokes += 1
         self.lost_place = self.lost_place or place
 
-    def findings(self, dialect: Choices) -> Iterator[Finding]:
+    def findings(self, dialect: ResolvedDialect) -> Iterator[Finding]:
         """One finding for each kind of change that was made."""
         grid_mm = dialect.grid_units * UNIT_MM
         if self.snap_mm:

@@ -26,8 +26,8 @@ from .dialect import (
     FIXED_Y_UNITS,
     UNIT_MM,
     UNITS_PER_MM,
-    Choices,
     MatlabRouterMachine,
+    ResolvedDialect,
     cut_z_mm,
     dialect_of,
 )
@@ -87,7 +87,7 @@ def _looks_like_text(data: bytes) -> bool:
 class _Moves:
     """Jobs in, the rows of a toolpath out."""
 
-    def __init__(self, machine: MatlabRouterMachine, dialect: Choices) -> None:
+    def __init__(self, machine: MatlabRouterMachine, dialect: ResolvedDialect) -> None:
         self._machine = machine
         self._dialect = dialect
         self._home = np.array(machine.controller.machine_zero_mm, dtype=np.float64)
@@ -162,7 +162,7 @@ class Executed(Struct, frozen=True, eq=False):
     asked: Ints
 
 
-def execute(job: ReadJob, dialect: Choices) -> Executed:
+def execute(job: ReadJob, dialect: ResolvedDialect) -> Executed:
     """Where the slaves and the listed master really bring the tool."""
     asked = _along(job.first, job.steps)
     first = job.first.copy()
@@ -280,7 +280,7 @@ class JobFindings(Struct):
     """What all jobs have that the machine does otherwise, or cannot do."""
 
     machine: MatlabRouterMachine
-    dialect: Choices
+    dialect: ResolvedDialect
     odd: Worst = field(default_factory=Worst)
     empty: Worst = field(default_factory=Worst)
     fast: Worst = field(default_factory=Worst)

@@ -21,14 +21,14 @@ from camtool.toolpath.lower import arcs_to_lines, xy_then_z
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.refusals import refuse
 
-from .dialect import Choices, MatlabRouterMachine, cut_z_mm
+from .dialect import MatlabRouterMachine, ResolvedDialect, cut_z_mm
 from .findings import EVENT_LEFT_OUT_DWELL, EVENT_LEFT_OUT_SPEED, EVENT_LEFT_OUT_TOOL, MOVE_SPLIT
 
 DEPTH_TOLERANCE_MM: Final = 0.005
 """A cut may lie this much above or below the one depth that the machine plunges to."""
 
 
-class Cuts(Struct, frozen=True, eq=False):
+class CutLines(Struct, frozen=True, eq=False):
     """The lines to be cut, in their order, L rows: `start`, `end` (L, 2) mm in the work frame;
     `feed` (L,) mm/min; `row` (L,) the row of the toolpath that each came from; `stroke` (L,)
     ascends from 0. Within a stroke each line starts where the one before it ended."""
@@ -41,8 +41,8 @@ class Cuts(Struct, frozen=True, eq=False):
 
 
 def cuts_of(
-    toolpath: Toolpath, machine: MatlabRouterMachine, dialect: Choices
-) -> tuple[Cuts, list[Finding]]:
+    toolpath: Toolpath, machine: MatlabRouterMachine, dialect: ResolvedDialect
+) -> tuple[CutLines, list[Finding]]:
     """The strokes of a toolpath, and what had to be changed to have them."""
     findings = _events(toolpath)
     apart = xy_then_z(toolpath)
@@ -63,7 +63,7 @@ def cuts_of(
     number: Ints = np.cumsum(~below, dtype=np.int64)
     _refuse_holes(toolpath, number, below & path.is_motion, cut, rows)
     stroke = np.unique(number[cut], return_inverse=True)[1].reshape(-1)
-    lines = Cuts(path.starts[cut, :2], path.end[cut, :2], path.feed[cut], rows[cut], stroke)
+    lines = CutLines(path.starts[cut, :2], path.end[cut, :2], path.feed[cut], rows[cut], stroke)
     return lines, findings
 
 
@@ -89,7 +89,7 @@ def _refuse_depths(
     cut: Bools,
     rows: Ints,
     machine: MatlabRouterMachine,
-    dialect: Choices,
+    dialect: ResolvedDialect,
 ) -> None:
     """All cuts lie at the one depth that the machine plunges to."""
     depth = cut_z_mm(machine, dialect)

@@ -21,7 +21,7 @@ from camtool.machine.model import Machine
 from camtool.target.twin import COMMANDED, Slides, Twin, travel_of
 
 from .controller import MatlabRouterModel
-from .dialect import Dialect, MatlabRouterController, dialect_of
+from .dialect import MatlabRouterController, MatlabRouterDialect, dialect_of
 from .jobs import ReadJob, check_count, check_job
 from .read import path_of
 
@@ -43,7 +43,9 @@ INT16: Final = 1 << 16
 NUMBER: Final = re.compile(rb"[+-]?\d+")
 
 
-class Choices(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class MatlabRouterTwinSettings(
+    msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
+):
     """What the thesis leaves open.
 
     `echo`: the master sends back the characters that it takes, or "none". `reset`: it is reset
@@ -61,7 +63,9 @@ class MatlabRouterTwin(Twin):
     wire = "USB (CDC), whose rate means nothing"
 
     def __init__(
-        self, machine: Machine[MatlabRouterController, Dialect], choices: Choices
+        self,
+        machine: Machine[MatlabRouterController, MatlabRouterDialect],
+        choices: MatlabRouterTwinSettings,
     ) -> None:
         super().__init__(Slides(machine))
         # What the numbers take on their way they have taken already when a job begins.

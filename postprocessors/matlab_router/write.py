@@ -21,7 +21,7 @@ from camtool.errors import PostError
 from camtool.toolpath.moves import Toolpath
 from camtool.toolpath.program import Program
 
-from .dialect import UNIT_MM, Choices, MatlabRouterMachine, dialect_of
+from .dialect import UNIT_MM, MatlabRouterMachine, ResolvedDialect, dialect_of
 from .lines import Jobs, jobs_of
 from .strokes import cuts_of
 
@@ -82,14 +82,14 @@ def _numbers_of(jobs: Jobs) -> Iterator[JobNumbers]:
         yield JobNumbers(high - low, first, tuple(xy), tuple(length), tuple(speed))
 
 
-def program_of(jobs: Iterable[JobNumbers], count: int, dialect: Choices) -> bytes:
+def program_of(jobs: Iterable[JobNumbers], count: int, dialect: ResolvedDialect) -> bytes:
     """So many jobs in the form that the dialect has."""
     if dialect.format == "stream":
         return stream_of(jobs, dialect)
     return _matlab(jobs, count, dialect)
 
 
-def _matlab(jobs: Iterable[JobNumbers], count: int, dialect: Choices) -> bytes:
+def _matlab(jobs: Iterable[JobNumbers], count: int, dialect: ResolvedDialect) -> bytes:
     """One section a job: the last job's arrays remain when all are run; `jobs{}` then holds all
     `count`."""
     lines = [
@@ -125,7 +125,7 @@ def _matrix(name: str, rows: Pair) -> list[str]:
     return [f"{name} = [", first, second, "];"]
 
 
-def stream_of(jobs: Iterable[JobNumbers], dialect: Choices) -> bytes:
+def stream_of(jobs: Iterable[JobNumbers], dialect: ResolvedDialect) -> bytes:
     """Each number in digits and a carriage return: lines, first x and y, all lx, ly, velx, vely
     (L4294-4360)."""
     parts = []
@@ -136,7 +136,7 @@ def stream_of(jobs: Iterable[JobNumbers], dialect: Choices) -> bytes:
     return b"".join(parts)
 
 
-def _first_y(y: int, number: int, dialect: Choices) -> bytes:
+def _first_y(y: int, number: int, dialect: ResolvedDialect) -> bytes:
     """y of the first point: in digits, or as the one character of that number (L4306)."""
     if dialect.first_y == "number":
         return b"%d\r" % y

@@ -8,11 +8,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, get_args
 
-import msgspec
-
 from camtool.target.contract import Target
 
-from .dialect import Dialect, Interpolator, PicMmhController, PicMmhLink, PicMmhMachine
+from .dialect import Interpolator, PicMmhController, PicMmhDialect, PicMmhLink, PicMmhMachine
 
 if TYPE_CHECKING:
     from camtool.machine.model import Axis, Machine
@@ -20,7 +18,7 @@ if TYPE_CHECKING:
     from camtool.toolpath.program import Listing, Program
 
     from .controller import PicMmhModel
-    from .twin import Choices, PicMmhTwin
+    from .twin import PicMmhTwin, PicMmhTwinSettings
     from .wire import PicMmhWire
 
 
@@ -29,7 +27,7 @@ class PicMmh(Target):
 
     name = "pic-mmh"
     controllers = (PicMmhController,)
-    dialect = Dialect
+    dialect = PicMmhDialect
     link = PicMmhLink
     interpolators = get_args(Interpolator)
 
@@ -73,21 +71,19 @@ class PicMmh(Target):
         *blocks, _ = data.decode("ascii").split(";")
         return Listing(tuple(block.strip(BLANKS) + ";" for block in blocks))
 
-    def twin_choices(self) -> type[Choices]:
+    def twin_settings(self) -> type[PicMmhTwinSettings]:
         """What its thesis leaves open of the wire."""
-        from .twin import Choices
+        from .twin import PicMmhTwinSettings
 
-        return Choices
+        return PicMmhTwinSettings
 
     def twin(
-        self,
-        machine: Machine[PicMmhController, Dialect],
-        choices: msgspec.Struct | None = None,
+        self, machine: Machine[PicMmhController, PicMmhDialect], settings: PicMmhTwinSettings
     ) -> PicMmhTwin:
         """The virtual controller; docs/wires/pic-mmh.md."""
-        from .twin import Choices, PicMmhTwin
+        from .twin import PicMmhTwin
 
-        return PicMmhTwin(machine, choices if isinstance(choices, Choices) else Choices())
+        return PicMmhTwin(machine, settings)
 
 
 POST = PicMmh()

@@ -59,7 +59,7 @@ LANDING_X, LANDING_Y, ITERATION = range(3)
 −1 where there is none."""
 
 
-class Search:
+class LandingSearch:
     """What the search for one landing after the other needs: the form's units to a step and the
     most units that it can say; a state (5,), and room for positions of a path with D = 0 at the
     start and for which of them turn no axis round."""
@@ -85,7 +85,7 @@ def land(
     room = 1
     for k in range(len(arcs)):
         room = max(room, _reach(_radius(arcs[k, START_X], arcs[k, START_Y]), sagitta))
-    search = Search(units_per_step, most_units, room)
+    search = LandingSearch(units_per_step, most_units, room)
     out = np.zeros((len(arcs), 3), dtype=np.int64)
     for k in range(len(arcs)):
         out[k, ITERATION] = -1
@@ -133,14 +133,14 @@ def _hits(arc: Ints, x: int, y: int, low: int, high: int, state: Ints) -> int:
     return met
 
 
-def _represents(steps: int, search: Search) -> bool:
+def _represents(steps: int, search: LandingSearch) -> bool:
     """Whether some whole unit means this step: the nearest one, if any does."""
     size = abs(steps)
     units = int(size * search.units_per_step + 0.5)
     return units <= search.most_units and int(units / search.units_per_step + 0.5) == size
 
 
-def _lands(arc: Ints, row: int, first: int, search: Search) -> bool:
+def _lands(arc: Ints, row: int, first: int, search: LandingSearch) -> bool:
     """Whether position `row` of the path, which began behind iteration `first`, can be written,
     and the controller stops there and not earlier, whatever D was."""
     x, y = search.path_x[row], search.path_y[row]
@@ -150,7 +150,7 @@ def _lands(arc: Ints, row: int, first: int, search: Search) -> bool:
     return _hits(arc, x, y, iteration, iteration, search.state) == iteration
 
 
-def _follow(arc: Ints, first: int, count: int, search: Search) -> None:
+def _follow(arc: Ints, first: int, count: int, search: LandingSearch) -> None:
     """The positions after the iterations first + 1 … first + count, D = 0 at the start."""
     _begin(arc, 0, search.state)
     skip(search.state, first)
@@ -158,7 +158,7 @@ def _follow(arc: Ints, first: int, count: int, search: Search) -> None:
     direct_search_run(search.state, NOWHERE, NOWHERE, path_x, path_y)
 
 
-def _mark_onward(arc: Ints, count: int, search: Search) -> None:
+def _mark_onward(arc: Ints, count: int, search: LandingSearch) -> None:
     """From which of the positions the line to the arc's end turns no axis round.
 
     The direction of an axis is that of its last step on the path. Before its first one it is that
@@ -176,13 +176,13 @@ def _mark_onward(arc: Ints, count: int, search: Search) -> None:
         search.onward[k] = 1 if on_x >= 0 and on_y >= 0 else 0
 
 
-def _take(row: int, first: int, search: Search, out: Ints) -> None:
+def _take(row: int, first: int, search: LandingSearch, out: Ints) -> None:
     """The landing at this position."""
     out[LANDING_X], out[LANDING_Y] = search.path_x[row], search.path_y[row]
     out[ITERATION] = first + row + 1
 
 
-def _land(arc: Ints, sweep_rad: float, sagitta: float, search: Search, out: Ints) -> None:
+def _land(arc: Ints, sweep_rad: float, sagitta: float, search: LandingSearch, out: Ints) -> None:
     """Fill `out` (3,) for one arc (7,), as `land` says; left alone when there is no landing."""
     radius = _radius(arc[START_X], arc[START_Y])
     end_x, end_y = arc[END_X], arc[END_Y]

@@ -42,9 +42,9 @@ from camtool.simulation.rows import block_of, refuse
 from camtool.toolpath.moves import Kind, Toolpath, frozen
 
 from . import steps as loops
-from .dialect import Dialect, PicMmhController
+from .dialect import PicMmhController, PicMmhDialect
 from .findings import ARC_END_UNSURE
-from .legs import METHODS, Course, FusedLegs, Periods, positions
+from .legs import METHODS, CommandedPath, FusedLegs, Periods, positions
 from .steps import (
     approach_scan,
     approach_start,
@@ -59,10 +59,10 @@ from .steps import (
     stairs_start,
 )
 
-_Machine = Machine[PicMmhController, Dialect]
+_Machine = Machine[PicMmhController, PicMmhDialect]
 
 
-class PicMmhModel(ControllerModel[PicMmhController, Dialect]):
+class PicMmhModel(ControllerModel[PicMmhController, PicMmhDialect]):
     """The PIC18F8720: lines by DDA, arcs by direct search, DDA or stairs."""
 
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
@@ -209,7 +209,7 @@ class PicMmhRun:
         for row in np.flatnonzero(self._suspect(places)[:rows]).tolist():
             self._check(row, places[row])
         return FusedLegs(
-            Course(toolpath, places, self._centres, self._stops),
+            CommandedPath(toolpath, places, self._centres, self._stops),
             rows,
             Periods(self._rapid_period_s, self._least_period_s, self._coded_mm[[0, 2]]),
             (
@@ -248,7 +248,7 @@ class PicMmhRun:
         toolpath = self._toolpath
         places = positions(toolpath, self._position, self._said, self._home)
         unknown = np.full(len(toolpath), -1, dtype=np.int64)
-        course = Course(toolpath, places, self._centres, unknown)
+        course = CommandedPath(toolpath, places, self._centres, unknown)
         parts = []
         for low in range(0, toolpath.running, ROWS_AT_ONCE):
             legs = course.legs(low, min(low + ROWS_AT_ONCE, toolpath.running))
@@ -319,7 +319,9 @@ class PicMmhRun:
         """The arc of a row, about its rounded centre, as far as it will go."""
         centre_x, centre_y = self._centres[row].tolist()
         x, y = int(self._position[0]) - centre_x, int(self._position[1]) - centre_y
-        arc = Arc(x, y, kind == Kind.ARC_CW, int(target[0]) - centre_x, int(target[1]) - centre_y)
+        arc = StepArc(
+            x, y, kind == Kind.ARC_CW, int(target[0]) - centre_x, int(target[1]) - centre_y
+        )
         period_s = self._period(row, kind, 0)
         origin, sign = (centre_x, centre_y), (1, 1)
         if x == 0 and y == 0:
@@ -419,7 +421,7 @@ SEARCH_ROWS = 1 << 14
 """Positions that the search for the end looks at in one go (256 KiB, stays in the cache)."""
 
 
-class Arc(Struct, frozen=True):
+class StepArc(Struct, frozen=True):
     """An arc in steps: start (x, y) and end relative to its centre."""
 
     x: int
@@ -440,7 +442,7 @@ def line_filler(a: int, b: int) -> Filler:
     return fill
 
 
-def arc_filler(arc: Arc, method: str, *, rounded: bool) -> Filler:
+def arc_filler(arc: StepArc, method: str, *, rounded: bool) -> Filler:
     """An arc whose start is not its centre; `rounded`: the error at the start is that against
     the circle of the rounded radius (DSM and stairs), else 0."""
     state: Ints
@@ -466,7 +468,7 @@ def arc_filler(arc: Arc, method: str, *, rounded: bool) -> Filler:
     return fill_each
 
 
-def arc_reach(arc: Arc, fill: Filler) -> tuple[int, bool]:
+def arc_reach(arc: StepArc, fill: Filler) -> tuple[int, bool]:
     """How many positions a fresh filler gives until the stop test is met, and True.
 
     When it is not met in the expected sweep and a quadrant more: how many until the nearest

@@ -10,7 +10,7 @@ from camtool.machine.model import Link, Machine, SlideStart
 from camtool.machine.ranges import Count
 
 
-class Dialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class PicMmhDialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Which of the thesis's two forms of a coordinate is used, and how long a block may be.
 
     `form` "example": `X02969.00`, sign only when negative (L1731); "annex": `X+02969` (L3284).
@@ -49,5 +49,5 @@ class PicMmhLink(Link, frozen=True, forbid_unknown_fields=True, kw_only=True):
     compensation: Literal["silent", "reported"] = "silent"
 
 
-PicMmhMachine = Machine[SlideStart, Dialect]
+PicMmhMachine = Machine[SlideStart, PicMmhDialect]
 """Any machine with this dialect."""

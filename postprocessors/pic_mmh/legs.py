@@ -41,7 +41,7 @@ def positions(toolpath: Toolpath, start: Ints, ends: Ints, home: Ints) -> Ints:
     return places
 
 
-class Course(Struct, frozen=True, eq=False):
+class CommandedPath(Struct, frozen=True, eq=False):
     """Where the controller is to go: `places` (N + 1, 3) of `positions`, `centres` (N, 2) steps of
     the arcs among the rows of the toolpath, `stops` (N,) samples of arcs or −1."""
 
@@ -103,7 +103,7 @@ class FusedLegs:
 
     def __init__(
         self,
-        course: Course,
+        course: CommandedPath,
         rows: int,
         periods: Periods,
         how: tuple[str, bool, bool, float],

@@ -23,7 +23,7 @@ from camtool.machine.model import controller_of
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.refusals import refuse, refuse_start, refuse_two_radii
 
-from .dialect import Dialect, PicMmhController, PicMmhMachine
+from .dialect import PicMmhController, PicMmhDialect, PicMmhMachine
 from .findings import FEED_ROUNDED
 
 HALF_STEP_TOLERANCE: Final = 1e-6
@@ -55,7 +55,7 @@ MOST_TOOL: Final = 99
 """Tools that the two digits of T can hold (L3455-3464)."""
 
 
-class Grid(Struct, frozen=True):
+class UnitGrid(Struct, frozen=True):
     """The units of one form laid over the steps of one axis."""
 
     units_per_mm: int
@@ -63,7 +63,7 @@ class Grid(Struct, frozen=True):
     step_mm: float
 
     @classmethod
-    def of(cls, dialect: Dialect, step_mm: float) -> Grid:
+    def of(cls, dialect: PicMmhDialect, step_mm: float) -> UnitGrid:
         """The grid of a form for an axis whose coded step is `step_mm`."""
         return cls(UNITS_PER_MM[dialect.form], MOST_UNITS[dialect.form], step_mm)
 
@@ -109,7 +109,7 @@ class Numbers(Struct, frozen=True, eq=False):
     written is none (`far_arcs`).
     """
 
-    grids: tuple[Grid, Grid, Grid]
+    grids: tuple[UnitGrid, UnitGrid, UnitGrid]
     end_units: Ints
     end_steps: Ints
     centre_units: Ints
@@ -118,9 +118,9 @@ class Numbers(Struct, frozen=True, eq=False):
     feed_finding: Finding | None
 
 
-def numbers_of(toolpath: Toolpath, machine: PicMmhMachine, dialect: Dialect) -> Numbers:
+def numbers_of(toolpath: Toolpath, machine: PicMmhMachine, dialect: PicMmhDialect) -> Numbers:
     """All numbers of a toolpath; PostError for the first that cannot be written or done."""
-    x, y, z = (Grid.of(dialect, axis.coded_step_mm) for axis in machine.axes)
+    x, y, z = (UnitGrid.of(dialect, axis.coded_step_mm) for axis in machine.axes)
     grids = (x, y, z)
     _check_coordinates(toolpath, grids)
     feed_units, finding = _feed_units(toolpath, machine)
@@ -139,7 +139,7 @@ def numbers_of(toolpath: Toolpath, machine: PicMmhMachine, dialect: Dialect) -> 
     )
 
 
-def _both(values_mm: Floats, grids: tuple[Grid, Grid, Grid]) -> tuple[Ints, Ints]:
+def _both(values_mm: Floats, grids: tuple[UnitGrid, UnitGrid, UnitGrid]) -> tuple[Ints, Ints]:
     """Columns of mm as units and as steps, each column by its own axis."""
     columns = list(zip(grids, values_mm.T, strict=False))
     units = [grid.units(column) for grid, column in columns]
@@ -171,7 +171,7 @@ def _check_arcs(toolpath: Toolpath, machine: PicMmhMachine) -> None:
     refuse_two_radii(toolpath, ARC_RADIUS_SPREAD_MM)
 
 
-def _check_coordinates(toolpath: Toolpath, grids: tuple[Grid, Grid, Grid]) -> None:
+def _check_coordinates(toolpath: Toolpath, grids: tuple[UnitGrid, UnitGrid, UnitGrid]) -> None:
     """Five digits of µm (L3284-3285) for every end."""
     for name, values, grid in zip("XYZ", toolpath.end.T, grids, strict=True):
         refuse(
@@ -184,9 +184,9 @@ def _check_coordinates(toolpath: Toolpath, grids: tuple[Grid, Grid, Grid]) -> No
         )
 
 
-def far_arcs(toolpath: Toolpath, machine: PicMmhMachine, dialect: Dialect) -> Bools:
+def far_arcs(toolpath: Toolpath, machine: PicMmhMachine, dialect: PicMmhDialect) -> Bools:
     """(N,) true for arcs whose centre has more than five digits of µm: nearly straight ones."""
-    grids = (Grid.of(dialect, axis.coded_step_mm) for axis in machine.axes)
+    grids = (UnitGrid.of(dialect, axis.coded_step_mm) for axis in machine.axes)
     fits = [grid.fits(values) for grid, values in zip(grids, toolpath.centre.T, strict=False)]
     return np.asarray(toolpath.is_arc & ~(fits[0] & fits[1]))
 

@@ -293,7 +293,7 @@ class _Reader:
 # The grammar of a block: the patterns that match one, and the words that say where it goes wrong.
 
 
-class Fault(Struct, frozen=True):
+class BlockFault(Struct, frozen=True):
     """Where a block goes wrong (column from 1), how, and how to fix it."""
 
     column: int
@@ -318,27 +318,31 @@ def patterns(form: str) -> Patterns:
     }
 
 
-def fault_of(text: str, form: str) -> Fault:
+def fault_of(text: str, form: str) -> BlockFault:
     """Why a block (without its `;`) is none in this form."""
     if not text:
-        return Fault(1, "an empty block", "remove the ; that has nothing before it")
+        return BlockFault(1, "an empty block", "remove the ; that has nothing before it")
     if _INTERACTIVE.fullmatch(text):
-        return Fault(1, f"{text!r} is an interactive command, not part of a program", "remove it")
+        return BlockFault(
+            1, f"{text!r} is an interactive command, not part of a program", "remove it"
+        )
     if small := re.search("[a-z]", text[: SHOWN_CHARS * 2]):
-        return Fault(
+        return BlockFault(
             small.start() + 1, "this controller takes no small letters", "write capital letters"
         )
     if text[0] not in "GM":
-        return Fault(1, f"{_quoted(text)} is no block: it begins with neither G nor M")
+        return BlockFault(1, f"{_quoted(text)} is no block: it begins with neither G nor M")
     if not re.match(r"\d\d", text[1:3]):
-        return Fault(2, f"{_quoted(text)}: wanted two digits after {text[0]}")
+        return BlockFault(2, f"{_quoted(text)}: wanted two digits after {text[0]}")
     shapes = SHAPES.get(text[:3])
     if shapes is None:
         known = " ".join(SHAPES)
-        return Fault(1, f"this controller does not know {text[:3]}", f"it knows {known}")
+        return BlockFault(1, f"this controller does not know {text[:3]}", f"it knows {known}")
     for other in _COORDINATES:
         if any(pattern.fullmatch(text, 3) for _, pattern in patterns(other)[text[:3]]):
-            return Fault(5, f"the block is in the {other} form", f"use --set dialect.form={other}")
+            return BlockFault(
+                5, f"the block is in the {other} form", f"use --set dialect.form={other}"
+            )
     return max((_walk(text, shape, form) for shape in shapes), key=lambda fault: fault.column)
 
 
@@ -346,7 +350,7 @@ def _value(kind: str, form: str) -> str:
     return _COORDINATES[form] if kind == "c" else _VALUES[kind]
 
 
-def _walk(text: str, shape: Shape, form: str) -> Fault:
+def _walk(text: str, shape: Shape, form: str) -> BlockFault:
     """The first word of the shape that the block does not have."""
     at = 3
     for letter, kind in shape:
@@ -354,9 +358,9 @@ def _walk(text: str, shape: Shape, form: str) -> Fault:
         if match is None:
             at += text.startswith(letter, at)
             words = _COORDINATE_WORDS[form] if kind == "c" else _VALUE_WORDS[kind]
-            return Fault(at + 1, f"{_quoted(text)}: wanted {letter} with {words}")
+            return BlockFault(at + 1, f"{_quoted(text)}: wanted {letter} with {words}")
         at = match.end()
-    return Fault(at + 1, f"{_quoted(text)}: wanted ; after the last word of {text[:3]}")
+    return BlockFault(at + 1, f"{_quoted(text)}: wanted ; after the last word of {text[:3]}")
 
 
 def _quoted(text: str) -> str:

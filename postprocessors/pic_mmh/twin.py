@@ -23,7 +23,7 @@ from camtool.target.twin import COMMANDED, Slides, Travel, Twin, travel_of
 from camtool.toolpath.moves import Kind
 
 from .controller import PicMmhModel
-from .dialect import Dialect, PicMmhController
+from .dialect import PicMmhController, PicMmhDialect
 from .read import read_program
 
 JOYSTICK_HZ: Final = 170.0
@@ -47,7 +47,7 @@ COMPENSATION: Final = re.compile(rb"B([XYZ])(\d{3})")
 JOYSTICK: Final = re.compile(rb"J[XYZ][+-]|&(?:[XYZ][+-]){2,3}")
 
 
-class Choices(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class PicMmhTwinSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """What the thesis leaves open.
 
     `echo`: the "string" comes back when it has ended (L1594), each "character" at once (L1670), or
@@ -71,7 +71,9 @@ class PicMmhTwin(Twin):
 
     wire = "RS-232, its rate is not known"
 
-    def __init__(self, machine: Machine[PicMmhController, Dialect], choices: Choices) -> None:
+    def __init__(
+        self, machine: Machine[PicMmhController, PicMmhDialect], choices: PicMmhTwinSettings
+    ) -> None:
         super().__init__(Slides(machine))
         self._given, self._machine, self._choices = machine, machine, choices
         self._model = PicMmhModel()

@@ -21,8 +21,8 @@ from camtool.target.wire import (
     Manner,
     Packet,
     PacketByPacket,
-    State,
     Wire,
+    WireState,
 )
 
 from .dialect import PicMmhLink, PicMmhMachine
@@ -238,7 +238,9 @@ class PicMmhConversation(PacketByPacket):
         if reports and self._count < least:
             self._fail(f"it has reported {self._count} of {least} steps", now)
         elif not reports and not packet.seconds:
-            self._end(State.FAILED, "nothing says when it stands, since link.step_byte is none")
+            self._end(
+                WireState.FAILED, "nothing says when it stands, since link.step_byte is none"
+            )
         elif not reports and now < self._over:
             self.next_s = self._over
         else:
@@ -314,7 +316,7 @@ class PicMmhConversation(PacketByPacket):
                 self._stopped("it was told to stop (A;); it does not say whether it stands")
             else:
                 why = self._failing or "it was told to stop"
-                self._end(State.FAILED, f"{why}; it did not confirm the stop: switch it off")
+                self._end(WireState.FAILED, f"{why}; it did not confirm the stop: switch it off")
             return
         if not self._busy:
             self.next_s = now + self.manner.patience_s

@@ -38,7 +38,7 @@ from .findings import (
     MOVE_SPLIT,
     VALUE_ROUNDED,
 )
-from .numbers import Grid, check_motion, event_words, far_arcs, numbers_of
+from .numbers import UnitGrid, check_motion, event_words, far_arcs, numbers_of
 
 BUFFER_CHARS: Final = 35
 """Characters of the thesis's buffer (L1740-1742), which cannot have taken its own sample block."""
@@ -74,7 +74,7 @@ class _Writer:
         self._machine = machine
         self._dialect = dialect
         self._wanted = toolpath
-        self._changes = Changes()
+        self._changes = WriterChanges()
         check_motion(toolpath, machine)
         # Refuses by the numbers of the rows that were given, before these are lowered.
         given = numbers_of(toolpath, machine, dialect)
@@ -92,8 +92,8 @@ class _Writer:
         self._before = np.concatenate([np.zeros((1, 3), dtype=np.int64), steps])[: len(steps)]
         self._before[: self._first + 1] = 0
 
-    def _lowered(self, grid: Grid) -> Lowered:
-        """Arcs whose centre cannot be written as lines, slopes as steps; `Changes` counts both."""
+    def _lowered(self, grid: UnitGrid) -> Lowered:
+        """Arcs whose centre cannot be written as lines, slopes as steps; both are counted."""
         toolpath, changes = self._wanted, self._changes
         far = far_arcs(toolpath, self._machine, self._dialect)
         changes.far = int(far.sum())
@@ -112,7 +112,7 @@ class _Writer:
         return lowered
 
     @property
-    def _grid(self) -> Grid:
+    def _grid(self) -> UnitGrid:
         """X and Y are alike wherever arcs and their lines are concerned."""
         return self._numbers.grids[0]
 
@@ -191,7 +191,7 @@ class _Writer:
         self._count(arcs, points)
         return points
 
-    def _arcs(self) -> Arcs:
+    def _arcs(self) -> StepArcs:
         """The arcs as this controller takes them from where it stands, and their landings."""
         numbers, path = self._numbers, self._toolpath
         deep = numbers.end_steps[:, 2] != self._before[:, 2]
@@ -212,9 +212,9 @@ class _Writer:
             grid.most_units,
             LINE_SAGITTA * grid.resolution_mm / grid.step_mm,
         )
-        return Arcs(rows[~nothing], table, sweep[~nothing], landing, rows[nothing])
+        return StepArcs(rows[~nothing], table, sweep[~nothing], landing, rows[nothing])
 
-    def _points_of(self, arcs: Arcs, refused: Bools) -> Points:
+    def _points_of(self, arcs: StepArcs, refused: Bools) -> Points:
         """All points when the landings of `refused` (J,) are none."""
         numbers, path, grid = self._numbers, self._toolpath, self._grid
         landed = arcs.landed & ~refused
@@ -264,7 +264,7 @@ class _Writer:
             misfit=int(misfit[0]) if len(misfit) else len(path),
         )
 
-    def _refused(self, arcs: Arcs, points: Points) -> Bools:
+    def _refused(self, arcs: StepArcs, points: Points) -> Bools:
         """(J,) landings with which a reader would take the block for another arc: short arcs can
         turn into almost full circles by the rounding of their numbers."""
         numbers, grid = self._numbers, self._grid
@@ -278,7 +278,7 @@ class _Writer:
         read = turned_rad(points.before - centre, units - centre, arcs.clockwise)
         return np.asarray(arcs.landed & (full_turns(read, arcs.expected_rad) != 0.0))
 
-    def _chords(self, arcs: Arcs, landed: Bools) -> Chords:
+    def _chords(self, arcs: StepArcs, landed: Bools) -> Chords:
         """Lines along the rest of each arc from its landing, or along all of it."""
         path, grid = self._toolpath, self._grid
         centre = path.centre[arcs.row]
@@ -290,7 +290,7 @@ class _Writer:
         ends = chord_ends(at, centre, sweep, LINE_SAGITTA * grid.resolution_mm)
         return ends.without(landed & arcs.at_end)
 
-    def _check_ends(self, arcs: Arcs, points: Points) -> None:
+    def _check_ends(self, arcs: StepArcs, points: Points) -> None:
         """The numbers of each arc, taken as the controller takes them, must be its landing."""
         at = np.flatnonzero(points.is_arc & points.sent)
         of = np.searchsorted(arcs.row, points.row[at])
@@ -301,7 +301,7 @@ class _Writer:
                 where=self._place(int(points.row[at[wrong.argmax()]])),
             )
 
-    def _count(self, arcs: Arcs, points: Points) -> None:
+    def _count(self, arcs: StepArcs, points: Points) -> None:
         """What the arcs and the moves of less than a step lose."""
         changes, path = self._changes, self._toolpath
         landed = np.zeros(len(arcs.row), dtype=np.bool_)
@@ -377,7 +377,7 @@ class _Writer:
         return np.concatenate(steps), np.concatenate(units)
 
 
-class Arcs(Struct, frozen=True, eq=False):
+class StepArcs(Struct, frozen=True, eq=False):
     """J arcs that are more than nothing: their rows; columns of `arcs` (J, 7) in steps; signed
     sweeps rad; landings (J, 3). `nothing`: the rows of those whose end is their start."""
 
@@ -492,7 +492,7 @@ def chord_ends(start: Floats, centre: Floats, sweep_rad: Floats, sagitta_mm: flo
     return Chords(count, centre[arc] + spoke, arc, part)
 
 
-class Changes(Struct):
+class WriterChanges(Struct):
     """What one run of the writer changed, counted; places name the first of each kind."""
 
     dropped: int = 0

@@ -10,17 +10,15 @@ from typing import TYPE_CHECKING
 
 from camtool.target.contract import Target
 
-from .dialect import Dialect, ValcncController, ValcncLink, ValcncMachine, check, scales_of
+from .dialect import ValcncController, ValcncDialect, ValcncLink, ValcncMachine, check, scales_of
 
 if TYPE_CHECKING:
-    import msgspec
-
     from camtool.machine.model import Axis, Machine
     from camtool.toolpath.moves import Toolpath
     from camtool.toolpath.program import Listing, Program
 
     from .controller import ValcncModel
-    from .twin import Choices, ValcncTwin
+    from .twin import ValcncTwin, ValcncTwinSettings
     from .wire import ValcncWire
 
 
@@ -29,7 +27,7 @@ class Valcnc(Target):
 
     name = "valcnc"
     controllers = (ValcncController,)
-    dialect = Dialect
+    dialect = ValcncDialect
     link = ValcncLink
 
     def check(self, machine: ValcncMachine) -> None:
@@ -65,21 +63,19 @@ class Valcnc(Target):
 
         return ValcncWire()
 
-    def twin_choices(self) -> type[Choices]:
+    def twin_settings(self) -> type[ValcncTwinSettings]:
         """What its thesis leaves open of the wire."""
-        from .twin import Choices
+        from .twin import ValcncTwinSettings
 
-        return Choices
+        return ValcncTwinSettings
 
     def twin(
-        self,
-        machine: Machine[ValcncController, Dialect],
-        choices: msgspec.Struct | None = None,
+        self, machine: Machine[ValcncController, ValcncDialect], settings: ValcncTwinSettings
     ) -> ValcncTwin:
         """The virtual controller; docs/wires/valcnc.md."""
-        from .twin import Choices, ValcncTwin
+        from .twin import ValcncTwin
 
-        return ValcncTwin(machine, choices if isinstance(choices, Choices) else Choices())
+        return ValcncTwin(machine, settings)
 
     def listing(self, data: bytes, machine: ValcncMachine) -> Listing:
         """The lines that are blocks."""

@@ -42,10 +42,10 @@ from camtool.simulation.path import on_steps
 from camtool.simulation.rows import block_of
 from camtool.toolpath.moves import Kind, Toolpath, frozen
 
-from .dialect import Dialect, ValcncController
+from .dialect import ValcncController, ValcncDialect
 from .steps import arc_angles
 
-_Machine = Machine[ValcncController, Dialect]
+_Machine = Machine[ValcncController, ValcncDialect]
 
 PIECES_AT_ONCE = 1 << 14
 """Lines, those of arcs included, that are computed together: some 5 MB."""
@@ -54,7 +54,7 @@ PIECE_EPS = 1e-9
 """A part of a piece by which an arc may be longer than whole pieces, by rounding alone."""
 
 
-class ValcncModel(ControllerModel[ValcncController, Dialect]):
+class ValcncModel(ControllerModel[ValcncController, ValcncDialect]):
     """The PIC18F4550 of ValCNC: lines by a counter, arcs as lines."""
 
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
@@ -62,8 +62,8 @@ class ValcncModel(ControllerModel[ValcncController, Dialect]):
         return _run(_Pieces(toolpath, machine), toolpath, machine, options)
 
     def run_on(
-        self, drawn: Drawn, toolpath: Toolpath, machine: _Machine, options: Options
-    ) -> tuple[list[Chunk], Drawn]:
+        self, drawn: DrawingProgress, toolpath: Toolpath, machine: _Machine, options: Options
+    ) -> tuple[list[Chunk], DrawingProgress]:
         """The motion of rows that follow others, which ended at `drawn`; and where these end."""
         pieces = _Pieces(toolpath, machine, drawn)
         chunks = list(_run(pieces, toolpath, machine, options))
@@ -116,7 +116,7 @@ class ValcncModel(ControllerModel[ValcncController, Dialect]):
         )
 
 
-class Drawn(Struct, frozen=True, eq=False):
+class DrawingProgress(Struct, frozen=True, eq=False):
     """How far it has drawn: the last point (3,) mm to which it drew a line, which an arc's angle
     puts beside the end that was programmed, and where its motors then stand, (3,) steps."""
 
@@ -137,13 +137,15 @@ class _Pieces:
     """The lines of a toolpath: one for each straight row, several for each arc; the first begins
     at its start, or where other rows before it have `drawn` to."""
 
-    def __init__(self, toolpath: Toolpath, machine: _Machine, drawn: Drawn | None = None) -> None:
+    def __init__(
+        self, toolpath: Toolpath, machine: _Machine, drawn: DrawingProgress | None = None
+    ) -> None:
         check_rows(toolpath, machine)
         self._controller = machine.controller
         self._step_mm = coded_steps_mm(machine)
         count = toolpath.running
         self._end = toolpath.end[:count]
-        self.drawn = drawn or Drawn(toolpath.start, self.in_steps(toolpath.start))
+        self.drawn = drawn or DrawingProgress(toolpath.start, self.in_steps(toolpath.start))
         """Where the legs that were asked for end."""
         self._arc_rows = np.flatnonzero(toolpath.is_arc[:count])
         self._arcs = self._angles(toolpath, count)
@@ -180,7 +182,7 @@ class _Pieces:
             else:
                 way = self.in_steps(np.diff(np.concatenate([before, points]), axis=0))
             before, at = points[-1:], at + way.sum(axis=0)
-            self.drawn = Drawn(before[0], at[0])
+            self.drawn = DrawingProgress(before[0], at[0])
             passes = np.abs(way).max(axis=1)
             moves = np.flatnonzero(passes)
             yield Legs(row[moves], way[moves], passes[moves] * period_s)

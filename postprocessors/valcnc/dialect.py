@@ -21,7 +21,7 @@ Answer = Annotated[str, Meta(max_length=40, pattern=r"^([!-~]([ -~]*[!-~])?)?$")
 Margin = Annotated[float, Meta(ge=0.0, le=60.0)]
 
 
-class Dialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class ValcncDialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Points on which the thesis leaves a choice; docs/dialects/valcnc.md says why.
 
     `coord_scale`: units of the program per mm on an axis whose step is `nominal_step_mm`;
@@ -73,7 +73,7 @@ class ValcncLink(Link, frozen=True, forbid_unknown_fields=True, kw_only=True):
     margin_s: Margin = 0.1
 
 
-ValcncMachine = Machine[SlideStart, Dialect]
+ValcncMachine = Machine[SlideStart, ValcncDialect]
 """Any machine with this dialect."""
 
 
@@ -85,7 +85,7 @@ def check(machine: ValcncMachine) -> None:
     check_unit(machine, 10.0**-dialect.decimals * mm_per_unit, dialect.arc_spread_mm)
 
 
-def scales_of(machine: Machine, dialect: Dialect) -> Floats:
+def scales_of(machine: Machine, dialect: ValcncDialect) -> Floats:
     """(3,) units of the program per mm on X, Y and Z.
 
     The controller makes 1 / (coord_scale · nominal_step_mm) steps of a unit, whatever the axis;

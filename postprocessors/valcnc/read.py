@@ -22,7 +22,7 @@ from camtool.kernels import words
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 
-from ..gcode.blocks import SURE_PART, Block, Lexing, PlainBlocks, blocks_of, form_of
+from ..gcode.blocks import SURE_PART, Lexing, PlainBlocks, WordBlock, blocks_of, form_of
 from .dialect import ValcncMachine, scales_of
 from .findings import ARC_MISSES_END, COORDINATES_SCALED_READ
 
@@ -95,7 +95,7 @@ class _Reader:
                 "the program is empty", mend="a program has blocks such as G00 X1 Y1 Z0"
             )
 
-    def block(self, block: Block) -> None:
+    def block(self, block: WordBlock) -> None:
         """One block."""
         self.blocks += 1
         code, letters = block.words[0][1], "".join([letter for letter, _ in block.words])
@@ -162,7 +162,7 @@ class _Reader:
             block=np.arange(plain.first, plain.first + count),
         )
 
-    def _check_words(self, block: Block, letters: str) -> None:
+    def _check_words(self, block: WordBlock, letters: str) -> None:
         """ProgramError for an unknown code, for a word that stands twice, and for tabs."""
         first = "".join(block.words[0])
         if letters[0] != "G" or block.words[0][1] not in CODES:
@@ -192,7 +192,7 @@ class _Reader:
                 count=self._missed.count,
             )
 
-    def _end(self, block: Block, values: dict[str, float]) -> Point:
+    def _end(self, block: WordBlock, values: dict[str, float]) -> Point:
         """Where the block goes, in the program's units; absolute (L1135)."""
         missing = [letter for letter in "XYZ" if letter not in values]
         if missing and self._dialect.missing_words == "refused":
@@ -211,7 +211,7 @@ class _Reader:
         a, b, c = self._scales
         return x / a + 0.0, y / b + 0.0, z / c + 0.0
 
-    def _line(self, block: Block, code: str, values: dict[str, float], end: Point) -> None:
+    def _line(self, block: WordBlock, code: str, values: dict[str, float], end: Point) -> None:
         """A line; in two where the option puts Z before or after X and Y."""
         if "I" in values or "J" in values:
             at, letter = next((at, one) for at, one in enumerate(values, 1) if one in "IJ")
@@ -224,7 +224,7 @@ class _Reader:
             else:
                 self.path.line(x, y, z, feed=self._feed)
 
-    def _in_order(self, block: Block, end: Point) -> Point | None:
+    def _in_order(self, block: WordBlock, end: Point) -> Point | None:
         """The corner between the parts along Z and in XY, if they are apart."""
         old, order = self.at, self._dialect.z_order
         if end[:2] == old[:2] or end[2] == old[2] or order == "together":
@@ -238,7 +238,7 @@ class _Reader:
             )
         return (*old[:2], end[2]) if order == "before" else (*end[:2], old[2])
 
-    def _arc(self, block: Block, code: str, values: dict[str, float], end: Point) -> None:
+    def _arc(self, block: WordBlock, code: str, values: dict[str, float], end: Point) -> None:
         """An arc; Z in a block of its own before or after it where the option asks for it."""
         if "I" not in values or "J" not in values:
             missing = "J" if "I" in values else "I"
@@ -263,7 +263,7 @@ class _Reader:
         if end[2] != self.at[2] and order == "after":
             self.path.line(x, y, z, feed=self._feed)
 
-    def _check_arc(self, block: Block, offset: tuple[float, float], end: Point) -> None:
+    def _check_arc(self, block: WordBlock, offset: tuple[float, float], end: Point) -> None:
         """That the firmware's formulas (L1284-1326) have a value, and nearly the right one."""
         i, j = offset
         radius = math.hypot(i, j)
@@ -294,7 +294,7 @@ class _Reader:
             self._note_miss(block, offset, chord)
 
     def _note_miss(
-        self, block: Block, offset: tuple[float, float], chord: tuple[float, float]
+        self, block: WordBlock, offset: tuple[float, float], chord: tuple[float, float]
     ) -> None:
         """Compare 2·arcsin(C/2R), or 2π less it, with the angle between the two arms."""
         out = -offset[0], -offset[1]
@@ -311,7 +311,7 @@ class _Reader:
                 self._missed.where = f"block {block.index + 1}"
 
 
-def _fail_at_i(block: Block, message: str, mend: str) -> NoReturn:
+def _fail_at_i(block: WordBlock, message: str, mend: str) -> NoReturn:
     """ProgramError at the I word of an arc."""
     at = next(index for index, (letter, _) in enumerate(block.words) if letter == "I")
     block.fail(message, word=at, mend=mend)

@@ -16,8 +16,8 @@ from camtool.errors import ProgramError
 from camtool.machine.model import Machine
 from camtool.target.twin import COMMANDED, Slides, Twin, travel_of
 
-from .controller import Drawn, ValcncModel
-from .dialect import Dialect, ValcncController
+from .controller import DrawingProgress, ValcncModel
+from .dialect import ValcncController, ValcncDialect
 from .read import read_block
 
 END: Final = ord("\n")
@@ -33,7 +33,7 @@ CONNECTED: Final = b"C"
 """What the PC's program says when it has opened the line (L1482)."""
 
 
-class Choices(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class ValcncTwinSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """What the thesis leaves open.
 
     `busy`: what comes in while a block is drawn is "lost", since nothing receives it, or "kept"
@@ -47,8 +47,8 @@ class Choices(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
 
 def _with_all_defined(
-    machine: Machine[ValcncController, Dialect],
-) -> Machine[ValcncController, Dialect]:
+    machine: Machine[ValcncController, ValcncDialect],
+) -> Machine[ValcncController, ValcncDialect]:
     """The machine with a meaning for what `[dialect]` refuses because the thesis gives it none: a
     controller does something all the same. What ours does is in the page of its wire."""
     dialect = machine.dialect
@@ -64,14 +64,16 @@ class ValcncTwin(Twin):
     wire = "9600 8N1"
     byte_s = 10.0 / 9600.0
 
-    def __init__(self, machine: Machine[ValcncController, Dialect], choices: Choices) -> None:
+    def __init__(
+        self, machine: Machine[ValcncController, ValcncDialect], choices: ValcncTwinSettings
+    ) -> None:
         super().__init__(Slides(machine))
         self._machine, self._choices = _with_all_defined(machine), choices
         self._model = ValcncModel()
         self._line, self._spoilt = bytearray(), False
         self._kept = bytearray()
         self._at = 0.0, 0.0, 0.0  # the coordinates of the last block
-        self._drawn = Drawn(np.zeros(3), np.zeros(3, dtype=np.int64))
+        self._drawn = DrawingProgress(np.zeros(3), np.zeros(3, dtype=np.int64))
         self._drawing = False
 
     def _due(self) -> None:

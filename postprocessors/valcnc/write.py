@@ -36,7 +36,7 @@ from ..gcode.plain import (
     plain_rows,
     split_z,
 )
-from .dialect import Dialect, ValcncMachine, scales_of
+from .dialect import ValcncDialect, ValcncMachine, scales_of
 from .findings import ARC_MENDED, COORDINATES_SCALED, EVENT_LEFT_OUT, FEED_ROUNDED
 
 UNSAID: Final = (
@@ -94,7 +94,7 @@ def _check_tools(toolpath: Toolpath) -> None:
 
 
 def _arcs_lowered(
-    lowered: Lowered, scales: Floats, machine: ValcncMachine, dialect: Dialect
+    lowered: Lowered, scales: Floats, machine: ValcncMachine, dialect: ValcncDialect
 ) -> tuple[Lowered, list[Finding]]:
     """Arcs of no more than the dialect's sweep; lines where X and Y are scaled differently."""
     path = lowered.toolpath
@@ -118,7 +118,7 @@ def _scaled(toolpath: Toolpath, scales: Floats) -> Toolpath:
     )
 
 
-def _text(rows: PlainRows, dialect: Dialect) -> bytes:
+def _text(rows: PlainRows, dialect: ValcncDialect) -> bytes:
     """The blocks of all rows that move."""
     style = NumberStyle(dialect.decimals)
     sent = rows.moves
@@ -131,7 +131,7 @@ def _text(rows: PlainRows, dialect: Dialect) -> bytes:
     return texts_of(columns, blanks=True).data
 
 
-def _check_length(data: bytes, dialect: Dialect) -> None:
+def _check_length(data: bytes, dialect: ValcncDialect) -> None:
     index, length = first_too_long(data, dialect.block_chars)
     if index >= 0:
         raise PostError(
@@ -141,7 +141,7 @@ def _check_length(data: bytes, dialect: Dialect) -> None:
         )
 
 
-def _scale_finding(dialect: Dialect) -> Iterator[Finding]:
+def _scale_finding(dialect: ValcncDialect) -> Iterator[Finding]:
     """The warning that a wrong scale makes parts 8 times too large or too small."""
     if not dialect.coord_scale_checked:
         yield COORDINATES_SCALED(measured=dialect.coord_scale)

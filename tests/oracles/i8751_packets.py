@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from camtool_postprocessors.i8751.dialect import RECORDS_PER_PACKET, Dialect
+from camtool_postprocessors.i8751.dialect import RECORDS_PER_PACKET, I8751Dialect
 from camtool_postprocessors.i8751.read import ACCESS, DATA_END, PACKET_END, ByteFault
 
 _MOTOR = rb"(?:\x05|([\x03\x04])(.)(.))"
@@ -13,7 +13,7 @@ _MOTOR = rb"(?:\x05|([\x03\x04])(.)(.))"
 class PacketReader:
     """Bytes in, records out; ByteFault at the first byte that does not fit."""
 
-    def __init__(self, data: bytes, dialect: Dialect) -> None:
+    def __init__(self, data: bytes, dialect: I8751Dialect) -> None:
         self._data = data
         self._dialect = dialect
         mark = re.escape(bytes([dialect.dwell_mark_byte]))

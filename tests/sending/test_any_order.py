@@ -28,7 +28,7 @@ from camtool.sending.journal import Place as Left
 from camtool.sending.prepare import consignment, forecast_of, rest_of, tool_at_of
 from camtool.target.registry import LoadedTarget, load_target
 from camtool.target.twin import Twin
-from camtool.target.wire import Conversation, Forecast, Manner, Packet, State, ToolAt
+from camtool.target.wire import Conversation, Forecast, Manner, Packet, ToolAt, WireState
 from camtool.toolpath.moves import Toolpath
 from tests.feeding import motion
 from tests.sending.talking import Talking
@@ -220,9 +220,9 @@ class Sending(RuleBasedStateMachine):
             assert outputs_until(self.twin, block) == wanted
 
     def nothing_moves_behind_a_halt(self) -> None:
-        halted = self.talk.state in (State.STOPPED, State.PAUSED)
+        halted = self.talk.state in (WireState.STOPPED, WireState.PAUSED)
         halted = halted or (
-            self.talk.state is State.FAILED and not _unknown(self.talk.why) and self.true
+            self.talk.state is WireState.FAILED and not _unknown(self.talk.why) and self.true
         )
         if not halted:
             self.still = None
@@ -245,14 +245,14 @@ class Sending(RuleBasedStateMachine):
         patience_s = self.talk.manner.patience_s
 
         def going_on(talk: Any, now: float) -> None:
-            if talk.state in (State.PAUSED, State.WAITING):
+            if talk.state in (WireState.PAUSED, WireState.WAITING):
                 talk.resume(now)
 
         self.talk.single = False
         self.both.until(self.both.now + BOUND * self.part.seconds + 10.0 * patience_s, going_on)
         assert self.talk.ended, (self.talk.state, self.talk.why)
         self.all_is_well()
-        if self.talk.state is State.FINISHED:
+        if self.talk.state is WireState.FINISHED:
             assert self.talk.done == len(self.part.packets)
             assert not self.twin.moves
             if self.true:
@@ -273,7 +273,7 @@ class Sending(RuleBasedStateMachine):
         talk = wire.conversation(rest.packets, target.machine, Manner())
         both = Talking(talk, Wired(twin), coarse=True)
         both.until(BOUND * rest.seconds + 60.0)
-        assert talk.state is State.FINISHED, talk.why
+        assert talk.state is WireState.FINISHED, talk.why
         assert twin.decoded == rest.blocks
         again, wanted = ends_of(rest.forecast.decoded), ends_of(decoded, int(rows[0]))
         unit = [target.target.unit_mm(target.machine, axis) for axis in target.machine.axes]
@@ -331,14 +331,14 @@ def stopped_and_gone_on(name: str, seed: int) -> str:
     stop_s = float(chance.uniform(0.0, one.seconds))
 
     def stopping(talk: Conversation, now: float) -> None:
-        if now > stop_s and (seed % 2 or talk.state is State.PAUSED):
+        if now > stop_s and (seed % 2 or talk.state is WireState.PAUSED):
             talk.stop(now)
         elif now > stop_s:
             talk.pause(now)
 
     talk = one.wire.conversation(one.packets, target.machine, Manner())
     Talking(talk, Wired(twin), coarse=name != "pic-mmh").until(1e5, stopping)
-    if talk.state is State.FINISHED:
+    if talk.state is WireState.FINISHED:
         return "finished"
     counts, tool = counts_of(talk, one.block_of), one.place_of(talk)
     left = Left(
@@ -364,7 +364,7 @@ def stopped_and_gone_on(name: str, seed: int) -> str:
     standing = second.standing if one.wire.place == "told" else None
     again = one.wire.conversation(second.packets, target.machine, Manner(standing=standing))
     Talking(again, Wired(twin), coarse=True, now=twin.now).until(2e5)
-    assert again.state is State.FINISHED, (again.why, left, said)
+    assert again.state is WireState.FINISHED, (again.why, left, said)
     trace = motion(program, target)
     of = target.target.read(program, target.machine).block[trace.block]
     whole = trace.commanded[int(np.searchsorted(of, left.block)) :]

@@ -30,7 +30,7 @@ from camtool.sending.faults import Faults, Wired
 from camtool.sending.prepare import forecast_of
 from camtool.target.registry import LoadedTarget, load_target
 from camtool.target.twin import Twin
-from camtool.target.wire import Conversation, Manner, State, Tell, Write
+from camtool.target.wire import Conversation, Manner, Tell, WireState, Write
 from tests.feeding import ROOT, logo
 from tests.oracles.grbl_firmware import Sent, Switch, built, factory, played, source
 from tests.postprocessors.grbl.test_wire import Small
@@ -215,7 +215,7 @@ def stopped_at(
     both.now = now
     both.until(now + LONG_S)
     assert talk.ended
-    if talk.state is State.STOPPED:
+    if talk.state is WireState.STOPPED:
         assert not twin.moves, talk.why
         says = talk.why.startswith("stopped") or talk.why.endswith("says nothing")
         assert says, talk.why
@@ -263,7 +263,7 @@ def test_what_was_not_written_yet_is_never_written(name: str) -> None:
     """A stop comes when an answer has just been heard, and the next lines are to go out."""
     for which in (1, 2, 3, 5, 9, 17):
         talk, twin, after = stopped_with_lines_to_go(WORKS[name], which)
-        assert talk.state in (State.STOPPED, State.FINISHED)
+        assert talk.state in (WireState.STOPPED, WireState.FINISHED)
         assert all(data.startswith(STOPPING) for data in after)
         assert not twin.moves
 
@@ -277,7 +277,7 @@ def check(name: str, count: int) -> None:
     work = WORKS[name]
     for moment in moments(work, count, name):
         talk, _ = stopped_at(work, moment)
-        assert talk.state in (State.STOPPED, State.FINISHED), (moment, talk.why)
+        assert talk.state in (WireState.STOPPED, WireState.FINISHED), (moment, talk.why)
 
 
 @pytest.mark.parametrize("name", sorted(WORKS))
@@ -301,7 +301,7 @@ def test_a_stop_whose_answer_is_lost_is_one_and_is_not_said_to_be(
     name: str, moment: float
 ) -> None:
     talk, twin = stopped_at(WORKS[name], moment, all_answers_lost)
-    assert talk.state is State.FAILED
+    assert talk.state is WireState.FAILED
     assert "did not confirm the stop: switch it off" in talk.why
     assert not twin.moves
 
@@ -314,7 +314,7 @@ def test_a_stop_whose_answer_is_late_is_one(name: str) -> None:
         line.back.faults = Faults(late=1.0, late_s=0.4)
 
     talk, twin = stopped_at(WORKS[name], 7.0, late)
-    assert talk.state is State.STOPPED, talk.why
+    assert talk.state is WireState.STOPPED, talk.why
     assert not twin.moves
 
 
@@ -327,7 +327,7 @@ def test_a_hold_that_grbl_did_not_hear_is_said_again() -> None:
     both.act()
     both.line.there.faults = Faults()
     both.until(60.0)
-    assert both.talk.state is State.STOPPED
+    assert both.talk.state is WireState.STOPPED
     assert twin.slides.commanded_mm[0] < 20.0
 
 
@@ -353,7 +353,7 @@ def test_a_second_stop_resets_grbl_at_once() -> None:
     both.line.write(b"\x18", both.now)
     both.until(LONG_S)
     assert not twin.moves
-    assert both.talk.state is State.STOPPED
+    assert both.talk.state is WireState.STOPPED
     assert "its position is lost" in both.talk.why
 
 
@@ -391,7 +391,7 @@ def test_done_is_said_of_a_jog_only_when_it_stands(name: str) -> None:
             talk.begin(both.now)
             both.talk, both.line = talk, line
             both.until(2.0 * LONG_S)
-        assert talk.state is State.FINISHED, talk.why
+        assert talk.state is WireState.FINISHED, talk.why
         assert not twin.moves
         assert twin.slides.commanded_mm[0] == pytest.approx(x, abs=0.02)
 
@@ -408,7 +408,7 @@ def test_done_is_said_of_homing_only_when_it_stands(step: str, echo: str) -> Non
     both, twin = work.begun()
     both.until(LONG_S)
     if step == "bits":
-        assert both.talk.state is State.FINISHED, both.talk.why
+        assert both.talk.state is WireState.FINISHED, both.talk.why
         assert not twin.moves
     else:
         assert both.talk.why == "nothing says when it stands, since link.step_byte is none"
@@ -692,7 +692,7 @@ def test_whatever_fails_around_a_conversation_stops_the_machine(
         driver.carry(talk)
         assert driver.trouble is not None
     elif isinstance(error, OSError):  # of the port: nobody can be told anything
-        assert driver.carry(talk) is State.FAILED
+        assert driver.carry(talk) is WireState.FAILED
         assert "the port is gone" in talk.why
         assert "it goes on with the lines that it has" in talk.why
         return
@@ -700,7 +700,7 @@ def test_whatever_fails_around_a_conversation_stops_the_machine(
         with pytest.raises(type(error)):
             driver.carry(talk)
     assert failed
-    assert talk.state is State.STOPPED
+    assert talk.state is WireState.STOPPED
     assert b"!" in line.wrote
     assert line.wrote.endswith(b"\x18")
     assert line.small.buffer == b""
@@ -712,7 +712,7 @@ def test_a_second_stop_closes_the_port_when_all_is_written() -> None:
     wishes, write = [Wish.STOP, Wish.CLOSE], line.small.write
     line.small.write = lambda data, now: write(data, now) if len(wishes) == 2 else []  # type: ignore[method-assign]
     driver = Driver(line, wish=lambda: wishes.pop(0) if talk.acknowledged > 3 and wishes else None)
-    assert driver.carry(talk) is State.FAILED
+    assert driver.carry(talk) is WireState.FAILED
     assert talk.why.startswith("camtool was ended before the machine said that it stands")
     assert line.wrote.endswith(b"!?\x18(closed)")
 
@@ -723,7 +723,7 @@ def test_a_port_that_does_not_come_back_holds_up_no_stop() -> None:
     talk, line = work.conversation(), Recorded()
     line.small.write = lambda data, now: []  # type: ignore[method-assign]
     driver = Driver(line, wish=lambda: Wish.STOP if line.opens > 1 else None, speed=1e6)
-    assert driver.carry(talk) is State.STOPPED
+    assert driver.carry(talk) is WireState.STOPPED
     assert line.opens == 2
     assert talk.done == 1
 
@@ -970,7 +970,7 @@ def test_a_stop_of_the_firmware_at_any_moment(
         before = both.now = max(moment, both.now)
         talk.stop(before)
         both.until(LONG_S)
-        assert talk.state is State.STOPPED, (moment, talk.why)
+        assert talk.state is WireState.STOPPED, (moment, talk.why)
         most = 0.1 if homes else GRBL_STOP_MM + AHEAD_MM
         assert line.way_mm(before + 10 * BYTE_S) <= most, moment
         assert line.stood_s() <= both.now
@@ -1015,7 +1015,7 @@ def measured(work: Work, moment_s: float, line: Any = None, *, stop: bool) -> st
     if stop:
         both.talk.stop(moment_s)
         both.until(LONG_S)
-        assert both.talk.state is State.STOPPED, both.talk.why
+        assert both.talk.state is WireState.STOPPED, both.talk.why
     both.line.read(both.now + LONG_S)
     if line is None:
         way, times = way_since(twin, moment_s, place), twin.slides.trace.time_s

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from camtool_postprocessors.gcode.arcs import arcs_accepted, arcs_of
-from camtool_postprocessors.grbl.dialect import Dialect
+from camtool_postprocessors.grbl.dialect import GrblDialect
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -16,12 +16,12 @@ from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.gcode_paths import farthest_mm
 
 
-def dialect(*settings: str) -> Dialect:
-    options: Dialect = load_target("grbl", settings=settings).machine.dialect
+def dialect(*settings: str) -> GrblDialect:
+    options: GrblDialect = load_target("grbl", settings=settings).machine.dialect
     return options
 
 
-def coarse(decimals: int) -> Dialect:
+def coarse(decimals: int) -> GrblDialect:
     """A dialect of fewer decimals than a machine file may say: there the rule is often broken."""
     import msgspec
 
@@ -40,7 +40,7 @@ def one_arc(
     return path.arc(*end, centre=at, ccw=sweep > 0.0, feed=100.0).finish()
 
 
-def rule(out: np.ndarray, back: np.ndarray, unit: float, options: Dialect) -> bool:
+def rule(out: np.ndarray, back: np.ndarray, unit: float, options: GrblDialect) -> bool:
     """grbl's own rule, once more."""
     r1, r2 = math.hypot(*out) * unit, math.hypot(*back) * unit
     gap = abs(r1 - r2)

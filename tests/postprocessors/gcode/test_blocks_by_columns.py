@@ -4,7 +4,7 @@ import msgspec
 import numpy as np
 from camtool_postprocessors.flashcut.write import _Blocks
 from camtool_postprocessors.gcode.plain import PlainRows
-from camtool_postprocessors.gcode.write import Events, Order, Sent
+from camtool_postprocessors.gcode.write import BlockOrder, Events, Sent
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -45,7 +45,7 @@ def test_modal_blocks(rows: list[Row], strip: bool, numbered: bool, of_feed: int
         dropped=0,
     )
     events = Events({k + 5: [f"M{k}"] for k in range(0, count, 2)}, (), False, ())
-    order = Order(sent.is_motion)
+    order = BlockOrder(sent.is_motion)
     order.add(0, ["G90"])
     for at, row in sent.others(events):
         order.add(at, events.blocks[row], row)

@@ -16,8 +16,8 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from camtool_postprocessors.gcode.faults import Fault
-from camtool_postprocessors.grbl.parser import Notes, Parser
+from camtool_postprocessors.gcode.faults import LineFault
+from camtool_postprocessors.grbl.parser import GrblParser, ParserNotes
 from camtool_postprocessors.grbl.twin import _stripped
 
 from camtool.errors import ProgramError
@@ -189,7 +189,7 @@ def test_words(firmware: Callable[..., Ran]) -> None:
         draw = random.Random(seed)
         text = program(draw, worded, 3, 25)
         ran = firmware(text, {"$110": 9000, "$111": 9000, "$112": 9000, "$120": 900, "$121": 900})
-        parser = Parser(target.machine, ToolpathBuilder(), Notes())
+        parser = GrblParser(target.machine, ToolpathBuilder(), ParserNotes())
         for k, line in enumerate(text.splitlines()):
             stripped, wrong = _stripped(line.encode()), 0
             try:
@@ -197,7 +197,7 @@ def test_words(firmware: Callable[..., Ran]) -> None:
                     wrong = 11
                 elif stripped:
                     parser.line(stripped)
-            except Fault as fault:
+            except LineFault as fault:
                 found = re.search(r"\(error:(\d+)\)", fault.message)
                 if found is None:  # what grbl takes and nobody can simulate
                     break

@@ -11,7 +11,7 @@ from camtool_postprocessors.grbl.wire import BUFFER_BYTES, GrblWire
 
 from camtool.sending.prepare import consignment, forecast_of
 from camtool.target.registry import load_target
-from camtool.target.wire import Conversation, Manner, Packet, State, Tell, Write
+from camtool.target.wire import Conversation, Manner, Packet, Tell, WireState, Write
 
 PLAIN = Manner()
 TARGET = load_target("grbl")
@@ -150,14 +150,14 @@ def test_blocks_behind_the_last_move_are_packets_too() -> None:
 
 def test_every_line_arrives_once_and_in_order() -> None:
     talk, small = held()
-    assert talk.state is State.FINISHED
+    assert talk.state is WireState.FINISHED
     assert small.lines == [each.data.strip() for each in packets()]
     assert talk.done == len(packets())
 
 
 def test_settings_that_differ_are_an_error_that_names_them() -> None:
     talk, small = held(small=Small(settings={**LISTING, 101: 80.0}))
-    assert talk.state is State.FAILED
+    assert talk.state is WireState.FAILED
     assert "$101 is 80.000" in talk.why
     assert small.lines == []
 
@@ -186,17 +186,17 @@ def test_no_fault_of_an_answer_loses_or_doubles_a_block(kind: str, seed: int) ->
         return [line if kind == "double" else b"\x01" + line[1:] for _ in made[kind]]
 
     talk, small = held(fault)
-    assert talk.state in (State.FINISHED, State.FAILED)
+    assert talk.state in (WireState.FINISHED, WireState.FAILED)
     wanted = [each.data.strip() for each in packets()]
     assert small.lines == wanted[: len(small.lines)]
     assert talk.done <= len(small.lines)
-    if talk.state is State.FAILED:
+    if talk.state is WireState.FAILED:
         assert small.reset == 2  # at the beginning, and to stop it
 
 
 def test_many_doubled_answers_never_overflow_its_buffer() -> None:
     talk, small = held(lambda number, line: [line, line] if line == b"ok" else [line])
-    assert talk.state is State.FAILED
+    assert talk.state is WireState.FAILED
     assert small.fullest < BUFFER_BYTES
     wanted = [each.data.strip() for each in packets()]
     assert small.lines == wanted[: len(small.lines)]
@@ -208,25 +208,25 @@ def test_a_stop_holds_resets_and_says_where_it_stands() -> None:
             talk.stop(now)
 
     talk, small = held(wish=wish)
-    assert talk.state is State.STOPPED
+    assert talk.state is WireState.STOPPED
     assert small.buffer == b""
     assert 30 <= len(small.lines) < 60
     assert talk.done <= len(small.lines)
 
 
 def test_a_pause_is_one_only_when_it_stands_and_goes_on() -> None:
-    seen = list[State]()
+    seen = list[WireState]()
 
     def wish(talk: Conversation, now: float) -> None:
         seen.append(talk.state)
-        if talk.acknowledged == 20 and State.PAUSED not in seen:
+        if talk.acknowledged == 20 and WireState.PAUSED not in seen:
             talk.pause(now)
-        elif talk.state is State.PAUSED:
+        elif talk.state is WireState.PAUSED:
             talk.resume(now)
 
     talk, small = held(wish=wish)
-    assert State.PAUSED in seen
-    assert talk.state is State.FINISHED
+    assert WireState.PAUSED in seen
+    assert talk.state is WireState.FINISHED
     assert len(small.lines) == len(packets())
 
 
@@ -235,30 +235,30 @@ def test_single_blocks_wait_each() -> None:
 
     def wish(talk: Conversation, now: float) -> None:
         nonlocal waits
-        if talk.state is State.PAUSED:
+        if talk.state is WireState.PAUSED:
             waits += 1
             assert talk.sent == talk.done == waits
             talk.resume(now)
 
     talk, _ = held(wish=wish, manner=Manner(single=True))
-    assert talk.state is State.FINISHED
+    assert talk.state is WireState.FINISHED
     assert waits == len(packets()) - 1
 
 
 def test_single_blocks_that_are_no_longer_wanted_go_on() -> None:
     def wish(talk: Conversation, now: float) -> None:
-        if talk.sent and talk.state is State.SENDING:
+        if talk.sent and talk.state is WireState.SENDING:
             talk.single = False
             talk.resume(now)
 
     talk, small = held(wish=wish, manner=Manner(single=True))
-    assert talk.state is State.FINISHED
+    assert talk.state is WireState.FINISHED
     assert len(small.lines) == len(packets())
 
 
 def test_silence_ends_within_bounds() -> None:
     talk, _ = held(lambda number, line: [] if number > 40 else [line])
-    assert talk.state is State.FAILED
+    assert talk.state is WireState.FAILED
     assert "not" in talk.why
 
 
@@ -280,14 +280,14 @@ def test_answers_of_startup_lines_are_none_of_the_programs(line: bytes, words: s
     """grbl runs $N0 and $N1 behind its banner and behind homing, and says so (report.c)."""
     told = list[str]()
     talk, small = held(small=Small(begins=[line]), told=told)
-    assert talk.state is State.FINISHED, talk.why
+    assert talk.state is WireState.FINISHED, talk.why
     assert small.lines == [each.data.strip() for each in packets()]
     assert [each for each in told if "startup" in each] == [words]
     values = {"x": 1.0, "y": 0.0, "z": 0.0, "feed": 100.0}
     for order in ORDERS:
         talk = GrblWire().command(order, TARGET.machine, values, PLAIN)
         talk, small = held(small=Small(begins=[line]), talk=talk)
-        assert talk.state is State.FINISHED, (order, talk.why)
+        assert talk.state is WireState.FINISHED, (order, talk.why)
         assert len(small.lines) == 1
 
 
@@ -305,7 +305,7 @@ def test_startup_lines_that_change_what_a_program_means_are_refused(
 ) -> None:
     talk = GrblWire().conversation(packets(program), TARGET.machine, PLAIN)
     talk, small = held(small=Small(begins=[b">G0:ok"], modes=modes), talk=talk)
-    assert talk.state is (State.FAILED if why else State.FINISHED), talk.why
+    assert talk.state is (WireState.FAILED if why else WireState.FINISHED), talk.why
     assert why in talk.why
     assert bool(small.lines) != bool(why)
 
@@ -331,7 +331,7 @@ def test_a_locked_one_is_advised_by_its_own_settings(
     talk.begin(0.0)
     talk.received(b"".join(line + b"\r\n" for line in (b"Grbl 1.1h ['$' for help]", *says)), 0.0)
     talk, small = held(small=small, talk=talk)
-    assert talk.state is State.FAILED
+    assert talk.state is WireState.FAILED
     assert all(each in talk.why for each in words), talk.why
     assert (homing == 0.0) or "$22" not in talk.why
     assert "--home" not in talk.why or homing
@@ -349,7 +349,7 @@ def test_one_that_a_reset_locks_is_seen_before_anything_is_sent() -> None:
     begins = [b"[MSG:Check Limits]", b"[MSG:'$H'|'$X' to unlock]"]
     small = Locking(settings={**LISTING, 22: 0.0}, begins=begins, closed="Z")
     talk, small = held(small=small)
-    assert talk.state is State.FAILED
+    assert talk.state is WireState.FAILED
     assert "Check Limits" in talk.why
     assert "limit of Z" in talk.why
     assert small.lines == []
@@ -357,7 +357,7 @@ def test_one_that_a_reset_locks_is_seen_before_anything_is_sent() -> None:
 
 def test_a_locked_one_is_unlocked_where_that_is_asked_for() -> None:
     talk, small = held(small=Small(locked=True), manner=Manner(unlock=True))
-    assert talk.state is State.FINISHED, talk.why
+    assert talk.state is WireState.FINISHED, talk.why
     assert small.lines == [b"$X", *(each.data.strip() for each in packets())]
 
 
@@ -379,7 +379,7 @@ def test_what_is_no_grbl_is_named(heard: bytes, words: list[str]) -> None:
     talk.received(heard, 0.5)
     while not talk.ended:
         talk.elapsed(talk.next_s)
-    assert talk.state is State.FAILED
+    assert talk.state is WireState.FAILED
     assert all(each in talk.why for each in words), talk.why
     assert talk.sent == 0
 
@@ -391,7 +391,7 @@ def test_switches_that_close_while_it_works_are_told() -> None:
         small.closed = "Z" if talk.acknowledged >= 30 else ""
 
     talk, _ = held(small=small, wish=wish, told=told)
-    assert talk.state is State.FINISHED
+    assert talk.state is WireState.FINISHED
     assert told.count("it reports closed switches: limit of Z") == 1
 
 
@@ -415,12 +415,12 @@ def test_a_stop_of_the_program_is_said_once_though_reports_are_late() -> None:
         return [late.pop(0)] if len(late) > 1 else []
 
     def wish(talk: Conversation, now: float) -> None:
-        if talk.state is State.WAITING:
+        if talk.state is WireState.WAITING:
             waits.append(talk.why)
             talk.resume(now)
 
     talk, small = held(fault, wish, small=Stopping(), talk=talk)
-    assert talk.state is State.FINISHED, talk.why
+    assert talk.state is WireState.FINISHED, talk.why
     assert small.lines == [b"G1X1F200", b"M0", b"G1X2", b"G1X3"]
     assert waits == ["the program waits: swap"]
 
@@ -461,7 +461,7 @@ def test_soft_limits_that_are_certain_are_found_before_anything_moves(
     small = Limited(zero)
     small.build = build
     talk, small = held(small=small, talk=talk)
-    assert talk.state is (State.FAILED if why else State.FINISHED), talk.why
+    assert talk.state is (WireState.FAILED if why else WireState.FINISHED), talk.why
     assert why in talk.why
     assert (b"$H" in small.lines) is not bool(why)
 

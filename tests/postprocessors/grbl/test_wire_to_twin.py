@@ -14,7 +14,7 @@ from msgspec.structs import replace
 from camtool.sending.faults import Faults, Wired
 from camtool.sending.prepare import forecast_of
 from camtool.target.registry import load_target
-from camtool.target.wire import Conversation, Manner, Packet, Standing, State
+from camtool.target.wire import Conversation, Manner, Packet, ResumePoint, WireState
 from tests.feeding import logo, made, same_motion
 from tests.oracles.grbl_firmware import Line, Switch, built, source
 from tests.sending.talking import talked
@@ -47,7 +47,7 @@ def test_the_logo_arrives_and_moves_as_verify_says() -> None:
     program = logo("grbl")
     talk = conversation(program)
     talked(talk, Wired(twin), latest_s=1000.0)
-    assert talk.state is State.FINISHED, talk.why
+    assert talk.state is WireState.FINISHED, talk.why
     same_motion(twin, program, loaded)
 
 
@@ -60,8 +60,8 @@ def test_faults_never_skip_or_double_a_block(fault: str, seed: int) -> None:
     talked(talk, Wired(twin, back=Faults.of(fault), seed=seed), latest_s=1000.0)
     wanted = sent_without_faults()
     assert twin.decoded == list(wanted[: len(twin.decoded)])
-    assert talk.state in (State.FINISHED, State.FAILED)
-    if talk.state is State.FAILED and "unplug" not in fault:
+    assert talk.state in (WireState.FINISHED, WireState.FAILED)
+    if talk.state is WireState.FAILED and "unplug" not in fault:
         assert not twin.moves
 
 
@@ -74,7 +74,7 @@ def test_a_stop_leaves_nothing_that_moves() -> None:
             talk.stop(now)
 
     talked(talk, Wired(twin), wish, latest_s=100.0)
-    assert talk.state is State.STOPPED, talk.why
+    assert talk.state is WireState.STOPPED, talk.why
     assert not twin.moves
 
 
@@ -83,7 +83,7 @@ def test_dwells_are_no_missing_answers_and_missing_ones_are_noticed() -> None:
     twin, _ = made("grbl")
     talk = conversation(program)
     talked(talk, Wired(twin), latest_s=100.0)
-    assert talk.state is State.FINISHED, talk.why
+    assert talk.state is WireState.FINISHED, talk.why
     twin, _ = made("grbl")
     line, talk = Wired(twin), conversation(program)
 
@@ -91,7 +91,7 @@ def test_dwells_are_no_missing_answers_and_missing_ones_are_noticed() -> None:
         line.back.faults = Faults(drop=1.0 if talk.acknowledged == 2 and now < 6.5 else 0.0)
 
     talked(talk, line, wish, latest_s=100.0)
-    assert talk.state is State.FAILED
+    assert talk.state is WireState.FAILED
 
 
 def test_short_lines_are_sent_as_fast_as_the_machine_takes_them() -> None:
@@ -110,7 +110,7 @@ def test_short_lines_are_sent_as_fast_as_the_machine_takes_them() -> None:
         tuple(wire.packets(program, loaded.machine, forecast)), loaded.machine, Manner()
     )
     talked(talk, Wired(twin, paced=True), latest_s=100.0)
-    assert talk.state is State.FINISHED, talk.why
+    assert talk.state is WireState.FINISHED, talk.why
     times = twin.slides.trace.time_s
     assert times[-1] - times[0] < 1.02 * forecast.seconds.sum()
 
@@ -118,7 +118,7 @@ def test_short_lines_are_sent_as_fast_as_the_machine_takes_them() -> None:
 # The firmware itself instead of the twin (GRBL_SOURCE names its sources).
 
 SQUARE = b"G21G90\nG0Z5\nG1X3F500\nG1Y2\nG0Z6\n"
-LEFT = Standing((1.5, -2.0, -1.0), True, np.zeros((0, 3)), "journal")
+LEFT = ResumePoint((1.5, -2.0, -1.0), True, np.zeros((0, 3)), "journal")
 CLOSED = [Switch("X", 0, 5)]
 """The limit switch of X is closed until it has gone 5 steps."""
 BESIDE = Manner(reach_mm=((0.0, 0.0, 0.0), (3.0, 2.0, 6.0)))
@@ -173,7 +173,7 @@ def test_conversations_with_the_firmware(
     talk = wire.conversation(made, loaded.machine, manner)
     line: Any = Line(firmware, tmp_path, before, switches)
     talked(talk, line, latest_s=100.0)
-    assert talk.state is (State.FAILED if why else State.FINISHED), talk.why
+    assert talk.state is (WireState.FAILED if why else WireState.FINISHED), talk.why
     assert why in talk.why
     went = line.played.steps[-1].tolist() if len(line.played.steps) else None
     assert went == (None if steps is None else list(steps))

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from camtool_postprocessors.i8751.dogleg import FREE, Line, elbows, reaches
+from camtool_postprocessors.i8751.dogleg import FREE, StepLine, elbows, reaches
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -61,7 +61,7 @@ def test_cut_lines_stay_within_the_tolerance(
     step_mm = (x_mm, y_mm)
     tolerance = 0.5 * max(step_mm) + above
     reach = int(reaches(np.array([[dx, dy]]), step_mm, tolerance)[0])
-    pieces = Line(dx, dy, reach).pieces(most)
+    pieces = StepLine(dx, dy, reach).pieces(most)
     assert (sum(x for x, _ in pieces), sum(y for _, y in pieces)) == (dx, dy)
     assert all((x or y) and max(abs(x), abs(y)) <= most for x, y in pieces)
     assert farthest(places_of(pieces), (dx, dy), step_mm) <= tolerance * (1.0 + 1e-9)
@@ -75,33 +75,33 @@ def test_no_more_records_than_the_formula_says(dx: int, dy: int, tolerance: floa
     # Whole steps take at most one step from each reach.
     near = tolerance - 0.5
     wanted = math.ceil((formula_mm(dx, dy, (1.0, 1.0)) / near + 1.0) / 2.0)
-    assert len(Line(dx, dy, reach).pieces(65535)) <= max(1, wanted)
+    assert len(StepLine(dx, dy, reach).pieces(65535)) <= max(1, wanted)
 
 
 @pytest.mark.parametrize("steps", [(500, 0), (0, -500), (-500, 500), (500, 200)])
 def test_a_line_that_nothing_binds_is_one_record(steps: tuple[int, int]) -> None:
-    assert Line(*steps).pieces(65535) == [steps]
+    assert StepLine(*steps).pieces(65535) == [steps]
 
 
 def test_steps_beyond_two_bytes_are_split() -> None:
-    assert Line(200_000, 0, FREE).pieces(65535) == [(65535, 0)] * 3 + [(3395, 0)]
-    assert Line(-70_000, 70_000, FREE).pieces(65535) == [(-65535, 65535), (-4465, 4465)]
+    assert StepLine(200_000, 0, FREE).pieces(65535) == [(65535, 0)] * 3 + [(3395, 0)]
+    assert StepLine(-70_000, 70_000, FREE).pieces(65535) == [(-65535, 65535), (-4465, 4465)]
 
 
 def test_the_finest_tolerance_is_a_bresenham_line() -> None:
     """Half a step: the path is that of single steps, some of them joined to one record."""
     reach = int(reaches(np.array([[1000, 410]]), (1.0, 1.0), 0.5)[0])
-    pieces = Line(1000, 410, reach).pieces(65535)
+    pieces = StepLine(1000, 410, reach).pieces(65535)
     assert farthest(places_of(pieces), (1000, 410), (1.0, 1.0)) <= 0.5
     assert len(pieces) <= 411
 
 
 def test_both_ways_look_alike_in_every_octant() -> None:
     reach = int(reaches(np.array([[300, 120]]), (1.0, 1.0), 5.0)[0])
-    first = Line(300, 120, reach).pieces(65535)
+    first = StepLine(300, 120, reach).pieces(65535)
     for right in (1, -1):
         for up in (1, -1):
             mirrored = [(right * x, up * y) for x, y in first]
-            assert Line(300 * right, 120 * up, reach).pieces(65535) == mirrored
+            assert StepLine(300 * right, 120 * up, reach).pieces(65535) == mirrored
             turned = [(up * y, right * x) for x, y in first]
-            assert Line(120 * up, 300 * right, reach).pieces(65535) == turned
+            assert StepLine(120 * up, 300 * right, reach).pieces(65535) == turned

@@ -59,8 +59,8 @@ def test_the_worked_examples_of_the_page() -> None:
 
 
 def test_every_option_has_its_line_on_the_page() -> None:
-    from camtool_postprocessors.i8751.dialect import Dialect
+    from camtool_postprocessors.i8751.dialect import I8751Dialect
 
     page = PAGE.read_text(encoding="utf-8")
-    keys = Dialect.__struct_fields__
+    keys = I8751Dialect.__struct_fields__
     assert [key for key in keys if not re.search(rf"`(dialect\.)?{key}\b", page)] == []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from camtool_postprocessors.i8751.twin import Choices, I8751Twin
+from camtool_postprocessors.i8751.twin import I8751Twin, I8751TwinSettings
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -145,4 +145,4 @@ def test_no_bytes_make_it_fall(pieces: list[bytes]) -> None:
 
 
 def test_the_choices_are_those_of_the_page() -> None:
-    assert Choices().key == "once"
+    assert I8751TwinSettings().key == "once"

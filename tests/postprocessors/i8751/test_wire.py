@@ -9,7 +9,7 @@ import pytest
 from camtool.errors import MachineError
 from camtool.sending.faults import Faults, Wired
 from camtool.sending.prepare import Consignment, consignment
-from camtool.target.wire import Conversation, Manner, State
+from camtool.target.wire import Conversation, Manner, WireState
 from tests.feeding import same_motion
 from tests.postprocessors.i8751.machines import loaded
 from tests.sending.talking import talked
@@ -52,13 +52,13 @@ def test_each_reading_of_what_is_open(settings: list[str], choices: list[str]) -
     data = target.target.write(decoded, target.machine).data
     twin, talk = target.twin(choices), conversation(data, *settings)
     talked(talk, Wired(twin, paced=True), latest_s=3000.0)
-    assert talk.state is State.FINISHED, talk.why
+    assert talk.state is WireState.FINISHED, talk.why
     same_motion(twin, data, target)
 
 
 def test_an_end_of_a_packet_that_is_stored_too() -> None:
     target = loaded().with_settings(["link.packet_end=M F"])
-    for choice, state in (("M F", State.FINISHED), ("F", State.FAILED)):
+    for choice, state in (("M F", WireState.FINISHED), ("F", WireState.FAILED)):
         one = consignment(SHORT, target, source="a.bin")
         talk = one.wire.conversation(one.packets, target.machine, Manner())
         talked(talk, Wired(target.twin([f"packet_end={choice}"])), latest_s=3000.0)
@@ -74,7 +74,7 @@ def test_faults_never_skip_or_double_a_record(fault: str, seed: int, way: str) -
     line = Wired(twin, **{way: faults}, seed=seed, paced=True)  # type: ignore[arg-type]
     now = talked(talk, line, latest_s=1000.0)
     wanted = consigned(SHORT).packets
-    assert talk.state in (State.FINISHED, State.FAILED)
+    assert talk.state in (WireState.FINISHED, WireState.FAILED)
     assert now < 1000.0
     if fault.startswith("garble") and way == "there":
         return  # replies do not repeat what came: nobody sees a wrong number of steps
@@ -83,8 +83,8 @@ def test_faults_never_skip_or_double_a_record(fault: str, seed: int, way: str) -
     assert whole.startswith(taken)
     assert talk.block < len(twin.decoded) + 1
     assert len(twin.decoded) <= talk.block + 1 + 5
-    assert (talk.state is State.FINISHED) == (taken + b"\x54" == whole and talk.block == 22)
-    if talk.state is State.FAILED and "reset" in talk.why:
+    assert (talk.state is WireState.FINISHED) == (taken + b"\x54" == whole and talk.block == 22)
+    if talk.state is WireState.FAILED and "reset" in talk.why:
         assert not twin.moves
 
 
@@ -97,7 +97,7 @@ def test_an_access_that_is_denied_is_asked_for_again() -> None:
         talk.received(b"RO\r\n", 1.0)
         assert [action.data for action in talk.actions()] == [b"\x13"]  # type: ignore[union-attr]
     talk.received(b"OTRO", 1.0)
-    assert talk.state is State.FAILED
+    assert talk.state is WireState.FAILED
 
 
 @pytest.mark.parametrize("at_s", [0.01, 0.2, 1.0, 20.0, 35.0])
@@ -109,7 +109,7 @@ def test_a_stop_never_begins_what_is_not_complete(at_s: float) -> None:
             talk.stop(now)
 
     talked(talk, Wired(twin, paced=True), wish, latest_s=200.0)
-    assert talk.state is State.STOPPED, talk.why
+    assert talk.state is WireState.STOPPED, talk.why
     assert not twin.moves
     assert len(twin.decoded) == talk.block + 1
 
@@ -121,15 +121,15 @@ def test_pauses_are_between_packets(single: bool) -> None:
     rests = list[int]()
 
     def wish(talk: Conversation, now: float) -> None:
-        if talk.state is State.SENDING and not single:
+        if talk.state is WireState.SENDING and not single:
             talk.pause(now)
-        elif talk.state is State.PAUSED:
+        elif talk.state is WireState.PAUSED:
             assert not twin.moves
             rests.append(talk.done)
             talk.resume(now)
 
     talked(talk, Wired(twin), wish, latest_s=2000.0)
-    assert talk.state is State.FINISHED, talk.why
+    assert talk.state is WireState.FINISHED, talk.why
     assert rests[-5:] == [1, 2, 3, 4, 5]
     same_motion(twin, SHORT, target)
 
@@ -140,7 +140,7 @@ def test_a_jog_is_a_program_of_its_steps() -> None:
     values = {"x": 10.0, "z": -1.0, "feed": 60.0}
     talk = wire.command("jog", target.machine, values, Manner())  # type: ignore[union-attr]
     talked(talk, Wired(twin, paced=True), latest_s=1000.0)
-    assert talk.state is State.FINISHED, talk.why
+    assert talk.state is WireState.FINISHED, talk.why
     assert twin.slides.commanded_mm == pytest.approx([10.0, 0.0, -1.0])
     for action in ("home", "zero"):
         with pytest.raises(MachineError, match=f"no command to {action}"):
@@ -165,5 +165,5 @@ def test_one_that_says_nothing_at_first_may_have_another_rate() -> None:
     talk = conversation(SHORT)
     talk.begin(0.0)
     talk.elapsed(talk.next_s)
-    assert talk.state is State.FAILED
+    assert talk.state is WireState.FAILED
     assert "is --baud its rate?" in talk.why

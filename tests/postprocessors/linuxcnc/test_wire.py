@@ -12,7 +12,7 @@ from camtool.errors import MachineError
 from camtool.sending.faults import Wired
 from camtool.sending.prepare import forecast_of
 from camtool.target.registry import LoadedTarget, load_target
-from camtool.target.wire import Conversation, Manner, Standing, State
+from camtool.target.wire import Conversation, Manner, ResumePoint, WireState
 from tests.feeding import logo, same_motion
 from tests.sending.talking import talked
 
@@ -57,7 +57,7 @@ def test_a_program_is_opened_run_and_watched_to_its_end(program: bytes) -> None:
         counts.append((talk.done, talk.acknowledged))
 
     twin, talk, loaded = met(program, wish=wish)
-    assert talk.state is State.FINISHED, talk.why
+    assert talk.state is WireState.FINISHED, talk.why
     same_motion(twin, program, loaded)
     assert talk.done == len(talk.packets) == len(twin.decoded)
     done = np.array(counts)
@@ -73,7 +73,7 @@ def test_what_is_done_has_been_done() -> None:
 
     def wish(talk: Any, now: float) -> None:
         block = talk.block
-        if block >= 0 and not np.isnan(ends[block]).any() and talk.state is State.SENDING:
+        if block >= 0 and not np.isnan(ends[block]).any() and talk.state is WireState.SENDING:
             trace = reached[0].slides.trace.commanded
             assert (np.abs(trace - ends[block]).max(axis=1) < 1e-6).any() or not ends[block].any()
 
@@ -85,23 +85,23 @@ def test_what_is_done_has_been_done() -> None:
     packets = wire.packets(PROGRAM, loaded.machine, forecast_of(decoded, loaded))
     talk = wire.conversation(packets, loaded.machine, Manner(file=FILE))
     talked(talk, Wired(twin), wish, latest_s=100.0)
-    assert talk.state is State.FINISHED, talk.why
+    assert talk.state is WireState.FINISHED, talk.why
 
 
 def test_a_pause_stands_and_goes_on() -> None:
-    seen: list[State] = []
+    seen: list[WireState] = []
     stood: list[int] = []
 
     def wish(talk: Any, now: float) -> None:
         seen.append(talk.state)
-        if talk.acknowledged >= 8 and State.PAUSED not in seen:
+        if talk.acknowledged >= 8 and WireState.PAUSED not in seen:
             talk.pause(now)
-        elif talk.state is State.PAUSED:
+        elif talk.state is WireState.PAUSED:
             stood.append(1)
             talk.resume(now)
 
     twin, talk, loaded = met(PROGRAM, wish=wish)
-    assert talk.state is State.FINISHED, talk.why
+    assert talk.state is WireState.FINISHED, talk.why
     assert stood
     same_motion(twin, PROGRAM, loaded)
 
@@ -110,12 +110,12 @@ def test_single_lines_wait_each() -> None:
     places = []
 
     def wish(talk: Any, now: float) -> None:
-        if talk.state is State.PAUSED:
+        if talk.state is WireState.PAUSED:
             places.append(talk.place_mm)
             talk.resume(now)
 
     twin, talk, loaded = met(PROGRAM, wish=wish, single=True)
-    assert talk.state is State.FINISHED, talk.why
+    assert talk.state is WireState.FINISHED, talk.why
     assert len(set(places)) >= 7
     same_motion(twin, PROGRAM, loaded)
 
@@ -124,13 +124,13 @@ def test_m0_waits_for_the_user() -> None:
     waits = []
 
     def wish(talk: Any, now: float) -> None:
-        if talk.state is State.WAITING:
+        if talk.state is WireState.WAITING:
             waits.append(now)
             talk.resume(now)
 
     program = PROGRAM.replace(b"G1 X2\n", b"M0\nG1 X2\n")
     twin, talk, loaded = met(program, wish=wish)
-    assert talk.state is State.FINISHED, talk.why
+    assert talk.state is WireState.FINISHED, talk.why
     assert len(waits) == 1
     same_motion(twin, program, loaded)
 
@@ -142,7 +142,7 @@ def test_a_stop_aborts_and_nothing_moves_behind_it(at_s: float) -> None:
             talk.stop(now)
 
     twin, talk, _ = met(PROGRAM, wish=wish)
-    assert talk.state is State.STOPPED, talk.why
+    assert talk.state is WireState.STOPPED, talk.why
     count = len(twin.slides.trace)
     twin.advance(1000.0)
     assert len(twin.slides.trace) == count
@@ -161,14 +161,14 @@ def test_what_it_is_not_ready_for(
     choices: list[str], manner: dict[str, bool], there: bool, words: str
 ) -> None:
     twin, talk, _ = met(PROGRAM, choices=choices, there=there, **manner)
-    assert talk.state is State.FAILED
+    assert talk.state is WireState.FAILED
     assert words in talk.why
     assert len(twin.slides.trace) == 0
 
 
 def test_it_is_homed_where_that_is_asked_for() -> None:
     _, talk, _ = met(PROGRAM, choices=["power=on"], home=True)
-    assert talk.state is State.FINISHED, talk.why
+    assert talk.state is WireState.FINISHED, talk.why
 
 
 def test_an_abort_at_the_machine_is_no_end() -> None:
@@ -187,7 +187,7 @@ def test_an_abort_at_the_machine_is_no_end() -> None:
     packets = wire.packets(PROGRAM, loaded.machine, forecast_of(decoded, loaded))
     talk = wire.conversation(packets, loaded.machine, Manner(file=FILE))
     talked(talk, Wired(twins[0]), wish, latest_s=100.0)
-    assert talk.state is State.FAILED
+    assert talk.state is WireState.FAILED
     assert "before the end" in talk.why
 
 
@@ -221,7 +221,7 @@ def test_by_hand(action: str, values: dict[str, float]) -> None:
     wire: Any = loaded.target.wire()
     talk = wire.command(action, loaded.machine, values, Manner())
     talked(talk, Wired(twin), latest_s=200.0)
-    assert talk.state is State.FINISHED, talk.why
+    assert talk.state is WireState.FINISHED, talk.why
     if action == "jog":
         assert twin.slides.commanded_mm == pytest.approx([1.5, -2.0, 0.0])
     if action == "zero":
@@ -251,14 +251,14 @@ def _text(*mm: float) -> str:
 def test_it_goes_on_only_where_the_program_was_left(
     place: Any, still: bool, ends: list[Any], tool_at: Any, said: str
 ) -> None:
-    standing = Standing(place, still, np.array(ends).reshape(-1, 3), tool_at)
+    standing = ResumePoint(place, still, np.array(ends).reshape(-1, 3), tool_at)
     twin, talk, _ = met(PROGRAM, standing=standing)
-    assert (talk.state is State.FINISHED) is not bool(said), talk.why
+    assert (talk.state is WireState.FINISHED) is not bool(said), talk.why
     assert said in talk.why
     assert bool(twin.decoded) is not bool(said)
 
 
 def test_it_cannot_be_told_where_it_stands() -> None:
-    standing = Standing((1.0, 0.0, 0.0), True, np.zeros((0, 3)), "journal")
+    standing = ResumePoint((1.0, 0.0, 0.0), True, np.zeros((0, 3)), "journal")
     with pytest.raises(MachineError, match="keeps its own place"):
         met(PROGRAM, standing=standing)

@@ -12,7 +12,7 @@ from camtool.errors import MachineError, PostError
 from camtool.sending.faults import Faults, Wired
 from camtool.sending.prepare import Consignment, consignment, rest_of
 from camtool.target.registry import LoadedTarget, load_target
-from camtool.target.wire import Conversation, Manner, State, Write
+from camtool.target.wire import Conversation, Manner, WireState, Write
 from tests.feeding import logo, same_motion
 from tests.sending.talking import talked
 
@@ -37,7 +37,7 @@ def conversation(program: bytes, *settings: str, manner: Manner | None = None) -
 
 def going_on(talk: Conversation, now: float) -> None:
     """The user resets the master whenever he is asked."""
-    if talk.state is State.WAITING:
+    if talk.state is WireState.WAITING:
         talk.resume(now)
 
 
@@ -47,7 +47,7 @@ def test_each_form_of_the_logo_arrives_and_moves_as_verify_says() -> None:
         target, program = loaded(*settings), logo("matlab-router", *settings)
         twin, talk = target.twin(), conversation(program, *settings)
         talked(talk, Wired(twin), going_on, latest_s=2000.0, coarse=True)
-        assert talk.state is State.FINISHED, talk.why
+        assert talk.state is WireState.FINISHED, talk.why
         assert b"".join(twin.decoded) == stream
         same_motion(twin, program, target)
 
@@ -62,18 +62,18 @@ def test_each_reading_of_what_is_open(echo: str, expected: str, reset: str) -> N
     talk, asked = conversation(JOBS, *settings), list[str]()
 
     def wish(talk: Conversation, now: float) -> None:
-        if talk.state is State.WAITING:
+        if talk.state is WireState.WAITING:
             asked.append(talk.why)
             assert not twin.moves
         going_on(talk, now)
 
     talked(talk, Wired(twin), wish, latest_s=2000.0, coarse=True)
     if (echo, expected) in (("none", "echo"), ("characters", "none")):
-        assert talk.state is State.FAILED
+        assert talk.state is WireState.FAILED
         assert twin.decoded == []
         assert not twin.moves
         return
-    assert talk.state is State.FINISHED, talk.why
+    assert talk.state is WireState.FINISHED, talk.why
     assert "goes home on the last number" in asked[0]
     assert asked[1:] == (
         ["reset the master for job 2 of 2, which then begins"] * (reset == "hand")
@@ -103,8 +103,8 @@ def test_with_an_echo_no_job_begins_that_came_back_otherwise(fault: str, seed: i
     now = talked(talk, line, going_on, latest_s=1000.0, coarse=True)
     assert now < 1000.0
     assert JOBS.startswith(b"".join(twin.decoded))
-    assert talk.state in (State.FINISHED, State.FAILED)
-    assert (talk.state is State.FINISHED) == (len(twin.decoded) == 2 and talk.block == 4)
+    assert talk.state in (WireState.FINISHED, WireState.FAILED)
+    assert (talk.state is WireState.FINISHED) == (len(twin.decoded) == 2 and talk.block == 4)
     if "has not begun" in talk.why:
         assert not twin.moves
 
@@ -128,7 +128,7 @@ def test_a_stop_never_begins_what_is_not_complete(at_s: float, jobs: int) -> Non
             talk.stop(now)
 
     talked(talk, Wired(twin), wish, latest_s=100.0, coarse=True)
-    assert talk.state is State.STOPPED, talk.why
+    assert talk.state is WireState.STOPPED, talk.why
     assert not twin.moves
     assert len(twin.decoded) == talk.done == jobs
 
@@ -139,14 +139,14 @@ def test_pauses_are_between_jobs() -> None:
 
     def wish(talk: Conversation, now: float) -> None:
         going_on(talk, now)
-        if talk.state is State.PAUSED:
+        if talk.state is WireState.PAUSED:
             assert not twin.moves
             rests.append(talk.done)
             talk.resume(now)
             going_on(talk, now)
 
     talked(talk, Wired(twin), wish, latest_s=1000.0, coarse=True)
-    assert talk.state is State.FINISHED
+    assert talk.state is WireState.FINISHED
     assert rests == [1]
 
 

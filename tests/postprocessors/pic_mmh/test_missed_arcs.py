@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from camtool_postprocessors.pic_mmh.controller import Arc, arc_filler, arc_reach
+from camtool_postprocessors.pic_mmh.controller import StepArc, arc_filler, arc_reach
 from camtool_postprocessors.pic_mmh.dialect import Interpolator
 
 from camtool.errors import OptionError
@@ -32,7 +32,7 @@ def steps_of(row: RowMotion) -> np.ndarray:
     return np.rint(row.commanded / STEP).astype(np.int64)
 
 
-def reach(arc: Arc, method: Interpolator = "dsm") -> tuple[int, bool, np.ndarray]:
+def reach(arc: StepArc, method: Interpolator = "dsm") -> tuple[int, bool, np.ndarray]:
     """Samples, whether the end is met, and the path of these samples."""
     samples, met = arc_reach(arc, arc_filler(arc, method, rounded=False))
     path = np.empty((samples, 2), dtype=np.int64)
@@ -40,7 +40,7 @@ def reach(arc: Arc, method: Interpolator = "dsm") -> tuple[int, bool, np.ndarray
     return samples, met, path
 
 
-def rounded_arc(rng: np.random.Generator) -> Arc:
+def rounded_arc(rng: np.random.Generator) -> StepArc:
     """Start, centre and end of a true arc, each rounded to steps by itself."""
     radius = rng.uniform(50.0, 20_000.0)
     begin, sweep = rng.uniform(0.0, 2.0 * math.pi), rng.uniform(0.3, 6.0)
@@ -51,7 +51,7 @@ def rounded_arc(rng: np.random.Generator) -> Arc:
         np.rint(centre + radius * np.array([math.cos(a), math.sin(a)])) for a in (begin, finish)
     ]
     start, end = (corner - np.rint(centre) for corner in corners)
-    return Arc(int(start[0]), int(start[1]), clockwise, int(end[0]), int(end[1]))
+    return StepArc(int(start[0]), int(start[1]), clockwise, int(end[0]), int(end[1]))
 
 
 def test_how_many_rounded_arcs_meet_their_end() -> None:
@@ -92,10 +92,10 @@ def test_a_missed_arc_stops_in_its_sweep(method: Interpolator) -> None:
 
 def test_an_end_behind_the_start_is_reached_after_a_whole_turn() -> None:
     """Not met and one step behind the start: nearly a turn. One step before it: next to none."""
-    behind, met, _ = reach(Arc(1000, 3, False, 1001, 2))
+    behind, met, _ = reach(StepArc(1000, 3, False, 1001, 2))
     assert not met
     assert behind == pytest.approx(4 * math.sqrt(2.0) * 1000, abs=10)
-    ahead, met, _ = reach(Arc(1000, 3, False, 1001, 4))
+    ahead, met, _ = reach(StepArc(1000, 3, False, 1001, 4))
     assert not met
     assert ahead <= 2
 
@@ -179,7 +179,7 @@ def test_every_tiny_arc_comes_to_an_end() -> None:
         for x, y in places:
             for ex, ey in places[::5]:
                 if (x, y) != (0, 0):
-                    samples, met, path = reach(Arc(x, y, True, ex, ey), method)
+                    samples, met, path = reach(StepArc(x, y, True, ex, ey), method)
                     assert samples < 120
                     assert not met or path[-1].tolist() == [ex, ey]
 

@@ -11,7 +11,7 @@ from camtool.errors import MachineError
 from camtool.sending.faults import Faults, Wired
 from camtool.sending.prepare import forecast_of
 from camtool.target.registry import LoadedTarget, load_target
-from camtool.target.wire import Conversation, Manner, Packet, State
+from camtool.target.wire import Conversation, Manner, Packet, WireState
 from tests.feeding import logo, made, same_motion
 from tests.sending.talking import talked
 
@@ -41,7 +41,7 @@ def test_the_logo_arrives_block_by_block_and_moves_as_verify_says() -> None:
     program = logo("pic-mmh")
     talk = conversation(program, loaded)
     talked(talk, Wired(twin), latest_s=30_000.0, coarse=True)
-    assert talk.state is State.FINISHED, talk.why
+    assert talk.state is WireState.FINISHED, talk.why
     assert twin.decoded == executed(program)
     assert twin.commands == [b"BX204;", b"BY178;"]
     same_motion(twin, program, loaded)
@@ -61,7 +61,7 @@ def test_each_reading_of_what_is_open(choices: list[str], settings: list[str]) -
     twin, loaded = made("pic-mmh", choices, settings)
     talk = conversation(SHORT, loaded, *settings)
     talked(talk, Wired(twin), latest_s=2000.0)
-    assert talk.state is State.FINISHED, talk.why
+    assert talk.state is WireState.FINISHED, talk.why
     same_motion(twin, SHORT, loaded)
 
 
@@ -74,8 +74,8 @@ def test_faults_never_skip_or_double_a_block(fault: str, seed: int) -> None:
     now = talked(talk, line, latest_s=2000.0)
     assert twin.decoded == executed(SHORT)[: len(twin.decoded)]
     assert max(talk.block, -1) < len(twin.decoded)
-    assert talk.state in (State.FINISHED, State.FAILED)
-    if talk.state is State.FAILED and "unplug" not in fault:
+    assert talk.state in (WireState.FINISHED, WireState.FAILED)
+    if talk.state is WireState.FAILED and "unplug" not in fault:
         assert not twin.moves
     assert now < 2000.0
 
@@ -92,7 +92,7 @@ def test_a_stop_is_at_once_and_nothing_moves_behind_it(at_s: float) -> None:
             talk.stop(now)
 
     talked(talk, Wired(twin), wish, latest_s=100.0)
-    assert talk.state is State.STOPPED, talk.why
+    assert talk.state is WireState.STOPPED, talk.why
     assert not twin.moves
     times = twin.slides.trace.time_s
     assert not len(times) or times[-1] <= stopped[0]
@@ -103,14 +103,14 @@ def test_pauses_are_between_blocks() -> None:
     talk = conversation(SHORT, loaded)
 
     def wish(talk: Conversation, now: float) -> None:
-        if talk.state is State.SENDING and talk.sent % 3 == 0:
+        if talk.state is WireState.SENDING and talk.sent % 3 == 0:
             talk.pause(now)
-        elif talk.state is State.PAUSED:
+        elif talk.state is WireState.PAUSED:
             assert not twin.moves
             talk.resume(now)
 
     talked(talk, Wired(twin), wish, latest_s=2000.0)
-    assert talk.state is State.FINISHED, talk.why
+    assert talk.state is WireState.FINISHED, talk.why
     same_motion(twin, SHORT, loaded)
 
 
@@ -130,5 +130,5 @@ def test_one_that_is_not_understood_at_first_may_have_another_rate(heard: bytes)
     talk.received(heard, 0.1)
     while not talk.ended:
         talk.elapsed(talk.next_s)
-    assert talk.state is State.FAILED
+    assert talk.state is WireState.FAILED
     assert "is --baud its rate?" in talk.why

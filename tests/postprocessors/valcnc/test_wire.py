@@ -11,7 +11,7 @@ from camtool.errors import MachineError
 from camtool.sending.faults import Faults, Wired
 from camtool.sending.prepare import Consignment, consignment
 from camtool.target.registry import load_target
-from camtool.target.wire import Conversation, Manner, State, Write
+from camtool.target.wire import Conversation, Manner, WireState, Write
 from tests.feeding import logo, made, same_motion
 from tests.sending.talking import talked as talked_with
 
@@ -43,7 +43,7 @@ def talked(stop_behind: int = 10**9) -> tuple[Conversation, list[tuple[float, by
 def test_each_block_goes_out_once_when_the_one_before_is_over() -> None:
     talk, out = talked()
     one = consigned()
-    assert talk.state is State.FINISHED
+    assert talk.state is WireState.FINISHED
     assert out[0] == (0.0, b"C\n")
     decoded = LOADED.target.read(b"".join(data for _, data in out[1:]), LOADED.machine)
     whole = LOADED.target.read(logo("valcnc"), LOADED.machine)
@@ -54,7 +54,7 @@ def test_each_block_goes_out_once_when_the_one_before_is_over() -> None:
 
 def test_a_stop_waits_for_the_block_that_is_cut() -> None:
     talk, out = talked(stop_behind=20)
-    assert talk.state is State.STOPPED
+    assert talk.state is WireState.STOPPED
     assert talk.done == talk.sent == len(out) == 21
 
 
@@ -77,7 +77,7 @@ def test_a_machine_that_hears_nothing_while_it_draws_hears_every_block(
     twin, loaded = made("valcnc", ["answer=ok"] if answers else [])
     talk, faults = conversation(answers=answers), Faults.of(fault)
     talked_with(talk, Wired(twin, faults, faults, paced=True), latest_s=1000.0)
-    assert talk.state is State.FINISHED, talk.why
+    assert talk.state is WireState.FINISHED, talk.why
     assert b"".join(twin.decoded) == logo("valcnc").replace(b" ", b"")
     same_motion(twin, logo("valcnc"), loaded)
 
@@ -92,8 +92,10 @@ def test_answers_that_fail_end_it_where_it_stands(fault: str, seed: int) -> None
     whole = logo("valcnc").replace(b" ", b"").splitlines(keepends=True)
     assert twin.decoded == whole[: len(twin.decoded)]
     assert talk.block < len(twin.decoded) <= talk.block + 2
-    assert talk.state in (State.FINISHED, State.FAILED)
-    assert (talk.state is State.FINISHED) == (len(twin.decoded) == talk.block + 1 == len(whole))
+    assert talk.state in (WireState.FINISHED, WireState.FAILED)
+    assert (talk.state is WireState.FINISHED) == (
+        len(twin.decoded) == talk.block + 1 == len(whole)
+    )
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -101,7 +103,7 @@ def test_a_block_that_is_lost_on_the_way_is_missed_where_it_answers(seed: int) -
     twin, _ = made("valcnc", ["answer=ok", "wrong=block"])
     talk = conversation(answers=True)
     talked_with(talk, Wired(twin, Faults(drop=0.005), seed=seed, paced=True), latest_s=1000.0)
-    assert talk.state is State.FAILED
+    assert talk.state is WireState.FAILED
     assert len(twin.decoded) <= talk.block + 2
 
 
@@ -109,7 +111,7 @@ def test_a_pulled_plug_ends_it_where_it_stands() -> None:
     twin, _ = made("valcnc")
     talk, pulled = conversation(), Faults(unplug_s=20.0)
     talked_with(talk, Wired(twin, pulled, pulled, paced=True), latest_s=1000.0)
-    assert talk.state is State.FAILED
+    assert talk.state is WireState.FAILED
     assert "plug" in talk.why
     assert talk.block + 1 <= len(twin.decoded) <= talk.block + 2
 
@@ -119,24 +121,24 @@ def test_a_pause_is_between_blocks_and_goes_on_behind_them() -> None:
     talk = conversation()
 
     def wish(talk: Conversation, now: float) -> None:
-        if talk.state is State.SENDING and talk.sent % 40 == 0:
+        if talk.state is WireState.SENDING and talk.sent % 40 == 0:
             talk.pause(now)
-        elif talk.state is State.PAUSED:
+        elif talk.state is WireState.PAUSED:
             assert not twin.moves
             talk.resume(now)
 
     talked_with(talk, Wired(twin, paced=True), wish, latest_s=1000.0)
-    assert talk.state is State.FINISHED, talk.why
+    assert talk.state is WireState.FINISHED, talk.why
     same_motion(twin, logo("valcnc"), loaded)
 
 
 def test_what_it_says_unasked_is_an_error_only_where_answers_are_awaited() -> None:
-    for answers, state in ((False, State.SENDING), (True, State.FAILED)):
+    for answers, state in ((False, WireState.SENDING), (True, WireState.FAILED)):
         talk = conversation(answers=answers)
         talk.begin(0.0)
         talk.received(b"hello\n", 0.0)
         talk.elapsed(1.0)
-        assert talk.state is State.SENDING
+        assert talk.state is WireState.SENDING
         talk.received(b"hello\n", 1.0)
         assert talk.state is state, talk.why
 
