@@ -18,6 +18,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from msgspec import Struct
@@ -135,7 +136,9 @@ class Polylines:
         return Polyline._trusted(self.vertices[low:high], bool(self.closed[index]))
 
     def __iter__(self) -> Iterator[Polyline]:
-        return (self[index] for index in range(len(self)))
+        bounds = pairwise(self.offsets.tolist())
+        for (begin, end), is_closed in zip(bounds, self.closed.tolist(), strict=True):
+            yield Polyline._trusted(self.vertices[begin:end], is_closed)
 
     def select(self, indices: Iterable[int] | Ints) -> Polylines:
         """The paths of these indices, in this order, the very columns where these are all;

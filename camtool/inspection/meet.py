@@ -392,7 +392,7 @@ def _rows(job: Job) -> Iterator[tuple[int, int, Operation]]:
 # The contours whose walls are moved.
 
 
-class Contours(Struct, frozen=True, eq=False):
+class JobContours(Struct, frozen=True, eq=False):
     """The contours of a job by the names of their entities. `cut`: which names the operation in
     each row of the file takes; `walls`: the same of those that have allowances; `depth`: in how
     many others each lies; `head`: walls with one head move alike, for an operation cannot be
@@ -406,7 +406,7 @@ class Contours(Struct, frozen=True, eq=False):
     of_path: tuple[str, ...]
 
     @classmethod
-    def of(cls, case: Case, job: Job) -> Contours:
+    def of(cls, case: Case, job: Job) -> JobContours:
         """Those of a job."""
         placed = place(case.drawing, job)
         sides = Sides.of(placed, job, case.target.machine.defaults.cut_depth_mm)
@@ -479,7 +479,7 @@ class Contours(Struct, frozen=True, eq=False):
 
 
 def closed_form(
-    inspector: Inspector, verdicts: Sequence[InspectedReport | None], contours: Contours
+    inspector: Inspector, verdicts: Sequence[InspectedReport | None], contours: JobContours
 ) -> dict[str, float]:
     """By how much more should be left on the wall of each contour, mm; {} where nothing helps.
     `verdicts` are those of the inspector's dimensions, None for what could not be measured."""
@@ -574,9 +574,9 @@ class Bench(Struct, eq=False, dict=True):
         return self.case.job_of(self.case.tables)
 
     @cached_property
-    def contours(self) -> Contours:
+    def contours(self) -> JobContours:
         """Those of the job as it is."""
-        return Contours.of(self.case, self.job)
+        return JobContours.of(self.case, self.job)
 
     def first(self) -> Trial:
         """The job as it is. Raises what posting it raises, and OptionError for a program with

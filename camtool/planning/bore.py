@@ -56,7 +56,7 @@ from camtool.planning.findings import (
     NOTHING_DRAWN_TO_BORE,
 )
 from camtool.planning.finish import along_walls
-from camtool.planning.items import Chosen, Contours, CutRun, Fixed, Setting, Work
+from camtool.planning.items import Chosen, Contour, CutRun, Fixed, Setting, Work
 from camtool.planning.job import Operation
 from camtool.planning.naming import at_place, key_of, operation_name, shortened_list, tool_name
 from camtool.planning.paths import QUARTER
@@ -106,7 +106,7 @@ def bore(chosen: Chosen, setting: Setting) -> Work:
     return Work(tuple(items), tuple(findings))
 
 
-def _walls(holes: list[Hole], setting: Setting) -> Contours:
+def _walls(holes: list[Hole], setting: Setting) -> list[Contour]:
     """The contours along the walls of the bores."""
     away = setting.operation.away_mm
     rings = [

@@ -54,7 +54,7 @@ from camtool.planning.findings import (
     TOOL_NOT_SAID,
     TOOL_NOT_SAID_APART,
 )
-from camtool.planning.items import Contours, Fixed, Setting, Step
+from camtool.planning.items import Fixed, Setting, Step, contours_of
 from camtool.planning.job import MILLS, Job, Stock, Tool
 from camtool.planning.naming import (
     at_place,
@@ -496,17 +496,18 @@ def _loose_pieces(step: Step, gone: Container[int]) -> Iterator[Finding]:
     of holes, and of contours that the tool runs on, where the part without may be what stays."""
     from camtool.geometry.offset import offset_shape
 
-    tool, contours = step.operation.tool, Contours.of_items(step.items)
+    tool = step.operation.tool
     if tool.diameter_mm == 0.0 or step.operation.stage == "finish":
         return
     beside = runs_beside(step.operation)
     parts = set(step.chosen.source[step.chosen.rim].tolist()) if beside else set[int]()
     held = {bridge.name for bridge in step.bridges}
-    for row in np.flatnonzero(contours.lines.closed).tolist():
-        source = int(contours.source[row])
-        if source in parts or source in gone or contours.names[row] in held:
+    for contour in contours_of(step.items):
+        if not contour.path.closed or contour.name in held:
             continue
-        path = contours.lines.select([row])
+        if contour.source in parts or contour.source in gone:
+            continue
+        path = Polylines.of([contour.path])
         round_ = lines_reversed(path, signed_areas(path) < 0.0)
         pieces = offset_shape(round_, tool.radius_mm)
         areas = signed_areas(pieces)
@@ -514,7 +515,7 @@ def _loose_pieces(step: Step, gone: Container[int]) -> Iterator[Finding]:
             continue
         largest = pieces.select([int(areas.argmax())])
         mend = "give it tabs in an operation of its own, or clear it with a pocket"
-        yield _loose_piece(contours.names[row], largest, mend)
+        yield _loose_piece(contour.name, largest, mend)
 
 
 def _loose_islands(step: Step) -> Iterator[Finding]:

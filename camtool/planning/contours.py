@@ -20,7 +20,7 @@ from camtool.arrays import Floats, Ints
 from camtool.findings import Finding
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines
 from camtool.planning.findings import ENTRY_CHANGED
-from camtool.planning.items import RAPID, Bridge, Contour, Contours, Feeds, Runs
+from camtool.planning.items import RAPID, Bridge, Contour, Feeds, Runs
 from camtool.planning.leads import NO_LEADS, KeepOut, Leads, leads_of
 from camtool.planning.naming import at_place
 from camtool.planning.paths import MeasuredPath, MeasuredPaths
@@ -38,7 +38,7 @@ from camtool.planning.ramps import (
 from camtool.planning.tabs import Tab, bridges_of, raised, tabs_of
 
 CONTOURS_AT_ONCE = 1 << 12
-"""So many contours are Python objects at a time, some 2 KB each."""
+"""Contours measured and lifted together: their measures take about 2 KB each."""
 
 START_SNAP_MM = 1e-3
 """A start nearer than this to a vertex is moved to that vertex, so that no shorter move arises."""
@@ -70,7 +70,7 @@ class _Pass(Struct, frozen=True, eq=False):
 
 
 def runs_of(
-    contours: Contours | Sequence[Contour], order: Ints, paths: Polylines, keep_out: KeepOut
+    contours: Sequence[Contour], order: Ints, paths: Polylines, keep_out: KeepOut
 ) -> CutContours:
     """How contours of one operation are cut, those of the indices `order` (M,) in that order.
 

@@ -31,7 +31,7 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.measure import extents, path_extents
 from camtool.geometry.nesting import nesting
 from camtool.geometry.polylines import Polylines, Segments, reverse
-from camtool.planning.items import Contour, Contours, Runs, Setting, Step
+from camtool.planning.items import Contour, Runs, Setting, Step, contours_of
 from camtool.planning.job import Operation, Tool
 from camtool.planning.sides import runs_beside
 from camtool.toolpath.moves import Toolpath
@@ -171,8 +171,8 @@ def _edges(step: Step, later: Step | None, placed: Drawing) -> _Edges:
         unsized, boxes = np.full(len(step.runs), NO_EDGE), np.empty((0, 2, 2))
         return _Edges(unsized, boxes, boxes, unsized[:0], none, none)
     drawn = path_extents(placed.paths)
-    if isinstance(step.items, Contours):
-        return _beside_or_on(step, drawn)
+    if contours := contours_of(step.items):
+        return _beside_or_on(step, contours, drawn)
     source = np.array([item.source for item in step.items])[step.owner]
     line, planned = drawn[source], _cleared_boxes(step.runs, operation.tool)
     if operation.kind != "vcarve":
@@ -184,18 +184,17 @@ def _edges(step: Step, later: Step | None, placed: Drawing) -> _Edges:
     return _Edges(every, line, planned, source, ~is_cleared, is_cleared)
 
 
-def _beside_or_on(step: Step, drawn: Floats) -> _Edges:
+def _beside_or_on(step: Step, contours: Sequence[Contour], drawn: Floats) -> _Edges:
     """The edges of contours beside their lines, or on them; `drawn` (M, 2, 2): the boxes of what
     is drawn."""
-    contours = Contours.of_items(step.items)
     used = np.unique(step.owner).tolist()
-    centres = path_extents(contours.lines.select(used))
-    source = contours.source[used]
+    centres = path_extents(Polylines.of(contours[k].path for k in used))
+    source = np.array([contours[k].source for k in used])
     nominal, planned = drawn[source], centres.copy()
     followed = np.zeros(len(used), dtype=np.bool_)
     for row, k in enumerate(used):
-        if contours.material_left[k] is None:
-            followed[row] = _cut_radius(contours.settings[k]) > 0.0
+        if contours[k].material_left is None:
+            followed[row] = _cut_radius(contours[k].setting) > 0.0
         else:
             nominal[row], planned[row] = _boxes(contours[k], nominal[row], centres[row])
     of_run = np.searchsorted(used, step.owner)

@@ -18,7 +18,7 @@ from camtool.findings import Finding
 from camtool.geometry.measure import point_at
 from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, Segments
 from camtool.planning.findings import LINES_RUN_TOGETHER
-from camtool.planning.items import Chosen, Contours, Setting, Work
+from camtool.planning.items import Chosen, Setting, Work, contours_along
 from camtool.planning.naming import at_place, key_of
 
 CHORD_RAD = math.pi / 18.0
@@ -48,7 +48,7 @@ def engrave(chosen: Chosen, setting: Setting) -> Work:
             where=key_of(operation, "direction"),
             mend='leave it out, or write "drawn"',
         )
-    items = Contours.along(chosen.lines, setting, chosen.names, chosen.source)
+    items = contours_along(chosen.lines, setting, chosen.names, chosen.source.tolist())
     return Work(items, tuple(run_together(chosen, setting)))
 
 

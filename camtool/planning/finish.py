@@ -30,7 +30,7 @@ from camtool.geometry.polylines import (
     lines_reversed,
 )
 from camtool.planning.findings import FINISH_IN_PASSES, FINISH_IN_PASSES_WHOLE, PlanningCode
-from camtool.planning.items import NO_STARTS, Contours, Setting, Step
+from camtool.planning.items import Contour, Setting, Step
 from camtool.planning.job import Operation
 from camtool.planning.naming import at_place, key_of
 from camtool.planning.settings import levels
@@ -68,27 +68,23 @@ def of_stage(operation: Operation, findings: Iterable[Finding]) -> list[Finding]
 
 def along_walls(
     paths: Polylines, setting: Setting, names: Sequence[str], sources: Sequence[int]
-) -> Contours:
+) -> list[Contour]:
     """Contours on the boundary of tool centre regions, which are on the left of their paths."""
     conventional = setting.operation.direction == "conventional"
-    count = len(paths)
-    return Contours(
-        lines=lines_reversed(paths) if conventional else paths,
-        settings=(setting,) * count,
-        names=tuple(names),
-        source=np.array(sources, dtype=np.int64),
-        reversible=np.zeros(count, dtype=np.bool_),
-        starts=(NO_STARTS,) * count,
-        material_left=(conventional,) * count,
-        outlines=(None,) * count,
-    )
+    lines = lines_reversed(paths) if conventional else paths
+    return [
+        Contour(path, setting, name, source, material_left=conventional)
+        for path, name, source in zip(lines, names, sources, strict=True)
+    ]
 
 
-def in_passes(contours: Contours, setting: Setting, rough: Step) -> tuple[Contours, list[Finding]]:
+def in_passes(
+    contours: list[Contour], setting: Setting, rough: Step
+) -> tuple[list[Contour], list[Finding]]:
     """The contours of a finishing pass; at the levels of the roughing where that has left more
     than the tool takes at once."""
     operation = setting.operation
-    if not len(contours):
+    if not contours:
         return contours, []
     most, where = _engaged(contours, operation, rough)
     if most <= ENGAGED_MOST * operation.tool.diameter_mm + POSITION_EPS_MM:
@@ -101,26 +97,27 @@ def in_passes(contours: Contours, setting: Setting, rough: Step) -> tuple[Contou
             error.message, where=key_of(operation, "step_down"), mend=error.mend
         ) from error
     stepped = replace(setting, levels_mm=passes)
-    contours = replace(contours, settings=(stepped,) * len(contours))
+    contours = [replace(contour, setting=stepped) for contour in contours]
     if math.isinf(most):
         return contours, [FINISH_IN_PASSES_WHOLE(where=where, passes=len(passes))]
     return contours, [FINISH_IN_PASSES(where=where, measured=most, passes=len(passes))]
 
 
-def _engaged(contours: Contours, operation: Operation, rough: Step) -> tuple[float, str]:
+def _engaged(contours: list[Contour], operation: Operation, rough: Step) -> tuple[float, str]:
     """How much there is left beside the wall at most, mm, and where; infinite where nothing was
     roughed."""
     if not len(rough.runs):
-        return math.inf, at_place(contours.names[0], contours.lines[0].start.tolist())
+        return math.inf, at_place(contours[0].name, contours[0].path.start.tolist())
     cleared = _paths(rough)
     most, where = -math.inf, ""
     wide = operation.tool.diameter_mm
-    for path, name in zip(contours.lines, contours.names, strict=True):
+    for contour in contours:
+        path = contour.path
         points = sample(path, wide / SAMPLES_PER_TOOL) if wide else path.vertices[:, :2]
         apart = nearest(points, cleared).distance
         worst = int(apart.argmax())
         if apart[worst] > most:
-            most, where = float(apart[worst]), at_place(name, points[worst].tolist())
+            most, where = float(apart[worst]), at_place(contour.name, points[worst].tolist())
     return most + operation.tool.radius_mm - rough.operation.tool.radius_mm, where
 
 

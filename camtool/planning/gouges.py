@@ -39,7 +39,7 @@ from camtool.planning.findings import (
     SIDE_BY_UNCUT,
     SIDE_BY_UNCUT_FRAME,
 )
-from camtool.planning.items import Chosen, Contours, Work
+from camtool.planning.items import Chosen, Work, contours_of
 from camtool.planning.job import Operation
 from camtool.planning.naming import at_place, operation_name, shortened_list, tool_name
 from camtool.planning.paths import midpoints
@@ -102,8 +102,7 @@ def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> I
     if operation.stage == "rough":
         allowance = 0.0  # what roughing takes of it is not missed
     bevel = operation.chamfer_mm or 0.0  # edges of others are not to be broken
-    items = Contours.of_items(work.items)
-    beside = [k for k, left in enumerate(items.material_left) if left is not None]
+    beside = [item for item in contours_of(work.items) if item.material_left is not None]
     seen, sided = sides.seen_by(operation), sides.sided()
     wanted = sided | seen.bounds
     # Those of one operation with the side auto are offset together.
@@ -113,9 +112,9 @@ def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> I
         wanted[chosen.source] = False
     others = np.flatnonzero(wanted)
     walls = sides.lines.select(others.tolist())
-    paths = items.lines.select(beside)
+    paths = Polylines.of(item.path for item in beside)
     for one, which in near_paths(paths, walls, radius + bevel + max(allowance, 0.0)):
-        item, other = items[beside[one]], int(others[which])
+        item, other = beside[one], int(others[which])
         wall = walls[which]
         if item.source == other:
             continue

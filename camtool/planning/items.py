@@ -4,14 +4,13 @@
 
 An item is cut in one go, before or after others. A `Contour` leaves its start (and perhaps its
 direction) to the order; a `Fixed` item is cut as it is. A `CutRun` is one stay of the tool in the
-stock: it goes down at its first point and comes up at its last one. Where there may be thousands,
-contours and runs are held in columns (`Contours`, `Runs`).
+stock: it goes down at its first point and comes up at its last one. Items are objects; the runs of
+a whole operation are held in columns (`Runs`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import TypeVar
 
 import numpy as np
 from msgspec import Struct, field
@@ -20,8 +19,6 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.findings import Finding
 from camtool.geometry.polylines import Polyline, Polylines
 from camtool.planning.job import Operation
-
-T = TypeVar("T")
 
 RAPID = float("nan")
 """The feed of a part of a run that is a rapid (a drill between two pecks)."""
@@ -162,100 +159,6 @@ class Contour(Struct, frozen=True, eq=False):
     outline: Polyline | None = None
 
 
-class Contours(Struct, frozen=True, eq=False):
-    """M contours in columns, each of which is made when it is asked for: their paths, the `lines`,
-    and of each what a Contour has; `source` (M,), `reversible` (M,)."""
-
-    lines: Polylines
-    settings: tuple[Setting, ...]
-    names: tuple[str, ...]
-    source: Ints
-    reversible: Bools
-    starts: tuple[Ints, ...]
-    material_left: tuple[bool | None, ...]
-    outlines: tuple[Polyline | None, ...]
-
-    @classmethod
-    def of(cls, contours: Iterable[Contour]) -> Contours:
-        """Columns from single contours."""
-        each = list(contours)
-        return cls(
-            Polylines.of(contour.path for contour in each),
-            tuple(contour.setting for contour in each),
-            tuple(contour.name for contour in each),
-            np.array([contour.source for contour in each], dtype=np.int64),
-            np.array([contour.reversible for contour in each], dtype=np.bool_),
-            tuple(contour.starts for contour in each),
-            tuple(contour.material_left for contour in each),
-            tuple(contour.outline for contour in each),
-        )
-
-    @classmethod
-    def of_items(cls, items: Items) -> Contours:
-        """The contours among some items."""
-        if isinstance(items, Contours):
-            return items
-        return cls.of(item for item in items if isinstance(item, Contour))
-
-    @classmethod
-    def along(
-        cls, lines: Polylines, setting: Setting, names: Sequence[str], source: Ints
-    ) -> Contours:
-        """Contours on the lines of these names and sources; open ones may be cut from either
-        end."""
-        count = len(lines)
-        return cls(
-            lines,
-            (setting,) * count,
-            tuple(names),
-            source,
-            ~lines.closed,
-            (NO_STARTS,) * count,
-            (None,) * count,
-            (None,) * count,
-        )
-
-    def with_others(self, others: Contours) -> Contours:
-        """These and others, in the order of their sources."""
-        source = np.concatenate([self.source, others.source])
-        order = np.argsort(source, kind="stable")
-        rows = order.tolist()
-
-        def arranged(mine: tuple[T, ...], theirs: tuple[T, ...]) -> tuple[T, ...]:
-            both = mine + theirs
-            return tuple(both[row] for row in rows)
-
-        return Contours(
-            Polylines.joined([self.lines, others.lines]).select(rows),
-            arranged(self.settings, others.settings),
-            arranged(self.names, others.names),
-            source[order],
-            np.concatenate([self.reversible, others.reversible])[order],
-            arranged(self.starts, others.starts),
-            arranged(self.material_left, others.material_left),
-            arranged(self.outlines, others.outlines),
-        )
-
-    def __len__(self) -> int:
-        return len(self.names)
-
-    def __iter__(self) -> Iterator[Contour]:
-        return (self[index] for index in range(len(self)))
-
-    def __getitem__(self, index: int) -> Contour:
-        row = range(len(self))[index]
-        return Contour(
-            self.lines[row],
-            self.settings[row],
-            self.names[row],
-            int(self.source[row]),
-            bool(self.reversible[row]),
-            self.starts[row],
-            self.material_left[row],
-            self.outlines[row],
-        )
-
-
 class Fixed(Struct, frozen=True, eq=False):
     """Runs that are cut one after the other as they are: a pocket, a hole, a carved letter.
 
@@ -270,7 +173,23 @@ class Fixed(Struct, frozen=True, eq=False):
 
 
 Item = Contour | Fixed
-Items = Contours | Sequence[Item]
+Items = Sequence[Item]
+
+
+def contours_of(items: Items) -> list[Contour]:
+    """Return the contours among the items, in their order."""
+    return [item for item in items if isinstance(item, Contour)]
+
+
+def contours_along(
+    lines: Polylines, setting: Setting, names: Iterable[str], sources: Iterable[int]
+) -> list[Contour]:
+    """Return a contour on each of the lines, with these names and sources (of all M); the material
+    stays on both sides, and open ones may be cut from either end."""
+    return [
+        Contour(path, setting, name, source, reversible=not path.closed)
+        for path, name, source in zip(lines, names, sources, strict=True)
+    ]
 
 
 class Work(Struct, frozen=True, eq=False):

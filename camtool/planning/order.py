@@ -10,7 +10,7 @@ within it has been cut). The same input always gives the same order.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,7 +20,7 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import OptionError
 from camtool.geometry.nesting import nesting
 from camtool.geometry.polylines import Polyline, Polylines, lines_reversed, lines_rolled
-from camtool.planning.items import Contour, Contours, Fixed, Items
+from camtool.planning.items import Contour, Fixed, Items, contours_of
 from camtool.planning.paths import flat, joints
 
 if TYPE_CHECKING:
@@ -95,14 +95,14 @@ def choices_of(items: Items) -> Choices:
     return Choices(owner[order], ends[order, :2], ends[order, 2:])
 
 
-def chosen_paths(contours: Contours, choices: Choices, rows: Ints) -> Polylines:
-    """The paths of the contours that own these rows (R,), in that order: begun where the row
-    says, and in that direction."""
+def chosen_paths(contours: Sequence[Contour], choices: Choices, rows: Ints) -> Polylines:
+    """Return the paths of the contours that own these rows (R,), in that order: begun where the
+    row says, and in that direction."""
     owners = choices.owner[rows]
     rank = rows - choices.first[owners]
     # The places in each closed path where it may begin, the first, the second, and so on.
-    lines = contours.lines
-    begins = np.flatnonzero(_begins(contours))
+    lines = _lines_of(contours)
+    begins = np.flatnonzero(_begins(contours, lines))
     first = np.searchsorted(begins, lines.offsets[:-1])[owners]
     closed = lines.closed[owners]
     start = np.where(closed, begins[first + np.where(closed, rank, 0)] - lines.offsets[owners], 0)
@@ -268,24 +268,26 @@ def _fixed_ends(items: Items) -> Ends:
 
 
 def _fixed(items: Items) -> Iterator[tuple[int, Fixed]]:
-    """The items that are cut as they are, with their indices."""
-    each = () if isinstance(items, Contours) else items
-    return ((k, item) for k, item in enumerate(each) if isinstance(item, Fixed))
+    """Yield the items that are cut as they are, with their indices."""
+    return ((k, item) for k, item in enumerate(items) if isinstance(item, Fixed))
 
 
-def _contours(items: Items) -> tuple[Contours, Ints]:
-    """The contours among the items, and their indices."""
-    if isinstance(items, Contours):
-        return items, np.arange(len(items))
-    index = [k for k, item in enumerate(items) if isinstance(item, Contour)]
-    return Contours.of_items(items), np.array(index, dtype=np.int64)
+def _contour_rows(items: Items) -> Ints:
+    """Return the indices of the contours among the items."""
+    rows = [k for k, item in enumerate(items) if isinstance(item, Contour)]
+    return np.array(rows, dtype=np.int64)
+
+
+def _lines_of(contours: Sequence[Contour]) -> Polylines:
+    """Return the paths of the contours as columns."""
+    return Polylines.of(contour.path for contour in contours)
 
 
 def _contour_ends(items: Items) -> Iterator[Ends]:
     """The variants of contours: of closed ones, of open ones as they run, and of those turned."""
-    contours, owner = _contours(items)
-    lines = contours.lines
-    begins = _begins(contours) & np.repeat(lines.closed, np.diff(lines.offsets))
+    contours, owner = contours_of(items), _contour_rows(items)
+    lines = _lines_of(contours)
+    begins = _begins(contours, lines) & np.repeat(lines.closed, np.diff(lines.offsets))
     of = np.repeat(owner, np.diff(lines.offsets))
     yield of[begins], np.tile(lines.vertices[begins, :2], 2)
     opens = np.flatnonzero(~lines.closed)
@@ -293,22 +295,24 @@ def _contour_ends(items: Items) -> Iterator[Ends]:
         lines.vertices[lines.offsets[opens], :2],
         lines.vertices[lines.offsets[opens + 1] - 1, :2],
     )
-    turns = contours.reversible[opens]
+    is_reversible = [contours[k].reversible for k in opens.tolist()]
+    turns = np.array(is_reversible, dtype=np.bool_)
     # Passes to and fro leave the tool where it went down when their number is even.
-    even = [len(contours.settings[k].levels_mm) % 2 == 0 for k in opens.tolist()]
+    even = [len(contours[k].setting.levels_mm) % 2 == 0 for k in opens.tolist()]
     back = (turns & np.array(even, dtype=np.bool_))[:, None]
     yield owner[opens], np.hstack([start, np.where(back, start, end)])
     yield owner[opens[turns]], np.hstack([end, np.where(back, end, start)])[turns]
 
 
-def _begins(contours: Contours) -> Bools:
-    """(N,) the vertices of contours at which they may begin."""
-    found, offsets = joints(contours.lines), contours.lines.offsets
-    for k, starts in enumerate(contours.starts):
-        if len(starts):
+def _begins(contours: Sequence[Contour], lines: Polylines) -> Bools:
+    """Return the mask (N,) of the vertices of `lines`, the paths of the contours, at which these
+    may begin."""
+    found, offsets = joints(lines), lines.offsets
+    for k, contour in enumerate(contours):
+        if len(contour.starts):
             begin, end = offsets[k : k + 2].tolist()
             found[begin:end] = False
-            found[begin + starts] = True
+            found[begin + contour.starts] = True
     return found
 
 
@@ -336,15 +340,16 @@ def _shapes(items: Items) -> tuple[Polylines, Ints, Ints]:
 
     Only a Contour's path is closed and holds any.
     """
-    contours, owner = _contours(items)
-    lines, shape = contours.lines, np.arange(len(contours))
-    if any(outline is not None for outline in contours.outlines):
+    contours, owner = contours_of(items), _contour_rows(items)
+    lines, shape = _lines_of(contours), np.arange(len(contours))
+    outlines = [contour.outline for contour in contours]
+    if any(outline is not None for outline in outlines):
         # The runs that a contour was divided into share its outline: they hold and lie as it does.
         known: dict[int, int] = {}
-        keys = [-k if path is None else id(path) for k, path in enumerate(contours.outlines, 1)]
+        keys = [-k if path is None else id(path) for k, path in enumerate(outlines, 1)]
         shape = np.array([known.setdefault(key, len(known)) for key in keys])
         first = np.unique(shape, return_index=True)[1].tolist()
-        lines = Polylines.of(contours.outlines[k] or contours.lines[k] for k in first)
+        lines = Polylines.of(outlines[k] or contours[k].path for k in first)
     others = [(k, path) for k, item in _fixed(items) for path in _places_of(item)]
     return (
         Polylines.joined([lines, Polylines.of(path for _, path in others)]),

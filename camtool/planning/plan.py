@@ -22,6 +22,7 @@ from camtool.errors import OptionError
 from camtool.findings import Finding
 from camtool.geometry.drawing import Drawing, is_text
 from camtool.geometry.measure import path_lengths
+from camtool.geometry.polylines import Polylines
 from camtool.machine.model import Machine
 from camtool.planning.checks import checked, with_loose_pieces
 from camtool.planning.contours import runs_of, with_starts
@@ -38,7 +39,18 @@ from camtool.planning.findings import (
 )
 from camtool.planning.finish import in_passes, of_stage
 from camtool.planning.gouges import branch_findings, side_findings
-from camtool.planning.items import Bridge, Chosen, Contours, Items, Runs, Setting, Step, Work
+from camtool.planning.items import (
+    Bridge,
+    Chosen,
+    Contour,
+    Fixed,
+    Items,
+    Runs,
+    Setting,
+    Step,
+    Work,
+    contours_of,
+)
 from camtool.planning.job import Job, Operation, Tool, refuse_endless
 from camtool.planning.leads import KeepOut
 from camtool.planning.link import link
@@ -233,12 +245,13 @@ def _step(
     chosen = choose(placed, setting.operation, sides)
     work = _kind(setting.operation.kind)(chosen, setting)
     items, bare = work.items, list[Finding]()
-    if isinstance(items, Contours):
-        items, bare = with_tabs(_with_starts(items))
-        items = _begun_between_tabs(items)
+    if contours := contours_of(items):
+        contours, bare = with_tabs(_with_starts(contours))
+        contours = _begun_between_tabs(contours)
         if rough is not None:
-            items, more = in_passes(items, setting, rough)
+            contours, more = in_passes(contours, setting, rough)
             bare += more
+        items = contours
     sided = side_findings(work, chosen, sides, setting.operation)
     unclear = branch_findings(placed.healing.branches, chosen, sides, setting.operation)
     findings = of_stage(setting.operation, [*unclear, *work.findings, *sided, *bare])
@@ -255,13 +268,14 @@ def _step(
     rows = best_order(choices, must_precede(items), *ends)
     order = choices.owner[rows]
     bridges: tuple[Bridge, ...] = ()
-    if isinstance(items, Contours):
-        paths = chosen_paths(items, choices, rows)
-        cut = runs_of(items, order, paths, _walls(placed, sides, setting.operation))
+    if contours := contours_of(items):
+        paths = chosen_paths(contours, choices, rows)
+        cut = runs_of(contours, order, paths, _walls(placed, sides, setting.operation))
         runs, counts, bridges = cut.runs, cut.counts, cut.bridges
         findings += of_stage(setting.operation, cut.findings)
     else:
-        each = [item.runs for item in (items[k] for k in order.tolist())]
+        fixed = [item for item in items if isinstance(item, Fixed)]
+        each = [fixed[k].runs for k in order.tolist()]
         runs, counts = Runs.of(chain.from_iterable(each)), tuple(map(len, each))
     return Step(
         operation=setting.operation,
@@ -335,16 +349,17 @@ def _rested(steps: list[Step]) -> list[Step]:
 def _refuse_endless(items: Items, setting: Setting) -> None:
     """OptionError for passes, or an overlap, that go round what is drawn too often."""
     operation, passes = setting.operation, len(setting.levels_mm)
-    lines = Contours.of_items(items).lines
+    paths = [contour.path for contour in contours_of(items)]
     if passes > 1:
         refuse_endless(
-            passes * float(len(lines.vertices)),
+            passes * float(sum(len(path.vertices) for path in paths)),
             key_of(operation, "step_down"),
             f"{passes} passes",
             "give a larger step",
         )
-    if operation.overlap_mm > 0.0 and lines.closed.any():
-        shortest = float(path_lengths(lines)[lines.closed].min())
+    closed = [path for path in paths if path.closed]
+    if operation.overlap_mm > 0.0 and closed:
+        shortest = float(path_lengths(Polylines.of(closed)).min())
         if operation.overlap_mm > MOST_OVERLAPS * shortest:
             raise OptionError(
                 f"an overlap of {operation.overlap_mm:g} mm goes"
@@ -365,23 +380,21 @@ def _walls(placed: Drawing, sides: Sides, operation: Operation) -> KeepOut:
     return KeepOut(placed.paths.select(rows.tolist()), own[rows])
 
 
-def _with_starts(contours: Contours) -> Contours:
+def _with_starts(contours: list[Contour]) -> list[Contour]:
     """Contours, the closed ones with the places where their operation lets them begin."""
-    if not len(contours) or contours.settings[0].operation.start == "nearest":
+    if contours[0].setting.operation.start == "nearest":
         return contours
     made = []
     for contour in contours:
         operation = contour.setting.operation
         path, starts = with_starts(contour.path, operation.start, operation.away_mm)
         made.append(structs.replace(contour, path=path, starts=starts))
-    return Contours.of(made)
+    return made
 
 
-def _begun_between_tabs(contours: Contours) -> Contours:
+def _begun_between_tabs(contours: list[Contour]) -> list[Contour]:
     """The contours, those with tabs by hand beginning farthest from these, if nothing says where:
     no tab can stand where a contour begins."""
-    if not any(each.operation.tabs and each.operation.tabs.at_mm for each in contours.settings):
-        return contours
     made = []
     for contour in contours:
         tabs = contour.setting.operation.tabs
@@ -389,7 +402,7 @@ def _begun_between_tabs(contours: Contours) -> Contours:
             path, starts = with_starts(contour.path, between(contour.path, tabs.at_mm), 0.0)
             contour = structs.replace(contour, path=path, starts=starts)
         made.append(contour)
-    return Contours.of(made)
+    return made
 
 
 def _end(runs: Runs, here: Point) -> Point:

@@ -41,7 +41,7 @@ from camtool.planning.findings import (
     UNREACHED_BETWEEN_MORE,
     PlanningCode,
 )
-from camtool.planning.items import NO_STARTS, Chosen, Contours, Setting, Work
+from camtool.planning.items import NO_STARTS, Chosen, Contour, Setting, Work, contours_along
 from camtool.planning.naming import at_place, shortened_list, tool_name, width_name
 from camtool.planning.paths import joints, midpoints
 from camtool.planning.sides import runs_beside
@@ -96,11 +96,10 @@ def profile(chosen: Chosen, setting: Setting) -> Work:
         found.findings += shortened_list(list(_far(chosen, setting, found.lines)), CORNER_FAR_MORE)
     if operation.corners != "none":
         found.lines = [_relieved(line, chosen, setting, found.findings) for line in found.lines]
-    on_line = Contours.along(
-        chosen.lines.select(opens), setting, [chosen.names[k] for k in opens], chosen.source[opens]
-    )
-    items = _beside(found.lines, chosen, setting).with_others(on_line)
-    return Work(items, tuple(found.findings))
+    names, sources = [chosen.names[k] for k in opens], chosen.source[opens].tolist()
+    on_line = contours_along(chosen.lines.select(opens), setting, names, sources)
+    items = [*_beside(found.lines, chosen, setting), *on_line]
+    return Work(sorted(items, key=lambda each: each.source), tuple(found.findings))
 
 
 def _together(chosen: Chosen, closed: list[int], setting: Setting, found: _Found) -> None:
@@ -292,7 +291,7 @@ def _relieved(line: _Line, chosen: Chosen, setting: Setting, findings: list[Find
     return replace(line, path=path, plain=line.path)
 
 
-def _beside(lines: list[_Line], chosen: Chosen, setting: Setting) -> Contours:
+def _beside(lines: list[_Line], chosen: Chosen, setting: Setting) -> list[Contour]:
     """The lines as the operation's direction has them: climbing, what is to stay is on the
     right."""
     wanted = setting.operation.direction
@@ -307,16 +306,17 @@ def _beside(lines: list[_Line], chosen: Chosen, setting: Setting) -> Contours:
     else:
         turn = left == (wanted == "climb")
     paths = lines_reversed(paths, turn)
-    return Contours(
-        lines=paths,
-        settings=(setting,) * len(lines),
-        names=tuple(chosen.names[k] for k in first),
-        source=chosen.source[first],
-        reversible=np.zeros(len(lines), dtype=np.bool_),
-        starts=tuple(_starts(paths[row], line.plain) for row, line in enumerate(lines)),
-        material_left=tuple((left != turn).tolist()),
-        outlines=(None,) * len(lines),
-    )
+    return [
+        Contour(
+            path,
+            setting,
+            chosen.names[line.of[0]],
+            int(chosen.source[line.of[0]]),
+            starts=_starts(path, line.plain),
+            material_left=is_left,
+        )
+        for path, line, is_left in zip(paths, lines, (left != turn).tolist(), strict=True)
+    ]
 
 
 def _starts(path: Polyline, plain: Polyline | None) -> Ints:

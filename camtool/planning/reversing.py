@@ -38,7 +38,7 @@ from camtool.planning.findings import (
     REVERSALS_IN_AIR,
     REVERSALS_IN_AIR_NOT,
 )
-from camtool.planning.items import Contour, Contours, CutRun, Fixed, Item, Items
+from camtool.planning.items import Contour, CutRun, Fixed, Item, Items
 from camtool.planning.job import Operation
 from camtool.planning.paths import flat
 from camtool.units import UM_PER_MM
@@ -99,8 +99,7 @@ def fewer_reversals(items: Items, machine: Machine) -> tuple[Items, tuple[Findin
             found.append(item)
         else:
             found.extend(_runs_of(item, machine, residual, counts))
-    made = Contours.of_items(found) if isinstance(items, Contours) else tuple(found)
-    return made, tuple(_findings(counts))
+    return tuple(found), tuple(_findings(counts))
 
 
 def _runs_of(

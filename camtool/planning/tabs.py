@@ -44,7 +44,7 @@ from camtool.planning.findings import (
     TAB_SHARED,
     TAB_SHARED_WITH_OWN,
 )
-from camtool.planning.items import Bridge, Contour, Contours, CutRun, Feeds, Runs
+from camtool.planning.items import Bridge, Contour, CutRun, Feeds, Runs
 from camtool.planning.job import Operation, Tool, refuse_endless
 from camtool.planning.naming import at_place, key_of, operation_name
 from camtool.planning.paths import QUARTER, MeasuredPath
@@ -121,47 +121,48 @@ class Tab(Struct, frozen=True):
         return self.top_mm - (self.fall * apart if apart else 0.0)
 
 
-def with_tabs(contours: Contours) -> tuple[Contours, list[Finding]]:
+def with_tabs(contours: list[Contour]) -> tuple[list[Contour], list[Finding]]:
     """The contours of an operation, those without tabs that are to have none; and how many.
 
     Tabs hold parts: where an operation cuts parts free, its holes and open paths get no tabs, nor
     do contours that are too short. Where it cuts none free, everything has tabs as asked. Where
     nothing is long enough, `tabs_of` raises the error.
     """
-    if not len(contours) or not contours.settings[0].operation.tabs:
+    if not contours or not contours[0].setting.operation.tabs:
         return contours, []
-    if contours.settings[0].operation.tabs.at_mm is not None:
+    if contours[0].setting.operation.tabs.at_mm is not None:
         return _by_hand(contours), []
-    asked = list(contours)
-    parts = [k for k, each in enumerate(asked) if each.path.closed and not _is_hole(each)]
-    tabbed = {k for k in parts or range(len(asked)) if _is_long_enough(asked[k])}
-    bare = [each for k, each in enumerate(asked) if tabbed and k not in tabbed]
+    parts = [k for k, each in enumerate(contours) if each.path.closed and not _is_hole(each)]
+    tabbed = {k for k in parts or range(len(contours)) if _is_long_enough(contours[k])}
+    bare = [each for k, each in enumerate(contours) if tabbed and k not in tabbed]
     if not bare:
         return contours, []
     opens = sum(not each.path.closed for each in bare)
     holes = sum(each.path.closed and _is_hole(each) for each in bare)
     kinds = ((holes, "holes"), (opens, "open"), (len(bare) - holes - opens, "too short for them"))
+    setting = contours[0].setting
     finding = TAB_LEFT_OUT_OF_ALL(
-        where=operation_name(asked[0].setting.operation),
+        where=operation_name(setting.operation),
         measured=len(bare),
         kinds=", ".join(f"{count} {kind}" for count, kind in kinds if count),
     )
-    setting = contours.settings[0]
     without = structs.replace(setting, operation=replace(setting.operation, tabs=None))
-    settings = tuple(setting if k in tabbed else without for k in range(len(asked)))
-    return structs.replace(contours, settings=settings), [finding]
+    return [
+        each if k in tabbed else structs.replace(each, setting=without)
+        for k, each in enumerate(contours)
+    ], [finding]
 
 
-def _by_hand(contours: Contours) -> Contours:
+def _by_hand(contours: list[Contour]) -> list[Contour]:
     """The contours, each with the places of the tabs that are nearest to it; OptionError for a
     place that is near to none."""
-    setting = contours.settings[0]
+    setting = contours[0].setting
     operation = setting.operation
     tabs = operation.tabs
     assert tabs is not None
     assert tabs.at_mm is not None
     limit = FAR_FROM_PLACE * max(operation.tool.diameter_mm, tabs.width_mm)
-    lines = Segments.of(contours.lines)
+    lines = Segments.of(Polylines.of(contour.path for contour in contours))
     near = nearest(np.array(tabs.at_mm), lines)
     places: dict[int, list[tuple[float, float]]] = {}
     for place, apart, row in zip(
@@ -175,11 +176,12 @@ def _by_hand(contours: Contours) -> Contours:
                 mend="give a place on a contour, in the work frame (after [place])",
             )
         places.setdefault(int(lines.path[row]), []).append(place)
-    settings = []
-    for row in range(len(contours)):
-        mine = replace(tabs, at_mm=tuple(places[row])) if row in places else None
-        settings.append(structs.replace(setting, operation=replace(operation, tabs=mine)))
-    return structs.replace(contours, settings=tuple(settings))
+    made = []
+    for row, contour in enumerate(contours):
+        own = replace(tabs, at_mm=tuple(places[row])) if row in places else None
+        tabbed = structs.replace(setting, operation=replace(operation, tabs=own))
+        made.append(structs.replace(contour, setting=tabbed))
+    return made
 
 
 def between(path: Polyline, places: Sequence[tuple[float, float]]) -> tuple[float, float]:

@@ -16,7 +16,7 @@ from camtool.geometry.measure import length, sample
 from camtool.geometry.polylines import Polyline, Polylines, reverse, rolled, rotated
 from camtool.planning import contours as module
 from camtool.planning.findings import PlanningCode
-from camtool.planning.items import Contour, Contours, CutRun, Feeds, Runs, Setting
+from camtool.planning.items import Contour, CutRun, Feeds, Runs, Setting
 from camtool.planning.job import Entry, Lead, Operation, Tabs, Tool
 from camtool.planning.leads import KeepOut
 from camtool.planning.settings import levels
@@ -171,7 +171,7 @@ def test_many_contours_are_cut_as_each_by_itself(paths: list[Polyline], at_once:
     lines = Polylines.of(paths).select(order.tolist())
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(module, "CONTOURS_AT_ONCE", at_once)
-        made = module.runs_of(Contours.of(items), order, lines, keep_out)
+        made = module.runs_of(items, order, lines, keep_out)
     each = [runs_of(items[k], paths[k]) for k in order.tolist()]
     assert list(made.counts) == [len(runs) for runs, _ in each]
     assert list(made.findings) == [finding for _, findings in each for finding in findings]

@@ -15,7 +15,7 @@ from camtool.errors import OptionError
 from camtool.geometry.nesting import nesting
 from camtool.geometry.polylines import Polyline, Polylines, reverse, rolled
 from camtool.planning import order
-from camtool.planning.items import Contour, Contours, CutRun, Feeds, Fixed, Item, Setting
+from camtool.planning.items import Contour, CutRun, Feeds, Fixed, Item, Setting, contours_of
 from camtool.planning.job import Operation
 from camtool.planning.order import (
     Choices,
@@ -158,8 +158,6 @@ def test_many_contours_wait_as_each_of_them_does(boxes: list[tuple[int, int, int
         items += divided if parts > 1 else [whole]
     wanted = before_by_pairs(items)
     assert must_precede(items).tolist() == wanted
-    contours = [item for item in items if isinstance(item, Contour)]
-    assert must_precede(Contours.of(contours)).tolist() == wanted
 
 
 def test_an_arc_of_a_run_is_seen_as_an_arc() -> None:
@@ -174,7 +172,7 @@ def test_an_arc_of_a_run_is_seen_as_an_arc() -> None:
 def test_open_paths_are_travelled_from_the_nearer_end() -> None:
     items: list[Item] = [line(9, 0, 1, 0), line(9, 1, 1, 1)]
     choices = choices_of(items)
-    first, second = chosen_paths(Contours.of(items), choices, best_order(choices, NONE))
+    first, second = chosen_paths(contours_of(items), choices, best_order(choices, NONE))
     assert (first.start.tolist(), first.end.tolist()) == ([1, 0], [9, 0])
     assert (second.start.tolist(), second.end.tolist()) == ([9, 1], [1, 1])
 
@@ -182,7 +180,7 @@ def test_open_paths_are_travelled_from_the_nearer_end() -> None:
 def test_what_may_not_be_turned_runs_as_drawn() -> None:
     items: list[Item] = [line(9, 0, 1, 0, reversible=False)]
     choices = choices_of(items)
-    (path,) = chosen_paths(Contours.of(items), choices, best_order(choices, NONE))
+    (path,) = chosen_paths(contours_of(items), choices, best_order(choices, NONE))
     assert path.start.tolist() == [9, 0]
 
 
@@ -196,7 +194,7 @@ def test_closed_paths_begin_at_the_nearest_place_allowed() -> None:
     square = box(-9, -9, -1, -1)
     for item, start in ((square, [-1, -1]), (replace(square, starts=np.array([1, 3])), [-1, -9])):
         choices = choices_of([item])
-        (path,) = chosen_paths(Contours.of([item]), choices, best_order(choices, NONE))
+        (path,) = chosen_paths([item], choices, best_order(choices, NONE))
         assert path.start.tolist() == start
 
 
@@ -204,7 +202,7 @@ def test_no_path_begins_within_an_arc_that_was_split() -> None:
     # A slot whose right cap is two quarters; the vertex between them is nearest to the tool.
     slot = closed((-5, -1), (-2, -1, QUARTER), (-1, 0, QUARTER), (-2, 1), (-5, 1, 1))
     choices = choices_of([slot])
-    (path,) = chosen_paths(Contours.of([slot]), choices, best_order(choices, NONE))
+    (path,) = chosen_paths([slot], choices, best_order(choices, NONE))
     assert path.start.tolist() == [-2, -1]
 
 
@@ -233,7 +231,7 @@ def test_each_variant_of_many_items_is_that_of_the_item(
             wanted += [rolled(item.path, k) for k in own.tolist()]
         else:
             wanted += [item.path, reverse(item.path)] if item.reversible else [item.path]
-    contours = Contours.of_items(items)
+    contours = contours_of(items)
     own = choices_of(contours)
     found = chosen_paths(contours, own, np.arange(len(own.owner))[::-1])
     assert len(found) == len(wanted)
