@@ -1,6 +1,6 @@
-"""The types of arrays: numbers, whole numbers and truths, of any shape.
+"""Array types: float64, int64, int32, int8, bool and uint8, of any shape.
 
-Shapes are said where an array is used: `(K, 2)` mm.
+Docstrings give the shape and the unit where an array is used: `(K, 2)` mm.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
-"""The bytes of files and streams, as far as they are within a bound, and the bounds of programs:
-what is beyond them is refused at once, before it fills the memory."""
+"""Upper bounds on the size of programs, and reading of files and streams up to a bound: what is
+larger is refused before it fills the memory."""
 
 from __future__ import annotations
 
@@ -19,35 +19,34 @@ MAX_MOVES = 3_000_000
 make more moves than this; each move needs some hundreds of bytes of memory."""
 
 SPLIT_PROGRAM = "split the program"
-"""The mend for what is too large."""
 
 _BYTES_AT_ONCE = 1 << 20
-"""Streams are read in pieces of this size, so that a small file needs little memory."""
+"""Size of the pieces in which streams are read, so that a small file needs little memory."""
 
 
-def file_bytes(path: Path, most: int) -> bytes | None:
-    """All bytes of a file; None, without reading it all, when they are more than `most`. OSError,
-    and ValueError for a name with a null character."""
+def file_bytes(path: Path, max_bytes: int) -> bytes | None:
+    """Read a file; None, without reading all of it, if it has more than `max_bytes`. Raises
+    OSError, and ValueError for a name with a null character."""
     with path.open("rb") as stream:
-        # The size that the system gives spares reading; pipes and devices have none.
+        # The size in the status saves reading a large file; pipes and devices have none.
         status = os.fstat(stream.fileno())
-        if stat.S_ISREG(status.st_mode) and status.st_size > most:
+        if stat.S_ISREG(status.st_mode) and status.st_size > max_bytes:
             return None
-        return stream_bytes(stream, most)
+        return stream_bytes(stream, max_bytes)
 
 
-def stream_bytes(stream: BinaryIO, most: int) -> bytes | None:
-    """All bytes of a stream; None as soon as they are more than `most`."""
+def stream_bytes(stream: BinaryIO, max_bytes: int) -> bytes | None:
+    """Read a stream; None as soon as it has more than `max_bytes`."""
     content = BytesIO()
     while piece := stream.read(_BYTES_AT_ONCE):
         content.write(piece)
-        if content.tell() > most:
+        if content.tell() > max_bytes:
             return None
     return content.getvalue()
 
 
 def program_bytes(source: Path | BinaryIO, file: str) -> bytes:
-    """A program; ProgramError, which names the file, when it cannot be read or is too large."""
+    """Read a program; ProgramError, which names the file, if it cannot be read or is too large."""
     try:
         if isinstance(source, Path):
             data = file_bytes(source, MAX_PROGRAM_BYTES)
@@ -64,13 +63,13 @@ def program_bytes(source: Path | BinaryIO, file: str) -> bytes:
 
 
 class TooLongError(PostError):
-    """A program that no reader would take; the pipeline names the drawing, or the program, that it
-    was to be made of."""
+    """A program too long for every reader; the pipeline adds the name of the drawing or program
+    that it was to be made from."""
 
 
 def refuse_too_long(count: int, unit: str) -> None:
-    """TooLongError for a program that would have more than MAX_MOVES lines, blocks or whatever its
-    `unit` is called: what writers ask before they make its text."""
+    """Raise TooLongError for a program of more than MAX_MOVES lines or blocks (`unit` is their
+    name); writers call it before they make the text."""
     if count > MAX_MOVES:
         raise TooLongError(
             f"the program would have more than {MAX_MOVES} {unit}s",
@@ -79,8 +78,8 @@ def refuse_too_long(count: int, unit: str) -> None:
 
 
 def check_count(count: int, unit: str) -> None:
-    """ProgramError for a program of more than MAX_MOVES lines, blocks or whatever its `unit` is
-    called."""
+    """Raise ProgramError for a program of more than MAX_MOVES lines or blocks (`unit` is their
+    name)."""
     if count > MAX_MOVES:
         raise ProgramError(
             f"the program has more than {MAX_MOVES} {unit}s",

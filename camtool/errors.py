@@ -1,4 +1,4 @@
-"""The exceptions that camtool raises on purpose.
+"""The exceptions of camtool.
 
     CamtoolError                 exit code 2: wrong use or bad input
     ├── InputError               a file cannot be used (also ValueError)

@@ -1,8 +1,7 @@
-"""A lock that one process holds: a file that the operating system locks for it.
+"""A lock file that one process at a time holds, locked by the operating system.
 
-The lock lasts as long as the process lives, so that none is ever stale. The file names the
-process, and is removed at the end; after a crash it stays, unlocked, and whoever comes next takes
-it over.
+The lock ends with the process, so that it is never stale. The file names the process and is
+removed at the end; after a crash it remains, unlocked, and the next process takes it over.
 """
 
 from __future__ import annotations
@@ -16,21 +15,24 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 _NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP)
-"""Errors of file systems that have no locks."""
+"""Error numbers of file systems without locks."""
 
 _LOCKED = (errno.EWOULDBLOCK, errno.EAGAIN, errno.EACCES, errno.EDEADLK)
-"""Errors for a file that another process has locked."""
+"""Error numbers of a file that another process has locked."""
 
 _READ_BYTES = 1000
-"""How much is read of the lock file of another process."""
+"""Bytes read from the lock file of another process."""
 
 
 @contextmanager
 def held(place: Path, taken: Callable[[str], Exception]) -> Iterator[bool]:
-    """Within the block, this process alone holds the lock at `place`; False where its file system
-    has no locks. Raises what `taken` makes of the words for the process that has it, and OSError
-    where the file cannot be made."""
-    handle, locked = _opened(place, taken)
+    """Hold the lock file at `place` within the block; yields False if its file system has no
+    locks.
+
+    Raises `taken(owner)` if another process holds it, where `owner` is a text about that process,
+    and OSError if the file cannot be made.
+    """
+    handle, locked = _open_locked(place, taken)
     try:
         with suppress(OSError):  # a full disk: the lock holds without a name in it
             os.ftruncate(handle, 0)
@@ -41,8 +43,8 @@ def held(place: Path, taken: Callable[[str], Exception]) -> Iterator[bool]:
         _release(place, handle)
 
 
-def _opened(place: Path, taken: Callable[[str], Exception]) -> tuple[int, bool]:
-    """The lock file, opened, and whether it is locked."""
+def _open_locked(place: Path, taken: Callable[[str], Exception]) -> tuple[int, bool]:
+    """Open and lock the file; return its descriptor, and False if the file system has no locks."""
     while True:
         handle = os.open(place, os.O_RDWR | os.O_CREAT, 0o666)
         try:
@@ -71,10 +73,11 @@ if sys.platform == "win32":
     import msvcrt
 
     _FAR = 1 << 20
-    """Windows lets nobody read locked bytes: the locked one is far behind the text."""
+    """Offset of the locked byte: Windows lets no process read locked bytes, so it lies far behind
+    the text."""
 
     def _lock(handle: int) -> None:
-        """Lock an open file, or OSError at once."""
+        """Lock an open file; OSError at once if it is locked."""
         os.lseek(handle, _FAR, os.SEEK_SET)
         msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
 
@@ -87,7 +90,7 @@ else:
     import fcntl
 
     def _lock(handle: int) -> None:
-        """Lock an open file, or OSError at once."""
+        """Lock an open file; OSError at once if it is locked."""
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
     def _release(place: Path, handle: int) -> None:

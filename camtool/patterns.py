@@ -1,5 +1,5 @@
-"""Patterns of names: `*`, `?` and `[…]`, in any case, as CAD has names; and guesses which name was
-meant."""
+"""Names matched without regard to case by the wildcards `*`, `?` and `[…]`, and suggestions for
+misspelt names."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from fnmatch import translate
 
 
 def matches(patterns: Iterable[str], name: str) -> bool:
-    """Whether any of the patterns matches the whole name."""
+    """True if any of the patterns matches the whole name."""
     folded = name.casefold()
     return any(re.fullmatch(translate(pattern.casefold()), folded) for pattern in patterns)
 
 
 def guess(word: str, known: Iterable[str]) -> str:
-    """ "did you mean NAME? " with the known name that is most similar; "" when none is similar."""
+    """Return "did you mean NAME? " with the most similar known name, "" if none is similar."""
     from difflib import get_close_matches
 
     folded = {name.casefold(): name for name in known}

@@ -37,9 +37,9 @@ if TYPE_CHECKING:
     from camtool.planning.plan import Plan
     from camtool.simulation.motion import Effects
     from camtool.target.registry import LoadedTarget
-    from camtool.toolpath.moves import Compensated, Toolpath
+    from camtool.toolpath.moves import CompensatedToolpath, Toolpath
     from camtool.toolpath.program import Program
-    from camtool.toolpath.wanted import Kept
+    from camtool.toolpath.wanted import ProtectedRegion
     from camtool.verification.conformance import Asked
     from camtool.verification.registration import Registration
     from camtool.verification.report import (
@@ -87,7 +87,7 @@ class _Goal(Struct, frozen=True, eq=False):
 
     wanted: Toolpath | None = None
     drawing: Drawing | None = None
-    compensated: Compensated | None = None
+    compensated: CompensatedToolpath | None = None
     asked: Asked | None = None
     written_from: Toolpath | None = None
     row_from: Indices | None = None
@@ -296,7 +296,7 @@ def verify_program(
     decoded = run.decoded
     assert decoded is not None
     goal = _Goal()
-    kept: tuple[Kept, ...] = ()
+    kept: tuple[ProtectedRegion, ...] = ()
     if drawing is not None and judging.found:
         goal, job = _registered(drawing, job or Job(), decoded, target, align=judging.align)
     elif drawing is not None:
@@ -609,7 +609,7 @@ def _beyond(
     return tuple(gate_findings(verification.report, gates, findings))
 
 
-def _compensated(wanted: Toolpath, machine: Machine) -> Compensated:
+def _compensated(wanted: Toolpath, machine: Machine) -> CompensatedToolpath:
     """The moves with which the slides follow `wanted`."""
     from camtool.planning.compensating import compensated
 
@@ -688,7 +688,7 @@ def _row_from(program: Program, decoded: Toolpath) -> Indices:
 
 
 def _asked(
-    job: Job, target: LoadedTarget, planned: Toolpath, compensation: Compensated | None
+    job: Job, target: LoadedTarget, planned: Toolpath, compensation: CompensatedToolpath | None
 ) -> Asked | None:
     """What the job asks for, as moves of the dialect; None where planning found an error, which
     is a finding already. `compensation` is `planned` compensated against the mechanics."""

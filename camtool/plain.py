@@ -1,4 +1,4 @@
-"""Text from files (names of drawings, layers, files, machines), made safe to show.
+"""Untrusted text (names of drawings, layers, files, machines) made safe to print.
 
 A terminal obeys control characters: an escape sequence in a layer's name may move the cursor,
 rename the window or write to the clipboard (ECMA-48), and an override of the writing direction
@@ -13,13 +13,13 @@ import re
 from typing import Any
 from unicodedata import category
 
-LONGEST_WORD = 200
-"""Longer words without a space are shortened to their beginning and end, in characters."""
+MAX_WORD_CHARS = 200
+"""Characters; longer words are shortened to their beginning and end."""
 
-LONGEST_LINE = 2000
-"""Longer lines are shortened to their beginning and end, in characters."""
+MAX_LINE_CHARS = 2000
+"""Characters; longer lines are shortened to their beginning and end."""
 
-_LONG = re.compile(rf"\S{{{LONGEST_WORD + 1},}}")
+_LONG = re.compile(rf"\S{{{MAX_WORD_CHARS + 1},}}")
 _BYTES_FROM = 0xDC00
 """The surrogate by which Python stands for byte 0 of a file name in another encoding."""
 
@@ -32,20 +32,20 @@ surrogate pairs."""
 
 
 def one_line(text: str) -> str:
-    r"""The text as one line without invisible characters, long words and long lines shortened.
+    r"""Return the text as one line without invisible characters, long words and lines shortened.
 
     >>> print(one_line("a\x1b[2Jb\nc"), one_line("x" * 1000)[118:124])
     a\x1b[2Jb\nc xx…xxx
     """
     shown = text if text.isprintable() else "".join(map(_visible, text))
-    if len(shown) > LONGEST_WORD:
-        shown = _LONG.sub(lambda found: _shortened(found[0], LONGEST_WORD), shown)
-    return shown if len(shown) <= LONGEST_LINE else _shortened(shown, LONGEST_LINE)
+    if len(shown) > MAX_WORD_CHARS:
+        shown = _LONG.sub(lambda found: _shortened(found[0], MAX_WORD_CHARS), shown)
+    return shown if len(shown) <= MAX_LINE_CHARS else _shortened(shown, MAX_LINE_CHARS)
 
 
 def to_json(value: Any, indent: int = 2) -> str:
-    """Records, lists, tables and plain values as a JSON text that ends with a line break, on one
-    line where `indent` is 0; bytes of names that are not text appear as \\udcXX."""
+    """Format records, lists, tables and scalars as JSON text that ends with a line break, on one
+    line if `indent` is 0; bytes of names that are not text appear as \\udcXX."""
     import msgspec
 
     try:

@@ -11,7 +11,6 @@ import re
 from camtool.errors import OptionError
 
 UM_PER_MM = 1000.0
-"""Micrometres in a millimetre."""
 
 MM_PER_UNIT: dict[str, float] = {
     "mm": 1.0,
@@ -42,7 +41,7 @@ _QUANTITY = re.compile(rf"\s*({_NUMBER})(?:\s*/\s*({_NUMBER}))?\s*([^\d\s].*?)?\
 
 
 def parse_length(text: str, *, name: str = "length") -> float:
-    """`"0.2mm"`, `"1/8in"`, `"200 um"` or a bare number (mm) as mm.
+    """Parse `"0.2mm"`, `"1/8in"`, `"200 um"` or a bare number (mm) to mm.
 
     Raises OptionError for anything else, for infinities and for NaN.
 
@@ -64,7 +63,7 @@ def parse_length(text: str, *, name: str = "length") -> float:
 
 
 def parse_feed(text: str) -> float:
-    """`"0.8"`, `"0.8mm/min"`, `"2 in/min"` or `"0.01mm/s"` as mm/min.
+    """Parse `"0.8"`, `"0.8mm/min"`, `"2 in/min"` or `"0.01mm/s"` to mm/min.
 
     >>> parse_feed("0.8mm/min"), parse_feed("0.01 mm/s")
     (0.8, 0.6)
@@ -79,7 +78,7 @@ def parse_feed(text: str) -> float:
 
 
 def parse_angle(text: str) -> float:
-    """`"30"`, `"30deg"`, `"30°"` or `"0.5rad"` as rad: a bare number is degrees.
+    """Parse `"30"`, `"30deg"`, `"30°"` or `"0.5rad"` to rad: a bare number is degrees.
 
     >>> parse_angle("180deg"), parse_angle("0.5 rad")
     (3.141592653589793, 0.5)
@@ -92,7 +91,7 @@ def parse_angle(text: str) -> float:
 
 
 def parse_time(text: str) -> float:
-    """`"0.5"`, `"0.5s"`, `"200ms"`, `"1min"` or `"1h"` as s: a bare number is seconds.
+    """Parse `"0.5"`, `"0.5s"`, `"200ms"`, `"1min"` or `"1h"` to s: a bare number is seconds.
 
     >>> parse_time("0.5"), parse_time("200 ms")
     (0.5, 0.2)
@@ -105,7 +104,8 @@ def parse_time(text: str) -> float:
 
 
 def _split(text: str, name: str) -> tuple[float, str]:
-    """The number and the unit of a text; OptionError, with the `name` of the quantity, without."""
+    """Split a text into its number and its unit; OptionError, which names the quantity `name`, if
+    it has no number."""
     comma = _COMMA.fullmatch(text)
     if comma is not None:
         raise OptionError(

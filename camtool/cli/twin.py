@@ -145,7 +145,7 @@ class _Journal:
 
     def note(self) -> None:
         """What came since the last call."""
-        done = self._twin.slides.drained()
+        done = self._twin.slides.drain()
         if self._file is not None and len(done):
             self._file.write(rows(done))
         for block in self._twin.decoded[self._shown :] if self._verbose else ():

@@ -24,7 +24,7 @@ from camtool.kernels.lattice import to_steps
 from camtool.machine.model import Axis, Machine, PlayCells
 from camtool.planning.reversing import Residual, residual
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.toolpath.moves import Compensated, Kind, Move, Toolpath
+from camtool.toolpath.moves import CompensatedToolpath, Kind, Move, Toolpath
 
 OVERSHOOT = 0.5
 """An axis overshoots at a reversal by this share of the controller's excess compensation."""
@@ -47,7 +47,7 @@ TURN_EPS_RAD = 1e-9
 Point = tuple[float, float, float]
 
 
-def compensated(toolpath: Toolpath, machine: Machine) -> Compensated:
+def compensated(toolpath: Toolpath, machine: Machine) -> CompensatedToolpath:
     """`toolpath` bent against the scale, squareness and backlash of the machine, so that its
     slides come out where `toolpath` says. Sources of the rows are kept; blocks are not.
 
@@ -58,12 +58,12 @@ def compensated(toolpath: Toolpath, machine: Machine) -> Compensated:
     bent = _taken_up(motors.toolpath, machine)
     row = motors.row[bent.row]
     if toolpath.operations is None or bent.toolpath is toolpath:
-        return Compensated(bent.toolpath, row)
+        return CompensatedToolpath(bent.toolpath, row)
     operations = toolpath.operations.picked(row)
-    return Compensated(replace(bent.toolpath, operations=operations), row)
+    return CompensatedToolpath(replace(bent.toolpath, operations=operations), row)
 
 
-def motor_path(toolpath: Toolpath, machine: Machine) -> Compensated:
+def motor_path(toolpath: Toolpath, machine: Machine) -> CompensatedToolpath:
     """Scale and squareness undone: the path of the motors for slides on `toolpath`; itself where
     both are as they should.
 
@@ -82,7 +82,7 @@ def motor_path(toolpath: Toolpath, machine: Machine) -> Compensated:
     scale = np.diag([axis.coded_step_mm / axis.real_step_mm for axis in machine.axes])
     matrix = scale @ square
     if np.array_equal(matrix, np.eye(3)):
-        return Compensated(toolpath, np.arange(len(toolpath)))
+        return CompensatedToolpath(toolpath, np.arange(len(toolpath)))
     return _Mapped(toolpath, matrix, machine.defaults.fit_tolerance_mm).bent()
 
 
@@ -97,7 +97,7 @@ class _Mapped:
         self._scale = float(sizes.mean())
         self._b = ToolpathBuilder(self._to(tuple(toolpath.start.tolist())))
 
-    def bent(self) -> Compensated:
+    def bent(self) -> CompensatedToolpath:
         sweeps = self._toolpath.sweeps()
         rows: list[int] = []
         for move in self._toolpath:
@@ -111,9 +111,11 @@ class _Mapped:
                 self._arc(move, end, float(sweeps[move.index]))
             else:
                 _add_event(self._b, move, self._toolpath)
-                self._b.moved_to(*end)
+                self._b.set_position(*end)
             rows += [move.index] * (len(self._b) - len(rows))
-        return Compensated(self._b.finish(self._toolpath.findings), np.array(rows, dtype=np.int64))
+        return CompensatedToolpath(
+            self._b.finish(self._toolpath.findings), np.array(rows, dtype=np.int64)
+        )
 
     def _to(self, point: tuple[float, ...]) -> Point:
         x, y, z = (self._matrix @ np.array(point)).tolist()
@@ -199,12 +201,12 @@ class _Drive(Struct):
                 return
 
 
-def _taken_up(toolpath: Toolpath, machine: Machine) -> Compensated:
+def _taken_up(toolpath: Toolpath, machine: Machine) -> CompensatedToolpath:
     """The positions that a controller must be given for slides on `toolpath` (in motor mm); the
     same toolpath where there is neither backlash nor compensation."""
     regions = _Regions(machine)
     if not regions.matter:
-        return Compensated(toolpath, np.arange(len(toolpath)))
+        return CompensatedToolpath(toolpath, np.arange(len(toolpath)))
     return _TakenUp(toolpath, machine, regions).bent()
 
 
@@ -247,7 +249,7 @@ class _TakenUp:
         ]
         self._b = ToolpathBuilder(self._place())
 
-    def bent(self) -> Compensated:
+    def bent(self) -> CompensatedToolpath:
         rows: list[int] = []
         sweeps = self._toolpath.sweeps()
         for move in self._toolpath:
@@ -265,7 +267,9 @@ class _TakenUp:
             else:
                 self._event(move)
             rows += [move.index] * (len(self._b) - len(rows))
-        return Compensated(self._b.finish(self._toolpath.findings), np.array(rows, dtype=np.int64))
+        return CompensatedToolpath(
+            self._b.finish(self._toolpath.findings), np.array(rows, dtype=np.int64)
+        )
 
     def _enter(self, point: Point) -> None:
         """From here on the backlash is that of the region around a point."""
@@ -348,7 +352,7 @@ class _TakenUp:
             if drive.at != self._home[index]:
                 drive.sense = 1 if self._home[index] > drive.at else -1
             drive.at = self._home[index]
-        self._b.moved_to(*self._place())
+        self._b.set_position(*self._place())
 
 
 def _step_mm(axis: Axis) -> float:

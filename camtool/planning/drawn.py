@@ -35,7 +35,7 @@ from camtool.planning.items import Contour, Runs, Setting, Step, contours_of
 from camtool.planning.job import Operation, Tool
 from camtool.planning.sides import runs_beside
 from camtool.toolpath.moves import Toolpath
-from camtool.toolpath.wanted import NO_EDGE, Drawn, Kept
+from camtool.toolpath.wanted import NO_EDGE, DrawnEdges, ProtectedRegion
 
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
@@ -58,7 +58,7 @@ SAME_SIZE_MM = 1e-3
 alone."""
 
 
-def drawn_of(toolpath: Toolpath, runs: Ints, steps: Sequence[Step], placed: Drawing) -> Drawn:
+def drawn_of(toolpath: Toolpath, runs: Ints, steps: Sequence[Step], placed: Drawing) -> DrawnEdges:
     """What is drawn for each row of a toolpath, whose rows are of the runs (N,) of these steps,
     counted through all of them; the drawing in the work frame."""
     # One number, seen as many, until there is another.
@@ -87,7 +87,7 @@ def drawn_of(toolpath: Toolpath, runs: Ints, steps: Sequence[Step], placed: Draw
         first += len(step.runs)
     nominal, planned, followed, cleared = map(np.concatenate, zip(*columns, strict=True))
     line = np.concatenate(lines)
-    return Drawn(
+    return DrawnEdges(
         off, edge, nominal, planned, line, followed, cleared, datum_off_mm=placed.datum_off_mm
     )
 
@@ -150,8 +150,8 @@ def _points(toolpath: Toolpath, rows: Ints) -> Floats:
 
 
 class _Edges(Struct, frozen=True, eq=False):
-    """The edges that a step cuts, in the columns of `Drawn`, `line` counted from 0; `of_run` (R,):
-    the edge of each of its runs, or NO_EDGE."""
+    """The edges that a step cuts, in the columns of `DrawnEdges`, `line` counted from 0; `of_run`
+    (R,): the edge of each of its runs, or NO_EDGE."""
 
     of_run: Ints
     nominal: Floats
@@ -274,7 +274,7 @@ def _cleared_boxes(runs: Runs, tool: Tool) -> Floats:
     return np.stack([low, high], axis=2)
 
 
-def kept_of(steps: Sequence[Step]) -> tuple[Kept, ...]:
+def kept_of(steps: Sequence[Step]) -> tuple[ProtectedRegion, ...]:
     """All runs of a plan, with what they must leave of the material, as the drawing has it.
 
     A profile leaves the part, a pocket and a carving what is outside of their region; engraving,
@@ -284,7 +284,7 @@ def kept_of(steps: Sequence[Step]) -> tuple[Kept, ...]:
     return tuple(each for step in steps for each in _kept(step))
 
 
-def _kept(step: Step) -> Iterator[Kept]:
+def _kept(step: Step) -> Iterator[ProtectedRegion]:
     operation, chosen = step.operation, step.chosen
     closed = np.flatnonzero(chosen.lines.closed)
     if operation.kind == "bore":
@@ -296,7 +296,7 @@ def _kept(step: Step) -> Iterator[Kept]:
     if operation.kind in ("pocket", "vcarve", "bore"):
         lines = chosen.lines.select(rows.tolist())
         runs = tuple(run.vertices for run in step.runs)
-        yield Kept(runs, lines, depth % 2 == 1, True, operation.beyond_mm)
+        yield ProtectedRegion(runs, lines, depth % 2 == 1, True, operation.beyond_mm)
         return
     beside = operation.kind == "profile" and runs_beside(operation)
     beside = beside and operation.corners == "none"
@@ -307,11 +307,11 @@ def _kept(step: Step) -> Iterator[Kept]:
         for rim in (True, False):
             names = {chosen.names[row] for row in mine[stays == rim].tolist()}
             runs = _contour_runs(step, names)
-            yield Kept(runs, lines, stays, not rim, operation.beyond_mm)
+            yield ProtectedRegion(runs, lines, stays, not rim, operation.beyond_mm)
     judged = {chosen.names[row] for row in rows.tolist()} if beside else set()
     # Open contours are cut on their lines, wherever these are; other runs leave nothing either.
     free = tuple(run.vertices for run in step.runs if run.name not in judged)
-    yield Kept(free, Polylines.of([]), np.empty(0, dtype=np.bool_), False)
+    yield ProtectedRegion(free, Polylines.of([]), np.empty(0, dtype=np.bool_), False)
 
 
 def _levels(operation: Operation, depth: Ints) -> Iterator[Bools]:

@@ -88,7 +88,7 @@ class LivePage:
 
     def __init__(self, file: Path, title: str, decoded: Toolpath) -> None:
         self.file, self._title = file, title
-        path = decoded.first(decoded.running)
+        path = decoded.first(decoded.executed_rows)
         (left, right), (low, top) = toolpath_extents(path)[:2].tolist()
         side = max(right - left, top - low, 1e-3)
         around = MARGIN * side

@@ -117,7 +117,7 @@ class Consignment(Struct, frozen=True, eq=False):
         """The lowest and the highest place that its moves reach, in the work frame; None where
         nothing moves. Where the first move begins is not counted: the tool may stand anywhere."""
         path = self.forecast.decoded
-        path = path.first(path.running)
+        path = path.first(path.executed_rows)
         moves = np.flatnonzero(path.is_motion)
         if not len(moves):
             return None
@@ -336,7 +336,7 @@ def rest_of(
         raise OptionError("nothing moves behind its last block", mend="it is finished")
     if not 0 <= first < blocks or not len(rows):
         raise OptionError(f"there is no block {first + 1}", mend=f"blocks are 1 to {blocks}")
-    low, high = int(rows[0]), decoded.running
+    low, high = int(rows[0]), decoded.executed_rows
     if low >= high or not _goes_on(decoded.part(low, high)):
         raise OptionError(f"nothing moves from block {first + 1} on", mend="it is finished")
     machine = target.machine
@@ -401,7 +401,7 @@ def _entry(decoded: Toolpath, low: int, target: LoadedTarget, begin_mm: Place | 
     machine = target.machine
     x, y, z = decoded.starts_of(np.array([low]))[0].tolist()
     before = decoded.part(0, low)
-    top = float(toolpath_extents(decoded.first(decoded.running))[2, 1])
+    top = float(toolpath_extents(decoded.first(decoded.executed_rows))[2, 1])
     safe = max(top, z, float(decoded.start[2]))
     start = decoded.start.tolist() if begin_mm is None else begin_mm
     safe = max(safe, start[2])
@@ -554,7 +554,7 @@ def lines_of(one: Consignment, target: LoadedTarget) -> Sequence[tuple[str, str]
     """What a dry run says: (name, words)."""
     machine, run = target.machine, one.run
     decoded = one.forecast.decoded
-    low_high = toolpath_extents(decoded.first(decoded.running))
+    low_high = toolpath_extents(decoded.first(decoded.executed_rows))
     size = ", ".join(
         f"{axis} {low:.3f} to {high:.3f}"
         for axis, (low, high) in zip("XYZ", low_high, strict=True)

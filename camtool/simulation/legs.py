@@ -167,7 +167,7 @@ def check_rows(toolpath: Toolpath, machine: Machine) -> None:
             "",
         ),
     ):
-        refuse(toolpath, np.asarray(bad)[: toolpath.running], message, mend)
+        refuse(toolpath, np.asarray(bad)[: toolpath.executed_rows], message, mend)
 
 
 def waits_s(toolpath: Toolpath, rows: int) -> Floats:

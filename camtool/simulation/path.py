@@ -45,7 +45,7 @@ from camtool.simulation.samples import (
     row_seconds,
     sample_spacing_mm,
 )
-from camtool.toolpath.moves import Kind, Toolpath, frozen
+from camtool.toolpath.moves import Kind, Toolpath, read_only
 
 SPREAD_STEPS = 2.0
 """Radii of the ends of an arc that differ by at most this many steps differ because of
@@ -97,8 +97,8 @@ class PathModel(ControllerModel[PathController, Any]):
 def _sampled(path: Toolpath, machine: Machine) -> Iterator[SampledRows]:
     """The rows up to the end of the program; ProgramError for those that cannot be followed."""
     spacing_mm = sample_spacing_mm(path, machine)
-    check_rows(path, path.running)
-    return _blocks(path.first(path.running), machine, spacing_mm)
+    check_rows(path, path.executed_rows)
+    return _blocks(path.first(path.executed_rows), machine, spacing_mm)
 
 
 def _blocks(path: Toolpath, machine: Machine, spacing_mm: float) -> Iterator[SampledRows]:
@@ -173,7 +173,7 @@ def _centred(made: Toolpath, arcs: Ints, sweep: Floats, machine: Machine) -> Too
     off = ((centre[apt] - 0.5 * (begin + end)[apt]) * u).sum(axis=1)
     new = made.centre.copy()
     new[arcs[apt]] -= off[:, None] * u
-    return replace(made, centre=frozen(new))
+    return replace(made, centre=read_only(new))
 
 
 def _turned_back(made: Toolpath, inside_out: Ints, short: Bools) -> Toolpath:

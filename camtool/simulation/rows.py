@@ -10,7 +10,7 @@ import numpy.typing as npt
 from camtool.arrays import Bools, Floats
 from camtool.errors import ProgramError
 from camtool.machine.model import Machine
-from camtool.toolpath.moves import Kind, Toolpath, frozen
+from camtool.toolpath.moves import Kind, Toolpath, read_only
 
 MAX_PATH_STEPS = 1 << 40
 """Positions beyond this many steps (a million kilometres at 1 µm) are refused, so that counts
@@ -39,7 +39,7 @@ def with_ends(toolpath: Toolpath, start: Floats, end: Floats) -> Toolpath:
     its own."""
     if (start == toolpath.start).all() and (end == toolpath.end).all():
         return toolpath
-    return replace(toolpath, start=start, end=frozen(end))
+    return replace(toolpath, start=start, end=read_only(end))
 
 
 def check_positions(toolpath: Toolpath, machine: Machine) -> None:

@@ -175,12 +175,12 @@ class Slides:
 
     @property
     def trace(self) -> SlideTrace:
-        """All that they have done, or since `drained`."""
+        """All that they have done, or since `drain`."""
         if len(self._pieces) != 1:
             self._pieces = [_joined(self._pieces)]
         return self._pieces[0]
 
-    def drained(self) -> SlideTrace:
+    def drain(self) -> SlideTrace:
         """What they have done since the last call, which they then forget."""
         trace, self._pieces = self.trace, []
         return trace

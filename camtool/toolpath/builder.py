@@ -10,20 +10,20 @@ import numpy as np
 
 from camtool.arrays import Floats, Ints
 from camtool.findings import Finding
-from camtool.toolpath.moves import COLUMNS, Kind, PathMode, Toolpath, frozen
+from camtool.toolpath.moves import COLUMNS, Kind, PathMode, Toolpath, read_only
 from camtool.toolpath.wanted import OperationNote, Operations
 
 Coordinate = float | None
 
 ROWS_AT_ONCE = 1 << 14
-"""So many rows are Python objects at a time, no more."""
+"""Rows kept as Python objects before they are moved into the columns."""
 
 GROWTH = 8
-"""A column that is full grows by this part of its rows."""
+"""A full column grows by 1/GROWTH of its rows."""
 
 
 class ToolpathBuilder:
-    """Collects rows; coordinates left out (None) stay where they are.
+    """Collect rows; a coordinate that is left out (None) keeps its value.
 
     >>> path = ToolpathBuilder().rapid(z=1.0).rapid(1, 0).line(z=-0.1, feed=10).arc(
     ...     3, 0, centre=(2, 0), ccw=False, feed=20).finish()
@@ -80,29 +80,29 @@ class ToolpathBuilder:
         return self._move(kind, (x, y, z), feed, centre)
 
     def event(self, kind: Kind, value: float | None = None) -> ToolpathBuilder:
-        """An event at the present position; `value` as `Kind` says."""
+        """Add an event at the present position; `value` in the unit that `Kind` gives."""
         return self._add(kind, self.position, (math.nan, math.nan), math.nan, value)
 
     def message(self, text: str) -> ToolpathBuilder:
-        """A message to the operator."""
+        """Add a message to the operator."""
         return self.event(Kind.MESSAGE, float(self._index(text)))
 
     def operation(self, note: OperationNote) -> None:
-        """From here on rows are of this operation."""
+        """Begin an operation: the rows that follow belong to it."""
         self._notes.append(note)
         self._begin.append(len(self))
 
-    def moved_to(self, x: float, y: float, z: float) -> ToolpathBuilder:
-        """An event before this one left the tool here (homing)."""
+    def set_position(self, x: float, y: float, z: float) -> ToolpathBuilder:
+        """Set the present position without a move, for an event that moves the tool (homing)."""
         self.position = (x, y, z)
         return self
 
     def moves(
         self, kind: Ints, end: Floats, centre: Floats, feed: Floats, **others: Ints | Floats
     ) -> None:
-        """K rows by columns as `Toolpath` has them; K is not 0. `others`: the columns `block`,
-        `value`, `source` (as `provenance` gives it) and `run` that are not as they would be for
-        moves one by one."""
+        """Add K > 0 rows given as columns of a `Toolpath`. `others` sets `block`, `value`,
+        `source` (indices from `provenance`) or `run`, where they differ from the builder's
+        present values."""
         self._gather()
         count = len(kind)
         of_all = {"source": self._of_source(), "mode": self._of_mode(), "run": self.run}
@@ -114,27 +114,27 @@ class ToolpathBuilder:
         self.position = (x, y, z)
 
     def provenance(self, texts: Iterable[str]) -> Ints:
-        """Index of each of these texts for a column `source`; −1 for an empty one."""
+        """Store the texts and return their indices for a column `source`; −1 for an empty text."""
         return np.array([self._index(text) if text else -1 for text in texts], dtype=np.int64)
 
     @property
     def runs(self) -> Ints:
         """(N,) index of the run of each row."""
         self._gather()
-        return np.asarray(self._columns["run"].whole(), dtype=np.int64)
+        return np.asarray(self._columns["run"].to_array(), dtype=np.int64)
 
-    def drained(self) -> Toolpath:
-        """The rows so far, which it then forgets: for what is read one block at a time."""
+    def drain(self) -> Toolpath:
+        """Return the rows so far and drop them, for programs that are read block by block."""
         path, self._start = self.finish(), self.position
         self._columns = {name: _Column(name) for name in (*COLUMNS, "run")}
         return path
 
     def finish(self, findings: Iterable[Finding] = ()) -> Toolpath:
-        """The rows so far as a Toolpath."""
+        """Return the rows so far as a Toolpath."""
         self._gather()
         begin = np.array(self._begin, dtype=np.int64)
         return Toolpath(
-            **{name: self._columns[name].whole() for name in COLUMNS},
+            **{name: self._columns[name].to_array() for name in COLUMNS},
             modes=tuple(self._modes),
             start=np.array(self._start, dtype=np.float64),
             texts=tuple(self._texts),
@@ -177,7 +177,7 @@ class ToolpathBuilder:
         return -1 if self.mode is None else self._modes.setdefault(self.mode, len(self._modes))
 
     def _gather(self) -> None:
-        """Bring the rows so far into columns."""
+        """Move the rows that are Python objects into the columns."""
         if self._rows:
             table = np.array(self._rows, dtype=np.float64)
             self._rows = []
@@ -190,9 +190,8 @@ class ToolpathBuilder:
 
 
 class _Column:
-    """A column that grows where it stands: parts that are put together at the end would need twice
-    the room, and leave holes in the memory. While all rows are the same, one of them is stored,
-    but for ends."""
+    """A column that grows in place: joining parts at the end would need twice the memory and
+    fragment it. While all rows are equal only one of them is stored, except for `end`."""
 
     def __init__(self, name: str) -> None:
         self._dtype, self._width = COLUMNS.get(name, (np.int64, ()))
@@ -204,11 +203,11 @@ class _Column:
         return self._count
 
     def shape_of(self, rows: int) -> tuple[int, ...]:
-        """The shape of so many rows."""
+        """Array shape of this number of rows."""
         return (rows, *self._width)
 
     def add(self, rows: Ints | Floats | float, count: int) -> None:
-        """So many further rows, at least one; a single number stands for all of them."""
+        """Append `count` ≥ 1 rows; a single number is the value of all of them."""
         given = np.broadcast_to(np.asarray(rows, dtype=self._dtype), self.shape_of(count))
         if self._same and not self._count:
             self._rows = given[:1].copy()
@@ -224,17 +223,17 @@ class _Column:
             self._rows[self._count : end] = given
         self._count = end
 
-    def whole(self) -> Any:
-        """All rows so far, which nobody can change any more."""
+    def to_array(self) -> Any:
+        """Return all rows so far as a read-only array."""
         if self._same and self._count:
-            return np.broadcast_to(frozen(self._rows), self.shape_of(self._count))
+            return np.broadcast_to(read_only(self._rows), self.shape_of(self._count))
         if len(self._rows) != self._count:
             self._rows.resize(self.shape_of(self._count), refcheck=False)
-        return frozen(self._rows)
+        return read_only(self._rows)
 
 
 def _are_same(one: Any, rows: Any) -> bool:
-    """Whether all rows are this one; NaN is the same as NaN, and 0 not as −0."""
+    """True if all rows have the bits of this one: NaN equals NaN, and 0 differs from −0."""
     if one.dtype == np.float64:
         one, rows = one.view(np.int64), rows.view(np.int64)
     return bool((rows == one).all())

@@ -20,7 +20,7 @@ from msgspec import Struct
 from camtool.arrays import Bools, Codes, Floats, Indices, Ints
 from camtool.errors import PostError
 from camtool.findings import Finding
-from camtool.toolpath.wanted import Drawn, Operations
+from camtool.toolpath.wanted import DrawnEdges, Operations
 
 Column = TypeVar("Column", bound=np.ndarray[Any, Any])
 
@@ -37,7 +37,7 @@ COLUMNS: dict[str, tuple[type[np.generic], tuple[int, ...]]] = {
 """The columns of a Toolpath: their types, and the shape of one row."""
 
 ROWS_AT_ONCE = 1 << 15
-"""What is computed from a row and its start alone is computed for so many rows together."""
+"""Rows computed at a time, for columns that follow from each row and its start alone."""
 
 
 class Kind(IntEnum):
@@ -79,7 +79,7 @@ class PathMode(Struct, frozen=True):
 
 
 class Move(Struct, frozen=True):
-    """One row, for people: `end` and `start` (x, y, z) mm, `centre` (x, y) mm or None for rows
+    """One row as a record: `end` and `start` (x, y, z) mm, `centre` (x, y) mm or None for rows
     that are no arcs, `feed` mm/min or None, `value` the event's argument or None."""
 
     index: int
@@ -105,10 +105,10 @@ class Toolpath:
     index into `texts` or −1 (provenance: layer and entity); block (N,) index, from 0, of the
     program block that the row was read from, −1 when planned; start (3,) mm; `tabs_mm` where
     tabs (x, y) were planned; `made_from` the name
-    of the drawing, "" when it is not known; mode (N,) index into `modes` or −1, where the program
-    leaves to the machine how it meets the corner behind the row; without modes all of them are;
-    `drawn` what the rows stand for, and `operations` which of them each operation cuts, None but
-    for plans. ValueError when columns disagree.
+    of the drawing, "" when unknown; mode (N,) index into `modes`, or −1 where the machine decides
+    how to meet the corner behind the row (−1 in all rows without modes); `drawn` the edges that
+    the rows cut, and `operations` the operation of each row: both None except for plans.
+    ValueError when columns disagree.
     """
 
     kind: Codes
@@ -125,17 +125,19 @@ class Toolpath:
     tabs_mm: tuple[tuple[float, float], ...] = ()
     mode: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     modes: tuple[PathMode, ...] = ()
-    drawn: Drawn | None = None
+    drawn: DrawnEdges | None = None
     operations: Operations | None = None
 
     def __post_init__(self) -> None:
         count = len(self.kind)
         if not self.modes:
-            silent = np.broadcast_to(frozen(np.full(1, -1)), count)
+            silent = np.broadcast_to(read_only(np.full(1, -1)), count)
             object.__setattr__(self, "mode", silent)
         for name, (dtype, row) in COLUMNS.items():
-            object.__setattr__(self, name, _kept(name, getattr(self, name), dtype, (count, *row)))
-        object.__setattr__(self, "start", _kept("start", self.start, np.float64, (3,)))
+            object.__setattr__(
+                self, name, _as_column(name, getattr(self, name), dtype, (count, *row))
+            )
+        object.__setattr__(self, "start", _as_column("start", self.start, np.float64, (3,)))
         if self.drawn is not None and len(self.drawn.edge) != count:
             raise ValueError(f"drawn is of {len(self.drawn.edge)} rows, not of {count}")
         if not (np.isfinite(self.end).all() and np.isfinite(self.start).all()):
@@ -146,38 +148,39 @@ class Toolpath:
 
     @property
     def starts(self) -> Floats:
-        """(N, 3) mm: where each row begins."""
+        """Start points of all rows, (N, 3) mm."""
         return np.concatenate([self.start[None, :], self.end[:-1]]) if len(self) else self.end
 
     def starts_of(self, rows: Ints | Indices) -> Floats:
-        """(K, 3) mm: where these rows begin."""
+        """Return the start points (K, 3) mm of these rows."""
         starts = self.end.take(rows - 1, axis=0)  # several times as fast as an index
         starts[rows == 0] = self.start
         return starts
 
     @property
     def is_arc(self) -> Bools:
-        """(N,) true for ARC_CW and ARC_CCW."""
+        """Mask (N,) of the rows that are ARC_CW or ARC_CCW."""
         return are_arcs(self.kind)
 
     @property
     def is_motion(self) -> Bools:
-        """(N,) true for RAPID, LINE and arcs."""
+        """Mask (N,) of the rows that are RAPID, LINE or arcs."""
         return np.asarray(self.kind <= Kind.ARC_CCW)
 
     @property
     def is_feed(self) -> Bools:
-        """(N,) true for LINE and arcs: moves at a feed."""
+        """Mask (N,) of the moves at a feed: LINE and arcs."""
         return np.asarray((self.kind >= Kind.LINE) & (self.kind <= Kind.ARC_CCW))
 
     def sweeps(self) -> Floats:
-        """(N,) signed sweep in rad, CCW positive; 0 where no arc, ±2π where end is start."""
+        """Return the signed sweep (N,) in rad, CCW positive: 0 for rows that are no arc, ±2π for
+        arcs that end at their start."""
         sweeps, arcs = np.zeros(len(self)), np.flatnonzero(self.is_arc)
         sweeps[arcs] = self.sweeps_of(arcs)
         return sweeps
 
     def sweeps_of(self, arcs: Ints | Indices) -> Floats:
-        """(J,) the same of these rows, which are arcs.
+        """Return the signed sweep (J,) in rad of these rows, all of them arcs.
 
         CCW: sweep = (angle(end) − angle(start)) mod 2π, taken in (0, 2π];  CW: mirrored.
         """
@@ -185,26 +188,26 @@ class Toolpath:
         return _sweeps(self.kind[arcs], *ends)
 
     @property
-    def running(self) -> int:
-        """How many rows are executed: those behind the end of the program are not."""
+    def executed_rows(self) -> int:
+        """Number of rows up to and including the end of the program; later rows never run."""
         ends = np.flatnonzero(self.kind == Kind.END)
         return int(ends[0]) + 1 if len(ends) else len(self)
 
     def first(self, rows: int) -> Toolpath:
-        """The first rows alone; the very toolpath where these are all."""
+        """Return the first rows; the toolpath itself if these are all."""
         return self if rows >= len(self) else self.part(0, rows)
 
     def part(self, low: int, high: int) -> Toolpath:
-        """The rows low:high, whose columns are not copied."""
+        """Return the rows low:high as views of the columns."""
         columns = {name: getattr(self, name)[low:high] for name in COLUMNS}
         drawn = None if self.drawn is None else self.drawn.picked(np.arange(low, high))
-        start = self.start if low == 0 else frozen(self.end[low - 1].copy())
+        start = self.start if low == 0 else read_only(self.end[low - 1].copy())
         operations = None if self.operations is None else self.operations.of_part(low, high)
         return replace(self, **columns, start=start, drawn=drawn, operations=operations)
 
     def by_parts(self, column: Callable[[Toolpath], Column]) -> Column:
-        """(N, …) a column in which each row follows from that row and its start alone, computed
-        for some thousand rows at a time, in order."""
+        """Compute a column (N, …) for ROWS_AT_ONCE rows at a time; each value must follow from its
+        row and the start of that row alone."""
         bare = replace(self, drawn=None, operations=None)
         if len(self) <= ROWS_AT_ONCE:
             return column(bare)
@@ -217,8 +220,8 @@ class Toolpath:
         return cast(Column, found)
 
     def picked(self, row: Ints, **others: Codes | Ints | Floats) -> Toolpath:
-        """Rows (M,) of this one, in that order and as often as they are named; `others`: columns
-        that take the place of theirs."""
+        """Select rows (M,) in the given order, with repetitions; `others` replaces columns of the
+        result."""
         columns = {
             name: rows_of(getattr(self, name), row) for name in COLUMNS if name not in others
         }
@@ -227,12 +230,12 @@ class Toolpath:
         return replace(self, **{**columns, **others}, drawn=drawn, operations=operations)
 
     def text(self, row: int) -> str:
-        """Provenance of a row ("" when it has none)."""
+        """Return the provenance of a row, "" if it has none."""
         index = int(self.source[row])
         return self.texts[index] if index >= 0 else ""
 
     def place(self, row: int) -> str:
-        """A row and where it came from, for messages: `move 12 (CIRCLE 2F)`."""
+        """Return the number of a row and its provenance for messages: `move 12 (CIRCLE 2F)`."""
         source = self.text(row)
         return f"move {row} ({source})" if source else f"move {row}"
 
@@ -257,12 +260,12 @@ class Toolpath:
 
 
 def are_arcs(kind: Codes | Ints) -> Bools:
-    """(K,) true for ARC_CW and ARC_CCW among kinds (K,)."""
+    """Mask (K,) of the kinds that are ARC_CW or ARC_CCW."""
     return np.asarray((kind == Kind.ARC_CW) | (kind == Kind.ARC_CCW))
 
 
 def _sweeps(kind: Codes, begin: Floats, end: Floats, centre: Floats) -> Floats:
-    """(K,) rad as `Toolpath.sweeps` has them, of rows that are arcs."""
+    """Compute the sweeps (K,) in rad of K arcs, signed as in `Toolpath.sweeps`."""
     full = 2.0 * np.pi
     from_ = np.arctan2(begin[:, 1] - centre[:, 1], begin[:, 0] - centre[:, 0])
     to = np.arctan2(end[:, 1] - centre[:, 1], end[:, 0] - centre[:, 0])
@@ -272,37 +275,37 @@ def _sweeps(kind: Codes, begin: Floats, end: Floats, centre: Floats) -> Floats:
     return np.asarray(sign * np.where(same | (turn == 0.0), full, turn))
 
 
-def frozen(column: Column) -> Column:
-    """The very array, which nobody may change any more: a Toolpath need not copy it."""
+def read_only(column: Column) -> Column:
+    """Make an array read-only and return it: a Toolpath takes it without a copy."""
     column.flags.writeable = False
     return column
 
 
-def _kept(
+def _as_column(
     name: str, given: Any, dtype: type[np.generic], shape: tuple[int, ...]
 ) -> np.ndarray[Any, Any]:
-    """A column that nobody can change: the given one if that is so already, else a copy of it.
-    ValueError for another shape."""
+    """Return the column if it is read-only and of this type, else a read-only copy. ValueError for
+    another shape."""
     column: np.ndarray[Any, Any] = given
-    if not (isinstance(given, np.ndarray) and given.dtype == dtype and _is_final(given)):
-        column = frozen(np.array(given, dtype=dtype))
+    if not (isinstance(given, np.ndarray) and given.dtype == dtype and _is_read_only(given)):
+        column = read_only(np.array(given, dtype=dtype))
     if column.shape != shape:
         raise ValueError(f"column {name} has shape {column.shape}, wanted {shape}")
     return column
 
 
-def _is_final(column: np.ndarray[Any, Any]) -> bool:
-    """Whether nobody can change these numbers, be they a part of another array or not."""
+def _is_read_only(column: np.ndarray[Any, Any]) -> bool:
+    """True if neither the array nor the array that it is a view of can be written."""
     owner = column if column.base is None else column.base
     own = isinstance(owner, np.ndarray) and bool(owner.flags.owndata)
     return own and not owner.flags.writeable and not column.flags.writeable
 
 
 def rows_of(column: Column, row: Ints) -> Column:
-    """The rows (M,) of a column; one row that is seen as many stays one."""
+    """Select rows (M,) of a column; a column that is one row broadcast to many stays one row."""
     if len(column) and column.strides[0] == 0:
         return cast(Column, np.broadcast_to(column[:1], (len(row), *column.shape[1:])))
-    return frozen(cast(Column, column[row]))
+    return read_only(cast(Column, column[row]))
 
 
 def _triple(row: Floats) -> tuple[float, float, float]:
@@ -313,10 +316,10 @@ def _or_none(number: np.float64) -> float | None:
     return None if np.isnan(number) else float(number)
 
 
-class Compensated(Struct, frozen=True, eq=False):
-    """A toolpath compensated beforehand, so that the slides come out on the wanted one: `toolpath`
-    is what the controller is sent, `row` (N,) the row of the wanted toolpath for each of its
-    rows."""
+class CompensatedToolpath(Struct, frozen=True, eq=False):
+    """A toolpath compensated for the machine's errors so that the slides follow the wanted one:
+    `toolpath` is what is sent to the controller, `row` (N,) the wanted toolpath's row of each of
+    its rows."""
 
     toolpath: Toolpath
     row: Ints
@@ -326,13 +329,13 @@ class PolarArcs:
     """The chosen arcs in polar coordinates: radius at start and end mm, angle at the start and
     signed sweep rad, each (J,), for the rows `row` (J,).
 
-    An arc whose ends lie at two distances of its centre (rounded coordinates) is taken as the
-    spiral between them; radius and, in a helix, Z change in proportion to the angle, so that both
-    ends are met.
+    An arc whose ends have different distances to its centre (rounded coordinates) is treated as
+    a spiral: radius and, in a helix, Z change in proportion to the angle, so that both ends are
+    met.
     """
 
     def __init__(self, toolpath: Toolpath, chosen: Bools) -> None:
-        """PostError for an arc without a centre."""
+        """Raise PostError for an arc without a centre."""
         self.row = np.flatnonzero(chosen)
         self.centre = toolpath.centre[self.row]
         bad = ~np.isfinite(self.centre).all(axis=1)
@@ -346,7 +349,7 @@ class PolarArcs:
         self.sweep = _sweeps(toolpath.kind[self.row], self.begin, self.end, self.centre)
 
     def points(self, which: Ints, share: Floats) -> Floats:
-        """(K, 3) mm: the points of the arcs `which` (K,) at `share` (K,) of their sweep."""
+        """Compute the points (K, 3) mm of the arcs `which` (K,) at `share` (K,) of their sweep."""
         angle = self.angle[which] + share * self.sweep[which]
         radius = self.radius[which] + share * (self.end_radius - self.radius)[which]
         rise = (self.end[:, 2] - self.begin[:, 2])[which]
@@ -360,8 +363,8 @@ class PolarArcs:
 
 
 def toolpath_extents(toolpath: Toolpath, *, rows: Bools | None = None) -> Floats:
-    """(3, 2) mm: lowest and highest X, Y and Z that any move reaches, exact with its arcs, the
-    start included; with `rows` (N,) those that these moves reach.
+    """Compute the lowest and highest X, Y and Z (3, 2) mm of all moves and the start, exact for
+    arcs; with `rows` (N,) of these moves alone.
 
     An arc reaches centre ± radius where its sweep passes the direction of an axis.
     """
@@ -384,7 +387,7 @@ def toolpath_extents(toolpath: Toolpath, *, rows: Bools | None = None) -> Floats
 
 
 def _arc_extremes(toolpath: Toolpath, arcs: Ints) -> Floats:
-    """(J, 2) the points of these arcs that lie straight right, above, left or below of the
+    """Compute the points (J, 2) mm of these arcs straight right, above, left or below of their
     centre."""
     centre, begin = toolpath.centre[arcs], toolpath.starts_of(arcs)[:, :2]
     arm = begin - centre
@@ -399,7 +402,7 @@ def _arc_extremes(toolpath: Toolpath, arcs: Ints) -> Floats:
 
 
 def mounted_before(toolpath: Toolpath) -> Bools:
-    """(N,) true for tool changes before the first move at a feed: where a machine has no
-    tool change, the operator mounts this one before the program starts."""
+    """Mask (N,) of tool changes before the first move at a feed: on a machine without a tool
+    changer the operator mounts this tool before the program starts."""
     fed = np.cumsum(toolpath.is_feed) > 0
     return np.asarray((toolpath.kind == Kind.TOOL_CHANGE) & ~fed)

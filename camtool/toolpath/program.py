@@ -35,7 +35,8 @@ class Program:
         row_of_block: Sequence[int] | Indices | Ints,
         findings: Iterable[Finding],
     ) -> Program:
-        """A program of this text, for a machine that calls its programs so."""
+        """Return a program of this text with the extension and the name of the machine's
+        target."""
         return cls(
             data=data,
             extension=machine.target.extension,
@@ -46,8 +47,8 @@ class Program:
 
 
 class Listing(Struct, frozen=True):
-    """A program for people: `blocks` (B,) are its lines, numbered as in `Toolpath.block`;
-    `binary` where they are bytes in hex."""
+    """A printable program: its lines `blocks` (B,), numbered as in `Toolpath.block`; `binary` if
+    they are bytes in hexadecimal."""
 
     blocks: tuple[str, ...]
     binary: bool = False

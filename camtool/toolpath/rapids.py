@@ -1,14 +1,15 @@
 """Rapids below the stock top, outside what earlier cuts have cleared.
 
-2.5 axes: at a height z that is cleared which the discs of earlier cuts at z or deeper have swept
-(a sloping cut: the part of it that is deep enough). A rapid must sweep its own disc there, at its
-lowest point; one that slopes is looked at in `SLOPE_PARTS` pieces. A rapid straight up is never
-wrong, and one straight down may go where a feed has been right there before (a drill's peck).
+The model has 2.5 axes: the area cleared at a height z is what the discs of earlier cuts at z or
+deeper have swept (of a sloping cut the part that is deep enough). A rapid must sweep its own disc
+within that area, at its lowest point; one that slopes is examined in `SLOPE_PARTS` pieces. A rapid
+straight up is never wrong, and one straight down may go where a feed at the same XY has been
+before (a drill's peck).
 
     swept by the rapid, disc half the tolerance smaller  ⊆  swept by the cuts, discs half larger
 
-so an area that is cleared exactly always counts, and what sticks out by more than the tolerance
-never does. Only rapids below the stock top cost anything, each no more than the cuts near it.
+so an area that is cleared exactly is always accepted, and a rapid that protrudes by more than the
+tolerance never is. Only rapids below the stock top take time, in proportion to the cuts near them.
 """
 
 from __future__ import annotations
@@ -27,33 +28,33 @@ from camtool.toolpath.lower import arcs_to_lines
 from camtool.toolpath.moves import Kind, Toolpath
 
 STOCK_TOP_MM = 0.0
-"""Part zero lies on the stock."""
+"""Z of the stock top: part zero lies on it."""
 
 CLEARED_MM = 0.01
 """A rapid's disc may extend beyond the cleared area by this much."""
 
 HEIGHT_EPS_MM = 1e-6
-"""Heights that differ by less are equal, and a rapid this little below the top is on it."""
+"""Heights that differ by less are equal; a rapid less than this below the top is on it."""
 
 SLOPE_PARTS = 8
 """A rapid in XY and Z at once is examined in this many pieces, each at its lowest height."""
 
 CHORD_SHARE, ROUND_SHARE = 0.25, 0.125
-"""Parts of the tolerance by which chords stray from arcs, and polygons from discs."""
+"""Fractions of the tolerance by which chords deviate from arcs, and polygons from discs."""
 
 
 class Reach(Struct, frozen=True, eq=False):
-    """Radii (N,) mm for each row: `cuts` of what a tool clears at the depth of its tip, `sweeps`
-    of what it needs free; `solid` (xmin, ymin, xmax, ymax) mm where there is stock, None: all
-    over."""
+    """Radii of the tool (N,) mm for each row: `cuts` is cleared at the depth of its tip, `sweeps`
+    must be free; `solid` is the box of the stock (xmin, ymin, xmax, ymax) mm, None without
+    limits."""
 
     cuts: Floats
     sweeps: Floats
     solid: tuple[float, float, float, float] | None = None
 
 
-class Through(Struct, frozen=True):
-    """A rapid through the stock: its row, its height there and about where, mm."""
+class RapidThroughStock(Struct, frozen=True):
+    """A rapid through the stock: its row, its height there and a point of the contact, mm."""
 
     row: int
     z_mm: float
@@ -62,47 +63,48 @@ class Through(Struct, frozen=True):
 
 def rapids_through_stock(
     toolpath: Toolpath, reach: Reach, tolerance_mm: float = CLEARED_MM
-) -> list[Through]:
-    """The rapids that run through material which no earlier cut has cleared, in order."""
+) -> list[RapidThroughStock]:
+    """Return the rapids through material that no earlier cut has cleared, in order."""
     wanted = low_rapids(toolpath)
     if not wanted:
         return []
-    swarf = _Swarf(toolpath, reach, tolerance_mm)
+    cleared_area = _ClearedArea(toolpath, reach, tolerance_mm)
     found = []
     for row in wanted:
         for begin, end in _pieces(toolpath, row):
-            stuck = swarf.uncut(begin, end, row)
-            if stuck is not None:
-                found.append(Through(row, float(min(begin[2], end[2])), stuck))
+            contact = cleared_area.uncut_point(begin, end, row)
+            if contact is not None:
+                found.append(RapidThroughStock(row, float(min(begin[2], end[2])), contact))
                 break
     return found
 
 
 def low_rapids(toolpath: Toolpath) -> list[int]:
-    """Rapids below the stock top that move in XY, or straight down to where no feed has been."""
-    chosen = toolpath.by_parts(_go_low)
+    """Return the rows of rapids below the stock top that move in XY, or straight down deeper than
+    any feed at the same XY before."""
+    chosen = toolpath.by_parts(_are_low_rapids)
     if not chosen.any():
         return []
-    flat = toolpath.by_parts(_go_across)
-    fine = ~flat & (_been(toolpath, flat) <= toolpath.end[:, 2] + HEIGHT_EPS_MM)
+    flat = toolpath.by_parts(_are_across)
+    fine = ~flat & (_fed_depths(toolpath, flat) <= toolpath.end[:, 2] + HEIGHT_EPS_MM)
     return np.flatnonzero(chosen & ~fine).tolist()
 
 
-def _go_low(toolpath: Toolpath) -> Bools:
-    """(N,) true for rapids below the stock top that move in XY or down."""
+def _are_low_rapids(toolpath: Toolpath) -> Bools:
+    """Mask (N,) of rapids below the stock top that move in XY or down."""
     start, end = toolpath.starts, toolpath.end
     low = np.minimum(start[:, 2], end[:, 2]) < STOCK_TOP_MM - HEIGHT_EPS_MM
     down = end[:, 2] < start[:, 2]
-    return np.asarray((toolpath.kind == Kind.RAPID) & low & (_go_across(toolpath) | down))
+    return np.asarray((toolpath.kind == Kind.RAPID) & low & (_are_across(toolpath) | down))
 
 
-def _go_across(toolpath: Toolpath) -> Bools:
-    """(N,) true for rows that move in XY."""
+def _are_across(toolpath: Toolpath) -> Bools:
+    """Mask (N,) of rows that move in XY."""
     return np.asarray((toolpath.starts[:, :2] != toolpath.end[:, :2]).any(axis=1))
 
 
-def _been(toolpath: Toolpath, flat: Bools) -> Floats:
-    """(N,) how deep feeds have been, before each row, since the tool last moved in XY."""
+def _fed_depths(toolpath: Toolpath, flat: Bools) -> Floats:
+    """Compute the lowest Z (N,) of feeds before each row since the tool last moved in XY."""
     deep, deepest = np.empty(len(toolpath)), math.inf
     feeds = np.where(toolpath.is_feed, toolpath.end[:, 2], math.inf)
     moves = (flat | toolpath.is_arc).tolist()
@@ -113,7 +115,7 @@ def _been(toolpath: Toolpath, flat: Bools) -> Floats:
 
 
 def _pieces(toolpath: Toolpath, row: int) -> Iterator[tuple[Floats, Floats]]:
-    """The parts of a rapid below the stock top: ends (3,) each."""
+    """Yield the pieces of a rapid below the stock top, as start and end (3,)."""
     begin, end = toolpath.starts[row], toolpath.end[row]
     if begin[2] == end[2] or (begin[:2] == end[:2]).all():
         yield begin, end
@@ -128,7 +130,7 @@ def _pieces(toolpath: Toolpath, row: int) -> Iterator[tuple[Floats, Floats]]:
 
 
 def feeds_below_top(toolpath: Toolpath) -> Bools:
-    """(N,) true for moves at a feed that begin or end below the stock top."""
+    """Mask (N,) of moves at a feed that begin or end below the stock top."""
     return toolpath.is_feed & toolpath.by_parts(_is_low)
 
 
@@ -137,8 +139,8 @@ def _is_low(toolpath: Toolpath) -> Bools:
     return np.asarray(lowest < STOCK_TOP_MM - HEIGHT_EPS_MM)
 
 
-class _Swarf:
-    """What the cuts of a toolpath have cleared, queried rapid by rapid."""
+class _ClearedArea:
+    """The area that the cuts of a toolpath have cleared, queried rapid by rapid."""
 
     def __init__(self, toolpath: Toolpath, reach: Reach, tolerance_mm: float) -> None:
         import shapely
@@ -156,13 +158,13 @@ class _Swarf:
         self._index = BoxIndex(corners + wide)
         self._solid = None if reach.solid is None else shapely.box(*reach.solid)
 
-    def uncut(self, begin: Floats, end: Floats, row: int) -> tuple[float, float] | None:
-        """A place (x, y) mm where the disc of the rapid `row` from `begin` to `end` (3,) meets
-        material at its lowest height; None when there is none."""
+    def uncut_point(self, begin: Floats, end: Floats, row: int) -> tuple[float, float] | None:
+        """Find a point (x, y) mm where the disc of the rapid `row`, from `begin` to `end` (3,),
+        meets material at its lowest height; None if it meets none."""
         import shapely
 
         half = 0.5 * self._tolerance_mm
-        needed = self._disc(_line(begin, end), float(self._reach.sweeps[row]) - half)
+        needed = self._swept(_line(begin, end), float(self._reach.sweeps[row]) - half)
         if self._solid is not None:
             needed = needed.intersection(self._solid)
         if needed.is_empty:
@@ -170,8 +172,8 @@ class _Swarf:
         _, near = self._index.touching(np.array([needed.bounds]))
         near = near[self._row[near] < row]
         cleared = [
-            self._disc(shapely.MultiLineString(lines), radius + half)
-            for radius, lines in self._deep(near, float(min(begin[2], end[2])))
+            self._swept(shapely.MultiLineString(lines), radius + half)
+            for radius, lines in self._deep_segments(near, float(min(begin[2], end[2])))
         ]
         left = needed.difference(shapely.union_all(cleared)) if cleared else needed
         if left.is_empty:
@@ -179,8 +181,9 @@ class _Swarf:
         point = left.representative_point()
         return float(point.x), float(point.y)
 
-    def _deep(self, near: Ints, z: float) -> Iterator[tuple[float, list[Any]]]:
-        """The cuts among `near` where they are as deep as `z`, by the radius of their tool."""
+    def _deep_segments(self, near: Ints, z: float) -> Iterator[tuple[float, list[Any]]]:
+        """Yield the parts of the cuts `near` that are at `z` or deeper, as segments grouped by the
+        radius of their tool."""
         begin, end = self._begin[near], self._end[near]
         floor = z + HEIGHT_EPS_MM
         rise = end[:, 2] - begin[:, 2]
@@ -196,8 +199,8 @@ class _Swarf:
             these = deep & (self._radius[near] == radius)
             yield radius, list(np.stack([first[these], last[these]], axis=1))
 
-    def _disc(self, shape: Any, radius: float) -> Any:
-        """What a disc sweeps along a shape; the shape itself when there is no disc left."""
+    def _swept(self, shape: Any, radius: float) -> Any:
+        """Return the area that a disc sweeps along a shape; the shape itself for a radius ≤ 0."""
         if radius <= 0.0:
             return shape
         sagitta = min(1.0, ROUND_SHARE * self._tolerance_mm / radius)

@@ -1,4 +1,4 @@
-"""What writers refuse before a block is made: a PostError that names the move and its source."""
+"""Checks before a writer makes blocks: a PostError names the move and its source."""
 
 from __future__ import annotations
 
@@ -19,9 +19,10 @@ def refuse(
     *,
     rows: Ints | None = None,
 ) -> None:
-    """PostError for the first bad row (N,), if there is one; `message` may be made of the row.
+    """Raise PostError for the first row of the mask `bad` (N,); `message` may be a function of the
+    row.
 
-    `rows`: where `bad` is of a toolpath that was made of this one, this one's row of each.
+    `rows` maps rows of `bad` to rows of `toolpath`, where `bad` is of a toolpath made from it.
     """
     if bad.any():
         row = int(np.argmax(bad)) if rows is None else int(rows[np.argmax(bad)])
@@ -30,7 +31,7 @@ def refuse(
 
 
 def refuse_start(toolpath: Toolpath) -> None:
-    """A program starts at part zero."""
+    """Refuse a toolpath that does not start at part zero."""
     if toolpath.start.any():
         x, y, z = toolpath.start.tolist()
         raise PostError(
@@ -39,11 +40,11 @@ def refuse_start(toolpath: Toolpath) -> None:
         )
 
 
-def refuse_two_radii(toolpath: Toolpath, most_mm: float) -> None:
-    """The radii at the start and at the end of an arc may differ by `most_mm`, no more."""
+def refuse_two_radii(toolpath: Toolpath, max_mm: float) -> None:
+    """Refuse arcs whose radii at start and end differ by more than `max_mm`."""
     spread = radius_spread(toolpath)
     with np.errstate(invalid="ignore"):
-        bad = toolpath.is_arc & ~(spread <= most_mm)
+        bad = toolpath.is_arc & ~(spread <= max_mm)
     refuse(
         toolpath,
         bad,
@@ -53,8 +54,8 @@ def refuse_two_radii(toolpath: Toolpath, most_mm: float) -> None:
 
 
 def radius_spread(toolpath: Toolpath) -> Floats:
-    """(N,) mm by which an arc's start and end differ in their distance to its centre; NaN for
-    rows without a centre."""
+    """Compute the difference (N,) mm of an arc's radii at its start and its end; NaN for rows
+    without a centre."""
     with np.errstate(invalid="ignore", over="ignore"):
         out, back = (p[:, :2] - toolpath.centre for p in (toolpath.starts, toolpath.end))
         return np.asarray(np.abs(np.hypot(*out.T) - np.hypot(*back.T)))

@@ -1,9 +1,9 @@
-"""Blocks of words as text, by columns: what every writer of words ends with.
+"""Blocks of words formatted as text by columns, for all writers of G-code and its relatives.
 
-    x = Words("X", units[:, 0], written[:, 0], decimals=3)
+    x = WordColumn("X", units[:, 0], written[:, 0], decimals=3)
     texts = texts_of([code, x, y], blanks=True)      b"G1 X1.500 Y2.000\\nG0 X..."
 
-Blocks that are no row of words (events, comments) are put between them afterwards.
+Blocks without words (events, comments) are inserted afterwards (`TextLines.with_lines`).
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from camtool.arrays import Bools, Codes, Ints, Octets
 from camtool.kernels.words import MOST_NUMBER, put_words
 
 ROWS_AT_ONCE = 1 << 14
-"""So many blocks are written in one go, so that little room is needed."""
+"""Blocks formatted at a time, to bound the buffer."""
 
 
-class Words(Struct, frozen=True, eq=False):
-    """A word of M blocks: what stands before its number, the number in whole units of its last
-    decimal (M,), and which blocks have it (M,).
+class WordColumn(Struct, frozen=True, eq=False):
+    """One word in M blocks: the text before its number, the number in whole units of its last
+    decimal (M,), and the mask of blocks that have it (M,).
 
-    `kept`: so many decimals stay where they are 0 (None: all); `digits`: at least so many before
-    the point; `plus`: a sign before numbers that are not negative.
+    `kept`: decimals that are written even if they are 0 (None: all); `digits`: least number of
+    digits before the point; `plus`: write a sign before numbers that are not negative.
     """
 
     letter: str
@@ -39,25 +39,25 @@ class Words(Struct, frozen=True, eq=False):
 
     @property
     def style(self) -> tuple[int, int, int, int]:
-        """As `camtool.kernels.words` has it."""
+        """Digits, decimals, kept decimals and sign, as `camtool.kernels.words` takes them."""
         kept = self.decimals if self.kept is None else self.kept
         return self.digits, self.decimals, kept, int(self.plus)
 
 
-class Texts(Struct, frozen=True, eq=False):
-    """M lines of text, some of them empty and without a line end: line k is data[ends[k − 1]:
-    ends[k]]."""
+class TextLines(Struct, frozen=True, eq=False):
+    """M lines of text with their line ends, some of them of no characters at all: line k is
+    data[ends[k − 1]:ends[k]]."""
 
     data: bytes
     ends: Ints
 
     @property
     def lengths(self) -> Ints:
-        """(M,) characters of each line, its end included."""
+        """Characters (M,) of each line, its end included."""
         return np.diff(self.ends, prepend=0)
 
     def with_lines(self, between: Iterable[tuple[int, str]]) -> bytes:
-        """The text with further lines, each before its line k; k ascends."""
+        """Return the text with further lines inserted, each (k, line) before line k; k ascends."""
         text, out, done = memoryview(self.data), BytesIO(), 0
         for k, line in between:
             upto = int(self.ends[k - 1]) if k > 0 else 0
@@ -69,13 +69,13 @@ class Texts(Struct, frozen=True, eq=False):
 
 
 def line_lengths(data: bytes) -> Ints:
-    """(L,) characters of each line of a program, line ends not counted."""
+    """Compute the characters (L,) of each line of a program, without line ends."""
     ends = np.flatnonzero(np.frombuffer(data, dtype=np.uint8) == ord("\n"))
     return np.asarray(np.diff(ends, prepend=-1) - 1)
 
 
-def texts_of(columns: Sequence[Words], *, blanks: bool = False, end: str = "\n") -> Texts:
-    """The lines of M blocks, each with the words that it has in this order; `blanks` part them."""
+def texts_of(columns: Sequence[WordColumn], *, blanks: bool = False, end: str = "\n") -> TextLines:
+    """Format M blocks, each with its words in this order, separated by spaces if `blanks`."""
     pieces = [*(each.letter for each in columns), end]
     fixed = np.frombuffer("".join(pieces).encode("ascii"), dtype=np.uint8).copy()
     fixed_ends = np.cumsum([len(piece) for piece in pieces])
@@ -93,4 +93,4 @@ def texts_of(columns: Sequence[Words], *, blanks: bool = False, end: str = "\n")
         parts.append(out[:size].tobytes())
         ends[rows] += begin
         begin += size
-    return Texts(b"".join(parts), ends)
+    return TextLines(b"".join(parts), ends)

@@ -12,8 +12,8 @@ from camtool.machine.model import Machine
 from camtool.planning.job import Job, Tool
 from camtool.simulation.motion import ALL, Effects, Options
 from camtool.target.registry import LoadedTarget
-from camtool.toolpath.moves import Compensated, Toolpath
-from camtool.toolpath.wanted import Kept
+from camtool.toolpath.moves import CompensatedToolpath, Toolpath
+from camtool.toolpath.wanted import ProtectedRegion
 
 if TYPE_CHECKING:
     from camtool.verification.conformance import Asked
@@ -86,7 +86,7 @@ class VerifyOptions(Struct, frozen=True):
     effects: Effects = ALL
     tool_diameter_mm: float | None = None
     nose: Tool | None = None
-    kept: tuple[Kept, ...] = ()
+    kept: tuple[ProtectedRegion, ...] = ()
     source: str = ""
     size_bytes: int | None = None
     line_bytes: int | None = None
@@ -108,7 +108,7 @@ class Case(Struct, frozen=True, eq=False):
     wanted: Toolpath | None
     drawing: Drawing | None
     options: VerifyOptions
-    compensated: Compensated | None = None
+    compensated: CompensatedToolpath | None = None
     asked: Asked | None = None
     written_from: Toolpath | None = None
     row_from: Indices | None = None

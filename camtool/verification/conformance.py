@@ -159,7 +159,7 @@ class Side(Struct, frozen=True, eq=False, dict=True):
     @classmethod
     def of(cls, toolpath: Toolpath, *, flat_cuts: bool) -> Side:
         """The toolpath with its cutting moves; `flat_cuts` as `camtool.verification.cuts` says."""
-        running = toolpath.first(toolpath.running)
+        running = toolpath.first(toolpath.executed_rows)
         return cls(running, cut_moves(running, flat_cuts=flat_cuts))
 
     @cached_property

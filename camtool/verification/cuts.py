@@ -141,7 +141,7 @@ def cutting_rows(toolpath: Toolpath, *, flat_cuts: bool, across: Bools | None = 
     across = moves_across(toolpath) if across is None else across
     is_drawn_flat = flat_cuts and is_flat(toolpath)
     cutting = across & (toolpath.is_feed if is_drawn_flat else feeds_below_top(toolpath))
-    cutting[toolpath.running :] = False
+    cutting[toolpath.executed_rows :] = False
     return cutting
 
 

@@ -158,8 +158,9 @@ def sizes(slides: SlideExtents, goal: LoopedCuts, gap_mm: float) -> Iterator[Siz
 class _Edges(Struct, frozen=True, eq=False):
     """The edges of C contours: which of them `counts` in sizes (C,), boxes (C, 2, 2) mm of the
     `nominal` edge and of the `predicted` one, the distance `rough` (C,) mm that the line to which
-    it belongs is planned to keep from its nominal edge, and what `Drawn` says of each. `own`: the
-    nominal box of what the contour cuts of its line; `listed` (C,): it is no ring within that."""
+    it belongs is planned to keep from its nominal edge, and what `DrawnEdges` says of each. `own`:
+    the nominal box of what the contour cuts of its line; `listed` (C,): it is no ring within
+    that."""
 
     counts: Bools
     nominal: Floats

@@ -37,7 +37,7 @@ class Match(Struct, frozen=True, eq=False):
     that do not cut. `only` (N,) is that contour where the slides are compared with it alone, else
     ANY_CONTOUR. `circle` (N,) is the index of the full circle that the row follows, or −1.
     `off_mm` (N,) is the largest distance of the drawing from the wanted rows beside it
-    (`Drawn.off_mm`).
+    (`DrawnEdges.off_mm`).
     """
 
     row: Indices

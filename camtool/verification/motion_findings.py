@@ -12,7 +12,13 @@ from camtool.findings import Finding, Severity
 from camtool.machine.model import Machine
 from camtool.planning.naming import own_numbers
 from camtool.toolpath.moves import Kind, Toolpath
-from camtool.toolpath.rapids import CLEARED_MM, Reach, Through, low_rapids, rapids_through_stock
+from camtool.toolpath.rapids import (
+    CLEARED_MM,
+    RapidThroughStock,
+    Reach,
+    low_rapids,
+    rapids_through_stock,
+)
 from camtool.units import UM_PER_MM
 from camtool.verification.case import Case
 from camtool.verification.coverage import at_point, block_name, holes_of, listed
@@ -112,7 +118,7 @@ def _rapids_in_stock(decoded: Toolpath, case: Case) -> Iterator[Finding]:
         )
 
 
-def _through_stock(decoded: Toolpath, case: Case) -> list[Through]:
+def _through_stock(decoded: Toolpath, case: Case) -> list[RapidThroughStock]:
     """Rapids through stock that the tool has not cleared. Where the tool is not known: all rapids
     in XY below the stock top, and those straight down to where no feed has been."""
     diameter = case.options.tool_diameter_mm
@@ -124,7 +130,7 @@ def _through_stock(decoded: Toolpath, case: Case) -> list[Through]:
     end = decoded.end[rows]
     low = np.minimum(decoded.starts_of(rows)[:, 2], end[:, 2])
     columns = (rows.tolist(), low.tolist(), end[:, :2].tolist())
-    return [Through(row, z, (x, y)) for row, z, (x, y) in zip(*columns, strict=True)]
+    return [RapidThroughStock(row, z, (x, y)) for row, z, (x, y) in zip(*columns, strict=True)]
 
 
 def _many_reversals(machine: Machine, tally: Tally, cuts: CutMoves) -> Iterator[Finding]:

@@ -46,7 +46,7 @@ from camtool.planning.drill import circle_of
 from camtool.planning.paths import Cuts, MeasuredPaths
 from camtool.planning.paths import cuts as joined_moves
 from camtool.toolpath.moves import Kind, Toolpath, are_arcs
-from camtool.toolpath.wanted import UNKNOWN_EDGE, Drawn
+from camtool.toolpath.wanted import UNKNOWN_EDGE, DrawnEdges
 from camtool.verification.coverage import at_point, block_name, holes_of, listed
 from camtool.verification.cuts import CutMoves, cut_moves, loops, moves_across, sample_cuts
 from camtool.verification.findings import (
@@ -317,7 +317,7 @@ def register(
             "holds single points alone, and no line that a program could follow",
             mend="say what the program does with them, with the flags of its job: --kind drill …",
         )
-    running = decoded.first(decoded.running)
+    running = decoded.first(decoded.executed_rows)
     cuts = cut_moves(running, flat_cuts=flat_cuts)
     lines = _Lines.of(drawing.paths)
     path = _Path.of(cuts, _tools_of(running), limit_mm)
@@ -1258,7 +1258,7 @@ def _spliced(
         start=toolpath.start,
         texts=(*toolpath.texts, *names),
         made_from=of.drawing.file,
-        drawn=Drawn(
+        drawn=DrawnEdges(
             off_mm=worst[contour],
             edge=edge,
             nominal=of.lines.boxes,

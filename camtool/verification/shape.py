@@ -4,8 +4,8 @@ At the surface of the stock the tool removes what its cross-section there covers
 disc of its diameter, or for a V bit a disc that is larger the deeper the tip is. Overcut is
 removed but should not be, undercut should be removed but is not. Each has an area and a depth: the
 largest distance of its points from the other shape. The wanted shape is what the tool covers along
-the wanted path, without what must stay (`Kept`): where the plan itself cuts into a drawn wall,
-that is overcut, however well the path is followed, and a finding (`OVERCUT`).
+the wanted path, without what must stay (`ProtectedRegion`): where the plan itself cuts into a
+drawn wall, that is overcut, however well the path is followed, and a finding (`OVERCUT`).
 
 Arcs and the edges of discs are chords here, with the same tolerance for both shapes. Depths are
 therefore wrong by up to twice the tolerance, and smaller depths are taken as 0. All depths of a
@@ -32,7 +32,7 @@ from camtool.planning.job import Tool
 from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Toolpath
 from camtool.toolpath.rapids import STOCK_TOP_MM
-from camtool.toolpath.wanted import Kept
+from camtool.toolpath.wanted import ProtectedRegion
 from camtool.verification.case import VerifyOptions
 from camtool.verification.cuts import CutMoves, moved_lengths
 from camtool.verification.findings import OVERCUT
@@ -147,7 +147,9 @@ class Wanted(Struct, frozen=True, eq=False):
     at_mm: tuple[float, float]
 
 
-def wanted_shape(cuts: CutMoves, cutter: Cutter, kept: Sequence[Kept] = ()) -> Wanted | None:
+def wanted_shape(
+    cuts: CutMoves, cutter: Cutter, kept: Sequence[ProtectedRegion] = ()
+) -> Wanted | None:
     """What the tool covers along the wanted moves; with `kept`, what it covers along its runs,
     without what must stay. None when nothing is cut."""
     import shapely
@@ -295,7 +297,7 @@ def _runs(trace: Trace, toolpath: Toolpath, cutter: Cutter) -> _Lines:
     return _Lines(np.concatenate(points), np.concatenate(heights), np.concatenate(line))
 
 
-def _moves(kept: Kept, cutter: Cutter) -> tuple[Segments, Floats]:
+def _moves(kept: ProtectedRegion, cutter: Cutter) -> tuple[Segments, Floats]:
     """The cutting moves of the runs, and the heights (K, 2) of their ends. Of equal moves at
     several heights one is enough, unless the tool is narrower
     at its tip."""
@@ -310,7 +312,7 @@ def _moves(kept: Kept, cutter: Cutter) -> tuple[Segments, Floats]:
     return Segments.between(moves[:, :2], moves[:, 4:6], moves[:, 3]), moves[:, [2, 6]]
 
 
-def _solid(kept: Kept, swept: Any, tolerance: float) -> Any:
+def _solid(kept: ProtectedRegion, swept: Any, tolerance: float) -> Any:
     """What must stay around a region: smaller than drawn by what shall be cut into it, and by
     `KEPT_SLACK_MM`."""
     import shapely

@@ -31,7 +31,7 @@ from camtool.simulation.controller import FusedRun
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import Chunk
 from camtool.target.registry import LoadedTarget
-from camtool.toolpath.moves import Compensated, Toolpath, toolpath_extents
+from camtool.toolpath.moves import CompensatedToolpath, Toolpath, toolpath_extents
 from camtool.units import UM_PER_MM
 from camtool.verification import report as record
 from camtool.verification.case import SAMPLE_MM, TRACE_POINTS, Case, VerifyOptions
@@ -110,7 +110,7 @@ def verify(
     wanted: Toolpath | None = None,
     drawing: Drawing | None = None,
     options: VerifyOptions | None = None,
-    compensated: Compensated | None = None,
+    compensated: CompensatedToolpath | None = None,
     asked: Asked | None = None,
     written_from: Toolpath | None = None,
     row_from: Indices | None = None,

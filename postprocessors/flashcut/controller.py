@@ -108,7 +108,7 @@ class FlashcutRun:
 
     def __init__(self, toolpath: Toolpath, machine: _Machine, options: Options) -> None:
         controller = machine.controller
-        path = followed(toolpath.first(toolpath.running), machine)
+        path = followed(toolpath.first(toolpath.executed_rows), machine)
         check_rows(path, len(path))
         self._rows = len(path)
         self._still_s = waits_s(path, len(path))

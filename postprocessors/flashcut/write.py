@@ -18,11 +18,11 @@ from camtool.bounds import refuse_too_long
 from camtool.errors import PostError
 from camtool.findings import Finding
 from camtool.kernels.lattice import to_steps
-from camtool.toolpath.lower import MAX_PARTS, Lowered
+from camtool.toolpath.lower import MAX_PARTS, LoweredToolpath
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Program
 from camtool.toolpath.refusals import refuse
-from camtool.toolpath.words import Words, texts_of
+from camtool.toolpath.words import WordColumn, texts_of
 
 from ..gcode.checks import feed_units
 from ..gcode.dialect import feed_decimals
@@ -88,7 +88,7 @@ def write_program(toolpath: Toolpath, machine: FlashcutMachine) -> Program:
     )
 
 
-def _split_slants(toolpath: Toolpath, machine: FlashcutMachine) -> Lowered:
+def _split_slants(toolpath: Toolpath, machine: FlashcutMachine) -> LoweredToolpath:
     """Long slanted lines in pieces that the machine's timers do exactly; PostError when they would
     be too many. XY and Z are apart.
 
@@ -100,7 +100,7 @@ def _split_slants(toolpath: Toolpath, machine: FlashcutMachine) -> Lowered:
     """
     controller = machine.controller
     if not isinstance(controller, FlashcutController):
-        return Lowered(toolpath, np.arange(len(toolpath)))
+        return LoweredToolpath(toolpath, np.arange(len(toolpath)))
     q_mm = np.array([machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm])
     begin = toolpath.starts
     travel = toolpath.end[:, :2] - begin[:, :2]
@@ -121,7 +121,7 @@ def _split_slants(toolpath: Toolpath, machine: FlashcutMachine) -> Lowered:
     return _cut(toolpath, count.astype(np.int64), steps, q_mm)
 
 
-def _cut(toolpath: Toolpath, count: Ints, steps: Ints, q_mm: Floats) -> Lowered:
+def _cut(toolpath: Toolpath, count: Ints, steps: Ints, q_mm: Floats) -> LoweredToolpath:
     """Each row in `count` (N,) pieces; `steps` (N, 2) of the whole row."""
     row = np.repeat(np.arange(len(count)), count)
     part = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
@@ -130,7 +130,7 @@ def _cut(toolpath: Toolpath, count: Ints, steps: Ints, q_mm: Floats) -> Lowered:
     share = ((part[inner] + 1) / count[of])[:, None]
     end = toolpath.end[row]
     end[inner, :2] = toolpath.starts[of, :2] + np.rint(share * steps[of]) * q_mm
-    return Lowered(toolpath.picked(row, end=end), row)
+    return LoweredToolpath(toolpath.picked(row, end=end), row)
 
 
 def _check_reach(
@@ -199,7 +199,7 @@ class _Blocks:
         self._flat = self._corner | self._ahead | (in_xy | arc)[self.row]
         self._feed = self._ahead | ((changes & ~ahead)[self.row] & last)
 
-    def words(self, dialect: FlashcutDialect, decimals: int) -> list[Words]:
+    def words(self, dialect: FlashcutDialect, decimals: int) -> list[WordColumn]:
         """The words of the blocks; `decimals` of a feed."""
         table, row = self._table, self.row
         kept = None if dialect.trailing_zeros else 1
@@ -214,7 +214,10 @@ class _Blocks:
         shown = max(1, decimals)
         feed = self._feeds[row] * 10 ** (shown - decimals)
         return [
-            Words("G", kind, np.ones(len(row), dtype=np.bool_), digits=2),
-            *(Words(name, units, has, dialect.decimals, kept) for name, units, has in columns),
-            Words("F", feed, self._feed, shown),
+            WordColumn("G", kind, np.ones(len(row), dtype=np.bool_), digits=2),
+            *(
+                WordColumn(name, units, has, dialect.decimals, kept)
+                for name, units, has in columns
+            ),
+            WordColumn("F", feed, self._feed, shown),
         ]

@@ -19,7 +19,7 @@ import numpy as np
 from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
-from camtool.toolpath.words import Words, line_lengths
+from camtool.toolpath.words import WordColumn, line_lengths
 
 MOST_UNITS: Final = 10**15
 """Whole units beyond this are not written: their decimals would no longer be exact in a float."""
@@ -65,9 +65,9 @@ def values_of(units: Ints, decimals: int) -> Floats:
     return np.asarray(units / 10.0**decimals)
 
 
-def word_of(letter: str, units: Ints, written: Bools, style: NumberStyle) -> Words:
+def word_of(letter: str, units: Ints, written: Bools, style: NumberStyle) -> WordColumn:
     """The words of a letter, with numbers of whole units (M,), in the blocks that have it (M,)."""
-    return Words(letter, units, written, style.decimals, 0 if style.strip else None)
+    return WordColumn(letter, units, written, style.decimals, 0 if style.strip else None)
 
 
 def format_column(values: Floats, style: NumberStyle) -> list[str]:

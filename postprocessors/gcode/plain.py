@@ -26,7 +26,7 @@ from camtool.errors import PostError
 from camtool.findings import Finding, Sentence
 from camtool.machine.model import Machine
 from camtool.toolpath.lower import (
-    Lowered,
+    LoweredToolpath,
     arcs_to_lines,
     arcs_within,
     helices_to_steps,
@@ -74,7 +74,7 @@ def check_plain(toolpath: Toolpath, machine: Machine) -> None:
             )
 
 
-def split_z(toolpath: Toolpath, machine: Machine) -> tuple[Lowered, list[Finding]]:
+def split_z(toolpath: Toolpath, machine: Machine) -> tuple[LoweredToolpath, list[Finding]]:
     """XY and Z apart, slopes and helices as steps; and MOVE_SPLIT when a feed move had to be."""
     step_mm = slope_step_mm(machine)
     lowered = helices_to_steps(toolpath, step_mm)
@@ -184,7 +184,7 @@ def arc_findings(rows: PlainRows, place: str) -> Iterator[Finding]:
         yield MOVE_COLLAPSED_PLAIN(measured=dropped + rows.flat, dropped=dropped, flat=rows.flat)
 
 
-def _halved(toolpath: Toolpath, rules: ArcRules) -> Lowered:
+def _halved(toolpath: Toolpath, rules: ArcRules) -> LoweredToolpath:
     """Full and nearly full circles, whose rounded ends coincide, in halves; other rows
     unchanged."""
     begin = units_of(toolpath.starts, rules.decimals)
@@ -192,12 +192,12 @@ def _halved(toolpath: Toolpath, rules: ArcRules) -> Lowered:
     full = toolpath.is_arc & (begin[:, :2] == stop[:, :2]).all(axis=1)
     full &= np.abs(toolpath.sweeps()) > math.pi
     if rules.full_circles == "whole" or not full.any():
-        return Lowered(toolpath, np.arange(len(toolpath)))
+        return LoweredToolpath(toolpath, np.arange(len(toolpath)))
     # Other arcs pass for lines meanwhile, so that these alone are cut.
     alone = np.where(toolpath.is_arc & ~full, int(Kind.LINE), toolpath.kind)
     halves = arcs_within(replace(toolpath, kind=alone), math.pi)
     kind = toolpath.kind[halves.row]
-    return Lowered(replace(halves.toolpath, kind=kind), halves.row)
+    return LoweredToolpath(replace(halves.toolpath, kind=kind), halves.row)
 
 
 class WantedArcs:

@@ -29,7 +29,7 @@ from camtool.simulation.controller import ControllerModel
 from camtool.simulation.path import PathModel
 from camtool.toolpath.moves import Kind, PathMode, Toolpath, mounted_before, rows_of
 from camtool.toolpath.program import Program
-from camtool.toolpath.words import Words, texts_of
+from camtool.toolpath.words import WordColumn, texts_of
 
 from .arcs import ArcCounts, RowArcs, arcs_of
 from .checks import check, feed_units
@@ -260,7 +260,7 @@ class BlockOrder:
         if dialect.block_numbers:
             every = np.arange(len(sent.row))
             mine = self._before[1:] + np.searchsorted(at, every, side="right")
-            columns.insert(0, Words("N", mine, sent.is_motion))
+            columns.insert(0, WordColumn("N", mine, sent.is_motion))
         # In front of a row: the other blocks, each behind its comments; then those of a motion.
         other, moves = np.searchsorted(number - 1, commented), ~np.isin(commented, number - 1)
         motion = (commented - other)[moves]
@@ -468,7 +468,7 @@ def _first_after(home: Bools, motion: Bools) -> Bools:
     return found
 
 
-def motion_words(sent: Sent, dialect: GcodeDialect, feed_decimals: int) -> list[Words]:
+def motion_words(sent: Sent, dialect: GcodeDialect, feed_decimals: int) -> list[WordColumn]:
     """The words of the motions among the rows."""
     motion = sent.is_motion
     rows = np.flatnonzero(motion)
@@ -479,7 +479,7 @@ def motion_words(sent: Sent, dialect: GcodeDialect, feed_decimals: int) -> list[
     fed = (motion & (sent.kind >= Kind.LINE)) | (sent.kind == CYCLE)
     feed = motion & _changes(sent.feed, fed)
     return [
-        Words("G", sent.kind, turns | (sent.forget & motion)),
+        WordColumn("G", sent.kind, turns | (sent.forget & motion)),
         *(
             word_of(axis, sent.end[:, at], sent.written[:, at], number)
             for at, axis in enumerate("XYZ")

@@ -94,8 +94,8 @@ class GrblModel(ControllerModel[GrblController, GrblDialect]):
 def _followed(path: Toolpath, machine: _Machine) -> Iterator[SampledRows]:
     """The rows up to the end of the program; ProgramError for those that cannot be followed."""
     controller = _controller(machine)
-    check_rows(path, path.running)
-    return sampled(path.first(path.running), machine, controller)
+    check_rows(path, path.executed_rows)
+    return sampled(path.first(path.executed_rows), machine, controller)
 
 
 def sampled(

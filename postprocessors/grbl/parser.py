@@ -709,7 +709,7 @@ class GrblParser:
             return False
         self._moving()
         x, y, z = (a - b for a, b in zip(target, self._shift(), strict=True))
-        self._path.moved_to(*self.moves.part(x, y, z)).event(kind)
+        self._path.set_position(*self.moves.part(x, y, z)).event(kind)
         self.position[:] = target
         return True
 

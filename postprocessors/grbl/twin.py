@@ -375,8 +375,8 @@ class _Parser(GrblParser):
     def at(self, place: Sequence[float]) -> None:
         """The parser stands there."""
         self.position[:] = [_single(value) for value in place]
-        self._rows.moved_to(*self.position)
-        self._rows.drained()
+        self._rows.set_position(*self.position)
+        self._rows.drain()
 
     def shifted(self, axis: int) -> float:
         """Where the coordinates of an axis have their zero on the machine."""
@@ -1162,7 +1162,7 @@ class GrblTwin(Twin):
             parser.line(text)
         except LineFault as fault:
             return _code(fault)
-        path = self._path.drained()
+        path = self._path.drain()
         if parser.jogs:
             return (yield from self._jogged(path, stood))
         if raw is not None:

@@ -42,7 +42,7 @@ class I8751Model(ControllerModel[I8751Controller, I8751Dialect]):
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
         """The motion, chunk by chunk."""
         _check(toolpath, machine)
-        count = toolpath.running
+        count = toolpath.executed_rows
         times = PulseTimes(machine.dialect)
         at = _in_steps(toolpath.start[None, :], machine)[0]
         standing = Standing(at, waits_s(toolpath, count), float(times.periods_s[0]))
@@ -77,7 +77,7 @@ class I8751Model(ControllerModel[I8751Controller, I8751Dialect]):
 
 def _check(toolpath: Toolpath, machine: _Machine) -> None:
     check_rows(toolpath, machine)
-    arcs = toolpath.is_arc[: toolpath.running]
+    arcs = toolpath.is_arc[: toolpath.executed_rows]
     refuse(toolpath, arcs, "this controller has no arcs", "write them as lines")
 
 

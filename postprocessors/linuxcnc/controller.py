@@ -50,7 +50,7 @@ from camtool.simulation.speed_plan import (
     allowed_along,
     axis_limits,
 )
-from camtool.toolpath.moves import Kind, PathMode, PolarArcs, Toolpath, are_arcs, frozen
+from camtool.toolpath.moves import Kind, PathMode, PolarArcs, Toolpath, are_arcs, read_only
 
 from .dialect import LinuxcncController, LinuxcncDialect
 from .steps import MOST_IN_CHAIN, merge_lines
@@ -103,7 +103,7 @@ class LinuxcncModel(ControllerModel[LinuxcncController, LinuxcncDialect]):
 
 def _followed(path: Toolpath, machine: _Machine) -> Iterator[SampledRows]:
     """The rows up to the end of the program; ProgramError for those that cannot be followed."""
-    rows = path.running
+    rows = path.executed_rows
     check_rows(path, rows)
     return _Run(path.first(rows), machine).blocks()
 
@@ -524,7 +524,7 @@ def halved(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Ints]:
         kind[half], centre[half] = Kind.LINE, np.nan
     end[first, :2] = arms.centre[flat] + spoke
     end[first, 2] = 0.5 * (arms.begin[flat, 2] + arms.end[flat, 2])
-    kind, end, centre = frozen(kind), frozen(end), frozen(centre)
+    kind, end, centre = read_only(kind), read_only(end), read_only(centre)
     return path.picked(origin, kind=kind, end=end, centre=centre), origin
 
 
@@ -546,7 +546,7 @@ def merged(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Ints]:
     points = np.concatenate([path.start[None, :], path.end])
     chain, moved = np.empty(count, dtype=np.int64), np.empty((count, 3))
     merge_lines(points, apart, tolerance_mm, chain, moved)
-    return replace(path, end=frozen(moved)), chain
+    return replace(path, end=read_only(moved)), chain
 
 
 def begins_of(path: Toolpath, modes: CornerModes) -> tuple[Ints, Floats]:

@@ -160,7 +160,7 @@ class BlockMoves(FrameCodes):
         kinds = {("x", "y"): Kind.HOME_XY, ("z",): Kind.HOME_Z}
         if named in kinds and not any(words[axis] for axis in named):
             self.canon.moved = True
-            self.canon.path.moved_to(*self.canon.part(*end)).event(kinds[named])
+            self.canon.path.set_position(*self.canon.part(*end)).event(kinds[named])
         else:
             self.canon.rapid(*end)
 

@@ -293,7 +293,7 @@ class LinuxcncTwin(Twin):
         lines = self._program.replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n")
         numbers = [k for k, line in enumerate(lines, 1) if _has_words(line)]
         self.decoded += [lines[number - 1].strip() for number in numbers]
-        path = path.first(path.running)
+        path = path.first(path.executed_rows)
         chunks = list(LinuxcncModel().run(path, self._machine, COMMANDED))
         self._travel = travel_of(chunks).moved(self._zero)
         ends = np.zeros(len(path))

@@ -118,7 +118,7 @@ class _Run:
     """One run of a toolpath; ProgramError for rows that the controller cannot follow."""
 
     def __init__(self, path: Toolpath, machine: _Machine, options: Options) -> None:
-        self._rows = path.running
+        self._rows = path.executed_rows
         self._lines: MasterOrders = lines_of(path, self._rows, machine)
         self._program = program_of(self._lines.orders, self._lines.pauses_s, machine)
         self._state = state_of(path.start, machine)

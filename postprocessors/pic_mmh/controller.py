@@ -39,7 +39,7 @@ from camtool.simulation.controller import ControllerModel
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import NO_SAMPLES, Chunk, Options, one_row
 from camtool.simulation.rows import block_of, refuse
-from camtool.toolpath.moves import Kind, Toolpath, frozen
+from camtool.toolpath.moves import Kind, Toolpath, read_only
 
 from . import steps as loops
 from .dialect import PicMmhController, PicMmhDialect
@@ -73,12 +73,12 @@ class PicMmhModel(ControllerModel[PicMmhController, PicMmhDialect]):
         """The same with start, ends and arc centres at their nearest steps."""
         coded_mm = [axis.coded_step_mm for axis in machine.axes]
         start = _on_grid(toolpath.start[None, :], coded_mm)[0]
-        end = frozen(toolpath.by_parts(lambda part: _on_grid(part.end, coded_mm)))
+        end = read_only(toolpath.by_parts(lambda part: _on_grid(part.end, coded_mm)))
         arcs, centre = np.flatnonzero(toolpath.is_arc), toolpath.centre
         if len(arcs):
             centre = centre.copy()
             centre[arcs] = _on_grid(centre[arcs], coded_mm[:2])
-        return replace(toolpath, start=start, end=end, centre=frozen(centre))
+        return replace(toolpath, start=start, end=end, centre=read_only(centre))
 
     def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
         """How arcs are made: dsm, dda or stairs."""
@@ -204,7 +204,7 @@ class PicMmhRun:
         if not self._mechanics.plain:
             return None
         toolpath = self._toolpath
-        rows = toolpath.running
+        rows = toolpath.executed_rows
         places = positions(toolpath, self._position, self._ends, self._home)
         for row in np.flatnonzero(self._suspect(places)[:rows]).tolist():
             self._check(row, places[row])
@@ -250,8 +250,8 @@ class PicMmhRun:
         unknown = np.full(len(toolpath), -1, dtype=np.int64)
         course = CommandedPath(toolpath, places, self._centres, unknown)
         parts = []
-        for low in range(0, toolpath.running, ROWS_AT_ONCE):
-            legs = course.legs(low, min(low + ROWS_AT_ONCE, toolpath.running))
+        for low in range(0, toolpath.executed_rows, ROWS_AT_ONCE):
+            legs = course.legs(low, min(low + ROWS_AT_ONCE, toolpath.executed_rows))
             parts.append(legs[legs[:, loops.KIND] == loops.ARC])
         return np.concatenate(parts)
 

@@ -279,9 +279,9 @@ class _Reader:
         if code == "G90":
             return
         if code == "G28" and letters == "Z":
-            self.path.moved_to(x, y, zero_z).event(Kind.HOME_Z)
+            self.path.set_position(x, y, zero_z).event(Kind.HOME_Z)
         elif code == "G28":
-            self.path.moved_to(zero_x, zero_y, z).event(Kind.HOME_XY)
+            self.path.set_position(zero_x, zero_y, z).event(Kind.HOME_XY)
         else:
             if code == "G54" and (x, y, z) != (0.0, 0.0, 0.0):
                 message = "G54 away from part zero would shift all that follows"

@@ -22,10 +22,10 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.bounds import refuse_too_long
 from camtool.errors import PostError
 from camtool.findings import Finding
-from camtool.toolpath.lower import Lowered, arcs_to_lines, helices_to_steps, slope_step_mm
+from camtool.toolpath.lower import LoweredToolpath, arcs_to_lines, helices_to_steps, slope_step_mm
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Program
-from camtool.toolpath.words import Words, line_lengths, texts_of
+from camtool.toolpath.words import WordColumn, line_lengths, texts_of
 
 from .arcs import CLOCKWISE, ITERATION, land
 from .dialect import PicMmhMachine
@@ -92,7 +92,7 @@ class _Writer:
         self._before = np.concatenate([np.zeros((1, 3), dtype=np.int64), steps])[: len(steps)]
         self._before[: self._first + 1] = 0
 
-    def _lowered(self, grid: UnitGrid) -> Lowered:
+    def _lowered(self, grid: UnitGrid) -> LoweredToolpath:
         """Arcs whose centre cannot be written as lines, slopes as steps; both are counted."""
         toolpath, changes = self._wanted, self._changes
         far = far_arcs(toolpath, self._machine, self._dialect)
@@ -148,7 +148,7 @@ class _Writer:
         """The given row that a row of the lowered toolpath came from."""
         return self._wanted.place(int(self._row[row]))
 
-    def _words(self, points: Points) -> list[Words]:
+    def _words(self, points: Points) -> list[WordColumn]:
         """The words of all points, none where nothing is sent."""
         row, sent = points.row, points.sent
         flat = sent & ~points.deep
@@ -156,21 +156,21 @@ class _Writer:
         annex = self._dialect.form == "annex"
         decimals = 0 if annex else 2
 
-        def coordinate(letter: str, units: Ints, written: Bools) -> Words:
-            return Words(letter, units, written, decimals=decimals, digits=5, plus=annex)
+        def coordinate(letter: str, units: Ints, written: Bools) -> WordColumn:
+            return WordColumn(letter, units, written, decimals=decimals, digits=5, plus=annex)
 
         kind = self._toolpath.kind[row]
         code = np.where(arc, kind, np.where(kind == Kind.RAPID, 0, 1))
         centre = self._numbers.centre_units[row]
         feed = self._numbers.feed_units[row]
         return [
-            Words("G", code, sent, digits=2),
+            WordColumn("G", code, sent, digits=2),
             coordinate("X", points.units[:, 0], flat),
             coordinate("Y", points.units[:, 1], flat),
             coordinate("Z", self._numbers.end_units[row, 2], sent & points.deep),
             coordinate("I", centre[:, 0], arc),
             coordinate("J", centre[:, 1], arc),
-            Words("F", feed, sent & (feed > 0), digits=2),
+            WordColumn("F", feed, sent & (feed > 0), digits=2),
         ]
 
     # Where blocks may bring the tool.

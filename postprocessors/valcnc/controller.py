@@ -40,7 +40,7 @@ from camtool.simulation.legs import (
 from camtool.simulation.motion import Chunk, Options
 from camtool.simulation.path import on_steps
 from camtool.simulation.rows import block_of
-from camtool.toolpath.moves import Kind, Toolpath, frozen
+from camtool.toolpath.moves import Kind, Toolpath, read_only
 
 from .dialect import ValcncController, ValcncDialect
 from .steps import arc_angles
@@ -80,7 +80,7 @@ class ValcncModel(ControllerModel[ValcncController, ValcncDialect]):
         step_mm = coded_steps_mm(machine)
         start = pieces.in_steps(toolpath.start) * step_mm
         end = toolpath.by_parts(lambda part: pieces.in_steps(part.end) * step_mm)
-        whole = replace(toolpath, start=start, end=frozen(end))
+        whole = replace(toolpath, start=start, end=read_only(end))
         # Arcs of less than a step: their ends may have become one point, and they a circle.
         arcs = np.flatnonzero(toolpath.is_arc)
         closed = (whole.end[arcs] == whole.starts_of(arcs))[:, :2].all(axis=1)
@@ -128,7 +128,7 @@ def _run(
     pieces: _Pieces, toolpath: Toolpath, machine: _Machine, options: Options
 ) -> Iterator[Chunk]:
     period_s = 1.0 / machine.controller.step_rate_hz
-    waits = waits_s(toolpath, toolpath.running)
+    waits = waits_s(toolpath, toolpath.executed_rows)
     standing = Standing(pieces.drawn.steps, waits, period_s)
     return LegRun(standing, machine, options).run(pieces.legs())
 
@@ -143,7 +143,7 @@ class _Pieces:
         check_rows(toolpath, machine)
         self._controller = machine.controller
         self._step_mm = coded_steps_mm(machine)
-        count = toolpath.running
+        count = toolpath.executed_rows
         self._end = toolpath.end[:count]
         self.drawn = drawn or DrawingProgress(toolpath.start, self.in_steps(toolpath.start))
         """Where the legs that were asked for end."""

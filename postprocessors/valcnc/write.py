@@ -20,11 +20,11 @@ from camtool.arrays import Floats
 from camtool.bounds import refuse_too_long
 from camtool.errors import PostError
 from camtool.findings import Finding
-from camtool.toolpath.lower import Lowered, arcs_to_lines, arcs_within
+from camtool.toolpath.lower import LoweredToolpath, arcs_to_lines, arcs_within
 from camtool.toolpath.moves import Kind, Toolpath, mounted_before
 from camtool.toolpath.program import Program
 from camtool.toolpath.refusals import refuse
-from camtool.toolpath.words import Words, texts_of
+from camtool.toolpath.words import WordColumn, texts_of
 
 from ..gcode.format import NumberStyle, first_too_long, word_of
 from ..gcode.plain import (
@@ -94,8 +94,8 @@ def _check_tools(toolpath: Toolpath) -> None:
 
 
 def _arcs_lowered(
-    lowered: Lowered, scales: Floats, machine: ValcncMachine, dialect: ValcncDialect
-) -> tuple[Lowered, list[Finding]]:
+    lowered: LoweredToolpath, scales: Floats, machine: ValcncMachine, dialect: ValcncDialect
+) -> tuple[LoweredToolpath, list[Finding]]:
     """Arcs of no more than the dialect's sweep; lines where X and Y are scaled differently."""
     path = lowered.toolpath
     count = int(path.is_arc.sum())
@@ -124,7 +124,7 @@ def _text(rows: PlainRows, dialect: ValcncDialect) -> bytes:
     sent = rows.moves
     arc = sent & rows.is_arc
     columns = [
-        Words("G", rows.kind, sent, digits=2),
+        WordColumn("G", rows.kind, sent, digits=2),
         *(word_of(axis, rows.end[:, at], sent, style) for at, axis in enumerate("XYZ")),
         *(word_of(axis, rows.offset[:, at], arc, style) for at, axis in enumerate("IJ")),
     ]

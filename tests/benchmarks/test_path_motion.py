@@ -12,7 +12,7 @@ import pytest
 
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.lower import (
-    Lowered,
+    LoweredToolpath,
     arcs_to_lines,
     arcs_within,
     xy_then_z,
@@ -48,7 +48,7 @@ def mixed(count: int) -> Toolpath:
     )
 
 
-LOWERINGS: dict[str, Callable[[Toolpath], Lowered]] = {
+LOWERINGS: dict[str, Callable[[Toolpath], LoweredToolpath]] = {
     "XY, then Z": xy_then_z,
     "four chords an arc": lambda path: arcs_to_lines(path, path.is_arc, 0.5),
     "halves": lambda path: arcs_within(path, math.pi),

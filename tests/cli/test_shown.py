@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from camtool.plain import LONGEST_LINE, LONGEST_WORD, one_line, to_json
+from camtool.plain import MAX_LINE_CHARS, MAX_WORD_CHARS, one_line, to_json
 from tests.cli.conftest import Run
 from tests.waiting import all_written
 
@@ -110,8 +110,8 @@ def test_what_is_shown_can_be_seen(
     assert done.returncode == code, done.stderr.decode()
     for said in (*done.stdout.decode().split("\n"), *done.stderr.decode().split("\n")):
         assert said.isprintable(), said
-        assert len(said) <= LONGEST_LINE
-        assert max(map(len, said.split()), default=0) <= LONGEST_WORD
+        assert len(said) <= MAX_LINE_CHARS
+        assert max(map(len, said.split()), default=0) <= MAX_WORD_CHARS
 
 
 def test_a_terminal_is_told_no_more_than_its_own_colours(evil: Path) -> None:
@@ -164,10 +164,10 @@ def test_words_are_shortened_in_their_middle() -> None:
     assert one_line("a\u00a0\u3000µ") == "a\u00a0\u3000µ", "blanks of other widths are harmless"
     assert one_line("\udcc3\udca9") == "\\xc3\\xa9"
     long = one_line(f"{'a' * 150}{'b' * 150} end")
-    assert len(long) == LONGEST_WORD + 4
+    assert len(long) == MAX_WORD_CHARS + 4
     assert long.startswith("a" * 119)
     assert long.endswith("b" * 60 + " end")
-    assert len(one_line("word " * 1000)) == LONGEST_LINE
+    assert len(one_line("word " * 1000)) == MAX_LINE_CHARS
     assert one_line(one_line("\x1b" * 1000)) == one_line("\x1b" * 1000)
 
 

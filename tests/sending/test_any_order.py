@@ -109,7 +109,7 @@ def outputs_until(twin: Twin, block: int) -> int:
 
 def ends_of(decoded: Toolpath, low: int = 0) -> Floats:
     """(K, 3) mm: where the moves from a row on end, if they are longer than nothing."""
-    path = decoded.part(low, decoded.running)
+    path = decoded.part(low, decoded.executed_rows)
     moved = path.is_motion & ((path.starts != path.end).any(axis=1) | path.is_arc)
     return path.end[moved]
 

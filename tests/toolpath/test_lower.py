@@ -13,7 +13,7 @@ from camtool.errors import OptionError, PostError
 from camtool.toolpath import lower
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.lower import (
-    Lowered,
+    LoweredToolpath,
     arcs_to_lines,
     arcs_within,
     helices_to_steps,
@@ -63,7 +63,7 @@ def _add_arc(draw: st.DrawFn, b: ToolpathBuilder, feed: float, *, full: bool) ->
     b.arc(*to, draw(st.none() | heights), centre=centre, ccw=draw(st.booleans()), feed=feed)
 
 
-def agrees(lowered: Lowered, given_: Toolpath, wanted: list[lowering.Piece]) -> None:
+def agrees(lowered: LoweredToolpath, given_: Toolpath, wanted: list[lowering.Piece]) -> None:
     """The rows of the twin, with all that goes on from the given rows."""
     made = lowered.toolpath
     assert [Kind(k) for k in made.kind] == [piece.kind for piece in wanted]
@@ -75,7 +75,7 @@ def agrees(lowered: Lowered, given_: Toolpath, wanted: list[lowering.Piece]) -> 
     keeps(lowered, given_)
 
 
-def keeps(lowered: Lowered, given_: Toolpath) -> None:
+def keeps(lowered: LoweredToolpath, given_: Toolpath) -> None:
     """Ends exact, rows ascending and all there, columns and records as they were."""
     made, row = lowered.toolpath, lowered.row
     last = np.flatnonzero(np.diff(row, append=len(given_)))
@@ -224,7 +224,7 @@ def empty() -> Toolpath:
         lambda t: arcs_to_lines(t, t.is_arc, 0.1),
     ],
 )
-def test_nothing_stays_nothing(run: Callable[[Toolpath], Lowered]) -> None:
+def test_nothing_stays_nothing(run: Callable[[Toolpath], LoweredToolpath]) -> None:
     assert (len(run(empty()).toolpath), len(run(empty()).row)) == (0, 0)
 
 

@@ -128,10 +128,10 @@ def test_arrays_are_read_only() -> None:
 def test_rows_behind_the_end_do_not_run() -> None:
     b = ToolpathBuilder().line(1.0, 0.0, feed=1.0).event(Kind.END).line(2.0, 0.0, feed=1.0)
     path = b.event(Kind.END).finish()
-    assert path.running == 2
-    assert [move.kind for move in path.first(path.running)] == [Kind.LINE, Kind.END]
-    assert ToolpathBuilder().line(1.0, 0.0, feed=1.0).finish().running == 1
-    assert ToolpathBuilder().finish().running == 0
+    assert path.executed_rows == 2
+    assert [move.kind for move in path.first(path.executed_rows)] == [Kind.LINE, Kind.END]
+    assert ToolpathBuilder().line(1.0, 0.0, feed=1.0).finish().executed_rows == 1
+    assert ToolpathBuilder().finish().executed_rows == 0
 
 
 def test_nothing_reaches_only_its_start() -> None:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
-from camtool.toolpath.rapids import Reach, Through, low_rapids, rapids_through_stock
+from camtool.toolpath.rapids import RapidThroughStock, Reach, low_rapids, rapids_through_stock
 from tests.oracles.cleared import most_uncut
 from tests.waiting import no_chewing
 
@@ -22,7 +22,7 @@ def through(
     path: ToolpathBuilder | Toolpath,
     radius: float = RADIUS_MM,
     solid: tuple[float, float, float, float] | None = None,
-) -> list[Through]:
+) -> list[RapidThroughStock]:
     made = path.finish() if isinstance(path, ToolpathBuilder) else path
     radii = np.full(len(made), radius)
     return rapids_through_stock(made, Reach(radii, radii, solid))

@@ -15,7 +15,7 @@ from camtool.planning.findings import PlanningCode
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Kind
-from camtool.toolpath.wanted import Drawn
+from camtool.toolpath.wanted import DrawnEdges
 from camtool.verification.findings import VerificationCode
 from camtool.verification.verify import Case, VerifyOptions, judge
 from tests.oracles.dense_moves import (
@@ -198,7 +198,7 @@ def test_findings_of_all_stages_are_merged_once() -> None:
     decoded, wanted = replace(plain, findings=(shared,)), replace(plain, findings=(other, shared))
     off, nothing = np.tile([2e-4, 1e-4], (len(wanted), 1)), np.zeros((0, 2, 2))
     edge, none = np.full(len(wanted), -1), np.zeros(0, dtype=np.bool_)
-    drawn_lines = Drawn(off, edge, nothing, nothing, edge[:0], none, none)
+    drawn_lines = DrawnEdges(off, edge, nothing, nothing, edge[:0], none, none)
     wanted = replace(wanted, drawn=drawn_lines)
     found = judge(
         Case(decoded, on(MACHINE), wanted, drawing, VerifyOptions()), follow(decoded, 10)

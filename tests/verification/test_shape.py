@@ -14,7 +14,7 @@ from camtool.planning.plan import planned
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
-from camtool.toolpath.wanted import Kept
+from camtool.toolpath.wanted import ProtectedRegion
 from camtool.verification.cuts import CutMoves, cut_moves
 from camtool.verification.findings import VerificationCode
 from camtool.verification.shape import (
@@ -154,15 +154,15 @@ def carved(*places: tuple[float, float, float]) -> Toolpath:
     return b.rapid(z=5.0).finish()
 
 
-def kept_of_run(path: Toolpath, *walls: Polyline, stays: bool = False) -> Kept:
+def kept_of_run(path: Toolpath, *walls: Polyline, stays: bool = False) -> ProtectedRegion:
     """One run of these moves, which must leave what is outside of the walls, or within them."""
     feeds = path.is_feed
     ends = np.concatenate([path.starts[feeds][:1], path.end[feeds]])
     run = np.column_stack([ends, np.zeros(len(ends))])
-    return Kept((run,), Polylines.of(walls), np.full(len(walls), stays), not stays)
+    return ProtectedRegion((run,), Polylines.of(walls), np.full(len(walls), stays), not stays)
 
 
-def verified(path: Toolpath, kept: Kept, nose: Tool | None) -> Verification:
+def verified(path: Toolpath, kept: ProtectedRegion, nose: Tool | None) -> Verification:
     options = VerifyOptions(tool_diameter_mm=6.0, nose=nose, kept=(kept,))
     return verify(path, path_machine(), wanted=path, options=options)
 
@@ -245,7 +245,7 @@ def test_what_a_window_and_a_rim_must_leave() -> None:
         assert found is not None
         assert found.beyond_mm == 0.0
     # The other way round each would cut into what stays.
-    wrong = Kept(beside_window.runs, beside_window.lines, ~beside_window.stays, False)
+    wrong = ProtectedRegion(beside_window.runs, beside_window.lines, ~beside_window.stays, False)
     found = wanted_shape(cut_moves(plan.toolpath, flat_cuts=False), Cutter(3.0), (wrong,))
     assert found is None or found.beyond_mm > 1.0
 

@@ -72,9 +72,9 @@ def jobs(draw: st.DrawFn) -> Toolpath:
             home = draw(st.sampled_from([Kind.HOME_XY, Kind.HOME_Z]))
             b.event(home)
             if home == Kind.HOME_XY:
-                b.moved_to(0.01, -0.02, z)
+                b.set_position(0.01, -0.02, z)
             else:
-                b.moved_to(x, y, 0.03)
+                b.set_position(x, y, 0.03)
     return b.event(Kind.END).line(9.0, 9.0, feed=1.0).finish()
 
 

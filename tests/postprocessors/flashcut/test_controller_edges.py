@@ -48,7 +48,7 @@ def test_an_arc_about_its_own_start_is_a_line_to_its_end() -> None:
 
 
 def test_homing_goes_by_its_sensors_whatever_was_too_much() -> None:
-    path = ToolpathBuilder().line(1.9, 0.95, feed=14.1).event(Kind.HOME_XY).moved_to(0, 0, 0)
+    path = ToolpathBuilder().line(1.9, 0.95, feed=14.1).event(Kind.HOME_XY).set_position(0, 0, 0)
     path.line(0.19, 0.0, feed=14.1)
     line, home, after = rows(path.finish(), "controller.half_period_ms=3")
     assert np.rint(line.commanded[-1] / STEP).tolist() == [1000, 571, 0]  # instead of 500

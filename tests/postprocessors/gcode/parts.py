@@ -31,7 +31,7 @@ def part(*, tools: bool = False) -> Toolpath:
     path.source = ""
     path.event(Kind.SPINDLE_OFF).event(Kind.SPINDLE_CCW, 812.5).message("turn the part")
     path.event(Kind.DWELL, 0.25).event(Kind.SPINDLE_OFF)
-    path.moved_to(-1.0, -1.0, 0.0).event(Kind.HOME_Z).moved_to(0, 0, 0).event(Kind.HOME_XY)
+    path.set_position(-1.0, -1.0, 0.0).event(Kind.HOME_Z).set_position(0, 0, 0).event(Kind.HOME_XY)
     return path.rapid(3.0, 0.0).event(Kind.END).finish()
 
 

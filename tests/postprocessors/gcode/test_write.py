@@ -55,7 +55,7 @@ def test_words_are_said_when_they_change(name: str) -> None:
 
 def test_where_the_tool_may_stand_anywhere_both_coordinates_are_said() -> None:
     path = ToolpathBuilder().rapid(z=5).rapid(0, 0).line(z=-1, feed=9).line(0, 2, feed=9)
-    path.rapid(z=5).moved_to(0, 0, 5).event(Kind.HOME_XY).rapid(1, 0).rapid(1, 1)
+    path.rapid(z=5).set_position(0, 0, 5).event(Kind.HOME_XY).rapid(1, 0).rapid(1, 1)
     assert blocks(path.finish()) == [
         "G0 Z5.000",
         "X0.000 Y0.000",

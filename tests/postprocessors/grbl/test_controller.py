@@ -45,7 +45,7 @@ def part() -> Toolpath:
     builder.arc(2.0, 2.002, -1.0, centre=(2.5, 2.002), ccw=False, feed=200.0)
     builder.message("half way").line(-1.234, 0.567, -0.25, feed=500.0)
     builder.event(Kind.DWELL, 0.21).line(-1.234, 0.617, -0.3, feed=20.0)
-    builder.rapid(-1.234, 0.617, 5.0).moved_to(0.0, 0.0, 5.0).event(Kind.HOME_XY)
+    builder.rapid(-1.234, 0.617, 5.0).set_position(0.0, 0.0, 5.0).event(Kind.HOME_XY)
     return builder.event(Kind.END).rapid(50.0, 50.0, 5.0).finish()
 
 

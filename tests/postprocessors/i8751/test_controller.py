@@ -248,7 +248,7 @@ def test_steps_of_their_own_for_each_axis() -> None:
         (lambda b: b.event(Kind.DWELL), "a dwell without its seconds"),
         (lambda b: b.rapid(1e9), "beyond all"),
         (lambda b: b.rapid(1).event(Kind.SET_ZERO), "part zero"),
-        (lambda b: b.moved_to(1, 1, 0).event(Kind.DWELL, 1.0), "an event that moves"),
+        (lambda b: b.set_position(1, 1, 0).event(Kind.DWELL, 1.0), "an event that moves"),
     ],
 )
 def test_what_cannot_be_followed_is_named(build, words: str) -> None:

@@ -240,7 +240,7 @@ REFUSED = {
     ),
     "no centre": (nan_arc(), "start and end differ by nan mm"),
     "moving event": (
-        ToolpathBuilder().rapid(1).moved_to(2, 0, 0).event(Kind.DWELL, 1),
+        ToolpathBuilder().rapid(1).set_position(2, 0, 0).event(Kind.DWELL, 1),
         "a DWELL cannot move the tool",
     ),
 }

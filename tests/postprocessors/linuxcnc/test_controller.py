@@ -375,7 +375,9 @@ def test_backlash_is_compensated_at_reversals() -> None:
 
 
 def test_counts_homing_and_the_end() -> None:
-    builder = ToolpathBuilder().rapid(1.0, 2.0, 3.0).moved_to(0.0, 0.0, 3.0).event(Kind.HOME_XY)
+    builder = (
+        ToolpathBuilder().rapid(1.0, 2.0, 3.0).set_position(0.0, 0.0, 3.0).event(Kind.HOME_XY)
+    )
     path = builder.event(Kind.END).rapid(9.0, 9.0, 9.0).finish()
     rows = run(path, in_mode("exact-path"))
     assert len(rows) == 3

@@ -273,7 +273,11 @@ REFUSED = {
         "follow the end",
     ),
     "home through the stock": (
-        builder().line(z=-1, feed=99).line(20, 10, feed=99).moved_to(0, 0, -1).event(Kind.HOME_XY),
+        builder()
+        .line(z=-1, feed=99)
+        .line(20, 10, feed=99)
+        .set_position(0, 0, -1)
+        .event(Kind.HOME_XY),
         "X and Y go home below",
     ),
 }

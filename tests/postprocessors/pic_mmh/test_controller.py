@@ -265,7 +265,7 @@ def test_z_follows_xy(machine: Machine) -> None:
 
 def test_homing_goes_to_machine_zero_at_the_rapid_rate(make_machine: MakeMachine) -> None:
     machine = make_machine("controller.machine_zero_mm=[0.014, 0.0, 0.0028]")
-    path = ToolpathBuilder().event(Kind.HOME_Z).event(Kind.HOME_XY).moved_to(0.014, 0, 0.0028)
+    path = ToolpathBuilder().event(Kind.HOME_Z).event(Kind.HOME_XY).set_position(0.014, 0, 0.0028)
     path.line(0.028, 0, feed=0.8)
     up, over, on = rows_of(path.finish(), machine)
     assert steps_of(up)[-1].tolist() == [0, 0, 20]

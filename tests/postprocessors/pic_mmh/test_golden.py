@@ -21,7 +21,9 @@ def part() -> Toolpath:
     path.arc(-1.2, -0.3, centre=(-1.5, -0.4), ccw=False, feed=0.8)
     path.arc(-1.58662, -0.70414, centre=(-1.5, -0.4), ccw=False, feed=0.8)  # needs a mend
     path.rapid(z=0.2).message("remove the part").event(Kind.SPINDLE_OFF)
-    path.moved_to(-1.58662, -0.70414, 0.0).event(Kind.HOME_Z).moved_to(0, 0, 0).event(Kind.HOME_XY)
+    path.set_position(-1.58662, -0.70414, 0.0).event(Kind.HOME_Z).set_position(0, 0, 0).event(
+        Kind.HOME_XY
+    )
     return path.event(Kind.END).finish()
 
 

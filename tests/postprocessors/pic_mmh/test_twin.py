@@ -144,7 +144,7 @@ def test_the_joystick_runs_until_a_character_comes() -> None:
 def test_home_goes_beyond_and_back_in_the_order_z_x_y() -> None:
     twin, _ = made("pic-mmh")
     feed(twin, BLOCK + b"G01Z00003.00F08;")
-    twin.slides.drained()
+    twin.slides.drain()
     feed(twin, b"H;")
     trace = twin.slides.trace
     np.testing.assert_allclose(trace.commanded[-1], 0.0, atol=1e-12)

@@ -74,7 +74,7 @@ def test_events() -> None:
 
 
 def test_after_homing_the_controller_stands_at_machine_zero() -> None:
-    path = ToolpathBuilder().line(1, 1, feed=1).moved_to(-1.4, -0.7, 0).event(Kind.HOME_XY)
+    path = ToolpathBuilder().line(1, 1, feed=1).set_position(-1.4, -0.7, 0).event(Kind.HOME_XY)
     path.line(-1.4, -0.7, feed=1).line(0, 0, feed=1)
     blocks = written(path, "controller.machine_zero_mm=[-1.4, -0.7, 0.0]")
     assert blocks[1:] == ["G28X0Y0;", "G01X00000.00Y00000.00F10;"]
@@ -203,7 +203,7 @@ REFUSED = {
     "part zero elsewhere": (builder().rapid(1, 0).event(Kind.SET_ZERO), "part zero"),
     "moves after the end": (builder().event(Kind.END).rapid(1, 0), "follow the end"),
     "homing to another place": (builder().rapid(1, 0).event(Kind.HOME_XY), "HOME_XY cannot end"),
-    "an event that moves": (builder().moved_to(1, 0, 0).event(Kind.DWELL, 1), "DWELL cannot"),
+    "an event that moves": (builder().set_position(1, 0, 0).event(Kind.DWELL, 1), "DWELL cannot"),
 }
 
 
