@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack
@@ -28,6 +28,7 @@ from camtool.pictures.scene import Scene
 from camtool.pipeline import Judging, convert_program, post_drawing, verify_program
 from camtool.planning.job import Job, Operation, Placement, Stock, Tool
 from camtool.planning.job import job_of as made
+from camtool.records import replace
 from camtool.run import Run, Shown, ShownDrawing, ShownToolpath
 from camtool.simulation.motion import Effects
 from camtool.target.loader import extended_by

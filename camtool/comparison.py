@@ -5,13 +5,14 @@ backlash, or without a part of the mechanics.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 from camtool.errors import OptionError
 from camtool.patterns import guess
 from camtool.pipeline import Judging, verify_program
+from camtool.records import replace
 from camtool.run import Run, Shown
 from camtool.units import UM_PER_MM
 

@@ -13,17 +13,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, TypeVar
 
-from msgspec import Struct, field, structs
+from msgspec import Struct, field
 
 from camtool.bounds import TooLongError
 from camtool.errors import ProgramError
 from camtool.findings import Finding, Severity, worst
 from camtool.progress import Progress
+from camtool.records import replace
 from camtool.run import Run
 
 if TYPE_CHECKING:
@@ -552,10 +553,10 @@ def _timed(
     count = len(planned.operations)
     seconds = np.bincount(turn.clip(min=0), verification.rows.seconds, minlength=count)
     operations = [
-        structs.replace(each, time_s=certain(float(seconds[k])))
+        replace(each, time_s=certain(float(seconds[k])))
         for k, each in enumerate(planned.operations)
     ]
-    return structs.replace(planned, operations=tuple(operations))
+    return replace(planned, operations=tuple(operations))
 
 
 def _cut_mm(wanted: Toolpath) -> tuple[float, float, float, float] | None:
@@ -648,9 +649,7 @@ def _judged(
     progress.begin("simulating and judging", len(decoded))
     line_bytes = target.target.line_bytes(data, target.machine)
     stray_mm = target.target.stray_mm(target.machine)
-    sized = structs.replace(
-        options, size_bytes=len(data), line_bytes=line_bytes, stray_mm=stray_mm
-    )
+    sized = replace(options, size_bytes=len(data), line_bytes=line_bytes, stray_mm=stray_mm)
     return verify(
         decoded,
         target,
@@ -675,7 +674,7 @@ def _with_operations(decoded: Toolpath, written: Toolpath, program: Program) -> 
         return decoded
     row = np.maximum.accumulate(_row_from(program, decoded).clip(min=0))
     begin = np.searchsorted(row, operations.begin).astype(operations.begin.dtype)
-    return replace(decoded, operations=structs.replace(operations, begin=begin))
+    return replace(decoded, operations=replace(operations, begin=begin))
 
 
 def _row_from(program: Program, decoded: Toolpath) -> Indices:

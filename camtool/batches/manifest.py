@@ -17,7 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from msgspec import Struct, field
-from msgspec.structs import replace
+
+from camtool.records import replace
 
 NAME = ".camtool-batch.jsonl"
 """The manifest's name in the output folder."""

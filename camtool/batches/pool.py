@@ -17,13 +17,14 @@ import traceback
 from collections import deque
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any
 
 from camtool.batches.run import Made, Task, Work
 from camtool.errors import CamtoolError
+from camtool.records import replace
 
 TICK_S = 0.2
 """How long to wait for a result before the caller gets a turn (to redraw, to stop)."""

@@ -13,7 +13,7 @@ import threading
 import time
 from collections.abc import Callable, Collection, Generator, Iterator, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, partial
 from itertools import chain
 from pathlib import Path
@@ -32,6 +32,7 @@ from camtool.cli.files import is_foreign, refuse_same, write_all
 from camtool.cli.messages import say
 from camtool.cli.options import InspectionFlags, JobFlags, own_job, own_tolerances
 from camtool.errors import CamtoolError, OutputError
+from camtool.records import replace
 
 if TYPE_CHECKING:
     from camtool.inspection.tolerances import Asked

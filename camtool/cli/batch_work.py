@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,6 +16,7 @@ from camtool.cli.options import DrawingFlags, JobFlags
 from camtool.cli.picture_options import PictureFlags
 from camtool.findings import Finding, Severity
 from camtool.plain import one_line
+from camtool.records import replace
 
 if TYPE_CHECKING:
     from camtool.inspection.tolerances import Asked

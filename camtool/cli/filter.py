@@ -8,8 +8,6 @@ else was on stderr (LinuxCNC's manual, "Filter programs").
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import click
 
 from camtool.cli.files import STDOUT
@@ -17,6 +15,7 @@ from camtool.cli.messages import say
 from camtool.cli.options import MachineFlags, SectionedCommand, talk_options
 from camtool.cli.picture_options import PictureFlags
 from camtool.cli.post import Asked, Posting, finish, posting_options
+from camtool.records import replace
 
 BEGUN, READ, MADE, DONE = 1, 20, 95, 100
 """What the progress bar shows, per cent: begun, read, made and judged, written."""

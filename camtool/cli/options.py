@@ -16,7 +16,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, cast
@@ -27,6 +27,7 @@ from camtool.cli.life_signs import progress
 from camtool.errors import MachineError, OptionError
 from camtool.importers.options import FORMATS, TEXTS, TRACES
 from camtool.jobs.keys import FLAGS, Key, flag_name
+from camtool.records import replace
 from camtool.units import parse_feed, parse_length, parse_time
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ refused by name before any work is done; the user is warned about named layers t
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import PurePath
 from typing import TYPE_CHECKING
@@ -19,6 +19,7 @@ from camtool.cli.messages import say
 from camtool.cli.options import Command, option, with_flags
 from camtool.errors import OptionError
 from camtool.pictures.layers import Layer, chosen, layer_names, layer_of, layers_in
+from camtool.records import replace
 from camtool.units import parse_length
 
 if TYPE_CHECKING:

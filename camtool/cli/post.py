@@ -7,7 +7,7 @@ import json
 import re
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, TypeVar
 
@@ -52,6 +52,7 @@ from camtool.cli.picture_options import (
 )
 from camtool.cli.report import Outputs, report_option
 from camtool.errors import CamtoolError, OptionError
+from camtool.records import replace
 
 if TYPE_CHECKING:
     from camtool.pictures.scene import Scene

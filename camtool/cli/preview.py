@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -33,6 +33,7 @@ from camtool.cli.picture_options import (
 )
 from camtool.errors import CamtoolError, DrawingError
 from camtool.findings import Finding
+from camtool.records import replace
 
 if TYPE_CHECKING:
     from camtool.pictures.scene import Scene

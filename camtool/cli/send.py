@@ -278,7 +278,7 @@ class _Job:
                 raise OutputError(
                     f"cannot be written ({error.strerror})", file=self.live
                 ) from error
-        from msgspec.structs import replace  # not for --help
+        from camtool.records import replace
 
         progress().begin("sending", len(one.packets))
         real = not self.port.is_virtual

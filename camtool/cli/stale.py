@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,6 +16,7 @@ from camtool.cli.post import Posting, posting_options
 from camtool.errors import CamtoolError, InputError
 from camtool.findings import Severity
 from camtool.importers.options import SUFFIXES
+from camtool.records import replace
 
 if TYPE_CHECKING:
     from camtool.target.registry import LoadedTarget

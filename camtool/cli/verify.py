@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import click
@@ -43,6 +43,7 @@ from camtool.cli.picture_options import (
     picture_options,
 )
 from camtool.cli.report import Outputs, report_option
+from camtool.records import replace
 
 if TYPE_CHECKING:
     from camtool.comparison import Variant

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from msgspec import Struct
-from msgspec.structs import replace
 
 from camtool.arrays import Floats, Ints
 from camtool.errors import GeometryError
@@ -24,6 +23,7 @@ from camtool.geometry.measure import (
     segment_lengths,
 )
 from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, Segments
+from camtool.records import replace
 
 
 def drawing_extents(drawing: Drawing) -> Floats:

@@ -66,7 +66,6 @@ from itertools import pairwise
 
 import numpy as np
 from msgspec import Struct
-from msgspec.structs import replace
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import GeometryError, OptionError
@@ -89,6 +88,7 @@ from camtool.geometry.polylines import (
     lines_reversed,
 )
 from camtool.kernels.move_tree import hilbert_order
+from camtool.records import replace
 
 NODE_EPS_MM = 1e-8
 """Ends and intersections of raw elements nearer than this become one node."""

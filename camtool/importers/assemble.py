@@ -16,7 +16,6 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -54,6 +53,7 @@ from camtool.importers.findings import (
 from camtool.importers.healing import IS_DRAWN_TWICE, cleaned, gap_of, healed, is_placed, off_drawn
 from camtool.importers.options import ReadOptions, Selection
 from camtool.importers.pieces import MAX_COORDINATE_MM, Piece, selected
+from camtool.records import replace
 from camtool.units import UM_PER_MM
 
 _SOURCES_NAMED = 3

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from camtool.errors import OptionError
+from camtool.records import replace
 from camtool.units import MM_PER_UNIT
 
 FORMATS = ("dxf", "svg", "points", "solid", "bitmap")

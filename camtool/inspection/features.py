@@ -14,7 +14,6 @@ from typing import Literal
 
 import numpy as np
 from msgspec import Struct
-from msgspec.structs import replace
 
 from camtool.arrays import Bools, Floats
 from camtool.findings import Finding
@@ -23,6 +22,7 @@ from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.inspection.dimensions import Dimension, Place
 from camtool.inspection.findings import DIMENSION_UNBOUND
 from camtool.planning.place import Map
+from camtool.records import replace
 
 BIND_MM = 0.01
 """A place lies on a feature that is no farther away than this: programs round the places that

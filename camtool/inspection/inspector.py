@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 
 import numpy as np
 from msgspec import Struct
@@ -34,6 +33,7 @@ from camtool.inspection.uncertainty import Variant, edges_of, opposite_edges
 from camtool.machine.model import Machine
 from camtool.planning.job import Job, Tool
 from camtool.planning.place import SCALE_SHARE, placements
+from camtool.records import replace
 from camtool.run import Run
 from camtool.toolpath.moves import Toolpath
 from camtool.verification.case import TRACE_POINTS, VerifyOptions, tool_mm

@@ -17,12 +17,12 @@ import math
 import re
 
 from msgspec import Struct
-from msgspec.structs import replace
 
 from camtool.errors import OptionError
 from camtool.findings import Finding
 from camtool.inspection.dimensions import ZONES, Dimension, Kind, Limits
 from camtool.inspection.findings import NO_GENERAL_TOLERANCE
+from camtool.records import replace
 from camtool.units import MM_PER_UNIT, UM_PER_MM
 
 SIZE_DIGITS = 3

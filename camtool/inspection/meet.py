@@ -43,7 +43,6 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 import numpy as np
 from msgspec import Struct, field
-from msgspec.structs import replace
 
 from camtool.arrays import Floats
 from camtool.errors import CamtoolError, OptionError
@@ -68,6 +67,7 @@ from camtool.plain import one_line
 from camtool.planning.place import place
 from camtool.planning.sides import Sides
 from camtool.progress import Progress
+from camtool.records import replace
 from camtool.run import Run
 from camtool.units import UM_PER_MM
 from camtool.verification.report import InspectedReport
@@ -673,12 +673,10 @@ class Bench(Struct, eq=False, dict=True):
             if known is None or not math.isfinite(size.low_mm + size.high_mm):
                 yield None
                 continue
-            made = msgspec.structs.replace(
-                known, fit_mm=size.fit_mm, low_mm=size.low_mm, high_mm=size.high_mm
-            )
+            made = replace(known, fit_mm=size.fit_mm, low_mm=size.low_mm, high_mm=size.high_mm)
             within = margin(made)
             verdict = "in" if within >= GUARD else "out" if within < 0.0 else "undecided"
-            yield msgspec.structs.replace(made, verdict=verdict)
+            yield replace(made, verdict=verdict)
 
     def certificate(self, best: Trial) -> Certificate:
         """Why the best trial does not hold."""

@@ -31,10 +31,10 @@ from functools import cached_property
 
 import numpy as np
 from msgspec import Struct
-from msgspec.structs import replace
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.inspection.features import Bound, Circle, Edge, End, Feature
+from camtool.records import replace
 
 CIRCLE_STATIONS = 360
 """Stations on a whole circle: an even number, so that each has one opposite."""

@@ -18,7 +18,6 @@ from typing import Any, Literal
 
 import msgspec
 from msgspec import Struct
-from msgspec.structs import replace
 
 from camtool.errors import DrawingError, InputError, OptionError
 from camtool.findings import Finding
@@ -43,6 +42,7 @@ from camtool.inspection.limits import (
     read_words,
 )
 from camtool.plain import one_line
+from camtool.records import replace
 from camtool.tables import convert, read_table
 from camtool.units import MM_PER_UNIT, parse_angle, parse_length
 

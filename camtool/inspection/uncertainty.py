@@ -54,16 +54,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-import msgspec
 import numpy as np
 from msgspec import Struct
 
 from camtool.machine.model import Machine, PlayCells
+from camtool.records import replace
 
 if TYPE_CHECKING:
     from camtool.arrays import Bools, Floats
@@ -345,26 +345,26 @@ def _with_backlash(name: str) -> Moved:
         index = "xy".index(name)
         cells = machine.play_map.used[index]
         if cells is not None:
-            own = {name: _more_play(cells, by_mm)}
-            return _varied(variant, play_map=msgspec.structs.replace(machine.play_map, **own))
+            own: dict[str, Any] = {name: _more_play(cells, by_mm)}
+            return _varied(variant, play_map=replace(machine.play_map, **own))
         axis = (machine.axes.x, machine.axes.y)[index]
-        own_axis = msgspec.structs.replace(axis, backlash_mm=max(0.0, axis.backlash_mm + by_mm))
-        return _varied(variant, axes=msgspec.structs.replace(machine.axes, **{name: own_axis}))
+        own_axis = replace(axis, backlash_mm=max(0.0, axis.backlash_mm + by_mm))
+        return _varied(variant, axes=replace(machine.axes, **{name: own_axis}))
 
     return moved
 
 
 def _more_play(cells: PlayCells, by_mm: float) -> PlayCells:
     rows = tuple(tuple(max(0.0, play + by_mm) for play in row) for row in cells.play_mm)
-    return msgspec.structs.replace(cells, play_mm=rows)
+    return replace(cells, play_mm=rows)
 
 
 def _with_scale(name: str) -> Moved:
     def moved(variant: Variant, by: float) -> Variant:
         axes = variant.machine.axes
         axis = axes.x if name == "x" else axes.y
-        axis = msgspec.structs.replace(axis, real_step_mm=axis.real_step_mm * (1.0 + by))
-        return _varied(variant, axes=msgspec.structs.replace(axes, **{name: axis}))
+        axis = replace(axis, real_step_mm=axis.real_step_mm * (1.0 + by))
+        return _varied(variant, axes=replace(axes, **{name: axis}))
 
     return moved
 
@@ -376,15 +376,15 @@ def _grown(variant: Variant, by: float) -> Variant:
 def _with_squareness(variant: Variant, by_rad: float) -> Variant:
     mechanics = variant.machine.mechanics
     lean = mechanics.squareness_rad + by_rad
-    return _varied(variant, mechanics=msgspec.structs.replace(mechanics, squareness_rad=lean))
+    return _varied(variant, mechanics=replace(mechanics, squareness_rad=lean))
 
 
 def _with_tool(variant: Variant, by_mm: float) -> Variant:
     return replace(variant, wider_mm=variant.wider_mm + by_mm)
 
 
-def _varied(variant: Variant, **records: msgspec.Struct) -> Variant:
-    return replace(variant, machine=msgspec.structs.replace(variant.machine, **records))
+def _varied(variant: Variant, **records: Any) -> Variant:
+    return replace(variant, machine=replace(variant.machine, **records))
 
 
 def without_scatter(variant: Variant) -> Variant:
@@ -393,10 +393,9 @@ def without_scatter(variant: Variant) -> Variant:
     if not any(axis.repeatability_mm for axis in axes):
         return variant
     plain = {
-        name: msgspec.structs.replace(axis, repeatability_mm=0.0)
-        for name, axis in zip("xyz", axes, strict=True)
+        name: replace(axis, repeatability_mm=0.0) for name, axis in zip("xyz", axes, strict=True)
     }
-    return _varied(variant, axes=msgspec.structs.replace(axes, **plain))
+    return _varied(variant, axes=replace(axes, **plain))
 
 
 # The weights of edges.
@@ -724,9 +723,7 @@ def monte_carlo(values: Values, inputs: Inputs, edges: Floats, draws: int, seed:
         for direction, by in zip(inputs.directions, off.tolist(), strict=True):
             if by:
                 variant = direction.moved(variant, max(by, direction.lowest))
-        mechanics = msgspec.structs.replace(
-            variant.machine.mechanics, seed=int(random.integers(1 << 32))
-        )
+        mechanics = replace(variant.machine.mechanics, seed=int(random.integers(1 << 32)))
         if without_scatter(variant) is not variant:
             variant = _varied(variant, mechanics=mechanics)
         drawn = np.asarray(values(variant), dtype=np.float64)

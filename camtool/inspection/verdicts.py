@@ -18,10 +18,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
 from typing import Literal
 
-import msgspec
 import numpy as np
 from msgspec import Struct
 
@@ -39,6 +37,7 @@ from camtool.inspection.findings import (
 from camtool.inspection.inspector import Inspected, Inspector
 from camtool.inspection.sizes import Size
 from camtool.inspection.uncertainty import Budget, inputs_of, propagate
+from camtool.records import replace
 from camtool.run import Run
 from camtool.units import UM_PER_MM
 from camtool.verification.report import Contribution, InspectedReport, certain, number
@@ -92,7 +91,7 @@ def inspect(run: Run, tolerances: Tolerances) -> Run:
         left_out = (*left_out, NOTHING_REQUIRED(where="tolerances"))
     findings = tuple(dict.fromkeys((*_without_read(run.findings, run), *left_out, *wrong)))
     verification = run.verification.with_findings(findings)
-    report = msgspec.structs.replace(verification.report, inspection=verdicts)
+    report = replace(verification.report, inspection=verdicts)
     return replace(run, verification=replace(verification, report=report), findings=findings)
 
 

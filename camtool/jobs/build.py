@@ -20,7 +20,6 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +43,7 @@ from camtool.jobs.keys import (
 )
 from camtool.jobs.tools import Described, Shop, Tools, Used, tool_tables, tools_for
 from camtool.planning.job import Job, Operation, Placement, Stock, rested
+from camtool.records import replace
 from camtool.tables import read_table
 
 OF_OPERATIONS = (*OPERATION, TOOL_NAME, *TOOL_KEYS)

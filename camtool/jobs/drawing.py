@@ -7,13 +7,13 @@ misspelt layer must not leave a part of the work undone.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from camtool.errors import OptionError
 from camtool.importers.pieces import NAMED, NoMatchError
 from camtool.importers.read import read_bytes
 from camtool.patterns import guess, matches
+from camtool.records import replace
 
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing

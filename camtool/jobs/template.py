@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from msgspec import Struct
-from msgspec.structs import replace
 
 from camtool.arrays import Ints
 from camtool.geometry.drawing import is_text
@@ -27,6 +26,7 @@ from camtool.jobs.keys import OPERATION, PLACE, TOOL, WHOLE, Key
 from camtool.planning.drill import HOLE_SIZE_MM, circle_of
 from camtool.planning.job import Operation, Stock
 from camtool.planning.sides import CONTINUOUS, Traits
+from camtool.records import replace
 from camtool.tables import quoted
 
 if TYPE_CHECKING:

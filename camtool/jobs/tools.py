@@ -18,12 +18,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from msgspec import Struct, field, structs
+from msgspec import Struct, field
 
 from camtool.errors import MachineError, OptionError
 from camtool.jobs.keys import (
@@ -43,6 +42,7 @@ from camtool.jobs.keys import (
 from camtool.jobs.tool_table import TableTool, read_tool_table
 from camtool.patterns import guess
 from camtool.planning.job import Operation, Tool
+from camtool.records import replace
 from camtool.tables import read_table
 
 PRESETS = "presets"
@@ -152,7 +152,7 @@ def tools_for(named: Mapping[str, Described], whole: Table, folder: Path, shop: 
             raise units.refused("has no effect without tool_table", "give tool_table too")
         return tools
     unit = "mm" if units is None else WHOLE["tool_table_units"].read(units)
-    return _with_table(structs.replace(tools, units=unit), table)
+    return _with_table(replace(tools, units=unit), table)
 
 
 def _path_of(key: str, whole: Table, folder: Path) -> Path | None:
@@ -201,7 +201,7 @@ class Tools(Struct, frozen=True, dict=True):
                 )
             given = {key.removeprefix("tool_"): value for key, value in own.given.items()}
             keys = Table(given, own.where, own.file).over(keys)
-        return self._used(name, structs.replace(described, keys=keys), kind)
+        return self._used(name, replace(described, keys=keys), kind)
 
     def _used(self, name: str, described: Described, kind: str) -> Used:
         """The tool, and its preset for what is cut. OptionError for a material for which it has
@@ -283,7 +283,7 @@ class Tools(Struct, frozen=True, dict=True):
         if number is None or number not in self.table:
             return described
         known = self._of_table(number, needed="diameter" not in keys.given)
-        return structs.replace(described, keys=keys.over(known))
+        return replace(described, keys=keys.over(known))
 
     def _of_table(self, number: int, *, needed: bool = True) -> Table:
         """The keys of a tool of the table; refused when it lacks a diameter that is needed."""
@@ -306,7 +306,7 @@ def _with_table(tools: Tools, path: Path) -> Tools:
         raise OptionError(
             f"cannot be read ({error.strerror})", file=str(path), mend="check the path"
         ) from error
-    return structs.replace(tools, table=read_tool_table(text, str(path)), table_file=str(path))
+    return replace(tools, table=read_tool_table(text, str(path)), table_file=str(path))
 
 
 def _number_of(keys: Table) -> int | None:

@@ -14,7 +14,6 @@ from collections.abc import Sequence
 from pathlib import PurePath
 
 from msgspec import Struct
-from msgspec.structs import replace
 
 from camtool.errors import OptionError
 from camtool.pictures import polar
@@ -52,6 +51,7 @@ from camtool.pictures.view import (
     page_width,
     union,
 )
+from camtool.records import replace
 
 WIDE = 0.5
 """A window lower than this share of its width is wide."""

@@ -8,7 +8,6 @@ from functools import cached_property
 
 import numpy as np
 from msgspec import Struct
-from msgspec.structs import replace
 
 from camtool.arrays import Floats
 from camtool.geometry.drawing import Drawing
@@ -29,6 +28,7 @@ from camtool.pictures.options import AS_USUAL, Options
 from camtool.pictures.scene import Scene
 from camtool.pictures.trace import Trace, exaggerated, trace_of
 from camtool.pictures.view import points_box, round_step, union, window
+from camtool.records import replace
 
 Place = tuple[float, float]
 """x, y in mm."""

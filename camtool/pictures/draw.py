@@ -8,7 +8,6 @@ no random ids, no fonts. Inside the group "mm" coordinates are those of the part
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import PurePath
 
 from camtool.errors import OutputError
@@ -34,6 +33,7 @@ from camtool.pictures.scene import Scene
 from camtool.pictures.svg import Look, element, number
 from camtool.pictures.text import Style
 from camtool.pictures.view import View, page_width
+from camtool.records import replace
 
 PNG_DPI = 96
 """resvg's own default of 0 makes lengths in mm vanish."""

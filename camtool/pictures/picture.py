@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +14,7 @@ from camtool.pictures.draw import draw, render
 from camtool.pictures.options import AS_USUAL, Options
 from camtool.pictures.overlay import Overlay, draw_overlay, render_overlay
 from camtool.pictures.scene import Scene
+from camtool.records import replace
 from camtool.units import UM_PER_MM
 
 

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from msgspec import Struct
-from msgspec.structs import replace
 
 from camtool.arrays import Floats
 from camtool.errors import OptionError
@@ -23,6 +22,7 @@ from camtool.pictures.scene import Round, Scene
 from camtool.pictures.svg import Look, PathData, element, number
 from camtool.pictures.text import Style
 from camtool.pictures.view import MARGIN, Box, decimals_of, page_width, round_step
+from camtool.records import replace
 from camtool.units import UM_PER_MM
 
 

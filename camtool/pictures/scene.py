@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from msgspec import Struct
-from msgspec.structs import replace
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import extents
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
+from camtool.records import replace
 from camtool.toolpath.moves import Kind, Toolpath, toolpath_extents
 
 if TYPE_CHECKING:

@@ -18,7 +18,6 @@ before.
 from __future__ import annotations
 
 import numpy as np
-from msgspec.structs import replace
 
 from camtool.findings import Finding
 from camtool.planning.drill import named
@@ -26,6 +25,7 @@ from camtool.planning.findings import NOT_CHAMFERED, NOTHING_DRAWN_TO_CHAMFER
 from camtool.planning.items import Chosen, Setting, Work
 from camtool.planning.naming import operation_name
 from camtool.planning.profile import profile
+from camtool.records import replace
 
 
 def chamfer(chosen: Chosen, setting: Setting) -> Work:

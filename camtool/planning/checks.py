@@ -13,7 +13,6 @@ from collections.abc import Container, Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
-from msgspec import structs
 
 from camtool.arrays import Bools, Floats
 from camtool.findings import Finding, Sentence
@@ -65,6 +64,7 @@ from camtool.planning.naming import (
 )
 from camtool.planning.settings import lowered_feeds
 from camtool.planning.sides import runs_beside
+from camtool.records import replace
 from camtool.toolpath.moves import Kind, Toolpath, mounted_before, toolpath_extents
 from camtool.toolpath.rapids import STOCK_TOP_MM, Reach, feeds_below_top, rapids_through_stock
 
@@ -484,7 +484,7 @@ def with_loose_pieces(steps: Sequence[Step], stock: Stock | None) -> list[Step]:
             if step.operation.kind in ("profile", "engrave"):
                 loose = _loose_pieces(step, gone)
             found = shortened_list(list(loose), LOOSE_PIECE_MORE)
-            step = structs.replace(step, findings=(*step.findings, *found))
+            step = replace(step, findings=(*step.findings, *found))
         if through:
             gone.update(step.chosen.source[step.chosen.lines.closed].tolist())
         made.append(step)

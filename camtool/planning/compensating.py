@@ -9,10 +9,8 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from itertools import pairwise
 
-import msgspec
 import numpy as np
 from msgspec import Struct
 
@@ -23,6 +21,7 @@ from camtool.geometry.fit import fit_curve
 from camtool.kernels.lattice import to_steps
 from camtool.machine.model import Axis, Machine, PlayCells
 from camtool.planning.reversing import Residual, residual
+from camtool.records import replace
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import CompensatedToolpath, Kind, Move, Toolpath
 
@@ -425,7 +424,7 @@ def _residual(axis: Axis, machine: Machine, play_mm: float | None) -> Residual:
     steps."""
     play = axis.backlash_mm if play_mm is None else play_mm
     whole = float(to_steps(axis.compensation_mm, axis.coded_step_mm)) * axis.coded_step_mm
-    at_motor = msgspec.structs.replace(
+    at_motor = replace(
         axis,
         backlash_mm=play * axis.coded_step_mm / axis.real_step_mm,
         compensation_mm=whole,

@@ -16,7 +16,6 @@ import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from msgspec.structs import replace
 
 from camtool.errors import OptionError
 from camtool.findings import Finding
@@ -34,6 +33,7 @@ from camtool.planning.items import Contour, Setting, Step
 from camtool.planning.job import Operation
 from camtool.planning.naming import at_place, key_of
 from camtool.planning.settings import levels
+from camtool.records import replace
 from camtool.toolpath.findings import ProgramCode
 
 ENGAGED_MOST = 0.5

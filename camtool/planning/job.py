@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 from camtool.errors import OptionError
 from camtool.patterns import matches
+from camtool.records import replace
 
 KINDS = ("profile", "pocket", "bore", "engrave", "drill", "vcarve", "chamfer")
 """Kinds of operation."""

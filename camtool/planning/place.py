@@ -10,10 +10,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
-from msgspec import Struct, structs
+from msgspec import Struct
 
 from camtool.arrays import Floats, Ints
 from camtool.errors import GeometryError, OptionError
@@ -31,6 +30,7 @@ from camtool.geometry.polylines import (
 )
 from camtool.planning.findings import POINTS_MERGED
 from camtool.planning.job import Job, Placement
+from camtool.records import replace
 
 MOST_SIZE_MM = 1e5
 """The cut geometry is no larger than this: 100 m, as the longest travel of a machine file."""
@@ -69,7 +69,7 @@ class Map(Struct, frozen=True, eq=False):
 
     def moved(self, shift: Floats) -> Map:
         """The same, and then moved by `shift` (2,) mm."""
-        return structs.replace(self, shift=self.shift + shift)
+        return replace(self, shift=self.shift + shift)
 
 
 def place(drawing: Drawing, job: Job) -> Drawing:
@@ -369,7 +369,7 @@ def _repeated(drawing: Drawing, maps: list[Map]) -> Drawing:
         sources=tuple(_copy_name(drawing.sources[each], n) for n, each in which),
         line_types=tuple(drawing.line_types[each] for _, each in which),
         marks=tuple(
-            structs.replace(mark, at_mm=where.point(mark.at_mm), source=_copy_name(mark.source, n))
+            replace(mark, at_mm=where.point(mark.at_mm), source=_copy_name(mark.source, n))
             for n, where in enumerate(maps)
             for mark in drawing.marks
         ),
@@ -438,7 +438,7 @@ def _copy_name(source: str, copy: int) -> str:
 
 def _gaps(gaps: tuple[Gap, ...], maps: list[Map]) -> tuple[Gap, ...]:
     return tuple(
-        structs.replace(gap, at_mm=where.point(gap.at_mm), size_mm=gap.size_mm * where.scale)
+        replace(gap, at_mm=where.point(gap.at_mm), size_mm=gap.size_mm * where.scale)
         for where in maps
         for gap in gaps
     )
@@ -449,10 +449,10 @@ def _healing(drawing: Drawing, maps: list[Map], rows: Ints) -> Healing:
     reading stays as it was."""
     healing, paths = drawing.healing, len(drawing.paths)
     now = {row: index for index, row in enumerate(rows.tolist())}
-    return structs.replace(
+    return replace(
         healing,
         branches=tuple(
-            structs.replace(
+            replace(
                 branch,
                 at_mm=where.point(branch.at_mm),
                 paths=tuple(now[k + n * paths] for k in branch.paths if k + n * paths in now),
@@ -461,7 +461,7 @@ def _healing(drawing: Drawing, maps: list[Map], rows: Ints) -> Healing:
             for branch in healing.branches
         ),
         crossings=tuple(
-            structs.replace(each, at_mm=where.point(each.at_mm), path=now[each.path + n * paths])
+            replace(each, at_mm=where.point(each.at_mm), path=now[each.path + n * paths])
             for n, where in enumerate(maps)
             for each in healing.crossings
             if each.path + n * paths in now

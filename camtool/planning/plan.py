@@ -10,13 +10,12 @@ Operations follow each other as the job lists them; each is put into order on it
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from functools import partial
 from itertools import chain
 from pathlib import PurePath
 
 import numpy as np
-from msgspec import Struct, structs
+from msgspec import Struct
 
 from camtool.errors import OptionError
 from camtool.findings import Finding
@@ -69,6 +68,7 @@ from camtool.planning.profile import profile
 from camtool.planning.settings import setting_of
 from camtool.planning.sides import Sides, choose, runs_beside, takes_mark
 from camtool.planning.tabs import between, raised_over_bridges, with_tabs
+from camtool.records import replace
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Toolpath
@@ -150,7 +150,7 @@ def _linked(
         tabs_mm=_tabs(steps),
         drawn=drawn_of(toolpath, builder.runs, steps, placed),
     )
-    return structs.replace(plan, toolpath=toolpath)
+    return replace(plan, toolpath=toolpath)
 
 
 def _tabs(steps: Sequence[Step]) -> tuple[tuple[float, float], ...]:
@@ -189,7 +189,7 @@ def parted(
     for turn in turns:
         steps = tuple(plan.steps[index] for index in turn)
         job = replace(plan.job, operations=tuple(step.operation for step in steps))
-        part = structs.replace(plan, job=job, steps=steps)
+        part = replace(plan, job=job, steps=steps)
         parts.append(_linked(part, drawing, plan.job, machine, undivided=undivided))
     return tuple(parts)
 
@@ -328,7 +328,7 @@ def _sparing(steps: list[Step]) -> list[Step]:
     for step in steps:
         kept = raised_over_bridges(step.runs, step.operation, step.setting.feeds, bridges)
         findings = (*step.findings, *of_stage(step.operation, kept.findings))
-        made.append(structs.replace(step, runs=kept.runs, findings=findings))
+        made.append(replace(step, runs=kept.runs, findings=findings))
     return made
 
 
@@ -337,9 +337,7 @@ def _rested(steps: list[Step]) -> list[Step]:
     left = [step.operation.rest for step in steps if step.operation.rest_of is not None]
     codes = (PlanningCode.UNREACHED, PlanningCode.DEPTH_LIMITED)
     return [
-        structs.replace(
-            step, findings=tuple(each for each in step.findings if each.code not in codes)
-        )
+        replace(step, findings=tuple(each for each in step.findings if each.code not in codes))
         if step.operation.name and step.operation.name in left
         else step
         for step in steps
@@ -388,7 +386,7 @@ def _with_starts(contours: list[Contour]) -> list[Contour]:
     for contour in contours:
         operation = contour.setting.operation
         path, starts = with_starts(contour.path, operation.start, operation.away_mm)
-        made.append(structs.replace(contour, path=path, starts=starts))
+        made.append(replace(contour, path=path, starts=starts))
     return made
 
 
@@ -400,7 +398,7 @@ def _begun_between_tabs(contours: list[Contour]) -> list[Contour]:
         tabs = contour.setting.operation.tabs
         if tabs and tabs.at_mm and contour.path.closed and not len(contour.starts):
             path, starts = with_starts(contour.path, between(contour.path, tabs.at_mm), 0.0)
-            contour = structs.replace(contour, path=path, starts=starts)
+            contour = replace(contour, path=path, starts=starts)
         made.append(contour)
     return made
 

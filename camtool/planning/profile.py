@@ -14,7 +14,6 @@ from itertools import pairwise
 
 import numpy as np
 from msgspec import Struct, field
-from msgspec.structs import replace
 
 from camtool.arrays import Ints
 from camtool.findings import Finding
@@ -45,6 +44,7 @@ from camtool.planning.items import NO_STARTS, Chosen, Contour, Setting, Work, co
 from camtool.planning.naming import at_place, shortened_list, tool_name, width_name
 from camtool.planning.paths import joints, midpoints
 from camtool.planning.sides import runs_beside
+from camtool.records import replace
 
 ROOM_TOLERANCE_MM = 1e-4
 """Two contours may be nearer than the tool is wide by this much before they count as joined."""

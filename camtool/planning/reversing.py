@@ -22,10 +22,8 @@ from collections.abc import Iterator, Sequence
 from functools import cached_property
 from itertools import chain, pairwise
 
-import msgspec
 import numpy as np
 from msgspec import Struct, field
-from msgspec.structs import replace
 
 from camtool.arrays import Floats, Ints
 from camtool.findings import Finding
@@ -41,6 +39,7 @@ from camtool.planning.findings import (
 from camtool.planning.items import Contour, CutRun, Fixed, Item, Items
 from camtool.planning.job import Operation
 from camtool.planning.paths import flat
+from camtool.records import replace
 from camtool.units import UM_PER_MM
 
 ALIKE_MM = 1e-4
@@ -709,7 +708,7 @@ def backlashes_mm(axis: Axis, cells: PlayCells | None) -> tuple[float, ...]:
 def loosest(machine: Machine) -> tuple[Axis, Axis]:
     """X and Y with the largest backlash of all regions."""
     x, y, _ = (
-        msgspec.structs.replace(axis, backlash_mm=max(backlashes_mm(axis, cells)))
+        replace(axis, backlash_mm=max(backlashes_mm(axis, cells)))
         for axis, cells in zip(machine.axes, machine.play_map.used, strict=True)
     )
     return x, y
@@ -722,7 +721,7 @@ def residuals(machine: Machine) -> tuple[Residual, Residual]:
     x, y, _ = (
         max(
             (
-                residual(msgspec.structs.replace(axis, backlash_mm=play), machine.controller)
+                residual(replace(axis, backlash_mm=play), machine.controller)
                 for play in backlashes_mm(axis, cells)
             ),
             key=lambda one: abs(one.plus_mm - one.minus_mm),

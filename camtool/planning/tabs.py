@@ -22,11 +22,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from msgspec import Struct, structs
+from msgspec import Struct
 
 from camtool.arrays import Bools, Floats
 from camtool.errors import OptionError
@@ -49,6 +48,7 @@ from camtool.planning.job import Operation, Tool, refuse_endless
 from camtool.planning.naming import at_place, key_of, operation_name
 from camtool.planning.paths import QUARTER, MeasuredPath
 from camtool.planning.ramps import ZProfile, feeds_along, lifted
+from camtool.records import replace
 
 SIDE_ANGLE_RAD = 0.25 * math.pi
 """Slope of the sides of ramped tabs when the tool may plunge."""
@@ -146,10 +146,9 @@ def with_tabs(contours: list[Contour]) -> tuple[list[Contour], list[Finding]]:
         measured=len(bare),
         kinds=", ".join(f"{count} {kind}" for count, kind in kinds if count),
     )
-    without = structs.replace(setting, operation=replace(setting.operation, tabs=None))
+    without = replace(setting, operation=replace(setting.operation, tabs=None))
     return [
-        each if k in tabbed else structs.replace(each, setting=without)
-        for k, each in enumerate(contours)
+        each if k in tabbed else replace(each, setting=without) for k, each in enumerate(contours)
     ], [finding]
 
 
@@ -179,8 +178,8 @@ def _by_hand(contours: list[Contour]) -> list[Contour]:
     made = []
     for row, contour in enumerate(contours):
         own = replace(tabs, at_mm=tuple(places[row])) if row in places else None
-        tabbed = structs.replace(setting, operation=replace(operation, tabs=own))
-        made.append(structs.replace(contour, setting=tabbed))
+        tabbed = replace(setting, operation=replace(operation, tabs=own))
+        made.append(replace(contour, setting=tabbed))
     return made
 
 
@@ -612,7 +611,7 @@ def _raised(
     if not tabs:
         return run
     (made,) = lifted(along.paths, [along.index], [raised(points, tabs, None)])
-    return structs.replace(run, vertices=made, feed_mm_min=feeds_along(made, feeds))
+    return replace(run, vertices=made, feed_mm_min=feeds_along(made, feeds))
 
 
 def _drilled(run: CutRun, bridge: Bridge, tool: Tool, found: _Found) -> None:

@@ -10,7 +10,6 @@ import hashlib
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +20,7 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import MachineError, OptionError, PostError, ProgramError
 from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.pipeline import read_program, verify_program
+from camtool.records import replace
 from camtool.sending.journal import Place as Left
 from camtool.sending.line import Port
 from camtool.simulation.motion import Options

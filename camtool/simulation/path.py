@@ -24,7 +24,6 @@ the steps of each axis do not depend on the spacing.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -32,6 +31,7 @@ import numpy as np
 from camtool.arrays import Bools, Floats, Ints
 from camtool.kernels.lattice import to_steps
 from camtool.machine.model import Machine, PathController
+from camtool.records import replace
 from camtool.simulation.controller import ControllerModel
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import Chunk, Options

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import numpy.typing as npt
 
 from camtool.arrays import Bools, Floats
 from camtool.errors import ProgramError
 from camtool.machine.model import Machine
+from camtool.records import replace
 from camtool.toolpath.moves import Kind, Toolpath, read_only
 
 MAX_PATH_STEPS = 1 << 40

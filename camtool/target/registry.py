@@ -12,7 +12,7 @@ import difflib
 import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, cast, get_args
@@ -21,6 +21,7 @@ import msgspec
 
 from camtool.errors import CamtoolError, MachineError, OptionError, PostError, UnknownTargetError
 from camtool.machine.model import Machine, PathController, TargetNames
+from camtool.records import replace
 from camtool.tables import Table, read_table
 from camtool.target.contract import Target
 from camtool.target.loader import machine_of, missing_keys, names_of, resolved_table

@@ -22,10 +22,10 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 from msgspec import Struct
-from msgspec.structs import replace
 
 from camtool.arrays import Floats, Ints
 from camtool.machine.model import Machine
+from camtool.records import replace
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import ALL, Chunk, Effects, Options
 

@@ -18,14 +18,14 @@ different radii is a spiral (`PolarArcs`).
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
-from msgspec import Struct, structs
+from msgspec import Struct
 
 from camtool.arrays import Bools, Codes, Floats, Ints
 from camtool.errors import OptionError, PostError
 from camtool.machine.model import Machine
+from camtool.records import replace
 from camtool.toolpath.findings import EVENT_LEFT_OUT_COOLANT, FEED_ABOVE_LIMIT_LOWERED
 from camtool.toolpath.moves import Kind, PolarArcs, Toolpath, read_only
 
@@ -52,7 +52,7 @@ class LoweredToolpath(Struct, frozen=True, eq=False):
     def after(self, earlier: LoweredToolpath) -> LoweredToolpath:
         """Return this with `row` composed with `earlier.row`, where this was made from
         `earlier`."""
-        return structs.replace(self, row=earlier.row[self.row])
+        return replace(self, row=earlier.row[self.row])
 
 
 def xy_then_z(toolpath: Toolpath) -> LoweredToolpath:

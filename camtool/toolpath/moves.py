@@ -10,7 +10,7 @@ at `start`. Planning builds it, a target writes it and reads it back, simulation
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any, Literal, TypeVar, cast
 
@@ -20,6 +20,7 @@ from msgspec import Struct
 from camtool.arrays import Bools, Codes, Floats, Indices, Ints
 from camtool.errors import PostError
 from camtool.findings import Finding
+from camtool.records import replace
 from camtool.toolpath.wanted import DrawnEdges, Operations
 
 Column = TypeVar("Column", bound=np.ndarray[Any, Any])

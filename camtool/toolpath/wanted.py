@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import numpy as np
 from msgspec import Struct
-from msgspec.structs import replace
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.polylines import Polylines
+from camtool.records import replace
 
 UNKNOWN_EDGE = -1
 """Value of `edge` for rows whose edge of the part is unknown."""

@@ -14,13 +14,13 @@ from typing import TypeVar
 
 import numpy as np
 from msgspec import Struct
-from msgspec.structs import replace
 
 from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.findings import Finding, Sentence
 from camtool.geometry.boxes import near_points
 from camtool.geometry.measure import point_at, segment_boxes, segment_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
+from camtool.records import replace
 from camtool.simulation.rows import block_of
 from camtool.toolpath.moves import ROWS_AT_ONCE, Kind, Toolpath, are_arcs
 from camtool.toolpath.rapids import STOCK_TOP_MM

@@ -15,9 +15,9 @@ from functools import cached_property
 
 import numpy as np
 from msgspec import Struct
-from msgspec.structs import replace
 
 from camtool.arrays import Bools, Floats, Indices, Ints
+from camtool.records import replace
 from camtool.toolpath.moves import ROWS_AT_ONCE
 from camtool.verification.circles import Circle
 from camtool.verification.cuts import CutMoves, Samples

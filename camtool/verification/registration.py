@@ -22,7 +22,6 @@ from typing import Any
 
 import numpy as np
 from msgspec import Struct
-from msgspec.structs import replace
 
 from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.errors import DrawingError
@@ -45,6 +44,7 @@ from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Seg
 from camtool.planning.drill import circle_of
 from camtool.planning.paths import Cuts, MeasuredPaths
 from camtool.planning.paths import cuts as joined_moves
+from camtool.records import replace
 from camtool.toolpath.moves import Kind, Toolpath, are_arcs
 from camtool.toolpath.wanted import UNKNOWN_EDGE, DrawnEdges
 from camtool.verification.coverage import at_point, block_name, holes_of, listed

@@ -25,6 +25,7 @@ from msgspec.structs import asdict
 
 from camtool.findings import Finding
 from camtool.plain import one_line, to_json
+from camtool.records import replace
 from camtool.toolpath.findings import ProgramCode
 from camtool.units import UM_PER_MM
 from camtool.verification.findings import (
@@ -503,7 +504,7 @@ class Report(msgspec.Struct, frozen=True):
 
     def with_findings(self, findings: Iterable[Finding]) -> Report:
         """The same report with these findings."""
-        return msgspec.structs.replace(self, findings=reported(findings))
+        return replace(self, findings=reported(findings))
 
 
 def reported(findings: Iterable[Finding]) -> tuple[FindingReport, ...]:

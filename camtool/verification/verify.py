@@ -14,12 +14,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
-import msgspec
 import numpy as np
 from msgspec import Struct
 
@@ -27,6 +26,7 @@ from camtool.arrays import Floats, Indices
 from camtool.findings import Finding
 from camtool.geometry.drawing import Drawing
 from camtool.progress import Progress
+from camtool.records import replace
 from camtool.simulation.controller import FusedRun
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import Chunk
@@ -99,7 +99,7 @@ class Verification:
 
     def with_planning(self, planned: Planned, before: Before | None) -> Verification:
         """The verification with the figures of planning in its report."""
-        report = msgspec.structs.replace(self.report, planned=planned, before=before)
+        report = replace(self.report, planned=planned, before=before)
         return replace(self, report=report)
 
 
@@ -231,7 +231,7 @@ def _coverage(case: Case, decoded: MoveIndex, goal: Goal, *, flat_cuts: bool) ->
     match = coverage.match
     if case.compensated is not None:
         match = carried_match(match, case.compensated.row, goal)
-    return msgspec.structs.replace(coverage, match=match, findings=(*coverage.findings, *unpaired))
+    return replace(coverage, match=match, findings=(*coverage.findings, *unpaired))
 
 
 def _turned(case: Case, decoded: MoveIndex, goal: Goal, *, flat_cuts: bool) -> tuple[Finding, ...]:

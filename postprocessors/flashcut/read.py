@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -20,6 +19,7 @@ from camtool.findings import Finding, Severity
 from camtool.kernels import words
 from camtool.kernels.lattice import to_steps
 from camtool.machine.model import exceeds
+from camtool.records import replace
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 

@@ -20,9 +20,9 @@ from typing import Final
 
 import numpy as np
 from msgspec import Struct, field
-from msgspec.structs import replace
 
 from camtool.arrays import Bools, Codes, Floats, Ints
+from camtool.records import replace
 from camtool.toolpath.moves import Kind, Toolpath
 
 from .dialect import GcodeDialect

@@ -15,9 +15,9 @@ from typing import Final
 
 import numpy as np
 from msgspec import Struct
-from msgspec.structs import replace
 
 from camtool.arrays import Ints
+from camtool.records import replace
 from camtool.toolpath.moves import Kind, Toolpath
 
 from .format import NumberStyle, format_number

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator
-from dataclasses import replace
 from typing import Final, Literal
 
 import numpy as np
@@ -25,6 +24,7 @@ from camtool.arrays import Bools, Codes, Floats, Ints
 from camtool.errors import PostError
 from camtool.findings import Finding, Sentence
 from camtool.machine.model import Machine
+from camtool.records import replace
 from camtool.toolpath.lower import (
     LoweredToolpath,
     arcs_to_lines,

@@ -13,18 +13,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
 from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
-from msgspec import Struct, structs
+from msgspec import Struct
 
 from camtool.arrays import Bools, Codes, Floats, Ints
 from camtool.bounds import refuse_too_long
 from camtool.errors import CamtoolError, PostError
 from camtool.findings import Finding
 from camtool.machine.model import Machine, PathController
+from camtool.records import replace
 from camtool.simulation.controller import ControllerModel
 from camtool.simulation.path import PathModel
 from camtool.toolpath.moves import Kind, PathMode, Toolpath, mounted_before, rows_of
@@ -118,7 +118,7 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: ProgramStyle) -> Pr
         feed_words = [f"F{word}" for word in _feed_texts(feeds, holes, decimals)]
         number = NumberStyle(dialect.decimals, strip=dialect.strip_zeros)
         blocks = {**events.blocks, **cycle_blocks(holes, feed_words, number)}
-        events = structs.replace(events, blocks=blocks)
+        events = replace(events, blocks=blocks)
     unmoved = _first_change(toolpath, events) if style.change_first else 0
     sent = sent_rows(toolpath, arcs, feeds, events.changes, holes, unmoved)
     arc_counts = arcs.counts
@@ -200,7 +200,7 @@ def in_units(
     decimals = dialect.decimals + unit.more_decimals
     return (
         replace(toolpath, **places),
-        structs.replace(dialect, decimals=decimals, **lengths),
+        replace(dialect, decimals=decimals, **lengths),
     )
 
 

@@ -22,11 +22,11 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 from msgspec import Struct
-from msgspec.structs import replace
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import MachineError, ProgramError
 from camtool.machine.model import Machine
+from camtool.records import replace
 from camtool.simulation.controller import ControllerModel
 from camtool.simulation.legs import coded_steps_mm
 from camtool.simulation.mechanics import Mechanics

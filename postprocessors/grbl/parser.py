@@ -14,8 +14,8 @@ import re
 from typing import Final
 
 from msgspec import Struct, field
-from msgspec.structs import replace
 
+from camtool.records import replace
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind
 

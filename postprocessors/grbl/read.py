@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Final, NoReturn
 
 import numpy as np
@@ -18,6 +17,7 @@ import numpy as np
 from camtool import bounds
 from camtool.errors import ProgramError
 from camtool.findings import Finding
+from camtool.records import replace
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 

@@ -11,9 +11,8 @@ import re
 import time
 from typing import Any
 
-from msgspec import structs
-
 from camtool.errors import MachineError
+from camtool.records import replace
 from camtool.target.contract import ControllerSetting
 from camtool.target.wire import Place, port_fault
 
@@ -87,7 +86,7 @@ def settings_of(text: str) -> list[ControllerSetting] | None:
         if number in said
     ]
     if not any(each.said == f"${LASER}" and each.value for each in made):
-        made = [structs.replace(each, doubt=_doubt(each)) for each in made]
+        made = [replace(each, doubt=_doubt(each)) for each in made]
     return made
 
 

@@ -21,10 +21,10 @@ from typing import Any, Final, Literal
 import msgspec
 import numpy as np
 from msgspec import Struct
-from msgspec.structs import replace
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.machine.model import Machine
+from camtool.records import replace
 from camtool.simulation.legs import coded_steps_mm
 from camtool.simulation.speed_plan import FROM_REST, allowed_along, axis_limits
 from camtool.target.twin import Slides, Travel, Twin
@@ -1581,18 +1581,16 @@ class GrblTwin(Twin):
                 given["coded_step_mm"] = 1.0 / settings[100 + k]
             if settings[120 + k] > 0.0:
                 given["acceleration_mm_s2"] = settings[120 + k]
-            axes[name] = msgspec.structs.replace(getattr(self._machine.axes, name), **given)
-        controller = msgspec.structs.replace(
+            axes[name] = replace(getattr(self._machine.axes, name), **given)
+        controller = replace(
             self._machine.controller,
             idle_delay_ms=int(settings[1]),
             junction_deviation_mm=settings[11],
             arc_tolerance_mm=settings[12],
             laser_mode=bool(settings[32]),
         )
-        axes_now = msgspec.structs.replace(self._machine.axes, **axes)
-        self._machine = msgspec.structs.replace(
-            self._machine, axes=axes_now, controller=controller
-        )
+        axes_now = replace(self._machine.axes, **axes)
+        self._machine = replace(self._machine, axes=axes_now, controller=controller)
 
     # Homing (`limits_go_home`).
 

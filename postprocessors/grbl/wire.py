@@ -20,9 +20,8 @@ from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
-from msgspec.structs import replace
-
 from camtool.errors import MachineError
+from camtool.records import replace
 from camtool.target.terminal import Terminal
 from camtool.target.wire import (
     HALTS,

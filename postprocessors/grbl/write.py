@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 from camtool.findings import Finding
+from camtool.records import replace
 from camtool.toolpath.moves import Kind, Toolpath, mounted_before
 from camtool.toolpath.program import Program
 

@@ -21,7 +21,6 @@ it over some milliseconds at half of the axis's limits; here it acts at once, an
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -29,6 +28,7 @@ from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.machine.model import Machine
+from camtool.records import replace
 from camtool.simulation.controller import ControllerModel
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import Chunk, Options

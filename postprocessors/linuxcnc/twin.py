@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Final, Literal
 
@@ -20,6 +19,7 @@ import numpy as np
 from camtool.arrays import Floats, Ints
 from camtool.errors import CamtoolError
 from camtool.machine.model import Machine
+from camtool.records import replace
 from camtool.target.twin import COMMANDED, Slides, Travel, Twin, travel_of
 from camtool.toolpath.moves import Toolpath
 

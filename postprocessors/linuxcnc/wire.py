@@ -17,9 +17,9 @@ from collections.abc import Callable, Generator, Mapping, Sequence
 from typing import Final, cast
 
 import numpy as np
-from msgspec.structs import replace
 
 from camtool.errors import MachineError
+from camtool.records import replace
 from camtool.target.terminal import Terminal
 from camtool.target.wire import (
     HALTS,

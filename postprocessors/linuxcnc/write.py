@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Final
 
-from msgspec import structs
-
+from camtool.records import replace
 from camtool.toolpath.moves import Kind, PathMode, Toolpath, mounted_before
 from camtool.toolpath.program import Program
 
@@ -57,7 +55,7 @@ def _path_mode(mode: PathMode, unit: Unit) -> str:
         return "G61"
     if mode.corners == "exact-stop":
         return "G61.1"
-    style = structs.replace(TOLERANCE, decimals=TOLERANCE.decimals + unit.more_decimals)
+    style = replace(TOLERANCE, decimals=TOLERANCE.decimals + unit.more_decimals)
     corner, merging = (
         format_number(length / unit.mm, style) for length in (mode.tolerance_mm, mode.merging_mm)
     )

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 from msgspec import Struct
@@ -27,6 +26,7 @@ from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.errors import MachineError
 from camtool.kernels.lattice import to_steps
 from camtool.machine.model import Machine
+from camtool.records import replace
 from camtool.simulation.controller import ControllerModel
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import NO_SAMPLES, Chunk, Ledger, Options

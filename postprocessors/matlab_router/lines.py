@@ -16,11 +16,11 @@ from typing import Final
 
 import numpy as np
 from msgspec import Struct
-from msgspec.structs import replace
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import PostError
 from camtool.findings import Finding
+from camtool.records import replace
 from camtool.toolpath.moves import Toolpath
 
 from .dialect import (

@@ -13,11 +13,11 @@ from typing import Final, Literal
 
 import msgspec
 import numpy as np
-from msgspec.structs import replace
 
 from camtool.arrays import Ints
 from camtool.errors import ProgramError
 from camtool.machine.model import Machine
+from camtool.records import replace
 from camtool.target.twin import COMMANDED, Slides, Twin, travel_of
 
 from .controller import MatlabRouterModel
@@ -69,10 +69,8 @@ class MatlabRouterTwin(Twin):
     ) -> None:
         super().__init__(Slides(machine))
         # What the numbers take on their way they have taken already when a job begins.
-        at_once = msgspec.structs.replace(
-            machine.controller, header_pause_s=0.0, number_pause_s=0.0
-        )
-        self._machine = msgspec.structs.replace(machine, controller=at_once)
+        at_once = replace(machine.controller, header_pause_s=0.0, number_pause_s=0.0)
+        self._machine = replace(machine, controller=at_once)
         self._choices, self._dialect = choices, dialect_of(machine)
         self._model = MatlabRouterModel()
         self._jobs: list[ReadJob] = []

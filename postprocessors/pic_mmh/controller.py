@@ -24,7 +24,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
@@ -35,6 +34,7 @@ from camtool.errors import MachineError, ProgramError
 from camtool.findings import Finding
 from camtool.kernels.lattice import to_steps
 from camtool.machine.model import Machine
+from camtool.records import replace
 from camtool.simulation.controller import ControllerModel
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import NO_SAMPLES, Chunk, Options, one_row

@@ -9,16 +9,15 @@ silence (L1755-1757, L1769-1770).
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from typing import Final, Literal
 
 import msgspec
 import numpy as np
-from msgspec import structs
 
 from camtool.arrays import Floats, Ints
 from camtool.errors import ProgramError
 from camtool.machine.model import Machine
+from camtool.records import replace
 from camtool.target.twin import COMMANDED, Slides, Travel, Twin, travel_of
 from camtool.toolpath.moves import Kind
 
@@ -151,9 +150,7 @@ class PicMmhTwin(Twin):
         travel = travel_of(motion, by_passes=by_passes)
         if not all(chunk.ledger.ended.all() for chunk in motion):
             # An arc that never ends is left at its nearest approach, as the model leaves it.
-            travel = structs.replace(
-                travel, left_at=self._model.quantised(row, self._machine).end[0]
-            )
+            travel = replace(travel, left_at=self._model.quantised(row, self._machine).end[0])
         self.slides.begin(travel.moved(self._zero), self.now, len(self.decoded) - 1)
 
     def _set_zero(self) -> None:
@@ -162,8 +159,8 @@ class PicMmhTwin(Twin):
         self._said = np.zeros(3)
         given = self._given.controller
         home = np.array(given.machine_zero_mm) - self._zero
-        moved = msgspec.structs.replace(given, machine_zero_mm=tuple(home.tolist()))
-        self._machine = msgspec.structs.replace(self._given, controller=moved)
+        moved = replace(given, machine_zero_mm=tuple(home.tolist()))
+        self._machine = replace(self._given, controller=moved)
 
     # The other strings.
 

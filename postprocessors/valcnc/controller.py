@@ -18,7 +18,6 @@ It issues nothing at reversals; compensation in a machine file would be steps at
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 from msgspec import Struct
@@ -27,6 +26,7 @@ from camtool.arrays import Floats, Ints
 from camtool.errors import ProgramError
 from camtool.kernels.lattice import HALF_STEP_GUARD, to_steps
 from camtool.machine.model import Machine
+from camtool.records import replace
 from camtool.simulation.controller import ControllerModel
 from camtool.simulation.legs import (
     MAX_STEPS,

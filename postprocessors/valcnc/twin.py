@@ -7,13 +7,14 @@ decoded is passed over in silence: the thesis describes no message and no answer
 
 from __future__ import annotations
 
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 import msgspec
 import numpy as np
 
 from camtool.errors import ProgramError
 from camtool.machine.model import Machine
+from camtool.records import replace
 from camtool.target.twin import COMMANDED, Slides, Twin, travel_of
 
 from .controller import DrawingProgress, ValcncModel
@@ -53,9 +54,11 @@ def _with_all_defined(
     controller does something all the same. What ours does is in the page of its wire."""
     dialect = machine.dialect
     meant = {"z_order": "before", "missing_words": "keep", "full_circles": "whole"}
-    given = {key: value for key, value in meant.items() if getattr(dialect, key) == "refused"}
-    dialect = msgspec.structs.replace(dialect, **given)
-    return msgspec.structs.replace(machine, dialect=dialect)
+    given: dict[str, Any] = {
+        key: value for key, value in meant.items() if getattr(dialect, key) == "refused"
+    }
+    dialect = replace(dialect, **given)
+    return replace(machine, dialect=dialect)
 
 
 class ValcncTwin(Twin):

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -20,6 +19,7 @@ from camtool.arrays import Floats
 from camtool.bounds import refuse_too_long
 from camtool.errors import PostError
 from camtool.findings import Finding
+from camtool.records import replace
 from camtool.toolpath.lower import LoweredToolpath, arcs_to_lines, arcs_within
 from camtool.toolpath.moves import Kind, Toolpath, mounted_before
 from camtool.toolpath.program import Program

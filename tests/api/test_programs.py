@@ -2,7 +2,6 @@
 
 import json
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,6 +10,7 @@ from click.testing import CliRunner
 import camtool
 from camtool.cli.main import cli
 from camtool.comparison import Comparison
+from camtool.records import replace
 from camtool.run import Run
 
 CIRCLE = b"G00X00000.00Y00004.20;G02X00000.00Y00004.20I00000.00J00000.00F08;M30;"

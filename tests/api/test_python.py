@@ -5,7 +5,7 @@ import inspect
 import pkgutil
 import subprocess
 import sys
-from dataclasses import fields, replace
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -15,6 +15,7 @@ from camtool import api
 from camtool.cli.main import cli
 from camtool.importers.options import ReadOptions, Selection
 from camtool.pictures.options import Options
+from camtool.records import replace
 from camtool.run import Run
 from camtool.target import registry
 

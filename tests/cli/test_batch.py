@@ -6,7 +6,7 @@ import os
 import shutil
 import signal
 from collections.abc import Generator, Sequence
-from dataclasses import fields, replace
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -18,6 +18,7 @@ from camtool.cli.batch_run import stoppable
 from camtool.cli.options import DrawingFlags
 from camtool.cli.picture_options import PictureFlags
 from camtool.errors import CamtoolError
+from camtool.records import replace
 from camtool.target.registry import load_target
 from camtool.verification.report import Gates
 from tests.cli.conftest import Run

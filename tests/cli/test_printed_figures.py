@@ -7,7 +7,7 @@ import copy
 import json
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 import shapely
 
+from camtool.records import replace
 from tests.cli.conftest import Done, Run
 from tests.oracles.part_sizes import Ball, left_of, polygon, removed, size_of
 from tests.oracles.printed_figures import (

@@ -9,7 +9,7 @@ import re
 import shlex
 import shutil
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ import click
 import pytest
 
 from camtool.cli.main import cli
+from camtool.records import replace
 from camtool.target.registry import target_names
 from tests.docs.test_examples import ROOT, shell
 

@@ -11,12 +11,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from random import Random
 from typing import TypeVar
 
 import numpy as np
 
+from camtool.records import replace
 from camtool.target.registry import LoadedTarget
 from camtool.toolpath.moves import Kind, Toolpath
 

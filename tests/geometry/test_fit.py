@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,6 +14,7 @@ from camtool.errors import GeometryError
 from camtool.geometry.curves import BezierCurve, EllipseCurve, FunctionCurve, SplineCurve
 from camtool.geometry.fit import MIN_STEPS, arc_vertices, curve_nodes, fit_curve
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines
+from camtool.records import replace
 from tests.drawings import drawing_of
 from tests.oracles import arcs
 

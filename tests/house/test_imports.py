@@ -23,6 +23,7 @@ BASE = {
     "lock",
     "patterns",
     "progress",
+    "records",
     "tables",
 }
 SHARED = BASE | {"geometry", "kernels", "machine", "toolpath"}
@@ -41,6 +42,7 @@ ALLOWED = {
     "lock": set(),
     "patterns": set(),
     "progress": set(),
+    "records": set(),
     "tables": {"errors", "patterns"},
     "project": {"errors", "patterns", "tables"},
     "geometry": BASE | {"kernels"},

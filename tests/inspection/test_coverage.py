@@ -6,7 +6,6 @@ from __future__ import annotations
 import math
 from functools import cache
 
-import msgspec
 import numpy as np
 import pytest
 
@@ -26,6 +25,7 @@ from camtool.inspection.uncertainty import (
 from camtool.machine.model import Machine
 from camtool.pipeline import post_drawing
 from camtool.planning.job import job_of
+from camtool.records import replace
 from camtool.target.registry import load_target
 from tests.calibration.test_recovered import found, machine_of
 
@@ -59,15 +59,13 @@ def calibrated(machine: Machine, result: Calibration) -> Machine:
         assert step is not None
         assert play is not None
         axis = getattr(axes, name)
-        own[name] = msgspec.structs.replace(
-            axis, real_step_mm=step.value, backlash_mm=max(play.value, 0.0)
-        )
+        own[name] = replace(axis, real_step_mm=step.value, backlash_mm=max(play.value, 0.0))
     lean = result.estimate("squareness")
     assert lean is not None
-    mechanics = msgspec.structs.replace(machine.mechanics, squareness_rad=lean.value)
-    return msgspec.structs.replace(
+    mechanics = replace(machine.mechanics, squareness_rad=lean.value)
+    return replace(
         machine,
-        axes=msgspec.structs.replace(axes, **own),
+        axes=replace(axes, **own),
         mechanics=mechanics,
         uncertainty=result.known,
     )

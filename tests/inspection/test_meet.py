@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from msgspec.structs import replace
 
 import camtool
 from camtool.errors import OptionError
@@ -38,6 +37,7 @@ from camtool.inspection.tolerances import dimensions_of
 from camtool.inspection.verdicts import Tolerances
 from camtool.jobs.changes import Change, Left, job_of_tables, text_of
 from camtool.jobs.tools import Shop
+from camtool.records import replace
 from camtool.tables import parsed_table
 from tests.inspection.test_verdicts import EXACT, SVG
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 import tempfile
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -19,6 +18,7 @@ from camtool.inspection.dimensions import Limits
 from camtool.inspection.findings import InspectionCode
 from camtool.inspection.limits import limits_of
 from camtool.inspection.tolerances import dimensions_of, read_text, read_tolerances
+from camtool.records import replace
 from tests.importers.test_dxf import document, drawn
 
 

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import msgspec
 import numpy as np
 import pytest
 import uncertainties
@@ -29,6 +28,7 @@ from camtool.inspection.uncertainty import (
     without_scatter,
 )
 from camtool.machine.model import AxisUncertainty, Machine, Uncertainty
+from camtool.records import replace
 from camtool.target.registry import load_target
 
 NAMES = (
@@ -76,7 +76,7 @@ def machine_of(
     rest = {key: known[key] for key in NAMES[5:]}
     said = Uncertainty(x=x, y=y, correlations=pairs, **rest, **more)
     said.check()
-    return msgspec.structs.replace(machine, uncertainty=said)
+    return replace(machine, uncertainty=said)
 
 
 def directions_of(variant: Variant, machine: Machine) -> Floats:
@@ -247,17 +247,17 @@ def test_what_nothing_depends_on_is_no_input() -> None:
 
 
 def with_axis_x(machine: Machine, **values: float) -> Machine:
-    x = msgspec.structs.replace(machine.axes.x, **values)
-    return msgspec.structs.replace(machine, axes=msgspec.structs.replace(machine.axes, x=x))
+    x = replace(machine.axes.x, **values)
+    return replace(machine, axes=replace(machine.axes, x=x))
 
 
 def with_scatter(machine: Machine, x: float, y: float) -> Machine:
     axes = machine.axes
     own = {
-        "x": msgspec.structs.replace(axes.x, repeatability_mm=x),
-        "y": msgspec.structs.replace(axes.y, repeatability_mm=y),
+        "x": replace(axes.x, repeatability_mm=x),
+        "y": replace(axes.y, repeatability_mm=y),
     }
-    return msgspec.structs.replace(machine, axes=msgspec.structs.replace(axes, **own))
+    return replace(machine, axes=replace(axes, **own))
 
 
 def test_sizes_are_predicted_without_scatter_and_edges_have_it() -> None:
@@ -459,10 +459,10 @@ def exchanged(machine: Machine) -> Machine:
         return other[key[0]] + key[1:] if key[1] == "." else key
 
     pairs = tuple((named(a), named(b), r) for a, b, r in said.correlations)
-    return msgspec.structs.replace(
+    return replace(
         machine,
-        axes=msgspec.structs.replace(axes, x=axes.y, y=axes.x),
-        uncertainty=msgspec.structs.replace(said, x=said.y, y=said.x, correlations=pairs),
+        axes=replace(axes, x=axes.y, y=axes.x),
+        uncertainty=replace(said, x=said.y, y=said.x, correlations=pairs),
     )
 
 

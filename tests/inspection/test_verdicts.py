@@ -4,7 +4,6 @@ import itertools
 import math
 from pathlib import Path
 
-import msgspec
 import numpy as np
 import pytest
 
@@ -18,6 +17,7 @@ from camtool.inspection.inspector import Inspector
 from camtool.inspection.sizes import edge_at, rows_of, size_of
 from camtool.inspection.uncertainty import DRAWS, Variant
 from camtool.inspection.verdicts import SURE, Tolerances, inspect
+from camtool.records import replace
 from camtool.run import Run
 from camtool.verification.report import InspectedReport, facts, inspected_words
 
@@ -549,7 +549,7 @@ def chances_and_shares(run: Run, asked: list[Dimension], count: int) -> tuple[Fl
     random, inside = np.random.default_rng(11), np.zeros(len(asked))
     for _ in range(count):
         x, y = (
-            msgspec.structs.replace(
+            replace(
                 axis,
                 # What compensation adds beyond what it says, backlash does not lose.
                 backlash_mm=max(
@@ -565,12 +565,8 @@ def chances_and_shares(run: Run, asked: list[Dimension], count: int) -> tuple[Fl
                 (machine.axes.y, machine.uncertainty.y),
             )
         )
-        lean = msgspec.structs.replace(
-            machine.mechanics, squareness_rad=random.normal(0.0, 0.0001)
-        )
-        drawn = msgspec.structs.replace(
-            machine, axes=msgspec.structs.replace(machine.axes, x=x, y=y), mechanics=lean
-        )
+        lean = replace(machine.mechanics, squareness_rad=random.normal(0.0, 0.0001))
+        drawn = replace(machine, axes=replace(machine.axes, x=x, y=y), mechanics=lean)
         sizes = inspector.sizes(Variant(drawn, random.normal(0.0, 0.01)))
         for k, (size, each) in enumerate(zip(sizes, said, strict=True)):
             assert each.upper_mm is not None

@@ -12,9 +12,9 @@ import math
 from collections import Counter
 
 import numpy as np
-from msgspec.structs import replace
 
 from camtool.arrays import Floats
+from camtool.records import replace
 from camtool.toolpath.moves import Kind, Move, Toolpath
 
 CHORDS = 24

@@ -11,8 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from msgspec.structs import replace
-
+from camtool.records import replace
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.lowering import sweep_of
 

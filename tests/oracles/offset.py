@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -15,6 +15,7 @@ import shapely
 
 from camtool.arrays import Bools, Floats
 from camtool.geometry.polylines import Polyline
+from camtool.records import replace
 
 GRID_MM = 1e-9
 """shapely unites on this grid: without one it has lost whole parts of nearly equal arcs."""

@@ -11,12 +11,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
 
 from camtool.arrays import Bools, Floats, Ints
+from camtool.records import replace
 
 Path = Sequence[tuple[float, float, float]]
 """A closed path: x, y, bulge of the side that leaves there (tan of a quarter of its sweep)."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
@@ -17,6 +17,7 @@ from scipy.ndimage import distance_transform_edt
 from scipy.spatial import cKDTree
 
 from camtool.arrays import Bools, Floats, Ints
+from camtool.records import replace
 from tests.oracles.stock import CELL_MM, POINT_MM, Cutter, Move, Path, Stock, Walls
 
 Rng = np.random.Generator

@@ -1,7 +1,6 @@
 """Scenes beside each other in one picture."""
 
 import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +11,7 @@ from camtool.pictures.beside import draw_beside, render_beside
 from camtool.pictures.draw import png
 from camtool.pictures.options import Options
 from camtool.pictures.scene import Scene
+from camtool.records import replace
 from tests.oracles import svg_page
 from tests.oracles.png import decode
 from tests.pictures.conftest import SCENES, circle, drawing_of, line

@@ -1,7 +1,6 @@
 """Close-ups: the worst place with its surroundings, and the circle that came out worst."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +9,7 @@ from camtool.kernels.judging import empty_bins
 from camtool.pictures.options import Options
 from camtool.pictures.picture import ERRORS_ACROSS, LEAST_SHARE, closeups
 from camtool.pictures.scene import Round, Scene
+from camtool.records import replace
 
 LENGTH_MM = 10.0
 

@@ -5,7 +5,6 @@ import os
 import re
 import subprocess
 import sys
-from dataclasses import replace
 from itertools import combinations
 from xml.etree.ElementTree import Element
 
@@ -22,6 +21,7 @@ from camtool.pictures.options import Options
 from camtool.pictures.page import TICK_CAP, page_of
 from camtool.pictures.scene import Scene
 from camtool.pictures.svg import clean
+from camtool.records import replace
 from tests.oracles import svg_page
 from tests.oracles.png import decode
 from tests.pictures.conftest import NASTY, SCENES, circle, drawing_of

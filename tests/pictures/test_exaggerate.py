@@ -1,7 +1,6 @@
 """Deviations drawn many times as large: nearest points by brute force, and the whole picture."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,6 +16,7 @@ from camtool.pictures.draw import draw
 from camtool.pictures.options import Options
 from camtool.pictures.scene import Scene
 from camtool.pictures.trace import exaggerated, nearest_points
+from camtool.records import replace
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.verification.cuts import cut_moves
 from tests.oracles import svg_page

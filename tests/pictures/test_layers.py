@@ -3,7 +3,6 @@
 import math
 import subprocess
 import sys
-from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 
@@ -21,6 +20,7 @@ from camtool.pictures.options import Options
 from camtool.pictures.page import page_of
 from camtool.pictures.plot import CLEAR, labels_beside
 from camtool.pictures.scene import Scene
+from camtool.records import replace
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.verification.report import InspectedReport
 from tests.oracles import literal_reversals, svg_page

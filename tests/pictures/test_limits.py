@@ -1,6 +1,5 @@
 """The plot of inspected dimensions within their limits."""
 
-from dataclasses import replace
 from itertools import cycle
 
 import pytest
@@ -9,6 +8,7 @@ from camtool.pictures.colours import VERDICTS
 from camtool.pictures.limits import MOST_ROWS, draw_limits, has_limits
 from camtool.pictures.options import Options
 from camtool.pictures.scene import Scene
+from camtool.records import replace
 from camtool.verification.report import InspectedReport
 from tests.oracles import svg_page
 

@@ -2,7 +2,6 @@
 only by --bless."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +14,7 @@ from camtool.pictures.layers import layer_names
 from camtool.pictures.options import Options
 from camtool.pictures.overlay import Overlay, draw_overlay
 from camtool.pictures.scene import Round, Scene
+from camtool.records import replace
 from tests.oracles.png import decode
 from tests.pictures.conftest import SCENES, circle, followed, plate
 

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from msgspec.structs import replace
 
 from camtool.errors import OptionError
 from camtool.kernels.judging import bin_directions, empty_bins
 from camtool.pictures.draw import draw, png
 from camtool.pictures.options import Options
 from camtool.pictures.scene import Round, Scene, rounds_of
+from camtool.records import replace
 from camtool.toolpath.builder import ToolpathBuilder
 from tests.oracles import svg_page
 from tests.oracles.dense_moves import pic_mmh

@@ -4,14 +4,12 @@ import base64
 import hashlib
 import re
 import tomllib
-from dataclasses import replace
 from html.parser import HTMLParser
 from importlib import resources
 from pathlib import Path
 
 import numpy as np
 import pytest
-from msgspec import structs
 
 from camtool.geometry.polylines import Polylines, Segments
 from camtool.pictures.colours import BINS
@@ -22,6 +20,7 @@ from camtool.pictures.scene import Line, Playback, Round, Scene, Table, by_feed
 from camtool.pictures.trace import bins_of, exaggerated, trace_of
 from camtool.pictures.viewer.columns import columns_of, packed, traced_of
 from camtool.pictures.viewer.page import MOST_PLOTS, SCRIPTED, SCRIPTS, viewer_page
+from camtool.records import replace
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind
 from tests.pictures.conftest import NASTY, SCENES, circle, drawing_of, followed, line
@@ -175,7 +174,7 @@ def test_the_page_draws_deviations_as_pictures_do() -> None:
     assert picture is not None
     shown = found.columns["trace_bin"][1:].astype(int)
     np.testing.assert_array_equal(
-        np.where(shown == BINS, -1, shown), bins_of(structs.replace(picture, top_um=20.0))
+        np.where(shown == BINS, -1, shown), bins_of(replace(picture, top_um=20.0))
     )
 
 
@@ -209,8 +208,8 @@ def test_full_circles_are_plotted_in_the_colours_of_the_page() -> None:
 
 def test_a_circle_in_both_directions_is_plotted_once() -> None:
     both = (
-        structs.replace(lobed(0.01), partner=2),
-        structs.replace(lobed(0.01), ccw=True, partner=1),
+        replace(lobed(0.01), partner=2),
+        replace(lobed(0.01), ccw=True, partner=1),
     )
     assert text_of(Scene("t", rounds=both)).count("<figure>") == 1
 

@@ -1,10 +1,10 @@
 """The viewer in a real browser: the picture, its time, the mouse and the keys."""
 
-from dataclasses import replace
 from typing import Any
 
 import pytest
 
+from camtool.records import replace
 from tests.pictures.conftest import SCENES
 from tests.pictures.viewer_browser import NEEDS_BROWSER, browser, find_move, paper, shown
 from tests.pictures.viewer_pages import HOSTILE, MANY, busy, large_text

@@ -1,6 +1,5 @@
 """The viewer in a real browser: its layers, deviations, print, names for all, bytes."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ from camtool.pictures.options import Options
 from camtool.pictures.scene import Scene
 from camtool.pipeline import verify_program
 from camtool.planning.job import Tool
+from camtool.records import replace
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath

@@ -1,7 +1,6 @@
 """How wide pictures draw a tool: as it cuts at the surface."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,6 +16,7 @@ from camtool.pictures.scene import scene_of
 from camtool.pictures.viewer.page import viewer_page
 from camtool.pipeline import post_drawing
 from camtool.planning.job import Job, Operation, Tool
+from camtool.records import replace
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from tests.drawings import drawing_of

@@ -2,16 +2,15 @@
 
 import json
 import re
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
-from msgspec import structs
 
 from camtool.geometry.polylines import Segments
 from camtool.pictures.scene import Line, Playback, Scene, Table, by_feed
 from camtool.pictures.viewer.page import viewer_page
+from camtool.records import replace
 from camtool.toolpath.moves import Toolpath
 
 MANY = [50_000, pytest.param(200_000, marks=pytest.mark.slow)]
@@ -22,7 +21,7 @@ HOSTILE = "</script><script>hack()</script><img src=x onerror=hack()> {script} &
 
 def run_of(toolpath: Toolpath, **more: object) -> Playback:
     """The run of a toolpath by its feeds, and whatever else is said."""
-    return structs.replace(by_feed(toolpath, 60.0), **more)
+    return replace(by_feed(toolpath, 60.0), **more)
 
 
 def with_run(scene: Scene, run: Playback) -> Scene:
@@ -50,7 +49,7 @@ def traced(scene: Scene) -> Scene:
     assert scene.toolpath is not None
     assert scene.trace_points is not None
     rows = np.linspace(0, len(scene.toolpath) - 1, len(scene.trace_points)).astype(np.int64)
-    return with_run(scene, structs.replace(scene.playback(), trace_row=rows))
+    return with_run(scene, replace(scene.playback(), trace_row=rows))
 
 
 def spiral(count: int) -> Toolpath:

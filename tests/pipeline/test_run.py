@@ -1,7 +1,5 @@
 """A Run: what it holds at each stage, how it prints, and what its picture is of."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -9,6 +7,7 @@ from camtool.errors import PostError
 from camtool.geometry.polylines import Polyline
 from camtool.pipeline import convert_program, post_drawing, read_program, verify_program
 from camtool.planning.job import Job, job_of
+from camtool.records import replace
 from camtool.run import Run
 from camtool.target.registry import LoadedTarget, load_target
 from tests.drawings import drawing_of

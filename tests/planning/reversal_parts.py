@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-import msgspec
 import numpy as np
 
 from camtool.geometry.polylines import Polyline
@@ -17,6 +16,7 @@ from camtool.planning.link import link
 from camtool.planning.paths import flat
 from camtool.planning.reversing import Approaches, least_reversal_mm, parts_of, reversals_along
 from camtool.planning.settings import setting_of
+from camtool.records import replace
 from camtool.target.registry import load_target
 from camtool.toolpath.moves import Toolpath
 from camtool.verification.report import Report
@@ -110,8 +110,8 @@ def with_play(machine: Machine, **changes: float) -> Machine:
             for key, value in changes.items()
             if not key.startswith(("y_", "x_")) or key.startswith(f"{name}_")
         }
-        axes[name] = msgspec.structs.replace(getattr(machine.axes, name), **of_axis)
-    return msgspec.structs.replace(machine, axes=msgspec.structs.replace(machine.axes, **axes))
+        axes[name] = replace(getattr(machine.axes, name), **of_axis)
+    return replace(machine, axes=replace(machine.axes, **axes))
 
 
 def polygon(*points: tuple[float, float]) -> Polyline:

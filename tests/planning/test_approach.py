@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import msgspec
 import numpy as np
 import pytest
 from camtool_postprocessors.pic_mmh.dialect import PicMmhController
@@ -18,6 +17,7 @@ from camtool.planning.reversing import (
     approach_mm,
     residuals,
 )
+from camtool.records import replace
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import ALL
 from camtool.verification.cuts import cut_moves
@@ -71,7 +71,7 @@ def test_of_a_map_of_play_the_regions_that_are_worst_count(machine: Machine) -> 
     another: the first is told, the second needs the longer approach."""
     cells = PlayCells((0.0, 10.0, 20.0), (0.0, 20.0), ((0.02, 0.2),))
     known = with_play(machine, backlash_mm=0.15, compensation_mm=0.15)
-    mapped = msgspec.structs.replace(known, play_map=PlayMap(use=True, x=cells))
+    mapped = replace(known, play_map=PlayMap(use=True, x=cells))
     x, y = residuals(mapped)
     assert abs(x.plus_mm - x.minus_mm) == pytest.approx(0.13)
     assert abs(y.plus_mm - y.minus_mm) == pytest.approx(0.0)
@@ -96,7 +96,7 @@ def test_an_engaged_axis_comes_straight(machine: Machine) -> None:
 @settings(max_examples=40)
 @given(st.lists(st.one_of(contours(max_points=6), open_contours(max_points=6)), max_size=5))
 def test_the_first_motion_of_a_cut_is_no_reversal(machine: Machine, paths: list[Polyline]) -> None:
-    follower = msgspec.structs.replace(machine, controller=PathController(grid="none"))
+    follower = replace(machine, controller=PathController(grid="none"))
     paths = [scaled(path, 0.05) for path in paths]
     moves = toolpath(paths, follower, approach=True)
     cuts = cut_moves(moves, flat_cuts=False).is_cut
@@ -111,7 +111,7 @@ def test_the_first_motion_of_a_cut_is_no_reversal(machine: Machine, paths: list[
 def test_a_slide_stands_engaged_from_the_first_cut_on(machine: Machine, path: Polyline) -> None:
     # Whole steps of compensation: 0.14 mm are 1000.
     loose = with_play(machine, backlash_mm=0.3, compensation_mm=0.14)
-    follower = msgspec.structs.replace(loose, controller=PathController(grid="none"))
+    follower = replace(loose, controller=PathController(grid="none"))
     path = scaled(path, 0.05)
     x, y = path.vertices[0, :2].tolist()
     # Short enough to drive each axis one way only.
@@ -137,7 +137,7 @@ def test_residual_errors_are_those_of_the_play_operator(
     machine: Machine, play: str, direction: str, compensation_steps: int
 ) -> None:
     step = 0.001
-    axis = msgspec.structs.replace(
+    axis = replace(
         machine.axes.x,
         coded_step_mm=step,
         real_step_mm=step,
@@ -145,9 +145,7 @@ def test_residual_errors_are_those_of_the_play_operator(
         compensation_mm=compensation_steps * step,
     )
     controller = PicMmhController(start_play=play, start_direction=direction)  # type: ignore[arg-type]
-    changed = msgspec.structs.replace(
-        machine, axes=msgspec.structs.replace(machine.axes, x=axis), controller=controller
-    )
+    changed = replace(machine, axes=replace(machine.axes, x=axis), controller=controller)
     residual = residuals(changed)[0]
     first = 1 if direction == "+" else -1
     way = np.concatenate([np.arange(2000), np.arange(2000, -2000, -1), np.arange(-2000, 0)])

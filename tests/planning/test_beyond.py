@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +20,7 @@ from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.pipeline import post_drawing
 from camtool.planning.findings import PlanningCode
 from camtool.planning.job import Entry, Job, Lead, Operation, Tabs, Tool, job_of
+from camtool.records import replace
 from camtool.run import Run
 from camtool.target.registry import load_target
 from camtool.toolpath.findings import ProgramCode

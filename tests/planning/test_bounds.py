@@ -1,12 +1,11 @@
 """What a job's numbers make together is estimated, and refused with the number that asks."""
 
-from dataclasses import replace
-
 import pytest
 
 from camtool.errors import OptionError
 from camtool.planning.job import MOST_MOVES, Tabs, refuse_endless
 from camtool.planning.plan import plan
+from camtool.records import replace
 from tests.oracles.path_machine import path_machine
 from tests.planning.test_place import drawing_of, job_of, rectangle
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,7 +11,6 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from msgspec.structs import replace
 
 from camtool.errors import OptionError
 from camtool.findings import Severity
@@ -25,6 +23,7 @@ from camtool.planning.findings import PlanningCode
 from camtool.planning.items import Chosen, CutRun, Feeds, Fixed, Setting, Work
 from camtool.planning.job import Job, Operation, Tool
 from camtool.planning.plan import plan
+from camtool.records import replace
 from camtool.target.registry import load_target
 from tests.drawings import drawing_of
 from tests.oracles import contours as shapes
@@ -303,7 +302,7 @@ def test_what_reading_moved_and_what_carving_leaves_add_up() -> None:
     drawing = drawing_of(RING)
     bit = Tool(6.0, "v", math.radians(60.0))
     job = Job((Operation(kind="vcarve", tool=bit, depth_mm=1.0),))
-    moved = dataclasses.replace(drawing, off_mm=np.full((len(drawing.paths.vertices), 2), 0.02))
+    moved = replace(drawing, off_mm=np.full((len(drawing.paths.vertices), 2), 0.02))
     for made, off in ((drawing, 0.0), (moved, 0.02)):
         toolpath = plan(made, job, machine)
         assert toolpath.drawn is not None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,6 +19,7 @@ from camtool.pipeline import post_drawing
 from camtool.planning.findings import PlanningCode
 from camtool.planning.job import Job, Operation, Placement, Stock, Tool
 from camtool.planning.plan import Plan, planned
+from camtool.records import replace
 from camtool.target.registry import load_target
 from camtool.toolpath.findings import ProgramCode
 from tests.drawings import drawing_of

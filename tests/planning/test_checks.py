@@ -2,7 +2,6 @@
 
 import math
 import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,6 +18,7 @@ from camtool.planning.checks import checked
 from camtool.planning.findings import PlanningCode
 from camtool.planning.job import Job, Operation, Placement, Stock, Tabs, Tool, job_of
 from camtool.planning.plan import plan
+from camtool.records import replace
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.findings import ProgramCode

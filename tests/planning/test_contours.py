@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from msgspec.structs import replace
 
 from camtool.geometry.measure import length, sample
 from camtool.geometry.polylines import Polyline, Polylines, reverse, rolled, rotated
@@ -20,6 +19,7 @@ from camtool.planning.items import Contour, CutRun, Feeds, Runs, Setting
 from camtool.planning.job import Entry, Lead, Operation, Tabs, Tool
 from camtool.planning.leads import KeepOut
 from camtool.planning.settings import levels
+from camtool.records import replace
 from tests.oracles.runs import cut_over, most_at_a_time, move_length, run_points, runs_of, steepest
 from tests.paths import mirrored, scaled
 from tests.strategies import contours, open_contours

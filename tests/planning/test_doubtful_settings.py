@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +13,7 @@ from camtool.pipeline import post_drawing
 from camtool.planning.checks import ridge_mm
 from camtool.planning.findings import PlanningCode
 from camtool.planning.job import Entry, Job, Operation, Stock, Tabs, Tool, job_of
+from camtool.records import replace
 from camtool.target.registry import load_target
 from tests.drawings import drawing_of
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from msgspec.structs import replace
 
 from camtool.arrays import Ints
 from camtool.errors import OptionError
@@ -27,6 +26,7 @@ from camtool.planning.order import (
     travel_mm,
 )
 from camtool.planning.paths import joints
+from camtool.records import replace
 from tests.oracles import tours
 from tests.strategies import coordinates, polylines
 

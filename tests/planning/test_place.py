@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +19,7 @@ from camtool.planning import place as module
 from camtool.planning.findings import PlanningCode
 from camtool.planning.job import Job, Operation, Placement, job_of
 from camtool.planning.place import collapsed, place, taken
+from camtool.records import replace
 from tests.drawings import drawing_of
 from tests.strategies import polylines
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,6 +18,7 @@ from camtool.machine.model import Machine
 from camtool.planning.findings import PlanningCode
 from camtool.planning.job import Job, Lead, Operation, Tool, job_of
 from camtool.planning.plan import plan, planned
+from camtool.records import replace
 from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.drawings import drawing_of

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -16,6 +14,7 @@ from camtool.planning.job import Job, Operation, Placement, Tool
 from camtool.planning.place import place
 from camtool.planning.plan import planned
 from camtool.planning.sides import Sides, choose
+from camtool.records import replace
 from camtool.target.registry import load_target
 from tests.drawings import drawing_of
 

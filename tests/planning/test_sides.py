@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 
-import msgspec
 import numpy as np
 import pytest
 import shapely
@@ -26,6 +25,7 @@ from camtool.planning.items import Contour
 from camtool.planning.job import Job, Operation, Stock, Tool, job_of
 from camtool.planning.plan import planned
 from camtool.planning.sides import Sides, choose
+from camtool.records import replace
 from camtool.toolpath.findings import ProgramCode
 
 LAYERS = ("A", "B", "C", "D")
@@ -422,7 +422,7 @@ def test_no_region_is_cut_that_depends_on_how_ends_are_joined(
     rings = np.flatnonzero(drawing.paths.closed).tolist()
     assert len(rings) == 1
     if kind == "pocket":  # which takes no open path
-        branches = [msgspec.structs.replace(each, paths=(0,)) for each in drawing.healing.branches]
+        branches = [replace(each, paths=(0,)) for each in drawing.healing.branches]
         drawing = Drawing(
             drawing.paths.select(rings),
             ("A",),
@@ -430,7 +430,7 @@ def test_no_region_is_cut_that_depends_on_how_ends_are_joined(
             ("LINE",),
             "test.dxf",
             drawing.units,
-            healing=msgspec.structs.replace(drawing.healing, branches=tuple(branches)),
+            healing=replace(drawing.healing, branches=tuple(branches)),
         )
     found = _refused(drawing, machine, kind=kind)
     assert [each.severity for each in found] == [Severity.ERROR] * 2

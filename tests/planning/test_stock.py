@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -18,6 +17,7 @@ from camtool.pipeline import post_drawing, verify_program
 from camtool.planning.findings import PlanningCode
 from camtool.planning.job import Entry, Job, Lead, Operation, Tabs, Tool
 from camtool.planning.plan import plan
+from camtool.records import replace
 from camtool.target.registry import LoadedTarget, load_target
 from camtool.toolpath.findings import ProgramCode
 from tests.drawings import drawing_of

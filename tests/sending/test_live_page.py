@@ -6,13 +6,13 @@ import random
 import re
 import subprocess
 import xml.etree.ElementTree as ET
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from camtool.records import replace
 from camtool.sending.live import MAX_LINES, STEPS_PX, WIDTH, LivePage
 from camtool.sending.prepare import consignment
 from camtool.target.registry import load_target

@@ -15,16 +15,16 @@ import termios
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from random import Random
 from typing import Any
 
 import numpy as np
 import pytest
-from msgspec import structs
 
 from camtool.arrays import Floats
+from camtool.records import replace
 from camtool.sending.drive import Driver, Wish
 from camtool.sending.faults import Faults, Wired
 from camtool.sending.prepare import forecast_of
@@ -80,7 +80,7 @@ class Work:
         if self.action == "send":
             decoded = loaded.target.read(self.program, loaded.machine)
             packets = wire.packets(self.program, loaded.machine, forecast_of(decoded, loaded))
-            packets = [structs.replace(packets[0], ask=""), *packets[1:]]
+            packets = [replace(packets[0], ask=""), *packets[1:]]
             talk = wire.conversation(packets, loaded.machine, manner)
         else:
             values = {"feed": 300.0, **self.values}

@@ -9,6 +9,7 @@ import pytest
 
 from camtool.arrays import Floats, Ints
 from camtool.machine.model import Machine
+from camtool.records import replace
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import ALL, IDEAL, Effects
 from tests.oracles.mechanics import LiteralMechanics
@@ -170,7 +171,7 @@ def test_each_effect_can_be_left_out(effect: str) -> None:
     """Left out is what a machine does that does not have it; and it makes a difference."""
     assert {field.name for field in dataclasses.fields(Effects)} == set(WITHOUT)
     points, machine = wander(14), path_machine(*EVERYTHING)
-    left_out = slides(machine, points, dataclasses.replace(ALL, **{effect: False}))
+    left_out = slides(machine, points, replace(ALL, **{effect: False}))
     assert np.array_equal(left_out, slides(path_machine(*EVERYTHING, *WITHOUT[effect]), points))
     assert np.abs(left_out - slides(machine, points)).max() > 1e-4
 

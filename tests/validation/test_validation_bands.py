@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from typing import Any, cast
 
@@ -27,6 +27,7 @@ from camtool.inspection.uncertainty import (
     propagate,
 )
 from camtool.pictures.text import Style, label
+from camtool.records import replace
 from tests.validation import pic_mmh_parts as pic
 from tests.validation import test_validation_flashcut as flashcut
 from tests.validation import test_validation_others as others

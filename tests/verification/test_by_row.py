@@ -1,10 +1,9 @@
 """Contours, the worst moves, missed ends, depth, time: from made motions and from real ones."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
+from camtool.records import replace
 from camtool.simulation.motion import one_row
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.verification.findings import VerificationCode

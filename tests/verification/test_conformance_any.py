@@ -1,6 +1,5 @@
 """Any program is as asked when it is camtool's own, or makes the same cuts from other starts."""
 
-from dataclasses import replace
 from random import Random
 
 import numpy as np
@@ -15,6 +14,7 @@ from camtool.geometry.polylines import Polyline
 from camtool.inspection.findings import InspectionCode
 from camtool.pipeline import post_drawing, verify_program
 from camtool.planning.job import Job, Placement, job_of
+from camtool.records import replace
 from camtool.run import Run
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath

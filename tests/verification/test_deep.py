@@ -1,12 +1,12 @@
 """Programs with depth: ramps, helices, passes, tabs, pockets, pecks, carving; judged rightly."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from camtool.findings import Code, Severity
+from camtool.records import replace
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.findings import ProgramCode

@@ -1,17 +1,16 @@
 """What a judgement must notice: missing and extra cuts, endless arcs, travel, reversals."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
-from msgspec import structs
 
 from camtool.findings import Finding, Severity
 from camtool.geometry.drawing import Drawing, Units
 from camtool.geometry.polylines import Polyline, Polylines
 from camtool.importers.findings import DrawingCode
 from camtool.planning.findings import PlanningCode
+from camtool.records import replace
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Kind
@@ -109,7 +108,7 @@ def test_reversals_are_told_apart_and_too_many_are_a_warning() -> None:
     def chunks(reversals: int):
         for piece in follow(decoded, 10):
             counted = np.array([[reversals, 1, 1]])
-            yield structs.replace(piece, ledger=structs.replace(piece.ledger, reversals=counted))
+            yield replace(piece, ledger=replace(piece.ledger, reversals=counted))
 
     case = Case(decoded, on(MACHINE), None, None, VerifyOptions())
     found = judge(case, chunks(1))
@@ -121,7 +120,7 @@ def test_reversals_are_told_apart_and_too_many_are_a_warning() -> None:
     # Their errors do not grow with the part: the thesis's larger ones bore as many.
     assert VerificationCode.MANY_REVERSALS not in codes(judge(case, chunks(2)))
     machine = pic_mmh("limits.small_part_mm=5")
-    many = judge(structs.replace(case, target=on(machine)), chunks(2))
+    many = judge(replace(case, target=on(machine)), chunks(2))
     (warning,) = [f for f in many.findings if f.code == VerificationCode.MANY_REVERSALS]
     assert (warning.measured, warning.limit) == (18.0, 16.0)
     assert warning.severity == Severity.WARNING
@@ -139,8 +138,8 @@ def test_an_arc_that_never_ends_is_an_error_with_its_block() -> None:
             if piece.ledger.row[0] == 3:
                 missed = piece.commanded.copy()
                 missed[-1, :2] = end[:2] + np.array([STEP, -STEP])
-                ledger = structs.replace(piece.ledger, ended=np.array([False]))
-                yield structs.replace(piece, commanded=missed, ledger=ledger)
+                ledger = replace(piece.ledger, ended=np.array([False]))
+                yield replace(piece, commanded=missed, ledger=ledger)
             else:
                 yield piece
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from msgspec.structs import replace
 
 from camtool.errors import ProgramError
 from camtool.findings import Severity
+from camtool.records import replace
 from camtool.simulation.motion import one_row
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -30,6 +30,7 @@ from camtool.geometry.measure import sample, signed_area
 from camtool.importers.read import read_drawing
 from camtool.pipeline import Judging, verify_program
 from camtool.planning.job import Job, Operation, Tool
+from camtool.records import replace
 from camtool.run import Run
 from camtool.target.registry import load_target
 from camtool.toolpath.moves import Kind, Toolpath

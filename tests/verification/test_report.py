@@ -2,15 +2,14 @@
 
 import json
 import math
-from dataclasses import replace
 
-import msgspec
 import numpy as np
 import pytest
 
 from camtool import __version__
 from camtool.findings import Finding, Severity
 from camtool.importers.findings import DrawingCode
+from camtool.records import replace
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.verification.report import (
     Planned,
@@ -164,9 +163,7 @@ def test_tools_are_called_by_number_and_name_and_operations_by_theirs() -> None:
     )
     cut = PlannedOperation("", "pocket", 0, "", 2.0, "", None, None, None, 300.0, 100.0, 3.0)
     names = ["", "rim", "holes", ""]
-    operations = tuple(
-        msgspec.structs.replace(cut, name=name, tool=row) for row, name in enumerate(names)
-    )
+    operations = tuple(replace(cut, name=name, tool=row) for row, name in enumerate(names))
     shown, done = setup_sheets(Planned(0.0, 0.0, operations, tools))
     assert [row[0] for row in shown.rows] == ["(1)", "T4 bit", "T7", "saw"]
     assert [row[:3] for row in done.rows] == [
@@ -184,11 +181,11 @@ def test_markdown_takes_names_from_drawings_as_words() -> None:
     lines = report.to_markdown().splitlines()
     (line,) = [line for line in lines if "UNITLESS" in line]
     assert line == "- warning `UNITLESS` (\\[x\\](y)): a\\|b \\<script\\> \\`c\\`\\\\n\\# d"
-    assert "\n" not in msgspec.structs.replace(report, source="a\nb").to_text().splitlines()[0]
+    assert "\n" not in replace(report, source="a\nb").to_text().splitlines()[0]
 
 
 def test_long_tables_are_cut_short_in_markdown_only() -> None:
     report = some_report()
-    many = msgspec.structs.replace(report, dimensions=report.dimensions * 5)
+    many = replace(report, dimensions=report.dimensions * 5)
     assert "and 18 more dimensions" in many.to_markdown()
     assert len(json.loads(many.to_json())["dimensions"]) == 30

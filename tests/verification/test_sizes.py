@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ import shapely
 from camtool.geometry.polylines import Polyline
 from camtool.pipeline import post_drawing
 from camtool.planning.job import Job, Operation, Tool, job_of
+from camtool.records import replace
 from camtool.target.registry import load_target
 from camtool.verification.report import Dimension
 from tests.drawings import drawing_of

@@ -1,11 +1,9 @@
 """What must not change the figures (chunks, place, direction), and the trace for pictures."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from msgspec import structs
 
+from camtool.records import replace
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.verification.verify import Case, VerifyOptions, judge
@@ -49,7 +47,7 @@ def test_a_moved_turned_or_mirrored_case_has_the_same_figures(move: str) -> None
     decoded, wanted = sample_part(shift=4 * STEP).finish(), sample_part().finish()
     chunks = list(follow(decoded, 300, lambda points: points + 0.004 * np.sin(40 * points)))
     there = [
-        structs.replace(
+        replace(
             piece,
             commanded=np.column_stack([carried(piece.commanded[:, :2]), piece.commanded[:, 2]]),
             slide=np.column_stack([carried(piece.slide[:, :2]), piece.slide[:, 2]]),

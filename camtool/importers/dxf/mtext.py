@@ -14,7 +14,6 @@ from itertools import groupby, pairwise
 from typing import Any
 
 from msgspec import Struct
-from msgspec.structs import replace
 
 from camtool.importers.pieces import Unusable
 from camtool.importers.text import (
@@ -28,6 +27,7 @@ from camtool.importers.text import (
     numbered,
     slant,
 )
+from camtool.records import replace
 
 TAB_HEIGHTS = 4.0
 """Distance of tab stops where a text sets none, in heights of a capital."""

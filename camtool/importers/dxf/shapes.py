@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 from msgspec import Struct, field
-from msgspec.structs import replace
 
 from camtool.arrays import Floats
 from camtool.errors import DrawingError, GeometryError
@@ -24,6 +23,7 @@ from camtool.geometry.curves import BezierCurve, Curve, EllipseCurve, SplineCurv
 from camtool.geometry.fit import Fit, arc_vertices, fit_curve, split_bulges
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
 from camtool.importers.pieces import MAX_COORDINATE_MM, Unusable
+from camtool.records import replace
 
 FLAT_TILT = 1e-4
 """An entity that rises by more than this share of its width is not flat: seen from above its shape

@@ -14,7 +14,7 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -24,6 +24,7 @@ from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import DrawingError
+from camtool.records import replace
 
 AGAIN = "export it again from the program that made it, best as DXF R2000 or later"
 

@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 from msgspec import Struct
-from msgspec.structs import replace
 
 from camtool.arrays import Floats
 from camtool.importers.dxf.load import printable
@@ -35,6 +34,7 @@ from camtool.importers.text import (
     numbered,
     slant,
 )
+from camtool.records import replace
 
 _CARET = re.compile(r"\^([ @-_])")
 _CODE = re.compile(NUMBERED.pattern + "|%%([cdpkou%])", re.ASCII | re.IGNORECASE)

@@ -15,7 +15,6 @@ from typing import Any
 import msgspec
 import numpy as np
 from msgspec import Struct
-from msgspec.structs import replace
 
 from camtool.arrays import Floats
 from camtool.errors import DrawingError
@@ -43,6 +42,7 @@ from camtool.importers.dxf.shapes import (
 )
 from camtool.importers.options import TEXT_SKIPPED, ReadOptions
 from camtool.importers.pieces import Piece, Unusable
+from camtool.records import replace
 
 MAX_NESTING = 50
 """Largest depth of blocks within blocks."""

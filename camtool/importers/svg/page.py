@@ -9,9 +9,7 @@ Source: Scalable Vector Graphics 1.1, 7.10 to 7.12; CSS 2.1, 4.3.2 for the units
 
 from __future__ import annotations
 
-from dataclasses import replace
-
-from msgspec import Struct, structs
+from msgspec import Struct
 
 from camtool.errors import DrawingError
 from camtool.findings import Finding
@@ -30,6 +28,7 @@ from camtool.importers.svg.transform import (
     view_box_map,
 )
 from camtool.importers.svg.tree import Node
+from camtool.records import replace
 
 
 class Page(Struct, frozen=True):
@@ -71,7 +70,7 @@ def page_of(root: Node, options: ReadOptions, writer: Writer | None = None) -> P
     if writer is None or not (box is None or page.units.name == "px"):
         return page
     hint = UNIT_GUESSED_BY_PROGRAM(program=writer[0], px_an_inch=writer[1], usual=DPI)
-    return structs.replace(page, findings=(*page.findings, hint))
+    return replace(page, findings=(*page.findings, hint))
 
 
 def _by_the_file(

@@ -11,12 +11,13 @@ from functools import cached_property
 from typing import Any
 
 from msgspec import Struct
-from msgspec.structs import asdict, replace
+from msgspec.structs import asdict
 
 from camtool.importers.svg.colours import parse_colour
 from camtool.importers.svg.css import Rules, declared
 from camtool.importers.svg.transform import NUMBER
 from camtool.importers.svg.tree import Node
+from camtool.records import replace
 from camtool.units import MM_PER_UNIT
 
 FONT_PX = 16.0

@@ -9,6 +9,7 @@ from camtool_postprocessors.grbl.dialect import GrblDialect
 from hypothesis import given
 from hypothesis import strategies as st
 
+from camtool.records import replace
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.findings import ProgramCode
@@ -23,9 +24,8 @@ def dialect(*settings: str) -> GrblDialect:
 
 def coarse(decimals: int) -> GrblDialect:
     """A dialect of fewer decimals than a machine file may say: there the rule is often broken."""
-    import msgspec
 
-    return msgspec.structs.replace(dialect(), decimals=decimals)
+    return replace(dialect(), decimals=decimals)
 
 
 def one_arc(

@@ -1,6 +1,5 @@
 """Blocks written by columns, against literal loops over the rows."""
 
-import msgspec
 import numpy as np
 from camtool_postprocessors.flashcut.write import _Blocks
 from camtool_postprocessors.gcode.plain import PlainRows
@@ -8,6 +7,7 @@ from camtool_postprocessors.gcode.write import BlockOrder, Events, Sent
 from hypothesis import given
 from hypothesis import strategies as st
 
+from camtool.records import replace
 from camtool.target.registry import load_target
 from camtool.toolpath.moves import Kind
 from camtool.toolpath.words import texts_of
@@ -28,7 +28,7 @@ ROWS = st.builds(
 
 @given(st.lists(ROWS, max_size=20), st.booleans(), st.booleans(), st.integers(0, 2))
 def test_modal_blocks(rows: list[Row], strip: bool, numbered: bool, of_feed: int) -> None:
-    dialect = msgspec.structs.replace(
+    dialect = replace(
         load_target("grbl").machine.dialect, strip_zeros=strip, block_numbers=numbered
     )
     count = len(rows)
@@ -88,7 +88,7 @@ def test_modal_blocks(rows: list[Row], strip: bool, numbered: bool, of_feed: int
 def test_blocks_of_flashcut(
     rows: list[Row], zeros: bool, words: str, rapids: str, z_up: str, of_feed: int
 ) -> None:
-    dialect = msgspec.structs.replace(
+    dialect = replace(
         load_target("flashcut").machine.dialect,
         trailing_zeros=zeros,
         feed_words=words,

@@ -2,7 +2,6 @@
 
 import math
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +15,7 @@ from camtool.pipeline import post_drawing, verify_program
 from camtool.planning.findings import PlanningCode
 from camtool.planning.job import Job, Operation, Tool
 from camtool.planning.plan import plan
+from camtool.records import replace
 from camtool.target.registry import LoadedTarget, load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.findings import ProgramCode

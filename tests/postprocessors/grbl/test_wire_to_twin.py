@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from msgspec.structs import replace
 
+from camtool.records import replace
 from camtool.sending.faults import Faults, Wired
 from camtool.sending.prepare import forecast_of
 from camtool.target.registry import load_target

@@ -3,7 +3,6 @@ holes that are written as cycles are those that were planned."""
 
 import math
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +14,7 @@ from camtool.errors import ProgramError
 from camtool.geometry.polylines import Polyline
 from camtool.pipeline import post_drawing, verify_program
 from camtool.planning.job import Job, Operation, Tool
+from camtool.records import replace
 from camtool.target.registry import load_target
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.drawings import drawing_of
