@@ -149,7 +149,7 @@ class Spindle(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError("default_rpm is outside of min_rpm and max_rpm")
 
     def reaches(self, rpm: float) -> bool:
-        """Whether the drive has this speed, in rev/min."""
+        """True if the drive has this speed, rev/min."""
         return self.min_rpm <= rpm and (self.max_rpm is None or rpm <= self.max_rpm)
 
 
@@ -161,7 +161,7 @@ class Coolant(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """What it has: "mist", "flood"."""
+        """Names of the coolants of the machine: "mist", "flood"."""
         return ("mist",) * self.mist + ("flood",) * self.flood
 
 
@@ -199,7 +199,7 @@ class Link(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     wait: Literal["sequential", "streamed"] = "sequential"
 
     def seconds(self, characters: int, motion_s: float) -> float:
-        """What the line adds to `motion_s` of motion for a program of so many characters."""
+        """Return the time, s, by which sending these characters prolongs `motion_s` of motion."""
         if self.baud is None:
             return 0.0
         sending = characters * self.bits_per_character / self.baud
@@ -527,6 +527,6 @@ def exceeds(feed_mm_min: Floats, limit_mm_min: float) -> Bools: ...
 
 
 def exceeds(feed_mm_min: float | Floats, limit_mm_min: float) -> bool | Bools:
-    """Whether a feed, or each of some (K,), is above its limit by more than rounding; NaN is
-    not."""
+    """True if a feed, or each of several feeds (K,), is above its limit by more than rounding;
+    False for NaN."""
     return feed_mm_min > limit_mm_min * (1.0 + FEED_TOLERANCE)

@@ -120,7 +120,8 @@ class Target(ABC):
         )
 
     def wire(self) -> Wire | NoWire:
-        """How its programs are sent; by default they are not, and why."""
+        """Return the protocol that sends its programs; by default a `NoWire`, which says why there
+        is none."""
         from camtool.target.wire import NoWire
 
         return NoWire()
@@ -130,7 +131,7 @@ class Target(ABC):
         return None
 
     def made_elsewhere(self, data: bytes) -> bool:
-        """Whether another program than camtool wrote this one, as far as its text shows."""
+        """True if the text of the program shows that another program than camtool wrote it."""
         return False
 
     def line_bytes(self, data: bytes, machine: Machine[Any, Any]) -> int:

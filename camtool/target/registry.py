@@ -209,7 +209,8 @@ NUMBERS = {
 
 
 def _placeholders(own: Table, settings: Sequence[str]) -> Iterator[str]:
-    """What a user has not said of all axes, neither in the machine's file nor by `--set`."""
+    """Yield the names of the numbers that the user has not given for all axes, neither in the
+    machine file nor by `--set`."""
     axes = own.get("axes", {})
     given = {f"axes.{axis}.{key}" for axis, keys in axes.items() for key in keys}
     given |= {each.partition("=")[0].strip() for each in settings}

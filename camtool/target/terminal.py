@@ -59,7 +59,7 @@ class Terminal:
         return self.unescaped(line) + self.end
 
     def halt(self) -> bytes:
-        """What stops the machine, which is told it now."""
+        """Return the bytes that stop the machine, and note that it was told to stop."""
         self.stands = self.runs_on = False
         return self.stop
 
@@ -68,19 +68,20 @@ class Terminal:
         return False
 
     def heard(self, data: bytes) -> list[str]:
-        """What is to be shown of what has come; an answer that is not whole is kept."""
+        """Return the lines to show for these received bytes; an unfinished line is kept for the
+        next call."""
         *lines, self._rest = _ENDS.split(self._rest + data)
         if len(self._rest) > MOST_LINE:
             lines, self._rest = [*lines, self._rest], b""
         return [self._shown(line) for line in lines if line]
 
     def left(self) -> list[str]:
-        """What has come without an end."""
+        """Return the unfinished line, if there is one, and forget it."""
         rest, self._rest = self._rest, b""
         return [self._shown(rest)] if rest else []
 
     def meaning(self, line: str) -> str:
-        """What an answer means; "" where it speaks for itself."""
+        """Return the explanation of an answer; "" for one that needs none."""
         return ""
 
     def _shown(self, line: bytes) -> str:

@@ -181,7 +181,7 @@ class Slides:
         return self._pieces[0]
 
     def drain(self) -> SlideTrace:
-        """What they have done since the last call, which they then forget."""
+        """Return the movements since the last call, and forget them."""
         trace, self._pieces = self.trace, []
         return trace
 
@@ -244,7 +244,7 @@ class Twin(ABC):
 
     @property
     def moves(self) -> bool:
-        """Whether slides move now, or a dwell runs."""
+        """True while slides move or a dwell runs."""
         return self.slides.ends_s is not None
 
     @abstractmethod

@@ -213,7 +213,7 @@ class Manner(Struct, frozen=True):
 
     @property
     def patience_s(self) -> float:
-        """How long an answer that is due may take, s."""
+        """Longest wait for an answer that is due, s."""
         return PATIENCE * self.late_s
 
 
@@ -235,7 +235,7 @@ class Conversation(ABC):
 
     @property
     def ended(self) -> bool:
-        """Whether there is nothing more to say."""
+        """True if the conversation is over."""
         return self.state in ENDS
 
     @property
@@ -244,14 +244,14 @@ class Conversation(ABC):
         return max((packet.block for packet in self.packets[: self.done]), default=-1)
 
     def actions(self) -> list[Action]:
-        """What is to be done now, in order; each is given once."""
+        """Return the actions to carry out now, in order, and forget them."""
         out, self._out = self._out, []
         return out
 
     @property
     def at_mm(self) -> Place | None:
-        """Where the machine says that it is, in the work frame in which the program began; None
-        where it does not say."""
+        """Position that the machine reports, mm in the work frame in which the program began; None
+        if it reports none."""
         return self.place_mm
 
     @property
@@ -262,7 +262,7 @@ class Conversation(ABC):
 
     @property
     def has_actions(self) -> bool:
-        """Whether there are any."""
+        """True if actions wait to be carried out."""
         return bool(self._out)
 
     @abstractmethod
@@ -303,7 +303,7 @@ class Conversation(ABC):
 
     @property
     def _alone(self) -> str:
-        """What the machine does if nobody speaks to it from now on; "" where it stands."""
+        """Return what the machine does if the connection is lost now; "" if it stands still."""
         return ""
 
     def _write(self, data: bytes) -> None:
@@ -490,7 +490,7 @@ class Wire(ABC):
         )
 
     def terminal(self, machine: Machine[Any, Any]) -> Terminal:
-        """What a person types to it, and what its answers mean."""
+        """Return the terminal that translates typed lines into bytes and explains answers."""
         from camtool.target.terminal import Terminal
 
         return Terminal()
@@ -509,8 +509,8 @@ _MENDS = {
 
 
 def port_fault(error: Exception) -> tuple[str, str]:
-    """What is wrong with a port, and what to do about it, of an OSError or of what pyserial
-    raises, whose own words are for programmers."""
+    """Return what is wrong with a serial port and its remedy, for an OSError or an exception of
+    pyserial, whose own words are for programmers."""
     text = str(error)
     said = re.search(r"\[Errno (\d+)\]", text)
     number = getattr(error, "errno", None) or (int(said[1]) if said else None)

@@ -73,7 +73,7 @@ class FlashcutModel(ControllerModel[FlashcutController, FlashcutDialect]):
         return "timers"
 
     def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
-        """What times and figures take for granted."""
+        """Return the assumptions behind times and figures, as sentences for the report."""
         controller = machine.controller
         shortest = shortest_ms(np.array([False, True]), controller)
         step_mm = max(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)

@@ -116,7 +116,7 @@ class _Reader:
         self._fast = _Excess()
 
     def block(self, block: WordBlock) -> None:
-        """One block."""
+        """Check one block and add its moves and events to the path."""
         self.blocks += 1
         if self._ended:
             block.fail(f"a block after {self._ended}, the end of the program", mend="remove it")
@@ -166,7 +166,7 @@ class _Reader:
         return count
 
     def findings(self) -> Iterator[Finding]:
-        """What goes beyond the machine's limits."""
+        """Yield a finding if feeds exceed the machine's limit."""
         if self._fast.count:
             yield FEED_ABOVE_LIMIT(
                 where=self._fast.where,
@@ -321,7 +321,8 @@ class _Worst(Struct):
 
 
 def _timer_findings(path: Toolpath, machine: FlashcutMachine) -> Iterator[Finding]:
-    """What feeds become, and which moves of both axes get steps too many on their shorter one."""
+    """Yield findings on feeds that the millisecond timers cannot reach, and on moves of both axes
+    that give the shorter axis too many steps."""
     controller = machine.controller
     if not isinstance(controller, FlashcutController):
         return

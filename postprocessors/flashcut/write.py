@@ -159,7 +159,7 @@ def _event_words(toolpath: Toolpath) -> dict[int, str]:
 
 
 def _event_findings(toolpath: Toolpath, dialect: FlashcutDialect) -> Iterator[Finding]:
-    """What the events lose."""
+    """Yield findings on events that the dialect cannot write, wholly or in part."""
     yield from left_out(toolpath, [Kind.DWELL], EVENT_LEFT_OUT_DWELL)
     kinds = toolpath.kind
     spindles = np.isin(kinds, [int(Kind.SPINDLE_CW), int(Kind.SPINDLE_CCW)])

@@ -111,7 +111,8 @@ def arcs_of(toolpath: Toolpath, dialect: GcodeDialect) -> RowArcs:
 def arcs_accepted(
     sweep_rad: Floats, points: tuple[Ints, Ints, Ints], kind: Codes, dialect: GcodeDialect
 ) -> Bools:
-    """Which arcs the controller accepts, and executes as they were meant.
+    """Return the mask (K,) of the arcs that the controller accepts and executes in the wanted
+    direction and turn.
 
     `sweep_rad` (K,) > 0 as wanted; `points` start, end, centre (K, 2) in units.
     """

@@ -304,6 +304,6 @@ def listing(data: bytes) -> Listing:
 
 
 def has_words(line: str) -> bool:
-    """Whether a line is a block."""
+    """True if a line is a block: it has words besides comments and a block number."""
     words = _NO_WORDS.sub("", line)
     return bool(_BLOCK_NUMBER.sub("", words, count=1) if words[:1] in "Nn" else words)

@@ -53,7 +53,7 @@ def header(toolpath: Toolpath, machine: Machine, dialect: GcodeDialect) -> list[
 
 
 def has_heading(data: bytes) -> bool:
-    """Whether a program has the heading that `header` writes."""
+    """True if a program has the heading that `header` writes."""
     heading = f"({MAKER}".encode()
     return any(line.startswith(heading) for line in data[:4096].splitlines()[:HEADING_LINES])
 
@@ -164,7 +164,8 @@ def tool_words(tool: ToolNote, unit: Unit) -> str:
 
 
 def mounting(toolpath: Toolpath, row: int, unit: Unit) -> list[str]:
-    """What the operator is told where a tool is changed by hand; the toolpath is in the unit."""
+    """Return the messages for the operator at a tool change by hand; the toolpath's lengths are in
+    `unit`."""
     tool = ToolNote(int(toolpath.value[row]))
     operations = toolpath.operations
     if operations is not None:

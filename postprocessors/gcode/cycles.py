@@ -42,7 +42,8 @@ class CycleHole(Struct, frozen=True):
 
     @property
     def words(self) -> tuple[float | None, ...]:
-        """What the blocks of holes that look alike say alike."""
+        """Numbers that a canned cycle repeats for all of its holes: height, bottom, peck,
+        dwell."""
         return self.height, self.bottom, self.bite, self.dwell_s
 
 

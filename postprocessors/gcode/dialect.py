@@ -91,7 +91,7 @@ UNITS: Final = {"mm": MM, "in": Unit("inch", 25.4, "G20", INCH_DECIMALS)}
 
 
 def last_decimal_mm(dialect: GcodeDialect) -> float:
-    """What the last decimal of a coordinate is worth, mm."""
+    """Return the value of the last decimal of a coordinate, mm."""
     unit = UNITS[dialect.units]
     return float(unit.mm * 10.0 ** -(dialect.decimals + unit.more_decimals))
 

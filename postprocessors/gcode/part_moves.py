@@ -66,7 +66,8 @@ class PartMoves:
 
     @property
     def same(self) -> bool:
-        """Whether the coordinates of the program are those of the part."""
+        """True if the coordinates of the program are those of the part: no shift, turn or scale is
+        in force."""
         return self._same
 
     def place(self, frame: ProgramFrame) -> None:
@@ -229,7 +230,8 @@ def turned(x: float, y: float, degrees: float) -> tuple[float, float]:
 def turn_of(
     start: tuple[float, float], end: tuple[float, float], centre: tuple[float, float]
 ) -> float:
-    """How far an arc turns, rad, in (−π, π]: near 0 for the shortest and for the longest."""
+    """Return the signed angle from start to end about the centre, rad in (−π, π]; near 0 for the
+    shortest arcs and for those of almost a full turn."""
     ox, oy = start[0] - centre[0], start[1] - centre[1]
     ex, ey = end[0] - centre[0], end[1] - centre[1]
     return math.atan2(ox * ey - oy * ex, ox * ex + oy * ey)

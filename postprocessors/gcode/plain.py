@@ -87,7 +87,8 @@ def split_z(toolpath: Toolpath, machine: Machine) -> tuple[LoweredToolpath, list
 
 
 def left_out(toolpath: Toolpath, kinds: Collection[Kind], sentence: Sentence) -> Iterator[Finding]:
-    """One EVENT_LEFT_OUT when there are rows of `kinds`: how many of what."""
+    """Yield a finding with the number of rows of these kinds, which the program leaves out, if
+    there are any."""
     rows = np.flatnonzero(np.isin(toolpath.kind, [int(kind) for kind in kinds]))
     if len(rows):
         names = ", ".join(dict.fromkeys(Kind(kind).name for kind in toolpath.kind[rows].tolist()))
@@ -217,7 +218,8 @@ class WantedArcs:
         self.most = rules.most_mm * scale
 
     def fits(self, which: Ints, centre: Floats) -> Bools:
-        """Which of these arcs (L,) are what was wanted about these centres (L, 2)."""
+        """Return the mask (L,) of arcs that satisfy the dialect's rules about these rounded
+        centres (L, 2)."""
         begin, stop = self.begin[which], self.stop[which]
         out, back = begin - centre, stop - centre
         r1, r2 = np.hypot(*out.T), np.hypot(*back.T)

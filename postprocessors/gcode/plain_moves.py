@@ -153,7 +153,7 @@ class FastFeeds:
             self._most = max(self._most, float(feeds[fast].max()))
 
     def findings(self) -> Iterator[Finding]:
-        """One finding, if there was one."""
+        """Yield one finding for all feeds above the limit, if there are any."""
         if self._count:
             yield FEED_ABOVE_LIMIT_IN_WORDS(
                 where=f"block {self._first + 1}",

@@ -81,7 +81,7 @@ class Grbl(Target):
         return GrblWire()
 
     def made_elsewhere(self, data: bytes) -> bool:
-        """Whether it does not begin with camtool's own heading."""
+        """True if the program does not begin with camtool's own heading."""
         from ..gcode.comments import has_heading
 
         return not has_heading(data)
@@ -93,7 +93,7 @@ class Grbl(Target):
         return listing(data)
 
     def twin_settings(self) -> type[GrblTwinSettings]:
-        """How a virtual grbl is set up."""
+        """Return the record that sets up a virtual grbl."""
         from .twin import GrblTwinSettings
 
         return GrblTwinSettings

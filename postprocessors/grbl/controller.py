@@ -80,7 +80,7 @@ class GrblModel(ControllerModel[GrblController, GrblDialect]):
         return "chords"
 
     def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
-        """What the times take for granted."""
+        """Return the assumptions behind the times, as sentences for the report."""
         controller = _controller(machine)
         return (
             f"arcs are chords within {controller.arc_tolerance_mm:g} mm ($12), lines whole steps",
@@ -184,7 +184,7 @@ def _controller(machine: _Machine) -> GrblController:
 
 
 def dwell_s(seconds: float) -> float:
-    """What `delay_sec` makes of a dwell; its count is a 32-bit float."""
+    """Return how long `delay_sec` of the firmware really waits, s; it counts in 32-bit floats."""
     per_second = np.float32(1.0 / DWELL_STEP_S)
     return math.ceil(per_second * np.float32(seconds)) * DWELL_STEP_S
 
@@ -318,7 +318,8 @@ def speeds_of(
     first: int,
     stops: Stops,
 ) -> SpeedPlan:
-    """How fast each block from `first` on may go, and each corner be passed.
+    """Compute the nominal speed of each block from `first` on, and the highest speed through each
+    corner.
 
     Along a unit vector u no axis exceeds its own limit, so a block is limited to min(limit / |u|).
     At a corner between u1 and u2, with θ the angle between −u1 and u2, a circle touches both at
@@ -435,8 +436,8 @@ class Targets(Struct, frozen=True, eq=False):
 def targets_of(
     path: Toolpath, rows: Ints, machine: _Machine, controller: GrblController
 ) -> Targets:
-    """What rows (R,), which follow one another, ask of the planner; rows that do not move ask
-    nothing."""
+    """Return the targets that these consecutive rows (R,) give the planner; rows without motion
+    give none."""
     kind = path.kind[rows]
     ends = as_read(path.end[rows], machine)
     begins = as_read(path.starts_of(rows), machine)
@@ -508,7 +509,7 @@ class _Chords:
         return np.maximum(counted, 1)
 
     def points(self, segments: Ints, first: Ints, correction: int) -> tuple[Ints, Singles]:
-        """Which targets (P,) are ends of chords within an arc, and where these lie (P, 3) mm.
+        """Return the indices (P,) of the targets inside arcs, and their positions (P, 3) mm.
 
         A radius vector is turned by the angle of a chord, θ, with cos θ ≈ 1 − θ²/2 and
         sin θ ≈ θ − θ³/6; after `correction` turns the next one is computed anew.

@@ -191,7 +191,7 @@ class GrblParser:
 
     @property
     def plain(self) -> bool:
-        """Whether blocks of plain moves may be read by columns now."""
+        """True if blocks of plain moves may now be read by columns."""
         modes = self.modes
         known = modes.motion in (0, 1, 2, 3, 80) and modes.plane == 17 and modes.absolute
         shift = any(self._frames[modes.frame]) or any(self._offset) or self._length
@@ -416,7 +416,7 @@ class GrblParser:
         return numbers.get("F", 0.0)  # the block that leaves G93, as it stands
 
     def _target(self, block: GrblBlock, words: dict[int, float], unused: set[str]) -> list[float]:
-        """Where the block goes, on the machine."""
+        """Return the end of the block's move, mm on the machine."""
         if block.once == "G10":
             self._check_g10(block, words)
             unused -= {"L", "P"}
@@ -714,7 +714,8 @@ class GrblParser:
         return True
 
     def _shift(self) -> list[float]:
-        """Where the coordinates of the program have their zero, for the tip of the tool."""
+        """Return the zero of the program's coordinates on the machine, mm, for the tip of the
+        tool."""
         frame = self._frames[self.modes.frame]
         shift = [a + b for a, b in zip(frame, self._offset, strict=True)]
         shift[2] += self._length

@@ -178,7 +178,7 @@ _DROPPED: Final = str.maketrans("", "", " \t/")
 
 
 def _columns(raw: str) -> list[int]:
-    """Where in a line the signs stand that grbl keeps, from 0."""
+    """Return the columns, from 0, of the characters of a line that grbl keeps."""
     blanked = COMMENT.sub(lambda found: " " * len(found[0]), raw)
     return [k for k, sign in enumerate(blanked) if sign not in " \t/"]
 

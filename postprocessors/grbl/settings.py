@@ -131,9 +131,9 @@ LASER_IS_NOT = (
 
 
 def differences(text: str, machine: GrblMachine) -> tuple[list[str], list[str]]:
-    """Where a listing says something else than the machine file: what would spoil the part or
-    leave the travel (steps, rates, travels, arcs, units of reports), and what only changes times.
-    MachineError as `settings_of`."""
+    """Compare a listing of `$$` with the machine file. Return the differences that would spoil the
+    part or leave the travel (steps, rates, travels, arcs, units of reports), and those that change
+    only times. MachineError as `settings_of`."""
     said = {each.said.split()[0]: each for each in settings_of(text) or ()}
     if not said:
         raise MachineError("its answer to $$ has no settings")

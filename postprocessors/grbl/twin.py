@@ -379,7 +379,7 @@ class _Parser(GrblParser):
         self._rows.drain()
 
     def shifted(self, axis: int) -> float:
-        """Where the coordinates of an axis have their zero on the machine."""
+        """Return the zero of an axis's program coordinates on the machine, mm."""
         value = _single(self.places[axis] + self.offset[axis])
         return _single(value + self.length) if axis == 2 else value
 
@@ -552,7 +552,8 @@ class GrblTwin(Twin):
     def _travel_ends(
         self, machine: Machine[GrblController, GrblDialect], zero: Floats
     ) -> tuple[Floats, Floats] | None:
-        """Where slides close the switches: beyond machine zero and beyond their travel, mm."""
+        """Return the positions, mm, at which slides close the limit switches, at both ends of the
+        travel; None without switches."""
         if self._choices.homing == "off":
             return None
         travel = [axis.travel_mm or DEFAULTS[130] for axis in machine.axes]
@@ -610,7 +611,7 @@ class GrblTwin(Twin):
 
     @property
     def moves(self) -> bool:
-        """Whether slides move now, or a dwell runs; not while it is held."""
+        """True while slides move or a dwell runs, but not during a hold."""
         return self.slides.ends_s is not None or self._running or self._dwells
 
     @property
@@ -728,7 +729,7 @@ class GrblTwin(Twin):
                 yield self.now + self._memory.settings[1] / 1000.0
 
     def _clear(self) -> None:
-        """What a reset forgets."""
+        """Set all state that a reset forgets to its initial value."""
         self._rx, self._line = bytearray(), bytearray(TEXT_BYTES)
         self._flags: set[str] = set()
         self._motion_overrides: set[int] = set()
@@ -915,7 +916,8 @@ class GrblTwin(Twin):
             self._aim_later()
 
     def _hold(self, flags: set[str]) -> None:
-        """What stops the machine, each in its manner."""
+        """Carry out the real-time commands that stop the machine: hold, jog cancel, door and
+        sleep."""
         if self._state not in ("Alarm", "Check"):
             if self._state in ("Run", "Jog") and not self._suspend & {"cancel", "jog"}:
                 self._holding = self._stale = True
@@ -1182,7 +1184,7 @@ class GrblTwin(Twin):
         return OK
 
     def _act(self, what: str, *values: Any) -> Wait:
-        """What a block does besides moving."""
+        """Carry out an action of a block other than motion."""
         if what == "spindle":
             yield from self._spin_at_rest(*values)
         elif what == "coolant":
@@ -1310,7 +1312,7 @@ class GrblTwin(Twin):
     # The probe and the switches.
 
     def _limits(self) -> list[bool]:
-        """Which switches of the travel are closed, as it reads its pins."""
+        """Return which limit switches its pins report as closed, for X, Y and Z."""
         if self._ends_mm is None:
             closed = [False] * 3
         else:
@@ -1487,7 +1489,7 @@ class GrblTwin(Twin):
         return OK
 
     def _shift_line(self, text: str) -> None:
-        """What stands in the line is moved to its begin."""
+        """Write the text to the start of the line buffer, followed by a zero byte."""
         self._line[: len(text) + 1] = text.encode("latin-1") + b"\0"
 
     def _restore(self, rest: str) -> Line:
@@ -1568,8 +1570,8 @@ class GrblTwin(Twin):
         return OK
 
     def _use_settings(self) -> None:
-        """What the model uses of the settings. Steps of a mm and accelerations of 0, with which
-        grbl divides by 0, are not used."""
+        """Give the model the current `$` settings. Steps per mm and accelerations of 0, by which
+        grbl would divide, are ignored."""
         settings, stood = self._memory.settings, self._steps
         turned = [int(settings[3]) >> axis & 1 for axis in range(3)]
         self._signs = 1 - 2 * np.array(turned, dtype=np.int64)  # as it was wired for $3=0
@@ -1765,7 +1767,8 @@ class GrblTwin(Twin):
         return max(min(block.asked * percent / 100.0, block.highest), LEAST_SPEED_MM_S)
 
     def _exit_speed(self) -> float:
-        """How fast the block that runs may be at its end, for those behind it in the ring."""
+        """Return the highest speed at the end of the current block from which the planned blocks
+        behind it can still slow down."""
         square, behind = 0.0, self._ring
         for k in range(len(behind) - 1, 0, -1):
             block = behind[k]
@@ -1814,7 +1817,7 @@ class GrblTwin(Twin):
         self._touches = self._touches_on(travel.commanded, travel.seconds)
 
     def _where(self, now: float) -> tuple[float, float]:
-        """How much of the block that runs is done, mm, and how fast it is."""
+        """Return the distance done of the current block, mm, and its speed."""
         since, done = now - self._begun_s, self._done_mm
         for seconds, v, a in self._phases:
             t = min(seconds, since)

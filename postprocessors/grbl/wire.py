@@ -554,7 +554,7 @@ class GrblConversation(Conversation):
 
     @property
     def _reasons(self) -> str:
-        """What it said of being locked, and the switches that are closed."""
+        """Return the messages about the lock and the closed switches, as the end of a sentence."""
         said = [f"it says {each!r}" for each in dict.fromkeys(self._messages)]
         if self._closed:
             said.append(f"it reports closed switches: {_switches(self._closed)}")
@@ -873,7 +873,8 @@ class GrblConversation(Conversation):
             self._go_on(now)
 
     def _dwell_s(self) -> float:
-        """How long it may be idle with lines that it has not answered: as long as they dwell."""
+        """Return the total dwell, s, of the lines that are sent and not answered: the machine may
+        report Idle for so long."""
         out = {line.packet for line in self._out_lines}
         return sum(
             packet.seconds
@@ -888,7 +889,7 @@ class GrblConversation(Conversation):
         self._write(RESET)
 
     def _stops(self) -> bool:
-        """Whether a block that stops the program is among those under way."""
+        """True if a block that stops the program is among those under way."""
         texts = (packet.data.decode("latin-1") for packet in self._under_way())
         return any(_PAUSES.search(text) for text in texts)
 

@@ -55,7 +55,7 @@ def write_program(toolpath: Toolpath, machine: GrblMachine) -> Program:
 
 
 def _by_hand(toolpath: Toolpath, dialect: GrblDialect) -> Iterator[Finding]:
-    """What the operator has to do about tools: mount one before the program, and some in it."""
+    """Yield findings on tools that the operator must mount, before the program and in it."""
     first = mounted_before(toolpath)
     if dialect.tool_change != "pause" and first.any():
         yield EVENT_LEFT_OUT()

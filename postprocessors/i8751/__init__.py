@@ -53,7 +53,8 @@ class I8751(Target):
         return I8751Model()
 
     def stray_mm(self, machine: I8751Machine) -> float:
-        """How far ends of records may lie from their lines, and lines from their arcs."""
+        """Return the sum of both tolerances, mm: of the ends of records from their lines, and of
+        lines from their arcs."""
         return machine.dialect.tolerance_mm + machine.dialect.arc_tolerance_mm
 
     def wire(self) -> I8751Wire:
@@ -63,7 +64,7 @@ class I8751(Target):
         return I8751Wire()
 
     def twin_settings(self) -> type[I8751TwinSettings]:
-        """What its thesis leaves open of the wire."""
+        """Return the record of what its thesis leaves open of the wire."""
         from .twin import I8751TwinSettings
 
         return I8751TwinSettings

@@ -62,7 +62,7 @@ class I8751Model(ControllerModel[I8751Controller, I8751Dialect]):
         return "dog-leg"
 
     def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
-        """What the times take for granted."""
+        """Return the assumptions behind the times, as sentences for the report."""
         firmware = machine.dialect
         periods = PulseTimes(firmware).periods_s
         elbow = "each leg of a dog-leg has" if firmware.elbow == "ramps" else "a dog-leg has"

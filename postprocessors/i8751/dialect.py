@@ -69,7 +69,7 @@ class I8751Dialect(Firmware, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
     @property
     def dwell_replies(self) -> list[str]:
-        """What the controller answers to the two bytes of a dwell pair."""
+        """Replies of the controller to the two bytes of a dwell pair."""
         return {
             "B M": [self.motor_reply, "M"],
             "M": ["M", "M"],

@@ -296,7 +296,8 @@ class PacketReader:
         raise self._fault(self._at, "bytes that are not a record")
 
     def _walk(self) -> tuple[int, int, int]:
-        """Where the motors of the record begin; ByteFault where it has not the form of one."""
+        """Return the offsets at which the three motors of the record begin; ByteFault for bytes
+        that do not have the form of a record."""
         second = self._motor(self._at, 1)
         third = self._wait(self._motor(second, 2), "T1")
         self._wait(self._motor(third, 3), "T2")
@@ -332,7 +333,7 @@ class PacketReader:
 
 
 def replies(data: bytes, decoded: Decoded, dialect: I8751Dialect) -> list[str]:
-    """What the controller is expected to answer to each byte of a stream that was read."""
+    """Return the expected reply of the controller to each byte of a decoded stream."""
     to_wait = dialect.dwell_replies
     standing = [dialect.motor_reply, "M"]
     moving = [dialect.motor_reply, "M", "M", "M"]
@@ -546,7 +547,8 @@ def _bytes(text: str) -> bytes:
 
 
 def _no_line(number: int, line: str) -> ProgramError:
-    """Where a line stops being offset and bytes."""
+    """Return the error for a line that is no line of a hex dump, with the column of its first
+    wrong character."""
     offset = re.match(r"[0-9A-Fa-f]{4,8}(?=[ \t]|$)", line)
     column = 1
     if offset:
@@ -611,7 +613,7 @@ def text_lines(data: bytes) -> list[str]:
 
 
 def _line_ends(data: bytes) -> int:
-    """How many lines end, whatever their ends are."""
+    """Return the number of lines that end, whether they end with CR, LF or both."""
     return max(data.count(b"\n"), data.count(b"\r"))
 
 

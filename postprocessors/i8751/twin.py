@@ -96,7 +96,7 @@ class I8751Twin(Twin):
     # The dialogue. What it does not wait for is neither stored nor answered; ours.
 
     def _program(self) -> Generator[None, int, None]:
-        """One program after the other, byte by byte."""
+        """Receive one program after the other, byte by byte, as a coroutine."""
         while True:
             yield from self._key((yield))
             yield from self._wanted(1)
@@ -184,7 +184,7 @@ class I8751Twin(Twin):
         self._next_record()
 
     def _travels(self, path: Toolpath, block: int, count: int) -> Iterator[tuple[Travel, int]]:
-        """How each record moves, and its index."""
+        """Yield the motion of each record, and its index."""
         edges = np.searchsorted(path.block, np.arange(count + 1))
         for index, (low, high) in enumerate(pairwise(edges.tolist())):
             rows = path.part(low, high)

@@ -228,7 +228,7 @@ class I8751Conversation(PacketByPacket):
 
     @property
     def _executes(self) -> bool:
-        """Whether the byte that is out is the one that makes the machine move."""
+        """True if the byte just sent ends the packet, which makes the machine move."""
         return self._octet[0] == END_OF_PACKET and self._at == len(self._packet_replies) - 1
 
     @property

@@ -257,7 +257,7 @@ class _Dump:
 
 
 def _findings(counts: Counts, dialect: I8751Dialect) -> Iterator[Finding]:
-    """One finding for each kind of change that was made."""
+    """Yield one finding for each kind of change that the writer made."""
     if counts.slopes:
         yield MOVE_SPLIT(
             where=counts.slopes_place, measured=counts.slope_step_mm, count=counts.slopes

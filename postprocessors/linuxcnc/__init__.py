@@ -74,7 +74,7 @@ class Linuxcnc(Target):
         return LinuxcncWire()
 
     def twin_settings(self) -> type[LinuxcncTwinSettings]:
-        """How it is set up."""
+        """Return the record that sets up a virtual LinuxCNC."""
         from .twin import LinuxcncTwinSettings
 
         return LinuxcncTwinSettings
@@ -98,7 +98,7 @@ class Linuxcnc(Target):
         return settings_of(text)
 
     def made_elsewhere(self, data: bytes) -> bool:
-        """Whether it does not begin with camtool's own heading."""
+        """True if the program does not begin with camtool's own heading."""
         from ..gcode.comments import has_heading
 
         return not has_heading(data)

@@ -70,7 +70,7 @@ class Canon(PartMoves):
         self.queue.append(move)
 
     def flush(self) -> None:
-        """What waits becomes rows."""
+        """Add the queued moves to the path as rows."""
         if not self.queue:
             return
         waiting, self.queue = self.queue, []

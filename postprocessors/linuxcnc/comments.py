@@ -21,7 +21,8 @@ _PARTS: Final = re.compile(r"%d|%f|%\.(\d)f|#(\d+)|#<([^>]*)>")
 
 
 def obeyed(text: str, given: Parameters) -> str | None:
-    """What the operator is shown; None for nothing. Fault for a comment that stops the program."""
+    """Carry out a comment that is a command. Return the text shown to the operator, or None;
+    LineFault for a comment that stops the program."""
     word, _, rest = text.partition(",")
     word = word.lower()
     if word == "debug":

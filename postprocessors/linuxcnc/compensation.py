@@ -59,7 +59,7 @@ class Compensation:
 
     @property
     def active(self) -> bool:
-        """Whether moves are offset."""
+        """True if moves are offset."""
         return self.side != 0 and self.radius > 0.0
 
     def scale(self, factor: float) -> None:
@@ -153,7 +153,7 @@ class Compensation:
         self._from = x, y
 
     def _arc_then_line(self, arc: Queued, way: Flat) -> Flat:
-        """Where the offset of an arc meets the offset of the line that follows it.
+        """Intersect the offset of an arc with the offset of the line that follows it.
 
         With the arc's centre c, the offset line lies d2 from it along its normal theta; the
         offset arc has the radius `old`: they meet at an angle acos(d2 / old) beside the normal.
@@ -249,7 +249,8 @@ class Compensation:
         return end
 
     def _line_then_arc(self, arc: ProgrammedArc, theta: float, across: float, new: float) -> Flat:
-        """Where the offset of a line meets the offset, of radius `new`, of the arc behind it."""
+        """Intersect the offset of a line with the offset, of radius `new`, of the arc that follows
+        it."""
         inside = arc.turn * self.side > 0
         part = (across + self.radius if inside else across - self.radius) / new if new else 2.0
         if not -1.0 <= part <= 1.0:
@@ -260,7 +261,8 @@ class Compensation:
         return arc.centre[0] + new * math.cos(angle), arc.centre[1] + new * math.sin(angle)
 
     def _arc_then_arc(self, before: Queued, arc: ProgrammedArc, new: float) -> Flat:
-        """Where two offset arcs meet: a triangle of both radii and the distance of the centres."""
+        """Intersect two offset arcs, by the triangle of both radii and the distance of the
+        centres."""
         (px, py), (cx, cy) = before.centre, arc.centre
         old = math.hypot(py - before.end[1], px - before.end[0])
         apart = math.hypot(py - cy, px - cx)
@@ -313,7 +315,7 @@ class Compensation:
 
 
 def swept(start: Flat, centre: Flat, turn: int, end: Flat) -> float:
-    """How far an arc turns, rad, with whole turns; counter-clockwise above 0."""
+    """Signed sweep of an arc, rad, full turns included; positive counter-clockwise."""
     alpha = math.atan2(start[1] - centre[1], start[0] - centre[0])
     beta = math.atan2(end[1] - centre[1], end[0] - centre[0])
     if turn > 0:

@@ -93,7 +93,7 @@ class LinuxcncModel(ControllerModel[LinuxcncController, LinuxcncDialect]):
         return "blend" if blends else "path"
 
     def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
-        """What the figures and times take for granted."""
+        """Return the assumptions behind figures and times, as sentences for the report."""
         return (
             *dict.fromkeys(_corners_said(mode) for mode in _asked(toolpath, machine)),
             "speeds by trapezoids within the limits of the axes, overrides at 100 %",
@@ -186,12 +186,12 @@ class _Run:
         return SampledRows(here.start, here.stop, first, samples, seconds)
 
     def _place(self, move: int) -> int:
-        """Where a move begins."""
+        """Return the place at which a move begins."""
         begins = self._begins
         return int(begins[max(move, 0)]) if move < len(begins) else 2 * len(self._path)
 
     def _planned(self, low: int, high: int) -> PlannedWindow:
-        """What lies between two places."""
+        """Plan the moves between two places."""
         part, modes = self._path.part(low // 2, (high + 1) // 2), self._rules.modes
         part, origin = halved(part, modes.merging_mm(part.mode))
         own = slice(low % 2, len(part) - high % 2)
@@ -428,7 +428,7 @@ class CornerModes(Struct, frozen=True, eq=False):
 
 
 def _modes(path: Toolpath, machine: _Machine) -> CornerModes:
-    """What the program says of each row, and where it says nothing, the machine file."""
+    """Return the path mode of each row: that of the program, else that of the machine file."""
     return CornerModes(
         np.array(
             [
@@ -459,7 +459,7 @@ def _rules(modes: CornerModes, machine: _Machine) -> CornerRules:
 
 
 def _machine_mode(machine: _Machine) -> PathMode:
-    """What `[dialect]` says of corners."""
+    """Return the path mode that `[dialect]` gives."""
     dialect = machine.dialect
     if dialect.path != "blend":
         return PathMode(dialect.path)
@@ -715,8 +715,8 @@ def _arc_limits(
 
 
 def _gone(x: Floats, ramp: Floats) -> Floats:
-    """Which part of its way the second of two moves that overlap has gone at the part x of the
-    time, while it speeds up in the first part `ramp` of that."""
+    """Fraction of its length that the second of two overlapping moves has covered after the
+    fraction x of the time, if it accelerates during the first fraction `ramp`."""
     return np.where(x < ramp, x**2 / (2.0 * ramp), x - 0.5 * ramp) / (1.0 - 0.5 * ramp)
 
 
@@ -856,12 +856,12 @@ class Bends(Struct, frozen=True, eq=False):
         return np.asarray(0.5 * np.arccos(cosine))
 
     def picked(self, which: Ints) -> Bends:
-        """Some of them."""
+        """Return a subset of the corners."""
         return Bends(self.before[which], self.after[which])
 
 
 def corners_of(moves: PlannerMoves, tangents: Tangents, rules: CornerRules) -> PlannerCorners:
-    """What happens at the start of each move."""
+    """Compute speed, overlap or blend at the start of each move."""
     bends = Bends(
         tangents.at_ends(np.roll(moves.row, 1)),  # nothing comes of that before the first
         tangents.at_starts(moves.row),
@@ -961,8 +961,9 @@ def _overlaps(
     overall: Floats,
     modes: CornerModes,
 ) -> _Overlaps:
-    """How moves overlap at corners (`tpComputeBlendVelocity`) with these accelerations along them,
-    where so much of them counts; `overall` (K,) is that of the second, with what turns it."""
+    """Compute the overlaps of moves at corners (`tpComputeBlendVelocity`), from the accelerations
+    along both moves and the lengths that count for them; `overall` (K,) is the acceleration of the
+    second move with its turning part."""
     one, other = rates
     reachable = [
         np.minimum(np.sqrt(rate * length), moves.speed[k])

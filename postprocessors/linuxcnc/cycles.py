@@ -128,7 +128,7 @@ def _word(
 def _place(
     machine: InterpreterState, words: dict[str, float], names: list[str], here: list[float]
 ) -> list[float]:
-    """Where an absolute cycle has its (first) hole."""
+    """Return the place of the (first) hole of an absolute cycle."""
     if "@" in words or "^" in words:
         x, y = machine.position[:2]
         radius = words.get("@", math.hypot(y, x))
@@ -171,7 +171,8 @@ def _bound(
 def _motion_of(
     machine: InterpreterState, block: LinuxcncBlock, motion: int, again: bool, hole: _Hole
 ) -> tuple[Callable[[_Hole], None], dict[str, float]]:
-    """What makes a hole, from R to where the tool comes out, and what is kept for the next."""
+    """Return the function that makes a hole, from R until the tool is out again, and the words
+    that the next hole inherits."""
     words, series = block.words, _kept(machine)
     axes = PLANES[machine.plane]
     kept: dict[str, float] = {}

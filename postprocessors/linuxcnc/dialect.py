@@ -35,7 +35,7 @@ class ToolTableEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def offset_mm(self) -> tuple[float, float, float]:
-        """How far its tip lies from the point that carries it."""
+        """Offset of the tool tip from the point that carries the tool, mm."""
         return self.x_mm, self.y_mm, self.length_mm
 
 

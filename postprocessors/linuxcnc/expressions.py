@@ -102,7 +102,7 @@ class Scanner:
         return lambda given: finite(function(given), begin)
 
     def _ranked(self, left: Value, rank: int) -> Value:
-        """What stands before the bracket, of operators of this rank and above."""
+        """Evaluate operators of this precedence and above, up to the closing bracket."""
         while True:
             name = self._operator_at(self.at)
             if name == "]" or RANKS[name] < rank:
@@ -135,7 +135,7 @@ class Scanner:
         return lambda given: given.numbered(check_index(computed(given), begin), begin)
 
     def name(self) -> str:
-        """What stands between < and >."""
+        """Read the name between < and >."""
         end = self.text.find(">", self.at)
         if end < 0:
             raise LineFault("a name without its closing >", self.at)

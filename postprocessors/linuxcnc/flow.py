@@ -172,12 +172,12 @@ class Flow:
 
     @property
     def level(self) -> int:
-        """How many calls are under way."""
+        """Depth of calls under way; 0 in the program itself."""
         return len(self.calls) - 1
 
     @property
     def seeks(self) -> bool:
-        """Whether lines are skipped."""
+        """True while lines are skipped in search of a label."""
         return self._seeking is not None
 
     @property
@@ -238,8 +238,8 @@ class Flow:
     # O words
 
     def _is_of_flow(self, line: ParsedLine) -> bool:
-        """Whether the O word, M98 or M99 in front is of the flow: M99 of the program itself is
-        not, it ends the program."""
+        """True if the O word, M98 or M99 at the start of the line changes the flow. M99 of the
+        program itself does not; it ends the program."""
         assert line.flow is not None
         return not line.text.startswith("m99", line.flow) or self.level > 0
 
@@ -419,8 +419,8 @@ class Flow:
         go_on()
 
     def _way_to(self, label: str) -> Callable[[], None]:
-        """What goes to a sub: to where it was seen, or it is looked for from the beginning of its
-        file, or from here on."""
+        """Return a function that jumps to a sub: to its known place, or by a search from the
+        beginning of its own file or from the present line on."""
         own = label.rsplit("/", 1)[-1]
         if own in self._labels:
             return lambda: self._go_to(own)

@@ -53,7 +53,8 @@ class FrameCodes(InterpreterState, ABC):
         """The names by which expressions ask for the state."""
 
     def _known_parameters(self) -> dict[int, float]:
-        """What the machine has stored, in its units: frames, homes, offsets."""
+        """Return the parameters that the machine has stored, in its units: frames, homes,
+        offsets."""
         zero = [-each for each in self._machine.controller.machine_zero_mm]
         known: dict[int, float] = {5210: 0.0, 5220: 1.0}
         if any(zero):

@@ -137,7 +137,7 @@ def _joints(ini: _Ini) -> dict[str, int]:
 
 
 def _axis(ini: _Ini, letter: str, joint: str, unit: float) -> list[ControllerSetting]:
-    """What is said of one axis."""
+    """Return the settings of one axis."""
     axis, found = f"AXIS_{letter}", list[ControllerSetting]()
 
     def add(key: str, value: float, section: str, entry: str) -> None:

@@ -353,7 +353,7 @@ class Interpreter(BlockMoves):
 
 
 def _nose(orientation: int, radius: float) -> tuple[float, float]:
-    """Where the controlled point of a lathe tool lies from the centre of its nose, X and Z."""
+    """Return the controlled point of a lathe tool, relative to the centre of its nose: X and Z."""
     x = -radius if orientation in (1, 2, 6) else radius if orientation in (3, 4, 8) else 0.0
     z = -radius if orientation in (2, 3, 7) else radius if orientation in (1, 4, 5) else 0.0
     return x, z

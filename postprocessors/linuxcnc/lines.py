@@ -173,7 +173,7 @@ class ParsedLine:
 
     @property
     def is_block(self) -> bool:
-        """Whether it says anything but comments."""
+        """True if the line has more than comments."""
         rest = self.text[self.begin :]
         while rest[:1] == "(":
             rest = rest[rest.find(")") + 1 :]
@@ -191,7 +191,7 @@ class ParsedLine:
         return self._evaluated(given)
 
     def place(self, letter: str) -> int | None:
-        """Where the last word of a letter stands."""
+        """Return the column of the last word with this letter; None if there is none."""
         found = [item.at for item in self._items if item.letter == letter]
         return found[-1] if found else None
 

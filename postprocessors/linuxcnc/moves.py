@@ -165,7 +165,7 @@ class BlockMoves(FrameCodes):
             self.canon.rapid(*end)
 
     def _ends(self, words: dict[str, float], g: Mapping[str, int]) -> list[float]:
-        """Where a block goes (find_ends)."""
+        """Return the end of a block's move (find_ends)."""
         for letter in "abc":
             if letter in words:
                 self.notes.axes.setdefault(letter.upper(), self.block_index)

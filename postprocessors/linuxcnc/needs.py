@@ -85,7 +85,7 @@ def motion_of(state: InterpreterState, block: LinuxcncBlock) -> int | None:
 
 
 def check(state: InterpreterState, block: LinuxcncBlock, motion: int | None) -> None:
-    """What words need (check_g_codes, check_other_codes)."""
+    """Refuse words without what they need beside them (check_g_codes, check_other_codes)."""
     words, g, m = block.words, block.g, block.m
     once = g.get("one block")
     if once is not None:

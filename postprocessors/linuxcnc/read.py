@@ -260,7 +260,7 @@ class _Reader:
 
 
 def _lengths(mounted: list[Mounted], path: Toolpath) -> Iterator[Finding]:
-    """What is said of tools that cut while the length of another one is in force, or none."""
+    """Yield findings on tools that cut while the length of another tool, or none, is in force."""
     feeds = np.flatnonzero((path.kind >= Kind.LINE) & (path.kind <= Kind.ARC_CCW))
     begins = np.searchsorted(feeds, [each.row for each in mounted])
     cut = np.diff(np.append(begins, len(feeds))) > 0
@@ -283,7 +283,7 @@ def _lengths(mounted: list[Mounted], path: Toolpath) -> Iterator[Finding]:
 
 
 def _says(text: str) -> bool:
-    """Whether a line is more than blanks, a % and comments."""
+    """True if a line has more than blanks, a % and comments."""
     return text.strip()[:1] not in ("", "%", "(", ";")
 
 

@@ -151,7 +151,7 @@ class InterpreterState:
 
     @property
     def plain(self) -> bool:
-        """Whether blocks of plain moves may be read by columns now."""
+        """True if blocks of plain moves may now be read by columns."""
         return (
             self.motion in (None, 0, 10, 20, 30, 800)
             and self.plane == 170
@@ -248,7 +248,8 @@ class InterpreterState:
         (self.canon.rapid if kind == Kind.RAPID else self.canon.line)(*to)
 
     def _begin(self) -> list[float]:
-        """Where the programmed move begins: beside it the cutter may stand, compensated."""
+        """Return the start of the programmed move; with compensation, the cutter itself stands
+        beside it."""
         compensation = self._compensation
         if compensation is not None and compensation.active and not compensation.first:
             to = [0.0, 0.0, 0.0]

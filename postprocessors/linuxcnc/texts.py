@@ -60,7 +60,8 @@ class ProgramText(ProgramLines):
         return line
 
     def blocks_before(self, number: int) -> int:
-        """How many lines before this one are blocks, as the program's listing has them."""
+        """Return the number of blocks before this line, counted as in the listing of the
+        program."""
         if self._before is None:
             lines = self.data.decode("latin-1").split("\n")
             flags = np.array([has_words(line) for line in lines], dtype=np.int64)
@@ -87,7 +88,7 @@ class Folder:
 
     @property
     def mend(self) -> str:
-        """What helps where a file is missing."""
+        """Remedy for a missing file, for the message of the error."""
         if self._folder is None:
             return "give the program as a file: its folder is where subs are looked for"
         return f"put the sub into the program or its file into {self._folder}"

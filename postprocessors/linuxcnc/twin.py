@@ -77,7 +77,7 @@ class LinuxcncTwin(Twin):
         self._hang_up()
 
     def _hang_up(self) -> None:
-        """What belongs to a connection."""
+        """Reset the state of the connection."""
         self._text = bytearray()
         self._greeted = self._enabled = self._verbose = False
         self._echo = True
@@ -167,7 +167,7 @@ class LinuxcncTwin(Twin):
         return int(self._lines[min(at, len(self._lines) - 1)])
 
     def _program_s(self) -> float:
-        """How much of the program's time is over."""
+        """Time since the program began, s, without pauses."""
         if self._status == "RUNNING" and self.slides.ends_s is not None:
             left = max(self.slides.ends_s - self.now, 0.0)
             return self._since + self._segment_s - left

@@ -394,7 +394,7 @@ class LinuxcncConversation(Conversation):
             yield self._poll_s
 
     def _obey(self, status: str, stands: bool) -> Script:
-        """What the user wants of a program that is under way."""
+        """Send the user's pause or resume, and follow the status of the running program."""
         if self._pausing:
             self._pausing = False
             yield from self._set("pause")
@@ -486,7 +486,7 @@ class LinuxcncConversation(Conversation):
         return [axis for axis in "xyz" if axis in self._values]
 
     def _jog(self) -> Script:
-        """One axis after the other."""
+        """Jog one axis after the other, and wait until the machine stands."""
         yield from self._set("mode manual")
         yield from self._set("teleop_enable on")
         self._begun = True
@@ -546,7 +546,7 @@ class LinuxcncTerminal(Terminal):
         return super().halt()
 
     def is_urgent(self, line: str) -> bool:
-        """What stops it."""
+        """True for the commands that stop the machine."""
         return line.lower().split() in (["set", "abort"], ["set", "estop", "on"])
 
     def meaning(self, line: str) -> str:

@@ -74,7 +74,7 @@ class MatlabRouter(Target):
         return rest_of(data, machine, first)
 
     def twin_settings(self) -> type[MatlabRouterTwinSettings]:
-        """What its thesis leaves open of the wire."""
+        """Return the record of what its thesis leaves open of the wire."""
         from .twin import MatlabRouterTwinSettings
 
         return MatlabRouterTwinSettings

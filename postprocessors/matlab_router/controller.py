@@ -82,7 +82,8 @@ class MatlabRouterModel(ControllerModel[MatlabRouterController, MatlabRouterDial
         return replace(toolpath, end=home + np.column_stack(columns))
 
     def spacing_mm(self, toolpath: Toolpath, machine: _Machine) -> float:
-        """What an axis goes in a tick at the highest feed of the machine or of the program."""
+        """Longest travel of an axis in one tick, mm, at the highest feed of the machine or of the
+        program."""
         feeds = toolpath.feed[np.isfinite(toolpath.feed)]
         fastest = min(float(feeds.max(initial=0.0)), machine.max_feed_mm_min)
         rapid = machine.rapid_mm_min if np.isfinite(machine.rapid_mm_min) else 0.0
@@ -94,7 +95,7 @@ class MatlabRouterModel(ControllerModel[MatlabRouterController, MatlabRouterDial
         return "servo"
 
     def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
-        """What times and figures take for granted."""
+        """Return the assumptions behind times and figures, as sentences for the report."""
         router = machine.controller
         law = (
             "slave X's program"
@@ -450,7 +451,8 @@ IDENTIFIED = 70.0
 
 
 def program_of(orders: Indices, pauses_s: Floats, machine: _Machine) -> Program:
-    """What the kernel runs; MachineError for gains that the listing's integers cannot hold."""
+    """Return the program for the compiled loops; MachineError for gains that the listing's
+    integers cannot hold."""
     router = machine.controller
     text = router.slaves == "text"
     axes = np.zeros((3, 8))

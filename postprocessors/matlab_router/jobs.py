@@ -243,7 +243,7 @@ class _Text:
 
     @property
     def ended(self) -> bool:
-        """Whether nothing but blanks is left."""
+        """True if only blanks are left."""
         return self.at == len(self.text)
 
     def fail(self, offset: int, message: str, mend: str = "") -> None:
@@ -269,7 +269,7 @@ class _Text:
         return match[1], match[2], at
 
     def scalar(self) -> _Value:
-        """One whole number and the end of its statement."""
+        """Read one whole number and the end of its statement."""
         match = _TEXT_NUMBER.match(self.text, self.at)
         if match is None:
             self.fail(self.at, f"{self._quoted(self.at)} is no whole number")
@@ -327,7 +327,8 @@ class _Text:
         return int(word)
 
     def _fail_rows(self) -> None:
-        """Where an array goes wrong: its opening, a sign in it, or its end."""
+        """Refuse an array at its first fault: its opening, a character in it, or its missing
+        end."""
         if self.text[self.at : self.at + 1] != "[":
             self.fail(self.at, f"{self._quoted(self.at)} is no array", "write [ and ]")
         odd = re.compile(r"[^0-9 \t\r\n,;+-]").search(self.text, self.at + 1)

@@ -156,7 +156,8 @@ class _Maker:
                 )
 
     def _room(self, units: Floats, axis: int, most: float) -> str:
-        """How to bring everything into the area along an axis: the place of home that does it."""
+        """Return the remedy that brings everything into the travel of an axis: the place of home,
+        or a smaller drawing."""
         low, high = float(units[:, axis].min()), float(units[:, axis].max())
         if not high - low <= most:
             return "scale the drawing down"
@@ -262,7 +263,7 @@ class _Maker:
         return SlaveLines(start, end, lines.feed[source], lines.row[source], lines.stroke[source])
 
     def offsets(self, lines: SlaveLines) -> list[int]:
-        """Where each job begins, and the end of the last one."""
+        """Return the index of each job's first line, and the number of all lines."""
         count = len(lines.row)
         if count == 0:
             return [0]
@@ -277,8 +278,8 @@ class _Maker:
         return [*offsets, count]
 
     def _cut_at(self, lines: SlaveLines, first: int, last: int) -> int:
-        """Where the job that begins with this line ends: at most `max_lines` on, and at a vertex
-        from which the next job can begin."""
+        """Return the end of the job that begins with this line: at most `max_lines` on, and at a
+        vertex from which the next job can begin."""
         most = first + self._dialect.max_lines
         if most >= last:
             return last
@@ -340,7 +341,8 @@ def split_line(
 
 
 def _bend(longer: int, shorter: int, counts: int) -> float:
-    """How far one line bends (units); inf when its slower axis would stop."""
+    """Return the deviation of one driven line from a straight one, units; inf if its slower axis
+    would stop."""
     wanted = counts * shorter / longer
     whole = math.floor(wanted + 0.5)
     if shorter == 0:
@@ -398,7 +400,7 @@ class LineChanges(Struct):
         self.lost_place = self.lost_place or place
 
     def findings(self, dialect: ResolvedDialect) -> Iterator[Finding]:
-        """One finding for each kind of change that was made."""
+        """Yield one finding for each kind of change that the writer made."""
         grid_mm = dialect.grid_units * UNIT_MM
         if self.snap_mm:
             yield (PLACES_SNAPPED_AND_STARTS if self.late_starts else PLACES_SNAPPED)(

@@ -125,7 +125,7 @@ class _Moves:
         return self._path.event(Kind.END).finish(self._findings.findings())
 
     def _lines(self, job: ReadJob, done: Executed, z: float) -> None:
-        """One row a line; two where its speeds bend it by more than the tolerance."""
+        """Add one row for each line; two if its speeds bend it by more than the tolerance."""
         run = DrivenLines(done.points, np.abs(job.speed.T), self._dialect.bend_tolerance_mm)
         self._findings.bent.add(
             run.bent, run.most_bend * UNIT_MM, f"job {job.number}, line {run.first_bent + 1}"
@@ -163,7 +163,7 @@ class Executed(Struct, frozen=True, eq=False):
 
 
 def execute(job: ReadJob, dialect: ResolvedDialect) -> Executed:
-    """Where the slaves and the listed master really bring the tool."""
+    """Compute where the slaves and the listed master really bring the tool."""
     asked = _along(job.first, job.steps)
     first = job.first.copy()
     if dialect.master_y == "fixed":
@@ -289,7 +289,7 @@ class JobFindings(Struct):
     bent: Worst = field(default_factory=Worst)
 
     def add(self, job: ReadJob, done: Executed) -> None:
-        """What one job has in it that the machine does otherwise, or cannot do."""
+        """Count what the machine does otherwise, or cannot do, in one job."""
         place = f"job {job.number}"
         odd = int((job.length % 2).sum() + (job.first % 2).sum())
         if self.dialect.odd == "truncated" and odd:
@@ -326,7 +326,7 @@ class JobFindings(Struct):
             self.outside.add(int(bad.sum()), most, f"{place}, line {line}")
 
     def findings(self) -> list[Finding]:
-        """One finding of each kind."""
+        """Return one finding for each kind of deviation."""
         return [
             *self.outside.finding(OUT_OF_TRAVEL),
             *self.fast.finding(FEED_ABOVE_LIMIT),

@@ -147,7 +147,8 @@ class MatlabRouterTwin(Twin):
 
 
 def _number(word: bytes) -> int:
-    """What atol makes of it, in a signed int16: 0 of what does not begin with a number."""
+    """Parse a word as the firmware's atol does, into a signed int16; 0 if it does not begin with a
+    number."""
     found = NUMBER.match(word)
     value = int(found[0]) if found else 0
     return (value + INT16 // 2) % INT16 - INT16 // 2

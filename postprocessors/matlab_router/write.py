@@ -90,8 +90,8 @@ def program_of(jobs: Iterable[JobNumbers], count: int, dialect: ResolvedDialect)
 
 
 def _matlab(jobs: Iterable[JobNumbers], count: int, dialect: ResolvedDialect) -> bytes:
-    """One section a job: the last job's arrays remain when all are run; `jobs{}` then holds all
-    `count`."""
+    """Write one section of MATLAB code for each job. A section overwrites the arrays of the one
+    before; `jobs{}` keeps all `count` of them."""
     lines = [
         f"% camtool: matlab-router, profile {dialect.profile}, {_count(count, 'job')}",
         "% xy, lxy and first point in 0.1 mm from home; velxy in counts of the encoder in 5 ms",

@@ -63,7 +63,7 @@ class PicMmh(Target):
         return PicMmhWire()
 
     def listing(self, data: bytes, machine: PicMmhMachine) -> Listing:
-        """What stands before each semicolon, with it."""
+        """Divide the program into its blocks, each with its semicolon."""
         from camtool.toolpath.program import Listing
 
         from .read import BLANKS
@@ -72,7 +72,7 @@ class PicMmh(Target):
         return Listing(tuple(block.strip(BLANKS) + ";" for block in blocks))
 
     def twin_settings(self) -> type[PicMmhTwinSettings]:
-        """What its thesis leaves open of the wire."""
+        """Return the record of what its thesis leaves open of the wire."""
         from .twin import PicMmhTwinSettings
 
         return PicMmhTwinSettings

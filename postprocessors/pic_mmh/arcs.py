@@ -134,15 +134,15 @@ def _hits(arc: Ints, x: int, y: int, low: int, high: int, state: Ints) -> int:
 
 
 def _represents(steps: int, search: LandingSearch) -> bool:
-    """Whether some whole unit means this step: the nearest one, if any does."""
+    """True if a whole number of units means this step."""
     size = abs(steps)
     units = int(size * search.units_per_step + 0.5)
     return units <= search.most_units and int(units / search.units_per_step + 0.5) == size
 
 
 def _lands(arc: Ints, row: int, first: int, search: LandingSearch) -> bool:
-    """Whether position `row` of the path, which began behind iteration `first`, can be written,
-    and the controller stops there and not earlier, whatever D was."""
+    """True if position `row` of the path, which began behind iteration `first`, can be written and
+    the controller stops there and not earlier, whatever D was."""
     x, y = search.path_x[row], search.path_y[row]
     if not _represents(x + arc[CENTRE_X], search) or not _represents(y + arc[CENTRE_Y], search):
         return False

@@ -81,11 +81,11 @@ class PicMmhModel(ControllerModel[PicMmhController, PicMmhDialect]):
         return replace(toolpath, start=start, end=end, centre=read_only(centre))
 
     def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
-        """How arcs are made: dsm, dda or stairs."""
+        """Return the interpolator of arcs: dsm, dda or stairs."""
         return options.interpolator or machine.controller.arcs
 
     def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
-        """What the times take for granted."""
+        """Return the assumptions behind the times, as sentences for the report."""
         base = machine.controller.time_base
         return (
             f"each {base} of the interpolator takes one period of the feed (controller.time_base)",
@@ -469,7 +469,8 @@ def arc_filler(arc: StepArc, method: str, *, rounded: bool) -> Filler:
 
 
 def arc_reach(arc: StepArc, fill: Filler) -> tuple[int, bool]:
-    """How many positions a fresh filler gives until the stop test is met, and True.
+    """Return the number of positions that a fresh filler gives until the stop test is met, and
+    True.
 
     When it is not met in the expected sweep and a quadrant more: how many until the nearest
     approach to the end there, and False. The controller then goes round at least once more, if it
@@ -499,8 +500,8 @@ def arc_reach(arc: StepArc, fill: Filler) -> tuple[int, bool]:
 
 
 def arc_end_findings(toolpath: Toolpath, machine: _Machine, arcs: Ints) -> tuple[Finding, ...]:
-    """One ARC_END_UNSURE for the legs `arcs` (L, 14), each from the end of the row before it,
-    that do not stop on their end by every reading."""
+    """Return one ARC_END_UNSURE for those of the legs `arcs` (L, 14), each from the end of the row
+    before it, that do not stop at their end under every reading of the thesis."""
     arcs = arcs[(arcs[:, [loops.A, loops.B]] != 0).any(axis=1)]
     met = [_stops(arcs, rounded, loops.EQUAL)[:, loops.MET] != 0 for rounded in (False, True)]
     unsure = ~(met[0] & met[1])

@@ -117,7 +117,7 @@ class FusedLegs:
 
     @property
     def rows(self) -> int:
-        """How many rows there are to run."""
+        """Number of rows to run."""
         return self._rows
 
     def judge(self, low: int, high: int, task: Task, sums: Sums) -> Ledger:

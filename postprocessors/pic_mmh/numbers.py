@@ -73,7 +73,7 @@ class UnitGrid(Struct, frozen=True):
         return max(1.0 / self.units_per_mm, self.step_mm)
 
     def fits(self, values_mm: Floats) -> Bools:
-        """Which values are finite and have no more digits than the form."""
+        """Mask of the values that are finite and have no more digits than the form."""
         with np.errstate(invalid="ignore", over="ignore"):
             return np.asarray(np.abs(values_mm) * self.units_per_mm < self.most_units + 0.5)
 
@@ -148,7 +148,7 @@ def _both(values_mm: Floats, grids: tuple[UnitGrid, UnitGrid, UnitGrid]) -> tupl
 
 
 def check_motion(toolpath: Toolpath, machine: PicMmhMachine) -> None:
-    """What depends on more than one number: where the path starts, and that arcs are arcs."""
+    """Refuse a path that does not start at the origin, and arcs that are none."""
     refuse_start(toolpath)
     _check_arcs(toolpath, machine)
 

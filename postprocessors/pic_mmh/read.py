@@ -181,7 +181,7 @@ class _Reader:
         self._fast = _Excess()
 
     def block(self, index: int, text: str) -> None:
-        """One block, without its `;` and the blanks around it."""
+        """Decode one block, without its `;` and the blanks around it, and add it to the path."""
         if self.ended:
             _fail(index, 1, "a block after M30, the end of the program", "remove it")
         if self._buffer_chars is not None and len(text) >= self._buffer_chars:
@@ -229,7 +229,7 @@ class _Reader:
         )
 
     def findings(self) -> Iterator[Finding]:
-        """What goes beyond the controller's limits."""
+        """Yield findings on blocks and feeds beyond the controller's limits."""
         if self._long.count:
             yield BLOCK_TOO_LONG_READ(
                 where=f"block {self._long.first + 1}",

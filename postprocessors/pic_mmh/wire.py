@@ -129,7 +129,8 @@ def _by_hand_hz(machine: PicMmhMachine) -> float:
 
 
 def _reverses_s(machine: PicMmhMachine) -> float:
-    """How long it may report nothing by hand, while it makes up for the play of an axis, s."""
+    """Return the longest time without reports, s, while the controller makes up for the play of an
+    axis by hand."""
     assert isinstance(machine.link, PicMmhLink)
     if machine.link.compensation == "reported" and machine.link.step_byte != "none":
         return 0.0
@@ -152,7 +153,7 @@ def _compensations(machine: PicMmhMachine) -> list[bytes]:
 
 
 def _reports(forecast: Forecast, block: int, machine: PicMmhMachine) -> int:
-    """How many bytes report the steps of a block."""
+    """Return the number of bytes that report the steps of a block."""
     link = machine.link
     assert isinstance(link, PicMmhLink)
     if link.step_byte == "none":
@@ -225,8 +226,8 @@ class PicMmhConversation(PacketByPacket):
 
     @property
     def _silence_s(self) -> float:
-        """How long nothing may come until the packet is over: all that a jog reports has come
-        when its steps have, but nobody knows how many homing needs."""
+        """Return the silence, s, after which the packet counts as done. All reports of a jog have
+        come when its steps have; the steps of homing are not known."""
         packet = self.packets[self.sent - 1]
         complete = packet.seconds > 0.0 and self._count >= packet.counts[1]
         return SILENT * self.manner.late_s + (0.0 if complete else self._reverses_s)
@@ -295,7 +296,8 @@ class PicMmhConversation(PacketByPacket):
 
     @property
     def _rate(self) -> str:
-        """What may be wrong where nothing has been understood yet."""
+        """Return the hint on power and rate for an error before anything was understood; else
+        ""."""
         return "; is it switched on, and is --baud its rate?" if not self.done else ""
 
     def _is_report(self, octet: int) -> bool:
@@ -392,7 +394,7 @@ class PicMmhTerminal(Terminal):
         return stop
 
     def is_urgent(self, line: str) -> bool:
-        """What stops it."""
+        """True for the command that stops the machine."""
         return line.strip().rstrip(";") == "A"
 
     def heard(self, data: bytes) -> list[str]:

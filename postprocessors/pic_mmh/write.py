@@ -138,7 +138,7 @@ class _Writer:
         return data, np.insert(rows, places, [row for _, _, row in others])
 
     def findings(self, data: bytes) -> Iterator[Finding]:
-        """What was changed, one finding for each kind."""
+        """Yield one finding for each kind of change that the writer made."""
         if self._feed_finding:
             yield self._feed_finding
         yield from self._changes.findings(self._grid.step_mm * 1000.0)
@@ -302,7 +302,8 @@ class _Writer:
             )
 
     def _count(self, arcs: StepArcs, points: Points) -> None:
-        """What the arcs and the moves of less than a step lose."""
+        """Count arcs that became lines, moves of less than a step that were dropped, and arcs with
+        a remainder."""
         changes, path = self._changes, self._toolpath
         landed = np.zeros(len(arcs.row), dtype=np.bool_)
         landed[np.searchsorted(arcs.row, points.row[points.is_arc])] = True
@@ -469,7 +470,7 @@ def turned_rad(out: Floats | Ints, now: Floats | Ints, clockwise: Bools) -> Floa
 
 
 def full_turns(turn_rad: Floats, expected_rad: Floats) -> Floats:
-    """How many full turns more bring each sweep nearest to the expected one."""
+    """Return the number of full turns that brings each sweep nearest to the expected one."""
     return np.asarray(np.rint((expected_rad - turn_rad) / _TURN))
 
 
@@ -511,7 +512,7 @@ class WriterChanges(Struct):
     rounded_place: str = ""
 
     def findings(self, step_um: float) -> Iterator[Finding]:
-        """One finding for each count that is not 0."""
+        """Yield one finding for each count that is not 0."""
         if self.split:
             yield MOVE_SPLIT(where=self.split_place, measured=self.split_step_mm, count=self.split)
         if collapsed := self.dropped + self.arcs_as_lines:
@@ -530,8 +531,9 @@ class WriterChanges(Struct):
 
 
 def too_long(data: bytes, buffer_chars: int | None) -> Iterator[Finding]:
-    """One BLOCK_TOO_LONG finding when blocks do not fit the controller's buffer: a remark where
-    it is that of the thesis, which contradicts itself, and a warning where the user knows it."""
+    """Yield a BLOCK_TOO_LONG finding if blocks exceed the controller's buffer: a remark for the
+    buffer of the thesis, which contradicts itself, and a warning for one that the user has
+    given."""
     lengths = line_lengths(data)
     limit = BUFFER_CHARS if buffer_chars is None else buffer_chars
     if count := int((lengths > limit).sum()):

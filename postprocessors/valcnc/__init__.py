@@ -64,7 +64,7 @@ class Valcnc(Target):
         return ValcncWire()
 
     def twin_settings(self) -> type[ValcncTwinSettings]:
-        """What its thesis leaves open of the wire."""
+        """Return the record of what its thesis leaves open of the wire."""
         from .twin import ValcncTwinSettings
 
         return ValcncTwinSettings

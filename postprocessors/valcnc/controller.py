@@ -96,7 +96,7 @@ class ValcncModel(ControllerModel[ValcncController, ValcncDialect]):
         return "counter"
 
     def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
-        """What the times and the path take for granted."""
+        """Return the assumptions behind the times and the path, as sentences for the report."""
         controller = machine.controller
         between = _Pieces(toolpath, machine).between_steps()
         midway = "midway between two steps" if controller.rounding == "nearest" else "on a step"

@@ -96,7 +96,7 @@ class _Reader:
             )
 
     def block(self, block: WordBlock) -> None:
-        """One block."""
+        """Check one block and add its move to the path."""
         self.blocks += 1
         code, letters = block.words[0][1], "".join([letter for letter, _ in block.words])
         if letters not in PLAIN or code not in CODES or "\t" in block.text:
@@ -193,7 +193,7 @@ class _Reader:
             )
 
     def _end(self, block: WordBlock, values: dict[str, float]) -> Point:
-        """Where the block goes, in the program's units; absolute (L1135)."""
+        """Return the end of the block's move, absolute and in units of the program (L1135)."""
         missing = [letter for letter in "XYZ" if letter not in values]
         if missing and self._dialect.missing_words == "refused":
             block.fail(
