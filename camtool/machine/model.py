@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 
 class TargetNames(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What the machine is called and what its programs are called."""
+    """Names of the machine and of its programs."""
 
     name: str
     title: str
@@ -55,12 +55,13 @@ AS_CODED = 0.0
 
 
 class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One axis. `coded_step_mm` is what the controller believes a step to be, `real_step_mm`
-    what the slide moves, as coded where left out; `backlash_mm` is the play of the mechanics,
-    `compensation_mm` what the controller adds at each reversal; `repeatability_mm` is the standard
-    deviation of the places where the slide arrives from one side. `resolution_mm` is the finest
-    difference of places in a program, where that is coarser than the step. `travel_mm`,
-    `max_rate_mm_min` and `acceleration_mm_s2` are None when they are not known."""
+    """Axis of the machine. `coded_step_mm` is the length of a step for the controller,
+    `real_step_mm` the travel of the slide in a step, as coded where left out; `backlash_mm` is the
+    play of the mechanics, `compensation_mm` what the controller adds at each reversal;
+    `repeatability_mm` is the standard deviation of the places where the slide arrives from one
+    side. `resolution_mm` is the finest difference of places in a program, where that is coarser
+    than the step. `travel_mm`, `max_rate_mm_min` and `acceleration_mm_s2` are None when they are
+    not known."""
 
     coded_step_mm: Step
     real_step_mm: Step = AS_CODED
@@ -96,7 +97,7 @@ class Feed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class MotionLimits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What bounds motion; None where it is not known.
+    """Limits of motion; None where not known.
 
     `max_step_rate_hz` bounds feed / coded step, `max_feed_mm_min` the feed itself; rapids run at
     `rapid_step_rate_hz` or `rapid_mm_min`; `max_reversals` is the count above which parts were
@@ -111,11 +112,11 @@ class MotionLimits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Defaults(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What planning takes where the job says nothing, mm. `feed_z_mm`: the height above the stock
-    down to which the tool comes as a rapid (None: it plunges from `safe_z_mm` on).
+    """Defaults of planning where the job gives no value, mm. `feed_z_mm`: the height above the
+    stock down to which the tool comes as a rapid (None: it plunges from `safe_z_mm` on).
     `plunge_share`: the feed of a plunge as a part of that of the cut (None: the same). `park_mm`:
-    where the tool goes when all is cut, in the work frame; `change_mm` and `change_z_mm`: where
-    it goes between two operations to be changed (None: to `park_mm`, and up some times
+    where the tool goes when all is cut, in the work frame; `change_mm` and `change_z_mm`: where it
+    goes between two operations to be changed (None: to `park_mm`, and up some times
     `safe_z_mm`)."""
 
     safe_z_mm: Length
@@ -154,7 +155,7 @@ class Spindle(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Coolant(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What the machine has: mist (M7) and flood (M8)."""
+    """Coolants of the machine: mist (M7) and flood (M8)."""
 
     mist: bool = False
     flood: bool = False
@@ -166,7 +167,7 @@ class Coolant(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SlideStart(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """How the slides stand when a program begins, and where machine zero is.
+    """State of the slides when a program begins, and the place of machine zero.
 
     `machine_zero_mm` is its place in the work frame: homing goes there.
     """

@@ -1,4 +1,4 @@
-"""What the numbers of a machine file may be: one range for each quantity, for all machines.
+"""Ranges of the numbers of a machine file: one for each quantity, for all machines.
 
 A range is wide of every machine there is, from a slide on piezos to a plasma table, and narrow
 enough that a number in other units, or one with a slip of the exponent, is refused where it was

@@ -74,17 +74,18 @@ class Target(ABC):
     codes: ClassVar[tuple[TargetCode, ...]] = ()
     """The codes of its own findings; their names start with the name of the target and a dot."""
     starts_spindle: ClassVar[bool] = False
-    """Whether a program starts the spindle, at a speed in the program."""
+    """True if a program starts the spindle, at a speed in the program."""
     switches_coolant: ClassVar[bool] = False
-    """Whether a program can switch coolant."""
+    """True if a program can switch coolant."""
     any_machine: ClassVar[bool] = False
-    """Whether the machine file describes no particular machine: travel and rates are examples."""
+    """True if the machine file describes no particular machine: travel and rates are examples."""
     filter_default: ClassVar[bool] = False
-    """Whether `camtool filter` uses it by default."""
+    """True if `camtool filter` uses it by default."""
     no_twin: ClassVar[str] = "its wire is not modelled"
-    """Why there is no virtual controller, where there is none."""
+    """Reason for the lack of a virtual controller."""
     settings_listing: ClassVar[str] = ""
-    """What `settings_from` reads, such as "what it answers to $$"; "" where it reads nothing."""
+    """Name of the listing that `settings_from` reads, such as "what it answers to $$"; "" where it
+    reads none."""
 
     @abstractmethod
     def write(self, toolpath: Toolpath, machine: Machine[Any, Any]) -> Program:

@@ -33,7 +33,7 @@ _ABOUT = {
     "is unknown,\n## and a dimension that depends on it is undecided.\n## No values hold for all "
     "machines: take both # away, and give yours. camtool calibrate writes some.",
 }
-"""What the keys of a table say."""
+"""Comments on the keys of a table."""
 
 _UNCERTAIN = {
     "uncertainty": {
@@ -54,7 +54,7 @@ _UNCERTAIN = {
         for axis in "xy"
     },
 }
-"""What a target's own file need not say: how well the numbers are known, key by key."""
+"""Keys that a target's own file may leave out: the uncertainty of its numbers, key by key."""
 
 
 def machine_template(

@@ -22,22 +22,22 @@ class Terminal:
     overrides what it knows better."""
 
     end: ClassVar[bytes] = b"\n"
-    """What ends a line that is typed."""
+    """End of a typed line."""
     stop: bytes = b""
-    """What stops the machine now, for Ctrl-C; b"" where nothing does."""
+    """Bytes that stop the machine at once, for Ctrl-C; b"" if none do."""
     asks: ClassVar[bytes] = b""
-    """What is asked again and again behind that, until it `stands`."""
+    """Query that is repeated behind `stop` until the machine `stands`."""
     leaves: ClassVar[bytes] = b""
-    """What is sent to one that stands when nobody is there any more."""
+    """Bytes sent to a standing machine when the terminal is closed."""
     knock: ClassVar[bytes] = b""
-    """What is asked again and again until it is `ready`."""
+    """Query that is repeated until the controller is `ready`."""
     about: ClassVar[str] = "each line goes out with a line feed; \\x13 is the byte of that number"
-    """How to speak to it."""
+    """Help for the user: how to type lines to it."""
 
     def __init__(self) -> None:
         self.due = 0
-        """How many answers it owes, where it owes one for each line; what is piped in waits for
-        them."""
+        """Count of answers that are due, for a controller that answers each line; piped input
+        waits for them."""
         self.answers = False
         """True if it answers every line with something, where `due` does not count them."""
         self.ready = True
@@ -49,9 +49,9 @@ class Terminal:
         self.runs_on = False
         """True if what was typed last ends only with the next thing that is typed."""
         self.rests_s = 0.0
-        """How long it may be silent while it does what was typed last."""
+        """Longest silence while it does what was typed last, s."""
         self.hello = b""
-        """What is said when the port is open."""
+        """Bytes sent when the port has been opened."""
         self._rest = b""
 
     def typed(self, line: str) -> bytes:

@@ -35,8 +35,8 @@ which outlive a block."""
 
 
 class SlideTrace(Struct, frozen=True, eq=False):
-    """What the slides did, K outputs in order: `time_s` (K,), the index (K,) in `Twin.decoded` of
-    the block that asked for it (−1: a command), the position (K, 3) mm that the controller
+    """Movements of the slides, K outputs in order: `time_s` (K,), the index (K,) in `Twin.decoded`
+    of the block that asked for it (−1: a command), the position (K, 3) mm that the controller
     commanded and that of the slides (K, 3) mm, both in the work frame of when the power came
     on."""
 
@@ -106,7 +106,7 @@ class Slides:
         self._before = self._mechanics.states.copy()
         self._added: Ints = np.empty((0, 3), dtype=np.int64)
         self.done = 0
-        """How many outputs of the last travel were made."""
+        """Count of outputs of the last travel that were made."""
         self._block = -1
         self._pieces: list[SlideTrace] = []
 
@@ -206,14 +206,14 @@ class Twin(ABC):
     wire: ClassVar[str]
     """The line as its terminal programs are told it, such as "115200 8N1"."""
     byte_s: ClassVar[float] = 0.0
-    """What a byte takes on the line, s; 0 where that is not known."""
+    """Time of a byte on the line, s; 0 if not known."""
 
     def __init__(self, slides: Slides) -> None:
         self.slides = slides
         self.decoded: list[bytes] = []
         """The blocks of programs that the controller has accepted, in order, as it has them."""
         self.commands: list[bytes] = []
-        """What else it was told and has accepted: jogging, settings."""
+        """Other commands that it has accepted: jogging, settings."""
         self.now = 0.0
         """The time up to which it has run, s."""
         self._out = bytearray()

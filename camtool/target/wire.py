@@ -44,10 +44,10 @@ ToolAt = Literal["", "journal", "zero", "known"]
 
 
 class Forecast(Struct, frozen=True, eq=False):
-    """What the simulation says of the B blocks of a program: `decoded`, the moves; `seconds` (B,)
-    of each with its compensation, `compensation_s` (B,) the part of it for compensation; `outputs`
-    (B,) of steps, each of one axis or several, `steps` (B, 3) of the axes, `reversals` (B, 3) of
-    them, and where each ends, `end_mm` (B, 3)."""
+    """Simulated course of the B blocks of a program: `decoded`, the moves; `seconds` (B,) of each
+    with its compensation, `compensation_s` (B,) the part of it for compensation; `outputs` (B,) of
+    steps, each of one axis or several, `steps` (B, 3) of the axes, `reversals` (B, 3) of them, and
+    where each ends, `end_mm` (B, 3)."""
 
     decoded: Toolpath
     seconds: Floats
@@ -66,7 +66,7 @@ class Forecast(Struct, frozen=True, eq=False):
 
 
 class Packet(Struct, frozen=True):
-    """What goes out in one piece and is acknowledged as one.
+    """Bytes that are sent in one piece and acknowledged as one.
 
     `block`: the last block of the program that is done when it is done, −1 before the first;
     `seconds`: how long the machine is busy with it, by the simulation. `counts`: how many reports
@@ -87,7 +87,7 @@ class Packet(Struct, frozen=True):
 
 
 class WireState(Enum):
-    """How a conversation stands."""
+    """State of a conversation."""
 
     OPENING = "opening"
     SENDING = "sending"
@@ -126,7 +126,7 @@ NEVER = math.inf
 """The time of what does not happen by itself, s."""
 
 LATE_S = 0.05
-"""How late a port and its cable may deliver what was written, s."""
+"""Longest delay of a port and its cable, s."""
 
 PATIENCE = 60
 """A controller that owes an answer and is silent for so many times the lateness of the line (3 s)
@@ -138,7 +138,7 @@ NEAR_MM = 0.02
 
 
 class ResumePoint(Struct, frozen=True, eq=False):
-    """Where a program was left that is to go on, by its journal. `place_mm`: the place of the
+    """Point at which an interrupted program goes on, by its journal. `place_mm`: the place of the
     tool, None where that is not known; `is_still`: it was known to stand there; `ends_mm` (K, 3):
     where it may stand otherwise, having done what it had. `tool_at`: what the user says: the tool
     stands at the place of the "journal", or at part "zero", and the controller is to take it so;
@@ -192,7 +192,7 @@ def place_words(place_mm: Place | None) -> str:
 
 
 class Manner(Struct, frozen=True):
-    """How a conversation is held. `single`: it waits for `resume` after every packet; `home`: the
+    """Options of a conversation. `single`: it waits for `resume` after every packet; `home`: the
     machine is homed first; `unlock`: a controller that is locked is unlocked first; `late_s`: how
     late the line may be, s; `checked`: settings of the controller are compared with the machine
     file; `paced`: each byte takes the time that the rate of the line gives it, so that a reply
@@ -218,8 +218,8 @@ class Manner(Struct, frozen=True):
 
 
 class Conversation(ABC):
-    """One conversation about some packets; see above. `place_mm`: where the controller says that
-    it is, in the work frame, None where it does not say."""
+    """Conversation that sends packets; see above. `place_mm`: position that the controller
+    reports, in the work frame, None where it does not say."""
 
     def __init__(self, packets: Sequence[Packet], manner: Manner) -> None:
         self.packets = tuple(packets)
@@ -329,9 +329,10 @@ class PacketByPacket(Conversation):
     """
 
     stands = "stopped: it has done what it was sent, and stands"
-    """What is known when it has stopped behind a packet."""
+    """Sentence for the user when the machine has stopped behind a packet."""
     goes_on = "it does what it was sent to its end; its switch stops it"
-    """What it does where it cannot be stopped, or nobody speaks to it any more."""
+    """Sentence for the user about a machine that cannot be stopped, or that nobody speaks to any
+    more."""
     halts_within: ClassVar[bool] = False
     """True if a stop may leave the machine somewhere within a packet."""
 
@@ -344,9 +345,9 @@ class PacketByPacket(Conversation):
     def __init__(self, packets: Sequence[Packet], manner: Manner) -> None:
         super().__init__(packets, manner)
         self._busy = False
-        """Whether a packet is out that is not done."""
+        """True while a packet is under way."""
         self._asked = False
-        """Whether the user has been asked for what the next packet asks."""
+        """True if the user has been asked for what the next packet needs."""
         self._failing = ""
         """Why it fails, while the machine is being stopped."""
 
@@ -450,15 +451,15 @@ class Wire(ABC):
     frame: ClassVar[str] = "8N1"
     ready: ClassVar[tuple[str, ...]] = ()
     opens_file: ClassVar[bool] = False
-    """Whether the controller opens the program as a file (`Manner.file`)."""
+    """True if the controller opens the program as a file (`Manner.file`)."""
     place: ClassVar[Literal["told", "kept", "steps", "homed"]] = "kept"
-    """What the controller knows of its place: it is "told" by reports; "kept" while it is switched
-    on, and not told; it knows "steps" only, and takes where it stands for the beginning; or each
-    piece of a program begins with homing ("homed")."""
+    """Knowledge of the controller about its place: it is "told" by reports; "kept" while it is
+    switched on, and not told; it knows "steps" only, and takes where it stands for the beginning;
+    or each piece of a program begins with homing ("homed")."""
     unlocks: ClassVar[bool] = False
     """True if the controller locks itself and has a command to end that (`Manner.unlock`)."""
     stopping: ClassVar[str] = ""
-    """What a stop does, such as "the machine stops at once"."""
+    """Effect of a stop, such as "the machine stops at once"."""
 
     @abstractmethod
     def packets(

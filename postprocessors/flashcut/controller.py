@@ -104,7 +104,7 @@ _FROM = {"programmed": "was, so that steps too many stay", "reached": "has got t
 
 
 class FlashcutRun:
-    """One run of a toolpath; ProgramError for rows that the controller cannot follow."""
+    """Run of a toolpath; ProgramError for rows that the controller cannot follow."""
 
     def __init__(self, toolpath: Toolpath, machine: _Machine, options: Options) -> None:
         controller = machine.controller
@@ -265,7 +265,8 @@ def _chords(toolpath: Toolpath, per_turn: int) -> Indices:
 
 
 class MoveTable(Struct, frozen=True, eq=False):
-    """How many moves each row of a placed toolpath makes, and the moves of any window of rows."""
+    """Number of moves that each row of a placed toolpath makes, and the moves of any window of
+    rows."""
 
     toolpath: Toolpath
     chords: Indices

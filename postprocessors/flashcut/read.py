@@ -77,7 +77,7 @@ def read_program(data: bytes, machine: FlashcutMachine) -> Toolpath:
 
 
 class _Excess(Struct):
-    """How many blocks have a feed above the limit, the highest, and the first of them."""
+    """Count of blocks with a feed above the limit, the highest feed, and the first of them."""
 
     count: int = 0
     most: float = 0.0
@@ -307,7 +307,7 @@ ROWS_AT_ONCE: Final = 1 << 14
 
 
 class _Worst(Struct):
-    """How many rows something is wrong with, the worst of them, and by how much."""
+    """Count of rows with a fault, the worst of them, and its size."""
 
     count: int = 0
     row: int = -1
@@ -370,8 +370,8 @@ def _limited(
 
 
 class _Rows:
-    """Some rows of a toolpath: `kind` (K,), `feed` (K,) mm/min, NaN where they do not cut, `steps`
-    (K, 3) of the axes without their signs."""
+    """Columns of consecutive rows of a toolpath: `kind` (K,), `feed` (K,) mm/min, NaN where they
+    do not cut, `steps` (K, 3) of the axes without their signs."""
 
     def __init__(self, path: Toolpath, rows: slice, machine: FlashcutMachine) -> None:
         self.kind = path.kind[rows]

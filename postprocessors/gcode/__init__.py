@@ -1,4 +1,4 @@
-"""What dialects of G-code share.
+"""Code shared by the dialects of G-code.
 
 dialect   options that writer and reader must agree on
 blocks    reading: bytes to lines, blocks of words, and runs of plain blocks

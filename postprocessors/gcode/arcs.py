@@ -44,8 +44,8 @@ RULE_MARGIN: Final = 0.9
 
 
 class ReplacementRow(Struct, frozen=True):
-    """One row in place of an arc: its kind, end (x, y) and offset of the centre (i, j), units.
-    `share`: the part of a helix's rise that is made at its end."""
+    """Row that replaces an arc or a part of it: its kind, end (x, y) and offset of the centre (i,
+    j), units. `share`: the part of a helix's rise that is made at its end."""
 
     kind: Kind
     end: tuple[int, int]
@@ -54,7 +54,7 @@ class ReplacementRow(Struct, frozen=True):
 
 
 class ArcCounts(Struct):
-    """How many arcs were changed, and how."""
+    """Counts of changed arcs, by kind of change."""
 
     flat: int = 0
     dropped: int = 0

@@ -43,7 +43,7 @@ LEAST_RUN: Final = 24
 """Fewer plain blocks in a row than these are read one by one."""
 
 LONGEST_WAIT: Final = 256
-"""Where no lines are plain, it is asked again after so many of them at most."""
+"""Most lines between two attempts to read a run of plain lines, in a text that has none."""
 
 ROWS_AT_ONCE: Final = 1 << 12
 """So many plain blocks are read in one go."""
@@ -85,7 +85,6 @@ class ProgramLines:
         ends = np.flatnonzero(self.octets == ord("\n"))
         self.begins: Ints = np.concatenate([[0], ends + 1])
         self.count = len(self.begins) - int(self.begins[-1] == len(self.data))
-        """How many lines."""
 
     def close(self) -> None:
         """Let go of the program, of which no line can be read any more."""
@@ -172,7 +171,7 @@ class PlainRuns:
 
 
 class Lexing(Struct, frozen=True):
-    """What a dialect's text may hold whose blocks are rows of words, without comments and block
+    """Lexical rules of a dialect whose blocks are rows of words, without comments and block
     numbers.
 
     `letters`: those that begin words, capitals only. `blanks`: spaces and tabs "anywhere" (even
@@ -185,7 +184,7 @@ class Lexing(Struct, frozen=True):
 
 
 class WordBlock:
-    """One block: `words` [(letter, number text)], and where it stands."""
+    """Words of a block, [(letter, number text)], and its place in the text."""
 
     __slots__ = ("index", "line", "text", "words")
 

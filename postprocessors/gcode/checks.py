@@ -1,4 +1,4 @@
-"""What writers of G-code refuse before a line is made: a PostError with the move."""
+"""Checks of moves before writers of G-code make blocks of them: a PostError names the move."""
 
 from __future__ import annotations
 

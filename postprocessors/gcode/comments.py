@@ -23,7 +23,7 @@ from .dialect import UNITS, GcodeDialect, Unit
 from .format import COMMENT_CHARS, NumberStyle, comment, format_column
 
 MAKER = "camtool "
-"""What the heading of a program begins with."""
+"""First word of the heading of a program."""
 
 HEADING_LINES = 20
 """The heading is looked for in so many lines: a machine's own start may stand before it."""

@@ -87,7 +87,7 @@ def _holes(toolpath: Toolpath, low: int, high: int) -> Iterator[CycleHole]:
 
 
 class _Rows(Struct, frozen=True):
-    """Some rows as lists."""
+    """Columns of consecutive rows, as lists."""
 
     kind: list[int]
     end: list[list[float]]

@@ -35,7 +35,7 @@ UNIT_GUARD: Final = 1e-9
 
 
 class GcodeDialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What both dialects let a user choose, and their controller's rule for arcs.
+    """Options that both dialects share, and their controller's rule for arcs.
 
     `units` of lengths and feeds: millimetres (G21) or inches (G20); `decimals` of coordinates in
     mm, inches have INCH_DECIMALS more; `strip_zeros` says 1.5 for 1.500; `line_chars` that the

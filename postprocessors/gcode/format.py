@@ -37,8 +37,8 @@ _UNSAFE: Final = re.compile(r"[^A-Za-z0-9 ._+:/=-]")
 
 
 class NumberStyle(Struct, frozen=True):
-    """How a number is written: digits after the point; `strip` their trailing zeros (and the point
-    if nothing follows it)."""
+    """Format of a number: digits after the point; `strip` their trailing zeros (and the point if
+    nothing follows it)."""
 
     decimals: int
     strip: bool = False

@@ -35,8 +35,8 @@ PLANES: Final = {170: (0, 1, 2), 180: (2, 0, 1), 190: (1, 2, 0)}
 
 
 class ProgramFrame(Struct, frozen=True):
-    """Where the program's coordinates p lie on the machine, mm and degrees: R(p + shift) + origin,
-    with a turn R about Z."""
+    """Frame that maps coordinates p of the program to the machine: R(p + shift) + origin, with a
+    turn R about Z, mm and degrees."""
 
     origin: Point = (0.0, 0.0, 0.0)
     rotation: float = 0.0
@@ -54,7 +54,7 @@ class PartMoves:
         self.feed = 0.0
         """Of moves that are not rapids, mm/min."""
         self.chords = 0
-        """How many arcs became chords."""
+        """Count of arcs that became chords."""
         self.moved = False
         self._full_turn_rad = full_turn_rad
         self._frame = self._base = ProgramFrame()

@@ -96,8 +96,8 @@ def left_out(toolpath: Toolpath, kinds: Collection[Kind], sentence: Sentence) ->
 
 
 class ArcRules(Struct, frozen=True):
-    """What a dialect wants of arcs: `most_mm` of an offset; `chord_fits`: the chord must
-    not exceed twice the radius at the start (a controller that takes its arcsine)."""
+    """Rules of a dialect for arcs. `most_mm`: longest offset of a centre; `chord_fits`: the chord
+    must not exceed twice the radius at the start (a controller that takes its arcsine)."""
 
     decimals: int
     full_circles: Literal["halves", "whole"]

@@ -27,9 +27,9 @@ RAPID, LINE, ARC_CCW = 0, 10, 30
 
 
 class ArcRule(Struct, frozen=True):
-    """Which arcs a controller surely takes: radii at both ends above `radius_mm` that differ by no
-    more than `gap_mm`; what turns by less than `full_turn_rad` it may take for a full circle.
-    `ends_in_plane`: an arc must have X or Y."""
+    """Bounds of the arcs that a controller surely accepts: radii at both ends above `radius_mm`
+    that differ by at most `gap_mm`; an arc that turns by less than `full_turn_rad` may be executed
+    as a full circle. `ends_in_plane`: an arc must have X or Y."""
 
     gap_mm: float
     radius_mm: float
@@ -43,8 +43,8 @@ KINDS[[0, 10, 20, 30]] = [Kind.RAPID, Kind.LINE, Kind.ARC_CW, Kind.ARC_CCW]
 
 
 class PlainState(Struct, frozen=True):
-    """What is in force before plain blocks: the motion (a G word tenfold, −1: none), the feed
-    (0: none), mm of a unit, and where the tool stands."""
+    """State before a run of plain blocks: the motion (a G word tenfold, −1: none), the feed (0:
+    none), mm of a unit, and the position of the tool."""
 
     motion: int
     feed: float

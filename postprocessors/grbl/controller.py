@@ -366,8 +366,8 @@ def speeds_of(
 
 
 class Stops(Struct, frozen=True, eq=False):
-    """Where the machine comes to rest: before rows (N,), and at targets without a step that rows
-    (N,) have, None where there are no such rows."""
+    """Masks of the stops of the machine: before rows (N,), and at targets without a step within
+    rows (N,), None where there are no such rows."""
 
     rows: Bools
     lit: Bools | None

@@ -67,13 +67,13 @@ WHY: Final = {
     37: "G43.1 wants Z alone",
     38: "T beyond 255",
 }
-"""What grbl's errors say of a line."""
+"""Meaning of grbl's error numbers."""
 
 SIGNS: Final = {",": "a decimal comma", "#": "a parameter", "%": "a %", "[": "an expression"}
 """Signs that begin no word, and what they are elsewhere."""
 
 NONE, NON_MODAL, MOTION, LENGTH = range(4)
-"""What uses the coordinates of a block."""
+"""Use of the coordinates of a block."""
 
 PROBES: Final = 140
 """The motion of G38.2; those of G38.3 to G38.5 follow."""
@@ -106,7 +106,7 @@ def error(number: int, at: int | str | None, what: str = "", mend: str = "") -> 
 
 
 class ParserModes(Struct):
-    """What is in force from line to line."""
+    """Modal state, which holds from line to line."""
 
     motion: int = 0
     plane: int = 17

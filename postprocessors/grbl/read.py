@@ -59,7 +59,7 @@ def read_program(data: bytes, machine: GrblMachine) -> Toolpath:
 
 
 class _Reader:
-    """One reading of one program."""
+    """Reader of one program."""
 
     def __init__(self, data: bytes, machine: GrblMachine) -> None:
         dialect: GrblDialect = machine.dialect

@@ -1,4 +1,4 @@
-"""What grbl's own settings say of a machine: its answer to `$$`, as a file or as it was pasted.
+"""Settings of a machine from grbl's answer to `$$`, as a file or as it was pasted.
 
 Each setting is a line `$110=500.000` (grbl 1.1 wiki, "Grbl v1.1 Configuration"); senders put a
 prompt before it, grbl 0.9 and some senders its meaning behind it. Other lines (`ok`, the banner,
@@ -33,7 +33,7 @@ _KEYS = {
     for k, axis in enumerate("xyz")
     for key, number in _AXES.items()
 } | {"controller.junction_deviation_mm": 11, "controller.arc_tolerance_mm": 12}
-"""What every listing says ..."""
+"""Settings that every listing has ..."""
 
 FULL_SPEED, FACTORY_FULL_SPEED = 30, 1000.0
 """The setting of the speed at which the spindle gets full power, and what it is until somebody
@@ -166,7 +166,7 @@ def differences(text: str, machine: GrblMachine) -> tuple[list[str], list[str]]:
 
 
 NEAR_MM = 0.005
-"""What leaves the travel by less may be rounding."""
+"""Largest excess over the travel that may be rounding."""
 
 
 def beyond_travel(text: str, zero_mm: Place, reach_mm: tuple[Place, Place]) -> str:

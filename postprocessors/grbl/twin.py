@@ -59,7 +59,6 @@ RX_BYTES: Final = 128
 """The receive buffer (RX_BUFFER_SIZE, serial.h); what comes beyond it is lost without a word."""
 
 BANNER: Final = "\r\nGrbl 1.1h ['$' for help]\r\n"
-"""What it says when it begins."""
 
 BUILD: Final = "1.1h.20190830"
 """Its version in `$I` (grbl.h)."""
@@ -71,13 +70,13 @@ DOOR, JOG_CANCEL = 0x84, 0x85
 """Real-time bytes (config.h)."""
 
 FEED_OVERRIDES: Final = {0x90: None, 0x91: 10, 0x92: -10, 0x93: 1, 0x94: -1}
-"""What real-time bytes add to the override of feeds, in percent; None: 100 % again (config.h)."""
+"""Changes of the feed override by real-time bytes, percent; None: back to 100 % (config.h)."""
 
 RAPID_OVERRIDES: Final = {0x95: 100, 0x96: 50, 0x97: 25}
 """The override of rapids that real-time bytes set, in percent (config.h)."""
 
 SPINDLE_OVERRIDES: Final = {0x99: None, 0x9A: 10, 0x9B: -10, 0x9C: 1, 0x9D: -1}
-"""What real-time bytes add to the override of the spindle, in percent; None: 100 % again."""
+"""Changes of the spindle override by real-time bytes, percent; None: back to 100 %."""
 
 SPINDLE_STOP, TOGGLE_FLOOD, TOGGLE_MIST = 0x9E, 0xA0, 0xA1
 """Real-time bytes that stop the spindle of a held machine, and switch its coolant."""
@@ -102,7 +101,8 @@ DWELL_STEP_S: Final = 0.05
 """It looks at its flags so often in a dwell (DWELL_TIME_STEP)."""
 
 DOOR_SPINDLE_S, DOOR_COOLANT_S = 4.0, 1.0
-"""What comes back after the door was open (SAFETY_DOOR_…_DELAY, config.h)."""
+"""Waits until spindle and coolant are restored after the door was open (SAFETY_DOOR_…_DELAY,
+config.h)."""
 
 SEGMENT_S: Final = 0.01
 """The length of a piece of a block (ACCELERATION_TICKS_PER_SECOND, config.h)."""
@@ -112,7 +112,7 @@ SEGMENTS: Final = 5
 (SEGMENT_BUFFER_SIZE − 1, stepper.h)."""
 
 SEARCH, LOCATE = 1.5, 5.0
-"""How far homing searches: times the travel, then times the pull-off (limits.c)."""
+"""Distances of homing: a multiple of the travel, then of the pull-off (limits.c)."""
 
 INCHES_PER_MM: Final = 0.0393701
 """As it stands in nuts_bolts.h."""
@@ -167,7 +167,7 @@ NEVER_CLOSED: Final = -1e6
 
 
 class GrblTwinSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """How this grbl is set up. `homing`: "on" has switches at both ends of the travel, and locks
+    """Set-up of a virtual grbl. `homing`: "on" has switches at both ends of the travel, and locks
     it until `$H` or `$X` ($22). `opening`: whether DTR resets the board when its port is opened,
     as that of an Uno, which then forgets its place. `probe_mm`: at or below this height on the
     machine, as it is when the power comes on, the probe is closed."""
@@ -206,7 +206,7 @@ Phase = tuple[float, float, float]
 """A part of a block at one acceleration: seconds, speed at its start, acceleration."""
 
 Wait = Generator[float | None, None, None]
-"""What waits: for anything (None), or until a time."""
+"""Coroutine that waits for any event (None) or until a time."""
 
 Line = Generator[float | None, None, int]
 """A line at work; returns its error, 0 for ok."""
@@ -1928,7 +1928,6 @@ def _end_speed(phases: list[Phase]) -> float:
 
 
 SPEED_EPS_MM_S: Final = 1e-9
-"""What is slower stands."""
 
 
 def _times(phases: list[Phase], at: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""How programs are sent to grbl 1.1: lines, as many as its buffer takes, and their answers.
+"""Protocol of grbl 1.1: lines, as many as its buffer takes, and their answers.
 
 grbl answers each line with `ok` or `error:N`, in order. Its serial buffer holds 128 bytes and
 drops what is beyond them without a word; so no more than 127 bytes may be in it. Counting answers
@@ -256,7 +256,7 @@ class _Line:
     def __init__(self, data: bytes, packet: int | None = None) -> None:
         self.data = data
         self.packet = packet
-        """How many packets are sent with it; None for what is none."""
+        """Number of packets sent with this line included; None for a line that is no packet."""
         self.seen = False
         """Of a query: whether its report has come, and only its `ok` is missing."""
 

@@ -29,7 +29,7 @@ HEADER = ("G17 {unit} G90 G94", "G54")
 always offsets, so G91.1 is not written."""
 
 BY_HAND = ("the spindle does not stop by itself: stop it",)
-"""What the operator is told where a hand switches the spindle."""
+"""Message to the operator of a spindle that is switched by hand."""
 
 
 def write_program(toolpath: Toolpath, machine: GrblMachine) -> Program:

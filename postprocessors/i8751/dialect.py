@@ -27,7 +27,7 @@ MOST_LOW_BYTE: Final = 255
 
 
 class I8751Dialect(Firmware, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """How programs look, how near lines are followed, and one reading for each open question.
+    """Format of programs, tolerances of lines, and one reading for each open question.
 
     `tolerance_mm`: how far the dog-leg of a line may stray from it; `arc_tolerance_mm`: how far
     the chords of an arc may. `plus_backward`: axes ("xz") whose motors turn backward for +. The
@@ -93,8 +93,8 @@ class I8751Controller(SlideStart, frozen=True, tag_field="model", tag="i8751"):
 
 
 class I8751Link(Link, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What its thesis leaves open beside the replies of `[dialect]`: whether the end of a packet,
-    which is stored too (L4343-4352), is answered by an M before its F."""
+    """Option for what the thesis leaves open beside the replies of `[dialect]`: whether the end of
+    a packet, which is stored too (L4343-4352), is answered by an M before its F."""
 
     packet_end: Literal["F", "M F"] = "F"
 

@@ -13,7 +13,6 @@ X, Y, Z, BEFORE, AFTER = range(5)
 seconds before and after Z."""
 
 COLUMNS = 5
-"""How many columns."""
 
 _FORWARD, _BACKWARD, _STANDS, _KEY, _PACKET_END, _DATA_END = 3, 4, 5, 0x13, 0x45, 0x54
 

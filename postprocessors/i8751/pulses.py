@@ -40,7 +40,7 @@ BURST_PULSES: Final = 255
 
 
 class Firmware(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """One reading for each question on pulses that the thesis leaves open: keys of `[dialect]`.
+    """Readings of the thesis where it leaves a question on pulses open: keys of `[dialect]`.
 
     `high_byte`: steps of one unit of PH (L4121-4127), or bursts with ramps of their own (L5039).
     `first_pulse`: whether the first pulse of a motor's move is the last one again (L4556-4566).

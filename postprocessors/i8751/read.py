@@ -222,7 +222,7 @@ class PacketReader:
         self._records = 0
         self._at = 0
         self._inside = 0
-        """How many records of the packet have been read."""
+        """Count of the records of the packet read so far."""
 
     def read(self) -> Decoded:
         """All records of the stream."""

@@ -109,7 +109,7 @@ def _check_coordinates(toolpath: Toolpath, machine: I8751Machine) -> None:
 
 
 class Counts(Struct):
-    """What was changed, for the findings; places name the first of each kind."""
+    """Counts of the writer's changes, for the findings; places name the first of each kind."""
 
     arcs: int = 0
     chords: int = 0

@@ -38,11 +38,11 @@ SENSES: Final = (3, 4, STANDS)
 """Forward, backward, standing (L4106-4119)."""
 
 LINE_ENDS: Final = {"none": b"", "cr": b"\r", "lf": b"\n", "crlf": b"\r\n"}
-"""What may stand behind LISTO and OTRO."""
+"""Possible line ends behind LISTO and OTRO."""
 
 
 class I8751TwinSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What the thesis leaves open.
+    """Options for what the thesis leaves open.
 
     `key`: 13H opens the acquisition "once", or stands before "each-packet". `line_end`: behind
     LISTO and OTRO. `motor_reply`: to the number of a motor, printed as B and as 8. `dwell_reply`:

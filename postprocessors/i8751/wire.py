@@ -1,4 +1,4 @@
-"""How programs are sent to the Intel 8751: a byte, its reply, the next byte; a packet, its F.
+"""Protocol of the Intel 8751: a byte, its reply, the next byte; a packet, its F.
 
 2400 8N1 (L3921), raw bytes; 13H and 11H are data, so that no flow control may be on. The key 13H
 is answered by LISTO, or by OTRO, and is then sent again (L4397-4426). Each byte of a record is
@@ -33,7 +33,7 @@ TRIES: Final = 5
 """So often the key is sent; ours."""
 
 SLOWER: Final = 1.05
-"""How much longer than simulated a packet may take, beyond what the line is late."""
+"""Factor on the simulated time of a packet, beyond the lateness of the line."""
 
 ANY: Final = "?"
 """A reply of which nothing is known, not even whether there is one."""
@@ -44,8 +44,8 @@ NONE: Final = "-"
 """No reply."""
 
 ROUND_TRIP_S: Final = 2.0 * 10.0 / 2400.0 * 0.9
-"""What comes sooner behind a byte cannot be its reply, s: both take ten bits on the line; a tenth
-is for clocks that are not alike."""
+"""Shortest time between a byte and its reply, s: both take ten bits on the line, less a tenth for
+clocks that differ."""
 
 UNANSWERED: Final = 2.0
 """A byte without a reply is given so many times the lateness of the line."""

@@ -70,7 +70,7 @@ COLUMNS: Final = 18
 """Key, then M G PH PL for X and Y, a pair, the same for Z, a pair, end of packet."""
 
 MOTOR_COLUMNS: Final = (1, 5, 11)
-"""Where X, Y and Z begin in a row of the table."""
+"""Columns at which X, Y and Z begin in a row of the table."""
 
 PAIR_COLUMNS: Final = (9, 15)
 

@@ -41,7 +41,7 @@ class Canon(PartMoves):
         self.queue: list[Queued | Callable[[], None]] = []
         self._events = 0
         self.nose: tuple[float, float] = (0.0, 0.0)
-        """Where the controlled point of a lathe tool lies from the centre of its nose: X, Z."""
+        """Controlled point of a lathe tool, from the centre of its nose: X, Z."""
 
     @property
     def moves(self) -> int:

@@ -51,11 +51,11 @@ class Compensation:
         self.side = 0
         self.radius = 0.0
         self.first = True
-        """Whether the next move is the first one beside the path."""
+        """True if the next move is the first one beside the path."""
         self.programmed = [0.0, 0.0, 0.0]
         self._canon = canon
         self._from: Flat | None = None
-        """Where the waiting move begins."""
+        """Start of the waiting move."""
 
     @property
     def active(self) -> bool:

@@ -131,7 +131,7 @@ class PlannedWindow(Struct, frozen=True, eq=False):
 
 
 class _Run:
-    """One run of a program, some thousand rows at a time.
+    """Run of a program, planned in windows of some thousand rows.
 
     A block of rows begins where a move does. Planned with it are the move before it, for the
     corner between them, and as many moves behind it as the planner knows of. Moves begin at
@@ -403,9 +403,10 @@ def _along_moves(
 
 
 class CornerModes(Struct, frozen=True, eq=False):
-    """How rows of a mode (an index, as in `Toolpath.mode`) meet the corners behind them: `table`
-    has a row for each, of numbers: whether they blend, whether they stop (neither: the path is
-    kept without a stop), the tolerance of blends in mm, inf: none, and that of merging, 0: none.
+    """Treatment of the corner behind a row, by its mode (an index, as in `Toolpath.mode`). Columns
+    of `table`, a row for each mode: 1 if corners are blended; 1 if the tool stops (neither: it
+    follows the path without a stop); the tolerance of blends, mm, inf: none; the tolerance of
+    merging, mm, 0: none.
     """
 
     table: Floats
@@ -478,7 +479,7 @@ def _machine_mode(machine: _Machine) -> PathMode:
 # the servo.
 
 NORMAL_RATIO = np.sqrt(0.75)
-"""How much of the acceleration a turn may take (BLEND_ACC_RATIO_NORMAL)."""
+"""Largest share of the acceleration for turning (BLEND_ACC_RATIO_NORMAL)."""
 
 TANGENT_RATIO = 0.5
 """Fraction of the acceleration that is used along the path of an arc
@@ -800,14 +801,13 @@ LEAST_BEND_RAD = 1e-3
 
 
 class PlannerCorners(Struct, frozen=True, eq=False):
-    """What happens at the start of each of M moves: `speed` (M,) mm/s, 0 for a stop; `lost` (M,):
-    the part of the acceleration that a bend takes from the moves on both sides; `reach` and
-    `reach_on` (M,) mm: how far from the corner a blend begins on the move before, and ends on the
-    move behind, 0 without one; `acceleration` (M,) mm/s² along blends; `way` (M,) mm along them;
-    `shape` (3, M, 3): their centres, and from there to where they begin and end. Where moves
-    overlap: `before` and `behind` (M,) mm, how far from the corner they do, `overlap` (M,) s, for
-    how long, and `ramp` (M,), in which part of that time the second of them speeds up; 0
-    elsewhere."""
+    """Corners at the starts of M moves: `speed` (M,) mm/s, 0 for a stop; `lost` (M,): the part of
+    the acceleration that a bend takes from the moves on both sides; `reach` and `reach_on` (M,)
+    mm: how far from the corner a blend begins on the move before, and ends on the move behind, 0
+    without one; `acceleration` (M,) mm/s² along blends; `way` (M,) mm along them; `shape` (3, M,
+    3): their centres, and from there to where they begin and end. Where moves overlap: `before`
+    and `behind` (M,) mm, how far from the corner they do, `overlap` (M,) s, for how long, and
+    `ramp` (M,), in which part of that time the second of them speeds up; 0 elsewhere."""
 
     speed: Floats
     lost: Floats
@@ -1131,8 +1131,8 @@ LEAST_THETA_RAD = np.pi / 12.0
 
 
 class _Side(Struct, frozen=True, eq=False):
-    """One of the two moves at K corners, in the plane as complex numbers: its tangent there, and
-    of arcs the circle that touches it (`centre`, `radius`), the `sign` by which a blend's radius
+    """One of the two moves at K corners, in the plane as complex numbers: its tangent there, of
+    arcs the circle that touches it (`centre`, `radius`), the `sign` by which a blend's radius
     counts where it touches it from inside (−1) or outside (1), and the angle `most` that a blend
     may use; so much of the move counts, `longest` mm, and by so much θ is `less`."""
 

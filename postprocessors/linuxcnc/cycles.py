@@ -37,7 +37,7 @@ MOST_PASSES: Final = 100_000
 
 
 class _Hole(Struct):
-    """One hole, in (first, second, normal) of the plane."""
+    """Heights and place of a hole, in (first, second, normal) of the plane."""
 
     at: list[float]
     r: float

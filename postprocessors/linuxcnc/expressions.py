@@ -342,7 +342,7 @@ RANKS: Final = {
     **dict.fromkeys(("and", "or", "xor"), 2),
     "]": 1,
 }
-"""What binds more tightly has the higher number."""
+"""Precedence of operators; higher ones bind more tightly."""
 
 _BY_LENGTH: Final = sorted(RANKS, key=len, reverse=True)
 

@@ -56,7 +56,7 @@ class TextPosition(Struct):
 
 
 class FlowLabel(Struct):
-    """Where a label was seen first, by which word; and how often a `repeat` is still to run, −1:
+    """First place of a label, the word that used it, and the repetitions left of a `repeat`, −1:
     it has not begun."""
 
     kind: str
@@ -111,9 +111,9 @@ class Flow:
     deleted: dict[int, None] = field(default_factory=dict)
     """Lines of the program that begin with /, counted from 1."""
     branches: bool = False
-    """Whether there has been an O word."""
+    """True if there has been an O word."""
     keep: bool = True
-    """Whether lines may be read again."""
+    """True if lines may be read again."""
     _labels: dict[str, FlowLabel] = field(default_factory=dict)
     _seeking: str | None = None
     _seeking_sub: str | None = None

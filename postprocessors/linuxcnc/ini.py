@@ -1,4 +1,4 @@
-"""What LinuxCNC's INI file says of a machine.
+"""Settings of a machine from LinuxCNC's INI file.
 
 Keys and units are those of its manual, "INI Configuration": lengths in LINEAR_UNITS of [TRAJ],
 velocities in these a second. Axes have their limits in [AXIS_X] and so on; what is a motor's, its

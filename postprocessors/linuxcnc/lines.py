@@ -124,7 +124,7 @@ def column_of(text: str, at: int) -> int:
 
 
 class LinuxcncBlock(Struct, frozen=True):
-    """What a line asks for: numbers by letter, G codes (tenfold) and M codes by group, the last
+    """Words of a line: numbers by letter, G codes (tenfold) and M codes by group, the last
     comment, and the parameters that it sets."""
 
     words: dict[str, float]
@@ -145,8 +145,8 @@ class Item(Struct, frozen=True):
 
 
 class ParsedLine:
-    """One line. `delete`: it begins with /; `flow`: where its O word begins, None for a line of
-    words; `begin`: where it begins behind / and N."""
+    """Scanned line. `delete`: it begins with /; `flow`: where its O word begins, None for a line
+    of words; `begin`: where it begins behind / and N."""
 
     __slots__ = (
         *("_block", "_compiled", "_items", "begin", "comment", "delete", "flow", "text"),

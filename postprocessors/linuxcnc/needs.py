@@ -1,5 +1,5 @@
-"""What the words of a block need: the motion that it asks for, and whether something uses each of
-its words (enhance_block, check_g_codes and check_other_codes of LinuxCNC).
+"""Needs of the words of a block: its motion, and a use for each of its words (enhance_block,
+check_g_codes and check_other_codes of LinuxCNC).
 """
 
 from __future__ import annotations

@@ -29,7 +29,7 @@ UNKNOWN: Final = {
     **dict.fromkeys(range(5061, 5071), "a result of probing"),
     5399: "the result of M66",
 }
-"""What only the machine knows."""
+"""Parameters whose values only the machine knows."""
 
 DEBUG: Final = 5599
 """1 at first: `(debug,…)` is shown where it is above 0."""
@@ -51,7 +51,7 @@ class Parameters:
     ) -> None:
         self.unset: dict[int, int] = {}
         self.compensating = False
-        """Whether the cutter's radius is compensated, when the position cannot be read."""
+        """True while the cutter's radius is compensated; the position cannot be read then."""
         self.line = 0
         """Number of the line that is executed."""
         self._values = {DEBUG: 1.0, 5600: 0.0, 5601: 0.0, **known}

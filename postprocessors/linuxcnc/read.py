@@ -77,7 +77,7 @@ def read_program(data: bytes, machine: LinuxcncMachine, folder: Path | None = No
 
 
 class _Reader:
-    """One reading of one program."""
+    """Reader of one program."""
 
     def __init__(self, data: bytes, machine: LinuxcncMachine, folder: Path | None) -> None:
         dialect: LinuxcncDialect = machine.dialect

@@ -59,8 +59,8 @@ class InterpreterNotes(Struct):
 
 
 class Series(Struct):
-    """What cycles keep from block to block: the height at which the first of them began (None:
-    none has), and the words R, P, Q, I, J, K and that of the depth."""
+    """Values that canned cycles keep from block to block: the height at which the first of them
+    began (None: none has), and the words R, P, Q, I, J, K and that of the depth."""
 
     height: float | None = None
     words: dict[str, float] = field(default_factory=dict)
@@ -123,7 +123,6 @@ class InterpreterState:
         self._order = 3
         self._leaving = (0.0, 0.0)
         self.series: Series | None = None
-        """What cycles keep, where there have been any."""
         self._compensation: Compensation | None = None
         self._first_frame: int | None = None
         self._placed: set[int] = set()

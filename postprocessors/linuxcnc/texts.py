@@ -70,7 +70,7 @@ class ProgramText(ProgramLines):
 
 
 class Folder:
-    """Where the files of subs are looked for; None: the program has no place of its own."""
+    """Folder in which the files of subs are looked for; None for a program that is no file."""
 
     def __init__(self, folder: Path | None, line_chars: int) -> None:
         self._folder = folder

@@ -40,7 +40,8 @@ BLOCK: Final = re.compile(rb"[A-Za-z#]")
 
 
 class LinuxcncTwinSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """How it is found. `power`: "ready" (switched on and homed), "on" (not homed), or "estop"."""
+    """State in which it is found. `power`: "ready" (switched on and homed), "on" (not homed), or
+    "estop"."""
 
     power: Literal["ready", "on", "estop"] = "ready"
 
@@ -73,7 +74,7 @@ class LinuxcncTwin(Twin):
         self._segment_s = 0.0
         self._homing = False
         self.read_file: Callable[[str], bytes] = lambda name: Path(name).read_bytes()
-        """How it opens files."""
+        """Function that reads the file of a program."""
         self._hang_up()
 
     def _hang_up(self) -> None:

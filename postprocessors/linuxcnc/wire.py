@@ -1,4 +1,4 @@
-"""How programs are sent to LinuxCNC: as a file that it opens, watched through linuxcncrsh.
+"""Protocol of LinuxCNC: it opens the program as a file, and is watched through linuxcncrsh.
 
 linuxcncrsh takes one line of text at a time over TCP and answers it (linuxcncrsh(1) of LinuxCNC
 2.9, tried with Debian's linuxcnc-uspace). LinuxCNC itself reads the program, so that nothing of it
@@ -36,7 +36,7 @@ from ..gcode.blocks import has_words
 from .dialect import LinuxcncLink, LinuxcncMachine
 
 POLLS: Final = 4
-"""How it stands is asked whenever so many times the lateness of the line (0.2 s) is over."""
+"""Interval of status queries, in multiples of the lateness of the line (0.2 s)."""
 
 HOMES_S: Final = 600.0
 """Homing takes no longer."""
@@ -67,7 +67,7 @@ _ENDS = re.compile(rb"[\r\n]+")
 _LINES = re.compile(r"\r\n|\n|\r")
 
 Script = Generator["str | float", str, None]
-"""What is held: requests and waits go out, answers come in."""
+"""Coroutine of a conversation: it yields requests and waits, and receives answers."""
 
 
 class _Refused(Exception):
@@ -150,7 +150,7 @@ def _link(machine: LinuxcncMachine) -> LinuxcncLink:
 
 
 class LinuxcncConversation(Conversation):
-    """One request at a time, and its answer."""
+    """Conversation of single requests, each followed by its answer."""
 
     def __init__(
         self,
@@ -175,7 +175,7 @@ class LinuxcncConversation(Conversation):
         self._begun = self._aborting = self._pausing = self._going_on = False
         self._why_aborted = ""
         self._said = ""
-        """What it has said of errors."""
+        """Errors that it has reported."""
         self._ends = np.cumsum([packet.seconds for packet in packets])
         self._lines = [packet.counts[0] for packet in packets]
 

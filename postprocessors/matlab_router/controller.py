@@ -116,7 +116,7 @@ class MatlabRouterModel(ControllerModel[MatlabRouterController, MatlabRouterDial
 
 
 class _Run:
-    """One run of a toolpath; ProgramError for rows that the controller cannot follow."""
+    """Run of a toolpath; ProgramError for rows that the controller cannot follow."""
 
     def __init__(self, path: Toolpath, machine: _Machine, options: Options) -> None:
         self._rows = path.executed_rows
@@ -199,10 +199,10 @@ INT16 = 0xFFFF
 """The slaves' counter of chunks is unsigned, 16 bits (L5589-5600)."""
 
 INT32 = 0x7FFFFFFF
-"""What is ordered, here, fits a signed int of 32 bits."""
+"""Orders of the master must fit a signed int of 32 bits."""
 
 NUMBERS_OF_HEADER, NUMBERS_OF_LINE = 3, 4
-"""How many numbers the PC sends for a job, and for each of its lines (L4294-4360)."""
+"""Counts of numbers that the PC sends for a job and for each of its lines (L4294-4360)."""
 
 PATIENCE, PATIENCE_TICKS = 4.0, 400.0
 """A line is given up after so many times what its speeds should need, and two seconds more."""

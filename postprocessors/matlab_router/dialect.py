@@ -182,11 +182,11 @@ class MatlabRouterController(SlideStart, frozen=True, tag_field="model", tag="ma
 
 
 class MatlabRouterLink(Link, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What its thesis leaves open. `echo`: whether the master sends back what it takes, as the
-    library of its compiler does; "detected": it is looked for behind the first number of a job.
-    `reset`: who resets the master before the next job: the user by "hand", the "opening" of the
-    port, or "none" where a master takes one job after the other. `margin_s`: how long a job is
-    left alone beyond its simulated time."""
+    """Options for what the thesis leaves open. `echo`: whether the master sends back what it
+    takes, as the library of its compiler does; "detected": it is looked for behind the first
+    number of a job. `reset`: who resets the master before the next job: the user by "hand", the
+    "opening" of the port, or "none" where a master takes one job after the other. `margin_s`: how
+    long a job is left alone beyond its simulated time."""
 
     echo: Literal["detected", "echo", "none"] = "detected"
     reset: Literal["hand", "opening", "none"] = "hand"

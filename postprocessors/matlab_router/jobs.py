@@ -48,7 +48,7 @@ _LIST: Final = re.compile(r"\{" + r",[ \t]*".join(NAMES) + r"\}")
 
 HEADER: Final = ("size_of_array", "first_pointx", "first_pointy")
 BODY: Final = {"lxy": 0, "velxy": 2}
-"""Which of the four rows of n numbers an array's x stands in."""
+"""Index of the row with an array's x, among the four rows of n numbers."""
 
 NUMBERS_PER_LINE: Final = 4
 """In a stream: two distances and two speeds."""
@@ -140,7 +140,7 @@ def _refuse(job: ReadJob, name: str, bad: Bools, what: str) -> None:
 
 
 class _Value(Struct, frozen=True, eq=False):
-    """What a name was set to: numbers (rows, columns), and where they begin in the text."""
+    """Value of a name: numbers (rows, columns), and the offset of their text."""
 
     table: Ints
     offset: int

@@ -102,7 +102,7 @@ def jobs_of(
 
 
 class _Maker:
-    """One run over all lines; `changes` counts what it changes."""
+    """Conversion of all lines; `changes` counts what it changes."""
 
     def __init__(
         self, toolpath: Toolpath, machine: MatlabRouterMachine, dialect: ResolvedDialect
@@ -307,7 +307,8 @@ class _Maker:
 
 
 class LineLimits(Struct, frozen=True):
-    """How far a line may bend, the grid of its ends, and the least distance; all in units."""
+    """Limits of a line, in units: its deviation from a straight one, the grid of its ends, and the
+    shortest distance."""
 
     tolerance: float
     grid: int
@@ -374,7 +375,7 @@ def _pieces(longer: int, shorter: int, counts: int, limits: LineLimits) -> list[
 
 
 class LineChanges(Struct):
-    """What one run of the writer changed; places name the worst or the first of each kind."""
+    """Counts of the writer's changes; places name the worst or the first of each kind."""
 
     snap_mm: float = 0.0
     snap_place: str = ""

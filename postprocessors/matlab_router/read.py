@@ -256,7 +256,7 @@ def _off(distance: Floats, speed: Ints, along: Floats) -> Floats:
 
 
 class Worst(Struct):
-    """How many are beyond a limit, by how much at most, and where the first is."""
+    """Count of excesses over a limit, the largest, and the place of the first."""
 
     count: int = 0
     most: float = 0.0
@@ -277,7 +277,7 @@ class Worst(Struct):
 
 
 class JobFindings(Struct):
-    """What all jobs have that the machine does otherwise, or cannot do."""
+    """Counts of what the machine does otherwise, or cannot do, in all jobs."""
 
     machine: MatlabRouterMachine
     dialect: ResolvedDialect

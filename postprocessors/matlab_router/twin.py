@@ -32,7 +32,7 @@ CHARACTERS: Final = 6
 """A number has no more: the others are dropped (a buffer of 7, L4668-4708)."""
 
 PRINTABLE: Final = range(ord(" "), ord("~") + 1)
-"""What the library's get_string_usb takes, and sends back; it drops the others."""
+"""Characters that the library's get_string_usb takes and sends back; it drops the others."""
 
 HEADER: Final = 3
 """Numbers of a job before those of its lines (L4294-4360)."""
@@ -46,7 +46,7 @@ NUMBER: Final = re.compile(rb"[+-]?\d+")
 class MatlabRouterTwinSettings(
     msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 ):
-    """What the thesis leaves open.
+    """Options for what the thesis leaves open.
 
     `echo`: the master sends back the characters that it takes, or "none". `reset`: it is reset
     when somebody opens the port and nothing moves (as a user's hand would), or, as a mended master

@@ -1,4 +1,4 @@
-"""How programs are sent to the Matlab router: the numbers of a job, then its simulated time.
+"""Protocol of the Matlab router: the numbers of a job, then a wait for its simulated time.
 
 Each number goes out in digits and a carriage return, with a pause behind it (L4294-4360). Nothing
 is acknowledged: homing begins on the last number (L4668-4929), and nothing tells when a job is
@@ -42,7 +42,6 @@ END: Final = b"\r"
 """Behind each number."""
 
 SLOWER: Final = 1.05
-"""How much longer than simulated a job may take."""
 
 LISTENED: Final = 10.0
 """An echo is looked for during so many times the lateness of the line (0.5 s)."""
@@ -171,9 +170,9 @@ class MatlabRouterConversation(PacketByPacket):
         self._left: list[bytes] = []
         self._count = 0  # how many numbers of the job are out
         self._echo = b""
-        """What is still to come back of the number that is out."""
+        """Rest of the expected echo of the last number."""
         self._echoes = False
-        """Whether the master sends back what it takes."""
+        """True if the master sends back what it takes."""
         self._moving = False
 
     def _send(self, packet: Packet, now: float) -> None:

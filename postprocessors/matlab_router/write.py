@@ -62,7 +62,7 @@ Pair = tuple[list[int], list[int]]
 
 
 class JobNumbers(Struct, frozen=True):
-    """One job as the words of its numbers: x and y in a pair each."""
+    """Words of the numbers of a job, x and y in pairs."""
 
     count: int
     first: tuple[int, int]

@@ -1,4 +1,4 @@
-"""Where an arc block may end, so that the controller really stops there.
+"""Search for ends of arc blocks at which the controller really stops.
 
 How the controller knows the end of an arc is not described (L1859-1862), nor with which error D it
 starts; by the strictest reading it stops only when it stands exactly on the end step. Start, end
@@ -60,9 +60,9 @@ LANDING_X, LANDING_Y, ITERATION = range(3)
 
 
 class LandingSearch:
-    """What the search for one landing after the other needs: the form's units to a step and the
-    most units that it can say; a state (5,), and room for positions of a path with D = 0 at the
-    start and for which of them turn no axis round."""
+    """Parameters and scratch buffers of the search for landings: the form's units per step and its
+    largest number of units; a state (5,), and buffers for the positions of a path with D = 0 at
+    the start and for the mask of those that reverse no axis."""
 
     def __init__(self, units_per_step: float, most_units: int, room: int) -> None:
         self.units_per_step, self.most_units = units_per_step, most_units

@@ -14,7 +14,6 @@ where it has none; the number of its G; whether it is one of Z; its characters w
 around it and its ;."""
 
 COLUMNS = 9
-"""How many columns."""
 
 WHOLE_DIGITS, DECIMALS, FEED_DIGITS = 5, 2, 2
 """Digits of a coordinate, after the point (in the example form alone), and of a feed."""

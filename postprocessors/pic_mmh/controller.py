@@ -153,7 +153,7 @@ def _counted(fill: Filler) -> Filler:
 
 
 class PicMmhRun:
-    """One run of a toolpath; ProgramError for rows that the controller cannot follow."""
+    """Run of a toolpath; ProgramError for rows that the controller cannot follow."""
 
     def __init__(self, toolpath: Toolpath, machine: _Machine, options: Options) -> None:
         self._toolpath, self._options = toolpath, options

@@ -11,7 +11,7 @@ from camtool.machine.ranges import Count
 
 
 class PicMmhDialect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Which of the thesis's two forms of a coordinate is used, and how long a block may be.
+    """Choice between the thesis's two forms of a coordinate, and the longest block.
 
     `form` "example": `X02969.00`, sign only when negative (L1731); "annex": `X+02969` (L3284).
     `buffer_chars`: characters that the controller's buffer takes, `;` included; None: as many as
@@ -39,10 +39,10 @@ class PicMmhController(SlideStart, frozen=True, tag_field="model", tag="pic-mmh"
 
 
 class PicMmhLink(Link, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What its thesis leaves open. `echo`: each block comes back, at its end or character by
-    character ("echo"), or not at all ("none"). `step_byte`: a byte for each output of steps, in
-    "bits", or one for each axis in it, as "letters", or "none". `compensation`: whether the steps
-    of a compensation are "reported" too, or "silent"."""
+    """Options for what the thesis leaves open. `echo`: each block comes back, at its end or
+    character by character ("echo"), or not at all ("none"). `step_byte`: a byte for each output of
+    steps, in "bits", or one for each axis in it, as "letters", or "none". `compensation`: whether
+    the steps of a compensation are "reported" too, or "silent"."""
 
     echo: Literal["echo", "none"] = "echo"
     step_byte: Literal["bits", "letters", "none"] = "bits"

@@ -42,8 +42,8 @@ def positions(toolpath: Toolpath, start: Ints, ends: Ints, home: Ints) -> Ints:
 
 
 class CommandedPath(Struct, frozen=True, eq=False):
-    """Where the controller is to go: `places` (N + 1, 3) of `positions`, `centres` (N, 2) steps of
-    the arcs among the rows of the toolpath, `stops` (N,) samples of arcs or −1."""
+    """Path that the controller is to follow: `places` (N + 1, 3) of `positions`, `centres` (N, 2)
+    steps of the arcs among the rows of the toolpath, `stops` (N,) samples of arcs or −1."""
 
     toolpath: Toolpath
     places: Ints

@@ -145,7 +145,7 @@ def _mm(whole: str, decimals: str) -> float:
 
 
 class _Excess(Struct):
-    """How many blocks go beyond a limit, by how much at most, and where first."""
+    """Count of blocks beyond a limit, the highest value, and the first of them."""
 
     count: int = 0
     most: float = 0.0
@@ -294,7 +294,7 @@ class _Reader:
 
 
 class BlockFault(Struct, frozen=True):
-    """Where a block goes wrong (column from 1), how, and how to fix it."""
+    """Fault of a block: its column (from 1), what is wrong, and the remedy."""
 
     column: int
     message: str

@@ -32,7 +32,7 @@ RETREAT_STEPS: Final = 400
 """Steps back from the switches of HOME (L1700-1705)."""
 
 FASTER: Final = 1.25
-"""What W and V multiply and divide the rate of the joystick by; ours, no number is given."""
+"""Factor by which W raises and V lowers the rate of the joystick; ours, no number is given."""
 
 JOYSTICK_STEPS: Final = 1 << 12
 """So many steps of the joystick are made at a time."""
@@ -47,7 +47,7 @@ JOYSTICK: Final = re.compile(rb"J[XYZ][+-]|&(?:[XYZ][+-]){2,3}")
 
 
 class PicMmhTwinSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What the thesis leaves open.
+    """Options for what the thesis leaves open.
 
     `echo`: the "string" comes back when it has ended (L1594), each "character" at once (L1670), or
     "none". `step_byte`: one byte for each output, "bits" (0x40, and for X, Y and Z in turn a bit

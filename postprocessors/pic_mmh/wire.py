@@ -1,4 +1,4 @@
-"""How programs are sent to the PIC18F8720: a block, its echo, its steps, the next block.
+"""Protocol of the PIC18F8720: a block, its echo, its steps, the next block.
 
 A block goes out whole and comes back (L1592-1596, L1670-1673); what comes back is compared. Then
 it is executed, and each output of steps reports a byte; any character that comes meanwhile stops
@@ -32,7 +32,7 @@ ALTO: Final = b"A;"
 _STEPS = re.compile(rb"P[XYZ][+-](\d{4});")
 
 SLOWER: Final = 1.05
-"""How much longer than simulated a block may take, beyond what the line is late."""
+"""Factor on the simulated time of a block, beyond the lateness of the line."""
 
 UNTIL_SILENT: Final = -1
 """The first of the reports of what nobody can count beforehand, as homing; behind it the fewest

@@ -67,7 +67,7 @@ def _refuse_chords(where: str) -> NoReturn:
 
 
 class _Writer:
-    """One toolpath, lowered to N rows, and what is changed on the way to its blocks."""
+    """Writer of one toolpath, lowered to N rows; it counts the changes on the way to blocks."""
 
     def __init__(self, toolpath: Toolpath, machine: PicMmhMachine) -> None:
         dialect = machine.dialect
@@ -494,7 +494,7 @@ def chord_ends(start: Floats, centre: Floats, sweep_rad: Floats, sagitta_mm: flo
 
 
 class WriterChanges(Struct):
-    """What one run of the writer changed, counted; places name the first of each kind."""
+    """Counts of the writer's changes; places name the first of each kind."""
 
     dropped: int = 0
     """Moves of less than a step."""

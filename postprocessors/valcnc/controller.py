@@ -117,8 +117,9 @@ class ValcncModel(ControllerModel[ValcncController, ValcncDialect]):
 
 
 class DrawingProgress(Struct, frozen=True, eq=False):
-    """How far it has drawn: the last point (3,) mm to which it drew a line, which an arc's angle
-    puts beside the end that was programmed, and where its motors then stand, (3,) steps."""
+    """State behind the lines drawn so far: the last point (3,) mm, which after an arc lies beside
+    the programmed end by the error of the controller's angle, and the positions of the motors
+    there, (3,) steps."""
 
     point: Floats
     steps: Ints
@@ -146,7 +147,7 @@ class _Pieces:
         count = toolpath.executed_rows
         self._end = toolpath.end[:count]
         self.drawn = drawn or DrawingProgress(toolpath.start, self.in_steps(toolpath.start))
-        """Where the legs that were asked for end."""
+        """State at the end of the legs computed so far."""
         self._arc_rows = np.flatnonzero(toolpath.is_arc[:count])
         self._arcs = self._angles(toolpath, count)
         parts = np.zeros(count + 1, dtype=np.int64)

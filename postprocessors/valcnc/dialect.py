@@ -65,9 +65,9 @@ class ValcncController(SlideStart, frozen=True, tag_field="model", tag="valcnc")
 
 
 class ValcncLink(Link, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What its thesis leaves open. `answer`: the line that the controller sends when a block is
-    done, such as "ok"; empty: nothing. `margin_s`: how long a block waits beyond the simulated
-    time of the one before, where nothing is answered."""
+    """Options for what the thesis leaves open. `answer`: the line that the controller sends when a
+    block is done, such as "ok"; empty: nothing. `margin_s`: how long a block waits beyond the
+    simulated time of the one before, where nothing is answered."""
 
     answer: Answer = ""
     margin_s: Margin = 0.1

@@ -61,7 +61,8 @@ def read_block(data: bytes, machine: ValcncMachine, at: Point) -> tuple[Toolpath
 
 
 class _Missed(Struct):
-    """How many arcs the controller's own angle takes past or short of their end, and the worst."""
+    """Count of arcs that the controller's own angle ends past or short of their end, and the
+    worst."""
 
     count: int = 0
     most_mm: float = 0.0

@@ -31,11 +31,11 @@ CORRECT: Final = b"CGXYZIJ0123456789.+-"
 """The others are wrong characters; ours, since the list is lost (L1179)."""
 
 CONNECTED: Final = b"C"
-"""What the PC's program says when it has opened the line (L1482)."""
+"""Character that the PC's program sends when it has opened the line (L1482)."""
 
 
 class ValcncTwinSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What the thesis leaves open.
+    """Options for what the thesis leaves open.
 
     `busy`: what comes in while a block is drawn is "lost", since nothing receives it, or "kept"
     until it is done. `wrong`: a wrong character is "dropped" alone, or spoils its "block".

@@ -1,4 +1,4 @@
-"""How programs are sent to the PIC18F4550: one block, its simulated time, the next block.
+"""Protocol of the PIC18F4550: a block, a wait for its simulated time, the next block.
 
 9600 8N1 without handshake (L1177-1209, L1468-1498); `C` and a line feed on opening. No answer and
 no error is documented; the only pace of the PC's own program is its animation. So a block goes out
@@ -24,7 +24,7 @@ BUFFER_CHARS: Final = 127
 """A block has fewer than 128 characters."""
 
 SLOWER: Final = 1.05
-"""How much longer than simulated a block may take: nothing says when it is over."""
+"""Factor on the simulated time of a block: nothing reports its end."""
 
 BITS: Final = 10
 """Of a character on the line: 8N1."""
