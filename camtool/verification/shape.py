@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator, Sequence
-from itertools import groupby
+from itertools import groupby, pairwise
 from operator import itemgetter
 from typing import Any
 
@@ -28,7 +28,11 @@ from camtool.arrays import Floats, Ints
 from camtool.findings import Code, Finding, TargetCode
 from camtool.geometry.measure import point_at
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
+from camtool.machine.model import Machine
 from camtool.planning.job import Tool
+from camtool.simulation.mechanics import Mechanics
+from camtool.simulation.motion import Effects
+from camtool.simulation.samples import PathSamples, move_lengths
 from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Toolpath
 from camtool.toolpath.rapids import STOCK_TOP_MM
@@ -67,6 +71,13 @@ MOST_MOVES = 10_000
 
 MOST_POINTS = 200_000
 """... and so do programs whose path would need more points than this."""
+
+
+SLIDE_SPACING_MM = 0.01
+"""Heights along a V bit's path are taken at points no farther apart than this ..."""
+
+MAX_SLIDE_SAMPLES = 200_000
+"""... but at no more than about this many points."""
 
 
 class Shape(Struct, frozen=True):
@@ -187,11 +198,12 @@ def overcut_findings(
     yield OVERCUT(where=f"near ({x:.3f}, {y:.3f}) mm", measured=wanted.beyond_mm, limit=OVERCUT_MM)
 
 
-def machined_shape(trace: Trace, toolpath: Toolpath, wanted: Wanted) -> Shape | None:
-    """What the tool covers along the trace of a toolpath against what it should cover; None when
-    nothing is cut."""
+def machined_shape(trace: Trace, motion: CommandedMotion, wanted: Wanted) -> Shape | None:
+    """Compare what the tool covers along the trace of a motion with what it should cover; None
+    when nothing is cut."""
     cutter, tolerance = wanted.cutter, wanted.cutter.tolerance_mm
-    made = _swept(_runs(trace, toolpath, cutter), cutter)
+    runs = _runs(trace) if cutter.nose is None else _rows_with_heights(trace, motion)
+    made = _swept(_simplified(runs, cutter), cutter)
     if made is None:
         return None
     over_mm2, over_mm, _ = _beyond(made, wanted.region, tolerance)
@@ -265,36 +277,114 @@ def _swept(lines: _Lines, cutter: Cutter) -> Any:
     return shapely.union_all(shapely.convex_hull(shapely.geometrycollections(pairs)))
 
 
-def _runs(trace: Trace, toolpath: Toolpath, cutter: Cutter) -> _Lines:
-    """The cutting runs of a trace as lines, simplified within the tolerance; with a V bit or
-    a nose each row is a line, because the height changes evenly along it."""
+class CommandedMotion(Struct, frozen=True, eq=False):
+    """A toolpath as its controller commands it, and a machine with the effects that move its
+    slides."""
+
+    toolpath: Toolpath
+    machine: Machine
+    effects: Effects
+
+    def slides(self) -> tuple[Ints, Floats, Floats]:
+        """Return (K,) rows, (K, 2) mm positions of the slides in XY and (K,) mm commanded heights
+        of samples along the exact path."""
+        length = float(move_lengths(self.toolpath).sum())
+        spacing = max(SLIDE_SPACING_MM, length / MAX_SLIDE_SAMPLES)
+        samples = PathSamples(self.toolpath, spacing)
+        row, commanded = samples.window(0, int(samples.first[-1]))
+        mechanics = Mechanics(self.machine, self.toolpath.start, self.effects)
+        slide, _ = mechanics.follow(commanded, np.array([0, len(commanded)]))
+        return row, slide[:, :2], commanded[:, 2]
+
+
+def _runs(trace: Trace) -> list[tuple[Floats, Floats]]:
+    """Return the cutting runs of a trace, each as points (J, 2) mm with heights (J,) of 0, from
+    the position before the run on."""
+    which = np.flatnonzero(trace.cutting)
+    if not len(which):
+        return []
+    found = []
+    for run in np.split(which, np.flatnonzero(np.diff(which) > 1) + 1):
+        points = trace.points[max(int(run[0]) - 1, 0) : int(run[-1]) + 1]
+        found.append((points, np.zeros(len(points))))
+    return found
+
+
+def _rows_with_heights(trace: Trace, motion: CommandedMotion) -> list[tuple[Floats, Floats]]:
+    """Return the cutting rows of a trace, each as points (J, 2) mm with their commanded heights
+    (J,) mm; where the slides wait while the height changes, the row is divided before and behind.
+
+    The height is commanded along the path, not along the way of the slides: at a reversal a slide
+    waits in its backlash while Z moves on. Slides on the exact path say how far along the trace
+    each height is reached.
+    """
+    which = np.flatnonzero(trace.cutting)
+    if not len(which):
+        return []
+    of_sample, slides, height = motion.slides()
+    first = np.searchsorted(of_sample, np.arange(len(motion.toolpath) + 1))
+    found = []
+    for run in np.split(which, np.flatnonzero(np.diff(trace.row[which]) != 0) + 1):
+        points = trace.points[max(int(run[0]) - 1, 0) : int(run[-1]) + 1]
+        row = int(trace.row[run[0]])
+        mine = slice(first[row], first[row + 1])
+        heights = np.append(motion.toolpath.starts_of(np.array([row]))[0, 2], height[mine])
+        # The slides stand where the row before left them, which the trace has as its first point.
+        begin = slides[first[row] - 1] if first[row] else points[0]
+        way, gone = _lengths(np.concatenate([begin[None], slides[mine]])), _lengths(points)
+        scale = gone[-1] / way[-1] if way[-1] > 0.0 else 0.0
+        places = np.column_stack([np.interp(way * scale, gone, axis) for axis in points.T])
+        waits = np.diff(way) <= 0.0
+        ends = np.flatnonzero(np.diff(waits)) + 1
+        for low, high in pairwise([0, *ends.tolist(), len(waits)]):
+            found.append((places[low : high + 1], heights[low : high + 1]))
+    return found
+
+
+def _lengths(points: Floats) -> Floats:
+    """Return (J,) mm: how far each of the points (J, 2) of a line is from its start, along it."""
+    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+
+
+def _simplified(runs: Sequence[tuple[Floats, Floats]], cutter: Cutter) -> _Lines:
+    """Return runs as lines simplified within the tolerance; for a cutter without a nose divided at
+    their corners.
+
+    GEOS removes corners that are within 1 % of the distance of a buffer from the line between
+    their neighbours, which would widen a cut by up to that; the ends of a line are kept.
+    """
     import shapely
 
-    which = np.flatnonzero(trace.cutting)
-    ends = np.diff(which) > 1
-    if cutter.nose is not None:
-        ends |= np.diff(trace.row[which]) != 0
-    points: list[Floats] = []
-    heights: list[Floats] = []
-    line: list[Ints] = []
-    for run in np.split(which, np.flatnonzero(ends) + 1) if len(which) else ():
-        begin = max(int(run[0]) - 1, 0)  # the position before the run
-        some = trace.points[begin : int(run[-1]) + 1]
-        if len(some) < 2:
+    points: list[Floats] = [np.empty((0, 2))]
+    heights: list[Floats] = [np.empty(0)]
+    line: list[Ints] = [np.empty(0, dtype=np.int64)]
+    count = 0
+    for places, z in runs:
+        if len(places) < 2:
             continue
-        row = int(trace.row[run[0]])
-        length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(some, axis=0).T))])
-        share = length / length[-1] if length[-1] > 0.0 else np.zeros(len(length))
-        low, high = toolpath.starts[row, 2], toolpath.end[row, 2]
-        solid = np.column_stack([some, low + share * (high - low)])
+        solid = np.column_stack([places, z])
         flat = shapely.simplify(shapely.linestrings(solid), 0.5 * cutter.tolerance_mm)
         kept = shapely.get_coordinates(flat, include_z=True)
-        points.append(kept[:, :2])
-        heights.append(kept[:, 2])
-        line.append(np.full(len(kept), len(line)))
-    if not points:
-        return _Lines(np.empty((0, 2)), np.empty(0), np.empty(0, dtype=np.int64))
+        corner = np.zeros(len(kept), dtype=np.int64)
+        if cutter.nose is None:
+            corner[1:-1] = _off_chords(kept[:, :2]) > 2.0 * cutter.tolerance_mm
+        twice = np.repeat(np.arange(len(kept)), 1 + corner)
+        number = count + np.cumsum(np.append(0, np.diff(twice) == 0))
+        points.append(kept[twice, :2])
+        heights.append(kept[twice, 2])
+        line.append(number)
+        count = int(number[-1]) + 1
     return _Lines(np.concatenate(points), np.concatenate(heights), np.concatenate(line))
+
+
+def _off_chords(points: Floats) -> Floats:
+    """Return (J − 2,) mm: how far each inner point of (J, 2) is from the line between its
+    neighbours, which is a point where they are one."""
+    chord, arm = points[2:] - points[:-2], points[1:-1] - points[:-2]
+    square = (chord**2).sum(axis=1)
+    share = (arm * chord).sum(axis=1) / np.where(square > 0.0, square, 1.0)
+    off = arm - np.clip(share, 0.0, 1.0)[:, None] * chord
+    return np.asarray(np.hypot(*off.T))
 
 
 def _moves(kept: ProtectedRegion, cutter: Cutter) -> tuple[Segments, Floats]:

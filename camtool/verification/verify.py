@@ -62,14 +62,15 @@ from camtool.verification.matching import Goal, carried_match, own_match
 from camtool.verification.motion_findings import motion_findings
 from camtool.verification.nearest import MoveIndex
 from camtool.verification.report import Before, Planned, Report, certain, number, reported
-from camtool.verification.shape import Wanted as WantedShape
 from camtool.verification.shape import (
+    CommandedMotion,
     cutter_of,
     machined_shape,
     overcut_findings,
     points_wanted,
     wanted_shape,
 )
+from camtool.verification.shape import Wanted as WantedShape
 from camtool.verification.slides import Paths, SeenCircle, SlidePass, Trace, trace_size
 
 if TYPE_CHECKING:
@@ -479,7 +480,9 @@ class Result(Struct, frozen=True, eq=False):
     def _shape(self, trace: Trace, wanted: WantedShape | None) -> record.ShapeReport | None:
         if wanted is None:
             return None
-        shape = machined_shape(trace, self.case.decoded, wanted)
+        case = self.case
+        motion = CommandedMotion(case.decoded, case.machine, case.options.effects)
+        shape = machined_shape(trace, motion, wanted)
         if shape is None:
             return None
         return record.ShapeReport(

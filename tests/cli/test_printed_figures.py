@@ -40,13 +40,6 @@ from tests.oracles.stock_jobs import Asked, circle, described, moved, random_job
 DEFAULT_JOBS = (0, 1, 2, 5, 6, 11, 13, 25, 34, 38, 48, 58, 97, 110)
 """Small ones of all kinds."""
 SLOW_JOBS = 300
-SHAPE_OFF = {
-    67: "7 µm of undercut at the tips of a carving where 13 are seen",
-    135: "10 µm of overcut where there is none",
-    231: "heights along a V bit's slide that waits in its backlash",
-    269: "69 µm of overcut where 50 are seen",
-}
-"""Jobs whose shape line is not what is seen."""
 FAST = 1e6
 """mm/s²: a machine that is at its feed at once."""
 RAPID_MM_MIN = 1828.8
@@ -533,15 +526,7 @@ def test_the_small_jobs_are_of_all_kinds() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "seed",
-    [
-        pytest.param(seed, marks=pytest.mark.xfail(strict=True, reason=SHAPE_OFF[seed]))
-        if seed in SHAPE_OFF
-        else seed
-        for seed in range(SLOW_JOBS)
-    ],
-)
+@pytest.mark.parametrize("seed", range(SLOW_JOBS))
 def test_every_printed_figure_of_many_jobs(seed: int, camtool: Run, tmp_path: Path) -> None:
     case = case_of(seed)
     made = made_of(case, camtool, tmp_path)

@@ -27,6 +27,9 @@ SIDES = 16
 SLACK_MM = 2e-3
 """How far a box may be off: sagittas, and three decimals of a program."""
 
+TOP_MM = 1e-9
+"""What is nearer to the top of the stock is at it."""
+
 Box = tuple[float, float, float, float]
 """x low, y low, x high, y high."""
 
@@ -42,10 +45,16 @@ class Ball(Cutter):
 
 def removed(moves: Iterable[Move], cutter: Cutter) -> Any:
     """The area (a shapely geometry) that the tool removes at the surface."""
-    tracks = [
-        (places, cutter.radius_at(-places[:, 2])) for places in map(_places, moves) if len(places)
-    ]
-    return swept(tracks)
+    return swept(
+        [(places, reach(places, cutter)) for places in map(_places, moves) if len(places)]
+    )
+
+
+def reach(places: Floats, cutter: Cutter) -> Floats:
+    """(J,) how wide the tool cuts at the surface from places (J, 3): at the very top as just below
+    it, where a cut ends."""
+    depth = -places[:, 2]
+    return np.asarray(cutter.radius_at(np.where(np.abs(depth) <= TOP_MM, TOP_MM, depth)))
 
 
 def _places(move: Move) -> Floats:
@@ -67,20 +76,22 @@ def swept(tracks: Iterable[tuple[Floats, Floats]]) -> Any:
     changes evenly."""
     lines: dict[float, list[Any]] = {}
     areas, seen = [], set[bytes]()
-    for places, reach in tracks:
+    for places, wide_mm in tracks:
         # The turns of a helix lie above each other.
-        key = np.round(np.column_stack([places[:, :2], reach]), 4).tobytes()
+        key = np.round(np.column_stack([places[:, :2], wide_mm]), 4).tobytes()
         if key in seen:
             continue
         seen.add(key)
         if len(places) == 1:
-            areas.append(shapely.buffer(shapely.points(places[0, :2]), reach[0], quad_segs=SIDES))
-        elif (reach == reach[0]).all():
-            if reach[0]:
+            areas.append(
+                shapely.buffer(shapely.points(places[0, :2]), wide_mm[0], quad_segs=SIDES)
+            )
+        elif (wide_mm == wide_mm[0]).all():
+            if wide_mm[0]:
                 line = shapely.simplify(shapely.linestrings(places[:, :2]), 0.2 * SAG_MM)
-                lines.setdefault(float(reach[0]), []).append(line)
+                lines.setdefault(float(wide_mm[0]), []).append(line)
             continue
-        wide = np.maximum(reach, 1e-6)  # a point has no area, and a tip ends in one
+        wide = np.maximum(wide_mm, 1e-6)  # a point has no area, and a tip ends in one
         discs = shapely.buffer(shapely.points(places[:, :2]), wide, quad_segs=SIDES)
         areas += [shapely.convex_hull(shapely.union(*two)) for two in pairwise(discs)]
     for radius, each in lines.items():

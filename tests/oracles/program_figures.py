@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from camtool.arrays import Floats
-from tests.oracles.part_sizes import removed, swept
+from tests.oracles.part_sizes import TOP_MM, reach, removed, swept
 from tests.oracles.stock import Cutter, Move, moves_of
 
 STEP_MM = 0.02
@@ -215,9 +215,11 @@ class Program:
     def _removed(self, cutter: Cutter) -> Any:
         if self.x == self.y == Axis():
             return removed([self.moves[k] for k in self.cuts], cutter)
-        places, rows = self.cut_slides()
-        tracks = np.split(places, np.flatnonzero(np.diff(rows)) + 1)
-        return swept([(along, cutter.radius_at(-along[:, 2])) for along in tracks])
+        # The tip of a carving lies at the top itself, and is cut.
+        places, rows = self.slides
+        here = np.isin(rows, self.cuts) & (places[:, 2] <= TOP_MM)
+        tracks = np.split(places[here], np.flatnonzero(np.diff(rows[here])) + 1)
+        return swept([(along, reach(along, cutter)) for along in tracks])
 
 
 def _poles(move: Move, axis: int) -> list[float]:

@@ -11,6 +11,7 @@ from camtool.geometry.polylines import Polyline, Polylines
 from camtool.planning.drawn import kept_of
 from camtool.planning.job import Tool, job_of
 from camtool.planning.plan import planned
+from camtool.simulation.motion import ALL
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
@@ -19,6 +20,7 @@ from camtool.verification.cuts import CutMoves, cut_moves
 from camtool.verification.findings import VerificationCode
 from camtool.verification.shape import (
     MOST_MOVES,
+    CommandedMotion,
     Cutter,
     Shape,
     cutter_of,
@@ -37,7 +39,8 @@ from tests.targets import verify
 
 def shape_of(made: Trace, cuts: CutMoves, diameter_mm: float) -> Shape | None:
     wanted = wanted_shape(cuts, Cutter(diameter_mm))
-    return None if wanted is None else machined_shape(made, cuts.toolpath, wanted)
+    motion = CommandedMotion(cuts.toolpath, path_machine(), ALL)
+    return None if wanted is None else machined_shape(made, motion, wanted)
 
 
 def circle(radius: float) -> CutMoves:
@@ -87,6 +90,18 @@ def test_a_cut_that_ends_early_leaves_its_end() -> None:
 
 def test_the_wanted_shape_itself_is_neither_over_nor_under() -> None:
     shape = shape_of(round_about(3.0, 20_000), circle(3.0), 0.3)
+    assert shape is not None
+    assert (shape.overcut_mm2, shape.overcut_mm) == (0.0, 0.0)
+    assert (shape.undercut_mm2, shape.undercut_mm) == (0.0, 0.0)
+
+
+def test_a_small_step_back_at_a_corner_widens_nothing() -> None:
+    # As a reversal leaves it; a buffer of the whole line would cover 0.1 mm² more.
+    places = np.array([[0.0, 10.0], [0.0, 0.0], [0.0, 0.02], [10.0, 0.02]])
+    b = ToolpathBuilder((*places[0].tolist(), -1.0))
+    for x, y in places[1:].tolist():
+        b.line(x, y, feed=1.0)
+    shape = shape_of(trace(places), cut_moves(b.finish(), flat_cuts=False), 6.0)
     assert shape is not None
     assert (shape.overcut_mm2, shape.overcut_mm) == (0.0, 0.0)
     assert (shape.undercut_mm2, shape.undercut_mm) == (0.0, 0.0)
@@ -180,10 +195,22 @@ def test_a_v_bit_is_as_wide_as_it_is_deep() -> None:
     made = Trace(
         points, np.zeros(3), np.flatnonzero(deeper.is_feed), np.array([False, True, True])
     )
-    shape = machined_shape(made, deeper, region)
+    shape = machined_shape(made, CommandedMotion(deeper, path_machine(), ALL), region)
     assert shape is not None
     assert shape.overcut_mm == pytest.approx(0.1, abs=2.0 * shape.tolerance_mm)
     assert shape.undercut_mm == 0.0
+
+
+def test_the_height_of_a_v_bit_goes_on_while_its_slide_waits_in_the_backlash() -> None:
+    # On the way back the slide is 0.5 mm behind, on which the bit sinks by 0.05 mm: so much wider
+    # is the cut everywhere, and it ends 0.5 mm before the wanted one.
+    path = carved((0, 0, -1), (10, 0, -1), (0, 0, -2))
+    machine = path_machine("axes.x.backlash_mm=0.5")
+    options = VerifyOptions(tool_diameter_mm=6.0, nose=CONE)
+    shape = verify(path, machine, wanted=path, options=options).report.shape
+    assert shape is not None
+    assert shape.overcut_um == pytest.approx(50.0 * math.cos(math.atan(0.1)), abs=1.5)
+    assert shape.undercut_um == pytest.approx(500.0, abs=1.5)
 
 
 def test_a_cut_that_comes_up_to_the_surface_ends_as_wide_as_the_flat_tip() -> None:
