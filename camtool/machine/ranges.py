@@ -54,7 +54,7 @@ Scale = Annotated[float, Meta(ge=1e-6, le=1e6)]
 """Times as many: units per millimetre."""
 
 Part = Annotated[float, Meta(ge=1e-9, le=1.0)]
-"""A part of something."""
+"""Fraction of a quantity."""
 
 Angle = Annotated[float, Meta(ge=0.0, le=1.0)]
 """rad within which a turn counts as none."""

@@ -36,8 +36,8 @@ GROUP = "camtool.postprocessors"
 
 MACHINE_FILE = "machine.toml"
 
-OURS = "camtool_postprocessors."
-"""The prefix of camtool's own modules: exceptions in them are faults of camtool itself."""
+OWN_PREFIX = "camtool_postprocessors."
+"""Prefix of camtool's own modules: exceptions in them are faults of camtool itself."""
 
 NOT_SAID = "not said"
 
@@ -205,7 +205,7 @@ NUMBERS = {
     "accelerations": "acceleration_mm_s2",
     "backlash": "backlash_mm",
 }
-"""The keys of axes that are of one machine and no other, by what they are called."""
+"""Keys of axes that differ from machine to machine, by the name of the quantity."""
 
 
 def _placeholders(own: Table, settings: Sequence[str]) -> Iterator[str]:
@@ -288,7 +288,7 @@ def _load(point: EntryPoint) -> tuple[Target, Path]:
             where=f"plug-in {point.value}",
             mend="reinstall or remove the package that brings it",
         ) from error
-    if point.module.startswith(OURS):
+    if point.module.startswith(OWN_PREFIX):
         return target, file
     return cast(Target, Guarded(target, point.value)), file
 

@@ -13,8 +13,8 @@ from typing import ClassVar
 _ESCAPE = re.compile(r"\\x([0-9A-Fa-f]{2})")
 _ENDS = re.compile(rb"[\r\n]+")
 
-MOST_LINE = 1000
-"""An answer without an end is shown when it has so many characters."""
+MAX_LINE_BYTES = 1000
+"""Longest answer that waits for its line end; longer ones are shown without it."""
 
 
 class Terminal:
@@ -71,7 +71,7 @@ class Terminal:
         """Return the lines to show for these received bytes; an unfinished line is kept for the
         next call."""
         *lines, self._rest = _ENDS.split(self._rest + data)
-        if len(self._rest) > MOST_LINE:
+        if len(self._rest) > MAX_LINE_BYTES:
             lines, self._rest = [*lines, self._rest], b""
         return [self._shown(line) for line in lines if line]
 

@@ -123,18 +123,19 @@ class Tell(Struct, frozen=True):
 Action = Write | Reopen | Tell
 
 NEVER = math.inf
-"""The time of what does not happen by itself, s."""
+"""Time of an event that does not happen by itself, s."""
 
 LATE_S = 0.05
 """Longest delay of a port and its cable, s."""
 
-PATIENCE = 60
-"""A controller that owes an answer and is silent for so many times the lateness of the line (3 s)
-does not answer."""
+PATIENCE_FACTOR = 60
+"""Longest wait for an answer that is due, in multiples of the lateness of the line (3 s in
+all)."""
 
 
 NEAR_MM = 0.02
-"""A place that is reported is one that is wanted when it lies so near: steps, and rounding."""
+"""Largest distance, mm, between a reported position and the same position as programmed: steps,
+and rounding."""
 
 
 class ResumePoint(Struct, frozen=True, eq=False):
@@ -214,7 +215,7 @@ class Manner(Struct, frozen=True):
     @property
     def patience_s(self) -> float:
         """Longest wait for an answer that is due, s."""
-        return PATIENCE * self.late_s
+        return PATIENCE_FACTOR * self.late_s
 
 
 class Conversation(ABC):

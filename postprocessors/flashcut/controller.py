@@ -53,7 +53,7 @@ from .timers import feeds_of, half_periods_ms, shortest_ms
 _Machine = Machine[FlashcutController, FlashcutDialect]
 
 MOVES_AT_ONCE = 1 << 14
-"""Chords and other moves that are computed together: some 100 bytes each."""
+"""Most chords and other moves that are computed together: some 100 bytes each."""
 
 
 class FlashcutModel(ControllerModel[FlashcutController, FlashcutDialect]):
@@ -193,7 +193,7 @@ class FlashcutRun:
 # arc             chords of one angle each, from its start to its programmed end
 # homing          Y, then X, each alone until its sensor; Z alone
 
-MOST_LONG = (1 << 31) - 1
+MAX_LONG = (1 << 31) - 1
 """The largest of the controller's whole numbers (timeGetTime is a Long, L1334-1340): half periods
 of more milliseconds are refused, and positions and radii of more than a quarter as many steps, so
 that no displacement between two of them has more."""
@@ -208,7 +208,7 @@ def followed(toolpath: Toolpath, machine: _Machine) -> Toolpath:
     ProgramError for arcs without a centre and positions of more steps than can be counted.
     """
     check_positions(toolpath, machine)
-    most = 0.25 * MOST_LONG * np.array([axis.coded_step_mm for axis in machine.axes])
+    most = 0.25 * MAX_LONG * np.array([axis.coded_step_mm for axis in machine.axes])
     far = toolpath.by_parts(lambda part: np.asarray((np.abs(part.end) > most).any(axis=1)))
     far |= (np.abs(toolpath.start) > most).any()
     arcs = np.flatnonzero(toolpath.is_arc)
@@ -230,10 +230,10 @@ def half_periods(
     def counted(part: Toolpath) -> Indices:
         feed = np.where(part.is_feed, part.feed, np.inf)
         wanted = half_periods_ms(feed, step_mm, alone(part), machine.controller)
-        return np.minimum(wanted, MOST_LONG).astype(np.int32)
+        return np.minimum(wanted, MAX_LONG).astype(np.int32)
 
     found = toolpath.by_parts(counted)
-    slow = found == MOST_LONG
+    slow = found == MAX_LONG
     if slow.any():
         feed = float(toolpath.feed[slow.argmax()])
         message = f"a feed of {feed:g} mm/min is too slow for the timers to count"

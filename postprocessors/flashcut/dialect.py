@@ -12,7 +12,7 @@ from camtool.machine.ranges import Tolerance
 
 from ..gcode.dialect import check_unit, feed_decimals
 
-MOST_MM: Final = 9999.999
+MAX_MM: Final = 9999.999
 """Coordinates beyond this have more than the 4.3 digits of a block (L436, L440-451)."""
 
 STOP_TEXT: Final = "programmed stop"

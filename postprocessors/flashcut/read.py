@@ -24,7 +24,7 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 
 from ..gcode.blocks import SURE_PART, Lexing, PlainBlocks, WordBlock, blocks_of, filled, form_of
-from .dialect import MOST_MM, STOP_TEXT, FlashcutController, FlashcutDialect, FlashcutMachine
+from .dialect import MAX_MM, STOP_TEXT, FlashcutController, FlashcutDialect, FlashcutMachine
 from .findings import EXECUTED_OTHERWISE, FEED_ABOVE_LIMIT, FEED_HELD, FEED_HELD_ALONE
 from .timers import feeds_of, half_periods_ms, shortest_ms, steps_too_many
 
@@ -37,7 +37,7 @@ milliseconds, so less is rounding."""
 WARNED_PART: Final = 0.5
 """Part of the programmed feed: a cut that gets less gives a warning instead of a remark."""
 
-MOST_MS: Final = 1e9
+MAX_MS: Final = 1e9
 """Half periods longer than this make no shorter axis go too far."""
 
 TEMPLATES: Final = {
@@ -177,9 +177,9 @@ class _Reader:
 
     def _motion(self, block: WordBlock, code: str, form: str, numbers: list[float]) -> None:
         """G00 to G03: X Y Z from part zero, I J from where the arc begins (L1000, L1016)."""
-        if not max(map(abs, numbers)) <= MOST_MM:
-            at = next(at for at, number in enumerate(numbers, 1) if not abs(number) <= MOST_MM)
-            block.fail(f"a number beyond ±{MOST_MM:g}", word=at, mend="check the units")
+        if not max(map(abs, numbers)) <= MAX_MM:
+            at = next(at for at, number in enumerate(numbers, 1) if not abs(number) <= MAX_MM)
+            block.fail(f"a number beyond ±{MAX_MM:g}", word=at, mend="check the units")
         if form[-1] == "F":
             self._set_feed(block, numbers.pop(), len(form))
         if code != "G00" and math.isnan(self._feed):
@@ -283,7 +283,7 @@ class DecodedMoves:
         sure = np.isin(4 * facts[:, words.FORM] + self.kind, keys)
         sure &= (facts[:, words.TWO_DIGITS] == 1) & (facts[:, words.ONE_BLANK] == 1)
         for column in range(words.X_WORD, words.F_WORD + 1):
-            sure &= ~plain.has(column) | (np.abs(numbers[:, column]) <= MOST_MM)
+            sure &= ~plain.has(column) | (np.abs(numbers[:, column]) <= MAX_MM)
         sure &= ~has_feed | (self.feed > 0.0)
         sure &= (self.kind == Kind.RAPID) | ~np.isnan(self.feed)
         radius = np.hypot(*(start[:, :2] - self.centre).T)
@@ -303,7 +303,6 @@ def _refuse_spacing(block: WordBlock) -> None:
 # columns of what becomes of each would need more room than the program.
 
 ROWS_AT_ONCE: Final = 1 << 14
-"""So many rows are looked at together."""
 
 
 class _Worst(Struct):
@@ -396,6 +395,6 @@ class _Rows:
         feed = np.where(self.kind == Kind.LINE, self.feed, np.inf)
         alone = (steps == 0).any(axis=1)
         half_period = half_periods_ms(feed, float(self.step_mm[:2].max()), alone, controller)
-        whole = np.minimum(half_period, MOST_MS).astype(np.int64)
+        whole = np.minimum(half_period, MAX_MS).astype(np.int64)
         extra = steps_too_many(steps.max(axis=1), steps.min(axis=1), whole, controller)
         return np.where(self.kind < Kind.ARC_CW, extra, 0)

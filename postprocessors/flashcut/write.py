@@ -35,7 +35,7 @@ from ..gcode.plain import (
     plain_rows,
     split_z,
 )
-from .dialect import MOST_MM, STOP_TEXT, FlashcutController, FlashcutDialect, FlashcutMachine
+from .dialect import MAX_MM, STOP_TEXT, FlashcutController, FlashcutDialect, FlashcutMachine
 from .findings import EVENT_LEFT_OUT_DWELL, EVENT_LEFT_OUT_STOP, VALUE_ROUNDED
 from .timers import half_periods_ms
 
@@ -55,7 +55,7 @@ def write_program(toolpath: Toolpath, machine: FlashcutMachine) -> Program:
     lowered, split = split_z(toolpath, machine)
     if dialect.slants == "split":
         lowered = _split_slants(lowered.toolpath, machine).after(lowered)
-    rules = ArcRules(dialect.decimals, dialect.full_circles, MOST_MM)
+    rules = ArcRules(dialect.decimals, dialect.full_circles, MAX_MM)
     rows = plain_rows(lowered.toolpath, rules)
     of_row = lowered.row[rows.row]
     _check_reach(toolpath, rows, of_row, dialect)
@@ -136,11 +136,11 @@ def _cut(toolpath: Toolpath, count: Ints, steps: Ints, q_mm: Floats) -> LoweredT
 def _check_reach(
     toolpath: Toolpath, rows: PlainRows, of_row: Ints, dialect: FlashcutDialect
 ) -> None:
-    far = (np.abs(rows.end) > MOST_MM * 10**dialect.decimals).any(axis=1)
+    far = (np.abs(rows.end) > MAX_MM * 10**dialect.decimals).any(axis=1)
     refuse(
         toolpath,
         far,
-        f"a coordinate has more than four digits before the point (±{MOST_MM:g} mm)",
+        f"a coordinate has more than four digits before the point (±{MAX_MM:g} mm)",
         "check the units",
         rows=of_row,
     )

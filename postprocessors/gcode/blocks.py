@@ -34,22 +34,20 @@ from camtool.kernels import words
 from camtool.toolpath.program import Listing
 
 SHOWN_CHARS: Final = 32
-"""An error message shows no more of a line than this."""
 
 LINE_CHARS: Final = 4096
 """A longer line is refused where the dialect itself has no limit: no machine reads such lines."""
 
-LEAST_RUN: Final = 24
-"""Fewer plain blocks in a row than these are read one by one."""
+MIN_RUN: Final = 24
+"""Shortest run of plain blocks that is read by columns."""
 
-LONGEST_WAIT: Final = 256
+MAX_UNTRIED_LINES: Final = 256
 """Most lines between two attempts to read a run of plain lines, in a text that has none."""
 
 ROWS_AT_ONCE: Final = 1 << 12
-"""So many plain blocks are read in one go."""
 
 LETTERS: Final = "GXYZIJF"
-"""Those of plain blocks, by column."""
+"""Letters of plain blocks, by column."""
 
 SURE_PART: Final = 0.999
 """Part of a limit of a rule for arcs: what keeps to it does so however it is rounded."""
@@ -161,10 +159,10 @@ class PlainRuns:
             self._lines.octets, begin, number + 1, self._most_chars, self._free, numbers, facts
         )
         count = 0
-        if rows >= LEAST_RUN:
+        if rows >= MIN_RUN:
             count = take(PlainBlocks(numbers[:rows], facts[:rows], index))
-        self._wait = 1 if count >= LEAST_RUN else min(2 * self._wait, LONGEST_WAIT)
-        self._most = min(2 * max(count, LEAST_RUN), ROWS_AT_ONCE)
+        self._wait = 1 if count >= MIN_RUN else min(2 * self._wait, MAX_UNTRIED_LINES)
+        self._most = min(2 * max(count, MIN_RUN), ROWS_AT_ONCE)
         if not count:
             return 0, number
         return count, behind - 1 if count == rows else int(facts[count, words.LINE]) - 1

@@ -15,7 +15,7 @@ from camtool.toolpath.refusals import radius_spread, refuse, refuse_start
 from .dialect import MM, Unit, feed_decimals
 from .findings import FEED_ROUNDED
 
-MOST_MM: Final = 99_999.0
+MAX_MM: Final = 99_999.0
 """Coordinates beyond this are refused: with three decimals, grbl's 8 digits end there."""
 
 ARC_RADIUS_SPREAD_MM: Final = 0.05
@@ -29,8 +29,8 @@ whole."""
 def check(toolpath: Toolpath, machine: Machine) -> None:
     """Refuse what cannot be written or done, whatever the order of the rows."""
     refuse_start(toolpath)
-    far = np.abs(toolpath.end).max(axis=1, initial=0.0) > MOST_MM
-    refuse(toolpath, far, f"a coordinate beyond {MOST_MM:g} mm", "check the units")
+    far = np.abs(toolpath.end).max(axis=1, initial=0.0) > MAX_MM
+    refuse(toolpath, far, f"a coordinate beyond {MAX_MM:g} mm", "check the units")
     _check_arcs(toolpath)
     _check_feeds(toolpath, machine)
 

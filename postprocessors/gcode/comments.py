@@ -26,7 +26,7 @@ MAKER = "camtool "
 """First word of the heading of a program."""
 
 HEADING_LINES = 20
-"""The heading is looked for in so many lines: a machine's own start may stand before it."""
+"""Most lines in which the heading is looked for: a machine's own start may stand before it."""
 
 Lines = Callable[[int], str]
 """The text of the k-th line."""

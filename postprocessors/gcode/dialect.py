@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 POWER_OF_TEN_TOLERANCE: Final = 1e-9
 """`feed.unit_mm_min` must be a power of ten to this part of its logarithm."""
 
-MOST_FEED_DECIMALS: Final = 6
+MAX_FEED_DECIMALS: Final = 6
 """`feed.unit_mm_min` is at least 10 to the power of minus this."""
 
 UNIT_GUARD: Final = 1e-9
@@ -101,7 +101,7 @@ def feed_decimals(machine: Machine) -> int:
     that is no power of ten between 1 and 10^−6."""
     digits = -math.log10(machine.feed.unit_mm_min)
     whole = round(digits)
-    if abs(digits - whole) > POWER_OF_TEN_TOLERANCE or not 0 <= whole <= MOST_FEED_DECIMALS:
+    if abs(digits - whole) > POWER_OF_TEN_TOLERANCE or not 0 <= whole <= MAX_FEED_DECIMALS:
         raise MachineError(
             f"{machine.feed.unit_mm_min:g} is not a unit that F words can have",
             file=machine.target.name,
@@ -111,8 +111,8 @@ def feed_decimals(machine: Machine) -> int:
     return whole
 
 
-MOST_BLOCKS: Final = 100
-"""So many start blocks, and end blocks, are a mistake."""
+MAX_BLOCKS: Final = 100
+"""Most start blocks, and most end blocks: more are a mistake."""
 
 
 def check_blocks(machine: Machine[Any, Any], read: Callable[[bytes], Toolpath]) -> None:
@@ -148,8 +148,8 @@ def check_blocks(machine: Machine[Any, Any], read: Callable[[bytes], Toolpath]) 
             if axis.travel_mm is not None and span > axis.travel_mm
         ]
         wrong = ""
-        if len(blocks) > MOST_BLOCKS:
-            wrong = f"{len(blocks)} blocks are more than {MOST_BLOCKS}"
+        if len(blocks) > MAX_BLOCKS:
+            wrong = f"{len(blocks)} blocks are more than {MAX_BLOCKS}"
         elif path.is_feed.any():
             wrong = "they cut: only rapids and switches may stand here"
         elif path.block[path.kind == Kind.END].tolist() != [len(blocks) + 1]:

@@ -21,11 +21,10 @@ from msgspec import Struct
 from camtool.arrays import Bools, Floats, Ints
 from camtool.toolpath.words import WordColumn, line_lengths
 
-MOST_UNITS: Final = 10**15
+MAX_UNITS: Final = 10**15
 """Whole units beyond this are not written: their decimals would no longer be exact in a float."""
 
 VALUES_AT_ONCE: Final = 1 << 16
-"""So many values become whole units together."""
 
 COMMENT_CHARS: Final = 60
 """Longest comment, without its parentheses."""
@@ -54,7 +53,7 @@ def units_of(values: Floats, decimals: int) -> Ints:
     for low in range(0, len(given), VALUES_AT_ONCE):
         some = slice(low, low + VALUES_AT_ONCE)
         scaled = given[some] * 10.0**decimals
-        if not (np.abs(scaled) <= MOST_UNITS).all():
+        if not (np.abs(scaled) <= MAX_UNITS).all():
             raise ValueError("a value is not finite, or too large for its decimals")
         found[some] = np.sign(scaled) * np.floor(np.abs(scaled) + 0.5)
     return units

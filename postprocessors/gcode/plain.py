@@ -42,7 +42,7 @@ from .format import units_of
 SPREAD_UNITS: Final = 1.0
 """The radii at start and end of a written arc differ by no more units."""
 
-LEAST_RADIUS_UNITS: Final = 4.0
+MIN_RADIUS_UNITS: Final = 4.0
 """Smaller arcs become lines: rounding alone would turn their ends by more than 20°."""
 
 RECENTRE_REACH: Final = 2
@@ -224,7 +224,7 @@ class WantedArcs:
         out, back = begin - centre, stop - centre
         r1, r2 = np.hypot(*out.T), np.hypot(*back.T)
         turn = turns_of(out, back, self.clockwise[which])
-        good = (np.abs(r1 - r2) <= SPREAD_UNITS) & (r1 >= LEAST_RADIUS_UNITS)
+        good = (np.abs(r1 - r2) <= SPREAD_UNITS) & (r1 >= MIN_RADIUS_UNITS)
         good &= (np.abs(turn - self.sweep[which]) < math.pi) & (
             np.abs(out).max(axis=1) <= self.most
         )
@@ -244,7 +244,7 @@ def _centres(wanted: WantedArcs) -> tuple[Ints, Bools, Bools]:
     found = in_range.copy()
     found[in_range] = wanted.fits(every[in_range], centre[in_range].astype(np.float64))
     moved = np.zeros(count, dtype=np.bool_)
-    left = every[in_range & ~found & (wanted.radius >= LEAST_RADIUS_UNITS - SPREAD_UNITS)]
+    left = every[in_range & ~found & (wanted.radius >= MIN_RADIUS_UNITS - SPREAD_UNITS)]
     if not len(left):
         return centre, found, moved
     reach = np.arange(-RECENTRE_REACH, RECENTRE_REACH + 1)

@@ -38,7 +38,7 @@ class ArcRule(Struct, frozen=True):
 
 
 KINDS: Final = np.full(ARC_CCW + 1, -1)
-"""The kind of a move, by its G word tenfold."""
+"""Kind of a move, by its G word tenfold."""
 KINDS[[0, 10, 20, 30]] = [Kind.RAPID, Kind.LINE, Kind.ARC_CW, Kind.ARC_CCW]
 
 

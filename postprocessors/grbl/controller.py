@@ -51,7 +51,7 @@ ALWAYS_ON = 255
 """The $1 that leaves the motors on, and causes no delay at a stop."""
 
 DWELL_STEP_S = 0.05
-"""Dwells are counted in whole steps of this, rounded up (DWELL_TIME_STEP, `delay_sec`)."""
+"""Step of dwells, which are rounded up (DWELL_TIME_STEP, `delay_sec`)."""
 
 
 LASER_ASSUMPTION = (
@@ -203,7 +203,7 @@ STRAIGHT_COS = 0.999999
 """Cosine between two blocks beyond which they count as straight on, or as straight back
 (planner.c)."""
 
-LEAST_SPEED_MM_S = 1.0 / 60.0
+MIN_SPEED_MM_S = 1.0 / 60.0
 """No block is slower (MINIMUM_FEED_RATE, config.h)."""
 
 WAITS = (
@@ -224,10 +224,8 @@ SPINDLE = (Kind.SPINDLE_CW, Kind.SPINDLE_CCW, Kind.SPINDLE_OFF)
 COOLANT = (Kind.COOLANT_MIST, Kind.COOLANT_FLOOD, Kind.COOLANT_OFF)
 
 ROWS_AT_ONCE = 1 << 12
-"""So many rows become blocks together."""
 
 BLOCKS_AT_ONCE = 1 << 14
-"""The speeds of so many blocks are computed together."""
 
 Shorts = npt.NDArray[np.int32]
 
@@ -346,7 +344,7 @@ def speeds_of(
         row = blocks.row[at]
         cuts = (path.kind[row] >= Kind.LINE) & (path.kind[row] <= Kind.ARC_CCW)
         feed = np.where(cuts, path.feed[row], np.inf) / 60.0
-        speed = np.maximum(np.minimum(feed, highest), LEAST_SPEED_MM_S)
+        speed = np.maximum(np.minimum(feed, highest), MIN_SPEED_MM_S)
         events = np.abs(blocks.way[at]).max(axis=1, initial=0)
         speed = np.maximum(speed, controller.least_step_hz * length / events)
         lengths_mm[at], speeds[at] = length, speed
@@ -422,7 +420,7 @@ decimals, and becomes its nearest float."""
 FULL_TURN_RAD = np.float32(5e-7)
 """An arc that turns by less is a full circle (ARC_ANGULAR_TRAVEL_EPSILON, config.h)."""
 
-MOST_SEGMENTS = 1 << 16
+MAX_SEGMENTS = 1 << 16
 """The chords of an arc are counted in 16 bits."""
 
 
@@ -505,7 +503,7 @@ class _Chords:
         way = np.abs(np.float32(0.5) * self._turn * self._radius)
         with np.errstate(invalid="ignore", divide="ignore"):
             count = np.floor(way / np.sqrt(half))
-        counted = np.where(np.isfinite(count), count, 0.0).astype(np.int64) % MOST_SEGMENTS
+        counted = np.where(np.isfinite(count), count, 0.0).astype(np.int64) % MAX_SEGMENTS
         return np.maximum(counted, 1)
 
     def points(self, segments: Ints, first: Ints, correction: int) -> tuple[Ints, Singles]:

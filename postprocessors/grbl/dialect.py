@@ -12,7 +12,7 @@ from camtool.machine.ranges import Place, Seconds, Slack, Tolerance
 
 from ..gcode.dialect import GcodeDialect
 
-MOST_TOOL: Final = 255
+MAX_TOOL: Final = 255
 """Tools beyond it are grbl's error 38 (`MAX_TOOL_NUMBER`, gcode.c)."""
 
 

@@ -21,22 +21,21 @@ from camtool.toolpath.moves import Kind
 
 from ..gcode.faults import LineFault
 from ..gcode.part_moves import PLANES, PartMoves, ProgramFrame
-from .dialect import MOST_TOOL, GrblController, GrblDialect, GrblMachine
+from .dialect import MAX_TOOL, GrblController, GrblDialect, GrblMachine
 
 MM_PER_INCH: Final = 25.4
-"""Length of an inch, mm."""
 
-MOST_DIGITS: Final = 8
+MAX_DIGITS: Final = 8
 """Further digits of a number count as 0 (MAX_INT_DIGITS)."""
 
-MOST_COUNTED: Final = 1 << 31
-"""Of a code grbl keeps eight bits, and sixteen of its decimals; of codes beyond this nobody knows
-what its compiler makes."""
+MAX_CODE: Final = 1 << 31
+"""Larger codes overflow the firmware's integers, which is undefined behaviour, so they are
+refused. Of smaller ones it keeps eight bits, and sixteen of the decimals."""
 
-MOST_LINE_NUMBER: Final = 10_000_000
-"""Of an N word (MAX_LINE_NUMBER)."""
+MAX_LINE_NUMBER: Final = 10_000_000
+"""Largest number of an N word (MAX_LINE_NUMBER)."""
 
-MOST_FRAMES: Final = 6
+MAX_FRAMES: Final = 6
 """G54 to G59 (N_COORDINATE_SYSTEM)."""
 
 NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)")
@@ -236,7 +235,7 @@ class GrblParser:
         self._check_and_execute(block, jogs=jogs)
 
     def _word(self, block: GrblBlock, letter: str, value: float, said: str, at: int) -> None:
-        whole = math.trunc(value) % 256 if abs(value) < MOST_COUNTED else 255
+        whole = math.trunc(value) % 256 if abs(value) < MAX_CODE else 255
         hundredths = round(100.0 * (value - whole)) % 65536
         name = f"{letter}{said}"
         if letter == "G":
@@ -254,7 +253,7 @@ class GrblParser:
         else:
             if letter not in VALUES:
                 raise error(20, at, f"the letter {letter}")
-            if letter == "T" and value > MOST_TOOL:
+            if letter == "T" and value > MAX_TOOL:
                 raise error(38, at)
             if letter in block.numbers:
                 raise error(25, at, letter)
@@ -354,7 +353,7 @@ class GrblParser:
     def _check_and_execute(self, block: GrblBlock, *, jogs: bool) -> None:
         numbers, modes = block.numbers, block.modes
         unused = set(numbers)
-        if numbers.get("N", 0.0) > MOST_LINE_NUMBER:
+        if numbers.get("N", 0.0) > MAX_LINE_NUMBER:
             raise error(27, block.at["N"])
         mm = MM_PER_INCH if modes.inches else 1.0
         feed = self._feed_of(block, mm, jogs=jogs)
@@ -444,7 +443,7 @@ class GrblParser:
             raise error(26, at, "G10")
         if "P" not in numbers and "L" not in numbers:
             raise error(28, at, "G10 without P or L")
-        if math.trunc(numbers.get("P", 0.0)) > MOST_FRAMES:
+        if math.trunc(numbers.get("P", 0.0)) > MAX_FRAMES:
             raise error(29, block.at["P"])
         if numbers.get("L") not in (2, 20) or (numbers["L"] == 2 and "R" in numbers):
             raise error(20, at, f"G10 L{numbers.get('L', 0.0):g}")
@@ -760,13 +759,13 @@ def target_length(block: GrblBlock, mm: float) -> float:
 
 def _number(text: str) -> float:
     """A number as grbl reads it: its first eight digits count."""
-    if len(text) <= MOST_DIGITS:
+    if len(text) <= MAX_DIGITS:
         return float(text)
     digits, kept = 0, []
     for sign in text:
         if sign.isdigit():
             digits += 1
-            kept.append(sign if digits <= MOST_DIGITS else "0")
+            kept.append(sign if digits <= MAX_DIGITS else "0")
         else:
             kept.append(sign)
     return float("".join(kept))

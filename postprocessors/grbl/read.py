@@ -45,7 +45,6 @@ SLOW_GUARD: Final = 1e-6
 """Part of a feed: one below the slowest by less counts as the slowest."""
 
 ROWS_AT_ONCE: Final = 1 << 14
-"""So many moves are compared with the slowest feed at a time."""
 
 COMMENT: Final = re.compile(r"\([^)]*\)?|;.*")
 

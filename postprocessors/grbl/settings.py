@@ -114,8 +114,8 @@ def _setting(key: str, number: int, text: str, line: int) -> ControllerSetting:
 
 # Comparing with the machine file, before a program is sent.
 
-SAID_TOLERANCE = 6e-4
-"""Settings are said with three decimals: what is nearer is the same."""
+LISTED_TOLERANCE = 6e-4
+"""Largest difference of equal settings: listings have three decimals."""
 
 REPORT_INCHES = 13
 """The setting of inches in status reports."""
@@ -194,7 +194,7 @@ def _difference(
     """A sentence where a setting is not what the machine file says, if it says anything."""
     value = float(found.value)
     shown = 1.0 / value if inverse else value
-    if wanted is None or abs(shown - wanted) <= SAID_TOLERANCE:
+    if wanted is None or abs(shown - wanted) <= LISTED_TOLERANCE:
         return []
     number = found.said.split()[0]
     return [
@@ -209,13 +209,12 @@ BAUD = 115200
 """grbl 1.1's rate (BAUD_RATE in its config.h)."""
 
 BANNER_S = 3.0
-"""Many boards begin anew when a port is opened, and say so within this time."""
+"""Longest wait for the greeting of a board that resets when its port is opened."""
 
 ANSWER_S = 3.0
-"""A controller that says nothing for so long does not answer."""
+"""Longest silence before a controller counts as not answering."""
 
-MOST_LINES = 1000
-"""No listing has more lines."""
+MAX_LINES = 1000
 
 
 def asked(port: str) -> str:
@@ -248,7 +247,7 @@ def _lines(port: Any, patience_s: float, *ends: str) -> list[str]:
     """The lines that come, up to one that begins with one of `ends`, or until nothing comes for
     so long."""
     rows, part, last = list[str](), b"", time.monotonic()
-    while time.monotonic() - last < patience_s and len(rows) < MOST_LINES:
+    while time.monotonic() - last < patience_s and len(rows) < MAX_LINES:
         found = port.read(256)
         if not found:
             continue

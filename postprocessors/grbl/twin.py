@@ -34,7 +34,7 @@ from camtool.toolpath.moves import Kind, Toolpath
 from ..gcode.faults import LineFault
 from .controller import (
     ALWAYS_ON,
-    LEAST_SPEED_MM_S,
+    MIN_SPEED_MM_S,
     NO_BLOCKS,
     blocks_from,
     dwell_s,
@@ -61,7 +61,7 @@ RX_BYTES: Final = 128
 BANNER: Final = "\r\nGrbl 1.1h ['$' for help]\r\n"
 
 BUILD: Final = "1.1h.20190830"
-"""Its version in `$I` (grbl.h)."""
+"""Version in `$I` (grbl.h)."""
 
 HELP: Final = "[HLP:$$ $# $G $I $N $x=val $Nx=line $J=line $SLP $C $X $H ~ ! ? ctrl-x]\r\n"
 
@@ -81,7 +81,7 @@ SPINDLE_OVERRIDES: Final = {0x99: None, 0x9A: 10, 0x9B: -10, 0x9C: 1, 0x9D: -1}
 SPINDLE_STOP, TOGGLE_FLOOD, TOGGLE_MIST = 0x9E, 0xA0, 0xA1
 """Real-time bytes that stop the spindle of a held machine, and switch its coolant."""
 
-LEAST_OVERRIDE, MOST_OVERRIDE = 10, 200
+MIN_OVERRIDE, MAX_OVERRIDE = 10, 200
 """Overrides of feed and spindle stay between these, in percent (config.h)."""
 
 HARD_LIMIT, SOFT_LIMIT, ABORTED = 1, 2, 3
@@ -95,10 +95,10 @@ TOO_LONG, BEYOND_TRAVEL = 11, 15
 """Answers to lines that its parser does not give (error_codes_en_US.csv)."""
 
 ALARM_S: Final = 0.5
-"""It waits so long after it has said an alarm (`report_alarm_message`)."""
+"""Wait after the report of an alarm (`report_alarm_message`)."""
 
 DWELL_STEP_S: Final = 0.05
-"""It looks at its flags so often in a dwell (DWELL_TIME_STEP)."""
+"""Interval at which a dwell looks at the flags (DWELL_TIME_STEP)."""
 
 DOOR_SPINDLE_S, DOOR_COOLANT_S = 4.0, 1.0
 """Waits until spindle and coolant are restored after the door was open (SAFETY_DOOR_…_DELAY,
@@ -134,7 +134,7 @@ REALS: Final = (11, 12, 24, 25, 27, 30, 31)
 """Settings that belong to no axis: bytes, bits, and floats."""
 
 RPM: Final = (30, 31)
-"""They are shown without decimals."""
+"""Settings that are shown without decimals."""
 
 AXIS_SETTINGS: Final = {
     100: "coded_step_mm",
@@ -160,7 +160,7 @@ DEFAULTS: Final = {
     120: 10.0,
     130: 200.0,
 }
-"""Those that are not 0 (DEFAULTS_GENERIC, defaults.h)."""
+"""Default settings that are not 0 (DEFAULTS_GENERIC, defaults.h)."""
 
 NEVER_CLOSED: Final = -1e6
 """No slide comes down to this height, mm."""
@@ -209,7 +209,7 @@ Wait = Generator[float | None, None, None]
 """Coroutine that waits for any event (None) or until a time."""
 
 Line = Generator[float | None, None, int]
-"""A line at work; returns its error, 0 for ok."""
+"""Coroutine that executes a line; it returns the error number, 0 for ok."""
 
 
 class _Abort(Exception):
@@ -1764,7 +1764,7 @@ class GrblTwin(Twin):
         percent = self._rapid_percent if block.rapid else percent
         if percent == 100:
             return block.speed
-        return max(min(block.asked * percent / 100.0, block.highest), LEAST_SPEED_MM_S)
+        return max(min(block.asked * percent / 100.0, block.highest), MIN_SPEED_MM_S)
 
     def _exit_speed(self) -> float:
         """Return the highest speed at the end of the current block from which the planned blocks
@@ -1854,7 +1854,7 @@ class GrblTwin(Twin):
 
 
 LENGTH_EPS_MM: Final = 1e-9
-"""A block of which no more is left has been done."""
+"""Remainder, mm, below which a block counts as done."""
 
 
 def _stripped(raw: bytes) -> str:
@@ -1878,7 +1878,7 @@ def _percent(now: int, changes: Mapping[int, int | None], asked: set[int]) -> in
     for octet, change in changes.items():
         if octet in asked:
             now = 100 if change is None else now + change
-    return max(LEAST_OVERRIDE, min(MOST_OVERRIDE, now))
+    return max(MIN_OVERRIDE, min(MAX_OVERRIDE, now))
 
 
 # Speeds within a block: phases of one acceleration each.

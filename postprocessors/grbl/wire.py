@@ -43,25 +43,25 @@ BUFFER_BYTES: Final = 127
 SEGMENTS: Final = 6
 """Pieces of blocks that wait behind the planner (SEGMENT_BUFFER_SIZE, stepper.h)."""
 
-POLLS: Final = 5
-"""A status report is asked for whenever so many times the lateness of the line (0.25 s) is over:
-the wiki advises 5 Hz at most."""
+POLL_FACTOR: Final = 5
+"""Interval of status queries, in multiples of the lateness of the line (0.25 s): the wiki advises
+5 Hz at most."""
 
-SILENT: Final = 10
-"""A controller that answers no question for so many times the lateness of the line (0.5 s) homes,
-or is none."""
+SILENCE_FACTOR: Final = 10
+"""Silence after which a controller is homing or is no grbl, in multiples of the lateness of the
+line (0.5 s)."""
 
-HELD: Final = 3
-"""So many reports in a row say that it is held though nobody has asked for it: by a button, or
-since a ~ was lost."""
+MIN_HOLD_REPORTS: Final = 3
+"""Consecutive Hold reports after which an unrequested feed hold is reported to the user: a button
+was pressed, or a ~ was lost."""
 
 PROBE: Final = b"$G\n"
 PROBE_EVERY: Final = 100
-"""A query follows after so many bytes of lines. Its answer is as long as ten `ok`, so that queries
-more often than this fill the line back; with fewer the buffer would run dry before the answer."""
+"""Bytes of lines between two queries. Its answer is as long as ten `ok`, so that queries more
+often than this fill the line back; with fewer the buffer would run dry before the answer."""
 
-MOST_DUE: Final = 3
-"""So many reports at most are taken to be on their way: others were lost."""
+MAX_REPORTS_DUE: Final = 3
+"""Most reports that count as on their way; others were lost."""
 
 HOLD, RESUME, STATUS, RESET, JOG_CANCEL = b"!", b"~", b"?", b"\x18", b"\x85"
 HOMING: Final = b"$H\n"
@@ -71,11 +71,10 @@ BUILD: Final = b"$I\n"
 STANDING: Final = frozenset({"Hold:0", "Door:0", "Door:1", "Alarm", "Check", "Sleep"})
 """States in which nothing moves, whatever was sent before; Idle is one when it is said twice."""
 
-MOST_LINE: Final = 1000
-"""No answer is longer."""
+MAX_LINE_BYTES: Final = 1000
 
-MOST_HEARD: Final = 200
-"""So many bytes of what is no grbl are kept, to say what it may be."""
+MAX_UNKNOWN_BYTES: Final = 200
+"""Bytes kept of the text of an unknown firmware, to say which it may be."""
 
 MODES: Final = (
     frozenset({"G54", "G55", "G56", "G57", "G58", "G59"}),
@@ -94,7 +93,7 @@ _NUMBER = re.compile(r"N\d+(?:\.\d*)?", re.IGNORECASE)
 _DWELLS = re.compile(r"G0*4(?![\d.])", re.IGNORECASE)
 _PAUSES = re.compile(r"M0*[01](?![\d.])", re.IGNORECASE)
 _WAITS = re.compile(r"M0+(?![\d.])", re.IGNORECASE)
-"""grbl passes over M1 (gcode.c)."""
+"""Words that make grbl wait; it passes over M1 (gcode.c)."""
 
 _STATUS = re.compile(
     r"<(Idle|Run|Hold:[01]|Jog|Alarm|Door:[0-3]|Check|Home|Sleep)((?:\|[A-Za-z]+:[^|<>]*)*)>"
@@ -108,7 +107,7 @@ _BANNER = re.compile(r"Grbl (?:1\.[1-9]|[2-9])")
 _WORD = re.compile(r"G0*(\d+(?:\.\d+)?)", re.IGNORECASE)
 _AXIS = re.compile(r"[XYZ]", re.IGNORECASE)
 _ELSEWHERE = re.compile(r"G0*(?:10|28|30|43|53|5[5-9]|92)(?!\d)", re.IGNORECASE)
-"""Words behind which places are told in another frame than that of the beginning."""
+"""Words after which positions are reported in another frame than that of the beginning."""
 _ORIGIN = re.compile(r"\[OPT:[^,\]]*Z")
 """Built so that zero of the machine is where the switches are (HOMING_FORCE_SET_ORIGIN)."""
 
@@ -418,7 +417,7 @@ class GrblConversation(Conversation):
             # One that homes since before the port was opened hears nothing else, and says nothing.
             homes = self._phase == "greeting" and self._answered <= self._halted
             if not self._reset_sent and since >= (
-                SILENT * self.manner.late_s if homes else patience
+                SILENCE_FACTOR * self.manner.late_s if homes else patience
             ):
                 self._reset(now)
         elif self._phase == "greeting" and now - self._answered >= patience:
@@ -430,7 +429,7 @@ class GrblConversation(Conversation):
             return
         elif self._phase != "greeting" and not self._homes and now - self._answered >= patience:
             self._fail("it does not answer any more", now)
-        if now >= self._polled + POLLS * self.manner.late_s:  # as `_wake` reckons it
+        if now >= self._polled + POLL_FACTOR * self.manner.late_s:  # as `_wake` reckons it
             if self.state is WireState.PAUSING and now - self._halted >= patience / 2.0:
                 self._write(HOLD)
                 self._halted = now
@@ -450,14 +449,14 @@ class GrblConversation(Conversation):
 
     def _poll(self, now: float) -> None:
         if not self._homes:
-            self._due = min(self._due + 1, MOST_DUE)
+            self._due = min(self._due + 1, MAX_REPORTS_DUE)
             self._write(STATUS)
         self._polled = now
         self._wake(now)
 
     def _wake(self, now: float) -> None:
         if not self.ended:
-            self.next_s = self._polled + POLLS * self.manner.late_s
+            self.next_s = self._polled + POLL_FACTOR * self.manner.late_s
 
     # What it says.
 
@@ -466,12 +465,12 @@ class GrblConversation(Conversation):
         if self.ended:
             return
         if not self._known:
-            self._heard = (self._heard + data)[:MOST_HEARD]
+            self._heard = (self._heard + data)[:MAX_UNKNOWN_BYTES]
         *lines, self._rest = (self._rest + data).split(b"\n")
         for line in lines:
             if not self.ended:
                 self._line(line.decode("latin-1").strip("\r"), now)
-        if len(self._rest) > MOST_LINE:
+        if len(self._rest) > MAX_LINE_BYTES:
             self._rest = b""
             self._fail("what it says is no line of grbl", now)
 
@@ -597,7 +596,7 @@ class GrblConversation(Conversation):
                 return
             if self._stops():
                 self.state, self.why = WireState.WAITING, self._stop_note()
-            elif self._holds >= HELD:
+            elif self._holds >= MIN_HOLD_REPORTS:
                 self.state, self.why = WireState.WAITING, "it is held"
         elif self.state is WireState.WAITING and state in ("Run", "Idle"):
             self.state, self.why = (
@@ -928,14 +927,14 @@ SETTINGS: Final = {
     31: "lowest spindle speed, rev/min",
     32: "laser mode",
 }
-"""Those that belong to no axis (settings_codes_en_US.csv)."""
+"""Settings that belong to no axis (settings_codes_en_US.csv)."""
 OF_AXES: Final = {
     100: "steps per mm",
     110: "highest rate, mm/min",
     120: "mm/s²",
     130: "travel, mm",
 }
-"""Those of X; Y and Z follow."""
+"""Settings of X; Y and Z follow."""
 FIELDS: Final = {
     "MPos": "machine position",
     "WPos": "work position",
@@ -952,7 +951,8 @@ FIELDS: Final = {
 
 
 LAST_WORDS: Final = ("ALARM:1", "ALARM:2")
-"""Behind these it answers nothing until it is reset (protocol.c, protocol_exec_rt_system)."""
+"""Alarms after which it answers nothing until it is reset (protocol.c,
+protocol_exec_rt_system)."""
 
 
 class GrblTerminal(Terminal):

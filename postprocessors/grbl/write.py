@@ -21,7 +21,7 @@ from ..gcode.write import (
     write_modal,
 )
 from .controller import GrblModel
-from .dialect import MOST_TOOL, GrblDialect, GrblMachine
+from .dialect import MAX_TOOL, GrblDialect, GrblMachine
 from .findings import EVENT_LEFT_OUT, TOOL_BY_HAND
 
 HEADER = ("G17 {unit} G90 G94", "G54")
@@ -92,8 +92,8 @@ def _change(event: Event, dialect: GrblDialect) -> tuple[str, ...]:
             "write one program for each tool (--split tool), or stop for it with --set"
             " dialect.tool_change=stop",
         )
-    if tool_number(event) > MOST_TOOL:
-        raise event.refuse(f"grbl's highest tool number is {MOST_TOOL}")
+    if tool_number(event) > MAX_TOOL:
+        raise event.refuse(f"grbl's highest tool number is {MAX_TOOL}")
     coolant = (COOLANT_OFF,) if event.cools else ()
     spindle = (SPINDLE_OFF,) if event.spindle_on else ()
     return (*coolant, *spindle, f"T{tool_number(event)} M0")

@@ -18,11 +18,11 @@ from .pulses import Firmware
 RECORDS_PER_PACKET: Final = 5
 """15 blocks of three motors (L4106-4134)."""
 
-MOST_DWELL_BYTE_S: Final = 255
+MAX_DWELL_BYTE_S: Final = 255
 """Seconds that one byte of a dwell pair can hold (L4136-4147)."""
 
 
-MOST_LOW_BYTE: Final = 255
+MAX_LOW_BYTE: Final = 255
 """Pulses that PL alone can hold."""
 
 
@@ -60,12 +60,12 @@ class I8751Dialect(Firmware, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     @property
     def most_steps(self) -> int:
         """Steps that one record may move a motor."""
-        return self.encodable_steps if self.long_runs else MOST_LOW_BYTE - self.lost_pulses
+        return self.encodable_steps if self.long_runs else MAX_LOW_BYTE - self.lost_pulses
 
     @property
     def encodable_steps(self) -> int:
         """Steps that PH and PL can hold."""
-        return MOST_LOW_BYTE * self.high_byte_steps + MOST_LOW_BYTE - self.lost_pulses
+        return MAX_LOW_BYTE * self.high_byte_steps + MAX_LOW_BYTE - self.lost_pulses
 
     @property
     def dwell_replies(self) -> list[str]:

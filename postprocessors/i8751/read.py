@@ -31,25 +31,20 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 
 from . import packets
-from .dialect import MOST_DWELL_BYTE_S, RECORDS_PER_PACKET, I8751Dialect, I8751Machine
+from .dialect import MAX_DWELL_BYTE_S, RECORDS_PER_PACKET, I8751Dialect, I8751Machine
 from .findings import READ_TWO_WAYS, VALUE_ROUNDED
 from .pulses import PulseTimes
 
 SHOWN_CHARS: Final = 40
-"""An error message shows no more of a line than this."""
 
 
 ACCESS: Final = 0x13
-"""The byte that opens the access, as it is read."""
 PACKET_END: Final = 0x45
-"""The byte after a packet, as it is read."""
 DATA_END: Final = 0x54
-"""The byte after the last packet, as it is read."""
 STANDS: Final = 5
 """The sense of a motor that stands, as it is read."""
 
 RECORDS_AT_ONCE: Final = 1 << 14
-"""So many records are read, and made rows, in one go."""
 
 Shorts = npt.NDArray[np.int32]
 
@@ -441,11 +436,11 @@ class ListingReader:
 
     def _wait(self, text: str, column: int) -> int:
         seconds = int(text)
-        if seconds > MOST_DWELL_BYTE_S:
+        if seconds > MAX_DWELL_BYTE_S:
             raise self._error(
                 column,
                 f"{seconds} s is more than a byte holds",
-                f"use {MOST_DWELL_BYTE_S} s or less, and another record for the rest",
+                f"use {MAX_DWELL_BYTE_S} s or less, and another record for the rest",
             )
         return seconds
 

@@ -20,16 +20,16 @@ from camtool.toolpath.lower import arcs_to_lines, helices_to_steps, slope_step_m
 from camtool.toolpath.moves import Kind, Toolpath, mounted_before
 from camtool.toolpath.refusals import refuse, refuse_start, refuse_two_radii
 
-from .dialect import MOST_DWELL_BYTE_S, I8751Dialect, I8751Machine
+from .dialect import MAX_DWELL_BYTE_S, I8751Dialect, I8751Machine
 from .dogleg import FREE, StepLine, elbows, reaches
 
-MOST_STEPS: Final = 10_000_000
+MAX_STEPS: Final = 10_000_000
 """A coordinate of more steps is taken for a mistake: 26 hours at the machine's speed."""
 
-MOST_DWELL_S: Final = 36_000.0
+MAX_DWELL_S: Final = 36_000.0
 """A longer dwell (10 hours) is taken for a mistake."""
 
-MOST_RECORDS: Final = 2_000_000
+MAX_RECORDS: Final = 2_000_000
 """A program of more records (30 MB, hours over the link) is taken for a mistake."""
 
 REFUSED: Final = {
@@ -78,12 +78,12 @@ def _check_events(toolpath: Toolpath) -> None:
         "set it first, before any move",
     )
     with np.errstate(invalid="ignore"):
-        bad = (kind == Kind.DWELL) & ~((value >= 0.0) & (value <= MOST_DWELL_S))
+        bad = (kind == Kind.DWELL) & ~((value >= 0.0) & (value <= MAX_DWELL_S))
     refuse(
         toolpath,
         bad,
         lambda row: f"a dwell of {value[row]:g} s does not fit into the program",
-        f"use 0 to {MOST_DWELL_S:g} s",
+        f"use 0 to {MAX_DWELL_S:g} s",
     )
     ended = np.cumsum(kind == Kind.END) - (kind == Kind.END)
     refuse(
@@ -96,13 +96,13 @@ def _check_events(toolpath: Toolpath) -> None:
 
 def _check_coordinates(toolpath: Toolpath, machine: I8751Machine) -> None:
     for axis, (name, given) in enumerate(zip("XYZ", machine.axes, strict=True)):
-        most_mm = MOST_STEPS * given.coded_step_mm
+        most_mm = MAX_STEPS * given.coded_step_mm
         values = toolpath.end[:, axis]
         refuse(
             toolpath,
             np.abs(values) > most_mm,
             lambda row, name=name, values=values: (  # type: ignore[misc]
-                f"{name} = {values[row]:.6g} mm is more than {MOST_STEPS} steps"
+                f"{name} = {values[row]:.6g} mm is more than {MAX_STEPS} steps"
             ),
             "check the unit of the drawing and the machine's coded_step_mm",
         )
@@ -232,9 +232,9 @@ def _cut_rows(
 def _refuse_too_many(each: Floats) -> None:
     """PostError for rows (N,) that need about so many records, or more."""
     total = float(np.maximum(each, 1.0).sum())
-    if total > MOST_RECORDS:
+    if total > MAX_RECORDS:
         raise PostError(
-            f"the program would have about {total:.3g} records, more than {MOST_RECORDS}",
+            f"the program would have about {total:.3g} records, more than {MAX_RECORDS}",
             mend="use a larger dialect.tolerance_mm, or check the unit of the drawing",
         )
 
@@ -296,10 +296,10 @@ class _Plain(Struct, frozen=True, eq=False):
             if kind == Kind.DWELL:
                 left = self._whole_seconds(index)
                 if record and not (own and own[-1][0] == record):
-                    given = min(left, MOST_DWELL_BYTE_S - int(waits[record - 1, 1]))
+                    given = min(left, MAX_DWELL_BYTE_S - int(waits[record - 1, 1]))
                     waits[record - 1, 1] += given
                     left -= given
-                own += [(record, part, index) for part in _chopped(left, MOST_DWELL_BYTE_S)]
+                own += [(record, part, index) for part in _chopped(left, MAX_DWELL_BYTE_S)]
             elif kind == Kind.MESSAGE:
                 text = self.lowered.texts[int(self.lowered.value[index])]
                 messages.append((record + len(own), text))

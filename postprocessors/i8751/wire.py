@@ -29,10 +29,10 @@ from .write import END_OF_DATA, END_OF_PACKET, KEY, STOPPED, packet_bytes
 READY: Final = "LISTO"
 AGAIN: Final = "OTRO"
 
-TRIES: Final = 5
-"""So often the key is sent; ours."""
+KEY_TRIES: Final = 5
+"""Ours."""
 
-SLOWER: Final = 1.05
+TIME_FACTOR: Final = 1.05
 """Factor on the simulated time of a packet, beyond the lateness of the line."""
 
 ANY: Final = "?"
@@ -47,8 +47,8 @@ ROUND_TRIP_S: Final = 2.0 * 10.0 / 2400.0 * 0.9
 """Shortest time between a byte and its reply, s: both take ten bits on the line, less a tenth for
 clocks that differ."""
 
-UNANSWERED: Final = 2.0
-"""A byte without a reply is given so many times the lateness of the line."""
+UNANSWERED_FACTOR: Final = 2.0
+"""Wait behind a byte without a reply, in multiples of the lateness of the line."""
 
 
 class I8751Wire(Wire):
@@ -217,9 +217,9 @@ class I8751Conversation(PacketByPacket):
         self._said, self._written = "", now
         wait_s = self.manner.patience_s
         if self._reply in (ANY, NONE):
-            wait_s = UNANSWERED * self.manner.late_s
+            wait_s = UNANSWERED_FACTOR * self.manner.late_s
         elif self._executes:
-            wait_s += SLOWER * packet.seconds
+            wait_s += TIME_FACTOR * packet.seconds
         self.next_s = now + wait_s
 
     @property
@@ -248,7 +248,7 @@ class I8751Conversation(PacketByPacket):
             self._fail(f"it says {text[:20]!r} without being asked", now)
             return
         self._said += text
-        awaits_key = self._reply == READY and self._tries < TRIES
+        awaits_key = self._reply == READY and self._tries < KEY_TRIES
         if self.manner.paced and now - self._written < ROUND_TRIP_S:
             self._fail(f"{self._said[:20]!r} comes too soon{self._in_reply}", now)
         elif self._is_answered:

@@ -75,18 +75,18 @@ MOTOR_COLUMNS: Final = (1, 5, 11)
 PAIR_COLUMNS: Final = (9, 15)
 
 RECORDS_AT_ONCE: Final = 3_000 * RECORDS_PER_PACKET
-"""So many records become bytes in one go, in whole packets."""
+"""Whole packets."""
 
 TEXT_EXTENSION: Final = ".txt"
 """Listings and hex dumps are text whatever the machine calls its programs."""
 
-LEAST_DECIMALS: Final = 3
+MIN_DECIMALS: Final = 3
 """A listing has at least this many decimals of a millimetre."""
 
 STEPS_PER_LAST_DIGIT: Final = 0.05
 """The last decimal of a listing is worth this part of the finest step or less."""
 
-MOST_MESSAGE_CHARS: Final = 60
+MAX_MESSAGE_CHARS: Final = 60
 """Longest comment of the hex dump, in characters."""
 
 BYTES_WIDTH: Final = 24
@@ -169,13 +169,13 @@ def _high_low(steps: Ints, dialect: I8751Dialect) -> tuple[Ints, Ints]:
 def decimals_of(machine: I8751Machine) -> int:
     """Decimals of mm that distinguish all steps of the machine."""
     finest = min(axis.coded_step_mm for axis in machine.axes)
-    return max(LEAST_DECIMALS, math.ceil(-math.log10(STEPS_PER_LAST_DIGIT * finest)))
+    return max(MIN_DECIMALS, math.ceil(-math.log10(STEPS_PER_LAST_DIGIT * finest)))
 
 
 def safe_text(text: str) -> str:
     """A text from outside as part of a comment: printable ASCII, one line, short."""
     plain = re.sub(r"[^A-Za-z0-9 _.,:+/#-]+", " ", text)
-    return " ".join(plain.split())[:MOST_MESSAGE_CHARS]
+    return " ".join(plain.split())[:MAX_MESSAGE_CHARS]
 
 
 def listing_text(records: Records, machine: I8751Machine) -> str:

@@ -10,10 +10,10 @@ import re
 from typing import Final
 
 from ..gcode.faults import LineFault
-from .parameters import DEBUG, MOST_PARAMETERS, Parameters
+from .parameters import DEBUG, MAX_PARAMETERS, Parameters
 
 NEAR_ZERO: Final = 1e-4
-"""A number nearer to 0 is shown as 0."""
+"""Numbers nearer to 0 are shown as 0."""
 
 UNKNOWN_SHOWN: Final = "######"
 
@@ -56,7 +56,7 @@ def _value(found: re.Match[str], given: Parameters) -> float | None:
     try:
         if found[2] is not None:
             index = int(found[2])
-            return given.numbered(index, 0) if 0 < index < MOST_PARAMETERS else None
+            return given.numbered(index, 0) if 0 < index < MAX_PARAMETERS else None
         return given.named("".join(found[3].split()).lower(), 0)
     except LineFault:
         return None

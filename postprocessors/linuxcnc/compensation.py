@@ -22,7 +22,8 @@ CORNER_RAD: Final = 0.05
 """A corner that turns by less is met without an arc (TOLERANCE_CONCAVE_CORNER)."""
 
 SPREAD: Final = 0.01
-"""Radii of an arc that compensation has cut off may differ by so much, in the program's units."""
+"""Largest difference of the radii of an arc that compensation has shortened, in the program's
+units."""
 
 LONGER_MM: Final = 0.0254
 """An arc may become longer by this much turn before the corner counts as unreachable; 0.001 in

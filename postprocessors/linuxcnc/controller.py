@@ -57,8 +57,8 @@ from .steps import MOST_IN_CHAIN, merge_lines
 
 _Machine = Machine[LinuxcncController, LinuxcncDialect]
 
-LEAST_WAY_MM = 1e-9
-"""The rest of a move between blends counts as nothing when it is shorter."""
+MIN_LENGTH_MM = 1e-9
+"""Shortest remainder of a move between two blends that counts."""
 
 LAST_PART = 0.5
 """Fraction of its acceleration that the last move before a wait uses in the mode "blend", and a
@@ -349,7 +349,7 @@ def _speeds(
     own -= np.append(corners.reach[1:], 0.0)
     ways = _in_turns(corners.way, np.maximum(own, 0.0, out=own))
     lasting = np.zeros(len(ways), dtype=np.bool_)
-    lasting[places] = ways[places] > LEAST_WAY_MM
+    lasting[places] = ways[places] > MIN_LENGTH_MM
     along, fastest = _along_moves(moves, modes, corners)
     met = np.where(corners.way > 0.0, np.inf, corners.speed)
     entered = np.minimum(met, np.where(moves.last, np.sqrt(along * own), np.inf))
@@ -475,7 +475,7 @@ def _machine_mode(machine: _Machine) -> PathMode:
 #     v² ≤ a_xy · √¾ · r_e,   r_e² = (least r)² + (dr/dφ)²       (`arc`, ARC_FEED)
 #
 # and a helix lets Z keep its own limits. Along an arc half of the acceleration is used, the rest
-# is kept for turning (`tcGetTangentialMaxAccel`, tc.c); no move takes less than `LEAST_PERIODS` of
+# is kept for turning (`tcGetTangentialMaxAccel`, tc.c); no move takes less than `MIN_PERIODS` of
 # the servo.
 
 NORMAL_RATIO = np.sqrt(0.75)
@@ -485,7 +485,7 @@ TANGENT_RATIO = 0.5
 """Fraction of the acceleration that is used along the path of an arc
 (BLEND_ACC_RATIO_TANGENTIAL)."""
 
-LEAST_PERIODS = 1.02
+MIN_PERIODS = 1.02
 """Servo periods that the shortest move lasts (TP_MIN_SEGMENT_CYCLES, tp_types.h)."""
 
 WAITS = (
@@ -636,7 +636,7 @@ def moves_of(tangents: Tangents, chain: Ints, rules: CornerRules) -> PlannerMove
     arm, limits = tangents.arm_of(lead[on]), (rules.rate, rules.acceleration)
     bend = np.zeros(len(lead))
     highest[on], along[on], bend[on] = _arc_limits(tangents.arms, arm, length[on], limits)
-    highest = np.minimum(highest, length / (LEAST_PERIODS * period_s))
+    highest = np.minimum(highest, length / (MIN_PERIODS * period_s))
     cuts = path.is_feed[lead]
     speed = np.minimum(np.where(cuts, path.feed[lead], np.inf) / 60.0, highest)
     waits = np.diff(np.cumsum(np.isin(path.kind, WAITS))[lead], prepend=-1) > 0
@@ -738,7 +738,7 @@ def _turn_of(before: Floats, behind: Floats, ramp: Floats) -> Floats:
 
 
 TURN_ROUNDS = 40
-"""Halvings of the time of an overlap: to the last digits."""
+"""Bisections of the time of an overlap: to the last digits."""
 
 
 def _turning_radius(r: Floats, growth: Floats, rise: Floats) -> Floats:
@@ -796,7 +796,7 @@ COPLANAR = 1e-6
 """Arcs and what they meet lie in one plane when the normal of their tangents leaves that of the
 arc by no more than this."""
 
-LEAST_BEND_RAD = 1e-3
+MIN_BEND_RAD = 1e-3
 """Moves that bend by less have no arc between them (TP_MIN_ARC_ANGLE)."""
 
 
@@ -867,7 +867,7 @@ def corners_of(moves: PlannerMoves, tangents: Tangents, rules: CornerRules) -> P
         tangents.at_starts(moves.row),
     )
     used = np.zeros(len(moves.length))  # of each move, by the blend at its start
-    for _ in range(MOST_ROUNDS):
+    for _ in range(MAX_ROUNDS):
         corners = _meet(moves, tangents, bends, used, rules)
         if not moves.is_arc.any() or (corners.reach_on == used).all():
             break
@@ -875,8 +875,9 @@ def corners_of(moves: PlannerMoves, tangents: Tangents, rules: CornerRules) -> P
     return corners
 
 
-MOST_ROUNDS = 4
-"""So often corners are planned anew with what the blend before leaves of a move."""
+MAX_ROUNDS = 4
+"""Most rounds of planning the corners with the lengths that the blends of the round before
+leave."""
 
 
 def _meet(
@@ -977,7 +978,7 @@ def _overlaps(
     after = tangents.pushed_at_starts(moves.row[on], overall, moves.speed[on])
     theta = Bends(before, after).theta
     asked, cosine = modes.tolerance_mm(moves.mode[on - 1]), np.cos(theta)
-    bends = cosine > 0.5 * LEAST_BEND_RAD
+    bends = cosine > 0.5 * MIN_BEND_RAD
     within = 2.0 * np.sqrt(one * asked / np.where(bends, cosine, 1.0))
     within = np.where(bends, within, np.inf)
     return _Overlaps(np.minimum(first, within), np.minimum(second, within), one, other, theta)
@@ -1078,7 +1079,7 @@ def _fill(
     where they are `good` (K,)."""
     on, shape = on[good], shape[:, good]
     way = np.linalg.norm(shape[1], axis=1) * _angle_between(shape[1], shape[2])
-    lasting = way / (LEAST_PERIODS * rules.period_s)
+    lasting = way / (MIN_PERIODS * rules.period_s)
     corners.speed[on] = np.minimum(rounds.speed[good], lasting)
     corners.reach[on], corners.reach_on[on] = reach[0][good], reach[1][good]
     corners.acceleration[on] = TANGENT_RATIO * rounds.whole[good]
@@ -1119,14 +1120,14 @@ def _round_lines(
             reach[:, None] * bends.after - inward,
         ]
     )
-    good = (bent > LEAST_BEND_RAD) & (rounds.radius * bent > LEAST_WAY_MM)
+    good = (bent > MIN_BEND_RAD) & (rounds.radius * bent > MIN_LENGTH_MM)
     _fill(corners, on, rounds, (reach, reach), shape, good, rules)
 
 
 CLIPPED_RAD = 0.49 * np.pi
 """The planner takes no corner for sharper, where it compares the speeds of two lines."""
 
-LEAST_THETA_RAD = np.pi / 12.0
+MIN_THETA_RAD = np.pi / 12.0
 """No arc is laid between two arcs where θ is less (`blendInit3FromArcArc`)."""
 
 
@@ -1229,8 +1230,8 @@ def _round_arcs(
         ]
     both = first.is_arc & last.is_arc
     good = np.isfinite(centre) & (strays <= rounds.tolerance) & (theta > 0.0)
-    good &= (np.pi - 2.0 * theta_tan > LEAST_BEND_RAD) & ~(both & (theta < LEAST_THETA_RAD))
-    good &= rounds.radius * (np.pi - 2.0 * theta) > LEAST_WAY_MM
+    good &= (np.pi - 2.0 * theta_tan > MIN_BEND_RAD) & ~(both & (theta < MIN_THETA_RAD))
+    good &= rounds.radius * (np.pi - 2.0 * theta) > MIN_LENGTH_MM
     reach, spokes = [], []
     for side, which, turn, ends in (
         (first, on - 1, turned[0], True),

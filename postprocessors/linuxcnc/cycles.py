@@ -32,8 +32,8 @@ WANTS_PECK: Final = (730, 830)
 TAPS: Final = (740, 840)
 WANTS_SPINDLE: Final = (860, 870, 880)
 
-MOST_PASSES: Final = 100_000
-"""Passes of one thread."""
+MAX_PASSES: Final = 100_000
+"""Passes of a thread."""
 
 
 class _Hole(Struct):
@@ -356,10 +356,10 @@ def thread(machine: InterpreterState, block: LinuxcncBlock, end: list[float]) ->
     while depth < deepest:
         one(depth)
         number += 1
-        if number > MOST_PASSES:
-            raise LineFault(f"a thread of more than {MOST_PASSES} passes", "j", "write a larger J")
+        if number > MAX_PASSES:
+            raise LineFault(f"a thread of more than {MAX_PASSES} passes", "j", "write a larger J")
         depth = offset + first * number ** (1.0 / degression)
-    for _ in range(min(max(int(words.get("h", 0.0)), 0), MOST_PASSES) + 1):
+    for _ in range(min(max(int(words.get("h", 0.0)), 0), MAX_PASSES) + 1):
         one(deepest)
     canon.rapid(*end)
     canon.feed = feed

@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 
 from ..gcode.faults import LineFault
-from .parameters import MOST_PARAMETERS, Parameters
+from .parameters import MAX_PARAMETERS, Parameters
 
 Function = Callable[[Parameters], float]
 Value = float | Function
@@ -28,10 +28,10 @@ EQUAL: Final = 1e-4
 WHOLE: Final = 1e-4
 """A number that differs from a whole one by no more counts as it, where a whole one is wanted."""
 
-MOST_ROUNDED: Final = 2.0**31
+MAX_ROUNDED: Final = 2.0**31
 """ROUND of LinuxCNC goes through a 32-bit integer."""
 
-MOST_NESTED: Final = 60
+MAX_NESTING: Final = 60
 """Brackets within brackets, deeper than a line has room for."""
 
 NUMBER: Final = re.compile(r"[+-]*[0-9.]*")
@@ -90,7 +90,7 @@ class Scanner:
         begin = self.at
         self.at += 1
         self._depth += 1
-        if self._depth > MOST_NESTED:
+        if self._depth > MAX_NESTING:
             raise LineFault("brackets are nested too deeply", begin)
         found = self._ranked(self.value(), 1)
         self._operator_at(self.at)  # the bracket
@@ -176,7 +176,7 @@ class Scanner:
         else:
             index = self.whole()
             computed = index if callable(index) else lambda given, fixed=index: fixed
-            found = lambda given: float(1 <= computed(given) < MOST_PARAMETERS)  # noqa: E731
+            found = lambda given: float(1 <= computed(given) < MAX_PARAMETERS)  # noqa: E731
         if self.text[self.at : self.at + 1] != "]":
             raise LineFault("exists wants a closing bracket behind its parameter", self.at)
         self.at += 1
@@ -207,8 +207,8 @@ def whole(value: float, at: int) -> int:
 
 def check_index(index: int, at: int) -> int:
     """The number of a parameter; Fault where there is none of it."""
-    if not 1 <= index < MOST_PARAMETERS:
-        raise LineFault(f"there is no parameter #{index} (1 to {MOST_PARAMETERS - 1})", at)
+    if not 1 <= index < MAX_PARAMETERS:
+        raise LineFault(f"there is no parameter #{index} (1 to {MAX_PARAMETERS - 1})", at)
     return index
 
 
@@ -309,7 +309,7 @@ def _exp(value: float, at: int) -> float:
 
 def _round(value: float, at: int) -> float:
     """To the nearest whole number, halves away from zero."""
-    if abs(value) >= MOST_ROUNDED:
+    if abs(value) >= MAX_ROUNDED:
         raise LineFault(f"round of {value:g}, which is too large", at)
     return float(math.trunc(value + (-0.5 if value < 0.0 else 0.5)))
 

@@ -5,7 +5,7 @@ knows no structure of the program, only labels and a place to seek: a condition 
 skips lines up to a word with the same label (interp_o_word.cc). Labels of branches and loops
 belong to the sub in which they stand; those of subs to the program.
 
-What is executed is bounded: `MOST_LEVELS` calls within calls, and `most_lines` lines in all.
+What is executed is bounded: `MAX_CALL_LEVELS` calls within calls, and `most_lines` lines in all.
 """
 
 from __future__ import annotations
@@ -26,11 +26,10 @@ from .texts import Folder, ProgramText
 if TYPE_CHECKING:
     from .expressions import Value
 
-MOST_LEVELS: Final = 10
+MAX_CALL_LEVELS: Final = 10
 """Calls within calls are fewer than this (INTERP_SUB_ROUTINE_LEVELS)."""
 
-MOST_CALLERS_SHOWN: Final = 3
-"""So many of the calls that led to a line are named in a message."""
+MAX_CALLERS_SHOWN: Final = 3
 
 KINDS: Final = (
     *("sub", "endsub", "call", "do", "while", "repeat", "if", "elseif", "else", "endif"),
@@ -188,7 +187,7 @@ class Flow:
             for call in reversed(self.calls[1:])
             if call.called is not None
         ]
-        return ", ".join(names[:MOST_CALLERS_SHOWN])
+        return ", ".join(names[:MAX_CALLERS_SHOWN])
 
     @property
     def block_line(self) -> int:
@@ -392,9 +391,9 @@ class Flow:
             self.restore(call.saved)
 
     def _call(self, word: _Word, label: str) -> None:
-        if len(self.calls) >= MOST_LEVELS:
+        if len(self.calls) >= MAX_CALL_LEVELS:
             raise LineFault(
-                f"{MOST_LEVELS} calls within calls, more than LinuxCNC takes: "
+                f"{MAX_CALL_LEVELS} calls within calls, more than LinuxCNC takes: "
                 f"o<{label}> may call itself without end"
             )
         caller = self.calls[-1]

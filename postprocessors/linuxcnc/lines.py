@@ -54,11 +54,11 @@ M_GROUPS: Final[Mapping[int, str]] = {
     **dict.fromkeys(range(100, 200), "user"),
 }
 
-MOST_M_WORDS: Final = 4
+MAX_M_WORDS: Final = 4
 """M words of one block (MAX_EMS)."""
 
 TENTHS: Final = 1e-3
-"""A G word may differ from its code by so many tenths of a tenth: G5.10001 is G5.1."""
+"""Largest difference of a G word, tenfold, from its code: G5.10001 is G5.1."""
 
 AXES: Final = "xyzabc"
 """U, V and W are unknown to a machine that does not have them."""
@@ -330,8 +330,8 @@ def grouped(items: list[Item], comment: str | None) -> LinuxcncBlock:
                 if letter == "h" and value < -1:
                     raise LineFault("a tool below 0", item.at)
             words[letter] = value
-    if len(m) > MOST_M_WORDS:
-        raise LineFault(f"more than {MOST_M_WORDS} M words", "m")
+    if len(m) > MAX_M_WORDS:
+        raise LineFault(f"more than {MAX_M_WORDS} M words", "m")
     return LinuxcncBlock(words, g, m, comment)
 
 

@@ -23,7 +23,7 @@ INCH_SLACK: Final = 2.54
 """Radii of an arc may differ by so many times as much under G20 (CENTER_ARC_RADIUS_TOLERANCE_INCH:
 0.001 inch where it has 0.01 mm)."""
 
-LEAST_RATE: Final = 0.1
+MIN_RATE: Final = 0.1
 """The lowest feed of inverse time, units/min (inverse_time_rate_straight)."""
 
 EQUAL_TO_ONE: Final = 1e-12
@@ -31,14 +31,14 @@ EQUAL_TO_ONE: Final = 1e-12
 
 NO_FEED: Final = "a feed move, and no feed yet"
 
-EFFORT: Final = 10
-"""A control point of a spline counts as so many lines that are executed."""
+CONTROL_POINT_LINES: Final = 10
+"""Executed lines that a control point of a spline counts as."""
 
-BESIDE_EFFORT: Final = 2
-"""So many lines more count for a move beside its path, by cutter compensation."""
+COMPENSATION_LINES: Final = 2
+"""Executed lines that a compensated move counts as beyond its own."""
 
-GOES: Final = f"{AXES}@^"
-"""A line or a rapid without any of these words goes nowhere."""
+AXIS_LETTERS: Final = f"{AXES}@^"
+"""Words of which a line or a rapid needs one to move."""
 
 REFUSED: Final = {
     **dict.fromkeys((382, 383, 384, 385), "probes, which cannot be simulated"),
@@ -117,7 +117,7 @@ class BlockMoves(FrameCodes):
         if self.feed_mode == 930:
             if "f" not in block.words:
                 raise LineFault("a feed move of inverse time (G93) without F")
-            rate = max(LEAST_RATE, length() * block.words["f"]) if length else 0.0
+            rate = max(MIN_RATE, length() * block.words["f"]) if length else 0.0
             self.feed_mm = rate * mm
             return self.feed_mm
         if self.feed_mm == 0.0:
@@ -136,13 +136,13 @@ class BlockMoves(FrameCodes):
         if motion == 10:
             begin = self._begin()
             canon.feed = self._rate(block, lambda: math.dist(begin, end))
-        if not any(letter in words for letter in GOES):
+        if not any(letter in words for letter in AXIS_LETTERS):
             return
         if self._compensation is not None and self._compensation.active:
             if block.g.get("one block") == 530:
                 raise LineFault("G53 while the cutter's radius is compensated", "g")
             kind = Kind.RAPID if motion == 0 else Kind.LINE
-            self.effort += BESIDE_EFFORT
+            self.effort += COMPENSATION_LINES
             at = self._compensation.straight(kind, self._flat(end), self._flat())
             self._put(at)
             return
@@ -266,7 +266,7 @@ class BlockMoves(FrameCodes):
             return
         from .compensation import ProgrammedArc
 
-        self.effort += BESIDE_EFFORT
+        self.effort += COMPENSATION_LINES
         inside = turn * compensation.side > 0
         radius = abs(words["r"]) if "r" in words else math.dist(begin[:2], centre)
         if inside and compensation.first and radius <= compensation.radius:
@@ -410,7 +410,7 @@ class BlockMoves(FrameCodes):
         canon, z = self.canon, self.position[2]
         if len(canon.path) + 2 * PIECES * len(points) > bounds.MAX_MOVES:
             raise LineFault(too_many("this spline"))
-        self.effort += EFFORT * len(points)
+        self.effort += CONTROL_POINT_LINES * len(points)
         for piece in pieces_of(points, order):
             if piece.centre is None:
                 canon.line(*piece.end, z)

@@ -15,7 +15,7 @@ from .state import InterpreterState
 TURNS_TOLERANCE: Final = 1e-3
 """A P of turns that differs from a whole number by no more counts as it (rs274 takes 2.001)."""
 
-MOST_TURNS: Final = 10_000
+MAX_TURNS: Final = 10_000
 """Turns of an arc, each of which is a move."""
 
 AXIS_MODES: Final = (100, 280, 300, 520, 920)
@@ -169,5 +169,5 @@ def _check_turns(value: float, motion: int | None) -> None:
     turns = round(value)
     if abs(value - turns) > TURNS_TOLERANCE or (motion in (20, 30) and turns < 1):
         raise LineFault("the turns of an arc are a whole number from 1", "p")
-    if turns > MOST_TURNS:
-        raise LineFault(f"an arc of more than {MOST_TURNS} turns", "p")
+    if turns > MAX_TURNS:
+        raise LineFault(f"an arc of more than {MAX_TURNS} turns", "p")

@@ -14,7 +14,7 @@ from typing import Final
 
 from ..gcode.faults import LineFault
 
-MOST_PARAMETERS: Final = 5602
+MAX_PARAMETERS: Final = 5602
 """Numbers of parameters are below this (RS274NGC_MAX_PARAMETERS)."""
 
 ARGUMENTS: Final = range(1, 31)

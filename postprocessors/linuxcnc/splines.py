@@ -27,7 +27,7 @@ NEAR: Final = 1e-5
 STRAIGHT: Final = 1e-6
 """A piece whose turn is flatter is a line (`arc` of emccanon.cc)."""
 
-MOST_CONTROL_POINTS: Final = 1000
+MAX_CONTROL_POINTS: Final = 1000
 """Of one spline; each point is computed from all of them."""
 
 Flat = tuple[float, float]
@@ -43,8 +43,8 @@ class SplinePiece(Struct, frozen=True):
 
 def pieces_of(points: Sequence[tuple[float, float, float]], order: int) -> Iterator[SplinePiece]:
     """The lines and arcs of a spline with control points (x, y, weight)."""
-    if len(points) > MOST_CONTROL_POINTS:
-        raise LineFault(f"a spline of more than {MOST_CONTROL_POINTS} control points")
+    if len(points) > MAX_CONTROL_POINTS:
+        raise LineFault(f"a spline of more than {MAX_CONTROL_POINTS} control points")
     count = PIECES * len(points)
     most = len(points) - 1 - order + 2
     where = most * np.arange(count + 1) / count

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from .compensation import Compensation
 
 MM_PER_INCH: Final = 25.4
-"""Length of an inch, mm."""
 
 
 class Mounted(Struct, frozen=True):

@@ -20,11 +20,10 @@ from ..gcode.blocks import ProgramLines, has_words
 from ..gcode.faults import LineFault
 from .lines import ParsedLine
 
-MOST_FILES: Final = 100
+MAX_FILES: Final = 100
 """Files of subs that one program may call."""
 
-MOST_FILE_BYTES: Final = 10_000_000
-"""A larger file of a sub is refused."""
+MAX_FILE_BYTES: Final = 10_000_000
 
 SUFFIX: Final = ".ngc"
 
@@ -81,8 +80,8 @@ class Folder:
         """The file of a sub, None where there is none; Fault for a place that is not opened."""
         if label in self._found:
             return self._found[label]
-        if len(self._found) >= MOST_FILES:
-            raise LineFault(f"the program calls more than {MOST_FILES} files")
+        if len(self._found) >= MAX_FILES:
+            raise LineFault(f"the program calls more than {MAX_FILES} files")
         self._found[label] = found = self._opened(label)
         return found
 
@@ -105,11 +104,11 @@ class Folder:
             file = (root / parts).resolve()
             if not file.is_relative_to(root):
                 raise LineFault(f"{name} lies outside of the program's folder", mend=self.mend)
-            data = bounds.file_bytes(file, MOST_FILE_BYTES)
+            data = bounds.file_bytes(file, MAX_FILE_BYTES)
         except (OSError, ValueError):
             return None
         if data is None:
-            raise LineFault(f"{name} is larger than {MOST_FILE_BYTES // 1_000_000} MB")
+            raise LineFault(f"{name} is larger than {MAX_FILE_BYTES // 1_000_000} MB")
         return ProgramText(data, name, self._line_chars)
 
 

@@ -31,7 +31,7 @@ HOMING_MM_S: Final = 10.0
 """The speed of its homing, in which every axis goes to machine zero; ours."""
 
 JOINTS: Final = 6
-"""It reports so many, whichever there are (linuxcncrsh of 2.9)."""
+"""Joints that it reports, whichever there are (linuxcncrsh of 2.9)."""
 
 FRAME: Final = re.compile(r"G10 ?L20 ?P0((?: ?[XYZ]-?\d*\.?\d+)+)", re.IGNORECASE)
 WORD: Final = re.compile(r"([XYZ])(-?\d*\.?\d+)", re.IGNORECASE)

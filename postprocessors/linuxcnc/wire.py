@@ -35,21 +35,20 @@ from camtool.target.wire import (
 from ..gcode.blocks import has_words
 from .dialect import LinuxcncLink, LinuxcncMachine
 
-POLLS: Final = 4
+POLL_FACTOR: Final = 4
 """Interval of status queries, in multiples of the lateness of the line (0.2 s)."""
 
-HOMES_S: Final = 600.0
-"""Homing takes no longer."""
+MAX_HOMING_S: Final = 600.0
 
 NEAR_MM: Final = 0.02
-"""A place that is reported is one that is wanted when it lies so near, as blends and an encoder
-leave it."""
+"""Largest distance, mm, between a reported position and the same position as programmed: blends,
+and encoders."""
 
-FASTEST: Final = 3.0
-"""Overrides of feed and rapids make a program no more than so many times as fast."""
+MAX_OVERRIDE: Final = 3.0
+"""Largest override of feed and rapids."""
 
-STANDS: Final = 2
-"""It stands when so many reports in a row give the same place."""
+STILL_REPORTS: Final = 2
+"""Consecutive equal positions after which it stands."""
 
 UNSURE: Final = "it did not confirm the stop: stop it at the machine"
 
@@ -57,10 +56,11 @@ JOINTS: Final = 3
 """X, Y and Z, in the order of its joints and of the places that it reports."""
 
 _FRAMES = re.compile(rb"G0*(?:10|52|5[5-9]|92)(?!\d)", re.IGNORECASE)
-"""Words behind which a place is told in another frame than it is programmed in."""
+"""Words after which positions are reported in another frame than they are programmed in."""
 
 _WAITS = re.compile(r"M0*(?:[01]|60)(?![\d.])", re.IGNORECASE)
-"""M1 does so where the switch of optional stops is on, which the program cannot know."""
+"""Words that wait for the operator; M1 does so where the switch of optional stops is on, which the
+program cannot know."""
 _COMMENT = re.compile(r"\([^()]*\)|;.*|\s")
 
 _ENDS = re.compile(rb"[\r\n]+")
@@ -348,7 +348,7 @@ class LinuxcncConversation(Conversation):
         yield from self._set("mode manual")
         self._begun = True
         yield from self._set("home -1")
-        end = self._now + HOMES_S
+        end = self._now + MAX_HOMING_S
         while not (yield from self._homed()):
             if self._now > end:
                 raise _Refused("homing does not end")
@@ -357,7 +357,7 @@ class LinuxcncConversation(Conversation):
 
     @property
     def _poll_s(self) -> float:
-        return POLLS * self.manner.late_s
+        return POLL_FACTOR * self.manner.late_s
 
     def _run(self) -> Script:
         file = self.manner.file
@@ -387,8 +387,8 @@ class LinuxcncConversation(Conversation):
             if status != "IDLE":
                 busy = True
                 self._reached(line, ran)
-                yield from self._obey(status, still >= STANDS - 1)
-            elif busy or now - begun > POLLS * self._poll_s:
+                yield from self._obey(status, still >= STILL_REPORTS - 1)
+            elif busy or now - begun > POLL_FACTOR * self._poll_s:
                 self._over(line, ran)
                 return
             yield self._poll_s
@@ -436,7 +436,7 @@ class LinuxcncConversation(Conversation):
             and place is not None
             and max(abs(one - other) for one, other in zip(end, place, strict=True)) > NEAR_MM
         )
-        early = FASTEST * ran + self.manner.patience_s < total
+        early = MAX_OVERRIDE * ran + self.manner.patience_s < total
         if elsewhere or early or left > self.manner.patience_s:
             raise _Refused("it has stopped before the end of the program")
         self.acknowledged = self.done = len(self.packets)
@@ -446,7 +446,7 @@ class LinuxcncConversation(Conversation):
         """Until it is idle, and stands."""
         yield from self._set("abort")
         end, last, still = self._now + self.manner.patience_s, None, 0
-        while still < STANDS:
+        while still < STILL_REPORTS:
             status = yield from self._get("program_status")
             place = yield from self._place()
             still = still + 1 if place == last and status.upper() == "IDLE" else 0

@@ -19,7 +19,7 @@ MODES: Final = "G17 {unit} G40{length} G54 G80 G90 G91.1 G94"
 """XY plane, mm or inches, no cutter radius, no tool length where the machine uses none, the first
 work frame, no cycle, absolute, I J as offsets, feeds a minute: whatever the last program left."""
 
-MOST_TOOL: Final = 99_999
+MAX_TOOL: Final = 99_999
 """Our choice: LinuxCNC's tool tables hold far fewer."""
 
 TOLERANCE: Final = NumberStyle(6, strip=True)
@@ -75,7 +75,7 @@ def _words(event: Event, dialect: LinuxcncDialect) -> tuple[str, ...]:
             "the machine changes no tools",
             "write one program for each tool (--split tool), or use --set dialect.tool_change=m6",
         )
-    if number > MOST_TOOL:
-        raise event.refuse(f"the highest tool number is {MOST_TOOL}")
+    if number > MAX_TOOL:
+        raise event.refuse(f"the highest tool number is {MAX_TOOL}")
     length = (f"G43 H{number}",) if dialect.tool_lengths else ()
     return (f"T{number} M6", *length)

@@ -52,7 +52,7 @@ from .steps import (
 
 _Machine = Machine[MatlabRouterController, MatlabRouterDialect]
 
-FARTHEST_UNITS = 32767
+MAX_DISTANCE_UNITS = 32767
 """Distances from home are an int16 of tenths of a millimetre (L4625-4635)."""
 
 UNIT_MM = 0.1
@@ -72,7 +72,7 @@ class MatlabRouterModel(ControllerModel[MatlabRouterController, MatlabRouterDial
         mend = "post the drawing for it: arcs become lines then"
         refuse(toolpath, toolpath.is_arc, "this machine has no arcs", mend)
         home = np.array(machine.controller.machine_zero_mm)
-        far = (np.abs(toolpath.end - home) > FARTHEST_UNITS * UNIT_MM).any(axis=1)
+        far = (np.abs(toolpath.end - home) > MAX_DISTANCE_UNITS * UNIT_MM).any(axis=1)
         refuse(toolpath, far, "a position is beyond all that the controller can count")
         end = placed(toolpath, home).end
         coded = [axis.coded_step_mm for axis in machine.axes]
@@ -193,7 +193,6 @@ class _Run:
 # apart, and those of the GUI lie within half a count of the way.)
 
 UNITS_PER_MM = 10
-"""The program counts in tenths of a millimetre (L3202-3204)."""
 
 INT16 = 0xFFFF
 """The slaves' counter of chunks is unsigned, 16 bits (L5589-5600)."""
@@ -205,7 +204,7 @@ NUMBERS_OF_HEADER, NUMBERS_OF_LINE = 3, 4
 """Counts of numbers that the PC sends for a job and for each of its lines (L4294-4360)."""
 
 PATIENCE, PATIENCE_TICKS = 4.0, 400.0
-"""A line is given up after so many times what its speeds should need, and two seconds more."""
+"""Longest time of a line: a multiple of the time that its speeds need, and two seconds more."""
 
 SETTLE_TAUS = 12.0
 """A job is followed for this many time constants after its last line: 6e-6 of the speed is
@@ -215,7 +214,6 @@ PAIR_COUNTS = 10
 """The speeds of a line are searched up to this far from those of its path, in counts in a tick."""
 
 LINES_AT_ONCE = 1 << 12
-"""So many lines are ordered together."""
 
 PAIR_TOLERANCE = 1e-4
 """A sum of squares of speeds that is a whole number within this comes from a program."""
@@ -435,7 +433,6 @@ TICK_S = 0.005
 """The slaves' timer: (65536 − 53036) · 2 / 5 MHz (L2757)."""
 
 TICKS_PER_S = 200
-"""Ticks in a second."""
 
 SIGNS = np.array([1, 1, -1])
 """Home is at the low ends of X and Y and at the top of Z: all distances are away from it."""

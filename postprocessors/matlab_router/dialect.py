@@ -20,7 +20,6 @@ UNIT_MM: Final = 0.1
 """Positions and distances are whole tenths of a millimetre (L3202-3204, L4444-4445)."""
 
 UNITS_PER_MM: Final = 10
-"""Units in a millimetre."""
 
 GRID_TOLERANCE: Final = 1e-9
 """`grid_mm` is a whole multiple of the unit within this part of a unit."""
@@ -31,7 +30,7 @@ CHUNK_UNITS: Final = 2
 FIXED_Y_UNITS: Final = 200
 """The listed master sends this to the Y slave instead of the first point (state 1, L4822)."""
 
-MOST_NUMBER: Final = 32767
+MAX_NUMBER: Final = 32767
 """Every number is a signed int16 in the master (L4625-4635)."""
 
 LineCount = Annotated[int, Meta(ge=1, le=255)]

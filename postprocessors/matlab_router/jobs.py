@@ -23,7 +23,7 @@ from camtool.toolpath.program import Listing
 
 from .dialect import (
     CHUNK_UNITS,
-    MOST_NUMBER,
+    MAX_NUMBER,
     UNIT_MM,
     MatlabRouterMachine,
     ResolvedDialect,
@@ -34,7 +34,6 @@ TABLES: Final = ("xy", "lxy", "velxy")
 NAMES: Final = (*TABLES, "size_of_array", "first_pointx", "first_pointy")
 
 SHOWN_CHARS: Final = 24
-"""An error message shows no more of a program than this."""
 
 _BLANK: Final = re.compile(r"(?:[ \t\r\n]+|%[^\n]*)*")
 _NAME: Final = re.compile(r"([A-Za-z]\w*)(?:\{(\d{1,6})\})?[ \t]*=[ \t]*", re.ASCII)
@@ -53,12 +52,11 @@ BODY: Final = {"lxy": 0, "velxy": 2}
 NUMBERS_PER_LINE: Final = 4
 """In a stream: two distances and two speeds."""
 
-MOST_DIGITS: Final = 5
+MAX_DIGITS: Final = 5
 """The master's buffer takes six characters, a sign and five digits (L4668-4708)."""
 
-_STREAM_NUMBER: Final = re.compile(rb"-?\d{1,%d}" % MOST_DIGITS)
+_STREAM_NUMBER: Final = re.compile(rb"-?\d{1,%d}" % MAX_DIGITS)
 SHOWN_BYTES: Final = 12
-"""An error message shows no more of a number than this."""
 
 Where = Callable[[str, int, int], str]
 """The place of a number in the file, by the name of its array, its row and its column."""
@@ -98,7 +96,7 @@ def check_count(count: int, where: Where, dialect: ResolvedDialect) -> None:
 def check_job(job: ReadJob, dialect: ResolvedDialect) -> None:
     """ProgramError for the first number with which the machine would run away or stop."""
     for name, table in (("lxy", job.length), ("velxy", job.speed)):
-        _refuse(job, name, np.abs(table) > MOST_NUMBER, "is beyond an int16")
+        _refuse(job, name, np.abs(table) > MAX_NUMBER, "is beyond an int16")
     _refuse(job, "lxy", job.length < 0, "is negative: the sign belongs in velxy")
     runaway = "makes the slave run away"
     if dialect.odd == "truncated":
@@ -109,7 +107,7 @@ def check_job(job: ReadJob, dialect: ResolvedDialect) -> None:
         first = int(job.first[axis])
         if axis == 1 and dialect.master_y == "fixed":
             continue
-        if not CHUNK_UNITS <= first <= MOST_NUMBER:
+        if not CHUNK_UNITS <= first <= MAX_NUMBER:
             reason = runaway if 0 <= first < CHUNK_UNITS else "is out of reach"
             fail(
                 job.where(name, 0, 0),
@@ -310,7 +308,7 @@ class _Text:
         if not rows:
             self.fail(begin, "an array is empty")
         table = np.stack(rows)
-        if np.abs(table).max() > MOST_NUMBER:
+        if np.abs(table).max() > MAX_NUMBER:
             self._refuse_words(begin, match.end(1))
         self._finish(match.end())
         return _Value(table, begin)
@@ -322,7 +320,7 @@ class _Text:
 
     def _int(self, word: str, offset: int) -> int:
         """A word at an offset as a whole number."""
-        if _TEXT_NUMBER.fullmatch(word) is None or abs(int(word)) > MOST_NUMBER:
+        if _TEXT_NUMBER.fullmatch(word) is None or abs(int(word)) > MAX_NUMBER:
             self.fail(offset, f"{word[:SHOWN_CHARS]!r} is no whole number of an int16")
         return int(word)
 
@@ -430,7 +428,7 @@ def _job_of_words(
 def _fail_number(word: bytes, where: str) -> NoReturn:
     fail(
         where,
-        f"{word[:SHOWN_BYTES]!r} is no whole number of at most {MOST_DIGITS} digits",
+        f"{word[:SHOWN_BYTES]!r} is no whole number of at most {MAX_DIGITS} digits",
         "each number is digits and a CR, nothing else",
     )
 

@@ -25,7 +25,7 @@ from camtool.toolpath.moves import Toolpath
 
 from .dialect import (
     CHUNK_UNITS,
-    MOST_NUMBER,
+    MAX_NUMBER,
     UNIT_MM,
     UNITS_PER_MM,
     MatlabRouterMachine,
@@ -52,7 +52,7 @@ half-way, and goes to the farther one."""
 FEED_TOLERANCE: Final = 1e-6
 """A feed within this many counts of the limit is on it."""
 
-FASTEST_COUNTS: Final = 1023
+MAX_SPEED_COUNTS: Final = 1023
 """The slaves discard a measured speed above this (L5496-5516)."""
 
 
@@ -115,7 +115,7 @@ class _Maker:
         self._unit = machine.feed.unit_mm_min
         self._least = max(CHUNK_UNITS, dialect.grid_units)
         self._most_counts = min(
-            FASTEST_COUNTS, int(machine.max_feed_mm_min / self._unit + FEED_TOLERANCE)
+            MAX_SPEED_COUNTS, int(machine.max_feed_mm_min / self._unit + FEED_TOLERANCE)
         )
 
     def lines(self, cuts: CutLines) -> SlaveLines:
@@ -144,7 +144,7 @@ class _Maker:
     def _refuse_outside(self, rows: Ints, units: Floats) -> None:
         for axis, name in enumerate("XY"):
             travel = (self._machine.axes.x, self._machine.axes.y)[axis].travel_mm
-            most = MOST_NUMBER if travel is None else min(MOST_NUMBER, travel * UNITS_PER_MM)
+            most = MAX_NUMBER if travel is None else min(MAX_NUMBER, travel * UNITS_PER_MM)
             bad = ~((units[:, axis] >= 0.0) & (units[:, axis] <= most + TIE_TOLERANCE))
             if bad.any():
                 line = int(np.argmax(bad))
@@ -199,7 +199,7 @@ class _Maker:
         larger = distance.max(axis=1).astype(np.float64)
         slant = np.hypot(*distance.T) / larger
         share = 1.0 / slant if self._dialect.speed == "path" else 1.0
-        wanted = np.minimum(lines.feed * share / self._unit, float(MOST_NUMBER))
+        wanted = np.minimum(lines.feed * share / self._unit, float(MAX_NUMBER))
         counts = np.floor(wanted + 0.5).astype(np.int64)
         fast = counts > self._most_counts
         if self._dialect.too_fast == "limited":

@@ -41,9 +41,9 @@ from .findings import (
 )
 from .jobs import ReadJob, read_stream, read_text
 
-MOST_OFF: Final = 8.0
-"""The speed of an axis may differ from the one for its distance by this many counts in 5 ms (the
-GUI's own differ by half a count, and by some when distances are shortened)."""
+MAX_SPEED_ERROR_COUNTS: Final = 8.0
+"""Largest difference between the speed of an axis and the speed for its distance, counts in 5 ms
+(the GUI's own differ by half a count, and by some when distances are shortened)."""
 
 FEED_GUARD: Final = 1e-6
 """A speed that is above its limit by less than this (in counts) is at the limit."""
@@ -190,9 +190,9 @@ class DrivenLines:
         the line bends at t₁ · v, by (1 − t₁/t₂) of the distance of the later axis.
 
     A line becomes two rows when it bends by more than the tolerance, or when a speed is off by
-    more than `MOST_OFF` from that of its distance: from the rows and the speed along them the
-    speeds of the axes can be found again. `end` (m, 2) units, `speed` (m,) counts in 5 ms of both
-    axes together, `line` (m,) its index; `bent` counts the lines beyond the tolerance.
+    more than `MAX_SPEED_ERROR_COUNTS` from that of its distance: from the rows and the speed along
+    them the speeds of the axes can be found again. `end` (m, 2) units, `speed` (m,) counts in 5 ms
+    of both axes together, `line` (m,) its index; `bent` counts the lines beyond the tolerance.
     """
 
     def __init__(self, points: Ints, speed: Ints, tolerance_mm: float) -> None:
@@ -211,7 +211,7 @@ class DrivenLines:
         self.most_bend = float(lag.max(initial=0.0))
         self.first_bent = int(np.argmax(bent)) if self.bent else 0
         keep = moving.any(axis=1)
-        parted = bent | (both & (_off(distance, speed, along) > MOST_OFF))
+        parted = bent | (both & (_off(distance, speed, along) > MAX_SPEED_ERROR_COUNTS))
         times = np.where(keep, np.where(parted, 2, 1), 0)
         self.line = np.repeat(np.arange(len(way)), times)
         self.end = points[1:][self.line].astype(np.float64)

@@ -29,7 +29,7 @@ END: Final = 13
 """The character that ends a number."""
 
 CHARACTERS: Final = 6
-"""A number has no more: the others are dropped (a buffer of 7, L4668-4708)."""
+"""Most characters of a number: further ones are dropped (a buffer of 7, L4668-4708)."""
 
 PRINTABLE: Final = range(ord(" "), ord("~") + 1)
 """Characters that the library's get_string_usb takes and sends back; it drops the others."""

@@ -41,10 +41,10 @@ from .write import JobNumbers, program_of, stream_of
 END: Final = b"\r"
 """Behind each number."""
 
-SLOWER: Final = 1.05
+TIME_FACTOR: Final = 1.05
 
-LISTENED: Final = 10.0
-"""An echo is looked for during so many times the lateness of the line (0.5 s)."""
+ECHO_FACTOR: Final = 10.0
+"""Longest wait for an echo, in multiples of the lateness of the line (0.5 s)."""
 
 HOMES: Final = (
     "the machine goes home on the last number of each job: Z rises first, then X and Y move"
@@ -190,7 +190,7 @@ class MatlabRouterConversation(PacketByPacket):
         if self._echoes:
             self._echo, self.next_s = word, now + self.manner.patience_s
         elif self._link.echo == "detected" and self._count == 1:
-            self._echo, self.next_s = word, now + LISTENED * self.manner.late_s
+            self._echo, self.next_s = word, now + ECHO_FACTOR * self.manner.late_s
         self._write(word)
         if not self._echo:
             self._end_number(now)
@@ -206,7 +206,7 @@ class MatlabRouterConversation(PacketByPacket):
         self._moving = True
         packet, lines = self.packets[self.sent - 1], self._count - len(HEADER)
         seconds = packet.seconds - len(HEADER) * header - lines * number
-        self.next_s = now + SLOWER * max(seconds, 0.0) + self._margin_s
+        self.next_s = now + TIME_FACTOR * max(seconds, 0.0) + self._margin_s
 
     def received(self, data: bytes, now: float) -> None:
         """Nothing but the digits that were sent may come back."""

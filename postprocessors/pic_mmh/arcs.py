@@ -43,11 +43,11 @@ EARLIEST, LATEST = 0.6, 1.1
 WINDOW_SLACK = 4
 """The end is searched from EARLIEST·L − slack to LATEST·L + slack iterations."""
 
-APART = 16
-"""Another start of D may take this many iterations more or less to a step: the paths may be one
-step apart at each of eight diagonals, and at the start."""
+MAX_LEAD_ITERATIONS = 16
+"""Largest difference in iterations, up to a step, between paths with different starts of D: they
+may be one step apart at each of eight diagonals, and at the start."""
 
-LEAST_RADIUS_STEPS = 4.0
+MIN_RADIUS_STEPS = 4.0
 """An arc of a smaller radius is written as lines: its path has too few steps to be an arc."""
 
 (START_X, START_Y, END_X, END_Y, CENTRE_X, CENTRE_Y, CLOCKWISE) = range(7)
@@ -89,7 +89,7 @@ def land(
     out = np.zeros((len(arcs), 3), dtype=np.int64)
     for k in range(len(arcs)):
         out[k, ITERATION] = -1
-        if _radius(arcs[k, START_X], arcs[k, START_Y]) >= LEAST_RADIUS_STEPS:
+        if _radius(arcs[k, START_X], arcs[k, START_Y]) >= MIN_RADIUS_STEPS:
             _land(arcs[k], sweeps[k], sagitta, search, out[k])
     return np.asarray(out)
 
@@ -127,8 +127,8 @@ def _hits(arc: Ints, x: int, y: int, low: int, high: int, state: Ints) -> int:
     error = arc[START_X] * arc[START_X] + arc[START_Y] * arc[START_Y] - radius * radius
     if error != 0:
         _begin(arc, error, state)
-        other = first_at(state, x, y, met + APART)
-        if other < max(1, met - APART):
+        other = first_at(state, x, y, met + MAX_LEAD_ITERATIONS)
+        if other < max(1, met - MAX_LEAD_ITERATIONS):
             return -1
     return met
 

@@ -126,7 +126,6 @@ MAX_STEPS = 1 << 30
 
 
 ROWS_AT_ONCE = 1 << 14
-"""The legs of so many rows are made together."""
 
 
 class _Leg(Struct, frozen=True):

@@ -30,28 +30,28 @@ HALF_STEP_TOLERANCE: Final = 1e-6
 """A coordinate within this much (in steps) of half a step is half-way between two steps."""
 
 UNITS_PER_MM: Final = {"example": 100_000, "annex": 1_000}
-MOST_UNITS: Final = {"example": 9_999_999, "annex": 99_999}
+MAX_UNITS: Final = {"example": 9_999_999, "annex": 99_999}
 
 FEED_TOLERANCE: Final = 1e-6
 """A feed within this much (in units of the feed word) of a limit or a whole unit is on it."""
 
-MOST_FEED_UNITS: Final = 99
+MAX_FEED_UNITS: Final = 99
 """Largest feed word: two digits (L3297-3309)."""
 
 ARC_RADIUS_SPREAD_MM: Final = 0.005
 """The radii at the start and at the end of an arc may differ by at most this. Rounding centre and
 ends to 1 µm causes less (√2 µm at each end)."""
 
-MOST_DWELL_S: Final = 9900.0
+MAX_DWELL_S: Final = 9900.0
 """A longer dwell (100 blocks, 2¾ hours) is taken for a mistake."""
 
 DWELL_DIGITS_S: Final = 99
 """Seconds that the two digits of one G04 can hold (L3359-3366)."""
 
-MOST_SPINDLE: Final = 9999
+MAX_SPINDLE: Final = 9999
 """Rev/min that the four digits of S can hold (L3418-3426)."""
 
-MOST_TOOL: Final = 99
+MAX_TOOL: Final = 99
 """Tools that the two digits of T can hold (L3455-3464)."""
 
 
@@ -65,7 +65,7 @@ class UnitGrid(Struct, frozen=True):
     @classmethod
     def of(cls, dialect: PicMmhDialect, step_mm: float) -> UnitGrid:
         """The grid of a form for an axis whose coded step is `step_mm`."""
-        return cls(UNITS_PER_MM[dialect.form], MOST_UNITS[dialect.form], step_mm)
+        return cls(UNITS_PER_MM[dialect.form], MAX_UNITS[dialect.form], step_mm)
 
     @property
     def resolution_mm(self) -> float:
@@ -198,11 +198,11 @@ def _feed_units(toolpath: Toolpath, machine: PicMmhMachine) -> tuple[Ints, Findi
     (L3196-3199); F00 would make the controller divide by 0.
     """
     unit = machine.feed.unit_mm_min
-    most = min(MOST_FEED_UNITS, math.floor(machine.max_feed_mm_min / unit + FEED_TOLERANCE))
+    most = min(MAX_FEED_UNITS, math.floor(machine.max_feed_mm_min / unit + FEED_TOLERANCE))
     mend = f"the highest feed is {most * unit:g} mm/min, the lowest {unit:g} mm/min"
     used = toolpath.is_feed
     feed = np.where(used, toolpath.feed, unit)
-    highest = min(machine.max_feed_mm_min, MOST_FEED_UNITS * unit)
+    highest = min(machine.max_feed_mm_min, MAX_FEED_UNITS * unit)
     refuse(toolpath, ~(feed > 0.0), lambda row: f"a feed of {feed[row]:g} mm/min", mend)
     refuse(
         toolpath,
@@ -238,10 +238,10 @@ def event_words(toolpath: Toolpath, row: int) -> tuple[list[str], bool]:
     if kind == Kind.SPINDLE_OFF:
         return ["M05;"], False
     name, most = {
-        Kind.DWELL: ("dwell", MOST_DWELL_S),
-        Kind.SPINDLE_CW: ("spindle speed", MOST_SPINDLE),
-        Kind.SPINDLE_CCW: ("spindle speed", MOST_SPINDLE),
-        Kind.TOOL_CHANGE: ("tool", MOST_TOOL),
+        Kind.DWELL: ("dwell", MAX_DWELL_S),
+        Kind.SPINDLE_CW: ("spindle speed", MAX_SPINDLE),
+        Kind.SPINDLE_CCW: ("spindle speed", MAX_SPINDLE),
+        Kind.TOOL_CHANGE: ("tool", MAX_TOOL),
     }[kind]
     if math.isnan(value) and name == "spindle speed":
         raise PostError(

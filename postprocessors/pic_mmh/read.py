@@ -27,16 +27,14 @@ from . import blocks
 from .dialect import PicMmhMachine
 from .findings import BLOCK_TOO_LONG_READ, FEED_ABOVE_LIMIT
 
-LEAST_RUN: Final = 24
-"""Fewer moves in a row than these are read block by block."""
+MIN_RUN: Final = 24
+"""Shortest run of moves that is read by columns."""
 
 BLOCKS_AT_ONCE: Final = 1 << 12
-"""So many moves are read in one go."""
 
 UNITS_PER_MM: Final = {"example": 100_000, "annex": 1_000}
 
 SHOWN_CHARS: Final = 48
-"""An error message shows no more of a block than this."""
 
 Shape = tuple[tuple[str, str], ...]
 """The words behind a code: letter and kind of value ("c" is a coordinate)."""
@@ -103,7 +101,7 @@ def read_program(data: bytes, machine: PicMmhMachine) -> Toolpath:
     while (end := data.find(b";", at)) >= 0:
         # Python objects for each of thousands of moves in a row would be most of the time.
         count, behind = blocks.moves_in_a_row(octets, at, annex, plain)
-        if count >= LEAST_RUN and not reader.ended:
+        if count >= MIN_RUN and not reader.ended:
             reader.moves(index, plain[:count])
             index, at = index + count, behind
             continue

@@ -31,11 +31,10 @@ JOYSTICK_HZ: Final = 170.0
 RETREAT_STEPS: Final = 400
 """Steps back from the switches of HOME (L1700-1705)."""
 
-FASTER: Final = 1.25
+JOYSTICK_FACTOR: Final = 1.25
 """Factor by which W raises and V lowers the rate of the joystick; ours, no number is given."""
 
 JOYSTICK_STEPS: Final = 1 << 12
-"""So many steps of the joystick are made at a time."""
 
 END: Final = ord(";")
 """The character that ends a string (L1742-1744)."""
@@ -173,7 +172,7 @@ class PicMmhTwin(Twin):
         elif text == b"Q":
             self._set_zero()
         elif text in (b"W", b"V"):
-            self._joystick_hz *= FASTER if text == b"W" else 1.0 / FASTER
+            self._joystick_hz *= JOYSTICK_FACTOR if text == b"W" else 1.0 / JOYSTICK_FACTOR
         elif found := COMPENSATION.fullmatch(text):
             self.slides.compensate(b"XYZ".index(found[1]), int(found[2]) / 1000.0)
         elif found := STEPS.fullmatch(text):

@@ -16,7 +16,7 @@ from typing import Final
 from camtool.errors import MachineError
 from camtool.target.terminal import Terminal
 from camtool.target.wire import (
-    PATIENCE,
+    PATIENCE_FACTOR,
     Forecast,
     Manner,
     Packet,
@@ -31,7 +31,7 @@ ALTO: Final = b"A;"
 
 _STEPS = re.compile(rb"P[XYZ][+-](\d{4});")
 
-SLOWER: Final = 1.05
+TIME_FACTOR: Final = 1.05
 """Factor on the simulated time of a block, beyond the lateness of the line."""
 
 UNTIL_SILENT: Final = -1
@@ -44,16 +44,16 @@ BY_HAND_HZ: Final = 166.0
 RETREAT_STEPS: Final = 400
 """Steps of each axis back from its switch (L1700-1705)."""
 
-AGAIN: Final = 10.0
-"""A machine that reports steps so many times the lateness of the line (0.5 s) after A; is told it
-again."""
+RESTOP_FACTOR: Final = 10.0
+"""Wait until A; is sent again to a machine that still reports steps, in multiples of the lateness
+of the line (0.5 s)."""
 
-SILENT: Final = 20
-"""It is over when nothing has come for so many times the lateness of the line (1 s)."""
+SILENCE_FACTOR: Final = 20
+"""Silence after which a block is over, in multiples of the lateness of the line (1 s)."""
 
-MOST_STEPS: Final = 9999
+MAX_STEPS: Final = 9999
 """A block PX moves by no more steps: its number has four digits."""
-MOST_COMPENSATION_UM: Final = 999
+MAX_COMPENSATION_UM: Final = 999
 """The largest compensation that a block BX can say: it has three digits."""
 
 
@@ -143,9 +143,9 @@ def _compensations(machine: PicMmhMachine) -> list[bytes]:
     found = []
     for letter, axis in zip("XY", machine.axes, strict=False):
         um = round(axis.compensation_mm * 1000.0)
-        if abs(um - axis.compensation_mm * 1000.0) > 1e-6 or um > MOST_COMPENSATION_UM:
+        if abs(um - axis.compensation_mm * 1000.0) > 1e-6 or um > MAX_COMPENSATION_UM:
             raise MachineError(
-                f"the controller takes a compensation in whole µm, up to {MOST_COMPENSATION_UM}",
+                f"the controller takes a compensation in whole µm, up to {MAX_COMPENSATION_UM}",
                 where=f"axes.{letter.lower()}.compensation_mm",
             )
         found.append(f"B{letter}{um:03d};".encode())
@@ -171,7 +171,7 @@ def _reports(forecast: Forecast, block: int, machine: PicMmhMachine) -> int:
 def _steps(letter: str, way_mm: float, step_mm: float) -> list[tuple[bytes, int]]:
     """The strings that move an axis, each with its steps."""
     left, sense = round(abs(way_mm) / step_mm), "-" if way_mm < 0.0 else "+"
-    parts = [MOST_STEPS] * (left // MOST_STEPS) + [left % MOST_STEPS] * (left % MOST_STEPS > 0)
+    parts = [MAX_STEPS] * (left // MAX_STEPS) + [left % MAX_STEPS] * (left % MAX_STEPS > 0)
     return [(f"P{letter.upper()}{sense}{part:04d};".encode(), part) for part in parts]
 
 
@@ -212,11 +212,11 @@ class PicMmhConversation(PacketByPacket):
         self._over = now + packet.seconds
         if self._is_counted_later:
             seconds = packet.seconds + self._reverses_s
-            self._over = now + SLOWER * seconds + 2.0 * self.manner.late_s
+            self._over = now + TIME_FACTOR * seconds + 2.0 * self.manner.late_s
             self.next_s = now + self._silence_s
             return
         if self._link.step_byte == "none" or self._link.echo == "none":
-            self._over = now + SLOWER * packet.seconds + 2.0 * self.manner.late_s
+            self._over = now + TIME_FACTOR * packet.seconds + 2.0 * self.manner.late_s
         self._count_on(now)
 
     @property
@@ -230,7 +230,7 @@ class PicMmhConversation(PacketByPacket):
         come when its steps have; the steps of homing are not known."""
         packet = self.packets[self.sent - 1]
         complete = packet.seconds > 0.0 and self._count >= packet.counts[1]
-        return SILENT * self.manner.late_s + (0.0 if complete else self._reverses_s)
+        return SILENCE_FACTOR * self.manner.late_s + (0.0 if complete else self._reverses_s)
 
     def _silent(self, now: float) -> None:
         """Nothing has come for long: done, if all can be that was reported."""
@@ -255,7 +255,9 @@ class PicMmhConversation(PacketByPacket):
             self._fail(f"it has reported {-missing} steps too many", now)
         elif missing:
             packet = self.packets[self.sent - 1]
-            self.next_s = self._over + (SLOWER - 1.0) * packet.seconds + self.manner.patience_s
+            self.next_s = (
+                self._over + (TIME_FACTOR - 1.0) * packet.seconds + self.manner.patience_s
+            )
         elif now >= self._over:
             self._packet_done(now)
         else:
@@ -267,10 +269,10 @@ class PicMmhConversation(PacketByPacket):
             return
         if self._halting:
             self._ends -= data.count(b";")
-            if self._ends > 0 and now >= self._told + AGAIN * self.manner.late_s:
+            if self._ends > 0 and now >= self._told + RESTOP_FACTOR * self.manner.late_s:
                 self._told = now
                 self._write(ALTO)
-            quiet = 4.0 if self._ends <= 0 or self._link.echo == "none" else PATIENCE
+            quiet = 4.0 if self._ends <= 0 or self._link.echo == "none" else PATIENCE_FACTOR
             self.next_s = now + quiet * self.manner.late_s
             return
         if not self._busy:

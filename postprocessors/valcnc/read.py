@@ -30,8 +30,8 @@ CODES: Final = ("00", "01", "02", "03")
 PLAIN: Final = frozenset({"GXYZ", "GXYZIJ"})
 """Letters of a block as they mostly come; other orders are as good."""
 
-MOST_UNITS: Final = 99_999.0
-"""Numbers beyond this are taken for a mistake."""
+MAX_UNITS: Final = 99_999.0
+"""Larger numbers are taken for a mistake."""
 
 CHORD_GUARD: Final = 1e-9
 """Part of an arc's diameter: a chord longer by less is a diameter."""
@@ -103,9 +103,9 @@ class _Reader:
         if letters not in PLAIN or code not in CODES or "\t" in block.text:
             self._check_words(block, letters)
         values = {letter: float(text) for letter, text in block.words[1:]}
-        if not max(map(abs, values.values()), default=0.0) <= MOST_UNITS:
-            at = next(at for at, value in enumerate(values.values(), 1) if abs(value) > MOST_UNITS)
-            block.fail(f"a number beyond ±{MOST_UNITS:g}", word=at, mend="check the units")
+        if not max(map(abs, values.values()), default=0.0) <= MAX_UNITS:
+            at = next(at for at, value in enumerate(values.values(), 1) if abs(value) > MAX_UNITS)
+            block.fail(f"a number beyond ±{MAX_UNITS:g}", word=at, mend="check the units")
         self.path.block = block.index
         if letters.startswith("GXYZ"):
             end = values["X"], values["Y"], values["Z"]
@@ -130,8 +130,8 @@ class _Reader:
             numbers[:, words.X_WORD : words.Z_WORD + 1],
             numbers[:, words.I_WORD :][:, :2],
         )
-        sure &= (np.abs(ends) <= MOST_UNITS).all(axis=1)
-        sure &= line | (np.abs(offset) <= MOST_UNITS).all(axis=1)
+        sure &= (np.abs(ends) <= MAX_UNITS).all(axis=1)
+        sure &= line | (np.abs(offset) <= MAX_UNITS).all(axis=1)
         start = np.concatenate([[self.at], ends[:-1]])
         travel = ends - start
         flat, deep = (travel[:, :2] != 0.0).any(axis=1), travel[:, 2] != 0.0

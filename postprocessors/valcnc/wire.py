@@ -23,7 +23,7 @@ OPENING: Final = b"C\n"
 BUFFER_CHARS: Final = 127
 """A block has fewer than 128 characters."""
 
-SLOWER: Final = 1.05
+TIME_FACTOR: Final = 1.05
 """Factor on the simulated time of a block: nothing reports its end."""
 
 BITS: Final = 10
@@ -104,7 +104,7 @@ class ValcncConversation(PacketByPacket):
         self._answered = False
         self._over = now + len(packet.data) * BITS / (ValcncWire.baud or 1) + packet.seconds
         if not self._awaits:
-            self._over += (SLOWER - 1.0) * packet.seconds + self._margin_s
+            self._over += (TIME_FACTOR - 1.0) * packet.seconds + self._margin_s
         self.next_s = self._over
 
     def received(self, data: bytes, now: float) -> None:
@@ -129,6 +129,6 @@ class ValcncConversation(PacketByPacket):
             self._packet_done(now)
             return
         seconds = self.packets[self.sent - 1].seconds
-        self.next_s = self._over + (SLOWER - 1.0) * seconds + self.manner.patience_s
+        self.next_s = self._over + (TIME_FACTOR - 1.0) * seconds + self.manner.patience_s
         if now >= self.next_s:
             self._fail("it does not answer that the block is done", now)

@@ -49,7 +49,7 @@ UNSAID: Final = (
 FEED_TOLERANCE: Final = 1e-6
 """A feed within this part of the machine's only speed is that speed."""
 
-MOST_UNITS: Final = 99_999.0
+MAX_UNITS: Final = 99_999.0
 """An arc becomes lines when its centre is farther from its start (in units of the program)."""
 
 
@@ -61,7 +61,7 @@ def write_program(toolpath: Toolpath, machine: ValcncMachine) -> Program:
     scales = scales_of(machine, dialect)
     lowered, split = split_z(toolpath, machine)
     lowered, squeezed = _arcs_lowered(lowered, scales, machine, dialect)
-    rules = ArcRules(dialect.decimals, "halves", MOST_UNITS, chord_fits=True)
+    rules = ArcRules(dialect.decimals, "halves", MAX_UNITS, chord_fits=True)
     rows = plain_rows(_scaled(lowered.toolpath, scales), rules)
     of_row = lowered.row[rows.row]
     refuse_too_long(int(np.count_nonzero(rows.moves)), "line")

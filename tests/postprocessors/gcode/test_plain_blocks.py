@@ -68,14 +68,14 @@ def table(path: Toolpath) -> object:
 def alone(name: str, data: bytes) -> object:
     """The same, with no block taken by columns."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(blocks, "LEAST_RUN", 1 << 60)
+        patch.setattr(blocks, "MIN_RUN", 1 << 60)
         return outcome(name, data)
 
 
 def by_columns(name: str, data: bytes, rows: int = 3) -> object:
     """The same, with every block offered by columns, few at a time."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(blocks, "LEAST_RUN", 1)
+        patch.setattr(blocks, "MIN_RUN", 1)
         patch.setattr(blocks, "ROWS_AT_ONCE", rows)
         return outcome(name, data)
 

@@ -53,7 +53,7 @@ def outcome(form: str, data: bytes, least_run: int, at_once: int) -> object:
     settings = [f"dialect.form={form}", "dialect.buffer_chars=35"]
     target = load_target("pic-mmh", settings=settings)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(read, "LEAST_RUN", least_run)
+        patch.setattr(read, "MIN_RUN", least_run)
         patch.setattr(read, "BLOCKS_AT_ONCE", at_once)
         try:
             path = target.target.read(data, target.machine)
