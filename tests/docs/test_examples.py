@@ -33,7 +33,7 @@ def runnable(page: Path) -> bool:
     return "console" in kinds or ("python" in kinds and page.name in PYTHON_PAGES)
 
 
-PAGES = [page for page in sorted(ROOT.glob("docs/**/*.md")) if runnable(page)]
+PAGES = [ROOT / "README.md", *filter(runnable, sorted(ROOT.glob("docs/**/*.md")))]
 
 
 def shell(command: str, folder: Path, before: int) -> tuple[str, int]:
@@ -113,7 +113,7 @@ def test_pages_show_what_comes_out(
 
 
 def test_there_are_pages_to_run() -> None:
-    assert {"tutorial.md", "python.md"} <= {page.name for page in PAGES}
+    assert {"README.md", "tutorial.md", "python.md"} <= {page.name for page in PAGES}
 
 
 def test_what_is_wrong_is_seen(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
+import yaml
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -26,6 +27,16 @@ def test_ci_runs_them_as_the_readme_has_them() -> None:
     ran = [line for line in script if line.startswith("python3 -m venv .venv")]
     assert ran == set_up_commands()
     assert script[-1] == set_up_commands()[-1]
+
+
+def test_its_job_on_github_gives_the_action_what_it_takes() -> None:
+    (block,) = re.findall(r"```yaml\n(.*?)```", README, flags=re.DOTALL)
+    (step,) = (
+        step for step in yaml.safe_load(block)["jobs"]["drawings"]["steps"] if "with" in step
+    )
+    inputs = yaml.safe_load((ROOT / "action.yml").read_text(encoding="utf-8"))["inputs"]
+    needed = {name for name, each in inputs.items() if each.get("required")}
+    assert needed <= step["with"].keys() <= inputs.keys()
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))
