@@ -1,4 +1,4 @@
-"""The workers of a Dask cluster: drawings are sent, results come back, files are written here.
+"""Workers of a Dask cluster: drawings are sent to them, and the client writes the results.
 
 The workers need the same camtool as the client, but no shared disk. A worker with another version
 ends the run, because its programs would differ.
@@ -19,56 +19,59 @@ from typing import TYPE_CHECKING
 from msgspec import Struct
 
 from camtool import __version__
-from camtool.batches.pool import TICK_S, made_of
-from camtool.batches.run import Made, Task, Work
+from camtool.batches.pool import TICK_S, make_outputs
+from camtool.batches.run import BatchWork, DrawingTask, Outputs
 from camtool.errors import CamtoolError, OptionError
 
 if TYPE_CHECKING:
     from distributed import Client, Future
 
 CONNECT_S = 10.0
-"""How long the scheduler may take to answer the first time."""
+"""Time limit for the first answer of the scheduler."""
 
 CLOSE_S = 5.0
-"""How long the scheduler may take to close the connection."""
+"""Time limit for closing the connection to the scheduler."""
 
 ALONE_S = 5.0
-"""After this time without any worker a message says so: workers may come later, or never."""
+"""Time without any worker after which the user is told; workers may still join later."""
 
 AHEAD = 2
-"""Number of drawings that are sent for each thread of the cluster: one is made, one waits. More
-would only take memory."""
+"""Drawings sent for each thread of the cluster: one is being made, one waits. More would only take
+memory."""
 
-_MEND = "what is written is whole; the same command goes on"
+_MEND = "all written files are complete; run the same command again to continue"
 
 
 class OtherCodeError(Exception):
-    """A worker has another camtool than the client; the text says which one."""
+    """A worker has another camtool than the client; the text names its version."""
 
 
 class ClusterPool:
     """The workers of the scheduler at `address` for one Work; `note` shows a message."""
 
-    def __init__(self, work: Work, address: str, note: Callable[[str], None]) -> None:
+    def __init__(self, work: BatchWork, address: str, note: Callable[[str], None]) -> None:
         self._work = work
         self._address = address
         self._note = note
 
-    def results(self, tasks: Sequence[Task]) -> Generator[tuple[Task, Made] | None]:
-        """One result for each task, in any order, and None after each `TICK_S` without a result.
+    def results(
+        self, tasks: Sequence[DrawingTask]
+    ) -> Generator[tuple[DrawingTask, Outputs] | None]:
+        """Yield a result for each task, in any order, and None after each `TICK_S` without one.
 
-        Closing the generator cancels the rest. OptionError without `distributed` or a scheduler at
-        the address; CamtoolError when the scheduler is lost, or a worker has another camtool.
+        Closing the generator cancels the tasks that are left. Raises OptionError without the
+        package `distributed` or a scheduler at the address, and CamtoolError when the scheduler is
+        lost or a worker has another camtool.
         """
-        with _connected(self._address) as client:
+        with _connect(self._address) as client:
             order = _Order(self._work.digest(), pickle.dumps(self._work))
             workers = _Workers(client, order, self._note)
-            sent = _Sent(client, order, tasks)
-            while sent.left:
+            sent = _SentDrawings(client, order, tasks)
+            while sent.has_results_left:
                 threads = workers.threads()
-                came = [*sent.send(AHEAD * threads), *sent.done()]
-                yield from came
-                if not came:
+                results = [*sent.send(AHEAD * threads), *sent.take_results()]
+                yield from results
+                if not results:
                     yield None
 
 
@@ -80,33 +83,33 @@ class _Order(Struct, frozen=True):
     work: bytes
 
 
-class _Sent:
-    """The drawings that are still to be sent, and those that the cluster has."""
+class _SentDrawings:
+    """Queue of the drawings to send, and those that the cluster is working on."""
 
-    def __init__(self, client: Client, order: _Order, tasks: Sequence[Task]) -> None:
+    def __init__(self, client: Client, order: _Order, tasks: Sequence[DrawingTask]) -> None:
         self._client = client
         self._order = order
         self._queue = deque(tasks)
-        self._busy: dict[Future, Task] = {}
+        self._busy: dict[Future, DrawingTask] = {}
 
     @property
-    def left(self) -> bool:
-        """Whether any result is still missing."""
+    def has_results_left(self) -> bool:
+        """True if any result is still missing."""
         return bool(self._queue or self._busy)
 
-    def send(self, most: int) -> Iterator[tuple[Task, Made]]:
-        """Send drawings until the cluster has `most`; errors of those that cannot be read."""
+    def send(self, max_busy: int) -> Iterator[tuple[DrawingTask, Outputs]]:
+        """Send drawings until the cluster has `max_busy`; yield the errors of unreadable ones."""
         from camtool.importers.read import file_bytes
 
-        while self._queue and len(self._busy) < most:
+        while self._queue and len(self._busy) < max_busy:
             task = self._queue.popleft()
             try:
                 data = file_bytes(task.path)
             except CamtoolError as error:
-                yield task, Made(error=str(error))
+                yield task, Outputs(error=str(error))
                 continue
             future = self._client.submit(
-                made_there,
+                make_on_worker,
                 self._order.digest,
                 self._order.work,
                 pickle.dumps(task),
@@ -116,8 +119,8 @@ class _Sent:
             )
             self._busy[future] = task
 
-    def done(self) -> Iterator[tuple[Task, Made]]:
-        """The results that are ready; waits for the first one, `TICK_S` at most."""
+    def take_results(self) -> Iterator[tuple[DrawingTask, Outputs]]:
+        """Yield the results that are ready, after at most `TICK_S` of waiting for the first."""
         from distributed import wait
 
         if not self._busy:
@@ -134,32 +137,32 @@ class _Sent:
 
 
 class _Workers:
-    """The workers of the cluster, each checked for its camtool before it gets a drawing."""
+    """The workers of the cluster; each one's camtool is compared before it gets a drawing."""
 
     def __init__(self, client: Client, order: _Order, note: Callable[[str], None]) -> None:
         self._client = client
         self._order = order
         self._note = note
-        self._known: set[str] = set()
-        self._alone_since_s: float | None = None
-        self._said = False
+        self._checked: set[str] = set()
+        self._without_since_s: float | None = None
+        self._reported = False
 
     def threads(self) -> int:
-        """How many drawings they make at once; shows a message when there are none for long.
+        """Count the threads of all checked workers, and check the workers that are new.
 
-        CamtoolError when the scheduler was lost, or a worker has another camtool.
+        Raises CamtoolError when the scheduler is lost or a worker has another camtool.
         """
-        there = _threads(self._client)
-        if new := sorted(there.keys() - self._known):
-            self._known.update(self._same_camtool(new))
-        threads = sum(there[worker] for worker in there.keys() & self._known)
+        threads_of = _threads(self._client)
+        if new := sorted(threads_of.keys() - self._checked):
+            self._checked.update(self._same_camtool(new))
+        threads = sum(threads_of[worker] for worker in threads_of.keys() & self._checked)
         self._report(threads)
         return threads
 
     def _same_camtool(self, workers: list[str]) -> Iterator[str]:
-        """The workers that have the same camtool, without those that have just left."""
+        """Yield the workers with the same camtool; those that have just left are skipped."""
         answers = self._client.run(
-            asked_there,
+            check_worker,
             self._order.digest,
             self._order.work,
             workers=workers,
@@ -169,37 +172,38 @@ class _Workers:
             if answer is None:
                 yield worker
             elif not isinstance(answer, OSError):
-                raise _refused(worker, answer)
+                raise _refusal(worker, answer)
 
     def _report(self, threads: int) -> None:
-        """A message when there have been no workers for long, and when they come."""
+        """Tell the user when there have been no workers for `ALONE_S`, and when some join
+        again."""
         if threads:
-            if self._said:
+            if self._reported:
                 self._note("the cluster has workers now")
-            self._alone_since_s, self._said = None, False
+            self._without_since_s, self._reported = None, False
             return
         now = time.monotonic()
-        self._alone_since_s = now if self._alone_since_s is None else self._alone_since_s
-        if not self._said and now - self._alone_since_s >= ALONE_S:
-            self._said = True
+        self._without_since_s = now if self._without_since_s is None else self._without_since_s
+        if not self._reported and now - self._without_since_s >= ALONE_S:
+            self._reported = True
             self._note("the cluster has no workers; waiting for some (Ctrl-C ends this)")
 
 
-def asked_there(digest: str, work: bytes) -> None:
-    """Runs on a worker: OtherCodeError when its camtool is not the client's."""
+def check_worker(digest: str, work: bytes) -> None:
+    """Raise OtherCodeError if the camtool of this worker is not the client's; runs on a worker."""
     _work_of(digest, work)
 
 
-def made_there(digest: str, work: bytes, task: bytes, data: bytes) -> Made:
-    """Runs on a worker: the outputs of a drawing; OtherCodeError as above."""
-    return made_of(_work_of(digest, work), pickle.loads(task), data)
+def make_on_worker(digest: str, work: bytes, task: bytes, data: bytes) -> Outputs:
+    """Make the outputs of a drawing; runs on a worker. OtherCodeError as above."""
+    return make_outputs(_work_of(digest, work), pickle.loads(task), data)
 
 
 @lru_cache(maxsize=1)
-def _work_of(digest: str, work: bytes) -> Work:
-    """The work, loaded once for all drawings of a run."""
+def _work_of(digest: str, work: bytes) -> BatchWork:
+    """Unpickle the work, once for all drawings of a run."""
     try:
-        loaded: Work = pickle.loads(work)
+        loaded: BatchWork = pickle.loads(work)
         same = loaded.digest() == digest
     except Exception:  # anything may go wrong when an object of other code is loaded
         same = False
@@ -209,8 +213,8 @@ def _work_of(digest: str, work: bytes) -> Work:
 
 
 @contextmanager
-def _connected(address: str) -> Iterator[Client]:
-    """A client; at the end, unfinished drawings are cancelled."""
+def _connect(address: str) -> Iterator[Client]:
+    """Connect a client within the block; at its end, unfinished drawings are cancelled."""
     try:
         from distributed import Client
     except ImportError as error:
@@ -219,7 +223,7 @@ def _connected(address: str) -> Iterator[Client]:
             where="--scheduler",
             mend="pip install 'camtool[distributed]'",
         ) from error
-    with _silenced():
+    with _silence():
         try:
             client = Client(address, timeout=CONNECT_S, set_as_default=False)
         except (OSError, ValueError) as error:
@@ -242,21 +246,21 @@ def _leave(client: Client) -> None:
 
 
 def _threads(client: Client) -> dict[str, int]:
-    """Threads by worker; CamtoolError when the scheduler was lost."""
+    """Return the number of threads by worker; CamtoolError when the scheduler is lost."""
     try:
         if client.status == "running":
             return dict(client.nthreads())
     except (OSError, TimeoutError):
         pass
-    raise _lost()
+    raise _lost_error()
 
 
-def _lost() -> CamtoolError:
+def _lost_error() -> CamtoolError:
     return CamtoolError("the scheduler was lost", where="--scheduler", mend=_MEND)
 
 
-def _refused(worker: str, error: Exception) -> CamtoolError:
-    """The error for a worker whose camtool differs."""
+def _refusal(worker: str, error: Exception) -> CamtoolError:
+    """Return the error for a worker whose camtool differs."""
     if isinstance(error, OtherCodeError):
         why = f"{error}, or other code or packages under that number, and this is {__version__}"
     else:
@@ -268,25 +272,28 @@ def _refused(worker: str, error: Exception) -> CamtoolError:
     )
 
 
-def _result(future: Future, task: Task) -> Made:
-    """The result of a drawing; lost workers are its error. CamtoolError for what ends the run."""
+def _result(future: Future, task: DrawingTask) -> Outputs:
+    """Return the result of a drawing, an error if its workers were lost; CamtoolError for faults
+    that end the run."""
     from distributed import KilledWorker
 
     try:
-        made: Made = future.result()
+        made: Outputs = future.result()
     except KilledWorker as error:
         times = error.allowed_failures + 1
-        return Made(error=f"{task.source}: {times} workers were lost over it, and it was given up")
+        return Outputs(
+            error=f"{task.source}: {times} workers were lost over it, and it was given up"
+        )
     except CancelledError as error:
-        raise _lost() from error
+        raise _lost_error() from error
     except Exception as error:
-        raise _refused("a worker", error) from error
+        raise _refusal("a worker", error) from error
     return made
 
 
 @contextmanager
-def _silenced() -> Iterator[None]:
-    """Within the block, `distributed` logs nothing: our messages say it in one line."""
+def _silence() -> Iterator[None]:
+    """Silence the log of `distributed` within the block: camtool reports the same in one line."""
     names = [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]
     handlers = {handler for name in names for handler in logging.getLogger(name).handlers}
     before = {handler: handler.level for handler in handlers}

@@ -1,7 +1,7 @@
-"""Which drawings a batch takes, and where the outputs of each one go.
+"""The drawings of a batch, and the names of their outputs.
 
     drawings/            every drawing below it      drawings/a/b.dxf → OUT/a/b.*
-    'parts/**/*.dxf'     what the pattern matches    parts/x/y.dxf    → OUT/x/y.*
+    'parts/**/*.dxf'     files that match            parts/x/y.dxf    → OUT/x/y.*
     one.dxf              this file                   one.dxf          → OUT/one.*
 
 Outputs keep the path below the folder, or below the part of a pattern that has no wildcard. Names
@@ -19,28 +19,29 @@ from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path, PurePath
 
 from camtool.batches.manifest import RealPaths
-from camtool.batches.run import Task
+from camtool.batches.run import DrawingTask
 from camtool.errors import InputError, OutputError
 from camtool.importers.options import SUFFIXES
 
 
 def find_tasks(
-    sources: Sequence[str], out: Path, made: Collection[Path] = frozenset()
-) -> list[Task]:
-    """One task for each drawing, sorted by output; a drawing that is given twice counts once.
+    sources: Sequence[str], out: Path, outputs: Collection[Path] = frozenset()
+) -> list[DrawingTask]:
+    """Return one task for each drawing, sorted by output; a drawing given twice counts once.
 
-    `made` are outputs of earlier runs (resolved paths), which are not taken as drawings.
-    InputError when a source has no drawing; OutputError when two drawings have the same output.
+    `outputs` are outputs of earlier runs (resolved paths), which are not taken as drawings.
+    Raises InputError when a source has no drawing, OutputError when two drawings have the same
+    output.
     """
-    tasks: dict[Path, Task] = {}
+    tasks: dict[Path, DrawingTask] = {}
     places = RealPaths()
     for source in sources:
         found = False
-        for path, stem in _found(source, places.of(out)):
+        for path, stem in _drawings_of(source, places.of(out)):
             place = places.of(path)
-            if place not in made:
+            if place not in outputs:
                 found = True
-                tasks.setdefault(place, Task(str(path), stem))
+                tasks.setdefault(place, DrawingTask(str(path), stem))
         if not found:
             raise InputError(
                 "holds no drawing" if Path(source).is_dir() else "no file matches",
@@ -52,8 +53,8 @@ def find_tasks(
     return sorted(tasks.values(), key=lambda task: task.stem)
 
 
-def _found(source: str, out: Path) -> Iterator[tuple[Path, str]]:
-    """The drawings of one argument, each with its stem; `out` is a real path."""
+def _drawings_of(source: str, out: Path) -> Iterator[tuple[Path, str]]:
+    """Yield the drawings of one argument, each with its stem; `out` is a real path."""
     path = Path(source)
     if path.is_dir():
         for found in files_below(path, out):
@@ -71,21 +72,21 @@ def _found(source: str, out: Path) -> Iterator[tuple[Path, str]]:
 
 
 def _fixed_part(pattern: str) -> Path:
-    """The folders of a pattern before its first wildcard."""
+    """Return the folders of a pattern before its first wildcard."""
     parts = PurePath(pattern).parts
     fixed = next(n for n, part in enumerate(parts) if glob.has_magic(part))
     return Path(*parts[: min(fixed, len(parts) - 1)])
 
 
 def _stem(relative: PurePath) -> str:
-    """The path without the extension of the file."""
+    """Return the path without the extension of the file."""
     return relative.with_suffix("").as_posix()
 
 
-def _refuse_collisions(tasks: Collection[Task]) -> None:
-    places: dict[str, Task] = {}
+def _refuse_collisions(tasks: Collection[DrawingTask]) -> None:
+    places: dict[str, DrawingTask] = {}
     for task in tasks:
-        other = places.setdefault(_folded(task.stem), task)
+        other = places.setdefault(_fold_name(task.stem), task)
         if other is not task:
             as_what = f"as {task.stem}.*"
             if other.stem != task.stem:
@@ -96,8 +97,8 @@ def _refuse_collisions(tasks: Collection[Task]) -> None:
             )
 
 
-def _folded(name: str) -> str:
-    """The name with case and the encoding of accents taken away."""
+def _fold_name(name: str) -> str:
+    """Return the name folded to one case and one encoding of accents."""
     return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())
 
 
@@ -110,10 +111,11 @@ def _folded(name: str) -> str:
 ANY_FOLDERS = "**"
 
 
-def files_below(folder: Path, apart: Path | None = None) -> Iterator[Path]:
-    """The files in a folder and below it, sorted, without hidden ones and those in `apart`.
+def files_below(folder: Path, excluded: Path | None = None) -> Iterator[Path]:
+    """Yield the files in a folder and below it, sorted, without hidden ones and those in
+    `excluded`.
 
-    InputError for a folder that cannot be read, so that no drawing is left out silently.
+    Raises InputError for a folder that cannot be read, so that no drawing is left out silently.
     """
     folders = []
     for entry in _entries(folder):
@@ -125,23 +127,28 @@ def files_below(folder: Path, apart: Path | None = None) -> Iterator[Path]:
         elif _is_file(entry):
             yield Path(entry.path)
     for entry in folders:
-        if apart is None or not _same(entry, apart):
-            yield from files_below(Path(entry.path), apart)
+        if excluded is None or not _is_folder(entry, excluded):
+            yield from files_below(Path(entry.path), excluded)
 
 
-def files_matching(base: Path, parts: Sequence[str], apart: Path | None = None) -> Iterator[Path]:
-    """Files below `base` that match a pattern, given by its parts; `**` does not enter `apart`."""
+def files_matching(
+    base: Path, parts: Sequence[str], excluded: Path | None = None
+) -> Iterator[Path]:
+    """Yield the files below `base` that match a pattern, given by its parts; `**` does not enter
+    the folder `excluded`."""
     head, rest = parts[0], parts[1:]
     if head == ANY_FOLDERS:
-        yield from files_matching(base, rest or ("*",), apart)
+        yield from files_matching(base, rest or ("*",), excluded)
         for entry in _entries(base):
             hidden = entry.name.startswith(".") or entry.is_symlink()
-            if _is_dir(entry) and not (hidden or (apart is not None and _same(entry, apart))):
-                yield from files_matching(Path(entry.path), parts, apart)
+            if _is_dir(entry) and not (
+                hidden or (excluded is not None and _is_folder(entry, excluded))
+            ):
+                yield from files_matching(Path(entry.path), parts, excluded)
     elif not glob.has_magic(head):
         place = base / head
         if rest and place.is_dir():
-            yield from files_matching(place, rest, apart)
+            yield from files_matching(place, rest, excluded)
         elif not rest and place.is_file():
             yield place
     else:
@@ -151,7 +158,7 @@ def files_matching(base: Path, parts: Sequence[str], apart: Path | None = None) 
             if entry.name.startswith(".") and not head.startswith("."):
                 continue
             if rest and _is_dir(entry):
-                yield from files_matching(Path(entry.path), rest, apart)
+                yield from files_matching(Path(entry.path), rest, excluded)
             elif not rest and not _is_dir(entry) and _is_file(entry):
                 yield Path(entry.path)
 
@@ -176,14 +183,15 @@ def _is_dir(entry: os.DirEntry[str]) -> bool:
 
 
 def _is_file(entry: os.DirEntry[str]) -> bool:
-    """Whether it is a file or a broken link (reading that gives an error); no pipe, no device."""
+    """True for a file and for a broken link (reading it gives an error), not for pipes and
+    devices."""
     try:
         return entry.is_file() or (entry.is_symlink() and not Path(entry.path).exists())
     except OSError:
         return True
 
 
-def _same(entry: os.DirEntry[str], folder: Path) -> bool:
+def _is_folder(entry: os.DirEntry[str], folder: Path) -> bool:
     try:
         return os.path.samestat(entry.stat(), folder.stat())
     except OSError:  # the output folder does not exist yet

@@ -1,4 +1,4 @@
-"""One batch at a time in an output folder."""
+"""The lock of an output folder: one batch at a time writes to it."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from camtool.errors import OutputError
 from camtool.lock import held
 
 NAME = ".camtool-batch.lock"
-"""The lock's name in the output folder."""
 
 
 @contextmanager
-def alone_in(out: Path) -> Iterator[bool]:
-    """Within the block, no other batch writes to the folder `out`; False where its file system has
-    no locks.
+def lock_folder(out: Path) -> Iterator[bool]:
+    """Lock the folder `out` against other batches within the block; yields False if its file
+    system has no locks.
 
-    OutputError names the process that has the lock, or says why the folder cannot be written.
+    Raises OutputError, which names the process that holds the lock or the reason why the folder
+    cannot be written.
     """
 
     def taken(who: str) -> OutputError:

@@ -1,9 +1,9 @@
-"""The manifest of an output folder: which files a batch made, and from what.
+"""The manifest of an output folder: the files that a batch made, and what they were made from.
 
-There is a line of JSON for each drawing, appended when its files are in place, so that the
-manifest can be used however the run ends: incomplete lines are skipped, and of several lines for
-one drawing the last counts. A run that ends normally rewrites it, sorted, without the drawings
-whose files are all gone.
+It has a line of JSON for each drawing, appended when the drawing's files are written, so that it
+can be used even after a crash: incomplete lines are skipped, and the last of several lines for one
+drawing counts. A run that ends normally rewrites it, sorted, without the drawings whose files are
+all gone.
 """
 
 from __future__ import annotations
@@ -21,13 +21,12 @@ from msgspec import Struct, field
 from camtool.records import replace
 
 NAME = ".camtool-batch.jsonl"
-"""The manifest's name in the output folder."""
 
 
-class Entry(Struct, frozen=True):
-    """One drawing: the digest of all that its outputs depend on, and the digests of its outputs by
-    name; `earlier` are those of outputs that the last run did not make again, such as those for
-    another machine."""
+class ManifestEntry(Struct, frozen=True):
+    """One drawing: `key`, the digest of everything that its outputs depend on, and the digests of
+    its outputs by name; `earlier` has those of outputs that the last run did not make again, such
+    as programs for another machine."""
 
     key: str
     files: Mapping[str, str]
@@ -37,8 +36,8 @@ class Entry(Struct, frozen=True):
     earlier: Mapping[str, str] = field(default_factory=dict)
 
     @property
-    def made(self) -> dict[str, str]:
-        """The digests of all outputs that any run made."""
+    def all_outputs(self) -> dict[str, str]:
+        """Digests of all outputs that any run made, by name."""
         return {**self.earlier, **self.files}
 
 
@@ -50,16 +49,16 @@ class Manifest:
         self._place = out / NAME
         self._entries, self._tidy = _read(self._place)
 
-    def up_to_date(self, stem: str, key: str) -> Entry | None:
-        """The entry of a drawing if its key is the same and its files are unchanged."""
+    def up_to_date(self, stem: str, key: str) -> ManifestEntry | None:
+        """Return the entry of a drawing if its key is the same and its files are unchanged."""
         entry = self._entries.get(stem)
         if entry is None or entry.key != key:
             return None
-        return entry if all(self._is(*each) for each in entry.files.items()) else None
+        return entry if all(self._has_digest(*each) for each in entry.files.items()) else None
 
     def outputs(self) -> frozenset[Path]:
-        """All files of all entries, resolved."""
-        names = (name for entry in self._entries.values() for name in entry.made)
+        """Return the real paths of all files of all entries."""
+        names = (name for entry in self._entries.values() for name in entry.all_outputs)
         places = RealPaths()
         return frozenset(places.of(self._out / name) for name in names)
 
@@ -69,16 +68,18 @@ class Manifest:
         place, entry = self._out / name, self._entries.get(stem)
         if not os.path.lexists(place):
             return True
-        known = {} if entry is None else entry.made
-        return self._is(name, content_digest(data)) or (
-            name in known and self._is(name, known[name])
+        known = {} if entry is None else entry.all_outputs
+        return self._has_digest(name, content_digest(data)) or (
+            name in known and self._has_digest(name, known[name])
         )
 
-    def add(self, stem: str, entry: Entry) -> None:
-        """Append an entry; OSError when the disk does not take it."""
+    def add(self, stem: str, entry: ManifestEntry) -> None:
+        """Append an entry; OSError when it cannot be written."""
         before = self._entries.get(stem)
         if before is not None:
-            left = {name: each for name, each in before.made.items() if name not in entry.files}
+            left = {
+                name: each for name, each in before.all_outputs.items() if name not in entry.files
+            }
             entry = replace(entry, earlier=left)
         self._entries[stem] = entry
         self._tidy = False
@@ -92,25 +93,25 @@ class Manifest:
             os.close(handle)
 
     def tidy(self, write: Callable[[dict[str, bytes]], None]) -> None:
-        """Rewrite the manifest with a line for each drawing that has files, unless it is so."""
-        kept = [stem for stem in sorted(self._entries) if self._there(self._entries[stem])]
-        if self._tidy and len(kept) == len(self._entries):
+        """Rewrite the manifest with one line for each drawing that has files, if it differs."""
+        present = [stem for stem in sorted(self._entries) if self._has_files(self._entries[stem])]
+        if self._tidy and len(present) == len(self._entries):
             return
-        lines = [_line(stem, self._entries[stem]) for stem in kept]
+        lines = [_line(stem, self._entries[stem]) for stem in present]
         write({str(self._place): ("\n".join(lines) + "\n").encode()})
-        self._entries, self._tidy = {stem: self._entries[stem] for stem in kept}, True
+        self._entries, self._tidy = {stem: self._entries[stem] for stem in present}, True
 
-    def _there(self, entry: Entry) -> bool:
-        return any(os.path.lexists(self._out / name) for name in entry.made)
+    def _has_files(self, entry: ManifestEntry) -> bool:
+        return any(os.path.lexists(self._out / name) for name in entry.all_outputs)
 
-    def _is(self, name: str, digest: str) -> bool:
+    def _has_digest(self, name: str, digest: str) -> bool:
         try:
             return file_digest(self._out / name) == digest
         except OSError:
             return False
 
 
-def _line(stem: str, entry: Entry) -> str:
+def _line(stem: str, entry: ManifestEntry) -> str:
     row = {
         "stem": stem,
         "key": entry.key,
@@ -123,19 +124,19 @@ def _line(stem: str, entry: Entry) -> str:
     return json.dumps(row, ensure_ascii=True, sort_keys=True)
 
 
-def _read(place: Path) -> tuple[dict[str, Entry], bool]:
-    """The entries of the complete lines, none without a manifest; and whether it is as `tidy`
-    writes it."""
+def _read(place: Path) -> tuple[dict[str, ManifestEntry], bool]:
+    """Read the entries of all complete lines (none without a manifest), and True if the file is as
+    `tidy` would write it."""
     try:
         lines = place.read_bytes().splitlines()
     except OSError:
         return {}, True
-    entries: dict[str, Entry] = {}
+    entries: dict[str, ManifestEntry] = {}
     for line in lines:
         try:
             row: dict[str, Any] = json.loads(line)
             stem = row.pop("stem")
-            entry = Entry(**row)
+            entry = ManifestEntry(**row)
         except (ValueError, TypeError, KeyError, AttributeError):
             continue
         digests = (entry.files, entry.earlier)
@@ -148,8 +149,8 @@ def _read(place: Path) -> tuple[dict[str, Entry], bool]:
 
 
 def digest_of(*parts: str | bytes) -> str:
-    """The digest of several parts in their order, each with its length: `ab`, `c` differs from
-    `a`, `bc`."""
+    """Return the digest of several parts in their order, each with its length: `ab`, `c` differs
+    from `a`, `bc`."""
     digest = hashlib.sha256()
     for part in parts:
         data = part.encode("utf-8", "surrogateescape") if isinstance(part, str) else part
@@ -159,24 +160,24 @@ def digest_of(*parts: str | bytes) -> str:
 
 
 def file_digest(path: Path) -> str:
-    """The digest of a file's content, equal to `content_digest` of it; OSError without one."""
+    """Return the digest of a file's content, as `content_digest`; OSError if it cannot be read."""
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def content_digest(data: bytes) -> str:
-    """The digest of a file's content."""
+    """Return the digest of a file's content."""
     return hashlib.sha256(data).hexdigest()
 
 
 def code_digest(files: Iterable[Path]) -> str:
-    """The digest of program files: their names and contents."""
+    """Return the digest of the names and contents of source files."""
     return digest_of(*(part for path in sorted(files) for part in (path.name, file_digest(path))))
 
 
 def packages_digest(name: str) -> str:
-    """The digest of the versions of all packages that the package `name` requires, without extras;
-    of no versions where it is not installed as a package."""
+    """Return the digest of the versions of all packages that the package `name` requires, without
+    extras; of no versions if it is not installed as a package."""
     from importlib import metadata
 
     try:
@@ -189,7 +190,7 @@ def packages_digest(name: str) -> str:
 
 
 def _version(name: str) -> str:
-    """A package's version, "" for one that is only needed on other systems."""
+    """Return the version of a package, "" for one that only other systems need."""
     from importlib import metadata
 
     try:
@@ -202,13 +203,13 @@ def _version(name: str) -> str:
 
 
 class RealPaths:
-    """Real paths; each folder is looked up once."""
+    """A cache of the real paths of folders."""
 
     def __init__(self) -> None:
         self._folders: dict[str, str] = {}
 
     def of(self, path: str | Path) -> Path:
-        """The real path of a file, there or not, through all links."""
+        """Return the real path of a file through all links, even if the file does not exist."""
         folder, name = os.path.split(path)
         if name in ("", ".", ".."):
             return Path(os.path.realpath(path))

@@ -1,4 +1,4 @@
-"""Worker processes of this computer, any of which may die or be stopped without harm to the rest.
+"""Worker processes of this computer; one that dies or is killed does not affect the others.
 
 When a process of a standard library's pool is killed, the whole pool is broken. Here each worker
 has a pipe of its own: the end of the pipe shows which drawing it was making, and a new worker
@@ -22,24 +22,24 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any
 
-from camtool.batches.run import Made, Task, Work
+from camtool.batches.run import BatchWork, DrawingTask, Outputs
 from camtool.errors import CamtoolError
 from camtool.records import replace
 
 TICK_S = 0.2
-"""How long to wait for a result before the caller gets a turn (to redraw, to stop)."""
+"""Time to wait for a result before control returns to the caller (to redraw, to stop)."""
 
 END_S = 2.0
-"""How long a worker may take to end before it is killed."""
+"""Time that a worker has to end before it is killed."""
 
 RECYCLE_AFTER = 200
-"""After how many drawings a new worker takes the place of an old one."""
+"""Number of drawings after which a worker is replaced by a new one."""
 
 RECYCLE_MIB = 1024.0
-"""A worker that has taken more memory than this, MiB, is replaced too."""
+"""A worker that has used more memory than this is replaced too."""
 
 FAILED_STARTS = 3
-"""The run ends when this many workers in a row die before they are ready."""
+"""Consecutive workers that die before they are ready, after which the run ends."""
 
 
 @dataclass(frozen=True)
@@ -55,45 +55,47 @@ class _Worker:
     process: Any
     pipe: Connection
     ready: bool = False
-    task: Task | None = None
+    task: DrawingTask | None = None
     since_s: float = 0.0
     done: int = 0
 
 
 class LocalPool:
-    """Worker processes for one Work."""
+    """Worker processes for one BatchWork."""
 
-    def __init__(self, work: Work, options: PoolOptions) -> None:
+    def __init__(self, work: BatchWork, options: PoolOptions) -> None:
         self._work = work
         self._options = options
         self._workers: list[_Worker] = []
         self._failed_starts = 0
 
-    def results(self, tasks: Sequence[Task]) -> Generator[tuple[Task, Made] | None]:
-        """One result for each task, in any order, and None after each `TICK_S` without a result.
+    def results(
+        self, tasks: Sequence[DrawingTask]
+    ) -> Generator[tuple[DrawingTask, Outputs] | None]:
+        """Yield a result for each task, in any order, and None after each `TICK_S` without one.
 
-        Closing the generator kills the workers. CamtoolError when no worker can be started.
+        Closing the generator kills the workers. Raises CamtoolError when no worker can be started.
         """
         queue = deque(tasks)
         try:
             while queue or any(worker.task for worker in self._workers):
-                self._staff(queue)
+                self._assign_tasks(queue)
                 ready = wait([worker.pipe for worker in self._workers], TICK_S)
-                came = [worker for worker in self._workers if worker.pipe in ready]
-                results = [each for worker in came if (each := self._received(worker))]
-                results += self._overdue()
+                senders = [worker for worker in self._workers if worker.pipe in ready]
+                results = [each for worker in senders if (each := self._receive(worker))]
+                results += self._kill_overdue()
                 yield from results
                 if not results:
                     yield None
         finally:
             self._end()
 
-    def _staff(self, queue: deque[Task]) -> None:
+    def _assign_tasks(self, queue: deque[DrawingTask]) -> None:
         """Start workers while there are tasks for them; give each free worker a task."""
         busy = sum(worker.task is not None for worker in self._workers)
         wanted = min(self._options.jobs, busy + len(queue))
         while len(self._workers) < wanted:
-            self._workers.append(self._started())
+            self._workers.append(self._start_worker())
         for worker in self._workers:
             if queue and worker.ready and worker.task is None:
                 task = queue.popleft()
@@ -106,7 +108,7 @@ class LocalPool:
                     self._drop(worker)
                     return
 
-    def _started(self) -> _Worker:
+    def _start_worker(self) -> _Worker:
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
         process = context.Process(target=serve, args=(theirs,), daemon=True)
@@ -118,12 +120,12 @@ class LocalPool:
             ours.send(self._work)
         return worker
 
-    def _received(self, worker: _Worker) -> tuple[Task, Made] | None:
-        """The result that a worker sent; None when it only says that it is ready, or died idle."""
+    def _receive(self, worker: _Worker) -> tuple[DrawingTask, Outputs] | None:
+        """Receive a result from a worker; None when it became ready, or died while idle."""
         try:
             message = worker.pipe.recv()
         except (EOFError, OSError):
-            return self._died(worker)
+            return self._remove_dead(worker)
         self._failed_starts = 0
         if message == READY:
             worker.ready = True
@@ -135,7 +137,7 @@ class LocalPool:
             self._drop(worker)
         return None if task is None else (task, made)
 
-    def _died(self, worker: _Worker) -> tuple[Task, Made] | None:
+    def _remove_dead(self, worker: _Worker) -> tuple[DrawingTask, Outputs] | None:
         worker.process.join(END_S)
         code = worker.process.exitcode
         task = worker.task
@@ -148,13 +150,14 @@ class LocalPool:
                     mend="see whether camtool post does one of the drawings",
                 )
             return None
-        return task, Made(
+        return task, Outputs(
             error=f"{task.source}: its worker was lost ({_cause(code)}); the others went on",
             seconds=time.monotonic() - worker.since_s,
         )
 
-    def _overdue(self) -> list[tuple[Task, Made]]:
-        """Kill the workers that have taken too long; an error for each of their drawings."""
+    def _kill_overdue(self) -> list[tuple[DrawingTask, Outputs]]:
+        """Kill the workers that exceed the time limit; return an error for each of their
+        drawings."""
         limit = self._options.timeout_s
         if limit is None:
             return []
@@ -163,7 +166,7 @@ class LocalPool:
             spent = time.monotonic() - worker.since_s
             if worker.task is not None and spent > limit:
                 error = f"{worker.task.source}: took longer than --timeout {limit:g} s"
-                overdue.append((worker.task, Made(error=error, seconds=spent)))
+                overdue.append((worker.task, Outputs(error=error, seconds=spent)))
                 worker.process.kill()
                 self._drop(worker)
         return overdue
@@ -188,7 +191,7 @@ class LocalPool:
 
 
 def _cause(code: int | None) -> str:
-    """Why a process ended."""
+    """Describe why a process ended, from its exit code."""
     if code is None or code >= 0:
         return f"exit code {code}"
     try:
@@ -201,8 +204,8 @@ def _cause(code: int | None) -> str:
 
 @contextmanager
 def _interrupts_blocked() -> Iterator[None]:
-    """Within the block, Ctrl-C waits. A worker that is started here inherits this: Ctrl-C cannot
-    stop it before it ignores the signal."""
+    """Block Ctrl-C within the block. A worker started here inherits that, so that Ctrl-C cannot
+    stop it before it ignores the signal itself."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
@@ -216,13 +219,13 @@ def _interrupts_blocked() -> Iterator[None]:
 # One worker: it takes tasks from its pipe and sends back the results, until the pipe ends.
 
 READY = "ready"
-"""What a worker sends when it is warm."""
+"""The message of a worker that has loaded what it needs."""
 
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def serve(pipe: Connection) -> None:
-    """The main function of a worker: it receives a Work, then tasks, until None or the pipe's end.
+    """Run a worker: receive a BatchWork, then tasks, until None or the end of the pipe.
 
     Ctrl-C reaches every process of a terminal; workers ignore it, because the parent ends them.
     """
@@ -230,7 +233,7 @@ def serve(pipe: Connection) -> None:
     for name in _ONE_THREAD:  # before numpy is loaded: the workers share the cores already
         os.environ.setdefault(name, "1")
     try:
-        work: Work = pipe.recv()
+        work: BatchWork = pipe.recv()
         gc.disable()
         with suppress(Exception):  # the fault shows again at each drawing, with its name
             work.warm()
@@ -238,23 +241,23 @@ def serve(pipe: Connection) -> None:
         gc.enable()
         pipe.send(READY)
         while (task := pipe.recv()) is not None:
-            pipe.send((made_of(work, task, None), peak_mib()))
+            pipe.send((make_outputs(work, task, None), peak_mib()))
     except (EOFError, BrokenPipeError, ConnectionResetError):
         return
 
 
-def made_of(work: Work, task: Task, data: bytes | None) -> Made:
-    """The outputs of one drawing; any exception becomes an error of this drawing alone."""
+def make_outputs(work: BatchWork, task: DrawingTask, data: bytes | None) -> Outputs:
+    """Make the outputs of one drawing; any exception becomes an error of this drawing alone."""
     begin = time.perf_counter()
     try:
         made = work.make(task, data)
     except CamtoolError as error:
-        made = Made(error=str(error))
+        made = Outputs(error=str(error))
     except MemoryError:
-        made = Made(error=f"{task.source}: needs more memory than there is")
+        made = Outputs(error=f"{task.source}: needs more memory than there is")
     except Exception as error:
         where = traceback.format_exc(limit=-1).strip().splitlines()[1].strip()
-        made = Made(
+        made = Outputs(
             error=f"{task.source}: fault in camtool itself ({type(error).__name__}: {error}; "
             f"{where}); please report it"
         )
@@ -262,9 +265,9 @@ def made_of(work: Work, task: Task, data: bytes | None) -> Made:
 
 
 def peak_mib() -> float:
-    """The most memory that this process has had, MiB; 0 where the system does not say.
+    """Return the peak memory of this process, MiB; 0 if the system does not report it.
 
-    Linux's getrusage gives the parent's memory at the fork where that was more, even after an
+    Linux's getrusage gives the parent's memory at the fork if that was larger, even after an
     exec; VmHWM is that of this program alone.
     """
     try:

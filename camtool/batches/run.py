@@ -9,18 +9,24 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, Protocol
 
-from camtool.batches.manifest import Entry, Manifest, content_digest, digest_of, file_digest
+from camtool.batches.manifest import (
+    Manifest,
+    ManifestEntry,
+    content_digest,
+    digest_of,
+    file_digest,
+)
 from camtool.errors import OutputError
 
-# What goes to a worker and what comes back: small records that can be pickled.
+# Messages to and from workers: small records that can be pickled.
 
 
 @dataclass(frozen=True)
-class Task:
-    """One drawing: its name as the user wrote it, and its outputs' common name.
+class DrawingTask:
+    """One drawing: its name as the user wrote it, and the common name of its outputs.
 
     `stem` is relative to the output folder, with / between folders and without extension.
-    `order` is whatever the Work needs besides (the job of this drawing).
+    `order` is further input of the BatchWork (the job of this drawing).
     """
 
     source: str
@@ -29,15 +35,15 @@ class Task:
 
     @property
     def path(self) -> Path:
-        """The drawing's file."""
+        """File of the drawing."""
         return Path(self.source)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Result:
-    """What the summary says of one drawing: `remarks` are findings, one line each, errors first;
-    `figures` are a few numbers; `verdicts` counts those of inspected dimensions; `code` is that of
-    the finding which is the error, "" for other errors."""
+class DrawingResult:
+    """One drawing in the summary: `remarks` are its findings, one line each, errors first;
+    `figures` a few numbers; `verdicts` the counts of inspected dimensions by verdict; `code` the
+    code of the finding that is the error, "" for other errors."""
 
     error: str | None = None
     remarks: tuple[str, ...] = ()
@@ -49,36 +55,39 @@ class Result:
 
 
 @dataclass(frozen=True)
-class Made(Result):
-    """What a Work made of a drawing: `files` by extension, none when there is an `error`;
-    `content` is the digest of the bytes of the drawing."""
+class Outputs(DrawingResult):
+    """The outputs of a drawing: `files` by extension, none when there is an `error`; `content` is
+    the digest of the bytes of the drawing."""
 
     content: str = ""
     files: Mapping[str, bytes] = field(default_factory=dict)
 
 
-class Work(Protocol):
-    """What is done with each drawing; every worker gets it."""
+class BatchWork(Protocol):
+    """The function from a drawing to its outputs; every worker gets a copy."""
 
     def warm(self) -> None:
-        """Load what every drawing needs; a new worker does so before its first drawing."""
+        """Load the modules that every drawing needs; called in a new worker."""
 
-    def make(self, task: Task, data: bytes | None) -> Made:
-        """The outputs of a drawing; `data` is its content, None to read the file."""
+    def make(self, task: DrawingTask, data: bytes | None) -> Outputs:
+        """Make the outputs of a drawing; `data` is its content, None to read the file."""
 
     def digest(self) -> str:
-        """The digest of all that outputs depend on, except the drawing and its order."""
+        """Return the digest of everything that outputs depend on, except the drawing and its
+        order."""
 
 
 class Pool(Protocol):
-    """Workers: tasks in, results out in any order; None when none has come for a moment."""
+    """Workers that turn tasks into results in any order, with None after a while without any."""
 
-    def results(self, tasks: Sequence[Task]) -> Generator[tuple[Task, Made] | None]:
-        """One result for each task; closing the generator ends the workers."""
+    def results(
+        self, tasks: Sequence[DrawingTask]
+    ) -> Generator[tuple[DrawingTask, Outputs] | None]:
+        """Yield a result for each task; closing the generator ends the workers."""
 
 
-class State(StrEnum):
-    """What became of a drawing."""
+class OutcomeState(StrEnum):
+    """Outcome of a drawing."""
 
     MADE = "made"
     UP_TO_DATE = "up to date"
@@ -87,30 +96,30 @@ class State(StrEnum):
 
 
 @dataclass(frozen=True)
-class Outcome(Result):
-    """What became of one drawing; `files` are relative to the output folder."""
+class Outcome(DrawingResult):
+    """The outcome of one drawing; `files` are relative to the output folder."""
 
     source: str
     stem: str
-    state: State
+    state: OutcomeState
     files: tuple[str, ...] = ()
 
 
 # The run.
 
 Writer = Callable[[dict[str, bytes]], None]
-"""Writes all of some files or none; OutputError names the one that cannot be written."""
+"""A function that writes all files or none; OutputError names the one that cannot be written."""
 
 SCRIPT = ".py"
-"""Scripts are made again in every run: they may read any file, so that nobody knows whether their
-outputs are up to date."""
+"""Scripts run again in every batch: they may read any file, so that their outputs are never known
+to be up to date."""
 
 
 @dataclass(frozen=True)
-class Order:
-    """Where outputs go and how they are written; the digest of all that they depend on besides the
-    drawing (`base` for all, `own` for each task by stem); `force` makes all of them again, and
-    replaces files that no batch made."""
+class BatchSettings:
+    """Settings of a batch: the output folder `out` and the function `write`; the digests of
+    everything that outputs depend on besides the drawing (`base` for all, `own` for each task by
+    stem); `force` makes all outputs again, and replaces files that no batch made."""
 
     out: Path
     write: Writer
@@ -118,41 +127,43 @@ class Order:
     own: Mapping[str, str]
     force: bool = False
 
-    def key(self, task: Task, content: str) -> str:
-        """The digest of all that a drawing's outputs depend on."""
+    def key(self, task: DrawingTask, content: str) -> str:
+        """Return the digest of everything that the outputs of a drawing depend on."""
         return digest_of(self.base, self.own.get(task.stem, ""), task.source, content)
 
 
 def run_batch(
-    tasks: Sequence[Task], order: Order, manifest: Manifest, pool: Pool
+    tasks: Sequence[DrawingTask], order: BatchSettings, manifest: Manifest, pool: Pool
 ) -> Generator[Outcome | None]:
-    """The outcome of every task, in the order in which they come; None as a Pool gives it.
+    """Yield the outcome of every task as soon as it is known, and None as the pool does.
 
     Closing the generator stops the workers; all files written by then are complete and recorded.
     """
-    left: list[Task] = []
+    outdated: list[DrawingTask] = []
     for task in tasks:
         entry = None if order.force else _up_to_date(task, order, manifest)
         if entry is None:
-            left.append(task)
+            outdated.append(task)
             continue
         yield Outcome(
             task.source,
             task.stem,
-            State.UP_TO_DATE,
+            OutcomeState.UP_TO_DATE,
             tuple(entry.files),
             warnings=entry.warnings,
             figures=entry.figures,
             verdicts=entry.verdicts,
         )
-    if not left:
+    if not outdated:
         return
-    with closing(pool.results(left)) as results:
+    with closing(pool.results(outdated)) as results:
         for result in results:
-            yield None if result is None else _finished(*result, order, manifest)
+            yield None if result is None else _record(*result, order, manifest)
 
 
-def _up_to_date(task: Task, order: Order, manifest: Manifest) -> Entry | None:
+def _up_to_date(
+    task: DrawingTask, order: BatchSettings, manifest: Manifest
+) -> ManifestEntry | None:
     if task.path.suffix.lower() == SCRIPT:
         return None
     try:
@@ -162,16 +173,16 @@ def _up_to_date(task: Task, order: Order, manifest: Manifest) -> Entry | None:
     return manifest.up_to_date(task.stem, order.key(task, content))
 
 
-def _finished(task: Task, made: Made, order: Order, manifest: Manifest) -> Outcome:
-    """Write a result; its outcome."""
+def _record(task: DrawingTask, made: Outputs, order: BatchSettings, manifest: Manifest) -> Outcome:
+    """Write the files of a result and return its outcome."""
     error, remarks = made.error, made.remarks
     names: tuple[str, ...] = ()
     if error is None:
         files = {f"{task.stem}{extension}": data for extension, data in made.files.items()}
-        error = _written(task, files, order, manifest)
+        error = _write_files(task, files, order, manifest)
         if error is None:
             names = tuple(files)
-            entry = Entry(
+            entry = ManifestEntry(
                 order.key(task, made.content),
                 {name: content_digest(data) for name, data in files.items()},
                 made.warnings,
@@ -185,7 +196,7 @@ def _finished(task: Task, made: Made, order: Order, manifest: Manifest) -> Outco
     return Outcome(
         task.source,
         task.stem,
-        State.MADE if error is None else State.FAILED,
+        OutcomeState.MADE if error is None else OutcomeState.FAILED,
         names,
         error=error,
         remarks=remarks,
@@ -197,10 +208,10 @@ def _finished(task: Task, made: Made, order: Order, manifest: Manifest) -> Outco
     )
 
 
-def _written(
-    task: Task, files: Mapping[str, bytes], order: Order, manifest: Manifest
+def _write_files(
+    task: DrawingTask, files: Mapping[str, bytes], order: BatchSettings, manifest: Manifest
 ) -> str | None:
-    """Write the files of a drawing; the error, None without one."""
+    """Write the files of a drawing; return the error, or None."""
     for name, data in () if order.force else files.items():
         if not manifest.may_replace(task.stem, name, data):
             foreign = OutputError(

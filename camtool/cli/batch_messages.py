@@ -12,7 +12,7 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Protocol
 
 from camtool import __version__
-from camtool.batches.run import Outcome, State
+from camtool.batches.run import Outcome, OutcomeState
 from camtool.cli.messages import say
 from camtool.plain import one_line, to_json
 
@@ -25,7 +25,11 @@ LISTED = 50
 CODES = 3
 """The most codes of findings that the last line counts."""
 
-COLOUR = {State.FAILED: "red", State.MADE: "yellow", State.UP_TO_DATE: "yellow"}
+COLOUR = {
+    OutcomeState.FAILED: "red",
+    OutcomeState.MADE: "yellow",
+    OutcomeState.UP_TO_DATE: "yellow",
+}
 """The colour of a row of the table; drawings that were made have a row for their warnings."""
 
 
@@ -79,7 +83,7 @@ class Lines:
         self._done += 1
         for line in lines_of(outcome, self._verbosity):
             say(line, quiet=False)
-        if outcome.state is not State.UP_TO_DATE or self._verbosity.verbose:
+        if outcome.state is not OutcomeState.UP_TO_DATE or self._verbosity.verbose:
             place = f"{self._done:>{len(str(self._total))}}/{self._total}"
             say(f"{place} {_line(outcome)}", quiet=self._verbosity.quiet)
 
@@ -106,8 +110,8 @@ class Bar:
     def add(self, outcome: Outcome) -> None:
         """One step further."""
         self._done += 1
-        self._failed += outcome.state is State.FAILED
-        if outcome.state is State.UP_TO_DATE and self._progress is None:
+        self._failed += outcome.state is OutcomeState.FAILED
+        if outcome.state is OutcomeState.UP_TO_DATE and self._progress is None:
             return
         progress = self._shown()
         if outcome.error is not None:
@@ -149,19 +153,19 @@ def lines_of(outcome: Outcome, verbosity: Verbosity) -> list[str]:
 
 def say_summary(outcomes: Sequence[Outcome], seconds: float, *, quiet: bool) -> None:
     """The table of what failed (and on a terminal of warnings), and a line of counts."""
-    failed = [each for each in outcomes if each.state is State.FAILED]
-    warned = [each for each in outcomes if each.warnings and each.state is not State.FAILED]
+    failed = [each for each in outcomes if each.state is OutcomeState.FAILED]
+    warned = [each for each in outcomes if each.warnings and each.state is not OutcomeState.FAILED]
     if sys.stderr.isatty():
         _table(failed if quiet else [*failed, *warned], outcomes)
     else:
         _lines(failed)
     counts = Counter(each.state for each in outcomes)
-    parts = [f"{counts[state]} {state.value}" for state in State if counts[state]]
+    parts = [f"{counts[state]} {state.value}" for state in OutcomeState if counts[state]]
     codes = Counter(each.code for each in failed if each.code).most_common(CODES)
     if codes:
         why = ", ".join(f"{number} {code}" for code, number in codes)
         parts = [f"{part} ({why})" if part.endswith(" failed") else part for part in parts]
-    made = counts[State.MADE]
+    made = counts[OutcomeState.MADE]
     rate = f", {made / seconds:.1f} made a second" if made and seconds > 0.0 else ""
     warnings = f"; {len(warned)} with warnings (-v shows them)" if warned else ""
     verdicts = _verdict_words(verdicts_of(outcomes))
@@ -185,7 +189,7 @@ def summary_json(outcomes: Sequence[Outcome], target: str, seconds: float) -> by
         "camtool": __version__,
         "target": target,
         "seconds": round(seconds, 3),
-        **{state.name.lower(): counts[state] for state in State},
+        **{state.name.lower(): counts[state] for state in OutcomeState},
         "verdicts": dict(verdicts_of(outcomes)),
         "drawings": rows,
     }
@@ -193,7 +197,7 @@ def summary_json(outcomes: Sequence[Outcome], target: str, seconds: float) -> by
 
 
 def _line(outcome: Outcome) -> str:
-    if outcome.state is not State.MADE:
+    if outcome.state is not OutcomeState.MADE:
         return f"{outcome.state.value}: {outcome.source}"
     error = outcome.figures.get("error_um")
     figure = "" if error is None else f", error {error:.3g} µm"
@@ -247,7 +251,7 @@ def _table(rows: Sequence[Outcome], outcomes: Sequence[Outcome]) -> None:
     table.add_column("")
     table.add_column("why", ratio=2, overflow="fold")
     for each in rows[:LISTED]:
-        failed = each.state is State.FAILED
+        failed = each.state is OutcomeState.FAILED
         what = "failed" if failed else _counted(each.warnings, "warning")
         name = PurePath(each.source).relative_to(base) if base else each.source
         # Errors are shown in full, warnings on one line each: there may be many alike.

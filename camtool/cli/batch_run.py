@@ -22,10 +22,18 @@ from typing import TYPE_CHECKING
 
 from camtool.batches.inputs import find_tasks
 from camtool.batches.lock import NAME as LOCK
-from camtool.batches.lock import alone_in
+from camtool.batches.lock import lock_folder
 from camtool.batches.manifest import NAME as MANIFEST
 from camtool.batches.manifest import Manifest, RealPaths
-from camtool.batches.run import Made, Order, Outcome, Pool, State, Task, run_batch
+from camtool.batches.run import (
+    BatchSettings,
+    DrawingTask,
+    Outcome,
+    OutcomeState,
+    Outputs,
+    Pool,
+    run_batch,
+)
 from camtool.cli.batch_messages import Display, Verbosity, display, say_summary, summary_json
 from camtool.cli.batch_work import SVG, JobOrder, PostWork
 from camtool.cli.files import is_foreign, refuse_same, write_all
@@ -68,7 +76,7 @@ class Ordered:
     """Tasks with their jobs and tolerances, a text that identifies these (by stem), the drawings
     whose own job or tolerances are wrong, and all files beside drawings that are read."""
 
-    tasks: list[Task]
+    tasks: list[DrawingTask]
     own: dict[str, str]
     failed: list[Outcome]
     reads: list[str]
@@ -89,7 +97,9 @@ class LazyPool:
     pool: Callable[[], Pool]
     begins: Callable[[], None]
 
-    def results(self, tasks: Sequence[Task]) -> Generator[tuple[Task, Made] | None]:
+    def results(
+        self, tasks: Sequence[DrawingTask]
+    ) -> Generator[tuple[DrawingTask, Outputs] | None]:
         """The results of the pool."""
         pool = self.pool()
         self.begins()
@@ -136,7 +146,7 @@ class BatchRun:
             reads = [*reads, *flags.job.files(), *flags.inspection.files(), *ordered.reads]
             self._refuse_overwriting(ordered, reads, made)
             _make_folder(self.out)
-            with alone_in(self.out) as locked:
+            with lock_folder(self.out) as locked:
                 if not locked:
                     text = "warning: --out has no locks: see that no other batch writes there"
                     self._note(text)
@@ -174,7 +184,7 @@ class BatchRun:
     def _note(self, text: str) -> None:
         say(f"camtool: {text}", quiet=self.verbosity.quiet)
 
-    def _ordered(self, tasks: Sequence[Task], flags: Flags) -> Ordered:
+    def _ordered(self, tasks: Sequence[DrawingTask], flags: Flags) -> Ordered:
         """The tasks with their jobs and tolerances. What is wrong beside a drawing fails that
         drawing; what is wrong in --job, --tolerances or the flags fails the whole command. Flags
         override both jobs."""
@@ -194,7 +204,9 @@ class BatchRun:
                     asked = _asked([str(limits)])
             except CamtoolError as error:
                 text = f"{task.source}: {error}"
-                ordered.failed.append(Outcome(task.source, task.stem, State.FAILED, error=text))
+                ordered.failed.append(
+                    Outcome(task.source, task.stem, OutcomeState.FAILED, error=text)
+                )
             else:
                 inspects = limits is not None or flags.inspection.tolerances is not None
                 wanted = replace(wanted, asked=asked, inspects=inspects)
@@ -217,7 +229,7 @@ class BatchRun:
             except CamtoolError as error:
                 fault = error
         for task in ordered.tasks:
-            done.setdefault(task.stem, Outcome(task.source, task.stem, State.NOT_RUN))
+            done.setdefault(task.stem, Outcome(task.source, task.stem, OutcomeState.NOT_RUN))
         return Ended([done[stem] for stem in sorted(done)], fault)
 
     def _outcomes(
@@ -225,13 +237,13 @@ class BatchRun:
     ) -> Generator[Outcome]:
         """The outcomes until something stops the run."""
         force = self.running.force
-        order = Order(self.out, write_all, self.work.digest(), ordered.own, force)
+        order = BatchSettings(self.out, write_all, self.work.digest(), ordered.own, force)
         pool = LazyPool(lambda: pool_for(self, shown.note), shown.begins)
         with closing(run_batch(ordered.tasks, order, manifest, pool)) as outcomes:
             for outcome in chain(ordered.failed, outcomes):
                 if outcome is not None:
                     yield outcome
-                    if self.running.fail_fast and outcome.state is State.FAILED:
+                    if self.running.fail_fast and outcome.state is OutcomeState.FAILED:
                         return
                 if stop.signal is not None:
                     return

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from camtool import __version__
 from camtool.batches.manifest import code_digest, content_digest, digest_of, packages_digest
-from camtool.batches.run import Made, Task
+from camtool.batches.run import DrawingTask, Outputs
 from camtool.cli.files import sealed
 from camtool.cli.options import DrawingFlags, JobFlags
 from camtool.cli.picture_options import PictureFlags
@@ -78,7 +78,7 @@ class PostWork:
         drawing = read_bytes(SMALL_JOB, "small.svg")
         post_drawing(drawing, job_of(), self.target, check=self.check)
 
-    def make(self, task: Task, data: bytes | None) -> Made:
+    def make(self, task: DrawingTask, data: bytes | None) -> Outputs:
         """Program, picture and report of a drawing, none of them when it has an error."""
         from camtool.importers.read import file_bytes
         from camtool.pipeline import post_drawing
@@ -131,7 +131,7 @@ class PostWork:
 
         return inspect(run, Tolerances(*dimensions_of(run.drawing, order.asked), self.require))
 
-    def _files(self, task: Task, run: Run) -> Iterator[tuple[str, bytes]]:
+    def _files(self, task: DrawingTask, run: Run) -> Iterator[tuple[str, bytes]]:
         if run.program is not None:
             yield run.program.extension, run.program.data
         if self.preview is not None:
@@ -146,7 +146,7 @@ def _is_code(path: Path) -> bool:
     return path.suffix in (".py", ".toml") and path.is_file()
 
 
-def _made(task: Task, run: Run) -> Made:
+def _made(task: DrawingTask, run: Run) -> Outputs:
     """What a worker reports: the error of a drawing that must not be written, and the worst
     findings."""
 
@@ -159,7 +159,7 @@ def _made(task: Task, run: Run) -> Made:
     )
     report = run.report
     verdicts = Counter(each.verdict for each in report.inspection) if report else {}
-    made = Made(remarks=remarks, warnings=len(warnings), verdicts=dict(verdicts))
+    made = Outputs(remarks=remarks, warnings=len(warnings), verdicts=dict(verdicts))
     if not run.failed and run.program is not None:
         return made
     more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""

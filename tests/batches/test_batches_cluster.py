@@ -16,7 +16,7 @@ import pytest
 from camtool.batches import cluster
 from camtool.batches.cluster import ClusterPool
 from camtool.batches.manifest import NAME, Manifest
-from camtool.batches.run import Made, Task
+from camtool.batches.run import DrawingTask, Outputs
 from camtool.errors import CamtoolError, OptionError
 from tests.oracles.batch_works import Obedient
 from tests.waiting import HANG_S, heard_from
@@ -168,14 +168,14 @@ def test_a_cluster_without_workers_is_told_and_waited_for(tmp_path: Path) -> Non
     assert said.count("has no workers") == 1
 
 
-def tasks_of(folder: Path, *contents: str) -> list[Task]:
-    tasks = [Task(str(folder / f"{n}.dxf"), str(n)) for n in range(len(contents))]
+def tasks_of(folder: Path, *contents: str) -> list[DrawingTask]:
+    tasks = [DrawingTask(str(folder / f"{n}.dxf"), str(n)) for n in range(len(contents))]
     for task, content in zip(tasks, contents, strict=True):
         task.path.write_text(content)
     return tasks
 
 
-def made_on(address: str, tasks: list[Task]) -> dict[str, Made]:
+def made_on(address: str, tasks: list[DrawingTask]) -> dict[str, Outputs]:
     notes: list[str] = []
     results = ClusterPool(Obedient(), address, notes.append).results(tasks)
     return {task.stem: made for task, made in (each for each in results if each is not None)}
@@ -227,4 +227,4 @@ def test_a_drawing_that_kills_its_workers_is_given_up_by_name(tmp_path: Path) ->
 def test_without_a_scheduler_it_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cluster, "CONNECT_S", 0.2)
     with pytest.raises(OptionError, match=r"no scheduler answers at 'tcp://127\.0\.0\.1:9'"):
-        made_on("tcp://127.0.0.1:9", [Task("a.dxf", "a")])
+        made_on("tcp://127.0.0.1:9", [DrawingTask("a.dxf", "a")])

@@ -11,23 +11,23 @@ from tempfile import TemporaryDirectory
 import pytest
 
 from camtool.batches.manifest import Manifest
-from camtool.batches.run import Order, Outcome, State, Task, run_batch
+from camtool.batches.run import BatchSettings, DrawingTask, Outcome, OutcomeState, run_batch
 from camtool.cli.files import write_all
 from tests.oracles.batch_works import HerePool, Obedient
 
 NOBODY = 65534
 
 
-def tasks_of(folder: Path, **contents: str) -> list[Task]:
+def tasks_of(folder: Path, **contents: str) -> list[DrawingTask]:
     tasks = []
     for name, content in contents.items():
         (folder / f"{name}.dxf").write_text(content)
-        tasks.append(Task(str(folder / f"{name}.dxf"), name))
+        tasks.append(DrawingTask(str(folder / f"{name}.dxf"), name))
     return tasks
 
 
-def run(tasks: list[Task], out: Path, *, force: bool = False) -> dict[str, Outcome]:
-    order = Order(out, write_all, "base", {}, force)
+def run(tasks: list[DrawingTask], out: Path, *, force: bool = False) -> dict[str, Outcome]:
+    order = BatchSettings(out, write_all, "base", {}, force)
     outcomes = run_batch(tasks, order, Manifest(out), HerePool(Obedient()))
     return {each.stem: each for each in outcomes if each is not None}
 
@@ -135,7 +135,7 @@ def test_missing_permissions_are_the_error_of_that_drawing(open_path: Path) -> N
         folder.mkdir()
         folder.chmod(0o777)
     tasks = tasks_of(open_path, a="a", secret="s", z="z")
-    tasks.insert(1, Task(tasks[0].source, "closed/b"))
+    tasks.insert(1, DrawingTask(tasks[0].source, "closed/b"))
     (open_path / "secret.dxf").chmod(0)
     (out / "closed" / "b.out").write_text("old")
     (out / "closed").chmod(0o555)
@@ -148,14 +148,14 @@ def test_missing_permissions_are_the_error_of_that_drawing(open_path: Path) -> N
     assert "Permission denied" in (outcomes["secret"].error or "")
     assert files_in(out) == {"a.out", "b.out", "z.out", ".camtool-batch.jsonl"}
     assert (out / "closed" / "b.out").read_text() == "old"
-    assert again["z"].state is State.UP_TO_DATE
+    assert again["z"].state is OutcomeState.UP_TO_DATE
 
 
 def test_a_file_where_a_folder_must_be(tmp_path: Path) -> None:
     out = tmp_path / "out"
     out.mkdir()
     (out / "x").write_text("no folder")
-    tasks = [Task(each.source, f"x/{each.stem}") for each in tasks_of(tmp_path, a="a")]
+    tasks = [DrawingTask(each.source, f"x/{each.stem}") for each in tasks_of(tmp_path, a="a")]
     outcomes = run([*tasks, *tasks_of(tmp_path, b="b")], out)
     assert states(outcomes) == {"x/a": "failed", "b": "made"}
     assert f"{out}/x" in (outcomes["x/a"].error or "")

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from camtool.batches.lock import NAME, alone_in
+from camtool.batches.lock import NAME, lock_folder
 from camtool.errors import OutputError
 from tests.waiting import HANG_S
 
@@ -21,8 +21,8 @@ ROOT = Path(__file__).parents[2]
 HOLDER = """
 import sys
 from pathlib import Path
-from camtool.batches.lock import alone_in
-with alone_in(Path(sys.argv[1])):
+from camtool.batches.lock import lock_folder
+with lock_folder(Path(sys.argv[1])):
     print("held", flush=True)
     sys.stdin.read()
 """
@@ -51,11 +51,11 @@ def test_another_process_is_refused_and_told_who_holds_it(tmp_path: Path) -> Non
         who = f"process {other.pid} on {socket.gethostname()}"
         for _ in range(2):  # being refused harms nothing
             with pytest.raises(OutputError, match=f"another batch writes there .{who}."):
-                alone_in(tmp_path).__enter__()
+                lock_folder(tmp_path).__enter__()
         other.communicate("", timeout=HANG_S)
         assert other.returncode == 0
         assert not any(tmp_path.iterdir())
-        with alone_in(tmp_path):
+        with lock_folder(tmp_path):
             assert (tmp_path / NAME).read_text().startswith(f"process {os.getpid()} on ")
     assert not any(tmp_path.iterdir())
 
@@ -65,7 +65,7 @@ def test_a_holder_that_was_killed_holds_nothing(tmp_path: Path) -> None:
         other.send_signal(signal.SIGKILL)
         other.wait()
     assert (tmp_path / NAME).exists()
-    with alone_in(tmp_path) as locked:
+    with lock_folder(tmp_path) as locked:
         assert locked
         assert f"process {os.getpid()} on" in (tmp_path / NAME).read_text()
     assert not any(tmp_path.iterdir())
@@ -83,10 +83,10 @@ def test_a_file_that_was_taken_away_while_it_was_locked_is_no_lock(
         real(handle, mode)
 
     monkeypatch.setattr(fcntl, "flock", late)
-    with alone_in(tmp_path):
+    with lock_folder(tmp_path):
         assert (tmp_path / NAME).exists()
         with pytest.raises(OutputError, match="another batch"):
-            alone_in(tmp_path).__enter__()
+            lock_folder(tmp_path).__enter__()
     assert len(opened) == 3
 
 
@@ -97,7 +97,7 @@ def test_a_file_system_without_locks_is_told(
         raise OSError(errno.ENOLCK, "No locks available")
 
     monkeypatch.setattr(fcntl, "flock", none)
-    with alone_in(tmp_path) as locked:
+    with lock_folder(tmp_path) as locked:
         assert not locked
     assert not any(tmp_path.iterdir())
 
@@ -111,9 +111,9 @@ def test_a_broken_disk_is_not_taken_for_another_batch(
 
     monkeypatch.setattr(fcntl, "flock", broken)
     with pytest.raises(OutputError, match=rf"{NAME}: cannot be written .{os.strerror(fault)}"):
-        alone_in(tmp_path).__enter__()
+        lock_folder(tmp_path).__enter__()
 
 
 def test_a_folder_that_is_gone(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="No such file or directory"):
-        alone_in(tmp_path / "gone").__enter__()
+        lock_folder(tmp_path / "gone").__enter__()

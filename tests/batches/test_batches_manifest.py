@@ -7,8 +7,8 @@ import pytest
 
 from camtool.batches.manifest import (
     NAME,
-    Entry,
     Manifest,
+    ManifestEntry,
     content_digest,
     digest_of,
     file_digest,
@@ -17,9 +17,9 @@ from camtool.batches.manifest import (
 from camtool.cli.files import write_all
 
 
-def entry(folder: Path, name: str, key: str) -> Entry:
+def entry(folder: Path, name: str, key: str) -> ManifestEntry:
     (folder / name).write_text(name)
-    return Entry(key, {name: content_digest(name.encode())}, 2, {"time_s": 1.5})
+    return ManifestEntry(key, {name: content_digest(name.encode())}, 2, {"time_s": 1.5})
 
 
 def test_what_was_added_is_up_to_date(tmp_path: Path) -> None:

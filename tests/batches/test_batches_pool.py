@@ -7,20 +7,22 @@ import pytest
 
 from camtool.batches import pool
 from camtool.batches.pool import LocalPool, PoolOptions
-from camtool.batches.run import Made, Task
+from camtool.batches.run import DrawingTask, Outputs
 from camtool.errors import CamtoolError
 from tests.oracles.batch_works import Obedient
 
 
-def tasks_of(folder: Path, *contents: str) -> list[Task]:
+def tasks_of(folder: Path, *contents: str) -> list[DrawingTask]:
     tasks = []
     for number, content in enumerate(contents):
         (folder / f"{number}.dxf").write_text(content)
-        tasks.append(Task(str(folder / f"{number}.dxf"), str(number)))
+        tasks.append(DrawingTask(str(folder / f"{number}.dxf"), str(number)))
     return tasks
 
 
-def run(tasks: list[Task], work: Obedient | None = None, **options: object) -> dict[str, Made]:
+def run(
+    tasks: list[DrawingTask], work: Obedient | None = None, **options: object
+) -> dict[str, Outputs]:
     workers = LocalPool(work or Obedient(), PoolOptions(**options))  # type: ignore[arg-type]
     results = [each for each in workers.results(tasks) if each is not None]
     assert not multiprocessing.active_children()

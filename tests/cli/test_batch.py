@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from camtool.batches.lock import alone_in
-from camtool.batches.run import Made, Pool, Task
+from camtool.batches.lock import lock_folder
+from camtool.batches.run import DrawingTask, Outputs, Pool
 from camtool.cli import batch_run, batch_work
 from camtool.cli.batch_run import stoppable
 from camtool.cli.options import DrawingFlags
@@ -248,7 +248,7 @@ def test_a_second_batch_into_the_same_folder_is_refused(
     build = tmp_path / "build"
     assert camtool("batch", "drawings/letter.svg", *PIC, *QUICK).returncode == 0
     before = {path: path.read_bytes() for path in build.iterdir()}
-    with alone_in(build):
+    with lock_folder(build):
         held = files_in(build)
         done = camtool("batch", "drawings/in", *PIC, *QUICK, "--force")
         assert files_in(build) == held
@@ -373,7 +373,9 @@ def test_a_run_that_cannot_go_on_still_sums_up(
     camtool: Run, drawings: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     class Lost(HerePool):
-        def results(self, tasks: Sequence[Task]) -> Generator[tuple[Task, Made] | None]:
+        def results(
+            self, tasks: Sequence[DrawingTask]
+        ) -> Generator[tuple[DrawingTask, Outputs] | None]:
             yield from super().results(tasks[:1])
             raise CamtoolError("the scheduler was lost", where="--scheduler")
 

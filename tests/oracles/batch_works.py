@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from camtool.batches.manifest import content_digest
-from camtool.batches.pool import made_of
-from camtool.batches.run import Made, Task, Work
+from camtool.batches.pool import make_outputs
+from camtool.batches.run import BatchWork, DrawingTask, Outputs
 from camtool.errors import DrawingError
 
 WARM_S = 0.3
@@ -38,7 +38,7 @@ class Obedient:
     def digest(self) -> str:
         return "of no matter"
 
-    def make(self, task: Task, data: bytes | None) -> Made:
+    def make(self, task: DrawingTask, data: bytes | None) -> Outputs:
         data = task.path.read_bytes() if data is None else data
         word, _, number = data.decode().partition(" ")
         if word == "die":
@@ -55,17 +55,19 @@ class Obedient:
             raise MemoryError
         size = int(number) if word == "large" else 0
         made = data + str(os.getpid()).encode() * (word == "pid") + b"x" * size
-        return Made(content=content_digest(data), files={".out": made})
+        return Outputs(content=content_digest(data), files={".out": made})
 
 
 class HerePool:
     """Makes one drawing after the other in this process."""
 
-    def __init__(self, work: Work) -> None:
+    def __init__(self, work: BatchWork) -> None:
         self.work = work
         self.asked: list[str] = []
 
-    def results(self, tasks: Sequence[Task]) -> Generator[tuple[Task, Made] | None]:
+    def results(
+        self, tasks: Sequence[DrawingTask]
+    ) -> Generator[tuple[DrawingTask, Outputs] | None]:
         for task in tasks:
             self.asked.append(task.stem)
-            yield task, made_of(self.work, task, None)
+            yield task, make_outputs(self.work, task, None)
