@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from camtool.toolpath.moves import CompensatedToolpath, Toolpath
     from camtool.toolpath.program import Program
     from camtool.toolpath.wanted import ProtectedRegion
+    from camtool.verification.case import Case
     from camtool.verification.conformance import Asked
     from camtool.verification.registration import Registration
     from camtool.verification.report import (
@@ -51,7 +52,7 @@ if TYPE_CHECKING:
         PlannedStock,
         PlannedTool,
     )
-    from camtool.verification.verify import Verification, VerifyOptions
+    from camtool.verification.verify import Verification
 
 
 T = TypeVar("T")
@@ -68,7 +69,8 @@ class Judging:
     drawing and the diameter of its tool are taken; `align`: the place is looked for too.
     `interpolator` takes the place of the controller's own; `effects` are the parts of the
     mechanics that act (None: all); exceeding `gates` is a finding. `worst` moves are listed, and
-    `trace_points` of the slides' path are kept (None: the default numbers).
+    `trace_points` of the slides' path are kept (None: the default numbers); `keep_ledger` keeps
+    time, steps and reversals of each row.
     """
 
     interpolator: str | None = None
@@ -78,21 +80,7 @@ class Judging:
     trace_points: int | None = None
     found: bool = False
     align: bool = False
-
-
-class _Goal(Struct, frozen=True, eq=False):
-    """What a program is compared with: the wanted toolpath, the drawing in its frame, the toolpath
-    compensated against the mechanics, what else the job asks for, and the moves from which the
-    program was written, with the row of these of each decoded row, or what of the drawing it was
-    found to cut; None for what there is not."""
-
-    wanted: Toolpath | None = None
-    drawing: Drawing | None = None
-    compensated: CompensatedToolpath | None = None
-    asked: Asked | None = None
-    written_from: Toolpath | None = None
-    row_from: Indices | None = None
-    registration: Registration | None = None
+    keep_ledger: bool = False
 
 
 class _Posting(Struct, frozen=True):
@@ -221,10 +209,9 @@ def _posted(
     if judged is None:
         return replace(run, program=program, decoded=decoded, findings=findings)
     from camtool.planning.drawn import kept_of
-    from camtool.verification.case import TRACE_POINTS, nose_of, tool_mm
+    from camtool.verification.case import TRACE_POINTS, Case, VerifyOptions, nose_of, tool_mm
     from camtool.verification.cuts import rapids_mm
     from camtool.verification.report import Planned, certain
-    from camtool.verification.verify import VerifyOptions
 
     plain = plain_run()
     # Contours that are divided at reversals are judged as the whole contours of the drawing.
@@ -240,9 +227,12 @@ def _posted(
         shape=not how.brief,
         trace_points=TRACE_POINTS if how.trace_points is None else how.trace_points,
     )
-    goal = _Goal(
+    case = Case(
+        decoded,
+        target,
         whole.toolpath,
         judged.placed,
+        options,
         compensation,
         written_from=written,
         row_from=_row_from(program, decoded),
@@ -259,8 +249,8 @@ def _posted(
         cut_mm=_cut_mm(wanted),
     )
     del judged, whole  # the paths of the stages are not needed any more
-    verification = _judged(program.data, decoded, target, goal, options, progress)
-    figures = _timed(figures, written, goal, verification)
+    verification = _judged(case, program.data, progress)
+    figures = _timed(figures, written, case, verification)
     beyond = _beyond(verification, how.gates, findings)
     findings = _merged(findings, verification.findings, beyond, without=repeated)
     verification = verification.with_planning(figures, _before(plain))
@@ -288,18 +278,24 @@ def verify_program(
     is given. ProgramError names file, block and column."""
     from camtool.planning.job import Job
     from camtool.simulation.motion import ALL
-    from camtool.verification.case import TRACE_POINTS, WORST_LISTED, nose_of, tool_mm
-    from camtool.verification.verify import VerifyOptions
+    from camtool.verification.case import (
+        TRACE_POINTS,
+        WORST_LISTED,
+        Case,
+        VerifyOptions,
+        nose_of,
+        tool_mm,
+    )
 
     judging, progress = judging or Judging(), progress or Progress()
     progress.begin(f"reading {PurePath(source).name}")
     run = read_program(data, target, source=source)
     decoded = run.decoded
     assert decoded is not None
-    goal = _Goal()
+    case = Case(decoded, target)
     kept: tuple[ProtectedRegion, ...] = ()
     if drawing is not None and judging.found:
-        goal, job = _registered(drawing, job or Job(), decoded, target, align=judging.align)
+        case, job = _registered(case, drawing, job or Job(), align=judging.align)
     elif drawing is not None:
         from camtool.planning.drawn import kept_of
         from camtool.planning.plan import planned
@@ -311,7 +307,13 @@ def verify_program(
         asked = _asked(wanted, target, plan.toolpath, compensation)
         if compensation is None and _plain(wanted) != wanted:
             plan = planned(drawing, wanted, machine, undivided=True)
-        goal = _Goal(plan.toolpath, plan.placed, compensation, asked)
+        case = replace(
+            case,
+            wanted=plan.toolpath,
+            drawing=plan.placed,
+            compensated=compensation,
+            asked=asked,
+        )
         kept = kept_of(plan.steps)
     options = VerifyOptions(
         interpolator=judging.interpolator,
@@ -322,8 +324,9 @@ def verify_program(
         kept=kept,
         worst=WORST_LISTED if judging.worst is None else judging.worst,
         trace_points=TRACE_POINTS if judging.trace_points is None else judging.trace_points,
+        keep_ledger=judging.keep_ledger,
     )
-    found = _judged(data, decoded, target, goal, options, progress)
+    found = _judged(replace(case, options=options), data, progress)
     beyond = _beyond(found, judging.gates)
     if beyond:
         found = found.with_findings((*found.findings, *beyond))
@@ -331,16 +334,15 @@ def verify_program(
         run,
         drawing=drawing,
         job=job,
-        wanted=goal.wanted,
+        wanted=case.wanted,
         verification=found,
         findings=found.findings,
     )
 
 
-def _registered(
-    drawing: Drawing, job: Job, decoded: Toolpath, target: LoadedTarget, *, align: bool
-) -> tuple[_Goal, Job]:
-    """What of the drawing a program cuts, and the job with the drawing and the tool so found."""
+def _registered(case: Case, drawing: Drawing, job: Job, *, align: bool) -> tuple[Case, Job]:
+    """Return the case with the parts of the drawing that its program cuts as the wanted moves, and
+    the job with the place of the drawing and the tool that were found in the program."""
     from camtool.planning.place import place
     from camtool.verification.case import coverage_of, tool_mm
     from camtool.verification.cuts import is_flat
@@ -348,16 +350,17 @@ def _registered(
 
     placed = place(drawing, job)
     found = register(
-        decoded,
+        case.decoded,
         placed,
         tool_diameter_mm=tool_mm(job),
         align=align,
-        limit_mm=coverage_of(target.machine),
-        flat_cuts=is_flat(decoded),
+        limit_mm=coverage_of(case.machine),
+        flat_cuts=is_flat(case.decoded),
     )
     job = _found_job(job, found)
     wanted = found.wanted if found.report.followed else None
-    return _Goal(wanted, place(drawing, job), registration=found), job
+    placed = place(drawing, job)
+    return replace(case, wanted=wanted, drawing=placed, registration=found), job
 
 
 def _found_job(job: Job, found: Registration) -> Job:
@@ -393,7 +396,7 @@ def convert_program(
     column.
     """
     from camtool.toolpath.lower import at_feed, carried_over, within_feeds, without_coolant
-    from camtool.verification.verify import VerifyOptions
+    from camtool.verification.case import Case, VerifyOptions
 
     progress = progress or Progress()
     progress.begin(f"reading {PurePath(file).name}")
@@ -414,9 +417,15 @@ def convert_program(
     findings = _merged(wanted.findings, program.findings, again.findings, without=repeated)
     if not check:
         return replace(run, program=program, decoded=again, findings=findings)
-    options = VerifyOptions(source=file)
-    goal = _Goal(wanted, written_from=wanted, row_from=_row_from(program, again))
-    judged = _judged(program.data, again, target, goal, options, progress)
+    case = Case(
+        again,
+        target,
+        wanted,
+        options=VerifyOptions(source=file),
+        written_from=wanted,
+        row_from=_row_from(program, again),
+    )
+    judged = _judged(case, program.data, progress)
     findings = _merged(findings, judged.findings, without=repeated)
     return replace(
         run,
@@ -536,19 +545,17 @@ def _tools(steps: Sequence[Step]) -> tuple[PlannedTool, ...]:
     )
 
 
-def _timed(
-    planned: Planned, written: Toolpath, goal: _Goal, verification: Verification
-) -> Planned:
+def _timed(planned: Planned, written: Toolpath, case: Case, verification: Verification) -> Planned:
     """The operations with the time that each takes, from where it has its turn: a change of tools
     and the way to its first cut are its own."""
     import numpy as np
 
     from camtool.verification.report import certain
 
-    if written.operations is None or goal.row_from is None:
+    if written.operations is None or case.row_from is None:
         return planned
     # Blocks that no row stands for (a header's, the end's) take their turn with the one before.
-    row = np.maximum.accumulate(goal.row_from.clip(min=0))
+    row = np.maximum.accumulate(case.row_from.clip(min=0))
     turn = np.searchsorted(written.operations.begin, row, side="right") - 1
     count = len(planned.operations)
     seconds = np.bincount(turn.clip(min=0), verification.rows.seconds, minlength=count)
@@ -635,34 +642,19 @@ def _before(plain: Run | None) -> Before | None:
     return Before(cutting.x + cutting.y, air.x + air.y, report.error_um.total.max, report.time_s)
 
 
-def _judged(
-    data: bytes,
-    decoded: Toolpath,
-    target: LoadedTarget,
-    goal: _Goal,
-    options: VerifyOptions,
-    progress: Progress,
-) -> Verification:
-    """The program simulated and compared with its goal."""
+def _judged(case: Case, data: bytes, progress: Progress) -> Verification:
+    """Simulate and judge a case whose program has these bytes."""
     from camtool.verification.verify import verify
 
-    progress.begin("simulating and judging", len(decoded))
-    line_bytes = target.target.line_bytes(data, target.machine)
-    stray_mm = target.target.stray_mm(target.machine)
-    sized = replace(options, size_bytes=len(data), line_bytes=line_bytes, stray_mm=stray_mm)
-    return verify(
-        decoded,
-        target,
-        wanted=goal.wanted,
-        drawing=goal.drawing,
-        options=sized,
-        compensated=goal.compensated,
-        asked=goal.asked,
-        written_from=goal.written_from,
-        row_from=goal.row_from,
-        registration=goal.registration,
-        progress=progress,
+    progress.begin("simulating and judging", len(case.decoded))
+    target, machine = case.target.target, case.target.machine
+    options = replace(
+        case.options,
+        size_bytes=len(data),
+        line_bytes=target.line_bytes(data, machine),
+        stray_mm=target.stray_mm(machine),
     )
+    return verify(replace(case, options=options), progress)
 
 
 def _with_operations(decoded: Toolpath, written: Toolpath, program: Program) -> Toolpath:

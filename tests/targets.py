@@ -68,6 +68,7 @@ def simulate(
 
 def verify(decoded: Toolpath, machine: Machine, **more: Any) -> Any:
     """`camtool.verification.verify.verify` on a machine."""
+    from camtool.verification.verify import Case
     from camtool.verification.verify import verify as judged
 
-    return judged(decoded, on(machine), **more)
+    return judged(Case(decoded, on(machine), **more))

@@ -36,7 +36,7 @@ from camtool.planning.place import SCALE_SHARE, placements
 from camtool.records import replace
 from camtool.run import Run
 from camtool.toolpath.moves import Toolpath
-from camtool.verification.case import TRACE_POINTS, VerifyOptions, tool_mm
+from camtool.verification.case import TRACE_POINTS, tool_mm
 from camtool.verification.cuts import CutMoves, moved_lengths, sample_cuts
 from camtool.verification.slides import Trace
 
@@ -173,10 +173,11 @@ class Inspector:
         """What the slides of this machine do with the program."""
         known = self._last
         if known is None or known[0] is not machine:
-            from camtool.verification.verify import verify
+            from camtool.verification.verify import Case, VerifyOptions, verify
 
             options = VerifyOptions(trace_points=self._points)
-            done = verify(self._decoded, replace(self._target, machine=machine), options=options)
+            target = replace(self._target, machine=machine)
+            done = verify(Case(self._decoded, target, options=options))
             known = self._last = machine, swept_trace(done.trace, self._follows, self._tool)
         return known[1]
 

@@ -19,11 +19,11 @@ from msgspec import Struct
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import MachineError, OptionError, PostError, ProgramError
 from camtool.geometry.polylines import POSITION_EPS_MM
-from camtool.pipeline import read_program, verify_program
+from camtool.pipeline import Judging, read_program, verify_program
 from camtool.records import replace
 from camtool.sending.journal import Place as Left
 from camtool.sending.line import Port
-from camtool.simulation.motion import Options
+from camtool.simulation.motion import Ledger, Options, still_ledger
 from camtool.target.wire import (
     Conversation,
     Forecast,
@@ -195,7 +195,8 @@ def consignment(
     the tool is then. ProgramError for a program with errors, or for another machine's."""
     wire = wire_of(target)
     check_settings(data, target, source)
-    run = verify_program(data, target, source=source, progress=progress)
+    judging = Judging(keep_ledger=True)
+    run = verify_program(data, target, source=source, judging=judging, progress=progress)
     if run.failed:
         return Consignment(run, wire, _no_forecast(run), ())
     decoded, rest = run.decoded, None
@@ -217,9 +218,11 @@ def consignment(
         assert decoded is not None
         if begin_mm is not None:
             decoded = _shifted(decoded, np.array(begin_mm))
-    if progress is not None:
-        progress.begin(f"simulating {PurePath(source).name}")
-    forecast = forecast_of(decoded, target)
+        if progress is not None:
+            progress.begin(f"simulating {PurePath(source).name}")
+        forecast = forecast_of(decoded, target)
+    else:
+        forecast = forecast_of_run(run)
     packets = tuple(wire.packets(data, target.machine, forecast))
     return Consignment(run, wire, forecast, packets, rest, standing)
 
@@ -291,21 +294,38 @@ def _no_forecast(run: Run) -> Forecast:
     return Forecast(run.decoded, none, none, whole[:, 0], whole, whole, np.zeros((0, 3)))
 
 
+def forecast_of_run(run: Run) -> Forecast:
+    """Return the forecast of each block of a program that was judged with `keep_ledger`."""
+    assert run.decoded is not None
+    assert run.verification is not None
+    books = run.verification.rows.books
+    assert books.ledger is not None
+    return _forecast(run.decoded, books.ledger, books.samples)
+
+
 def forecast_of(decoded: Toolpath, target: LoadedTarget) -> Forecast:
-    """What the simulation says of each block; those behind the end of the program take no time."""
+    """Simulate moves that are not judged, and return the forecast of each of their blocks."""
+    count = len(decoded)
+    ledger, samples = still_ledger(np.arange(count)), np.zeros(count, dtype=np.int64)
+    for chunk in target.simulate(decoded, Options()):
+        ledger.add(chunk.ledger)
+        samples += np.bincount(chunk.row, minlength=count)
+    return _forecast(decoded, ledger, samples)
+
+
+def _forecast(decoded: Toolpath, ledger: Ledger, samples: Ints) -> Forecast:
+    """Sum up the ledger and the samples (N,) of each row by blocks; those behind the end of the
+    program take no time."""
     blocks = int(decoded.block.max(initial=-1)) + 1
     seconds, compensation = np.zeros(blocks), np.zeros(blocks)
     outputs = np.zeros(blocks, dtype=np.int64)
     steps = np.zeros((blocks, 3), dtype=np.int64)
     reversals = np.zeros((blocks, 3), dtype=np.int64)
-    for chunk in target.simulate(decoded, Options()):
-        ledger = chunk.ledger
-        of = decoded.block[ledger.row]
-        np.add.at(seconds, of, ledger.duration_s)
-        np.add.at(compensation, of, ledger.compensation_s)
-        outputs += np.bincount(decoded.block[chunk.row], minlength=blocks)
-        np.add.at(steps, of, ledger.steps)
-        np.add.at(reversals, of, ledger.reversals)
+    np.add.at(seconds, decoded.block, ledger.duration_s)
+    np.add.at(compensation, decoded.block, ledger.compensation_s)
+    np.add.at(outputs, decoded.block, samples)
+    np.add.at(steps, decoded.block, ledger.steps)
+    np.add.at(reversals, decoded.block, ledger.reversals)
     ends = np.full((blocks, 3), np.nan)
     ends[decoded.block] = decoded.end  # the last row of a block wins
     return Forecast(decoded, seconds, compensation, outputs, steps, reversals, ends)

@@ -30,6 +30,16 @@ class Ledger(Struct, frozen=True, eq=False):
     reversals: Ints
     ended: Bools
 
+    def add(self, other: Ledger) -> None:
+        """Add the ledger of a chunk, with each row at most once, to this one of all rows."""
+        rows = other.row
+        self.duration_s[rows] += other.duration_s
+        self.compensation_s[rows] += other.compensation_s
+        self.iterations[rows] += other.iterations
+        self.steps[rows] += other.steps
+        self.reversals[rows] += other.reversals
+        self.ended[rows] &= other.ended
+
 
 def still_ledger(rows: Ints) -> Ledger:
     """The ledger of rows (R,) without motion; its columns may be written to."""

@@ -79,7 +79,8 @@ class VerifyOptions(Struct, frozen=True):
     the file; `line_bytes`: what is sent over the line to the machine. `stray_mm`: how far the
     dialect may leave the wanted path on purpose. `trace_points`: points of the slides' path for
     pictures. `worst`: number of moves listed as those with the largest errors. `shape`: the part
-    that comes out is compared with the one that is wanted, if the tool is known.
+    that comes out is compared with the one that is wanted, if the tool is known. `keep_ledger`:
+    keep time, steps and reversals of each row.
     """
 
     interpolator: str | None = None
@@ -94,20 +95,26 @@ class VerifyOptions(Struct, frozen=True):
     trace_points: int = TRACE_POINTS
     worst: int = WORST_LISTED
     shape: bool = True
+    keep_ledger: bool = False
 
 
 class Case(Struct, frozen=True, eq=False):
-    """A program to judge. `compensated`: what the program should say where `wanted` is compensated
-    against the mechanics. `asked`: what the job asks for besides, as the dialect would say it.
-    `written_from`: the moves from which the program was written, where they are known: contours
-    must have the same direction; `row_from` (N,) the row of these from which each decoded row was
-    written, −1 for none."""
+    """A program to judge, its machine, and what it is compared with; None for what there is not.
+
+    `decoded`: the moves that the controller reads from the program. `wanted`: the moves that it
+    should make; both are in the work frame. `drawing`, in that frame too, gives its findings.
+    `compensated`: the moves that the program should contain where `wanted` is compensated against
+    the mechanics. `asked`: what else the job asks for, as a program of the dialect.
+    `written_from`: the moves from which the program was written: contours must have the same
+    direction; `row_from` (N,): the row of these from which each decoded row was written, −1 for
+    none. `registration`: the parts of the drawing that a program of others cuts.
+    """
 
     decoded: Toolpath
     target: LoadedTarget
-    wanted: Toolpath | None
-    drawing: Drawing | None
-    options: VerifyOptions
+    wanted: Toolpath | None = None
+    drawing: Drawing | None = None
+    options: VerifyOptions = VerifyOptions()
     compensated: CompensatedToolpath | None = None
     asked: Asked | None = None
     written_from: Toolpath | None = None

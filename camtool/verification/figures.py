@@ -20,7 +20,7 @@ from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.kernels.judging import BEFORE_FIRST, BINS, SHIFT, leading_bits
-from camtool.simulation.motion import Ledger
+from camtool.simulation.motion import Ledger, still_ledger
 from camtool.toolpath.moves import Kind, Toolpath, are_arcs
 from camtool.verification.cuts import CutMoves
 from camtool.verification.matching import Match
@@ -142,13 +142,20 @@ class RowFigures:
     """
 
     def __init__(
-        self, cuts: CutMoves, match: Match, steps_mm: tuple[float, float], worst: int
+        self,
+        cuts: CutMoves,
+        match: Match,
+        steps_mm: tuple[float, float],
+        worst: int,
+        *,
+        keep_ledger: bool = False,
     ) -> None:
-        """`steps_mm`: the coded steps of X and Y; `worst`: so many rows are known as such."""
+        """`steps_mm`: the coded steps of X and Y; `worst`: so many rows are known as such;
+        `keep_ledger`: keep the ledger of each row."""
         count = len(cuts.contour)
         self._toolpath, self._steps_mm = cuts.toolpath, steps_mm
         self.total = np.full(count, np.nan)
-        self.books = Books(count)
+        self.books = Books(count, keep_ledger=keep_ledger)
         self.inner, self.lag, self.whole = Figure(), Figure(), Figure()
         self.lines_mm = self.arcs_mm = math.nan
         self.contours = ContourSums(match)
@@ -162,6 +169,8 @@ class RowFigures:
 
         columns = block.columns
         samples, known = block.count(at.SAMPLES), block.count(at.KNOWN)
+        if self.books.ledger is not None:
+            self.books.samples[block.rows] = samples
         judged = np.where(block.is_cut, samples, 0)
         inner = block.largest(at.INNER_MAX, judged > 0)
         lag = block.largest(at.LAG_MAX, judged > 0)
@@ -213,9 +222,11 @@ def _larger(most: float, errors: Floats) -> float:
 class Books:
     """The ledgers of all chunks: `seconds` (N,) of each row, `ended` (N,) False for rows whose
     stop test was never met, `endless` the places in XY (mm) where these were left; the rest is
-    summed up."""
+    summed up, and kept by row only with `keep_ledger`: `ledger` of N rows, `samples` (N,)."""
 
-    def __init__(self, count: int) -> None:
+    def __init__(self, count: int, *, keep_ledger: bool = False) -> None:
+        self.ledger = still_ledger(np.arange(count)) if keep_ledger else None
+        self.samples = np.zeros(count if keep_ledger else 0, dtype=np.int64)
         self.seconds = np.zeros(count)
         self.ended = np.ones(count, dtype=np.bool_)
         self.endless: dict[int, tuple[float, float]] = {}
@@ -226,6 +237,8 @@ class Books:
     def add(self, ledger: Ledger, is_cut: Bools) -> None:
         """The ledger of a chunk, with each row at most once; `is_cut` (N,): the rows that cut."""
         rows = ledger.row
+        if self.ledger is not None:
+            self.ledger.add(ledger)
         self.seconds[rows] += ledger.duration_s
         self.ended[rows] &= ledger.ended
         self.steps += ledger.steps.sum(axis=0)

@@ -24,14 +24,12 @@ from msgspec import Struct
 
 from camtool.arrays import Floats, Indices
 from camtool.findings import Finding
-from camtool.geometry.drawing import Drawing
 from camtool.progress import Progress
 from camtool.records import replace
 from camtool.simulation.controller import FusedRun
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import Chunk
-from camtool.target.registry import LoadedTarget
-from camtool.toolpath.moves import CompensatedToolpath, Toolpath, toolpath_extents
+from camtool.toolpath.moves import Toolpath, toolpath_extents
 from camtool.units import UM_PER_MM
 from camtool.verification import report as record
 from camtool.verification.case import SAMPLE_MM, TRACE_POINTS, Case, VerifyOptions
@@ -74,8 +72,7 @@ from camtool.verification.shape import Wanted as WantedShape
 from camtool.verification.slides import Paths, SeenCircle, SlidePass, Trace, trace_size
 
 if TYPE_CHECKING:
-    from camtool.verification.conformance import Asked, Conformance
-    from camtool.verification.registration import Registration
+    from camtool.verification.conformance import Conformance
 
 __all__ = ["Case", "Verification", "VerifyOptions", "judge", "verify"]
 
@@ -104,42 +101,15 @@ class Verification:
         return replace(self, report=report)
 
 
-def verify(
-    decoded: Toolpath,
-    target: LoadedTarget,
-    *,
-    wanted: Toolpath | None = None,
-    drawing: Drawing | None = None,
-    options: VerifyOptions | None = None,
-    compensated: CompensatedToolpath | None = None,
-    asked: Asked | None = None,
-    written_from: Toolpath | None = None,
-    row_from: Indices | None = None,
-    registration: Registration | None = None,
-    progress: Progress | None = None,
-) -> Verification:
-    """Simulate `decoded` on the target's machine and judge it, against `wanted` if it is given.
+def verify(case: Case, progress: Progress | None = None) -> Verification:
+    """Simulate the program of a case and judge it, against the wanted moves if there are any.
 
-    `drawing` gives its findings; `compensated`, `asked`, `written_from`, `row_from` and
-    `registration` are as in `Case`. `progress` is told how many rows are judged.
-    Toolpaths are in the work frame. Raises what `LoadedTarget.simulate` raises.
+    `progress` is told how many rows are judged. Raises what `LoadedTarget.simulate` raises.
     """
-    options = options or VerifyOptions()
-    case = Case(
-        decoded,
-        target,
-        wanted,
-        drawing,
-        options,
-        compensated,
-        asked,
-        written_from,
-        row_from,
-        registration,
-    )
-    target.check_options(case.simulation)
-    fused = target.model.fused_run(decoded, target.machine, case.simulation)
-    return judge(case, fused or target.simulate(decoded, case.simulation), progress)
+    decoded, target, options = case.decoded, case.target, case.simulation
+    target.check_options(options)
+    fused = target.model.fused_run(decoded, target.machine, options)
+    return judge(case, fused or target.simulate(decoded, options), progress)
 
 
 def judge(
@@ -158,7 +128,8 @@ def judge(
     own, looped = _looped(case, paths)
     sizes_of = SlideExtents(case.decoded.start, own, looped, coverage.match)
     steps_mm = case.machine.axes.x.coded_step_mm, case.machine.axes.y.coded_step_mm
-    rows = RowFigures(cuts, coverage.match, steps_mm, case.options.worst)
+    worst, keep = case.options.worst, case.options.keep_ledger
+    rows = RowFigures(cuts, coverage.match, steps_mm, worst, keep_ledger=keep)
     size = trace_size(case.decoded, case.spacing_mm, points)
     slides = SlidePass(paths, coverage.match, (rows, sizes_of), size)
     if isinstance(motion, Iterable):

@@ -19,6 +19,7 @@ from camtool.kernels.judging import BEFORE_FIRST, BINS, bin_directions
 from camtool.simulation.motion import Options
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
+from camtool.verification.case import Case, VerifyOptions
 from camtool.verification.verify import Verification, verify
 from tests.oracles.dense_moves import pic_mmh
 from tests.targets import on, simulate
@@ -73,7 +74,7 @@ def judged() -> tuple[Verification, float]:
     )
     toolpath, target = circles(), on(machine)
     begun = time.perf_counter()
-    found = verify(toolpath, target)
+    found = verify(Case(toolpath, target))
     return found, time.perf_counter() - begun
 
 
@@ -113,7 +114,6 @@ def test_judging_is_as_fast_as_c(tmp_path: Path) -> None:
 
 def test_chunks_are_judged_too() -> None:
     """What other controllers get: their samples, judged; without making them."""
-    from camtool.verification.case import Case, VerifyOptions
     from camtool.verification.verify import judge
 
     machine, toolpath = pic_mmh(), circles()

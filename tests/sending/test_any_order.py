@@ -59,6 +59,21 @@ CHOICES = {"valcnc": ["answer=ok"]}
 END = {"valcnc": b"\n"}
 """What machine files leave out, what is chosen of what is open, and what ends a block."""
 
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_the_forecast_of_the_judged_run_is_that_of_a_simulation(name: str) -> None:
+    target = load_target(name, settings=SETTINGS.get(name, ()))
+    one = consignment(PROGRAMS[name], target, source=name)
+    decoded = one.run.decoded
+    assert decoded is not None
+    again = forecast_of(decoded, target)
+    assert one.forecast.decoded is decoded
+    for column in ("seconds", "compensation_s", "outputs", "steps", "reversals", "end_mm"):
+        judged, simulated = getattr(one.forecast, column), getattr(again, column)
+        np.testing.assert_allclose(judged, simulated, rtol=1e-12, err_msg=column)
+    assert one.forecast.seconds.sum() > 0.0
+
+
 BOUND = 3.0
 """A program ends within so many times its simulated time, and what the machine may be silent."""
 
