@@ -14,6 +14,7 @@ from msgspec import Struct
 from camtool.arrays import Floats
 from camtool.findings import Finding
 from camtool.geometry.measure import segment_lengths
+from camtool.geometry.nesting import Nesting
 from camtool.geometry.polylines import Polylines, Segments, segment_rows
 
 TEXT_KINDS = frozenset(("text", "mtext", "attrib", "attdef"))
@@ -197,6 +198,11 @@ class Drawing:
         for name in ("layers", "colours", "sources", "line_types"):
             if len(getattr(self, name)) != count:
                 raise ValueError(f"{name}: {len(getattr(self, name))} items for {count} paths")
+
+    @cached_property
+    def nesting(self) -> Nesting:
+        """Nesting of all contours: of the `paths`, and then of those that were not chosen."""
+        return Nesting(Polylines.joined([self.paths, self.unchosen.paths]))
 
     @cached_property
     def fit(self) -> FitError:

@@ -1,4 +1,4 @@
-"""Which closed path holds which path, exact with arcs; and regions: outer paths with their holes.
+"""Nesting of closed paths, exact with arcs; and regions: outer paths with their holes.
 
 A point is inside a closed path when it is inside the polygon of its chords, or when it lies
 between a chord and its arc, but not both (XOR, arc by arc). A point exactly on a chord is taken
@@ -8,64 +8,115 @@ as a hair up and to the right of it, the same way in both questions, so that no 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cached_property
 
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.errors import GeometryError
 from camtool.geometry.boxes import BoxIndex, Curves
 from camtool.geometry.measure import path_extents, point_at, signed_areas
-from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, Segments, reverse
+from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, Segments, lines_reversed
 
 HOLDERS_AT_A_TIME = 256
-"""For how many paths those within their boxes are found together: it bounds the memory."""
+"""Closed paths whose boxes are compared with all others together: it bounds the memory."""
 
 
-class Nesting(Struct, frozen=True, eq=False):
-    """For M paths: `parent` (M,), the smallest closed path that holds each one, −1 if none; and
-    `depth` (M,), how many closed paths hold it."""
+class Levels(Struct, frozen=True, eq=False):
+    """Where M paths lie: `parent` (M,), the smallest holder of each, −1 if none; and `depth` (M,),
+    the number of its holders."""
 
     parent: Ints
     depth: Ints
 
 
-def nesting(lines: Polylines, holds: Bools | None = None) -> Nesting:
-    """Which closed path holds which path; of closed paths only those that `holds` (M,) marks
-    count as holders (None: all).
+class Nesting(Struct, frozen=True, eq=False, dict=True):
+    """The nesting of M paths, the `lines`, found when it is first asked for and then kept.
 
-    Path i is in path j when its vertices and the middles of its segments lie inside j, or nearer
-    to its line than `POSITION_EPS_MM` (but not all of them: a path does not hold its double, and
-    doubles count as one). Paths that cross a closed path are not in it.
+    A closed path j holds path i when the vertices of i and the middles of its segments lie inside
+    j, or nearer to its line than `POSITION_EPS_MM` (but not all of them: a path does not hold its
+    double, and doubles count as one). Paths that cross a closed path are not in it. `part_of`: the
+    nesting that has these paths in the rows `rows`, ascending, so that nothing is found twice.
     """
-    count = len(lines)
-    parent, depth = np.full(count, -1, dtype=np.int64), np.zeros(count, dtype=np.int64)
-    if not lines.closed.any():
-        return Nesting(parent, depth)
-    areas = np.abs(signed_areas(lines))
-    boxes = path_extents(lines)
-    is_double = np.zeros(count, dtype=np.bool_)
-    # From large to small: the last path found to hold another one is the smallest of them.
-    closed = np.flatnonzero(lines.closed)
-    closed = closed[np.argsort(-areas[closed], kind="stable")]
-    rank = np.full(count, len(closed))
-    rank[closed] = np.arange(len(closed))
-    places: _Places | None = None
-    for j, within in _within(boxes, closed if holds is None else closed[holds[closed]]):
-        inner = within[rank[within] > rank[j]]
-        if len(inner) == 0 or is_double[j]:
-            continue
-        # Most drawings of very many paths hold none within another.
-        places = places or _Places.of(lines)
-        held, on_line = places.held(inner, j)
-        is_double[on_line] = True
-        parent[held] = j
-        depth[held] += 1
-    return Nesting(parent, depth)
+
+    lines: Polylines
+    part_of: Nesting | None = None
+    rows: Ints | None = None
+
+    @cached_property
+    def levels(self) -> Levels:
+        """The levels where every closed path is a holder."""
+        return self.levels_by(self.lines.closed)
+
+    def levels_by(self, holders: Bools) -> Levels:
+        """Return the levels where the closed paths of the mask `holders` (M,) are the holders."""
+        count = len(self.lines)
+        pairs = self._pairs
+        counts = holders[pairs.holder]
+        is_double = np.zeros(count, dtype=np.bool_)
+        doubles = counts & pairs.is_double
+        for j, i in np.column_stack([pairs.holder[doubles], pairs.inner[doubles]]).tolist():
+            is_double[i] |= not is_double[j]
+        counts &= ~pairs.is_double & ~is_double[pairs.holder]
+        holder, inner = pairs.holder[counts], pairs.inner[counts]
+        parent = np.full(count, -1, dtype=np.int64)
+        parent[inner] = holder  # the last holder of a path is its smallest one
+        return Levels(parent, np.bincount(inner, minlength=count))
+
+    def among(self, rows: Ints) -> Nesting:
+        """Return the nesting of the paths in these rows, ascending, without the others."""
+        return Nesting(self.lines.select(rows), self, rows)
+
+    @cached_property
+    def _pairs(self) -> _Pairs:
+        if self.part_of is None or self.rows is None:
+            return _Pairs.of(self.lines)
+        return self.part_of._pairs.among(self.rows, len(self.part_of.lines))
+
+
+class _Pairs(Struct, frozen=True, eq=False):
+    """Closed paths, the `holder` (P,), with the paths `inner` (P,) that each holds, or that lie on
+    its line as a whole: `is_double` (P,). From the largest holder to the smallest."""
+
+    holder: Indices
+    inner: Indices
+    is_double: Bools
+
+    @classmethod
+    def of(cls, lines: Polylines) -> _Pairs:
+        """Compare every closed path with the paths within its box that are no larger."""
+        none = np.empty(0, dtype=np.int32)
+        holder, inner, is_double = [none], [none], [np.empty(0, dtype=np.bool_)]
+        areas = np.abs(signed_areas(lines))
+        closed = np.flatnonzero(lines.closed)
+        closed = closed[np.argsort(-areas[closed], kind="stable")]
+        rank = np.full(len(lines), len(closed))
+        rank[closed] = np.arange(len(closed))
+        places: _Places | None = None
+        for j, within in _within(path_extents(lines), closed) if len(closed) else ():
+            smaller = within[rank[within] > rank[j]]
+            if len(smaller) == 0:
+                continue
+            # Most drawings of very many paths hold none within another.
+            places = places or _Places.of(lines)
+            for found, on_line in zip(places.held(smaller, j), (False, True), strict=True):
+                holder.append(np.full(len(found), j, dtype=np.int32))
+                inner.append(found.astype(np.int32))
+                is_double.append(np.full(len(found), on_line))
+        return cls(np.concatenate(holder), np.concatenate(inner), np.concatenate(is_double))
+
+    def among(self, rows: Ints, count: int) -> _Pairs:
+        """Return the pairs of which both are among these rows of `count` paths, renumbered."""
+        row_of = np.full(count, -1, dtype=np.int32)
+        row_of[rows] = np.arange(len(rows), dtype=np.int32)
+        holder, inner = row_of[self.holder], row_of[self.inner]
+        keep = (holder >= 0) & (inner >= 0)
+        return _Pairs(holder[keep], inner[keep], self.is_double[keep])
 
 
 def inside(points: Floats, ring: Segments) -> Bools:
-    """(P,) true for the points (P, 2) within a closed path; on the line either may come out."""
+    """Mask (P,) of the points (P, 2) within a closed path; a point on its line may be either."""
     from camtool.kernels.offsets import insides
 
     curves = Curves.of(ring)
@@ -100,8 +151,8 @@ class _Places(Struct, frozen=True, eq=False):
         )
 
     def held(self, inner: Ints, j: int) -> tuple[Ints, Ints]:
-        """Which paths of `inner` have all their points within path j, and which have all on its
-        line."""
+        """Return those of the paths `inner` that have all their points within path j, and those
+        that have all of them on its line."""
         from camtool.kernels.offsets import HELD, ON_LINE, holds
 
         ring = self.segments[self.first_segment[j] : self.first_segment[j + 1]]
@@ -112,8 +163,8 @@ class _Places(Struct, frozen=True, eq=False):
 
 
 def _within(boxes: Floats, holders: Ints) -> Iterator[tuple[int, Ints]]:
-    """Each of these paths in turn, and the paths whose boxes (M, 2, 2) do not reach out of its
-    own: their centres lie in it."""
+    """Yield each of these paths with the paths whose boxes (M, 2, 2) do not reach out of its own:
+    their centres lie in it."""
     low, high = boxes[:, :, 0], boxes[:, :, 1]
     centres = 0.5 * (low + high)
     index = BoxIndex(np.hstack([centres, centres]))
@@ -133,37 +184,27 @@ def _within(boxes: Floats, holders: Ints) -> Iterator[tuple[int, Ints]]:
 # Regions: outer paths CCW, their holes CW.
 
 
-def oriented(lines: Polylines) -> Polylines:
-    """The closed paths, in their order, so turned that what an odd number of them hold is left.
+def oriented(nest: Nesting) -> Polylines:
+    """Return the closed paths in their order, turned so that the regions are on their left.
 
     Paths held by none, by two, and so on run CCW, the others CW. Open paths: GeometryError.
     """
-    return _oriented(lines, _nesting(lines))
-
-
-def regions(lines: Polylines) -> list[Polylines]:
-    """Each outer path (CCW) with the holes (CW) that are directly in it; in the order of paths.
-
-    An island in a hole is the outer path of a region of its own. Open paths: GeometryError.
-    """
-    nest = _nesting(lines)
-    turned = _oriented(lines, nest)
-    outer = np.flatnonzero(nest.depth % 2 == 0)
-    return [
-        turned.select([row, *np.flatnonzero((nest.parent == row) & (nest.depth % 2 == 1))])
-        for row in outer.tolist()
-    ]
-
-
-def _nesting(lines: Polylines) -> Nesting:
+    lines = nest.lines
     if not lines.closed.all():
         where = f"path {np.argmin(lines.closed)}"
         raise GeometryError("an open path has no inside", where=where, mend="close it")
-    return nesting(lines)
+    is_ccw = signed_areas(lines) > 0.0
+    return lines_reversed(lines, is_ccw != (nest.levels.depth % 2 == 0))
 
 
-def _oriented(lines: Polylines, nest: Nesting) -> Polylines:
-    ccw = signed_areas(lines) > 0.0
-    wanted = nest.depth % 2 == 0
-    paths = zip(lines, (ccw == wanted).tolist(), strict=True)
-    return Polylines.of([p if right else reverse(p) for p, right in paths])
+def regions(nest: Nesting) -> list[tuple[int, Polylines]]:
+    """Return the row of each outer path, and that path (CCW) with the holes (CW) directly in it.
+
+    An island in a hole is the outer path of a region of its own. Open paths: GeometryError.
+    """
+    turned, levels = oriented(nest), nest.levels
+    is_hole = levels.depth % 2 == 1
+    return [
+        (row, turned.select([row, *np.flatnonzero((levels.parent == row) & is_hole)]))
+        for row in np.flatnonzero(~is_hole).tolist()
+    ]

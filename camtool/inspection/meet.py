@@ -47,7 +47,6 @@ from msgspec import Struct, field
 from camtool.arrays import Floats
 from camtool.errors import CamtoolError, OptionError
 from camtool.findings import Severity
-from camtool.geometry.nesting import nesting
 from camtool.inspection.inspector import Inspected, Inspector
 from camtool.inspection.sizes import least
 from camtool.inspection.tolerances import unbound
@@ -411,7 +410,8 @@ class JobContours(Struct, frozen=True, eq=False):
         placed = place(case.drawing, job)
         sides = Sides.of(placed, job, case.target.machine.defaults.cut_depth_mm)
         depths: dict[str, set[int]] = {}
-        for name, depth in zip(placed.sources, nesting(placed.paths).depth.tolist(), strict=True):
+        nesting = placed.nesting.among(np.arange(len(placed.paths)))
+        for name, depth in zip(placed.sources, nesting.levels.depth.tolist(), strict=True):
             depths.setdefault(name, set()).add(depth)
         rests = {each.rest for each in job.operations} - {""}
         head = {name: name for name in depths}
@@ -429,7 +429,7 @@ class JobContours(Struct, frozen=True, eq=False):
             alone = not (operation.rest or operation.name in rests)
             if operation.kind != "profile":
                 # A contour within another one is an island of its pocket, or bored with it.
-                alone = alone and not nesting(placed.paths.select(mine)).depth.any()
+                alone = alone and not nesting.among(mine).levels.depth.any()
             if not (alone and all(name and len(depths[name]) == 1 for name in names)):
                 heads = {head[name] for name in names}
                 head = {name: min(heads) if each in heads else each for name, each in head.items()}

@@ -258,7 +258,8 @@ def _cut_parts(drawing: Drawing, group: _Group, contours: Ints, proposal: Propos
     lines, tool = drawing.paths, proposal.tool_mm
     continuous = [kind.casefold() in CONTINUOUS for kind in drawing.line_types]
     edges = np.array(continuous, dtype=np.bool_)
-    traits = Traits(lines, drawing.sources, edges)
+    own = drawing.nesting.among(np.arange(len(lines)))
+    traits = Traits(own, drawing.sources, edges)
     mine = np.zeros(len(lines), dtype=np.bool_)
     mine[contours] = True
 

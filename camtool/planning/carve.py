@@ -48,7 +48,7 @@ from camtool.geometry.medial import (
     medial_trace,
     off_chord,
 )
-from camtool.geometry.nesting import nesting, regions
+from camtool.geometry.nesting import regions
 from camtool.geometry.offset import merge_points
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
 from camtool.planning.findings import (
@@ -188,8 +188,7 @@ def _no_region(region: _Region, error: GeometryError) -> Finding:
 
 
 def _regions(chosen: Chosen) -> Iterator[_Region]:
-    outer = np.flatnonzero(nesting(chosen.lines).depth % 2 == 0)
-    for row, lines in zip(outer.tolist(), regions(chosen.lines), strict=True):
+    for row, lines in regions(chosen.nesting):
         yield _Region(lines, chosen.names[row], int(chosen.source[row]))
 
 

@@ -39,7 +39,7 @@ def chamfer(chosen: Chosen, setting: Setting) -> Work:
         findings.append(NOTHING_DRAWN_TO_CHAMFER(where=operation_name(setting.operation)))
     edges = replace(
         chosen,
-        lines=chosen.lines.select(closed.tolist()),
+        nesting=chosen.nesting.among(closed),
         source=chosen.source[closed],
         names=tuple(chosen.names[k] for k in closed.tolist()),
         rim=chosen.rim[closed],

@@ -17,7 +17,6 @@ import numpy as np
 from camtool.arrays import Bools, Floats
 from camtool.findings import Finding, Sentence
 from camtool.geometry.measure import extents, path_extents, signed_areas
-from camtool.geometry.nesting import nesting
 from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, lines_reversed
 from camtool.machine.model import Machine
 from camtool.planning.findings import (
@@ -521,7 +520,7 @@ def _loose_pieces(step: Step, gone: Container[int]) -> Iterator[Finding]:
 def _loose_islands(step: Step) -> Iterator[Finding]:
     """The islands of pockets that are cut through."""
     chosen = step.chosen
-    islands = chosen.lines.closed & (nesting(chosen.lines, chosen.lines.closed).depth % 2 == 1)
+    islands = chosen.lines.closed & (chosen.nesting.levels.depth % 2 == 1)
     for row in np.flatnonzero(islands).tolist():
         mend = "cut the pocket less deep, or fasten the island from below"
         yield _loose_piece(chosen.names[row], chosen.lines.select([row]), mend)

@@ -29,7 +29,6 @@ from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.measure import extents, path_extents
-from camtool.geometry.nesting import nesting
 from camtool.geometry.polylines import Polylines, Segments, reverse
 from camtool.planning.items import Contour, Runs, Setting, Step, contours_of
 from camtool.planning.job import Operation, Tool
@@ -290,9 +289,9 @@ def _kept(step: Step) -> Iterator[ProtectedRegion]:
     if operation.kind == "bore":
         bored = [item.source for item in step.items]
         closed = closed[np.isin(chosen.source[closed], bored)]
-    nest = nesting(chosen.lines.select(closed.tolist()))
-    order = np.argsort(nest.depth, kind="stable")
-    rows, depth = closed[order], nest.depth[order]
+    depth = chosen.nesting.among(closed).levels.depth
+    order = np.argsort(depth, kind="stable")
+    rows, depth = closed[order], depth[order]
     if operation.kind in ("pocket", "vcarve", "bore"):
         lines = chosen.lines.select(rows.tolist())
         runs = tuple(run.vertices for run in step.runs)

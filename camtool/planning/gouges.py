@@ -25,7 +25,7 @@ from camtool.findings import Finding, Severity
 from camtool.geometry.distance import approach, near_paths, nearest
 from camtool.geometry.drawing import Branch
 from camtool.geometry.measure import extents, path_lengths, sample
-from camtool.geometry.nesting import inside, nesting
+from camtool.geometry.nesting import inside
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
 from camtool.planning.findings import (
     BRANCHED_REGION,
@@ -245,9 +245,9 @@ def _cleared_away(chosen: Chosen, sides: Sides, pocket: Operation) -> Iterator[F
     if len(rows) == 0:
         return
     holds = sides.cut_by(pocket)
-    nest = nesting(sides.lines, holds & sides.lines.closed)
-    for row in rows[nest.depth[rows] % 2 == 1].tolist():
-        holder = sides.names[int(nest.parent[row])]
+    levels = sides.nesting.levels_by(holds)
+    for row in rows[levels.depth[rows] % 2 == 1].tolist():
+        holder = sides.names[int(levels.parent[row])]
         width = float(np.ptp(extents(sides.lines.select([row])), axis=1).min())
         yield GOUGE_BY_POCKET(
             where=at_place(sides.names[row], sides.lines[row].start.tolist()),
@@ -269,7 +269,7 @@ def by_uncut(sides: Sides, operation: Operation, rows: Ints) -> Iterator[Finding
         found = rows[turned[rows]]
         if len(found) == 0:
             continue
-        parent = nesting(sides.lines, around).parent
+        parent = sides.nesting.levels_by(around).parent
         first = int(found[0])
         name = sides.names[int(parent[first])]
         yield sentence(

@@ -17,6 +17,7 @@ from msgspec import Struct, field
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.findings import Finding
+from camtool.geometry.nesting import Nesting
 from camtool.geometry.polylines import Polyline, Polylines
 from camtool.planning.job import Operation
 
@@ -200,18 +201,23 @@ class Work(Struct, frozen=True, eq=False):
 
 
 class Chosen(Struct, frozen=True, eq=False):
-    """The paths that an operation takes, in the work frame: `lines`; `source` (M,), the index of
-    each in the placed drawing; `names` for people; `points` (K, 2) mm, the marks of its layers,
-    with their `point_names`. `rim` (M,): whether a closed path is the rim of a part, what lies
-    within it staying, or of a hole. `file`: that of the drawing."""
+    """The paths that an operation takes, in the work frame: `lines` with their `nesting`; `source`
+    (M,), the index of each in the placed drawing; `names` for people; `points` (K, 2) mm, the
+    marks of its layers, with their `point_names`. `rim` (M,): whether a closed path is the rim of
+    a part, what lies within it staying, or of a hole. `file`: that of the drawing."""
 
-    lines: Polylines
+    nesting: Nesting
     source: Ints
     names: tuple[str, ...]
     points: Floats
     point_names: tuple[str, ...]
     rim: Bools
     file: str | None = None
+
+    @property
+    def lines(self) -> Polylines:
+        """The M paths."""
+        return self.nesting.lines
 
 
 class Bridge(Struct, frozen=True, eq=False):

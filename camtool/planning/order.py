@@ -18,7 +18,7 @@ from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import OptionError
-from camtool.geometry.nesting import nesting
+from camtool.geometry.nesting import Nesting
 from camtool.geometry.polylines import Polyline, Polylines, lines_reversed, lines_rolled
 from camtool.planning.items import Contour, Fixed, Items, contours_of
 from camtool.planning.paths import flat, joints
@@ -323,7 +323,7 @@ def must_precede(items: Items) -> Ints:
     else does. Contours that cross hold each other not.
     """
     shapes, shape, item = _shapes(items)
-    parent = nesting(shapes).parent
+    parent = Nesting(shapes).levels.parent
     order = np.argsort(shape, kind="stable")
     shape, item = shape[order], item[order]
     first = np.searchsorted(shape, np.arange(len(shapes) + 1))

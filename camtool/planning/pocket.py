@@ -28,7 +28,7 @@ from camtool.findings import Finding
 from camtool.geometry.distance import points_to_segments
 from camtool.geometry.intersect import meetings, self_crossings
 from camtool.geometry.measure import extents, signed_areas
-from camtool.geometry.nesting import nesting, oriented
+from camtool.geometry.nesting import oriented, regions
 from camtool.geometry.offset import offset_shape
 from camtool.geometry.polylines import (
     POSITION_EPS_MM,
@@ -148,19 +148,15 @@ def _walls(chosen: Chosen, setting: Setting) -> Work:
 
 def kept_by(chosen: Chosen) -> Polylines:
     """The boundary of what the pockets leave, which is on the left of its paths."""
-    return lines_reversed(oriented(chosen.lines))
+    return lines_reversed(oriented(chosen.nesting))
 
 
 def pockets(chosen: Chosen) -> list[Pocket]:
     """The regions that the closed paths enclose, each outer path with the islands in it."""
-    nest = nesting(chosen.lines)
-    lines = oriented(chosen.lines)
-    found = []
-    for row in np.flatnonzero(nest.depth % 2 == 0).tolist():
-        islands = np.flatnonzero((nest.parent == row) & (nest.depth % 2 == 1)).tolist()
-        region = lines.select([row, *islands])
-        found.append(Pocket(region, chosen.names[row], int(chosen.source[row])))
-    return found
+    return [
+        Pocket(region, chosen.names[row], int(chosen.source[row]))
+        for row, region in regions(chosen.nesting)
+    ]
 
 
 def _cleared(slots: list[Floats], each: Pocket, setting: Setting) -> Cleared:

@@ -19,7 +19,6 @@ from camtool.arrays import Ints
 from camtool.findings import Finding
 from camtool.geometry.distance import approach, near_paths, nearest
 from camtool.geometry.measure import extents, signed_areas
-from camtool.geometry.nesting import nesting
 from camtool.geometry.polylines import (
     POSITION_EPS_MM,
     Polyline,
@@ -116,7 +115,7 @@ def _shapes(chosen: Chosen, closed: list[int]) -> list[list[int]]:
     """
     if not closed:
         return []
-    alone = nesting(chosen.lines.select(closed)).depth % 2 == 0
+    alone = chosen.nesting.levels.depth[closed] % 2 == 0
     turned = alone != chosen.rim[closed]
     rows = np.array(closed)
     return [each.tolist() for each in (rows[~turned], rows[turned]) if len(each)]

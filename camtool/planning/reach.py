@@ -22,7 +22,7 @@ from camtool.findings import Finding
 from camtool.geometry.boxes import Curves
 from camtool.geometry.distance import nearest
 from camtool.geometry.measure import Frames, extents, point_at, segment_lengths, signed_areas
-from camtool.geometry.nesting import regions
+from camtool.geometry.nesting import Nesting, regions
 from camtool.geometry.offset import merge_points, offset_shape
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments, reverse
 from camtool.planning.findings import (
@@ -86,7 +86,8 @@ def unreached(region: Polylines, tool_radius_mm: float) -> list[Unreached]:
     reached = opened(region, tool_radius_mm)
     least = LEAST_FOOT * np.pi * tool_radius_mm**2
     parting = PARTING * math.sqrt(2.0 * tool_radius_mm * TOGETHER_MM)
-    pieces = regions(_without(region, reached, least, parting))
+    left = Nesting(_without(region, reached, least, parting))
+    pieces = [piece for _, piece in regions(left)]
     areas = [float(signed_areas(piece).sum()) for piece in pieces]
     large = [(area, piece) for area, piece in zip(areas, pieces, strict=True) if area >= least]
     places = _far_places([piece for _, piece in large], reached)

@@ -31,7 +31,7 @@ from camtool.geometry.boxes import box_pairs
 from camtool.geometry.distance import nearest
 from camtool.geometry.drawing import Drawing, Mark, is_text
 from camtool.geometry.measure import path_extents, signed_areas
-from camtool.geometry.nesting import nesting
+from camtool.geometry.nesting import Nesting
 from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.patterns import matches
 from camtool.planning.items import Chosen
@@ -73,7 +73,7 @@ class Sides(Struct, eq=False, dict=True):
     `framed`, what is on the layer of a frame.
     `default_depth_mm`: the depth of operations that give none."""
 
-    lines: Polylines
+    nesting: Nesting
     names: tuple[str, ...]
     operations: tuple[Operation, ...]
     takes: Bools
@@ -87,10 +87,8 @@ class Sides(Struct, eq=False, dict=True):
     @classmethod
     def of(cls, placed: Drawing, job: Job, default_depth_mm: float) -> Sides:
         """The sides of a drawing in the work frame, cut by this job."""
-        around, lines = placed.unchosen, placed.paths
-        takes = np.zeros((len(job.operations), len(lines) + len(around.paths)), dtype=np.bool_)
-        if len(around.paths):
-            lines = Polylines.joined([lines, around.paths])
+        around, lines = placed.unchosen, placed.nesting.lines
+        takes = np.zeros((len(job.operations), len(lines)), dtype=np.bool_)
         names = list(zip(placed.layers, placed.colours, strict=True))
         for number, operation in enumerate(job.operations):
             known = {name: operation.takes(*name) for name in set(names)}
@@ -102,7 +100,7 @@ class Sides(Struct, eq=False, dict=True):
         edges = np.array([kind.casefold() in CONTINUOUS for kind in types], dtype=np.bool_)
         framed = np.array([layer in sheet for layer in layers], dtype=np.bool_)
         if any(operation.selects for operation in job.operations):
-            traits = Traits(lines, sources, edges & ~framed)
+            traits = Traits(placed.nesting, sources, edges & ~framed)
             for number, operation in enumerate(job.operations):
                 takes[number] = traits.selected(operation, takes[number])
         # Drills and bores take circles alone, whatever else is on their layers.
@@ -112,7 +110,7 @@ class Sides(Struct, eq=False, dict=True):
             if operation.kind == "bore":
                 cuts[number] &= circles(lines, takes[number])
         return cls(
-            lines=lines,
+            nesting=placed.nesting,
             names=tuple(f"{layer}/{it}" for layer, it in zip(layers, sources, strict=True)),
             operations=job.operations,
             takes=takes,
@@ -122,6 +120,11 @@ class Sides(Struct, eq=False, dict=True):
             framed=framed,
             default_depth_mm=default_depth_mm,
         )
+
+    @property
+    def lines(self) -> Polylines:
+        """The M contours."""
+        return self.nesting.lines
 
     @cached_property
     def uncut(self) -> Bools:
@@ -157,11 +160,11 @@ class Sides(Struct, eq=False, dict=True):
         bounds = cut | self.uncut
         key = bounds.tobytes()
         if key not in self._known:
-            nest = nesting(self.lines, bounds)
-            rim = nest.depth % 2 == 0
+            levels = self.nesting.levels_by(bounds)
+            rim = levels.depth % 2 == 0
             less = self._rim(cut) if self.uncut.any() else rim
             more = self._rim(bounds | self.frames) if self.frames.any() else rim
-            self._known[key] = Seen(rim, nest.parent, less != rim, more != rim, bounds)
+            self._known[key] = Seen(rim, levels.parent, less != rim, more != rim, bounds)
         return self._known[key]
 
     def sided(self) -> Bools:
@@ -194,7 +197,7 @@ class Sides(Struct, eq=False, dict=True):
         return found
 
     def _rim(self, bounds: Bools) -> Bools:
-        return np.asarray(nesting(self.lines, bounds).depth % 2 == 0)
+        return np.asarray(self.nesting.levels_by(bounds).depth % 2 == 0)
 
     def _taken(self, chosen: Iterable[bool]) -> Bools:
         """(M,) the closed contours that any of these operations takes."""
@@ -225,8 +228,9 @@ class Traits:
     """What M paths are, each found out when an operation asks for it. `edges` (M,): those by
     which outer and inner ones are told."""
 
-    def __init__(self, lines: Polylines, sources: tuple[str, ...], edges: Bools) -> None:
-        self._lines, self._sources, self._edges = lines, sources, edges
+    def __init__(self, nesting: Nesting, sources: tuple[str, ...], edges: Bools) -> None:
+        self._nesting, self._sources, self._edges = nesting, sources, edges
+        self._lines = nesting.lines
 
     def selected(self, operation: Operation, rows: Bools) -> Bools:
         """(M,) those of the rows that the operation selects."""
@@ -263,7 +267,7 @@ class Traits:
     @cached_property
     def _depth(self) -> Ints:
         """(M,) in how many closed edges each path lies."""
-        return nesting(self._lines, self._edges & self._lines.closed).depth
+        return self._nesting.levels_by(self._edges).depth
 
 
 def circles(lines: Polylines, rows: Bools) -> Bools:
@@ -355,7 +359,7 @@ def choose(drawing: Drawing, operation: Operation, sides: Sides) -> Chosen:
     if not index and not marks and (len(drawing.paths) or drawing.marks):
         raise _nothing(drawing, operation)
     return Chosen(
-        lines=drawing.paths.select(index),
+        nesting=sides.nesting.among(np.array(index, dtype=np.int64)),
         source=np.array(index, dtype=np.int64),
         names=tuple(sides.names[i] for i in index),
         points=np.array([mark.at_mm for mark in marks], dtype=np.float64).reshape(len(marks), 2),

@@ -12,7 +12,7 @@ from camtool.arrays import Floats
 from camtool.geometry.distance import nearest
 from camtool.geometry.measure import sample
 from camtool.geometry.medial import Boundary, Trace, discs_at, medial_trace
-from camtool.geometry.nesting import oriented, regions
+from camtool.geometry.nesting import Nesting, oriented, regions
 from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.kernels.discs import LENGTH, SWEEP, frame
 from camtool.planning.carve import with_level
@@ -22,19 +22,15 @@ from tests.strategies import contours
 EXACT_MM = 1e-9
 TOLERANCE_MM = 1e-3
 NAMED = ["SQUARE", "ELL", "DUMBBELL", "KEYHOLE", "LENS", "CRESCENT", "NOTCH", "FILLETED", "SLOT"]
-WITH_ISLANDS = oriented(
-    Polylines.of(
-        [
-            shapes.OBLONG,
-            shapes.closed((3, 3), (3, 6), (6, 6), (6, 3)),
-            shapes.closed((12, 4, 1), (16, 4, 1)),
-        ]
-    )
-)
+ISLANDS = [
+    shapes.closed((3, 3), (3, 6), (6, 6), (6, 3)),
+    shapes.closed((12, 4, 1), (16, 4, 1)),
+]
+WITH_ISLANDS = oriented(Nesting(Polylines.of([shapes.OBLONG, *ISLANDS])))
 
 
 def region_of(path: Polyline) -> Polylines:
-    (region,) = regions(Polylines.of([path]))
+    ((_, region),) = regions(Nesting(Polylines.of([path])))
     return region
 
 

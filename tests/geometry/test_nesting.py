@@ -10,7 +10,7 @@ from shapely import Point
 
 from camtool.errors import GeometryError
 from camtool.geometry.measure import signed_areas
-from camtool.geometry.nesting import inside, nesting, oriented, regions
+from camtool.geometry.nesting import Nesting, inside, oriented, regions
 from camtool.geometry.offset import offset_shape
 from camtool.geometry.polylines import Polyline, Polylines, Segments, reverse, rolled, rotated
 from tests.oracles.contours import CIRCLE, OBLONG, SQUARE, closed, comb, opened
@@ -32,7 +32,7 @@ def _line(*numbers: float) -> Polyline:
 
 
 def _nested(paths: list[Polyline]) -> tuple[list[int], list[int]]:
-    found = nesting(Polylines.of(paths))
+    found = Nesting(Polylines.of(paths)).levels
     return found.parent.tolist(), found.depth.tolist()
 
 
@@ -97,7 +97,7 @@ def test_arrangements(paths: list[Polyline], parent: list[int], depth: list[int]
 def test_the_order_of_the_paths_does_not_matter() -> None:
     paths = [_circle(0, 0, r) for r in (5, 4, 3, 2, 1)]
     for shuffled in ([4, 2, 0, 1, 3], [1, 0, 3, 2, 4]):
-        found = nesting(Polylines.of(paths).select(shuffled))
+        found = Nesting(Polylines.of(paths).select(shuffled)).levels
         assert found.depth.tolist() == shuffled
 
 
@@ -136,14 +136,14 @@ def test_points_on_the_chord_of_an_arc_are_within_the_circle() -> None:
 @given(contours(), st.integers(1, 4))
 def test_copies_made_smaller_are_nested(path: Polyline, count: int) -> None:
     paths = [scaled(path, 0.5**k) for k in range(count + 1)]
-    found = nesting(Polylines.of(paths))
+    found = Nesting(Polylines.of(paths)).levels
     assert found.depth.tolist() == list(range(count + 1))
     assert found.parent.tolist() == list(range(-1, count))
 
 
 @given(st.lists(polylines(max_points=5), max_size=6))
 def test_any_paths_give_a_forest(paths: list[Polyline]) -> None:
-    found = nesting(Polylines.of(paths))
+    found = Nesting(Polylines.of(paths)).levels
     for path, (parent, depth) in enumerate(zip(found.parent, found.depth, strict=True)):
         assert (parent == -1) == (depth == 0)
         seen = {path}
@@ -154,9 +154,39 @@ def test_any_paths_give_a_forest(paths: list[Polyline]) -> None:
             parent = found.parent[parent]
 
 
+@given(st.lists(polylines(max_points=5), min_size=1, max_size=6), st.data())
+def test_a_part_nests_as_if_it_stood_alone(paths: list[Polyline], data: st.DataObject) -> None:
+    paths += [reverse(path) for path in paths if path.closed][:2]
+    paths += [scaled(path, 0.5) for path in paths]
+    every = Nesting(Polylines.of(paths))
+    mask = np.array(data.draw(st.lists(st.booleans(), min_size=len(paths), max_size=len(paths))))
+    rows = np.flatnonzero(mask)
+    alone = Nesting(every.lines.select(rows)).levels
+    part, holders = every.among(rows).levels, every.levels_by(mask)
+    assert part.parent.tolist() == alone.parent.tolist()
+    assert part.depth.tolist() == alone.depth.tolist()
+    assert holders.depth[rows].tolist() == alone.depth.tolist()
+    parent = np.where(alone.parent < 0, -1, np.append(rows, -1)[alone.parent])
+    assert holders.parent[rows].tolist() == parent.tolist()
+    # The others are held by these alone, too.
+    for row in np.flatnonzero(~mask).tolist():
+        one = np.flatnonzero(mask | (np.arange(len(paths)) == row))
+        if not paths[row].closed:
+            levels = Nesting(every.lines.select(one)).levels
+            assert holders.depth[row] == levels.depth[one.tolist().index(row)]
+
+
 # Regions: which path is an outer one, which a hole of it.
 
 RINGS = [scaled(CIRCLE, k) for k in (4.0, 3.0, 2.0, 1.0)]
+
+
+def regions_of(lines: Polylines) -> list[Polylines]:
+    found = regions(Nesting(lines))
+    assert [region[0].start.tolist() for _, region in found] == [
+        lines[row].start.tolist() for row, _ in found
+    ]
+    return [region for _, region in found]
 
 
 def areas_of(found: list[Polylines]) -> list[list[float]]:
@@ -168,12 +198,12 @@ def test_rings_in_any_order_and_sense(order: list[int], turned: list[bool]) -> N
     paths = [
         reverse(RINGS[k]) if turn else RINGS[k] for k, turn in zip(order, turned, strict=True)
     ]
-    lines = oriented(Polylines.of(paths))
+    lines = oriented(Nesting(Polylines.of(paths)))
     signs = np.sign(signed_areas(lines)).tolist()
     assert signs == [1.0 if k % 2 == 0 else -1.0 for k in order]
     # The order of paths stays, and so does where each begins.
     assert [tuple(p.start) for p in lines] == [tuple(p.start) for p in paths]
-    found = areas_of(regions(Polylines.of(paths)))
+    found = areas_of(regions_of(Polylines.of(paths)))
     a, b, c, d = (np.pi * 100.0 * k * k for k in (4, 3, 2, 1))
     wanted = [[a, -b], [c, -d]] if order.index(0) < order.index(2) else [[c, -d], [a, -b]]
     assert found == [np.round(each, 6).tolist() for each in wanted]
@@ -183,26 +213,27 @@ def test_holes_go_to_the_smallest_outer_path() -> None:
     frame, far = scaled(SQUARE, 10.0), moved(scaled(SQUARE, 10.0), 200.0, 0.0)
     holes = [moved(SQUARE, 20.0 * k, 50.0) for k in range(3)]
     island = moved(scaled(SQUARE, 0.2), 4.0, 54.0)
-    found = areas_of(regions(Polylines.of([island, *holes, frame, moved(SQUARE, 250, 50), far])))
+    paths = [island, *holes, frame, moved(SQUARE, 250, 50), far]
+    found = areas_of(regions_of(Polylines.of(paths)))
     assert found == [[4.0], [10000.0, -100.0, -100.0, -100.0], [10000.0, -100.0]]
 
 
 def test_what_an_offset_gives_is_oriented_already() -> None:
-    lines = oriented(Polylines.of([scaled(SQUARE, 10.0), moved(comb(9), 20, 20), OBLONG]))
+    lines = oriented(Nesting(Polylines.of([scaled(SQUARE, 10.0), moved(comb(9), 20, 20), OBLONG])))
     for d in (0.4, 0.5, 1.0, 2.0, -0.4, -0.5, -3.0):
         result = offset_shape(lines, d)
-        again = oriented(result)
+        again = oriented(Nesting(result))
         assert np.array_equal(again.vertices, result.vertices)
-        assert sum(len(each) for each in regions(result)) == len(result)
+        assert sum(len(each) for each in regions_of(result)) == len(result)
 
 
 def test_paths_that_touch() -> None:
     # Two squares at one corner, and a hole that touches the edge of its square.
     corner = [SQUARE, moved(SQUARE, 10.0, 10.0)]
-    assert areas_of(regions(Polylines.of(corner))) == [[100.0], [100.0]]
+    assert areas_of(regions_of(Polylines.of(corner))) == [[100.0], [100.0]]
     diamond = closed((5, 0), (8, 3), (5, 6), (2, 3))
     for start in range(4):
-        found = areas_of(regions(Polylines.of([rolled(diamond, start), SQUARE])))
+        found = areas_of(regions_of(Polylines.of([rolled(diamond, start), SQUARE])))
         assert found == [[100.0, -18.0]]
 
 
@@ -210,19 +241,19 @@ def test_open_paths_have_no_inside() -> None:
     lines = Polylines.of([SQUARE, opened((0, 0), (1, 1))])
     for function in (oriented, regions):
         with pytest.raises(GeometryError, match="path 1"):
-            function(lines)
+            function(Nesting(lines))
 
 
 def test_nothing() -> None:
-    assert len(oriented(Polylines.of([]))) == 0
-    assert regions(Polylines.of([])) == []
+    assert len(oriented(Nesting(Polylines.of([])))) == 0
+    assert regions_of(Polylines.of([])) == []
 
 
 def test_many_vertices() -> None:
     # A ring of many segments in another one: every witness asks a tree, not every segment.
     angle = np.linspace(0.0, 2.0 * np.pi, 20_000, endpoint=False)
     ring = Polyline(np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle]), True)
-    found = regions(Polylines.of([scaled(ring, 50.0), scaled(ring, 49.99), scaled(ring, 1.0)]))
+    found = regions_of(Polylines.of([scaled(ring, 50.0), scaled(ring, 49.99), scaled(ring, 1.0)]))
     assert [len(each) for each in found] == [2, 1]
 
 
@@ -236,6 +267,6 @@ def test_many_paths_nest_as_their_boxes_do() -> None:
     inside = (low[:, None] >= low[None]).all(axis=2) & (high[:, None] <= high[None]).all(axis=2)
     np.fill_diagonal(inside, False)
     areas = np.where(inside, sizes.prod(axis=1), np.inf)
-    found = nesting(Polylines.of(paths))
+    found = Nesting(Polylines.of(paths)).levels
     assert found.depth.tolist() == inside.sum(axis=1).tolist()
     assert found.parent.tolist() == np.where(inside.any(axis=1), areas.argmin(axis=1), -1).tolist()

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from camtool.errors import GeometryError, OptionError
 from camtool.geometry.measure import path_lengths, signed_areas
-from camtool.geometry.nesting import oriented
+from camtool.geometry.nesting import Nesting, oriented
 from camtool.geometry.offset import offset_each, offset_shape
 from camtool.geometry.polylines import (
     POSITION_EPS_MM,
@@ -90,7 +90,7 @@ PAST_FAILURES: list[tuple[str, list[Polyline], float, tuple[int, int]]] = []
 
 
 def shape(paths: list[Polyline]) -> Polylines:
-    return oriented(Polylines.of(paths))
+    return oriented(Nesting(Polylines.of(paths)))
 
 
 def rng() -> np.random.Generator:

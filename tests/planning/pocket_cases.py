@@ -11,7 +11,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from camtool.geometry.distance import approach
-from camtool.geometry.nesting import oriented
+from camtool.geometry.nesting import Nesting, oriented
 from camtool.geometry.polylines import Polyline, Polylines, rotated
 from camtool.planning.items import Chosen, CutRun, Feeds, Setting, Work
 from camtool.planning.job import Operation, Tool
@@ -68,9 +68,8 @@ def chosen_of(paths: Sequence[Polyline]) -> Chosen:
     """The paths as an operation takes them."""
     count = len(paths)
     names = tuple(f"0/PATH {index}" for index in range(count))
-    return Chosen(
-        Polylines.of(paths), np.arange(count), names, np.empty((0, 2)), (), np.zeros(count, bool)
-    )
+    nesting, rim = Nesting(Polylines.of(paths)), np.zeros(count, bool)
+    return Chosen(nesting, np.arange(count), names, np.empty((0, 2)), (), rim)
 
 
 def setting_of(diameter_mm: float, **settings: Any) -> Setting:
@@ -94,7 +93,7 @@ def runs_of(work: Work) -> list[CutRun]:
 
 def region_of(paths: Sequence[Polyline]) -> Polylines:
     """What the paths enclose, outer ones CCW and islands CW."""
-    return oriented(Polylines.of(paths))
+    return oriented(Nesting(Polylines.of(paths)))
 
 
 @st.composite

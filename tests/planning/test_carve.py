@@ -16,6 +16,7 @@ from camtool.errors import OptionError
 from camtool.findings import Severity
 from camtool.geometry.distance import nearest
 from camtool.geometry.findings import ContourCode
+from camtool.geometry.nesting import Nesting
 from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.importers.read import read_drawing
 from camtool.planning.carve import CARVE_TOLERANCE_MM, vcarve
@@ -62,11 +63,9 @@ SHAPES = {
 
 
 def chosen_of(paths: Sequence[Polyline]) -> Chosen:
-    lines = Polylines.of(paths)
-    names = tuple(f"PATH {index}" for index in range(len(lines)))
-    return Chosen(
-        lines, np.arange(len(lines)), names, np.empty((0, 2)), (), np.zeros(len(lines), bool)
-    )
+    nesting, rows = Nesting(Polylines.of(paths)), np.arange(len(paths))
+    names = tuple(f"PATH {index}" for index in rows)
+    return Chosen(nesting, rows, names, np.empty((0, 2)), (), np.zeros(len(rows), bool))
 
 
 def setting_of(*levels: float, angle: float = math.pi / 2, **tool: float) -> Setting:

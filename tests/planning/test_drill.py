@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.findings import Severity
+from camtool.geometry.nesting import Nesting
 from camtool.geometry.polylines import Polyline, Polylines
 from camtool.planning.drill import (
     HOLE_SIZE_MM,
@@ -41,7 +42,7 @@ def chosen_of(
     marks = tuple(f"POINT {index}" for index in range(len(points)))
     places = np.array(points, dtype=np.float64).reshape(-1, 2)
     return Chosen(
-        Polylines.of(paths),
+        Nesting(Polylines.of(paths)),
         10 + np.arange(len(paths)),
         names,
         places,

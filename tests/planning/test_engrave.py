@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from camtool.errors import OptionError
 from camtool.findings import Finding, Severity
 from camtool.geometry.measure import sample
+from camtool.geometry.nesting import Nesting
 from camtool.geometry.polylines import Polyline, Polylines
 from camtool.planning.engrave import engrave
 from camtool.planning.items import Chosen, Contour, Feeds, Setting
@@ -30,7 +31,7 @@ def setting_of(direction: str = "drawn") -> Setting:
 def chosen_of(paths: list[Polyline]) -> Chosen:
     names = tuple(f"PATH {index}" for index in range(len(paths)))
     return Chosen(
-        Polylines.of(paths),
+        Nesting(Polylines.of(paths)),
         3 + np.arange(len(paths)),
         names,
         np.empty((0, 2)),

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from camtool.arrays import Ints
 from camtool.errors import OptionError
-from camtool.geometry.nesting import nesting
+from camtool.geometry.nesting import Nesting
 from camtool.geometry.polylines import Polyline, Polylines, reverse, rolled
 from camtool.planning import order
 from camtool.planning.items import Contour, CutRun, Feeds, Fixed, Item, Setting, contours_of
@@ -129,7 +129,7 @@ def before_by_pairs(items: list[Item]) -> list[list[int]]:
     """What must precede what, one item after the other."""
     shapes = {id(shape): shape for shape in map(shape_of, items)}
     rank = {key: k for k, key in enumerate(shapes)}
-    parent = nesting(Polylines.of(shapes.values())).parent if shapes else []
+    parent = Nesting(Polylines.of(shapes.values())).levels.parent if shapes else []
     return sorted(
         [one, other]
         for one, item in enumerate(items)
