@@ -491,7 +491,7 @@ def _repeated(program: Program, decoded: Toolpath) -> set[Finding]:
 
 def _operations(steps: Sequence[Step]) -> tuple[PlannedOperation, ...]:
     """How the operations that cut something do it, for the report."""
-    from camtool.planning.checks import IN_PASSES, deepest_pass
+    from camtool.planning.checks import deepest_pass
     from camtool.verification.report import PlannedOperation, certain
 
     cutting = [step for step in steps if step.runs]
@@ -499,7 +499,7 @@ def _operations(steps: Sequence[Step]) -> tuple[PlannedOperation, ...]:
     found = []
     for step in cutting:
         operation, setting = step.operation, step.setting
-        in_passes = operation.kind in IN_PASSES
+        in_passes = operation.contract.descent == "passes"
         found.append(
             PlannedOperation(
                 name=operation.name,

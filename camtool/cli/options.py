@@ -26,7 +26,8 @@ import click
 from camtool.cli.life_signs import progress
 from camtool.errors import MachineError, OptionError
 from camtool.importers.options import FORMATS, TEXTS, TRACES
-from camtool.jobs.keys import FLAGS, Key, flag_name
+from camtool.jobs.keys import FLAGS, flag_name
+from camtool.keys import Key
 from camtool.records import replace
 from camtool.units import parse_feed, parse_length, parse_time
 
@@ -569,8 +570,8 @@ class JobFlags:
 
     def _shop(self) -> Shop:
         """The tools that the job may name, and the defaults of the project and the user."""
-        from camtool.jobs.keys import Given
         from camtool.jobs.tools import Shop
+        from camtool.keys import Given
 
         if self.project is None:
             return Shop()

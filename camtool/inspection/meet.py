@@ -59,7 +59,7 @@ from camtool.inspection.verdicts import (
     verdicts_of,
 )
 from camtool.jobs.changes import LEFT_DIGITS, Change, Left, changed, text_of
-from camtool.jobs.keys import OPERATION
+from camtool.jobs.keys import OPERATION, is_known
 from camtool.machine.model import Machine
 from camtool.pipeline import post_drawing
 from camtool.plain import one_line
@@ -368,7 +368,7 @@ OTHER_WORDS = {"direction": ("climb", "conventional"), "start": ("longest-line",
 
 def _other_words(key: str, row: int, operation: Operation) -> list[Proposal]:
     """The other words for a key of an operation, if its kind has that."""
-    if operation.kind not in OPERATION[key].kinds:
+    if not is_known(key, operation.kind):
         return []
     now = getattr(operation, OPERATION[key].field)
     said = now if isinstance(now, str) else f"{now[0]:g},{now[1]:g}"
@@ -421,13 +421,13 @@ class JobContours(Struct, frozen=True, eq=False):
         for row, index, operation in _rows(job):
             mine = np.flatnonzero(sides.cuts[index, : len(placed.paths)])
             names = cut[row] = tuple(dict.fromkeys(placed.sources[k] for k in mine))
-            if operation.kind not in OPERATION["allowance"].kinds or not operation.tool.radius_mm:
+            if not is_known("allowance", operation.kind) or not operation.tool.radius_mm:
                 continue
             walls[row] = names
             for name in names:
                 most[name] = min(most.get(name, math.inf), MOST_LEFT * operation.tool.radius_mm)
             alone = not (operation.rest or operation.name in rests)
-            if operation.kind != "profile":
+            if not operation.contract.runs_beside:
                 # A contour within another one is an island of its pocket, or bored with it.
                 alone = alone and not nesting.among(mine).levels.depth.any()
             if not (alone and all(name and len(depths[name]) == 1 for name in names)):

@@ -34,15 +34,12 @@ from camtool.jobs.keys import (
     TOOL_KEYS,
     TOOL_NAME,
     WHOLE,
-    Given,
-    Table,
     flag_name,
-    record_of,
-    table_of,
-    why_idle,
+    is_known,
 )
 from camtool.jobs.tools import Described, Shop, Tools, Used, tool_tables, tools_for
-from camtool.planning.job import Job, Operation, Placement, Stock, rested
+from camtool.keys import Given, Table, record_of, table_of, why_idle
+from camtool.planning.job import Job, Operation, Placement, Stock, operation_of, rested
 from camtool.records import replace
 from camtool.tables import read_table
 
@@ -173,7 +170,7 @@ def build_job(
     whole = flags.whole.over(file.whole)
     tools = tools_for(file.tools, whole, file.folder, shop)
     tables = file.operations or (Table(),)
-    record_of(Operation, OPERATION, file.defaults.only(_RECORDED))
+    record_of(operation_of, OPERATION, file.defaults.only(_RECORDED))
     stock = _stock(file.stock)
     operations = [
         _operation(n, (file.defaults, own, flags.defaults), tools, len(tables))
@@ -214,19 +211,19 @@ def _operation(
     defaults, own, flags = layers
     merged = _nearest((defaults, own, flags)).only(OPERATION)
     record_of(
-        Operation, OPERATION, own.only(_RECORDED)
+        operation_of, OPERATION, own.only(_RECORDED)
     )  # keys that flags override must be right too
     kind = Operation.kind
     if "kind" in merged.given:
         kind = OPERATION["kind"].read(merged.given["kind"])
     for name, given in own.only(OPERATION).given.items():
-        if kind not in OPERATION[name].kinds:
+        if not is_known(name, kind):
             raise given.refused(*_unknown(name, kind))
     used = tools.of(layers, kind)
     preset = tuple(key for key in used.preset.given if key not in merged.given)
     merged = merged.over(used.preset)
-    known = merged.only(name for name in OPERATION if kind in OPERATION[name].kinds)
-    operation = record_of(Operation, OPERATION, known.only(_RECORDED))
+    known = merged.only(name for name in OPERATION if is_known(name, kind))
+    operation = record_of(operation_of, OPERATION, known.only(_RECORDED))
     for name, given in own.only(OPERATION).given.items():
         why = why_idle(OPERATION, name, operation)
         if why is not None and merged.given[name] is given:
@@ -270,22 +267,23 @@ def _nearest(layers: Sequence[Table]) -> Table:
     for layer in layers[1:]:
         below = dict(merged.given)
         for one in layer.only(OPERATION).given:
-            if one in EITHER and kind in OPERATION[one].kinds:
+            if one in EITHER and is_known(one, kind):
                 below.pop(EITHER[one], None)
         merged = layer.over(Table(below, merged.where, merged.file))
     return merged
 
 
 def _deep(operation: Operation, layers: Sequence[Table], stock: Stock | None) -> Operation:
-    """The operation with the depth that its breakthrough, or its chamfer, makes."""
+    """The operation as its kind and the stock settle it; errors at the key that is wrong."""
     try:
-        return operation.chamfered().through(stock)
+        return operation.settled(stock)
     except OptionError as error:
         # The last pass may be what is wrong with the depth.
-        known = _nearest(layers).given
-        key = "chamfer" if operation.kind == "chamfer" else "breakthrough"
-        key = "last_pass" if (error.where or "").endswith("last_pass") else key
-        place = known.get(key) or known.get("kind")
+        given = _nearest(layers).given
+        named = re.search(r"key (\w+)$", error.where or "")
+        keys = (named[1] if named else "", "breakthrough", "kind")
+        known = (key for key in keys if key in given and is_known(key, operation.kind))
+        place = given.get(next(known, ""))
         if place is None:
             raise
         raise place.refused(error.message, error.mend) from error
@@ -293,7 +291,7 @@ def _deep(operation: Operation, layers: Sequence[Table], stock: Stock | None) ->
 
 def _rested(operations: list[Operation], tables: Sequence[Table]) -> list[Operation]:
     """The operations with what they clear the rest of."""
-    carvings = {each.name for each in operations if each.kind == "vcarve" and each.name}
+    carvings = {each.name for each in operations if each.contract.rest == "floor" and each.name}
     for operation, own in zip(operations, tables, strict=True):
         for key in ("depth", "breakthrough"):
             if operation.rest in carvings and key in own.given:
@@ -312,14 +310,14 @@ def _rested(operations: list[Operation], tables: Sequence[Table]) -> list[Operat
 
 def _unknown(name: str, kind: str) -> tuple[str, str]:
     """What is wrong with a key that a kind of operation does not know, and how to fix it."""
-    known = [key for key in OPERATION if kind in OPERATION[key].kinds]
+    known = [key for key in OPERATION if is_known(key, kind)]
     return f"means nothing to the kind {kind}", f"it has: {', '.join(known)}, tool"
 
 
 def _refuse_tool(operation: Operation, own: Table) -> None:
-    """A V bit is needed to carve and to chamfer, and its angle to know how deep."""
+    """Refuse a tool that is no V bit, or has no angle, where the operation needs one."""
     tool, kind = operation.tool, operation.kind
-    if kind in ("vcarve", "chamfer") and (tool.kind != "v" or tool.tip_angle_rad is None):
+    if operation.contract.needs_v_bit and (tool.kind != "v" or tool.tip_angle_rad is None):
         place = own.given.get("tool", own)
         raise place.refused(
             f"{kind} needs a V bit, not a tool of kind {tool.kind!r}"
@@ -368,7 +366,7 @@ def _refuse_unused(layer: Table, operations: list[Operation]) -> None:
 
 
 def _why_unused(name: str, operation: Operation) -> OptionError | None:
-    if operation.kind not in OPERATION[name].kinds:
+    if not is_known(name, operation.kind):
         message, mend = _unknown(name, operation.kind)
         return OptionError(message, mend=mend)
     return why_idle(OPERATION, name, operation)

@@ -17,10 +17,12 @@ from typing import Any
 from msgspec import Struct
 
 from camtool.jobs.build import EITHER, JobTables, build_job, tables_of
-from camtool.jobs.keys import OPERATION, TOOL_KEYS, TOOL_NAME, Given, Table, length
+from camtool.jobs.keys import OPERATION, TOOL_KEYS, TOOL_NAME, is_known
 from camtool.jobs.template import pattern_of
 from camtool.jobs.tools import Shop
+from camtool.keys import Given, Table, length
 from camtool.planning.job import Job
+from camtool.planning.kinds import kind_named
 from camtool.tables import Table as Values
 from camtool.tables import parsed_table, written
 
@@ -75,7 +77,7 @@ def together(file: JobTables, flags: JobTables, folder: Path) -> Values:
             for name, each in file.tools.items()
         }
     rows = file.operations or (Table(),)
-    carved = {str(_raw(own).get("name")) for own in rows if _raw(own).get("kind") == "vcarve"}
+    carved = {str(_raw(own).get("name")) for own in rows if _leaves_floor(_raw(own))}
     tables["operations"] = [_operation(own, file.defaults, flags.defaults, carved) for own in rows]
     return tables
 
@@ -93,12 +95,14 @@ def _operation(own: Table, defaults: Table, flags: Table, carved: set[str]) -> V
             "cannot be written into a job file whose operation names its tool",
             "change the tool in the job file",
         )
-    known = [name for name in flags.given if name not in OPERATION or _knows(named, name)]
+    known = [name for name in flags.given if name not in OPERATION or is_known(name, named)]
     return _raw(_over(flags.only(known), own))
 
 
-def _knows(kind: object, name: str) -> bool:
-    return kind in OPERATION[name].kinds
+def _leaves_floor(table: Values) -> bool:
+    """True if the operation of this table carves a floor, whose depth is its own."""
+    kind = table.get("kind")
+    return isinstance(kind, str) and kind_named(kind).rest == "floor"
 
 
 def _over(above: Table, below: Table) -> Table:

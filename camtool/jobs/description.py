@@ -22,13 +22,6 @@ if TYPE_CHECKING:
     from camtool.planning.items import Chosen
     from camtool.planning.job import Job, Operation
 
-WITHIN = {
-    "pocket": "it is cleared as a pocket",
-    "vcarve": "it is carved",
-    "bore": "it is bored, if it is a circle wider than the tool",
-}
-"""Kinds of operation that take all within their contours, and why."""
-
 NOT_KNOWN_MM = math.inf
 """The depth of an operation where neither the job nor the machine gives one."""
 
@@ -103,15 +96,14 @@ def _groups(
     operation: Operation, chosen: Chosen, sides: Sides, placed: Drawing
 ) -> list[dict[str, Any]]:
     """How many contours of each layer have the tool on which side, and why."""
-    if operation.kind == "drill":
+    contract = operation.contract
+    if contract.cuts in ("at", "over"):
         return []
     groups: Counter[tuple[str, str, str]] = Counter()
     beside = runs_beside(operation)
     for place_in, row in enumerate(chosen.source.tolist()):
-        if operation.kind in WITHIN:
-            side, why = "within", WITHIN[operation.kind]
-        elif operation.kind == "engrave":
-            side, why = "on", "it is engraved"
+        if contract.cuts in ("within", "along"):
+            side, why = ("within" if contract.cuts == "within" else "on"), contract.reason
         else:
             outer = "outside" if chosen.rim[place_in] else "inside"
             side = outer if beside and chosen.lines.closed[place_in] else "on"

@@ -1,24 +1,48 @@
-"""The keys of job files: what each may be, which field it fills, and the flag that says the same.
+"""The keys of job files: the field that each fills, and the flag that says the same.
 
-    Given     a value as a file or a flag gave it, with its place
-    Table     several of them by key: one table of a file, or flags
-    Key       the field that a key fills, its Value, the help of its flag, an example
     WHOLE, PLACE, STOCK, TOOL, OPERATION: every key, table by table; FLAGS: those that are flags
 
-Whatever is wrong is an OptionError that names the file, the table and the key (or the flag), and
-says how to fix it. docs/jobs.md explains the keys; a test keeps the page and these tables equal.
+Kinds of operations name the keys that they know, and may bring keys of their own
+(`camtool.planning.kinds`). docs/jobs.md explains the keys; a test keeps the page and these tables
+equal.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from camtool.errors import OptionError
+from camtool.keys import (
+    ANGLE,
+    COUNT,
+    FACTOR,
+    FEED,
+    LENGTH,
+    PATTERNS_OF_NAMES,
+    SWITCH,
+    TEXT,
+    TIME,
+    Given,
+    Key,
+    Table,
+    Value,
+    fraction,
+    length,
+    meant,
+    number,
+    number_text,
+    one_of,
+    patterns,
+    plain,
+    record_of,
+    refuse_idle,
+    text,
+    whole,
+    word,
+)
 from camtool.patterns import guess
 from camtool.planning.job import (
     COOLANTS,
@@ -27,7 +51,6 @@ from camtool.planning.job import (
     ENTRIES,
     GOALS,
     JOINS,
-    KINDS,
     LEADS,
     ORIGINS,
     PATTERNS,
@@ -39,260 +62,14 @@ from camtool.planning.job import (
     Lead,
     Tabs,
 )
-from camtool.units import parse_angle, parse_feed, parse_length, parse_time
+from camtool.planning.kinds import broken_kinds, installed_kinds, kind_named
 
 _T = TypeVar("_T")
-
-
-@dataclass(frozen=True)
-class Given:
-    """A value as the user wrote it; `where` names its key or flag, `file` its file, if any."""
-
-    value: Any
-    where: str
-    file: str | None = None
-
-    def refused(self, message: str, mend: str = "") -> OptionError:
-        """The error that says what is wrong with it."""
-        return OptionError(message, file=self.file, where=self.where, mend=mend)
-
-    @contextmanager
-    def blamed(self) -> Iterator[None]:
-        """Within the block, an OptionError gets the place of this value."""
-        try:
-            yield
-        except OptionError as error:
-            raise self.refused(error.message, error.mend) from error
-
-
-@dataclass(frozen=True)
-class Value:
-    """What a key may be: `read` makes the field's value of what was given. The help of its flag
-    shows `metavar` or `choices`; a switch has neither. With `tables`, a table
-    may give it too."""
-
-    read: Callable[[Given], Any]
-    metavar: str = ""
-    choices: tuple[str, ...] = ()
-    tables: bool = False
-
-
-@dataclass(frozen=True)
-class Key:
-    """A key of a table: the `field` of its record that it fills, and what its `value` may be.
-
-    `help` is that of the flag that says the same; a key without has none. `example` stands in the
-    files that `camtool job new` begins. `kinds`: the kinds of operations that know it. `only`:
-    another key of the table, and the values of it without which this one has no effect.
-    """
-
-    field: str
-    value: Value
-    help: str = ""
-    example: str = ""
-    kinds: tuple[str, ...] = ()
-    only: tuple[str, tuple[str, ...]] | None = None
-
-    def read(self, given: Given) -> Any:
-        """The field's value."""
-        return self.value.read(given)
-
-
-@dataclass(frozen=True)
-class Table:
-    """The keys of one table of a file, or flags, as given; `where` and `file` name the table."""
-
-    given: Mapping[str, Given] = field(default_factory=dict)
-    where: str = ""
-    file: str | None = None
-
-    def refused(self, message: str, mend: str = "") -> OptionError:
-        """The error that says what is wrong with the table as a whole."""
-        return OptionError(message, file=self.file, where=self.where, mend=mend)
-
-    def only(self, names: Iterable[str]) -> Table:
-        """The keys of these names."""
-        known = set(names)
-        given = {name: each for name, each in self.given.items() if name in known}
-        return Table(given, self.where, self.file)
-
-    def over(self, below: Table) -> Table:
-        """The keys of both, those of this table where both have one."""
-        where = self if self.given else below
-        return Table({**below.given, **self.given}, where.where, where.file)
-
-
-def table_of(values: object, known: Iterable[str], where: str, file: str) -> Table:
-    """A TOML table, its keys checked; `where` is "" for the top of the file."""
-    if not isinstance(values, dict):
-        raise OptionError(
-            f"{values!r} is no table", file=file, where=where, mend=f"known keys: {_listed(known)}"
-        )
-    given = {}
-    for name, value in values.items():
-        place = f"{where}, key {name}" if where else f"key {name}"
-        given[name] = Given(value, place, file)
-        if name not in known:
-            raise given[name].refused("unknown key", _meant(name, known))
-    return Table(given, where, file)
-
-
-def record_of(
-    make: Callable[..., _T],
-    keys: Mapping[str, Key],
-    table: Table,
-    base: Mapping[str, Any] | None = None,
-) -> _T:
-    """The record of a table's values: each is tried alone first, so that its key can be named.
-
-    `base`: fields without which the record cannot be made.
-    """
-    fields: dict[str, Any] = {}
-    for name, given in table.given.items():
-        key = keys[name]
-        fields[key.field] = key.read(given)
-        try:
-            make(**{**(base or {}), key.field: fields[key.field]})
-        except OptionError as error:
-            # An error with a place of its own says what contradicts what: that is for the whole.
-            if error.where is None:
-                raise given.refused(error.message, error.mend) from error
-    try:
-        return make(**fields)
-    except OptionError as error:
-        named = re.search(r"key (\w+)$", error.where or "")
-        culprit = table.given.get(named[1] if named else "")
-        raise (culprit or table).refused(error.message, error.mend) from error
-
-
-def why_idle(keys: Mapping[str, Key], name: str, record: object) -> OptionError | None:
-    """Why a key has no effect in this record, as an error without a place; None when it has."""
-    only = keys[name].only
-    if only is None:
-        return None
-    other, values = only
-    if getattr(record, keys[other].field) in values:
-        return None
-    needed = " or ".join(f'"{value}"' for value in values)
-    return OptionError(
-        f"has no effect without {other} = {needed}", mend=f"give {other} too, or leave {name} out"
-    )
-
-
-def refuse_idle(keys: Mapping[str, Key], table: Table, record: object) -> None:
-    """Refuse a key that has no effect in the record made of its table."""
-    for name, given in table.given.items():
-        why = why_idle(keys, name, record)
-        if why is not None:
-            raise given.refused(why.message, why.mend)
-
-
-def _meant(name: str, known: Iterable[str]) -> str:
-    return f"{guess(name, known)}known keys: {_listed(known)}"
-
-
-def _listed(known: Iterable[str]) -> str:
-    return ", ".join(known)
-
-
-# How values are read: what TOML or the command line gives becomes numbers and records. Lengths,
-# angles, feeds and times take units in texts; bare numbers are mm, degrees, mm/min and s.
 
 _PAIR = re.compile(r"(.+?)\s*[x×]\s*([-+.\d].*)")
 _UNIT = re.compile(r"[^\d\s.+/-].*$")
 _COUNT = re.compile(r"\s*\d+\s*(:|$)")
 _WILD = re.compile(r"[*?\[]")
-
-
-def plain(convert: Callable[[object], Any]) -> Callable[[Given], Any]:
-    """A reader that converts the bare value; errors get the place of the value."""
-
-    def read(given: Given) -> Any:
-        with given.blamed():
-            return convert(given.value)
-
-    return read
-
-
-def length(value: object) -> float:
-    """mm."""
-    return parse_length(_number_text(value))
-
-
-def feed(value: object) -> float:
-    """mm/min."""
-    return parse_feed(_number_text(value))
-
-
-def angle(value: object) -> float:
-    """rad."""
-    return parse_angle(_number_text(value))
-
-
-def time(value: object) -> float:
-    """s."""
-    return parse_time(_number_text(value))
-
-
-def number(value: object) -> float:
-    """A number without a unit."""
-    text = _number_text(value)
-    try:
-        return float(text)
-    except ValueError:
-        raise OptionError(f"{text!r} is no number", mend="give a number without a unit") from None
-
-
-def fraction(value: object) -> float:
-    """0.4 or "40%"."""
-    text = _number_text(value).strip()
-    return number(text[:-1]) / 100.0 if text.endswith("%") else number(text)
-
-
-def whole(value: object) -> int:
-    """A whole number."""
-    text = _number_text(value).strip()
-    if not re.fullmatch(r"[+-]?\d{1,9}", text):
-        raise OptionError(f"{text!r} is no whole number", mend="write it like 4")
-    return int(text)
-
-
-def switch(value: object) -> bool:
-    """true or false."""
-    if not isinstance(value, bool):
-        raise OptionError(f"{value!r} is neither true nor false", mend="write true or false")
-    return value
-
-
-def text(value: object) -> str:
-    """Any text."""
-    if not isinstance(value, str):
-        raise OptionError(f"{value!r} is no text", mend=f'write it in quotes: "{value}"')
-    return value
-
-
-def word(known: Sequence[str]) -> Callable[[Given], Any]:
-    """One of the known words; the error for another one guesses which was meant."""
-
-    def convert(value: object) -> str:
-        name = text(value)
-        if name not in known:
-            raise OptionError(
-                f"unknown word {name!r}",
-                mend=f"{guess(name, known)}use one of {', '.join(known)}",
-            )
-        return name
-
-    return plain(convert)
-
-
-def patterns(value: object) -> tuple[str, ...]:
-    """A list of texts."""
-    if not isinstance(value, list | tuple):
-        raise OptionError(f"{value!r} is no list", mend=f'write it in brackets: ["{value}"]')
-    if not value:
-        raise OptionError("an empty list takes nothing", mend="leave it out to take all")
-    return tuple(text(item) for item in value)
 
 
 def layers(value: object) -> tuple[str, ...]:
@@ -380,6 +157,15 @@ def places(value: object) -> tuple[tuple[float, float], ...]:
     return tuple(_two(each, length, '["10mm", "5mm"]') for each in value)
 
 
+def kind(given: Given) -> str:
+    """The name of an installed kind of operation."""
+    if given.value in broken_kinds():
+        with given.blamed():
+            kind_named(given.value)
+    name: str = word(tuple(installed_kinds()))(given)
+    return name
+
+
 def entry(given: Given) -> Entry:
     """A table, or "ramp", "ramp:3deg", "helix:3deg:1mm"."""
     return _record(Entry, ENTRY, _parts(given, ENTRY, ("kind", "angle", "radius")))
@@ -416,7 +202,7 @@ def _part_of(given: Given, known: Iterable[str]) -> Table:
     for name, value in given.value.items():
         parts[name] = Given(value, f"{given.where}.{name}", given.file)
         if name not in known:
-            raise parts[name].refused("unknown key", _meant(name, known))
+            raise parts[name].refused("unknown key", meant(name, known))
     return Table(parts, given.where, given.file)
 
 
@@ -425,7 +211,7 @@ def _parts(given: Given, keys: Mapping[str, Key], names: Sequence[str]) -> Table
     if isinstance(given.value, dict):
         return _part_of(given, keys)
     with given.blamed():
-        texts = _number_text(given.value).split(":")
+        texts = number_text(given.value).split(":")
         if len(texts) > len(names):
             raise OptionError(
                 f"{given.value!r} has too many parts", mend=f"write it like {':'.join(names)}"
@@ -459,30 +245,10 @@ def _two(value: object, convert: Callable[[object], _T], like: str) -> tuple[_T,
     return convert(value[0]), convert(value[1])
 
 
-def _number_text(value: object) -> str:
-    if isinstance(value, bool) or not isinstance(value, int | float | str):
-        raise OptionError(f"{value!r} is no number", mend='write it like 0.2 or "0.2mm"')
-    return value if isinstance(value, str) else repr(value)
-
-
 # The values of keys.
 
-LENGTH = Value(plain(length), "LENGTH")
-ANGLE = Value(plain(angle), "ANGLE")
-FEED = Value(plain(feed), "FEED")
-TIME = Value(plain(time), "TIME")
-COUNT = Value(plain(whole), "COUNT")
-FACTOR = Value(plain(number), "FACTOR")
-TEXT = Value(plain(text))
-PATTERNS_OF_NAMES = Value(plain(patterns))
-SWITCH = Value(plain(switch))
 LENGTHS = Value(plain(length_range), "RANGE")
 NUMBERS = Value(plain(number_range), "RANGE")
-
-
-def one_of(known: tuple[str, ...]) -> Value:
-    """One of these words."""
-    return Value(word(known), choices=known)
 
 
 # Tables that are values: `entry`, `lead_in` and `lead_out`, `tabs`.
@@ -612,144 +378,121 @@ def _as_given(given: Given) -> Any:
     return given.value
 
 
-_LINES = ("profile", "pocket", "engrave", "chamfer")
-_LAYERED = ("profile", "pocket", "engrave", "chamfer", "vcarve")
-_STEPPED = (*_LAYERED, "bore")
-_CLEARING = ("profile", "pocket", "bore")
-_ALONG = ("profile", "engrave", "chamfer")
-_PROFILE = ("profile",)
-_BESIDE = ("profile", "chamfer")
-_CHAMFER = ("chamfer",)
-_NOT_CHAMFER = tuple(kind for kind in KINDS if kind != "chamfer")
-_POCKET = ("pocket",)
-_RINGS = ("pocket", "bore")
-_DRILL = ("drill",)
-_THROUGH = ("profile", "pocket", "bore", "drill")
-
 OPERATION = {
-    "name": Key("name", TEXT, kinds=KINDS),
-    "kind": Key("kind", one_of(KINDS), "What is done.  [profile]", kinds=KINDS),
-    "layers": Key("layers", PATTERNS_OF_NAMES, kinds=KINDS),
-    "colours": Key("colours", Value(plain(colours)), kinds=KINDS),
+    "name": Key("name", TEXT),
+    "kind": Key("kind", Value(kind, choices=tuple(installed_kinds())), "What is done.  [profile]"),
+    "layers": Key("layers", PATTERNS_OF_NAMES),
+    "colours": Key("colours", Value(plain(colours))),
     "select": Key(
         "select",
         Value(plain(words), "WORDS"),
         "Only closed, open, outer, inner, circle, not circle, point; several: all of it.",
         '["inner", "circle"]',
-        KINDS,
     ),
-    "select_size": Key("size_mm", LENGTHS, "And so large.", '"3..8mm"', KINDS),
+    "select_size": Key("size_mm", LENGTHS, "And so large.", '"3..8mm"'),
     "select_area": Key(
         "area_mm2",
         NUMBERS,
         "And of such an area, mm².",
         '"10..200"',
-        KINDS,
     ),
     "select_entities": Key(
-        "entities", Value(plain(layers), "NAMES"), "And these by handle or id.", '["2F"]', KINDS
+        "entities", Value(plain(layers), "NAMES"), "And these by handle or id.", '["2F"]'
     ),
     "side": Key(
         "side",
         Value(word(SIDES), choices=("auto", "on", "outside", "inside")),
         "Where the tool runs; auto: outside of parts, inside of holes.",
         '"auto"',
-        _BESIDE,
     ),
-    "direction": Key(
-        "direction", one_of(DIRECTIONS), "Which way round.", '"climb"', (*_CLEARING, "chamfer")
-    ),
-    "chamfer": Key("chamfer_mm", LENGTH, "Its width from above.", '"0.5mm"', _CHAMFER),
-    "tip_offset": Key("tip_offset_mm", LENGTH, "Its bit's tip below it.", '"0.1mm"', _CHAMFER),
+    "direction": Key("direction", one_of(DIRECTIONS), "Which way round.", '"climb"'),
+    "chamfer": Key("chamfer_mm", LENGTH, "Its width from above.", '"0.5mm"'),
+    "tip_offset": Key("tip_offset_mm", LENGTH, "Its bit's tip below it.", '"0.1mm"'),
     "allowance": Key(
         "allowance_mm",
         LENGTH,
         "Left on the wall; below 0: cut beyond the line.",
         '"0.1mm"',
-        _CLEARING,
     ),
-    "finish": Key("finish_mm", LENGTH, "Left for a last pass.", '"0.1mm"', _CLEARING),
-    "finish_feed": Key("finish_feed_mm_min", FEED, "Of that pass.", kinds=_CLEARING),
-    "finish_spindle": Key(
-        "finish_spindle_rpm", Value(plain(number), "SPEED"), "Of that pass.", kinds=_CLEARING
-    ),
-    FINISH_TOOL: Key("finish_tool", Value(_as_given, "NAME"), "Of that pass.", kinds=_CLEARING),
-    "feed": Key("feed_mm_min", FEED, "In mm/min.", '"90mm/min"', KINDS),
-    "plunge_feed": Key("plunge_feed_mm_min", FEED, "In mm/min.", '"30mm/min"', KINDS),
+    "finish": Key("finish_mm", LENGTH, "Left for a last pass.", '"0.1mm"'),
+    "finish_feed": Key("finish_feed_mm_min", FEED, "Of that pass."),
+    "finish_spindle": Key("finish_spindle_rpm", Value(plain(number), "SPEED"), "Of that pass."),
+    FINISH_TOOL: Key("finish_tool", Value(_as_given, "NAME"), "Of that pass."),
+    "feed": Key("feed_mm_min", FEED, "In mm/min.", '"90mm/min"'),
+    "plunge_feed": Key("plunge_feed_mm_min", FEED, "In mm/min.", '"30mm/min"'),
     "spindle": Key(
         "spindle_rpm",
         Value(plain(number), "SPEED"),
         "In rev/min; 0: off.  [the machine's]",
         "12000",
-        KINDS,
     ),
-    "coolant": Key("coolant", one_of(COOLANTS), "M7, M8 or both.", '"mist"', KINDS),
-    "depth": Key("depth_mm", LENGTH, "Depth of cut below Z0.", '"1mm"', _NOT_CHAMFER),
-    "breakthrough": Key("breakthrough_mm", LENGTH, "Or so far below the stock.", kinds=_THROUGH),
-    "step_down": Key("step_down_mm", LENGTH, "Depth of a pass.", '"0.5mm"', _STEPPED),
-    "last_pass": Key("last_pass_mm", LENGTH, "Depth of the last pass.", '"0.1mm"', _LAYERED),
+    "coolant": Key("coolant", one_of(COOLANTS), "M7, M8 or both.", '"mist"'),
+    "depth": Key("depth_mm", LENGTH, "Depth of cut below Z0.", '"1mm"'),
+    "breakthrough": Key("breakthrough_mm", LENGTH, "Or so far below the stock."),
+    "step_down": Key("step_down_mm", LENGTH, "Depth of a pass.", '"0.5mm"'),
+    "last_pass": Key("last_pass_mm", LENGTH, "Depth of the last pass.", '"0.1mm"'),
     "entry": Key(
         "entry",
         Value(entry, "ENTRY", tables=True),
         "plunge, ramp:3deg, or helix:3deg:1mm in pockets.",
         '"ramp:3deg"',
-        (*_LINES, "bore"),
     ),
     "lead_in": Key(
         "lead_in",
         Value(lead, "LEAD", tables=True),
         "none, line:1mm or arc:1mm.",
         '"arc:1mm"',
-        _BESIDE,
     ),
     "lead_out": Key(
         "lead_out",
         Value(lead, "LEAD", tables=True),
         "The same at the end.",
         '"arc:1mm"',
-        _BESIDE,
     ),
-    "overlap": Key("overlap_mm", LENGTH, "Cut beyond the start.", '"0.2mm"', _ALONG),
+    "overlap": Key("overlap_mm", LENGTH, "Cut beyond the start.", '"0.2mm"'),
     "start": Key(
         "start",
         Value(plain(start), "START"),
         "nearest, longest-line, corner, or x,y.",
         '"longest-line"',
-        _ALONG,
     ),
     "tabs": Key(
         "tabs",
         Value(tabs, "TABS", tables=True),
         "How many (4), or how far apart (20mm); 4:2mm:0.5mm.",
         '"4:2mm:0.5mm"',
-        _PROFILE,
     ),
-    "corners": Key("corners", one_of(CORNERS), "Relief of inner corners.", '"dogbone"', _PROFILE),
-    "joins": Key(
-        "joins", one_of(JOINS), "The tool's path around outer corners.", '"mitre"', _PROFILE
-    ),
+    "corners": Key("corners", one_of(CORNERS), "Relief of inner corners.", '"dogbone"'),
+    "joins": Key("joins", one_of(JOINS), "The tool's path around outer corners.", '"mitre"'),
     "mitre_limit": Key(
         "mitre_limit",
         FACTOR,
         "How long a mitre may be.",
         "2.0",
-        _PROFILE,
         only=("joins", ("mitre",)),
     ),
-    "pattern": Key("pattern", one_of(PATTERNS), "How a pocket is cleared.", kinds=_POCKET),
-    "rest": Key("rest", TEXT, kinds=_POCKET),
+    "pattern": Key("pattern", one_of(PATTERNS), "How a pocket is cleared."),
+    "rest": Key("rest", TEXT),
     "step_over": Key(
         "step_over",
         Value(plain(fraction), "PART"),
         "Part of the diameter (0.4, 40%).",
-        kinds=_RINGS,
     ),
-    "angle": Key("angle_rad", ANGLE, "Of a zigzag.", kinds=_POCKET, only=("pattern", ("zigzag",))),
-    "peck": Key("peck_mm", LENGTH, "How deep a drill goes at a time.", '"0.2mm"', _DRILL),
-    "dwell": Key("dwell_s", TIME, "At the bottom, in s.", '"0.5s"', _DRILL),
-    "max_hole": Key("max_hole_mm", LENGTH, "The largest circle that is drilled.", '"3mm"', _DRILL),
+    "angle": Key("angle_rad", ANGLE, "Of a zigzag.", only=("pattern", ("zigzag",))),
+    "peck": Key("peck_mm", LENGTH, "How deep a drill goes at a time.", '"0.2mm"'),
+    "dwell": Key("dwell_s", TIME, "At the bottom, in s.", '"0.5s"'),
+    "max_hole": Key("max_hole_mm", LENGTH, "The largest circle that is drilled.", '"3mm"'),
 }
-"""Keys of an operation, but for its tool."""
+for _contract in installed_kinds().values():
+    OPERATION |= _contract.own
+"""Keys of an operation, but for its tool; those that its kind alone has come last."""
+
+
+def is_known(name: str, kind: str) -> bool:
+    """True if operations of this kind know a key of `OPERATION`."""
+    contract = kind_named(kind)
+    return name in contract.keys or name in contract.own
+
 
 PRESET = {
     **{

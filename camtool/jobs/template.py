@@ -22,8 +22,9 @@ from camtool.arrays import Ints
 from camtool.geometry.drawing import is_text
 from camtool.geometry.facts import drawing_extents
 from camtool.geometry.measure import extents, path_lengths
-from camtool.jobs.keys import OPERATION, PLACE, TOOL, WHOLE, Key
-from camtool.planning.drill import HOLE_SIZE_MM, circle_of
+from camtool.jobs.keys import OPERATION, PLACE, TOOL, WHOLE, is_known
+from camtool.keys import Key
+from camtool.planning.holes import HOLE_SIZE_MM, circle_of
 from camtool.planning.job import Operation, Stock
 from camtool.planning.sides import CONTINUOUS, Traits
 from camtool.records import replace
@@ -329,7 +330,7 @@ def _text(drawing: Drawing, group: _Group, part: _Part, proposal: Proposal) -> l
     ]
     if part.kind in ("profile", "bore") and proposal.tool_mm:
         text.append(_row('direction = "climb"', OPERATION["direction"].help))
-    if proposal.breakthrough_mm and part.kind in OPERATION["breakthrough"].kinds:
+    if proposal.breakthrough_mm and is_known("breakthrough", part.kind):
         through = f'breakthrough = "{proposal.breakthrough_mm:.6g}mm"'
         text.append(_row(through, "through the stock, and so far into the board below"))
         if part.kind == "profile" and proposal.tool_mm and not proposal.materials:
@@ -342,7 +343,7 @@ def _text(drawing: Drawing, group: _Group, part: _Part, proposal: Proposal) -> l
     known = {
         name: key
         for name, key in OPERATION.items()
-        if part.kind in key.kinds and name not in given
+        if is_known(name, part.kind) and name not in given
     }
     return [*text, *_comments(known)]
 

@@ -33,15 +33,12 @@ from camtool.jobs.keys import (
     TOOL_KEYS,
     TOOL_NAME,
     WHOLE,
-    Given,
-    Table,
-    record_of,
-    refuse_idle,
-    table_of,
 )
 from camtool.jobs.tool_table import TableTool, read_tool_table
+from camtool.keys import Given, Table, record_of, refuse_idle, table_of
 from camtool.patterns import guess
-from camtool.planning.job import Operation, Tool
+from camtool.planning.job import Operation, Tool, operation_of
+from camtool.planning.kinds import kind_named
 from camtool.records import replace
 from camtool.tables import read_table
 
@@ -115,7 +112,7 @@ def _described(name: str, values: object, file: str) -> Described:
         for material, preset in presets.value.items()
     }
     for preset in tables.values():
-        record_of(Operation, OPERATION, preset.only(OPERATION))
+        record_of(operation_of, OPERATION, preset.only(OPERATION))
         record_of(Tool, TOOL, preset.only(LIMITS))
     return Described(table.only(TOOL), tables)
 
@@ -319,7 +316,8 @@ def _number_of(keys: Table) -> int | None:
 def _tool(name: str, keys: Table, kind: str) -> Tool:
     """The record; a tool with a tip that does not say its kind is a V bit, or drills."""
     if "tip_angle" in keys.given and "kind" not in keys.given:
-        meant = Given("drill" if kind == "drill" else "v", keys.where, keys.file)
+        drills = bool(kind) and kind_named(kind).descent == "pecks"
+        meant = Given("drill" if drills else "v", keys.where, keys.file)
         keys = Table({**keys.given, "kind": meant}, keys.where, keys.file)
     tool = record_of(Tool, TOOL, keys)
     refuse_idle(TOOL, keys, tool)

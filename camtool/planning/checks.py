@@ -90,12 +90,6 @@ OFF_STOCK_MM = 0.01
 EDGES = ("left", "right", "lower", "upper")
 """The edges of the stock, seen from above."""
 
-STOCK_WORDS = {"pocket": "pocket", "engrave": "line", "vcarve": "carving", "chamfer": "edge"}
-"""The words for the cuts of a kind of operation; kinds that are not here cut parts and holes."""
-
-IN_PASSES = ("profile", "pocket", "engrave", "chamfer")
-"""Kinds of operation that go down in passes, each of one depth."""
-
 AXES = "XYZ"
 Box = tuple[float, float, float, float]
 """Left, lower, right and upper edge, mm."""
@@ -217,16 +211,16 @@ def _off_stock(step: Step, stock: Stock | None) -> list[Finding]:
     again = step.operation.stage == "finish" or step.operation.rest_of is not None
     if stock is None or stock.box_mm is None or again or not step.runs:
         return []
-    chosen, kind = step.chosen, step.operation.kind
+    chosen, contract = step.chosen, step.operation.contract
     boxes, names = path_extents(chosen.lines), list(chosen.names)
-    whole = chosen.lines.closed & (chosen.rim if kind in ("profile", "chamfer") else True)
-    whole = np.asarray(whole & (kind in ("profile", "chamfer", "engrave", "vcarve")))
-    what = [STOCK_WORDS.get(kind, "hole" if not each else "part") for each in chosen.rim.tolist()]
-    if kind in ("drill", "bore"):
+    whole = chosen.lines.closed & (chosen.rim if contract.runs_beside else True)
+    whole = np.asarray(whole & (not contract.clears))
+    what = [contract.cut_name or ("part" if rim else "hole") for rim in chosen.rim.tolist()]
+    if contract.takes in ("circles", "holes"):
         items = [item for item in step.items if isinstance(item, Fixed)]
         mine = np.isin(chosen.source, [item.source for item in items])
         boxes, names = boxes[mine], [names[row] for row in np.flatnonzero(mine).tolist()]
-        points = chosen.points if kind == "drill" else chosen.points[:0]
+        points = chosen.points if contract.takes == "holes" else chosen.points[:0]
         boxes = np.concatenate([boxes, np.repeat(points[:, :, None], 2, axis=2)])
         names += chosen.point_names[: len(points)]
         whole, what = np.zeros(len(boxes), dtype=np.bool_), ["hole"] * len(boxes)
@@ -424,14 +418,14 @@ def _doubtful(step: Step, starts_spindle: bool) -> Iterator[str]:
     """What is doubtful about an operation, each with the flag that changes it."""
     operation, feeds, tool = step.operation, step.setting.feeds, step.operation.tool
     wide = operation.away_mm > 0.0
-    on_line = operation.kind == "profile" and operation.side != "on" and not wide
+    on_line = operation.contract.runs_beside and operation.side != "on" and not wide
     if starts_spindle and on_line and step.chosen.lines.closed.any():
         yield CUT_DOUBTFUL_WIDTH.words()
     if operation.beyond_mm > BEYOND_MOST * tool.radius_mm:
         yield CUT_DOUBTFUL_BEYOND.words(beyond=operation.beyond_mm)
     deepest = deepest_pass(step.setting)
     finishes = operation.stage == "finish"  # beside the wall, in what is roughed
-    mills = operation.kind in IN_PASSES and tool.kind in MILLS and tool.radius_mm > 0.0
+    mills = operation.contract.descent == "passes" and tool.kind in MILLS and tool.radius_mm > 0.0
     mills = mills and not finishes
     if mills and deepest > tool.diameter_mm + POSITION_EPS_MM:
         yield CUT_DOUBTFUL_DEPTH.words(depth=deepest, width=tool.diameter_mm)
@@ -446,9 +440,9 @@ def _plunges(step: Step) -> bool:
     operation = step.operation
     if operation.stage == "finish":
         return False
-    if operation.kind == "bore":
+    if operation.contract.descent == "helix":
         return bool((step.runs.vertices[step.runs.first[:-1], 2] < -POSITION_EPS_MM).any())
-    return operation.kind in IN_PASSES and operation.entry.kind == "plunge"
+    return operation.contract.descent == "passes" and operation.entry.kind == "plunge"
 
 
 def _loose(step: Step, stock: Stock | None, steps: Sequence[Step]) -> Iterator[str]:
@@ -479,8 +473,11 @@ def with_loose_pieces(steps: Sequence[Step], stock: Stock | None) -> list[Step]:
     for step in steps:
         through = -step.setting.levels_mm[-1] >= stock.thickness_mm - POSITION_EPS_MM
         if through and step.runs:
-            loose = _loose_islands(step) if step.operation.kind == "pocket" else ()
-            if step.operation.kind in ("profile", "engrave"):
+            contract = step.operation.contract
+            loose: Iterator[Finding] = iter(())
+            if contract.clears and contract.takes == "paths":
+                loose = _loose_islands(step)
+            elif contract.cuts in ("beside", "along") and not contract.breaks_edges:
                 loose = _loose_pieces(step, gone)
             found = shortened_list(list(loose), LOOSE_PIECE_MORE)
             step = replace(step, findings=(*step.findings, *found))
@@ -540,24 +537,25 @@ def _loose_piece(name: str, outline: Polylines, mend: str) -> Finding:
 def _beyond_tool(step: Step, stock: Stock | None) -> Iterator[str]:
     """What the tool of an operation is not made for, as far as its file says it."""
     operation, tool, setting = step.operation, step.operation.tool, step.setting
+    contract, pecks = operation.contract, operation.contract.descent == "pecks"
     depth = -setting.levels_mm[-1]
     length = tool.cutting_length_mm
     if length is not None and depth > length + POSITION_EPS_MM:
         yield CUT_DOUBTFUL_LENGTH.words(depth=depth, length=length)
-    if (operation.kind == "drill" or _plunges(step)) and tool.centre_cutting is False:
+    if (pecks or _plunges(step)) and tool.centre_cutting is False:
         yield CUT_DOUBTFUL_CENTRE.words()
     chip = tool.feed_per_tooth_mm(setting.feeds.cut_mm_min, setting.spindle_rpm)
     speed = tool.edge_speed_m_min(setting.spindle_rpm)
-    if chip is not None and operation.kind != "drill" and _is_beyond(chip, tool.chip_load_mm):
+    if chip is not None and not pecks and _is_beyond(chip, tool.chip_load_mm):
         yield CUT_DOUBTFUL_CHIP.words(chip=chip, limits=range_words(tool.chip_load_mm))
     if speed is not None and _is_beyond(speed, tool.surface_speed_m_min):
         yield CUT_DOUBTFUL_EDGE.words(speed=speed, limits=range_words(tool.surface_speed_m_min))
-    clears = operation.kind in ("pocket", "bore")
-    beside = clears or (operation.kind == "profile" and operation.side != "on")
+    beside = contract.leaves_walls and (contract.clears or operation.side != "on")
     below = depth - stock.thickness_mm if stock is not None else 0.0
     if beside and max(below, 0.0) < tool.nose_mm - POSITION_EPS_MM:
         yield CUT_DOUBTFUL_NOSE.words(nose=tool.nose_mm)
-    ridge = ridge_mm(tool, operation.step_over) if clears else 0.0
+    makes_floor = contract.clears or contract.cuts == "over"
+    ridge = ridge_mm(tool, operation.step_over) if makes_floor else 0.0
     if ridge > POSITION_EPS_MM and below <= 0.0:
         yield CUT_DOUBTFUL_RIDGES.words(ridge=ridge)
     if tool.materials and not operation.material:

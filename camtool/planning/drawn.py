@@ -96,11 +96,7 @@ def _off(
 ) -> Iterator[tuple[Ints, Floats]]:
     """Some of the rows (R,) at a time, and (R, 2) how far what was drawn lies from the lines that
     they were planned along, mm; rows that are left out lie on them."""
-    made = 0.0
-    if step.operation.kind == "vcarve":
-        from camtool.planning.carve import CARVE_TOLERANCE_MM
-
-        made = CARVE_TOLERANCE_MM
+    made = step.operation.contract.path_error_mm
     lines, of = step.chosen.lines, placed.off_mm
     if placed.datum_off_mm:
         of = of + placed.datum_off_mm
@@ -166,7 +162,7 @@ def _edges(step: Step, later: Step | None, placed: Drawing) -> _Edges:
     none = np.empty(0, dtype=np.bool_)
     operation = step.operation
     is_finished = operation.stage == "rough" and later and later.operation.stage == "finish"
-    if operation.kind in ("chamfer", "drill") or is_finished or not len(step.runs):
+    if not operation.contract.has_edge or is_finished or not len(step.runs):
         unsized, boxes = np.full(len(step.runs), NO_EDGE), np.empty((0, 2, 2))
         return _Edges(unsized, boxes, boxes, unsized[:0], none, none)
     drawn = path_extents(placed.paths)
@@ -174,7 +170,7 @@ def _edges(step: Step, later: Step | None, placed: Drawing) -> _Edges:
         return _beside_or_on(step, contours, drawn)
     source = np.array([item.source for item in step.items])[step.owner]
     line, planned = drawn[source], _cleared_boxes(step.runs, operation.tool)
-    if operation.kind != "vcarve":
+    if operation.contract.leaves_walls:
         # Reliefs reach farther into corners than the walls are apart.
         low, high = np.moveaxis(line - operation.allowance_mm * OUTWARDS, 2, 0)
         planned = np.clip(planned, low[:, :, None], high[:, :, None])
@@ -286,18 +282,18 @@ def kept_of(steps: Sequence[Step]) -> tuple[ProtectedRegion, ...]:
 def _kept(step: Step) -> Iterator[ProtectedRegion]:
     operation, chosen = step.operation, step.chosen
     closed = np.flatnonzero(chosen.lines.closed)
-    if operation.kind == "bore":
+    if operation.contract.takes == "circles":
         bored = [item.source for item in step.items]
         closed = closed[np.isin(chosen.source[closed], bored)]
     depth = chosen.nesting.among(closed).levels.depth
     order = np.argsort(depth, kind="stable")
     rows, depth = closed[order], depth[order]
-    if operation.kind in ("pocket", "vcarve", "bore"):
+    if operation.contract.cuts == "within":
         lines = chosen.lines.select(rows.tolist())
         runs = tuple(run.vertices for run in step.runs)
         yield ProtectedRegion(runs, lines, depth % 2 == 1, True, operation.beyond_mm)
         return
-    beside = operation.kind == "profile" and runs_beside(operation)
+    beside = operation.contract.leaves_walls and runs_beside(operation)
     beside = beside and operation.corners == "none"
     for level in _levels(operation, depth) if beside else ():
         mine = rows[level]

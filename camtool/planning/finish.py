@@ -61,7 +61,7 @@ def of_stage(operation: Operation, findings: Iterable[Finding]) -> list[Finding]
     if not operation.stage:
         return list(findings)
     if operation.stage == "rough":
-        own = {ProgramCode.GOUGE} if operation.kind == "profile" else set()
+        own = {ProgramCode.GOUGE} if operation.contract.runs_beside else set()
         return [each for each in findings if each.code in own or each.code not in OF_WALLS]
     return [each for each in findings if each.code in (*OF_WALLS, PlanningCode.LEAD_LEFT_OUT)]
 

@@ -54,7 +54,7 @@ SAMPLES_ROUND = 500
 
 def side_findings(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> list[Finding]:
     """Findings on the sides of an operation: gouges, and sides that follow from uncut contours."""
-    if operation.kind in ("pocket", "bore"):
+    if operation.contract.clears:
         cleared = list(_cleared_away(chosen, sides, operation))
         beyond = list(_beside_pocket(sides, operation)) if operation.beyond_mm else []
         return [
@@ -76,7 +76,7 @@ def branch_findings(
     """Errors where an operation needs to know what contours enclose that pass `branches` of the
     placed drawing at which that is a choice: its own, and those that decide its sides."""
     beside = runs_beside(operation)
-    if not (beside or operation.kind in ("pocket", "bore", "vcarve")):
+    if not (beside or operation.contract.cuts == "within"):
         return []
     asked = np.zeros(len(sides.lines), dtype=np.bool_)
     asked[chosen.source] = True

@@ -19,7 +19,7 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.findings import Finding
 from camtool.geometry.nesting import Nesting
 from camtool.geometry.polylines import Polyline, Polylines
-from camtool.planning.job import Operation
+from camtool.planning.job import Operation, Stock
 
 RAPID = float("nan")
 """The feed of a part of a run that is a rapid (a drill between two pecks)."""
@@ -35,13 +35,14 @@ class Feeds(Struct, frozen=True):
 class Setting(Struct, frozen=True):
     """An operation with what the machine adds to it: feeds; `levels_mm`, the z of its passes,
     downwards, the last at the full depth; `safe_z_mm` above the stock top (z = 0); `spindle_rpm`,
-    None: off or unknown."""
+    None: off or unknown; the `stock` as far as the job gives it."""
 
     operation: Operation
     feeds: Feeds
     levels_mm: tuple[float, ...]
     safe_z_mm: float
     spindle_rpm: float | None = None
+    stock: Stock | None = None
 
 
 class CutRun(Struct, frozen=True, eq=False):

@@ -15,10 +15,8 @@ from typing import Any
 
 from camtool.errors import OptionError
 from camtool.patterns import matches
+from camtool.planning.kinds import OperationKind, function_of, installed_kinds, kind_named
 from camtool.records import replace
-
-KINDS = ("profile", "pocket", "bore", "engrave", "drill", "vcarve", "chamfer")
-"""Kinds of operation."""
 
 SIDES = ("on", "outside", "inside", "auto")
 """Where the tool of a profile or a chamfer runs: on the line, around it, within it, or as the
@@ -401,7 +399,8 @@ class Operation:
     `tip_offset_mm`: how far below it the tip of its bit runs.
     `max_hole_mm`: circles up to this diameter are drilled (None: as wide as the drill, or any
     for a drill of no width). `material`: that of the tool's preset, "" where none was taken;
-    `preset`: the keys of the operation that it gave.
+    `preset`: the keys of the operation that it gave. `own`: names and values of the fields that
+    its kind alone has, in the order of names.
     Raises OptionError for what no operation can be.
     """
 
@@ -451,9 +450,10 @@ class Operation:
     tip_offset_mm: float = 0.1
     material: str = ""
     preset: tuple[str, ...] = ()
+    own: tuple[tuple[str, Any], ...] = ()
 
     def __post_init__(self) -> None:
-        one_of("kind of operation", self.kind, KINDS)
+        kind_named(self.kind)
         for each in self.select:
             one_of("word to select by", each, SELECTED)
         one_of("side", self.side, SIDES)
@@ -526,13 +526,13 @@ class Operation:
                 mend="give a smaller last pass, or a larger depth",
             )
         self._refuse_finish(named)
-        if self.entry.kind == "helix" and self.kind not in ("pocket", "bore"):
+        if self.entry.kind == "helix" and not self.contract.clears:
             raise OptionError(
                 f"only pockets can be entered by a helix, not the kind {self.kind}",
                 where=f"{named}key entry",
                 mend='use "ramp" or "plunge"',
             )
-        if self.kind == "bore" and self.entry.radius_mm is not None:
+        if self.contract.descent == "helix" and self.entry.radius_mm is not None:
             raise OptionError(
                 "a bore goes down in a helix as wide as the hole lets it",
                 where=f"{named}key entry",
@@ -543,7 +543,7 @@ class Operation:
         """A finishing pass without a wall, or with a tool that is not for it."""
         if self.finish_mm is None:
             return
-        if self.kind == "profile" and self.side == "on":
+        if self.contract.runs_beside and self.side == "on":
             raise OptionError(
                 "a tool on the line leaves nothing on a wall",
                 where=f"{named}key finish",
@@ -594,7 +594,9 @@ class Operation:
                 mend="leave these out",
             )
         self._refuse_rest(other, where)
-        depth = self.depth_mm if other.kind == "pocket" and self.depth_mm else other.depth_mm
+        depth = other.depth_mm
+        if other.contract.rest == "corners" and self.depth_mm:
+            depth = self.depth_mm
         return replace(self, rest_of=other, depth_mm=depth, **its)
 
     def _refuse_rest(self, other: Operation, where: str) -> None:
@@ -603,14 +605,14 @@ class Operation:
         def refuse(message: str, mend: str) -> OptionError:
             return OptionError(message, where=where, mend=mend)
 
-        if other.kind not in ("pocket", "vcarve") or other.rest:
+        if not other.contract.rest or other.rest:
             raise refuse(
                 f"{other.name!r} is no pocket and no vcarve of its own",
                 "name a pocket that a wider tool clears, or a vcarve whose floor is flat",
             )
         if self.finish_mm is not None:
             raise refuse("a rest has no finishing pass", "give finish to the other operation")
-        if other.kind == "vcarve":
+        if other.contract.rest == "floor":
             if self.tool.kind not in MILLS:
                 raise refuse(
                     f"a flat floor is for an end mill, not for a tool of kind {self.tool.kind!r}",
@@ -685,7 +687,7 @@ class Operation:
         if self.allowance_mm >= 0.0:
             return
         where = f"operation {self.name or self.kind!r}, key allowance"
-        if self.kind == "profile" and self.side == "on":
+        if self.contract.runs_beside and self.side == "on":
             raise OptionError(
                 "a tool on the line cuts beyond it on both sides",
                 where=where,
@@ -728,54 +730,29 @@ class Operation:
             )
         return replace(self, depth_mm=stock.thickness_mm + beyond + point, breakthrough_mm=None)
 
-    def chamfered(self) -> Operation:
-        """The operation with the depth that its chamfer makes; itself where it is none.
+    def settled(self, stock: Stock | None) -> Operation:
+        """Return the operation as its kind completes it, with the depth of its breakthrough.
 
-        A cone of half angle α and tip radius t is r(h) = t + h·tan α wide, h above its tip. Its
-        tip runs an offset o below the bevel, whose lower edge is the drawn line: the axis runs
-        r(o) beside that line, and the bevel is w = r(D) − r(o) wide at the stock top for a tip
-        D = o + w / tan α deep.
-        OptionError without a width, for a tool that is no V bit, and for one too narrow.
-        """
-        if self.kind != "chamfer":
-            return self
-        where = f"operation {self.name or self.kind!r}, key chamfer"
-        if self.chamfer_mm is None:
-            raise OptionError(
-                "a chamfer has no width",
-                where=where,
-                mend='say how wide it is, seen from above: chamfer = "0.5mm"',
-            )
-        tool = self.tool
-        if tool.kind != "v" or tool.tip_angle_rad is None:
-            raise OptionError(
-                "a chamfer needs a V bit, and its angle",
-                where=f"operation {self.name or self.kind!r}, key tool",
-                mend='give a tool with kind = "v" and its tip_angle',
-            )
-        depth = self.tip_offset_mm + self.chamfer_mm / math.tan(0.5 * tool.tip_angle_rad)
-        needed = 2.0 * (self.wall_radius_mm + self.chamfer_mm)
-        if 0.0 < tool.diameter_mm < needed * (1.0 - THROUGH_SLACK):
-            raise OptionError(
-                f"a chamfer of {self.chamfer_mm:g} mm, the tip {self.tip_offset_mm:g} mm below it,"
-                f" needs a bit of {needed:.4g} mm, and this one has {tool.diameter_mm:g} mm",
-                where=where,
-                mend="give a smaller chamfer or tip_offset, or a wider bit",
-            )
-        if self.depth_mm is not None and abs(self.depth_mm - depth) > LEAST:
-            raise OptionError(
-                f"a depth of {self.depth_mm:g} mm is given too, but the chamfer makes it"
-                f" {depth:.4g} mm",
-                where=where,
-                mend="leave the depth out",
-            )
-        return replace(self, depth_mm=depth)
+        OptionError for what cannot be, with this stock (None: not known)."""
+        settle = self.contract.settle
+        settled: Operation = function_of(settle)(self, stock) if settle else self
+        return settled.through(stock)
+
+    @property
+    def contract(self) -> OperationKind:
+        """The record of its kind: what is done."""
+        return kind_named(self.kind)
+
+    def own_value(self, name: str) -> Any:
+        """The value of a key that its kind alone has, or its default."""
+        key = self.contract.own[name]
+        return dict(self.own).get(key.field, key.default)
 
     @property
     def wall_radius_mm(self) -> float:
         """The tool's radius where it passes the line beside which it runs, mm: half its diameter,
         and for a chamfer how wide its bit is where the bevel ends."""
-        if self.kind == "chamfer":
+        if self.contract.breaks_edges:
             return self.tool.radius_at(self.tip_offset_mm)
         return self.tool.radius_mm
 
@@ -797,8 +774,10 @@ class Operation:
     def takes(self, layer: str, colour: str) -> bool:
         """Whether paths of this layer and colour are cut, as far as it does not select them by
         what they are."""
-        return (not self.layers or matches(self.layers, layer)) and (
-            not self.colours or matches(self.colours, colour)
+        return (
+            self.contract.takes != "nothing"
+            and (not self.layers or matches(self.layers, layer))
+            and (not self.colours or matches(self.colours, colour))
         )
 
 
@@ -813,7 +792,7 @@ def rested(operations: Sequence[Operation]) -> list[Operation]:
     floor may be cleared before or after its walls."""
     made = []
     for row, each in enumerate(operations):
-        later = [other for other in operations[row + 1 :] if other.kind == "vcarve"]
+        later = [other for other in operations[row + 1 :] if other.contract.rest == "floor"]
         made.append(each.after([*operations[:row], *later]))
     return made
 
@@ -921,7 +900,7 @@ class Job:
     they are not cut, are no edges of parts. Operations with a breakthrough get their depth,
     those with a finishing pass become two. Raises OptionError for what no job can be."""
 
-    operations: tuple[Operation, ...] = (Operation(),)
+    operations: tuple[Operation, ...] = field(default_factory=lambda: (Operation(),))
     placement: Placement = Placement()
     stock: Stock | None = None
     safe_z_mm: float | None = None
@@ -935,16 +914,17 @@ class Job:
         one_of("goal", self.minimise, GOALS)
         if not self.operations:
             raise OptionError("the job has no operations", mend="give it at least one")
-        deep = [each.chamfered().through(self.stock) for each in self.operations]
+        deep = [each.settled(self.stock) for each in self.operations]
         made = [stage for each in rested(deep) for stage in each.stages()]
         object.__setattr__(self, "operations", tuple(made))
 
     @property
     def layers(self) -> tuple[str, ...]:
         """The patterns of the layers of all operations; empty when one of them takes all."""
-        if not all(operation.layers for operation in self.operations):
+        taking = [each for each in self.operations if each.contract.takes != "nothing"]
+        if not all(operation.layers for operation in taking):
             return ()
-        every = (pattern for operation in self.operations for pattern in operation.layers)
+        every = (pattern for operation in taking for pattern in operation.layers)
         return tuple(dict.fromkeys(every))
 
     def takes(self, layer: str, colour: str) -> bool:
@@ -967,7 +947,16 @@ def job_of(**settings: Any) -> Job:
     place = {key: settings.pop(key) for key in _names(Placement) & settings.keys()}
     if place:
         whole["placement"] = Placement(**place)
-    return Job(operations=(Operation(**settings),), **whole)
+    return Job(operations=(operation_of(**{"kind": Operation.kind, **settings}),), **whole)
+
+
+def operation_of(**settings: Any) -> Operation:
+    """The operation of these fields; those that its kind alone has (without a kind: any kind) go
+    into `own`. TypeError for a name that it does not have."""
+    named = [kind_named(settings["kind"])] if "kind" in settings else installed_kinds().values()
+    own_names = {key.field for kind in named for key in kind.own.values()} - _names(Operation)
+    own = tuple(sorted((name, settings.pop(name)) for name in own_names & settings.keys()))
+    return Operation(**settings, own=own) if own else Operation(**settings)
 
 
 def _names(record: type) -> set[str]:

@@ -10,7 +10,6 @@ from msgspec import Struct
 
 from camtool.arrays import Floats
 from camtool.machine.model import Machine, Spindle
-from camtool.planning.checks import IN_PASSES
 from camtool.planning.items import CutRun, Runs, Setting
 from camtool.planning.job import Tool
 from camtool.planning.paths import cuts
@@ -132,7 +131,7 @@ def _note(setting: Setting) -> OperationNote:
         plunge_mm_min=setting.feeds.plunge_mm_min,
         depth_mm=-setting.levels_mm[-1],
         spindle_rpm=setting.spindle_rpm,
-        passes=len(setting.levels_mm) if operation.kind in IN_PASSES else None,
+        passes=len(setting.levels_mm) if operation.contract.descent == "passes" else None,
         peck_mm=operation.peck_mm,
     )
 

@@ -27,7 +27,7 @@ def tool_name(tool: Tool) -> str:
 
 def width_name(operation: Operation) -> str:
     """The tool of an operation by how wide it is beside the line that it follows."""
-    if operation.kind == "chamfer":
+    if operation.contract.breaks_edges:
         return f"a V bit, {2.0 * operation.wall_radius_mm:.3g} mm wide where its bevel ends,"
     return tool_name(operation.tool)
 

@@ -272,7 +272,7 @@ def _box(drawing: Drawing, job: Job, where: Map) -> Floats | None:
 
 def taken(drawing: Drawing, job: Job) -> tuple[list[int], list[int]]:
     """Indices of the paths that any operation takes, and of the marks that any one drills."""
-    drills = [operation for operation in job.operations if operation.kind == "drill"]
+    drills = [operation for operation in job.operations if operation.contract.takes == "holes"]
     takes = _remembered(job.takes)
     drilled = _remembered(lambda *names: any(drill.takes(*names) for drill in drills))
     names = zip(drawing.layers, drawing.colours, strict=True)

@@ -9,7 +9,7 @@ Operations follow each other as the job lists them; each is put into order on it
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from itertools import chain
 from pathlib import PurePath
@@ -26,8 +26,6 @@ from camtool.machine.model import Machine
 from camtool.planning.checks import checked, with_loose_pieces
 from camtool.planning.contours import runs_of, with_starts
 from camtool.planning.drawn import drawn_of
-from camtool.planning.drill import drill
-from camtool.planning.engrave import engrave
 from camtool.planning.findings import (
     FIT_COARSE,
     MARKS_NOT_CUT,
@@ -51,6 +49,7 @@ from camtool.planning.items import (
     contours_of,
 )
 from camtool.planning.job import Job, Operation, Tool, refuse_endless
+from camtool.planning.kinds import function_of
 from camtool.planning.leads import KeepOut
 from camtool.planning.link import link
 from camtool.planning.naming import key_of, operation_name
@@ -64,7 +63,6 @@ from camtool.planning.order import (
     travel_mm,
 )
 from camtool.planning.place import SCALE_SHARE, collapsed, place
-from camtool.planning.profile import profile
 from camtool.planning.settings import setting_of
 from camtool.planning.sides import Sides, choose, runs_beside, takes_mark
 from camtool.planning.tabs import between, raised_over_bridges, with_tabs
@@ -209,27 +207,6 @@ def _coarse(drawing: Drawing, placed: Drawing) -> Iterator[Finding]:
         )
 
 
-def _kind(kind: str) -> Callable[[Chosen, Setting], Work]:
-    """What makes items of the paths; what needs more is imported where it is used."""
-    if kind == "pocket":
-        from camtool.planning.pocket import pocket
-
-        return pocket
-    if kind == "vcarve":
-        from camtool.planning.carve import vcarve
-
-        return vcarve
-    if kind == "bore":
-        from camtool.planning.bore import bore
-
-        return bore
-    if kind == "chamfer":
-        from camtool.planning.chamfer import chamfer
-
-        return chamfer
-    return {"profile": profile, "engrave": engrave, "drill": drill}[kind]
-
-
 def _step(
     placed: Drawing,
     job: Job,
@@ -243,7 +220,7 @@ def _step(
     of its `ends` and goes to the second (None: stays). `rough`: what has cleared the way, where
     it is a finishing pass."""
     chosen = choose(placed, setting.operation, sides)
-    work = _kind(setting.operation.kind)(chosen, setting)
+    work: Work = function_of(setting.operation.contract.work)(chosen, setting)
     items, bare = work.items, list[Finding]()
     if contours := contours_of(items):
         contours, bare = with_tabs(_with_starts(contours))
@@ -372,7 +349,7 @@ def _walls(placed: Drawing, sides: Sides, operation: Operation) -> KeepOut:
     """The closed lines that leads of a contour must keep away from: those of the operation itself,
     and those that any operation makes walls of."""
     count = len(placed.paths)
-    makers = [each.kind in ("profile", "pocket", "bore") for each in sides.operations]
+    makers = [each.contract.leaves_walls for each in sides.operations]
     own, walls = sides.taken_by(operation)[:count], sides.cuts[makers, :count].any(axis=0)
     rows = np.flatnonzero((own | walls) & placed.paths.closed)
     return KeepOut(placed.paths.select(rows.tolist()), own[rows])
@@ -414,7 +391,7 @@ def _end(runs: Runs, here: Point) -> Point:
 def _left_over(placed: Drawing, job: Job, cuts: bool) -> list[Finding]:
     """What is drawn and not cut: points that are not drilled, or all of it."""
     found: list[Finding] = []
-    drills = [operation for operation in job.operations if operation.kind == "drill"]
+    drills = [operation for operation in job.operations if operation.contract.takes == "holes"]
     left = [
         mark
         for mark in placed.marks

@@ -283,7 +283,7 @@ def unreached_findings(
     largest_foot = CORNER_SHARE * np.pi * radius**2
     wide = [piece for piece in pieces if piece.area_mm2 > largest_foot]
     feet = [piece for piece in pieces if piece.area_mm2 <= largest_foot]
-    if setting.operation.corners != "none" or setting.operation.kind == "chamfer":
+    if setting.operation.corners != "none" or setting.operation.contract.breaks_edges:
         feet = []
     called = width_name(setting.operation)
     return [*_places(wide, called), *_corners(feet, called)]

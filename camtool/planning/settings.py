@@ -7,7 +7,9 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
+from msgspec import Struct
 
+from camtool.arrays import Floats
 from camtool.errors import OptionError
 from camtool.findings import Finding
 from camtool.machine.model import FEED_TOLERANCE, Machine, exceeds
@@ -23,15 +25,46 @@ MOST_PASSES = 10_000
 """More passes than this are taken as a mistake."""
 
 
+class Cone(Struct, frozen=True):
+    """A V bit: the tangent of its half angle, the radius of its flat tip, mm, and the largest
+    radius that it cuts at the surface, mm (inf: not known)."""
+
+    slope: float
+    tip_mm: float
+    widest_mm: float
+
+    @classmethod
+    def of(cls, operation: Operation) -> Cone:
+        """The V bit of an operation; OptionError when its tool is none."""
+        tool = operation.tool
+        if tool.kind != "v" or tool.tip_angle_rad is None:
+            raise OptionError(
+                "carving needs a V bit",
+                where=key_of(operation, "tool"),
+                mend='use a tool with kind = "v" and a tip_angle',
+            )
+        widest = tool.radius_mm or math.inf
+        return cls(math.tan(0.5 * tool.tip_angle_rad), 0.5 * tool.tip_diameter_mm, widest)
+
+    def radius_at(self, depth_mm: float) -> float:
+        """Radius of what is cut at the surface with the tip so deep."""
+        return min(self.tip_mm + depth_mm * self.slope, self.widest_mm)
+
+    def depth_of(self, rho: Floats) -> Floats:
+        """How deep the tip goes to cut these radii at the surface."""
+        return np.maximum(rho - self.tip_mm, 0.0) / self.slope
+
+
 def setting_of(operation: Operation, job: Job, machine: Machine) -> Setting:
     """The operation with the machine's numbers where it gives none; OptionError when too fast,
     and for impossible passes."""
     depth = depth_of(operation, machine)
     _check_coolant(operation, machine)
     # The helix of a bore has turns, not passes; along the wall one pass takes it all.
-    in_one = operation.kind == "bore" or operation.stage == "finish"
+    descent = operation.contract.descent
+    in_one = descent == "helix" or operation.stage == "finish"
     try:
-        made = carved_levels if operation.kind == "vcarve" else levels
+        made = carved_levels if descent == "slopes" else levels
         step, last = operation.step_down_mm, operation.last_pass_mm
         passes = (-depth,) if in_one else made(depth, step, last)
     except OptionError as error:
@@ -43,6 +76,7 @@ def setting_of(operation: Operation, job: Job, machine: Machine) -> Setting:
         passes,
         safe_z_of(job, machine),
         speed_of(operation, machine),
+        job.stock,
     )
 
 
@@ -93,9 +127,7 @@ def depth_of(operation: Operation, machine: Machine) -> float:
     """The operation's depth of cut below the stock top, or the machine's, mm; of a carved floor no
     more than the bit is deep where it is widest."""
     carved = operation.rest_of
-    if carved is not None and carved.kind == "vcarve":
-        from camtool.planning.carve import Cone
-
+    if carved is not None and carved.contract.rest == "floor":
         cone = Cone.of(carved)
         wanted = machine.defaults.cut_depth_mm if carved.depth_mm is None else carved.depth_mm
         return min(wanted, float(cone.depth_of(np.array(cone.widest_mm))))

@@ -103,11 +103,11 @@ class Sides(Struct, eq=False, dict=True):
             traits = Traits(placed.nesting, sources, edges & ~framed)
             for number, operation in enumerate(job.operations):
                 takes[number] = traits.selected(operation, takes[number])
-        # Drills and bores take circles alone, whatever else is on their layers.
-        makers = [operation.kind != "drill" for operation in job.operations]
+        # Bores take circles alone, whatever else is on their layers.
+        makers = [operation.contract.cuts != "at" for operation in job.operations]
         cuts = takes.copy()
         for number, operation in enumerate(job.operations):
-            if operation.kind == "bore":
+            if operation.contract.takes == "circles":
                 cuts[number] &= circles(lines, takes[number])
         return cls(
             nesting=placed.nesting,
@@ -153,8 +153,7 @@ class Sides(Struct, eq=False, dict=True):
         """The sides for a profile of this operation."""
         depth = self._depth(operation)
         cut = self._taken(
-            each.kind in ("profile", "chamfer")
-            or (each.kind in ("pocket", "bore") and self._depth(each) >= depth)
+            each.contract.runs_beside or (each.contract.clears and self._depth(each) >= depth)
             for each in self.operations
         )
         bounds = cut | self.uncut
@@ -272,7 +271,7 @@ class Traits:
 
 def circles(lines: Polylines, rows: Bools) -> Bools:
     """(M,) which of the rows (M,) of some paths are full circles."""
-    from camtool.planning.drill import circle_of
+    from camtool.planning.holes import circle_of
 
     found = np.zeros(len(rows), dtype=np.bool_)
     for row in np.flatnonzero(rows & lines.closed).tolist():
@@ -317,9 +316,8 @@ def _selection(operation: Operation) -> str:
 
 
 def runs_beside(operation: Operation) -> bool:
-    """Whether an operation is a profile, or a chamfer, that runs beside its closed contours, not
-    on them."""
-    if operation.kind not in ("profile", "chamfer") or operation.side == "on":
+    """True if an operation runs beside its closed contours, not on them."""
+    if not operation.contract.runs_beside or operation.side == "on":
         return False
     return operation.away_mm > 0.0
 
@@ -356,7 +354,8 @@ def choose(drawing: Drawing, operation: Operation, sides: Sides) -> Chosen:
     """
     index = np.flatnonzero(sides.taken_by(operation)).tolist()
     marks = [mark for mark in drawing.marks if takes_mark(operation, mark)]
-    if not index and not marks and (len(drawing.paths) or drawing.marks):
+    takes_nothing = operation.contract.takes == "nothing"
+    if not (index or marks or takes_nothing) and (len(drawing.paths) or drawing.marks):
         raise _nothing(drawing, operation)
     return Chosen(
         nesting=sides.nesting.among(np.array(index, dtype=np.int64)),

@@ -41,7 +41,7 @@ from camtool.geometry.measure import (
 )
 from camtool.geometry.offset import offset_each
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
-from camtool.planning.drill import circle_of
+from camtool.planning.holes import circle_of
 from camtool.planning.paths import Cuts, MeasuredPaths
 from camtool.planning.paths import cuts as joined_moves
 from camtool.records import replace

@@ -16,7 +16,8 @@ from pathlib import Path
 import click
 
 from camtool.cli.main import cli, main
-from camtool.jobs.keys import OPERATION, TOOL_KEYS, flag_name
+from camtool.jobs.keys import OPERATION, TOOL_KEYS, flag_name, is_known
+from camtool.planning.kinds import installed_kinds
 from tests.waiting import HANG_S
 
 BAD = ("nan", "inf", "-inf", "-1", "0", "1e308", "1e-308", "", "9" * 5000, "\x1b[31m")
@@ -132,7 +133,8 @@ class Flag:
         if self.name in _KINDS and self.command not in ("verify", "stale"):
             kind = _KINDS[self.name]
             words[-1] = "holes.svg" if kind == "drill" else words[-1]
-            needs += [*KINDS[kind], *_NEEDED.get(self.name, ())]
+            plain = KINDS.get(kind, ("--kind", kind, *TOOL))
+            needs += [*plain, *_NEEDED.get(self.name, ())]
         if self.command == "verify":
             needs += ["--against", DRAWING]
         if self.name in _BESIDE:
@@ -145,7 +147,7 @@ class Flag:
 
 
 _KINDS = {
-    flag_name(name): next(kind for kind in KINDS if kind in key.kinds)
+    flag_name(name): next(kind for kind in (*KINDS, *installed_kinds()) if is_known(name, kind))
     for name, key in OPERATION.items()
     if key.help
 } | {flag_name(name): "vcarve" if "tip" in name else "profile" for name in TOOL_KEYS}

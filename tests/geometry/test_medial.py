@@ -15,7 +15,7 @@ from camtool.geometry.medial import Boundary, Trace, discs_at, medial_trace
 from camtool.geometry.nesting import Nesting, oriented, regions
 from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.kernels.discs import LENGTH, SWEEP, frame
-from camtool.planning.carve import with_level
+from camtool.operations.vcarve.work import with_level
 from tests.oracles import contours as shapes
 from tests.strategies import contours
 

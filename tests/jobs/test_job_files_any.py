@@ -10,10 +10,25 @@ from hypothesis import strategies as st
 from camtool.errors import OptionError
 from camtool.jobs.build import AT_THE_TOP, OF_OPERATIONS, JobTables, build_job, tables_of
 from camtool.jobs.keys import ENTRY, LEAD, PLACE, STOCK, TABS, TOOL
-from camtool.planning.job import ENTRIES, KINDS, LEADS, Job
+from camtool.planning.job import ENTRIES, LEADS, Job
+from camtool.planning.kinds import installed_kinds
 
 _words = st.sampled_from(
-    [*KINDS, *ENTRIES, *LEADS, "a", "3", "3mm", "30deg", "3x2", "1,2", "4:1:1", "arc:1", "40%", ""]
+    [
+        *installed_kinds(),
+        *ENTRIES,
+        *LEADS,
+        "a",
+        "3",
+        "3mm",
+        "30deg",
+        "3x2",
+        "1,2",
+        "4:1:1",
+        "arc:1",
+        "40%",
+        "",
+    ]
 )
 _plain = st.one_of(
     _words,

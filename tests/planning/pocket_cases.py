@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from camtool.geometry.distance import approach
 from camtool.geometry.nesting import Nesting, oriented
 from camtool.geometry.polylines import Polyline, Polylines, rotated
+from camtool.operations.pocket.work import pocket
 from camtool.planning.items import Chosen, CutRun, Feeds, Setting, Work
 from camtool.planning.job import Operation, Tool
-from camtool.planning.pocket import pocket
 from camtool.planning.settings import levels
 from tests.oracles.contours import (
     CIRCLE,

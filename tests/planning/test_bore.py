@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from camtool.errors import OptionError
 from camtool.findings import Severity
 from camtool.geometry.polylines import Polyline
-from camtool.planning.bore import CORE_SHARE, MOST_TURNS, bore, radii
-from camtool.planning.drill import HOLE_SIZE_MM
+from camtool.operations.bore.work import CORE_SHARE, MOST_TURNS, bore, radii
 from camtool.planning.findings import PlanningCode
+from camtool.planning.holes import HOLE_SIZE_MM
 from camtool.planning.items import CutRun, Feeds, Fixed, Setting, Work
 from camtool.planning.job import Entry, Operation, Tool
 from camtool.planning.ramps import HELIX_LEAST

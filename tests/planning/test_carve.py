@@ -19,7 +19,7 @@ from camtool.geometry.findings import ContourCode
 from camtool.geometry.nesting import Nesting
 from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.importers.read import read_drawing
-from camtool.planning.carve import CARVE_TOLERANCE_MM, vcarve
+from camtool.operations.vcarve.work import CARVE_TOLERANCE_MM, vcarve
 from camtool.planning.findings import PlanningCode
 from camtool.planning.items import Chosen, CutRun, Feeds, Fixed, Setting, Work
 from camtool.planning.job import Job, Operation, Tool

@@ -13,16 +13,16 @@ from hypothesis import strategies as st
 from camtool.findings import Severity
 from camtool.geometry.nesting import Nesting
 from camtool.geometry.polylines import Polyline, Polylines
-from camtool.planning.drill import (
+from camtool.operations.drill.work import drill
+from camtool.planning.findings import PlanningCode
+from camtool.planning.holes import (
     HOLE_SIZE_MM,
     PECK_CLEARANCE_MM,
     PECK_TOP_MM,
     SAME_HOLE_MM,
     circle_of,
-    drill,
     peck_depths,
 )
-from camtool.planning.findings import PlanningCode
 from camtool.planning.items import Chosen, CutRun, Feeds, Fixed, Setting, Work
 from camtool.planning.job import Operation, Tool
 from tests.oracles import contours as shapes

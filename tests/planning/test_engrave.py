@@ -15,7 +15,7 @@ from camtool.findings import Finding, Severity
 from camtool.geometry.measure import sample
 from camtool.geometry.nesting import Nesting
 from camtool.geometry.polylines import Polyline, Polylines
-from camtool.planning.engrave import engrave
+from camtool.operations.engrave.work import engrave
 from camtool.planning.items import Chosen, Contour, Feeds, Setting
 from camtool.planning.job import Operation, Tool
 from tests.oracles import contours as shapes

@@ -16,11 +16,11 @@ from camtool.findings import Severity
 from camtool.geometry.measure import length, signed_area
 from camtool.geometry.offset import offset_shape
 from camtool.geometry.polylines import Polyline, Polylines, Segments, reverse, rotated
+from camtool.operations.pocket.work import pocket
 from camtool.planning.clearing import Cell, Steps, parts_of, ring_cells
 from camtool.planning.findings import PlanningCode
 from camtool.planning.items import CutRun, Fixed
 from camtool.planning.job import Entry
-from camtool.planning.pocket import pocket
 from tests.oracles import swept
 from tests.oracles.contours import CIRCLE, DUMBBELL, OBLONG, SLOT, SQUARE, closed, comb, star
 from tests.oracles.contours import opened as open_path

@@ -16,11 +16,11 @@ from camtool.geometry.distance import nearest
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import sample, signed_areas
 from camtool.geometry.polylines import Polyline, Polylines, Segments, reverse
+from camtool.operations.profile.work import profile
 from camtool.planning.findings import PlanningCode
 from camtool.planning.gouges import side_findings
 from camtool.planning.items import Contour, Feeds, Setting
 from camtool.planning.job import Job, job_of
-from camtool.planning.profile import profile
 from camtool.planning.sides import Sides, choose
 from camtool.toolpath.findings import ProgramCode
 from tests.drawings import drawing_of

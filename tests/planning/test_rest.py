@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 from camtool.errors import OptionError
 from camtool.geometry.polylines import Polyline
 from camtool.machine.model import Machine
+from camtool.operations.pocket.work import REST_OVERLAP
 from camtool.planning.findings import PlanningCode
 from camtool.planning.items import Step
 from camtool.planning.job import Job, Operation, Tool
 from camtool.planning.plan import planned
-from camtool.planning.pocket import REST_OVERLAP
 from tests.drawings import drawing_of
 from tests.oracles.run_sweep import dense, swept
 

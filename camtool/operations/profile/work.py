@@ -26,7 +26,7 @@ from camtool.geometry.polylines import (
     Segments,
     lines_reversed,
 )
-from camtool.planning.engrave import run_together
+from camtool.operations.engrave.work import run_together
 from camtool.planning.findings import (
     CONTOUR_TOO_SMALL,
     CONTOUR_TOO_SMALL_ROUND,

@@ -1,33 +1,20 @@
-"""Drilling: single points and small circles become holes.
-
-    marks, circles ──each place once──▶ holes ──pecks──▶ one Fixed item per hole
-
-The tip goes to the full depth, and no farther: a hole that is to go through with its whole
-diameter needs a depth greater by the height of the cone, ½·diameter / tan(½·tip angle).
-"""
+"""Holes: full circles and single points of a drawing, and pecks down at a place."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
 from msgspec import Struct
 
 from camtool.arrays import Bools, Floats
-from camtool.findings import Finding
 from camtool.geometry.measure import path_extents, sample
 from camtool.geometry.polylines import Polyline, Polylines, Segments
-from camtool.planning.findings import (
-    HOLE_SIZE,
-    NOT_DRILLED,
-    NOT_DRILLED_TOO_LARGE,
-    NOTHING_DRAWN_TO_DRILL,
-)
-from camtool.planning.items import RAPID, Chosen, CutRun, Fixed, Setting, Work
+from camtool.planning.items import RAPID, Chosen, Setting
 from camtool.planning.job import Operation, refuse_endless
-from camtool.planning.naming import key_of, operation_name
+from camtool.planning.naming import key_of
 
 ROUND_SHARE = 1e-3
 """A closed path is a circle when its points are off the mean radius by no more than this share
@@ -72,44 +59,12 @@ class Hole(Struct, frozen=True):
     outline: Polyline | None = None
 
 
-def drill(chosen: Chosen, setting: Setting) -> Work:
-    """One Fixed item for each mark and each circle up to the largest hole of the operation.
-
-    Places that are drawn twice are drilled once; of concentric circles the one nearest to the
-    drill's diameter counts. What is no hole for this drill is named in a finding; when nothing
-    is left that is an error.
-    """
-    operation = setting.operation
-    circles, others = circles_of(chosen)
-    limit = _largest(operation)
-    small = [hole for hole in circles if (hole.diameter_mm or 0.0) <= limit + HOLE_SIZE_MM]
-    large = [hole for hole in circles if hole not in small]
-    marks = [
-        Hole((float(x), float(y)), None, name)
-        for (x, y), name in zip(chosen.points, chosen.point_names, strict=True)
-    ]
-    holes = each_once([*marks, *small], operation.tool.diameter_mm)
-    findings = [
-        *_too_large(large, limit),
-        *_no_circles(others),
-        *_other_sizes(holes, operation),
-        *_nothing(holes, operation),
-    ]
-    if operation.peck_mm is not None:
-        refuse_endless_pecks(-setting.levels_mm[-1], operation.peck_mm, holes, operation)
-    items = (
-        Fixed((_run(hole, setting),), setting, hole.name, hole.source, hole.outline)
-        for hole in holes
-    )
-    return Work(tuple(items), tuple(findings))
-
-
 def refuse_endless_pecks(
     depth_mm: float, peck_mm: float, holes: Sequence[Hole], operation: Operation
 ) -> None:
     """OptionError for pecks so small that the holes take too many moves; a bore has its pecks from
     the step down."""
-    key = "peck" if operation.kind == "drill" else "step_down"
+    key = "peck" if operation.contract.descent == "pecks" else "step_down"
     refuse_endless(
         MOVES_OF_PECK * depth_mm / peck_mm * len(holes),
         key_of(operation, key),
@@ -173,15 +128,6 @@ def peck_depths(depth_mm: float, peck_mm: float | None) -> list[float]:
     return [depth_mm * ((step + 1) / count) for step in range(count)]
 
 
-def _run(hole: Hole, setting: Setting) -> CutRun:
-    """Down and up in the hole."""
-    operation = setting.operation
-    depths = peck_depths(-setting.levels_mm[-1], operation.peck_mm)
-    vertices, feeds = pecks(hole.at_mm, depths, setting)
-    down = setting.feeds.plunge_mm_min
-    return CutRun(vertices, np.array(feeds), down, hole.name, operation.dwell_s)
-
-
 def pecks(
     at_mm: tuple[float, float], depths: Sequence[float], setting: Setting
 ) -> tuple[Floats, list[float]]:
@@ -206,44 +152,6 @@ def circles_of(chosen: Chosen) -> tuple[list[Hole], list[str]]:
         else:
             holes.append(Hole(*circle, name, int(source), path))
     return holes, others
-
-
-def _largest(operation: Operation) -> float:
-    """Circles up to this diameter are drilled."""
-    if operation.max_hole_mm is not None:
-        return operation.max_hole_mm
-    return operation.tool.diameter_mm or math.inf
-
-
-def _too_large(holes: list[Hole], limit: float) -> Iterator[Finding]:
-    if holes:
-        yield NOT_DRILLED_TOO_LARGE(
-            where=named([hole.name for hole in holes]),
-            measured=max(hole.diameter_mm or 0.0 for hole in holes),
-            limit=limit,
-            count=len(holes),
-        )
-
-
-def _no_circles(names: list[str]) -> Iterator[Finding]:
-    if names:
-        yield NOT_DRILLED(where=named(names), measured=len(names))
-
-
-def _other_sizes(holes: list[Hole], operation: Operation) -> Iterator[Finding]:
-    """One finding for each diameter that is not the drill's."""
-    wanted = operation.tool.diameter_mm
-    by_size: dict[float, list[str]] = {}
-    for hole in holes:
-        if wanted and hole.diameter_mm and abs(hole.diameter_mm - wanted) > HOLE_SIZE_MM:
-            by_size.setdefault(round(hole.diameter_mm, 3), []).append(hole.name)
-    for size, names in sorted(by_size.items()):
-        yield HOLE_SIZE(where=named(names), measured=wanted, limit=size, count=len(names))
-
-
-def _nothing(holes: list[Hole], operation: Operation) -> Iterator[Finding]:
-    if not holes:
-        yield NOTHING_DRAWN_TO_DRILL(where=operation_name(operation))
 
 
 def named(names: list[str]) -> str:

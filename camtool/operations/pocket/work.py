@@ -165,7 +165,7 @@ def _cleared(slots: list[Floats], each: Pocket, setting: Setting) -> Cleared:
     changed: dict[str, CutRun] = {}
     for part in _tool_regions(each.region, setting):
         whole, runs = ConnectedRegion(part), list[CutRun]()
-        for path, around in _paths(part, setting.operation):
+        for path, around in clearing_paths(part, setting.operation):
             down = down_for(path, around, whole, setting)
             runs += lowered(path, down, over_floor(whole), setting, each.name)
             changed.setdefault(down.changed, runs[0])
@@ -182,7 +182,7 @@ def _left_mm(setting: Setting) -> float:
     """What is left beside the edge: the allowance, and of a carving its slopes. The wall of a V
     bit of half the angle α is z tan α from the edge where it is z deep."""
     operation, carved = setting.operation, setting.operation.rest_of
-    if carved is None or carved.kind != "vcarve" or carved.tool.tip_angle_rad is None:
+    if carved is None or carved.contract.rest != "floor" or carved.tool.tip_angle_rad is None:
         return operation.allowance_mm
     slope = math.tan(0.5 * carved.tool.tip_angle_rad)
     return operation.allowance_mm - setting.levels_mm[-1] * slope
@@ -202,7 +202,7 @@ def _tool_regions(region: Polylines, setting: Setting) -> list[Polylines]:
     operation = setting.operation
     tool_region = offset_shape(region, operation.tool.radius_mm + _left_mm(setting))
     wider = operation.rest_of
-    if wider is None or wider.kind == "vcarve":
+    if wider is None or wider.contract.rest == "floor":
         return parts_of(tool_region)
     reached_mm = (1.0 + REST_OVERLAP) * wider.tool.radius_mm
     pieces = unreached(tool_region, reached_mm - operation.tool.radius_mm)
@@ -220,7 +220,9 @@ def _nearest_next(groups: list[list[CutRun]]) -> list[CutRun]:
     return runs
 
 
-def _paths(part: Polylines, operation: Operation) -> Iterator[tuple[Floats, ConnectedRegion]]:
+def clearing_paths(
+    part: Polylines, operation: Operation
+) -> Iterator[tuple[Floats, ConnectedRegion]]:
     """The paths through one connected tool centre region, each with the region at whose pole there
     is the most room to go down."""
     radius = operation.tool.radius_mm

@@ -51,6 +51,7 @@ from camtool.geometry.medial import (
 from camtool.geometry.nesting import regions
 from camtool.geometry.offset import merge_points
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
+from camtool.operations.vcarve import VCARVE
 from camtool.planning.findings import (
     CONTOUR_TOO_SMALL_FOR_TIP,
     DEPTH_LIMITED,
@@ -63,13 +64,12 @@ from camtool.planning.job import Operation
 from camtool.planning.naming import at_place, key_of
 from camtool.planning.paths import backwards, joined
 from camtool.planning.ramps import feeds_along
+from camtool.planning.settings import Cone
 
 CROSSINGS_SHOWN = 3
 """At most this many places where paths cross are named."""
 
-CARVE_TOLERANCE_MM = 5e-4
-"""A carved wall may be off its line by this much: half a micrometre."""
-
+CARVE_TOLERANCE_MM = VCARVE.path_error_mm
 
 LEVEL_EPS_MM = 1e-9
 """A radius nearer than this to a limit is the limit: rounding, along walls that are parallel."""
@@ -90,36 +90,6 @@ MOST_SWEEP_RAD = 2.0
 
 MEET_MM = 1e-4
 """Ends of pieces that are nearer than this meet."""
-
-
-class Cone(Struct, frozen=True):
-    """A V bit: the tangent of its half angle, the radius of its flat tip, mm, and the largest
-    radius that it cuts at the surface, mm (inf: not known)."""
-
-    slope: float
-    tip_mm: float
-    widest_mm: float
-
-    @classmethod
-    def of(cls, operation: Operation) -> Cone:
-        """The V bit of an operation; OptionError when its tool is none."""
-        tool = operation.tool
-        if tool.kind != "v" or tool.tip_angle_rad is None:
-            raise OptionError(
-                "carving needs a V bit",
-                where=key_of(operation, "tool"),
-                mend='use a tool with kind = "v" and a tip_angle',
-            )
-        widest = tool.radius_mm or math.inf
-        return cls(math.tan(0.5 * tool.tip_angle_rad), 0.5 * tool.tip_diameter_mm, widest)
-
-    def radius_at(self, depth_mm: float) -> float:
-        """Radius of what is cut at the surface with the tip so deep."""
-        return min(self.tip_mm + depth_mm * self.slope, self.widest_mm)
-
-    def depth_of(self, rho: Floats) -> Floats:
-        """How deep the tip goes to cut these radii at the surface."""
-        return np.maximum(rho - self.tip_mm, 0.0) / self.slope
 
 
 class _Region(Struct, frozen=True, eq=False):

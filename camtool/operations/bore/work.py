@@ -35,16 +35,6 @@ from camtool.errors import OptionError
 from camtool.findings import Finding
 from camtool.geometry.distance import near_paths
 from camtool.geometry.polylines import Polyline, Polylines
-from camtool.planning.drill import (
-    HOLE_SIZE_MM,
-    SAME_HOLE_MM,
-    Hole,
-    circles_of,
-    named,
-    peck_depths,
-    pecks,
-    refuse_endless_pecks,
-)
 from camtool.planning.findings import (
     ENTRY_CHANGED_IN_NARROW_BORE,
     ENTRY_CHANGED_STEEPER,
@@ -56,6 +46,16 @@ from camtool.planning.findings import (
     NOTHING_DRAWN_TO_BORE,
 )
 from camtool.planning.finish import along_walls
+from camtool.planning.holes import (
+    HOLE_SIZE_MM,
+    SAME_HOLE_MM,
+    Hole,
+    circles_of,
+    named,
+    peck_depths,
+    pecks,
+    refuse_endless_pecks,
+)
 from camtool.planning.items import Chosen, Contour, CutRun, Fixed, Setting, Work
 from camtool.planning.job import Operation
 from camtool.planning.naming import at_place, key_of, operation_name, shortened_list, tool_name

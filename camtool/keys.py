@@ -1,0 +1,300 @@
+"""Keys of tables and flags: what each may be, which field it fills, and how its value is read.
+
+    Given     a value as a file or a flag gave it, with its place
+    Table     several of them by key: one table of a file, or flags
+    Value     what a key may be: how it is read, and what the help of its flag shows
+    Key       the field that a key fills, its Value, the help of its flag, an example
+
+Whatever is wrong is an OptionError that names the file, the table and the key (or the flag), and
+says how to fix it. `camtool.jobs.keys` has the keys of jobs; an operation may bring keys of its
+own (`camtool.planning.kinds`).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+from camtool.errors import OptionError
+from camtool.patterns import guess
+from camtool.units import parse_angle, parse_feed, parse_length, parse_time
+
+_T = TypeVar("_T")
+
+
+@dataclass(frozen=True)
+class Given:
+    """A value as the user wrote it; `where` names its key or flag, `file` its file, if any."""
+
+    value: Any
+    where: str
+    file: str | None = None
+
+    def refused(self, message: str, mend: str = "") -> OptionError:
+        """The error that says what is wrong with it."""
+        return OptionError(message, file=self.file, where=self.where, mend=mend)
+
+    @contextmanager
+    def blamed(self) -> Iterator[None]:
+        """Within the block, an OptionError gets the place of this value."""
+        try:
+            yield
+        except OptionError as error:
+            raise self.refused(error.message, error.mend) from error
+
+
+@dataclass(frozen=True)
+class Value:
+    """What a key may be: `read` makes the field's value of what was given. The help of its flag
+    shows `metavar` or `choices`; a switch has neither. With `tables`, a table
+    may give it too."""
+
+    read: Callable[[Given], Any]
+    metavar: str = ""
+    choices: tuple[str, ...] = ()
+    tables: bool = False
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key of a table: the `field` of its record that it fills, and what its `value` may be.
+
+    `help` is that of the flag that says the same; a key without has none. `example` stands in the
+    files that `camtool job new` begins. `only`: another key of the table, and the values of it
+    without which this one has no effect. `default`: the value of the field where nothing is given;
+    of keys that a kind of operation alone has, for the others' stand in their records.
+    """
+
+    field: str
+    value: Value
+    help: str = ""
+    example: str = ""
+    only: tuple[str, tuple[str, ...]] | None = None
+    default: Any = None
+
+    def read(self, given: Given) -> Any:
+        """The field's value."""
+        return self.value.read(given)
+
+
+@dataclass(frozen=True)
+class Table:
+    """The keys of one table of a file, or flags, as given; `where` and `file` name the table."""
+
+    given: Mapping[str, Given] = field(default_factory=dict)
+    where: str = ""
+    file: str | None = None
+
+    def refused(self, message: str, mend: str = "") -> OptionError:
+        """The error that says what is wrong with the table as a whole."""
+        return OptionError(message, file=self.file, where=self.where, mend=mend)
+
+    def only(self, names: Iterable[str]) -> Table:
+        """The keys of these names."""
+        known = set(names)
+        given = {name: each for name, each in self.given.items() if name in known}
+        return Table(given, self.where, self.file)
+
+    def over(self, below: Table) -> Table:
+        """The keys of both, those of this table where both have one."""
+        where = self if self.given else below
+        return Table({**below.given, **self.given}, where.where, where.file)
+
+
+def table_of(values: object, known: Iterable[str], where: str, file: str) -> Table:
+    """A TOML table, its keys checked; `where` is "" for the top of the file."""
+    if not isinstance(values, dict):
+        raise OptionError(
+            f"{values!r} is no table", file=file, where=where, mend=f"known keys: {_listed(known)}"
+        )
+    given = {}
+    for name, value in values.items():
+        place = f"{where}, key {name}" if where else f"key {name}"
+        given[name] = Given(value, place, file)
+        if name not in known:
+            raise given[name].refused("unknown key", meant(name, known))
+    return Table(given, where, file)
+
+
+def record_of(
+    make: Callable[..., _T],
+    keys: Mapping[str, Key],
+    table: Table,
+    base: Mapping[str, Any] | None = None,
+) -> _T:
+    """The record of a table's values: each is tried alone first, so that its key can be named.
+
+    `base`: fields without which the record cannot be made.
+    """
+    fields: dict[str, Any] = {}
+    for name, given in table.given.items():
+        key = keys[name]
+        fields[key.field] = key.read(given)
+        try:
+            make(**{**(base or {}), key.field: fields[key.field]})
+        except OptionError as error:
+            # An error with a place of its own says what contradicts what: that is for the whole.
+            if error.where is None:
+                raise given.refused(error.message, error.mend) from error
+    try:
+        return make(**fields)
+    except OptionError as error:
+        named = re.search(r"key (\w+)$", error.where or "")
+        culprit = table.given.get(named[1] if named else "")
+        raise (culprit or table).refused(error.message, error.mend) from error
+
+
+def why_idle(keys: Mapping[str, Key], name: str, record: object) -> OptionError | None:
+    """Why a key has no effect in this record, as an error without a place; None when it has."""
+    only = keys[name].only
+    if only is None:
+        return None
+    other, values = only
+    field_name = keys[other].field
+    own = dict(getattr(record, "own", ()))
+    if own.get(field_name, getattr(record, field_name, None)) in values:
+        return None
+    needed = " or ".join(f'"{value}"' for value in values)
+    return OptionError(
+        f"has no effect without {other} = {needed}", mend=f"give {other} too, or leave {name} out"
+    )
+
+
+def refuse_idle(keys: Mapping[str, Key], table: Table, record: object) -> None:
+    """Refuse a key that has no effect in the record made of its table."""
+    for name, given in table.given.items():
+        why = why_idle(keys, name, record)
+        if why is not None:
+            raise given.refused(why.message, why.mend)
+
+
+def meant(name: str, known: Iterable[str]) -> str:
+    """The known name that was probably meant, and all known names: the mend of an unknown key."""
+    return f"{guess(name, known)}known keys: {_listed(known)}"
+
+
+def _listed(known: Iterable[str]) -> str:
+    return ", ".join(known)
+
+
+# How values are read: what TOML or the command line gives becomes numbers and records. Lengths,
+# angles, feeds and times take units in texts; bare numbers are mm, degrees, mm/min and s.
+
+
+def plain(convert: Callable[[object], Any]) -> Callable[[Given], Any]:
+    """A reader that converts the bare value; errors get the place of the value."""
+
+    def read(given: Given) -> Any:
+        with given.blamed():
+            return convert(given.value)
+
+    return read
+
+
+def length(value: object) -> float:
+    """mm."""
+    return parse_length(number_text(value))
+
+
+def feed(value: object) -> float:
+    """mm/min."""
+    return parse_feed(number_text(value))
+
+
+def angle(value: object) -> float:
+    """rad."""
+    return parse_angle(number_text(value))
+
+
+def time(value: object) -> float:
+    """s."""
+    return parse_time(number_text(value))
+
+
+def number(value: object) -> float:
+    """A number without a unit."""
+    text = number_text(value)
+    try:
+        return float(text)
+    except ValueError:
+        raise OptionError(f"{text!r} is no number", mend="give a number without a unit") from None
+
+
+def fraction(value: object) -> float:
+    """0.4 or "40%"."""
+    text = number_text(value).strip()
+    return number(text[:-1]) / 100.0 if text.endswith("%") else number(text)
+
+
+def whole(value: object) -> int:
+    """A whole number."""
+    text = number_text(value).strip()
+    if not re.fullmatch(r"[+-]?\d{1,9}", text):
+        raise OptionError(f"{text!r} is no whole number", mend="write it like 4")
+    return int(text)
+
+
+def switch(value: object) -> bool:
+    """true or false."""
+    if not isinstance(value, bool):
+        raise OptionError(f"{value!r} is neither true nor false", mend="write true or false")
+    return value
+
+
+def text(value: object) -> str:
+    """Any text."""
+    if not isinstance(value, str):
+        raise OptionError(f"{value!r} is no text", mend=f'write it in quotes: "{value}"')
+    return value
+
+
+def word(known: Sequence[str]) -> Callable[[Given], Any]:
+    """One of the known words; the error for another one guesses which was meant."""
+
+    def convert(value: object) -> str:
+        name = text(value)
+        if name not in known:
+            raise OptionError(
+                f"unknown word {name!r}",
+                mend=f"{guess(name, known)}use one of {', '.join(known)}",
+            )
+        return name
+
+    return plain(convert)
+
+
+def patterns(value: object) -> tuple[str, ...]:
+    """A list of texts."""
+    if not isinstance(value, list | tuple):
+        raise OptionError(f"{value!r} is no list", mend=f'write it in brackets: ["{value}"]')
+    if not value:
+        raise OptionError("an empty list takes nothing", mend="leave it out to take all")
+    return tuple(text(item) for item in value)
+
+
+def number_text(value: object) -> str:
+    """The text of a number with or without a unit; OptionError for what is neither."""
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise OptionError(f"{value!r} is no number", mend='write it like 0.2 or "0.2mm"')
+    return value if isinstance(value, str) else repr(value)
+
+
+# The values of keys.
+
+LENGTH = Value(plain(length), "LENGTH")
+ANGLE = Value(plain(angle), "ANGLE")
+FEED = Value(plain(feed), "FEED")
+TIME = Value(plain(time), "TIME")
+COUNT = Value(plain(whole), "COUNT")
+FACTOR = Value(plain(number), "FACTOR")
+TEXT = Value(plain(text))
+PATTERNS_OF_NAMES = Value(plain(patterns))
+SWITCH = Value(plain(switch))
+
+
+def one_of(known: tuple[str, ...]) -> Value:
+    """One of these words."""
+    return Value(word(known), choices=known)

@@ -1,0 +1,21 @@
+"""Drilling: single points and small circles become holes."""
+
+from camtool.planning.kinds import COMMON_KEYS, SELECTING_KEYS, OperationKind
+
+DRILL = OperationKind(
+    name="drill",
+    work="camtool.operations.drill.work:drill",
+    keys=(
+        *COMMON_KEYS,
+        *SELECTING_KEYS,
+        "depth",
+        "breakthrough",
+        "peck",
+        "dwell",
+        "max_hole",
+    ),
+    rank=5,
+    takes="holes",
+    cuts="at",
+    descent="pecks",
+)

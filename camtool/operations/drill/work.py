@@ -1,0 +1,114 @@
+"""Drilling: single points and small circles become holes.
+
+    marks, circles ──each place once──▶ holes ──pecks──▶ one Fixed item per hole
+
+The tip goes to the full depth, and no farther: a hole that is to go through with its whole
+diameter needs a depth greater by the height of the cone, ½·diameter / tan(½·tip angle).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from camtool.findings import Finding
+from camtool.planning.findings import (
+    HOLE_SIZE,
+    NOT_DRILLED,
+    NOT_DRILLED_TOO_LARGE,
+    NOTHING_DRAWN_TO_DRILL,
+)
+from camtool.planning.holes import (
+    HOLE_SIZE_MM,
+    Hole,
+    circles_of,
+    each_once,
+    named,
+    peck_depths,
+    pecks,
+    refuse_endless_pecks,
+)
+from camtool.planning.items import Chosen, CutRun, Fixed, Setting, Work
+from camtool.planning.job import Operation
+from camtool.planning.naming import operation_name
+
+
+def drill(chosen: Chosen, setting: Setting) -> Work:
+    """One Fixed item for each mark and each circle up to the largest hole of the operation.
+
+    Places that are drawn twice are drilled once; of concentric circles the one nearest to the
+    drill's diameter counts. What is no hole for this drill is named in a finding; when nothing
+    is left that is an error.
+    """
+    operation = setting.operation
+    circles, others = circles_of(chosen)
+    limit = _largest(operation)
+    small = [hole for hole in circles if (hole.diameter_mm or 0.0) <= limit + HOLE_SIZE_MM]
+    large = [hole for hole in circles if hole not in small]
+    marks = [
+        Hole((float(x), float(y)), None, name)
+        for (x, y), name in zip(chosen.points, chosen.point_names, strict=True)
+    ]
+    holes = each_once([*marks, *small], operation.tool.diameter_mm)
+    findings = [
+        *_too_large(large, limit),
+        *_no_circles(others),
+        *_other_sizes(holes, operation),
+        *_nothing(holes, operation),
+    ]
+    if operation.peck_mm is not None:
+        refuse_endless_pecks(-setting.levels_mm[-1], operation.peck_mm, holes, operation)
+    items = (
+        Fixed((_run(hole, setting),), setting, hole.name, hole.source, hole.outline)
+        for hole in holes
+    )
+    return Work(tuple(items), tuple(findings))
+
+
+def _run(hole: Hole, setting: Setting) -> CutRun:
+    """Down and up in the hole."""
+    operation = setting.operation
+    depths = peck_depths(-setting.levels_mm[-1], operation.peck_mm)
+    vertices, feeds = pecks(hole.at_mm, depths, setting)
+    down = setting.feeds.plunge_mm_min
+    return CutRun(vertices, np.array(feeds), down, hole.name, operation.dwell_s)
+
+
+def _largest(operation: Operation) -> float:
+    """Circles up to this diameter are drilled."""
+    if operation.max_hole_mm is not None:
+        return operation.max_hole_mm
+    return operation.tool.diameter_mm or math.inf
+
+
+def _too_large(holes: list[Hole], limit: float) -> Iterator[Finding]:
+    if holes:
+        yield NOT_DRILLED_TOO_LARGE(
+            where=named([hole.name for hole in holes]),
+            measured=max(hole.diameter_mm or 0.0 for hole in holes),
+            limit=limit,
+            count=len(holes),
+        )
+
+
+def _no_circles(names: list[str]) -> Iterator[Finding]:
+    if names:
+        yield NOT_DRILLED(where=named(names), measured=len(names))
+
+
+def _other_sizes(holes: list[Hole], operation: Operation) -> Iterator[Finding]:
+    """One finding for each diameter that is not the drill's."""
+    wanted = operation.tool.diameter_mm
+    by_size: dict[float, list[str]] = {}
+    for hole in holes:
+        if wanted and hole.diameter_mm and abs(hole.diameter_mm - wanted) > HOLE_SIZE_MM:
+            by_size.setdefault(round(hole.diameter_mm, 3), []).append(hole.name)
+    for size, names in sorted(by_size.items()):
+        yield HOLE_SIZE(where=named(names), measured=wanted, limit=size, count=len(names))
+
+
+def _nothing(holes: list[Hole], operation: Operation) -> Iterator[Finding]:
+    if not holes:
+        yield NOTHING_DRAWN_TO_DRILL(where=operation_name(operation))

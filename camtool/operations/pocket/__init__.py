@@ -1,0 +1,28 @@
+"""Pockets: all within closed contours is cleared, except islands."""
+
+from camtool.planning.kinds import COMMON_KEYS, SELECTING_KEYS, WALL_KEYS, OperationKind
+
+POCKET = OperationKind(
+    name="pocket",
+    work="camtool.operations.pocket.work:pocket",
+    keys=(
+        *COMMON_KEYS,
+        *SELECTING_KEYS,
+        *WALL_KEYS,
+        "depth",
+        "breakthrough",
+        "step_down",
+        "last_pass",
+        "entry",
+        "pattern",
+        "rest",
+        "step_over",
+        "angle",
+    ),
+    rank=2,
+    cuts="within",
+    leaves_walls=True,
+    rest="corners",
+    cut_name="pocket",
+    reason="it is cleared as a pocket",
+)

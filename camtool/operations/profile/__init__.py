@@ -1,0 +1,30 @@
+"""Profiles: the tool runs beside closed contours, outside of parts and inside of holes."""
+
+from camtool.planning.kinds import COMMON_KEYS, SELECTING_KEYS, WALL_KEYS, OperationKind
+
+PROFILE = OperationKind(
+    name="profile",
+    work="camtool.operations.profile.work:profile",
+    keys=(
+        *COMMON_KEYS,
+        *SELECTING_KEYS,
+        *WALL_KEYS,
+        "side",
+        "depth",
+        "breakthrough",
+        "step_down",
+        "last_pass",
+        "entry",
+        "lead_in",
+        "lead_out",
+        "overlap",
+        "start",
+        "tabs",
+        "corners",
+        "joins",
+        "mitre_limit",
+    ),
+    rank=1,
+    cuts="beside",
+    leaves_walls=True,
+)
