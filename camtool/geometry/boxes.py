@@ -65,16 +65,16 @@ class BoxIndex:
             level = np.concatenate([low, high], axis=1)
 
     def touching(self, boxes: Floats) -> tuple[Ints, Ints]:
-        """Rows (J,), (J,), in order, of boxes (B, 4) and of the index that have a point in
-        common."""
+        """Return the rows (J,), (J,), in order, of boxes (B, 4) and of the index that have a point
+        in common."""
         found = [one * self._count + other for one, other in self.pairs(boxes)]
         pairs = np.sort(np.concatenate([np.empty(0, dtype=np.int64), *found]))
         one, other = np.divmod(pairs, max(self._count, 1))
         return one, other
 
     def pairs(self, boxes: Floats) -> Iterator[tuple[Ints, Ints]]:
-        """The same in batches that bound the memory; rows of `boxes` never descend, those of the
-        index come in any order."""
+        """Yield the rows of boxes and of the index that have a point in common, in batches that
+        bound the memory; rows of `boxes` never descend, those of the index come in any order."""
         columns = np.ascontiguousarray(boxes.T)
         waiting = [(0, np.arange(len(boxes)), np.zeros(len(boxes), dtype=np.int64))]
         while waiting:
@@ -96,8 +96,9 @@ class BoxIndex:
 
 
 def box_pairs(boxes_a: Floats, boxes_b: Floats, *, reach_mm: float) -> Iterator[tuple[Ints, Ints]]:
-    """Rows (J,), (J,) of all boxes xmin, ymin, xmax, ymax no farther apart than `reach_mm`: by the
-    rows of `a`, and for each from left to right those of `b`, in batches that bound the memory."""
+    """Yield the rows (J,), (J,) of all boxes xmin, ymin, xmax, ymax no farther apart than
+    `reach_mm`, in batches that bound the memory: by the rows of `a`, and for each from left to
+    right those of `b`."""
     one, other = BoxIndex(boxes_b).touching(_widened(boxes_a, reach_mm))
     low = np.maximum(boxes_a[one, :2], boxes_b[other, :2])
     high = np.minimum(boxes_a[one, 2:], boxes_b[other, 2:])
@@ -110,8 +111,8 @@ def box_pairs(boxes_a: Floats, boxes_b: Floats, *, reach_mm: float) -> Iterator[
 
 
 def near_points(points: Floats, places: Floats, reach_mm: float | Floats) -> tuple[Ints, Ints]:
-    """Rows (J,), (J,), in order, of all points (P, 2) and places (K, 2) no farther apart than
-    `reach_mm`, which may differ from point to point (P,)."""
+    """Return the rows (J,), (J,), in order, of all points (P, 2) and places (K, 2) no farther
+    apart than `reach_mm`, which may differ from point to point (P,)."""
     around = _widened(np.hstack([points, points]), reach_mm)
     one, other = BoxIndex(np.hstack([places, places])).touching(around)
     way = points[one] - places[other]
@@ -120,8 +121,8 @@ def near_points(points: Floats, places: Floats, reach_mm: float | Floats) -> tup
 
 
 def _widened(boxes: Floats, reach_mm: float | Floats) -> Floats:
-    """Boxes wider by the reach all round, and by a last digit more, so that rounding leaves
-    nothing out."""
+    """Return the boxes grown by the reach on all sides, and by one more unit in the last place, so
+    that rounding excludes nothing."""
     reach = np.reshape(reach_mm, (-1, 1))
     low, high = boxes[:, :2] - reach, boxes[:, 2:] + reach
     return np.concatenate([np.nextafter(low, -np.inf), np.nextafter(high, np.inf)], axis=1)
@@ -153,7 +154,7 @@ def touching_boxes(
 
 
 def _looks(boxes: Floats) -> int:
-    """How many pairs of boxes a sweep along their first column looks at."""
+    """Count the pairs of boxes that a sweep along their first column compares."""
     begins = np.sort(boxes[:, 0])
     return int(np.searchsorted(begins, boxes[:, 2], side="right").sum()) - int(
         np.arange(len(boxes), dtype=np.int64).sum()
@@ -170,7 +171,7 @@ class Curves(Struct, frozen=True, eq=False):
 
     @classmethod
     def of(cls, segments: Segments, *, margin_mm: float = 0.0) -> Curves:
-        """The segments, with boxes that are wider by a margin all round."""
+        """Return the segments with boxes that are grown by a margin on all sides."""
         from camtool.kernels.offsets import curve_boxes, tree_of
 
         rows = curve_rows_of(segments)
@@ -193,7 +194,7 @@ def segment_tree(vertices: Floats, begin: Indices, end: Indices) -> SegmentTree:
 
 
 def curve_rows_of(segments: Segments) -> Floats:
-    """(K, 11) rows of camtool.kernels.offsets."""
+    """Return the segments as rows (K, 11) of camtool.kernels.offsets."""
     from camtool.kernels.offsets import curve_rows
 
     columns = (segments.start, segments.end, segments.bulge)
@@ -201,7 +202,7 @@ def curve_rows_of(segments: Segments) -> Floats:
 
 
 def moves_of(segments: Segments, heights: Floats) -> Moves:
-    """The segments, with the heights of their starts and ends (K, 2) mm, as
+    """Return the segments with the heights of their starts and ends (K, 2) mm, as
     `camtool.kernels.near` takes them."""
     from camtool.geometry.measure import segment_boxes
     from camtool.kernels import near as at

@@ -78,7 +78,7 @@ def chain(
     groups: Sequence[Hashable] | None = None,
     kinds: Kinds | None = None,
 ) -> Chained:
-    """Open paths joined where their ends meet exactly, then where free ends lie within `gap_mm`.
+    """Join open paths where their ends meet exactly, then where free ends lie within `gap_mm`.
 
     Paths of different groups (layers) are never joined; `kinds` says more than `groups` alone. A
     chain whose own ends meet becomes closed, unless nothing would lie inside (a line and its
@@ -110,7 +110,8 @@ def chain(
 
 
 def numbered(items: Sequence[Hashable] | None, count: int) -> Ints:
-    """(count,) a number for each different item, in order of first appearance; 0 for None."""
+    """Return a number (count,) for each different item, in order of first appearance; 0 for
+    None."""
     if items is None:
         return np.zeros(count, dtype=np.int64)
     numbers: dict[Hashable, int] = {}
@@ -118,15 +119,15 @@ def numbered(items: Sequence[Hashable] | None, count: int) -> Ints:
 
 
 def _each_alone(paths: Ints) -> tuple[tuple[int, ...], ...]:
-    """The members of chains of one path."""
+    """Return the members of chains that have one path each."""
     return tuple((index,) for index in paths.tolist())
 
 
 def _in_order(
     lines: Polylines, alone: Ints, lots: Sequence[Joined]
 ) -> tuple[Polylines, tuple[tuple[int, ...], ...]]:
-    """The paths that are joined to none and all chains, in the order of their first members; and
-    the members."""
+    """Return the paths that are joined to none and all chains, in the order of their first
+    members; and the members."""
     if not lots:
         return lines, _each_alone(alone)
     members = list(_each_alone(alone))
@@ -143,7 +144,7 @@ def _in_order(
 
 
 def _closed_gaps(lots: Sequence[Joined], layers: Sequence[str]) -> list[Gap]:
-    """The bridged gaps, in the order of the first members of their chains."""
+    """Return the bridged gaps, in the order of the first members of their chains."""
     found: list[tuple[int, Gap]] = []
     for lot in lots:
         paths = lot.chains.entries // 2
@@ -207,7 +208,7 @@ class Ends(Struct, frozen=True, eq=False):
 
     @classmethod
     def of(cls, lines: Polylines, group: Ints, style: Ints) -> Ends:
-        """The ends of all paths, those of closed ones too."""
+        """Return the ends of all paths, also those of closed ones."""
         vertices, first, last = lines.vertices, lines.offsets[:-1], lines.offsets[1:] - 1
         rows = np.column_stack([first, last]).ravel()
         inner = np.column_stack([first + 1, last - 1]).ravel()
@@ -241,7 +242,7 @@ class Joints(Struct, frozen=True, eq=False):
         members: Sequence[Sequence[int]],
         closed: Bools,
     ) -> tuple[Branch, ...]:
-        """The branches with their places, in the order of place, layer and size.
+        """Return the branches with their places, in the order of place, layer and size.
 
         `members` are the input paths of each result, `closed` says which results are rings.
         """
@@ -274,7 +275,7 @@ class Joints(Struct, frozen=True, eq=False):
 
 
 def joints(ends: Ends, reach: float) -> Joints:
-    """Which ends are joined, within `reach` and within their group (see the top)."""
+    """Choose the ends to be joined, within `reach` and within their group (see the top)."""
     joining = _Joining.of(ends)
     free = every = np.flatnonzero(np.repeat(ends.is_open, 2))
     alone = np.ones(len(joining.mates), dtype=np.bool_)
@@ -313,7 +314,7 @@ class _Joining(Struct, eq=False):
 
     @classmethod
     def of(cls, ends: Ends) -> _Joining:
-        """No joints yet."""
+        """Begin without any joint."""
         none = np.full(len(ends.points), -1, dtype=np.int64)
         segments, arcs = ends.weights[:, 0].copy(), ends.weights[:, 1].copy()
         return cls(ends, none, none.copy(), {}, np.arange(len(ends.group)), segments, arcs)
@@ -325,7 +326,7 @@ class _Joining(Struct, eq=False):
         return join(one, other, self.mates, self.above, self.segments, self.arcs)
 
     def possible(self, one: Ints, other: Ints) -> tuple[Ints, Ints]:
-        """The pairs without those of both ends of one path that would enclose nothing."""
+        """Return the pairs without those of both ends of one path that would enclose no area."""
         segments, arcs = self.ends.weights[one // 2].T
         apart = (one // 2 != other // 2) | (segments > 2) | ((segments == 2) & (arcs > 0))
         return one[apart], other[apart]
@@ -388,7 +389,7 @@ class _Joining(Struct, eq=False):
 
 
 def _bearable(points: Floats, reach: float) -> float:
-    """`reach`, or so much less that there are no more than MOST_PAIRS pairs."""
+    """Return `reach`, or a smaller distance within which there are at most MOST_PAIRS pairs."""
     while reach > POSITION_EPS_MM:
         cells = np.floor(points / reach).astype(np.int64)
         mixed = cells[:, 0] * _MIX + cells[:, 1]
@@ -403,7 +404,7 @@ _MIX = np.int64(0x9E3779B1)
 
 
 def _near(ends: Ends, free: Ints, reach: float) -> tuple[Ints, Ints]:
-    """The pairs of free ends within `reach` in one group, the lesser end first."""
+    """Return the pairs of free ends within `reach` in one group, the lesser end first."""
     from camtool.kernels.chaining import near_pairs
 
     points = ends.points[free]
@@ -421,13 +422,14 @@ _WIDER = 1.0 + 1e-9
 
 
 def _in_turn(one: Ints, other: Ints) -> tuple[Ints, Ints]:
-    """Pairs of different ends, sorted by their first ones."""
+    """Return pairs of different ends, sorted by their first ones."""
     order = np.argsort(one, kind="stable")
     return one[order], other[order]
 
 
 def _clusters(count: int, one: Ints, other: Ints) -> tuple[Ints, Ints]:
-    """For each end the least end of its cluster, and for each such end how many are in it."""
+    """Return the least end of each end's cluster, and for each such end the number of ends in
+    it."""
     from camtool.kernels.chaining import clusters
 
     label = clusters(count, one, other)
@@ -435,7 +437,7 @@ def _clusters(count: int, one: Ints, other: Ints) -> tuple[Ints, Ints]:
 
 
 def _ranked(ends: Ends, one: Ints, other: Ints) -> tuple[Ints, Ints]:
-    """Pairs at branches, the best first."""
+    """Return pairs at branches, the best first."""
     apart = np.hypot(*(ends.points[one] - ends.points[other]).T)
     with np.errstate(divide="ignore"):
         steps = np.log(apart / POSITION_EPS_MM) / math.log(CLASS_RATIO)
@@ -451,12 +453,13 @@ def _ranked(ends: Ends, one: Ints, other: Ints) -> tuple[Ints, Ints]:
 
 
 def wrapped(angle: Floats) -> Floats:
-    """Angles (…,) brought into −π ≤ angle < π."""
+    """Return angles (…,) brought into −π ≤ angle < π."""
     return np.asarray((angle + math.pi) % (2.0 * math.pi) - math.pi)
 
 
 def _places(ends: Ends, chosen: Ints) -> Ints:
-    """(2M,) the rank of the chosen ends by place, direction and the place of the other end."""
+    """Return the rank (2M,) of the chosen ends by place, direction and the place of the other
+    end."""
     x, y = (np.round(ends.points[chosen] / POSITION_EPS_MM)).T
     far_x, far_y = (np.round(ends.points[chosen ^ 1] / POSITION_EPS_MM)).T
     leaving = np.round(wrapped(ends.leaving[chosen]) / SAME_TURN_RAD)
@@ -466,7 +469,8 @@ def _places(ends: Ends, chosen: Ints) -> Ints:
 
 
 def _first_ends(ends: Ends, meeting: Ints, label: Ints) -> dict[int, tuple[int, int]]:
-    """For each branch, by its label, its first end by place and how many ends meet there."""
+    """Return, for each branch by its label, its first end by place and the number of ends that
+    meet there."""
     if not len(meeting):
         return {}
     rank = _places(ends, meeting)
@@ -477,7 +481,7 @@ def _first_ends(ends: Ends, meeting: Ints, label: Ints) -> dict[int, tuple[int, 
 
 
 def _split(ends: Ends, mates: Ints, node: Ints, reach: float) -> None:
-    """Rings that pass a branch twice are parted there, each walked from its first end by place."""
+    """Split rings that pass a branch twice there, each walked from its first end by place."""
     if not (node >= 0).any():
         return
     from camtool.kernels.chaining import split_loops, walk
@@ -520,14 +524,14 @@ class Chains(Struct, frozen=True, eq=False):
         return len(self.rings)
 
     def select(self, chosen: Bools, rings: Bools) -> Chains:
-        """The chosen chains (C,), as rings or not."""
+        """Return the chosen chains (C,), as rings or as open chains."""
         counts = np.diff(self.begins)
         rows = np.repeat(chosen, counts)
         begins = np.concatenate([[0], np.cumsum(counts[chosen])])
         return Chains(self.entries[rows], begins, rings[chosen])
 
     def apart(self) -> Chains:
-        """Each path as a chain of its own, travelled as it was drawn."""
+        """Return each path as a chain of its own, travelled as it was drawn."""
         count = len(self.entries)
         return Chains(self.entries & ~1, np.arange(count + 1), np.zeros(count, dtype=np.bool_))
 
@@ -543,7 +547,7 @@ class Joined(Struct, frozen=True, eq=False):
 
 
 def joined(lines: Polylines, chains: Chains) -> list[Joined]:
-    """The chains of these open paths as paths, in up to three lots (see the top)."""
+    """Return the chains of these open paths as paths, in up to three lots (see the top)."""
     done: list[Joined] = []
     left = chains
     for _ in range(2):
@@ -565,7 +569,7 @@ def joined(lines: Polylines, chains: Chains) -> list[Joined]:
 
 
 def _attempt(lines: Polylines, chains: Chains) -> tuple[Bools, Joined]:
-    """Which chains (C,) make a path, and those."""
+    """Return the mask (C,) of the chains that make a path, and these paths."""
     vertices, counts, gaps = _bridged(lines, chains)
     good = np.asarray(counts >= 2)
     path = np.repeat(np.arange(len(chains)), counts)
@@ -584,7 +588,7 @@ def _attempt(lines: Polylines, chains: Chains) -> tuple[Bools, Joined]:
 
 
 def _laid(lines: Polylines, chains: Chains) -> Joined:
-    """Paths as they are."""
+    """Return chains of one path each, unchanged."""
     none = np.empty(0, dtype=np.int64)
     return Joined(chains, lines.select(chains.entries // 2), none, np.empty((0, 2)), np.empty(0))
 
@@ -597,7 +601,8 @@ _Gaps = tuple[Ints, Floats, Floats]
 
 
 def _bridged(lines: Polylines, chains: Chains) -> tuple[Floats, Ints, _Gaps]:
-    """The vertices (N, 3) of all chains, how many each has (C,), and the gaps bridged."""
+    """Return the vertices (N, 3) of all chains, the number of vertices of each (C,), and the
+    bridged gaps."""
     rows, counts = _rows(lines, chains)
     vertices = lines.vertices[rows]
     turned = np.repeat(chains.entries & 1, counts) == 1
@@ -624,7 +629,8 @@ def _bridged(lines: Polylines, chains: Chains) -> tuple[Floats, Ints, _Gaps]:
 
 
 def _rows(lines: Polylines, chains: Chains) -> tuple[Ints, Ints]:
-    """The rows of all vertices in the order of travel, and how many each entry has."""
+    """Return the rows of all vertices in the order of travel, and the number of rows of each
+    entry."""
     path, turned = chains.entries // 2, chains.entries % 2
     counts = np.diff(lines.offsets)[path]
     begin = np.where(turned, lines.offsets[1:][path] - 1, lines.offsets[:-1][path])
@@ -635,7 +641,8 @@ def _rows(lines: Polylines, chains: Chains) -> tuple[Ints, Ints]:
 def _bridge(
     vertices: Floats, end: Ints, begin: Ints
 ) -> tuple[Bools, tuple[Bools, Floats, Floats]]:
-    """Moves where pieces begin to where the others end; which ends go, and the gaps.
+    """Move the starts of pieces to the ends of those before them; return the ends that are
+    dropped, and the gaps.
 
     The piece before ends at the row `end`, the one after begins at the row `begin`.
     """
@@ -653,7 +660,7 @@ def _bridge(
 
 
 def _without_short(vertices: Floats, owner: Ints, rings: Bools) -> tuple[Floats, Ints]:
-    """Vertices without those that moved lines have left on top of each other."""
+    """Return the vertices without those that moved lines have left on top of each other."""
     while len(vertices) > 1:
         counts = np.bincount(owner, minlength=len(rings))
         last = np.cumsum(counts) - 1
@@ -696,7 +703,8 @@ FINEST_CELLS = 16.0
 
 
 def open_gaps(ends: Ends, lengths: Floats, layers: Sequence[str], gap_mm: float) -> list[Gap]:
-    """For each open path, the nearest other open end of its group if it looks like a gap.
+    """Return, for each open path, the gap to the nearest other open end of its group if it looks
+    like one.
 
     `ends` are those of M paths with `lengths` (M,) mm and `layers`. Each pair of ends comes once;
     ends that lie on each other are no gap.
@@ -722,7 +730,7 @@ def open_gaps(ends: Ends, lengths: Floats, layers: Sequence[str], gap_mm: float)
 
 
 def _is_gap(ends: Ends, lengths: Floats, one: Ints, other: Ints, size: Floats) -> Bools:
-    """Which pairs of near ends look as if they were meant to meet."""
+    """Mask of the pairs of near ends that look as if they were meant to meet."""
     own = one // 2 == other // 2
     shorter = np.minimum(lengths[one // 2], lengths[other // 2])
     small = size <= np.where(own, OWN_GAP_SHARE, GAP_SHARE) * shorter
@@ -731,7 +739,8 @@ def _is_gap(ends: Ends, lengths: Floats, one: Ints, other: Ints, size: Floats) -
 
 
 def _spacing(points: Floats) -> float:
-    """The mean distance of the nearest one of points strewn over the box of these, mm.
+    """Estimate the mean distance of nearest neighbours for points scattered over the box of these,
+    mm.
 
     It is half the square root of the area that each has, and half the length on a line.
     """
@@ -741,7 +750,8 @@ def _spacing(points: Floats) -> float:
 
 
 def _nearest_ends(points: Floats, reach: float) -> tuple[Ints, Ints, Floats]:
-    """Rows (J,), the row of the nearest other point (J,) and how far it is (J,), within reach."""
+    """Return rows (J,), the row of the nearest other point (J,) and its distance (J,), within
+    reach."""
     from camtool.kernels.chaining import nearest_others
 
     spread = points.max(axis=0) - points.min(axis=0)

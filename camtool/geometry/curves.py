@@ -98,7 +98,7 @@ class BezierCurve(Struct, frozen=True, eq=False):
         return (len(self.control) - 1.0) * _bernstein(np.diff(self.control, axis=0), t)
 
     def pieces(self) -> Pieces:
-        """Itself."""
+        """The curve itself, a single piece."""
         rows = np.ones((1, len(self.control), 3))
         rows[0, :, :2] = self.control - self.control[0]
         return Pieces(rows, self.control[0], self.control[[0, -1]])
@@ -267,7 +267,7 @@ Pieced = BezierCurve | EllipseCurve | SplineCurve
 
 
 def _bernstein(control: Floats, t: Floats) -> Floats:
-    """de Casteljau for all t at once."""
+    """Evaluate Bézier curves by de Casteljau for all t at once."""
     rows = [np.broadcast_to(point, (len(t), 2)) for point in control]
     share = t[:, None]
     while len(rows) > 1:

@@ -61,18 +61,18 @@ class Approach(Struct, frozen=True):
 
 
 def points_to_segments(points: Floats, segments: Segments) -> Floats:
-    """(P, K) distance in mm of each point (P, 2) to each line or arc."""
+    """Return the distance (P, K) in mm of each point (P, 2) to each line or arc."""
     return _distance(points[:, None, :], _Rows.of(segments))
 
 
 def point_to_segment(points: Floats, segments: Segments) -> Floats:
-    """(K,) distance in mm of each point (K, 2) to the line or arc of the same row."""
+    """Return the distance (K,) in mm of each point (K, 2) to the line or arc of the same row."""
     return _distance(points, _Rows.of(segments))
 
 
 def nearest(points: Floats, segments: Segments) -> Nearest:
-    """The nearest segment to each point (P, 2), the first of several; ValueError when there are
-    no segments.
+    """Find the nearest segment to each point (P, 2), the first of several; ValueError when there
+    are no segments.
 
     A tree over the segments gives those that are hardly farther than the nearest one, and the
     formula above decides among them.
@@ -100,7 +100,8 @@ def nearest(points: Floats, segments: Segments) -> Nearest:
 
 
 def approach(a: Polyline, b: Polyline) -> Approach:
-    """Where two paths come nearest to each other, and how near; 0 where they cross."""
+    """Compute the least distance of two paths, and a point of one of them at that distance from
+    the other; 0 where they cross."""
     first, second = Segments.of(a), Segments.of(b)
     boxes, others = segment_boxes(first), segment_boxes(second)
     if len(a.vertices) * len(second) <= FEW_PAIRS:
@@ -119,7 +120,7 @@ def approach(a: Polyline, b: Polyline) -> Approach:
 
 
 def near_paths(lines: Polylines, others: Polylines, reach_mm: float) -> Iterator[tuple[int, int]]:
-    """Pairs of paths whose boxes come within `reach_mm` of each other."""
+    """Yield pairs of paths whose boxes come within `reach_mm` of each other."""
     one, other = (path_extents(each).transpose(0, 2, 1).reshape(-1, 4) for each in (lines, others))
     for rows, columns in box_pairs(one, other, reach_mm=reach_mm):
         yield from zip(rows.tolist(), columns.tolist(), strict=True)
@@ -131,7 +132,7 @@ def _approach(distance: Floats, points: Floats) -> Approach:
 
 
 def _box_distance(boxes: Floats, others: Floats) -> Floats:
-    """(N, M) distance of boxes (N, 4) and (M, 4)."""
+    """Return the distance (N, M) of boxes (N, 4) and (M, 4)."""
     low = np.maximum(boxes[:, None, :2], others[None, :, :2])
     high = np.minimum(boxes[:, None, 2:], others[None, :, 2:])
     apart = np.maximum(low - high, 0.0)
@@ -182,14 +183,14 @@ class _Rows(Struct, frozen=True, eq=False):
         return linear, self.four_b * _dot(a, b) + 2.0 * self.flat * _cross(self.d, a)
 
     def beside(self, points: Floats) -> Bools:
-        """True where the nearest point of the whole circle or line is within the segment."""
+        """True where the nearest point of the full circle or line lies within the segment."""
         after_a = _dot(points - self.a, self.tangent_a) >= 0.0
         before_b = _dot(points - self.b, self.tangent_b) <= 0.0
         return np.asarray(after_a & before_b)
 
 
 def _distance(points: Floats, rows: _Rows) -> Floats:
-    """Distance of points to segments; both are broadcast against each other."""
+    """Return the distance of points to segments; both are broadcast against each other."""
     to_a = np.hypot(points[..., 0] - rows.a[..., 0], points[..., 1] - rows.a[..., 1])
     to_b = np.hypot(points[..., 0] - rows.b[..., 0], points[..., 1] - rows.b[..., 1])
     middle = 0.5 * (rows.a + rows.b)

@@ -206,7 +206,7 @@ class Drawing:
 
     @cached_property
     def fit(self) -> FitError:
-        """How far the paths are from what was drawn."""
+        """The distance between the paths and what was drawn."""
         if not self.off_mm.any():
             return FitError()
         rows = segment_rows(self.paths)

@@ -103,7 +103,7 @@ def _layers(drawing: Drawing) -> dict[str, dict[str, int]]:
 
 
 def _times(names: Iterable[str]) -> dict[str, int]:
-    """How many of each, sorted by name."""
+    """Count equal names, sorted by name."""
     return dict(sorted(Counter(names).items()))
 
 
@@ -123,7 +123,7 @@ def _gaps(gaps: Iterable[Gap]) -> list[dict[str, Any]]:
 
 
 def _healing(drawing: Drawing) -> dict[str, Any]:
-    """What was corrected, and where the drawing leaves a choice or crosses itself."""
+    """Describe what was corrected, and where the drawing is ambiguous or crosses itself."""
     healed = drawing.healing
     return {
         "duplicates": {"count": healed.duplicates, "length_mm": healed.duplicates_mm},

@@ -97,7 +97,7 @@ def arc_vertices(centre: Floats, radius: float, start_rad: float, sweep_rad: flo
 
 
 def split_bulges(vertices: Floats, closed: bool) -> Floats:
-    """The same path with every arc of more than a half circle (|bulge| > 1) cut into two halves.
+    """Cut every arc of more than a half circle (|bulge| > 1) of a path into two halves.
 
     Vertices (n, 3), of an open path the last one without a segment; mm or any other unit.
     """
@@ -315,7 +315,8 @@ def _refine(
 
 
 def _too_coarse(nodes: _NodeColumns, rows: Ints, probes: Floats, tolerance_mm: float) -> Bools:
-    """Whether each step, of which some points (j, steps, 2) are given, must be halved."""
+    """Mask of the steps that must be halved, by points (j, steps, 2) of the curve within each
+    step."""
     from camtool.kernels.fits import step_errors
 
     error = step_errors(nodes.point, nodes.leave, nodes.arrive, rows, probes)
@@ -327,7 +328,7 @@ def _too_coarse(nodes: _NodeColumns, rows: Ints, probes: Floats, tolerance_mm: f
 
 
 def _merged(nodes: _NodeColumns) -> Nodes:
-    """Nodes at one position become one node, which is a corner when the tangents differ."""
+    """Merge the nodes at one position into one, which is a corner when the tangents differ."""
     gaps = np.hypot(*np.diff(nodes.point, axis=0).T)
     first = list(range(len(nodes.t)))
     if (gaps <= POSITION_EPS_MM).any():

@@ -86,7 +86,8 @@ def self_crossings(segments: Segments) -> Crossings:
 
 
 def meetings(segments: Segments, row_a: Ints, row_b: Ints) -> tuple[Crossings, Bools]:
-    """The common points of the rows a and b, pair by pair; and which of them cross, not touch."""
+    """Return the common points of the rows a and b, pair by pair; and the mask of those that
+    cross, not touch."""
     frames = Frames.of(segments)
     found = _meetings(frames, frames, row_a, row_b, POSITION_EPS_MM)
     return found, ~_touching(found, frames, POSITION_EPS_MM)
@@ -99,7 +100,8 @@ def _joined(parts: list[Crossings]) -> Crossings:
 
 
 def _meetings(a: Frames, b: Frames, row_a: Ints, row_b: Ints, eps: float) -> Crossings:
-    """The common points of row_a[j] of `a` and row_b[j] of `b`, end points before crossings."""
+    """Return the common points of row_a[j] of `a` and row_b[j] of `b`, end points before
+    crossings."""
     frames_a, frames_b = a[row_a], b[row_b]
     ends = [frames_a.start, frames_a.end, frames_b.start, frames_b.end]
     common = [
@@ -130,20 +132,21 @@ def _meetings(a: Frames, b: Frames, row_a: Ints, row_b: Ints, eps: float) -> Cro
 
 
 def _within(points: Floats, frames: Frames, eps: float) -> tuple[Bools, Floats]:
-    """Which points are on their segment, and how far along; no NaN is."""
+    """Return the mask of the points that lie on their segment, and their lengths along it; NaN is
+    never on it."""
     along = frames.along(points)
     inside = (along >= -eps) & (along <= frames.length + eps)
     return np.asarray(inside & (frames.gap(points) <= eps)), along
 
 
 def _fraction(along: Floats, length: Floats, eps: float) -> Floats:
-    """Fraction of the length, exactly 0 or 1 within `eps` of an end."""
+    """Return the fraction of the length, exactly 0 or 1 within `eps` of an end."""
     t = np.where(along <= eps, 0.0, along / length)
     return np.where(along >= length - eps, 1.0, t)
 
 
 def _common_points(a: Frames, b: Frames) -> tuple[Floats, Floats]:
-    """The two points (K, 2) that the whole curves share (see the top); NaN if none.
+    """Compute the two points (K, 2) that the full curves share (see the top); NaN if none.
 
     Where they miss each other, both are the point of the common line nearest to R: the caller
     measures how near that is.

@@ -188,7 +188,7 @@ class Frames(Struct, frozen=True, eq=False):
 
     @classmethod
     def of(cls, segments: Segments) -> Frames:
-        """One frame for each segment."""
+        """Return the frames of the segments, one for each."""
         chord = segments.end - segments.start
         size = np.hypot(chord[:, 0], chord[:, 1])
         unit = chord / size[:, None]
@@ -212,7 +212,7 @@ class Frames(Struct, frozen=True, eq=False):
         return Frames(*(column[rows] for column in astuple(self)))
 
     def tangent_at(self, t: Floats) -> Floats:
-        """(K, 2) unit tangent at the fraction t (K,) of each length."""
+        """Return the unit tangent (K, 2) at the fraction t (K,) of each length."""
         turn = t * self.sweep
         cosine, sine = np.cos(turn)[:, None], np.sin(turn)[:, None]
         return np.asarray(cosine * self.tangent + sine * self.normal)

@@ -56,7 +56,7 @@ class Trace(Struct, frozen=True, eq=False):
         return len(self.t)
 
     def rows(self, chosen: Ints | Bools) -> Trace:
-        """The chosen rows."""
+        """Return the chosen rows."""
         return Trace(*(column[chosen] for column in astuple(self)))
 
     @property
@@ -66,14 +66,14 @@ class Trace(Struct, frozen=True, eq=False):
 
 
 def concatenated(traces: list[Trace]) -> Trace:
-    """The rows of all, one trace after the other."""
+    """Return the rows of all traces, one trace after the other."""
     return Trace(*map(np.concatenate, zip(*map(astuple, traces), strict=True)))
 
 
 def discs_at(boundary: Boundary, element: Ints, t: Floats, guess: Ints | None = None) -> Trace:
-    """The largest disc that touches each of these places; `guess` (N, 2): elements that are
-    likely to be touched besides, which makes it quick. GeometryError where nothing ends a disc:
-    paths that lie on each other enclose no region there."""
+    """Compute the largest disc within the region that touches each of these places; `guess` (N,
+    2): elements that are likely to be touched besides, which makes it quick. GeometryError where
+    nothing ends a disc: paths that lie on each other enclose no region there."""
     from camtool.kernels.discs import largest_discs
 
     result, partner = np.empty((len(t), 4)), np.empty(len(t), dtype=np.int64)
@@ -93,7 +93,8 @@ def discs_at(boundary: Boundary, element: Ints, t: Floats, guess: Ints | None = 
 
 
 def medial_trace(region: Polylines, tolerance_mm: float) -> tuple[Boundary, Trace]:
-    """The trace of a region: closed paths, outer ones CCW, holes CW, that do not cross."""
+    """Compute the medial trace of a region: closed paths, outer ones CCW, holes CW, that do not
+    cross."""
     boundary = Boundary.of(region)
     element = np.repeat(np.arange(len(boundary)), FIRST_SAMPLES)
     t = np.tile(np.linspace(0.0, 1.0, FIRST_SAMPLES), len(boundary))
@@ -110,13 +111,13 @@ def medial_trace(region: Polylines, tolerance_mm: float) -> tuple[Boundary, Trac
 
 
 def _gaps(trace: Trace) -> Bools:
-    """(N,) true where the next row belongs to the same element."""
+    """Mask (N,) of the rows whose next row belongs to the same element."""
     return np.append(trace.element[1:] == trace.element[:-1], False)
 
 
 def _inserted(trace: Trace, more: Trace, is_open: Bools) -> tuple[Trace, Bools]:
-    """The trace with more rows, and its gaps that are open: those beside the new rows that
-    `is_open` names, but for gaps in which no number lies."""
+    """Return the trace with more rows, and its gaps that are open: those beside the new rows that
+    `is_open` names, except gaps too narrow for another number."""
     both = concatenated([trace, more])
     order = np.lexsort((both.t, both.element))
     both = both.rows(order)
@@ -129,8 +130,8 @@ def _inserted(trace: Trace, more: Trace, is_open: Bools) -> tuple[Trace, Bools]:
 def _refined(
     boundary: Boundary, trace: Trace, open_gaps: Bools, tolerance_mm: float
 ) -> tuple[Trace, Bools]:
-    """All open gaps once: halved, and open still where the curve left the chord; cut where the
-    partner changes."""
+    """Halve all open gaps once, or cut them where the partner changes; a halved gap stays open
+    while the curve deviates from the chord by more than the tolerance."""
     at = np.flatnonzero(open_gaps)
     middle = 0.5 * (trace.t[at] + trace.t[at + 1])
     halves = discs_at(boundary, trace.element[at], middle, _partners(trace, at))
@@ -147,13 +148,13 @@ def _refined(
 
 
 def _apart(discs: Floats, others: Floats) -> Floats:
-    """(N,) how far discs (N, 3) are from others, in the plane and in radius."""
+    """Return the distance (N,) of discs (N, 3) from others: in the plane plus in radius."""
     off = discs - others
     return np.asarray(np.hypot(off[:, 0], off[:, 1]) + np.abs(off[:, 2]))
 
 
 def _events(boundary: Boundary, trace: Trace, at: Ints) -> tuple[Trace, Trace]:
-    """Where the partner of row `at` ceases to be one: the last disc with it, and the next."""
+    """Return the last disc with the partner of row `at`, and the first disc with another one."""
     element, partner, guess = trace.element[at], trace.partner[at], _partners(trace, at)
     low, high = trace.t[at].copy(), trace.t[at + 1].copy()
     for _ in range(HALVINGS):
@@ -169,8 +170,8 @@ def _partners(trace: Trace, at: Ints) -> Ints:
 
 
 def off_chord(points: Floats, begin: Floats, end: Floats) -> Floats:
-    """(N,) how far points (N, 3) lie from the chords between begin and end (N, 3): the distance
-    in the plane and the difference of radii, added."""
+    """Return the distance (N,) of points (N, 3) from the chords between begin and end (N, 3): the
+    distance in the plane plus the difference of radii."""
     chord, arm = end - begin, points - begin
     square = (chord**2).sum(axis=1)
     part = np.clip((arm * chord).sum(axis=1) / np.where(square > 0.0, square, 1.0), 0.0, 1.0)

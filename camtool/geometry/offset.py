@@ -110,7 +110,7 @@ JOINS = ("round", "mitre", "sharp")
 def offset_shape(
     lines: Polylines, distance_mm: float, *, joins: str = "round", mitre_limit: float = 2.0
 ) -> Polylines:
-    """The boundary of a region shrunk by a distance in mm, or grown by one below 0.
+    """Compute the boundary of a region shrunk by a distance in mm, or grown by one below 0.
 
     The region lies on the left of its closed paths: outer ones run CCW, holes CW (`oriented`). So
     do those of the result. Islands merge, split and vanish. Loops come in the order of the first
@@ -131,8 +131,8 @@ def offset_shape(
 def offset_each(
     lines: Polylines, distance_mm: float, *, joins: str = "round", mitre_limit: float = 2.0
 ) -> tuple[Polylines, Ints]:
-    """The same for each closed path as a region of its own, whatever the others are; and the path
-    that each of the J loops is of (J,), ascending.
+    """Offset each closed path as a region of its own, independently of the others; return the
+    loops and the path that each of the J loops belongs to (J,), ascending.
 
     Paths that lie so far apart that their offsets cannot meet are offset together.
     """
@@ -157,7 +157,7 @@ def offset_each(
 
 
 def _asked(lines: Polylines, distance_mm: float, joins: str, mitre_limit: float) -> Offset | None:
-    """What is asked of closed paths, checked; None where they stay as they are."""
+    """Check a request to offset closed paths, and return it; None where they stay as they are."""
     if joins not in JOINS:
         raise OptionError(f"unknown joins {joins!r}", mend=f"use one of {', '.join(JOINS)}")
     if joins == "mitre" and not 1.0 <= mitre_limit < math.inf:
@@ -179,8 +179,8 @@ PATHS_AT_A_TIME = 64
 
 
 def _far_apart(boxes: Floats, reach_mm: float) -> Iterator[Ints]:
-    """Groups of rows of boxes (M, 4) no two of which come within twice the reach of each other;
-    those of a group in the order of the plane, so that neighbours are near in it."""
+    """Yield groups of rows of boxes (M, 4) no two of which come within twice the reach of each
+    other; those of a group in the order of the plane, so that neighbours are near in it."""
     order = hilbert_order(boxes[:, :2], boxes[:, 2:])
     wide = boxes + reach_mm * np.array([-1.0, -1.0, 1.0, 1.0])
     index, group = BoxIndex(wide), np.full(len(boxes), -1)
@@ -196,8 +196,8 @@ def _far_apart(boxes: Floats, reach_mm: float) -> Iterator[Ints]:
 
 
 def _moved(lines: Polylines, distance_mm: float, asked: Offset) -> tuple[Polylines, Ints]:
-    """The boundary of the region of closed paths moved, and the path that each loop (J,) mostly
-    begins along."""
+    """Return the boundary of the region of closed paths moved, and the path that each loop (J,)
+    mostly begins along."""
     if distance_mm < 0.0:
         moved, of = _left_of(lines_reversed(lines), asked)
         return lines_reversed(moved), of
@@ -213,7 +213,7 @@ class Offset(Struct, frozen=True):
 
 
 def _left_of(lines: Polylines, asked: Offset) -> tuple[Polylines, Ints]:
-    """The offset to the left, and the path that each of its loops (J,) begins along."""
+    """Return the offset to the left, and the path that each of its loops (J,) begins along."""
     stages = shape_stages(lines, asked)
     moved, kept = paths_of(stages.loops, stages.kept, stages.trimmed.elements)
     begins = np.array([loop[0] for loop in stages.loops], dtype=np.int64)[kept]
@@ -229,8 +229,8 @@ def _left_of(lines: Polylines, asked: Offset) -> tuple[Polylines, Ints]:
 
 
 def _turns_about(points: Floats, lines: Polylines) -> Ints:
-    """(P,) of points (P, 2): in how many closed paths that run CCW each lies, less those that run
-    CW."""
+    """Return the winding number (P,) of closed paths about points (P, 2): the paths around a point
+    that run CCW, less those that run CW."""
     turns = np.zeros(len(points), dtype=np.int64)
     signs = np.where(signed_areas(lines) > 0.0, 1, -1).tolist()
     for path, box, sign in zip(lines, path_extents(lines), signs, strict=True):
@@ -254,7 +254,7 @@ class Stages(Struct, frozen=True, eq=False):
 
 
 def shape_stages(lines: Polylines, asked: Offset) -> Stages:
-    """All stages of the offset of closed paths to the left."""
+    """Compute all stages of the offset of closed paths to the left."""
     raw = raw_offset(lines, asked)
     source = source_arrays(Segments.of(lines), raw.kites)
     trimmed = trim_raw(raw, source, asked)
@@ -274,8 +274,8 @@ Arrays = tuple[Floats, Floats, Floats, Floats]
 
 
 def source_arrays(source: Segments, kites: Floats) -> Arrays:
-    """What elements may not come near to, as the kernels take it: the rows of the source and their
-    tree, the kites (J, 10) of mitres and theirs."""
+    """Return the forbidden zone of elements as the kernels take it: the rows of the source and
+    their tree, the kites (J, 10) of mitres and theirs."""
     from camtool.kernels.offsets import kite_boxes, tree_of
 
     curves = Curves.of(source)
@@ -283,7 +283,8 @@ def source_arrays(source: Segments, kites: Floats) -> Arrays:
 
 
 def _met(lines: Polylines) -> Ints:
-    """(J, 2) the paths at each common point of closed paths, other than between neighbours."""
+    """Return the two paths (J, 2) at each common point of closed paths, except those of
+    neighbours."""
     from camtool.kernels.offsets import TA, TB, meetings_of, pairs_of
 
     segments = Segments.of(lines)
@@ -298,7 +299,7 @@ def _met(lines: Polylines) -> Ints:
 
 
 def _next_rows(lines: Polylines) -> Ints:
-    """The row of the segment that follows each one, of closed paths."""
+    """Return the row of the segment that follows each one, of closed paths."""
     following = np.arange(1, len(lines.vertices) + 1)
     following[lines.offsets[1:] - 1] = lines.offsets[:-1]
     return following
@@ -325,7 +326,7 @@ class Corners(Struct, frozen=True, eq=False):
 
     @classmethod
     def of(cls, frames: Frames, lines: Polylines) -> Corners:
-        """The corners of closed paths, whose segments `frames` describe."""
+        """Return the corners of closed paths, whose segments `frames` describe."""
         before = frames.tangent_at(np.ones(len(frames.length)))
         following = _next_rows(lines)
         after = frames.tangent[following]
@@ -334,13 +335,15 @@ class Corners(Struct, frozen=True, eq=False):
         return cls(frames.end, before, after, turn, np.argsort(following, kind="stable"))
 
     def outer(self, asked: Offset) -> Bools:
-        """(K,) true where the path turns right so much that the shifted segments part."""
+        """Mask (K,) of the corners where the path turns right so much that the shifted segments
+        part."""
         gap = 2.0 * asked.distance_mm * np.sin(-0.5 * self.turn)
         return np.asarray(gap > NODE_EPS_MM)
 
 
 def arcs_about(corners: Corners, rows: Ints, asked: Offset) -> tuple[Ints, Segments]:
-    """Arcs about the outer corners `rows`, and the corner of each; two where one is above π."""
+    """Return arcs about the outer corners `rows`, and the corner of each; two where one is above
+    π."""
     turn = corners.turn[rows]
     parts = np.where(turn < -np.pi, 2, 1)
     corner = np.repeat(rows, parts)
@@ -371,7 +374,7 @@ class Mitres(Struct, frozen=True, eq=False):
 
     @classmethod
     def about(cls, corners: Corners, rows: Ints, asked: Offset) -> Mitres:
-        """Mitres at the outer corners `rows`."""
+        """Return the mitres at the outer corners `rows`."""
         half, d = -0.5 * corners.turn[rows], asked.distance_mm
         is_cut = asked.limit * np.cos(half) < 1.0
         reach, cut = np.zeros(len(corners.turn)), np.zeros(len(corners.turn), dtype=np.bool_)
@@ -386,8 +389,9 @@ class Mitres(Struct, frozen=True, eq=False):
         return cls(reach, cut, np.column_stack(columns))
 
     def lines(self, corners: Corners, is_arc: Bools, asked: Offset) -> tuple[Ints, Segments]:
-        """The lines about the corners that are not parts of shifted lines, and the corner of
-        each: on from an arc, across where the mitre is cut off, on to an arc.
+        """Return the lines about the corners that are not parts of shifted lines, and the corner
+        of each: on from an arc, across where the mitre is cut off, on to an arc. `is_arc` (K, 2)
+        says whether the segments before and after each corner are arcs.
 
         `is_arc` (K, 2) says whether the segments before and after each corner are arcs.
         """
@@ -420,7 +424,8 @@ class RawOffset(Struct, frozen=True, eq=False):
 
 
 def raw_offset(lines: Polylines, asked: Offset) -> RawOffset:
-    """All of the offset to the left of closed paths, and much that is too near to them.
+    """Compute the raw offset to the left of closed paths: all of the offset, and much that is too
+    near to them.
 
     An arc that bends left with a radius up to the distance has nothing there: every point beyond
     its centre is nearer to another of its points. Inner corners need no join: the elements
@@ -442,7 +447,8 @@ def raw_offset(lines: Polylines, asked: Offset) -> RawOffset:
 def _shifted(
     segments: Segments, frames: Frames, corners: Corners, mitres: Mitres, asked: Offset
 ) -> tuple[Ints, Segments]:
-    """The segments at the distance, and the row of each; lines go on to the tips of mitres."""
+    """Return the segments at the distance, and the row of each; lines go on to the tips of
+    mitres."""
     start = segments.start + asked.distance_mm * frames.normal
     end = segments.end + asked.distance_mm * turned(corners.before)
     left_over = 1.0 - asked.distance_mm * frames.curvature
@@ -456,7 +462,7 @@ def _shifted(
 
 
 def _in_order(sources: list[Ints], parts: list[Segments], kites: Floats) -> RawOffset:
-    """Shifted segments and then joins, by their source."""
+    """Merge shifted segments and then joins, by their source."""
     source = np.concatenate(sources)
     order = np.argsort(source, kind="stable")
     elements = Segments.between(
@@ -475,7 +481,7 @@ cut are judged invalid later."""
 
 
 def trim_raw(raw: RawOffset, source: Arrays, asked: Offset) -> RawOffset:
-    """The raw offset without what is surely too near at both ends of each element.
+    """Remove from the raw offset what is surely too near at both ends of each element.
 
     What goes could never be kept, and what is kept is not cut by it: this only saves cuts, which
     would grow with the square of the number of elements where the distance is large against them.
@@ -491,7 +497,8 @@ def trim_raw(raw: RawOffset, source: Arrays, asked: Offset) -> RawOffset:
 
 
 def _between(elements: Segments, low: Floats, high: Floats) -> Segments:
-    """The part of each element between two fractions; elements that are whole stay the same."""
+    """Return the part of each element between two fractions; elements that are whole stay the
+    same."""
     cut = np.flatnonzero((low != 0.0) | (high != 1.0))
     start, end, bulge = elements.start.copy(), elements.end.copy(), elements.bulge.copy()
     start[cut] = point_at(elements, cut, low[cut])
@@ -521,7 +528,7 @@ class Slices(Struct, frozen=True, eq=False):
         return len(self.element)
 
     def __getitem__(self, rows: Bools | Ints) -> Slices:
-        """The chosen slices; the nodes stay."""
+        """Return the chosen slices; the nodes stay."""
         return Slices(
             self.element[rows],
             self.t0[rows],
@@ -543,7 +550,7 @@ class Slices(Struct, frozen=True, eq=False):
 
 
 def slice_elements(elements: Segments, others: Segments | None) -> Slices:
-    """The elements cut at all meetings with each other and with `others`."""
+    """Cut the elements at all meetings with each other and with `others`."""
     from camtool.kernels.offsets import TA, TB, X, Y, meetings_of, pairs_of
 
     eps = NODE_EPS_MM
@@ -562,7 +569,7 @@ def slice_elements(elements: Segments, others: Segments | None) -> Slices:
 
 
 def _cut(elements: Segments, rows: Ints, found: Floats) -> Slices:
-    """The elements cut at `found` (J, 3), the fraction and the place on the element rows[j]."""
+    """Cut the elements at `found` (J, 3), the fraction and the place on the element rows[j]."""
     from camtool.kernels.offsets import in_order
 
     count = len(elements)
@@ -580,7 +587,8 @@ def _cut(elements: Segments, rows: Ints, found: Floats) -> Slices:
 
 
 def merge_points(points: Floats, eps_mm: float) -> tuple[Ints, Floats]:
-    """Node (P,) of each point (P, 2), and the nodes (N, 2): the first point of each group.
+    """Return the node (P,) of each point (P, 2), and the nodes (N, 2): the first point of each
+    group.
 
     Points within `eps_mm` share a node, and so do chains of such points.
     """
@@ -592,7 +600,8 @@ def merge_points(points: Floats, eps_mm: float) -> tuple[Ints, Floats]:
 
 
 def valid_slices(slices: Slices, elements: Segments, source: Arrays, asked: Offset) -> Bools:
-    """(S,) true where no measured point is too near to the source, or within a mitre.
+    """Mask (S,) of the slices of which no measured point is too near to the source, or within a
+    mitre.
 
     Too near is what falls short of the distance, or is deeper in a kite, by VALIDITY_EPS_MM.
     The raw offset changes between valid and invalid only where it meets itself, so that one point
@@ -609,7 +618,7 @@ def valid_slices(slices: Slices, elements: Segments, source: Arrays, asked: Offs
 
 
 def without_doubles(slices: Slices, elements: Segments) -> Slices:
-    """The slices without repetitions, and without pairs that run to and fro along each other.
+    """Remove repeated slices, and pairs that run to and fro along each other.
 
     Such a pair encloses nothing: it is where the offset falls apart, or collapses to a line.
     """
@@ -621,14 +630,14 @@ def without_doubles(slices: Slices, elements: Segments) -> Slices:
 
 
 def without_dead_ends(slices: Slices) -> Slices:
-    """The slices that others lead to and lead on from."""
+    """Keep the slices that others lead to and lead on from."""
     from camtool.kernels.offsets import leading_on
 
     return slices[leading_on(*slices.ends)]
 
 
 def trace_loops(slices: Slices, elements: Segments) -> list[Ints]:
-    """Rows of the slices of each loop, in order; no loop passes a node twice.
+    """Return the rows of the slices of each loop, in order; no loop passes a node twice.
 
     At a node where several slices leave, the leftmost one is taken: the region that is far
     enough from the source is on the left, and so it falls into parts that only touch. Each loop
@@ -643,8 +652,8 @@ def trace_loops(slices: Slices, elements: Segments) -> list[Ints]:
 
 
 def paths_of(loops: list[Ints], slices: Slices, elements: Segments) -> tuple[Polylines, Ints]:
-    """Clean closed paths of loops of slices, and the loop of each; slices of one element become
-    one.
+    """Return clean closed paths of loops of slices, and the loop of each; slices of one element
+    become one.
 
     Segments up to POSITION_EPS_MM go. A path of which nothing is left goes, and so does one whose
     mean width, area over half the length, is no more than that.

@@ -42,7 +42,8 @@ _Spans = list[tuple[float, float]]
 
 
 def without_overlaps(lines: Polylines, groups: Ints, within_mm: float) -> Unlapped:
-    """The paths without what lies twice, within `groups` (M,) numbers; see the top.
+    """Remove what lies twice, within `groups` (M,) numbers; see the top. What is shorter than
+    `within_mm` is left out with the overlap beside it.
 
     What is shorter than `within_mm` is left out with the overlap beside it.
     """
@@ -73,7 +74,7 @@ def without_overlaps(lines: Polylines, groups: Ints, within_mm: float) -> Unlapp
 
 
 def _may_be_loose(lines: Polylines) -> Bools:
-    """(M,) the open paths of a single line, or of arcs alone."""
+    """Mask (M,) of the open paths that are a single line, or arcs alone."""
     counts = np.diff(lines.offsets) - 1
     arcs = np.searchsorted(lines.offsets, np.flatnonzero(lines.vertices[:, 2]), side="right") - 1
     of_arcs = np.bincount(arcs, minlength=len(lines)) == counts
@@ -81,7 +82,7 @@ def _may_be_loose(lines: Polylines) -> Bools:
 
 
 def _intervals(lines: Polylines, groups: Ints, within: float) -> Intervals:
-    """One interval for each loose path, and one for each segment of the others."""
+    """Return an interval for each loose path, and for each segment of the others."""
     segments = Segments.of(lines)
     counts = np.bincount(segments.path, minlength=len(lines))
     first = np.cumsum(counts) - counts
@@ -120,7 +121,7 @@ def _intervals(lines: Polylines, groups: Ints, within: float) -> Intervals:
 
 
 def _left(of: Intervals, found: Covers, within: float) -> dict[int, _Spans]:
-    """For each loose interval that is covered by what stays, the spans of it that are left."""
+    """Return the remaining spans of each loose interval that is covered by what stays."""
     rank = _ranks(of, np.unique(np.concatenate([found.a, found.b])))
     # A loose interval yields to what is not loose, and to loose ones that rank before it.
     yields = ~of.loose[found.b] | (rank[found.b] < rank[found.a])
@@ -145,7 +146,8 @@ def _left(of: Intervals, found: Covers, within: float) -> dict[int, _Spans]:
 
 
 def _ranks(of: Intervals, rows: Ints) -> Ints:
-    """(K,) the rank of each: the longest first, then by place, whatever was drawn first."""
+    """Return the rank (K,) of each interval: the longest first, then by place, independent of the
+    order in which they were drawn."""
     of_line = of.start + 0.5 * of.length[:, None] * of.direction
     middle = np.where(np.isnan(of.centre), of_line, of.centre)
     low = np.where(np.isnan(of.low), 0.0, np.mod(of.low, 2.0 * math.pi))
@@ -157,7 +159,7 @@ def _ranks(of: Intervals, rows: Ints) -> Ints:
 
 
 def _cut(spans: _Spans, low: float, high: float, within: float) -> _Spans:
-    """The spans without low … high; crumbs no longer than `within` go too."""
+    """Return the spans without low … high; crumbs no longer than `within` go too."""
     if high <= low:
         return spans
     cut: _Spans = []
@@ -171,7 +173,7 @@ def _cut(spans: _Spans, low: float, high: float, within: float) -> _Spans:
 
 
 def _part(lines: Polylines, of: Intervals, row: int, span: tuple[float, float]) -> Polylines:
-    """A span of a loose interval as a path that runs as the interval was drawn."""
+    """Return a span of a loose interval as a path that runs as the interval was drawn."""
     path = lines[int(of.path[row])].vertices
     begin, end = span
     if math.isnan(of.radius[row]):
@@ -197,7 +199,7 @@ def _part(lines: Polylines, of: Intervals, row: int, span: tuple[float, float]) 
 
 
 def _together(parts: list[Polylines]) -> Polylines:
-    """All paths of all parts, in order."""
+    """Return all paths of all parts, in order."""
     counts = np.concatenate([np.diff(part.offsets) for part in parts])
     return Polylines(
         np.concatenate([part.vertices for part in parts]),
@@ -259,12 +261,12 @@ class Covers(Struct, frozen=True, eq=False):
     sense: Floats
 
     def __getitem__(self, rows: Bools) -> Covers:
-        """The chosen rows."""
+        """Return the chosen rows."""
         return Covers(*(column[rows] for column in astuple(self)))
 
 
 def covers(all_of: Intervals, within_mm: float) -> Covers:
-    """Every interval that covers part of a loose one of another path of its group."""
+    """Find every interval that covers part of a loose one of another path of its group."""
     found: list[Covers] = []
     count = 0
     for part in chain(_on_lines(all_of, within_mm), _on_circles(all_of, within_mm)):
@@ -303,7 +305,7 @@ def _level_boxes(of: Intervals, rows: Ints, angle: float, margin: float) -> Floa
 
 
 def _shared_line(of: Intervals, a: Ints, b: Ints, within: float) -> Covers:
-    """What the lines a lie on the lines b, pair by pair.
+    """Compute the stretch that each line a has in common with the line b of the same row.
 
     Along a, the distance of b's line is linear: it is largest at the ends of what they share.
     """
@@ -343,7 +345,8 @@ def _on_circles(of: Intervals, within_mm: float) -> Iterator[Covers]:
 
 
 def _shared_circle(of: Intervals, a: Ints, b: Ints, within: float) -> Iterator[Covers]:
-    """What arcs a lie on arcs b: b may cover a's beginning and its end, from two turns."""
+    """Yield the stretches that each arc a has in common with the arc b of the same row: b may
+    cover a's beginning and its end, from two turns."""
     radius, turn = of.radius[a], 2.0 * np.pi
     ahead = np.mod(of.low[b] - of.low[a], turn)
     for shift in (ahead * radius, (ahead - turn) * radius):

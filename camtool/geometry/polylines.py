@@ -56,14 +56,14 @@ class Polyline:
 
     @classmethod
     def _trusted(cls, vertices: Floats, closed: bool) -> Polyline:
-        """Vertices that were checked before, read-only."""
+        """Wrap vertices that were checked before, read-only."""
         path = object.__new__(cls)
         object.__setattr__(path, "vertices", vertices)
         object.__setattr__(path, "closed", closed)
         return path
 
     def __len__(self) -> int:
-        """How many segments."""
+        """The number of segments."""
         return len(self.vertices) - (0 if self.closed else 1)
 
     @property
@@ -99,7 +99,7 @@ class Polylines:
 
     @classmethod
     def of(cls, paths: Iterable[Polyline]) -> Polylines:
-        """Columns from single paths, which were checked when they were made."""
+        """Return columns of single paths, which were checked when they were made."""
         items = list(paths)
         counts = np.array([0] + [len(path.vertices) for path in items], dtype=np.int64)
         vertices = [path.vertices for path in items] or [np.empty((0, 3))]
@@ -112,7 +112,7 @@ class Polylines:
 
     @classmethod
     def joined(cls, parts: Sequence[Polylines]) -> Polylines:
-        """The paths of all parts, one part after the other; the very columns where only one part
+        """Return the paths of all parts, one part after the other; the part itself where only one
         has any."""
         parts = [part for part in parts if len(part)]
         if len(parts) == 1:
@@ -125,7 +125,7 @@ class Polylines:
         )
 
     def __len__(self) -> int:
-        """How many paths."""
+        """The number of paths."""
         return len(self.closed)
 
     def __getitem__(self, index: int) -> Polyline:
@@ -141,7 +141,7 @@ class Polylines:
             yield Polyline._trusted(self.vertices[begin:end], is_closed)
 
     def select(self, indices: Iterable[int] | Ints) -> Polylines:
-        """The paths of these indices, in this order, the very columns where these are all;
+        """Return the paths of these indices, in this order; self if every path is selected.
         IndexError for one that is not there."""
         if not isinstance(indices, np.ndarray):
             indices = np.fromiter((int(index) for index in indices), dtype=np.int64)
@@ -159,7 +159,7 @@ class Polylines:
 
     @classmethod
     def _trusted(cls, vertices: Floats, offsets: Ints, closed: Bools) -> Polylines:
-        """Columns that were checked before; they become read-only."""
+        """Wrap columns that were checked before; they become read-only."""
         lines = object.__new__(cls)
         for name, column in (("vertices", vertices), ("offsets", offsets), ("closed", closed)):
             column.flags.writeable = False
@@ -168,14 +168,15 @@ class Polylines:
 
 
 def next_vertices(offsets: Ints) -> Ints:
-    """(N,) the vertex behind each one of the paths with these offsets: of the last the first."""
+    """Return the vertex (N,) that follows each one of the paths with these offsets: the first one
+    follows the last."""
     following = np.arange(1, offsets[-1] + 1)
     following[offsets[1:] - 1] = offsets[:-1]
     return following
 
 
 def segment_rows(lines: Polylines) -> Ints:
-    """(K,) the vertex that each segment leaves, in the order of `Segments.of`."""
+    """Return the vertex (K,) that each segment leaves, in the order of `Segments.of`."""
     keep = np.ones(len(lines.vertices), dtype=np.bool_)
     keep[lines.offsets[1:][~lines.closed] - 1] = False
     return np.flatnonzero(keep)
@@ -201,21 +202,21 @@ class Segments(Struct, frozen=True, eq=False, dict=True):
 
     @classmethod
     def of(cls, lines: Polyline | Polylines) -> Segments:
-        """All segments of the paths, in order."""
+        """Return all segments of the paths, in order."""
         if isinstance(lines, Polyline):
             lines = Polylines.of([lines])
         return cls.leaving(lines, segment_rows(lines))
 
     @classmethod
     def lots(cls, lines: Polylines) -> Iterator[Segments]:
-        """The same in lots of SEGMENTS_AT_ONCE."""
+        """Yield all segments of the paths, in order, at most SEGMENTS_AT_ONCE at a time."""
         rows = segment_rows(lines)
         for first in range(0, len(rows), SEGMENTS_AT_ONCE):
             yield cls.leaving(lines, rows[first : first + SEGMENTS_AT_ONCE])
 
     @classmethod
     def leaving(cls, lines: Polylines, rows: Ints) -> Segments:
-        """The segments that leave these vertices (K,), which are no ends of open paths."""
+        """Return the segments that leave these vertices (K,), which are no ends of open paths."""
         vertices, offsets = lines.vertices, lines.offsets
         path = np.searchsorted(offsets, rows, side="right") - 1
         following = rows + 1
@@ -229,24 +230,24 @@ class Segments(Struct, frozen=True, eq=False, dict=True):
     def between(
         cls, start: Floats, end: Floats, bulge: Floats, path: Ints | None = None
     ) -> Segments:
-        """Segments from their end points (K, 2) and bulges (K,)."""
+        """Return segments from their end points (K, 2) and bulges (K,)."""
         return cls(start, end, bulge, np.zeros(len(bulge), np.int64) if path is None else path)
 
     def __len__(self) -> int:
         return len(self.bulge)
 
     def __getitem__(self, rows: Bools | Ints | slice) -> Segments:
-        """The chosen rows."""
+        """Return the chosen rows."""
         return Segments(self.start[rows], self.end[rows], self.bulge[rows], self.path[rows])
 
     @property
     def is_arc(self) -> Bools:
-        """(K,) true where the row is an arc."""
+        """Mask (K,) of the rows that are arcs."""
         return np.asarray(self.bulge != 0.0)
 
     @cached_property
     def centre(self) -> Floats:
-        """(K, 2) mm."""
+        """Centres (K, 2) of arcs, mm; NaN for lines."""
         chord, safe = self.end - self.start, np.where(self.is_arc, self.bulge, 1.0)
         turned = np.column_stack([-chord[:, 1], chord[:, 0]])
         middle = 0.5 * (self.start + self.end) + ((1.0 - safe**2) / (4.0 * safe))[:, None] * turned
@@ -254,26 +255,26 @@ class Segments(Struct, frozen=True, eq=False, dict=True):
 
     @cached_property
     def radius(self) -> Floats:
-        """(K,) mm."""
+        """Radii (K,) of arcs, mm; infinite for lines."""
         chord, safe = self.end - self.start, np.where(self.is_arc, self.bulge, 1.0)
         length = np.hypot(chord[:, 0], chord[:, 1])
         return np.where(self.is_arc, length * (1.0 + safe**2) / (4.0 * np.abs(safe)), np.inf)
 
     @cached_property
     def sweep(self) -> Floats:
-        """(K,) rad."""
+        """Signed sweeps (K,), rad; 0 for lines."""
         return np.asarray(4.0 * np.arctan(self.bulge))
 
     @cached_property
     def start_angle(self) -> Floats:
-        """(K,) rad."""
+        """Directions (K,) from the centre to the start, rad; NaN for lines."""
         spoke = self.start - self.centre
         return np.asarray(np.arctan2(spoke[:, 1], spoke[:, 0]))
 
 
 def _checked(vertices: Floats, offsets: Ints, closed: Bools | list[bool]) -> Floats:
-    """The vertices, read-only and normalised, a copy unless nobody can change them any more and
-    nothing is to be normalised; GeometryError when they are no polylines."""
+    """Return the vertices, read-only and normalised, a copy unless they are read-only and normal
+    already; GeometryError when they are no polylines."""
     array = np.asarray(vertices, dtype=np.float64)
     is_own = array is vertices and array.flags.owndata and not array.flags.writeable
     if not is_own:
@@ -308,13 +309,13 @@ def _checked(vertices: Floats, offsets: Ints, closed: Bools | list[bool]) -> Flo
 
 
 def _is_short(segments: Segments) -> Bools:
-    """(K,) whether both ends of a segment are one position."""
+    """Mask (K,) of the segments whose ends are equal positions."""
     chord = segments.end - segments.start
     return np.asarray(np.hypot(chord[:, 0], chord[:, 1]) <= POSITION_EPS_MM)
 
 
 def _refuse(bad: Bools, message: str, offsets: Ints) -> None:
-    """GeometryError with path and vertex of the first bad row, if there is one."""
+    """Raise GeometryError with path and vertex of the first bad row, if there is one."""
     if not bad.any():
         return
     row = int(np.argmax(bad))
@@ -326,7 +327,7 @@ def _refuse(bad: Bools, message: str, offsets: Ints) -> None:
 
 
 def reverse(p: Polyline) -> Polyline:
-    """The same path travelled backwards; a closed one still begins at its first vertex."""
+    """Return the path travelled backwards; a closed one still begins at its first vertex."""
     count = len(p.vertices)
     order = np.arange(count)[::-1]
     if p.closed:
@@ -338,7 +339,8 @@ def reverse(p: Polyline) -> Polyline:
 
 
 def lines_reversed(lines: Polylines, which: Bools | None = None) -> Polylines:
-    """Every path (or those of `which` (M,)) travelled backwards, as `reverse` does."""
+    """Return the paths with all (or those of `which` (M,)) travelled backwards, as `reverse`
+    does."""
     if which is not None and not which.any():
         return lines
     counts = np.diff(lines.offsets)
@@ -356,7 +358,7 @@ def lines_reversed(lines: Polylines, which: Bools | None = None) -> Polylines:
 
 
 def rotated(p: Polyline, angle_rad: float) -> Polyline:
-    """The path turned about (0, 0), CCW positive."""
+    """Return the path turned about (0, 0), CCW positive."""
     cosine, sine = math.cos(angle_rad), math.sin(angle_rad)
     x, y, bulge = p.vertices.T
     turned = np.column_stack([cosine * x - sine * y, sine * x + cosine * y, bulge])
@@ -364,14 +366,15 @@ def rotated(p: Polyline, angle_rad: float) -> Polyline:
 
 
 def rolled(p: Polyline, start_index: int) -> Polyline:
-    """A closed path begun at another of its vertices; GeometryError for an open one."""
+    """Return a closed path begun at another of its vertices; GeometryError for an open one."""
     if not p.closed:
         raise GeometryError("an open path can only begin at an end")
     return Polyline(np.roll(p.vertices, -start_index, axis=0), True)
 
 
 def lines_rolled(lines: Polylines, begins: Ints) -> Polylines:
-    """Paths begun at these of their vertices (M,), as `rolled` does; 0 for open ones."""
+    """Return the paths begun at these of their vertices (M,), as `rolled` does; 0 for open
+    ones."""
     if not (lines.closed | (begins == 0)).all():
         raise GeometryError("an open path can only begin at an end")
     if not begins.any():
@@ -390,7 +393,8 @@ def lines_rolled(lines: Polylines, begins: Ints) -> Polylines:
 
 
 def without_repeats(vertices: Floats, counts: Ints, closed: Bools) -> tuple[Bools, Ints]:
-    """The vertices (N,) to keep, and how many points each path repeats (M,).
+    """Return the mask (N,) of the vertices to keep, and the number of points that each path
+    repeats (M,).
 
     `vertices` (N, 3) of x, y, bulge, mm, path after path, `counts` (M,) of each. A vertex is kept
     when it lies off the one kept before it; its bulge becomes, in place, that of the last vertex
@@ -413,14 +417,15 @@ def without_repeats(vertices: Floats, counts: Ints, closed: Bools) -> tuple[Bool
 
 
 def encloses(vertices: Floats, owner: Ints, left: Ints) -> Bools:
-    """(M,) false for paths of two vertices (of `left` (M,)) without a bulge: there and back along
-    one line encloses nothing; it is that line, once. `owner` (N,) names each vertex's path."""
+    """Mask (M,), false for paths of two vertices (of `left` (M,)) without a bulge: there and
+    back along one line encloses nothing; it is that line, once. `owner` (N,) names each
+    vertex's path."""
     bent = np.bincount(owner, weights=vertices[:, 2] != 0.0, minlength=len(left))
     return np.asarray((left != 2) | (bent != 0.0))
 
 
 def _leave_out(path: Floats, keep: Bools) -> None:
-    """Take vertices of one path out of `keep`, which is false for those on the one before them:
+    """Remove vertices of one path from `keep`, which is false for those on the one before them:
     those on the last one that is kept, which takes the bulge of the last of these."""
     done = 0
     for row in np.flatnonzero(~keep).tolist():
@@ -437,7 +442,7 @@ def _leave_out(path: Floats, keep: Bools) -> None:
 
 
 def _drop_closing(vertices: Floats, keep: Bools, owner: Ints, first: Ints, closed: Bools) -> None:
-    """Takes vertices at the end of closed paths out of `keep` that lie on their first one."""
+    """Remove vertices at the end of closed paths from `keep` that lie on their first one."""
     waiting = closed.copy()
     while waiting.any():
         rows = np.flatnonzero(keep)

@@ -44,7 +44,7 @@ HALF_SLACK = 1e-3
 
 
 def recognise_arcs(path: Polyline, tolerance_mm: float) -> tuple[Polyline, int]:
-    """The path with runs of chords on one circle replaced by arcs, and how many arcs were found.
+    """Replace runs of chords on one circle by arcs; return the path, and the number of arcs found.
 
     Each point that an arc replaces lies within `tolerance_mm` of it; existing arcs and all other
     lines stay. An arc of more than a half circle counts once, though it is written as two; so
@@ -70,8 +70,8 @@ def recognise_arcs(path: Polyline, tolerance_mm: float) -> tuple[Polyline, int]:
 
 
 def rounding_noise(points: Floats) -> float:
-    """How far rounding to decimals has moved the points, mm: from the fewest decimals that say
-    all of them, `NOISE_MM` when none of `DECIMALS` do."""
+    """Estimate how far rounding to decimals has moved the points, mm: from the fewest decimals
+    with which all of them can be written, `NOISE_MM` when none of `DECIMALS` suffice."""
     for decimals in DECIMALS:
         units = points * 10.0**decimals
         if np.abs(units - np.round(units)).max() <= GRID_SHARE:
@@ -82,7 +82,7 @@ def rounding_noise(points: Floats) -> float:
 def _replaced(
     vertices: Floats, noise: float, tolerance_mm: float
 ) -> tuple[Floats, list[tuple[int, int]]]:
-    """The open path with its arcs, and the first and last vertex of each before."""
+    """Return the open path with its arcs, and the first and last vertex of each before."""
     from camtool.kernels.fits import MIN_POINTS, find_runs, furthest_off
 
     keep = np.ones(len(vertices), dtype=np.bool_)
@@ -118,15 +118,15 @@ def _replaced(
 
 
 def _line_runs(vertices: Floats) -> list[tuple[int, int]]:
-    """First and last vertex of each run of lines without an arc between."""
+    """Return the first and last vertex of each run of lines without an arc between."""
     straight: Bools = np.concatenate([[False], vertices[:-1, 2] == 0.0, [False]])
     edges = np.flatnonzero(np.diff(straight.astype(np.int8)))
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def _arcs(start: Floats, end: Floats, circle: Floats) -> Iterator[Floats]:
-    """Vertices of the arc about `circle` (centre, radius, sweep) from start to end: two rows, or
-    three with a point in its middle when it is more than a half circle."""
+    """Yield the vertices of the arc about `circle` (centre, radius, sweep) from start to end: two
+    rows, or three with a point in its middle when it is more than a half circle."""
     centre, radius, sweep = circle[:2], float(circle[2]), float(circle[3])
     turn = math.copysign(1.0, sweep)
     if np.array_equal(start, end):
@@ -145,7 +145,7 @@ def _arcs(start: Floats, end: Floats, circle: Floats) -> Iterator[Floats]:
 
 
 def _whole(rows: Floats) -> bool:
-    """Whether a closed path became one circle of two halves."""
+    """True if a closed path became one circle of two halves."""
     return len(rows) == 3 and bool((np.abs(rows[:2, 2]) == 1.0).all())
 
 
@@ -166,7 +166,8 @@ class Merged(Struct, frozen=True, eq=False):
 
 
 def without_tiny(lines: Polylines, limit_mm: float) -> Merged:
-    """The paths with no vertex moved by more than `limit_mm`, less the segments below it.
+    """Merge the segments below `limit_mm` into their neighbours, with no vertex moved by more than
+    that.
 
     A path of which too little would be left stays as it is.
     """
@@ -187,7 +188,8 @@ def without_tiny(lines: Polylines, limit_mm: float) -> Merged:
 
 
 def _merged(path: Polyline, lengths: Floats, limit: float) -> tuple[Ints, Ints]:
-    """For each vertex of the new path the old one whose place it takes, and whose bulge."""
+    """Return, for each vertex of the new path, the old one whose place it takes, and the one whose
+    bulge it takes."""
     bulges = path.vertices[:, 2]
     count = len(bulges)
     place, bend = np.arange(count), np.arange(count)
@@ -213,7 +215,7 @@ def _merged(path: Polyline, lengths: Floats, limit: float) -> tuple[Ints, Ints]:
 
 
 def _made(path: Polyline, place: Ints, bend: Ints) -> Polyline | None:
-    """The path of these vertices; None when it is no path, or nothing has changed."""
+    """Return the path of these vertices; None when it is no path, or nothing has changed."""
     if len(place) == len(path.vertices) or len(place) < 2:
         return None
     vertices = path.vertices[place]
