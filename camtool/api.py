@@ -21,6 +21,7 @@ from camtool.calibration.calibrate import calibrate as calibrated
 from camtool.comparison import Comparison, Variant, compare_program, variants_of
 from camtool.errors import CamtoolError, OptionError
 from camtool.geometry.drawing import Drawing
+from camtool.importers.options import Reading, options_of
 from camtool.jobs.keys import field_value
 from camtool.pictures.options import Options
 from camtool.pictures.picture import Picture
@@ -35,13 +36,11 @@ from camtool.target.loader import extended_by
 from camtool.target.registry import ListedTarget, LoadedTarget, each_target, list_target
 from camtool.toolpath.moves import Toolpath
 from camtool.toolpath.program import Program
-from camtool.units import parse_length
 from camtool.verification.report import Gates
 from camtool.verification.verify import Verification
 
 if TYPE_CHECKING:
     from camtool.calibration.measurements import Measurements
-    from camtool.importers.options import ReadOptions
     from camtool.inspection.meet import Meeting
     from camtool.machine.model import Machine
 
@@ -91,41 +90,6 @@ BYTES = "<bytes>"
 """What messages call a program that was given as bytes."""
 
 
-class Reading(TypedDict, total=False):
-    """How a drawing is read: the fields of `camtool.importers.options.ReadOptions`, and of its
-    `Selection` (patterns of layers, colours and line types; without patterns, all)."""
-
-    units: str | None
-    tolerance_mm: float
-    gap_mm: float
-    scale: float
-    dpi: float | None
-    format: str | None
-    chain_gaps: bool
-    across_layers: bool
-    text: str
-    recognise_arcs: bool
-    layout: str | None
-    dimensions: bool
-    section_z_mm: float | None
-    allow_scripts: bool
-    width_mm: float | None
-    own_dpi: bool
-    threshold: float
-    speckle_px: float
-    smooth_px: float
-    invert: bool
-    trace: str
-    layers: Sequence[str]
-    exclude_layers: Sequence[str]
-    colours: Sequence[str]
-    line_types: Sequence[str]
-
-
-_SELECTION = ("layers", "exclude_layers", "colours", "line_types")
-_LENGTHS = ("tolerance_mm", "gap_mm", "section_z_mm", "width_mm")
-
-
 def _patterns(given: str | Sequence[str]) -> tuple[str, ...]:
     """The patterns; a single one may be given as it is."""
     return (given,) if isinstance(given, str) else tuple(given)
@@ -144,25 +108,7 @@ def read_drawing(
     """
     from camtool.importers.read import read_drawing as read
 
-    return ShownDrawing.of(read(Path(file), options=_read_options(target, reading)))
-
-
-def _read_options(target: str | LoadedTarget | None, reading: Reading) -> ReadOptions:
-    """The options of reading a drawing; by default tolerances are those of the `target`."""
-    from camtool.importers.options import ReadOptions, Selection
-    from camtool.importers.pieces import colour_named
-
-    settings: dict[str, Any] = {}
-    if target is not None:
-        defaults = as_target(target).machine.defaults
-        settings = {"tolerance_mm": defaults.fit_tolerance_mm, "gap_mm": defaults.gap_mm}
-    settings.update(reading)
-    for key in _LENGTHS:
-        if isinstance(settings.get(key), str):
-            settings[key] = parse_length(settings[key], name=key)
-    chosen = {key: _patterns(settings.pop(key, ())) for key in _SELECTION}
-    chosen["colours"] = tuple(colour_named(colour) for colour in chosen["colours"])
-    return ReadOptions(**settings, select=Selection(**chosen))
+    return ShownDrawing.of(read(Path(file), options=options_of(reading, _machine_of(target))))
 
 
 def read_job(
@@ -201,7 +147,7 @@ def as_drawing(
     if isinstance(drawing, Drawing):
         return drawing
     data, name = content(Path(drawing))
-    return ShownDrawing.of(read_for_job(data, name, _read_options(target, {}), job))
+    return ShownDrawing.of(read_for_job(data, name, options_of({}, _machine_of(target)), job))
 
 
 def as_bytes(program: bytes | Program | str | Path) -> tuple[bytes, str]:
@@ -268,6 +214,11 @@ def load_target(
 def as_target(target: str | LoadedTarget) -> LoadedTarget:
     """The target, loaded where its name is given."""
     return load_target(target) if isinstance(target, str) else target
+
+
+def _machine_of(target: str | LoadedTarget | None) -> Machine | None:
+    """Return the machine of the target, None without one."""
+    return None if target is None else as_target(target).machine
 
 
 def _as_toml(value: Any) -> str:

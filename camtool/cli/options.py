@@ -16,7 +16,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, cast
@@ -25,7 +25,7 @@ import click
 
 from camtool.cli.life_signs import progress
 from camtool.errors import MachineError, OptionError
-from camtool.importers.options import FORMATS, TEXTS, TRACES
+from camtool.importers.options import Flag, ReadOptions, Selection, flags_of, options_of
 from camtool.jobs.keys import FLAGS, flag_name
 from camtool.keys import Key
 from camtool.records import replace
@@ -33,7 +33,6 @@ from camtool.units import parse_feed, parse_length, parse_time
 
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
-    from camtool.importers.options import ReadOptions
     from camtool.jobs.tools import Shop
     from camtool.machine.model import Machine
     from camtool.planning.job import Job
@@ -366,35 +365,26 @@ def inspection_options(command: Command) -> Command:
 
 _READ, _CHOSEN = "How the drawing is read", "Which part of it"
 
+_OF_READING = "read_"
+"""Begins the names of these parameters: flags of pictures have `layers` too."""
+
 
 @dataclass(frozen=True)
 class DrawingFlags:
-    """Patterns of what is read (`--layer` to `--line-type`), and fields of ReadOptions, None where
-    no flag says."""
+    """The flags of reading that were given: values of fields of `ReadOptions` and `Selection`, by
+    name."""
 
-    layer: tuple[str, ...] = ()
-    exclude_layer: tuple[str, ...] = ()
-    colour: tuple[str, ...] = ()
-    line_type: tuple[str, ...] = ()
-    format: str | None = None
-    units: str | None = None
-    dpi: float | None = None
-    tolerance_mm: float | None = None
-    gap_mm: float | None = None
-    across_layers: bool | None = None
-    recognise_arcs: bool | None = None
-    text: str | None = None
-    dimensions: bool | None = None
-    layout: str | None = None
-    section_z_mm: float | None = None
-    allow_scripts: bool | None = None
-    width_mm: float | None = None
-    own_dpi: bool | None = None
-    threshold: float | None = None
-    speckle_px: float | None = None
-    smooth_px: float | None = None
-    invert: bool | None = None
-    trace: str | None = None
+    given: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def layers(self) -> tuple[str, ...]:
+        """The patterns of `--layer`."""
+        return tuple(self.given.get("layers", ()))
+
+    @property
+    def format(self) -> str | None:
+        """The format that `--format` names."""
+        return self.given.get("format")
 
     def read(
         self,
@@ -411,104 +401,46 @@ class DrawingFlags:
         from camtool.importers.read import content, read_bytes
         from camtool.jobs.drawing import read_for_job
 
-        options = self._options(machine)
+        options = options_of(self.given, machine)
         progress().begin(f"reading {Path(name).name}")
         data, file = content(Path(name)) if data is None else (data, name)
         if job is None:
             return read_bytes(data, file, options)
         return read_for_job(data, file, options, job)
 
-    def _options(self, machine: Machine | None) -> ReadOptions:
-        """Tolerances that no flag gives are the machine's, or else the importer's; they are of
-        the part, whose scale the job says."""
-        from camtool.importers.options import ReadOptions, Selection
-        from camtool.importers.pieces import colour_named
-
-        settings = asdict(self)
-        select = Selection(
-            layers=settings.pop("layer"),
-            exclude_layers=settings.pop("exclude_layer"),
-            colours=tuple(colour_named(colour) for colour in settings.pop("colour")),
-            line_types=settings.pop("line_type"),
-        )
-        given = {name: value for name, value in settings.items() if value is not None}
-        if machine is not None:
-            given.setdefault("tolerance_mm", machine.defaults.fit_tolerance_mm)
-            given.setdefault("gap_mm", machine.defaults.gap_mm)
-        return ReadOptions(**given, select=select)
-
 
 def drawing_options(command: Command) -> Command:
     """Adds `drawing: DrawingFlags`."""
-    options = [
-        option(
-            _READ,
-            "--format",
-            type=click.Choice(FORMATS),
-            help="Read it as this format, not by its content.",
-        ),
-        option(_READ, "--units", metavar="UNIT", help="Unit of the drawing: mm, in, um, px ..."),
-        option(
-            _READ,
-            "--dpi",
-            type=float,
-            help="Pixels per inch of an SVG [96, or that of the program that drew it] or a PNG.",
-        ),
-        _length(
-            "--tolerance",
-            "tolerance_mm",
-            "LENGTH",
-            "Largest distance of fitted arcs from the curves of the part.",
-        ),
-        _length("--gap", "gap_mm", "LENGTH", "Ends nearer than this are joined."),
-        _switch("--across-layers", "Join ends of different layers too."),
-        _switch("--recognise-arcs", "Chords on one circle become arcs again."),
-        option(_READ, "--text", type=click.Choice(TEXTS), help="What to do with text.  [skip]"),
-        _switch("--dimensions", "Read the lines of dimensions too."),
-        option(_READ, "--layout", metavar="NAME", help="A layout of a DXF, not model space."),
-        _length("--section-z", "section_z_mm", "HEIGHT", "Cut a solid at this height."),
-        _switch("--allow-scripts", "Run a build123d script, with your rights."),
-        _length("--width", "width_mm", "LENGTH", "How wide a PNG or JPEG is."),
-        _switch("--own-dpi", "A PNG or JPEG has the pixels per inch that it says."),
-        option(
-            _READ,
-            "--threshold",
-            type=float,
-            metavar="DARKNESS",
-            help="From which darkness of a PNG or JPEG on it is drawn: 0 to 1.  [0.5]",
-        ),
-        _switch("--invert", "What is light in a PNG or JPEG is drawn."),
-        _pixels("--speckle", "speckle_px", "Shapes of fewer pixels are left out.  [4]"),
-        _pixels("--smooth", "smooth_px", "How far contours may leave the pixels' edges.  [0.75]"),
-        option(
-            _READ,
-            "--trace",
-            type=click.Choice(TRACES),
-            help="What of dark shapes in a PNG or JPEG is drawn.  [outline]",
-        ),
-        _patterns("--layer", "Only these layers (CUT, ENG*)."),
-        _patterns("--exclude-layer", "Not these layers."),
-        _patterns("--colour", "Only this colour (#ff0000, red, or 1 to 255)."),
-        _patterns("--line-type", "Only these line types (DASHED, CENTER*)."),
+
+    def made(**values: Any) -> DrawingFlags:
+        named = ((name.removeprefix(_OF_READING), value) for name, value in values.items())
+        return DrawingFlags({name: value for name, value in named if value not in (None, ())})
+
+    rows = [
+        (section, *row)
+        for section, record in ((_READ, ReadOptions), (_CHOSEN, Selection))
+        for row in flags_of(record)
     ]
-    return with_flags(command, "drawing", DrawingFlags, options)
+    options = [_read_flag(section, name, flag, kind) for section, name, flag, kind in rows]
+    return decorate(
+        gather("drawing", made, [_OF_READING + row[1] for row in rows])(command), options
+    )
 
 
-def _switch(flag: str, text: str) -> Option:
-    """A flag that is None unless given, so that defaults apply."""
-    return option(_READ, flag, is_flag=True, default=None, help=text)
-
-
-def _length(flag: str, name: str, metavar: str, text: str) -> Option:
-    return option(_READ, flag, name, callback=length, metavar=metavar, help=text)
-
-
-def _pixels(flag: str, name: str, text: str) -> Option:
-    return option(_READ, flag, name, type=float, metavar="PIXELS", help=text)
-
-
-def _patterns(flag: str, text: str) -> Option:
-    return option(_CHOSEN, flag, multiple=True, metavar="PATTERN", help=text)
+def _read_flag(section: str, name: str, flag: Flag, kind: Any) -> Option:
+    """The flag of an option of reading; None unless given, so that defaults apply."""
+    settings: dict[str, Any] = {"metavar": flag.metavar}
+    if kind is bool:
+        settings = {"is_flag": True, "default": None}
+    elif flag.choices:
+        settings = {"type": click.Choice(flag.choices)}
+    elif section == _CHOSEN:
+        settings["multiple"] = True
+    elif name.endswith("_mm"):
+        settings["callback"] = length
+    elif kind in (float, float | None):
+        settings["type"] = float
+    return option(section, flag.name, _OF_READING + name, help=flag.help, **settings)
 
 
 # The job: each key of a job file by its name with hyphens for underscores.
@@ -545,8 +477,8 @@ class JobFlags:
         if self.file is not None:
             file = read_job_file(Path(self.file), self._piped)
         job = build_job(file, tables_of_flags(self.given), self.operations, self._shop())
-        if drawing.layer and len(job.operations) == 1:
-            return replace(job, operations=(replace(job.operations[0], layers=drawing.layer),))
+        if drawing.layers and len(job.operations) == 1:
+            return replace(job, operations=(replace(job.operations[0], layers=drawing.layers),))
         return job
 
     def as_file(self, drawing: DrawingFlags, place: Path) -> tuple[Job, Table, ReadJob]:
@@ -562,8 +494,8 @@ class JobFlags:
         wanted = self.job(drawing)
         file = JobTables() if self.file is None else read_job_file(Path(self.file), self._piped)
         tables = together(file, tables_of_flags(self.given), place.parent)
-        if drawing.layer and len(wanted.operations) == 1:
-            tables["operations"][0]["layers"] = list(drawing.layer)
+        if drawing.layers and len(wanted.operations) == 1:
+            tables["operations"][0]["layers"] = list(drawing.layers)
         read = functools.partial(job_of_tables, place=place, shop=self._shop())
         assert read(tables) == wanted, "a job is not what its file says"
         return wanted, tables, read

@@ -1,13 +1,24 @@
-"""How a drawing is read: the options of a caller."""
+"""How a drawing is read: one table of options.
+
+`ReadOptions` and its `Selection` are the table: name, type, default and flag of each option. The
+flags of commands are made from it, and `Reading` has the same names and types as keywords of the
+Python API, where a type checker wants them written out.
+"""
 
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict, get_type_hints
 
 from camtool.errors import OptionError
 from camtool.records import replace
-from camtool.units import MM_PER_UNIT
+from camtool.units import MM_PER_UNIT, parse_length
+
+if TYPE_CHECKING:
+    from camtool.machine.model import Machine
 
 FORMATS = ("dxf", "svg", "points", "solid", "bitmap")
 """Names of the formats, each with a package of that name beside this file."""
@@ -21,17 +32,6 @@ TEXTS = ("skip", "outline", "stroke")
 
 TRACES = ("outline", "centre")
 """What becomes of dark shapes in a picture of pixels: their outlines, or their centre lines."""
-
-OF_PICTURES = {
-    "width_mm": "--width",
-    "own_dpi": "--own-dpi",
-    "threshold": "--threshold",
-    "speckle_px": "--speckle",
-    "smooth_px": "--smooth",
-    "invert": "--invert",
-    "trace": "--trace",
-}
-"""The fields of `ReadOptions` that are for pictures of pixels alone, and their flags."""
 
 TEXT_SKIPPED = "is text: read it with --text outline, or --text stroke for engraving"
 """Why text is left out."""
@@ -49,6 +49,18 @@ _MM_PER_INCH = 25.4
 
 
 @dataclass(frozen=True)
+class Flag:
+    """The flag of an option, with its help and what it shows for its value; a switch has neither
+    `metavar` nor `choices`. `for_pixels`: the option is for pictures of pixels alone."""
+
+    name: str
+    help: str
+    metavar: str | None = None
+    choices: tuple[str, ...] = ()
+    for_pixels: bool = False
+
+
+@dataclass(frozen=True)
 class Selection:
     """Which entities are read; empty fields choose all.
 
@@ -56,10 +68,20 @@ class Selection:
     "#rrggbb". `line_types`: patterns like those of layers (DASHED, CENTER*).
     """
 
-    layers: tuple[str, ...] = ()
-    exclude_layers: tuple[str, ...] = ()
-    colours: tuple[str, ...] = ()
-    line_types: tuple[str, ...] = ()
+    layers: Annotated[
+        tuple[str, ...], Flag("--layer", "Only these layers (CUT, ENG*).", "PATTERN")
+    ] = ()
+    exclude_layers: Annotated[
+        tuple[str, ...], Flag("--exclude-layer", "Not these layers.", "PATTERN")
+    ] = ()
+    colours: Annotated[
+        tuple[str, ...],
+        Flag("--colour", "Only this colour (#ff0000, red, or 1 to 255).", "PATTERN"),
+    ] = ()
+    line_types: Annotated[
+        tuple[str, ...],
+        Flag("--line-type", "Only these line types (DASHED, CENTER*).", "PATTERN"),
+    ] = ()
 
 
 @dataclass(frozen=True)
@@ -85,28 +107,95 @@ class ReadOptions:
     Raises OptionError.
     """
 
-    units: str | None = None
-    tolerance_mm: float = TOLERANCE_MM
-    gap_mm: float = GAP_MM
+    format: Annotated[
+        str | None,
+        Flag("--format", "Read it as this format, not by its content.", choices=FORMATS),
+    ] = None
+    units: Annotated[
+        str | None, Flag("--units", "Unit of the drawing: mm, in, um, px ...", "UNIT")
+    ] = None
+    dpi: Annotated[
+        float | None,
+        Flag(
+            "--dpi",
+            "Pixels per inch of an SVG [96, or that of the program that drew it] or a PNG.",
+        ),
+    ] = None
+    tolerance_mm: Annotated[
+        float,
+        Flag(
+            "--tolerance",
+            "Largest distance of fitted arcs from the curves of the part.",
+            "LENGTH",
+        ),
+    ] = TOLERANCE_MM
+    gap_mm: Annotated[float, Flag("--gap", "Ends nearer than this are joined.", "LENGTH")] = GAP_MM
+    across_layers: Annotated[
+        bool, Flag("--across-layers", "Join ends of different layers too.")
+    ] = False
+    recognise_arcs: Annotated[
+        bool, Flag("--recognise-arcs", "Chords on one circle become arcs again.")
+    ] = False
+    text: Annotated[str, Flag("--text", "What to do with text.  [skip]", choices=TEXTS)] = "skip"
+    dimensions: Annotated[bool, Flag("--dimensions", "Read the lines of dimensions too.")] = False
+    layout: Annotated[
+        str | None, Flag("--layout", "A layout of a DXF, not model space.", "NAME")
+    ] = None
+    section_z_mm: Annotated[
+        float | None, Flag("--section-z", "Cut a solid at this height.", "HEIGHT")
+    ] = None
+    allow_scripts: Annotated[
+        bool, Flag("--allow-scripts", "Run a build123d script, with your rights.")
+    ] = False
+    width_mm: Annotated[
+        float | None,
+        Flag("--width", "How wide a PNG or JPEG is.", "LENGTH", for_pixels=True),
+    ] = None
+    own_dpi: Annotated[
+        bool,
+        Flag(
+            "--own-dpi",
+            "A PNG or JPEG has the pixels per inch that it says.",
+            for_pixels=True,
+        ),
+    ] = False
+    threshold: Annotated[
+        float,
+        Flag(
+            "--threshold",
+            "From which darkness of a PNG or JPEG on it is drawn: 0 to 1.  [0.5]",
+            "DARKNESS",
+            for_pixels=True,
+        ),
+    ] = 0.5
+    invert: Annotated[
+        bool, Flag("--invert", "What is light in a PNG or JPEG is drawn.", for_pixels=True)
+    ] = False
+    speckle_px: Annotated[
+        float,
+        Flag("--speckle", "Shapes of fewer pixels are left out.  [4]", "PIXELS", for_pixels=True),
+    ] = 4.0
+    smooth_px: Annotated[
+        float,
+        Flag(
+            "--smooth",
+            "How far contours may leave the pixels' edges.  [0.75]",
+            "PIXELS",
+            for_pixels=True,
+        ),
+    ] = 0.75
+    trace: Annotated[
+        str,
+        Flag(
+            "--trace",
+            "What of dark shapes in a PNG or JPEG is drawn.  [outline]",
+            choices=TRACES,
+            for_pixels=True,
+        ),
+    ] = "outline"
     scale: float = 1.0
-    dpi: float | None = None
-    format: str | None = None
     chain_gaps: bool = True
-    across_layers: bool = False
     select: Selection = Selection()
-    text: str = "skip"
-    recognise_arcs: bool = False
-    layout: str | None = None
-    dimensions: bool = False
-    section_z_mm: float | None = None
-    allow_scripts: bool = False
-    width_mm: float | None = None
-    own_dpi: bool = False
-    threshold: float = 0.5
-    speckle_px: float = 4.0
-    smooth_px: float = 0.75
-    invert: bool = False
-    trace: str = "outline"
 
     def __post_init__(self) -> None:
         if self.units is not None and self.units.lower() not in MM_PER_UNIT:
@@ -170,3 +259,88 @@ class ReadOptions:
 
 DEFAULTS = ReadOptions()
 """The options when none are given."""
+
+
+class Reading(TypedDict, total=False):
+    """How a drawing is read, as keywords: the fields of `ReadOptions`, and of its `Selection`
+    (patterns of layers, colours and line types; without patterns, all)."""
+
+    units: str | None
+    tolerance_mm: float
+    gap_mm: float
+    scale: float
+    dpi: float | None
+    format: str | None
+    chain_gaps: bool
+    across_layers: bool
+    text: str
+    recognise_arcs: bool
+    layout: str | None
+    dimensions: bool
+    section_z_mm: float | None
+    allow_scripts: bool
+    width_mm: float | None
+    own_dpi: bool
+    threshold: float
+    speckle_px: float
+    smooth_px: float
+    invert: bool
+    trace: str
+    layers: Sequence[str]
+    exclude_layers: Sequence[str]
+    colours: Sequence[str]
+    line_types: Sequence[str]
+
+
+def flags_of(record: type[ReadOptions | Selection]) -> Iterator[tuple[str, Flag, Any]]:
+    """Yield name, flag and type of each option that has a flag."""
+    for name, hint in get_type_hints(record, include_extras=True).items():
+        for flag in getattr(hint, "__metadata__", ()):
+            yield name, flag, hint.__origin__
+
+
+_HEX = re.compile(r"#(?:[0-9a-f]{3}|[0-9a-f]{6})")
+
+
+def colour_named(text: str) -> str:
+    """Return "#rrggbb" for "#rgb", "#rrggbb", a colour name of SVG or a colour number of AutoCAD
+    (1–255); OptionError for any other text."""
+    word = text.strip().lower()
+    if _HEX.fullmatch(word):
+        return word if len(word) > 4 else "#" + "".join(2 * digit for digit in word[1:])
+    if re.fullmatch(r"\d{1,3}", word) and 1 <= int(word) <= 255:
+        from ezdxf.colors import aci2rgb
+
+        # 7 is the foreground: white on a black screen, black on paper, and read as black.
+        number = int(word)
+        return "#000000" if number == 7 else "#{:02x}{:02x}{:02x}".format(*aci2rgb(number))
+    from camtool.importers.svg.colours import NAMES
+
+    if word in NAMES:
+        return NAMES[word]
+    raise OptionError(
+        f"unknown colour {text!r}", mend="give #rrggbb, a name such as red, or 1 to 255"
+    )
+
+
+def options_of(given: Mapping[str, Any], machine: Machine | None = None) -> ReadOptions:
+    """Return the options of these fields of `ReadOptions` and `Selection`, by name.
+
+    Lengths may be texts with a unit, and a single pattern may stand without a list. Tolerances
+    that are not given are those of the `machine`, if there is one. Raises OptionError.
+    """
+    settings: dict[str, Any] = {}
+    if machine is not None:
+        defaults = machine.defaults
+        settings = {"tolerance_mm": defaults.fit_tolerance_mm, "gap_mm": defaults.gap_mm}
+    chosen: dict[str, tuple[str, ...]] = {}
+    for name, value in given.items():
+        if name in Selection.__dataclass_fields__:
+            patterns = (value,) if isinstance(value, str) else tuple(value)
+            named = name == "colours"
+            chosen[name] = tuple(map(colour_named, patterns)) if named else patterns
+        elif name.endswith("_mm") and isinstance(value, str):
+            settings[name] = parse_length(value, name=name)
+        else:
+            settings[name] = value
+    return ReadOptions(**settings, select=Selection(**chosen))

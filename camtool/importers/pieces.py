@@ -8,14 +8,13 @@ or nothing.
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 
 from msgspec import Struct
 
 from camtool.arrays import Floats
-from camtool.errors import DrawingError, OptionError
+from camtool.errors import DrawingError
 from camtool.geometry.drawing import Skipped
 from camtool.importers.options import Selection
 from camtool.patterns import guess, matches
@@ -154,29 +153,3 @@ def matching(
 
 def _line_type(piece: Piece) -> str:
     return piece.line_type or NO_LINE_TYPE
-
-
-_HEX = re.compile(r"#(?:[0-9a-f]{3}|[0-9a-f]{6})")
-
-
-def colour_named(text: str) -> str:
-    """ "#rrggbb" of "#rgb", "#rrggbb", a colour name of SVG or a colour number of AutoCAD (1–255).
-
-    OptionError when it is none of these.
-    """
-    word = text.strip().lower()
-    if _HEX.fullmatch(word):
-        return word if len(word) > 4 else "#" + "".join(2 * digit for digit in word[1:])
-    if re.fullmatch(r"\d{1,3}", word) and 1 <= int(word) <= 255:
-        from ezdxf.colors import aci2rgb
-
-        # 7 is the foreground: white on a black screen, black on paper, and read as black.
-        number = int(word)
-        return "#000000" if number == 7 else "#{:02x}{:02x}{:02x}".format(*aci2rgb(number))
-    from camtool.importers.svg.colours import NAMES
-
-    if word in NAMES:
-        return NAMES[word]
-    raise OptionError(
-        f"unknown colour {text!r}", mend="give #rrggbb, a name such as red, or 1 to 255"
-    )

@@ -11,7 +11,7 @@ from camtool.bounds import file_bytes as bytes_of
 from camtool.bounds import stream_bytes
 from camtool.errors import DrawingError, OptionError
 from camtool.importers.formats import find_format
-from camtool.importers.options import DEFAULTS, OF_PICTURES, ReadOptions
+from camtool.importers.options import DEFAULTS, ReadOptions, flags_of
 
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
@@ -59,10 +59,12 @@ def read_bytes(data: bytes, file: str, options: ReadOptions = DEFAULTS) -> Drawi
 
 def _refuse_flags_of_pictures(options: ReadOptions, file: str) -> None:
     """OptionError for an option that has no effect on drawings of lines."""
-    for name, flag in OF_PICTURES.items():
-        if getattr(options, name) != getattr(DEFAULTS, name):
+    for name, flag, _ in flags_of(ReadOptions):
+        if flag.for_pixels and getattr(options, name) != getattr(DEFAULTS, name):
             raise OptionError(
-                f"{flag} is for pictures of pixels", file=file, mend=f"leave {flag} out"
+                f"{flag.name} is for pictures of pixels",
+                file=file,
+                mend=f"leave {flag.name} out",
             )
 
 

@@ -109,7 +109,7 @@ def _range(value: object, convert: Callable[[object], float]) -> tuple[float, fl
 
 def colours(value: object) -> tuple[str, ...]:
     """Patterns of colours, "#rrggbb" as drawings have them; names and numbers are converted."""
-    from camtool.importers.pieces import colour_named
+    from camtool.importers.options import colour_named
 
     if isinstance(value, list | tuple):
         value = [str(item) if type(item) is int else item for item in value]

@@ -321,7 +321,7 @@ def test_all_that_outputs_depend_on_is_in_the_digest(monkeypatch: pytest.MonkeyP
     work = batch_work.PostWork(load_target("grbl"), DrawingFlags())
     other = {
         "target": load_target("grbl", settings=["axes.x.backlash_mm=0.2"]),
-        "drawing": DrawingFlags(gap_mm=0.5),
+        "drawing": DrawingFlags({"gap_mm": 0.5}),
         "gates": Gates(error_mm=0.1),
         "preview": ".svg",
         "reports": True,

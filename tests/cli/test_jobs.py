@@ -177,7 +177,7 @@ def job(
     (folder / "tool.tbl").write_text(TABLE)
     chosen = (only,) if only else ()
     given = JobFlags(str(folder / "job.toml"), chosen, flags)
-    return given.job(DrawingFlags(layers))
+    return given.job(DrawingFlags({"layers": layers}))
 
 
 def test_every_key_has_its_place(tmp_path: Path) -> None:

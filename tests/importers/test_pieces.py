@@ -5,8 +5,8 @@ import pytest
 
 from camtool.errors import DrawingError, OptionError
 from camtool.geometry.drawing import Skipped
-from camtool.importers.options import Selection
-from camtool.importers.pieces import Piece, colour_named, selected
+from camtool.importers.options import Selection, colour_named
+from camtool.importers.pieces import Piece, selected
 
 LINE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
 PIECES = [
