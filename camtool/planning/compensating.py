@@ -163,7 +163,7 @@ def _feed(move: Move) -> float:
 
 
 def _add_event(builder: ToolpathBuilder, move: Move, toolpath: Toolpath) -> None:
-    """The same event; a message keeps its words."""
+    """Add the same event; a message keeps its words."""
     if move.kind == Kind.MESSAGE and move.value is not None:
         builder.message(toolpath.texts[int(move.value)])
     else:
@@ -181,18 +181,19 @@ class _Drive(Struct):
     step_mm: float
 
     def asked(self, value: float, sense: int) -> float:
-        """The position that puts the slide on `value` when driven towards `sense`."""
+        """Return the position that puts the slide on `value` when driven towards `sense`."""
         return value - self.residual.error_mm(sense)
 
     def sense_of(self, begin: float, end: float) -> int:
-        """The direction of a move; the last one where it does not move."""
+        """Return the direction of a move; the last one where it does not move."""
         step = end - begin
         if abs(step) < STILL_STEPS * self.axis.coded_step_mm:
             return self.sense
         return 1 if step > 0.0 else -1
 
     def free(self, begin: float, end: float) -> None:
-        """A move in the air to `end`: whatever direction takes the axis to where it is asked."""
+        """Move in the air to `end`, in the direction that takes the axis to the position for
+        it."""
         for sense in (self.sense_of(begin, end), -self.sense_of(begin, end)):
             to = self.asked(end, sense)
             if (to - self.at) * sense > 0.0 or (sense == self.sense and to == self.at):
@@ -201,8 +202,8 @@ class _Drive(Struct):
 
 
 def _taken_up(toolpath: Toolpath, machine: Machine) -> CompensatedToolpath:
-    """The positions that a controller must be given for slides on `toolpath` (in motor mm); the
-    same toolpath where there is neither backlash nor compensation."""
+    """Return the positions that a controller must be given for slides on `toolpath` (in motor mm);
+    the same toolpath where there is neither backlash nor compensation."""
     regions = _Regions(machine)
     if not regions.matter:
         return CompensatedToolpath(toolpath, np.arange(len(toolpath)))
@@ -271,7 +272,7 @@ class _TakenUp:
         )
 
     def _enter(self, point: Point) -> None:
-        """From here on the backlash is that of the region around a point."""
+        """Use the backlash of the region around a point from here on."""
         for drive, found in zip(self._drives, self._regions.residuals(point), strict=True):
             drive.residual = found
 
@@ -280,12 +281,12 @@ class _TakenUp:
         return x, y, z
 
     def _line(self, move: Move) -> None:
-        """To where the drives now stand, if that is elsewhere."""
+        """Add a line to where the drives now stand, if that is elsewhere."""
         if math.dist(self._b.position, self._place()) > AHEAD_MM:
             self._b.line(*self._place(), feed=_feed(move))
 
     def _cut(self, segment: MonotoneSegment, move: Move) -> None:
-        """A segment at a feed: take up, overshoot, hold, and follow."""
+        """Add a segment at a feed: take up the backlash, overshoot, hold, and follow."""
         self._overshoot(segment, move)
         for drive, begin, end in zip(self._drives, segment.begin, segment.end, strict=True):
             drive.sense = drive.sense_of(begin, end)
@@ -300,7 +301,8 @@ class _TakenUp:
             low = high
 
     def _overshoot(self, segment: MonotoneSegment, move: Move) -> None:
-        """Before a reversal that the controller compensates too much: out, and one step back."""
+        """Go out and make one step back, before a reversal that the controller compensates too
+        much."""
         back = []
         for drive, begin, end in zip(self._drives, segment.begin, segment.end, strict=True):
             sense = drive.sense_of(begin, end)
@@ -317,7 +319,8 @@ class _TakenUp:
             self._line(move)
 
     def _joins(self, index: int, segment: MonotoneSegment) -> float:
-        """The share of the segment from which on an axis follows it: 0 unless it stands ahead."""
+        """Return the share of the segment from which on an axis follows it: 0 unless it stands
+        ahead."""
         drive = self._drives[index]
         begin, end = segment.begin[index], segment.end[index]
         ahead = (drive.at - drive.asked(begin, drive.sense)) * drive.sense
@@ -328,7 +331,7 @@ class _TakenUp:
         return segment.where(index, drive.at + drive.residual.error_mm(drive.sense))
 
     def _follow(self, part: MonotoneSegment, follows: list[bool], move: Move) -> None:
-        """One part of a segment, on which each axis either follows or holds."""
+        """Add a part of a segment on which each axis either follows or holds."""
         offsets = []
         for drive, begin, end, moves in zip(
             self._drives, part.begin, part.end, follows, strict=True
@@ -355,13 +358,13 @@ class _TakenUp:
 
 
 def _step_mm(axis: Axis) -> float:
-    """The smallest distance, mm, of whole steps that a program can express."""
+    """Return the smallest distance, mm, of whole steps that a program can express."""
     steps = to_steps(axis.resolution_mm or 0.0, axis.coded_step_mm)
     return max(1.0, float(steps)) * axis.coded_step_mm
 
 
 class _Regions:
-    """What backlash and compensation leave over in each region of the table; it is divided by the
+    """Residuals of backlash and compensation in each region of the table; they are divided by the
     scale, since the path is that of the motors.
 
     A wanted path is cut at the edges of the regions. The regions belong to positions of
@@ -382,12 +385,12 @@ class _Regions:
 
     @property
     def matter(self) -> bool:
-        """Whether there is backlash or compensation anywhere."""
+        """True if there is backlash or compensation anywhere."""
         cells = [one for table in self._by_cell for row in table for one in row]
         return any(one.matters for one in (*self._plain, *cells))
 
     def residuals(self, point: Sequence[float]) -> tuple[Residual, ...]:
-        """(X, Y, Z) where the tool is at `point` mm."""
+        """Return the residuals (X, Y, Z) where the tool is at `point` mm."""
         found = []
         for axis, cells in enumerate(self._cells):
             if cells is None:
@@ -399,7 +402,7 @@ class _Regions:
         return tuple(found)
 
     def parts(self, segment: MonotoneSegment) -> Iterator[MonotoneSegment]:
-        """The segment cut at the edges of all regions."""
+        """Yield the segment cut at the edges of all regions."""
         shares = {0.0, 1.0}
         for cells in self._cells:
             if cells is None:
@@ -420,7 +423,7 @@ class _Regions:
 
 
 def _residual(axis: Axis, machine: Machine, play_mm: float | None) -> Residual:
-    """What is left over on an axis with this backlash (None: its own); compensation is in whole
+    """Compute the residual of an axis with this backlash (None: its own); compensation is in whole
     steps."""
     play = axis.backlash_mm if play_mm is None else play_mm
     whole = float(to_steps(axis.compensation_mm, axis.coded_step_mm)) * axis.coded_step_mm
@@ -443,7 +446,7 @@ class MonotoneSegment(Struct, frozen=True):
     sweep_rad: float = 0.0
 
     def at(self, share: float) -> Point:
-        """The point at this share (0 … 1) of the length; exact at the ends."""
+        """Return the point at this share (0 … 1) of the length; exact at the ends."""
         if share <= 0.0:
             return self.begin
         if share >= 1.0:
@@ -458,7 +461,8 @@ class MonotoneSegment(Struct, frozen=True):
         return cx + radius * math.cos(angle), cy + radius * math.sin(angle), line[2]
 
     def where(self, axis: int, value: float) -> float:
-        """The share of the length at which an axis that moves has this value; 0 or 1 beyond it.
+        """Return the share of the length at which an axis that moves has this value; 0 or 1 beyond
+        it.
 
         On an arc the angle θ with c + r cos θ (sin θ for Y) = value; of its two solutions the one
         within the sweep.
@@ -480,14 +484,14 @@ class MonotoneSegment(Struct, frozen=True):
         return high
 
     def part(self, low: float, high: float) -> MonotoneSegment:
-        """The part between two shares of the length."""
+        """Return the part between two shares of the length."""
         return MonotoneSegment(
             self.at(low), self.at(high), self.centre, (high - low) * self.sweep_rad
         )
 
 
 def monotone_segments(move: Move, sweep_rad: float) -> Iterator[MonotoneSegment]:
-    """A line as one segment; an arc of this signed sweep cut where X or Y reverses."""
+    """Yield a line as one segment; an arc of this signed sweep cut where X or Y reverses."""
     if move.kind not in (Kind.ARC_CW, Kind.ARC_CCW) or move.centre is None:
         yield MonotoneSegment(move.start, move.end)
         return

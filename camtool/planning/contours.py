@@ -61,7 +61,7 @@ class CutContours(Struct, frozen=True, eq=False):
 
 
 class _Pass(Struct, frozen=True, eq=False):
-    """A run as it is to be made: along the path, with the heights of these parts of it, each of
+    """A run before it is made: along the path, with the heights of these parts of it, each of
     which ends where the next one begins, and with these leads."""
 
     along: MeasuredPath
@@ -72,7 +72,8 @@ class _Pass(Struct, frozen=True, eq=False):
 def runs_of(
     contours: Sequence[Contour], order: Ints, paths: Polylines, keep_out: KeepOut
 ) -> CutContours:
-    """How contours of one operation are cut, those of the indices `order` (M,) in that order.
+    """Return the runs that cut the contours of one operation, those of the indices `order` (M,) in
+    that order.
 
     `paths` (M) are those of the contours, from the chosen starts in the chosen directions. On its
     leads the tool keeps away from the lines of `keep_out`. A ramp slopes by the entry's angle.
@@ -94,7 +95,7 @@ def runs_of(
 
 
 def _cut_of(contours: Sequence[Contour], paths: Polylines, keep_out: KeepOut) -> CutContours:
-    """The same for some of the contours, as they come."""
+    """Return the runs that cut these contours, in their order."""
     passes: list[_Pass] = []
     counts: list[int] = []
     findings: list[Finding] = []
@@ -115,7 +116,8 @@ def _cut_of(contours: Sequence[Contour], paths: Polylines, keep_out: KeepOut) ->
 
 
 def _runs(passes: Sequence[_Pass], feeds: Feeds, names: Sequence[str]) -> Runs:
-    """The runs of these names, lifted all at once where their paths lie in the same columns."""
+    """Return the runs of these names, lifted together where their paths lie in the same
+    columns."""
     owner = [k for k, each in enumerate(passes) for _ in each.parts]
     parts = [part for each in passes for part in each.parts]
     columns: dict[int, list[int]] = {}
@@ -144,7 +146,7 @@ def _runs(passes: Sequence[_Pass], feeds: Feeds, names: Sequence[str]) -> Runs:
 def _round(
     contour: Contour, along: MeasuredPath, heights: Heights, keep_out: KeepOut
 ) -> tuple[list[_Pass], Leads]:
-    """The runs round a closed contour."""
+    """Return the passes round a closed contour, and its leads."""
     angle, tabs = heights
     levels, overlap = contour.setting.levels_mm, contour.setting.operation.overlap_mm
     total = along.total_mm
@@ -166,7 +168,7 @@ def _round(
 
 
 def _split(points: ZProfile, stops: list[float]) -> list[ZProfile]:
-    """The profile in parts that end and begin at these lengths."""
+    """Split the profile at these lengths."""
     parts: list[ZProfile] = []
     begin = 0
     for stop in stops:
@@ -177,8 +179,8 @@ def _split(points: ZProfile, stops: list[float]) -> list[ZProfile]:
 
 
 def _with_leads(parts: list[Floats], leads: Leads) -> Floats:
-    """The run (n, 4) along parts (n, 4) of a contour: the lead-in before the first of them, the
-    lead-out behind the last, and out and back between two."""
+    """Return the run (n, 4) along parts (n, 4) of a contour: the lead-in before the first of them,
+    the lead-out behind the last, and out and back between two."""
     if len(leads.to) == len(leads.away) == 0:
         return parts[0]
     rows = [np.insert(leads.to[:-1], 2, parts[0][0, 2], axis=1)]
@@ -195,7 +197,8 @@ def _with_leads(parts: list[Floats], leads: Leads) -> Floats:
 def _along(
     contour: Contour, along: MeasuredPath, heights: Heights, keep_out: KeepOut
 ) -> tuple[list[_Pass], Leads]:
-    """The runs along an open contour, whose leads are parts of its path."""
+    """Return the passes along an open contour, whose leads are parts of its path, and these
+    leads."""
     angle, tabs = heights
     levels = contour.setting.levels_mm
     leads = leads_of(contour, along, (0.0, along.total_mm), keep_out)
@@ -217,7 +220,8 @@ def _along(
 
 
 def _slope(contour: Contour, along: MeasuredPath) -> tuple[float | None, list[Finding]]:
-    """The angle of the ramp, None for a plunge; and when a plunge stands for a ramp."""
+    """Return the angle of the ramp, None for a plunge; and a finding when a plunge stands for a
+    ramp."""
     operation = contour.setting.operation
     angle = operation.entry.angle_rad
     if operation.entry.kind == "plunge":
@@ -237,7 +241,7 @@ def _slope(contour: Contour, along: MeasuredPath) -> tuple[float | None, list[Fi
 def with_starts(
     path: Polyline, rule: str | tuple[float, float], away_mm: float
 ) -> tuple[Polyline, Ints]:
-    """The path, perhaps with one more vertex, and the vertices at which it may begin.
+    """Return the path, perhaps with one more vertex, and the vertices at which it may begin.
 
     `rule` is one of STARTS, or a place (x, y) mm: then the nearest one of the path. None are
     given (any will do) for "nearest", for open paths, and when nothing is as the rule says.
@@ -262,7 +266,7 @@ def with_starts(
 
 
 def _midpoint(along: MeasuredPath) -> float:
-    """The length along the path of the midpoint of its longest line, or else arc."""
+    """Return the length along the path of the midpoint of its longest line, or else arc."""
     size = np.diff(along.reach)
     lines = np.where(along.segments.is_arc, 0.0, size)
     row = int((lines if lines.any() else size).argmax())
@@ -270,7 +274,7 @@ def _midpoint(along: MeasuredPath) -> float:
 
 
 def _with_vertex(path: Polyline, along: MeasuredPath, length: float) -> tuple[Polyline, int]:
-    """A measured path with a vertex at this length, and its index."""
+    """Return a measured path with a vertex at this length, and the index of the vertex."""
     off = np.abs(along.reach - length)
     vertex = int(off.argmin())
     if off[vertex] <= START_SNAP_MM:

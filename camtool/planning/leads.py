@@ -48,7 +48,7 @@ class KeepOut(Struct, frozen=True, eq=False):
 
 
 class Border(Struct, frozen=True, eq=False):
-    """What leads must keep to: `line`, the contour, with the tool free on its left or right
+    """The limits of leads: `line`, the contour, with the tool free on its left or right
     (`free_left`; None: nowhere); and `keep_out`, with the distance `reach_mm` to stay away, and
     besides `allowance_mm` from what is the operation's own, which may be below 0."""
 
@@ -60,7 +60,7 @@ class Border(Struct, frozen=True, eq=False):
 
     @classmethod
     def of(cls, contour: Contour, keep_out: KeepOut) -> Border:
-        """The border of a contour."""
+        """Return the border of a contour."""
         line, left = contour.path, contour.material_left
         if contour.outline is not None:
             line = contour.outline
@@ -75,7 +75,8 @@ class Border(Struct, frozen=True, eq=False):
         )
 
     def near(self, place: Floats, size_mm: float) -> Segments:
-        """What a lead of this size from a place (2,) of the contour must stay away from.
+        """Return the segments that a lead of this size from a place (2,) of the contour must stay
+        away from.
 
         What an engraved contour itself cuts there is not kept from its leads.
         """
@@ -87,14 +88,14 @@ class Border(Struct, frozen=True, eq=False):
         return found
 
     def allows(self, lead: Segments, near: Segments) -> bool:
-        """Whether the tool does no harm along this one line or arc."""
+        """True if the tool cuts no wanted material along this one line or arc."""
         distance, _ = paired_distances(lead[np.zeros(len(near), dtype=np.int64)], near)
         wanted = self.reach_mm + np.where(self.keep_out.own[near.path], self.allowance_mm, 0.0)
         far = bool((distance >= wanted - LEAD_SLACK_MM).all())
         return far and (self.free_left is None or self._is_beside(lead))
 
     def _is_beside(self, lead: Segments) -> bool:
-        """Whether no piece of the lead lies on the side of the contour that is not free."""
+        """True if no piece of the lead lies on the side of the contour that is not free."""
         meets = crossings(lead, Segments.of(self.line))
         parts = np.unique(np.concatenate([[0.0, 1.0], meets.ta]))
         rows = np.zeros(len(parts) - 1, dtype=np.int64)
@@ -118,7 +119,8 @@ NO_LEADS = Leads(np.empty((0, 3)), np.empty((0, 3)), ())
 def leads_of(
     contour: Contour, along: MeasuredPath, ends: tuple[float, float], keep_out: KeepOut
 ) -> Leads:
-    """The leads of a contour that is cut as `along` from one length to another, its `ends`."""
+    """Return the leads of a contour that is cut as `along` from one length to another, its
+    `ends`."""
     operation = contour.setting.operation
     if operation.lead_in.kind == operation.lead_out.kind == "none":
         return NO_LEADS
@@ -155,7 +157,8 @@ def _bend(sign: float, material_left: bool | None) -> float:
 def _longest(
     lead: Lead, at: tuple[Floats, Floats], bulge: float, border: Border
 ) -> tuple[Floats, float]:
-    """The lead as it leaves its place at the contour, as long as does no harm; its size."""
+    """Return the longest permitted lead as it leaves its place at the contour; and its size,
+    mm."""
     place, ahead = at
     near = border.near(place, lead.length_mm)
     size = lead.length_mm
@@ -172,7 +175,7 @@ def _longest(
 
 
 def runs_back(path: Polyline, other: Polyline) -> bool:
-    """Whether `other`, a part of the path or all of it, is travelled in the other direction."""
+    """True if `other`, a part of the path or all of it, is travelled in the other direction."""
     there = MeasuredPath.of(other)
     middle = 0.5 * there.reach[1:2]
     point, ahead = there.at(middle), there.directions(middle)
@@ -184,7 +187,7 @@ def runs_back(path: Polyline, other: Polyline) -> bool:
 
 
 def segments_near(lines: Polylines, place: Floats, reach_mm: float) -> Segments:
-    """The segments of paths that may come so near to a place (2,); few others.
+    """Return the segments of paths that may come so near to a place (2,), and few others.
 
     No point of an arc of a half circle at most is farther from its start than π/2 of its chord.
     """
@@ -202,7 +205,8 @@ def segments_near(lines: Polylines, place: Floats, reach_mm: float) -> Segments:
 
 
 def left_of(path: Polyline, points: Floats) -> Floats:
-    """(J,) distances of points (J, 2) from a path, positive to its left, negative to its right.
+    """Return the distances (J,) of points (J, 2) from a path, positive to its left, negative to
+    its right.
 
     Left of a closed path is its inside when it runs CCW. Beside an open path the nearest place
     of it decides: on a line or arc the side of that, at a vertex the side of the bisector of the

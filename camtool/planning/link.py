@@ -94,12 +94,12 @@ def link(
 
 
 def _changes(before: Tool | None, tool: Tool) -> bool:
-    """Whether the program must ask for this tool: it has a number, and another was in."""
+    """True if the program must ask for this tool: it has a number, and another was in."""
     return tool.number is not None and (before is None or before.number != tool.number)
 
 
 def _to_change(builder: ToolpathBuilder, machine: Machine, lowest_mm: float) -> None:
-    """To where the machine changes tools, up first; where it states none, up as far as a hand
+    """Move to where the machine changes tools, up first; where it states none, up as far as a hand
     needs and to where it parks. `lowest_mm`: the lowest Z of the program."""
     x, y, z = builder.position
     height, place = machine.defaults.change_z_mm, machine.defaults.change_mm
@@ -116,12 +116,12 @@ def _to_change(builder: ToolpathBuilder, machine: Machine, lowest_mm: float) -> 
 
 
 def tool_note(tool: Tool) -> ToolNote:
-    """A tool as a program names it."""
+    """Return a tool as a program names it."""
     return ToolNote(tool.number, tool.name, tool.kind, tool.diameter_mm, tool.tip_angle_rad)
 
 
 def _note(setting: Setting) -> OperationNote:
-    """What the program may say of an operation."""
+    """Return the description of an operation for the comments of the program."""
     operation, tool = setting.operation, setting.operation.tool
     return OperationNote(
         kind=operation.kind,
@@ -139,8 +139,8 @@ def _note(setting: Setting) -> OperationNote:
 def _spin(
     builder: ToolpathBuilder, speed: float | None, wanted: float | None, spindle: Spindle
 ) -> float | None:
-    """Bring the spindle from one speed to another, None being off; the new speed. Nothing is done
-    where the program does not switch it."""
+    """Bring the spindle from one speed to another, None being off; return the new speed. Nothing
+    is done where the program does not switch it."""
     if wanted == speed or spindle.switched != "program":
         return speed
     if wanted is None:
@@ -153,7 +153,7 @@ def _spin(
 
 
 def _cool(builder: ToolpathBuilder, now: str, wanted: str) -> str:
-    """Change from one way of cooling to another; the new one."""
+    """Change from one way of cooling to another; return the new one."""
     if now != wanted and (wanted == "off" or (now not in ("off", wanted) and wanted != "both")):
         builder.event(Kind.COOLANT_OFF, None)
         now = "off"
@@ -177,8 +177,8 @@ class _Lot(Struct, frozen=True, eq=False):
 
 
 def _lots(runs: Runs) -> Iterator[_Lot]:
-    """The runs in lots of about VERTICES_AT_ONCE. One is parted only where a line leaves a vertex:
-    there no arc goes on."""
+    """Yield the runs in lots of about VERTICES_AT_ONCE vertices. A run is split only where a line
+    leaves a vertex: there no arc goes on."""
     first, count = runs.first, len(runs.vertices)
     may_part = runs.vertices[:, 3] == 0.0
     may_part[first[1:] - 1] = False

@@ -15,25 +15,25 @@ MOST_PLACES = 12
 
 
 def at_place(name: str, point: Sequence[float]) -> str:
-    """A path's name and a place (x, y) mm of it."""
+    """Return a path's name and a place (x, y) mm of it."""
     return f"{name} at X {point[0]:.4f} Y {point[1]:.4f}"
 
 
 def tool_name(tool: Tool) -> str:
-    """The tool by its diameter, and its name if it has one."""
+    """Return the tool's diameter, and its name if it has one."""
     called = f" ({tool.name})" if tool.name else ""
     return f"a tool of {tool.diameter_mm:g} mm{called}"
 
 
 def width_name(operation: Operation) -> str:
-    """The tool of an operation by how wide it is beside the line that it follows."""
+    """Return the name of an operation's tool by its width beside the line that it follows."""
     if operation.contract.breaks_edges:
         return f"a V bit, {2.0 * operation.wall_radius_mm:.3g} mm wide where its bevel ends,"
     return tool_name(operation.tool)
 
 
 def tool_words(tool: Tool) -> str:
-    """All that is known of a tool's shape: `end mill 3.175 mm, 2 flutes, cuts 12 mm`."""
+    """Describe all that is known of a tool's shape: `end mill 3.175 mm, 2 flutes, cuts 12 mm`."""
     words = [f"{TOOL_SHAPES[tool.kind]} {tool.diameter_mm:g} mm"]
     if not tool.diameter_mm:
         words = [TOOL_SHAPES[tool.kind] if tool.kind != "flat" else "point"]
@@ -51,18 +51,18 @@ def tool_words(tool: Tool) -> str:
 
 
 def key_of(operation: Operation, key: str) -> str:
-    """Where a setting of an operation stands: in its job, or in the preset of its tool."""
+    """Name the place of a setting of an operation: in its job, or in the preset of its tool."""
     of = f" of the tool's preset for {operation.material!r}" if key in operation.preset else ""
     return f"{operation_name(operation)}, key {key}{of}"
 
 
 def operation_name(operation: Operation) -> str:
-    """An operation by its name, or by its kind when it has none."""
+    """Return an operation's name, or its kind when it has none."""
     return f"operation {operation.name or operation.kind!r}"
 
 
 def range_words(limits: tuple[float, float] | None) -> str:
-    """`0.02 to 0.06`, `at most 0.06` or `at least 0.02`."""
+    """Describe a range: `0.02 to 0.06`, `at most 0.06` or `at least 0.02`."""
     least, most = limits or (0.0, math.inf)
     if math.isinf(most):
         return f"at least {least:g}"
@@ -70,7 +70,8 @@ def range_words(limits: tuple[float, float] | None) -> str:
 
 
 def own_numbers(machine: Machine, settings: Sequence[str]) -> str:
-    """How to give the numbers of the user's own machine, which may differ from the target's."""
+    """Describe how to give the numbers of the user's own machine, which may differ from the
+    target's."""
     keys = " ".join(f"--set {each}" for each in settings)
     return (
         f"if your machine can do more, use {keys}, or make its own file with camtool init NAME "
@@ -79,7 +80,8 @@ def own_numbers(machine: Machine, settings: Sequence[str]) -> str:
 
 
 def shortened_list(findings: Sequence[Finding], more: Sentence) -> list[Finding]:
-    """The first `MOST_PLACES` of findings of one kind, and one more that counts the others."""
+    """Return the first `MOST_PLACES` of findings of one kind, and one more that counts the
+    others."""
     listed, rest = list(findings[:MOST_PLACES]), findings[MOST_PLACES:]
     if rest:
         listed.append(more(where=rest[0].where, measured=len(rest), severity=rest[0].severity))

@@ -74,17 +74,17 @@ class Choices(Struct, frozen=True, eq=False):
                 raise ValueError(f"{name} is not (S, 2) of finite numbers")
 
     def __len__(self) -> int:
-        """How many items."""
+        """The number of items."""
         return int(self.owner[-1]) + 1 if len(self.owner) else 0
 
     @property
     def first(self) -> Ints:
-        """(M + 1,): item i owns the rows from first[i] to first[i + 1]."""
+        """First rows (M + 1,): item i owns the rows from first[i] to first[i + 1]."""
         return np.searchsorted(self.owner, np.arange(len(self) + 1))
 
 
 def choices_of(items: Items) -> Choices:
-    """The variants in which the items may be cut, by where the tool goes down and comes up.
+    """Return the variants in which the items may be cut, by where the tool goes down and comes up.
 
     A closed contour may begin at its `starts` or at any joint, and ends there; its direction
     changes nothing. An open one runs as drawn, or from its end too when reversible.
@@ -121,7 +121,7 @@ def best_order(
     from_point: Point = (0.0, 0.0),
     to_point: Point | None = (0.0, 0.0),
 ) -> Ints:
-    """Rows (M,), one of each item, in the order of cutting.
+    """Return the rows (M,), one of each item, in the order of cutting.
 
     `before` (P, 2): the first item of a pair is cut before the second. The tool comes from
     `from_point` and goes to `to_point` at last (None: it stays where it is). OptionError when
@@ -156,7 +156,7 @@ def best_order(
 
 
 def tour_of(choices: Choices, before: Ints, rows: Ints, start: Floats, goal: Floats) -> Tour:
-    """The tour of these rows, with all that the search wants to know."""
+    """Return the tour of these rows, with the tables that the search uses."""
     from camtool.kernels.tours import Tour, neighbours, tree_of
 
     count, variants = len(choices), len(choices.owner)
@@ -192,7 +192,8 @@ def tour_of(choices: Choices, before: Ints, rows: Ints, start: Floats, goal: Flo
 
 
 def _turned(choices: Choices) -> Ints:
-    """(S,): of each row the one of its item with entry and exit exchanged, itself when none is."""
+    """Return, for each row (S,), the row of its item with entry and exit exchanged; itself when
+    there is none."""
     turned = np.arange(len(choices.owner))
     rows = np.flatnonzero((choices.entry != choices.exit).any(axis=1))
     of = choices.owner[rows]
@@ -203,8 +204,8 @@ def _turned(choices: Choices) -> Ints:
 
 
 def _turned_among(choices: Choices, rows: Ints) -> Ints:
-    """(R,): the same of these rows, which are all of their items that end elsewhere than they
-    begin."""
+    """Return, for each of these rows (R,), the row of its item with entry and exit exchanged; the
+    rows are all of their items that end elsewhere than they begin."""
     if len(rows) == 0:
         return rows
     owner, entry, leave = choices.owner[rows, None], choices.entry[rows], choices.exit[rows]
@@ -215,7 +216,8 @@ def _turned_among(choices: Choices, rows: Ints) -> Ints:
 
 
 def _places(choices: Choices) -> tuple[Floats, Ints]:
-    """Places (N, 2) that stand for the items when neighbours are sought, and their owners (N,)."""
+    """Return places (N, 2) that stand for the items when neighbours are sought, and their owners
+    (N,)."""
     first, variants = choices.first, np.diff(choices.first)
     step = -(-variants // MOST_PLACES)
     rank = np.arange(len(choices.owner)) - first[choices.owner]
@@ -228,7 +230,8 @@ def _places(choices: Choices) -> tuple[Floats, Ints]:
 
 
 def travel_mm(choices: Choices, rows: Ints, from_point: Point, to_point: Point | None) -> float:
-    """How far the tool travels between items cut in this order, and from and to the points, mm."""
+    """Return the length of the tool's travel between items cut in this order, and from and to the
+    points, mm."""
     leave = np.concatenate([np.array([from_point]), choices.exit[rows]])
     arrive = choices.entry[rows]
     if to_point is None:
@@ -240,7 +243,7 @@ def travel_mm(choices: Choices, rows: Ints, from_point: Point, to_point: Point |
 
 
 def _followers(before: Ints, count: int) -> tuple[Ints, Ints]:
-    """What comes after item i: after[first[i] : first[i + 1]], each once."""
+    """Return the items that must follow each item i: after[first[i] : first[i + 1]], each once."""
     pairs = np.unique(np.asarray(before, dtype=np.int64).reshape(-1, 2), axis=0)
     if len(pairs) and not (pairs.min() >= 0 and pairs.max() < count):
         raise ValueError(f"a pair names an item that is none of {count}")
@@ -261,7 +264,7 @@ tool goes down and where it comes up."""
 
 
 def _fixed_ends(items: Items) -> Ends:
-    """The one variant of each item that is cut as it is."""
+    """Return the only variant of each item that is cut as it is."""
     fixed = [(k, item.runs) for k, item in _fixed(items)]
     ends = [[runs[0].vertices[0, :2], runs[-1].vertices[-1, :2]] for _, runs in fixed]
     return np.array([k for k, _ in fixed], dtype=np.int64), np.array(ends).reshape(-1, 4)
@@ -284,7 +287,8 @@ def _lines_of(contours: Sequence[Contour]) -> Polylines:
 
 
 def _contour_ends(items: Items) -> Iterator[Ends]:
-    """The variants of contours: of closed ones, of open ones as they run, and of those turned."""
+    """Yield the variants of contours: of closed ones, of open ones as they run, and of those
+    turned."""
     contours, owner = contours_of(items), _contour_rows(items)
     lines = _lines_of(contours)
     begins = _begins(contours, lines) & np.repeat(lines.closed, np.diff(lines.offsets))
@@ -317,7 +321,7 @@ def _begins(contours: Sequence[Contour], lines: Polylines) -> Bools:
 
 
 def must_precede(items: Items) -> Ints:
-    """Pairs (P, 2) of items, the first to be cut before the second, ascending.
+    """Return pairs (P, 2) of items, the first to be cut before the second, ascending.
 
     An item goes before the smallest closed Contour that holds it, or any of its runs; nothing
     else does. Contours that cross hold each other not.
@@ -336,7 +340,8 @@ def must_precede(items: Items) -> Ints:
 
 
 def _shapes(items: Items) -> tuple[Polylines, Ints, Ints]:
-    """Paths that say where items lie, and pairs (J,), (J,) of a path and an item that it is of.
+    """Return paths that show where items lie, and pairs (J,), (J,) of a path and an item that it
+    belongs to.
 
     Only a Contour's path is closed and holds any.
     """
@@ -359,7 +364,7 @@ def _shapes(items: Items) -> tuple[Polylines, Ints, Ints]:
 
 
 def _places_of(item: Fixed) -> Iterator[Polyline]:
-    """Open paths that say where an item lies that is cut as it is."""
+    """Yield open paths that show where an item lies that is cut as it is."""
     if item.outline is not None:
         yield Polyline(item.outline.vertices, closed=False)
         return

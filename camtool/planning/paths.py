@@ -67,7 +67,7 @@ class MeasuredPath:
 
     @classmethod
     def of(cls, path: Polyline) -> MeasuredPath:
-        """The path, measured."""
+        """Measure a single path."""
         return cls(MeasuredPaths(Polylines.of([path])), 0)
 
     @cached_property
@@ -83,14 +83,15 @@ class MeasuredPath:
 
     @cached_property
     def reach(self) -> Floats:
-        """(n+1,) mm from the start of the path to the start of each segment, and to its end."""
+        """Lengths (n+1,) mm from the start of the path to the start of each segment, and to its
+        end."""
         first, index = self.paths.first, self.index
         return self.paths.reach[first[index] + index : first[index + 1] + index + 1]
 
     @cached_property
     def turns(self) -> Floats:
-        """(n,) rad by which the path turns at the start of each segment, left positive; 0 at the
-        start of an open one."""
+        """Angles (n,) rad by which the path turns at the start of each segment, left positive; 0
+        at the start of an open one."""
         frames = Frames.of(self.segments)
         before = np.roll(frames.tangent_at(np.ones(len(self.segments))), 1, axis=0)
         cross = dot(turned(before), frames.tangent)
@@ -101,7 +102,7 @@ class MeasuredPath:
 
     @property
     def closed(self) -> bool:
-        """Whether the path is closed."""
+        """True if the path is closed."""
         return bool(self.paths.lines.closed[self.index])
 
     @property
@@ -110,22 +111,24 @@ class MeasuredPath:
         return float(self.paths.total_mm[self.index])
 
     def at(self, lengths: Floats) -> Floats:
-        """(J, 2) the places at these lengths (J,) mm."""
+        """Return the places (J, 2) at these lengths (J,) mm."""
         row, part = self._where(lengths, 0.0)
         return point_at(self.segments, row, part)
 
     def directions(self, lengths: Floats) -> Floats:
-        """(J, 2) the unit tangents at these lengths (J,) mm; at a vertex, of what follows it."""
+        """Return the unit tangents (J, 2) at these lengths (J,) mm; at a vertex, of what follows
+        it."""
         row, part = self._where(lengths, POSITION_EPS_MM)
         return Frames.of(self.segments[row]).tangent_at(part)
 
     def arrivals(self, lengths: Floats) -> Floats:
-        """(J, 2) the unit tangents at these lengths (J,) mm; at a vertex, of what leads to it."""
+        """Return the unit tangents (J, 2) at these lengths (J,) mm; at a vertex, of what leads to
+        it."""
         row, part = self._where(lengths, -POSITION_EPS_MM)
         return Frames.of(self.segments[row]).tangent_at(part)
 
     def nearest_to(self, point: tuple[float, float]) -> float:
-        """The length at which the path is nearest to a point (x, y) mm.
+        """Return the length at which the path is nearest to a point (x, y) mm.
 
         Measured from the start of an arc of the curvature k, with the point at x along the tangent
         and y along the left normal, the foot of the point is  atan2(k x, 1 − k y) / k  along.
@@ -144,7 +147,8 @@ class MeasuredPath:
         return float(tries[np.hypot(apart[:, 0], apart[:, 1]).argmin()])
 
     def piece(self, begin: float, end: float) -> Floats:
-        """(k, 3) x, y, bulge from one length to another, backwards when `end` is the lower one.
+        """Return vertices (k, 3) x, y, bulge from one length to another, backwards when `end` is
+        the lower one.
 
         Vertices nearer than POSITION_EPS_MM to an end are that end. The last bulge is 0.
         """
@@ -154,7 +158,8 @@ class MeasuredPath:
         return np.ascontiguousarray(found[:, [0, 1, 3]])
 
     def _where(self, lengths: Floats, ahead_mm: float) -> tuple[Ints, Floats]:
-        """The segment that is so far ahead of each length, and the part of it at the length.
+        """Return the segment that is so far ahead of each length, and the part of it at the
+        length.
 
         Ends of open paths reach no further.
         """
@@ -168,7 +173,7 @@ class MeasuredPath:
 
 
 def backwards(vertices: Floats) -> Floats:
-    """Vertices (k, n) of an open path, the bulge in the last column, travelled in the other
+    """Return vertices (k, n) of an open path, the bulge in the last column, travelled in the other
     direction."""
     back = vertices[::-1].copy()
     back[:-1, -1] = 0.0 - vertices[-2::-1, -1]
@@ -177,24 +182,25 @@ def backwards(vertices: Floats) -> Floats:
 
 
 def joined(paths: Sequence[Floats]) -> Floats:
-    """Open paths (k, n), each of which begins where the one before it ends, as one."""
+    """Join open paths (k, n), each of which begins where the one before it ends."""
     return np.concatenate([*(path[:-1] for path in paths[:-1]), paths[-1]])
 
 
 def midpoints(segments: Segments) -> Floats:
-    """(K, 2) the midpoints of lines and arcs."""
+    """Return the midpoints (K, 2) of lines and arcs."""
     return point_at(segments, np.arange(len(segments)), np.full(len(segments), 0.5))
 
 
 def runs_of_true(values: Bools) -> tuple[Ints, Ints]:
-    """(J,), (J,): from which and up to which index values are true, the last one not included."""
+    """Return the ranges of true values: first indices (J,), and the indices (J,) behind the last
+    ones."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], values.astype(np.int64), [0]])))
     return edges[::2], edges[1::2]
 
 
 def flat(vertices: Floats) -> Polyline | None:
-    """A run (n, 4) of x, y, z, bulge seen from above, without the moves that lead nowhere there;
-    None when it stays at one place."""
+    """Return a run (n, 4) of x, y, z, bulge seen from above, without the moves that lead nowhere
+    there; None when it stays at one place."""
     kept: list[Floats] = []
     for vertex in vertices[:, [0, 1, 3]]:
         if kept and np.hypot(*(vertex[:2] - kept[-1][:2])) <= POSITION_EPS_MM:
@@ -216,7 +222,7 @@ class Cuts(Struct, frozen=True, eq=False):
 
 
 def joints(lines: Polylines) -> Bools:
-    """(N,) for closed paths, the vertices where one move ends and another begins.
+    """Mask (N,) of the vertices of closed paths where one move ends and another begins.
 
     For a circle every vertex is as good, and all are true; so are those of open paths.
     """
@@ -234,7 +240,7 @@ def joints(lines: Polylines) -> Bools:
 
 
 def cuts(vertices: Floats, feed_mm_min: Floats, first: Ints) -> Cuts:
-    """The lines and arcs of R runs, arcs of one circle that follow each other as one.
+    """Return the lines and arcs of R runs, arcs of one circle that follow each other as one.
 
     Run i has the rows first[i] to first[i + 1] (R + 1,) of `vertices` (N, 4), x, y, z, bulge, and
     of `feed_mm_min` (N,), that of the move which leaves the vertex. A circle becomes a single arc
@@ -266,8 +272,8 @@ def cuts(vertices: Floats, feed_mm_min: Floats, first: Ints) -> Cuts:
 
 
 def _begins(segments: Segments, goes_on: Bools) -> Bools:
-    """(n,) true for the segments with which a move begins, `goes_on` (n−1,) where one may go on
-    in the next: an arc sweeps no more than one may, or a whole circle."""
+    """Mask (n,) of the segments with which a move begins, `goes_on` (n−1,) where one may go on in
+    the next: an arc sweeps no more than one may, or a whole circle."""
     begins = np.ones(len(segments), dtype=np.bool_)
     begin, swept, last = 0, 0.0, -1
     for row in (np.flatnonzero(goes_on) + 1).tolist():
@@ -283,7 +289,7 @@ def _begins(segments: Segments, goes_on: Bools) -> Bools:
 
 
 def _within(segments: Segments, begin: int, last: int, swept: float) -> bool:
-    """Whether the rows from `begin` to `last` sweep no more than an arc may, or a whole circle."""
+    """True if the rows from `begin` to `last` sweep no more than an arc may, or a whole circle."""
     if abs(swept) <= LARGEST_PART_SWEEP_RAD:
         return True
     apart = segments.end[last] - segments.start[begin]
@@ -291,7 +297,7 @@ def _within(segments: Segments, begin: int, last: int, swept: float) -> bool:
 
 
 def _goes_on(segments: Segments, rise: Floats, feed: Floats) -> Bools:
-    """(n−1,) true where a segment goes on in the next: one run, circle, slope and feed."""
+    """Mask (n−1,) of the segments that go on in the next: one run, circle, slope and feed."""
     found = _same_arc(segments[:-1], segments[1:]) & (feed[:-1] == feed[1:])
     found &= np.diff(segments.path) == 0
     pairs = np.flatnonzero(found)
@@ -302,13 +308,13 @@ def _goes_on(segments: Segments, rise: Floats, feed: Floats) -> Bools:
 
 
 def _slopes(segments: Segments, rise: Floats, rows: Ints) -> Floats:
-    """(J,) mm per mm: how steep these rows are, all of them arcs."""
+    """Return the slopes (J,) of these rows, mm per mm, all of them arcs."""
     arcs = segments[rows]
     return np.asarray(rise[rows] / (arcs.radius * np.abs(arcs.sweep)))
 
 
 def _same_arc(one: Segments, other: Segments) -> Bools:
-    """(K,) true where two rows are arcs of one circle in the same direction."""
+    """Mask (K,) of the rows of which both are arcs of one circle in the same direction."""
     found = one.is_arc & (np.sign(one.bulge) == np.sign(other.bulge))
     rows = np.flatnonzero(found)
     one, other = one[rows], other[rows]

@@ -46,34 +46,36 @@ SCALE_SHARE = 1e-3
 
 
 class Map(Struct, frozen=True, eq=False):
-    """p ↦ `matrix` p + `shift`: (2, 2) and (2,), mm; lengths grow `scale` times."""
+    """An affine map: p ↦ `matrix` p + `shift`: (2, 2) and (2,), mm; lengths grow `scale` times."""
 
     matrix: Floats
     shift: Floats
     scale: float
 
     def points(self, points: Floats) -> Floats:
-        """Points (K, 2) mm where they come to lie."""
+        """Return the images of points (K, 2) mm."""
         return np.asarray(points @ self.matrix.T + self.shift)
 
     def point(self, at_mm: tuple[float, float]) -> tuple[float, float]:
-        """A single point."""
+        """Return the image of a single point."""
         x, y = self.points(np.array([at_mm]))[0].tolist()
         return x, y
 
     def vertices(self, vertices: Floats) -> Floats:
-        """Vertices (N, 3) of x, y, bulge: the bulge changes its sign with the handedness."""
+        """Return the images of vertices (N, 3) of x, y, bulge: the bulge changes its sign with the
+        handedness."""
         flipped = np.linalg.det(self.matrix) < 0.0
         bulge = 0.0 - vertices[:, 2] if flipped else vertices[:, 2]
         return np.column_stack([self.points(vertices[:, :2]), bulge])
 
     def moved(self, shift: Floats) -> Map:
-        """The same, and then moved by `shift` (2,) mm."""
+        """Return the map followed by a shift (2,) mm."""
         return replace(self, shift=self.shift + shift)
 
 
 def place(drawing: Drawing, job: Job) -> Drawing:
-    """The drawing in the work frame, as the job's placement says; itself when nothing changes.
+    """Return the drawing in the work frame, as the job's placement says; itself when nothing
+    changes.
 
     Copies come one after the other, row by row: all paths and marks of the first, then of the
     second, whose sources name the copy ("CIRCLE 2F copy 2"). Fit, lower left and centre take the
@@ -88,7 +90,7 @@ def place(drawing: Drawing, job: Job) -> Drawing:
 
 
 def _placed(drawing: Drawing, job: Job) -> Drawing:
-    """The drawing where the job's placement says, however large."""
+    """Return the drawing where the job's placement says, of whatever size."""
     placement = job.placement
     _refuse_too_many(drawing, placement)
     maps = placements(drawing, job)
@@ -99,7 +101,7 @@ def _placed(drawing: Drawing, job: Job) -> Drawing:
 
 
 def placements(drawing: Drawing, job: Job) -> list[Map]:
-    """Where each copy of the drawing comes to lie in the work frame, row by row.
+    """Return the map of each copy of the drawing into the work frame, row by row.
 
     Raises OptionError for an impossible fit.
     """
@@ -109,7 +111,7 @@ def placements(drawing: Drawing, job: Job) -> list[Map]:
 
 
 def part_scale(drawing: Drawing, job: Job) -> float:
-    """How many times as large as what is drawn the part is, whose size the job's placement says.
+    """Return the size of the part over the size of the drawing, as the job's placement says.
 
     Raises OptionError for an impossible fit.
     """
@@ -117,8 +119,8 @@ def part_scale(drawing: Drawing, job: Job) -> float:
 
 
 def collapsed(drawing: Drawing, placed: Drawing, job: Job) -> list[Finding]:
-    """One finding for what the scale made too small for a shape: points that became one, and paths
-    that became a point and are left out (a warning: something drawn is not cut)."""
+    """Return a finding for paths that the scale made too small for a shape: points that became
+    one, and paths that became a point and are left out (a warning: something drawn is not cut)."""
     columns, rows = job.placement.copies
     paths = columns * rows * len(drawing.paths) - len(placed.paths)
     points = columns * rows * len(drawing.paths.vertices) - len(placed.paths.vertices)
@@ -137,7 +139,7 @@ def collapsed(drawing: Drawing, placed: Drawing, job: Job) -> list[Finding]:
 
 
 def _first_map(drawing: Drawing, job: Job) -> Map:
-    """Mirror, rotation and scale about the drawing's zero."""
+    """Return the mirror, rotation and scale about the drawing's zero."""
     placement, turned = job.placement, _turned(job.placement)
     scale = placement.scale
     if placement.fit_mm is not None:
@@ -146,7 +148,7 @@ def _first_map(drawing: Drawing, job: Job) -> Map:
 
 
 def _turned(placement: Placement) -> Map:
-    """Mirror and rotation about the drawing's zero."""
+    """Return the mirror and rotation about the drawing's zero."""
     cosine, sine = _cosine_and_sine(placement.rotate_rad)
     flip = np.diag([-1.0 if placement.mirror == axis else 1.0 for axis in ("x", "y")])
     return Map(np.array([[cosine, -sine], [sine, cosine]]) @ flip, np.zeros(2), 1.0)
@@ -157,8 +159,8 @@ def _turned(placement: Placement) -> Map:
 
 
 def datum_off(drawing: Drawing, job: Job, placed: Map) -> float:
-    """Upper bound of the distance, mm in the work frame, of the drawing that is `placed` from
-    where the box of what was drawn would have put it; 0 where no box is asked for."""
+    """Return an upper bound of the distance, mm in the work frame, of the drawing that is `placed`
+    from where the box of what was drawn would have put it; 0 where no box is asked for."""
     placement = job.placement
     by_box = placement.origin in ("lower-left", "centre")
     if not (by_box or placement.fit_mm) or not drawing.off_mm.any():
@@ -186,7 +188,8 @@ def datum_off(drawing: Drawing, job: Job, placed: Map) -> float:
 
 
 def _box_slack(drawing: Drawing, job: Job, where: Map) -> Floats:
-    """(2, 2) how far each side of `_box` may lie from that of what was drawn, mm."""
+    """Return an upper bound (2, 2), mm, of the distance of each side of `_box` from that of what
+    was drawn."""
     paths, marks = taken(drawing, job)
     lines, off = drawing.paths.select(paths), drawing.off_mm[:, 0]
     if len(paths) < len(drawing.paths):
@@ -209,7 +212,8 @@ def _box_slack(drawing: Drawing, job: Job, where: Map) -> Floats:
 
 
 def _cosine_and_sine(angle_rad: float) -> tuple[float, float]:
-    """Those of the angle; exactly 0 and ±1 for quarter turns, so that squares stay square."""
+    """Return the cosine and sine of an angle; exactly 0 and ±1 for quarter turns, so that squares
+    stay square."""
     quarters = angle_rad / (0.5 * math.pi)
     if quarters == round(quarters):
         return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[round(quarters) % 4]
@@ -217,7 +221,8 @@ def _cosine_and_sine(angle_rad: float) -> tuple[float, float]:
 
 
 def _fitting_scale(fit_mm: tuple[float, float], box: Floats | None, file: str) -> float:
-    """The largest scale at which the box (2, 2) is no larger than `fit_mm`; 0 there is any."""
+    """Return the largest scale at which the box (2, 2) is no larger than `fit_mm`, where 0 means
+    any size."""
     if box is None:
         raise OptionError(
             "the operations choose nothing of this drawing, so there is nothing to fit",
@@ -243,7 +248,7 @@ def _fitting_scale(fit_mm: tuple[float, float], box: Floats | None, file: str) -
 
 
 def _origin(drawing: Drawing, job: Job, first: Map, shifts: Floats) -> Floats:
-    """(2,) the place, before it is moved, that becomes part zero."""
+    """Return the place (2,), before it is moved, that becomes part zero."""
     origin = job.placement.origin
     if not isinstance(origin, str):
         return np.array(origin)
@@ -256,7 +261,8 @@ def _origin(drawing: Drawing, job: Job, first: Map, shifts: Floats) -> Floats:
 
 
 def _box(drawing: Drawing, job: Job, where: Map) -> Floats | None:
-    """(2, 2) the box of all that the operations take, there; None when they take nothing."""
+    """Return the box (2, 2) of all that the operations take, mapped by `where`; None when they
+    take nothing."""
     paths, marks = taken(drawing, job)
     boxes = []
     if paths:
@@ -271,7 +277,8 @@ def _box(drawing: Drawing, job: Job, where: Map) -> Floats | None:
 
 
 def taken(drawing: Drawing, job: Job) -> tuple[list[int], list[int]]:
-    """Indices of the paths that any operation takes, and of the marks that any one drills."""
+    """Return the indices of the paths that any operation takes, and of the marks that any one
+    drills."""
     drills = [operation for operation in job.operations if operation.contract.takes == "holes"]
     takes = _remembered(job.takes)
     drilled = _remembered(lambda *names: any(drill.takes(*names) for drill in drills))
@@ -283,7 +290,7 @@ def taken(drawing: Drawing, job: Job) -> tuple[list[int], list[int]]:
 
 
 def _remembered(takes: Callable[[str, str], bool]) -> Callable[[str, str], bool]:
-    """The same answers, each pattern matched once for a layer and colour."""
+    """Return a function with the same answers that matches each layer and colour only once."""
     known: dict[tuple[str, str], bool] = {}
 
     def asked(layer: str, colour: str) -> bool:
@@ -296,7 +303,7 @@ def _remembered(takes: Callable[[str, str], bool]) -> Callable[[str, str], bool]
 
 
 def _copy_shifts(placement: Placement) -> Floats:
-    """(K, 2) mm, how far each copy lies from the first, row by row."""
+    """Return the shift (K, 2) mm of each copy from the first, row by row."""
     columns, rows = placement.copies
     row, column = np.divmod(np.arange(columns * rows), columns)
     return np.asarray(np.column_stack([column, row]) * np.array(placement.pitch_mm))
@@ -315,7 +322,8 @@ def _refuse_too_many(drawing: Drawing, placement: Placement) -> None:
 
 
 def _refuse_too_large(placed: Drawing, placement: Placement) -> None:
-    """OptionError for a drawing in the work frame that is larger than any machine, or away."""
+    """Refuse a drawing that is larger in the work frame than any machine, or far from part
+    zero."""
     places = placed.paths.vertices[:, :2]
     if len(places) == 0:
         return
@@ -341,7 +349,7 @@ def _refuse_too_large(placed: Drawing, placement: Placement) -> None:
 
 
 def _what_enlarges(placement: Placement) -> str:
-    """The key that makes a drawing large; "" when none does."""
+    """Return the key that makes a drawing large; "" when none does."""
     if placement.scale > 1.0:
         return "scale"
     if placement.fit_mm is not None:
@@ -354,7 +362,8 @@ def _is_identity(where: Map) -> bool:
 
 
 def _repeated(drawing: Drawing, maps: list[Map]) -> Drawing:
-    """All that has a place, once for each map; paths that the scale makes a point are left out."""
+    """Return the drawing with all that has a place repeated for each map; paths that the scale
+    makes a point are left out."""
     paths, rows, kept = _lines(drawing.paths, maps)
     off = np.tile(maps[0].scale * drawing.off_mm, (len(maps), 1))
     copy, path = np.divmod(rows, max(1, len(drawing.paths)))
@@ -381,9 +390,9 @@ def _repeated(drawing: Drawing, maps: list[Map]) -> Drawing:
 
 
 def _lines(lines: Polylines, maps: list[Map]) -> tuple[Polylines, Ints, Ints]:
-    """The paths under each map, one map after the other, which of these (copy · paths + path) are
-    left, and which of all vertices: points that the scale brings together are merged, and a path
-    of one point is none.
+    """Return the paths under each map, one map after the other, the indices (copy · paths + path)
+    of those that remain, and the mask of the vertices that do: points that the scale brings
+    together are merged, and a path of one point is dropped.
 
     OptionError when numbers are lost, or no path is left of any.
     """
@@ -417,7 +426,8 @@ def _lines(lines: Polylines, maps: list[Map]) -> tuple[Polylines, Ints, Ints]:
 
 
 def _around(unchosen: Unchosen, maps: list[Map]) -> Unchosen:
-    """What was not chosen, once for each map, but for contours that shrink to points."""
+    """Return the contours that were not chosen under each map, except those that shrink to
+    points."""
     try:
         paths, rows, _ = _lines(unchosen.paths, maps)
     except OptionError:  # nothing is left of them; what is chosen has been placed already
@@ -445,8 +455,8 @@ def _gaps(gaps: tuple[Gap, ...], maps: list[Map]) -> tuple[Gap, ...]:
 
 
 def _healing(drawing: Drawing, maps: list[Map], rows: Ints) -> Healing:
-    """The places of branches and crossings of the paths `rows` that are left; what was counted on
-    reading stays as it was."""
+    """Return the places of branches and crossings of the paths `rows` that are left; the counts of
+    what was corrected on reading stay as they were."""
     healing, paths = drawing.healing, len(drawing.paths)
     now = {row: index for index, row in enumerate(rows.tolist())}
     return replace(

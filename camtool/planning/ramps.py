@@ -46,7 +46,8 @@ MOST_LAPS = 200.0
 
 
 def laps(total_mm: float, levels_mm: Sequence[float], overlap_mm: float) -> ZProfile:
-    """Round a closed path at each level, straight down from one to the next at the start."""
+    """Return the profile round a closed path at each level, straight down from one to the next at
+    the start."""
     points: ZProfile = []
     for turn, z in enumerate(levels_mm):
         points += [(turn * total_mm, z), ((turn + 1) * total_mm, z)]
@@ -55,14 +56,15 @@ def laps(total_mm: float, levels_mm: Sequence[float], overlap_mm: float) -> ZPro
 
 
 def apart(total_mm: float, levels_mm: Sequence[float], overlap_mm: float) -> list[ZProfile]:
-    """Round a closed path at each level on its own."""
+    """Return one profile round a closed path for each level."""
     return [[(0.0, z), (total_mm + overlap_mm, z)] for z in levels_mm]
 
 
 def spiral(
     total_mm: float, levels_mm: Sequence[float], overlap_mm: float, angle_rad: float
 ) -> ZProfile:
-    """Round a closed path, sloping from the stock top to each level, and once flat at the last."""
+    """Return the profile round a closed path, sloping from the stock top to each level, and one
+    flat lap at the last."""
     points: ZProfile = [(0.0, 0.0)]
     begin = above = 0.0
     for z in levels_mm:
@@ -78,8 +80,8 @@ def spiral(
 def spiral_with_stops(
     total_mm: float, levels_mm: Sequence[float], overlap_mm: float, angle_rad: float
 ) -> tuple[ZProfile, list[float]]:
-    """The same, and a length at each level but the last where the tool is down at it, always at
-    the place where the last lap ends.
+    """Return the profile of a spiral, and for each level but the last a length at which the tool
+    has reached it, always at the place where the last lap ends.
 
     All ramps are as long as that of the largest step, so that all end at one place.
     """
@@ -99,7 +101,8 @@ def spiral_with_stops(
 def to_and_fro(
     total_mm: float, levels_mm: Sequence[float], above_mm: float, angle_rad: float | None
 ) -> ZProfile:
-    """Along an open path at each level, from the end where the level before ended.
+    """Return the profile along an open path at each level, from the end where the level before
+    ended.
 
     Down from `above_mm` and between the levels straight (None), or sloping by the angle.
     """
@@ -116,7 +119,7 @@ def to_and_fro(
 
 
 def _zigzag(total_mm: float, above_mm: float, z_mm: float, angle_rad: float) -> ZProfile:
-    """Down at the start of an open path, to and fro as often as needed."""
+    """Return the profile down at the start of an open path, to and fro as often as needed."""
     ramp = (above_mm - z_mm) / math.tan(angle_rad)
     legs = 2 * math.ceil(ramp / (2.0 * total_mm))
     drop = (above_mm - z_mm) / legs
@@ -126,7 +129,8 @@ def _zigzag(total_mm: float, above_mm: float, z_mm: float, angle_rad: float) -> 
 def lifted(
     paths: MeasuredPaths, index: Sequence[int], profiles: Sequence[ZProfile]
 ) -> list[Floats]:
-    """(n, 4) each: x, y, z, bulge of the paths of these indices (R,) with these profiles (R,)."""
+    """Return vertices (n, 4) for each run: x, y, z, bulge of the paths of these indices (R,) with
+    these profiles (R,)."""
     from camtool.kernels.passes import lifted as lift
 
     first = np.concatenate([[0], np.cumsum([len(points) for points in profiles])])
@@ -138,7 +142,7 @@ def lifted(
 
 
 def feeds_along(vertices: Floats, feeds: Feeds) -> Floats:
-    """(n−1,) mm/min for the moves between vertices (n, 4).
+    """Return the feeds (n−1,) mm/min for the moves between vertices (n, 4).
 
     Straight up and down at the plunge feed; all others at the feed of the cut, but no faster than
     that the vertical part of the feed is the plunge feed.
@@ -152,5 +156,5 @@ def feeds_along(vertices: Floats, feeds: Feeds) -> Floats:
 
 
 def _lengths(vertices: Floats) -> Floats:
-    """(k−1,) lengths of the lines and arcs between vertices (k, 3), seen from above."""
+    """Return the lengths (k−1,) of the lines and arcs between vertices (k, 3), seen from above."""
     return segment_lengths(Segments.between(vertices[:-1, :2], vertices[1:, :2], vertices[:-1, 2]))

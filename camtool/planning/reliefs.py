@@ -50,7 +50,7 @@ class Relieved(Struct, frozen=True, eq=False):
 def relieved(
     path: Polyline, original: Polyline, near_mm: float, kind: str, keep_out: Polylines
 ) -> Relieved:
-    """A path of the tool centre with reliefs at the sharp inner corners of the `original`.
+    """Return a path of the tool centre with reliefs at the sharp inner corners of the `original`.
 
     `kind` is "dogbone" or "overcut". Reliefs come nowhere nearer than `near_mm` to the lines of
     `keep_out`, and to the walls of the original beyond the corner: the tool's radius, or less by
@@ -77,8 +77,9 @@ def relieved(
 
 
 def _stands(along: MeasuredPath, walls: MeasuredPath, near_mm: float) -> dict[int, int]:
-    """The corners (vertices of the walls) that the tool misses, and at which vertex of its path it
-    stands then: the nearest of those that are equally far from both walls of the corner."""
+    """Return the corners (vertices of the walls) that the tool misses, with the vertex of its path
+    at which it stands then: the nearest of those that are equally far from both walls of the
+    corner."""
     found: dict[int, tuple[float, int]] = {}
     for vertex in np.flatnonzero(np.abs(along.turns) > RELIEF_TURN_RAD).tolist():
         v = along.path.vertices[vertex, :2]
@@ -96,7 +97,7 @@ def _stands(along: MeasuredPath, walls: MeasuredPath, near_mm: float) -> dict[in
 
 
 def _move(along: MeasuredPath, vertex: int, walls: MeasuredPath, corner: int, kind: str) -> Floats:
-    """(2, 2) from V to where the tool's edge touches the corner."""
+    """Return the move (2, 2) from V to where the tool's edge touches the corner."""
     v, c = along.path.vertices[vertex, :2], walls.segments.start[corner]
     away = float(points_to_segments(v[None], walls.segments).min())
     arm = c - v
@@ -114,7 +115,7 @@ def _move(along: MeasuredPath, vertex: int, walls: MeasuredPath, corner: int, ki
 
 
 def _along_longer(along: MeasuredPath, vertex: int, walls: MeasuredPath, corner: int) -> Floats:
-    """The direction (2,) in which the tool goes on beyond V along the longer wall.
+    """Return the direction (2,) in which the tool goes on beyond V along the longer wall.
 
     Of two as long it is the one nearer to the X axis, so that symmetric parts stay symmetric.
     """
@@ -130,7 +131,7 @@ def _along_longer(along: MeasuredPath, vertex: int, walls: MeasuredPath, corner:
 
 
 def _is_clear(move: Floats, corner: Floats, others: Segments, near_mm: float) -> bool:
-    """Whether a tool that makes this move cuts into no wanted line but those at the corner."""
+    """True if a tool that makes this move cuts into no wanted line but those at the corner."""
     low, high = move.min(axis=0) - near_mm, move.max(axis=0) + near_mm
     boxes = segment_boxes(others)
     rows = np.flatnonzero(((boxes[:, :2] < high) & (boxes[:, 2:] > low)).all(axis=1))

@@ -66,14 +66,15 @@ class _Sums(Struct):
     error_mm: float = 0.0
 
     def add(self, runs: int, reversals: int, error_mm: float) -> None:
-        """One contour more."""
+        """Add the figures of one contour."""
         self.runs += runs
         self.reversals += reversals
         self.error_mm = max(self.error_mm, error_mm)
 
 
 class _Counts(Struct):
-    """What changes; `whole`: why contours stayed in one piece, with the names of those."""
+    """Figures before and after the division; `whole`: reasons why contours stayed in one piece,
+    with the names of these contours."""
 
     before: _Sums = field(default_factory=_Sums)
     after: _Sums = field(default_factory=_Sums)
@@ -81,8 +82,8 @@ class _Counts(Struct):
 
 
 def fewer_reversals(items: Items, machine: Machine) -> tuple[Items, tuple[Finding, ...]]:
-    """The items with contours replaced by runs that reverse no axis while cutting, in the order
-    of the contours, and what that changes; items of `Fixed` runs stay.
+    """Replace contours by runs that reverse no axis while cutting, in the order of the contours;
+    return all items, and findings that compare. Items of `Fixed` runs stay.
 
     An axis without backlash and compensation may reverse anywhere. The runs of a contour together
     are the contour: they meet exactly, keep its name, source and setting, and know the whole path
@@ -145,19 +146,19 @@ def _reversals(
 
 
 def _keeps_direction(contour: Contour) -> bool:
-    """Whether the side on which the teeth cut was asked for, and there is a side."""
+    """True if the job fixes the side on which the teeth cut, and the contour has one."""
     operation = contour.setting.operation
     wide = operation.tool.diameter_mm > 0.0 and contour.material_left is not None
     return operation.direction != "drawn" and wide
 
 
 def may_divide(operation: Operation) -> bool:
-    """Whether contours of this operation may be cut as several runs."""
+    """True if contours of this operation may be cut as several runs."""
     return not _stays_whole(operation)
 
 
 def _stays_whole(operation: Operation) -> str:
-    """Why contours of this operation are not divided; "" when they may be."""
+    """Return the reason why contours of this operation are not divided; "" when they may be."""
     if operation.tabs is not None:
         return "tabs are counted along whole contours"
     if operation.lead_in.kind != "none" or operation.lead_out.kind != "none":
@@ -170,7 +171,8 @@ def _stays_whole(operation: Operation) -> str:
 
 
 def _part(contour: Contour, path: Polyline, backward: bool) -> Contour:
-    """A run of a contour; one that is the whole of an open contour keeps no other outline."""
+    """Return a run of a contour; one that is the whole of an open contour keeps no other
+    outline."""
     left = contour.material_left
     return replace(
         contour,
@@ -185,8 +187,8 @@ def _part(contour: Contour, path: Polyline, backward: bool) -> Contour:
 def _begun_at_reversals(
     contour: Contour, parts: Parts, reversals: tuple[AxisReversals, AxisReversals]
 ) -> tuple[Contour, int]:
-    """The closed contour with only those starts at which the most reversals happen in the air, and
-    how many do: two at most, one of X and one of Y."""
+    """Return the closed contour with only those starts at which the most reversals happen in the
+    air, and the number of these: two at most, one of X and one of Y."""
     count = len(parts)
     if len(contour.starts):
         at = np.flatnonzero(parts.begin == 0.0)[contour.starts]
@@ -376,8 +378,8 @@ def _traced(came: Sequence[tuple[int, Piece] | None]) -> list[Piece]:
 
 
 def _possible(division: Division, places: list[int]) -> Iterator[tuple[int, int, Piece]]:
-    """Pieces from place i to place j of `places` in all directions, in the order of i: each ends
-    before, or on, the first reversal that lies ahead as a whole."""
+    """Yield pieces from place i to place j of `places` in all directions, in the order of i: each
+    ends before, or on, the first reversal that lies ahead as a whole."""
     reach = _reaches(division, np.array(places, dtype=np.int64))
     for i, first in enumerate(places):
         for j in range(i + 1, len(places)):
@@ -388,7 +390,8 @@ def _possible(division: Division, places: list[int]) -> Iterator[tuple[int, int,
 
 
 def _reaches(division: Division, places: Ints) -> Floats:
-    """(P,) the farthest place that no reversal forbids to a piece from each of the places."""
+    """Return the farthest place (P,) that a piece from each of the places may reach without a
+    reversal."""
     count = len(division.parts)
     laps = np.arange(3 if division.parts.path.closed else 1) * count
     first = np.concatenate([(t.first + laps[:, None]).ravel() for t in division.reversals])
@@ -400,8 +403,8 @@ def _reaches(division: Division, places: Ints) -> Floats:
 
 
 def _places(division: Division, begin: int, end: int) -> list[int]:
-    """Where a path may be divided between two places, these too: the ends of all spans, and
-    where an axis of an open path begins or ends to move."""
+    """Return the places between two places, these too, at which a path may be divided: the ends of
+    all spans, and where an axis of an open path begins or ends to move."""
     count, found = len(division.parts), {begin, end}
     for reversals in division.reversals:
         found.update(reversals.first.tolist(), reversals.last.tolist(), reversals.moves or ())
@@ -449,7 +452,8 @@ class Parts(Struct, frozen=True, eq=False, dict=True):
         return Polyline(np.column_stack([places, bulge]))
 
     def with_vertices(self, at: Ints) -> tuple[Polyline, Ints]:
-        """The closed path with vertices at these places, and which of its vertices they are."""
+        """Return the closed path with vertices at these places, and the indices of these
+        vertices."""
         keep = np.union1d(np.flatnonzero(self.begin == 0.0), at)
         last = np.append(keep[1:], len(self)) - 1
         bulge = _bulges(self.path, self.row[keep], self.end[last] - self.begin[keep])
@@ -458,13 +462,13 @@ class Parts(Struct, frozen=True, eq=False, dict=True):
 
 
 def _bulges(path: Polyline, row: Ints, share: Floats) -> Floats:
-    """Bulges of these shares of segments; a whole one keeps its own to the last bit."""
+    """Return the bulges of these shares of segments; a whole one keeps its own to the last bit."""
     bulge = path.vertices[row, 2]
     return np.asarray(np.where(share == 1.0, bulge, np.tan(np.arctan(bulge) * share)))
 
 
 def parts_of(path: Polyline) -> Parts:
-    """The path with its arcs split where their tangents lie along an axis.
+    """Split the arcs of a path where their tangents lie along an axis.
 
     The tangent of an arc turns from  chord direction − sweep/2  to  chord direction + sweep/2;
     it lies along an axis at the multiples of 90° between, of which |sweep| ≤ 180° has three at
@@ -515,19 +519,21 @@ class AxisReversals(Struct, frozen=True, eq=False):
         return len(self.first)
 
     def within(self, count: int) -> int:
-        """How many lie between the first of `count` parts' places and the last: those at the start
-        of a closed path do not."""
+        """Count the reversals between the first of `count` parts' places and the last: those at
+        the start of a closed path do not count."""
         return int(((self.first > 0) & (self.last < count)).sum())
 
 
 def no_reversals(count: int) -> AxisReversals:
-    """The reversals of an axis that never moves, or does not matter, along `count` parts."""
+    """Return the reversals of an axis that never moves, or does not matter, along `count`
+    parts."""
     none = np.empty(0, dtype=np.int64)
     return AxisReversals(np.zeros(count, dtype=np.int64), none, none)
 
 
 def reversals_along(values: Floats, closed: bool, least_mm: float) -> AxisReversals:
-    """Where `values` (A+1,), the positions of one axis in mm, come back by `least_mm` or more."""
+    """Find the reversals of at least `least_mm` in `values` (A+1,), the positions of one axis in
+    mm."""
     count = len(values) - 1
     # A closed path is begun at its highest value, which is a reversal if there are any.
     begin = int(values[:-1].argmax()) if closed else 0
@@ -587,7 +593,8 @@ def _flat(values: list[float], extreme: int, closed: bool, least_mm: float) -> t
 
 
 class Approaches:
-    """Where the tool comes from, so that no axis has backlash left to cross when a cut begins.
+    """Points from which the tool comes, so that no axis has backlash left to cross when a cut
+    begins.
 
     The tool goes down where it last moved to in XY. If each axis came there in the direction in
     which the cut first drives it, and over more than its backlash, its slide is engaged from the
@@ -608,8 +615,8 @@ class Approaches:
         ]
 
     def __call__(self, run: CutRun) -> tuple[float, float] | None:
-        """Where the tool goes first (x, y) mm, at safe z; None: straight to the first point of the
-        run, as always where neither axis has backlash or compensation.
+        """Return the place (x, y) mm to which the tool goes first, at safe z; None: straight to
+        the first point of the run, as always where neither axis has backlash or compensation.
 
         The place lies beside the run, nearer than the backlash and `APPROACH_MARGIN_MM` on each
         axis. Nothing keeps it within the travel: a nearer one would not do, and the toolpath that
@@ -633,8 +640,8 @@ class _Drive:
         self._sense = 0
 
     def before(self, values: list[float]) -> float:
-        """Where the axis comes from to a run that takes it to these values, mm: their first one
-        when it comes from anywhere. It has cut the run then."""
+        """Return the position, mm, from which the axis comes to a run that takes it to these
+        values: their first one when any will do. Afterwards the axis has made the run."""
         start, sense = values[0], self._first_sense(values)
         since = self._since if sense == self._sense else self._at
         engaged = (start - self._at) * sense >= 0.0 and (start - since) * sense >= self._need_mm
@@ -646,7 +653,8 @@ class _Drive:
         return come
 
     def _first_sense(self, values: list[float]) -> int:
-        """The direction in which a run first drives the axis; the better one when it does not."""
+        """Return the direction in which a run first drives the axis; the better one when it does
+        not."""
         if len(values) == 1:
             return self._residual.better
         sense = reversals_along(np.array(values), False, self._least_mm).sense
@@ -661,13 +669,13 @@ class _Drive:
 
 
 def approach_mm(axis: Axis) -> float:
-    """How far an axis must be driven in one direction until its slide follows for certain: what
-    the controller's compensation leaves of the backlash, and the margin."""
+    """Return the distance that an axis must be driven in one direction until its slide follows for
+    certain: the backlash that the controller's compensation leaves, and the margin."""
     return max(axis.backlash_mm - axis.compensation_mm, 0.0) + APPROACH_MARGIN_MM
 
 
 def least_reversal_mm(axis: Axis) -> float:
-    """How far back an axis must go to reverse."""
+    """Return the least distance that counts as a reversal of an axis."""
     return REVERSAL_STEPS * axis.coded_step_mm
 
 
@@ -701,12 +709,12 @@ class Residual(Struct, frozen=True):
 
 
 def backlashes_mm(axis: Axis, cells: PlayCells | None) -> tuple[float, ...]:
-    """The backlash of an axis in every region of the table, mm."""
+    """Return the backlash of an axis in every region of the table, mm."""
     return (axis.backlash_mm,) if cells is None else tuple(chain.from_iterable(cells.play_mm))
 
 
 def loosest(machine: Machine) -> tuple[Axis, Axis]:
-    """X and Y with the largest backlash of all regions."""
+    """Return X and Y with the largest backlash of all regions."""
     x, y, _ = (
         replace(axis, backlash_mm=max(backlashes_mm(axis, cells)))
         for axis, cells in zip(machine.axes, machine.play_map.used, strict=True)
@@ -715,9 +723,9 @@ def loosest(machine: Machine) -> tuple[Axis, Axis]:
 
 
 def residuals(machine: Machine) -> tuple[Residual, Residual]:
-    """X and Y of a machine, each in the region where compensation leaves most over: where a
-    contour is divided then depends on its shape alone, not on its place, and no other region
-    leaves more over than is reported."""
+    """Return the residuals of X and Y, each in the region where compensation leaves most over:
+    where a contour is divided then depends on its shape alone, not on its place, and no other
+    region leaves more over than is reported."""
     x, y, _ = (
         max(
             (
@@ -732,7 +740,7 @@ def residuals(machine: Machine) -> tuple[Residual, Residual]:
 
 
 def residual(axis: Axis, controller: SlideStart) -> Residual:
-    """One axis of a machine with this controller."""
+    """Compute the residual of one axis of a machine with this controller."""
     from camtool.kernels.play import play_limits
 
     first = 1 if controller.start_direction == "+" else -1

@@ -104,25 +104,26 @@ class Tab(Struct, frozen=True):
     fall: float
 
     def foot(self, bottom_mm: float) -> float:
-        """How long the slope to each side is that reaches down to the bottom, mm."""
+        """Return the length of the slope to each side that reaches down to the bottom, mm."""
         return (self.top_mm - bottom_mm) / self.fall
 
     def moved(self, by_mm: float) -> Tab:
-        """The tab so much further along."""
+        """Return the tab shifted along the path."""
         return Tab(self.begin + by_mm, self.end + by_mm, self.top_mm, self.fall)
 
     def holds(self, length: float) -> bool:
-        """Whether a tool that stands at this length stands on the tab; not at a straight edge."""
+        """True if a tool that stands at this length stands on the tab; not at a straight edge."""
         return not math.isinf(self.fall) or self.begin < length < self.end
 
     def height(self, length: float) -> float:
-        """The lowest z that the tab allows at this length."""
+        """Return the lowest z that the tab allows at this length."""
         apart = max(self.begin - length, length - self.end, 0.0)
         return self.top_mm - (self.fall * apart if apart else 0.0)
 
 
 def with_tabs(contours: list[Contour]) -> tuple[list[Contour], list[Finding]]:
-    """The contours of an operation, those without tabs that are to have none; and how many.
+    """Return the contours of an operation, with no tabs on those that are to have none; and a
+    finding that counts these.
 
     Tabs hold parts: where an operation cuts parts free, its holes and open paths get no tabs, nor
     do contours that are too short. Where it cuts none free, everything has tabs as asked. Where
@@ -153,8 +154,8 @@ def with_tabs(contours: list[Contour]) -> tuple[list[Contour], list[Finding]]:
 
 
 def _by_hand(contours: list[Contour]) -> list[Contour]:
-    """The contours, each with the places of the tabs that are nearest to it; OptionError for a
-    place that is near to none."""
+    """Return the contours, each with the places of the tabs that are nearest to it; OptionError
+    for a place that is near to none."""
     setting = contours[0].setting
     operation = setting.operation
     tabs = operation.tabs
@@ -184,7 +185,8 @@ def _by_hand(contours: list[Contour]) -> list[Contour]:
 
 
 def between(path: Polyline, places: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """The place (x, y) mm of a closed path in the middle of the longest piece between these."""
+    """Return the place (x, y) mm of a closed path in the middle of its longest piece between these
+    places."""
     along = MeasuredPath.of(path)
     lengths = np.sort([along.nearest_to(place) for place in places])
     gaps = np.diff(np.append(lengths, lengths[0] + along.total_mm))
@@ -194,7 +196,7 @@ def between(path: Polyline, places: Sequence[tuple[float, float]]) -> tuple[floa
 
 
 def _is_hole(contour: Contour) -> bool:
-    """Whether what is to stay lies around a closed contour, and not within it."""
+    """True if the material that stays lies around a closed contour, and not within it."""
     if contour.material_left is None:
         return False
     ccw = bool(signed_areas(Polylines.of([contour.path]))[0] > 0.0)
@@ -202,7 +204,7 @@ def _is_hole(contour: Contour) -> bool:
 
 
 def _is_long_enough(contour: Contour) -> bool:
-    """Whether a contour is at least as long as its tabs."""
+    """True if a contour is at least as long as its tabs."""
     operation = contour.setting.operation
     total = float(path_lengths(Polylines.of([contour.path]))[0])
     model, foot = _model(operation, contour.setting.levels_mm[-1])
@@ -211,7 +213,8 @@ def _is_long_enough(contour: Contour) -> bool:
 
 
 def tabs_of(contour: Contour, along: MeasuredPath) -> tuple[list[Tab], list[Finding]]:
-    """The tabs of a contour whose path, from its start, is `along`; and those that do not fit.
+    """Return the tabs of a contour whose path, from its start, is `along`; and findings for those
+    that do not fit.
 
     OptionError for tabs that are higher than the cut is deep or longer than the path together.
     """
@@ -250,7 +253,8 @@ def tabs_of(contour: Contour, along: MeasuredPath) -> tuple[list[Tab], list[Find
 
 
 def _model(operation: Operation, bottom_mm: float) -> tuple[Tab, float]:
-    """A tab of the operation, from the length 0, and how long the slope to each side of it is."""
+    """Return a tab of the operation, from the length 0, and the length of the slope to each side
+    of it."""
     tabs = operation.tabs
     assert tabs is not None
     end, top = tabs.width_mm + operation.tool.diameter_mm, bottom_mm + tabs.height_mm
@@ -264,8 +268,8 @@ def _model(operation: Operation, bottom_mm: float) -> tuple[Tab, float]:
 
 
 def raised(points: ZProfile, tabs: list[Tab], total_mm: float | None) -> ZProfile:
-    """The profile, kept above the tabs; `total_mm`: the length of a closed path, round which
-    they come again, None for an open one."""
+    """Return the profile, kept above the tabs; `total_mm`: the length of a closed path, round
+    which they come again, None for an open one."""
     if not tabs:
         return points
     result: ZProfile = []
@@ -297,7 +301,7 @@ def raised(points: ZProfile, tabs: list[Tab], total_mm: float | None) -> ZProfil
 
 
 def _between(tabs: list[Tab], total_mm: float | None, low: float, high: float) -> list[Tab]:
-    """The tabs between two lengths, round a closed path as often as they come."""
+    """Return the tabs between two lengths, repeated for each lap of a closed path."""
     if total_mm is None:
         return tabs
     laps = range(math.floor(low / total_mm), math.floor(high / total_mm) + 1)
@@ -305,7 +309,8 @@ def _between(tabs: list[Tab], total_mm: float | None, low: float, high: float) -
 
 
 def _breaks(tab: Tab, begin: float, z_begin: float, slope: float) -> list[float]:
-    """Lengths at which a line of z, sloping from a place, and the height of a tab may part."""
+    """Return the lengths at which a line of z, sloping from a place, and the height of a tab may
+    part."""
     places = [tab.begin, tab.end]
     if slope != 0.0:
         places.append(begin + (tab.top_mm - z_begin) / slope)
@@ -320,7 +325,8 @@ def _breaks(tab: Tab, begin: float, z_begin: float, slope: float) -> list[float]
 
 
 def _count(total_mm: float, operation: Operation, length_mm: float) -> int:
-    """How many tabs of this length; OptionError when together they are longer than the path."""
+    """Return the number of tabs of this length; OptionError when together they are longer than the
+    path."""
     count = _wanted(total_mm, operation)
     if count * length_mm > total_mm * (1.0 + COUNT_SLACK):
         raise OptionError(
@@ -333,7 +339,7 @@ def _count(total_mm: float, operation: Operation, length_mm: float) -> int:
 
 
 def _wanted(total_mm: float, operation: Operation) -> int:
-    """How many tabs the operation asks of a path of this length."""
+    """Return the number of tabs that the operation asks of a path of this length."""
     tabs = operation.tabs
     assert tabs is not None
     if tabs.spacing_mm is not None:
@@ -370,9 +376,10 @@ class _Fitting(Struct, frozen=True, eq=False):
     def nearest(
         self, centre: float, share: tuple[float, float], others: Sequence[Tab]
     ) -> Tab | None:
-        """The tab that is nearest to a length: on what is hardly bent before what is, within its
-        share before elsewhere; and only where there is no such place where the bridge alone lies
-        off the corners, and the tool is up on the arcs round them. None where it fits nowhere."""
+        """Return the tab that is nearest to a length: on what is hardly bent before what is,
+        within its share before elsewhere; and only where there is no such place where the bridge
+        alone lies off the corners, and the tool is up on the arcs round them. None where it fits
+        nowhere."""
         within = self._places(centre, share)
         anywhere = self._places(centre, (0.0, self.along.total_mm))
         for clear in (self._straight, self._off_corners, self._bridge_off_corners):
@@ -384,8 +391,8 @@ class _Fitting(Struct, frozen=True, eq=False):
         return None
 
     def _places(self, centre: float, span: tuple[float, float]) -> Floats:
-        """Lengths of a span, the nearest to a place first; those beyond the seam of a closed path
-        are further round."""
+        """Return lengths of a span, the nearest to a place first; those beyond the seam of a
+        closed path are further round."""
         low, high = span
         count = math.ceil(PLACES_PER_TAB * (high - low) / self.model.end)
         count = min(max(count, 2 * PLACES_PER_SIDE), MOST_PLACES_ROUND)
@@ -401,18 +408,20 @@ class _Fitting(Struct, frozen=True, eq=False):
         return np.asarray(places[np.lexsort([ahead < 0.0, apart])])
 
     def _straight(self, places: Floats) -> Bools:
-        """(P,) at which lengths a tab, its slopes included, lies across no corner and no bend."""
+        """Mask (P,) of the lengths at which a tab, its slopes included, lies across no corner and
+        no bend."""
         low, high = places - self._reach, places + self._reach
         bend = np.abs(self._heading(high) - self._heading(low))
         return np.asarray(self._off_corners(places) & (bend <= GENTLE_RAD))
 
     def _off_corners(self, places: Floats) -> Bools:
-        """(P,) at which lengths it lies across no corner."""
+        """Mask (P,) of the lengths at which a tab lies across no corner."""
         corners = np.concatenate([self.corners.vertices, self.corners.arcs])
         return self._clear(places, self._reach, corners)
 
     def _bridge_off_corners(self, places: Floats) -> Bools:
-        """(P,) at which lengths it lies across no sharp corner, and its bridge not round one."""
+        """Mask (P,) of the lengths at which a tab lies across no sharp corner, and its bridge not
+        round one."""
         clear = self._clear(places, self._reach, self.corners.sharply)
         return np.asarray(clear & self._clear(places, self.half_width_mm, self.corners.arcs))
 
@@ -427,7 +436,8 @@ class _Fitting(Struct, frozen=True, eq=False):
         return np.asarray(~touches.any(axis=1))
 
     def _heading(self, lengths: Floats) -> Floats:
-        """(P,) rad: the direction of the path there, counted through all its turns."""
+        """Return the direction of the path (P,) at these lengths, rad, counted through all its
+        turns."""
         reach, segments = self.along.reach, self.along.segments
         heading = np.cumsum(segments.sweep + self.along.turns) - segments.sweep
         row = np.clip(np.searchsorted(reach, lengths, side="right") - 1, 0, len(segments) - 1)
@@ -435,7 +445,7 @@ class _Fitting(Struct, frozen=True, eq=False):
         return np.asarray(heading[row] + segments.sweep[row] * np.clip(part, 0.0, 1.0))
 
     def _at(self, centre: float, others: Sequence[Tab]) -> Tab | None:
-        """The tab at a length, where it has room there beside others."""
+        """Return the tab at a length, None where it has no room there beside others."""
         foot, total = self.foot_mm, self.along.total_mm
         half = _half(self.along, centre, self.model.end, min(centre, total - centre) - foot)
         if half is None:
@@ -448,7 +458,7 @@ class _Fitting(Struct, frozen=True, eq=False):
 
 
 def _corners(along: MeasuredPath, operation: Operation) -> _Corners:
-    """The corners of a path of this operation."""
+    """Return the corners of a path of this operation."""
     reach, total = along.reach, along.total_mm
     bend = np.abs(along.turns)
 
@@ -468,7 +478,8 @@ def _corners(along: MeasuredPath, operation: Operation) -> _Corners:
 
 
 def _half(along: MeasuredPath, centre: float, chord: float, room: float) -> float | None:
-    """Half the length about a place whose ends are so far apart; None beyond the room there is."""
+    """Return half the length about a place whose ends are so far apart; None beyond the room there
+    is."""
 
     def lacks(halves: Floats) -> Floats:
         ends = along.at(centre + halves) - along.at(centre - halves)
@@ -490,7 +501,7 @@ def _half(along: MeasuredPath, centre: float, chord: float, room: float) -> floa
 
 
 def _stays(along: MeasuredPath, tab: Tab) -> bool:
-    """Whether no other part of the path comes nearer to the centre of the bridge than its ends."""
+    """True if no other part of the path comes nearer to the centre of the bridge than its ends."""
     ends = along.at(np.array([tab.begin, tab.end]))
     rest = [(0.0, tab.begin), (tab.end, along.total_mm)]
     if along.path.closed:
@@ -509,7 +520,7 @@ def _left_out(contour: Contour, along: MeasuredPath, length: float) -> Finding:
 
 
 def bridges_of(along: MeasuredPath, tabs: Sequence[Tab], tool: Tool, name: str) -> list[Bridge]:
-    """The bridges of the tabs of a contour; none for a tool that cuts no width."""
+    """Return the bridges of the tabs of a contour; none for a tool that cuts no width."""
     found = []
     for tab in tabs if tool.radius_mm > 0.0 else ():
         a, b, centre = along.at(np.array([tab.begin, tab.end, 0.5 * (tab.begin + tab.end)]))
@@ -532,7 +543,7 @@ class RaisedRuns(Struct, frozen=True, eq=False):
 def raised_over_bridges(
     runs: Runs, operation: Operation, feeds: Feeds, bridges: Sequence[Bridge]
 ) -> RaisedRuns:
-    """The runs of an operation, kept above all bridges: no cut goes through them.
+    """Return the runs of an operation, kept above all bridges: no cut goes through them.
 
     A tab is made by the contour that it belongs to. The tool comes by again: round a neighbour
     that is nearer than two slots are wide, on the other side of a narrow contour, on a lead, or in
@@ -584,7 +595,7 @@ class _Found:
 def _raised(
     run: CutRun, near: Sequence[Bridge], tool: Tool, feeds: Feeds, found: _Found
 ) -> CutRun:
-    """The run kept above the bridges near to it; itself when it is so already."""
+    """Return the run kept above the bridges near to it; itself when it is so already."""
     vertices = run.vertices
     moves = np.hypot(*np.diff(vertices[:, :2], axis=0).T) > POSITION_EPS_MM
     is_drilled = not moves.any()
@@ -623,7 +634,7 @@ def _drilled(run: CutRun, bridge: Bridge, tool: Tool, found: _Found) -> None:
 
 
 def _over(along: MeasuredPath, low: Floats, bridge: Bridge, tool: Tool) -> Iterator[Tab]:
-    """The pieces of a path, with the lowest z (n,) of each of its segments, where the tool
+    """Yield the pieces of a path, with the lowest z (n,) of each of its segments, where the tool
     would cut into a bridge."""
     is_low = low < bridge.top_mm - POSITION_EPS_MM
     if not is_low.any():
@@ -658,7 +669,7 @@ def _over(along: MeasuredPath, low: Floats, bridge: Bridge, tool: Tool) -> Itera
 
 
 def _zone(bridge: Bridge, reach_mm: float) -> Polyline:
-    """Where the centre of a tool of this radius would cut into a bridge."""
+    """Return the zone in which the centre of a tool of this radius would cut into a bridge."""
     aside = np.array([-bridge.ahead[1], bridge.ahead[0]])
     w, s, r = bridge.half_width_mm, bridge.half_span_mm, reach_mm
     corners = [
@@ -676,7 +687,8 @@ def _box(bridge: Bridge, reach: float) -> tuple[float, float, float, float]:
 
 
 def _extent(run: CutRun) -> tuple[Floats, Floats]:
-    """A box around a run; an arc of a half circle stays within its chord's length of its ends."""
+    """Return a box around a run; an arc of a half circle stays within its chord's length of its
+    ends."""
     chords = np.hypot(*np.diff(run.vertices[:, :2], axis=0).T)
     bent = run.vertices[:-1, 3] != 0.0
     wide = float(chords[bent].max(initial=0.0))
