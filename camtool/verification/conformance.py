@@ -13,14 +13,13 @@ and coolant must be the same.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from functools import cached_property
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
-from camtool.findings import Code, Finding, Sentence, Severity
+from camtool.findings import Finding, Severity
 from camtool.geometry.boxes import near_points
 from camtool.geometry.measure import point_at
 from camtool.geometry.polylines import POSITION_EPS_MM
@@ -28,20 +27,22 @@ from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.rapids import STOCK_TOP_MM
 from camtool.verification.coverage import (
     Compared,
-    Holes,
     Limits,
+    PlaceSentences,
+    Side,
+    Uncovered,
     at_point,
     block_name,
+    compare_holes,
     compared,
-    contours_drilled,
-    hole_findings,
-    holes_of,
     listed,
     other_way,
     round_trips,
     turned,
+    uncovered,
+    uncovered_findings,
 )
-from camtool.verification.cuts import CutMoves, cut_moves, is_flat
+from camtool.verification.cuts import is_flat
 from camtool.verification.findings import (
     CLEARANCE_LOW,
     CLEARANCE_LOW_OWN,
@@ -70,7 +71,6 @@ from camtool.verification.findings import (
     SETTING_DIFFERS_WAIT,
     SPINDLE_DIFFERS,
     SPINDLE_DIFFERS_UNASKED,
-    VerificationCode,
 )
 from camtool.verification.matching import nearest_at_height
 from camtool.verification.nearest import MoveIndex
@@ -92,12 +92,12 @@ def conformance_of(
     decoded: Toolpath, asked: Asked, *, flat_cuts: bool, sample_mm: float
 ) -> Conformance:
     """Compare the moves of a program with those that the job asks for."""
-    mine = Side.of(decoded, flat_cuts=flat_cuts)
+    mine = Side.of(decoded.first(decoded.executed_rows), flat_cuts=flat_cuts)
     count = len(mine.cuts.rows)
     if _same(decoded, asked.written):
         return Conformance(moves=count, alike=count)
-    other = Side.of(asked.written, flat_cuts=flat_cuts)
-    wanted = Side.of(asked.wanted, flat_cuts=flat_cuts)
+    other = Side.of(asked.written.first(asked.written.executed_rows), flat_cuts=flat_cuts)
+    wanted = Side.of(asked.wanted.first(asked.wanted.executed_rows), flat_cuts=flat_cuts)
     alike = Alike.of(mine.toolpath, other.toolpath)
     place = compare_places(mine, other, wanted, alike, asked, sample_mm)
     settings = compare_settings(mine, other, alike, place.pairs, asked)
@@ -148,37 +148,6 @@ class Asked(Struct, frozen=True, eq=False):
     def limits_mm(self) -> tuple[float, float]:
         """The tolerance in XY and in height, mm."""
         return LIMIT_UNITS * self.unit_mm, LIMIT_UNITS * self.unit_z_mm
-
-
-class Side(Struct, frozen=True, eq=False, dict=True):
-    """One of the toolpaths that are compared, with what is derived from it."""
-
-    toolpath: Toolpath
-    cuts: CutMoves
-
-    @classmethod
-    def of(cls, toolpath: Toolpath, *, flat_cuts: bool) -> Side:
-        """The toolpath with its cutting moves; `flat_cuts` as `camtool.verification.cuts` says."""
-        running = toolpath.first(toolpath.executed_rows)
-        return cls(running, cut_moves(running, flat_cuts=flat_cuts))
-
-    @cached_property
-    def moves(self) -> MoveIndex:
-        """The cutting moves, indexed by place."""
-        return MoveIndex(self.cuts)
-
-    @cached_property
-    def holes(self) -> Holes:
-        """The drilled holes."""
-        return holes_of(self.toolpath)
-
-    @cached_property
-    def plunges(self) -> Bools:
-        """(N,) true for feeds straight down that end below the stock top."""
-        start, end = self.toolpath.starts, self.toolpath.end
-        still = (start[:, :2] == end[:, :2]).all(axis=1) & ~self.toolpath.is_arc
-        deep = (end[:, 2] < start[:, 2]) & (end[:, 2] < STOCK_TOP_MM - POSITION_EPS_MM)
-        return np.asarray(self.toolpath.is_feed & still & deep)
 
 
 class Alike(Struct, frozen=True, eq=False):
@@ -236,8 +205,7 @@ def compare_places(
 ) -> PlaceComparison:
     """Compare `mine`, the decoded side, with `other`, the written side, and the reverse."""
     limits = asked.limits_mm
-    drilled, other_stand = contours_drilled(mine.cuts, other.holes, limits)
-    undrilled, mine_stand = contours_drilled(other.cuts, mine.holes, limits)
+    holes = compare_holes(mine, other, limits)
     there = compared(mine.cuts, ~alike.in_written, other.moves, limits, sample_mm)
     back = compared(other.cuts, ~alike.in_decoded, mine.moves, limits, sample_mm)
     _near_wanted(there, wanted.moves, limits)
@@ -248,9 +216,9 @@ def compare_places(
     written = other.moves.contour_of(back.samples.segment[back.point])
     turns_back = turned(back, trips[written], limits)
     findings = (
-        *_place_findings(back, undrilled, limits, VerificationCode.CONTOUR_MISSING),
-        *_place_findings(there, drilled, limits, VerificationCode.EXTRA_CUT),
-        *hole_findings(mine.holes, other.holes, limits, (mine_stand, other_stand)),
+        *_missing(back, holes.undrilled, limits),
+        *_extra(there, holes.drilled, limits),
+        *holes.findings,
         *_plunges(mine, (other, wanted), alike, limits),
         *_repeated_cuts(mine, other, alike, limits),
         *(other_way(there, turns) if len(turns) else other_way(back, turns_back)),
@@ -298,41 +266,42 @@ def _written_from_cut(
     np.minimum.at(back.distance, rest[point], distance)
 
 
-def _place_findings(
-    found: Compared, drilled: Bools, limits: Limits, code: Code
+_MISSING = CONTOUR_MISSING_ELSEWHERE, CONTOUR_MISSING_OTHER_DEPTH, CONTOUR_MISSING_NOTHING_CUT
+_EXTRA = EXTRA_CUT_ELSEWHERE, EXTRA_CUT_OTHER_DEPTH, EXTRA_CUT_NOTHING_ASKED
+
+
+def _missing(back: Compared, undrilled: Bools, limits: Limits) -> Iterator[Finding]:
+    """Yield CONTOUR_MISSING for written contours, at the block that cuts nearest."""
+    decoded = back.others.cuts
+
+    def block(part: Uncovered) -> str:
+        known = part.nearest >= 0
+        return block_name(decoded.toolpath, int(decoded.row[part.nearest])) if known else ""
+
+    return _uncovered_findings(back, undrilled, limits, _MISSING, block)
+
+
+def _extra(there: Compared, drilled: Bools, limits: Limits) -> Iterator[Finding]:
+    """Yield EXTRA_CUT for contours of the program, at their own blocks."""
+
+    def block(part: Uncovered) -> str:
+        return block_name(there.cuts.toolpath, part.row)
+
+    return _uncovered_findings(there, drilled, limits, _EXTRA, block)
+
+
+def _uncovered_findings(
+    found: Compared,
+    drilled: Bools,
+    limits: Limits,
+    sentences: PlaceSentences,
+    place: Callable[[Uncovered], str],
 ) -> Iterator[Finding]:
-    """One finding for each contour of which a part lies where the other side does not cut, except
-    contours that are holes there (`drilled`) and slopes within the tolerance of the stock top."""
-    cuts, samples = found.cuts, found.samples
-    contour = cuts.contour[found.rows]
-    judged = ~cuts.slopes(samples.segment) | (samples.z < STOCK_TOP_MM - limits[1])
-    bad = np.flatnonzero(np.isinf(found.distance) & judged & ~drilled[contour])
-    if len(bad) == 0:
-        return
-    near, wrong_depth = nearest_at_height(samples.of(bad), None, MoveIndex(found.others), limits)
-    order = np.lexsort((bad, -near.distance, contour[bad]))
-    first = order[np.flatnonzero(np.diff(contour[bad][order], prepend=-1))]
-    for worst, more in listed(first.tolist()):
-        sample, nearest = int(bad[worst]), int(near.segment[worst])
-        extra, known = code == VerificationCode.EXTRA_CUT, nearest >= 0
-        one, which = (cuts, samples.segment[sample]) if extra else (found.others, nearest)
-        at = at_point(samples.points[sample])
-        block = block_name(one.toolpath, int(one.row[which])) if extra or known else ""
-        yield _away(near.distance[worst], bool(wrong_depth[worst]), code)(
-            where=f"{block} near {at}".strip(),
-            measured=float(near.distance[worst]) if known else None,
-            limit=limits[0],
-            more=more,
-        )
-
-
-def _away(distance: float, wrong_depth: bool, code: Code) -> Sentence:
-    extra = code == VerificationCode.EXTRA_CUT
-    if not np.isfinite(distance):
-        return EXTRA_CUT_NOTHING_ASKED if extra else CONTOUR_MISSING_NOTHING_CUT
-    if wrong_depth:
-        return EXTRA_CUT_OTHER_DEPTH if extra else CONTOUR_MISSING_OTHER_DEPTH
-    return EXTRA_CUT_ELSEWHERE if extra else CONTOUR_MISSING_ELSEWHERE
+    """Yield a finding for each contour of which a sample is near nothing on the other side."""
+    samples = found.samples.of(np.flatnonzero(np.isinf(found.distance)))
+    nearest = nearest_at_height(samples, None, found.others, limits)
+    parts = list(uncovered(found.cuts, samples, nearest, drilled, limits))
+    return uncovered_findings(parts, found.cuts, limits[0], sentences, place)
 
 
 def _plunges(

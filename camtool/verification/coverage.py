@@ -1,4 +1,8 @@
-"""Whether everything wanted is cut, and nothing else: contours, holes and their direction.
+"""The comparison of what is cut with what was wanted: contours, holes and their direction.
+
+It serves verification (`cover`, with the tolerance of the machine) and conformance (`compared`,
+with the resolution of the dialect); docs/decisions/0075-one-comparison-of-cuts.md says what each
+compares.
 
 Decoded moves are sampled and compared with the wanted moves, which gives the rounding error, the
 extra cuts, and the wanted contour to which each decoded row belongs. Wanted moves are sampled and
@@ -9,7 +13,8 @@ is found. The tolerance of heights allows for slopes that a machine makes in sma
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -28,6 +33,7 @@ from camtool.verification.cuts import (
     NO_LOOP,
     CutMoves,
     Samples,
+    cut_moves,
     cutting_rows,
     loops,
     moves_across,
@@ -75,77 +81,101 @@ class Coverage(Struct, frozen=True, eq=False):
     findings: tuple[Finding, ...]
 
 
-class Drilled(Struct, frozen=True, eq=False):
-    """Which wanted and which decoded contours (C,) are holes on the other side."""
+class Side(Struct, frozen=True, eq=False, dict=True):
+    """A toolpath that is compared with another: its cutting moves, and what is derived from it."""
 
-    wanted: Bools
-    decoded: Bools
-
-
-class _Sampled(Struct, frozen=True, eq=False):
-    """Samples of the cuts of one side, each with the nearest move of the other; `drilled` (C,) as
-    in `Drilled`."""
-
+    toolpath: Toolpath
     cuts: CutMoves
-    samples: Samples
-    found: Found
-    wrong_depth: Bools
-    drilled: Bools
 
-    def bad(self, goal: Goal) -> Bools:
-        """(S,) true for samples that the other side does not cut. Slopes within the tolerance of
-        the stock top are excepted: they may be flat moves on it, which cut nothing."""
-        sloping = self.cuts.slopes(self.samples.segment)
-        judged = ~sloping | (self.samples.z < STOCK_TOP_MM - goal.depth_mm)
-        judged &= ~self.drilled[self.cuts.contour[self.cuts.row[self.samples.segment]]]
-        return np.asarray(judged & (self.wrong_depth | (self.found.distance > goal.limit_mm)))
+    @classmethod
+    def of(cls, toolpath: Toolpath, *, flat_cuts: bool) -> Side:
+        """Return the toolpath with its cutting moves; `flat_cuts` as `camtool.verification.cuts`
+        says."""
+        return cls(toolpath, cut_moves(toolpath, flat_cuts=flat_cuts))
+
+    @cached_property
+    def moves(self) -> MoveIndex:
+        """The cutting moves, indexed by place."""
+        return MoveIndex(self.cuts)
+
+    @cached_property
+    def holes(self) -> Holes:
+        """The drilled holes."""
+        return holes_of(self.toolpath)
+
+    @cached_property
+    def plunges(self) -> Bools:
+        """(N,) true for feeds straight down that end below the stock top."""
+        start, end = self.toolpath.starts, self.toolpath.end
+        still = (start[:, :2] == end[:, :2]).all(axis=1) & ~self.toolpath.is_arc
+        deep = (end[:, 2] < start[:, 2]) & (end[:, 2] < STOCK_TOP_MM - POSITION_EPS_MM)
+        return np.asarray(self.toolpath.is_feed & still & deep)
 
 
 def cover(
-    decoded: MoveIndex, goal: Goal, spacing_mm: float, drilled: Drilled, row_from: Indices | None
+    decoded: Side,
+    wanted: Side,
+    goal: Goal,
+    spacing_mm: float,
+    row_from: Indices | None,
+    *,
+    is_judged: bool = True,
 ) -> Coverage:
     """Compare decoded with wanted cutting moves, and wanted with decoded ones, on samples about
-    `spacing_mm` apart; `row_from` (N,) is the wanted row from which each decoded row was written,
-    −1 for none, where that is known.
+    `spacing_mm` apart; `goal` holds the moves of the wanted side. `row_from` (N,) is the wanted
+    row from which each decoded row was written, −1 for none, where that is known. Unless
+    `is_judged`, only the match and the rounding error are computed, and nothing is found.
 
     A contour is compared with the one that it was written from, or that was written from it,
     first, and only where that does not fit with everything
     (docs/decisions/0037-own-rows-first.md).
     """
-    cuts, wanted, limits = decoded.cuts, goal.moves, (goal.limit_mm, goal.depth_mm)
+    cuts, limits = decoded.cuts, (goal.limit_mm, goal.depth_mm)
     own, became = _contours_from(cuts, wanted.cuts, row_from)
-    match, rounding, extra = no_match(len(cuts.contour)), Figure(), list[_Uncovered]()
+    holes = compare_holes(decoded, wanted, limits)
+    match, rounding, extra = no_match(len(cuts.contour)), Figure(), list[Uncovered]()
     beside = _rows_alike(cuts, wanted.cuts, limits, row_from)
     for samples in samples_by_parts(
         cuts, spacing_mm, cuts.is_cut, SAMPLES_AT_ONCE, _together(cuts, own, beside)
     ):
         found, belongs = _own_found(cuts, samples, own, goal)
         other = np.flatnonzero(belongs == ANY_CONTOUR)
-        some, wrong = nearest_at_height(samples.of(other), None, wanted, limits)
+        some, wrong = nearest_at_height(samples.of(other), None, wanted.moves, limits)
         wrong_depth = np.zeros(len(found.distance), dtype=np.bool_)
         wrong_depth[other] = wrong
         found.distance[other], found.segment[other] = some.distance, some.segment
-        extra += _uncovered(_Sampled(cuts, samples, found, wrong_depth, drilled.decoded), goal)
+        extra += uncovered(cuts, samples, (found, wrong_depth), holes.drilled, limits)
         belongs[other] = match_contours(cuts, samples.of(other), some, goal)
         found.distance[other], found.segment[other] = some.distance, some.segment
         real = np.isfinite(found.distance)
         rows = cuts.row[samples.segment]
         rounding.add(found.distance[real], samples.points[real], rows[real])
         match_rows(match, cuts, samples, belongs, found, goal)
+    match = with_neighbours(match)
+    if not is_judged:
+        return Coverage(match, rounding, ())
     alike = _contours_alike(wanted.cuts, beside, row_from)
     became = np.where(alike, ANY_CONTOUR, became)
-    cut = np.append(alike | _fits(wanted.cuts, became, decoded, limits, spacing_mm), True)
-    missing = list[_Uncovered]()
+    cut = np.append(alike | _fits(wanted.cuts, became, decoded.moves, limits, spacing_mm), True)
+    missing = list[Uncovered]()
     for rest in samples_by_parts(
         wanted.cuts, spacing_mm, ~cut[wanted.cuts.contour], SAMPLES_AT_ONCE, wanted.cuts.contour
     ):
-        nearest, wrong = nearest_at_height(rest, None, decoded, limits)
-        missing += _uncovered(_Sampled(wanted.cuts, rest, nearest, wrong, drilled.wanted), goal)
+        nearest = nearest_at_height(rest, None, decoded.moves, limits)
+        missing += uncovered(wanted.cuts, rest, nearest, holes.undrilled, limits)
+
+    def block(part: Uncovered) -> str:
+        return block_name(cuts.toolpath, part.row)
+
+    def contour(part: Uncovered) -> str:
+        return _contour_name(wanted.cuts, part)
+
     findings = (
-        *_findings_of(missing, wanted.cuts, goal, _MISSING),
-        *_findings_of(extra, cuts, goal, _EXTRA),
+        *uncovered_findings(missing, wanted.cuts, goal.limit_mm, _MISSING, contour),
+        *uncovered_findings(extra, cuts, goal.limit_mm, _EXTRA, block),
+        *holes.findings,
     )
-    return Coverage(with_neighbours(match), rounding, findings)
+    return Coverage(match, rounding, findings)
 
 
 def _contours_from(
@@ -272,80 +302,96 @@ def _fits(
     return fit
 
 
+# The comparison that all judgements share: what of one side's cuts the other side does not cut.
+# Verification calls it with the tolerance of the machine, conformance with the resolution of the
+# dialect (docs/decisions/0075-one-comparison-of-cuts.md).
+
+PlaceSentences = tuple[Sentence, Sentence, Sentence]
+"""What is said of a sample: far from all cuts, far from those at its depth, or there are none."""
+
 _MISSING = CONTOUR_MISSING, CONTOUR_MISSING_AT_DEPTH, CONTOUR_MISSING_NO_CUTS
 _EXTRA = EXTRA_CUT, EXTRA_CUT_AT_DEPTH, EXTRA_CUT_NONE_WANTED
 
 
-class _Uncovered(Struct, frozen=True):
-    """The sample of a contour with the largest distance from the other side, mm, where that does
-    not cut a `share` of its samples."""
+class Uncovered(Struct, frozen=True):
+    """The sample of a contour with the largest `distance` (mm, inf without any cuts) from the
+    other side, where that does not cut a `share` of its samples; `nearest` is the segment there,
+    −1 for none. `wrong_depth`: the other side cuts at this place, but at another depth."""
 
     contour: int
     row: int
     at_mm: Floats
     distance: float
+    nearest: int
     wrong_depth: bool
     share: float
 
 
-def _uncovered(sampled: _Sampled, goal: Goal) -> Iterator[_Uncovered]:
-    """The contours of which a part is not cut by the other side; all samples of each are there."""
-    cuts, samples, distance = sampled.cuts, sampled.samples, sampled.found.distance
-    bad = np.flatnonzero(sampled.bad(goal))
-    if len(bad) == 0:
-        return
+def uncovered(
+    cuts: CutMoves,
+    samples: Samples,
+    nearest: tuple[Found, Bools],
+    drilled: Bools,
+    limits: Limits,
+) -> Iterator[Uncovered]:
+    """Yield the contours of which a part is not cut by the other side, by all samples of each.
+
+    `nearest` is the result of `nearest_at_height` for the samples, `drilled` (C,) the contours
+    that are holes on the other side. Slopes within the tolerance of the stock top are excepted:
+    they may be flat moves on it, which cut nothing.
+    """
+    found, wrong_depth = nearest
     rows = cuts.row[samples.segment]
     contour = cuts.contour[rows]
-    all_of = np.bincount(contour)
-    order = bad[np.lexsort((bad, -distance[bad], contour[bad]))]
+    sloping = cuts.slopes(samples.segment)
+    judged = ~sloping | (samples.z < STOCK_TOP_MM - limits[1])
+    judged &= ~drilled[contour]
+    bad = np.flatnonzero(judged & (wrong_depth | (found.distance > limits[0])))
+    if len(bad) == 0:
+        return
+    sample_counts = np.bincount(contour)
+    order = bad[np.lexsort((bad, -found.distance[bad], contour[bad]))]
     first = np.flatnonzero(np.diff(contour[order], prepend=-1))
     counts = np.diff(np.append(first, len(order)))
     for worst, count in zip(order[first].tolist(), counts.tolist(), strict=True):
         which = int(contour[worst])
-        yield _Uncovered(
+        yield Uncovered(
             which,
             int(rows[worst]),
             samples.points[worst],
-            float(distance[worst]),
-            bool(sampled.wrong_depth[worst]),
-            float(count / all_of[which]),
+            float(found.distance[worst]),
+            int(found.segment[worst]),
+            bool(wrong_depth[worst]),
+            float(count / sample_counts[which]),
         )
 
 
-def _findings_of(
-    contours: list[_Uncovered],
+def uncovered_findings(
+    parts: Sequence[Uncovered],
     cuts: CutMoves,
-    goal: Goal,
-    sentences: tuple[Sentence, Sentence, Sentence],
+    limit_mm: float,
+    sentences: PlaceSentences,
+    place: Callable[[Uncovered], str],
 ) -> Iterator[Finding]:
-    """A finding for each of these contours. Extra cuts are named by their block, missing ones by
-    their contour."""
-    for one, more in listed(contours):
-        source = cuts.toolpath.text(one.row)
-        name = f"contour {one.contour + 1}" + (f" ({source})" if source else "")
-        place = block_name(cuts.toolpath, one.row) if sentences is _EXTRA else name
-        yield _away(one.distance, one.wrong_depth, sentences)(
-            where=f"{place} near {at_point(one.at_mm)}",
-            measured=_finite(one.distance),
-            limit=goal.limit_mm,
-            share=one.share,
-            contour=name,
+    """Yield a finding for each of these contours of `cuts`; `place` names the block or contour."""
+    elsewhere, other_depth, nothing = sentences
+    for part, more in listed(parts):
+        known = np.isfinite(part.distance)
+        sentence = (other_depth if part.wrong_depth else elsewhere) if known else nothing
+        yield sentence(
+            where=f"{place(part)} near {at_point(part.at_mm)}".strip(),
+            measured=part.distance if known else None,
+            limit=limit_mm,
+            share=part.share,
+            contour=_contour_name(cuts, part),
             more=more,
         )
 
 
-def _away(
-    distance: float, wrong_depth: bool, sentences: tuple[Sentence, Sentence, Sentence]
-) -> Sentence:
-    """The sentence for a sample: far from all cuts, far from those at its depth, or no cuts."""
-    away, at_depth, nothing = sentences
-    if not np.isfinite(distance):
-        return nothing
-    return at_depth if wrong_depth else away
-
-
-def _finite(distance: float) -> float | None:
-    return float(distance) if np.isfinite(distance) else None
+def _contour_name(cuts: CutMoves, part: Uncovered) -> str:
+    """Return `contour 3 (layer and entity)`."""
+    source = cuts.toolpath.text(part.row)
+    return f"contour {part.contour + 1}" + (f" ({source})" if source else "")
 
 
 # Drilled holes: all that are wanted, as deep as wanted, and no others.
@@ -385,9 +431,7 @@ def holes_of(toolpath: Toolpath) -> Holes:
     return Holes(toolpath, toolpath.end[deepest, :2], toolpath.end[deepest, 2], deepest)
 
 
-def contours_drilled(
-    cuts: CutMoves, holes: Holes, limits_mm: tuple[float, float]
-) -> tuple[Bools, Bools]:
+def contours_drilled(cuts: CutMoves, holes: Holes, limits_mm: Limits) -> tuple[Bools, Bools]:
     """(C,) the contours that are holes on the other side, and (H,) those holes: all of the contour
     lies within the first limit of the hole, and their depths agree within the second.
 
@@ -416,25 +460,32 @@ _MISSING_HOLES = CONTOUR_MISSING_HOLE, CONTOUR_MISSING_HOLE_DEPTH
 _EXTRA_HOLES = EXTRA_CUT_HOLE, EXTRA_CUT_HOLE_DEPTH
 
 
-def hole_findings(
-    decoded: Holes,
-    wanted: Holes,
-    limits_mm: tuple[float, float],
-    stand: tuple[Bools, Bools],
-) -> tuple[Finding, ...]:
-    """CONTOUR_MISSING for wanted holes that the program does not drill, EXTRA_CUT for holes that
-    are not wanted; `limits_mm` in XY and in height. `stand`: the decoded and the wanted holes that
-    are contours on the other side, by `contours_drilled`."""
-    return (
-        *_unpaired(wanted, decoded, limits_mm, stand[1], _MISSING_HOLES),
-        *_unpaired(decoded, wanted, limits_mm, stand[0], _EXTRA_HOLES),
+class HoleComparison(Struct, frozen=True, eq=False):
+    """The contours of a program that are `drilled` holes of the wanted side (C,), the wanted
+    contours that are holes of the program, `undrilled` (W,), and findings on all other holes."""
+
+    drilled: Bools
+    undrilled: Bools
+    findings: tuple[Finding, ...]
+
+
+def compare_holes(decoded: Side, wanted: Side, limits: Limits) -> HoleComparison:
+    """Compare the holes of a program with the wanted ones and with small contours:
+    CONTOUR_MISSING for wanted holes that the program does not drill, EXTRA_CUT for holes that are
+    not wanted."""
+    drilled, wanted_stand = contours_drilled(decoded.cuts, wanted.holes, limits)
+    undrilled, decoded_stand = contours_drilled(wanted.cuts, decoded.holes, limits)
+    findings = (
+        *_unpaired(wanted.holes, decoded.holes, limits, wanted_stand, _MISSING_HOLES),
+        *_unpaired(decoded.holes, wanted.holes, limits, decoded_stand, _EXTRA_HOLES),
     )
+    return HoleComparison(drilled, undrilled, findings)
 
 
 def _unpaired(
     holes: Holes,
     others: Holes,
-    limits_mm: tuple[float, float],
+    limits_mm: Limits,
     stand: Bools,
     sentences: tuple[Sentence, Sentence],
 ) -> Iterator[Finding]:
@@ -452,7 +503,7 @@ def _unpaired(
         )
 
 
-def _paired(holes: Holes, others: Holes, limits_mm: tuple[float, float]) -> tuple[Bools, Bools]:
+def _paired(holes: Holes, others: Holes, limits_mm: Limits) -> tuple[Bools, Bools]:
     """(H,), (H,) which holes have one of the others at their position, and which one that is as
     deep."""
     here, same = np.zeros(len(holes), dtype=np.bool_), np.zeros(len(holes), dtype=np.bool_)
@@ -553,7 +604,7 @@ class Compared(Struct, eq=False):
     sample to the nearest move, inf where none is near."""
 
     cuts: CutMoves
-    others: CutMoves
+    others: MoveIndex
     samples: Samples
     point: Ints
     move: Ints
@@ -573,8 +624,8 @@ class Compared(Struct, eq=False):
     def rows_along(self) -> Ints:
         """(P, 2) rows of both sides that lie on each other and have the same direction."""
         along = self.cosine > ALONG
-        pairs = np.column_stack([self.rows[self.point[along]], self.others.row[self.move[along]]])
-        return np.unique(pairs, axis=0)
+        other_rows = self.others.cuts.row[self.move[along]]
+        return np.unique(np.column_stack([self.rows[self.point[along]], other_rows]), axis=0)
 
 
 def compared(
@@ -590,7 +641,7 @@ def compared(
     share = others.shares(samples.points[point], move)
     there = headings(others.cuts.segments, move, share)
     cosine = (here * there).sum(axis=1)
-    return Compared(cuts, others.cuts, samples, point, move, cosine, nearest)
+    return Compared(cuts, others, samples, point, move, cosine, nearest)
 
 
 def _with_ends(cuts: CutMoves, samples: Samples) -> Samples:
@@ -618,7 +669,7 @@ def turned(compared: Compared, round_trip: Bools, limits: Limits) -> Ints:
     same = np.zeros(count, dtype=np.bool_)
     same[compared.point[compared.cosine > ALONG]] = True
     long = LONG_ENOUGH * limits[0]
-    there = segment_lengths(compared.others.segments)[compared.move] > long
+    there = segment_lengths(compared.others.cuts.segments)[compared.move] > long
     against = np.zeros(count, dtype=np.bool_)
     against[compared.point[(compared.cosine < -ALONG) & round_trip & there]] = True
     here = segment_lengths(cuts.segments)[samples.segment] > long

@@ -47,8 +47,8 @@ from camtool.planning.paths import cuts as joined_moves
 from camtool.records import replace
 from camtool.toolpath.moves import Kind, Toolpath, are_arcs
 from camtool.toolpath.wanted import UNKNOWN_EDGE, DrawnEdges
-from camtool.verification.coverage import at_point, block_name, holes_of, listed
-from camtool.verification.cuts import CutMoves, cut_moves, loops, moves_across, sample_cuts
+from camtool.verification.coverage import Side, at_point, block_name, listed
+from camtool.verification.cuts import CutMoves, loops, moves_across, sample_cuts
 from camtool.verification.findings import (
     CUT_INTO_PART,
     CUTS_BESIDE,
@@ -236,7 +236,8 @@ class _Path(Struct, frozen=True, eq=False):
     holes: Floats
 
     @classmethod
-    def of(cls, cuts: CutMoves, tool: Ints, limit_mm: float) -> _Path:
+    def of(cls, program: Side, tool: Ints, limit_mm: float) -> _Path:
+        cuts = program.cuts
         sizes = segment_lengths(cuts.segments)
         samples = sample_cuts(cuts, max(float(sizes.sum()) / MOST_TRACK_POINTS, TRACK_MM))
         counts = np.bincount(samples.segment, minlength=len(sizes))
@@ -249,7 +250,7 @@ class _Path(Struct, frozen=True, eq=False):
             tool[row],
             _boxes_of(cuts, limit_mm),
             np.unique(cuts.segments[arcs].centre.round(3), axis=0),
-            holes_of(cuts.toolpath).at,
+            program.holes.at,
         )
 
     def seen(self, matrix: Floats) -> _Path:
@@ -318,9 +319,9 @@ def register(
             mend="say what the program does with them, with the flags of its job: --kind drill …",
         )
     running = decoded.first(decoded.executed_rows)
-    cuts = cut_moves(running, flat_cuts=flat_cuts)
+    program = Side.of(running, flat_cuts=flat_cuts)
     lines = _Lines.of(drawing.paths)
-    path = _Path.of(cuts, _tools_of(running), limit_mm)
+    path = _Path.of(program, _tools_of(running), limit_mm)
     if len(path.points) == 0 and len(path.holes) == 0:
         return _nothing(running, [DRAWING_PLACE_NOWHERE(measured=0.0, limit=100.0 * FITS)])
     shift: tuple[float, float] | None = (0.0, 0.0)
@@ -330,7 +331,7 @@ def register(
     if shift is None:
         return _nothing(running, said)
     moved = Polylines.joined([_moved(drawing.paths, shift)]) if any(shift) else drawing.paths
-    return _Follower(cuts, path, _Lines.of(moved), drawing, limit_mm).result(
+    return _Follower(program, path, _Lines.of(moved), drawing, limit_mm).result(
         shift, said, tool_diameter_mm, align=align
     )
 
@@ -684,14 +685,13 @@ class _Try(Struct, frozen=True, eq=False):
 
 
 class _Cells(Struct, frozen=True, eq=False):
-    """Points along T tracks: the track (C,), place (C, 2), what length each stands for (C,),
-    whether it is cut (C,), and how deep (C,) mm, NaN where not."""
+    """Points along T tracks: the track (C,), place (C, 2) mm, the length (C,) mm that each stands
+    for, and whether it is cut at any depth (C,)."""
 
     track: Ints
     places: Floats
     length: Floats
     cut: Bools
-    depth: Floats
 
     def share(self, count: int) -> Floats:
         """(T,) the part of each track that is cut."""
@@ -714,11 +714,16 @@ class _Chosen(Struct, frozen=True, eq=False):
 class _Follower(Struct, frozen=True, eq=False):
     """A program over a drawing that lies where it belongs."""
 
-    cuts: CutMoves
+    program: Side
     path: _Path
     lines: _Lines
     drawing: Drawing
     limit_mm: float
+
+    @property
+    def cuts(self) -> CutMoves:
+        """The cutting moves of the program."""
+        return self.program.cuts
 
     def result(
         self,
@@ -858,18 +863,9 @@ class _Follower(Struct, frozen=True, eq=False):
         owner = np.repeat(np.arange(len(sizes)), parts)
         within = np.arange(len(owner)) - np.repeat(np.cumsum(parts) - parts, parts)
         places = point_at(segments, owner, (within + 0.5) / parts[owner])
-        depth = np.full(len(places), np.nan)
-        index = MoveIndex(self.cuts)
-        point, move, _ = index.within(places, np.zeros(len(places)), (near, np.inf))
-        if len(point):
-            share = index.shares(places[point], move)
-            begin, end = self.cuts.heights(move).T
-            lowest = np.full(len(places), np.inf)
-            np.minimum.at(lowest, point, begin + share * (end - begin))
-            depth = np.where(np.isfinite(lowest), -lowest, np.nan)
-        return _Cells(
-            segments.path[owner], places, (sizes / parts)[owner], np.isfinite(depth), depth
-        )
+        found = self.program.moves.nearest(places, np.zeros(len(places)), None, (near, np.inf))
+        cut = np.isfinite(found.distance)
+        return _Cells(segments.path[owner], places, (sizes / parts)[owner], cut)
 
     def _chosen(self, parts: Sequence[tuple[_Try, int]]) -> _Chosen | None:
         """The tracks of all tools, each once."""

@@ -34,16 +34,8 @@ from camtool.units import UM_PER_MM
 from camtool.verification import report as record
 from camtool.verification.case import SAMPLE_MM, TRACE_POINTS, Case, VerifyOptions
 from camtool.verification.circles import UNSEEN, full_circles
-from camtool.verification.coverage import (
-    Coverage,
-    Drilled,
-    contours_drilled,
-    cover,
-    cut_other_way,
-    hole_findings,
-    holes_of,
-)
-from camtool.verification.cuts import CutMoves, cut_moves, is_flat, loops, moved_lengths
+from camtool.verification.coverage import Coverage, Side, cover, cut_other_way
+from camtool.verification.cuts import CutMoves, is_flat, loops, moved_lengths
 from camtool.verification.dimensions import (
     LoopedCuts,
     SlideExtents,
@@ -58,7 +50,6 @@ from camtool.verification.figures import (
 )
 from camtool.verification.matching import Goal, carried_match, own_match
 from camtool.verification.motion_findings import motion_findings
-from camtool.verification.nearest import MoveIndex
 from camtool.verification.report import Before, Planned, Report, certain, number, reported
 from camtool.verification.shape import (
     CommandedMotion,
@@ -162,15 +153,15 @@ def _compared(
     # Where the wanted moves have no motion in Z, all feed moves cut.
     flat_cuts = case.wanted is None or is_flat(case.wanted)
     quantised = case.target.model.quantised(case.decoded, case.machine)
-    decoded = MoveIndex(cut_moves(quantised, flat_cuts=flat_cuts))
-    wanted = decoded
-    if case.wanted is not None:
-        wanted = MoveIndex(cut_moves(case.wanted, flat_cuts=flat_cuts))
+    decoded = Side.of(quantised, flat_cuts=flat_cuts)
+    wanted = decoded if case.wanted is None else Side.of(case.wanted, flat_cuts=flat_cuts)
     circles = full_circles(wanted.cuts, case.coverage_mm)
-    goal = Goal(wanted, circles, case.coverage_mm, case.depth_mm)
-    coverage = _coverage(case, decoded, goal, flat_cuts=flat_cuts)
+    goal = Goal(wanted.moves, circles, case.coverage_mm, case.depth_mm)
     conformance = _conformance(case, flat_cuts=flat_cuts)
-    turned = _turned(case, decoded, goal, flat_cuts=flat_cuts)
+    # What conformance or registration found with its own tolerance is not found again.
+    is_judged = case.registration is None and not (conformance and conformance.place)
+    coverage = _coverage(case, (decoded, wanted), goal, flat_cuts=flat_cuts, is_judged=is_judged)
+    turned = _turned(case, decoded, wanted, flat_cuts=flat_cuts)
     paths = Paths(decoded.cuts, wanted.cuts, circles, case.depth_mm)
     return paths, coverage, conformance, turned
 
@@ -183,37 +174,33 @@ def _looped(case: Case, paths: Paths) -> tuple[LoopedCuts, LoopedCuts]:
     return own, LoopedCuts(paths.wanted, loops(paths.wanted, case.coverage_mm))
 
 
-def _coverage(case: Case, decoded: MoveIndex, goal: Goal, *, flat_cuts: bool) -> Coverage:
+def _coverage(
+    case: Case, sides: tuple[Side, Side], goal: Goal, *, flat_cuts: bool, is_judged: bool
+) -> Coverage:
+    """Match and compare the decoded side with the wanted one, which may be compensated."""
+    decoded, wanted = sides
     if case.wanted is None:
         return Coverage(own_match(decoded.cuts, goal.circles), Figure(), ())
     programmed = goal  # what the program should say
     if case.compensated is not None:
-        cuts = cut_moves(case.compensated.toolpath, flat_cuts=flat_cuts)
-        programmed = Goal(MoveIndex(cuts), [], goal.limit_mm, goal.depth_mm)
-    limits = goal.limit_mm, goal.depth_mm
-    holes = holes_of(decoded.cuts.toolpath)
-    wanted_holes = holes_of(programmed.moves.cuts.toolpath)
-    missing, stand = contours_drilled(programmed.moves.cuts, holes, limits)
-    extra, wanted_stand = contours_drilled(decoded.cuts, wanted_holes, limits)
-    own = None
-    if programmed.moves.cuts.toolpath is case.written_from:
-        own = case.row_from
-    coverage = cover(decoded, programmed, SAMPLE_MM, Drilled(missing, extra), own)
-    unpaired = hole_findings(holes, wanted_holes, limits, (stand, wanted_stand))
-    match = coverage.match
-    if case.compensated is not None:
-        match = carried_match(match, case.compensated.row, goal)
-    return replace(coverage, match=match, findings=(*coverage.findings, *unpaired))
+        wanted = Side.of(case.compensated.toolpath, flat_cuts=flat_cuts)
+        programmed = Goal(wanted.moves, [], goal.limit_mm, goal.depth_mm)
+    own = case.row_from if wanted.toolpath is case.written_from else None
+    coverage = cover(decoded, wanted, programmed, SAMPLE_MM, own, is_judged=is_judged)
+    if case.compensated is None:
+        return coverage
+    return replace(coverage, match=carried_match(coverage.match, case.compensated.row, goal))
 
 
-def _turned(case: Case, decoded: MoveIndex, goal: Goal, *, flat_cuts: bool) -> tuple[Finding, ...]:
+def _turned(case: Case, decoded: Side, wanted: Side, *, flat_cuts: bool) -> tuple[Finding, ...]:
+    """Return CUT_OTHER_WAY for contours that are cut against the moves they were written from."""
     if case.written_from is None:
         return ()
-    source = goal.moves
-    if source.cuts.toolpath is not case.written_from:
-        source = MoveIndex(cut_moves(case.written_from, flat_cuts=flat_cuts))
+    source = wanted
+    if wanted.toolpath is not case.written_from:
+        source = Side.of(case.written_from, flat_cuts=flat_cuts)
     limits = case.coverage_mm, case.depth_mm
-    return tuple(cut_other_way(decoded, source, limits, SAMPLE_MM, case.row_from))
+    return tuple(cut_other_way(decoded.moves, source.moves, limits, SAMPLE_MM, case.row_from))
 
 
 def _conformance(case: Case, *, flat_cuts: bool) -> Conformance | None:
@@ -227,13 +214,14 @@ def _conformance(case: Case, *, flat_cuts: bool) -> Conformance | None:
 def _all_findings(
     case: Case, coverage: Coverage, conformance: Conformance | None, motion: tuple[Finding, ...]
 ) -> tuple[Finding, ...]:
-    """Findings of all stages in their order, each once. Coverage finds again, with its wider
-    tolerance, what conformance finds: then only the findings of conformance are listed."""
-    places = coverage.findings
-    if conformance is not None and conformance.place:
-        places = conformance.place
-    if case.registration is not None:  # the wanted moves are what the program follows
+    """Return the findings of all stages in their order, each once; where is cut is judged by
+    registration, else by conformance, else by coverage."""
+    if case.registration is not None:
         places = case.registration.findings
+    elif conformance is not None and conformance.place:
+        places = conformance.place
+    else:
+        places = coverage.findings
     groups = (
         case.drawing.findings if case.drawing is not None else (),
         case.wanted.findings if case.wanted is not None else (),

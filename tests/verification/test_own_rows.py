@@ -13,7 +13,7 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.verification import coverage, matching
 from camtool.verification.circles import full_circles
-from camtool.verification.coverage import Coverage, Drilled, cover, cut_other_way
+from camtool.verification.coverage import Coverage, Side, cover, cut_other_way
 from camtool.verification.cuts import cut_moves
 from camtool.verification.matching import Goal
 from camtool.verification.nearest import MoveIndex
@@ -82,16 +82,11 @@ def compared(
     decoded: Toolpath, wanted: Toolpath, row_from: np.ndarray | None
 ) -> tuple[Coverage, list[object]]:
     """How both cover each other, and the contours that are cut the other way."""
-    cuts = MoveIndex(cut_moves(decoded, flat_cuts=False))
-    moves = MoveIndex(cut_moves(wanted, flat_cuts=False))
-    goal = Goal(moves, full_circles(moves.cuts, LIMIT_MM), LIMIT_MM, DEPTH_MM)
-    none = Drilled(
-        np.zeros(moves.cuts.contour_count, dtype=bool),
-        np.zeros(cuts.cuts.contour_count, dtype=bool),
-    )
+    mine, other = Side.of(decoded, flat_cuts=False), Side.of(wanted, flat_cuts=False)
+    goal = Goal(other.moves, full_circles(other.cuts, LIMIT_MM), LIMIT_MM, DEPTH_MM)
     limits = LIMIT_MM, DEPTH_MM
-    turned = cut_other_way(cuts, moves, limits, SAMPLE_MM, row_from)
-    return cover(cuts, goal, SAMPLE_MM, none, row_from), list(turned)
+    turned = cut_other_way(mine.moves, other.moves, limits, SAMPLE_MM, row_from)
+    return cover(mine, other, goal, SAMPLE_MM, row_from), list(turned)
 
 
 @given(st.integers(0, 10_000), st.integers(1, 8), st.sampled_from(DAMAGES))
