@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack
 from camtool.bounds import program_bytes
 from camtool.calibration.calibrate import Calibration, to_text
 from camtool.calibration.calibrate import calibrate as calibrated
-from camtool.comparison import Comparison, Variant, compare_program, variants_of
+from camtool.comparison import Comparison, ProgramVariant, compare_program, variants_of
 from camtool.errors import CamtoolError, OptionError
 from camtool.geometry.drawing import Drawing
 from camtool.importers.options import Reading, options_of
@@ -421,7 +421,7 @@ def compare(
     if isinstance(ways, str):
         chosen = variants_of(ways, lambda settings: loaded.with_settings(settings), how)
     else:
-        chosen = [Variant(name, as_target(each), how) for name, each in ways.items()]
+        chosen = [ProgramVariant(name, as_target(each), how) for name, each in ways.items()]
     if not chosen:
         raise OptionError("there is nothing to compare", mend="give a target for each way")
     return compare_program(data, chosen, source=source, drawing=read, job=wanted)

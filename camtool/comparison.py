@@ -35,10 +35,10 @@ WINDOW_STEPS = 30.0
 WINDOW_ERRORS = 1.5
 """... or this many times that error, whichever is more ..."""
 
-WHOLE = 2.0
+MAX_WHOLE_RATIO = 2.0
 """... or the whole path, unless it is this many times larger than that."""
 
-ROOM = 0.25
+MARGIN_SHARE = 0.25
 """Paths are drawn in a window wider by this share on each side: the page may show more."""
 
 EFFECTS = ("play", "compensation", "scale", "squareness", "repeatability")
@@ -52,7 +52,7 @@ Load = Callable[[Sequence[str]], "LoadedTarget"]
 
 
 @dataclass(frozen=True, eq=False)
-class Variant:
+class ProgramVariant:
     """A variant of a program's run: its name, the target with its settings, how it is judged."""
 
     name: str
@@ -66,7 +66,7 @@ class Comparison(Shown):
     same order. The picture shows the paths around the largest error."""
 
     source: str
-    ways: tuple[Variant, ...]
+    ways: tuple[ProgramVariant, ...]
     runs: tuple[Run, ...]
 
     @property
@@ -78,9 +78,9 @@ class Comparison(Shown):
     @property
     def rows(self) -> tuple[ContrastRow, ...]:
         """A row for each variant: errors µm, time s, counts."""
-        from camtool.verification.contrast import row_of
+        from camtool.verification.contrast import contrast_row
 
-        return tuple(row_of(name, each.report) for name, each in self.verdicts.items())
+        return tuple(contrast_row(name, each.report) for name, each in self.verdicts.items())
 
     def scene(self) -> Overlay:
         """The paths of all variants around the largest error: of the slides, or of the commanded
@@ -98,7 +98,7 @@ class Comparison(Shown):
         wanted = first.model.quantised(decoded, first.machine)
         place = worst_place(self.verdicts.values())
         window = self._window(wanted, place)
-        room = ROOM * (window[:, 1] - window[:, 0]).max()
+        room = MARGIN_SHARE * (window[:, 1] - window[:, 0]).max()
         around = window + np.array([-room, room])
         lines = []
         for variant, run in zip(self.ways, self.runs, strict=True):
@@ -125,16 +125,16 @@ class Comparison(Shown):
         half = max(WINDOW_STEPS * step, WINDOW_ERRORS * error_um / UM_PER_MM)
         whole = toolpath_extents(wanted)[:2]
         size = float((whole[:, 1] - whole[:, 0]).max())
-        if size <= 2.0 * half * WHOLE:
+        if size <= 2.0 * half * MAX_WHOLE_RATIO:
             pad = max(0.05 * size, error_um / UM_PER_MM, step)
             return np.asarray(whole + np.array([-pad, pad]))
         x, y = place
         return np.array([[x - half, x + half], [y - half, y + half]])
 
     def __str__(self) -> str:
-        from camtool.verification.contrast import table
+        from camtool.verification.contrast import contrast_table
 
-        return table(self.rows)
+        return contrast_table(self.rows)
 
     def __repr__(self) -> str:
         return f"<Comparison of {self.source}: {', '.join(each.name for each in self.ways)}>"
@@ -142,7 +142,7 @@ class Comparison(Shown):
 
 def compare_program(
     data: bytes,
-    variants: Sequence[Variant],
+    variants: Sequence[ProgramVariant],
     *,
     source: str,
     drawing: Drawing | None = None,
@@ -165,7 +165,7 @@ def compare_program(
     return Comparison(source, tuple(variants), tuple(runs))
 
 
-def variants_of(what: str, load: Load, judging: Judging) -> list[Variant]:
+def variants_of(what: str, load: Load, judging: Judging) -> list[ProgramVariant]:
     """The variants that `what` names: `interpolators`, `mechanics`, or KEY=VALUE,VALUE,...
 
     OptionError for anything else, and MachineError for values that the machine cannot have.
@@ -182,7 +182,9 @@ def variants_of(what: str, load: Load, judging: Judging) -> list[Variant]:
             mend="write interpolators, mechanics, backlash=0,0.1,0.2 or KEY=VALUE,VALUE,...",
         )
     return [
-        Variant(f"{key}={value.strip()}", load(_settings(key.strip(), value.strip())), judging)
+        ProgramVariant(
+            f"{key}={value.strip()}", load(_settings(key.strip(), value.strip())), judging
+        )
         for value in values.split(",")
     ]
 
@@ -201,27 +203,29 @@ def effects_without(names: Sequence[str]) -> Effects:
     return replace(ALL, **dict.fromkeys(names, False))
 
 
-def _interpolators(target: LoadedTarget, judging: Judging) -> list[Variant]:
+def _interpolators(target: LoadedTarget, judging: Judging) -> list[ProgramVariant]:
     names = target.interpolators
-    return [Variant(name, target, replace(judging, interpolator=name)) for name in names]
+    return [ProgramVariant(name, target, replace(judging, interpolator=name)) for name in names]
 
 
-def _mechanics(target: LoadedTarget, judging: Judging) -> list[Variant]:
+def _mechanics(target: LoadedTarget, judging: Judging) -> list[ProgramVariant]:
     """All of the mechanics, without each part that acts, and without all of them."""
     from camtool.simulation.motion import IDEAL
 
     return [
-        Variant("as it is", target, judging),
+        ProgramVariant("as it is", target, judging),
         *(
-            Variant(f"without {name}", target, replace(judging, effects=effects_without((name,))))
+            ProgramVariant(
+                f"without {name}", target, replace(judging, effects=effects_without((name,)))
+            )
             for name in EFFECTS
-            if _matters(name, target.machine)
+            if _acts_on(name, target.machine)
         ),
-        Variant("ideal", target, replace(judging, effects=IDEAL)),
+        ProgramVariant("ideal", target, replace(judging, effects=IDEAL)),
     ]
 
 
-def _matters(effect: str, machine: Machine) -> bool:
+def _acts_on(effect: str, machine: Machine) -> bool:
     """Whether this part of the mechanics acts on the machine."""
     axes = list(machine.axes)
     return {

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from camtool.toolpath.program import Program
     from camtool.toolpath.wanted import ProtectedRegion
     from camtool.verification.case import Case
-    from camtool.verification.conformance import Asked
+    from camtool.verification.conformance import ProgramRequest
     from camtool.verification.registration import Registration
     from camtool.verification.report import (
         Before,
@@ -210,8 +210,8 @@ def _posted(
         return replace(run, program=program, decoded=decoded, findings=findings)
     from camtool.planning.drawn import kept_of
     from camtool.verification.case import TRACE_POINTS, Case, VerifyOptions, nose_of, tool_mm
-    from camtool.verification.cuts import rapids_mm
-    from camtool.verification.report import Planned, certain
+    from camtool.verification.cuts import rapid_length_mm
+    from camtool.verification.report import Planned, rounded
 
     plain = plain_run()
     # Contours that are divided at reversals are judged as the whole contours of the drawing.
@@ -238,10 +238,10 @@ def _posted(
         row_from=_row_from(program, decoded),
     )
     saved = sum(step.rapid_drawn_mm - step.rapid_mm for step in judged.steps)
-    rapid = rapids_mm(written)
+    rapid = rapid_length_mm(written)
     figures = Planned(
-        rapid_drawn_mm=certain(rapid + saved),
-        rapid_mm=certain(rapid),
+        rapid_drawn_mm=rounded(rapid + saved),
+        rapid_mm=rounded(rapid),
         operations=_operations(judged.steps),
         tools=_tools(judged.steps),
         stock=_stock(job),
@@ -492,7 +492,7 @@ def _repeated(program: Program, decoded: Toolpath) -> set[Finding]:
 def _operations(steps: Sequence[Step]) -> tuple[PlannedOperation, ...]:
     """How the operations that cut something do it, for the report."""
     from camtool.planning.checks import deepest_pass
-    from camtool.verification.report import PlannedOperation, certain
+    from camtool.verification.report import PlannedOperation, rounded
 
     cutting = [step for step in steps if step.runs]
     tools = list(dict.fromkeys(step.operation.tool for step in cutting))
@@ -515,7 +515,7 @@ def _operations(steps: Sequence[Step]) -> tuple[PlannedOperation, ...]:
                 spindle_rpm=setting.spindle_rpm,
                 feed_mm_min=setting.feeds.cut_mm_min,
                 plunge_mm_min=setting.feeds.plunge_mm_min,
-                depth_mm=certain(_deepest_mm(step)),
+                depth_mm=rounded(_deepest_mm(step)),
                 passes=len(setting.levels_mm) if in_passes else None,
                 deepest_pass_mm=deepest_pass(setting) if in_passes else None,
                 coolant=operation.coolant,
@@ -532,12 +532,12 @@ def _deepest_mm(step: Step) -> float:
 def _tools(steps: Sequence[Step]) -> tuple[PlannedTool, ...]:
     """The tools of the operations that cut something, in the order of first use."""
     from camtool.planning.naming import tool_words
-    from camtool.verification.report import PlannedTool, certain
+    from camtool.verification.report import PlannedTool, rounded
 
     deepest: dict[Tool, float] = {}
     for step in steps:
         if step.runs:
-            tool, depth = step.operation.tool, certain(_deepest_mm(step))
+            tool, depth = step.operation.tool, rounded(_deepest_mm(step))
             deepest[tool] = max(depth, deepest.get(tool, 0.0))
     return tuple(
         PlannedTool(tool.number, tool.name, tool_words(tool), depth, tool.cutting_length_mm)
@@ -550,7 +550,7 @@ def _timed(planned: Planned, written: Toolpath, case: Case, verification: Verifi
     and the way to its first cut are its own."""
     import numpy as np
 
-    from camtool.verification.report import certain
+    from camtool.verification.report import rounded
 
     if written.operations is None or case.row_from is None:
         return planned
@@ -560,7 +560,7 @@ def _timed(planned: Planned, written: Toolpath, case: Case, verification: Verifi
     count = len(planned.operations)
     seconds = np.bincount(turn.clip(min=0), verification.rows.seconds, minlength=count)
     operations = [
-        replace(each, time_s=certain(float(seconds[k])))
+        replace(each, time_s=rounded(float(seconds[k])))
         for k, each in enumerate(planned.operations)
     ]
     return replace(planned, operations=tuple(operations))
@@ -680,11 +680,11 @@ def _row_from(program: Program, decoded: Toolpath) -> Indices:
 
 def _asked(
     job: Job, target: LoadedTarget, planned: Toolpath, compensation: CompensatedToolpath | None
-) -> Asked | None:
+) -> ProgramRequest | None:
     """What the job asks for, as moves of the dialect; None where planning found an error, which
     is a finding already. `compensation` is `planned` compensated against the mechanics."""
     from camtool.planning.settings import safe_z_of
-    from camtool.verification.conformance import Asked
+    from camtool.verification.conformance import ProgramRequest
 
     if worst(planned.findings) >= Severity.ERROR:
         return None
@@ -693,7 +693,7 @@ def _asked(
     program = target.target.write(wanted, machine)
     units = [target.target.unit_mm(machine, axis) for axis in machine.axes]
     written = target.target.read(program.data, machine)
-    return Asked(
+    return ProgramRequest(
         written=written,
         wanted=wanted,
         unit_mm=max(units[:2]),

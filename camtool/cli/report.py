@@ -25,7 +25,7 @@ from camtool.plain import one_line
 
 if TYPE_CHECKING:
     from camtool.run import Run
-    from camtool.verification.report import Page, Setup
+    from camtool.verification.report import ReportPage, Setup
 
 PAGES = (".html", ".md", ".json")
 EMBEDDED = "picture.svg"
@@ -107,7 +107,7 @@ class Outputs:
 
     def page_files(self, run: Run, picture: Painter) -> dict[str, bytes]:
         """The page, and the picture beside it where it has one of its own."""
-        from camtool.verification.report import html, markdown, page_json
+        from camtool.verification.report import page_html, page_json, page_markdown
 
         if self.page is None:
             return {}
@@ -119,9 +119,9 @@ class Outputs:
             shown = tuple((caption, _held(data)) for caption, data in pictures)
             stock = picture.stock()
             page = _page(run, shown, "" if stock is None else _held(stock))
-            return {name: html(page).encode()}
+            return {name: page_html(page).encode()}
         links = () if self.linked is None else ((_CAPTION, _from(name, self.linked)),)
-        files = {name: markdown(_page(run, links)).encode()}
+        files = {name: page_markdown(_page(run, links)).encode()}
         if self.beside is None:
             return files
         return {**files, self.beside: sealed(picture(self.beside), name)}
@@ -138,22 +138,24 @@ def _from(page_name: str, picture_name: str) -> str:
     return PurePath(os.path.relpath(picture_name, folder)).as_posix()
 
 
-def _page(run: Run, pictures: tuple[tuple[str, str], ...], stock: str = "") -> Page:
-    from camtool.verification.report import Page, reported
+def _page(run: Run, pictures: tuple[tuple[str, str], ...], stock: str = "") -> ReportPage:
+    from camtool.verification.report import ReportPage, finding_reports
 
     title = one_line(run.title)
-    return Page(title, run.report, reported(run.findings), _setup(run), pictures, stock)
+    return ReportPage(
+        title, run.report, finding_reports(run.findings), _setup(run), pictures, stock
+    )
 
 
 def _setup(run: Run) -> Setup:
-    from camtool.verification.report import Changed, Setup
+    from camtool.verification.report import ChangedValue, Setup
 
     machine, program = run.target.machine, run.program
     return Setup(
         machine=f"{machine.target.name}: {machine.target.title}",
         machine_sha256=machine.digest,
         program_sha256=None if program is None else hashlib.sha256(program.data).hexdigest(),
-        changed=tuple(Changed(*change) for change in run.target.changed_values()),
+        changed=tuple(ChangedValue(*change) for change in run.target.changed_values()),
         flags=_flags_given(),
     )
 

@@ -86,7 +86,7 @@ def show(
     import msgspec
 
     from camtool.inspection.tolerances import dimensions_of, read_tolerances, unbound
-    from camtool.verification.report import reported
+    from camtool.verification.report import finding_reports
 
     check_places([file, against], [report])
     _, dimensions = read_tolerances(Path(file))
@@ -97,7 +97,7 @@ def show(
         findings = (*_told(read.findings), *found, *unbound(read, dimensions))
     if report is not None:
         rows = [_facts(each) for each in dimensions]
-        said = msgspec.to_builtins(reported(findings))
+        said = msgspec.to_builtins(finding_reports(findings))
         write_all({report: to_json({"dimensions": rows, "findings": said}).encode()})
     if not quiet and report != STDOUT:
         for line in _lines(dimensions):

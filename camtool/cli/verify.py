@@ -46,7 +46,7 @@ from camtool.cli.report import Outputs, report_option
 from camtool.records import replace
 
 if TYPE_CHECKING:
-    from camtool.comparison import Variant
+    from camtool.comparison import ProgramVariant
     from camtool.geometry.drawing import Drawing
     from camtool.pictures.scene import Scene
     from camtool.pipeline import Judging
@@ -193,7 +193,7 @@ def _finds(job: JobFlags, against: str | None, *, align: bool, comparing: bool) 
     return against is not None and not said
 
 
-def _variants(spec: str, machine: MachineFlags, judging: Judging) -> list[Variant]:
+def _variants(spec: str, machine: MachineFlags, judging: Judging) -> list[ProgramVariant]:
     """The variants that `--compare SPEC` names; OptionError when it names none."""
     from camtool.comparison import variants_of
 
@@ -282,7 +282,7 @@ def _judge(file: str, case: Case, inspection: InspectionFlags, wishes: Wishes) -
     return 1
 
 
-def _compare(file: str, variants: list[Variant], case: Case, wishes: Wishes) -> int:
+def _compare(file: str, variants: list[ProgramVariant], case: Case, wishes: Wishes) -> int:
     """The table of all variants, and their picture; the exit code."""
     from camtool.comparison import compare_program
     from camtool.verification.contrast import to_json

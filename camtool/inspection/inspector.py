@@ -37,8 +37,8 @@ from camtool.records import replace
 from camtool.run import Run
 from camtool.toolpath.moves import Toolpath
 from camtool.verification.case import TRACE_POINTS, tool_mm
-from camtool.verification.cuts import CutMoves, moved_lengths, sample_cuts
-from camtool.verification.slides import Trace
+from camtool.verification.cuts import CutMoves, row_lengths, sample_cuts
+from camtool.verification.slides import SlideTrace
 
 CHORD_MM = 1e-4
 """Arcs of the slides' path are chords within this, as far as `MOST_POINTS` allows."""
@@ -289,7 +289,7 @@ def swept_moves(wanted: CutMoves, tool: ToolAt) -> Swept:
     return Swept(a, b, tool.radius[row], tool.z[row], row)
 
 
-def swept_trace(trace: Trace, follows: Ints, tool: ToolAt) -> Swept:
+def swept_trace(trace: SlideTrace, follows: Ints, tool: ToolAt) -> Swept:
     """The slides' path where they cut, as segments; `follows` (N,) is the wanted row of each
     decoded row."""
     last = np.flatnonzero(trace.cutting)
@@ -306,5 +306,5 @@ def _points(wanted: CutMoves) -> int:
     if not arcs.any():
         return TRACE_POINTS
     chord = math.sqrt(8.0 * float(wanted.segments.radius[arcs].min()) * CHORD_MM)
-    length = float(moved_lengths(wanted.toolpath).sum())
+    length = float(row_lengths(wanted.toolpath).sum())
     return int(min(max(4.0 * length / chord, TRACE_POINTS), MOST_POINTS))

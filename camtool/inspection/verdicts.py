@@ -40,7 +40,12 @@ from camtool.inspection.uncertainty import Budget, inputs_of, propagate
 from camtool.records import replace
 from camtool.run import Run
 from camtool.units import UM_PER_MM
-from camtool.verification.report import Contribution, InspectedReport, certain, number
+from camtool.verification.report import (
+    ContributionReport,
+    InspectedReport,
+    rounded,
+    rounded_or_none,
+)
 
 SURE = 0.95
 """The probability of a verdict (ISO 14253-1: 95 % unless agreed otherwise)."""
@@ -172,17 +177,17 @@ def _verdict(each: Inspected, size: Size, budget: Budget, first: int) -> Inspect
         kind=bound.dimension.kind,
         source=bound.dimension.source,
         places_mm=_shown_between(each),
-        nominal_mm=certain(bound.nominal_mm),
+        nominal_mm=rounded(bound.nominal_mm),
         limits="" if limits is None else limits.said,
-        lower_mm=number(lower),
-        upper_mm=number(upper),
-        fit_mm=certain(size.fit_mm),
-        low_mm=certain(size.low_mm),
-        high_mm=certain(size.high_mm),
+        lower_mm=rounded_or_none(lower),
+        upper_mm=rounded_or_none(upper),
+        fit_mm=rounded(size.fit_mm),
+        low_mm=rounded(size.low_mm),
+        high_mm=rounded(size.high_mm),
         verdict=verdict,
-        standard_um=number(standard, UM_PER_MM) if bounded else None,
-        unknown_um=number(most, UM_PER_MM) if bounded else None,
-        guard_um=number(GUARD * standard + most, UM_PER_MM) if bounded else None,
+        standard_um=rounded_or_none(standard, UM_PER_MM) if bounded else None,
+        unknown_um=rounded_or_none(most, UM_PER_MM) if bounded else None,
+        guard_um=rounded_or_none(GUARD * standard + most, UM_PER_MM) if bounded else None,
         probability=chance,
         contributions=contributions,
         unknown=tuple(key for one in unknown for key in one.missing),
@@ -190,19 +195,19 @@ def _verdict(each: Inspected, size: Size, budget: Budget, first: int) -> Inspect
     )
 
 
-def _contributions(budget: Budget, value: int) -> tuple[Contribution, ...]:
+def _contributions(budget: Budget, value: int) -> tuple[ContributionReport, ...]:
     """What the inputs contribute to a value: the known ones, the largest first, then those that
     are not known, first what nothing bounds."""
     known = (
-        Contribution(one.input.name, number(one.standard_mm, UM_PER_MM))
+        ContributionReport(one.input.name, rounded_or_none(one.standard_mm, UM_PER_MM))
         for one in budget.contributions(value)
     )
     most = dict(zip(budget.inputs, budget.at_most[value].tolist(), strict=True))
     unknown = (
-        Contribution(
+        ContributionReport(
             one.name,
             None,
-            number(most[one], UM_PER_MM) if math.isfinite(most[one]) else None,
+            rounded_or_none(most[one], UM_PER_MM) if math.isfinite(most[one]) else None,
             one.within,
         )
         for one in sorted(budget.unknown(value), key=lambda one: -most[one])
@@ -210,7 +215,7 @@ def _contributions(budget: Budget, value: int) -> tuple[Contribution, ...]:
     return (*known, *unknown)
 
 
-def _likely_um(one: Contribution) -> float:
+def _likely_um(one: ContributionReport) -> float:
     """A standard uncertainty: that of a uniform distribution where only a bound is known."""
     if one.um is None:
         return math.inf if one.at_most_um is None else one.at_most_um / math.sqrt(3.0)

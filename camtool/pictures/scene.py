@@ -242,10 +242,10 @@ def scene_of(
 def rounds_of(verification: Verification) -> tuple[Round, ...]:
     """The full circles as polar plots show them, each with the number of the same circle in the
     other direction."""
-    from camtool.verification.circles import Pairs
+    from camtool.verification.circles import CirclePairs
 
     seen = verification.circles
-    pairs = Pairs([one.circle for one in seen])
+    pairs = CirclePairs([one.circle for one in seen])
     both_mm: dict[int | None, float] = {}
     for index, one in enumerate(seen):
         for both in pairs.add(index, one.bins):

@@ -31,7 +31,7 @@ class Legs(Struct, frozen=True, eq=False):
     seconds: Floats
 
 
-class Standing(Struct, frozen=True, eq=False):
+class LegProgram(Struct, frozen=True, eq=False):
     """What applies to all R rows up to the end of the program: `start` (3,) steps; `waits` (R,) s
     of rows without motion; `compensation_s`, the time of each step added at a reversal."""
 
@@ -43,7 +43,7 @@ class Standing(Struct, frozen=True, eq=False):
 class LegRun:
     """A run of legs on a machine."""
 
-    def __init__(self, standing: Standing, machine: Machine, options: Options) -> None:
+    def __init__(self, standing: LegProgram, machine: Machine, options: Options) -> None:
         self._standing, self._position = standing, standing.start
         self._step_mm = np.array([axis.coded_step_mm for axis in machine.axes])
         self._mechanics = Mechanics(machine, standing.start * self._step_mm, options.effects)

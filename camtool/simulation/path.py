@@ -51,7 +51,7 @@ SPREAD_STEPS = 2.0
 """Radii of the ends of an arc that differ by at most this many steps differ because of
 rounding."""
 
-LEAST_CHORD_STEPS = 2.0
+MIN_CHORD_STEPS = 2.0
 """An arc whose ends are nearer than this keeps its centre: its chord has no certain direction."""
 
 
@@ -76,7 +76,7 @@ class PathModel(ControllerModel[PathController, Any]):
         """The moves with their ends on the controller's grid, if it has one."""
         if machine.controller.grid == "none":
             return super().quantised(toolpath, machine)
-        return on_steps(toolpath, machine)
+        return round_to_steps(toolpath, machine)
 
     def spacing_mm(self, toolpath: Toolpath, machine: _Machine) -> float:
         """A coded step, or more where the program would have more than `MAX_SAMPLES` samples."""
@@ -125,7 +125,7 @@ def _durations(path: Toolpath, machine: Machine) -> Floats:
     return np.where(path.kind == Kind.DWELL, path.value, seconds)
 
 
-def on_steps(toolpath: Toolpath, machine: Machine) -> Toolpath:
+def round_to_steps(toolpath: Toolpath, machine: Machine) -> Toolpath:
     """The moves with their ends at the nearest coded steps, and homing at machine zero.
 
     Raises ProgramError for arcs without a centre and for positions that cannot be counted. An arc
@@ -140,7 +140,7 @@ def on_steps(toolpath: Toolpath, machine: Machine) -> Toolpath:
     end = exact.by_parts(lambda part: _on_grid(part.end, machine))
     arcs = np.flatnonzero(exact.is_arc)
     sweeps = exact.sweeps_of(arcs)
-    made = _centred(with_ends(exact, start, end), arcs, np.abs(sweeps), machine)
+    made = _centre_arcs(with_ends(exact, start, end), arcs, np.abs(sweeps), machine)
     while True:
         bent = made.is_arc[arcs]
         arcs, sweeps = arcs[bent], sweeps[bent]
@@ -148,10 +148,10 @@ def on_steps(toolpath: Toolpath, machine: Machine) -> Toolpath:
         if not inside_out.any():
             return made
         short = np.abs(sweeps[inside_out]) < np.pi
-        made = placed(_turned_back(made, arcs[inside_out], short), home)
+        made = placed(_restore_turned_arcs(made, arcs[inside_out], short), home)
 
 
-def _centred(made: Toolpath, arcs: Ints, sweep: Floats, machine: Machine) -> Toolpath:
+def _centre_arcs(made: Toolpath, arcs: Ints, sweep: Floats, machine: Machine) -> Toolpath:
     """The rows `arcs` (J,), which turn by `sweep` (J,), with centres at the same distance from
     their rounded ends and starts.
 
@@ -165,7 +165,7 @@ def _centred(made: Toolpath, arcs: Ints, sweep: Floats, machine: Machine) -> Too
     chord, out, back = end - begin, begin - centre, end - centre
     length, radius = np.hypot(chord[:, 0], chord[:, 1]), np.hypot(out[:, 0], out[:, 1])
     spread = np.abs(radius - np.hypot(back[:, 0], back[:, 1]))
-    apt = (length >= LEAST_CHORD_STEPS * step) & (spread <= SPREAD_STEPS * step)
+    apt = (length >= MIN_CHORD_STEPS * step) & (spread <= SPREAD_STEPS * step)
     apt &= (sweep <= np.pi) | (length >= radius)
     if not apt.any():
         return made
@@ -176,7 +176,7 @@ def _centred(made: Toolpath, arcs: Ints, sweep: Floats, machine: Machine) -> Too
     return replace(made, centre=read_only(new))
 
 
-def _turned_back(made: Toolpath, inside_out: Ints, short: Bools) -> Toolpath:
+def _restore_turned_arcs(made: Toolpath, inside_out: Ints, short: Bools) -> Toolpath:
     """The arcs (J,) that rounding has turned inside out: short ones as lines, long ones as
     circles."""
     lines, full = inside_out[short], inside_out[~short]

@@ -39,7 +39,7 @@ TURNS_OF_ARC = 4
 """An arc has at most this many reversals between its ends."""
 
 
-class Samples(Protocol):
+class SampleSource(Protocol):
     """All samples of some rows. `first` (R+1,): row r owns samples first[r]:first[r+1]."""
 
     @property
@@ -61,7 +61,7 @@ class SampledRows(Struct, frozen=True, eq=False):
     low: int
     high: int
     base: int
-    samples: Samples
+    samples: SampleSource
     seconds: Floats
     iterates: bool = False
 
@@ -162,7 +162,7 @@ class PathSamples:
         self._toolpath = toolpath
         self._arms = PolarArcs(toolpath, toolpath.is_arc)
         length = move_lengths(toolpath)
-        self._pieces = _pieces(length, self._arms)
+        self._pieces = _pieces_of_rows(length, self._arms)
         pieces = self._pieces
         of_piece = length[pieces.row] * (pieces.end - pieces.begin)
         self._parts = np.maximum(np.ceil(of_piece / spacing_mm - SPACING_EPS), 1.0).astype(
@@ -238,7 +238,7 @@ class CountedSamples(PathSamples):
         return np.column_stack(columns)
 
 
-def _pieces(length: Floats, arms: PolarArcs) -> _Pieces:
+def _pieces_of_rows(length: Floats, arms: PolarArcs) -> _Pieces:
     """All pieces in order: one for each straight row with motion, one or more for each arc."""
     straight = length > 0.0
     straight[arms.row] = False

@@ -18,7 +18,7 @@ from camtool.errors import MachineError
 from camtool.machine.model import Machine
 
 
-class Approach(Struct, frozen=True):
+class EntryState(Struct, frozen=True):
     """What the blocks before those of a plan leave to it: the highest speed in the last of them,
     and the square of the speed, (mm/s)², that they allow behind it; 0 and 0 before the first."""
 
@@ -26,7 +26,7 @@ class Approach(Struct, frozen=True):
     square: float = 0.0
 
 
-FROM_REST = Approach()
+FROM_REST = EntryState()
 
 
 class SpeedPlan(Struct, frozen=True, eq=False):
@@ -38,7 +38,7 @@ class SpeedPlan(Struct, frozen=True, eq=False):
     speed_mm_s: Floats
     acceleration_mm_s2: Floats
     corner_mm_s: Floats
-    before: Approach = FROM_REST
+    before: EntryState = FROM_REST
 
     def squares(self, window: int) -> Floats:
         """(N + 1,) (mm/s)²: the square of the speed at the start of each block, and 0 after the
@@ -63,19 +63,19 @@ class SpeedPlan(Struct, frozen=True, eq=False):
         steady = np.maximum(d - ramps, 0.0) / peak
         return np.asarray((2.0 * peak - first - last) / a + steady)
 
-    def behind(self, count: int, squares: Floats) -> Approach:
+    def behind(self, count: int, squares: Floats) -> EntryState:
         """What the first `count` blocks leave to those behind them."""
         if count == 0:
             return self.before
         reached = squares[count - 1] + self._gains()[count - 1]
-        return Approach(float(self.speed_mm_s[count - 1]), float(reached))
+        return EntryState(float(self.speed_mm_s[count - 1]), float(reached))
 
     def _gains(self) -> Floats:
         """(N,) (mm/s)²: what the square of the speed can change by within each block."""
         return np.asarray(2.0 * self.acceleration_mm_s2 * self.length_mm)
 
 
-def allowed_along(limit: Floats, unit: Floats) -> Floats:
+def max_along(limit: Floats, unit: Floats) -> Floats:
     """(B,) the largest value along unit vectors (B, 3) within the limits of three axes (3,)."""
     with np.errstate(divide="ignore", over="ignore"):
         return np.asarray((limit / np.abs(unit)).min(axis=1, initial=np.inf))

@@ -16,7 +16,7 @@ from camtool.toolpath.moves import CompensatedToolpath, Toolpath
 from camtool.toolpath.wanted import ProtectedRegion
 
 if TYPE_CHECKING:
-    from camtool.verification.conformance import Asked
+    from camtool.verification.conformance import ProgramRequest
     from camtool.verification.registration import Registration
 
 COVERAGE_MM = 0.005
@@ -116,7 +116,7 @@ class Case(Struct, frozen=True, eq=False):
     drawing: Drawing | None = None
     options: VerifyOptions = VerifyOptions()
     compensated: CompensatedToolpath | None = None
-    asked: Asked | None = None
+    asked: ProgramRequest | None = None
     written_from: Toolpath | None = None
     row_from: Indices | None = None
     registration: Registration | None = None

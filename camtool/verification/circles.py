@@ -32,11 +32,11 @@ FIT_ROUNDS = 30
 FIT_END_MM = 1e-9
 """The least-squares centre is found when it moves by less than this."""
 
-FEWEST_BINS = 3
+MIN_BINS = 3
 """A circle has three unknowns."""
 
 
-class Circle(Struct, frozen=True):
+class FullCircle(Struct, frozen=True):
     """A full circle of a toolpath: centre (x, y) mm, radius mm, direction, first and last row."""
 
     centre_mm: tuple[float, float]
@@ -57,11 +57,11 @@ class CircleFigures(Struct, frozen=True):
     radial_mean_mm: float
 
 
-UNSEEN = CircleFigures(math.nan, math.nan, math.nan, math.nan)
+NO_FIGURES = CircleFigures(math.nan, math.nan, math.nan, math.nan)
 """Figures of a circle that the slides did not follow."""
 
 
-def full_circles(cuts: CutMoves, gap_mm: float) -> list[Circle]:
+def full_circles(cuts: CutMoves, gap_mm: float) -> list[FullCircle]:
     """Runs of consecutive level arcs that cut about one centre in one direction and make a full
     turn; of circles below each other (passes, or a helix and its last turn) the deepest.
 
@@ -95,7 +95,7 @@ def full_circles(cuts: CutMoves, gap_mm: float) -> list[Circle]:
     )
 
 
-def _deepest(circles: list[Circle], gap_mm: float) -> list[Circle]:
+def _deepest(circles: list[FullCircle], gap_mm: float) -> list[FullCircle]:
     """Of circles below each other the deepest, in their order; all of several equally deep."""
     lowest: dict[tuple[object, ...], float] = {}
     keys = []
@@ -109,9 +109,9 @@ def _deepest(circles: list[Circle], gap_mm: float) -> list[Circle]:
     ]
 
 
-def _circle(toolpath: Toolpath, run: Ints, radius: float) -> Circle:
+def _circle(toolpath: Toolpath, run: Ints, radius: float) -> FullCircle:
     row = int(run[0])
-    return Circle(
+    return FullCircle(
         centre_mm=(float(toolpath.centre[row, 0]), float(toolpath.centre[row, 1])),
         radius_mm=radius,
         ccw=bool(toolpath.kind[row] == Kind.ARC_CCW),
@@ -124,8 +124,8 @@ def _circle(toolpath: Toolpath, run: Ints, radius: float) -> Circle:
 def circle_figures(bins: Floats, radius_mm: float) -> CircleFigures:
     """G, F max, F min and D of the bins (720, 9) of `camtool.kernels.judging`."""
     seen = bins[bins[:, 0] > 0.0]
-    if len(seen) < FEWEST_BINS:
-        return UNSEEN
+    if len(seen) < MIN_BINS:
+        return NO_FIGURES
     least, largest = np.sqrt(seen[:, 3]), np.sqrt(seen[:, 6])
     # The points of a bin that does not reach from edge to edge make a shorter arc.
     mean = np.clip(mean_radii(bins)[bins[:, 0] > 0.0], least, largest)
@@ -218,7 +218,7 @@ SAME_SHARE = 1e-3
 circle, cut twice."""
 
 
-class Reversing(Struct, frozen=True):
+class ReversalFigures(Struct, frozen=True):
     """The reversals of a circle, mm: `step` and `spike` at 0°, 90°, 180° and 270°; the reversal
     `value` B of X and Y. NaN with too few bins."""
 
@@ -227,22 +227,22 @@ class Reversing(Struct, frozen=True):
     value: tuple[float, float]
 
 
-class BothWays(Struct, frozen=True):
+class BidirectionalFigures(Struct, frozen=True):
     """A circle that is cut in both directions, mm: bi-directional circular error G(b) and mean
     bi-directional radial error D."""
 
-    circle: Circle
+    circle: FullCircle
     circular_mm: float
     radial_mean_mm: float
 
 
-def reversing(bins: Floats, ccw: bool) -> Reversing:
+def reversal_figures(bins: Floats, ccw: bool) -> ReversalFigures:
     """The reversals of one circle from its bins (B, 9) about the programmed centre."""
     radius = mean_radii(bins)
     with np.errstate(invalid="ignore"):
         least, largest = np.sqrt(bins[:, 3]), np.sqrt(bins[:, 6])
     steps, spikes = _steps(radius, least, largest, 1 if ccw else -1)
-    return Reversing(
+    return ReversalFigures(
         (steps[0], steps[1], steps[2], steps[3]),
         (spikes[0], spikes[1], spikes[2], spikes[3]),
         _values(radius, ccw),
@@ -296,11 +296,11 @@ def _terms(count: int, turn: float) -> Floats:
     return terms
 
 
-class Pairs:
+class CirclePairs:
     """Pairs of circles cut clockwise and counterclockwise about one centre. Only the bins of the
     first are kept, and only until the second is done."""
 
-    def __init__(self, circles: Sequence[Circle]) -> None:
+    def __init__(self, circles: Sequence[FullCircle]) -> None:
         """Each counterclockwise circle takes the first free clockwise one as its partner."""
         self._circles = circles
         self._partner: dict[int, int] = {}
@@ -320,7 +320,7 @@ class Pairs:
         """The other circle of the pair; None for a circle without a partner."""
         return self._partner.get(circle)
 
-    def add(self, circle: int, bins: Floats) -> list[BothWays]:
+    def add(self, circle: int, bins: Floats) -> list[BidirectionalFigures]:
         """Take the bins of a circle; the figures of the pair if its partner is done already."""
         partner = self._partner.get(circle)
         if partner is None:
@@ -329,14 +329,16 @@ class Pairs:
             self._waiting[circle] = bins.copy()
             return []
         return [
-            both_ways(self._circles[circle], np.concatenate([self._waiting.pop(partner), bins]))
+            bidirectional_figures(
+                self._circles[circle], np.concatenate([self._waiting.pop(partner), bins])
+            )
         ]
 
 
-def both_ways(circle: Circle, bins: Floats) -> BothWays:
+def bidirectional_figures(circle: FullCircle, bins: Floats) -> BidirectionalFigures:
     """The figures of a circle from the bins (2 B, 9) of both directions; NaN without points."""
     seen = bins[bins[:, 0] > 0.0]
     if len(seen) == 0:
-        return BothWays(circle, math.nan, math.nan)
+        return BidirectionalFigures(circle, math.nan, math.nan)
     about = np.hypot(*mean_points(seen).T).mean()
-    return BothWays(circle, circular_error(seen), float(about) - circle.radius_mm)
+    return BidirectionalFigures(circle, circular_error(seen), float(about) - circle.radius_mm)

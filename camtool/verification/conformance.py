@@ -26,20 +26,20 @@ from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.rapids import STOCK_TOP_MM
 from camtool.verification.coverage import (
-    Compared,
     Limits,
+    NearPairs,
     PlaceSentences,
     Side,
-    Uncovered,
+    UncoveredContour,
     at_point,
     block_name,
     compare_holes,
-    compared,
+    encloses_area,
     listed,
-    other_way,
-    round_trips,
-    turned,
-    uncovered,
+    near_pairs,
+    reversal_findings,
+    reversed_samples,
+    uncovered_contours,
     uncovered_findings,
 )
 from camtool.verification.cuts import is_flat
@@ -89,12 +89,12 @@ class Conformance(Struct, frozen=True, eq=False):
 
 
 def conformance_of(
-    decoded: Toolpath, asked: Asked, *, flat_cuts: bool, sample_mm: float
+    decoded: Toolpath, asked: ProgramRequest, *, flat_cuts: bool, sample_mm: float
 ) -> Conformance:
     """Compare the moves of a program with those that the job asks for."""
     mine = Side.of(decoded.first(decoded.executed_rows), flat_cuts=flat_cuts)
     count = len(mine.cuts.rows)
-    if _same(decoded, asked.written):
+    if _equal_toolpaths(decoded, asked.written):
         return Conformance(moves=count, alike=count)
     other = Side.of(asked.written.first(asked.written.executed_rows), flat_cuts=flat_cuts)
     wanted = Side.of(asked.wanted.first(asked.wanted.executed_rows), flat_cuts=flat_cuts)
@@ -110,7 +110,7 @@ def conformance_of(
     )
 
 
-def _same(one: Toolpath, other: Toolpath) -> bool:
+def _equal_toolpaths(one: Toolpath, other: Toolpath) -> bool:
     """Whether two toolpaths are equal, row for row."""
     names = ("kind", "end", "centre", "feed", "value", "start", "mode")
     return one.modes == other.modes and all(
@@ -125,7 +125,7 @@ LIMIT_UNITS = 1.5
 and the centres of arcs as well."""
 
 
-class Asked(Struct, frozen=True, eq=False):
+class ProgramRequest(Struct, frozen=True, eq=False):
     """What a job asks of its program.
 
     `written`: the moves of the program that camtool would write, as its dialect decodes them;
@@ -201,33 +201,33 @@ class PlaceComparison(Struct, frozen=True, eq=False):
 
 
 def compare_places(
-    mine: Side, other: Side, wanted: Side, alike: Alike, asked: Asked, sample_mm: float
+    mine: Side, other: Side, wanted: Side, alike: Alike, asked: ProgramRequest, sample_mm: float
 ) -> PlaceComparison:
     """Compare `mine`, the decoded side, with `other`, the written side, and the reverse."""
     limits = asked.limits_mm
     holes = compare_holes(mine, other, limits)
-    there = compared(mine.cuts, ~alike.in_written, other.moves, limits, sample_mm)
-    back = compared(other.cuts, ~alike.in_decoded, mine.moves, limits, sample_mm)
+    there = near_pairs(mine.cuts, ~alike.in_written, other.moves, limits, sample_mm)
+    back = near_pairs(other.cuts, ~alike.in_decoded, mine.moves, limits, sample_mm)
     _near_wanted(there, wanted.moves, limits)
     _written_from_cut(back, wanted.moves, mine.moves, limits)
-    trips = round_trips(other.cuts, limits[0])
+    trips = encloses_area(other.cuts, limits[0])
     written = other.moves.contour_of(there.move)
-    turns = turned(there, trips[written], limits)
+    turns = reversed_samples(there, trips[written], limits)
     written = other.moves.contour_of(back.samples.segment[back.point])
-    turns_back = turned(back, trips[written], limits)
+    turns_back = reversed_samples(back, trips[written], limits)
     findings = (
-        *_missing(back, holes.undrilled, limits),
-        *_extra(there, holes.drilled, limits),
+        *_missing_findings(back, holes.undrilled, limits),
+        *_extra_findings(there, holes.drilled, limits),
         *holes.findings,
-        *_plunges(mine, (other, wanted), alike, limits),
+        *_plunge_findings(mine, (other, wanted), alike, limits),
         *_repeated_cuts(mine, other, alike, limits),
-        *(other_way(there, turns) if len(turns) else other_way(back, turns_back)),
+        *(reversal_findings(there, turns) if len(turns) else reversal_findings(back, turns_back)),
     )
-    findings = findings or tuple(_changed(mine.toolpath, other.toolpath))
+    findings = findings or tuple(_changed_ends(mine.toolpath, other.toolpath))
     return PlaceComparison(findings, max(there.off_mm, back.off_mm), there.rows_along())
 
 
-def _changed(decoded: Toolpath, written: Toolpath) -> Iterator[Finding]:
+def _changed_ends(decoded: Toolpath, written: Toolpath) -> Iterator[Finding]:
     """MOVES_CHANGED for the same moves as written, some of which end a little elsewhere."""
     if not np.array_equal(decoded.kind, written.kind):
         return
@@ -243,7 +243,7 @@ def _changed(decoded: Toolpath, written: Toolpath) -> Iterator[Finding]:
         )
 
 
-def _near_wanted(there: Compared, wanted: MoveIndex, limits: Limits) -> None:
+def _near_wanted(there: NearPairs, wanted: MoveIndex, limits: Limits) -> None:
     """Mark samples near a wanted move as near, even where the writer would move otherwise."""
     rest = np.flatnonzero(np.isinf(there.distance))
     point, _, distance = wanted.within(there.samples.points[rest], there.samples.z[rest], limits)
@@ -251,7 +251,7 @@ def _near_wanted(there: Compared, wanted: MoveIndex, limits: Limits) -> None:
 
 
 def _written_from_cut(
-    back: Compared, wanted: MoveIndex, decoded: MoveIndex, limits: Limits
+    back: NearPairs, wanted: MoveIndex, decoded: MoveIndex, limits: Limits
 ) -> None:
     """Mark written samples as near where the program cuts the wanted move behind them."""
     rest = np.flatnonzero(np.isinf(back.distance))
@@ -270,48 +270,48 @@ _MISSING = CONTOUR_MISSING_ELSEWHERE, CONTOUR_MISSING_OTHER_DEPTH, CONTOUR_MISSI
 _EXTRA = EXTRA_CUT_ELSEWHERE, EXTRA_CUT_OTHER_DEPTH, EXTRA_CUT_NOTHING_ASKED
 
 
-def _missing(back: Compared, undrilled: Bools, limits: Limits) -> Iterator[Finding]:
+def _missing_findings(back: NearPairs, undrilled: Bools, limits: Limits) -> Iterator[Finding]:
     """Yield CONTOUR_MISSING for written contours, at the block that cuts nearest."""
     decoded = back.others.cuts
 
-    def block(part: Uncovered) -> str:
+    def block(part: UncoveredContour) -> str:
         known = part.nearest >= 0
         return block_name(decoded.toolpath, int(decoded.row[part.nearest])) if known else ""
 
     return _uncovered_findings(back, undrilled, limits, _MISSING, block)
 
 
-def _extra(there: Compared, drilled: Bools, limits: Limits) -> Iterator[Finding]:
+def _extra_findings(there: NearPairs, drilled: Bools, limits: Limits) -> Iterator[Finding]:
     """Yield EXTRA_CUT for contours of the program, at their own blocks."""
 
-    def block(part: Uncovered) -> str:
+    def block(part: UncoveredContour) -> str:
         return block_name(there.cuts.toolpath, part.row)
 
     return _uncovered_findings(there, drilled, limits, _EXTRA, block)
 
 
 def _uncovered_findings(
-    found: Compared,
+    found: NearPairs,
     drilled: Bools,
     limits: Limits,
     sentences: PlaceSentences,
-    place: Callable[[Uncovered], str],
+    place: Callable[[UncoveredContour], str],
 ) -> Iterator[Finding]:
     """Yield a finding for each contour of which a sample is near nothing on the other side."""
     samples = found.samples.of(np.flatnonzero(np.isinf(found.distance)))
     nearest = nearest_at_height(samples, None, found.others, limits)
-    parts = list(uncovered(found.cuts, samples, nearest, drilled, limits))
+    parts = list(uncovered_contours(found.cuts, samples, nearest, drilled, limits))
     return uncovered_findings(parts, found.cuts, limits[0], sentences, place)
 
 
-def _plunges(
+def _plunge_findings(
     mine: Side, others: tuple[Side, Side], alike: Alike, limits: Limits
 ) -> Iterator[Finding]:
     """EXTRA_CUT for feeds straight down to where no cut was asked for, except holes, which are
     compared by `hole_findings`."""
     toolpath = mine.toolpath
     rows = np.flatnonzero(mine.plunges & ~alike.in_written)
-    rows = rows[~_on(toolpath.end[rows, :2], mine.holes.at)]
+    rows = rows[~_is_at_place(toolpath.end[rows, :2], mine.holes.at)]
     fine = np.zeros(len(rows), dtype=np.bool_)
     for other in others:
         ends = toolpath.end[rows]
@@ -328,7 +328,7 @@ def _plunges(
         )
 
 
-def _on(points: Floats, places: Floats) -> Bools:
+def _is_at_place(points: Floats, places: Floats) -> Bools:
     """(J,) true for points (J, 2) that are one of the places (K, 2)."""
     known = {tuple(place) for place in np.rint(places / POSITION_EPS_MM).astype(int).tolist()}
     mine = np.rint(points / POSITION_EPS_MM).astype(int).tolist()
@@ -374,7 +374,7 @@ FEED_SHARE = 0.5
 DWELL_S = 0.0005
 """A dwell is too short when it is shorter by more than this."""
 
-OFF = 0.0
+SPINDLE_OFF = 0.0
 """The value of a spindle that is off, and of no tool."""
 
 COOLANTS = ("no coolant", "mist", "flood", "mist and flood")
@@ -382,25 +382,25 @@ COOLANTS = ("no coolant", "mist", "flood", "mist and flood")
 
 
 def compare_settings(
-    mine: Side, other: Side, alike: Alike, pairs: Ints, asked: Asked
+    mine: Side, other: Side, alike: Alike, pairs: Ints, asked: ProgramRequest
 ) -> tuple[Finding, ...]:
     """Compare feeds, spindle, tool, coolant, corners, dwells, clearance and end; `pairs` (P, 2)
     are rows of both sides that lie on each other, besides those that are alike."""
-    both = _Both.of(mine, other, alike, pairs, asked.limits_mm)
+    both = _SettingPairs.of(mine, other, alike, pairs, asked.limits_mm)
     return (
-        *_feeds(both, asked),
-        *_feeds_in_air(mine.toolpath, other.toolpath),
-        *_spindle(both),
-        *_tools(both),
-        *_coolant(both),
-        *_corners(both),
-        *_dwells(mine.toolpath, other.toolpath, asked),
-        *_clearance(mine, other, alike, asked),
-        *_end(mine.toolpath, other.toolpath, asked),
+        *_feed_findings(both, asked),
+        *_air_feed_findings(mine.toolpath, other.toolpath),
+        *_spindle_findings(both),
+        *_tool_findings(both),
+        *_coolant_findings(both),
+        *_corner_findings(both),
+        *_dwell_findings(mine.toolpath, other.toolpath, asked),
+        *_clearance_findings(mine, other, alike, asked),
+        *_end_findings(mine.toolpath, other.toolpath, asked),
     )
 
 
-class _Both(Struct, frozen=True, eq=False):
+class _SettingPairs(Struct, frozen=True, eq=False):
     """Decoded rows (R,) that cut or plunge, and pairs (P, 2) of such a row with a written row to
     compare it with."""
 
@@ -410,7 +410,9 @@ class _Both(Struct, frozen=True, eq=False):
     pairs: Ints
 
     @classmethod
-    def of(cls, mine: Side, other: Side, alike: Alike, pairs: Ints, limits: Limits) -> _Both:
+    def of(
+        cls, mine: Side, other: Side, alike: Alike, pairs: Ints, limits: Limits
+    ) -> _SettingPairs:
         """The given pairs, all rows that are alike, each plunge that is not alike with every
         written plunge, and each cut without any of these with the written moves at its middle,
         whatever their direction."""
@@ -450,12 +452,12 @@ class _Both(Struct, frozen=True, eq=False):
 
 
 def _settings(toolpath: Toolpath) -> tuple[Floats, Floats, Floats, Ints]:
-    """(N,) each: feed, spindle speed in rev/min (CCW negative, OFF when it is off), tool, and an
-    index of COOLANTS."""
+    """Return (N,) each: feed, spindle speed in rev/min (CCW negative, SPINDLE_OFF when it is
+    off), tool, and an index of COOLANTS."""
     kind = toolpath.kind
     turning = np.where(kind == Kind.SPINDLE_CCW, -toolpath.value, toolpath.value)
     spindle = (kind >= Kind.SPINDLE_CW) & (kind <= Kind.SPINDLE_OFF)
-    turns = _last_value(spindle, np.where(kind == Kind.SPINDLE_OFF, OFF, turning))
+    turns = _last_value(spindle, np.where(kind == Kind.SPINDLE_OFF, SPINDLE_OFF, turning))
     tool = _last_value(kind == Kind.TOOL_CHANGE, toolpath.value)
     off = _last_row(kind == Kind.COOLANT_OFF)
     mist, flood = (_last_row(kind == one) > off for one in (Kind.COOLANT_MIST, Kind.COOLANT_FLOOD))
@@ -468,12 +470,12 @@ def _last_row(given: Bools) -> Ints:
 
 
 def _last_value(given: Bools, values: Floats) -> Floats:
-    """(N,) the last `given` value up to each row, OFF before the first."""
+    """(N,) the last `given` value up to each row, SPINDLE_OFF before the first."""
     last = _last_row(given)
-    return np.where(last >= 0, np.nan_to_num(values[np.maximum(last, 0)]), OFF)
+    return np.where(last >= 0, np.nan_to_num(values[np.maximum(last, 0)]), SPINDLE_OFF)
 
 
-def _feeds(both: _Both, asked: Asked) -> Iterator[Finding]:
+def _feed_findings(both: _SettingPairs, asked: ProgramRequest) -> Iterator[Finding]:
     """FEED_DIFFERS: an error for feeds that the job names, a remark for those it leaves to the
     machine.
 
@@ -483,7 +485,10 @@ def _feeds(both: _Both, asked: Asked) -> Iterator[Finding]:
     both feeds are rounded.
     """
     is_, wanted = both.decoded.feed[both.pairs[:, 0]], both.written.feed[both.pairs[:, 1]]
-    slant, other = _slant(both.decoded)[both.pairs[:, 0]], _slant(both.written)[both.pairs[:, 1]]
+    slant, other = (
+        _speed_ratios(both.decoded)[both.pairs[:, 0]],
+        _speed_ratios(both.written)[both.pairs[:, 1]],
+    )
     turned = np.abs(slant / other - 1.0)
     share = np.where(turned > 0.0, 2.0 * FEED_SHARE, FEED_SHARE)
     off = np.abs(is_ - wanted) > share * asked.feed_unit_mm_min + wanted * turned
@@ -500,7 +505,7 @@ def _feeds(both: _Both, asked: Asked) -> Iterator[Finding]:
             )
 
 
-def _feeds_in_air(decoded: Toolpath, written: Toolpath) -> Iterator[Finding]:
+def _air_feed_findings(decoded: Toolpath, written: Toolpath) -> Iterator[Finding]:
     """FEED_DIFFERS, a warning, for moves at a feed where a rapid was written."""
     rapids = np.flatnonzero(written.kind == Kind.RAPID)
     feeds = np.flatnonzero(written.is_feed)
@@ -519,7 +524,7 @@ def _feeds_in_air(decoded: Toolpath, written: Toolpath) -> Iterator[Finding]:
         )
 
 
-def _slant(toolpath: Toolpath) -> Floats:
+def _speed_ratios(toolpath: Toolpath) -> Floats:
     """(N,) ratio of the length of a line in XY to its run on the faster axis, 1 to √2; 1 for
     other rows."""
     run = np.abs(toolpath.end - toolpath.starts)[:, :2]
@@ -528,11 +533,11 @@ def _slant(toolpath: Toolpath) -> Floats:
     return np.asarray(np.where(line, np.hypot(*run.T) / np.where(line, faster, 1.0), 1.0))
 
 
-def _spindle(both: _Both) -> Iterator[Finding]:
+def _spindle_findings(both: _SettingPairs) -> Iterator[Finding]:
     """SPINDLE_DIFFERS: an error where the job starts the spindle, otherwise a remark."""
     is_, wanted = _settings(both.decoded)[1], _settings(both.written)[1]
     rows, of = both.unlike(is_[both.pairs[:, 0]] == wanted[both.pairs[:, 1]])
-    asked = wanted[of] != OFF
+    asked = wanted[of] != SPINDLE_OFF
     for is_asked, which in ((True, asked), (False, ~asked)):
         if which.any():
             row, limit = int(rows[which][0]), float(wanted[of][which][0])
@@ -541,22 +546,22 @@ def _spindle(both: _Both) -> Iterator[Finding]:
                 measured=is_[row],
                 limit=limit,
                 moves=int(which.sum()),
-                turning=_turning(float(is_[row])),
-                wanted=_turning(limit),
+                turning=_spindle_words(float(is_[row])),
+                wanted=_spindle_words(limit),
             )
 
 
-def _turning(turns: float) -> str:
-    if turns == OFF:
+def _spindle_words(turns: float) -> str:
+    if turns == SPINDLE_OFF:
         return "the spindle off"
-    return f"the spindle at {abs(turns):g} rev/min {'CW' if turns > OFF else 'CCW'}"
+    return f"the spindle at {abs(turns):g} rev/min {'CW' if turns > SPINDLE_OFF else 'CCW'}"
 
 
-def _tools(both: _Both) -> Iterator[Finding]:
+def _tool_findings(both: _SettingPairs) -> Iterator[Finding]:
     """SETTING_DIFFERS for cuts with another tool than in the written program."""
     is_, wanted = _settings(both.decoded)[2], _settings(both.written)[2]
     rows, of = both.unlike(is_[both.pairs[:, 0]] == wanted[both.pairs[:, 1]])
-    asked = wanted[of] != OFF
+    asked = wanted[of] != SPINDLE_OFF
     for is_asked, which in ((True, asked), (False, ~asked)):
         if which.any():
             row = int(rows[which][0])
@@ -568,7 +573,7 @@ def _tools(both: _Both) -> Iterator[Finding]:
             )
 
 
-def _coolant(both: _Both) -> Iterator[Finding]:
+def _coolant_findings(both: _SettingPairs) -> Iterator[Finding]:
     """SETTING_DIFFERS for cuts with other coolant than in the written program."""
     is_, wanted = _settings(both.decoded)[3], _settings(both.written)[3]
     rows, of = both.unlike(is_[both.pairs[:, 0]] == wanted[both.pairs[:, 1]])
@@ -584,7 +589,7 @@ def _coolant(both: _Both) -> Iterator[Finding]:
             )
 
 
-def _corners(both: _Both) -> Iterator[Finding]:
+def _corner_findings(both: _SettingPairs) -> Iterator[Finding]:
     """SETTING_DIFFERS for moves whose corners the controller may round farther than in the written
     program. A program without a mode leaves corners to the machine and is not compared."""
     is_, wanted = _corner_tolerances(both.decoded), _corner_tolerances(both.written)
@@ -611,7 +616,9 @@ def _corner_tolerances(toolpath: Toolpath) -> Floats:
     return np.array([*tolerances, np.nan])[toolpath.mode]
 
 
-def _dwells(decoded: Toolpath, written: Toolpath, asked: Asked) -> Iterator[Finding]:
+def _dwell_findings(
+    decoded: Toolpath, written: Toolpath, asked: ProgramRequest
+) -> Iterator[Finding]:
     """SETTING_DIFFERS where the tool dwells for less than was asked, and where it dwells for
     longer: a warning in the stock, where it rubs, else a remark."""
     wanted, found = (np.flatnonzero(each.kind == Kind.DWELL) for each in (written, decoded))
@@ -630,10 +637,10 @@ def _dwells(decoded: Toolpath, written: Toolpath, asked: Asked) -> Iterator[Find
             limit=written.value[row],
             places=len(short),
         )
-    yield from _waits(decoded, written, found, wanted, limits)
+    yield from _long_dwell_findings(decoded, written, found, wanted, limits)
 
 
-def _waits(
+def _long_dwell_findings(
     decoded: Toolpath, written: Toolpath, found: Ints, wanted: Ints, limits: Floats
 ) -> Iterator[Finding]:
     """SETTING_DIFFERS where the tool dwells for longer than was asked; `found` and `wanted` are
@@ -665,7 +672,9 @@ def _waits(
             )
 
 
-def _clearance(mine: Side, other: Side, alike: Alike, asked: Asked) -> Iterator[Finding]:
+def _clearance_findings(
+    mine: Side, other: Side, alike: Alike, asked: ProgramRequest
+) -> Iterator[Finding]:
     """CLEARANCE_LOW for rapids in XY below the height asked for, except rapids in `written`."""
     toolpath = mine.toolpath
     if is_flat(other.toolpath):
@@ -690,13 +699,15 @@ def _clearance(mine: Side, other: Side, alike: Alike, asked: Asked) -> Iterator[
     )
 
 
-def _severity(low_mm: float, asked: Asked) -> Severity:
+def _severity(low_mm: float, asked: ProgramRequest) -> Severity:
     """An error where the tool touches the stock or the job names the height, else a warning."""
     touching = low_mm <= STOCK_TOP_MM + asked.limits_mm[1]
     return Severity.ERROR if touching or asked.safe_z_named else Severity.WARNING
 
 
-def _end(decoded: Toolpath, written: Toolpath, asked: Asked) -> Iterator[Finding]:
+def _end_findings(
+    decoded: Toolpath, written: Toolpath, asked: ProgramRequest
+) -> Iterator[Finding]:
     """END_DIFFERS for a program without END, and for one whose tool ends lower or elsewhere than
     asked."""
     if (written.kind == Kind.END).any() and not (decoded.kind == Kind.END).any():

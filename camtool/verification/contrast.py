@@ -30,7 +30,7 @@ class ContrastRow(msgspec.Struct, frozen=True):
     time_s: float
 
 
-def row_of(name: str, report: Report) -> ContrastRow:
+def contrast_row(name: str, report: Report) -> ContrastRow:
     """The row of one report."""
     error = report.error_um
     circular = [circle.G_um for circle in report.circles if circle.G_um is not None]
@@ -51,14 +51,14 @@ def row_of(name: str, report: Report) -> ContrastRow:
 _HEADS = ("interp.", "mechanics", "total", "rms", "G", "iterations", "reversals", "endless")
 
 
-def table(rows: Sequence[ContrastRow]) -> str:
+def contrast_table(rows: Sequence[ContrastRow]) -> str:
     """The rows as aligned text, errors in µm."""
     cells: list[tuple[str, ...]] = [("µm", *_HEADS, "time")]
     cells += [
         (
             row.name,
-            *map(_um, (row.interpolation_max_um, row.mechanics_max_um, row.total_max_um)),
-            *map(_um, (row.total_rms_um, row.circular_um)),
+            *map(_um_words, (row.interpolation_max_um, row.mechanics_max_um, row.total_max_um)),
+            *map(_um_words, (row.total_rms_um, row.circular_um)),
             *map(str, (row.iterations, row.reversals_cutting, row.endless)),
             clock(row.time_s),
         )
@@ -92,7 +92,7 @@ def worst_place(verdicts: Iterable[Verification]) -> tuple[float, float]:
     return place
 
 
-MOST_SHOWN = 40_000
+MAX_SHOWN_SAMPLES = 40_000
 """At most this many samples of each variant are drawn; later ones are left out."""
 
 
@@ -108,7 +108,7 @@ def paths_within(
         points = (chunk.commanded if commanded else chunk.slide)[:, :2]
         inside = ((points >= window[:, 0]) & (points <= window[:, 1])).all(axis=1)
         inside &= cutting[chunk.row]
-        which = np.flatnonzero(inside)[: MOST_SHOWN - shown]
+        which = np.flatnonzero(inside)[: MAX_SHOWN_SAMPLES - shown]
         line = np.concatenate([before, points])  # each polyline begins with the sample before it
         for run in np.split(which, np.flatnonzero(np.diff(which) > 1) + 1) if len(which) else []:
             first, end = int(run[0]) + len(before), int(run[-1]) + len(before) + 1
@@ -119,10 +119,10 @@ def paths_within(
         shown += len(which)
         if len(points):
             open_end, before = bool(inside[-1]), points[-1:]
-        if shown >= MOST_SHOWN:
+        if shown >= MAX_SHOWN_SAMPLES:
             break
     return paths
 
 
-def _um(value: float | None) -> str:
+def _um_words(value: float | None) -> str:
     return "–" if value is None else f"{value:.3f}"

@@ -1,6 +1,6 @@
 """The comparison of what is cut with what was wanted: contours, holes and their direction.
 
-It serves verification (`cover`, with the tolerance of the machine) and conformance (`compared`,
+It serves verification (`cover`, with the tolerance of the machine) and conformance (`near_pairs`,
 with the resolution of the dialect); docs/decisions/0075-one-comparison-of-cuts.md says what each
 compares.
 
@@ -32,7 +32,7 @@ from camtool.toolpath.rapids import STOCK_TOP_MM
 from camtool.verification.cuts import (
     NO_LOOP,
     CutMoves,
-    Samples,
+    CutSamples,
     cut_moves,
     cutting_rows,
     loops,
@@ -55,16 +55,16 @@ from camtool.verification.findings import (
     EXTRA_CUT_NONE_WANTED,
 )
 from camtool.verification.matching import (
-    LEAST_MM,
+    MIN_LIMIT_MM,
     Goal,
     Match,
+    empty_match,
     match_contours,
     match_rows,
     nearest_at_height,
-    no_match,
     with_neighbours,
 )
-from camtool.verification.nearest import ANY_CONTOUR, Found, MoveIndex
+from camtool.verification.nearest import ANY_CONTOUR, MoveIndex, NearestMoves
 
 SAMPLES_AT_ONCE = 1 << 16
 """So many samples are compared with the moves that they were written from in one go."""
@@ -133,18 +133,18 @@ def cover(
     cuts, limits = decoded.cuts, (goal.limit_mm, goal.depth_mm)
     own, became = _contours_from(cuts, wanted.cuts, row_from)
     holes = compare_holes(decoded, wanted, limits)
-    match, rounding, extra = no_match(len(cuts.contour)), Figure(), list[Uncovered]()
+    match, rounding, extra = empty_match(len(cuts.contour)), Figure(), list[UncoveredContour]()
     beside = _rows_alike(cuts, wanted.cuts, limits, row_from)
     for samples in samples_by_parts(
-        cuts, spacing_mm, cuts.is_cut, SAMPLES_AT_ONCE, _together(cuts, own, beside)
+        cuts, spacing_mm, cuts.is_cut, SAMPLES_AT_ONCE, _judged_together(cuts, own, beside)
     ):
-        found, belongs = _own_found(cuts, samples, own, goal)
+        found, belongs = _nearest_in_own_contour(cuts, samples, own, goal)
         other = np.flatnonzero(belongs == ANY_CONTOUR)
         some, wrong = nearest_at_height(samples.of(other), None, wanted.moves, limits)
         wrong_depth = np.zeros(len(found.distance), dtype=np.bool_)
         wrong_depth[other] = wrong
         found.distance[other], found.segment[other] = some.distance, some.segment
-        extra += uncovered(cuts, samples, (found, wrong_depth), holes.drilled, limits)
+        extra += uncovered_contours(cuts, samples, (found, wrong_depth), holes.drilled, limits)
         belongs[other] = match_contours(cuts, samples.of(other), some, goal)
         found.distance[other], found.segment[other] = some.distance, some.segment
         real = np.isfinite(found.distance)
@@ -156,18 +156,20 @@ def cover(
         return Coverage(match, rounding, ())
     alike = _contours_alike(wanted.cuts, beside, row_from)
     became = np.where(alike, ANY_CONTOUR, became)
-    cut = np.append(alike | _fits(wanted.cuts, became, decoded.moves, limits, spacing_mm), True)
-    missing = list[Uncovered]()
+    cut = np.append(
+        alike | _fits_contour(wanted.cuts, became, decoded.moves, limits, spacing_mm), True
+    )
+    missing = list[UncoveredContour]()
     for rest in samples_by_parts(
         wanted.cuts, spacing_mm, ~cut[wanted.cuts.contour], SAMPLES_AT_ONCE, wanted.cuts.contour
     ):
         nearest = nearest_at_height(rest, None, decoded.moves, limits)
-        missing += uncovered(wanted.cuts, rest, nearest, holes.undrilled, limits)
+        missing += uncovered_contours(wanted.cuts, rest, nearest, holes.undrilled, limits)
 
-    def block(part: Uncovered) -> str:
+    def block(part: UncoveredContour) -> str:
         return block_name(cuts.toolpath, part.row)
 
-    def contour(part: Uncovered) -> str:
+    def contour(part: UncoveredContour) -> str:
         return _contour_name(wanted.cuts, part)
 
     findings = (
@@ -200,15 +202,17 @@ def _contours_from(
     return mine, theirs
 
 
-def _own_found(cuts: CutMoves, samples: Samples, own: Ints, goal: Goal) -> tuple[Found, Ints]:
+def _nearest_in_own_contour(
+    cuts: CutMoves, samples: CutSamples, own: Ints, goal: Goal
+) -> tuple[NearestMoves, Ints]:
     """The nearest move of the `own` wanted contour (C,) to each sample (S,), and that contour;
     ANY_CONTOUR for the samples of contours that have none, or do not lie within the limits of
     it."""
     count, fit = len(samples.points), np.asarray(own != ANY_CONTOUR)
-    found = Found(np.full(count, np.inf), np.full(count, -1, dtype=np.int64))
+    found = NearestMoves(np.full(count, np.inf), np.full(count, -1, dtype=np.int64))
     mine = cuts.contour[cuts.row[samples.segment]]
     some = np.flatnonzero(fit[mine])
-    limits = max(goal.limit_mm, LEAST_MM), goal.depth_mm
+    limits = max(goal.limit_mm, MIN_LIMIT_MM), goal.depth_mm
     for low in range(0, len(some), SAMPLES_AT_ONCE):
         part = some[low : low + SAMPLES_AT_ONCE]
         near = goal.moves.nearest(
@@ -219,7 +223,7 @@ def _own_found(cuts: CutMoves, samples: Samples, own: Ints, goal: Goal) -> tuple
     return found, np.where(fit[mine], own[mine], ANY_CONTOUR)
 
 
-def _together(cuts: CutMoves, own: Ints, beside: Ints) -> Indices:
+def _judged_together(cuts: CutMoves, own: Ints, beside: Ints) -> Indices:
     """(N,) a number that rows have in common which are judged together: those of one contour,
     unless all of them are `beside` rows of their `own` one, so that no other decides on any."""
     alike, every = (
@@ -267,7 +271,7 @@ def _rows_alike(
         if len(arcs):
             here, there = some[arcs], came[arcs]
             room_mm[arcs] -= 2.0 * np.hypot(*(mine.centre[here] - theirs.centre[there]).T)
-            room_mm[arcs] -= _beside_circle(mine, here) + _beside_circle(theirs, there)
+            room_mm[arcs] -= _radius_differences(mine, here) + _radius_differences(theirs, there)
             fit[arcs] &= np.abs(mine.sweeps_of(here) - theirs.sweeps_of(there)) < np.pi
         starts = mine.starts_of(some) - theirs.starts_of(came)
         ends = mine.end.take(some, axis=0) - theirs.end.take(came, axis=0)
@@ -277,7 +281,7 @@ def _rows_alike(
     return np.asarray(rows[near])
 
 
-def _beside_circle(toolpath: Toolpath, arcs: Ints | Indices) -> Floats:
+def _radius_differences(toolpath: Toolpath, arcs: Ints | Indices) -> Floats:
     """(J,) mm: how far the ends of these arcs lie from the circles of their starts."""
     centre = toolpath.centre[arcs]
     out, back = (
@@ -287,7 +291,7 @@ def _beside_circle(toolpath: Toolpath, arcs: Ints | Indices) -> Floats:
     return np.asarray(np.abs(out - back))
 
 
-def _fits(
+def _fits_contour(
     cuts: CutMoves, own: Ints, others: MoveIndex, limits: Limits, spacing_mm: float
 ) -> Bools:
     """(C,) the contours of one side that lie within the limits of their `own` contour (C,) of the
@@ -296,7 +300,7 @@ def _fits(
     limit_mm, depth_mm = limits
     for samples in samples_by_parts(cuts, spacing_mm, np.append(fit, False)[cuts.contour]):
         mine = cuts.contour[cuts.row[samples.segment]]
-        near_mm = max(limit_mm, LEAST_MM)
+        near_mm = max(limit_mm, MIN_LIMIT_MM)
         found = others.nearest(samples.points, samples.z, own[mine], (near_mm, depth_mm))
         fit[mine[found.distance > limit_mm]] = False
     return fit
@@ -313,7 +317,7 @@ _MISSING = CONTOUR_MISSING, CONTOUR_MISSING_AT_DEPTH, CONTOUR_MISSING_NO_CUTS
 _EXTRA = EXTRA_CUT, EXTRA_CUT_AT_DEPTH, EXTRA_CUT_NONE_WANTED
 
 
-class Uncovered(Struct, frozen=True):
+class UncoveredContour(Struct, frozen=True):
     """The sample of a contour with the largest `distance` (mm, inf without any cuts) from the
     other side, where that does not cut a `share` of its samples; `nearest` is the segment there,
     −1 for none. `wrong_depth`: the other side cuts at this place, but at another depth."""
@@ -327,13 +331,13 @@ class Uncovered(Struct, frozen=True):
     share: float
 
 
-def uncovered(
+def uncovered_contours(
     cuts: CutMoves,
-    samples: Samples,
-    nearest: tuple[Found, Bools],
+    samples: CutSamples,
+    nearest: tuple[NearestMoves, Bools],
     drilled: Bools,
     limits: Limits,
-) -> Iterator[Uncovered]:
+) -> Iterator[UncoveredContour]:
     """Yield the contours of which a part is not cut by the other side, by all samples of each.
 
     `nearest` is the result of `nearest_at_height` for the samples, `drilled` (C,) the contours
@@ -355,7 +359,7 @@ def uncovered(
     counts = np.diff(np.append(first, len(order)))
     for worst, count in zip(order[first].tolist(), counts.tolist(), strict=True):
         which = int(contour[worst])
-        yield Uncovered(
+        yield UncoveredContour(
             which,
             int(rows[worst]),
             samples.points[worst],
@@ -367,11 +371,11 @@ def uncovered(
 
 
 def uncovered_findings(
-    parts: Sequence[Uncovered],
+    parts: Sequence[UncoveredContour],
     cuts: CutMoves,
     limit_mm: float,
     sentences: PlaceSentences,
-    place: Callable[[Uncovered], str],
+    place: Callable[[UncoveredContour], str],
 ) -> Iterator[Finding]:
     """Yield a finding for each of these contours of `cuts`; `place` names the block or contour."""
     elsewhere, other_depth, nothing = sentences
@@ -388,7 +392,7 @@ def uncovered_findings(
         )
 
 
-def _contour_name(cuts: CutMoves, part: Uncovered) -> str:
+def _contour_name(cuts: CutMoves, part: UncoveredContour) -> str:
     """Return `contour 3 (layer and entity)`."""
     source = cuts.toolpath.text(part.row)
     return f"contour {part.contour + 1}" + (f" ({source})" if source else "")
@@ -476,13 +480,13 @@ def compare_holes(decoded: Side, wanted: Side, limits: Limits) -> HoleComparison
     drilled, wanted_stand = contours_drilled(decoded.cuts, wanted.holes, limits)
     undrilled, decoded_stand = contours_drilled(wanted.cuts, decoded.holes, limits)
     findings = (
-        *_unpaired(wanted.holes, decoded.holes, limits, wanted_stand, _MISSING_HOLES),
-        *_unpaired(decoded.holes, wanted.holes, limits, decoded_stand, _EXTRA_HOLES),
+        *_unpaired_findings(wanted.holes, decoded.holes, limits, wanted_stand, _MISSING_HOLES),
+        *_unpaired_findings(decoded.holes, wanted.holes, limits, decoded_stand, _EXTRA_HOLES),
     )
     return HoleComparison(drilled, undrilled, findings)
 
 
-def _unpaired(
+def _unpaired_findings(
     holes: Holes,
     others: Holes,
     limits_mm: Limits,
@@ -492,7 +496,7 @@ def _unpaired(
     """A finding for each hole that the other side lacks; `sentences`: for no hole at its position,
     and for one of another depth."""
     none, other_depth = sentences
-    here, paired = _paired(holes, others, limits_mm)
+    here, paired = _has_hole(holes, others, limits_mm)
     alone = np.flatnonzero(~paired & ~stand).tolist()
     for hole, more in listed(alone):
         row = int(holes.row[hole])
@@ -503,7 +507,7 @@ def _unpaired(
         )
 
 
-def _paired(holes: Holes, others: Holes, limits_mm: Limits) -> tuple[Bools, Bools]:
+def _has_hole(holes: Holes, others: Holes, limits_mm: Limits) -> tuple[Bools, Bools]:
     """(H,), (H,) which holes have one of the others at their position, and which one that is as
     deep."""
     here, same = np.zeros(len(holes), dtype=np.bool_), np.zeros(len(holes), dtype=np.bool_)
@@ -516,22 +520,22 @@ def _paired(holes: Holes, others: Holes, limits_mm: Limits) -> tuple[Bools, Bool
 
 # The direction in which a program cuts, wherever its moves lie on those it is compared with.
 
-ALONG = 0.7
+MIN_SAME_COSINE = 0.7
 """Two moves on each other have the same direction when the cosine between them is above this, and
 opposite directions when it is below minus this; between, one crosses the other."""
 
-LONG_ENOUGH = 1.5
+MIN_DIRECTION_LIMITS = 1.5
 """The direction of moves shorter than this many times the tolerance is not certain: their ends are
 rounded by up to 1.41 units in all, which turns a longer move by no more than 32 degrees."""
 
 
-def round_trips(cuts: CutMoves, gap_mm: float) -> Bools:
+def encloses_area(cuts: CutMoves, gap_mm: float) -> Bools:
     """(C,) contours that enclose an area; others (open paths, paths there and back) may be cut
     from either end."""
     return np.asarray(loops(cuts, gap_mm)[:, 0] != NO_LOOP)
 
 
-def cut_other_way(
+def direction_findings(
     decoded: MoveIndex,
     source: MoveIndex,
     limits: Limits,
@@ -549,29 +553,29 @@ def cut_other_way(
     rest = cuts.is_cut
     if row_from is not None:
         alike = _rows_alike(cuts, source.cuts, limits, row_from)
-        rest[alike] = ~_same_way(cuts, source.cuts, alike, row_from)
+        rest[alike] = ~_same_direction(cuts, source.cuts, alike, row_from)
     rows = np.flatnonzero(rest)
     if len(rows) == 0:
         return
     here, half = cuts.first[rows].astype(np.int64), np.full(len(rows), 0.5)
     z = cuts.heights(here).mean(axis=1)
-    middles = Samples(point_at(cuts.segments, here, half), here, z, half)
+    middles = CutSamples(point_at(cuts.segments, here, half), here, z, half)
     own = _contours_from(cuts, source.cuts, row_from)[0][cuts.contour[rows]]
     known = np.flatnonzero(own != ANY_CONTOUR)
     near = source.nearest(middles.points[known], z[known], own[known], limits)
     rest = np.ones(len(rows), dtype=np.bool_)
-    rest[known[_cosines(cuts, middles.of(known), source, near) > ALONG]] = False
+    rest[known[_cosines(cuts, middles.of(known), source, near) > MIN_SAME_COSINE]] = False
     rows, middles = rows[rest], middles.of(np.flatnonzero(rest))
     nearest = nearest_at_height(middles, None, source, limits)[0]
     suspect = np.zeros(len(cuts.contour), dtype=np.bool_)
-    suspect[rows[_cosines(cuts, middles, source, nearest) < -ALONG]] = True
+    suspect[rows[_cosines(cuts, middles, source, nearest) < -MIN_SAME_COSINE]] = True
     if suspect.any():
-        found = compared(cuts, suspect, source, limits, sample_mm)
-        trips = round_trips(source.cuts, limits[0])[source.contour_of(found.move)]
-        yield from other_way(found, turned(found, trips, limits))
+        found = near_pairs(cuts, suspect, source, limits, sample_mm)
+        trips = encloses_area(source.cuts, limits[0])[source.contour_of(found.move)]
+        yield from reversal_findings(found, reversed_samples(found, trips, limits))
 
 
-def _same_way(cuts: CutMoves, source: CutMoves, rows: Ints, row_from: Indices) -> Bools:
+def _same_direction(cuts: CutMoves, source: CutMoves, rows: Ints, row_from: Indices) -> Bools:
     """(J,) whether the chords of these rows have the direction of those of the rows that they came
     from, which are alike; none has that of a full circle."""
     same = np.empty(len(rows), dtype=np.bool_)
@@ -582,11 +586,13 @@ def _same_way(cuts: CutMoves, source: CutMoves, rows: Ints, row_from: Indices) -
             for path, of in ((cuts.toolpath, some), (source.toolpath, row_from[some]))
         )
         lengths = np.hypot(*way.T) * np.hypot(*other.T)
-        same[low : low + len(some)] = (way * other).sum(axis=1) > ALONG * lengths
+        same[low : low + len(some)] = (way * other).sum(axis=1) > MIN_SAME_COSINE * lengths
     return same
 
 
-def _cosines(cuts: CutMoves, samples: Samples, others: MoveIndex, found: Found) -> Floats:
+def _cosines(
+    cuts: CutMoves, samples: CutSamples, others: MoveIndex, found: NearestMoves
+) -> Floats:
     """(S,) cosine of the angle between the move of each sample and the move of the other side
     that was found; 0 where none was."""
     cosine = np.zeros(len(samples.points))
@@ -598,14 +604,14 @@ def _cosines(cuts: CutMoves, samples: Samples, others: MoveIndex, found: Found) 
     return cosine
 
 
-class Compared(Struct, eq=False):
+class NearPairs(Struct, eq=False):
     """S samples on cuts of one side, and all P pairs of a sample (`point`) with a `move` of the
     other side near it; `cosine` (P,) of the angle between both. `distance` (S,) mm from each
     sample to the nearest move, inf where none is near."""
 
     cuts: CutMoves
     others: MoveIndex
-    samples: Samples
+    samples: CutSamples
     point: Ints
     move: Ints
     cosine: Floats
@@ -623,14 +629,14 @@ class Compared(Struct, eq=False):
 
     def rows_along(self) -> Ints:
         """(P, 2) rows of both sides that lie on each other and have the same direction."""
-        along = self.cosine > ALONG
+        along = self.cosine > MIN_SAME_COSINE
         other_rows = self.others.cuts.row[self.move[along]]
         return np.unique(np.column_stack([self.rows[self.point[along]], other_rows]), axis=0)
 
 
-def compared(
+def near_pairs(
     cuts: CutMoves, rows: Bools, others: MoveIndex, limits: Limits, sample_mm: float
-) -> Compared:
+) -> NearPairs:
     """The cuts of these rows (N,) of one side against the cuts of the other side, at samples about
     `sample_mm` apart; `limits`: what is near, in XY and in height, mm."""
     samples = _with_ends(cuts, sample_cuts(cuts, sample_mm, np.flatnonzero(rows[cuts.row])))
@@ -641,10 +647,10 @@ def compared(
     share = others.shares(samples.points[point], move)
     there = headings(others.cuts.segments, move, share)
     cosine = (here * there).sum(axis=1)
-    return Compared(cuts, others, samples, point, move, cosine, nearest)
+    return NearPairs(cuts, others, samples, point, move, cosine, nearest)
 
 
-def _with_ends(cuts: CutMoves, samples: Samples) -> Samples:
+def _with_ends(cuts: CutMoves, samples: CutSamples) -> CutSamples:
     """The samples with the last one of each row moved to the programmed end, which need not lie
     on the circle of an arc."""
     row = cuts.row[samples.segment]
@@ -662,22 +668,22 @@ def headings(segments: Segments, which: Ints, share: Floats) -> Floats:
     return np.column_stack([np.cos(angle), np.sin(angle)])
 
 
-def turned(compared: Compared, round_trip: Bools, limits: Limits) -> Ints:
+def reversed_samples(compared: NearPairs, round_trip: Bools, limits: Limits) -> Ints:
     """The samples on moves that the other side cuts only in the opposite direction; only contours
     that enclose an area count (`round_trip` (P,) of each pair)."""
     cuts, samples, count = compared.cuts, compared.samples, len(compared.distance)
     same = np.zeros(count, dtype=np.bool_)
-    same[compared.point[compared.cosine > ALONG]] = True
-    long = LONG_ENOUGH * limits[0]
+    same[compared.point[compared.cosine > MIN_SAME_COSINE]] = True
+    long = MIN_DIRECTION_LIMITS * limits[0]
     there = segment_lengths(compared.others.cuts.segments)[compared.move] > long
     against = np.zeros(count, dtype=np.bool_)
-    against[compared.point[(compared.cosine < -ALONG) & round_trip & there]] = True
+    against[compared.point[(compared.cosine < -MIN_SAME_COSINE) & round_trip & there]] = True
     here = segment_lengths(cuts.segments)[samples.segment] > long
     sure = here & (samples.share > 0.0) & (samples.share < 1.0)
     return np.flatnonzero(against & ~same & sure)
 
 
-def other_way(compared: Compared, turned: Ints) -> Iterator[Finding]:
+def reversal_findings(compared: NearPairs, turned: Ints) -> Iterator[Finding]:
     """One finding for each contour that is cut in the opposite direction."""
     cuts = compared.cuts
     rows = compared.rows[turned]

@@ -24,11 +24,11 @@ from camtool.geometry.polylines import POSITION_EPS_MM, Segments
 from camtool.toolpath.moves import ROWS_AT_ONCE, Kind, Toolpath, are_arcs
 from camtool.toolpath.rapids import feeds_below_top
 
-FEWEST_SAMPLES = 4
+MIN_PARTS = 4
 """Each line and arc is sampled in at least this many parts, so that short moves are sampled
 too."""
 
-MOST_SAMPLES = 200_000
+MAX_SAMPLES = 200_000
 """Long programs are sampled more coarsely, so that there are about this many points."""
 
 
@@ -110,7 +110,7 @@ class CutMoves(Struct, frozen=True, eq=False):
         return np.asarray(np.hypot(gap[:, 0], gap[:, 1]) <= gap_mm)
 
 
-def moved_lengths(toolpath: Toolpath) -> Floats:
+def row_lengths(toolpath: Toolpath) -> Floats:
     """(N,) mm: length of each row in XY, 0 for events; of an arc, its start radius times its
     sweep."""
     return toolpath.by_parts(_lengths)
@@ -125,9 +125,9 @@ def _lengths(toolpath: Toolpath) -> Floats:
     return length
 
 
-def rapids_mm(toolpath: Toolpath) -> float:
+def rapid_length_mm(toolpath: Toolpath) -> float:
     """How far the rapids of a toolpath go in XY, mm."""
-    return float(moved_lengths(toolpath)[toolpath.kind == Kind.RAPID].sum())
+    return float(row_lengths(toolpath)[toolpath.kind == Kind.RAPID].sum())
 
 
 def is_flat(toolpath: Toolpath) -> bool:
@@ -185,8 +185,8 @@ def _segments(
         turn: Floats = arcs[1][np.searchsorted(arcs[0], of)] / (first[of + 1] - first[of])
         part = bent - first[of]
         inner = np.flatnonzero(part)
-        start[bent[inner]] = _turned(begin, centre, part * turn)[inner]
-        end[bent] = _turned(begin, centre, (part + 1) * turn)
+        start[bent[inner]] = _rotate(begin, centre, part * turn)[inner]
+        end[bent] = _rotate(begin, centre, (part + 1) * turn)
         bulge[bent] = np.tan(0.25 * turn)
     if len(row) and (start[1:] == end[:-1]).all():  # one path, whose points are stored once
         points = np.concatenate([start[:1], end])
@@ -194,7 +194,7 @@ def _segments(
     return Segments(start, end, bulge, path)
 
 
-def _turned(points: Floats, centre: Floats, angle: Floats) -> Floats:
+def _rotate(points: Floats, centre: Floats, angle: Floats) -> Floats:
     """Points (J, 2) turned about their centres (J, 2) by angles (J,) rad."""
     spoke = points - centre
     cos, sin = np.cos(angle), np.sin(angle)
@@ -222,7 +222,7 @@ def _leaves_stock(toolpath: Toolpath) -> Bools:
     return np.asarray((moves | homes) & ~sinks)
 
 
-class Samples(Struct, frozen=True, eq=False):
+class CutSamples(Struct, frozen=True, eq=False):
     """Points (S, 2) mm on the segments `segment` (S,) of CutMoves, ends included, each at the
     part `share` (S,) of the length of its segment, and their heights `z` (S,) mm."""
 
@@ -231,18 +231,20 @@ class Samples(Struct, frozen=True, eq=False):
     z: Floats
     share: Floats
 
-    def of(self, which: Ints) -> Samples:
+    def of(self, which: Ints) -> CutSamples:
         """The samples with these indices."""
-        return Samples(self.points[which], self.segment[which], self.z[which], self.share[which])
+        return CutSamples(
+            self.points[which], self.segment[which], self.z[which], self.share[which]
+        )
 
 
-def sample_cuts(cuts: CutMoves, spacing_mm: float, only: Ints | None = None) -> Samples:
+def sample_cuts(cuts: CutMoves, spacing_mm: float, only: Ints | None = None) -> CutSamples:
     """Points on the true lines and arcs, about `spacing_mm` apart; with `only`, on those segments
-    alone. The spacing is wider where there would be more than `MOST_SAMPLES` points, but each
-    segment has at least `FEWEST_SAMPLES` parts."""
+    alone. The spacing is wider where there would be more than `MAX_SAMPLES` points, but each
+    segment has at least `MIN_PARTS` parts."""
     which = np.arange(len(cuts.segments)) if only is None else only
     lengths = segment_lengths(cuts.segments[which])
-    spacing = max(spacing_mm, float(lengths.sum()) / MOST_SAMPLES)
+    spacing = max(spacing_mm, float(lengths.sum()) / MAX_SAMPLES)
     return _samples(cuts, which, _parts(lengths, spacing))
 
 
@@ -250,25 +252,25 @@ def samples_by_parts(
     cuts: CutMoves,
     spacing_mm: float,
     rows: Bools,
-    at_once: int = MOST_SAMPLES,
+    at_once: int = MAX_SAMPLES,
     whole: Indices | None = None,
-) -> Iterator[Samples]:
+) -> Iterator[CutSamples]:
     """The samples of `sample_cuts` on the rows (N,) that are true, in parts of whole rows, or of
     rows (N,) with one number `whole`, with about `at_once` samples each, so that memory does not
     grow with the program. The spacing is that of all cuts."""
-    taken, parts, ends = _lots(cuts, spacing_mm, rows, at_once, whole)
+    taken, parts, ends = _sample_batches(cuts, spacing_mm, rows, at_once, whole)
     for low, high in pairwise([0, *ends, len(taken)]):
         if low < high:
             yield _samples(cuts, taken[low:high], parts[low:high].astype(np.int64))
 
 
-def _lots(
+def _sample_batches(
     cuts: CutMoves, spacing_mm: float, rows: Bools, at_once: int, whole: Indices | None
 ) -> tuple[Ints, Indices, list[int]]:
     """Of `samples_by_parts` the segments (T,), in how many parts each is sampled (T,), and where
     among them a lot ends that is not the last."""
     lengths = segment_lengths(cuts.segments)
-    spacing = max(spacing_mm, float(lengths.sum()) / MOST_SAMPLES)
+    spacing = max(spacing_mm, float(lengths.sum()) / MAX_SAMPLES)
     taken = np.flatnonzero(rows[cuts.row])
     parts = _parts(lengths[taken], spacing).astype(np.int32)
     del lengths
@@ -281,10 +283,10 @@ def _lots(
 
 def _parts(lengths: Floats, spacing_mm: float) -> Ints:
     """(K,) in how many parts each segment is sampled."""
-    return np.maximum(np.ceil(lengths / spacing_mm).astype(np.int64), FEWEST_SAMPLES)
+    return np.maximum(np.ceil(lengths / spacing_mm).astype(np.int64), MIN_PARTS)
 
 
-def _samples(cuts: CutMoves, which: Ints, parts: Ints) -> Samples:
+def _samples(cuts: CutMoves, which: Ints, parts: Ints) -> CutSamples:
     """The ends of the equal parts of the segments `which`."""
     owner = np.repeat(np.arange(len(parts)), parts + 1)
     within = np.arange(len(owner)) - np.repeat(np.cumsum(parts + 1) - parts - 1, parts + 1)
@@ -292,7 +294,7 @@ def _samples(cuts: CutMoves, which: Ints, parts: Ints) -> Samples:
     begin, end = cuts.heights(which)[owner].T
     # Level moves stay level exactly: rounding must not turn them into slopes.
     z = np.where(begin == end, begin, begin + share * (end - begin))
-    return Samples(point_at(cuts.segments, segment, share), segment, z, share)
+    return CutSamples(point_at(cuts.segments, segment, share), segment, z, share)
 
 
 # The loop of each contour: its closed part, on which sizes and closure are measured.
@@ -302,7 +304,7 @@ def _samples(cuts: CutMoves, which: Ints, parts: Ints) -> Samples:
 # parts: the final pass of a profile, the outermost ring of a pocket. A level contour that ends
 # where it starts is its own loop. A path there and back encloses no area and is not a loop.
 
-AS_LONG = 0.98
+MIN_LOOP_SHARE = 0.98
 """A later loop replaces the longest one so far if it has at least this part of its length."""
 
 NO_LOOP = -1
@@ -316,7 +318,7 @@ def loops(cuts: CutMoves, gap_mm: float) -> Ints:
 
     begin, finish = cuts.contour_ends()
     found = np.full((len(begin), 2), NO_LOOP, dtype=np.int64)
-    whole = cuts.closed(gap_mm) & _level(cuts)
+    whole = cuts.closed(gap_mm) & _is_level(cuts)
     found[whole] = np.column_stack([begin, finish])[whole]
     rows = np.flatnonzero(cuts.is_cut & ~np.append(whole, True)[cuts.contour]).astype(np.int32)
     begins = np.flatnonzero(np.diff(cuts.contour[rows], prepend=-1))
@@ -342,7 +344,7 @@ def loops(cuts: CutMoves, gap_mm: float) -> Ints:
     return found
 
 
-def of_loops(cuts: CutMoves, found: Ints) -> Bools:
+def is_in_loop(cuts: CutMoves, found: Ints) -> Bools:
     """(N,) true for the cutting rows that belong to the loop of their contour."""
     first, last = found[found[:, 0] != NO_LOOP].T
     inside = np.zeros(len(cuts.contour) + 1, dtype=np.int8)
@@ -351,7 +353,7 @@ def of_loops(cuts: CutMoves, found: Ints) -> Bools:
     return np.asarray(cuts.is_cut & (np.cumsum(inside, dtype=np.int8)[:-1] > 0))
 
 
-def _level(cuts: CutMoves) -> Bools:
+def _is_level(cuts: CutMoves) -> Bools:
     """(C,) true for contours at one height."""
     low, high = np.full(cuts.contour_count, np.inf), np.full(cuts.contour_count, -np.inf)
     for begin in range(0, len(cuts.segments), ROWS_AT_ONCE):
@@ -396,6 +398,6 @@ def _longest_loop(
         for begin, end, length in zip(
             low[around].tolist(), high[around].tolist(), long[around].tolist(), strict=True
         ):
-            if length >= AS_LONG * most:
+            if length >= MIN_LOOP_SHARE * most:
                 best, most = (begin, end - 1), max(most, length)
     return best

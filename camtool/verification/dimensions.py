@@ -31,14 +31,14 @@ from camtool.geometry.measure import segment_boxes
 from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.toolpath.moves import ROWS_AT_ONCE
 from camtool.toolpath.wanted import NO_EDGE, UNKNOWN_EDGE
-from camtool.verification.cuts import NO_LOOP, CutMoves, of_loops
+from camtool.verification.cuts import NO_LOOP, CutMoves, is_in_loop
 from camtool.verification.matching import Match
 
 SAME_MM = 1e-3
 """Edges nearer to each other than this are one side of the part."""
 
 
-class Size(Struct, frozen=True):
+class PredictedSize(Struct, frozen=True):
     """One dimension, such as "part X" or "contour 3 Y", mm. `of_edge`: it is that of the cut
     edge, not of the tool centre's path."""
 
@@ -72,7 +72,7 @@ class SlideExtents:
         self._counts = np.zeros(len(contour), dtype=np.bool_)
         self._begins = self._counts.copy()
         self._contour = contour
-        mine = _counting(decoded, goal, match)
+        mine = _sized_rows(decoded, goal, match)
         self._counts[mine] = True
         self._begins[mine[np.flatnonzero(np.diff(contour[mine], prepend=-1))]] = True
         self._least = np.full((count, 2), np.inf)
@@ -123,7 +123,7 @@ class SlideExtents:
             found[one:other] = places[ends[one:other] - low]
 
 
-def sizes(slides: SlideExtents, goal: LoopedCuts, gap_mm: float) -> Iterator[Size]:
+def sizes(slides: SlideExtents, goal: LoopedCuts, gap_mm: float) -> Iterator[PredictedSize]:
     """X and Y of the whole part, then of each closed contour of the wanted moves (`goal`), by the
     extents of the slides.
 
@@ -140,18 +140,23 @@ def sizes(slides: SlideExtents, goal: LoopedCuts, gap_mm: float) -> Iterator[Siz
     if not seen.any():
         return
     # Contours that the program does not cut still count in the nominal size of the part.
-    yield from _pair(
+    yield from _axis_sizes(
         "part",
-        _around(edges.nominal[sized], edges.followed[sized]),
-        _around(edges.predicted[_finest(edges, seen)], edges.followed[_finest(edges, seen)]),
+        _joint_size(edges.nominal[sized], edges.followed[sized]),
+        _joint_size(
+            edges.predicted[_finest_contours(edges, seen)],
+            edges.followed[_finest_contours(edges, seen)],
+        ),
     )
     closed = (goal.loops[:, 0] != NO_LOOP) | edges.cleared
-    for index in np.flatnonzero(closed & _final(centre, lowest, gap_mm) & seen & edges.listed):
+    for index in np.flatnonzero(
+        closed & _is_final_pass(centre, lowest, gap_mm) & seen & edges.listed
+    ):
         only = edges.followed[index : index + 1]
-        yield from _pair(
+        yield from _axis_sizes(
             f"contour {index + 1}",
-            _around(edges.own[index : index + 1], only),
-            _around(edges.predicted[index : index + 1], only),
+            _joint_size(edges.own[index : index + 1], only),
+            _joint_size(edges.predicted[index : index + 1], only),
         )
 
 
@@ -211,7 +216,7 @@ def _edge_of(wanted: CutMoves) -> Ints:
     return edge
 
 
-def _finest(edges: _Edges, seen: Bools) -> Ints:
+def _finest_contours(edges: _Edges, seen: Bools) -> Ints:
     """The contours that decide a size, of those (C,) that are `seen`: where several lines cut one
     edge, as in roughing and finishing, those of the line that comes nearest to it."""
     rows = np.flatnonzero(seen)
@@ -222,7 +227,7 @@ def _finest(edges: _Edges, seen: Bools) -> Ints:
     return rows[edges.rough[rows] <= least[same.reshape(-1)]]
 
 
-def _around(boxes: Floats, followed: Bools) -> tuple[Floats, Bools]:
+def _joint_size(boxes: Floats, followed: Bools) -> tuple[Floats, Bools]:
     """(2,) size in X and Y of all boxes (C, 2, 2) together, and (2,) where it is that of lines
     which the tool's centre follows."""
     low, high = boxes[:, :, 0].min(axis=0), boxes[:, :, 1].max(axis=0)
@@ -233,7 +238,7 @@ def _around(boxes: Floats, followed: Bools) -> tuple[Floats, Bools]:
     return high - low, beyond[0] | beyond[1]
 
 
-def _final(boxes: Floats, lowest: Floats, gap_mm: float) -> Bools:
+def _is_final_pass(boxes: Floats, lowest: Floats, gap_mm: float) -> Bools:
     """(C,) true for contours below which no contour of the same box is cut: passes between which
     the tool leaves the stock are contours of their own. `boxes` (C, 2, 2) and `lowest` (C,) as
     `_extents` gives them."""
@@ -259,17 +264,17 @@ def _is_looped(goal: LoopedCuts) -> Bools:
 def _wanted_rows(goal: LoopedCuts) -> Bools:
     """(W,) the wanted rows that determine sizes: those of loops, and of contours without one."""
     wanted, looped = goal.cuts, np.append(_is_looped(goal), False)[goal.cuts.contour]
-    return np.asarray(wanted.is_cut & (of_loops(wanted, goal.loops) | ~looped))
+    return np.asarray(wanted.is_cut & (is_in_loop(wanted, goal.loops) | ~looped))
 
 
-def _counting(decoded: LoopedCuts, goal: LoopedCuts, match: Match) -> Ints:
+def _sized_rows(decoded: LoopedCuts, goal: LoopedCuts, match: Match) -> Ints:
     """The decoded rows that determine the sizes: for wanted contours with a loop the rows of their
     decoded loops, where there are any; otherwise the rows that follow a wanted row that does."""
     if len(decoded.cuts.rows) == 0 or len(goal.cuts.rows) == 0:
         return np.empty(0, dtype=np.int64)
     of, has_loop = match.contour, np.append(_is_looped(goal), False)
     follow = _wanted_rows(goal)[match.row] & (of >= 0)
-    looped = of_loops(decoded.cuts, decoded.loops) & (of >= 0) & has_loop[of]
+    looped = is_in_loop(decoded.cuts, decoded.loops) & (of >= 0) & has_loop[of]
     with_loop = np.zeros(len(has_loop), dtype=np.bool_)
     with_loop[of[looped]] = True
     return np.flatnonzero(looped | (follow & ~with_loop[of]))
@@ -294,11 +299,12 @@ def _extents(cuts: CutMoves, counts: Bools) -> tuple[Floats, Floats]:
     return np.stack([least, most], axis=2), lowest
 
 
-def _pair(
+def _axis_sizes(
     name: str, nominal: tuple[Floats, Bools], predicted: tuple[Floats, Bools]
-) -> Iterator[Size]:
-    """X and Y of a size, as `_around` gives it; of the tool's centre where either of both is."""
+) -> Iterator[PredictedSize]:
+    """Yield X and Y of a size, as `_joint_size` gives it; of the tool's centre where either of
+    both is."""
     of_centre = nominal[1] | predicted[1]
     for k, axis in enumerate("XY"):
         sizes_mm = float(nominal[0][k]), float(predicted[0][k])
-        yield Size(f"{name} {axis}", *sizes_mm, of_edge=not of_centre[k])
+        yield PredictedSize(f"{name} {axis}", *sizes_mm, of_edge=not of_centre[k])

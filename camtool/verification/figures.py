@@ -155,7 +155,7 @@ class RowFigures:
         count = len(cuts.contour)
         self._toolpath, self._steps_mm = cuts.toolpath, steps_mm
         self.total = np.full(count, np.nan)
-        self.books = Books(count, keep_ledger=keep_ledger)
+        self.books = LedgerSums(count, keep_ledger=keep_ledger)
         self.inner, self.lag, self.whole = Figure(), Figure(), Figure()
         self.lines_mm = self.arcs_mm = math.nan
         self.contours = ContourSums(match)
@@ -179,8 +179,8 @@ class RowFigures:
         self.lag.add_rows(block.low, lag, columns[:, at.LAG_SQUARES], judged)
         self.whole.add_rows(block.low, total, columns[:, at.TOTAL_SQUARES], known)
         is_arc = are_arcs(self._toolpath.kind[block.rows])
-        self.lines_mm = _larger(self.lines_mm, inner[~is_arc])
-        self.arcs_mm = _larger(self.arcs_mm, inner[is_arc])
+        self.lines_mm = _larger_error(self.lines_mm, inner[~is_arc])
+        self.arcs_mm = _larger_error(self.arcs_mm, inner[is_arc])
         self._sum += float(columns[:, at.TOTAL_SUM].sum())
         self.total[block.rows] = total
         self.contours.add(block, known, (inner, lag, total))
@@ -210,7 +210,7 @@ class RowFigures:
         return self._sum / self.whole.count if self.whole.count else math.nan
 
 
-def _larger(most: float, errors: Floats) -> float:
+def _larger_error(most: float, errors: Floats) -> float:
     """The largest known error, mm; NaN without any."""
     known = errors[np.isfinite(errors)]
     return float(np.fmax(most, known.max())) if len(known) else most
@@ -219,7 +219,7 @@ def _larger(most: float, errors: Floats) -> float:
 # Figures of the whole motion: steps, reversals, time, and endless arcs.
 
 
-class Books:
+class LedgerSums:
     """The ledgers of all chunks: `seconds` (N,) of each row, `ended` (N,) False for rows whose
     stop test was never met, `endless` the places in XY (mm) where these were left; the rest is
     summed up, and kept by row only with `keep_ledger`: `ledger` of N rows, `samples` (N,)."""
@@ -269,7 +269,7 @@ class Tally(Struct, frozen=True, eq=False):
         return self.cutting_s + self.air_s + self.dwell_s
 
 
-def tally_of(books: Books, decoded: Toolpath, is_cut: Bools) -> Tally:
+def tally_of(books: LedgerSums, decoded: Toolpath, is_cut: Bools) -> Tally:
     """The sums over all rows; `is_cut` (N,): the rows that cut."""
     dwell = decoded.kind == Kind.DWELL
     return Tally(

@@ -2,7 +2,7 @@
 
 Contours may overlap or share ends, so the move nearest to one point does not decide. A decoded
 contour belongs to the wanted contour that is nearest to most of its samples, if all samples lie
-within the tolerance of it; otherwise the next by that count is tried, up to `MOST_TRIES`. A
+within the tolerance of it; otherwise the next by that count is tried, up to `MAX_CONTOUR_TRIES`. A
 contour that no single wanted contour covers (a foreign program may cut several without lifting, or
 more than wanted) is matched row by row: a row belongs to the contour that is nearest to all of its
 inner samples.
@@ -19,14 +19,14 @@ from msgspec import Struct
 from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.records import replace
 from camtool.toolpath.moves import ROWS_AT_ONCE
-from camtool.verification.circles import Circle
-from camtool.verification.cuts import CutMoves, Samples
-from camtool.verification.nearest import ANY_CONTOUR, Found, MoveIndex, ranges, run_offsets
+from camtool.verification.circles import FullCircle
+from camtool.verification.cuts import CutMoves, CutSamples
+from camtool.verification.nearest import ANY_CONTOUR, MoveIndex, NearestMoves, ranges, run_offsets
 
-MOST_TRIES = 4
+MAX_CONTOUR_TRIES = 4
 """At most this many wanted contours are tried for each decoded contour."""
 
-LEAST_MM = 1e-6
+MIN_LIMIT_MM = 1e-6
 """Moves nearer than this are found even when the tolerance is 0."""
 
 
@@ -52,7 +52,7 @@ class Goal(Struct, frozen=True, eq=False, dict=True):
     contour in XY and in height, mm."""
 
     moves: MoveIndex
-    circles: list[Circle]
+    circles: list[FullCircle]
     limit_mm: float
     depth_mm: float
 
@@ -71,7 +71,7 @@ class Goal(Struct, frozen=True, eq=False, dict=True):
         return wanted.drawn.off_mm[:, 0]
 
 
-def own_match(cuts: CutMoves, circles: list[Circle]) -> Match:
+def own_match(cuts: CutMoves, circles: list[FullCircle]) -> Match:
     """The match of a program without wanted moves: each row belongs to itself."""
     count = len(cuts.contour)
     row = np.where(cuts.is_cut, np.arange(count, dtype=np.int32), np.int32(-1))
@@ -79,7 +79,7 @@ def own_match(cuts: CutMoves, circles: list[Circle]) -> Match:
     return Match(row, cuts.contour, cuts.contour, circle, np.broadcast_to(0.0, count))
 
 
-def carried_match(match: Match, of: Ints, goal: Goal) -> Match:
+def match_through_compensation(match: Match, of: Ints, goal: Goal) -> Match:
     """A match with the rows of a compensated toolpath as one with the wanted rows: `of` (S,) is
     the wanted row of each compensated row. Compensation may divide contours and circles."""
     known = match.row >= 0
@@ -98,8 +98,8 @@ def carried_match(match: Match, of: Ints, goal: Goal) -> Match:
 
 
 def nearest_at_height(
-    samples: Samples, choice: Ints | None, moves: MoveIndex, limits_mm: tuple[float, float]
-) -> tuple[Found, Bools]:
+    samples: CutSamples, choice: Ints | None, moves: MoveIndex, limits_mm: tuple[float, float]
+) -> tuple[NearestMoves, Bools]:
     """The move nearest to each sample at its own height; where no move is near at that height, the
     nearest at any height, and true (S,) where that one is near.
 
@@ -107,7 +107,7 @@ def nearest_at_height(
     are found. None: all contours. `limits_mm`: what is near, in XY and in height.
     """
     limit_mm, depth_mm = limits_mm
-    near_mm = max(limit_mm, LEAST_MM)
+    near_mm = max(limit_mm, MIN_LIMIT_MM)
     points, z = samples.points, samples.z
     found = moves.nearest(points, z, choice, (near_mm, depth_mm))
     wrong_depth = np.zeros(len(points), dtype=np.bool_)
@@ -122,7 +122,7 @@ def nearest_at_height(
     return found, wrong_depth
 
 
-def match_contours(cuts: CutMoves, samples: Samples, found: Found, goal: Goal) -> Ints:
+def match_contours(cuts: CutMoves, samples: CutSamples, found: NearestMoves, goal: Goal) -> Ints:
     """(S,) the wanted contour to which the decoded contour of each sample belongs, ANY_CONTOUR for
     none. `found` is changed in place to the nearest move of that contour."""
     wanted = goal.moves
@@ -161,7 +161,7 @@ def _candidates(mine: Indices, nearest: Indices) -> list[Ints]:
     offsets = run_offsets(contour, len(contour))
     rank = np.arange(len(contour)) - np.repeat(offsets[:-1], np.diff(offsets))
     tries = []
-    for number in range(min(MOST_TRIES, int(rank.max()) + 1)):
+    for number in range(min(MAX_CONTOUR_TRIES, int(rank.max()) + 1)):
         column = np.full(len(offsets) - 1, -1, dtype=np.int64)
         here = rank == number
         column[np.repeat(np.arange(len(column)), np.diff(offsets))[here]] = choice[here]
@@ -169,7 +169,7 @@ def _candidates(mine: Indices, nearest: Indices) -> list[Ints]:
     return tries
 
 
-def no_match(count: int) -> Match:
+def empty_match(count: int) -> Match:
     """That of so many rows that cut nothing; `match_rows` fills it."""
     return Match(
         row=np.full(count, -1, dtype=np.int32),
@@ -181,7 +181,12 @@ def no_match(count: int) -> Match:
 
 
 def match_rows(
-    match: Match, cuts: CutMoves, samples: Samples, belongs: Ints, found: Found, goal: Goal
+    match: Match,
+    cuts: CutMoves,
+    samples: CutSamples,
+    belongs: Ints,
+    found: NearestMoves,
+    goal: Goal,
 ) -> None:
     """Fill in the match of each row of `cuts` that has samples, which are all of its own;
     `belongs` (S,) and `found` are the result of `match_contours`."""
@@ -197,8 +202,8 @@ def match_rows(
     match.row[row] = followed[middle]
     known = belongs[begin] != ANY_CONTOUR
     match.contour[row] = np.where(known, belongs[begin], nearest[middle])
-    match.only[row] = np.where(known, belongs[begin], _unanimous(nearest, offsets))
-    match.circle[row] = _unanimous(goal.circle_of_row[followed], offsets)
+    match.only[row] = np.where(known, belongs[begin], _common_values(nearest, offsets))
+    match.circle[row] = _common_values(goal.circle_of_row[followed], offsets)
     match.off_mm[row] = np.maximum.reduceat(goal.off_mm[followed], begin)
 
 
@@ -221,7 +226,7 @@ def _with_neighbours(off_mm: Floats, contour: Indices) -> Floats:
     return most
 
 
-def _unanimous(values: Ints | Indices, offsets: Ints) -> Ints:
+def _common_values(values: Ints | Indices, offsets: Ints) -> Ints:
     """(R,) the value of all inner samples of each run, −1 where they differ; at its first and last
     sample a row touches its neighbours."""
     inner = np.column_stack([offsets[:-1] + 1, offsets[1:] - 1]).ravel()
@@ -230,7 +235,7 @@ def _unanimous(values: Ints | Indices, offsets: Ints) -> Ints:
     return np.where(low == high, low, -1)
 
 
-def _circle_of_row(circles: list[Circle], count: int) -> Indices:
+def _circle_of_row(circles: list[FullCircle], count: int) -> Indices:
     if not circles:
         return np.broadcast_to(np.int32(-1), count)
     of_row = np.full(count, -1, dtype=np.int32)

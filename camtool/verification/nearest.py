@@ -35,7 +35,7 @@ ANY_CONTOUR = -1
 """The contour of points that are compared with the moves of every contour."""
 
 
-class Found(Struct, frozen=True, eq=False):
+class NearestMoves(Struct, frozen=True, eq=False):
     """(J,) distance mm, inf where no move is found, and (J,) segment, −1 there."""
 
     distance: Floats
@@ -69,7 +69,7 @@ class MoveIndex:
         height: Floats,
         choice: Ints | None,
         limits_mm: tuple[float, float],
-    ) -> Found:
+    ) -> NearestMoves:
         """The nearest move within the first limit in XY, and the second in height at its place
         nearest to the point (more on slopes, where a shift in XY changes the height), of points
         (J, 2) at heights (J,) mm; of equally near moves the last. `choice` (J,): the only contour
@@ -77,13 +77,17 @@ class MoveIndex:
         from camtool.kernels.near import nearest
 
         if len(points) == 0:  # the tables need not be made
-            return Found(np.empty(0), np.empty(0, dtype=np.int64))
+            return NearestMoves(np.empty(0), np.empty(0, dtype=np.int64))
         places = np.column_stack([points, height])
-        return Found(*nearest(self._moves, places, self._runs(choice, len(points)), limits_mm))
+        return NearestMoves(
+            *nearest(self._moves, places, self._runs(choice, len(points)), limits_mm)
+        )
 
-    def nearest_of_all(self, points: Floats, height: Floats, from_mm: float) -> Found:
+    def nearest_of_all(self, points: Floats, height: Floats, from_mm: float) -> NearestMoves:
         """The nearest move at any distance and height, which is expected within `from_mm`."""
-        found = Found(np.full(len(points), np.inf), np.full(len(points), -1, dtype=np.int64))
+        found = NearestMoves(
+            np.full(len(points), np.inf), np.full(len(points), -1, dtype=np.int64)
+        )
         rest, limit = np.arange(len(points)), from_mm
         while len(rest) and len(self.cuts.segments):
             near = self.nearest(points[rest], height[rest], None, (limit, math.inf))

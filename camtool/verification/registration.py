@@ -75,26 +75,26 @@ NEAR_SHARE = 0.25
 NEAR_SIZE = 0.003
 """... and of the size of all that the program cuts, for small things have small details."""
 
-MOST_RADIUS_MM = 30.0
+MAX_RADIUS_MM = 30.0
 """Tools are not wider than twice this."""
 
 BIN_MM = 0.01
 """Distances to the nearest line are counted in bins of this width."""
 
-LEAST_PEAK = 0.04
+MIN_PEAK_SHARE = 0.04
 """A distance is a candidate for the radius when this part of the path keeps it."""
 
-MOST_CANDIDATES = 6
+MAX_CANDIDATES = 6
 """So many distances are tried."""
 
-AS_MUCH = 0.3
+MIN_WALL_SHARE = 0.3
 """A smaller distance along the same contours is the wall, and the larger ones clear the way to it,
 when it has this part of their length."""
 
-MOSTLY = 0.9
+MIN_ON_LINE_SHARE = 0.9
 """A path that keeps to the lines for this part of what it keeps to at all has no radius."""
 
-RIVAL = 0.25
+MIN_RIVAL_SHARE = 0.25
 """Two radii are ambiguous when the second explains this part as much as the first, elsewhere."""
 
 CUT_SHARE = 0.5
@@ -103,28 +103,28 @@ CUT_SHARE = 0.5
 PARTLY_SHARE = 0.15
 """... with at least this."""
 
-LEAST_MORE = 1e-3
+MIN_SHARP_GAIN = 1e-3
 """Sharp corners take the place of round ones when this part more of them is cut."""
 
 SEARCH_POINTS = 3000
 """So many points of the path decide on its place."""
 
-MOST_MARKS = 300
+MAX_MARKS = 300
 """So many boxes, centres and holes of the program, and of the drawing, are compared in pairs."""
 
 VOTE_MM = 0.25
 """Shifts that differ by less are one candidate."""
 
-MOST_PLACES = 16
+MAX_PLACES = 16
 """So many candidates are refined."""
 
-FITS = 0.5
+MIN_FOLLOWED_SHARE = 0.5
 """A drawing lies where its program cuts when this part of the cuts follows its lines."""
 
-FITS_WELL = 0.8
+MIN_OTHER_SHARE = 0.8
 """Another scale, mirror or turn is named when so much would follow them."""
 
-SAME_SCORE = 0.97
+MIN_EQUAL_SHARE = 0.97
 """A second place is as good as the first when it explains this part as much."""
 
 WIDTHS_MM = (1.0, 0.5, 0.25, 0.12, 0.08, 0.05, 0.05, 0.05)
@@ -133,10 +133,10 @@ WIDTHS_MM = (1.0, 0.5, 0.25, 0.12, 0.08, 0.05, 0.05, 0.05)
 TRACK_MM = 0.1
 """Tracks are looked at about this far apart, to see what is cut ..."""
 
-MOST_TRACK_POINTS = 200_000
+MAX_TRACK_POINTS = 200_000
 """... but at no more than about this many points."""
 
-LEAST_LEFT_MM = 0.5
+MIN_LEFT_MM = 0.5
 """A part of a contour that is not cut is named from this length on: ends of paths differ."""
 
 TURNS = (
@@ -163,10 +163,10 @@ SCALES = (
 """Scales that units are mistaken by, tried where the sizes are about in that proportion: a circle
 would follow any larger one, with a tool as wide."""
 
-ABOUT = 1.2
+NEAR_SCALE_RATIO = 1.2
 """Proportions near 1 that differ by less are about the same: a tool adds its diameter ..."""
 
-ABOUT_FAR = 3.0
+FAR_SCALE_RATIO = 3.0
 """... and so do others by less than this: not all of the drawing need be cut."""
 
 
@@ -239,7 +239,7 @@ class _Path(Struct, frozen=True, eq=False):
     def of(cls, program: Side, tool: Ints, limit_mm: float) -> _Path:
         cuts = program.cuts
         sizes = segment_lengths(cuts.segments)
-        samples = sample_cuts(cuts, max(float(sizes.sum()) / MOST_TRACK_POINTS, TRACK_MM))
+        samples = sample_cuts(cuts, max(float(sizes.sum()) / MAX_TRACK_POINTS, TRACK_MM))
         counts = np.bincount(samples.segment, minlength=len(sizes))
         arcs = np.flatnonzero(cuts.segments.is_arc)
         row = cuts.row[samples.segment]
@@ -323,20 +323,22 @@ def register(
     lines = _Lines.of(drawing.paths)
     path = _Path.of(program, _tools_of(running), limit_mm)
     if len(path.points) == 0 and len(path.holes) == 0:
-        return _nothing(running, [DRAWING_PLACE_NOWHERE(measured=0.0, limit=100.0 * FITS)])
+        return _empty_registration(
+            running, [DRAWING_PLACE_NOWHERE(measured=0.0, limit=100.0 * MIN_FOLLOWED_SHARE)]
+        )
     shift: tuple[float, float] | None = (0.0, 0.0)
     said: list[Finding] = []
     if align or tool_diameter_mm is None:
-        shift, said = _place(path, lines, align=align)
+        shift, said = _find_place(path, lines, align=align)
     if shift is None:
-        return _nothing(running, said)
-    moved = Polylines.joined([_moved(drawing.paths, shift)]) if any(shift) else drawing.paths
+        return _empty_registration(running, said)
+    moved = Polylines.joined([_shift_lines(drawing.paths, shift)]) if any(shift) else drawing.paths
     return _Follower(program, path, _Lines.of(moved), drawing, limit_mm).result(
         shift, said, tool_diameter_mm, align=align
     )
 
 
-def _moved(lines: Polylines, shift: tuple[float, float]) -> Polylines:
+def _shift_lines(lines: Polylines, shift: tuple[float, float]) -> Polylines:
     vertices = lines.vertices + np.array([*shift, 0.0])
     return Polylines(vertices, lines.offsets, lines.closed)
 
@@ -349,7 +351,7 @@ def _tools_of(toolpath: Toolpath) -> Ints:
     return np.asarray(np.rint(number[latest]).astype(np.int64))
 
 
-def _nothing(running: Toolpath, said: Sequence[Finding]) -> Registration:
+def _empty_registration(running: Toolpath, said: Sequence[Finding]) -> Registration:
     """For a program that follows nothing, which `said` says."""
     report = FoundReport(shift_mm=(0.0, 0.0), aligned=False, followed=0.0)
     return Registration((0.0, 0.0), running, tuple(said), report, None)
@@ -362,27 +364,27 @@ def _nothing(running: Toolpath, said: Sequence[Finding]) -> Registration:
 # best of these on, Gauss and Newton move the path until it keeps to the lines at one distance.
 
 
-class _Placed(Struct, frozen=True):
+class _Place(Struct, frozen=True):
     """A shift, and the part of the path that follows the lines there."""
 
     shift: tuple[float, float]
     share: float
 
 
-def _place(
+def _find_place(
     path: _Path, lines: _Lines, *, align: bool
 ) -> tuple[tuple[float, float] | None, list[Finding]]:
     """By how much the drawing is to be moved, None where that does not help, and what is to be
     said of it."""
     few = path.fewer()
-    here = _Placed((0.0, 0.0), _followed(few, lines, np.zeros(2)))
-    if not align and here.share >= FITS:
+    here = _Place((0.0, 0.0), _followed_share(few, lines, np.zeros(2)))
+    if not align and here.share >= MIN_FOLLOWED_SHARE:
         return here.shift, []
-    found = _places(few, lines)
+    found = _refined_places(few, lines)
     best = max([here, *found], key=lambda each: each.share)
-    if here.share >= SAME_SCORE * best.share:
+    if here.share >= MIN_EQUAL_SHARE * best.share:
         best = here
-    if best.share >= FITS:
+    if best.share >= MIN_FOLLOWED_SHARE:
         if not align:
             x, y = best.shift
             return None, [
@@ -390,79 +392,85 @@ def _place(
                     measured=100.0 * here.share, limit=100.0 * best.share, x=x, y=y
                 )
             ]
-        other = None if best.share >= FITS_WELL else _turned(few, lines)
-        if other is not None and best.share < SAME_SCORE * other[1].share:
+        other = None if best.share >= MIN_OTHER_SHARE else _best_other_frame(few, lines)
+        if other is not None and best.share < MIN_EQUAL_SHARE * other[1].share:
             return None, [
                 DRAWING_PLACE_OTHERWISE(measured=100.0 * best.share, limit=100.0 * other[1].share,
                                flag=other[0])
             ]  # fmt: skip
-        rivals = [] if best is here else _rivals(best, found)
+        rivals = [] if best is here else _rival_places(best, found)
         return best.shift, [
             DRAWING_PLACE_AMBIGUOUS(
                 x=best.shift[0], y=best.shift[1], other_x=each.shift[0], other_y=each.shift[1],
-                measured=100.0 * each.share, limit=100.0 * SAME_SCORE * best.share,
+                measured=100.0 * each.share, limit=100.0 * MIN_EQUAL_SHARE * best.share,
             )
             for each in rivals[:1]
         ]  # fmt: skip
-    other = _turned(few, lines)
+    other = _best_other_frame(few, lines)
     if other is not None:
         return None, [
             DRAWING_PLACE_OTHERWISE(
                 measured=100.0 * best.share, limit=100.0 * other[1].share, flag=other[0]
             )
         ]
-    return None, [DRAWING_PLACE_NOWHERE(measured=100.0 * best.share, limit=100.0 * FITS)]
+    return None, [
+        DRAWING_PLACE_NOWHERE(measured=100.0 * best.share, limit=100.0 * MIN_FOLLOWED_SHARE)
+    ]
 
 
-def _turned(path: _Path, lines: _Lines) -> tuple[str, _Placed] | None:
+def _best_other_frame(path: _Path, lines: _Lines) -> tuple[str, _Place] | None:
     """Another scale, mirror or turn of the drawing with which the path follows it well, as the
     flag that makes it; None without any."""
     found = []
-    scales = [(flag, size * np.eye(2)) for flag, size in SCALES if _about(path, lines, size)]
+    scales = [
+        (flag, size * np.eye(2)) for flag, size in SCALES if _is_about_size(path, lines, size)
+    ]
     for flag, matrix in (*TURNS, *scales):
         other = path.seen(np.linalg.inv(matrix))
-        here = _Placed((0.0, 0.0), _followed(other, lines, np.zeros(2)))
-        places = [here] if here.share >= FITS_WELL else [here, *_places(other, lines)]
+        here = _Place((0.0, 0.0), _followed_share(other, lines, np.zeros(2)))
+        places = (
+            [here] if here.share >= MIN_OTHER_SHARE else [here, *_refined_places(other, lines)]
+        )
         found.append((flag, max(places, key=lambda each: each.share)))
     best = max(found, key=lambda each: each[1].share)
-    return best if best[1].share >= FITS_WELL else None
+    return best if best[1].share >= MIN_OTHER_SHARE else None
 
 
-def _about(path: _Path, lines: _Lines, size: float) -> bool:
+def _is_about_size(path: _Path, lines: _Lines, size: float) -> bool:
     """Whether what is cut is about so many times as large as the drawing."""
     if not len(path.boxes) or not len(lines.boxes):
         return False
-    about = ABOUT if 0.5 < size < 2.0 else ABOUT_FAR
+    about = NEAR_SCALE_RATIO if 0.5 < size < 2.0 else FAR_SCALE_RATIO
     drawn = np.hypot(*(lines.boxes[:, :, 1].max(axis=0) - lines.boxes[:, :, 0].min(axis=0)))
     cut = np.hypot(*(path.boxes[0, :, 1] - path.boxes[0, :, 0]))
     return bool(size * drawn / about < cut < size * drawn * about)
 
 
-def _rivals(best: _Placed, found: Sequence[_Placed]) -> list[_Placed]:
+def _rival_places(best: _Place, found: Sequence[_Place]) -> list[_Place]:
     """Other places that explain as much."""
     return [
         each
         for each in found
-        if each.share >= SAME_SCORE * best.share
+        if each.share >= MIN_EQUAL_SHARE * best.share
         and np.hypot(*np.subtract(each.shift, best.shift)) > 2.0 * VOTE_MM
     ]
 
 
-def _places(path: _Path, lines: _Lines) -> list[_Placed]:
+def _refined_places(path: _Path, lines: _Lines) -> list[_Place]:
     """The best candidates, refined, each once, the best first."""
-    found: list[_Placed] = []
-    for shift in _candidates(path, lines):
-        refined = _refined(path, lines, shift)
+    found: list[_Place] = []
+    for shift in _candidate_shifts(path, lines):
+        refined = _refine_shift(path, lines, shift)
         if all(np.hypot(*(refined - each.shift)) > VOTE_MM for each in found):
-            share = _followed(path, lines, refined)
-            found.append(_Placed((float(refined[0]), float(refined[1])), share))
+            share = _followed_share(path, lines, refined)
+            found.append(_Place((float(refined[0]), float(refined[1])), share))
     return sorted(found, key=lambda each: -each.share)
 
 
-def _candidates(path: _Path, lines: _Lines) -> Floats:
+def _candidate_shifts(path: _Path, lines: _Lines) -> Floats:
     """(C, 2) shifts with the most votes."""
-    drawn = _largest(lines.boxes)
-    mine = np.concatenate([path.boxes[:1], _largest(path.boxes[1:])])
+    drawn = _largest_boxes(lines.boxes)
+    mine = np.concatenate([path.boxes[:1], _largest_boxes(path.boxes[1:])])
     whole = np.stack([lines.boxes[:, :, 0].min(axis=0), lines.boxes[:, :, 1].max(axis=0)], axis=1)
     drawn = np.concatenate([whole[None], drawn])
     votes, weights = [np.zeros((1, 2))], [np.zeros(1)]
@@ -471,13 +479,13 @@ def _candidates(path: _Path, lines: _Lines) -> Floats:
         grown = size[:, None] - their[None]
         room = VOTE_MM + 0.02 * their.max(axis=1)
         alike = np.abs(grown[..., 0] - grown[..., 1]) <= room
-        alike &= np.abs(grown).max(axis=-1) <= 2.0 * MOST_RADIUS_MM
+        alike &= np.abs(grown).max(axis=-1) <= 2.0 * MAX_RADIUS_MM
         alike[0, 0] = True
         i, j = np.nonzero(alike)
         votes.append(mine[i].mean(axis=2) - drawn[j].mean(axis=2))
         weights.append(size[i].sum(axis=1))
-    points = np.concatenate([path.centres, path.holes])[:MOST_MARKS]
-    theirs = _centres_of(lines)[:MOST_MARKS]
+    points = np.concatenate([path.centres, path.holes])[:MAX_MARKS]
+    theirs = _centres_of(lines)[:MAX_MARKS]
     if len(points) and len(theirs):
         votes.append((points[:, None] - theirs[None]).reshape(-1, 2))
         share = float(path.length.sum()) / len(points)
@@ -489,7 +497,7 @@ def _candidates(path: _Path, lines: _Lines) -> Floats:
     total = np.bincount(of.reshape(-1), weight)
     one, other = near_points(names.astype(np.float64), names.astype(np.float64), 1.5)
     around = np.bincount(one, total[other], minlength=len(names))
-    best = np.argsort(-around, kind="stable")[: 4 * MOST_PLACES]
+    best = np.argsort(-around, kind="stable")[: 4 * MAX_PLACES]
     chosen: list[Floats] = []
     for cell_of in best.tolist():
         mine_of = one == cell_of
@@ -500,15 +508,15 @@ def _candidates(path: _Path, lines: _Lines) -> Floats:
             middle = (every[near] * heavy[:, None]).sum(axis=0) / heavy.sum()
         if all(np.hypot(*(middle - each)) > VOTE_MM for each in chosen):
             chosen.append(middle)
-        if len(chosen) == MOST_PLACES:
+        if len(chosen) == MAX_PLACES:
             break
     return np.array(chosen)
 
 
-def _largest(boxes: Floats) -> Floats:
+def _largest_boxes(boxes: Floats) -> Floats:
     """The largest boxes, so many as are compared."""
     size = np.diff(boxes)[..., 0].sum(axis=1)
-    return boxes[np.argsort(-size, kind="stable")[:MOST_MARKS]]
+    return boxes[np.argsort(-size, kind="stable")[:MAX_MARKS]]
 
 
 def _centres_of(lines: _Lines) -> Floats:
@@ -517,13 +525,13 @@ def _centres_of(lines: _Lines) -> Floats:
     return np.unique(lines.segments[arcs].centre.round(3), axis=0)
 
 
-def _refined(path: _Path, lines: _Lines, shift: Floats) -> Floats:
+def _refine_shift(path: _Path, lines: _Lines, shift: Floats) -> Floats:
     """A shift, moved until the path keeps to the lines, or to one distance from them."""
     shift = np.array(shift, dtype=np.float64)
     for width in WIDTHS_MM:
         distance, normal, _ = lines.beside(path.points - shift)
         far = np.abs(distance)
-        radius = _peak(far, path.length, width)
+        radius = _peak_distance(far, path.length, width)
         side = np.where(distance < 0.0, -1.0, 1.0)
         beside = np.abs(far - radius) < width
         along = (far < width) & ~beside
@@ -539,10 +547,10 @@ def _refined(path: _Path, lines: _Lines, shift: Floats) -> Floats:
     return shift
 
 
-def _peak(far: Floats, length: Floats, width: float) -> float:
+def _peak_distance(far: Floats, length: Floats, width: float) -> float:
     """The distance that most of the path keeps, within `width`; 0 where that is the line."""
     bins = max(width, BIN_MM)
-    which, counts = _counted(far, length, bins)
+    which, counts = _distance_histogram(far, length, bins)
     pairs = counts + np.append(counts[1:], 0.0)
     at = int(pairs.argmax())
     near = (which == at) | (which == at + 1)
@@ -550,23 +558,23 @@ def _peak(far: Floats, length: Floats, width: float) -> float:
     return middle if middle > width else 0.0
 
 
-def _counted(far: Floats, length: Floats, bins: float) -> tuple[Ints, Floats]:
+def _distance_histogram(far: Floats, length: Floats, bins: float) -> tuple[Ints, Floats]:
     """The bin of each distance, and the length of the path in each bin; none in the last, which is
     farther than any tool is wide."""
-    most = int(MOST_RADIUS_MM / bins) + 2
+    most = int(MAX_RADIUS_MM / bins) + 2
     which = np.minimum(far / bins, most).astype(np.int64)
     counts = np.bincount(which, length, minlength=most + 1).astype(np.float64)
     counts[-1] = 0.0
     return which, counts
 
 
-def _followed(path: _Path, lines: _Lines, shift: Floats) -> float:
+def _followed_share(path: _Path, lines: _Lines, shift: Floats) -> float:
     """The part of the path that keeps to the lines, or to one distance from them."""
     if len(path.points) == 0:
         drilled = near_points(path.holes - shift, _centres_of(lines), NEAR_MM)[0]
         return len(np.unique(drilled)) / max(len(path.holes), 1)
     far = np.abs(lines.beside(path.points - shift)[0])
-    radius = _peak(far, path.length, 2.0 * path.near_mm(0.0))
+    radius = _peak_distance(far, path.length, 2.0 * path.near_mm(0.0))
     near = path.near_mm(radius)
     fine = (np.abs(far - radius) <= near) | (far <= near)
     return float(path.length[fine].sum() / path.length.sum())
@@ -612,7 +620,7 @@ def _tracks_of(lines: Polylines, radius_mm: float, which: Ints) -> _Tracks:
     parts = []
     closed, open_ = which[lines.closed[which]], which[~lines.closed[which]]
     if len(closed):
-        ccw = _each_ccw(lines.select(closed))
+        ccw = _orient_ccw(lines.select(closed))
         for side, joins in ((-1, "round"), (1, "round"), (1, "sharp")):
             paths, of = offset_each(ccw, -side * radius_mm, joins=joins)
             if len(paths):
@@ -620,7 +628,7 @@ def _tracks_of(lines: Polylines, radius_mm: float, which: Ints) -> _Tracks:
                 sharp = np.full(len(of), joins == "sharp")
                 parts.append(_Tracks(paths, closed[of], sides, sharp))
     if len(open_):
-        about = Polylines.of([_there_and_back(path) for path in lines.select(open_)])
+        about = Polylines.of([_doubled_path(path) for path in lines.select(open_)])
         paths, of = offset_each(about, -radius_mm)
         if len(paths):
             one = np.ones(len(of), dtype=np.int64)
@@ -631,14 +639,14 @@ def _tracks_of(lines: Polylines, radius_mm: float, which: Ints) -> _Tracks:
     return _Tracks.joined(parts)
 
 
-def _each_ccw(lines: Polylines) -> Polylines:
+def _orient_ccw(lines: Polylines) -> Polylines:
     """Closed paths, each travelled CCW, whatever the others are."""
     from camtool.geometry.polylines import lines_reversed
 
     return lines_reversed(lines, np.asarray(signed_areas(lines) < 0.0))
 
 
-def _there_and_back(path: Polyline) -> Polyline:
+def _doubled_path(path: Polyline) -> Polyline:
     """An open path as a closed one of no width."""
     from camtool.geometry.polylines import reverse
 
@@ -646,7 +654,7 @@ def _there_and_back(path: Polyline) -> Polyline:
     return Polyline(np.concatenate([path.vertices[:-1], back[:-1]]), closed=True)
 
 
-def _followed_by(points: Floats, tracks: _Tracks, near_mm: float) -> Bools:
+def _is_on_track(points: Floats, tracks: _Tracks, near_mm: float) -> Bools:
     """(J,) which points lie on a track."""
     if len(tracks.paths) == 0:
         return np.zeros(len(points), dtype=np.bool_)
@@ -655,10 +663,10 @@ def _followed_by(points: Floats, tracks: _Tracks, near_mm: float) -> Bools:
 
 def _candidate_radii(far: Floats, length: Floats) -> list[float]:
     """The distances from the nearest line that much of a path keeps, the most kept first."""
-    which, counts = _counted(far, length, BIN_MM)
-    least = LEAST_PEAK * float(length.sum())
+    which, counts = _distance_histogram(far, length, BIN_MM)
+    least = MIN_PEAK_SHARE * float(length.sum())
     found: list[float] = []
-    for _ in range(MOST_CANDIDATES):
+    for _ in range(MAX_CANDIDATES):
         around = np.convolve(counts, np.ones(5), mode="same")
         at = int(around.argmax())
         if around[at] < least:
@@ -670,7 +678,7 @@ def _candidate_radii(far: Floats, length: Floats) -> list[float]:
     return list(dict.fromkeys(found))
 
 
-class _Try(Struct, frozen=True, eq=False):
+class _RadiusTrial(Struct, frozen=True, eq=False):
     """A radius, its tracks that are followed, and which points (S,) follow them."""
 
     radius_mm: float
@@ -702,7 +710,7 @@ class _Cells(Struct, frozen=True, eq=False):
         )
 
 
-class _Chosen(Struct, frozen=True, eq=False):
+class _FollowedTracks(Struct, frozen=True, eq=False):
     """What is followed: tracks, the radius of each (T,), its tool (T,), and its cells."""
 
     tracks: _Tracks
@@ -753,7 +761,7 @@ class _Follower(Struct, frozen=True, eq=False):
         wanted, off = self.cuts.toolpath, np.empty(0)
         rows = np.zeros(len(wanted), dtype=np.bool_)
         if chosen is not None:
-            follow = _Followed.of(self.cuts, chosen, self.path)
+            follow = _RowTracks.of(self.cuts, chosen, self.path)
             wanted, off, rows = _with_tracks(self, chosen, follow), follow.off, follow.rows
         if chosen is not None or drilled.any():
             findings += self._not_cut(chosen, drilled)
@@ -763,16 +771,16 @@ class _Follower(Struct, frozen=True, eq=False):
         beside = float(self._row_lengths()[self.cuts.is_cut & ~rows].sum())
         whole = float(self._row_lengths()[self.cuts.is_cut].sum())
         wrong = any(each.severity == Severity.ERROR for each in findings)
-        if whole and beside > (1.0 - FITS) * whole and not wrong:
+        if whole and beside > (1.0 - MIN_FOLLOWED_SHARE) * whole and not wrong:
             findings.append(DRAWING_PLACE_NOWHERE(measured=100.0 * (1.0 - beside / whole),
-                                          limit=100.0 * FITS))  # fmt: skip
+                                          limit=100.0 * MIN_FOLLOWED_SHARE))  # fmt: skip
         report = FoundReport(
             shift_mm=shift,
             aligned=align,
             followed=1.0 - beside / whole if whole else 0.0,
             beside_mm=beside,
             tools=tuple(tools),
-            **_counts(chosen, drilled, len(self.lines.paths)),
+            **_side_counts(chosen, drilled, len(self.lines.paths)),
             off_max_um=1000.0 * float(off.max()) if len(off) else None,
             off_rms_um=1000.0 * float(np.sqrt(np.mean(off**2))) if len(off) else None,
         )
@@ -788,7 +796,9 @@ class _Follower(Struct, frozen=True, eq=False):
         )
         return found
 
-    def _radius(self, mine: Ints, given: float | None) -> tuple[_Try | None, list[Finding]]:
+    def _radius(
+        self, mine: Ints, given: float | None
+    ) -> tuple[_RadiusTrial | None, list[Finding]]:
         """The radius with which most of the points `mine` follow tracks, and its tracks."""
         points, length = self.path.points[mine], self.path.length[mine]
         far = np.abs(self.lines.beside(points)[0])
@@ -806,11 +816,15 @@ class _Follower(Struct, frozen=True, eq=False):
             return None, []
         best = max(tries, key=lambda each: each.length_mm)
         on_lines = [each for each in tries if not each.radius_mm]
-        if on_lines and on_lines[0].length_mm >= MOSTLY * best.length_mm:
+        if on_lines and on_lines[0].length_mm >= MIN_ON_LINE_SHARE * best.length_mm:
             return on_lines[0], []
         for smaller in sorted(tries, key=lambda each: each.radius_mm):
             less = smaller.radius_mm < best.radius_mm and smaller.radius_mm > 0.0
-            if less and smaller.length_mm >= AS_MUCH * best.length_mm and best.keys & smaller.keys:
+            if (
+                less
+                and smaller.length_mm >= MIN_WALL_SHARE * best.length_mm
+                and best.keys & smaller.keys
+            ):
                 best = smaller
                 break
         said = []
@@ -819,7 +833,9 @@ class _Follower(Struct, frozen=True, eq=False):
             if other is best or not other.radius_mm or not other.keys - best.keys:
                 continue
             apart = {key for key in other.keys if key not in best.keys}
-            if more >= RIVAL * best.length_mm and len(apart) >= len(other.keys & best.keys):
+            if more >= MIN_RIVAL_SHARE * best.length_mm and len(apart) >= len(
+                other.keys & best.keys
+            ):
                 said.append(
                     TOOL_FOUND_SEVERAL(
                         measured=2.0 * best.radius_mm, other=2.0 * other.radius_mm,
@@ -830,7 +846,7 @@ class _Follower(Struct, frozen=True, eq=False):
                 break
         return best, said
 
-    def _tried(self, points: Floats, length: Floats, radius: float, slack: float) -> _Try:
+    def _tried(self, points: Floats, length: Floats, radius: float, slack: float) -> _RadiusTrial:
         """The tracks of a radius that are followed, and what of these points follows them."""
         near = self.path.near_mm(radius) + slack
         count = len(self.lines.paths)
@@ -844,8 +860,8 @@ class _Follower(Struct, frozen=True, eq=False):
         cells = self._cells(tracks, near)
         which = _sides_followed(tracks, cells.share(len(tracks.paths)))
         tracks = tracks.picked(which)
-        follows = _followed_by(points, tracks, near)
-        return _Try(radius, tracks, follows, float(length[follows].sum()))
+        follows = _is_on_track(points, tracks, near)
+        return _RadiusTrial(radius, tracks, follows, float(length[follows].sum()))
 
     def _reached(self, points: Floats, radius: float, near: float) -> Bools:
         """(M,) the contours that any point is as far from as the radius, and those about them."""
@@ -858,7 +874,7 @@ class _Follower(Struct, frozen=True, eq=False):
         """Points along tracks, and what of the program is near them."""
         segments = Segments.of(tracks.paths)
         sizes = segment_lengths(segments)
-        spacing = max(TRACK_MM, float(sizes.sum()) / MOST_TRACK_POINTS)
+        spacing = max(TRACK_MM, float(sizes.sum()) / MAX_TRACK_POINTS)
         parts = np.maximum(np.ceil(sizes / spacing).astype(np.int64), 2)
         owner = np.repeat(np.arange(len(sizes)), parts)
         within = np.arange(len(owner)) - np.repeat(np.cumsum(parts) - parts, parts)
@@ -867,7 +883,7 @@ class _Follower(Struct, frozen=True, eq=False):
         cut = np.isfinite(found.distance)
         return _Cells(segments.path[owner], places, (sizes / parts)[owner], cut)
 
-    def _chosen(self, parts: Sequence[tuple[_Try, int]]) -> _Chosen | None:
+    def _chosen(self, parts: Sequence[tuple[_RadiusTrial, int]]) -> _FollowedTracks | None:
         """The tracks of all tools, each once."""
         parts = [(tried, number) for tried, number in parts if len(tried.tracks.paths)]
         if not parts:
@@ -884,9 +900,9 @@ class _Follower(Struct, frozen=True, eq=False):
         which = np.array(first, dtype=np.int64)
         tracks, radius, tool = tracks.picked(which), radius[which], tool[which]
         near = max(self.path.near_mm(float(each)) for each in radius)
-        return _Chosen(tracks, radius, tool, self._cells(tracks, near))
+        return _FollowedTracks(tracks, radius, tool, self._cells(tracks, near))
 
-    def _drilled(self, chosen: _Chosen | None) -> Bools:
+    def _drilled(self, chosen: _FollowedTracks | None) -> Bools:
         """(M,) the circles in whose middle a hole is drilled, and that are not cut."""
         found = np.zeros(len(self.lines.paths), dtype=np.bool_)
         holes = self.path.holes
@@ -900,7 +916,7 @@ class _Follower(Struct, frozen=True, eq=False):
                 found[index] = near <= max(NEAR_MM, self.limit_mm)
         return found
 
-    def _not_cut(self, chosen: _Chosen | None, drilled: Bools) -> Iterator[Finding]:
+    def _not_cut(self, chosen: _FollowedTracks | None, drilled: Bools) -> Iterator[Finding]:
         """A finding for each contour that nothing cuts, and for each that is cut in part."""
         count = len(self.lines.paths)
         cut = np.zeros(count, dtype=np.bool_)
@@ -921,7 +937,7 @@ class _Follower(Struct, frozen=True, eq=False):
         # Of the variants of a contour the one of which most is cut says what is left of it.
         order = np.lexsort((left, tracks.contour))
         first = order[np.flatnonzero(np.diff(tracks.contour[order], prepend=-1))]
-        some = first[left[first] >= LEAST_LEFT_MM]
+        some = first[left[first] >= MIN_LEFT_MM]
         for track, more in listed(some.tolist()):
             at = cells.places[(cells.track == track) & ~cells.cut]
             yield NOT_CUT_PART(
@@ -932,7 +948,7 @@ class _Follower(Struct, frozen=True, eq=False):
                 more=more,
             )
 
-    def _into_parts(self, chosen: _Chosen, rows: Bools) -> Iterator[Finding]:
+    def _into_parts(self, chosen: _FollowedTracks, rows: Bools) -> Iterator[Finding]:
         """A finding for each move that follows nothing and comes nearer to the nearest line than
         the tool may that cuts along one side of it, or lies on its other side."""
         lines, loose = self.lines, np.flatnonzero(~rows[self.path.row])
@@ -1001,7 +1017,7 @@ def _sides_followed(tracks: _Tracks, share: Floats) -> Ints:
     ):
         # Inside, one contour may have several tracks; all of those that are cut count.
         name = contour, side, k if side < 0 else -1
-        if name not in best or share[k] > share[best[name]] + LEAST_MORE:
+        if name not in best or share[k] > share[best[name]] + MIN_SHARP_GAIN:
             best[name] = k
     found: list[int] = []
     partly: dict[int, int] = {}
@@ -1017,7 +1033,7 @@ def _sides_followed(tracks: _Tracks, share: Floats) -> Ints:
     return np.array(sorted(found), dtype=np.int64)
 
 
-def _counts(chosen: _Chosen | None, drilled: Bools, count: int) -> dict[str, int]:
+def _side_counts(chosen: _FollowedTracks | None, drilled: Bools, count: int) -> dict[str, int]:
     """How many contours are cut on which side."""
     found = {"outside": 0, "inside": 0, "on_line": 0}
     cut: set[int] = set()
@@ -1034,7 +1050,7 @@ def _counts(chosen: _Chosen | None, drilled: Bools, count: int) -> dict[str, int
 # The wanted moves: those of the program, along the tracks where they follow one.
 
 
-class _Followed(Struct, frozen=True, eq=False):
+class _RowTracks(Struct, frozen=True, eq=False):
     """Which rows (N,) follow a track; the track (N,), and the lengths (N,), (N,) mm along it at
     their starts and ends, the end counted on from the start; `off` (J,) mm as `_Made.wanted`."""
 
@@ -1045,7 +1061,7 @@ class _Followed(Struct, frozen=True, eq=False):
     off: Floats
 
     @classmethod
-    def of(cls, cuts: CutMoves, chosen: _Chosen, path: _Path) -> _Followed:
+    def of(cls, cuts: CutMoves, chosen: _FollowedTracks, path: _Path) -> _RowTracks:
         tracks = chosen.tracks
         index = MoveIndex(_as_cuts(tracks.paths))
         samples = sample_cuts(cuts, TRACK_MM)
@@ -1117,7 +1133,7 @@ def _as_cuts(paths: Polylines) -> CutMoves:
     return CutMoves(toolpath, segments, first[:-1], first, segments.path.astype(np.int32))
 
 
-def _with_tracks(of: _Follower, chosen: _Chosen, follow: _Followed) -> Toolpath:
+def _with_tracks(of: _Follower, chosen: _FollowedTracks, follow: _RowTracks) -> Toolpath:
     """The program with the tracks in the place of the moves that follow them."""
     from camtool.kernels.passes import lifted
 
@@ -1153,7 +1169,9 @@ def _with_tracks(of: _Follower, chosen: _Chosen, follow: _Followed) -> Toolpath:
     feed = np.repeat(toolpath.feed[rows[first]], np.diff(runs))
     moves = joined_moves(vertices, feed, runs)
     track = follow.track[rows[first]]
-    return _spliced(of, chosen, (rows[first], rows[last] + 1), (vertices, runs, moves), track)
+    return _splice_tracks(
+        of, chosen, (rows[first], rows[last] + 1), (vertices, runs, moves), track
+    )
 
 
 def _close_turns(kind: Ints, end: Floats) -> None:
@@ -1164,14 +1182,14 @@ def _close_turns(kind: Ints, end: Floats) -> None:
 
 
 def _link(end: Sequence[float] | Floats, feed: float, chain: int) -> tuple[Any, ...]:
-    """A line to where what follows begins, as the columns of `_spliced`."""
+    """A line to where what follows begins, as the columns of `_splice_tracks`."""
     centre = np.full((1, 2), np.nan)
     return np.array([Kind.LINE]), np.array([end]), centre, np.array([feed]), chain
 
 
-def _spliced(
+def _splice_tracks(
     of: _Follower,
-    chosen: _Chosen,
+    chosen: _FollowedTracks,
     chains: tuple[Ints, Ints],
     made: tuple[Floats, Ints, Cuts],
     track: Ints,

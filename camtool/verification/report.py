@@ -5,8 +5,9 @@ NaN or infinite: unknown values are null. Numbers are rounded to `DECIMALS` plac
 resolution of any machine, so that the same job gives the same bytes on every computer.
 
     records ─▶ Report ─▶ limits of a pipeline (`Gates`)
-                  ├────▶ `facts`, lines for a terminal and for the margin of a picture
-                  └────▶ `sheets`, tables of text ─▶ `Page` ─▶ `markdown`, `html`, `page_json`
+                  ├────▶ `summary_lines`, lines for a terminal and for the margin of a picture
+                  └────▶ `sheets`, tables of text ─▶ `ReportPage` ─▶ `page_markdown`, `page_html`,
+                                                          `page_json`
 """
 
 from __future__ import annotations
@@ -100,7 +101,7 @@ class ExtentsMm(msgspec.Struct, frozen=True):
     z: tuple[float, float]
 
 
-class Steps(msgspec.Struct, frozen=True):
+class StepCounts(msgspec.Struct, frozen=True):
     """Steps of each axis, and iterations of the interpolator."""
 
     x: int
@@ -138,7 +139,7 @@ class TimeSplit(msgspec.Struct, frozen=True):
     link: float = 0.0
 
 
-class Dimension(msgspec.Struct, frozen=True):
+class DimensionReport(msgspec.Struct, frozen=True):
     """A size of the cut edge, nominally as drawn, or without a drawing of the tool centre's path
     (`of`: "edge", "centre"). error_percent > 0 when it is too large. Of a contour in several
     passes the last and deepest counts, without leads and ramps."""
@@ -273,7 +274,7 @@ COVERAGE = 2.0
 """Uncertainties in tables and pictures are expanded by this, to cover some 95 %."""
 
 
-class Contribution(msgspec.Struct, frozen=True):
+class ContributionReport(msgspec.Struct, frozen=True):
     """What one input contributes to the standard uncertainty of a dimension, µm; null where it is
     not known how well the input is. Then `at_most_um` bounds by how much it can change the
     dimension `within` what is said there; null where nothing does."""
@@ -313,7 +314,7 @@ class InspectedReport(msgspec.Struct, frozen=True):
     unknown_um: float | None = None
     guard_um: float | None = None
     probability: float | None = None
-    contributions: tuple[Contribution, ...] = ()
+    contributions: tuple[ContributionReport, ...] = ()
     unknown: tuple[str, ...] = ()
     measure: str = ""
 
@@ -325,7 +326,7 @@ class InspectedReport(msgspec.Struct, frozen=True):
         return f"{nominal} {self.limits}".rstrip()
 
     @property
-    def not_known(self) -> tuple[Contribution, ...]:
+    def not_known(self) -> tuple[ContributionReport, ...]:
         """The inputs that matter and of which it is not known how well they are."""
         return tuple(each for each in self.contributions if each.um is None)
 
@@ -437,11 +438,11 @@ class Report(msgspec.Struct, frozen=True):
     bytes: int | None
     extents_mm: ExtentsMm
     time_s: float
-    steps: Steps
+    steps: StepCounts
     reversals: Reversals
     error_um: Errors
     closure_um: float | None
-    dimensions: tuple[Dimension, ...]
+    dimensions: tuple[DimensionReport, ...]
     circles: tuple[CircleReport, ...]
     findings: tuple[FindingReport, ...]
     contours: int
@@ -468,7 +469,7 @@ class Report(msgspec.Struct, frozen=True):
     def to_text(self, *, findings: bool = True) -> str:
         """The summary that `camtool post` and `camtool verify` print, without a final newline, and
         with a line for each finding unless `findings=False`."""
-        lines = [f"{name:<10} {value}" for name, value in facts(self)]
+        lines = [f"{name:<10} {value}" for name, value in summary_lines(self)]
         for item in self.findings if findings else ():
             place = f" [{item.where}]" if item.where else ""
             lines.append(f"{item.severity} {item.code}{place}: {item.message}")
@@ -477,7 +478,7 @@ class Report(msgspec.Struct, frozen=True):
     def worst_text(self) -> str:
         """The moves with the largest errors, one per line, µm; "" when nothing is cut."""
         lines = [
-            f"{named(item.block, item.move):<12} {item.total_um:>9.2f} µm  interpolation"
+            f"{move_name(item.block, item.move):<12} {item.total_um:>9.2f} µm  interpolation"
             f" {um(item.interpolation_um)}, mechanics {um(item.mechanics_um)}"
             f"  near ({item.at_mm[0]:.3f}, {item.at_mm[1]:.3f}) mm"
             + (f"  {one_line(item.source)}" if item.source else "")
@@ -487,14 +488,14 @@ class Report(msgspec.Struct, frozen=True):
 
     def to_markdown(self) -> str:
         """The report as Markdown, for a pull request or a job's record."""
-        return markdown(Page(self.source or self.target, self, self.findings))
+        return page_markdown(ReportPage(self.source or self.target, self, self.findings))
 
     def notes(self) -> tuple[str, ...]:
         """Two short lines beside a picture: target, time and reversals; the error."""
         total = self.error_um.total
         return (
             f"{self.target}: {duration(self.time_s)}, {self.cutting_reversals} reversals",
-            f"predicted error {um(total.max)} µm at most, rms {um(total.rms)} µm{besides(self)}",
+            f"predicted error {um(total.max)} µm at most, rms {um(total.rms)} µm{remarks(self)}",
         )
 
     @property
@@ -504,10 +505,10 @@ class Report(msgspec.Struct, frozen=True):
 
     def with_findings(self, findings: Iterable[Finding]) -> Report:
         """The same report with these findings."""
-        return replace(self, findings=reported(findings))
+        return replace(self, findings=finding_reports(findings))
 
 
-def reported(findings: Iterable[Finding]) -> tuple[FindingReport, ...]:
+def finding_reports(findings: Iterable[Finding]) -> tuple[FindingReport, ...]:
     """The findings as records of the report, in order, each once."""
     return tuple(
         FindingReport(
@@ -515,22 +516,22 @@ def reported(findings: Iterable[Finding]) -> tuple[FindingReport, ...]:
             severity=finding.severity.name.lower(),
             message=finding.message,
             where=finding.where,
-            measured=number(finding.measured),
-            limit=number(finding.limit),
+            measured=rounded_or_none(finding.measured),
+            limit=rounded_or_none(finding.limit),
             unit=finding.unit,
         )
         for finding in dict.fromkeys(findings)
     )
 
 
-def number(value: float | None, scale: float = 1.0) -> float | None:
+def rounded_or_none(value: float | None, scale: float = 1.0) -> float | None:
     """`value` · scale, rounded for the report, never −0; None for values that are not finite."""
     if value is None or not math.isfinite(value):
         return None
     return round(float(value) * scale, DECIMALS) or 0.0
 
 
-def certain(value: float) -> float:
+def rounded(value: float) -> float:
     """A known number, rounded for the report, never −0."""
     return round(float(value), DECIMALS) or 0.0
 
@@ -582,7 +583,7 @@ def _error_gate(found_um: float | None, limit_um: float) -> Iterator[Finding]:
 
 # The report as lines of text.
 
-MOST_OPERATIONS = 24
+MAX_OPERATIONS = 24
 """At most this many operations are listed; the others are counted."""
 
 COOLANT_WORDS = {"off": "", "mist": ", mist", "flood": ", flood", "both": ", mist and flood"}
@@ -610,7 +611,7 @@ def duration(seconds: float) -> str:
     return " ".join(f"{count} {unit}" for count, unit in parts if count) or "0 s"
 
 
-def facts(report: Report) -> Iterator[tuple[str, str]]:
+def summary_lines(report: Report) -> Iterator[tuple[str, str]]:
     """(name, value) of each line of the summary."""
     steps, extents = report.steps, report.extents_mm
     how = report.interpolator
@@ -656,7 +657,7 @@ def facts(report: Report) -> Iterator[tuple[str, str]]:
     error = report.error_um.total
     yield (
         "error",
-        f"{um(error.max)} µm at most, rms {um(error.rms)}, p95 {um(error.p95)}{besides(report)}",
+        f"{um(error.max)} µm at most, rms {um(error.rms)}, p95 {um(error.p95)}{remarks(report)}",
     )
     yield "by source", _error_sources(report)
     if report.error_um.depth_max:
@@ -695,7 +696,7 @@ def inspected_words(item: InspectedReport) -> str:
     return words + (f"; {verb} {item.measure}" if item.measure else "")
 
 
-def _unknown_words(item: Contribution) -> str:
+def _unknown_words(item: ContributionReport) -> str:
     if item.at_most_um is None:
         return item.input
     return f"{item.input} (at most {item.at_most_um:.1f} µm)"
@@ -749,7 +750,7 @@ def _found_words(found: FoundReport) -> Iterator[str]:
 
 def _operation_words(operations: Sequence[PlannedOperation]) -> Iterator[str]:
     """Tool, spindle, feeds, depth and passes, one line per operation."""
-    for each in operations[:MOST_OPERATIONS]:
+    for each in operations[:MAX_OPERATIONS]:
         name = one_line(each.name or each.kind)
         called = one_line(f" {each.tool_name}") if each.tool_name else ""
         tool = f"tool{called} {each.tool_diameter_mm:g} mm"
@@ -769,11 +770,11 @@ def _operation_words(operations: Sequence[PlannedOperation]) -> Iterator[str]:
             f"{name}: {tool}, {speed}, feed {each.feed_mm_min:g} mm/min{chip}, plunge"
             f" {each.plunge_mm_min:g} mm/min{preset}, {each.depth_mm:.4g} mm deep{passes}{cooled}"
         )
-    if len(operations) > MOST_OPERATIONS:
-        yield f"and {len(operations) - MOST_OPERATIONS} operations more"
+    if len(operations) > MAX_OPERATIONS:
+        yield f"and {len(operations) - MAX_OPERATIONS} operations more"
 
 
-def besides(report: Report) -> str:
+def remarks(report: Report) -> str:
     """Remarks on the largest error: its reference where it is not the drawing, and gouges, which
     it does not count."""
     words = "" if report.against == "drawing" else "; to the program's moves: no drawing is known"
@@ -807,7 +808,7 @@ def _shape_words(shape: ShapeReport) -> str:
     return f"{over}; {under} (tool {shape.tool_diameter_mm:g} mm)"
 
 
-def named(block: int | None, move: int) -> str:
+def move_name(block: int | None, move: int) -> str:
     """A move by its block, or by its own number where there are no blocks."""
     return f"block {block}" if block is not None else f"move {move}"
 
@@ -845,23 +846,23 @@ def _by_source(error: Errors) -> dict[str, _MaxRmsP95]:
 
 def um(value: float | None) -> str:
     """Micrometres with two decimals, a dash for an unknown value."""
-    return "–" if value is None else _fixed(value, 2)
+    return "–" if value is None else _fixed_decimals(value, 2)
 
 
 def mm(value: float) -> str:
     """Millimetres with three decimals."""
-    return _fixed(value, 3)
+    return _fixed_decimals(value, 3)
 
 
 def percent(value: float | None) -> str:
     """Per cent with sign, a dash for an unknown value."""
     if value is None:
         return "–"
-    text = _fixed(value, 2)
+    text = _fixed_decimals(value, 2)
     return f"{text} %" if text.startswith("−") else f"+{text} %"
 
 
-def _fixed(value: float, places: int) -> str:
+def _fixed_decimals(value: float, places: int) -> str:
     """A number with so many decimals and a true minus; what is rounded to zero has no sign."""
     text = f"{abs(value):.{places}f}"
     return f"−{text}" if value < 0.0 and float(text) else text
@@ -876,7 +877,7 @@ NAME_SHOWN = 200
 """The text of a cell or a finding is shortened to this many characters on a page, not in JSON."""
 
 
-class Changed(Struct, frozen=True):
+class ChangedValue(Struct, frozen=True):
     """A value of the machine that `--machine` or `--set` has changed."""
 
     key: str
@@ -891,11 +892,11 @@ class Setup(Struct, frozen=True):
     machine: str
     machine_sha256: str
     program_sha256: str | None = None
-    changed: tuple[Changed, ...] = ()
+    changed: tuple[ChangedValue, ...] = ()
     flags: tuple[tuple[str, str], ...] = ()
 
 
-class Page(Struct, frozen=True):
+class ReportPage(Struct, frozen=True):
     """A page: `report` is None where the program could not be judged; `findings` then say why.
     `pictures` are (caption, address): of a file beside the page, or a data address; `stock` is
     that of the stock with part zero, "" without one."""
@@ -925,12 +926,12 @@ def setup_rows(setup: Setup) -> tuple[tuple[str, str], ...]:
     return (*digests, *changed, *setup.flags)
 
 
-def shortened(words: str) -> str:
+def shorten(words: str) -> str:
     """The text, shortened to `NAME_SHOWN` characters."""
     return words if len(words) <= NAME_SHOWN else words[: NAME_SHOWN - 1] + "…"
 
 
-def page_json(page: Page) -> str:
+def page_json(page: ReportPage) -> str:
     """The report's own keys, with `title`, `verdict` and `setup` before them; indented.
 
     Where the program could not be judged, only `findings` follow."""
@@ -945,7 +946,7 @@ def page_json(page: Page) -> str:
 # The tables of a Report as rows of text, for Markdown and HTML.
 
 
-class Sheet(Struct, frozen=True):
+class ReportTable(Struct, frozen=True):
     """A table: `noun` is what its rows are called, `words` the number of leading columns with text
     (the others hold numbers). Cells are not escaped."""
 
@@ -955,7 +956,7 @@ class Sheet(Struct, frozen=True):
     words: int = 1
 
 
-def sheets(report: Report) -> Iterator[Sheet]:
+def sheets(report: Report) -> Iterator[ReportTable]:
     """Inspected dimensions, errors by source, sizes, circles, contours and worst moves, without
     empty tables."""
     every = (
@@ -970,7 +971,7 @@ def sheets(report: Report) -> Iterator[Sheet]:
     return (sheet for sheet in every if sheet.rows)
 
 
-def _inspection_sheet(report: Report) -> Sheet:
+def _inspection_sheet(report: Report) -> ReportTable:
     limits, sizes = ("lower mm", "upper mm"), ("least mm", "fit mm", "largest mm")
     heads = ("inspected", "verdict", "most from", "not known", *limits, *sizes, "± µm", "in")
     rows = tuple(
@@ -989,17 +990,17 @@ def _inspection_sheet(report: Report) -> Sheet:
         )
         for item in report.inspection
     )
-    return Sheet("dimensions", heads, rows, words=4)
+    return ReportTable("dimensions", heads, rows, words=4)
 
 
-def _error_sheet(report: Report) -> Sheet:
+def _error_sheet(report: Report) -> ReportTable:
     total = report.error_um.total
     figures = {**_by_source(report.error_um), "total": (total.max, total.rms, total.p95)}
     rows = tuple((name, *map(um, three)) for name, three in figures.items())
-    return Sheet("sources", ("error by source", "max µm", "rms µm", "p95 µm"), rows)
+    return ReportTable("sources", ("error by source", "max µm", "rms µm", "p95 µm"), rows)
 
 
-def _dimension_sheet(report: Report) -> Sheet:
+def _dimension_sheet(report: Report) -> ReportTable:
     heads = ("dimension", "nominal mm", "predicted mm", "error")
     rows = tuple(
         (
@@ -1010,33 +1011,33 @@ def _dimension_sheet(report: Report) -> Sheet:
         )
         for item in report.dimensions
     )
-    return Sheet("dimensions", heads, rows)
+    return ReportTable("dimensions", heads, rows)
 
 
-def _circle_sheet(report: Report) -> Sheet:
+def _circle_sheet(report: Report) -> ReportTable:
     heads = ("circle at mm", "way", "radius mm", "G µm", "Fmax µm", "Fmin µm", "D µm", "fit µm")
     rows = tuple(
         (
-            _at(item.centre_mm),
+            _point_words(item.centre_mm),
             item.direction,
             f"{item.radius_mm:.4f}",
             *map(um, (item.G_um, item.Fmax_um, item.Fmin_um, item.D_um, item.fit_um)),
         )
         for item in report.circles
     )
-    return Sheet("circles", heads, rows, words=2)
+    return ReportTable("circles", heads, rows, words=2)
 
 
-def _both_ways_sheet(report: Report) -> Sheet:
+def _both_ways_sheet(report: Report) -> ReportTable:
     heads = ("circle both ways round, at mm", "radius mm", "G(b) µm", "D µm")
     rows = tuple(
-        (_at(item.centre_mm), f"{item.radius_mm:.4f}", um(item.Gb_um), um(item.D_um))
+        (_point_words(item.centre_mm), f"{item.radius_mm:.4f}", um(item.Gb_um), um(item.D_um))
         for item in report.bidirectional
     )
-    return Sheet("circles", heads, rows)
+    return ReportTable("circles", heads, rows)
 
 
-def _contour_sheet(report: Report) -> Sheet:
+def _contour_sheet(report: Report) -> ReportTable:
     """The contours, by falling error."""
     heads = (
         "contour",
@@ -1051,7 +1052,7 @@ def _contour_sheet(report: Report) -> Sheet:
     rows = tuple(
         (
             item.name,
-            _at(item.at_mm),
+            _point_words(item.at_mm),
             um(item.max_um),
             um(item.rms_um),
             um(item.mean_um),
@@ -1061,10 +1062,10 @@ def _contour_sheet(report: Report) -> Sheet:
         )
         for item in sorted(report.contour_errors, key=lambda item: -item.max_um)
     )
-    return Sheet("contours", heads, rows, words=2)
+    return ReportTable("contours", heads, rows, words=2)
 
 
-def _worst_sheet(report: Report) -> Sheet:
+def _worst_sheet(report: Report) -> ReportTable:
     heads = (
         "worst moves",
         "where",
@@ -1076,8 +1077,8 @@ def _worst_sheet(report: Report) -> Sheet:
     )
     rows = tuple(
         (
-            named(item.block, item.move),
-            _at(item.at_mm),
+            move_name(item.block, item.move),
+            _point_words(item.at_mm),
             item.source,
             um(item.total_um),
             um(item.fit_um),
@@ -1086,10 +1087,10 @@ def _worst_sheet(report: Report) -> Sheet:
         )
         for item in report.worst
     )
-    return Sheet("moves", heads, rows, words=3)
+    return ReportTable("moves", heads, rows, words=3)
 
 
-def _at(at_mm: tuple[float, float]) -> str:
+def _point_words(at_mm: tuple[float, float]) -> str:
     return f"({at_mm[0]:.3f}, {at_mm[1]:.3f})"
 
 
@@ -1104,7 +1105,7 @@ SETUP_FINDINGS = 6
 """So many warnings and errors stand there, the gravest first; below are all."""
 
 
-def mounting(report: Report) -> Iterator[tuple[str, str]]:
+def mounting_lines(report: Report) -> Iterator[tuple[str, str]]:
     """(name, value) of where the stock lies, how far the program goes, and what it takes."""
     planned, extents = report.planned, report.extents_mm
     stock = None if planned is None else planned.stock
@@ -1154,7 +1155,7 @@ def _zero_words(stock: PlannedStock | None, zero: str | tuple[float, float] = "d
     return f"X0 Y0 is {across} and {along} the lower left corner of the stock{too}; Z0 is its top"
 
 
-def setup_sheets(planned: Planned) -> Iterator[Sheet]:
+def setup_sheets(planned: Planned) -> Iterator[ReportTable]:
     """The tools in the order of use, and the operations."""
     rows = tuple(
         (
@@ -1166,8 +1167,8 @@ def setup_sheets(planned: Planned) -> Iterator[Sheet]:
         for row, tool in enumerate(planned.tools)
     )
     heads = ("tool", "shape", "sticks out more than mm", "edges mm")
-    yield Sheet("tools", heads, rows, words=2)
-    yield Sheet("operations", *_setup_operations(planned), words=4)
+    yield ReportTable("tools", heads, rows, words=2)
+    yield ReportTable("operations", *_setup_operations(planned), words=4)
 
 
 def _tool_called(planned: Planned, row: int) -> str:
@@ -1198,7 +1199,7 @@ def _setup_operations(planned: Planned) -> tuple[tuple[str, ...], tuple[tuple[st
     return heads, rows
 
 
-def gravest(page: Page) -> tuple[FindingReport, ...]:
+def gravest_findings(page: ReportPage) -> tuple[FindingReport, ...]:
     """The findings that one must know at the machine, errors first."""
     found = [each for each in page.findings if each.severity in _GRAVEST_FIRST]
     return tuple(sorted(found, key=lambda item: _GRAVEST_FIRST[item.severity]))
@@ -1223,7 +1224,7 @@ _MARKS = frozenset("\\`*_[]<>|#~$&!")
 _BROKEN = {"@": "@<!-- -->", "://": ":<!-- -->//", "www.": "www<!-- -->."}
 
 
-def markdown(page: Page) -> str:
+def page_markdown(page: ReportPage) -> str:
     """The page, at most PAGE_BYTES long; where something is left out, its last line says so."""
     kept: list[str] = []
     room = PAGE_BYTES
@@ -1238,18 +1239,20 @@ def markdown(page: Page) -> str:
 
 def markdown_words(words: str) -> str:
     """The text, shortened and escaped, as one line of Markdown."""
-    line = shortened(one_line(words))
+    line = shorten(one_line(words))
     escaped = "".join("\\" + sign if sign in _MARKS else sign for sign in line)
     for mark, broken in _BROKEN.items():
         escaped = escaped.replace(mark, broken)
     return escaped
 
 
-def _markdown_lines(page: Page) -> Iterator[str]:
+def _markdown_lines(page: ReportPage) -> Iterator[str]:
     yield f"# {markdown_words(page.title)}"
     yield ""
     if page.report is not None:
-        yield from (f"- **{name}:** {markdown_words(value)}" for name, value in facts(page.report))
+        yield from (
+            f"- **{name}:** {markdown_words(value)}" for name, value in summary_lines(page.report)
+        )
         yield ""
         yield from _markdown_setup(page, page.report)
     for caption, address in page.pictures:
@@ -1271,18 +1274,18 @@ def _markdown_lines(page: Page) -> Iterator[str]:
         yield from (f"- assumed: {markdown_words(words)}" for words in page.report.assumptions)
 
 
-def _markdown_setup(page: Page, report: Report) -> Iterator[str]:
+def _markdown_setup(page: ReportPage, report: Report) -> Iterator[str]:
     if report.planned is None:
         return
     yield f"## {SETUP}"
     yield ""
-    yield from (f"- **{name}:** {markdown_words(value)}" for name, value in mounting(report))
+    yield from (f"- **{name}:** {markdown_words(value)}" for name, value in mounting_lines(report))
     yield ""
     for sheet in setup_sheets(report.planned):
         yield from _markdown_table(sheet)
 
 
-def _markdown_findings(page: Page) -> Iterator[str]:
+def _markdown_findings(page: ReportPage) -> Iterator[str]:
     ordered = sorted(page.findings, key=lambda item: _GRAVEST_FIRST.get(item.severity, 2))
     for item in ordered[:MARKDOWN_FINDINGS]:
         place = f" ({markdown_words(item.where)})" if item.where else ""
@@ -1293,7 +1296,7 @@ def _markdown_findings(page: Page) -> Iterator[str]:
         yield ""
 
 
-def _markdown_table(sheet: Sheet) -> Iterator[str]:
+def _markdown_table(sheet: ReportTable) -> Iterator[str]:
     numbers = len(sheet.heads) - sheet.words
     yield f"| {' | '.join(sheet.heads)} |"
     yield "|" + "---|" * sheet.words + "---:|" * numbers
@@ -1346,17 +1349,17 @@ figure { margin: 1rem 0; } figcaption { opacity: .7; }
 """
 
 
-def html(page: Page) -> str:
+def page_html(page: ReportPage) -> str:
     """The page as an HTML document."""
     return "\n".join(_html_lines(page)) + "\n"
 
 
-def _safe(text: str) -> str:
-    return escape(shortened(one_line(text)), quote=True)
+def _escape(text: str) -> str:
+    return escape(shorten(one_line(text)), quote=True)
 
 
-def _html_lines(page: Page) -> Iterator[str]:
-    title = _safe(page.title)
+def _html_lines(page: ReportPage) -> Iterator[str]:
+    title = _escape(page.title)
     yield '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">'
     yield f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
     yield '<meta name="viewport" content="width=device-width, initial-scale=1">'
@@ -1364,10 +1367,10 @@ def _html_lines(page: Page) -> Iterator[str]:
     yield f'<h1>{title} <small class="{page.verdict}">{page.verdict}</small></h1>'
     if page.report is not None:
         yield from _html_setup(page, page.report)
-        yield from _html_pairs(tuple(facts(page.report)))
+        yield from _html_pairs(tuple(summary_lines(page.report)))
     for caption, address in page.pictures:
-        yield f'<figure><img src="{escape(address, quote=True)}" alt="{_safe(caption)}">'
-        yield f"<figcaption>{_safe(caption)}</figcaption></figure>"
+        yield f'<figure><img src="{escape(address, quote=True)}" alt="{_escape(caption)}">'
+        yield f"<figcaption>{_escape(caption)}</figcaption></figure>"
     yield from _html_findings(page)
     if page.report is not None:
         for sheet in sheets(page.report):
@@ -1377,29 +1380,29 @@ def _html_lines(page: Page) -> Iterator[str]:
         yield from _html_pairs(setup_rows(page.setup))
     if page.report is not None and page.report.assumptions:
         yield "<h2>Assumptions</h2>\n<ul>"
-        yield from (f"<li>{_safe(words)}</li>" for words in page.report.assumptions)
+        yield from (f"<li>{_escape(words)}</li>" for words in page.report.assumptions)
         yield "</ul>"
     yield "</body>\n</html>"
 
 
-def _html_setup(page: Page, report: Report) -> Iterator[str]:
+def _html_setup(page: ReportPage, report: Report) -> Iterator[str]:
     """What to take to the machine; printed it fills the first side."""
     if report.planned is None:
         return
     yield f'<section class="setup"><h2>{SETUP}</h2>'
     machine = () if page.setup is None else (("machine", page.setup.machine),)
-    yield from _html_pairs((*machine, *mounting(report)))
+    yield from _html_pairs((*machine, *mounting_lines(report)))
     if page.stock:
         yield f'<img src="{escape(page.stock, quote=True)}" alt="the stock and part zero">'
     for sheet in setup_sheets(report.planned):
         yield from _html_table(sheet, with_heads=True)
-    grave = gravest(page)
+    grave = gravest_findings(page)
     if grave:
         yield "<ul>"
         for item in grave[:SETUP_FINDINGS]:
-            place = f" ({_safe(item.where)})" if item.where else ""
+            place = f" ({_escape(item.where)})" if item.where else ""
             yield f'<li><span class="{item.severity}">{item.severity}</span>'
-            yield f"{place}: {_safe(item.message)}</li>"
+            yield f"{place}: {_escape(item.message)}</li>"
         if len(grave) > SETUP_FINDINGS:
             yield f"<li>and {len(grave) - SETUP_FINDINGS} more, below</li>"
         yield "</ul>"
@@ -1409,37 +1412,37 @@ def _html_setup(page: Page, report: Report) -> Iterator[str]:
 def _html_pairs(rows: tuple[tuple[str, str], ...]) -> Iterator[str]:
     yield '<table class="pairs">'
     for name, value in rows:
-        yield f'<tr><th scope="row">{_safe(name)}</th><td>{_safe(value)}</td></tr>'
+        yield f'<tr><th scope="row">{_escape(name)}</th><td>{_escape(value)}</td></tr>'
     yield "</table>"
 
 
-def _html_findings(page: Page) -> Iterator[str]:
+def _html_findings(page: ReportPage) -> Iterator[str]:
     if not page.findings:
         return
     yield "<h2>Findings</h2>\n<ul>"
     for item in page.findings[:HTML_ROWS]:
-        place = f" ({_safe(item.where)})" if item.where else ""
-        head = f'<span class="{_safe(item.severity)}">{_safe(item.severity)}</span>'
-        yield f"<li>{head} <code>{_safe(item.code)}</code>{place}: {_safe(item.message)}</li>"
+        place = f" ({_escape(item.where)})" if item.where else ""
+        head = f'<span class="{_escape(item.severity)}">{_escape(item.severity)}</span>'
+        yield f"<li>{head} <code>{_escape(item.code)}</code>{place}: {_escape(item.message)}</li>"
     yield "</ul>"
     yield from _html_more(len(page.findings), "findings")
 
 
-def _html_table(sheet: Sheet, *, with_heads: bool = False) -> Iterator[str]:
+def _html_table(sheet: ReportTable, *, with_heads: bool = False) -> Iterator[str]:
     """The table; `with_heads`: each cell knows its heading, for windows too narrow for columns."""
     kinds = ["" if n < sheet.words else ' class="number"' for n in range(len(sheet.heads))]
     heads = zip(kinds, sheet.heads, strict=True)
     yield '<div class="wide"><table class="rows">\n<thead><tr>'
-    yield "".join(f'<th scope="col"{kind}>{_safe(head)}</th>' for kind, head in heads)
+    yield "".join(f'<th scope="col"{kind}>{_escape(head)}</th>' for kind, head in heads)
     yield "</tr></thead>\n<tbody>"
     if with_heads:
         kinds = [
-            f'{kind} data-head="{_safe(head)}"'
+            f'{kind} data-head="{_escape(head)}"'
             for kind, head in zip(kinds, sheet.heads, strict=True)
         ]
     for row in sheet.rows[:HTML_ROWS]:
         cells = zip(kinds, row, strict=True)
-        yield f"<tr>{''.join(f'<td{kind}>{_safe(cell)}</td>' for kind, cell in cells)}</tr>"
+        yield f"<tr>{''.join(f'<td{kind}>{_escape(cell)}</td>' for kind, cell in cells)}</tr>"
     yield "</tbody>\n</table></div>"
     yield from _html_more(len(sheet.rows), sheet.noun)
 

@@ -38,9 +38,9 @@ from camtool.toolpath.moves import Toolpath
 from camtool.toolpath.rapids import STOCK_TOP_MM
 from camtool.toolpath.wanted import ProtectedRegion
 from camtool.verification.case import VerifyOptions
-from camtool.verification.cuts import CutMoves, moved_lengths
+from camtool.verification.cuts import CutMoves, row_lengths
 from camtool.verification.findings import OVERCUT
-from camtool.verification.slides import Trace
+from camtool.verification.slides import SlideTrace
 
 SHAPE_TOLERANCE_MM = 5e-4
 """The tolerance of chords, at most ..."""
@@ -48,7 +48,7 @@ SHAPE_TOLERANCE_MM = 5e-4
 TOLERANCE_SHARE = 2e-3
 """... and at most this share of the tool's radius."""
 
-FEWEST_QUARTER = 8
+MIN_QUARTER_CHORDS = 8
 """A quarter of the tool's edge has at least this many chords."""
 
 KEPT_SHARE = 0.25
@@ -60,16 +60,16 @@ KEPT_SLACK_MM = 1e-3
 DEPTH_SPACING_MM = 0.02
 """The depth of a strip is measured at points no farther apart than this ..."""
 
-MOST_PLACES = 20_000
+MAX_DEPTH_POINTS = 20_000
 """... but at no more than about this many points."""
 
 OVERCUT_MM = 0.005
 """A plan that cuts into what must stay by more than this is an error."""
 
-MOST_MOVES = 10_000
+MAX_MOVES = 10_000
 """Programs of more cutting moves get no shape: to sweep them would take longest of all ..."""
 
-MOST_POINTS = 200_000
+MAX_POINTS = 200_000
 """... and so do programs whose path would need more points than this."""
 
 
@@ -80,7 +80,7 @@ MAX_SLIDE_SAMPLES = 200_000
 """... but at no more than about this many points."""
 
 
-class Shape(Struct, frozen=True):
+class MachinedShape(Struct, frozen=True):
     """The machined shape against the wanted shape, mm and mm²; `tolerance_mm` of the chords."""
 
     diameter_mm: float
@@ -116,7 +116,7 @@ class Cutter(Struct, frozen=True):
     def quarter(self) -> int:
         """Number of chords of a quarter of its edge."""
         sagitta = max(1.0 - self.tolerance_mm / (0.5 * self.diameter_mm), 0.0)
-        return max(FEWEST_QUARTER, math.ceil(0.25 * math.pi / math.acos(sagitta)))
+        return max(MIN_QUARTER_CHORDS, math.ceil(0.25 * math.pi / math.acos(sagitta)))
 
 
 def cutter_of(options: VerifyOptions, cuts: CutMoves) -> Cutter | None:
@@ -137,18 +137,18 @@ def points_wanted(decoded: CutMoves, cutter: Cutter | None) -> int | None:
     one at the end of each move.
     """
     arcs = decoded.segments.is_arc
-    if cutter is None or len(decoded.rows) > MOST_MOVES:
+    if cutter is None or len(decoded.rows) > MAX_MOVES:
         return None
     points = 2 * len(decoded.toolpath)
     if arcs.any():
         least = float(decoded.segments.radius[arcs].min())
         chord = math.sqrt(8.0 * least * cutter.tolerance_mm)
-        length = float(moved_lengths(decoded.toolpath).sum())
+        length = float(row_lengths(decoded.toolpath).sum())
         points += math.ceil(4.0 * length / chord)
-    return points if points <= MOST_POINTS else None
+    return points if points <= MAX_POINTS else None
 
 
-class Wanted(Struct, frozen=True, eq=False):
+class WantedShape(Struct, frozen=True, eq=False):
     """What a tool should remove, as a region of shapely; how deep (mm) the wanted path itself cuts
     into what must stay, and where."""
 
@@ -160,22 +160,22 @@ class Wanted(Struct, frozen=True, eq=False):
 
 def wanted_shape(
     cuts: CutMoves, cutter: Cutter, kept: Sequence[ProtectedRegion] = ()
-) -> Wanted | None:
+) -> WantedShape | None:
     """What the tool covers along the wanted moves; with `kept`, what it covers along its runs,
     without what must stay. None when nothing is cut."""
     import shapely
 
     if not kept:
-        lines = _chords(cuts.segments, cuts.ends_z, cutter.tolerance_mm)
-        region = _swept(lines, cutter)
-        return None if region is None else Wanted(cutter, region, 0.0, (0.0, 0.0))
+        lines = _chord_lines(cuts.segments, cuts.ends_z, cutter.tolerance_mm)
+        region = _swept_area(lines, cutter)
+        return None if region is None else WantedShape(cutter, region, 0.0, (0.0, 0.0))
     left, taken = [], []
     for each in kept:
-        lines = _chords(*_moves(each, cutter), cutter.tolerance_mm)
-        region = _swept(lines, cutter)
+        lines = _chord_lines(*_cutting_moves(each, cutter), cutter.tolerance_mm)
+        region = _swept_area(lines, cutter)
         if region is None:
             continue
-        solid = _solid(each, region, cutter.tolerance_mm)
+        solid = _protected_area(each, region, cutter.tolerance_mm)
         into = shapely.intersection(region, solid)
         left.append(region if into.is_empty else shapely.difference(region, solid))
         taken.append(into)
@@ -183,12 +183,12 @@ def wanted_shape(
         return None
     wanted = left[0] if len(left) == 1 else shapely.union_all(left)
     # What must stay for one operation may be removed by another.
-    _, depth, at = _beyond(shapely.union_all(taken), wanted, cutter.tolerance_mm)
-    return Wanted(cutter, wanted, depth, at)
+    _, depth, at = _area_outside(shapely.union_all(taken), wanted, cutter.tolerance_mm)
+    return WantedShape(cutter, wanted, depth, at)
 
 
 def overcut_findings(
-    wanted: Wanted | None, planned: Collection[Code | TargetCode]
+    wanted: WantedShape | None, planned: Collection[Code | TargetCode]
 ) -> Iterator[Finding]:
     """OVERCUT for a plan that cuts into what must stay, unless GOUGE is among the codes of its
     findings already."""
@@ -198,20 +198,24 @@ def overcut_findings(
     yield OVERCUT(where=f"near ({x:.3f}, {y:.3f}) mm", measured=wanted.beyond_mm, limit=OVERCUT_MM)
 
 
-def machined_shape(trace: Trace, motion: CommandedMotion, wanted: Wanted) -> Shape | None:
+def machined_shape(
+    trace: SlideTrace, motion: CommandedMotion, wanted: WantedShape
+) -> MachinedShape | None:
     """Compare what the tool covers along the trace of a motion with what it should cover; None
     when nothing is cut."""
     cutter, tolerance = wanted.cutter, wanted.cutter.tolerance_mm
     runs = _runs(trace) if cutter.nose is None else _rows_with_heights(trace, motion)
-    made = _swept(_simplified(runs, cutter), cutter)
+    made = _swept_area(_simplify_runs(runs, cutter), cutter)
     if made is None:
         return None
-    over_mm2, over_mm, _ = _beyond(made, wanted.region, tolerance)
-    under_mm2, under_mm, _ = _beyond(wanted.region, made, tolerance)
-    return Shape(cutter.diameter_mm, over_mm2, over_mm, under_mm2, under_mm, tolerance)
+    over_mm2, over_mm, _ = _area_outside(made, wanted.region, tolerance)
+    under_mm2, under_mm, _ = _area_outside(wanted.region, made, tolerance)
+    return MachinedShape(cutter.diameter_mm, over_mm2, over_mm, under_mm2, under_mm, tolerance)
 
 
-def _beyond(one: Any, other: Any, tolerance: float) -> tuple[float, float, tuple[float, float]]:
+def _area_outside(
+    one: Any, other: Any, tolerance: float
+) -> tuple[float, float, tuple[float, float]]:
     """Area (mm²) of `one` outside `other`, its depth (mm) and its place; 0 for depths within the
     tolerance of chords."""
     import shapely
@@ -220,12 +224,12 @@ def _beyond(one: Any, other: Any, tolerance: float) -> tuple[float, float, tuple
     if rest.is_empty:
         return 0.0, 0.0, (0.0, 0.0)
     # A strip may be deeper between its corners than at them.
-    dense = shapely.segmentize(rest, max(rest.length / MOST_PLACES, DEPTH_SPACING_MM))
+    dense = shapely.segmentize(rest, max(rest.length / MAX_DEPTH_POINTS, DEPTH_SPACING_MM))
     places = shapely.get_coordinates(dense)
     nowhere = (0.0, 0.0)
     if len(shapely.get_coordinates(shapely.boundary(other))) == 0:
         return float(rest.area), math.inf, nowhere
-    tree = shapely.STRtree(_pieces(other))
+    tree = shapely.STRtree(_boundary_edges(other))
     shapely.prepare(other)  # newer versions of shapely do this themselves
     places = places[~shapely.intersects_xy(other, *places.T)]
     points = shapely.points(places)
@@ -237,7 +241,7 @@ def _beyond(one: Any, other: Any, tolerance: float) -> tuple[float, float, tuple
     return float(rest.area), depth, (x, y)
 
 
-def _pieces(region: Any) -> Any:
+def _boundary_edges(region: Any) -> Any:
     """The edges of the boundary of a region."""
     import shapely
 
@@ -257,7 +261,7 @@ class _Lines(Struct, frozen=True, eq=False):
     line: Ints
 
 
-def _swept(lines: _Lines, cutter: Cutter) -> Any:
+def _swept_area(lines: _Lines, cutter: Cutter) -> Any:
     """What the tool covers at the surface along lines; None without lines.
 
     Between two neighbouring points the radius of a V bit changes evenly: it covers the convex hull
@@ -297,7 +301,7 @@ class CommandedMotion(Struct, frozen=True, eq=False):
         return row, slide[:, :2], commanded[:, 2]
 
 
-def _runs(trace: Trace) -> list[tuple[Floats, Floats]]:
+def _runs(trace: SlideTrace) -> list[tuple[Floats, Floats]]:
     """Return the cutting runs of a trace, each as points (J, 2) mm with heights (J,) of 0, from
     the position before the run on."""
     which = np.flatnonzero(trace.cutting)
@@ -310,7 +314,7 @@ def _runs(trace: Trace) -> list[tuple[Floats, Floats]]:
     return found
 
 
-def _rows_with_heights(trace: Trace, motion: CommandedMotion) -> list[tuple[Floats, Floats]]:
+def _rows_with_heights(trace: SlideTrace, motion: CommandedMotion) -> list[tuple[Floats, Floats]]:
     """Return the cutting rows of a trace, each as points (J, 2) mm with their commanded heights
     (J,) mm; where the slides wait while the height changes, the row is divided before and behind.
 
@@ -346,7 +350,7 @@ def _lengths(points: Floats) -> Floats:
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
 
 
-def _simplified(runs: Sequence[tuple[Floats, Floats]], cutter: Cutter) -> _Lines:
+def _simplify_runs(runs: Sequence[tuple[Floats, Floats]], cutter: Cutter) -> _Lines:
     """Return runs as lines simplified within the tolerance; for a cutter without a nose divided at
     their corners.
 
@@ -387,7 +391,7 @@ def _off_chords(points: Floats) -> Floats:
     return np.asarray(np.hypot(*off.T))
 
 
-def _moves(kept: ProtectedRegion, cutter: Cutter) -> tuple[Segments, Floats]:
+def _cutting_moves(kept: ProtectedRegion, cutter: Cutter) -> tuple[Segments, Floats]:
     """The cutting moves of the runs, and the heights (K, 2) of their ends. Of equal moves at
     several heights one is enough, unless the tool is narrower
     at its tip."""
@@ -402,7 +406,7 @@ def _moves(kept: ProtectedRegion, cutter: Cutter) -> tuple[Segments, Floats]:
     return Segments.between(moves[:, :2], moves[:, 4:6], moves[:, 3]), moves[:, [2, 6]]
 
 
-def _solid(kept: ProtectedRegion, swept: Any, tolerance: float) -> Any:
+def _protected_area(kept: ProtectedRegion, swept: Any, tolerance: float) -> Any:
     """What must stay around a region: smaller than drawn by what shall be cut into it, and by
     `KEPT_SLACK_MM`."""
     import shapely
@@ -415,14 +419,14 @@ def _solid(kept: ProtectedRegion, swept: Any, tolerance: float) -> Any:
         areas = []
         for _, path in lines:
             segments = Segments.of(path)
-            ring = _chords(segments, np.zeros((len(segments), 2)), KEPT_SHARE * tolerance)
+            ring = _chord_lines(segments, np.zeros((len(segments), 2)), KEPT_SHARE * tolerance)
             areas.append(shapely.make_valid(shapely.Polygon(ring.points)))
         area = shapely.union_all(areas)
         region = shapely.union(region, area) if stays else shapely.difference(region, area)
     return shapely.buffer(region, -kept.into_mm - KEPT_SLACK_MM)
 
 
-def _chords(segments: Segments, ends_z: Floats, tolerance: float) -> _Lines:
+def _chord_lines(segments: Segments, ends_z: Floats, tolerance: float) -> _Lines:
     """Lines and arcs as chords, with the heights (K, 2) of their ends."""
     radius = np.where(segments.is_arc, segments.radius, 1.0)
     most = 2.0 * np.arccos(np.clip(1.0 - tolerance / np.maximum(radius, tolerance), -1.0, 1.0))

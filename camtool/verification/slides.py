@@ -25,16 +25,16 @@ from camtool.simulation.motion import Chunk
 from camtool.simulation.rows import block_of
 from camtool.toolpath.moves import Toolpath
 from camtool.verification.circles import (
-    UNSEEN,
-    BothWays,
-    Circle,
+    NO_FIGURES,
+    BidirectionalFigures,
     CircleFigures,
-    Pairs,
-    Reversing,
+    CirclePairs,
+    FullCircle,
+    ReversalFigures,
     circle_figures,
-    reversing,
+    reversal_figures,
 )
-from camtool.verification.cuts import CutMoves, moved_lengths
+from camtool.verification.cuts import CutMoves, row_lengths
 from camtool.verification.dimensions import SlideExtents
 from camtool.verification.figures import RowBlock, RowFigures, empty_columns
 from camtool.verification.matching import Match
@@ -51,9 +51,9 @@ BINS_KEPT = 64
 class SeenCircle(Struct, frozen=True, eq=False):
     """A circle, its figures, and its bins (720, 9) about the programmed centre."""
 
-    circle: Circle
+    circle: FullCircle
     figures: CircleFigures
-    reversing: Reversing
+    reversing: ReversalFigures
     bins: Floats
 
 
@@ -63,7 +63,7 @@ class Paths(Struct, frozen=True, eq=False):
 
     decoded: CutMoves
     wanted: CutMoves
-    circles: list[Circle]
+    circles: list[FullCircle]
     depth_mm: float
 
 
@@ -85,11 +85,11 @@ class SlidePass:
     ) -> None:
         self.rows, self.extents = results
         self.circles = paths.circles
-        self.circle_figures: list[CircleFigures] = [UNSEEN] * len(paths.circles)
-        self.reversing: list[Reversing | None] = [None] * len(paths.circles)
-        self.both_ways: list[BothWays] = []
+        self.circle_figures: list[CircleFigures] = [NO_FIGURES] * len(paths.circles)
+        self.reversing: list[ReversalFigures | None] = [None] * len(paths.circles)
+        self.both_ways: list[BidirectionalFigures] = []
         self.bins: dict[int, Floats] = {}
-        self._pairs = Pairs(paths.circles)
+        self._pairs = CirclePairs(paths.circles)
         self._cuts, self._is_cut = paths.decoded, paths.decoded.is_cut
         self._first, self._last = _rows_of_circles(match.circle, len(paths.circles))
         self._slot = _slots(self._first, self._last)
@@ -137,7 +137,7 @@ class SlidePass:
             self.rows.books.add(ledger, self._is_cut)
             progress.done = high
 
-    def finish(self) -> Trace:
+    def finish(self) -> SlideTrace:
         """End of the motion: evaluate what remains; the path of the slides, thinned."""
         self._close(len(self._is_cut))
         self._sum_up()
@@ -166,7 +166,7 @@ class SlidePass:
             bins = self._sums.bins[self._slot[circle]]
             one = self.circles[circle]
             self.circle_figures[circle] = circle_figures(bins, one.radius_mm)
-            self.reversing[circle] = reversing(bins, one.ccw)
+            self.reversing[circle] = reversal_figures(bins, one.ccw)
             self.both_ways += self._pairs.add(circle, bins)
             if len(self.bins) < BINS_KEPT:
                 self.bins[circle] = bins.copy()
@@ -358,7 +358,7 @@ def shapes(cuts: CutMoves, low: int, high: int) -> Shapes:
 # sample of each row (`camtool.kernels.judging`).
 
 
-class Trace(Struct, frozen=True, eq=False):
+class SlideTrace(Struct, frozen=True, eq=False):
     """T positions of the slides in order: `points` (T, 2) mm, `error_mm` (T,) from the wanted
     moves (0 where nothing is cut), `row` (T,) of the decoded toolpath, `cutting` (T,)."""
 
@@ -381,14 +381,14 @@ def trace_size(decoded: Toolpath, spacing_mm: float, most: int) -> TraceSize:
     """A stride for samples about `spacing_mm` apart that keeps about half of `most` points."""
     if most == 0:
         return TraceSize(decoded.start[None, :2], 0, 1)
-    lengths = moved_lengths(decoded)
+    lengths = row_lengths(decoded)
     lengths += decoded.by_parts(lambda part: np.abs(part.end[:, 2] - part.starts[:, 2]))
     expected = float(lengths.sum()) / spacing_mm
     stride = max(1, int(np.ceil(2.0 * expected / most)))
     return TraceSize(decoded.start[None, :2], stride, most)
 
 
-def trace_of(sums: Sums, start: Floats, cutting: Bools, most: int) -> Trace:
+def trace_of(sums: Sums, start: Floats, cutting: Bools, most: int) -> SlideTrace:
     """The start (1, 2) mm and the samples that the judge kept, none for a stride of 0. Where they
     are more than `most` (more rows than points), runs of them are reduced to the sample with the
     largest error. `cutting` (N,): the rows that cut."""
@@ -407,4 +407,4 @@ def trace_of(sums: Sums, start: Floats, cutting: Bools, most: int) -> Trace:
     kept[first] = (*start[0], 0.0, 0.0)
     row = kept[:, 3].astype(np.int64)
     shown = np.append(cutting, False)[np.where(first, -1, row)]
-    return Trace(kept[:, :2].copy(), kept[:, 2].copy(), row, shown)
+    return SlideTrace(kept[:, :2].copy(), kept[:, 2].copy(), row, shown)

@@ -33,9 +33,9 @@ from camtool.toolpath.moves import Toolpath, toolpath_extents
 from camtool.units import UM_PER_MM
 from camtool.verification import report as record
 from camtool.verification.case import SAMPLE_MM, TRACE_POINTS, Case, VerifyOptions
-from camtool.verification.circles import UNSEEN, full_circles
-from camtool.verification.coverage import Coverage, Side, cover, cut_other_way
-from camtool.verification.cuts import CutMoves, is_flat, loops, moved_lengths
+from camtool.verification.circles import NO_FIGURES, full_circles
+from camtool.verification.coverage import Coverage, Side, cover, direction_findings
+from camtool.verification.cuts import CutMoves, is_flat, loops, row_lengths
 from camtool.verification.dimensions import (
     LoopedCuts,
     SlideExtents,
@@ -48,19 +48,26 @@ from camtool.verification.figures import (
     contour_names,
     tally_of,
 )
-from camtool.verification.matching import Goal, carried_match, own_match
+from camtool.verification.matching import Goal, match_through_compensation, own_match
 from camtool.verification.motion_findings import motion_findings
-from camtool.verification.report import Before, Planned, Report, certain, number, reported
+from camtool.verification.report import (
+    Before,
+    Planned,
+    Report,
+    finding_reports,
+    rounded,
+    rounded_or_none,
+)
 from camtool.verification.shape import (
     CommandedMotion,
+    WantedShape,
     cutter_of,
     machined_shape,
     overcut_findings,
     points_wanted,
     wanted_shape,
 )
-from camtool.verification.shape import Wanted as WantedShape
-from camtool.verification.slides import Paths, SeenCircle, SlidePass, Trace, trace_size
+from camtool.verification.slides import Paths, SeenCircle, SlidePass, SlideTrace, trace_size
 
 if TYPE_CHECKING:
     from camtool.verification.conformance import Conformance
@@ -75,7 +82,7 @@ class Verification:
     (N,), −1 for none, and full circles."""
 
     report: Report
-    trace: Trace
+    trace: SlideTrace
     findings: tuple[Finding, ...]
     rows: RowFigures
     wanted: CutMoves
@@ -108,7 +115,7 @@ def judge(
 ) -> Verification:
     """Judge a case by the chunks of its motion, or by a run that is judged as it is simulated."""
     progress = progress or Progress()
-    paths, coverage, conformance, turned = _compared(case)
+    paths, coverage, conformance, turned = _compare_cuts(case)
     cuts, wanted = paths.decoded, paths.wanted
     cutter = cutter_of(case.options, cuts) if case.options.shape else None
     shape_points = points_wanted(cuts, cutter)
@@ -116,7 +123,7 @@ def judge(
     # and is the same whether there are any.
     least = max(shape_points, TRACE_POINTS) if shape_points else 0
     points = max(case.options.trace_points, least)
-    own, looped = _looped(case, paths)
+    own, looped = _with_loops(case, paths)
     sizes_of = SlideExtents(case.decoded.start, own, looped, coverage.match)
     steps_mm = case.machine.axes.x.coded_step_mm, case.machine.axes.y.coded_step_mm
     worst, keep = case.options.worst, case.options.keep_ledger
@@ -139,13 +146,13 @@ def judge(
     planned = () if case.wanted is None else case.wanted.findings
     overcut = overcut_findings(shape, {finding.code for finding in planned})
     findings = _all_findings(case, coverage, conformance, (*turned, *motion_faults, *overcut))
-    result = Result(case, cuts, looped, coverage, slides, tally, conformance)
+    result = ReportBuilder(case, cuts, looped, coverage, slides, tally, conformance)
     report = result.report(extents, findings, trace, shape)
     follows = coverage.match.row
     return Verification(report, trace, findings, rows, wanted, follows, slides.seen())
 
 
-def _compared(
+def _compare_cuts(
     case: Case,
 ) -> tuple[Paths, Coverage, Conformance | None, tuple[Finding, ...]]:
     """What the slides are judged by, and what is known without them: coverage, conformance, and
@@ -161,12 +168,12 @@ def _compared(
     # What conformance or registration found with its own tolerance is not found again.
     is_judged = case.registration is None and not (conformance and conformance.place)
     coverage = _coverage(case, (decoded, wanted), goal, flat_cuts=flat_cuts, is_judged=is_judged)
-    turned = _turned(case, decoded, wanted, flat_cuts=flat_cuts)
+    turned = _direction_findings(case, decoded, wanted, flat_cuts=flat_cuts)
     paths = Paths(decoded.cuts, wanted.cuts, circles, case.depth_mm)
     return paths, coverage, conformance, turned
 
 
-def _looped(case: Case, paths: Paths) -> tuple[LoopedCuts, LoopedCuts]:
+def _with_loops(case: Case, paths: Paths) -> tuple[LoopedCuts, LoopedCuts]:
     """The decoded and the wanted cuts with their loops."""
     own = LoopedCuts(paths.decoded, loops(paths.decoded, case.coverage_mm))
     if paths.wanted is paths.decoded:
@@ -189,10 +196,14 @@ def _coverage(
     coverage = cover(decoded, wanted, programmed, SAMPLE_MM, own, is_judged=is_judged)
     if case.compensated is None:
         return coverage
-    return replace(coverage, match=carried_match(coverage.match, case.compensated.row, goal))
+    return replace(
+        coverage, match=match_through_compensation(coverage.match, case.compensated.row, goal)
+    )
 
 
-def _turned(case: Case, decoded: Side, wanted: Side, *, flat_cuts: bool) -> tuple[Finding, ...]:
+def _direction_findings(
+    case: Case, decoded: Side, wanted: Side, *, flat_cuts: bool
+) -> tuple[Finding, ...]:
     """Return CUT_OTHER_WAY for contours that are cut against the moves they were written from."""
     if case.written_from is None:
         return ()
@@ -200,7 +211,7 @@ def _turned(case: Case, decoded: Side, wanted: Side, *, flat_cuts: bool) -> tupl
     if wanted.toolpath is not case.written_from:
         source = Side.of(case.written_from, flat_cuts=flat_cuts)
     limits = case.coverage_mm, case.depth_mm
-    return tuple(cut_other_way(decoded.moves, source.moves, limits, SAMPLE_MM, case.row_from))
+    return tuple(direction_findings(decoded.moves, source.moves, limits, SAMPLE_MM, case.row_from))
 
 
 def _conformance(case: Case, *, flat_cuts: bool) -> Conformance | None:
@@ -236,7 +247,7 @@ def _all_findings(
 # The results as the report's record: mm to µm, NaN to null.
 
 
-class Result(Struct, frozen=True, eq=False):
+class ReportBuilder(Struct, frozen=True, eq=False):
     """The results of all stages, from which the report is made."""
 
     case: Case
@@ -251,7 +262,7 @@ class Result(Struct, frozen=True, eq=False):
         self,
         extents: Floats,
         findings: tuple[Finding, ...],
-        trace: Trace,
+        trace: SlideTrace,
         shape: WantedShape | None = None,
     ) -> Report:
         """The report; `extents` (3, 2) mm of the decoded toolpath, `trace` of the slides, and the
@@ -259,7 +270,7 @@ class Result(Struct, frozen=True, eq=False):
         case, tally = self.case, self.tally
         options = case.options
         link_s = case.machine.link.seconds(options.line_bytes or 0, tally.time_s)
-        x, y, z = ((certain(low), certain(high)) for low, high in extents)
+        x, y, z = ((rounded(low), rounded(high)) for low, high in extents)
         return Report(
             target=case.machine.target.name,
             source=options.source,
@@ -267,14 +278,14 @@ class Result(Struct, frozen=True, eq=False):
             blocks=_blocks(case),
             bytes=options.size_bytes,
             extents_mm=record.ExtentsMm(x=x, y=y, z=z),
-            time_s=certain(tally.time_s + link_s),
+            time_s=rounded(tally.time_s + link_s),
             steps=_steps(tally),
             reversals=_reversals(tally),
             error_um=self._errors(),
-            closure_um=number(self.slides.extents.closure_mm, UM_PER_MM),
+            closure_um=rounded_or_none(self.slides.extents.closure_mm, UM_PER_MM),
             dimensions=self._dimensions(),
             circles=self._circles(),
-            findings=reported(findings),
+            findings=finding_reports(findings),
             contours=self.cuts.contour_count,
             time_split_s=_time_split(tally, link_s),
             interpolator=_interpolator(case),
@@ -297,22 +308,22 @@ class Result(Struct, frozen=True, eq=False):
             fit=self._fit(),
             rounding=_max_rms(self.coverage.rounding),
             interpolation=record.InterpolationFigures(
-                max=number(inside.max, UM_PER_MM),
-                rms=number(inside.rms, UM_PER_MM),
-                p95=number(inside.p95, UM_PER_MM),
-                lines_max=number(rows.lines_mm, UM_PER_MM),
-                arcs_max=number(rows.arcs_mm, UM_PER_MM),
-                lines_steps=number(rows.lines_mm / step),
-                arcs_steps=number(rows.arcs_mm / step),
+                max=rounded_or_none(inside.max, UM_PER_MM),
+                rms=rounded_or_none(inside.rms, UM_PER_MM),
+                p95=rounded_or_none(inside.p95, UM_PER_MM),
+                lines_max=rounded_or_none(rows.lines_mm, UM_PER_MM),
+                arcs_max=rounded_or_none(rows.arcs_mm, UM_PER_MM),
+                lines_steps=rounded_or_none(rows.lines_mm / step),
+                arcs_steps=rounded_or_none(rows.arcs_mm / step),
             ),
             mechanics=_max_rms(rows.lag),
             total=record.ErrorFigures(
-                number(total.max, UM_PER_MM),
-                number(total.rms, UM_PER_MM),
-                number(total.p95, UM_PER_MM),
-                number(rows.mean_mm, UM_PER_MM),
+                rounded_or_none(total.max, UM_PER_MM),
+                rounded_or_none(total.rms, UM_PER_MM),
+                rounded_or_none(total.p95, UM_PER_MM),
+                rounded_or_none(rows.mean_mm, UM_PER_MM),
             ),
-            depth_max=number(_depth_error_mm(self.case, self.cuts), UM_PER_MM),
+            depth_max=rounded_or_none(_depth_error_mm(self.case, self.cuts), UM_PER_MM),
         )
 
     def _fit(self) -> record.MaxRms:
@@ -322,24 +333,24 @@ class Result(Struct, frozen=True, eq=False):
         if self.case.wanted is None or drawn is None or not len(rows):
             return record.MaxRms()
         largest, rms = np.maximum(drawn.off_mm[rows] - drawn.datum_off_mm, 0.0).T
-        length = np.where(largest > 0.0, moved_lengths(self.goal.cuts.toolpath)[rows], 0.0)
+        length = np.where(largest > 0.0, row_lengths(self.goal.cuts.toolpath)[rows], 0.0)
         mean = float((length * rms**2).sum()) / (float(length.sum()) or 1.0)
         return record.MaxRms(
-            certain(float(largest.max()) * UM_PER_MM), certain(math.sqrt(mean) * UM_PER_MM)
+            rounded(float(largest.max()) * UM_PER_MM), rounded(math.sqrt(mean) * UM_PER_MM)
         )
 
     def _off_um(self, off_mm: float) -> float | None:
         """A distance from the drawing; None where none is known."""
         known = self.case.wanted is not None and self.case.wanted.drawn is not None
-        return certain(off_mm * UM_PER_MM) if known else None
+        return rounded(off_mm * UM_PER_MM) if known else None
 
-    def _dimensions(self) -> tuple[record.Dimension, ...]:
+    def _dimensions(self) -> tuple[record.DimensionReport, ...]:
         return tuple(
-            record.Dimension(
+            record.DimensionReport(
                 name=size.name,
-                nominal_mm=certain(size.nominal_mm),
-                predicted_mm=certain(size.predicted_mm),
-                error_percent=number(size.error_percent),
+                nominal_mm=rounded(size.nominal_mm),
+                predicted_mm=rounded(size.predicted_mm),
+                error_percent=rounded_or_none(size.error_percent),
                 of="edge" if size.of_edge else "centre",
             )
             for size in sizes(self.slides.extents, self.goal, self.case.coverage_mm)
@@ -350,17 +361,17 @@ class Result(Struct, frozen=True, eq=False):
         np.maximum.at(off_mm, match.circle, match.off_mm)  # the last one is for none, −1
         return tuple(
             record.CircleReport(
-                centre_mm=(certain(circle.centre_mm[0]), certain(circle.centre_mm[1])),
-                radius_mm=certain(circle.radius_mm),
-                G_um=number(figures.circular_mm, UM_PER_MM),
-                Fmax_um=number(figures.radial_max_mm, UM_PER_MM),
-                Fmin_um=number(figures.radial_min_mm, UM_PER_MM),
-                D_um=number(figures.radial_mean_mm, UM_PER_MM),
+                centre_mm=(rounded(circle.centre_mm[0]), rounded(circle.centre_mm[1])),
+                radius_mm=rounded(circle.radius_mm),
+                G_um=rounded_or_none(figures.circular_mm, UM_PER_MM),
+                Fmax_um=rounded_or_none(figures.radial_max_mm, UM_PER_MM),
+                Fmin_um=rounded_or_none(figures.radial_min_mm, UM_PER_MM),
+                D_um=rounded_or_none(figures.radial_mean_mm, UM_PER_MM),
                 direction="ccw" if circle.ccw else "cw",
-                z_mm=certain(circle.z_mm),
-                step_um=tuple(number(value, UM_PER_MM) for value in turned.step),
-                spike_um=tuple(number(value, UM_PER_MM) for value in turned.spike),
-                B_um=tuple(number(value, UM_PER_MM) for value in turned.value),
+                z_mm=rounded(circle.z_mm),
+                step_um=tuple(rounded_or_none(value, UM_PER_MM) for value in turned.step),
+                spike_um=tuple(rounded_or_none(value, UM_PER_MM) for value in turned.spike),
+                B_um=tuple(rounded_or_none(value, UM_PER_MM) for value in turned.value),
                 fit_um=self._off_um(float(off_mm[k])),
             )
             for k, circle, figures, turned in zip(
@@ -370,16 +381,16 @@ class Result(Struct, frozen=True, eq=False):
                 self.slides.reversing,
                 strict=True,
             )
-            if figures is not UNSEEN and turned is not None
+            if figures is not NO_FIGURES and turned is not None
         )
 
     def _both_ways(self) -> tuple[record.BothWaysReport, ...]:
         return tuple(
             record.BothWaysReport(
-                centre_mm=(certain(one.circle.centre_mm[0]), certain(one.circle.centre_mm[1])),
-                radius_mm=certain(one.circle.radius_mm),
-                Gb_um=number(one.circular_mm, UM_PER_MM),
-                D_um=number(one.radial_mean_mm, UM_PER_MM),
+                centre_mm=(rounded(one.circle.centre_mm[0]), rounded(one.circle.centre_mm[1])),
+                radius_mm=rounded(one.circle.radius_mm),
+                Gb_um=rounded_or_none(one.circular_mm, UM_PER_MM),
+                D_um=rounded_or_none(one.radial_mean_mm, UM_PER_MM),
             )
             for one in self.slides.both_ways
         )
@@ -389,13 +400,13 @@ class Result(Struct, frozen=True, eq=False):
         return tuple(
             record.ContourReport(
                 name=names[one.contour],
-                max_um=certain(one.max_mm * UM_PER_MM),
-                rms_um=certain(one.rms_mm * UM_PER_MM),
-                mean_um=certain(one.mean_mm * UM_PER_MM),
-                at_mm=(certain(one.at_mm[0]), certain(one.at_mm[1])),
+                max_um=rounded(one.max_mm * UM_PER_MM),
+                rms_um=rounded(one.rms_mm * UM_PER_MM),
+                mean_um=rounded(one.mean_mm * UM_PER_MM),
+                at_mm=(rounded(one.at_mm[0]), rounded(one.at_mm[1])),
                 block=_block(self.case, one.row),
-                interpolation_um=certain(one.interpolation_mm * UM_PER_MM),
-                mechanics_um=certain(one.mechanics_mm * UM_PER_MM),
+                interpolation_um=rounded(one.interpolation_mm * UM_PER_MM),
+                mechanics_um=rounded(one.mechanics_mm * UM_PER_MM),
                 fit_um=self._off_um(one.fit_mm),
             )
             for one in self.slides.rows.contours.figures()
@@ -406,10 +417,10 @@ class Result(Struct, frozen=True, eq=False):
             record.WorstReport(
                 block=_block(self.case, int(row)),
                 move=int(row) + 1,
-                at_mm=(certain(x), certain(y)),
-                total_um=certain(total_mm * UM_PER_MM),
-                interpolation_um=number(inner_mm, UM_PER_MM),
-                mechanics_um=number(lag_mm, UM_PER_MM),
+                at_mm=(rounded(x), rounded(y)),
+                total_um=rounded(total_mm * UM_PER_MM),
+                interpolation_um=rounded_or_none(inner_mm, UM_PER_MM),
+                mechanics_um=rounded_or_none(lag_mm, UM_PER_MM),
                 source=self._source(int(row)),
                 fit_um=self._off_um(float(self.coverage.match.off_mm[int(row)])),
             )
@@ -423,7 +434,7 @@ class Result(Struct, frozen=True, eq=False):
 
     def _unreached(self) -> record.UnreachedReport:
         missed = self.slides.rows.missed
-        return record.UnreachedReport(missed.count, certain(missed.most_mm * UM_PER_MM))
+        return record.UnreachedReport(missed.count, rounded(missed.most_mm * UM_PER_MM))
 
     def _asked(self) -> record.AskedReport | None:
         asked, conformance = self.case.asked, self.conformance
@@ -432,11 +443,11 @@ class Result(Struct, frozen=True, eq=False):
         return record.AskedReport(
             moves=conformance.moves,
             alike=conformance.alike,
-            off_um=certain(conformance.off_mm * UM_PER_MM),
-            limit_um=certain(asked.limits_mm[0] * UM_PER_MM),
+            off_um=rounded(conformance.off_mm * UM_PER_MM),
+            limit_um=rounded(asked.limits_mm[0] * UM_PER_MM),
         )
 
-    def _shape(self, trace: Trace, wanted: WantedShape | None) -> record.ShapeReport | None:
+    def _shape(self, trace: SlideTrace, wanted: WantedShape | None) -> record.ShapeReport | None:
         if wanted is None:
             return None
         case = self.case
@@ -445,11 +456,11 @@ class Result(Struct, frozen=True, eq=False):
         if shape is None:
             return None
         return record.ShapeReport(
-            tool_diameter_mm=certain(shape.diameter_mm),
-            overcut_mm2=certain(shape.overcut_mm2),
-            overcut_um=certain(shape.overcut_mm * UM_PER_MM),
-            undercut_mm2=certain(shape.undercut_mm2),
-            undercut_um=certain(shape.undercut_mm * UM_PER_MM),
+            tool_diameter_mm=rounded(shape.diameter_mm),
+            overcut_mm2=rounded(shape.overcut_mm2),
+            overcut_um=rounded(shape.overcut_mm * UM_PER_MM),
+            undercut_mm2=rounded(shape.undercut_mm2),
+            undercut_um=rounded(shape.undercut_mm * UM_PER_MM),
         )
 
 
@@ -489,7 +500,9 @@ def _block(case: Case, row: int) -> int | None:
 
 
 def _max_rms(figure: Figure) -> record.MaxRms:
-    return record.MaxRms(number(figure.max, UM_PER_MM), number(figure.rms, UM_PER_MM))
+    return record.MaxRms(
+        rounded_or_none(figure.max, UM_PER_MM), rounded_or_none(figure.rms, UM_PER_MM)
+    )
 
 
 @cache
@@ -508,18 +521,18 @@ def _blocks(case: Case) -> int | None:
     return highest + 1 if highest >= 0 else None
 
 
-def _steps(tally: Tally) -> record.Steps:
+def _steps(tally: Tally) -> record.StepCounts:
     x, y, z = tally.steps.tolist()
-    return record.Steps(x, y, z, tally.iterations)
+    return record.StepCounts(x, y, z, tally.iterations)
 
 
 def _time_split(tally: Tally, link_s: float) -> record.TimeSplit:
     return record.TimeSplit(
-        cutting=certain(tally.cutting_s),
-        air=certain(tally.air_s),
-        dwell=certain(tally.dwell_s),
-        compensation=certain(tally.compensation_s),
-        link=certain(link_s),
+        cutting=rounded(tally.cutting_s),
+        air=rounded(tally.air_s),
+        dwell=rounded(tally.dwell_s),
+        compensation=rounded(tally.compensation_s),
+        link=rounded(link_s),
     )
 
 

@@ -35,10 +35,10 @@ from camtool.simulation.rows import check_rows
 from camtool.simulation.samples import SampledRows, row_chunks, row_seconds
 from camtool.simulation.speed_plan import (
     FROM_REST,
-    Approach,
+    EntryState,
     SpeedPlan,
-    allowed_along,
     axis_limits,
+    max_along,
 )
 from camtool.toolpath.moves import Kind, Toolpath, are_arcs
 
@@ -312,7 +312,7 @@ def speeds_of(
     blocks: Blocks,
     path: Toolpath,
     machine: _Machine,
-    before: Approach,
+    before: EntryState,
     first: int,
     stops: Stops,
 ) -> SpeedPlan:
@@ -340,7 +340,7 @@ def speeds_of(
         turn = np.diff(units, axis=0, prepend=units[: 1 if low == 0 else 0])
         earlier = 0 if low == 0 else 1
         length, unit = lengths[earlier:], units[earlier:]
-        highest = allowed_along(rate, unit)
+        highest = max_along(rate, unit)
         row = blocks.row[at]
         cuts = (path.kind[row] >= Kind.LINE) & (path.kind[row] <= Kind.ARC_CCW)
         feed = np.where(cuts, path.feed[row], np.inf) / 60.0
@@ -348,13 +348,13 @@ def speeds_of(
         events = np.abs(blocks.way[at]).max(axis=1, initial=0)
         speed = np.maximum(speed, controller.least_step_hz * length / events)
         lengths_mm[at], speeds[at] = length, speed
-        along[at] = allowed_along(acceleration, unit)
+        along[at] = max_along(acceleration, unit)
         across = np.sqrt((turn**2).sum(axis=1))
         cosine = 0.5 * across**2 - 1.0  # of the angle between the way back and the way on
         half_sine = np.sqrt(np.clip(0.5 * (1.0 - cosine), 0.0, 1.0))
         turn /= np.where(across > 0.0, across, 1.0)[:, None]
         with np.errstate(divide="ignore", invalid="ignore"):
-            allowed = allowed_along(acceleration, turn)
+            allowed = max_along(acceleration, turn)
             square = allowed * controller.junction_deviation_mm * half_sine / (1.0 - half_sine)
         corner = np.sqrt(np.where(cosine < -STRAIGHT_COS, np.inf, square))
         corner[cosine > STRAIGHT_COS] = 0.0

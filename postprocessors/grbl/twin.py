@@ -26,7 +26,7 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.machine.model import Machine
 from camtool.records import replace
 from camtool.simulation.legs import coded_steps_mm
-from camtool.simulation.speed_plan import FROM_REST, allowed_along, axis_limits
+from camtool.simulation.speed_plan import FROM_REST, axis_limits, max_along
 from camtool.target.twin import Slides, Travel, Twin
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
@@ -1280,7 +1280,7 @@ class GrblTwin(Twin):
         plan = speeds_of(joined([last, own]), path, machine, FROM_REST, len(last), stops)
         ways = own.way * coded_steps_mm(machine)
         units = ways / np.linalg.norm(ways, axis=1)[:, None]
-        highest = allowed_along(axis_limits(machine, "max_rate_mm_min") / 60.0, units)
+        highest = max_along(axis_limits(machine, "max_rate_mm_min") / 60.0, units)
         self._last = own.part(len(own) - 1, len(own))
         for k in range(len(own)):
             while len(self._ring) >= controller.buffer_blocks - 1:

@@ -22,7 +22,7 @@ from camtool.arrays import Floats, Ints
 from camtool.kernels.lattice import to_steps
 from camtool.machine.model import Machine
 from camtool.simulation.controller import ControllerModel
-from camtool.simulation.legs import LegRun, Legs, Standing, check_rows, coded_steps_mm, waits_s
+from camtool.simulation.legs import LegProgram, LegRun, Legs, check_rows, coded_steps_mm, waits_s
 from camtool.simulation.motion import Chunk, Options
 from camtool.simulation.rows import refuse, with_ends
 from camtool.toolpath.moves import Toolpath
@@ -45,7 +45,7 @@ class I8751Model(ControllerModel[I8751Controller, I8751Dialect]):
         count = toolpath.executed_rows
         times = PulseTimes(machine.dialect)
         at = _in_steps(toolpath.start[None, :], machine)[0]
-        standing = Standing(at, waits_s(toolpath, count), float(times.periods_s[0]))
+        standing = LegProgram(at, waits_s(toolpath, count), float(times.periods_s[0]))
         blocks = _blocks(toolpath.first(count), machine, times)
         return LegRun(standing, machine, options).run(blocks)
 

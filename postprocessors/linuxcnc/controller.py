@@ -45,10 +45,10 @@ from camtool.simulation.samples import (
 )
 from camtool.simulation.speed_plan import (
     FROM_REST,
-    Approach,
+    EntryState,
     SpeedPlan,
-    allowed_along,
     axis_limits,
+    max_along,
 )
 from camtool.toolpath.moves import Kind, PathMode, PolarArcs, Toolpath, are_arcs, read_only
 
@@ -334,7 +334,7 @@ class LinuxcncSamples(CountedSamples):
 
 
 def _speeds(
-    planned: PlannedWindow, places: slice, modes: CornerModes, before: Approach
+    planned: PlannedWindow, places: slice, modes: CornerModes, before: EntryState
 ) -> tuple[Bools, SpeedPlan]:
     """Blends and moves as blocks of their own. At even places of all (2 M,) stands the blend
     before a move, then the move: which of them last and lie in `places`, and these.
@@ -631,7 +631,7 @@ def moves_of(tangents: Tangents, chain: Ints, rules: CornerRules) -> PlannerMove
     assert len(lead) == len(length)
     is_arc = path.is_arc[lead]
     begin = tangents.at_starts(lead)
-    highest, along = allowed_along(rules.rate, begin), allowed_along(rules.acceleration, begin)
+    highest, along = max_along(rules.rate, begin), max_along(rules.acceleration, begin)
     on = np.flatnonzero(is_arc)
     arm, limits = tangents.arm_of(lead[on]), (rules.rate, rules.acceleration)
     bend = np.zeros(len(lead))

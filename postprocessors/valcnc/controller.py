@@ -30,15 +30,15 @@ from camtool.records import replace
 from camtool.simulation.controller import ControllerModel
 from camtool.simulation.legs import (
     MAX_STEPS,
+    LegProgram,
     LegRun,
     Legs,
-    Standing,
     check_rows,
     coded_steps_mm,
     waits_s,
 )
 from camtool.simulation.motion import Chunk, Options
-from camtool.simulation.path import on_steps
+from camtool.simulation.path import round_to_steps
 from camtool.simulation.rows import block_of
 from camtool.toolpath.moves import Kind, Toolpath, read_only
 
@@ -76,7 +76,7 @@ class ValcncModel(ControllerModel[ValcncController, ValcncDialect]):
         """
         pieces = _Pieces(toolpath, machine)
         if machine.controller.rounding == "nearest":
-            return on_steps(toolpath, machine)
+            return round_to_steps(toolpath, machine)
         step_mm = coded_steps_mm(machine)
         start = pieces.in_steps(toolpath.start) * step_mm
         end = toolpath.by_parts(lambda part: pieces.in_steps(part.end) * step_mm)
@@ -89,7 +89,7 @@ class ValcncModel(ControllerModel[ValcncController, ValcncDialect]):
             kind, centre = whole.kind.copy(), whole.centre.copy()
             kind[lost], centre[lost] = Kind.LINE, np.nan
             whole = replace(whole, kind=kind, centre=centre)
-        return on_steps(whole, machine)
+        return round_to_steps(whole, machine)
 
     def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
         """Lines by the counter, arcs by lines."""
@@ -130,7 +130,7 @@ def _run(
 ) -> Iterator[Chunk]:
     period_s = 1.0 / machine.controller.step_rate_hz
     waits = waits_s(toolpath, toolpath.executed_rows)
-    standing = Standing(pieces.drawn.steps, waits, period_s)
+    standing = LegProgram(pieces.drawn.steps, waits, period_s)
     return LegRun(standing, machine, options).run(pieces.legs())
 
 

@@ -101,13 +101,13 @@ def test_what_exceeds_a_limit_is_red(coloured: None, capsys: pytest.CaptureFixtu
 def test_the_best_way_is_green_and_an_endless_one_red(
     coloured: None, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from camtool.verification.contrast import ContrastRow, table
+    from camtool.verification.contrast import ContrastRow, contrast_table
 
     rows = [
         ContrastRow(name, 1.0, 1.0, total, 1.0, None, 1, 1, endless, 1.0)
         for name, total, endless in (("a", 2.0, 0), ("b", 1.0, 0), ("c", 0.5, 1), ("d", None, 0))
     ]
-    plain = table(rows)
+    plain = contrast_table(rows)
     show_compared(plain, rows)
     shown = capsys.readouterr().out.encode()
     head, *lines = shown.splitlines()

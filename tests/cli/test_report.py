@@ -14,14 +14,14 @@ from camtool.importers.findings import DrawingCode
 from camtool.verification.report import (
     HTML_ROWS,
     PAGE_BYTES,
-    Changed,
-    Page,
+    ChangedValue,
+    ReportPage,
     Setup,
-    html,
-    markdown,
+    finding_reports,
     markdown_words,
+    page_html,
     page_json,
-    reported,
+    page_markdown,
 )
 from tests.cli.conftest import Run
 
@@ -56,13 +56,13 @@ def drawing(tmp_path: Path) -> Path:
     return file
 
 
-def sly_page(count: int = 3) -> Page:
+def sly_page(count: int = 3) -> ReportPage:
     """A page full of names that want to be more than words."""
     findings = [
         Finding(DrawingCode.UNITLESS, Severity.ERROR, f"{SLY}{n}", SLY) for n in range(count)
     ]
-    setup = Setup("m: " + SLY, "0" * 64, None, (Changed(SLY, SLY, SLY),), ((SLY, SLY),))
-    return Page(SLY, None, reported(findings), setup, ((SLY, "a b).svg"),))
+    setup = Setup("m: " + SLY, "0" * 64, None, (ChangedValue(SLY, SLY, SLY),), ((SLY, SLY),))
+    return ReportPage(SLY, None, finding_reports(findings), setup, ((SLY, "a b).svg"),))
 
 
 def test_html_is_one_page_without_scripts(camtool: Run, drawing: Path, tmp_path: Path) -> None:
@@ -204,14 +204,14 @@ def test_a_sly_layer_name_is_words_on_every_page(camtool: Run, tmp_path: Path) -
 
 
 def test_sly_names_are_words_in_html() -> None:
-    found = Tags(html(sly_page()))
+    found = Tags(page_html(sly_page()))
     assert "script" not in found.tags
     assert found.addresses == ["a b).svg"]
-    assert not [sign for sign in html(sly_page()) if ord(sign) in (0x202E, 0x1B)]
+    assert not [sign for sign in page_html(sly_page()) if ord(sign) in (0x202E, 0x1B)]
 
 
 def test_sly_names_are_words_in_markdown() -> None:
-    text = markdown(sly_page())
+    text = page_markdown(sly_page())
     assert not re.search(r"(?<!\\)<(?!!-- -->)", text)
     assert text.count("![") == 1  # the page's own picture
     assert "](a%20b%29.svg)" in text
@@ -223,24 +223,26 @@ def test_sly_names_are_words_in_markdown() -> None:
 
 def test_a_row_stays_one_row() -> None:
     assert markdown_words("a|b\nc") == "a\\|b\\\\nc"
-    rows = [line for line in markdown(sly_page()).splitlines() if line.startswith("| machine | ")]
+    rows = [
+        line for line in page_markdown(sly_page()).splitlines() if line.startswith("| machine | ")
+    ]
     (row,) = rows
     assert len(re.findall(r"(?<!\\)\|", row)) == 3
 
 
 def test_a_page_of_ten_thousand_findings_fits() -> None:
     page = sly_page(10_000)
-    text = markdown(page)
+    text = page_markdown(page)
     assert len(text.encode()) <= PAGE_BYTES + 100
     assert "and 9950 more findings" in text
-    assert f"and {10_000 - HTML_ROWS} more findings" in html(page)
+    assert f"and {10_000 - HTML_ROWS} more findings" in page_html(page)
     assert len(json.loads(page_json(page))["findings"]) == 10_000
 
 
 def test_a_page_that_is_too_long_says_so() -> None:
-    many = tuple(Changed(f"{n}{'€' * 190}", "1", "2") for n in range(1000))
-    page = Page("t", None, (), Setup("m", "0", None, many))
-    text = markdown(page)
+    many = tuple(ChangedValue(f"{n}{'€' * 190}", "1", "2") for n in range(1000))
+    page = ReportPage("t", None, (), Setup("m", "0", None, many))
+    text = page_markdown(page)
     assert len(text.encode()) <= PAGE_BYTES + 100
     assert text.endswith("would be too long.*\n")
-    assert "would be too long" not in markdown(Page("t", None, (), Setup("m", "0")))
+    assert "would be too long" not in page_markdown(ReportPage("t", None, (), Setup("m", "0")))

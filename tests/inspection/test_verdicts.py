@@ -19,7 +19,7 @@ from camtool.inspection.uncertainty import DRAWS, Variant
 from camtool.inspection.verdicts import SURE, Tolerances, inspect
 from camtool.records import replace
 from camtool.run import Run
-from camtool.verification.report import InspectedReport, facts, inspected_words
+from camtool.verification.report import InspectedReport, inspected_words, summary_lines
 
 KNOWN = (
     "uncertainty.x.backlash_mm=0.004",
@@ -270,7 +270,7 @@ def test_words_of_what_is_not_known(plate: Path) -> None:
     tight = dimension("diameter", (15.0, 20.0), limits=(-0.035, 0.035))
     done = inspect(at_room(plate), Tolerances((tight,)))
     assert done.report is not None
-    assert list(facts(done.report))[-1] == ("not known", f"temperature_k: if {WITHIN}")
+    assert list(summary_lines(done.report))[-1] == ("not known", f"temperature_k: if {WITHIN}")
     assert inspected_words(done.report.inspection[0]).endswith("; say part_expansion_per_k")
     (finding,) = [each for each in done.findings if each.code == InspectionCode.DIMENSION_NOT_IN]
     assert "does not say part_expansion_per_k, machine_expansion_per_k" in finding.message

@@ -8,8 +8,8 @@ import pytest
 from camtool.kernels.judging import ANGLE_BINS, bin_directions, empty_bins
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.verification.circles import (
-    UNSEEN,
-    Circle,
+    NO_FIGURES,
+    FullCircle,
     circle_figures,
     full_circles,
     least_squares_centre,
@@ -20,7 +20,7 @@ from tests.oracles.kernel_doors import fill_bins_
 
 GAP_MM = 0.005
 RADIUS = 1.5
-UNIT = Circle((2.0, 1.0), RADIUS, True, -0.02, 0, 0)
+UNIT = FullCircle((2.0, 1.0), RADIUS, True, -0.02, 0, 0)
 
 
 def ring(count: int, turns: float = 1.0) -> np.ndarray:
@@ -111,9 +111,9 @@ def test_parts_in_any_order_give_the_same() -> None:
 
 
 def test_too_few_angles_have_no_figures() -> None:
-    assert figures(np.empty((0, 2))) == UNSEEN
-    assert figures(ring(2)) == UNSEEN
-    assert figures(ring(ANGLE_BINS)) != UNSEEN
+    assert figures(np.empty((0, 2))) == NO_FIGURES
+    assert figures(ring(2)) == NO_FIGURES
+    assert figures(ring(ANGLE_BINS)) != NO_FIGURES
 
 
 def test_the_least_squares_centre_is_the_minimum() -> None:
@@ -132,14 +132,14 @@ def test_the_least_squares_centre_is_the_minimum() -> None:
         assert spread(centre) < spread(nearby)
 
 
-def found_in(b: ToolpathBuilder) -> list[Circle]:
+def found_in(b: ToolpathBuilder) -> list[FullCircle]:
     return full_circles(cut_moves(b.finish(), flat_cuts=False), GAP_MM)
 
 
 @pytest.mark.parametrize("ccw", [True, False])
 def test_a_full_circle_in_one_arc(ccw: bool) -> None:
     (one,) = found_in(circle(ToolpathBuilder(), 2.0, 1.0, 0.5, ccw=ccw))
-    assert one == Circle((2.0, 1.0), 0.5, ccw, -0.02, 3, 3)
+    assert one == FullCircle((2.0, 1.0), 0.5, ccw, -0.02, 3, 3)
 
 
 @pytest.mark.parametrize("parts", [2, 3, 4])

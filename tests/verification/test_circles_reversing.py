@@ -5,7 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from camtool.verification.circles import FAR_BINS, NEAR_BINS, Circle, Pairs, reversing
+from camtool.verification.circles import (
+    FAR_BINS,
+    NEAR_BINS,
+    CirclePairs,
+    FullCircle,
+    reversal_figures,
+)
 
 RADIUS = 5.0
 
@@ -39,7 +45,7 @@ def travel(ccw: bool, count: int = 72_000) -> tuple[np.ndarray, np.ndarray, np.n
 def test_play_is_found_again(ccw: bool, x: float, y: float) -> None:
     _, points, way = travel(ccw)
     # Slides that lag by half the play, at once.
-    found = reversing(bins_of(points - 0.5 * way * np.array([x, y])), ccw)
+    found = reversal_figures(bins_of(points - 0.5 * way * np.array([x, y])), ccw)
     assert found.value == pytest.approx((x, y), abs=2e-4)
     assert found.step[0] == pytest.approx(x, rel=0.02, abs=2e-4)
     assert found.step[2] == pytest.approx(x, rel=0.02, abs=2e-4)
@@ -53,34 +59,34 @@ def test_a_spike_is_seen_where_it_is(degrees: int, height: float) -> None:
     angle, points, _ = travel(True)
     apart = np.degrees(np.abs(np.angle(np.exp(1j * (angle - math.radians(degrees))))))
     points = points * (1.0 + height / RADIUS * np.maximum(0.0, 1.0 - apart))[:, None]
-    spikes = reversing(bins_of(points), True).spike
+    spikes = reversal_figures(bins_of(points), True).spike
     assert spikes[degrees // 90] == pytest.approx(height, rel=0.02)
     for other in (90, 180, 270):
         assert spikes[(degrees + other) % 360 // 90] == pytest.approx(0.0, abs=1e-6)
 
 
 def test_a_true_circle_turns_without_a_trace() -> None:
-    found = reversing(bins_of(travel(True)[1]), True)
+    found = reversal_figures(bins_of(travel(True)[1]), True)
     numbers = (*found.step, *found.spike, *found.value)
     assert numbers == pytest.approx([0.0] * 10, abs=1e-6)
 
 
 def test_half_a_circle_says_what_it_can() -> None:
     angle, points, _ = travel(True)
-    found = reversing(bins_of(points[np.sin(angle) > 0.0]), True)
+    found = reversal_figures(bins_of(points[np.sin(angle) > 0.0]), True)
     assert math.isnan(found.step[0])
     assert found.step[1] == pytest.approx(0.0, abs=1e-6)
-    nothing = reversing(bins_of(points[:1]), True)
+    nothing = reversal_figures(bins_of(points[:1]), True)
     assert all(math.isnan(number) for number in (*nothing.step, *nothing.spike, *nothing.value))
 
 
-def circle(ccw: bool, radius: float = RADIUS, x: float = 0.0) -> Circle:
-    return Circle((x, 0.0), radius, ccw, -1.0, 0, 0)
+def circle(ccw: bool, radius: float = RADIUS, x: float = 0.0) -> FullCircle:
+    return FullCircle((x, 0.0), radius, ccw, -1.0, 0, 0)
 
 
 def test_both_ways_round() -> None:
     ways = [bins_of(travel(ccw)[1] * scale) for ccw, scale in ((True, 1.002), (False, 0.999))]
-    pairs = Pairs([circle(True), circle(False)])
+    pairs = CirclePairs([circle(True), circle(False)])
     assert pairs.add(0, ways[0]) == []
     (both,) = pairs.add(1, ways[1])
     assert both.circular_mm == pytest.approx(RADIUS * 0.003, rel=1e-3)
@@ -90,8 +96,8 @@ def test_both_ways_round() -> None:
 @pytest.mark.parametrize(
     "other", [circle(True), circle(False, x=1.0), circle(False, radius=6.0)], ids=str
 )
-def test_circles_that_are_no_pair(other: Circle) -> None:
-    pairs = Pairs([circle(True), other])
+def test_circles_that_are_no_pair(other: FullCircle) -> None:
+    pairs = CirclePairs([circle(True), other])
     bins = bins_of(travel(True)[1])
     assert pairs.add(0, bins) == []
     assert pairs.add(1, bins) == []
@@ -99,7 +105,7 @@ def test_circles_that_are_no_pair(other: Circle) -> None:
 
 def test_each_circle_has_one_partner() -> None:
     bins = bins_of(travel(True)[1])
-    pairs = Pairs([circle(True), circle(True), circle(False)])
+    pairs = CirclePairs([circle(True), circle(True), circle(False)])
     assert [len(pairs.add(index, bins)) for index in range(3)] == [0, 0, 1]
 
 
@@ -116,4 +122,4 @@ def test_steps_are_those_of_lines_by_least_squares() -> None:
     ahead, behind = (
         np.polyfit(away + 0.5, of_arc * radius[row], 1)[1] for row in (away, -1 - away)
     )
-    assert reversing(bins, True).step[0] == pytest.approx(ahead - behind, rel=1e-9)
+    assert reversal_figures(bins, True).step[0] == pytest.approx(ahead - behind, rel=1e-9)

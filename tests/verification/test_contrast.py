@@ -5,7 +5,7 @@ import pytest
 
 from camtool.simulation.motion import Chunk, one_row
 from camtool.verification import contrast
-from camtool.verification.contrast import paths_within, row_of, table, to_json
+from camtool.verification.contrast import contrast_row, contrast_table, paths_within, to_json
 from tests.oracles.judged import judged, sample_part
 
 WINDOW = np.array([[0.0, 1.0], [0.0, 1.0]])
@@ -51,7 +51,7 @@ def test_slides_are_taken_unless_commanded_positions_are_asked_for() -> None:
 
 
 def test_pictures_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(contrast, "MOST_SHOWN", 7)
+    monkeypatch.setattr(contrast, "MAX_SHOWN_SAMPLES", 7)
     points = [(0.01 * number, 0.5) for number in range(50)]
     runs = paths_within(chunks_of(points, [0] * 50, 3), CUTS, WINDOW, commanded=True)
     assert sum(len(run) for run in runs) == 7
@@ -59,9 +59,11 @@ def test_pictures_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_table_and_its_json_say_the_same() -> None:
     part = sample_part().finish()
-    row = row_of("as it is", judged(part, part, lambda p: p + np.array([0.003, 0.004])).report)
+    row = contrast_row(
+        "as it is", judged(part, part, lambda p: p + np.array([0.003, 0.004])).report
+    )
     assert row.mechanics_max_um == pytest.approx(5.0)
-    head, line = table([row]).splitlines()
+    head, line = contrast_table([row]).splitlines()
     cells = line.removeprefix("as it is").split()
     assert cells[1] == f"{row.mechanics_max_um:.3f}"
     assert len(cells) == len(head.split()) - 1

@@ -7,7 +7,7 @@ import pytest
 
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind
-from camtool.verification.cuts import MOST_SAMPLES, cut_moves, cutting_rows, is_flat, sample_cuts
+from camtool.verification.cuts import MAX_SAMPLES, cut_moves, cutting_rows, is_flat, sample_cuts
 from tests.oracles.dense_moves import circle, cut, dense_distance, points_of, square
 
 
@@ -109,7 +109,7 @@ def test_samples_include_both_ends_and_stay_bounded() -> None:
     b = cut(ToolpathBuilder(), 0, 0).line(10_000, 0, feed=1).line(10_000, 0.001, feed=1)
     cuts = cut_moves(b.finish(), flat_cuts=False)
     samples = sample_cuts(cuts, 0.001)
-    assert MOST_SAMPLES <= len(samples.points) <= MOST_SAMPLES + 10
+    assert MAX_SAMPLES <= len(samples.points) <= MAX_SAMPLES + 10
     for segment in (0, 1):
         own = samples.points[samples.segment == segment]
         assert own[0].tolist() == pytest.approx(cuts.segments.start[segment].tolist())

@@ -13,7 +13,7 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.verification import coverage, matching
 from camtool.verification.circles import full_circles
-from camtool.verification.coverage import Coverage, Side, cover, cut_other_way
+from camtool.verification.coverage import Coverage, Side, cover, direction_findings
 from camtool.verification.cuts import cut_moves
 from camtool.verification.matching import Goal
 from camtool.verification.nearest import MoveIndex
@@ -85,7 +85,7 @@ def compared(
     mine, other = Side.of(decoded, flat_cuts=False), Side.of(wanted, flat_cuts=False)
     goal = Goal(other.moves, full_circles(other.cuts, LIMIT_MM), LIMIT_MM, DEPTH_MM)
     limits = LIMIT_MM, DEPTH_MM
-    turned = cut_other_way(mine.moves, other.moves, limits, SAMPLE_MM, row_from)
+    turned = direction_findings(mine.moves, other.moves, limits, SAMPLE_MM, row_from)
     return cover(mine, other, goal, SAMPLE_MM, row_from), list(turned)
 
 

@@ -16,9 +16,9 @@ from camtool.verification.report import (
     PlannedOperation,
     PlannedTool,
     Report,
-    certain,
     clock,
-    number,
+    rounded,
+    rounded_or_none,
     setup_sheets,
 )
 from camtool.verification.verify import Case, VerifyOptions, judge
@@ -128,10 +128,10 @@ def test_what_is_not_known_is_null() -> None:
     [(1.23456789, 1.234568), (-1e-12, 0.0), (math.nan, None), (math.inf, None), (None, None)],
 )
 def test_numbers_are_rounded_and_never_minus_zero(value, expected) -> None:
-    assert number(value) == expected
+    assert rounded_or_none(value) == expected
     if expected is not None:
-        assert math.copysign(1.0, number(value)) == math.copysign(1.0, expected)
-        assert certain(value) == expected
+        assert math.copysign(1.0, rounded_or_none(value)) == math.copysign(1.0, expected)
+        assert rounded(value) == expected
 
 
 @pytest.mark.parametrize(

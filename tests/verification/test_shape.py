@@ -19,16 +19,16 @@ from camtool.toolpath.wanted import ProtectedRegion
 from camtool.verification.cuts import CutMoves, cut_moves
 from camtool.verification.findings import VerificationCode
 from camtool.verification.shape import (
-    MOST_MOVES,
+    MAX_MOVES,
     CommandedMotion,
     Cutter,
-    Shape,
+    MachinedShape,
     cutter_of,
     machined_shape,
     points_wanted,
     wanted_shape,
 )
-from camtool.verification.slides import Trace
+from camtool.verification.slides import SlideTrace
 from camtool.verification.verify import Verification, VerifyOptions
 from tests.drawings import drawing_of
 from tests.oracles.contours import closed
@@ -37,7 +37,7 @@ from tests.oracles.stock_jobs import moved, rectangle
 from tests.targets import verify
 
 
-def shape_of(made: Trace, cuts: CutMoves, diameter_mm: float) -> Shape | None:
+def shape_of(made: SlideTrace, cuts: CutMoves, diameter_mm: float) -> MachinedShape | None:
     wanted = wanted_shape(cuts, Cutter(diameter_mm))
     motion = CommandedMotion(cuts.toolpath, path_machine(), ALL)
     return None if wanted is None else machined_shape(made, motion, wanted)
@@ -54,13 +54,13 @@ def strip(length: float) -> CutMoves:
     return cut_moves(b.finish(), flat_cuts=False)
 
 
-def trace(points: np.ndarray) -> Trace:
+def trace(points: np.ndarray) -> SlideTrace:
     count = len(points)
     cutting = np.arange(count) > 0
-    return Trace(points, np.zeros(count), np.zeros(count, dtype=np.int64), cutting)
+    return SlideTrace(points, np.zeros(count), np.zeros(count, dtype=np.int64), cutting)
 
 
-def round_about(radius: float, count: int = 4000) -> Trace:
+def round_about(radius: float, count: int = 4000) -> SlideTrace:
     angle = np.linspace(0.0, 2.0 * np.pi, count)
     return trace(radius * np.column_stack([np.cos(angle), np.sin(angle)]))
 
@@ -137,7 +137,7 @@ def test_a_trace_needs_points_for_its_smallest_arcs_and_its_ends() -> None:
 
 def test_what_is_too_much_work_has_no_shape() -> None:
     b = ToolpathBuilder((0.0, 0.0, -1.0))
-    for number in range(MOST_MOVES + 2):
+    for number in range(MAX_MOVES + 2):
         b.line(float(number % 7), float(number), feed=1.0)
     long = cut_moves(b.finish(), flat_cuts=False)
     assert points_wanted(long, Cutter(1.0)) is None
@@ -192,7 +192,7 @@ def test_a_v_bit_is_as_wide_as_it_is_deep() -> None:
     assert not shapely.contains_xy(region.region, 5.0, 1.01)
     deeper = carved((0, 0, -1.1), (10, 0, -1.1), (20, 0, -2.1))
     points = deeper.end[deeper.is_feed][:, :2]
-    made = Trace(
+    made = SlideTrace(
         points, np.zeros(3), np.flatnonzero(deeper.is_feed), np.array([False, True, True])
     )
     shape = machined_shape(made, CommandedMotion(deeper, path_machine(), ALL), region)

@@ -14,7 +14,7 @@ from camtool.pipeline import post_drawing
 from camtool.planning.job import Job, Operation, Tool, job_of
 from camtool.records import replace
 from camtool.target.registry import load_target
-from camtool.verification.report import Dimension
+from camtool.verification.report import DimensionReport
 from tests.drawings import drawing_of
 from tests.oracles.contours import closed
 from tests.oracles.part_sizes import SLACK_MM, Ball, left_of, polygon, removed, size_of
@@ -29,7 +29,7 @@ def box(x: float, y: float, width: float, height: float) -> Polyline:
     return Polyline(np.column_stack([corners, np.zeros(4)]), closed=True)
 
 
-def sizes(paths: list[Polyline], *settings: str, **asked: Any) -> dict[str, Dimension]:
+def sizes(paths: list[Polyline], *settings: str, **asked: Any) -> dict[str, DimensionReport]:
     """The dimensions by name."""
     loaded = load_target("linuxcnc", settings=("dialect.path=exact-path", *settings))
     made = post_drawing(drawing_of(paths), job_of(**asked), loaded)
@@ -174,7 +174,7 @@ def test_what_has_no_edge_has_no_size() -> None:
     target = load_target("linuxcnc", settings=("dialect.path=exact-path",))
     drawing = drawing_of([closed(*path) for path in ROUND])
 
-    def found(*operations: Operation) -> tuple[Dimension, ...]:
+    def found(*operations: Operation) -> tuple[DimensionReport, ...]:
         made = post_drawing(drawing, Job(operations), target)
         assert made.verification is not None, made.findings
         return made.verification.report.dimensions
