@@ -94,6 +94,20 @@ def test_the_changelog_has_every_command() -> None:
     assert [name for name in COMMANDS if not re.search(rf"`(camtool )?{name}\b", text)] == []
 
 
+def test_the_index_of_decisions_has_each_with_its_title() -> None:
+    folder = ROOT / "docs" / "decisions"
+    index = (folder / "README.md").read_text(encoding="utf-8")
+    listed = re.findall(r"^- \[(\d{4})\]\((\S+)\) (.+)$", index, re.MULTILINE)
+    titles = []
+    for file in sorted(folder.glob("0*.md")):
+        heading = file.read_text(encoding="utf-8").partition("\n")[0]
+        match = re.fullmatch(r"# (\d{4}) · (.+) · \d{4}-\d\d-\d\d", heading)
+        assert match, f"{file.name}: # NUMBER · what was chosen · DATE"
+        assert file.name.startswith(match[1])
+        titles.append((match[1], file.name, match[2]))
+    assert sorted(listed) == titles
+
+
 def test_the_navigation_has_every_page_once() -> None:
     text = (ROOT / "mkdocs.yml").read_text(encoding="utf-8").partition("\nnav:")[2]
     listed = re.findall(r"- (?:[^:\n]+: )?([\w./-]+\.md)$", text, re.MULTILINE)

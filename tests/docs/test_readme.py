@@ -29,6 +29,17 @@ def test_ci_runs_them_as_the_readme_has_them() -> None:
     assert script[-1] == set_up_commands()[-1]
 
 
+def test_hooks_and_pull_requests_run_the_checks_of_ci() -> None:
+    script = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    (hooks,) = yaml.safe_load((ROOT / ".pre-commit-config.yaml").read_text("utf-8"))["repos"]
+    commands = [hook["entry"].partition(" ") for hook in hooks["hooks"]]
+    assert [tool for tool, _, _ in commands] == ["ruff", "ruff", "mypy"]
+    for tool, _, arguments in commands:
+        assert re.search(rf'bin/{tool}"? {re.escape(arguments)}$', script, re.MULTILINE)
+    workflow = yaml.safe_load((ROOT / ".github" / "workflows" / "ci.yml").read_text("utf-8"))
+    assert {"run": ".ci/run"} in workflow["jobs"]["check"]["steps"]
+
+
 def test_its_job_on_github_gives_the_action_what_it_takes() -> None:
     (block,) = re.findall(r"```yaml\n(.*?)```", README, flags=re.DOTALL)
     (step,) = (

@@ -1,6 +1,6 @@
-"""What starting costs: the packages that a command loads.
+"""Bounds for the start of a command: the heavy packages that it may load, and no others.
 
-The lists are here so that whoever drags more in has to say so; docs/benchmarks.md has the times.
+docs/benchmarks.md has the times.
 """
 
 import re
@@ -29,7 +29,7 @@ PIC = ("--target", "pic-mmh", "-q")
 
 
 def modules_of(*arguments: str) -> set[str]:
-    """Modules that a run of `camtool ARGUMENTS` has loaded when it ends."""
+    """Return the modules that a run of `camtool ARGUMENTS` has loaded when it ends."""
     code = (
         "import sys, atexit; sys.argv = ['camtool', *sys.argv[1:]]; "
         "atexit.register(lambda: print('LOADED', *sys.modules)); "
@@ -41,7 +41,7 @@ def modules_of(*arguments: str) -> set[str]:
 
 
 def loaded_heavy(*arguments: str) -> set[str]:
-    """The heavy ones of them."""
+    """Return the heavy packages that a run of `camtool ARGUMENTS` has loaded when it ends."""
     return HEAVY & modules_of(*arguments)
 
 
@@ -52,37 +52,42 @@ def output(tmp_path: Path) -> str:
 
 def test_post_of_a_dxf_without_verification(output: str) -> None:
     loaded = loaded_heavy("post", "samples/logo.dxf", *PIC, "-o", output, "--no-verify")
-    assert loaded == {"ezdxf", "numpy"}
+    assert loaded <= {"ezdxf", "numpy"}
 
 
 def test_post_and_verify(output: str) -> None:
     loaded = loaded_heavy("post", "samples/logo.dxf", *PIC, "-o", output)
-    assert loaded == {"ezdxf", "numpy"}
-    assert loaded_heavy("verify", output, *PIC) == {"numpy"}
+    assert loaded <= {"ezdxf", "numpy"}
+    assert loaded_heavy("verify", output, *PIC) <= {"numpy"}
 
 
 def test_post_of_an_svg(output: str) -> None:
     # Its curves are Béziers.
     loaded = loaded_heavy("post", "samples/logo.svg", *PIC, "-o", output)
-    assert loaded == {"defusedxml", "numpy"}
+    assert loaded <= {"defusedxml", "numpy"}
 
 
 def test_post_of_points(tmp_path: Path) -> None:
     output = str(tmp_path / "star.m")
     loaded = loaded_heavy("post", "samples/star.csv", "-t", "matlab-router", "-q", "-o", output)
-    assert loaded == {"numpy"}
+    assert loaded <= {"numpy"}
+
+
+def test_what_is_loaded_is_seen() -> None:
+    assert "ezdxf" in loaded_heavy("check", "samples/logo.dxf", "-q")
+    assert heavy_of("import scipy") >= {"numpy", "scipy"}
 
 
 def heavy_of(code: str) -> set[str]:
-    """The heavy packages that a piece of Python has loaded when it ends."""
+    """Return the heavy packages that a piece of Python has loaded when it ends."""
     command = [sys.executable, "-c", f"import sys, camtool; {code}; print('LOADED', *sys.modules)"]
     result = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=True)
     return HEAVY & set(result.stdout.rpartition("LOADED")[2].split())
 
 
 def test_python_loads_what_its_calls_need() -> None:
-    assert heavy_of("camtool.targets") == {"numpy"}
-    assert heavy_of("camtool.targets()") == {"numpy"}
+    assert heavy_of("camtool.targets") <= {"numpy"}
+    assert heavy_of("camtool.targets()") <= {"numpy"}
     assert "ezdxf" not in heavy_of("camtool.read_drawing('samples/letter.svg')")
 
 
@@ -96,7 +101,7 @@ def test_text_of_an_svg_loads_the_fonts_that_it_needs(
         '<text y="9">A</text><path d="M0 0h9"/></svg>'
     )
     loaded = heavy_of(f"camtool.read_drawing({str(file)!r}, text={mode!r})")
-    assert loaded & {"ezdxf", "HersheyFonts", "defusedxml"} == {"defusedxml"} | fonts
+    assert loaded & {"ezdxf", "HersheyFonts", "defusedxml"} <= {"defusedxml"} | fonts
 
 
 def test_targets_load_no_library_of_drawings() -> None:
@@ -114,7 +119,7 @@ def test_targets_load_no_library_of_drawings() -> None:
 )
 def test_a_command_loads_no_other_command(arguments: tuple[str, ...], wanted: set[str]) -> None:
     loaded = {module.removeprefix("camtool.cli.") for module in modules_of(*arguments)}
-    assert loaded & set(COMMANDS) == wanted
+    assert loaded & set(COMMANDS) <= wanted
 
 
 def test_a_command_that_does_not_plan_loads_no_findings_of_planning(output: str) -> None:
