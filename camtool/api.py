@@ -23,7 +23,7 @@ from camtool.errors import CamtoolError, OptionError
 from camtool.geometry.drawing import Drawing
 from camtool.importers.options import Reading, options_of
 from camtool.jobs.keys import field_value
-from camtool.pictures.options import Options
+from camtool.pictures.options import PictureOptions
 from camtool.pictures.picture import Picture
 from camtool.pictures.scene import Scene
 from camtool.pipeline import Judging, convert_program, post_drawing, verify_program
@@ -522,7 +522,7 @@ def preview(
         raise TypeError(f"{len(titles)} titles for {len(scenes)} values")
     for row, title in enumerate(titles):
         scenes[row] = replace(scenes[row], title=title)
-    options = Options(**looks)
+    options = PictureOptions(**looks)
     if not beside:
         return Picture(scenes[0], options)
     for value, scene in zip((what, *beside), scenes, strict=True):

@@ -23,7 +23,7 @@ from camtool.records import replace
 from camtool.units import parse_length
 
 if TYPE_CHECKING:
-    from camtool.pictures.options import Options
+    from camtool.pictures.options import PictureOptions
     from camtool.pictures.scene import Scene
 
 
@@ -99,13 +99,13 @@ class PictureFlags:
         names = (name.strip() for name in (self.layers or "").split(","))
         return tuple(dict.fromkeys(name for name in names if name))
 
-    def options(self) -> Options:
+    def options(self) -> PictureOptions:
         """The options of the pictures; OptionError for what makes no picture."""
-        from camtool.pictures.options import Options
+        from camtool.pictures.options import PictureOptions
 
         times = 1.0 if self.exaggerate is None else self.exaggerate
         layers = chosen(self.named, self.no_layer) if self.named or self.no_layer else None
-        return Options(self.size, self.crop, self.dark, times, layers, self.polar)
+        return PictureOptions(self.size, self.crop, self.dark, times, layers, self.polar)
 
     def check(self, pictures: Sequence[str | None], canvas: Canvas) -> None:
         """A usage error for flags that none of the `pictures` can honour, and for flags that
@@ -138,7 +138,7 @@ class PictureFlags:
         if self.polar is not None and others:
             raise click.UsageError(f"{others}: --polar plots a circle alone; drop one of them")
 
-    def _check_layers(self, canvas: Canvas, options: Options) -> None:
+    def _check_layers(self, canvas: Canvas, options: PictureOptions) -> None:
         shown = layer_names() if options.layers is None else options.layers
         covered = canvas.predicted and "path" in shown
         for name in self.named:

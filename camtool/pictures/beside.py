@@ -20,12 +20,12 @@ from camtool.pictures import polar
 from camtool.pictures.colours import DRAWING, LAYER_COLOURS
 from camtool.pictures.content import Content, Group, content_of
 from camtool.pictures.draw import panel, rendered
-from camtool.pictures.layers import Entry, legend_of
-from camtool.pictures.options import AS_USUAL, SVG_WIDTH_PX, Options
+from camtool.pictures.layers import LegendEntry, legend_of
+from camtool.pictures.options import AS_USUAL, SVG_WIDTH_PX, PictureOptions
 from camtool.pictures.page import (
     HEAD_GAP,
     LEGEND_DROP,
-    Page,
+    PageLayout,
     colour_bar,
     colour_bar_width,
     fitted,
@@ -46,7 +46,7 @@ from camtool.pictures.view import (
     MARGIN,
     TALLEST,
     WIDEST,
-    Box,
+    PageBox,
     View,
     page_width,
     union,
@@ -60,7 +60,7 @@ NUMBERS_FOOT = 32.0
 """Height below a plot for its numbers."""
 
 
-def render_beside(scenes: Sequence[Scene], name: str, options: Options = AS_USUAL) -> bytes:
+def render_beside(scenes: Sequence[Scene], name: str, options: PictureOptions = AS_USUAL) -> bytes:
     """SVG or PNG bytes of the scenes for a file of this name; OutputError for other extensions,
     OptionError for .html and for what a scene does not have."""
     if PurePath(name).suffix.lower() == ".html":
@@ -70,7 +70,7 @@ def render_beside(scenes: Sequence[Scene], name: str, options: Options = AS_USUA
     return rendered(lambda sized: draw_beside(scenes, sized), name, options)
 
 
-def draw_beside(scenes: Sequence[Scene], options: Options = AS_USUAL) -> str:
+def draw_beside(scenes: Sequence[Scene], options: PictureOptions = AS_USUAL) -> str:
     """The scenes as SVG text; equal input gives equal bytes. ValueError when there are none."""
     if not scenes:
         raise ValueError("no scene to draw")
@@ -80,7 +80,7 @@ def draw_beside(scenes: Sequence[Scene], options: Options = AS_USUAL) -> str:
     grid, views = _views(contents, options)
     view, ticks = views[0], ticks_of(views[0])
     panels = [
-        panel(content, Page(head, own, ticks, [], 0.0, 0.0, 0.0))
+        panel(content, PageLayout(head, own, ticks, [], 0.0, 0.0, 0.0))
         for content, head, own in zip(contents, grid.heads, views, strict=True)
     ]
     plots = grid.around([own.box for own in views])
@@ -91,16 +91,18 @@ def draw_beside(scenes: Sequence[Scene], options: Options = AS_USUAL) -> str:
         _title(scenes),
         (grid.page, foot_of(table, legend_y)),
         options,
-        *grid.placed(panels),
+        *grid.place_panels(panels),
         "" if top_um is None else colour_bar(top_um, plots),
         legend_rows(table, plots.left, legend_y),
         scale_bar(view, plots.right, bar_y),
     )
 
 
-def _views(contents: Sequence[Content], options: Options) -> tuple[Grid, list[View]]:
-    """Where each panel lies, and its view: all alike but for the height of the head. Fitted twice,
-    since the width of the colour bar follows from the height of the plots."""
+def _views(contents: Sequence[Content], options: PictureOptions) -> tuple[PanelGrid, list[View]]:
+    """Return the grid of panels and the view of each; views differ in the height of the head.
+
+    The fit runs twice, since the width of the colour bar follows from the height of the plots.
+    """
     window, top_um = contents[0].window, _top_um(contents)
     across, down = (window[:, 1] - window[:, 0]).tolist()
     columns = columns_of(len(contents), wide=down < WIDE * across)
@@ -144,7 +146,7 @@ def _alike(contents: Sequence[Content]) -> list[Content]:
     return found
 
 
-def _entries(contents: Sequence[Content], view: View) -> list[Entry]:
+def _entries(contents: Sequence[Content], view: View) -> list[LegendEntry]:
     """The legend of all, each entry once, with the layers of all drawings."""
     groups = {(group.name, group.colour): group for one in contents for group in one.groups}
     every = tuple(groups.values())
@@ -156,9 +158,9 @@ def _title(scenes: Sequence[Scene]) -> str:
     return ", ".join(scene.title for scene in scenes if scene.title)
 
 
-def _polars(scenes: Sequence[Scene], which: int, options: Options) -> str:
+def _polars(scenes: Sequence[Scene], which: int, options: PictureOptions) -> str:
     """The same circle of each scene, all magnified alike."""
-    plots = [polar.shown(scene, which) for scene in scenes]
+    plots = [polar.circle_pair(scene, which) for scene in scenes]
     columns = columns_of(len(plots), wide=False)
     page = page_units(columns, options)
     width = panel_width(columns, page)
@@ -170,12 +172,12 @@ def _polars(scenes: Sequence[Scene], which: int, options: Options) -> str:
     ]
     grid = grid_of(heads, columns, page).with_bodies(2.0 * (dial.outer + ROOM))
     panels = [
-        [head, *plot(shown, dial.placed(down, width))]
+        [head, *plot(shown, dial.centred_below(down, width))]
         for shown, head, down in zip(errors, grid.heads, grid.downs, strict=True)
     ]
     entries = list(dict.fromkeys(entry for circles in plots for entry in polar.entries(circles)))
     below, foot = legend_below(entries, grid.rows[-1], page)
-    return sheet(_title(scenes), (page, foot), options, *grid.placed(panels), below)
+    return sheet(_title(scenes), (page, foot), options, *grid.place_panels(panels), below)
 
 
 # Panels in rows and columns of a page: where each lies, and the ids of its parts.
@@ -193,10 +195,12 @@ Head = tuple[str, Sequence[str]]
 """Title and notes of a panel."""
 
 
-class Grid(Struct, frozen=True):
-    """Panels of `width`, margins included, in `columns` on a page of width `page`; `heads` are the
-    SVG of titles and notes, `downs` the heights at which those of each panel's row end; `rows` are
-    the heights at which the rows begin."""
+class PanelGrid(Struct, frozen=True):
+    """A grid of panels of `width`, margins included, in `columns` on a page of width `page`.
+
+    `heads` are the SVG of titles and notes, `downs` the page heights at which the heads of each
+    panel's row end, `rows` the page heights at which the rows begin.
+    """
 
     columns: int
     page: float
@@ -205,7 +209,7 @@ class Grid(Struct, frozen=True):
     downs: tuple[float, ...]
     rows: tuple[float, ...] = ()
 
-    def with_bodies(self, height: float) -> Grid:
+    def with_bodies(self, height: float) -> PanelGrid:
         """The grid with its rows, whose panels have this height below their heads."""
         rows = [0.0]
         for down in self.downs[:: self.columns]:
@@ -213,26 +217,26 @@ class Grid(Struct, frozen=True):
         return replace(self, rows=tuple(rows))
 
     def corner(self, index: int) -> tuple[float, float]:
-        """Where a panel lies on the page; the margins of neighbours are one."""
+        """Return the upper left corner of a panel on the page; neighbours share their margin."""
         across = (index % self.columns) * (self.width - MARGIN)
         return across, self.rows[index // self.columns]
 
-    def moved(self, index: int, box: Box) -> Box:
+    def moved(self, index: int, box: PageBox) -> PageBox:
         """A box of a panel on the page."""
         x, y = self.corner(index)
-        return Box(box.left + x, box.top + y, box.right + x, box.bottom + y)
+        return PageBox(box.left + x, box.top + y, box.right + x, box.bottom + y)
 
-    def around(self, boxes: Sequence[Box]) -> Box:
+    def around(self, boxes: Sequence[PageBox]) -> PageBox:
         """The box round the boxes of all panels, on the page."""
         moved = [self.moved(index, box) for index, box in enumerate(boxes)]
-        return Box(
+        return PageBox(
             min(box.left for box in moved),
             min(box.top for box in moved),
             max(box.right for box in moved),
             max(box.bottom for box in moved),
         )
 
-    def placed(self, panels: Sequence[Sequence[str]]) -> list[str]:
+    def place_panels(self, panels: Sequence[Sequence[str]]) -> list[str]:
         """The panels in their places; the ids of their parts begin with that of the panel."""
         groups = []
         for index, parts in enumerate(panels):
@@ -249,7 +253,7 @@ def columns_of(count: int, *, wide: bool) -> int:
     return 1 if wide else math.ceil(math.sqrt(count))
 
 
-def page_units(columns: int, options: Options) -> float:
+def page_units(columns: int, options: PictureOptions) -> float:
     """Units of a page with this number of columns."""
     page = page_width(options.size_px or SVG_WIDTH_PX)
     return page if columns == 1 else round(GROWN * page)
@@ -260,10 +264,10 @@ def panel_width(columns: int, room: float) -> float:
     return float(math.floor((room + (columns - 1) * MARGIN) / columns))
 
 
-def grid_of(heads: Sequence[Head], columns: int, page: float, bar: float = 0.0) -> Grid:
+def grid_of(heads: Sequence[Head], columns: int, page: float, bar: float = 0.0) -> PanelGrid:
     """The grid for panels of these titles and notes; a width of `bar` stays free."""
     width = panel_width(columns, page - bar)
     drawn = [title_and_notes(title, notes, width, lines=TITLE_LINES) for title, notes in heads]
     downs = [down for _, down in drawn]
     lowest = [max(downs[k - k % columns :][:columns]) for k in range(len(downs))]
-    return Grid(columns, page, width, tuple(head for head, _ in drawn), tuple(lowest))
+    return PanelGrid(columns, page, width, tuple(head for head, _ in drawn), tuple(lowest))

@@ -19,17 +19,17 @@ from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, Segments
 from camtool.pictures.svg import MM_DECIMALS, PathData
 from camtool.toolpath.moves import Kind, Toolpath, rows_of
 
-MOST_TAPERS = 30_000
+MAX_TAPERS = 30_000
 """The outlines of more moves than this would make too large a picture: some 5 MB."""
 
 TAPER_ARC_RAD = 0.2
 """Arcs along which a tool may become wider are taken as chords of this turn: of a circle of 1 mm
 they are 5 µm off."""
 
-LEAST_TAPER_MM = 1e-6
+MIN_TAPER_MM = 1e-6
 """A tool that cuts less than this at the surface is a point there."""
 
-LONGEST_ARC_RAD = 0.75 * math.pi
+MAX_ARC_RAD = 0.75 * math.pi
 """A longer arc is written as several: a half circle whose end lies δ beside its circle of radius
 r, as rounded numbers do, would have its centre √(2 r δ) off."""
 
@@ -81,7 +81,7 @@ class Chain(Struct, frozen=True, eq=False):
         return (cx + radius * math.cos(angle), cy + radius * math.sin(angle)), heading
 
 
-class Moves(Struct, frozen=True, eq=False):
+class MoveChains(Struct, frozen=True, eq=False):
     """A toolpath from above: `feeds` (level), `ramps` (that change Z as well) and `rapids` as
     chains; `plunges` (P, 2) mm, where the tool goes straight down, but not from cut to cut;
     `starts` (S, 2) mm, where feeds in XY begin; each place once; `begin` (2,) mm, where the tool
@@ -95,13 +95,13 @@ class Moves(Struct, frozen=True, eq=False):
     begin: Floats
 
 
-def moves_of(toolpath: Toolpath) -> Moves:
+def moves_of(toolpath: Toolpath) -> MoveChains:
     """The moves of a toolpath, sorted by how they are drawn."""
     cuts, slopes, rapid, down = toolpath.by_parts(_how_drawn).T
     # A step straight down within a cut, as from one pass to the next, is not drawn as a plunge.
     follows = _follows(cuts, cuts | (toolpath.kind == Kind.RAPID))
     rapids, begins = np.flatnonzero(rapid), np.flatnonzero(cuts & ~follows)
-    return Moves(
+    return MoveChains(
         feeds=_chains(toolpath, cuts & ~slopes),
         ramps=_chains(toolpath, slopes),
         rapids=_once(toolpath.starts_of(rapids)[:, :2], toolpath.end[rapids, :2]),
@@ -247,7 +247,7 @@ def path_data(chains: Iterable[Chain]) -> str:
 
 
 def _is_flat(chain: Chain, index: int, sweep: float) -> bool:
-    """Whether an arc lies nearer to its chord than `POSITION_EPS_MM`.
+    """True if an arc lies nearer to its chord than `POSITION_EPS_MM`.
 
     height = chord/2 · tan(sweep/4); renderers are inexact for radii of kilometres.
     """
@@ -258,7 +258,7 @@ def _is_flat(chain: Chain, index: int, sweep: float) -> bool:
 def _arc(data: PathData, chain: Chain, index: int, sweep: float) -> None:
     begin, centre = chain.points[index], chain.centre[index]
     radius = math.hypot(*(begin - centre).tolist())
-    count = max(math.ceil(abs(sweep) / LONGEST_ARC_RAD), 1)
+    count = max(math.ceil(abs(sweep) / MAX_ARC_RAD), 1)
     sweep /= count
     for k in range(1, count):
         data.arc(*chain.at(index, k / count)[0], radius=radius, sweep_rad=sweep)
@@ -321,13 +321,13 @@ def _halved(chains: Sequence[Chain]) -> Segments:
 
 QUARTER_RAD = 0.5 * np.pi
 
-LEAST_PIECE_RAD = 1e-9
+MIN_PIECE_RAD = 1e-9
 """Of an arc that begins or ends at a multiple of 90°, a shorter piece is not counted."""
 
 
 class _Pieces(Struct, frozen=True, eq=False):
-    """Where P pieces begin, (P, 2) mm; the signs of X and Y on each, (P, 2); its row of the
-    toolpath, (P,)."""
+    """Monotone pieces of a toolpath: the start of each, (P, 2) mm, the signs of its motion in X
+    and Y, (P, 2), and its row of the toolpath, (P,)."""
 
     begin: Floats
     signs: Ints
@@ -382,8 +382,8 @@ def _pieces(toolpath: Toolpath) -> _Pieces:
 def _quarters(begin: Floats, sweep: Floats) -> tuple[Floats, Ints]:
     """Of arcs (A,): the first multiple of 90° strictly inside, in the order of travel, and how
     many there are. Lines, of sweep 0, have none."""
-    low = np.minimum(begin, begin + sweep) + LEAST_PIECE_RAD
-    high = np.maximum(begin, begin + sweep) - LEAST_PIECE_RAD
+    low = np.minimum(begin, begin + sweep) + MIN_PIECE_RAD
+    high = np.maximum(begin, begin + sweep) - MIN_PIECE_RAD
     least, most = np.ceil(low / QUARTER_RAD), np.floor(high / QUARTER_RAD)
     inside = np.where(sweep == 0.0, 0, np.maximum(most - least + 1.0, 0.0)).astype(np.int64)
     return np.where(sweep < 0.0, most, least), inside
@@ -404,10 +404,10 @@ def tapers(
 ) -> tuple[Chain, ...]:
     """Return the outline, CCW, of each cut at the surface for feeds below the stock top (of the
     `chosen` rows (N,) alone), with a tool of `radius_at(depth)` mm: the hull of the discs at its
-    ends. () for more moves than MOST_TAPERS."""
+    ends. () for more moves than MAX_TAPERS."""
     below = toolpath.is_feed & (np.minimum(toolpath.starts[:, 2], toolpath.end[:, 2]) < 0.0)
     rows = np.flatnonzero(below if chosen is None else below & chosen)
-    if len(rows) > MOST_TAPERS:
+    if len(rows) > MAX_TAPERS:
         return ()
     starts, ends = toolpath.starts_of(rows), toolpath.end[rows]
     sweeps = np.where(toolpath.is_arc[rows], toolpath.sweeps_of(rows), 0.0)
@@ -441,11 +441,11 @@ def _hull(one: Floats, radius: float, other: Floats, last: float) -> Chain | Non
     Their common tangents touch both where the radius makes the angle φ with the line from one to
     the other, cos φ = (r − s) / d; there are none where one disc holds the other.
     """
-    if max(radius, last) < LEAST_TAPER_MM:
+    if max(radius, last) < MIN_TAPER_MM:
         return None
     ahead = other - one
     distance = float(np.hypot(ahead[0], ahead[1]))
-    if distance <= abs(radius - last) + LEAST_TAPER_MM:
+    if distance <= abs(radius - last) + MIN_TAPER_MM:
         centre, wide = (one, radius) if radius >= last else (other, last)
         return _round([(centre, wide, 0.0, 2.0 * math.pi)])
     angle = math.atan2(float(ahead[1]), float(ahead[0]))
@@ -463,6 +463,6 @@ def _round(arcs: Sequence[tuple[Floats, float, float, float]]) -> Chain:
             angle = begin + 0.5 * k * turn
             points.append(centre + radius * np.array([math.cos(angle), math.sin(angle)]))
             centres.append(centre)
-            sweeps.append(0.5 * turn if k < 2 and radius > LEAST_TAPER_MM else 0.0)
+            sweeps.append(0.5 * turn if k < 2 and radius > MIN_TAPER_MM else 0.0)
     points.append(points[0])
     return Chain(np.array(points), np.array(centres), np.array(sweeps), closed=True)

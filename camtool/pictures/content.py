@@ -14,7 +14,7 @@ from camtool.geometry.drawing import Drawing
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines
 from camtool.pictures.chains import (
     Chain,
-    Moves,
+    MoveChains,
     chains_between,
     chains_box,
     chains_of,
@@ -24,20 +24,20 @@ from camtool.pictures.chains import (
     tapers,
 )
 from camtool.pictures.colours import DRAWING, LAYER_COLOURS
-from camtool.pictures.options import AS_USUAL, Options
+from camtool.pictures.options import AS_USUAL, PictureOptions
 from camtool.pictures.scene import Scene
-from camtool.pictures.trace import Trace, exaggerated, trace_of
+from camtool.pictures.trace import ErrorTrace, exaggerated, trace_of
 from camtool.pictures.view import points_box, round_step, union, window
 from camtool.records import replace
 
 Place = tuple[float, float]
 """x, y in mm."""
 
-MOST_NUMBERED = 100
+MAX_NUMBERED = 100
 """Of more contours than this only every 2nd, 5th, 10th … is numbered."""
 
 NOWHERE: Floats = np.empty((0, 2))
-NO_MOVES = Moves((), (), (), NOWHERE, NOWHERE, np.zeros(2))
+NO_MOVES = MoveChains((), (), (), NOWHERE, NOWHERE, np.zeros(2))
 
 
 class Group(Struct, frozen=True):
@@ -48,7 +48,7 @@ class Group(Struct, frozen=True):
     chains: tuple[Chain, ...]
 
 
-class Swept(Struct, frozen=True, eq=False):
+class SweptCut(Struct, frozen=True, eq=False):
     """The cut of a tool of a constant width along `chains`; where the width is None these are the
     outlines of the cut."""
 
@@ -75,9 +75,9 @@ class Content(Struct, frozen=True, eq=False, dict=True):
     scene: Scene
     groups: tuple[Group, ...]
     outlines: tuple[Chain, ...]
-    moves: Moves
+    moves: MoveChains
     places: Places
-    trace: Trace | None
+    trace: ErrorTrace | None
     window: Floats
     shown: frozenset[str] | None
     crop_mm: tuple[float, float, float, float] | None
@@ -93,7 +93,7 @@ class Content(Struct, frozen=True, eq=False, dict=True):
 
     @property
     def is_empty(self) -> bool:
-        """Whether there is nothing at all to draw."""
+        """True if there is nothing at all to draw."""
         outlines = self.shown is None or "drawing" in self.shown
         points = self.shown is None or "doubts" in self.shown
         marked = (outlines and self.outlines) or (points and len(self.places.points))
@@ -101,7 +101,7 @@ class Content(Struct, frozen=True, eq=False, dict=True):
 
     @property
     def is_drawing_alone(self) -> bool:
-        """Whether there are neither moves nor a predicted path."""
+        """True if there are neither moves nor a predicted path."""
         return self.scene.toolpath is None and self.trace is None
 
     @cached_property
@@ -117,21 +117,19 @@ class Content(Struct, frozen=True, eq=False, dict=True):
     def order(self) -> tuple[list[str], list[Place]]:
         """The numbers of contours, from 1, and where these begin; of many contours only some."""
         starts: list[Place] = self.moves.starts.tolist()
-        step = (
-            1 if len(starts) <= MOST_NUMBERED else round(round_step(len(starts) / MOST_NUMBERED))
-        )
+        step = 1 if len(starts) <= MAX_NUMBERED else round(round_step(len(starts) / MAX_NUMBERED))
         chosen = [k for k in range(len(starts)) if k == 0 or (k + 1) % step == 0]
         return [str(k + 1) for k in chosen], [starts[k] for k in chosen]
 
     @cached_property
-    def swept(self) -> tuple[Swept, ...]:
+    def swept(self) -> tuple[SweptCut, ...]:
         """The cuts, each as wide as its tool cuts at the surface, where that is known."""
         scene, toolpath = self.scene, self.scene.toolpath
-        found: list[Swept] = []
+        found: list[SweptCut] = []
         if scene.tool_mm:
-            found.append(Swept(scene.tool_mm, (*self.moves.feeds, *self.moves.ramps)))
+            found.append(SweptCut(scene.tool_mm, (*self.moves.feeds, *self.moves.ramps)))
         elif toolpath is not None and scene.nose is not None:
-            found.append(Swept(None, tapers(toolpath, scene.nose.radius_at)))
+            found.append(SweptCut(None, tapers(toolpath, scene.nose.radius_at)))
         elif toolpath is not None and scene.turns:
             begins = [row for row, _ in scene.turns]
             turn = np.searchsorted(begins, np.arange(len(toolpath)), side="right") - 1
@@ -139,9 +137,9 @@ class Content(Struct, frozen=True, eq=False, dict=True):
                 mine = [k for k, (_, each) in enumerate(scene.turns) if each == tool]
                 chosen = np.isin(turn.clip(min=0), mine)
                 if tool.nose_mm or tool.kind in ("v", "drill"):
-                    found.append(Swept(None, tapers(toolpath, tool.radius_at, chosen)))
+                    found.append(SweptCut(None, tapers(toolpath, tool.radius_at, chosen)))
                 elif tool.diameter_mm:
-                    found.append(Swept(tool.diameter_mm, cuts_of(toolpath, chosen)))
+                    found.append(SweptCut(tool.diameter_mm, cuts_of(toolpath, chosen)))
         return tuple(each for each in found if each.chains)
 
     @property
@@ -176,8 +174,8 @@ class Content(Struct, frozen=True, eq=False, dict=True):
         return exaggerated(places, self.scene.wanted, self.times)
 
 
-def content_of(scene: Scene, options: Options = AS_USUAL) -> Content:
-    """What the page and its layers need of the scene."""
+def content_of(scene: Scene, options: PictureOptions = AS_USUAL) -> Content:
+    """Compute everything that the page and its layers draw of the scene."""
     moves = NO_MOVES if scene.toolpath is None else moves_of(scene.toolpath)
     trace = trace_of(scene, options.exaggerate)
     times = 1.0 if trace is None else trace.times
@@ -252,8 +250,8 @@ def cropped(x: float, y: float, width: float, height: float) -> Floats:
 def _window(
     outlines: tuple[Chain, ...],
     points: Floats,
-    moves: Moves,
-    trace: Trace | None,
+    moves: MoveChains,
+    trace: ErrorTrace | None,
     tool_mm: float | None,
     stock_mm: tuple[float, float, float, float] | None,
 ) -> Floats:

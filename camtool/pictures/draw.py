@@ -14,10 +14,16 @@ from camtool.errors import OutputError
 from camtool.pictures import text
 from camtool.pictures.colours import QUIET
 from camtool.pictures.content import Content, content_of
-from camtool.pictures.layers import drawn
-from camtool.pictures.options import AS_USUAL, PNG_WIDTH_PX, SVG_WIDTH_PX, Options, check_width
+from camtool.pictures.layers import draw_layers
+from camtool.pictures.options import (
+    AS_USUAL,
+    PNG_WIDTH_PX,
+    SVG_WIDTH_PX,
+    PictureOptions,
+    check_width,
+)
 from camtool.pictures.page import (
-    Page,
+    PageLayout,
     axes_around,
     colour_bar,
     ground,
@@ -31,7 +37,7 @@ from camtool.pictures.plot import Plot
 from camtool.pictures.polar import draw_polar
 from camtool.pictures.scene import Scene
 from camtool.pictures.svg import Look, element, number
-from camtool.pictures.text import Style
+from camtool.pictures.text import TextStyle
 from camtool.pictures.view import View, page_width
 from camtool.records import replace
 
@@ -39,7 +45,7 @@ PNG_DPI = 96
 """resvg's own default of 0 makes lengths in mm vanish."""
 
 
-def draw(scene: Scene, options: Options = AS_USUAL) -> str:
+def draw(scene: Scene, options: PictureOptions = AS_USUAL) -> str:
     """The scene as SVG text; OptionError for a circle that it does not have."""
     if options.polar is not None:
         return draw_polar(scene, options.polar, options)
@@ -59,7 +65,7 @@ def draw(scene: Scene, options: Options = AS_USUAL) -> str:
     )
 
 
-def panel(content: Content, page: Page) -> list[str]:
+def panel(content: Content, page: PageLayout) -> list[str]:
     """Head, plot and axes of one of several scenes; the plot is clipped, so that it covers none of
     its neighbours."""
     box = page.view.box
@@ -89,14 +95,14 @@ def png(svg: str, width_px: int) -> bytes:
 
 def _plot(content: Content, view: View) -> list[str]:
     """The SVG of the plot, with a label where there is nothing to draw."""
-    layers = drawn(content, Plot(view))
+    layers = draw_layers(content, Plot(view))
     if not content.is_empty:
         return layers
     middle = (view.box.left + view.box.right) / 2.0, (view.box.top + view.box.bottom) / 2.0
-    return [*layers, text.label("nothing to draw", middle, Style(16.0, QUIET, "middle"))]
+    return [*layers, text.label("nothing to draw", middle, TextStyle(16.0, QUIET, "middle"))]
 
 
-def _beside(content: Content, page: Page) -> list[str]:
+def _beside(content: Content, page: PageLayout) -> list[str]:
     """Colour bar, legend and scale bar."""
     box, parts = page.view.box, []
     if content.trace is not None:
@@ -106,7 +112,7 @@ def _beside(content: Content, page: Page) -> list[str]:
     return parts
 
 
-def render(scene: Scene, name: str, options: Options = AS_USUAL) -> bytes:
+def render(scene: Scene, name: str, options: PictureOptions = AS_USUAL) -> bytes:
     """SVG, PNG or HTML bytes of the scene for a file of this name; OutputError for other
     extensions. HTML is the viewer's page, which takes no options."""
     if PurePath(name).suffix.lower() == ".html":
@@ -116,7 +122,7 @@ def render(scene: Scene, name: str, options: Options = AS_USUAL) -> bytes:
     return rendered(lambda sized: draw(scene, sized), name, options)
 
 
-def rendered(drawn: Callable[[Options], str], name: str, options: Options) -> bytes:
+def rendered(drawn: Callable[[PictureOptions], str], name: str, options: PictureOptions) -> bytes:
     """SVG or PNG bytes for a file of this name; `drawn` makes SVG text by options with a width.
     OutputError for other extensions."""
     suffix = PurePath(name).suffix.lower()

@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 SWATCH = 34.0
 """Width of the swatch before a line of the legend."""
 
-MOST_LAYERS_NAMED = 7
+MAX_LAYERS_NAMED = 7
 """The legend names at most this many layers of a drawing, and counts the others."""
 
 TRACE_PEN, FEED_PEN, DRAWING_PEN, ALONE_PEN = 2.7, 2.8, 4.8, 2.8
@@ -66,18 +66,18 @@ CROSSING_MARK: Look = {"r": 5.0, "fill": GAP, "stroke": PAPER, "stroke-width": 1
 
 
 @dataclass(frozen=True)
-class Entry:
-    """One line of the legend: its swatch (from x 0 to `SWATCH`, centred on height 0; "" for none)
-    and its text."""
+class LegendEntry:
+    """A line of the legend: its text, and its swatch as SVG from x 0 to `SWATCH`, centred on
+    height 0 ("" for none)."""
 
     swatch: str
     name: str
 
 
 @dataclass(frozen=True, eq=False)
-class Lines:
-    """Lines and arcs of one look, as a group of this id; its width and dashes are in units of the
-    page. The legend calls them `name`."""
+class LineGroup:
+    """Lines and arcs of one look, as an SVG group of this id. Width and dashes are in units of the
+    page; `name` stands in the legend."""
 
     id: str
     name: str
@@ -96,18 +96,18 @@ class Lines:
             look["stroke-dasharray"] = " ".join(f"{mm(float(dash)):.9g}" for dash in dashes)
         return plot.lines(self.id, self.chains, look)
 
-    def entries(self, view: View) -> Iterator[Entry]:
+    def entries(self, view: View) -> Iterator[LegendEntry]:
         """Its line of the legend."""
         look = self.look
         dashes = str(look.get("stroke-dasharray", ""))
         swatch = line_swatch(str(look["stroke"]), float(look["stroke-width"]), dashes)
-        yield Entry(swatch, self.name)
+        yield LegendEntry(swatch, self.name)
 
 
 @dataclass(frozen=True, eq=False)
-class Dots:
-    """Round marks of one look at `places` (x, y) mm, as a group of this id. The legend calls one
-    of them `name`."""
+class DotGroup:
+    """Round marks of one look at `places` (x, y) mm, as an SVG group of this id; `name` stands in
+    the legend."""
 
     id: str
     name: str
@@ -121,14 +121,14 @@ class Dots:
         """The marks, in units of the page."""
         return plot.dots(self.id, self.places, self.look)
 
-    def entries(self, view: View) -> Iterator[Entry]:
+    def entries(self, view: View) -> Iterator[LegendEntry]:
         """Its line of the legend, if any of the marks is in view."""
         if any(view.shows(*place) for place in self.places):
-            yield Entry(dot_swatch(self.look), self.name)
+            yield LegendEntry(dot_swatch(self.look), self.name)
 
 
 @dataclass(frozen=True, eq=False)
-class Texts:
+class TextGroup:
     """Short texts of one colour beside their `places` (x, y) mm, as a group of this id; a text
     without room is left out. The legend does not name them."""
 
@@ -144,32 +144,37 @@ class Texts:
         """The texts, in units of the page."""
         return plot.texts(self.id, self.texts, self.places, self.colour)
 
-    def entries(self, view: View) -> Iterator[Entry]:
+    def entries(self, view: View) -> Iterator[LegendEntry]:
         """None."""
         yield from ()
 
 
-Part = Lines | Dots | Texts
+Part = LineGroup | DotGroup | TextGroup
 
 
 @dataclass(frozen=True)
 class Layer:
-    """One layer: either its `parts`, or functions: whether it `holds` anything in a picture, its
-    SVG (`draw`), its `legend`. A `legend` beside `parts` takes the place of theirs.
+    """A layer of a picture, made of `parts` or drawn by functions.
 
-    in_mm: it lies below all layers that are not, and is drawn in mm, Y up; the others are drawn in
-    units of the page. height: of two layers of a kind, the higher one covers the other. ground:
-    draws what lies below all layers. place: its order in the legend. usual: it is shown where no
-    layers are named. needs: what a picture must be of, a "drawing", "moves", or the predicted
-    "path". under_path: it is not left out where the predicted path is shown. hint: why it may be
-    empty, where the drawing is not the reason. key: switches it in the viewer's page.
+    parts: the groups of lines, dots and texts that it draws and that the legend names.
+    holds, draw, legend: in place of parts, functions that say if the layer has anything to show,
+        write its SVG, and yield its lines of the legend. A legend beside parts replaces theirs.
+    ground: writes the SVG that lies below all layers.
+    in_mm: the layer is drawn in mm with Y up, below all layers in units of the page.
+    height: of two layers of a kind, the higher one covers the other.
+    place: order in the legend.
+    usual: the layer is shown when no layers are named.
+    needs: content that a picture must have: a "drawing", "moves", or the predicted "path".
+    under_path: the layer stays when the predicted path is shown.
+    hint: reason why the layer may be empty, if that is not the drawing.
+    key: key that switches the layer in the viewer.
     """
 
     name: str
     parts: Callable[[Content], Sequence[Part]] | None = None
     holds: Callable[[Content], object] | None = None
     draw: Callable[[Content, Plot], str] | None = None
-    legend: Callable[[Content, View], Iterable[Entry]] | None = None
+    legend: Callable[[Content, View], Iterable[LegendEntry]] | None = None
     ground: Callable[[Content, Plot], str] | None = None
     in_mm: bool = False
     height: int = 100
@@ -181,7 +186,7 @@ class Layer:
     key: str = ""
 
     def is_in(self, content: Content) -> bool:
-        """Whether the picture shows it and it has something to show."""
+        """True if the picture shows the layer and the layer is not empty."""
         shown = content.shown
         return (
             (self.usual if shown is None else self.name in shown)
@@ -200,7 +205,7 @@ class Layer:
         parts = (part.draw(plot) for part in self.parts_in(content))
         return "\n".join(part for part in parts if part)
 
-    def entries(self, content: Content, view: View) -> Iterable[Entry]:
+    def entries(self, content: Content, view: View) -> Iterable[LegendEntry]:
         """Its lines of the legend."""
         if self.legend is not None:
             return self.legend(content, view)
@@ -253,27 +258,27 @@ def _drawing(content: Content, plot: Plot) -> str:
     return element("g", {"id": "drawing", **plot.round_pen(width)}, *groups)
 
 
-def _drawing_legend(content: Content, view: View) -> Iterator[Entry]:
+def _drawing_legend(content: Content, view: View) -> Iterator[LegendEntry]:
     if not content.is_drawing_alone:
-        yield Entry(line_swatch(DRAWING, 5.0), "drawing")
+        yield LegendEntry(line_swatch(DRAWING, 5.0), "drawing")
     elif len(content.groups) == 1:
         name = content.groups[0].name
         named = f"drawing, layer {name}" if name.strip() else "drawing"
-        yield Entry(line_swatch(OUTLINE, 2.8), named)
+        yield LegendEntry(line_swatch(OUTLINE, 2.8), named)
     else:
-        for group in content.groups[:MOST_LAYERS_NAMED]:
-            yield Entry(line_swatch(group.colour, 2.8), group.name or "(no layer)")
-        if more := len(content.groups[MOST_LAYERS_NAMED:]):
-            yield Entry("", f"and {more} more layers")
+        for group in content.groups[:MAX_LAYERS_NAMED]:
+            yield LegendEntry(line_swatch(group.colour, 2.8), group.name or "(no layer)")
+        if more := len(content.groups[MAX_LAYERS_NAMED:]):
+            yield LegendEntry("", f"and {more} more layers")
 
 
 def _noted(content: Content) -> list[Part]:
     """Open ends, drill centres, and places where a contour is ambiguous."""
     places = content.places
     return [
-        Dots("gaps", "open end", places.gaps.tolist(), GAP_MARK),
-        Dots("points", "point", places.points.tolist(), POINT_MARK),
-        Dots("doubts", "crossing or branch", places.ambiguous.tolist(), CROSSING_MARK),
+        DotGroup("gaps", "open end", places.gaps.tolist(), GAP_MARK),
+        DotGroup("points", "point", places.points.tolist(), POINT_MARK),
+        DotGroup("doubts", "crossing or branch", places.ambiguous.tolist(), CROSSING_MARK),
     ]
 
 
@@ -292,8 +297,8 @@ def _swept(content: Content, plot: Plot) -> str:
     return "\n".join(groups)
 
 
-def _swept_legend(content: Content, view: View) -> Iterator[Entry]:
-    yield Entry(line_swatch(SWEPT, 9.0), swept_words(content.scene))
+def _swept_legend(content: Content, view: View) -> Iterator[LegendEntry]:
+    yield LegendEntry(line_swatch(SWEPT, 9.0), swept_words(content.scene))
 
 
 def swept_words(scene: Scene) -> str:
@@ -313,14 +318,14 @@ def _travel(content: Content, plot: Plot) -> str:
     return plot.frame("travel", content.scene.travel_mm or (0.0, 0.0), TRAVEL)
 
 
-def _travel_legend(content: Content, view: View) -> Iterator[Entry]:
+def _travel_legend(content: Content, view: View) -> Iterator[LegendEntry]:
     """Only where a side of the frame is in view."""
     wide, high = content.scene.travel_mm or (0.0, 0.0)
     (x0, x1), (y0, y1) = view.x_range, view.y_range
     overlaps = x0 <= wide and x1 >= 0.0 and y0 <= high and y1 >= 0.0
     inside = x0 > 0.0 and x1 < wide and y0 > 0.0 and y1 < high
     if overlaps and not inside:
-        yield Entry(line_swatch(TRAVEL, 2.0), f"travel {wide:g} × {high:g} mm")
+        yield LegendEntry(line_swatch(TRAVEL, 2.0), f"travel {wide:g} × {high:g} mm")
 
 
 def _stock(content: Content) -> list[Part]:
@@ -329,7 +334,7 @@ def _stock(content: Content) -> list[Part]:
         return []
     left, low, right, high = content.scene.stock_mm
     name = f"stock {right - left:g} × {high - low:g} mm"
-    return [Lines("stock", name, content.stock, STOCK_LINE)]
+    return [LineGroup("stock", name, content.stock, STOCK_LINE)]
 
 
 def _feeds(content: Content, plot: Plot) -> str:
@@ -344,15 +349,15 @@ def _feeds(content: Content, plot: Plot) -> str:
     return "\n".join(part for part in (level, slopes) if part)
 
 
-def _feeds_legend(content: Content, view: View) -> Iterator[Entry]:
+def _feeds_legend(content: Content, view: View) -> Iterator[LegendEntry]:
     moves, trace = content.moves, content.trace
     if moves.feeds and trace is None:
-        yield Entry(line_swatch(FEED, 2.8), "feed")
+        yield LegendEntry(line_swatch(FEED, 2.8), "feed")
     elif moves.feeds:
         below = "programmed path" if content.times == 1.0 else "wanted path"
-        yield Entry(line_swatch(FEED_PALE, 2.0), below)
+        yield LegendEntry(line_swatch(FEED_PALE, 2.0), below)
     if moves.ramps and trace is None:
-        yield Entry(line_swatch(PLUNGE, 2.8), "slope")
+        yield LegendEntry(line_swatch(PLUNGE, 2.8), "slope")
 
 
 # What is predicted.
@@ -362,14 +367,14 @@ def _path(content: Content, plot: Plot) -> str:
     return plot.trace(content.trace, TRACE_PEN) if content.trace is not None else ""
 
 
-def _path_legend(content: Content, view: View) -> Iterator[Entry]:
+def _path_legend(content: Content, view: View) -> Iterator[LegendEntry]:
     scale = "by error" if content.times == 1.0 else f"error × {content.times:g}"
-    yield Entry(map_swatch(4.0), f"predicted path, {scale}")
+    yield LegendEntry(map_swatch(4.0), f"predicted path, {scale}")
 
 
-def _worst_legend(content: Content, view: View) -> Iterator[Entry]:
+def _worst_legend(content: Content, view: View) -> Iterator[LegendEntry]:
     if any(view.shows(*place) for place in content.worst.tolist()):
-        yield Entry(dot_swatch(WORST_MARK), "largest errors, by rank")
+        yield LegendEntry(dot_swatch(WORST_MARK), "largest errors, by rank")
 
 
 # Dimensions with their verdicts.
@@ -384,7 +389,7 @@ def _inspected(content: Content) -> list[Part]:
         mine = [each for each in content.scene.inspected if each.verdict == verdict]
         look: Look = {"stroke": colour, "stroke-width": INSPECTED_PEN}
         chains = content.straight([each.places_mm for each in mine])
-        parts.append(Lines(f"dimensions-{verdict}", f"dimension: {verdict}", chains, look))
+        parts.append(LineGroup(f"dimensions-{verdict}", f"dimension: {verdict}", chains, look))
     return parts
 
 
@@ -395,12 +400,12 @@ def _sizes(content: Content) -> list[Part]:
     for verdict, colour in VERDICTS.items():
         ends = [end for each in every if each.verdict == verdict for end in each.places_mm]
         look: Look = {"r": 3.4, "fill": colour, "stroke": PAPER, "stroke-width": 1.0}
-        parts.append(Dots(f"ends-{verdict}", "", ends, look))
+        parts.append(DotGroup(f"ends-{verdict}", "", ends, look))
     # Where there is no room for all, those that matter most have it.
     order = {"out": 0, "undecided": 1}
     every = tuple(sorted(every, key=lambda each: order.get(each.verdict, 2)))
     middles = [_middle(*each.places_mm) for each in every]
-    return [*parts, Texts("sizes", [_size_words(each) for each in every], middles, INK)]
+    return [*parts, TextGroup("sizes", [_size_words(each) for each in every], middles, INK)]
 
 
 def _middle(one: Place, other: Place) -> Place:
@@ -408,7 +413,7 @@ def _middle(one: Place, other: Place) -> Place:
 
 
 def _size_words(item: InspectedReport) -> str:
-    """What is asked, and the predicted size with its uncertainty."""
+    """Format the required size and the predicted size with its uncertainty."""
     band = "" if item.expanded_um is None else f" ± {1e-3 * item.expanded_um:.3f}"
     return f"{item.asked}: {item.fit_mm:.3f}{band}"
 
@@ -421,9 +426,9 @@ def _zero(content: Content, plot: Plot) -> str:
     return _cross(at, 13.0, {"id": "part-zero"}) if plot.view.shows(0.0, 0.0) else ""
 
 
-def _zero_legend(content: Content, view: View) -> Iterator[Entry]:
+def _zero_legend(content: Content, view: View) -> Iterator[LegendEntry]:
     if view.shows(0.0, 0.0):
-        yield Entry(_cross((SWATCH / 2.0, 0.0), 9.0, {}), "part zero")
+        yield LegendEntry(_cross((SWATCH / 2.0, 0.0), 9.0, {}), "part zero")
 
 
 def _cross(at: tuple[float, float], size: float, name: Look) -> str:
@@ -482,8 +487,8 @@ LAYERS = (
     ),
     Layer(
         "rapids",
-        lambda content: [Lines("rapids", "rapid", content.moves.rapids, RAPID_LINE)],
-        legend=lambda content, view: [Entry(line_swatch(RAPID, 1.6, "7 5"), "rapid")],
+        lambda content: [LineGroup("rapids", "rapid", content.moves.rapids, RAPID_LINE)],
+        legend=lambda content, view: [LegendEntry(line_swatch(RAPID, 1.6, "7 5"), "rapid")],
         in_mm=True,
         height=4,
         place=3,
@@ -500,23 +505,25 @@ LAYERS = (
     ),
     Layer(
         "plunges",
-        lambda content: [Dots("plunges", "plunge", content.moves.plunges.tolist(), PLUNGE_MARK)],
-        legend=lambda content, view: [Entry(dot_swatch(PLUNGE_MARK), "plunge")],
+        lambda content: [
+            DotGroup("plunges", "plunge", content.moves.plunges.tolist(), PLUNGE_MARK)
+        ],
+        legend=lambda content, view: [LegendEntry(dot_swatch(PLUNGE_MARK), "plunge")],
         height=4,
         place=4,
         under_path=False,
     ),
     Layer(
         "starts",
-        lambda content: [Dots("starts", "start", content.starts.tolist(), START_MARK)],
-        legend=lambda content, view: [Entry(dot_swatch(START_MARK), "start")],
+        lambda content: [DotGroup("starts", "start", content.starts.tolist(), START_MARK)],
+        legend=lambda content, view: [LegendEntry(dot_swatch(START_MARK), "start")],
         height=3,
         place=5,
         under_path=False,
     ),
     Layer(
         "order",
-        lambda content: [Texts("order", *content.order, INK)],
+        lambda content: [TextGroup("order", *content.order, INK)],
         height=7,
         under_path=False,
     ),
@@ -529,7 +536,9 @@ LAYERS = (
     ),
     Layer(
         "reversals",
-        lambda content: [Dots("reversals", "reversal", content.reversals.tolist(), REVERSAL_MARK)],
+        lambda content: [
+            DotGroup("reversals", "reversal", content.reversals.tolist(), REVERSAL_MARK)
+        ],
         height=1,
         place=7,
         usual=False,
@@ -565,7 +574,7 @@ LAYERS = (
     ),
     Layer(
         "tabs",
-        lambda content: [Dots("tabs", "tab", content.scene.tabs, TAB_MARK)],
+        lambda content: [DotGroup("tabs", "tab", content.scene.tabs, TAB_MARK)],
         height=9,
         place=13,
         hint="; tabs of a job, or --tabs, make some",
@@ -633,16 +642,15 @@ def layers_in(content: Content) -> list[str]:
     return [layer.name for layer in LAYERS if layer.is_in(content)]
 
 
-def legend_of(content: Content, view: View) -> list[Entry]:
+def legend_of(content: Content, view: View) -> list[LegendEntry]:
     """The legend of the layers that are in the picture."""
     there = (layer for layer in LAYERS if layer.is_in(content))
     placed = sorted(there, key=lambda layer: layer.place)
     return [entry for layer in placed for entry in layer.entries(content, view)]
 
 
-def drawn(content: Content, plot: Plot) -> list[str]:
-    """The SVG of the plot, from the ground up: a group of all that is drawn in mm, and the rest
-    above it."""
+def draw_layers(content: Content, plot: Plot) -> list[str]:
+    """Draw the layers as SVG, the lowest first: a group of all layers in mm, then the others."""
     there = [layer for layer in from_the_ground_up() if layer.is_in(content)]
     lines = [layer.ground(content, plot) for layer in there if layer.ground is not None]
     lines += [layer.svg(content, plot) for layer in there if layer.in_mm]

@@ -11,17 +11,17 @@ from collections.abc import Sequence
 
 from camtool.pictures import text
 from camtool.pictures.colours import FRAME, INK, QUIET, SWEPT, VERDICTS
-from camtool.pictures.layers import Entry, line_swatch
-from camtool.pictures.options import SVG_WIDTH_PX, Options
+from camtool.pictures.layers import LegendEntry, line_swatch
+from camtool.pictures.options import SVG_WIDTH_PX, PictureOptions
 from camtool.pictures.page import legend_below, sheet, title_and_notes
 from camtool.pictures.scene import Scene
 from camtool.pictures.svg import Look, PathData, element, title
-from camtool.pictures.text import Style
+from camtool.pictures.text import TextStyle
 from camtool.pictures.view import MARGIN, page_width
 from camtool.units import UM_PER_MM
 from camtool.verification.report import COVERAGE, InspectedReport
 
-MOST_ROWS = 60
+MAX_ROWS = 60
 """Most dimensions in one plot: first those that are out, then the undecided; the report's table
 has all of them."""
 
@@ -36,17 +36,17 @@ _ORDER = {"out": 0, "undecided": 1, "in": 2}
 
 
 def has_limits(scene: Scene) -> bool:
-    """Whether there is anything to plot."""
+    """True if at least one inspected dimension has an upper limit."""
     return any(each.upper_mm is not None for each in scene.inspected)
 
 
-def draw_limits(scene: Scene, options: Options) -> str:
+def draw_limits(scene: Scene, options: PictureOptions) -> str:
     """SVG text of the plot of the scene's dimensions with limits."""
     width = page_width(options.size_px or SVG_WIDTH_PX)
     every = [each for each in scene.inspected if each.upper_mm is not None]
     shown = every
-    if len(every) > MOST_ROWS:
-        shown = sorted(every, key=lambda each: _ORDER[each.verdict])[:MOST_ROWS]
+    if len(every) > MAX_ROWS:
+        shown = sorted(every, key=lambda each: _ORDER[each.verdict])[:MAX_ROWS]
     more = len(every) - len(shown)
     notes = ["limits, all drawn equally wide, and what is predicted"]
     notes += [f"{more} more dimensions are in the table"] if more else []
@@ -77,7 +77,7 @@ def _row(item: InspectedReport, y: float, width: float) -> str:
     thick: Look = {**thin, "stroke-width": 5.0, "stroke-linecap": "round"}
     middle = at(0.5 * (lower + item.upper_mm))
     base = y + 0.5 * CAP
-    style = Style(cap=CAP, colour=INK)
+    style = TextStyle(cap=CAP, colour=INK)
     name = text.shortened(item.name, CAP, NAMES * room - 12.0)
     size = f"{item.fit_mm:.4f}" + (f" ± {spread:.4f}" if spread else "")
     words = text.shortened(f"{size} {item.verdict}", CAP, SIZES * room - 12.0)
@@ -92,7 +92,7 @@ def _row(item: InspectedReport, y: float, width: float) -> str:
         element("path", {"d": _line(at(item.low_mm), y, at(item.high_mm), y), **thick}),
         element("circle", {"cx": at(item.fit_mm), "cy": y, "r": 4.0, "fill": colour}),
         text.label(name, (MARGIN, base), style, full=item.name),
-        text.label(words, (right + 12.0, base), Style(cap=CAP, colour=QUIET)),
+        text.label(words, (right + 12.0, base), TextStyle(cap=CAP, colour=QUIET)),
     )
 
 
@@ -114,13 +114,13 @@ def _bar(x0: float, x1: float, y: float) -> str:
     return str(data)
 
 
-def _entries(shown: Sequence[InspectedReport]) -> list[Entry]:
+def _entries(shown: Sequence[InspectedReport]) -> list[LegendEntry]:
     found = {each.verdict for each in shown}
     entries = [
-        Entry(line_swatch(colour, 5.0), verdict)
+        LegendEntry(line_swatch(colour, 5.0), verdict)
         for verdict, colour in VERDICTS.items()
         if verdict in found
     ]
-    entries.append(Entry(line_swatch(QUIET, 1.6), f"uncertainty, expanded by {COVERAGE:g}"))
-    entries.append(Entry(line_swatch(SWEPT, 12.0), "limits"))
+    entries.append(LegendEntry(line_swatch(QUIET, 1.6), f"uncertainty, expanded by {COVERAGE:g}"))
+    entries.append(LegendEntry(line_swatch(SWEPT, 12.0), "limits"))
     return entries

@@ -23,7 +23,7 @@ LEAST_TIMES, MOST_TIMES = 1.0, 1e6
 
 
 @dataclass(frozen=True)
-class Options:
+class PictureOptions:
     """`size_px` is the width, None: as usual. `crop_mm` (x, y, width, height): only this part of
     the plane, with more beside or above it where it is very long or very high. `dark`: on a dark
     ground. `exaggerate`: the factor by which the distance of the predicted path from the wanted
@@ -63,7 +63,7 @@ class Options:
             )
 
 
-AS_USUAL = Options()
+AS_USUAL = PictureOptions()
 
 
 def check_width(width_px: int) -> None:
@@ -76,8 +76,10 @@ def check_width(width_px: int) -> None:
 
 
 def points_for(pictures: Sequence[str]) -> int | None:
-    """How many points of the slides' path pictures of these names need: none where there are none
-    to be made; None: as usual."""
+    """Return the number of points of the slides' path to keep for pictures of these file names.
+
+    It is 0 when there are no pictures, and None for the default number.
+    """
     if any(name.lower().endswith(".html") for name in pictures):
         return POINTS_OF_A_PAGE
     return None if pictures else 0

@@ -16,8 +16,8 @@ from camtool.pictures.chains import moves_of
 from camtool.pictures.colours import FEED_PALE, LAYER_COLOURS
 from camtool.pictures.content import cropped
 from camtool.pictures.draw import rendered
-from camtool.pictures.layers import Entry, line_swatch
-from camtool.pictures.options import AS_USUAL, SVG_WIDTH_PX, Options
+from camtool.pictures.layers import LegendEntry, line_swatch
+from camtool.pictures.options import AS_USUAL, SVG_WIDTH_PX, PictureOptions
 from camtool.pictures.page import (
     HEAD_GAP,
     LEGEND_DROP,
@@ -52,12 +52,12 @@ class Overlay(Struct, frozen=True, eq=False):
     notes: tuple[str, ...] = ()
 
 
-def render_overlay(overlay: Overlay, name: str, options: Options = AS_USUAL) -> bytes:
+def render_overlay(overlay: Overlay, name: str, options: PictureOptions = AS_USUAL) -> bytes:
     """SVG or PNG bytes for a file of this name; OutputError for other extensions."""
     return rendered(lambda sized: draw_overlay(overlay, sized), name, options)
 
 
-def draw_overlay(overlay: Overlay, options: Options = AS_USUAL) -> str:
+def draw_overlay(overlay: Overlay, options: PictureOptions = AS_USUAL) -> str:
     """The paths as SVG text; equal input gives equal bytes."""
     size_px = options.size_px or SVG_WIDTH_PX
     page = page_width(size_px)
@@ -86,10 +86,10 @@ def _colour(index: int) -> str:
     return LAYER_COLOURS[index % len(LAYER_COLOURS)]
 
 
-def _entries(overlay: Overlay) -> list[Entry]:
-    wanted = Entry(line_swatch(FEED_PALE, WANTED_PEN), "wanted")
+def _entries(overlay: Overlay) -> list[LegendEntry]:
+    wanted = LegendEntry(line_swatch(FEED_PALE, WANTED_PEN), "wanted")
     return [wanted] + [
-        Entry(line_swatch(_colour(index), RUN_PEN), name)
+        LegendEntry(line_swatch(_colour(index), RUN_PEN), name)
         for index, (name, _) in enumerate(overlay.runs)
     ]
 

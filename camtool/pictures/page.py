@@ -25,17 +25,17 @@ from camtool.pictures.colours import (
     darkened,
 )
 from camtool.pictures.content import Content
-from camtool.pictures.layers import SWATCH, Entry, legend_of
-from camtool.pictures.options import SMALLEST_PX, SVG_WIDTH_PX, Options
+from camtool.pictures.layers import SWATCH, LegendEntry, legend_of
+from camtool.pictures.options import SMALLEST_PX, SVG_WIDTH_PX, PictureOptions
 from camtool.pictures.svg import Look, PathData, element, number, one_line, title
-from camtool.pictures.text import Style
+from camtool.pictures.text import TextStyle
 from camtool.pictures.view import (
     CROP_SHAPES,
     MARGIN,
     PAGE,
     TALLEST,
     WIDEST,
-    Box,
+    PageBox,
     View,
     decimals_of,
     fit,
@@ -56,21 +56,21 @@ GUESSED_LEFT = 52.0
 FITS = 3
 
 
-class Page(Struct, frozen=True, eq=False):
+class PageLayout(Struct, frozen=True, eq=False):
     """`head` is the SVG of title and notes, `rows` the legend; the first row is centred on
     `legend_y`, the scale bar on `bar_y`; `width` and `height` are those of the page."""
 
     head: str
     view: View
     ticks: Ticks
-    rows: list[list[Entry]]
+    rows: list[list[LegendEntry]]
     legend_y: float
     bar_y: float
     height: float
     width: float = PAGE
 
 
-def page_of(content: Content, width: float = PAGE) -> Page:
+def page_of(content: Content, width: float = PAGE) -> PageLayout:
     """The page of a picture of one scene."""
     head, down = title_and_notes(content.scene.title, content.notes, width)
     top = down + HEAD_GAP
@@ -83,10 +83,12 @@ def page_of(content: Content, width: float = PAGE) -> Page:
     view, ticks = fitted(content.window, top, width, shapes, bar)
     table, bar_y = table_of(legend_of(content, view), view, view.box)
     legend_y = view.box.bottom + LEGEND_DROP
-    return Page(head, view, ticks, table, legend_y, bar_y, foot_of(table, legend_y), width)
+    return PageLayout(head, view, ticks, table, legend_y, bar_y, foot_of(table, legend_y), width)
 
 
-def table_of(entries: Sequence[Entry], view: View, plots: Box) -> tuple[list[list[Entry]], float]:
+def table_of(
+    entries: Sequence[LegendEntry], view: View, plots: PageBox
+) -> tuple[list[list[LegendEntry]], float]:
     """The rows of the legend below the plots, and the middle of the view's scale bar in them."""
     bar = scale_bar_width(view) + BAR_ROOM
     table, row = rows_beside(entries, bar, plots.width)
@@ -111,16 +113,16 @@ def fitted(
     return view, ticks
 
 
-def foot_of(rows: list[list[Entry]], legend_y: float) -> float:
+def foot_of(rows: list[list[LegendEntry]], legend_y: float) -> float:
     """Height of a page whose legend has these rows, the first centred on `legend_y`."""
     return round(legend_y + max(len(rows) - 1, 0) * ROW_STEP + FOOT)
 
 
-def mat(box: Box, width: float, height: float) -> str:
+def mat(box: PageBox, width: float, height: float) -> str:
     """Paper round the plot of a page, which hides what leaves the plot. A clip would do the same,
     but takes the renderer as long as all lines together."""
     path = PathData()
-    paper = Box(0.0, 0.0, width, height + math.ceil(width / SMALLEST_PX))
+    paper = PageBox(0.0, 0.0, width, height + math.ceil(width / SMALLEST_PX))
     for each in (paper, box):
         path.move(each.left, each.top)
         path.line(each.right, each.top)
@@ -131,7 +133,7 @@ def mat(box: Box, width: float, height: float) -> str:
     return element("path", look)
 
 
-def sheet(name: str, sizes: tuple[float, float], options: Options, *parts: str) -> str:
+def sheet(name: str, sizes: tuple[float, float], options: PictureOptions, *parts: str) -> str:
     """The SVG text of a picture: its parts on paper of `sizes` (width and height in units of the
     page), in the size and the palette of the options."""
     width, height = sizes
@@ -151,28 +153,28 @@ def sheet(name: str, sizes: tuple[float, float], options: Options, *parts: str) 
 
 # Title and notes, legend, and the colour bar of errors.
 
-TITLE = Style(cap=22.0, colour=INK, weight=0.13)
-NOTE = Style(cap=14.5, colour=QUIET)
-ENTRY = Style(cap=14.5, colour=QUIET)
+TITLE = TextStyle(cap=22.0, colour=INK, weight=0.13)
+NOTE = TextStyle(cap=14.5, colour=QUIET)
+ENTRY = TextStyle(cap=14.5, colour=QUIET)
 TITLE_STEP = 34.0
 NOTE_STEP = 28.0
 ROW_STEP = 33.0
 SWATCH_GAP, ENTRY_GAP = 11.0, 28.0
-LONGEST_ENTRY = 330.0
+MAX_ENTRY_WIDTH = 330.0
 BAR_WIDTH, BAR_GAP = 18.0, 26.0
-LEAST_BAR_SPACING = 85.0
+MIN_BAR_SPACING = 85.0
 CLEAR_OF_TOP = 2.3
 """Round numbers are left out nearer than this many heights of a letter to the largest error."""
 
 BAR_TITLE = "error (µm)"
 
 
-def _name(entry: Entry) -> str:
-    """The text of an entry, shortened to `LONGEST_ENTRY`."""
-    return text.shortened(entry.name, ENTRY.cap, LONGEST_ENTRY)
+def _name(entry: LegendEntry) -> str:
+    """The text of an entry, shortened to `MAX_ENTRY_WIDTH`."""
+    return text.shortened(entry.name, ENTRY.cap, MAX_ENTRY_WIDTH)
 
 
-def _width(entry: Entry) -> float:
+def _width(entry: LegendEntry) -> float:
     """Width of an entry in its row, with the gap to the next."""
     return SWATCH + SWATCH_GAP + text.width(_name(entry), ENTRY.cap) + ENTRY_GAP
 
@@ -213,10 +215,10 @@ def _title_lines(name: str, room: float, most: int) -> list[str]:
     return lines
 
 
-def rows_of(entries: Sequence[Entry], first: float, room: float) -> list[list[Entry]]:
+def rows_of(entries: Sequence[LegendEntry], first: float, room: float) -> list[list[LegendEntry]]:
     """The entries in rows: the first row no wider than `first`, the others than `room`; the first
     row stays empty when no entry fits into it."""
-    found: list[list[Entry]] = []
+    found: list[list[LegendEntry]] = []
     if entries and _width(entries[0]) - ENTRY_GAP > first:
         found.append([])
     used = math.inf
@@ -231,8 +233,8 @@ def rows_of(entries: Sequence[Entry], first: float, room: float) -> list[list[En
 
 
 def rows_beside(
-    entries: Sequence[Entry], bar: float, room: float
-) -> tuple[list[list[Entry]], int]:
+    entries: Sequence[LegendEntry], bar: float, room: float
+) -> tuple[list[list[LegendEntry]], int]:
     """The rows, and the one that leaves `bar` free at its end: the first, where an entry fits
     beside that, else the last one with so much room, else a row of its own."""
     first = room - bar
@@ -245,7 +247,7 @@ def rows_beside(
     return [[], *found], 0
 
 
-def legend_rows(table: Sequence[Sequence[Entry]], left: float, middle: float) -> str:
+def legend_rows(table: Sequence[Sequence[LegendEntry]], left: float, middle: float) -> str:
     """The rows of the legend, the first centred on height `middle`."""
     parts = []
     for index, row in enumerate(table):
@@ -259,7 +261,7 @@ def legend_rows(table: Sequence[Sequence[Entry]], left: float, middle: float) ->
     return element("g", {"id": "legend"}, *parts) if parts else ""
 
 
-def legend_below(entries: Sequence[Entry], top: float, width: float) -> tuple[str, float]:
+def legend_below(entries: Sequence[LegendEntry], top: float, width: float) -> tuple[str, float]:
     """The legend below `top` on a page of this width, and the height of that page."""
     if not entries:
         return "", round(top + MARGIN)
@@ -271,7 +273,7 @@ def legend_below(entries: Sequence[Entry], top: float, width: float) -> tuple[st
 
 def colour_bar_labels(top_um: float, height: float) -> list[tuple[float, str]]:
     """(value µm, text) along the colour bar: round numbers, and the largest error at the top."""
-    step = round_step(top_um * LEAST_BAR_SPACING / height)
+    step = round_step(top_um * MIN_BAR_SPACING / height)
     room = top_um * CLEAR_OF_TOP * TICK_CAP / height
     labels = [
         (value, number(value, decimals_of(step)))
@@ -288,7 +290,7 @@ def colour_bar_width(top_um: float, height: float) -> float:
     return BAR_GAP + max(BAR_WIDTH + 12.0 + widest, header)
 
 
-def colour_bar(top_um: float, box: Box) -> str:
+def colour_bar(top_um: float, box: PageBox) -> str:
     """The colour map with its numbers, right of the plot and as high."""
     left = box.right + BAR_GAP
     step = box.height / BINS
@@ -316,10 +318,10 @@ def colour_bar(top_um: float, box: Box) -> str:
         ticks.move(left + BAR_WIDTH, down)
         ticks.line(left + BAR_WIDTH + 5.0, down)
         at = (left + BAR_WIDTH + 12.0, down + TICK_CAP / 2.0)
-        parts.append(text.label(name, at, Style(TICK_CAP, QUIET)))
+        parts.append(text.label(name, at, TextStyle(TICK_CAP, QUIET)))
     line: Look = {"d": str(ticks), "fill": "none", "stroke": FRAME, "stroke-width": 1.4}
     parts.append(element("path", line))
-    parts.append(text.label(BAR_TITLE, (left, box.top - NAME_LIFT), Style(TICK_CAP, QUIET)))
+    parts.append(text.label(BAR_TITLE, (left, box.top - NAME_LIFT), TextStyle(TICK_CAP, QUIET)))
     return element("g", {"id": "error-scale"}, *parts)
 
 
@@ -331,12 +333,12 @@ NAME_LIFT = 19.0
 
 TICK, MINOR_TICK = 8.0, 4.5
 LABEL_GAP = 7.0
-LEAST_SPACING = 78.0
+MIN_SPACING = 78.0
 BAR_SHARE = 0.2
 """The scale bar is at most this share of the plot's width."""
 
 BAR_MARK = 5.0
-NUMBERS = Style(TICK_CAP, QUIET)
+NUMBERS = TextStyle(TICK_CAP, QUIET)
 
 
 class Ticks(Struct, frozen=True):
@@ -358,7 +360,7 @@ class Ticks(Struct, frozen=True):
 
 def ticks_of(view: View) -> Ticks:
     """Ticks whose numbers cannot touch."""
-    spacing = LEAST_SPACING
+    spacing = MIN_SPACING
     while True:
         step = round_step(spacing / view.scale)
         ticks = Ticks(
@@ -399,15 +401,15 @@ def axes_around(view: View, ticks: Ticks) -> str:
         _tick(marks, (across, box.bottom), (0.0, TICK))
         room = text.width(ticks.text(x), TICK_CAP) / 2.0 + TICK_CAP
         if across + room <= box.right - unit:
-            centred = Style(TICK_CAP, QUIET, "middle")
+            centred = TextStyle(TICK_CAP, QUIET, "middle")
             labels.append(text.label(ticks.text(x), (across, base), centred))
     for y in ticks.y:
         down = view.page(0.0, y)[1]
         _tick(marks, (box.left, down), (-TICK, 0.0))
         at = (box.left - TICK - LABEL_GAP, down + TICK_CAP / 2.0)
-        labels.append(text.label(ticks.text(y), at, Style(TICK_CAP, QUIET, "end")))
+        labels.append(text.label(ticks.text(y), at, TextStyle(TICK_CAP, QUIET, "end")))
     _minor(marks, view, ticks)
-    labels.append(text.label("X (mm)", (box.right, base), Style(TICK_CAP, QUIET, "end")))
+    labels.append(text.label("X (mm)", (box.right, base), TextStyle(TICK_CAP, QUIET, "end")))
     labels.append(text.label("Y (mm)", (box.left, box.top - NAME_LIFT), NUMBERS))
     pen: Look = {"fill": "none", "stroke": FRAME, "stroke-width": 1.4}
     edge: Look = {"x": box.left, "y": box.top, "width": box.width, "height": box.height}
@@ -466,6 +468,6 @@ def scale_bar(view: View, right: float, middle: float) -> str:
         title(f"scale bar: {name}"),
         element("path", {"d": str(data), "fill": "none", "stroke": INK, "stroke-width": 2.2}),
         text.label(
-            name, (begin - 12.0, middle + TICK_CAP / 2.0), Style(TICK_CAP, QUIET, anchor="end")
+            name, (begin - 12.0, middle + TICK_CAP / 2.0), TextStyle(TICK_CAP, QUIET, anchor="end")
         ),
     )

@@ -11,7 +11,7 @@ import numpy as np
 
 from camtool.pictures.beside import draw_beside, render_beside
 from camtool.pictures.draw import draw, render
-from camtool.pictures.options import AS_USUAL, Options
+from camtool.pictures.options import AS_USUAL, PictureOptions
 from camtool.pictures.overlay import Overlay, draw_overlay, render_overlay
 from camtool.pictures.scene import Scene
 from camtool.records import replace
@@ -24,7 +24,7 @@ class Picture:
     values give equal bytes."""
 
     scene: Scene | Overlay | tuple[Scene, ...]
-    options: Options = AS_USUAL
+    options: PictureOptions = AS_USUAL
 
     @property
     def svg(self) -> str:
@@ -61,19 +61,19 @@ class Picture:
 ERRORS_ACROSS = 16.0
 """Width of a close-up in largest errors: it shows single steps and the line that they follow."""
 
-LEAST_SHARE = 0.02
+MIN_SHARE = 0.02
 """Least width of a close-up as a share of the predicted path, whose points are no finer."""
 
 
-def closeups(scene: Scene, options: Options) -> Iterator[tuple[str, Options]]:
+def closeups(scene: Scene, options: PictureOptions) -> Iterator[tuple[str, PictureOptions]]:
     """Caption and options of each close-up; none where nothing was predicted. Size and ground are
     those of `options`, the rest is as usual."""
-    plain = Options(size_px=options.size_px, dark=options.dark)
+    plain = PictureOptions(size_px=options.size_px, dark=options.dark)
     points, errors = scene.trace_points, scene.trace_error_mm
     if points is not None and errors is not None and scene.worst and len(points):
         size = float(np.ptp(points, axis=0).max())
         largest = float(errors[scene.trace_cutting].max(initial=0.0))
-        side = max(ERRORS_ACROSS * largest, LEAST_SHARE * size)
+        side = max(ERRORS_ACROSS * largest, MIN_SHARE * size)
         if 0.0 < side < 0.5 * size:
             x, y = scene.worst[0]
             shown = (x - 0.5 * side, y - 0.5 * side, side, side)
@@ -92,9 +92,9 @@ LAID = frozenset({"drawing", "stock", "zero"})
 """The layers of a picture that shows how the stock lies on the machine."""
 
 
-def on_stock(scene: Scene) -> tuple[Scene, Options] | None:
+def on_stock(scene: Scene) -> tuple[Scene, PictureOptions] | None:
     """The scene of the drawing on its stock, with part zero, and its options; None without a
     drawing."""
     if scene.drawing is None:
         return None
-    return Scene(drawing=scene.drawing, stock_mm=scene.stock_mm), Options(layers=LAID)
+    return Scene(drawing=scene.drawing, stock_mm=scene.stock_mm), PictureOptions(layers=LAID)

@@ -16,11 +16,11 @@ from camtool.pictures.chains import Chain, path_data
 from camtool.pictures.colours import BODY, FEED, PLOT
 from camtool.pictures.content import Place
 from camtool.pictures.svg import Look, PathData, element, number
-from camtool.pictures.text import Style
-from camtool.pictures.trace import Trace, trace_layer
+from camtool.pictures.text import TextStyle
+from camtool.pictures.trace import ErrorTrace, trace_layer
 from camtool.pictures.view import View
 
-MOST_BODIES = 500
+MAX_BODIES = 500
 """Drawings of more closed paths have no light fill."""
 
 INK_SHARE = 0.12
@@ -34,10 +34,10 @@ ARROWS_APART = 60.0
 """An arrow nearer than this to another one is left out: passes at several depths lie over each
 other."""
 
-SHORTEST_WITH_ARROW = 90.0
+MIN_LENGTH_WITH_ARROW = 90.0
 MOST_WITH_ARROW, MOST_ON_ONE = 150, 4
 MARKS_OF_FULL_SIZE = 120
-SMALLEST_MARK = 0.3
+MIN_MARK = 0.3
 TIE_DECIMALS = 4
 
 CAP = 12.0
@@ -48,14 +48,14 @@ HALO = 5.0
 
 AWAY = 9.0
 CLEAR = 3.0
-MOST_LABELS = 400
+MAX_LABELS = 400
 """Of more texts than this only the first ones are tried."""
 
 DIRECTIONS = ((1.0, -1.0), (-1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
 
 
 class Plot(Struct, frozen=True):
-    """What layers draw on: the window of a picture."""
+    """The plot area of a picture, on which layers draw."""
 
     view: View
 
@@ -103,7 +103,7 @@ class Plot(Struct, frozen=True):
     def body(self, chains: Sequence[Chain]) -> str:
         """A light fill of what is closed (even-odd, so that holes stay open)."""
         closed = [chain for chain in chains if chain.closed]
-        if not closed or len(closed) > MOST_BODIES:
+        if not closed or len(closed) > MAX_BODIES:
             return ""
         fill: Look = {"d": path_data(closed), "fill": BODY, "fill-rule": "evenodd"}
         return element("g", {"id": "body"}, element("path", fill))
@@ -114,7 +114,7 @@ class Plot(Struct, frozen=True):
         line: Look = {"fill": "none", "stroke": colour, "stroke-width": self.view.mm(2.0)}
         return element("g", {"id": name}, element("rect", {**sides, **line}))
 
-    def trace(self, trace: Trace, width: float) -> str:
+    def trace(self, trace: ErrorTrace, width: float) -> str:
         """The path of the slides, coloured by its error."""
         return trace_layer(trace, self.view, width)
 
@@ -125,7 +125,7 @@ class Plot(Struct, frozen=True):
         shown = [self.view.page(*place) for place in places if self.view.shows(*place)]
         if not shown:
             return ""
-        shrink = max(math.sqrt(min(MARKS_OF_FULL_SIZE / len(shown), 1.0)), SMALLEST_MARK)
+        shrink = max(math.sqrt(min(MARKS_OF_FULL_SIZE / len(shown), 1.0)), MIN_MARK)
         line = {key: value for key, value in look.items() if key != "r"}
         if "stroke-width" in line:
             line["stroke-width"] = round(float(line["stroke-width"]) * shrink, 3)
@@ -139,7 +139,7 @@ class Plot(Struct, frozen=True):
         """Arrows in the direction of travel: none on a short chain, four at most on any."""
         view = self.view
         lengths = [float(chain.lengths().sum()) * view.scale for chain in chains]
-        long = [index for index, length in enumerate(lengths) if length >= SHORTEST_WITH_ARROW]
+        long = [index for index, length in enumerate(lengths) if length >= MIN_LENGTH_WITH_ARROW]
         data, taken = PathData(), list[Place]()
         for index in long[:: 1 + len(long) // MOST_WITH_ARROW]:
             wanted = min(1 + int(lengths[index] / ARROW_EVERY), MOST_ON_ONE)
@@ -205,7 +205,7 @@ class Label(Struct, frozen=True):
 def labels_beside(texts: Sequence[str], places: Sequence[Place], view: View) -> list[Label]:
     """Texts beside their places in mm, none over another: one that finds no room is left out."""
     found: list[Label] = []
-    for words, place in list(zip(texts, places, strict=True))[:MOST_LABELS]:
+    for words, place in list(zip(texts, places, strict=True))[:MAX_LABELS]:
         if not view.shows(*place):
             continue
         at = view.page(*place)
@@ -244,7 +244,7 @@ def _group(name: str, parts: list[str]) -> str:
 
 
 def _written(label: Label, colour: str) -> str:
-    style, at = Style(CAP, colour), (label.box[0], label.box[3])
+    style, at = TextStyle(CAP, colour), (label.box[0], label.box[3])
     halo: Look = {**text.stroke_of(style), "stroke": PLOT, "stroke-width": HALO}
     below = element("path", {"d": text.strokes(label.text, at, style), **halo})
     return below + "\n" + text.label(label.text, at, style)

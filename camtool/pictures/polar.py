@@ -15,13 +15,13 @@ from camtool.arrays import Floats
 from camtool.errors import OptionError
 from camtool.pictures import text
 from camtool.pictures.colours import BACK, BACK_SPREAD, FEED, FRAME, GRID, INK, PLOT, QUIET, SPREAD
-from camtool.pictures.layers import Entry, line_swatch
-from camtool.pictures.options import SVG_WIDTH_PX, Options
+from camtool.pictures.layers import LegendEntry, line_swatch
+from camtool.pictures.options import SVG_WIDTH_PX, PictureOptions
 from camtool.pictures.page import legend_below, sheet, title_and_notes
 from camtool.pictures.scene import Round, Scene
 from camtool.pictures.svg import Look, PathData, element, number
-from camtool.pictures.text import Style
-from camtool.pictures.view import MARGIN, Box, decimals_of, page_width, round_step
+from camtool.pictures.text import TextStyle
+from camtool.pictures.view import MARGIN, PageBox, decimals_of, page_width, round_step
 from camtool.records import replace
 from camtool.units import UM_PER_MM
 
@@ -38,9 +38,9 @@ class CircleErrors(Struct, frozen=True, eq=False):
         return "counterclockwise" if self.one.ccw else "clockwise"
 
 
-def shown(scene: Scene, which: int) -> tuple[CircleErrors, ...]:
-    """The `which`-th circle of the scene, from 1, with the same one in the other direction where
-    there is that, counterclockwise first; OptionError when there is no such circle."""
+def circle_pair(scene: Scene, which: int) -> tuple[CircleErrors, ...]:
+    """Return the `which`-th circle of the scene, from 1, and the same circle cut in the other
+    direction, if there is one, counterclockwise first. OptionError if there is no such circle."""
     if not 1 <= which <= len(scene.rounds):
         many = len(scene.rounds)
         raise OptionError(
@@ -55,26 +55,26 @@ def shown(scene: Scene, which: int) -> tuple[CircleErrors, ...]:
     return tuple(CircleErrors(number, one, one.errors() * UM_PER_MM) for number, one in rounds)
 
 
-def draw_polar(scene: Scene, which: int, options: Options) -> str:
+def draw_polar(scene: Scene, which: int, options: PictureOptions) -> str:
     """SVG text of the plot of the `which`-th circle of the scene, from 1; OptionError when there
     is none."""
     width = page_width(options.size_px or SVG_WIDTH_PX)
-    circles = shown(scene, which)
+    circles = circle_pair(scene, which)
     errors = [circle.errors_um for circle in circles]
     dial = dial_of(errors, width)
     head, down = title_and_notes(scene.title, notes(circles, dial), width)
-    dial = dial.placed(down, width)
+    dial = dial.centred_below(down, width)
     foot = dial.middle[1] + dial.outer + ROOM
     below, foot = legend_below(entries(circles), foot, width)
     return sheet(scene.title, (width, foot), options, head, *plot(errors, dial), below)
 
 
-def entries(circles: Sequence[CircleErrors]) -> list[Entry]:
+def entries(circles: Sequence[CircleErrors]) -> list[LegendEntry]:
     """The legend: the direction of each circle, where there are two."""
     if len(circles) < 2:
         return []
     return [
-        Entry(line_swatch(line, 2.4), f"{circle.direction} (circle {circle.which})")
+        LegendEntry(line_swatch(line, 2.4), f"{circle.direction} (circle {circle.which})")
         for circle, (line, _) in zip(circles, PENS, strict=False)
     ]
 
@@ -127,16 +127,16 @@ ROOM = 62.0
 BASE_SHARE = 0.62
 """Radius of the programmed circle as a share of the outermost one, at most."""
 
-FEWEST_RINGS = 3
+MIN_RINGS = 3
 """Least number of rings between the programmed circle and the largest error."""
 
-LEAST_UM = 1e-3
+MIN_RANGE_UM = 1e-3
 """The magnification grows no further for errors smaller than this."""
 
 LABELS_DEG = (22.5, 67.5, 112.5, 157.5, 202.5, 247.5, 292.5, 337.5)
 """The rings are numbered along that of these directions where the numbers hide least."""
 
-FEWEST_LABELS = 2
+MIN_LABELS = 2
 
 FIRST_LABEL = 40.0
 """Rings of a smaller radius have no number: it would lie on the middle."""
@@ -163,7 +163,7 @@ class Dial(Struct, frozen=True):
         x, y = self.middle
         return x + radius * math.cos(angle), y - radius * math.sin(angle)
 
-    def placed(self, top: float, width: float) -> Dial:
+    def centred_below(self, top: float, width: float) -> Dial:
         """The dial below `top`, in the middle of the width."""
         return replace(self, middle=(0.5 * width, top + ROOM + self.outer))
 
@@ -176,8 +176,8 @@ def dial_of(errors_um: Sequence[Floats], width: float) -> Dial:
     seen = errors[np.isfinite(errors)]
     out = max(float(seen.max(initial=0.0)), 0.0)
     into = max(-float(seen.min(initial=0.0)), 0.0)
-    largest = max(out, into, LEAST_UM)
-    step = round_step(largest / FEWEST_RINGS / 2.0)
+    largest = max(out, into, MIN_RANGE_UM)
+    step = round_step(largest / MIN_RINGS / 2.0)
     reach = step * math.ceil(largest / step)
     share = (1.0 - BASE_SHARE) if out >= into else 0.5
     base = (1.0 - share) * outer
@@ -217,7 +217,7 @@ def _rings(dial: Dial) -> str:
 def _quadrants(dial: Dial) -> str:
     """A line to each end of an axis, where that axis reverses, with its name."""
     data, labels = PathData(), []
-    (x, y), outer, style = dial.middle, dial.outer, Style(CAP, INK, "middle")
+    (x, y), outer, style = dial.middle, dial.outer, TextStyle(CAP, INK, "middle")
     for index, name in enumerate(AXES):
         cos, sin = round(math.cos(index * math.pi / 2)), round(math.sin(index * math.pi / 2))
         data.move(x, y)
@@ -274,15 +274,15 @@ def _runs(seen: np.ndarray) -> list[list[int]]:
 
 def _labels(errors_um: Sequence[Floats], dial: Dial) -> str:
     """The numbers of the rings, µm, along the direction where they hide least. A number that would
-    hide an error is left out where at least `FEWEST_LABELS` remain."""
+    hide an error is left out where at least `MIN_LABELS` remain."""
     places = np.array([_places(errors, dial) for errors in errors_um]).reshape(-1, 2)
     clear, numbers = [], []
     for degrees in LABELS_DEG:
         numbers.append(_numbers(dial, math.radians(degrees)))
         clear.append([one for one in numbers[-1] if not _hides(one[2], places)])
     best = max(range(len(clear)), key=lambda index: len(clear[index]))
-    shown = clear[best] if len(clear[best]) >= FEWEST_LABELS else numbers[best]
-    style, parts = Style(LABEL_CAP, QUIET), []
+    shown = clear[best] if len(clear[best]) >= MIN_LABELS else numbers[best]
+    style, parts = TextStyle(LABEL_CAP, QUIET), []
     for name, at, _ in shown:
         halo: Look = {**text.stroke_of(style), "stroke": PLOT, "stroke-width": 2.0 * HALO}
         parts.append(element("path", {"d": text.strokes(name, at, style), **halo}))
@@ -300,7 +300,7 @@ def _places(errors_um: Floats, dial: Dial) -> Floats:
     return np.column_stack([x.ravel(), y.ravel()])
 
 
-def _numbers(dial: Dial, angle: float) -> list[tuple[str, tuple[float, float], Box]]:
+def _numbers(dial: Dial, angle: float) -> list[tuple[str, tuple[float, float], PageBox]]:
     """(number, where its baseline begins, its box) of each ring with a number."""
     every = max(1, math.ceil(2.2 * CAP / (dial.step_um * dial.per_um)))
     shown = [e for e in _ring_errors(dial) if round(e / dial.step_um) % every == 0]
@@ -313,12 +313,12 @@ def _numbers(dial: Dial, angle: float) -> list[tuple[str, tuple[float, float], B
         half, base = 0.5 * text.width(name, LABEL_CAP), y + 0.5 * LABEL_CAP
         name += " µm" if error == shown[-1] else ""
         left, right = x - half, x - half + text.width(name, LABEL_CAP)
-        around = Box(left - HALO, base - LABEL_CAP - HALO, right + HALO, base + HALO)
+        around = PageBox(left - HALO, base - LABEL_CAP - HALO, right + HALO, base + HALO)
         found.append((name, (left, base), around))
     return found
 
 
-def _hides(box: Box, places: Floats) -> bool:
+def _hides(box: PageBox, places: Floats) -> bool:
     x, y = places.T
     inside = (x > box.left) & (x < box.right) & (y > box.top) & (y < box.bottom)
     return bool(inside.any())

@@ -38,7 +38,7 @@ NAME_WIDTH = 11
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What to draw; what is None or empty is left out.
+    """The content of a picture. Fields that are None or empty are left out.
 
     The drawing is in the work frame. trace_points (T, 2) mm is the predicted path of the slides,
     trace_error_mm (T,) its distance from the wanted path, trace_cutting (T,) whether the tool cuts
@@ -124,24 +124,26 @@ class Round(Struct, frozen=True, eq=False):
         return found - self.radius_mm
 
 
-class Line(Struct, frozen=True):
-    """A line of a table: its cells, and the row of the toolpath that it is about."""
+class TableLine(Struct, frozen=True):
+    """A line of a table: its cells, and the row of the toolpath to which it refers."""
 
     cells: tuple[str, ...]
     move: int | None = None
 
 
-class Table(Struct, frozen=True):
+class ReportTable(Struct, frozen=True):
     """A table of the report; `columns` are its headings, which may be missing."""
 
     title: str
     columns: tuple[str, ...]
-    lines: tuple[Line, ...]
+    lines: tuple[TableLine, ...]
 
 
 class Playback(Struct, frozen=True, eq=False):
-    """How N rows of a toolpath run: `seconds` (N,); `error_mm` (N,), NaN where unknown;
-    `trace_row` (T,) the row of each point of the scene's trace.
+    """Times of a toolpath of N rows, for the viewer.
+
+    `seconds` (N,); `error_mm` (N,), NaN where unknown; `trace_row` (T,) the row of each point of
+    the scene's trace.
 
     `blocks` are the program's lines, one per block, None without a program; `binary`: they are
     bytes in hex. ValueError when the lengths of the columns differ, and for impossible seconds.
@@ -152,7 +154,7 @@ class Playback(Struct, frozen=True, eq=False):
     trace_row: Ints
     blocks: tuple[str, ...] | None = None
     binary: bool = False
-    tables: tuple[Table, ...] = ()
+    tables: tuple[ReportTable, ...] = ()
 
     def __post_init__(self) -> None:
         if self.seconds.shape != self.error_mm.shape or self.seconds.ndim != 1:
@@ -162,8 +164,11 @@ class Playback(Struct, frozen=True, eq=False):
 
 
 def by_feed(toolpath: Toolpath, rapid_mm_min: float) -> Playback:
-    """How a toolpath runs without a simulation: each move at its feed, rapids at `rapid_mm_min`
-    (inf: in no time), dwells for their seconds."""
+    """Compute the times of a toolpath without a simulation.
+
+    Each move runs at its feed, rapids at `rapid_mm_min` (inf: in no time), and dwells last their
+    seconds.
+    """
     seconds = np.zeros(len(toolpath))
     if len(toolpath):
         away = toolpath.end - toolpath.starts
@@ -270,7 +275,7 @@ def rounds_of(verification: Verification) -> tuple[Round, ...]:
 
 
 def _width_mm(job: Job, toolpath: Toolpath | None) -> float | None:
-    """How wide the tool cuts at the surface, mm; None where that changes along the path.
+    """Return the width of the cut at the surface, mm; None if it changes along the path.
 
     A V bit, or a round nose, is as wide as it is deep: it has one width where one operation cuts
     level, that of its deepest pass.
@@ -344,28 +349,28 @@ def _playback(
     return playback
 
 
-def _tables(report: Report) -> Iterator[Table]:
+def _tables(report: Report) -> Iterator[ReportTable]:
     """The tables of a report: its figures, findings, worst moves and contours, none without a
     line."""
     lines = report.to_text(findings=False).splitlines()
     facts = [(line[:NAME_WIDTH].strip(), line[NAME_WIDTH:].strip()) for line in lines]
-    yield Table("Report", (), tuple(map(Line, facts)))
+    yield ReportTable("Report", (), tuple(map(TableLine, facts)))
     for title, columns, found in (_findings(report), _worst(report), _contours(report)):
         if found:
-            yield Table(title, columns, tuple(found[:LINES_SHOWN]))
+            yield ReportTable(title, columns, tuple(found[:LINES_SHOWN]))
 
 
-def _findings(report: Report) -> tuple[str, tuple[str, ...], list[Line]]:
+def _findings(report: Report) -> tuple[str, tuple[str, ...], list[TableLine]]:
     lines = [
-        Line((item.severity, item.code, item.where, item.message)) for item in report.findings
+        TableLine((item.severity, item.code, item.where, item.message)) for item in report.findings
     ]
     return "Findings", ("severity", "code", "where", "message"), lines
 
 
-def _worst(report: Report) -> tuple[str, tuple[str, ...], list[Line]]:
+def _worst(report: Report) -> tuple[str, tuple[str, ...], list[TableLine]]:
     """The worst moves, which the report numbers from 1."""
     lines = [
-        Line(
+        TableLine(
             (
                 str(index),
                 str(item.move if item.block is None else item.block),
@@ -383,9 +388,9 @@ def _worst(report: Report) -> tuple[str, tuple[str, ...], list[Line]]:
     return "Worst moves", names, lines
 
 
-def _contours(report: Report) -> tuple[str, tuple[str, ...], list[Line]]:
+def _contours(report: Report) -> tuple[str, tuple[str, ...], list[TableLine]]:
     lines = [
-        Line(
+        TableLine(
             (item.name, _um(item.max_um), _um(item.rms_um), _um(item.mean_um), _place(item.at_mm))
         )
         for item in sorted(report.contour_errors, key=lambda item: -item.max_um)

@@ -60,7 +60,7 @@ def escape(text: str) -> str:
 
 
 def element(name: str, attributes: Attributes, *children: str) -> str:
-    """One element; strings among the attributes are escaped, the children are SVG already."""
+    """Write an SVG element. Strings among the attributes are escaped; children are SVG already."""
     head = name + "".join(f' {key}="{_value(value)}"' for key, value in attributes.items())
     inner = [child for child in children if child]
     if not inner:

@@ -19,7 +19,7 @@ _UNIT = re.compile(r" (?!\(?(?:µm|mm|h)\b)")
 """Blanks where a line may break: not those between a number and its unit."""
 
 
-class Style(Struct, frozen=True):
+class TextStyle(Struct, frozen=True):
     """`cap` is the height of a capital on the page; `weight` is the width of its strokes as a
     share of `cap`."""
 
@@ -29,13 +29,13 @@ class Style(Struct, frozen=True):
     weight: float = 0.12
 
 
-def _drawn(letter: str) -> Glyph:
+def _glyph_or_box(letter: str) -> Glyph:
     return glyph(letter) or BOX
 
 
 def width(text: str, cap: float) -> float:
     """Width on the page of `text` at this height of capitals."""
-    return sum(_drawn(letter).advance for letter in one_line(text)) * cap / CAP_UNITS
+    return sum(_glyph_or_box(letter).advance for letter in one_line(text)) * cap / CAP_UNITS
 
 
 def shortened(text: str, cap: float, limit: float) -> str:
@@ -44,7 +44,9 @@ def shortened(text: str, cap: float, limit: float) -> str:
     if width(text, cap) <= limit:
         return text
     # A name may have many thousand letters: each is measured once.
-    advances = accumulate((_drawn(letter).advance for letter in text), initial=_drawn("…").advance)
+    advances = accumulate(
+        (_glyph_or_box(letter).advance for letter in text), initial=_glyph_or_box("…").advance
+    )
     kept = sum(advance * cap / CAP_UNITS <= limit for advance in advances)
     return text[: max(kept - 1, 0)].rstrip() + "…"
 
@@ -62,7 +64,7 @@ def wrapped(text: str, cap: float, limit: float) -> list[str]:
     return lines
 
 
-def label(text: str, at: tuple[float, float], style: Style, *, full: str | None = None) -> str:
+def label(text: str, at: tuple[float, float], style: TextStyle, *, full: str | None = None) -> str:
     """The strokes of `text` with its baseline at `at`; `full` is the text for screen readers."""
     data = strokes(text, at, style)
     spoken = text if full is None else full
@@ -74,14 +76,14 @@ def label(text: str, at: tuple[float, float], style: Style, *, full: str | None 
     )
 
 
-def strokes(text: str, at: tuple[float, float], style: Style) -> str:
+def strokes(text: str, at: tuple[float, float], style: TextStyle) -> str:
     """The path data of a label; empty when there is nothing to see."""
     shown = one_line(text)
     scale = style.cap / CAP_UNITS
     x = at[0] - {"start": 0.0, "middle": 0.5, "end": 1.0}[style.anchor] * width(shown, style.cap)
     data = PathData()
     for letter in shown:
-        drawn = _drawn(letter)
+        drawn = _glyph_or_box(letter)
         for stroke in drawn.strokes:
             for index, (dx, dy) in enumerate(stroke):
                 to = (x + dx * scale, at[1] + (dy - BASELINE) * scale)
@@ -90,7 +92,7 @@ def strokes(text: str, at: tuple[float, float], style: Style) -> str:
     return str(data)
 
 
-def stroke_of(style: Style) -> Look:
+def stroke_of(style: TextStyle) -> Look:
     """The pen of a label."""
     return {
         "fill": "none",

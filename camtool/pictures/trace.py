@@ -21,7 +21,7 @@ from camtool.pictures.svg import Look, PathData, element
 from camtool.pictures.view import View
 from camtool.units import UM_PER_MM
 
-LEAST_TOP_UM = 1e-3
+MIN_TOP_UM = 1e-3
 """The colour map ends here where all errors are smaller."""
 
 FINEST_SHARE = 1e-5
@@ -31,10 +31,13 @@ MERGED_SHARE = 1.25e-4
 """Points nearer than this share of the window, half a pixel of 4000, may be left out."""
 
 
-class Trace(Struct, frozen=True, eq=False):
-    """Points (T, 2) mm, as drawn; |error| (T,) µm; whether the tool cuts between the point before
-    and this one (T,); the end of the colour map, µm; `times`, by which the distances of the points
-    from the wanted path have been multiplied."""
+class ErrorTrace(Struct, frozen=True, eq=False):
+    """The predicted path as it is drawn.
+
+    points (T, 2) mm, error_um (T,) absolute error, cutting (T,) True if the tool cuts between the
+    previous point and this one, top_um the upper end of the colour map, times the factor by which
+    the distances of the points from the wanted path are enlarged.
+    """
 
     points: Floats
     error_um: Floats
@@ -43,24 +46,24 @@ class Trace(Struct, frozen=True, eq=False):
     times: float = 1.0
 
 
-def trace_of(scene: Scene, times: float = 1.0) -> Trace | None:
+def trace_of(scene: Scene, times: float = 1.0) -> ErrorTrace | None:
     """The predicted path of a scene, its errors drawn `times` as large where the wanted path is
     known; None when there is none or it never cuts."""
     points, error, cutting = scene.trace_points, scene.trace_error_mm, scene.trace_cutting
     if points is None or error is None or cutting is None or not cutting.any():
         return None
     error_um = np.where(cutting, np.abs(error) * UM_PER_MM, 0.0)
-    top_um = max(float(error_um.max()), LEAST_TOP_UM)
+    top_um = max(float(error_um.max()), MIN_TOP_UM)
     if times == 1.0 or scene.wanted is None:
-        return Trace(points, error_um, cutting, top_um)
+        return ErrorTrace(points, error_um, cutting, top_um)
     # The point before a cut is where the cut begins.
     drawn = cutting | np.append(cutting[1:], False)
     moved = points.copy()
     moved[drawn] = exaggerated(points[drawn], scene.wanted, times)
-    return Trace(moved, error_um, cutting, top_um, times)
+    return ErrorTrace(moved, error_um, cutting, top_um, times)
 
 
-def bins_of(trace: Trace) -> Ints:
+def bins_of(trace: ErrorTrace) -> Ints:
     """(T−1,) the step of the map for each piece of the path, by the larger error of its ends; −1
     where the tool does not cut."""
     worse = np.maximum(trace.error_um[:-1], trace.error_um[1:])
@@ -68,10 +71,10 @@ def bins_of(trace: Trace) -> Ints:
     return np.where(trace.cutting[1:], step, -1)
 
 
-def lines_by_step(trace: Trace, window_mm: float) -> list[list[Floats]]:
+def lines_by_step(trace: ErrorTrace, window_mm: float) -> list[list[Floats]]:
     """For each step of the map, its lines: arrays (n, 2) of points, n ≥ 2."""
     keep = _kept(trace, MERGED_SHARE * window_mm)
-    chosen = Trace(
+    chosen = ErrorTrace(
         trace.points[keep], _worst_between(trace, keep), trace.cutting[keep], trace.top_um
     )
     bins = bins_of(chosen)
@@ -85,7 +88,7 @@ def lines_by_step(trace: Trace, window_mm: float) -> list[list[Floats]]:
     return found
 
 
-def _kept(trace: Trace, apart_mm: float) -> Ints:
+def _kept(trace: ErrorTrace, apart_mm: float) -> Ints:
     """Rows of the points to draw: those at least `apart_mm` from the one before, and all ends of
     cuts."""
     cutting = trace.cutting
@@ -101,12 +104,12 @@ def _kept(trace: Trace, apart_mm: float) -> Ints:
     return np.array(kept, dtype=np.int64)
 
 
-def _worst_between(trace: Trace, keep: Ints) -> Floats:
+def _worst_between(trace: ErrorTrace, keep: Ints) -> Floats:
     """(kept,) the largest error from each kept point up to the next: no error is hidden."""
     return np.maximum.reduceat(trace.error_um, keep)
 
 
-def trace_layer(trace: Trace, view: View, pen: float) -> str:
+def trace_layer(trace: ErrorTrace, view: View, pen: float) -> str:
     """The coloured path, in mm."""
     (low, high), colours = view.x_range, bin_colours()
     decimals = max(0, math.ceil(-math.log10(FINEST_SHARE * (high - low))))
@@ -157,12 +160,12 @@ def nearest_points(points: Floats, wanted: Segments) -> Floats:
     share = ((points - begin) * chord).sum(axis=1) / np.where(square > 0.0, square, 1.0)
     foot = begin + np.clip(share, 0.0, 1.0)[:, None] * chord
     is_arc = sweep != 0.0
-    foot[is_arc] = _on_arcs(points[is_arc], wanted, row[is_arc])
+    foot[is_arc] = _project_on_arcs(points[is_arc], wanted, row[is_arc])
     return np.asarray(foot)
 
 
-def _on_arcs(points: Floats, wanted: Segments, row: Ints) -> Floats:
-    """Where the ray from the centre through a point meets the arc, else the arc's nearer end."""
+def _project_on_arcs(points: Floats, wanted: Segments, row: Ints) -> Floats:
+    """Project points on arcs along the ray from the centre; off the arc, take its nearer end."""
     spoke = points - wanted.centre[row]
     length = np.hypot(spoke[:, 0], spoke[:, 1])
     along = spoke / np.where(length > 0.0, length, 1.0)[:, None]

@@ -17,7 +17,7 @@ ORDINARY_PX = (1000, 1200)
 """Pictures between these widths have a page of `PAGE` units. Smaller ones have fewer units and
 larger ones more, by the root of the size: letters grow with the picture, but less than it does."""
 
-LEAST_PAGE = 560.0
+MIN_PAGE = 560.0
 """No page has fewer units: head, legend and numbers need them."""
 
 MARGIN = 36.0
@@ -28,7 +28,7 @@ LOOK_AROUND = 2.0
 PADDING = 0.06
 """Room around the part, as a share of its larger side."""
 
-SMALLEST_WINDOW_MM = 1e-3
+MIN_WINDOW_MM = 1e-3
 """A part smaller than this, such as a point, gets a window of this size."""
 
 EMPTY_WINDOW_MM = 10.0
@@ -43,7 +43,7 @@ CROP_SHAPES = (0.2, 2.0)
 ROUND_STEPS = (1.0, 2.0, 5.0, 10.0)
 
 
-class Box(Struct, frozen=True):
+class PageBox(Struct, frozen=True):
     """A rectangle; on the page `top` < `bottom`."""
 
     left: float
@@ -63,7 +63,7 @@ class Box(Struct, frozen=True):
 class View(Struct, frozen=True):
     """`scale` page units per mm; `centre` (x, y) mm is shown in the middle of `box`."""
 
-    box: Box
+    box: PageBox
     scale: float
     centre: tuple[float, float]
 
@@ -98,7 +98,7 @@ class View(Struct, frozen=True):
         return self.centre[1] - half, self.centre[1] + half
 
     def shows(self, x: float, y: float) -> bool:
-        """Whether a point in mm lies in the box."""
+        """True if a point in mm lies in the box."""
         (x0, x1), (y0, y1) = self.x_range, self.y_range
         return x0 <= x <= x1 and y0 <= y <= y1
 
@@ -109,7 +109,7 @@ def page_width(size_px: int) -> float:
     if low <= size_px <= high:
         return PAGE
     width = PAGE * math.sqrt(size_px / (low if size_px < low else high))
-    return max(float(round(width)), LEAST_PAGE)
+    return max(float(round(width)), MIN_PAGE)
 
 
 def union(boxes: Iterable[Floats | None]) -> Floats | None:
@@ -136,7 +136,7 @@ def window(part: Floats | None, around: Floats | None) -> Floats:
         return np.array([[-half, half], [-half / 2.0, half / 2.0]])
     if part is not None and _larger(part) > 0.0 and _larger(both) > LOOK_AROUND * _larger(part):
         both = part
-    size = max(_larger(both), SMALLEST_WINDOW_MM)
+    size = max(_larger(both), MIN_WINDOW_MM)
     pad = PADDING * size if _larger(both) > 0.0 else 0.5 * size
     return np.asarray(both + np.array([-pad, pad]))
 
@@ -158,7 +158,7 @@ def fit(
     middle = shown.mean(axis=1)
     # The matrix is written with nine digits.
     return View(
-        Box(left, top, right, top + round(height)),
+        PageBox(left, top, right, top + round(height)),
         float(f"{scale:.9g}"),
         (float(middle[0]), float(middle[1])),
     )
@@ -181,7 +181,7 @@ def round_length(most: float) -> float:
 
 
 def decimals_of(step: float) -> int:
-    """How many decimals the multiples of a round step need."""
+    """Return the number of decimals that multiples of a round step need."""
     return max(0, -math.floor(math.log10(step)))
 
 

@@ -16,7 +16,7 @@ import camtool
 from camtool import api
 from camtool.cli.main import cli
 from camtool.importers.options import ReadOptions, Selection
-from camtool.pictures.options import Options
+from camtool.pictures.options import PictureOptions
 from camtool.records import replace
 from camtool.run import Run
 from camtool.target import registry
@@ -92,7 +92,7 @@ def test_reading_takes_every_field_of_the_options() -> None:
 
 
 def test_pictures_take_every_option() -> None:
-    assert set(api.Looks.__annotations__) == {each.name for each in fields(Options)}
+    assert set(api.Looks.__annotations__) == {each.name for each in fields(PictureOptions)}
 
 
 def test_looks_change_a_picture(posted: Run) -> None:

@@ -10,7 +10,7 @@ import pytest
 from camtool.cli.files import sealed
 from camtool.cli.main import cli
 from camtool.errors import OptionError
-from camtool.pictures.options import Options
+from camtool.pictures.options import PictureOptions
 from tests.cli.conftest import Run
 from tests.oracles import svg_page
 from tests.oracles.batch_works import HerePool
@@ -230,5 +230,5 @@ def test_where_nothing_can_be_judged_the_page_is_what_matters(
 def test_a_circle_has_no_part_and_no_layers_for_nobody() -> None:
     for more in ({"crop_mm": (0.0, 0.0, 1.0, 1.0)}, {"exaggerate": 2.0}, {"layers": {"path"}}):
         with pytest.raises(OptionError, match="plotted alone"):
-            Options(polar=1, **more)
-    assert Options(polar=1, dark=True, size_px=400).polar == 1
+            PictureOptions(polar=1, **more)
+    assert PictureOptions(polar=1, dark=True, size_px=400).polar == 1

@@ -24,7 +24,7 @@ COMMANDS: dict[str, list[str]] = make_images.commands()
 DRAWN = "offset-stages.png"
 """What docs/images/make_images.py draws without a command."""
 
-MOST_CHANGED, CHANGED = 5e-4, 48
+MAX_CHANGED_SHARE, CHANGED = 5e-4, 48
 """So many of the pixels may be another by more than this: another version of the renderer may
 round an edge the other way, but moves nothing."""
 
@@ -35,7 +35,7 @@ def compare(name: str, made: bytes, shown: bytes) -> None:
     mend = f"docs/images/{name} is not what its command draws: run docs/images/make_images.py"
     new, old = decode(made).astype(int), decode(shown).astype(int)
     assert new.shape == old.shape, mend
-    assert (np.abs(new - old).max(axis=2) > CHANGED).mean() <= MOST_CHANGED, mend
+    assert (np.abs(new - old).max(axis=2) > CHANGED).mean() <= MAX_CHANGED_SHARE, mend
 
 
 QUICK = {"layers.png", "outline.png", "polar.png", make_images.FIRST}

@@ -9,7 +9,7 @@ from camtool.errors import OptionError, OutputError
 from camtool.geometry.polylines import Polylines, Segments
 from camtool.pictures.beside import draw_beside, render_beside
 from camtool.pictures.draw import png
-from camtool.pictures.options import Options
+from camtool.pictures.options import PictureOptions
 from camtool.pictures.scene import Scene
 from camtool.records import replace
 from tests.oracles import svg_page
@@ -22,10 +22,10 @@ BEFORE = replace(
 )
 AFTER = replace(BEFORE, trace_error_mm=0.4 * BEFORE.trace_error_mm, title="after")
 LOOKS = {
-    "usual": Options(),
-    "small and dark": Options(size_px=400, dark=True),
-    "part": Options(crop_mm=(0.0, 0.0, 3.0, 3.0)),
-    "exaggerated": Options(exaggerate=20.0, layers=frozenset({"path", "feeds"})),
+    "usual": PictureOptions(),
+    "small and dark": PictureOptions(size_px=400, dark=True),
+    "part": PictureOptions(crop_mm=(0.0, 0.0, 3.0, 3.0)),
+    "exaggerated": PictureOptions(exaggerate=20.0, layers=frozenset({"path", "feeds"})),
 }
 
 
@@ -54,7 +54,7 @@ def test_equal_scenes_make_equal_panels(look: str) -> None:
 
 
 def test_equal_scenes_make_equal_pixels() -> None:
-    svg = draw_beside([SCENES["toolpath"]] * 2, Options(size_px=250))
+    svg = draw_beside([SCENES["toolpath"]] * 2, PictureOptions(size_px=250))
     page = int(svg_page.parse(svg).attrib["viewBox"].split()[2])
     image = decode(png(svg, page // 2))
     (x0, _), (x1, _) = corners(svg)
@@ -107,7 +107,7 @@ def test_names_of_parts_are_there_once() -> None:
 
 def test_pictures_of_one_page_do_not_clip_each_other() -> None:
     large = draw_beside([BEFORE, AFTER])
-    small = draw_beside([BEFORE, AFTER], Options(size_px=400))
+    small = draw_beside([BEFORE, AFTER], PictureOptions(size_px=400))
     clips = [set(re.findall(r'<clipPath id="([^"]+)"', svg)) for svg in (large, small)]
     assert len(clips[0]) == len(clips[1]) == 2
     assert not clips[0] & clips[1]
@@ -133,7 +133,7 @@ def layers(panel: str) -> list[tuple[str, str]]:
 def test_all_lies_on_the_page_and_no_two_labels_touch(size_px: int) -> None:
     long = replace(AFTER, title="a title that goes on and on and on, and then once more beyond")
     for scenes in ([BEFORE, long], [SCENES["wide"], SCENES["wide"]], [SCENES["toolpath"], long]):
-        svg = draw_beside(scenes, Options(size_px=size_px))
+        svg = draw_beside(scenes, PictureOptions(size_px=size_px))
         root = svg_page.parse(svg)
         assert root.attrib["width"] == str(size_px)
         _, _, width, height = map(float, root.attrib["viewBox"].split())
@@ -161,7 +161,7 @@ def rounded(error_mm: float, title: str) -> Scene:
 
 
 def test_polar_plots_are_magnified_alike() -> None:
-    svg = draw_beside([rounded(0.01, "a"), rounded(0.002, "b")], Options(polar=1))
+    svg = draw_beside([rounded(0.01, "a"), rounded(0.002, "b")], PictureOptions(polar=1))
     first, second = panels(svg)
     rings = [re.findall(r'<circle [^>]*r="([\d.]+)"', part.split('"radial-error"')[0])
              for part in (first, second)]  # fmt: skip
@@ -177,12 +177,12 @@ def test_polar_plots_are_magnified_alike() -> None:
 
 def test_each_must_have_the_circle() -> None:
     with pytest.raises(OptionError, match="no circle 1 in b"):
-        draw_beside([rounded(0.01, "a"), Scene("b")], Options(polar=1))
+        draw_beside([rounded(0.01, "a"), Scene("b")], PictureOptions(polar=1))
 
 
 def test_kinds_of_files() -> None:
     assert render_beside([BEFORE, AFTER], "x.svg").startswith(b"<svg")
-    assert decode(render_beside([BEFORE], "x.png", Options(size_px=300))).shape[1] == 300
+    assert decode(render_beside([BEFORE], "x.png", PictureOptions(size_px=300))).shape[1] == 300
     with pytest.raises(OptionError, match=r"x\.html"):
         render_beside([BEFORE, AFTER], "x.html")
     with pytest.raises(OutputError, match="not a picture file"):

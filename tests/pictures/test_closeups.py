@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from camtool.kernels.judging import empty_bins
-from camtool.pictures.options import Options
-from camtool.pictures.picture import ERRORS_ACROSS, LEAST_SHARE, closeups
+from camtool.pictures.options import PictureOptions
+from camtool.pictures.picture import ERRORS_ACROSS, MIN_SHARE, closeups
 from camtool.pictures.scene import Round, Scene
 from camtool.records import replace
 
@@ -33,10 +33,10 @@ def circle(circular_mm: float) -> Round:
 
 
 @pytest.mark.parametrize(
-    ("error_mm", "side"), [(0.05, 0.05 * ERRORS_ACROSS), (1e-4, LEAST_SHARE * LENGTH_MM)]
+    ("error_mm", "side"), [(0.05, 0.05 * ERRORS_ACROSS), (1e-4, MIN_SHARE * LENGTH_MM)]
 )
 def test_the_worst_place_lies_in_the_middle(error_mm: float, side: float) -> None:
-    asked = Options(size_px=500, dark=True, exaggerate=9.0)
+    asked = PictureOptions(size_px=500, dark=True, exaggerate=9.0)
     ((caption, looks),) = closeups(bent(error_mm), asked)
     assert caption == "The largest error, near (4.000, 0.000) mm"
     assert looks.crop_mm == pytest.approx((4.0 - side / 2, -side / 2, side, side))
@@ -44,17 +44,17 @@ def test_the_worst_place_lies_in_the_middle(error_mm: float, side: float) -> Non
 
 
 def test_an_error_as_large_as_the_part_needs_no_close_up() -> None:
-    assert list(closeups(bent(0.4), Options())) == []
+    assert list(closeups(bent(0.4), PictureOptions())) == []
 
 
 def test_what_was_not_judged_has_none() -> None:
-    assert list(closeups(Scene(), Options())) == []
-    assert list(closeups(replace(bent(0.05), worst=()), Options())) == []
+    assert list(closeups(Scene(), PictureOptions())) == []
+    assert list(closeups(replace(bent(0.05), worst=()), PictureOptions())) == []
 
 
 def test_the_circle_is_the_worst_of_those_that_are_known() -> None:
     rounds = tuple(map(circle, (0.01, math.nan, 0.03, 0.02)))
-    ((caption, looks),) = closeups(Scene(rounds=rounds), Options())
+    ((caption, looks),) = closeups(Scene(rounds=rounds), PictureOptions())
     assert looks.polar == 3
     assert caption == "Circle 3, that of the largest circular error, 30.00 µm"
-    assert list(closeups(Scene(rounds=(circle(math.nan),)), Options())) == []
+    assert list(closeups(Scene(rounds=(circle(math.nan),)), PictureOptions())) == []

@@ -17,7 +17,7 @@ from camtool.pictures.colours import FEED, PAPER, PLUNGE, RAPID, bin_colours, on
 from camtool.pictures.content import content_of
 from camtool.pictures.draw import draw, png
 from camtool.pictures.layers import ALONE_PEN, TRACE_PEN
-from camtool.pictures.options import Options
+from camtool.pictures.options import PictureOptions
 from camtool.pictures.page import TICK_CAP, page_of
 from camtool.pictures.scene import Scene
 from camtool.pictures.svg import clean
@@ -293,7 +293,7 @@ def test_the_picture_is_the_right_way_up() -> None:
 
 
 def test_pictures_of_ordinary_size_are_alike() -> None:
-    small, large = (draw(SCENES["drawing"], Options(size_px=px)) for px in (1000, 1200))
+    small, large = (draw(SCENES["drawing"], PictureOptions(size_px=px)) for px in (1000, 1200))
     assert small.split("viewBox")[1] == large.split("viewBox")[1]
     assert 'width="1200"' in large
 
@@ -301,7 +301,7 @@ def test_pictures_of_ordinary_size_are_alike() -> None:
 @pytest.mark.parametrize("size", [400, 4000])
 def test_letters_and_lines_suit_the_size(size: int) -> None:
     """Pixels of a capital and of a line: neither too small to read nor as coarse as a poster."""
-    root = svg_page.parse(draw(SCENES["result"], Options(size_px=size)))
+    root = svg_page.parse(draw(SCENES["result"], PictureOptions(size_px=size)))
     pixels = size / float(root.attrib["viewBox"].split()[2])
     assert 9.0 < pixels * TICK_CAP < 36.0
     assert 1.5 < pixels * TRACE_PEN < 8.0
@@ -310,7 +310,7 @@ def test_letters_and_lines_suit_the_size(size: int) -> None:
 @pytest.mark.parametrize("size", [400, 4000])
 @pytest.mark.parametrize("name", list(SCENES))
 def test_no_two_labels_touch_at_any_size(name: str, size: int) -> None:
-    root = svg_page.parse(draw(SCENES[name], Options(size_px=size)))
+    root = svg_page.parse(draw(SCENES[name], PictureOptions(size_px=size)))
     page = [float(part) for part in root.attrib["viewBox"].split()]
     boxes = list(svg_page.label_boxes(root).items())
     for (one, box), (other, other_box) in combinations(boxes, 2):
@@ -319,7 +319,7 @@ def test_no_two_labels_touch_at_any_size(name: str, size: int) -> None:
 
 
 def test_a_part_is_shown_as_it_was_asked_for() -> None:
-    crop = Options(crop_mm=(1.0, 2.0, 2.0, 1.5))
+    crop = PictureOptions(crop_mm=(1.0, 2.0, 2.0, 1.5))
     view = page_of(content_of(SCENES["result"], crop)).view
     assert view.x_range == pytest.approx((1.0, 3.0), abs=0.005)
     assert view.y_range == pytest.approx((2.0, 3.5), abs=0.005)
@@ -338,7 +338,7 @@ def bar_numbers(svg: str) -> list[str]:
 def test_lines_of_a_part_are_not_thinned_by_what_lies_outside() -> None:
     far = [circle(50.0, 50.0, 1.0 + k / 200) for k in range(200)]
     scene = Scene("", drawing_of([circle(0.0, 0.0, 1.0), *far], ["0"] * 201))
-    options = Options(crop_mm=(-2.0, -2.0, 4.0, 4.0))
+    options = PictureOptions(crop_mm=(-2.0, -2.0, 4.0, 4.0))
     root = svg_page.parse(draw(scene, options))
     factor = float(named(root, "mm").attrib["transform"][7:].split()[0])
     width = float(named(root, "drawing").attrib["stroke-width"])
@@ -348,18 +348,18 @@ def test_lines_of_a_part_are_not_thinned_by_what_lies_outside() -> None:
 @pytest.mark.parametrize("crop", [(0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 1.0, -1.0), (0, 0, 1, np.inf)])
 def test_senseless_parts_are_refused(crop: tuple[float, float, float, float]) -> None:
     with pytest.raises(OptionError, match="cannot be shown"):
-        Options(crop_mm=crop)
+        PictureOptions(crop_mm=crop)
 
 
 def test_the_dark_palette_changes_colours_only(scene: Scene) -> None:
-    light, dark = draw(scene), draw(scene, Options(dark=True))
+    light, dark = draw(scene), draw(scene, PictureOptions(dark=True))
     paint = re.compile('"#[0-9a-f]{6}"')
     assert paint.sub("", dark) == paint.sub("", light)
     assert f'fill="{PAPER}"' not in dark
 
 
 def test_png_of_a_dark_picture_is_dark() -> None:
-    svg = draw(SCENES["result"], Options(dark=True))
+    svg = draw(SCENES["result"], PictureOptions(dark=True))
     image = decode(png(svg, 320))[..., :3].astype(int)
     assert np.median(image.max(axis=2)) < 48
     top = rgb(bin_colours(dark=True)[-1])
@@ -368,13 +368,13 @@ def test_png_of_a_dark_picture_is_dark() -> None:
 
 @pytest.mark.parametrize("width", [251, 400])
 def test_the_paper_covers_the_last_row_of_pixels(width: int) -> None:
-    svg = draw(SCENES["wide"], Options(size_px=width))
+    svg = draw(SCENES["wide"], PictureOptions(size_px=width))
     assert (decode(png(svg, width))[..., 3] == 255).all()
 
 
 @pytest.mark.parametrize("dark", [False, True])
 def test_what_leaves_the_plot_is_not_seen(dark: bool) -> None:
-    part = Options(crop_mm=(1.0, 1.0, 1.0, 1.0), dark=dark, size_px=400)
+    part = PictureOptions(crop_mm=(1.0, 1.0, 1.0, 1.0), dark=dark, size_px=400)
     svg = draw(replace(SCENES["toolpath"], tool_mm=2.0), options=part)
     root = svg_page.parse(svg)
     pixels = 400 / float(root.attrib["viewBox"].split()[2])
@@ -389,7 +389,7 @@ def test_what_leaves_the_plot_is_not_seen(dark: bool) -> None:
 @pytest.mark.parametrize("width", [0, -5, 15, 20_001])
 def test_senseless_widths_are_refused(width: int) -> None:
     with pytest.raises(OptionError, match="pixels wide"):
-        draw(SCENES["empty"], Options(size_px=width))
+        draw(SCENES["empty"], PictureOptions(size_px=width))
     with pytest.raises(OptionError, match="pixels wide"):
         png("<svg/>", width)
 
@@ -415,7 +415,7 @@ def test_points_alone_are_a_picture() -> None:
 
 @pytest.mark.parametrize("size", [400, 1000])
 def test_the_scale_bar_has_a_row_to_itself_only_when_it_must(size: int) -> None:
-    root = svg_page.parse(draw(SCENES["no error"], Options(size_px=size)))
+    root = svg_page.parse(draw(SCENES["no error"], PictureOptions(size_px=size)))
     bar, legend = named(root, "scale-bar"), named(root, "legend")
     rows = {
         float(g.attrib["transform"].split()[1][:-1]) for g in legend if "transform" in g.attrib

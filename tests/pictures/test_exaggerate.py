@@ -13,7 +13,7 @@ from camtool.geometry.measure import point_at
 from camtool.geometry.polylines import Polylines, Segments
 from camtool.pictures.content import content_of
 from camtool.pictures.draw import draw
-from camtool.pictures.options import Options
+from camtool.pictures.options import PictureOptions
 from camtool.pictures.scene import Scene
 from camtool.pictures.trace import exaggerated, nearest_points
 from camtool.records import replace
@@ -71,19 +71,19 @@ def result() -> Scene:
 
 
 def test_the_picture_says_the_factor_and_keeps_the_true_error_on_its_scale() -> None:
-    usual, ten = draw(result()), draw(result(), options=Options(exaggerate=10.0))
+    usual, ten = draw(result()), draw(result(), options=PictureOptions(exaggerate=10.0))
     assert usual == draw(SCENES["result"])
     labels = {g.get("aria-label") for g in svg_page.parse(ten).iter()}
     assert "the path is drawn with its deviation from the wanted one × 10" in labels
     assert {"predicted path, error × 10", "wanted path"} <= labels
-    assert content_of(result(), Options(exaggerate=10.0)).trace.top_um == pytest.approx(
+    assert content_of(result(), PictureOptions(exaggerate=10.0)).trace.top_um == pytest.approx(
         content_of(result()).trace.top_um
     )
 
 
 def test_the_drawn_path_is_ten_times_as_far_away() -> None:
     one = content_of(result()).trace
-    ten = content_of(result(), Options(exaggerate=10.0)).trace
+    ten = content_of(result(), PictureOptions(exaggerate=10.0)).trace
     radii = [np.hypot(*(t.points[t.cutting] - 2.5).T) - 2.0 for t in (one, ten)]
     assert radii[1] == pytest.approx(10.0 * radii[0])
 
@@ -91,4 +91,4 @@ def test_the_drawn_path_is_ten_times_as_far_away() -> None:
 @pytest.mark.parametrize("times", [0.0, 0.5, -1.0, 1e7, math.nan, math.inf])
 def test_senseless_factors_are_refused(times: float) -> None:
     with pytest.raises(OptionError, match="times as large"):
-        Options(exaggerate=times)
+        PictureOptions(exaggerate=times)

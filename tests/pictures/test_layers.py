@@ -16,7 +16,7 @@ from camtool.pictures.colours import VERDICTS
 from camtool.pictures.content import content_of
 from camtool.pictures.draw import draw
 from camtool.pictures.layers import chosen, layer_names, layers_in, usual_layers
-from camtool.pictures.options import Options
+from camtool.pictures.options import PictureOptions
 from camtool.pictures.page import page_of
 from camtool.pictures.plot import CLEAR, labels_beside
 from camtool.pictures.scene import Scene
@@ -77,13 +77,13 @@ GROUPS = {
 
 
 def ids(scene: Scene, *layers: str) -> set[str]:
-    svg = draw(scene, Options(layers=frozenset(layers)))
+    svg = draw(scene, PictureOptions(layers=frozenset(layers)))
     return {g.attrib["id"] for g in svg_page.parse(svg).iter() if "id" in g.attrib}
 
 
 def present(scene: Scene, *layers: str) -> set[str]:
     """The layers, of these or of all, that have something to show."""
-    return set(layers_in(content_of(scene, Options(layers=frozenset(layers or LAYERS)))))
+    return set(layers_in(content_of(scene, PictureOptions(layers=frozenset(layers or LAYERS)))))
 
 
 @pytest.mark.parametrize("layer", list(GROUPS))
@@ -105,7 +105,7 @@ def test_without_a_layer_the_others_stay(layer: str) -> None:
 def test_layers_do_not_move_the_picture() -> None:
     usual = content_of(JUDGED).window
     for layer in LAYERS:
-        options = Options(layers=frozenset(LAYERS) - {layer})
+        options = PictureOptions(layers=frozenset(LAYERS) - {layer})
         assert content_of(JUDGED, options).window.tolist() == usual.tolist()
 
 
@@ -235,7 +235,7 @@ def test_reversals_are_those_of_the_literal_loop(seed: int) -> None:
 
 def test_pictures_of_all_layers_are_drawn() -> None:
     scene = scene_of_toolpath(followed(drawing_of([circle(1.0, 1.0, 1.0)], ["0"])), title="all")
-    assert draw(scene, Options(layers=frozenset(LAYERS)))
+    assert draw(scene, PictureOptions(layers=frozenset(LAYERS)))
 
 
 def rows_of_marks(count: int) -> Scene:
@@ -247,7 +247,7 @@ def rows_of_marks(count: int) -> Scene:
 
 
 def test_of_very_many_contours_some_are_numbered() -> None:
-    root = svg_page.parse(draw(rows_of_marks(1200), options=Options(size_px=4000)))
+    root = svg_page.parse(draw(rows_of_marks(1200), options=PictureOptions(size_px=4000)))
     order = svg_page.group(root, "order")
     assert order is not None
     shown = [int(g.attrib["aria-label"]) for g in order if "aria-label" in g.attrib]
@@ -269,7 +269,8 @@ def test_rims_of_marks_shrink_with_them() -> None:
 def test_numbers_lie_over_all_other_marks() -> None:
     gapped = drawing_of([circle(2.5, 2.5, 1.0)], ["0"], (Gap((3.5, 2.5), 0.1, ""),))
     svg = draw(
-        replace(SCENES["toolpath"], drawing=gapped), options=Options(layers=frozenset(LAYERS))
+        replace(SCENES["toolpath"], drawing=gapped),
+        options=PictureOptions(layers=frozenset(LAYERS)),
     )
     marks = ("plunges", "reversals", "arrows", "part-zero", "gaps")
     assert svg.index('id="order"') > max(svg.index(f'id="{name}"') for name in marks)
@@ -291,7 +292,7 @@ from camtool.pictures import layers
 
 def corners(content):
     places = [place for chain in content.outlines for place in chain.points.tolist()]
-    return [layers.Dots("corners", "corner", places, layers.POINT_MARK)]
+    return [layers.DotGroup("corners", "corner", places, layers.POINT_MARK)]
 
 layers.LAYERS += (layers.Layer("corners", corners, needs="drawing"),)
 from camtool.cli.main import main

@@ -5,8 +5,8 @@ from itertools import cycle
 import pytest
 
 from camtool.pictures.colours import VERDICTS
-from camtool.pictures.limits import MOST_ROWS, draw_limits, has_limits
-from camtool.pictures.options import Options
+from camtool.pictures.limits import MAX_ROWS, draw_limits, has_limits
+from camtool.pictures.options import PictureOptions
 from camtool.pictures.scene import Scene
 from camtool.records import replace
 from camtool.verification.report import InspectedReport
@@ -33,9 +33,9 @@ def inspected(
     )
 
 
-def rows(scene: Scene, options: Options | None = None) -> list[dict[str, object]]:
+def rows(scene: Scene, options: PictureOptions | None = None) -> list[dict[str, object]]:
     """Of each row: its zone, its dot and what it says."""
-    page = svg_page.parse(draw_limits(scene, options or Options()))
+    page = svg_page.parse(draw_limits(scene, options or PictureOptions()))
     found = []
     for group in page.iter():
         if group.attrib.get("class") != "dimension":
@@ -74,16 +74,18 @@ def test_what_is_far_out_ends_at_the_edge() -> None:
 
 def test_of_many_those_that_do_not_hold_come_first() -> None:
     words = cycle(("in", "in", "undecided", "out"))
-    many = tuple(inspected(f"d{k}", 4.0, next(words)) for k in range(3 * MOST_ROWS))
+    many = tuple(inspected(f"d{k}", 4.0, next(words)) for k in range(3 * MAX_ROWS))
     found = rows(Scene(inspected=many))
-    assert len(found) == MOST_ROWS
-    assert sum("out" in str(each["says"]) for each in found) == 3 * MOST_ROWS // 4
-    assert f"{2 * MOST_ROWS} more dimensions" in draw_limits(Scene(inspected=many), Options())
+    assert len(found) == MAX_ROWS
+    assert sum("out" in str(each["says"]) for each in found) == 3 * MAX_ROWS // 4
+    assert f"{2 * MAX_ROWS} more dimensions" in draw_limits(
+        Scene(inspected=many), PictureOptions()
+    )
 
 
 def test_dark_and_nothing() -> None:
     scene = Scene(inspected=(inspected("one", 4.0, "in"),))
-    dark = draw_limits(scene, replace(Options(), dark=True))
+    dark = draw_limits(scene, replace(PictureOptions(), dark=True))
     assert VERDICTS["in"] not in dark
     assert has_limits(scene)
     assert not has_limits(Scene(inspected=(inspected("four", 4.0, "predicted", None),)))

@@ -11,7 +11,7 @@ from camtool.geometry.polylines import Polylines, Segments
 from camtool.pictures.beside import draw_beside
 from camtool.pictures.draw import draw, png
 from camtool.pictures.layers import layer_names
-from camtool.pictures.options import Options
+from camtool.pictures.options import PictureOptions
 from camtool.pictures.overlay import Overlay, draw_overlay
 from camtool.pictures.scene import Round, Scene
 from camtool.records import replace
@@ -22,7 +22,7 @@ GOLDEN = Path(__file__).parents[1] / "golden"
 PNG_PX = 240
 """Width of the goldens of pixels: as small as can be read."""
 
-MOST_CHANGED, CHANGED = 5e-4, 48
+MAX_CHANGED_SHARE, CHANGED = 5e-4, 48
 """So many of the pixels may be another by more than this: another version of the renderer may
 round an edge the other way, but moves nothing."""
 
@@ -61,11 +61,11 @@ def compared() -> Overlay:
 
 
 def one(scene: Scene, **looks: object) -> Callable[[], str]:
-    return lambda: draw(scene, Options(**looks))
+    return lambda: draw(scene, PictureOptions(**looks))
 
 
 def beside(*scenes: Scene, **looks: object) -> Callable[[], str]:
-    return lambda: draw_beside(scenes, Options(**looks))
+    return lambda: draw_beside(scenes, PictureOptions(**looks))
 
 
 PICTURES = {
@@ -93,7 +93,7 @@ def compare_pixels(name: str, image: bytes, folder: Path) -> None:
     new, old = decode(image).astype(int), decode(path.read_bytes()).astype(int)
     assert new.shape == old.shape, f"{path.name} has another size"
     changed = (np.abs(new - old).max(axis=2) > CHANGED).mean()
-    assert changed <= MOST_CHANGED, f"{path.name}: {changed:.1%} of its pixels differ"
+    assert changed <= MAX_CHANGED_SHARE, f"{path.name}: {changed:.1%} of its pixels differ"
 
 
 @pytest.mark.parametrize("name", list(PICTURES))

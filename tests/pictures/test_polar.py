@@ -6,7 +6,7 @@ import pytest
 from camtool.errors import OptionError
 from camtool.kernels.judging import bin_directions, empty_bins
 from camtool.pictures.draw import draw, png
-from camtool.pictures.options import Options
+from camtool.pictures.options import PictureOptions
 from camtool.pictures.scene import Round, Scene, rounds_of
 from camtool.records import replace
 from camtool.toolpath.builder import ToolpathBuilder
@@ -34,7 +34,7 @@ WAVY = seen(lambda angle: 0.01 * np.sin(2.0 * angle))
 
 
 def plot(one: Round, **how: object) -> str:
-    return draw(Scene("circle", rounds=(one,)), options=Options(polar=1, **how))
+    return draw(Scene("circle", rounds=(one,)), options=PictureOptions(polar=1, **how))
 
 
 def line_of(svg: str) -> np.ndarray:
@@ -115,9 +115,9 @@ def test_equal_circles_give_equal_bytes_and_a_dark_one_is_dark() -> None:
 @pytest.mark.parametrize("which", [0, 2])
 def test_there_must_be_such_a_circle(which: int) -> None:
     with pytest.raises(OptionError, match="there is no circle"):
-        draw(Scene("", rounds=(WAVY,)), options=Options(polar=which))
+        draw(Scene("", rounds=(WAVY,)), options=PictureOptions(polar=which))
     with pytest.raises(OptionError, match="no full circle"):
-        draw(Scene(""), options=Options(polar=1))
+        draw(Scene(""), options=PictureOptions(polar=1))
 
 
 def both_ways(ccw: Round, cw: Round) -> Scene:
@@ -134,22 +134,22 @@ def strokes_of(svg: str) -> list[str]:
 
 def test_both_ways_round_are_in_one_plot() -> None:
     scene = both_ways(seen(lambda a: 0.002 + 0 * a), seen(lambda a: -0.004 + 0 * a))
-    svg = draw(scene, Options(polar=2))
+    svg = draw(scene, PictureOptions(polar=2))
     strokes = strokes_of(svg)
     assert len(strokes) == len(set(strokes)) == 4
-    assert len(strokes_of(draw(scene, Options(polar=1)))) == 2
+    assert len(strokes_of(draw(scene, PictureOptions(polar=1)))) == 2
     labels = [g.get("aria-label") or "" for g in svg_page.parse(svg).iter()]
     assert "counterclockwise (circle 2)" in labels
     assert "clockwise (circle 3)" in labels
     assert any("both ways together: G(b) 30.00" in label for label in labels)
     assert sum(label.startswith("clockwise: G 20.00") for label in labels) == 1
-    assert svg == draw(scene, Options(polar=3))
+    assert svg == draw(scene, PictureOptions(polar=3))
 
 
 @pytest.mark.parametrize("size_px", [300, 1000])
 def test_the_legend_of_both_ways_lies_on_the_page(size_px: int) -> None:
     scene = both_ways(seen(lambda a: 0.002 + 0 * a), seen(lambda a: -0.004 + 0 * a))
-    root = svg_page.parse(draw(scene, Options(polar=2, size_px=size_px)))
+    root = svg_page.parse(draw(scene, PictureOptions(polar=2, size_px=size_px)))
     _, _, width, height = map(float, root.attrib["viewBox"].split())
     for _, top, right, bottom in svg_page.label_boxes(root).values():
         assert right < width

@@ -16,10 +16,10 @@ from camtool.pictures.colours import BINS
 from camtool.pictures.content import content_of
 from camtool.pictures.draw import render
 from camtool.pictures.layers import LAYERS
-from camtool.pictures.scene import Line, Playback, Round, Scene, Table, by_feed
+from camtool.pictures.scene import Playback, ReportTable, Round, Scene, TableLine, by_feed
 from camtool.pictures.trace import bins_of, exaggerated, trace_of
 from camtool.pictures.viewer.columns import columns_of, packed, traced_of
-from camtool.pictures.viewer.page import MOST_PLOTS, SCRIPTED, SCRIPTS, viewer_page
+from camtool.pictures.viewer.page import MAX_PLOTS, SCRIPTED, SCRIPTS, viewer_page
 from camtool.records import replace
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind
@@ -105,7 +105,7 @@ def test_the_script_makes_no_markup_of_text() -> None:
 def test_names_stay_names(words: str) -> None:
     drawing = drawing_of([circle(1.0, 1.0, 1.0)], [words])
     toolpath = followed(drawing)
-    table = Table(words, (words,), (Line((words,), 0),))
+    table = ReportTable(words, (words,), (TableLine((words,), 0),))
     run = run_of(toolpath, blocks=(words,) * 3, tables=(table,))
     scene = with_run(Scene(words, drawing, toolpath, notes=(words,)), run)
     page = text_of(scene)
@@ -193,7 +193,7 @@ def test_full_circles_are_plotted_in_the_colours_of_the_page() -> None:
     rounds = tuple(lobed(1e-3 * size) for size in range(20))
     page = text_of(Scene("t", rounds=rounds))
     figures = re.findall(r"<figure>.*?</figure>", page, re.S)
-    assert len(figures) == MOST_PLOTS == 16
+    assert len(figures) == MAX_PLOTS == 16
     assert "16 of 20 with the largest" in page
     # The least ones are left out, the order is that of the report.
     assert [int(found) for found in re.findall(r"of circle (\d+)", page)] == [*range(5, 21)]

@@ -8,7 +8,7 @@ import pytest
 from camtool.geometry.polylines import Polylines, Segments
 from camtool.pictures import layers
 from camtool.pictures.draw import draw, render
-from camtool.pictures.options import Options
+from camtool.pictures.options import PictureOptions
 from camtool.pictures.scene import Scene
 from camtool.pipeline import verify_program
 from camtool.planning.job import Tool
@@ -231,5 +231,5 @@ def test_the_page_of_a_job_with_stock_opens(shown: Any) -> None:
     view = shown(replace(busy(SCENES["toolpath"]), stock_mm=stock))
     assert "stock 7 × 5 mm" in view.text("#layers")
     assert b"stock" in render(
-        replace(SCENES["toolpath"], stock_mm=stock), "a.svg", Options(dark=True)
+        replace(SCENES["toolpath"], stock_mm=stock), "a.svg", PictureOptions(dark=True)
     )

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from camtool.geometry.polylines import Segments
-from camtool.pictures.scene import Line, Playback, Scene, Table, by_feed
+from camtool.pictures.scene import Playback, ReportTable, Scene, TableLine, by_feed
 from camtool.pictures.viewer.page import viewer_page
 from camtool.records import replace
 from camtool.toolpath.moves import Toolpath
@@ -38,7 +38,7 @@ def busy(scene: Scene) -> Scene:
         numbered,
         error_mm=np.linspace(0.0, 0.02, count),
         blocks=tuple(f"N{row} G01 X{row}" for row in range(count)),
-        tables=(Table("Worst moves", ("block", "error"), (Line(("3", "20"), 2),)),),
+        tables=(ReportTable("Worst moves", ("block", "error"), (TableLine(("3", "20"), 2),)),),
     )
     return with_run(replace(scene, toolpath=numbered, tool_mm=0.5, worst=((2.5, 2.5),)), run)
 

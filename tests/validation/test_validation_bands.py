@@ -26,7 +26,7 @@ from camtool.inspection.uncertainty import (
     opposite_edges,
     propagate,
 )
-from camtool.pictures.text import Style, label
+from camtool.pictures.text import TextStyle, label
 from camtool.records import replace
 from tests.validation import pic_mmh_parts as pic
 from tests.validation import test_validation_flashcut as flashcut
@@ -376,8 +376,8 @@ def _diagram(levels: Sequence[float], lines: dict[str, list[float]]) -> str:
         parts += [
             f'<polyline points="{at(part, 0)} {at(part, 1)}" stroke="#ddd"/>',
             f'<polyline points="{at(0, part)} {at(1, part)}" stroke="#ddd"/>',
-            label(str(tick), (x, 347.0), Style(CAP, anchor="middle")),
-            label(str(tick), (52.0, y + 4.0), Style(CAP, anchor="end")),
+            label(str(tick), (x, 347.0), TextStyle(CAP, anchor="middle")),
+            label(str(tick), (52.0, y + 4.0), TextStyle(CAP, anchor="end")),
         ]
     colours = ("#0072b2", "#d55e00", "#009e73", "#333333")
     for k, ((name, shares), colour) in enumerate(zip(lines.items(), colours, strict=True)):
@@ -385,12 +385,14 @@ def _diagram(levels: Sequence[float], lines: dict[str, list[float]]) -> str:
         parts += [
             f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="2"/>',
             f'<rect x="380" y="{50 + 24 * k}" width="18" height="3" fill="{colour}"/>',
-            label(name, (404.0, 56.0 + 24.0 * k), Style(CAP)),
+            label(name, (404.0, 56.0 + 24.0 * k), TextStyle(CAP)),
         ]
     parts += [
-        label("readings predicted in the band, %", (210.0, 372.0), Style(CAP, anchor="middle")),
+        label(
+            "readings predicted in the band, %", (210.0, 372.0), TextStyle(CAP, anchor="middle")
+        ),
         '<g transform="rotate(-90 18 180)">',
-        label("readings in the band, %", (18.0, 180.0), Style(CAP, anchor="middle")),
+        label("readings in the band, %", (18.0, 180.0), TextStyle(CAP, anchor="middle")),
         "</g></svg>",
     ]
     return "\n".join(parts) + "\n"

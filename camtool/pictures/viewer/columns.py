@@ -16,9 +16,9 @@ from camtool.geometry.drawing import Drawing
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
 from camtool.pictures.colours import BINS
 from camtool.pictures.content import Content
-from camtool.pictures.layers import Lines, Part
+from camtool.pictures.layers import LineGroup, Part
 from camtool.pictures.scene import Playback, Scene
-from camtool.pictures.trace import Trace, bins_of, nearest_points
+from camtool.pictures.trace import ErrorTrace, bins_of, nearest_points
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.units import UM_PER_MM
 
@@ -51,13 +51,13 @@ def columns_of(content: Content, run: Playback | None) -> Columns:
 def part_columns(name: str, part: Part) -> Columns:
     """The columns of a part of a layer, which begin with `name`: the places of dots and texts, or
     from where to where lines and arcs go."""
-    if not isinstance(part, Lines):
+    if not isinstance(part, LineGroup):
         return {f"{name}_at": np.array(part.places, dtype=FLOAT).reshape(-1, 2)}
     chains = part.chains
     sweep = np.concatenate([chain.sweep for chain in chains])
     centre = np.concatenate([chain.centre for chain in chains])
     return {
-        **_bends(name, sweep != 0.0, centre, sweep),
+        **_arc_columns(name, sweep != 0.0, centre, sweep),
         f"{name}_from": np.concatenate([chain.points[:-1] for chain in chains]).astype(FLOAT),
         f"{name}_to": np.concatenate([chain.points[1:] for chain in chains]).astype(FLOAT),
     }
@@ -99,7 +99,7 @@ def _drawing(drawing: Drawing | None) -> Columns:
     if drawing is None:
         none = np.empty(0)
         return {
-            **_bends("drawn", none.astype(np.bool_), none.reshape(0, 2), none),
+            **_arc_columns("drawn", none.astype(np.bool_), none.reshape(0, 2), none),
             **{name: none.astype(FLOAT) for name in ("drawn_from", "drawn_to", "mark_at")},
             **{name: none.astype(INT) for name in ("drawn_path", "drawn_layer", "mark_layer")},
         }
@@ -108,7 +108,7 @@ def _drawing(drawing: Drawing | None) -> Columns:
     layer = np.array([number[name] for name in drawing.layers], dtype=INT)
     marks = drawing.marks
     return {
-        **_bends("drawn", segments.bulge != 0.0, segments.centre, segments.sweep),
+        **_arc_columns("drawn", segments.bulge != 0.0, segments.centre, segments.sweep),
         "drawn_from": segments.start.astype(FLOAT),
         "drawn_to": segments.end.astype(FLOAT),
         "drawn_path": segments.path.astype(INT),
@@ -127,7 +127,7 @@ def _moves(scene: Scene, run: Playback | None) -> Columns:
             "move_wide",
         )
         return {
-            **_bends("move", none.astype(np.bool_), none.reshape(0, 2), none),
+            **_arc_columns("move", none.astype(np.bool_), none.reshape(0, 2), none),
             **{name: none.astype(FLOAT) for name in floats},
             **{name: none.astype(INT) for name in ("move_block", "move_source")},
             **{name: none.astype(BYTE) for name in ("move_kind", "move_sort")},
@@ -135,7 +135,7 @@ def _moves(scene: Scene, run: Playback | None) -> Columns:
     if len(run.seconds) != len(toolpath):
         raise ValueError("the playback is that of another toolpath")
     return {
-        **_bends("move", toolpath.is_arc, toolpath.centre, toolpath.sweeps()),
+        **_arc_columns("move", toolpath.is_arc, toolpath.centre, toolpath.sweeps()),
         "move_start": toolpath.start.astype(FLOAT),
         "move_end": toolpath.end.astype(FLOAT),
         "move_feed": toolpath.feed.astype(FLOAT),
@@ -182,7 +182,7 @@ def _wanted(wanted: Segments | None) -> Columns:
     if wanted is None or not len(wanted):
         none = np.empty(0)
         return {
-            **_bends("wanted", none.astype(np.bool_), none.reshape(0, 2), none),
+            **_arc_columns("wanted", none.astype(np.bool_), none.reshape(0, 2), none),
             "wanted_to": none.astype(FLOAT),
             "wanted_begin": none.astype(FLOAT),
             "wanted_break": none.astype(INT),
@@ -190,20 +190,20 @@ def _wanted(wanted: Segments | None) -> Columns:
     apart = np.hypot(*(wanted.start[1:] - wanted.end[:-1]).T) > POSITION_EPS_MM
     breaks = np.concatenate([[0], np.flatnonzero(apart) + 1])
     return {
-        **_bends("wanted", wanted.bulge != 0.0, wanted.centre, wanted.sweep),
+        **_arc_columns("wanted", wanted.bulge != 0.0, wanted.centre, wanted.sweep),
         "wanted_to": wanted.end.astype(FLOAT),
         "wanted_begin": wanted.start[breaks].astype(FLOAT),
         "wanted_break": breaks.astype(INT),
     }
 
 
-def _bends(
+def _arc_columns(
     name: str,
     is_arc: Bools,
     centre: Floats,
     sweep: Floats,
 ) -> Columns:
-    """Which rows are arcs, and the centre x, y and sweep of each."""
+    """Pack the indices of rows that are arcs, and centre x, y and sweep of each."""
     rows = np.flatnonzero(is_arc)
     bends = np.column_stack([centre[rows], sweep[rows]])
     return {f"{name}_arc": rows.astype(INT), f"{name}_bend": bends.astype(FLOAT)}
@@ -214,7 +214,7 @@ def _bends(
 # Of a point p of the slides and the nearest point q of the wanted path, the page holds p and p−q,
 # and draws p + (N − 1)(p − q) for a deviation N times as large (see `camtool.pictures.trace`).
 
-MOST_COUNTS = 32_000
+MAX_COUNTS = 32_000
 """Deviations are whole numbers of counts, this many for the largest."""
 
 
@@ -239,7 +239,7 @@ def traced_of(scene: Scene, run: Playback | None, top_um: float) -> Traced:
     if len(run.trace_row) != len(points):
         raise ValueError("the playback does not have a row for each point of the trace")
     error_um = np.where(cutting, np.abs(error) * UM_PER_MM, 0.0)
-    steps = bins_of(Trace(points, error_um, cutting, top_um))
+    steps = bins_of(ErrorTrace(points, error_um, cutting, top_um))
     bins = np.concatenate([[BINS], np.where(steps < 0, BINS, steps)])
     kept = thinned(points, bins, float(error_um.max(initial=0.0)) / UM_PER_MM)
     # A cut begins at the point before its first one.
@@ -247,7 +247,7 @@ def traced_of(scene: Scene, run: Playback | None, top_um: float) -> Traced:
     points, bins, row = points[kept], bins[kept], run.trace_row[kept]
     off = _off(points, drawn, scene.wanted)
     largest = float(np.abs(off).max(initial=0.0))
-    count_mm = largest / MOST_COUNTS if scene.wanted is not None and largest > 0.0 else 0.0
+    count_mm = largest / MAX_COUNTS if scene.wanted is not None and largest > 0.0 else 0.0
     counts = np.rint(off / count_mm) if count_mm else np.zeros_like(off)
     ever = np.ones(len(worst), dtype=np.bool_)
     return Traced(_columns(points, bins, row, counts), count_mm, _off(worst, ever, scene.wanted))
@@ -277,7 +277,7 @@ def _columns(points: Floats, bins: Ints, row: Ints | Floats, counts: Floats) -> 
 # then every second one of those that are left, and so on. Points that stay are not moved, and each
 # round moves the path by the tolerance at most.
 
-MOST_POINTS = 200_000
+MAX_POINTS = 200_000
 """Most points of the predicted path in a page."""
 
 FINEST_MM = 1e-4
@@ -290,7 +290,7 @@ COARSER = 4.0
 """... and the distance grows by this factor while there are too many points."""
 
 
-def thinned(points: Floats, bins: Ints, largest_mm: float, most: int = MOST_POINTS) -> Ints:
+def thinned(points: Floats, bins: Ints, largest_mm: float, most: int = MAX_POINTS) -> Ints:
     """Ascending rows of the points (T, 2) mm, with their colours (T,), that are kept: among them
     the ends of all pieces of one colour, unless these alone are more than `most`."""
     kept = np.arange(len(points))

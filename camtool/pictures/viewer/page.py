@@ -36,9 +36,9 @@ from camtool.pictures.colours import (
     on_dark,
 )
 from camtool.pictures.content import Content, content_of
-from camtool.pictures.layers import Lines, Part, Texts, from_the_ground_up, swept_words
-from camtool.pictures.polar import ROOM, dial_of, notes, plot, shown
-from camtool.pictures.scene import Playback, Scene, Table, by_feed
+from camtool.pictures.layers import LineGroup, Part, TextGroup, from_the_ground_up, swept_words
+from camtool.pictures.polar import ROOM, circle_pair, dial_of, notes, plot
+from camtool.pictures.scene import Playback, ReportTable, Scene, by_feed
 from camtool.pictures.svg import Look, element, number
 from camtool.pictures.viewer.columns import (
     Columns,
@@ -60,7 +60,7 @@ SCRIPTED = frozenset(
 """The layers for which the script has functions of its own, since they change with time, zoom or
 other switches. It draws all others by their parts."""
 
-LEAST_TOP_UM = 1e-3
+MIN_TOP_UM = 1e-3
 """The colour map ends here where all errors are smaller."""
 
 _SLOT = re.compile(r"\{([a-z]+)\}")
@@ -136,26 +136,31 @@ def _rows(content: Content) -> tuple[list[dict[str, object]], Columns]:
         for index, part in enumerate(parts):
             name = f"{layer.name}_{index}"
             columns |= part_columns(name, part)
-            shown.append({"columns": name, **_looks(part)})
+            shown.append({"columns": name, **_part_style(part)})
         if shown:
             is_on = layer.usual and (layer.under_path or content.trace is None)
             rows.append({"name": layer.name, "key": layer.key, "on": is_on, "parts": shown})
     return rows, columns
 
 
-def _looks(part: Part) -> dict[str, object]:
-    """What a part is called, and how it looks on light and on dark ground."""
-    if isinstance(part, Texts):
-        return {"texts": part.texts, "line": _tones(part.colour)}
+def _part_style(part: Part) -> dict[str, object]:
+    """Return name, colours and widths of a part, on light and on dark ground, for JSON."""
+    if isinstance(part, TextGroup):
+        return {"texts": part.texts, "line": _light_and_dark(part.colour)}
     look = part.look
-    line = {"line": _tones(look["stroke"]), "width": look["stroke-width"]}
-    if isinstance(part, Lines):
+    line = {"line": _light_and_dark(look["stroke"]), "width": look["stroke-width"]}
+    if isinstance(part, LineGroup):
         dashes = str(look.get("stroke-dasharray", "")).split()
         return {"legend": part.name, **line, "dash": [float(dash) for dash in dashes]}
-    return {"legend": part.name, **line, "radius": look["r"], "fill": _tones(look["fill"])}
+    return {
+        "legend": part.name,
+        **line,
+        "radius": look["r"],
+        "fill": _light_and_dark(look["fill"]),
+    }
 
 
-def _tones(colour: str | float) -> dict[str, str] | None:
+def _light_and_dark(colour: str | float) -> dict[str, str] | None:
     """A colour on light and on dark ground; None for none."""
     paint = str(colour)
     return None if paint == "none" else {"light": paint, "dark": on_dark(paint)}
@@ -169,7 +174,7 @@ def _ambiguous(drawing: Drawing) -> list[tuple[float, float]]:
     return [(float(x), float(y)) for x, y in places]
 
 
-def _table(table: Table) -> dict[str, object]:
+def _table(table: ReportTable) -> dict[str, object]:
     return {
         "title": table.title,
         "columns": table.columns,
@@ -179,7 +184,7 @@ def _table(table: Table) -> dict[str, object]:
 
 def _top_um(scene: Scene, run: Playback | None) -> float:
     """The end of the map of errors, µm: the largest error of the moves and of the trace."""
-    errors = [LEAST_TOP_UM / UM_PER_MM]
+    errors = [MIN_TOP_UM / UM_PER_MM]
     if run is not None:
         errors += [float(error) for error in run.error_mm[np.isfinite(run.error_mm)]]
     if scene.trace_error_mm is not None and scene.trace_cutting is not None:
@@ -218,7 +223,7 @@ def _file(name: str) -> str:
 
 # The polar plots of full circles below the report: SVG within the page, in the page's colours.
 
-MOST_PLOTS = 16
+MAX_PLOTS = 16
 """Most plots of a page: those of the largest circular errors."""
 
 BINS_SHOWN = 120
@@ -254,7 +259,7 @@ def circles_of(scene: Scene) -> str:
         for which, one in enumerate(scene.rounds, 1)
         if one.partner is None or one.partner > which
     ]
-    chosen = sorted(sorted(first, key=lambda which: -_size(scene, which))[:MOST_PLOTS])
+    chosen = sorted(sorted(first, key=lambda which: -_size(scene, which))[:MAX_PLOTS])
     if not chosen:
         return ""
     heading = "Full circles"
@@ -270,10 +275,10 @@ def _size(scene: Scene, which: int) -> float:
 
 
 def _figure(scene: Scene, which: int) -> str:
-    circles = shown(scene, which)
+    circles = circle_pair(scene, which)
     errors = [_joined(circle.errors_um) for circle in circles]
     dial = dial_of(errors, WIDTH)
-    dial = dial.placed(0.0, WIDTH)
+    dial = dial.centred_below(0.0, WIDTH)
     side = 2.0 * (dial.outer + ROOM)
     box = " ".join(map(number, (0.5 * (WIDTH - side), 0.0, side, side)))
     about = f"radial error of circle {which}"
