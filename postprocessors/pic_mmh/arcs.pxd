@@ -7,12 +7,12 @@ from camtool_postprocessors.pic_mmh.steps cimport (
     direct_search_run, first_at, heading, nearest_to, rounded_radius, skip
 )
 
-cdef class Search:
+cdef class LandingSearch:
     cdef double units_per_step
     cdef Int most_units
     cdef Int[::1] state, path_x, path_y, onward
 
-@cython.locals(k=Int, room=Int, search=Search, out=Int[:, ::1])
+@cython.locals(k=Int, room=Int, search=LandingSearch, out=Int[:, ::1])
 cpdef land(
     Int[:, ::1] arcs, double[::1] sweeps, double units_per_step, Int most_units, double sagitta
 )
@@ -28,20 +28,20 @@ cdef void _begin(Int[::1] arc, Int error, Int[::1] state) noexcept
 cdef Int _hits(Int[::1] arc, Int x, Int y, Int low, Int high, Int[::1] state) noexcept
 
 @cython.locals(size=Int, units=Int)
-cdef bint _represents(Int steps, Search search) noexcept
+cdef bint _represents(Int steps, LandingSearch search) noexcept
 
 @cython.locals(x=Int, y=Int, iteration=Int)
-cdef bint _lands(Int[::1] arc, Int row, Int first, Search search) noexcept
+cdef bint _lands(Int[::1] arc, Int row, Int first, LandingSearch search) noexcept
 
 @cython.locals(path_x=Int[::1], path_y=Int[::1])
-cdef void _follow(Int[::1] arc, Int first, Int count, Search search) noexcept
+cdef void _follow(Int[::1] arc, Int first, Int count, LandingSearch search) noexcept
 
 @cython.locals(
     k=Int, turn=Int, along_x=Int, along_y=Int, on_x=Int, on_y=Int, path_x=Int[::1], path_y=Int[::1]
 )
-cdef void _mark_onward(Int[::1] arc, Int count, Search search) noexcept
+cdef void _mark_onward(Int[::1] arc, Int count, LandingSearch search) noexcept
 
-cdef void _take(Int row, Int first, Search search, Int[::1] out) noexcept
+cdef void _take(Int row, Int first, LandingSearch search, Int[::1] out) noexcept
 
 @cython.locals(
     radius=double, latest=double, end_x=Int, end_y=Int, low=Int, high=Int, met=Int, near=Int, _=Int, first=Int,
@@ -49,5 +49,5 @@ cdef void _take(Int row, Int first, Search search, Int[::1] out) noexcept
     nearer=bint
 )
 cdef void _land(
-    Int[::1] arc, double sweep_rad, double sagitta, Search search, Int[::1] out
+    Int[::1] arc, double sweep_rad, double sagitta, LandingSearch search, Int[::1] out
 ) noexcept
