@@ -52,9 +52,9 @@ def test_every_layer_is_switched_by_its_key(shown: Any) -> None:
 ROW = layers.Layer(
     "hints",
     lambda content: [
-        layers.Lines("edges", "edge", content.outlines, layers.RAPID_LINE),
-        layers.Dots("corners", "corner", [(1.0, 1.0), (3.0, 1.0)], layers.PLUNGE_MARK),
-        layers.Texts("names", ["A", "B"], [(1.0, 1.0), (3.0, 1.0)], layers.INK),
+        layers.LineGroup("edges", "edge", content.outlines, layers.RAPID_LINE),
+        layers.DotGroup("corners", "corner", [(1.0, 1.0), (3.0, 1.0)], layers.PLUNGE_MARK),
+        layers.TextGroup("names", ["A", "B"], [(1.0, 1.0), (3.0, 1.0)], layers.INK),
     ],
     key="h",
 )
