@@ -491,10 +491,13 @@ def calibrate(
 
 
 class Looks(TypedDict, total=False):
-    """How a picture looks: the fields of `camtool.pictures.options.PictureOptions`. `size_px` is its
-    width, `crop_mm` the rectangle (x, y, width, height) that it shows, `exaggerate` the factor by
-    which deviations from the wanted path are enlarged, `layers` the names of the layers to show,
-    `polar` the number (from 1) of the circle whose radial errors are plotted instead."""
+    """The look of a picture: the fields of `camtool.pictures.options.PictureOptions`.
+
+    `size_px` is its width, `crop_mm` the rectangle (x, y, width, height) that it shows,
+    `exaggerate` the factor by which deviations from the wanted path are enlarged, `layers` the
+    names of the layers to show, `polar` the number (from 1) of the circle whose radial errors are
+    plotted instead.
+    """
 
     size_px: int | None
     crop_mm: tuple[float, float, float, float] | None
