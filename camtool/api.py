@@ -335,7 +335,7 @@ def meet(
     `certificate` says why no job does, None where one does. Raises OptionError where the job
     has errors, and where no dimension has limits. Source: docs/tolerances.md.
     """
-    from camtool.inspection.meet import MOST_TRIALS, Case
+    from camtool.inspection.meet import DEFAULT_TRIALS, MeetingCase
     from camtool.inspection.meet import meet as met
     from camtool.inspection.tolerances import dimensions_of
     from camtool.inspection.verdicts import Tolerances
@@ -349,8 +349,8 @@ def meet(
     job_of = partial(job_of_tables, place=place, shop=Shop())
     read = as_drawing(drawing, loaded, job_of(tables))
     asked = None if tolerances is None else Path(tolerances)
-    case = Case(read, loaded, tables, job_of, Tolerances(*dimensions_of(read, asked)))
-    return met(case, most or MOST_TRIALS)
+    case = MeetingCase(read, loaded, tables, job_of, Tolerances(*dimensions_of(read, asked)))
+    return met(case, most or DEFAULT_TRIALS)
 
 
 def convert(

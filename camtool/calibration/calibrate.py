@@ -17,7 +17,7 @@ from msgspec import Struct
 
 from camtool.arrays import Bools, Floats
 from camtool.calibration.measurements import Measurements
-from camtool.calibration.model import SQUARENESS, Model, Parameter, Reading, readings_of
+from camtool.calibration.model import SQUARENESS, MeasuredLength, Model, Parameter, readings_of
 from camtool.errors import InputError
 from camtool.machine.model import Axis, AxisUncertainty, Machine, Uncertainty
 from camtool.units import UM_PER_MM
@@ -90,13 +90,15 @@ class Solution(Struct, frozen=True, eq=False):
     spread: float
 
     def uncertainty(self, columns: Sequence[int]) -> float:
-        """Standard uncertainty of the mean of the parameters `columns`; nan when not known."""
+        """Return the standard uncertainty of the mean of the parameters `columns`; nan if
+        unknown."""
         part = self.covariance[np.ix_(columns, columns)]
         return float(np.sqrt(part.sum())) / len(columns)
 
 
 def solve(model: Model, start: Floats) -> Solution:
-    """The parameters that fit the readings of the model best, from the values `start` (P,)."""
+    """Fit the parameters of the model to its readings by least squares, from the values `start`
+    (P,)."""
     uncertain_mm = [reading.uncertainty_mm or np.nan for reading in model.readings]
     known = bool(np.isfinite(uncertain_mm).all())
     weights = 1.0 / np.array(uncertain_mm) if known else np.ones(len(uncertain_mm))
@@ -125,7 +127,8 @@ def solve(model: Model, start: Floats) -> Solution:
 
 
 def _sigma(residual: Floats, leverage: Floats, freedom: int, *, known: bool) -> Floats:
-    """(n,) standard deviation of each weighted residual, estimated from the other readings.
+    """Compute the standard deviation (n,) of each weighted residual, estimated from the other
+    readings.
 
     Without reading i the sum of squares is smaller by r_i² / (1 − h_i), h the leverage. A reading
     that alone determines a parameter (h = 1) has no residual.
@@ -143,7 +146,7 @@ def _sigma(residual: Floats, leverage: Floats, freedom: int, *, known: bool) -> 
 def _identifiable(
     parameters: Sequence[Parameter], matrix: Floats
 ) -> tuple[Bools, tuple[FixedParameter, ...]]:
-    """(P,) true for parameters that the readings determine, and the others with the reason."""
+    """Mask (P,) of the parameters that the readings determine, and the others with the reason."""
     size = np.linalg.norm(matrix, axis=0)
     free = size > 0.0
     touched = free.copy()
@@ -168,7 +171,8 @@ def _identifiable(
 
 
 def _fixing_order(parameter: Parameter) -> int:
-    """Parameters with a higher number are fixed first: the scale of a step is mostly known."""
+    """Return the rank in which a parameter is fixed, the highest first: the scale of a step is
+    mostly known."""
     return ("play", "squareness", "scale").index(parameter.what)
 
 
@@ -184,9 +188,9 @@ COEFFICIENT_DECIMALS = 4
 
 
 class Estimate(Struct, frozen=True):
-    """A value of the machine: `before` is that of its file, `value` the measured one, with its
-    standard `uncertainty` (None: not known); `readings` is the number of readings that depend on
-    it. Steps and backlash (`what` is "play") in mm, squareness in rad."""
+    """An estimated value of the machine: `before` in its file, the measured `value` with its
+    standard `uncertainty` (None: unknown), and the number of `readings` that depend on it. Steps
+    and backlash (`what` is "play") in mm, squareness in rad."""
 
     what: str
     axis: str
@@ -198,33 +202,33 @@ class Estimate(Struct, frozen=True):
 
     @property
     def name(self) -> str:
-        """Such as "step of x" or "play of y in V2"."""
+        """Name such as "step of x" or "play of y in V2"."""
         return str(Parameter(self.what, self.axis, self.region))
 
 
 class NotEstimated(Struct, frozen=True):
-    """A value that the readings do not determine, with the reason."""
+    """A value that the readings do not determine, and the reason."""
 
     name: str
     why: str
 
 
 class Fitted(Struct, frozen=True):
-    """A reading and its prediction from the estimates; `sigmas`: residual over its standard
-    deviation, None where that is not known."""
+    """A reading and its prediction from the estimates; `sigmas`: residual divided by its standard
+    deviation, None if that is unknown."""
 
-    reading: Reading
+    reading: MeasuredLength
     predicted_mm: float
     sigmas: float | None
 
     @property
     def residual_mm(self) -> float:
-        """Measured minus predicted."""
+        """Measured value minus prediction."""
         return self.reading.measured_mm - self.predicted_mm
 
     @property
     def outlier(self) -> bool:
-        """Whether the residual exceeds `OUTLIER_SIGMAS`."""
+        """True if the residual exceeds `OUTLIER_SIGMAS`."""
         return self.sigmas is not None and abs(self.sigmas) > OUTLIER_SIGMAS
 
 
@@ -247,7 +251,7 @@ class Calibration:
     known: Uncertainty
 
     def estimate(self, what: str, axis: str = "", region: str = "") -> Estimate | None:
-        """The estimate of this value, or None."""
+        """Return the estimate of this value, or None."""
         for each in self.estimates:
             if (each.what, each.axis, each.region) == (what, axis, region):
                 return each
@@ -255,7 +259,7 @@ class Calibration:
 
 
 def calibrate(measurements: Measurements, machine: Machine) -> Calibration:
-    """Estimates of the values of `machine` from measurements.
+    """Estimate the values of `machine` from measurements.
 
     InputError for a file of another target, a file without measurements, and a backlash below
     zero.
@@ -308,7 +312,7 @@ def _check_target(measurements: Measurements, machine: Machine) -> None:
 
 
 def _estimates(model: Model, solution: Solution, machine: Machine) -> list[Estimate]:
-    """The estimated parameters in the units of the machine."""
+    """Return the estimated parameters in the units of the machine."""
     start = model.start(machine)
     depends = model.depends(solution.values)
     found = []
@@ -331,7 +335,8 @@ def _estimates(model: Model, solution: Solution, machine: Machine) -> list[Estim
 
 
 def _mean_backlash(model: Model, solution: Solution, machine: Machine) -> list[Estimate]:
-    """The mean backlash of axes measured in regions, where that of all regions is estimated."""
+    """Return the mean backlash of axes measured in regions, if that of all regions is
+    estimated."""
     depends = model.depends(solution.values)
     found = []
     for axis in ("x", "y"):
@@ -351,7 +356,7 @@ def _mean_backlash(model: Model, solution: Solution, machine: Machine) -> list[E
 
 
 def _known(model: Model, solution: Solution) -> Uncertainty:
-    """The standard uncertainties of the estimates and their correlations.
+    """Compute the standard uncertainties of the estimates and their correlations.
 
     With J the derivatives of the machine's values by the parameters, their covariance is J C Jᵀ.
     Of the cells of an axis J takes the mean; their variance is the mean of those of the cells,
@@ -408,13 +413,14 @@ def _rows(model: Model, values: Floats) -> Iterator[tuple[str, Floats]]:
 
 
 def _compensated(model: Model, axis: str) -> bool:
-    """Whether the controller added something at the reversals of an axis in every coupon."""
+    """True if the controller added compensation at the reversals of an axis in every coupon."""
     courses = [each for reading in model.readings for each in reading.measure.courses]
     return all(each.added_mm > 0.0 for each in courses if each.axis == axis)
 
 
 def _refuse_negative_backlash(estimate: Estimate, machine: Machine, file: str) -> None:
-    """InputError for a backlash below zero by more than a step and more than its uncertainty."""
+    """Raise InputError for a backlash below zero by more than a step and more than its
+    uncertainty."""
     if estimate.what != "play":
         return
     axis: Axis = getattr(machine.axes, estimate.axis)
@@ -440,12 +446,12 @@ def _sigmas(residual: float, sigma: float) -> float | None:
 
 
 def to_text(calibration: Calibration, machine: Machine) -> str:
-    """The values, those not estimated, the compensation to set, and the residuals."""
+    """Format the values, those not estimated, the compensation to set, and the residuals."""
     return "\n".join(_text(calibration, machine))
 
 
 def to_data(calibration: Calibration, machine: Machine) -> dict[str, Any]:
-    """The same for JSON; lengths in mm, residuals in µm, squareness in rad."""
+    """Return the same data for JSON; lengths in mm, residuals in µm, squareness in rad."""
     return {
         "target": calibration.target,
         "file": calibration.file,
@@ -490,7 +496,7 @@ def to_data(calibration: Calibration, machine: Machine) -> dict[str, Any]:
 
 
 def _given_only(table: dict[str, Any]) -> dict[str, Any]:
-    """A table without what is not known."""
+    """Return a table without unknown values."""
     inner = {
         key: _given_only(value) if isinstance(value, dict) else value
         for key, value in table.items()
@@ -499,8 +505,8 @@ def _given_only(table: dict[str, Any]) -> dict[str, Any]:
 
 
 def compensations(calibration: Calibration, machine: Machine) -> Iterator[tuple[str, float, int]]:
-    """(axis, mm, whole steps) that the controller must add at reversals to take up the measured
-    backlash: B/k, in its own mm."""
+    """Return (axis, mm, whole steps) that the controller must add at reversals to take up the
+    measured backlash: B/k, in its own mm."""
     for axis in ("x", "y", "z"):
         play, step = calibration.estimate("play", axis), calibration.estimate("step", axis)
         if play is not None:
@@ -510,7 +516,7 @@ def compensations(calibration: Calibration, machine: Machine) -> Iterator[tuple[
 
 
 def outliers(calibration: Calibration) -> list[str]:
-    """One line for each outlier."""
+    """Return one line for each outlier."""
     return [
         f"{each.reading.coupon}, {each.reading.name}: {each.residual_mm * UM_PER_MM:+.1f} µm off, "
         f"{abs(each.sigmas or 0.0):.1f} standard deviations"
@@ -576,7 +582,7 @@ def _um(mm: float | None) -> float | None:
 
 
 def _columns(rows: list[tuple[str, ...]]) -> Iterator[str]:
-    """Rows as aligned text: words to the left, numbers to the right."""
+    """Align rows as text: words to the left, numbers to the right."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     text = {0, 1} if rows[0][1] == "reading" else {0}
     for row in rows:

@@ -55,11 +55,11 @@ two, half of the longest line of a coupon, in whose middle the tool begins, take
 SAME = 1e-9
 """Numbers of units that differ by less than this from a whole number are that number."""
 
-MOST_REGIONS = 9
-"""The most columns and rows of regions."""
+MAX_REGIONS = 9
+"""Most columns and rows of regions."""
 
 
-class Cell(Struct, frozen=True):
+class CouponCell(Struct, frozen=True):
     """A rectangle for coupons, mm, without its margin."""
 
     left: float
@@ -68,7 +68,7 @@ class Cell(Struct, frozen=True):
     high: float
 
 
-class Grid(Struct, frozen=True):
+class CouponGrid(Struct, frozen=True):
     """The grid on which coupons lie, and the length of their run-ups, mm."""
 
     unit: float
@@ -78,7 +78,7 @@ class Grid(Struct, frozen=True):
         return count * self.unit
 
     def down(self, length: float) -> float:
-        """The length rounded down to the grid; OptionError when it becomes 0."""
+        """Round the length down to the grid; OptionError if it becomes 0."""
         cut = math.floor(length / self.unit + SAME) * self.unit
         if cut <= 0.0:
             raise OptionError(
@@ -87,15 +87,19 @@ class Grid(Struct, frozen=True):
             )
         return cut
 
-    def middle(self, cell: Cell) -> tuple[float, float, float]:
-        """(x, y) of the middle of a cell on the grid, and the distance to its nearest side."""
+    def middle(self, cell: CouponCell) -> tuple[float, float, float]:
+        """Return the point (x, y) of the grid at the middle of a cell, and its distance to the
+        nearest side."""
         x = self.down(0.5 * (cell.left + cell.right))
         y = self.down(0.5 * (cell.low + cell.high))
         return x, y, min(cell.right - x, x - cell.left, cell.high - y, y - cell.low)
 
 
-def cells_of(size: Point, regions: tuple[int, int], unit: float) -> Iterator[tuple[str, Cell]]:
-    """(name, cell) from the lower left on, row by row: A1, B1 … A2; "" for a single cell."""
+def cells_of(
+    size: Point, regions: tuple[int, int], unit: float
+) -> Iterator[tuple[str, CouponCell]]:
+    """Return (name, cell) from the lower left on, row by row: A1, B1 … A2; "" for a single
+    cell."""
     columns, rows = regions
     margin = MARGIN_UNITS * unit
     for row in range(rows):
@@ -105,11 +109,11 @@ def cells_of(size: Point, regions: tuple[int, int], unit: float) -> Iterator[tup
             right = _on_grid(size[0] * (column + 1) / columns, unit, math.floor) - margin
             low = _on_grid(size[1] * row / rows, unit, math.ceil) + margin
             high = _on_grid(size[1] * (row + 1) / rows, unit, math.floor) - margin
-            yield name, Cell(left, low, right, high)
+            yield name, CouponCell(left, low, right, high)
 
 
 def edges_of(size: Point, regions: tuple[int, int]) -> dict[str, Any]:
-    """The cells for a file of measurements; {} for a single cell."""
+    """Return the edges of the cells for a file of measurements; {} for a single cell."""
     columns, rows = regions
     if columns * rows == 1:
         return {}
@@ -123,9 +127,9 @@ def edges_of(size: Point, regions: tuple[int, int]) -> dict[str, Any]:
     }
 
 
-def grid_of(side: float, machine: Machine | None) -> Grid:
-    """A round unit (1, 2 or 5 times a power of ten) that the machine can represent, and run-ups
-    that take up its backlash."""
+def grid_of(side: float, machine: Machine | None) -> CouponGrid:
+    """Choose a round unit (1, 2 or 5 times a power of ten) that the machine can represent, and
+    run-ups that take up its backlash."""
     rough = side / FINENESS
     power = 10.0 ** math.floor(math.log10(rough) + SAME)
     unit = power * max(part for part in (1.0, 2.0, 5.0) if part * power <= rough * (1.0 + SAME))
@@ -135,18 +139,19 @@ def grid_of(side: float, machine: Machine | None) -> Grid:
         unit = finest * max(1, math.floor(unit / finest + SAME))
     lost = max((max(axis.backlash_mm, axis.compensation_mm) for axis in axes), default=0.0)
     run_up = unit * max(RUN_UP_UNITS, math.ceil(RUN_UP_PLAYS * lost / unit - SAME))
-    return Grid(unit, run_up)
+    return CouponGrid(unit, run_up)
 
 
 def _on_grid(value: float, unit: float, how: Callable[[float], float]) -> float:
-    """The value as whole units, rounded by `how`; rounding errors do not change the number."""
+    """Return the value in whole units, rounded by `how`; rounding errors do not change the
+    number."""
     units = value / unit
     near = round(units)
     return (near if abs(units - near) < SAME * max(1.0, abs(near)) else how(units)) * unit
 
 
 def clean(value: float) -> float:
-    """The value without rounding errors of sums of units."""
+    """Remove the rounding errors of sums of units from a value."""
     return round(value, 9) + 0.0
 
 
@@ -172,7 +177,7 @@ STEPS = 10
 """Steps of a ruler (ten "tramos": ValCNC thesis, L1645)."""
 
 
-class Path(Struct, frozen=True):
+class SheetPath(Struct, frozen=True):
     """A polyline of a drawing: vertices of x, y (mm) and bulge."""
 
     layer: str
@@ -180,65 +185,66 @@ class Path(Struct, frozen=True):
     closed: bool = False
 
 
-class Sheet(Struct, frozen=True):
+class CouponSheet(Struct, frozen=True):
     """A drawing of `size` mm with its lower left corner at part zero. For the file of
     measurements, `tables` are its coupons, (kind, keys) each, and `regions` its cells, for both
     axes."""
 
     kind: Kind
     size: Point
-    paths: tuple[Path, ...]
+    paths: tuple[SheetPath, ...]
     tables: tuple[tuple[str, dict[str, Any]], ...]
     regions: dict[str, Any] = field(default_factory=dict)
 
 
 def sheet(
     kind: Kind, size: Point, regions: tuple[int, int] = (1, 1), machine: Machine | None = None
-) -> Sheet:
-    """The coupons of a kind on a sheet, with run-ups for the backlash of `machine`; OptionError
-    when they do not fit."""
-    if not all(1 <= count <= MOST_REGIONS for count in regions):
+) -> CouponSheet:
+    """Lay out the coupons of a kind on a sheet, with run-ups for the backlash of `machine`;
+    OptionError if they do not fit."""
+    if not all(1 <= count <= MAX_REGIONS for count in regions):
         raise OptionError(
-            f"{regions[0]}x{regions[1]} regions", mend=f"give 1 to {MOST_REGIONS} each way"
+            f"{regions[0]}x{regions[1]} regions", mend=f"give 1 to {MAX_REGIONS} each way"
         )
     if kind != "lines" and regions != (1, 1):
         raise OptionError(f"{kind} have no regions", mend="leave --regions out")
     grid = grid_of(min(size[0] / regions[0], size[1] / regions[1]), machine)
     made = {"lines": _lines, "squares": _squares, "circles": _circles, "steps": _steps}
-    paths: list[Path] = []
+    paths: list[SheetPath] = []
     tables: list[tuple[str, dict[str, Any]]] = []
     for name, cell in cells_of(size, regions, grid.unit):
         for path, table in made[kind](cell, grid):
             paths.append(path)
             region = {"region": name} if name else {}
             tables.append((kind, {**region, **table}))
-    return Sheet(kind, size, tuple(paths), tuple(tables), edges_of(size, regions))
+    return CouponSheet(kind, size, tuple(paths), tuple(tables), edges_of(size, regions))
 
 
-Coupon = tuple[Path, dict[str, Any]]
+Coupon = tuple[SheetPath, dict[str, Any]]
 Made = Iterator[Coupon]
-AlongAxis = Callable[[str, Point, float, Grid], Coupon]
+AlongAxis = Callable[[str, Point, float, CouponGrid], Coupon]
 
 
-def _lines(cell: Cell, grid: Grid) -> Made:
-    """Two lines along X at the bottom of the cell, two along Y at its left side."""
+def _lines(cell: CouponCell, grid: CouponGrid) -> Made:
+    """Lay out two lines along X at the bottom of the cell and two along Y at its left side."""
     return _along_both(_two_lines, cell, grid)
 
 
-def _steps(cell: Cell, grid: Grid) -> Made:
-    """A ruler along X at the bottom, one along Y at the left side."""
+def _steps(cell: CouponCell, grid: CouponGrid) -> Made:
+    """Lay out a ruler along X at the bottom and one along Y at the left side."""
     return _along_both(_ruler, cell, grid)
 
 
-def _along_both(one: AlongAxis, cell: Cell, grid: Grid) -> Made:
-    """One coupon along X at the bottom of the cell, one along Y at its left side, above it."""
+def _along_both(one: AlongAxis, cell: CouponCell, grid: CouponGrid) -> Made:
+    """Lay out one coupon along X at the bottom of the cell and one along Y at its left side, above
+    it."""
     low = cell.low + grid.units(3 * GAP_UNITS + MARGIN_UNITS)
     yield one("x", (cell.left, cell.low), cell.right, grid)
     yield one("y", (low, cell.left), cell.high, grid)
 
 
-def _two_lines(axis: str, corner: Point, end: float, grid: Grid) -> Coupon:
-    """Two lines along an axis, from `corner` (along, across) to `end`."""
+def _two_lines(axis: str, corner: Point, end: float, grid: CouponGrid) -> Coupon:
+    """Lay out two lines along an axis, from `corner` (along, across) to `end`."""
     along, across = corner
     run_up, gap = grid.run_up, grid.units(GAP_UNITS)
     mark = along + run_up
@@ -254,10 +260,10 @@ def _two_lines(axis: str, corner: Point, end: float, grid: Grid) -> Coupon:
         (along, across + 3 * gap),
     ]
     table = {"axis": axis, "nominal_mm": clean(length), "first_mm": 0.0, "second_mm": 0.0}
-    return Path(f"LINES_{axis.upper()}", _vertices(axis, points), closed=True), table
+    return SheetPath(f"LINES_{axis.upper()}", _vertices(axis, points), closed=True), table
 
 
-def _ruler(axis: str, corner: Point, end: float, grid: Grid) -> Coupon:
+def _ruler(axis: str, corner: Point, end: float, grid: CouponGrid) -> Coupon:
     along, across = corner
     run_up, tall = grid.run_up, grid.units(GAP_UNITS)
     zero = along + run_up
@@ -274,11 +280,11 @@ def _ruler(axis: str, corner: Point, end: float, grid: Grid) -> Coupon:
         "backward_mm": [0.0] * STEPS,
         "rows_apart_mm": clean(2 * tall),
     }
-    return Path(f"STEPS_{axis.upper()}", _vertices(axis, points), closed=True), table
+    return SheetPath(f"STEPS_{axis.upper()}", _vertices(axis, points), closed=True), table
 
 
 def _wave(marks: Sequence[float], levels: Point) -> list[Point]:
-    """The points of a square wave: up at one mark, down at the next."""
+    """Return the points of a square wave: up at one mark, down at the next."""
     points: list[Point] = []
     for number, mark in enumerate(marks):
         first, second = levels if number % 2 == 0 else levels[::-1]
@@ -286,8 +292,8 @@ def _wave(marks: Sequence[float], levels: Point) -> list[Point]:
     return points
 
 
-def _squares(cell: Cell, grid: Grid) -> Made:
-    """Squares about the middle of the cell, one inside the other."""
+def _squares(cell: CouponCell, grid: CouponGrid) -> Made:
+    """Lay out squares about the middle of the cell, one inside the other."""
     hook = grid.run_up
     x, y, most = grid.middle(cell)
     for part in SQUARES:
@@ -306,19 +312,19 @@ def _squares(cell: Cell, grid: Grid) -> Made:
         size = clean(2.0 * half)
         diagonals = {"diagonals_mm": [0.0, 0.0]}
         yield (
-            Path("SQUARES", _vertices("x", points)),
+            SheetPath("SQUARES", _vertices("x", points)),
             {"nominal_mm": [size, size], "dx_mm": 0.0, "dy_mm": 0.0, **diagonals},
         )
 
 
-def _circles(cell: Cell, grid: Grid) -> Made:
-    """Circles about the middle of the cell, each of two half circles, CCW from +X."""
+def _circles(cell: CouponCell, grid: CouponGrid) -> Made:
+    """Lay out circles about the middle of the cell, each of two half circles, CCW from +X."""
     x, y, most = grid.middle(cell)
     for part in CIRCLES:
         radius = grid.down(part * most)
         halves = ((clean(x + radius), y, 1.0), (clean(x - radius), y, 1.0))
         yield (
-            Path("CIRCLES", halves, closed=True),
+            SheetPath("CIRCLES", halves, closed=True),
             {
                 "nominal_mm": clean(2.0 * radius),
                 "direction": "ccw",
@@ -329,7 +335,7 @@ def _circles(cell: Cell, grid: Grid) -> Made:
 
 
 def _vertices(axis: str, points: Sequence[Point]) -> tuple[tuple[float, float, float], ...]:
-    """Points (along, across) an axis as vertices."""
+    """Convert points (along, across) an axis to vertices."""
     if axis == "y":
         points = [(across, along) for along, across in points]
     return tuple((clean(x), clean(y), 0.0) for x, y in points)
@@ -344,8 +350,8 @@ DECIMALS = 9
 """Decimal places of numbers in SVG."""
 
 
-def dxf(sheet: Sheet) -> bytes:
-    """The sheet as DXF R2000, each path an LWPOLYLINE."""
+def dxf(sheet: CouponSheet) -> bytes:
+    """Write the sheet as DXF R2000, each path an LWPOLYLINE."""
     from ezdxf._options import options
     from ezdxf.filemanagement import new
     from ezdxf.units import MM
@@ -372,8 +378,8 @@ def dxf(sheet: Sheet) -> bytes:
     return text.getvalue().encode("cp1252")
 
 
-def svg(sheet: Sheet) -> bytes:
-    """The sheet as SVG, Y up by the transform of its only group."""
+def svg(sheet: CouponSheet) -> bytes:
+    """Write the sheet as SVG, Y up by the transform of its only group."""
     width, height = (_number(side) for side in sheet.size)
     rows = [
         '<?xml version="1.0" encoding="UTF-8"?>',
@@ -389,8 +395,8 @@ def svg(sheet: Sheet) -> bytes:
     return "\n".join(rows).encode()
 
 
-def _path(path: Path) -> str:
-    """The path data; the radius of an arc is chord · (1 + b²) / (4 |b|)."""
+def _path(path: SheetPath) -> str:
+    """Return SVG path data; the radius of an arc is chord · (1 + b²) / (4 |b|)."""
     ring = [*path.vertices, path.vertices[0]] if path.closed else list(path.vertices)
     x, y, _ = ring[0]
     parts = [f"M {_number(x)} {_number(y)}"]
@@ -431,8 +437,8 @@ HOW: dict[Kind, tuple[str, ...]] = {
 """What to measure, as comments of the file."""
 
 
-def skeleton(sheet: Sheet, machine: Machine | None) -> str:
-    """TOML text for the measurements of a sheet; 0.0 means not measured."""
+def skeleton(sheet: CouponSheet, machine: Machine | None) -> str:
+    """Write TOML text for the measurements of a sheet; 0.0 means not measured."""
     width, height = sheet.size
     lines = [
         f"# Measurements of the {sheet.kind} coupon, {width:g} by {height:g} mm.",
@@ -454,7 +460,8 @@ def skeleton(sheet: Sheet, machine: Machine | None) -> str:
 
 
 def _compensation(machine: Machine | None) -> str:
-    """The compensation of the machine, for the user to change if it was off while cutting."""
+    """Return the compensation of the machine as text, for the user to change if it was off while
+    cutting."""
     if machine is None:
         return "# compensation_mm = { x = 0.0, y = 0.0 }   # added at reversals while cutting"
     x, y = machine.axes.x.compensation_mm, machine.axes.y.compensation_mm

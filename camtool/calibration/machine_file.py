@@ -29,8 +29,8 @@ UNCERTAINTY_DIGITS = 3
 def machine_file(
     calibration: Calibration, measurements: Measurements, machine: Machine, own: Table
 ) -> str:
-    """TOML text. `machine` has the values before the calibration; `own` is the table of the user's
-    file, or one with only the key `extends`."""
+    """Return the TOML text of a machine file. `machine` has the values before the calibration;
+    `own` is the table of the user's file, or one with only the key `extends`."""
     said: Table = json.loads(json.dumps(own))  # a copy, tables and all
     notes: dict[str, str] = {}
     for axis in ("x", "y", "z"):
@@ -82,8 +82,8 @@ def _set_map(
 
 
 def _set_uncertainty(said: Table, notes: dict[str, str], calibration: Calibration) -> None:
-    """Set how well the measured values are known; what an older file says of how well these
-    were known holds no more, and the rest of it stays."""
+    """Set the uncertainties of the measured values; those in an older file for the same values are
+    removed, and the rest of it is kept."""
     measured = [
         f"{axis}.{key}"
         for axis in ("x", "y")
@@ -112,14 +112,14 @@ def _set_uncertainty(said: Table, notes: dict[str, str], calibration: Calibratio
 
 
 def _table(said: Table, path: str) -> Table:
-    """The table at this path; an empty one where there is none."""
+    """Return the table at this path; a new one if there is none."""
     for name in path.split("."):
         said = said.get(name, {})
     return said
 
 
 def _rounded(estimate: Estimate | None) -> float:
-    """The value, rounded to a small part of its uncertainty; a backlash below 0 is 0."""
+    """Round the value to a small part of its uncertainty; a backlash below 0 becomes 0."""
     assert estimate is not None
     value = max(estimate.value, 0.0) if estimate.what != "squareness" else estimate.value
     if estimate.uncertainty:
@@ -141,7 +141,8 @@ def _within(uncertainty: float | None) -> str:
 
 
 def _plain(file: str) -> str:
-    """The name of a file for a comment: without its folder, with printable characters only."""
+    """Return the name of a file for a comment: without its folder, with printable characters
+    only."""
     return "".join(char if char.isprintable() else "?" for char in Path(file).name)
 
 

@@ -33,7 +33,7 @@ Any3 = Literal["x", "y", "z"]
 
 _ZERO_IS_A_RESULT = ("shorter_by_mm", "gap_x_mm", "gap_y_mm")
 
-MOST_TIMES = 2.0
+MAX_RATIO = 2.0
 """A length more than this many times its nominal one, or less than that part of it, is a mistake:
 a wrong unit, a missing digit."""
 
@@ -57,7 +57,7 @@ class Regions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def every(self) -> frozenset[str]:
-        """The names of all cells."""
+        """Return the names of all cells."""
         return frozenset(name for row in self.names for name in row)
 
 
@@ -83,12 +83,12 @@ class Coupon(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
     @property
     def axes(self) -> str:
-        """The axes whose backlash it may determine."""
+        """Axes whose backlash the coupon may determine."""
         return "xy"
 
     @property
     def measured(self) -> bool:
-        """Whether anything is measured: 0.0 is a reading still to be filled in, except where it is
+        """True if anything is measured: 0.0 is a reading still to be filled in, except where it is
         a possible result (`shorter_by_mm`, gaps)."""
         for key in self.readings:
             value = getattr(self, key)
@@ -98,15 +98,15 @@ class Coupon(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         return False
 
     def lengths(self) -> Iterator[tuple[str, float, float]]:
-        """(key, measured, nominal) of each length that must be near a nominal one, mm."""
+        """Return (key, measured, nominal) of each length that must be near a nominal one, mm."""
         return iter(())
 
     def faults(self) -> Iterator[tuple[str, str, str]]:
-        """(key, what is wrong, how to correct it) of faults that the types do not find."""
+        """Return (key, fault, correction) of faults that the types do not reveal."""
         return iter(())
 
 
-class Lines(Coupon, frozen=True, kw_only=True):
+class LinesCoupon(Coupon, frozen=True, kw_only=True):
     """Two parallel lines along an axis, joined at one end. `first_mm` is the line that was cut
     in +, `second_mm` the other one, or `shorter_by_mm` how much it falls short of the first."""
 
@@ -131,11 +131,11 @@ class Lines(Coupon, frozen=True, kw_only=True):
         if self.second_mm is not None and self.shorter_by_mm is not None:
             yield "shorter_by_mm", "says what second_mm says", "leave one of them out"
         for key, value in (("second_mm", self.second_mm), ("shorter_by_mm", self.shorter_by_mm)):
-            if value is not None and abs(value) > MOST_TIMES * self.nominal_mm:
+            if value is not None and abs(value) > MAX_RATIO * self.nominal_mm:
                 yield key, f"is {value:g} on a line of {self.nominal_mm:g} mm", "write it in mm"
 
 
-class Square(Coupon, frozen=True, kw_only=True):
+class SquareCoupon(Coupon, frozen=True, kw_only=True):
     """A rectangle whose opposite edges were reached from opposite sides. `diagonals_mm`: from
     the lower left to the upper right corner, and from the upper left to the lower right one."""
 
@@ -157,7 +157,7 @@ class Square(Coupon, frozen=True, kw_only=True):
             yield "diagonals_mm", diagonal, (width**2 + height**2) ** 0.5
 
 
-class Circle(Coupon, frozen=True, kw_only=True):
+class CircleCoupon(Coupon, frozen=True, kw_only=True):
     """A full circle, cut in a `direction`. `diameters_mm` are those at `angles_deg` from the X
     axis towards the Y axis, or at equal angles over half a turn from the X axis on."""
 
@@ -171,7 +171,7 @@ class Circle(Coupon, frozen=True, kw_only=True):
 
     @property
     def angles(self) -> tuple[float, ...]:
-        """The angles of the diameters, degrees."""
+        """Angles of the diameters, degrees."""
         count = len(self.diameters_mm)
         return self.angles_deg or tuple(180.0 * k / count for k in range(count))
 
@@ -188,7 +188,7 @@ class Circle(Coupon, frozen=True, kw_only=True):
             )
 
 
-class Steps(Coupon, frozen=True, kw_only=True):
+class StepsCoupon(Coupon, frozen=True, kw_only=True):
     """A ruler: positions at `nominal_mm` from a zero that was reached in +. `forward_mm` were
     reached in + too, `backward_mm` in −, at the same nominal positions, in a row that lies
     `rows_apart_mm` to the + side of the first."""
@@ -220,11 +220,11 @@ class Steps(Coupon, frozen=True, kw_only=True):
                     "give one for each; 0.0 is one not taken",
                 )
             for value in values or ():
-                if abs(value) > MOST_TIMES * max(self.nominal_mm):
+                if abs(value) > MAX_RATIO * max(self.nominal_mm):
                     yield key, f"{value:g} is far beyond the ruler", "write it in mm"
 
 
-class Closure(Coupon, frozen=True, kw_only=True):
+class ClosureCoupon(Coupon, frozen=True, kw_only=True):
     """A closed contour, begun in + on both axes and ended in −: the distance of its end from its
     start, mm, positive towards +. `nominal_mm` is its size, for the check of the gaps."""
 
@@ -242,7 +242,13 @@ class Closure(Coupon, frozen=True, kw_only=True):
                 yield key, f"is {gap:g} on a contour of {size:g} mm", "write it in mm"
 
 
-KINDS: tuple[type[Coupon], ...] = (Lines, Square, Circle, Steps, Closure)
+KINDS: tuple[type[Coupon], ...] = (
+    LinesCoupon,
+    SquareCoupon,
+    CircleCoupon,
+    StepsCoupon,
+    ClosureCoupon,
+)
 """The kinds of tables in a file, in order."""
 
 
@@ -275,7 +281,7 @@ class Measurements(msgspec.Struct, frozen=True):
 
 
 def read_measurements(path: Path) -> Measurements:
-    """The checked file; InputError names file, table, key and the correction."""
+    """Read and check a file; InputError names file, table, key and the correction."""
     file = str(path)
     try:
         table = read_table(path)
@@ -311,7 +317,7 @@ def read_measurements(path: Path) -> Measurements:
 
 
 def _tables(value: Any, kind: str, file: str) -> list[dict[str, Any]]:
-    """The tables of a kind of coupon."""
+    """Return the tables of a kind of coupon."""
     if not isinstance(value, list) or not all(isinstance(each, dict) for each in value):
         raise InputError(
             "is no array of tables", file=file, where=f"key {kind}", mend=f"write [[{kind}]]"
@@ -320,7 +326,7 @@ def _tables(value: Any, kind: str, file: str) -> list[dict[str, Any]]:
 
 
 def _check_regions(regions: RegionsOf, coupons: list[tuple[str, Coupon]], file: str) -> None:
-    """InputError for cells that are not a grid, and for a cell without a coupon."""
+    """Raise InputError for cells that are not a grid, and for a cell without a coupon."""
     for axis, cells in (("x", regions.x), ("y", regions.y)):
         if cells is None:
             continue
@@ -351,7 +357,7 @@ def _check_regions(regions: RegionsOf, coupons: list[tuple[str, Coupon]], file: 
 
 
 def _coupon(values: dict[str, Any], kind: type[Coupon], file: str, name: str) -> Coupon:
-    """One table as a checked record."""
+    """Convert one table to a checked record."""
     try:
         coupon = convert(values, kind, file)
     except MachineError as error:
@@ -360,7 +366,7 @@ def _coupon(values: dict[str, Any], kind: type[Coupon], file: str, name: str) ->
         raise InputError(wrong, file=file, where=_where(name, key), mend=mend)
     for key, measured, nominal in coupon.lengths():
         times = measured / nominal
-        if not 1.0 / MOST_TIMES < times < MOST_TIMES:
+        if not 1.0 / MAX_RATIO < times < MAX_RATIO:
             raise InputError(
                 f"{measured:g} is {times:.3g} times the nominal {nominal:g} mm",
                 file=file,
@@ -376,10 +382,10 @@ def _where(name: str, key: str) -> str:
 
 
 def _unit_meant(times: float) -> str:
-    """The correction for a length that is this many times its nominal one."""
+    """Return the correction for a length that is this many times its nominal one."""
     units = {"µm": 1000.0, "cm": 0.1, "m": 0.001, "inches": 1.0 / 25.4, "thousandths": 39.37}
     for unit, factor in units.items():
-        if 1.0 / MOST_TIMES < times / factor < MOST_TIMES:
+        if 1.0 / MAX_RATIO < times / factor < MAX_RATIO:
             return f"write it in mm: it seems to be in {unit}"
     return "look at the nominal length too: it is what the program commanded, in mm"
 

@@ -54,13 +54,13 @@ from msgspec import Struct
 from camtool.arrays import Bools, Floats
 from camtool.calibration.measurements import (
     Added,
-    Circle,
-    Closure,
+    CircleCoupon,
+    ClosureCoupon,
     Coupon,
-    Lines,
+    LinesCoupon,
     Measurements,
-    Square,
-    Steps,
+    SquareCoupon,
+    StepsCoupon,
 )
 from camtool.machine.model import Axis, Machine
 
@@ -89,8 +89,8 @@ class Parameter(Struct, frozen=True):
 SQUARENESS = Parameter("squareness", "")
 
 
-class Course(Struct, frozen=True):
-    """An axis while a coupon was cut: the compensation that the controller added, and the
+class CutAxis(Struct, frozen=True):
+    """An axis during the cut of a coupon: the compensation that the controller added, and the
     region."""
 
     axis: str
@@ -98,20 +98,20 @@ class Course(Struct, frozen=True):
     region: str = ""
 
 
-class Trial:
-    """Values of the parameters, real or complex, as the equations ask for them."""
+class ParameterValues:
+    """Trial values of the parameters, real or complex, by the names in the equations."""
 
     def __init__(self, values: Sequence[Any], columns: dict[Parameter, int]) -> None:
         self._values, self._columns = values, columns
         self.tangent = values[columns[SQUARENESS]]
 
-    def scale(self, course: Course) -> Any:
-        """k of an axis."""
+    def scale(self, course: CutAxis) -> Any:
+        """Return k of an axis."""
         return self._values[self._columns[Parameter("scale", course.axis)]]
 
-    def lost(self, course: Course) -> Any:
-        """B − k·C of an axis, mm. Where its backlash is measured in regions, coupons without a
-        region take the mean of all regions."""
+    def lost(self, course: CutAxis) -> Any:
+        """Return B − k·C of an axis, mm. If its backlash is measured in regions, coupons without a
+        region use the mean of all regions."""
         own = self._columns.get(Parameter("play", course.axis, course.region))
         if own is not None:
             play = self._values[own]
@@ -126,14 +126,14 @@ class Trial:
 
 
 class Measure(Protocol):
-    """A length that is measured on a coupon."""
+    """A length measured on a coupon."""
 
     @property
-    def courses(self) -> tuple[Course, ...]:
-        """The axes on which it depends."""
+    def courses(self) -> tuple[CutAxis, ...]:
+        """Axes on which the length depends."""
 
-    def predict(self, trial: Trial) -> Any:
-        """The length by the model, mm."""
+    def predict(self, trial: ParameterValues) -> Any:
+        """Compute the length by the model, mm."""
 
 
 class AxisDistance(Struct, frozen=True):
@@ -141,16 +141,16 @@ class AxisDistance(Struct, frozen=True):
     the second equation above. Along X, `aside_mm` is how much further towards +Y the second
     position lies."""
 
-    course: Course
+    course: CutAxis
     nominal_mm: float
     turned: int
     aside_mm: float = 0.0
 
     @property
-    def courses(self) -> tuple[Course, ...]:
+    def courses(self) -> tuple[CutAxis, ...]:
         return (self.course,)
 
-    def predict(self, trial: Trial) -> Any:
+    def predict(self, trial: ParameterValues) -> Any:
         own = trial.scale(self.course) * self.nominal_mm + self.turned * trial.lost(self.course)
         return own + trial.tangent * self.aside_mm
 
@@ -162,10 +162,10 @@ class Diagonal(Struct, frozen=True):
     y: AxisDistance
 
     @property
-    def courses(self) -> tuple[Course, ...]:
+    def courses(self) -> tuple[CutAxis, ...]:
         return self.x.course, self.y.course
 
-    def predict(self, trial: Trial) -> Any:
+    def predict(self, trial: ParameterValues) -> Any:
         up = self.y.predict(trial)
         across = self.x.predict(trial) + trial.tangent * up
         return (across * across + up * up) ** 0.5
@@ -174,17 +174,17 @@ class Diagonal(Struct, frozen=True):
 class Diameter(Struct, frozen=True):
     """A diameter of a circle, at an angle from the X axis towards the Y axis."""
 
-    x: Course
-    y: Course
+    x: CutAxis
+    y: CutAxis
     radius_mm: float
     angle_rad: float
     ccw: bool
 
     @property
-    def courses(self) -> tuple[Course, ...]:
+    def courses(self) -> tuple[CutAxis, ...]:
         return self.x, self.y
 
-    def predict(self, trial: Trial) -> Any:
+    def predict(self, trial: ParameterValues) -> Any:
         cosine, sine = math.cos(self.angle_rad), math.sin(self.angle_rad)
         v_x = (cosine - trial.tangent * sine) / trial.scale(self.x)
         v_y = sine / trial.scale(self.y)
@@ -213,7 +213,7 @@ class Diameter(Struct, frozen=True):
 
 
 @dataclass(frozen=True)
-class Reading:
+class MeasuredLength:
     """One measured length, mm, with its standard uncertainty where that is known. `coupon` and
     `name` identify it, `source` is where its numbers come from."""
 
@@ -226,9 +226,9 @@ class Reading:
 
 
 class Model:
-    """The parameters of a set of readings, and the readings that follow from their values."""
+    """The parameters of a set of readings, and the predicted readings."""
 
-    def __init__(self, readings: Sequence[Reading]) -> None:
+    def __init__(self, readings: Sequence[MeasuredLength]) -> None:
         self.readings = tuple(readings)
         courses = [course for reading in readings for course in reading.measure.courses]
         axes = sorted({course.axis for course in courses})
@@ -240,33 +240,33 @@ class Model:
         self._columns = {parameter: column for column, parameter in enumerate(self.parameters)}
 
     def start(self, machine: Machine) -> Floats:
-        """(P,) the values of the machine's file."""
+        """Return the values (P,) of the machine's file."""
         return np.array([_said(parameter, machine) for parameter in self.parameters])
 
     def predict(self, values: Floats) -> Floats:
-        """(n,) the readings by the model, mm, for values (P,) of the parameters."""
-        trial = Trial(values.tolist(), self._columns)
+        """Predict the readings (n,) mm for values (P,) of the parameters."""
+        trial = ParameterValues(values.tolist(), self._columns)
         return np.array([reading.measure.predict(trial) for reading in self.readings])
 
     def slopes(self, values: Floats) -> Floats:
-        """(n, P) derivatives of the predictions by the parameters."""
+        """Compute the derivatives (n, P) of the predictions by the parameters."""
         columns = []
         for column in range(len(values)):
             stepped = values.astype(np.complex128)
             stepped[column] += 1j * DERIVATIVE_STEP
-            trial = Trial(stepped.tolist(), self._columns)
+            trial = ParameterValues(stepped.tolist(), self._columns)
             predicted = [complex(reading.measure.predict(trial)) for reading in self.readings]
             columns.append([value.imag / DERIVATIVE_STEP for value in predicted])
         return np.array(columns).T
 
     def depends(self, values: Floats) -> Bools:
-        """(n, P) true where a reading depends on a parameter."""
+        """Mask (n, P) of readings that depend on a parameter."""
         slopes = np.abs(self.slopes(values))
         return np.asarray(slopes > ROUNDING * slopes.max(axis=0))
 
 
-def _regions(courses: Sequence[Course], axis: str) -> Iterator[str]:
-    """The named regions of an axis in order, or one without a name."""
+def _regions(courses: Sequence[CutAxis], axis: str) -> Iterator[str]:
+    """Return the named regions of an axis in order, or one without a name."""
     named = dict.fromkeys(each.region for each in courses if each.axis == axis and each.region)
     yield from named or ("",)
 
@@ -283,12 +283,12 @@ def _said(parameter: Parameter, machine: Machine) -> float:
 # The readings of the coupons in a file.
 
 
-def readings_of(measurements: Measurements, machine: Machine) -> list[Reading]:
-    """All measured lengths, in the order of the file."""
-    found: list[Reading] = []
+def readings_of(measurements: Measurements, machine: Machine) -> list[MeasuredLength]:
+    """Return all measured lengths, in the order of the file."""
+    found: list[MeasuredLength] = []
     for name, coupon in measurements.coupons:
         courses = {
-            axis: Course(
+            axis: CutAxis(
                 axis,
                 _added_mm(axis, getattr(machine.axes, axis), coupon, measurements),
                 coupon.region,
@@ -297,7 +297,7 @@ def readings_of(measurements: Measurements, machine: Machine) -> list[Reading]:
         }
         uncertainty_mm = coupon.uncertainty_mm or measurements.uncertainty_mm
         found += [
-            Reading(name, called, length_mm, uncertainty_mm, measure, coupon.source)
+            MeasuredLength(name, called, length_mm, uncertainty_mm, measure, coupon.source)
             for called, length_mm, measure in _measures(coupon, courses)
         ]
     return found
@@ -306,24 +306,24 @@ def readings_of(measurements: Measurements, machine: Machine) -> list[Reading]:
 Measured = Iterator[tuple[str, float, Measure]]
 
 
-def _measures(coupon: Coupon, courses: dict[str, Course]) -> Measured:
-    """(name, mm, measure) of each measured length of a coupon."""
+def _measures(coupon: Coupon, courses: dict[str, CutAxis]) -> Measured:
+    """Yield (name, mm, measure) of each measured length of a coupon."""
     match coupon:
-        case Lines():
+        case LinesCoupon():
             yield from _lines(coupon, courses[coupon.axis])
-        case Square():
+        case SquareCoupon():
             yield from _square(coupon, courses["x"], courses["y"])
-        case Circle():
+        case CircleCoupon():
             yield from _circle(coupon, courses["x"], courses["y"])
-        case Steps():
+        case StepsCoupon():
             yield from _steps(coupon, courses[coupon.axis])
-        case Closure():
+        case ClosureCoupon():
             for axis, gap in (("x", coupon.gap_x_mm), ("y", coupon.gap_y_mm)):
                 if gap is not None:
                     yield f"gap in {axis}", gap, AxisDistance(courses[axis], 0.0, 1)
 
 
-def _lines(lines: Lines, course: Course) -> Measured:
+def _lines(lines: LinesCoupon, course: CutAxis) -> Measured:
     if lines.first_mm:
         yield "first line", lines.first_mm, AxisDistance(course, lines.nominal_mm, 0)
     if lines.second_mm:
@@ -332,7 +332,7 @@ def _lines(lines: Lines, course: Course) -> Measured:
         yield "shorter by", lines.shorter_by_mm, AxisDistance(course, 0.0, 1)
 
 
-def _square(square: Square, x: Course, y: Course) -> Measured:
+def _square(square: SquareCoupon, x: CutAxis, y: CutAxis) -> Measured:
     width, height = square.nominal_mm
     across, up = AxisDistance(x, width, -1), AxisDistance(y, height, -1)
     if square.dx_mm:
@@ -346,7 +346,7 @@ def _square(square: Square, x: Course, y: Course) -> Measured:
         yield "falling diagonal", falling, Diagonal(AxisDistance(x, -width, 1), up)
 
 
-def _circle(circle: Circle, x: Course, y: Course) -> Measured:
+def _circle(circle: CircleCoupon, x: CutAxis, y: CutAxis) -> Measured:
     for degrees, diameter in zip(circle.angles, circle.diameters_mm, strict=True):
         if diameter:
             angle, ccw = math.radians(degrees), circle.direction == "ccw"
@@ -354,7 +354,7 @@ def _circle(circle: Circle, x: Course, y: Course) -> Measured:
             yield f"diameter at {degrees:g}°", diameter, measure
 
 
-def _steps(steps: Steps, course: Course) -> Measured:
+def _steps(steps: StepsCoupon, course: CutAxis) -> Measured:
     aside_mm = steps.rows_apart_mm if steps.axis == "x" else 0.0
     for called, values, turned, aside in (
         ("forward", steps.forward_mm, 0, 0.0),
@@ -370,8 +370,8 @@ def _steps(steps: Steps, course: Course) -> Measured:
 
 
 def _added_mm(axis: str, machine: Axis, coupon: Coupon, measurements: Measurements) -> float:
-    """The compensation that the controller added at reversals of the axis, in its own mm: whole
-    steps."""
+    """Return the compensation that the controller added at reversals of the axis, in its own mm:
+    whole steps."""
     said = coupon.compensation_mm or Added()
     for value in (getattr(said, axis), getattr(measurements.compensation_mm, axis)):
         if value is not None:

@@ -17,8 +17,8 @@ from camtool.cli.options import MachineFlags, talk_options
 
 if TYPE_CHECKING:
     from camtool.cli.wishes import Wishes
-    from camtool.sending.drive import Wish
-    from camtool.sending.line import Line
+    from camtool.sending.drive import Request
+    from camtool.sending.line import OpenPort
     from camtool.target.terminal import Terminal
 
 TICK_S = 0.05
@@ -93,7 +93,7 @@ def console(
 class _Talk:
     """The dialogue of a person, or a pipe, with a controller."""
 
-    def __init__(self, terminal: Terminal, line: Line, wait_s: float, *, quiet: bool) -> None:
+    def __init__(self, terminal: Terminal, line: OpenPort, wait_s: float, *, quiet: bool) -> None:
         self._terminal, self._line, self._wait_s = terminal, line, wait_s
         from camtool.cli.wishes import Messages
 
@@ -183,7 +183,7 @@ class _Talk:
             self._stops = False
         return None
 
-    def _stop(self, wish: Wish, *, by_hand: bool) -> int | None:
+    def _stop(self, wish: Request, *, by_hand: bool) -> int | None:
         """Stop the machine; the exit code where nobody waits until it stands."""
         at_keyboard = self._at_terminal and by_hand
         if self._stops if at_keyboard else wish.value == "close":

@@ -37,7 +37,7 @@ def act(
     """Hold the conversation of one command; the exit code. Ctrl-C and q stop the machine, and so
     does whatever else would end camtool."""
     from camtool.cli.wishes import Messages, Wishes, keys_of_terminal
-    from camtool.sending.drive import Driver, Wish
+    from camtool.sending.drive import Driver, Request
     from camtool.sending.line import opened_line
     from camtool.sending.prepare import manner_of, port_of, wire_of
     from camtool.target.wire import WireState
@@ -46,7 +46,7 @@ def act(
     wire = wire_of(target)
     conversation = wire.command(action, target.machine, values, manner_of(target, unlock=unlock))
     with opened_line(port_of(name, baud, wire, target)) as line, keys_of_terminal() as key:
-        wishes = Wishes(key, {"q": Wish.STOP})
+        wishes = Wishes(key, {"q": Request.STOP})
         tell = Messages(quiet=quiet)
         driver = Driver(line, wish=wishes, tell=tell)
         with wishes.caught():

@@ -66,7 +66,7 @@ def meet(
     written, with what it changes. Where none holds, exit code 1, and why: the dimension that
     decides, and how good the machine would have to be.
     """
-    from camtool.inspection.meet import MOST_TRIALS, Case, is_proposal, to_data, to_text
+    from camtool.inspection.meet import DEFAULT_TRIALS, MeetingCase, is_proposal, to_data, to_text
     from camtool.inspection.meet import meet as met
     from camtool.inspection.tolerances import dimensions_of
     from camtool.inspection.verdicts import NOT_INSPECTED, Tolerances
@@ -84,7 +84,9 @@ def meet(
         dimensions, findings = dimensions_of(read, file)
         asked = Tolerances(dimensions, findings)
         say_findings((*read.findings, *findings), quiet=quiet, verbose=verbose)
-        found = met(Case(read, target, tables, job_of, asked), most or MOST_TRIALS, progress())
+        found = met(
+            MeetingCase(read, target, tables, job_of, asked), most or DEFAULT_TRIALS, progress()
+        )
     files = {output: found.text.encode()} if found.changed else {}
     if files and not named:
         check_ours(output, is_proposal)

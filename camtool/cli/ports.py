@@ -17,9 +17,9 @@ from camtool.plain import one_line
 @talk_options
 def ports(as_json: bool, quiet: bool, verbose: bool) -> int:
     """List the serial ports of this computer, for `camtool send --port`."""
-    from camtool.sending.line import found_ports
+    from camtool.sending.line import list_serial_ports
 
-    found = found_ports()
+    found = list_serial_ports()
     if as_json:
         show_text(json.dumps([asdict(each) for each in found], indent=2, ensure_ascii=False))
         return 0

@@ -22,7 +22,7 @@ from camtool.errors import InputError, OptionError, OutputError
 from camtool.plain import one_line
 
 if TYPE_CHECKING:
-    from camtool.sending.journal import Place as Left
+    from camtool.sending.journal import JournalState
     from camtool.sending.line import Port
     from camtool.sending.live import LivePage
     from camtool.sending.prepare import Consignment
@@ -149,7 +149,7 @@ def send(
     return job.run(single=single, home=home, unlock=unlock, speed=speed, yes=yes)
 
 
-def _unfinished(place: Path, data: bytes) -> Left | None:
+def _unfinished(place: Path, data: bytes) -> JournalState | None:
     """Return the state in the journal of this program, None if there is none or it is finished."""
     from camtool.sending.journal import read_journal
     from camtool.sending.prepare import digest
@@ -161,7 +161,7 @@ def _unfinished(place: Path, data: bytes) -> Left | None:
     return None
 
 
-def _tool_at(wire: Wire, left: Left, said: ToolAt, target: LoadedTarget) -> ToolAt:
+def _tool_at(wire: Wire, left: JournalState, said: ToolAt, target: LoadedTarget) -> ToolAt:
     """Return where the tool is; ask the user if the machine does not say it."""
     from camtool.sending.prepare import tool_at_of
 
@@ -182,7 +182,7 @@ def _tool_at(wire: Wire, left: Left, said: ToolAt, target: LoadedTarget) -> Tool
     raise OptionError(asked.partition(": ")[0], where="--resume", mend=mend)
 
 
-def _resumed(place: Path, data: bytes, target: LoadedTarget) -> Left:
+def _resumed(place: Path, data: bytes, target: LoadedTarget) -> JournalState:
     """Return the state in a journal; InputError for that of another program."""
     from camtool.sending.journal import read_journal
     from camtool.sending.prepare import digest
@@ -257,7 +257,7 @@ class _Job:
     def run(self, *, single: bool, home: bool, unlock: bool, speed: float, yes: bool) -> int:
         """Send it; the exit code."""
         from camtool.cli.wishes import Messages, Wishes, keys_of_terminal
-        from camtool.sending.drive import Driver, Wish, counts_of
+        from camtool.sending.drive import Driver, Request, counts_of
         from camtool.sending.journal import Journal
         from camtool.sending.line import opened_line
         from camtool.sending.live import LivePage
@@ -296,8 +296,8 @@ class _Job:
         # The dry run has asked for the first packet.
         packets = [replace(packet, ask="") for packet in one.packets[:1]] + [*one.packets[1:]]
         conversation = one.wire.conversation(packets, self.target.machine, manner)
-        keys = {"p": Wish.PAUSE, " ": Wish.PAUSE, "r": Wish.RESUME, "\n": Wish.RESUME}
-        keys |= {"s": Wish.STEP, "q": Wish.STOP}
+        keys = {"p": Request.PAUSE, " ": Request.PAUSE, "r": Request.RESUME, "\n": Request.RESUME}
+        keys |= {"s": Request.STEP, "q": Request.STOP}
         with opened_line(self.port) as line, keys_of_terminal() as key:
             journal = Journal(self.place, self._head(), more=self.more)
             wishes = Wishes(key, keys)
@@ -392,11 +392,11 @@ class _Job:
     def _show_page(self, conversation: Conversation, left_s: float) -> None:
         """Write the live page anew, once a second and when the state changes. A page that cannot
         be written is given up: the machine is not stopped for it."""
-        from camtool.sending.live import EVERY_S
+        from camtool.sending.live import RELOAD_S
         from camtool.verification.report import clock
 
         state, now = conversation.state.value, time.monotonic()
-        if self._page is None or (now - self._paged[0] < EVERY_S and state == self._paged[1]):
+        if self._page is None or (now - self._paged[0] < RELOAD_S and state == self._paged[1]):
             return
         self._paged = now, state
         done = self.one.packets[: conversation.acknowledged]

@@ -45,14 +45,14 @@ def new(
     """Write the dimensions of DRAWING (- is stdin): those that it says itself with their limits,
     then its circles, slots and the overall sizes of its outlines, to which you give limits.
     """
-    from camtool.inspection.proposal import proposed
+    from camtool.inspection.proposal import propose_file
 
     output = output or FILE
     check_places([source], [output])
     check_new(output)
     read = drawing.read(source)
     progress().begin("finding what can be measured")
-    text, findings, faults = proposed(read)
+    text, findings, faults = propose_file(read)
     write_all({output: text.encode()})
     say_findings((*_told(read.findings), *findings), quiet=quiet, verbose=verbose)
     for fault in faults:
@@ -85,7 +85,7 @@ def show(
     --against also those that the drawing says itself."""
     import msgspec
 
-    from camtool.inspection.tolerances import dimensions_of, read_tolerances, unbound
+    from camtool.inspection.tolerances import dimensions_of, read_tolerances, unbound_findings
     from camtool.verification.report import finding_reports
 
     check_places([file, against], [report])
@@ -94,7 +94,7 @@ def show(
     if against is not None:
         read = drawing.read(against)
         dimensions, found = dimensions_of(read, Path(file))
-        findings = (*_told(read.findings), *found, *unbound(read, dimensions))
+        findings = (*_told(read.findings), *found, *unbound_findings(read, dimensions))
     if report is not None:
         rows = [_facts(each) for each in dimensions]
         said = msgspec.to_builtins(finding_reports(findings))

@@ -93,16 +93,16 @@ def twin(
     camtool twin grbl --tcp 5007 --speed max
     camtool twin pic-mmh --assume echo=character --fault drop=0.001 --trace slides.csv
     """
-    from camtool.sending.faults import Faults, Wired
-    from camtool.sending.twin import Clock, Port, PseudoTerminal, TcpPort, serve
+    from camtool.sending.faults import Faults, WiredTwin
+    from camtool.sending.twin import Clock, PseudoTerminal, TcpPort, TwinPort, serve
 
     name = target if machine is None else None
     loaded = MachineFlags.of(name, machine, settings).load()
     virtual = loaded.twin(assume)
     factor, faults = parse_speed(speed), Faults.of(fault)
-    wired = Wired(virtual, faults, faults, seed=seed, paced=factor is not None)
+    wired = WiredTwin(virtual, faults, faults, seed=seed, paced=factor is not None)
     file = None if trace is None else _opened(trace)
-    port: Port = PseudoTerminal() if tcp is None else TcpPort(*parse_address(tcp))
+    port: TwinPort = PseudoTerminal() if tcp is None else TcpPort(*parse_address(tcp))
     journal = _Journal(virtual, file, verbose=verbose)
     show_text(port.name)
     say(f"camtool: {loaded.target.name} ({virtual.wire}); Ctrl-C ends it", quiet=quiet)

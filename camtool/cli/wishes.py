@@ -18,7 +18,7 @@ from typing import TextIO
 
 from camtool.cli.messages import say
 from camtool.plain import one_line
-from camtool.sending.drive import Wish
+from camtool.sending.drive import Request
 
 ENDING = ("SIGINT", "SIGQUIT", "SIGBREAK", "SIGTERM", "SIGHUP")
 """Signals that would end camtool; not all systems have all of them."""
@@ -42,7 +42,7 @@ class Wishes:
     def __init__(
         self,
         key: Callable[[], str] = lambda: "",
-        keys: Mapping[str, Wish] | None = None,
+        keys: Mapping[str, Request] | None = None,
         *,
         one_s: float = ONE_S,
     ) -> None:
@@ -54,27 +54,27 @@ class Wishes:
         """True if the last wish came from a person at the keyboard who is still there."""
         self._watched = {each for each in _streams() if not _is_lost(each)}
 
-    def __call__(self) -> Wish | None:
+    def __call__(self) -> Request | None:
         self.by_hand = not self._ended
         if self._closes:
             self._closes = self._stops = 0
-            return Wish.CLOSE
+            return Request.CLOSE
         if self._stops:
             self._stops = 0
-            return Wish.STOP
+            return Request.STOP
         if self._suspends:
             self._suspends = 0
-            return self._keys.get("p", Wish.STOP)
+            return self._keys.get("p", Request.STOP)
         if any(map(_is_lost, self._watched)):
             self._watched.clear()  # said once
             self.by_hand = False
-            return Wish.STOP
+            return Request.STOP
         try:
             return self._keys.get(self._key())
         except OSError:  # what a terminal says that has been closed
             self._key = lambda: ""
             self.by_hand = False
-            return Wish.STOP
+            return Request.STOP
 
     @contextmanager
     def caught(self) -> Iterator[None]:

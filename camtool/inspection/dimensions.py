@@ -25,8 +25,8 @@ Place = tuple[float, float]
 
 
 class Limits(Struct, frozen=True):
-    """By how much a dimension may differ from its nominal value, mm, `lower_mm` ≤ `upper_mm`; and
-    the words that say so ("H7", "±0.05", "ISO 2768-m")."""
+    """Permitted deviations of a dimension from its nominal value, mm, `lower_mm` ≤ `upper_mm`, and
+    their source text ("H7", "±0.05", "ISO 2768-m")."""
 
     lower_mm: float
     upper_mm: float
@@ -58,5 +58,5 @@ class Dimension(Struct, frozen=True):
 
     @property
     def asks(self) -> bool:
-        """Whether it is to have limits, also such as are not known yet."""
+        """True if it is to have limits, including limits that are not known yet."""
         return self.limits is not None or bool(self.words or self.general)

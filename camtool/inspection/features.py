@@ -1,9 +1,9 @@
-"""The circles and straight edges of a drawing, and of which of them a dimension is.
+"""Circles and straight edges of a drawing, and their assignment to dimensions.
 
 A dimension names places (`camtool.inspection.dimensions`). A place belongs to a centre that lies
-there, to an edge that it lies on and that is square to the direction of measuring, or to the
-outermost point of a circle in that direction. What fits nothing, or several features that differ,
-is a finding, and the dimension is not inspected.
+there, to an edge that it lies on and that is perpendicular to the direction of measurement, or to
+the outermost point of a circle in that direction. A place that fits no feature, or several that
+differ, is a finding, and the dimension is not inspected.
 """
 
 from __future__ import annotations
@@ -32,18 +32,18 @@ SAME_CIRCLE_MM = 1e-4
 """Arcs of one path whose centres and radii differ by no more are one circle."""
 
 SQUARE_RAD = 2e-3
-"""An edge is square to a direction within this, and parallel to another edge: 0.1°."""
+"""Tolerance of perpendicular and of parallel: 0.1°."""
 
-SAME_LINE = 1e-6
-"""Segments whose directions differ by no more than this, rad, are one edge."""
+SAME_DIRECTION_RAD = 1e-6
+"""Segments whose directions differ by at most this angle, rad, form one edge."""
 
 FULL_TURN_RAD = 1e-6
-"""Arcs that lack no more than this of a whole turn are a whole circle."""
+"""Arcs whose sweeps lack at most this angle of a full turn form a closed circle."""
 
 
-class Circle(Struct, frozen=True, eq=False):
-    """A circle, or arcs of one: centre and radius mm, and its arcs (A, 2): start angle and sweep,
-    rad."""
+class CircleFeature(Struct, frozen=True, eq=False):
+    """A circle or arcs of one: its centre and radius, mm, and its arcs (A, 2) as start angle and
+    sweep, rad."""
 
     path: int
     centre_mm: Place
@@ -51,12 +51,13 @@ class Circle(Struct, frozen=True, eq=False):
     arcs: Floats
 
     @property
-    def whole(self) -> bool:
-        """Whether it has no gap."""
+    def is_closed(self) -> bool:
+        """True if the arcs close the circle."""
         return bool(np.abs(self.arcs[:, 1]).sum() >= 2.0 * math.pi - FULL_TURN_RAD)
 
     def has(self, angle: Floats, slack: float = 0.0) -> Bools:
-        """(K,) true for the angles, rad, that lie on an arc of it, or within `slack` beside."""
+        """Mask (K,) of the angles, rad, that lie on one of its arcs, or within `slack` beside
+        it."""
         found = np.zeros(np.shape(angle), dtype=np.bool_)
         for start, sweep in self.arcs:
             first = start if sweep > 0.0 else start + sweep
@@ -65,21 +66,23 @@ class Circle(Struct, frozen=True, eq=False):
         return found
 
     def distance_mm(self, place: Place) -> float:
-        """How far a place is from its arcs, along the radius; infinite beside them."""
+        """Return the radial distance of a place from the arcs; infinite beside them."""
         x, y = place[0] - self.centre_mm[0], place[1] - self.centre_mm[1]
         slack = BIND_MM / max(self.radius_mm, BIND_MM)
         on_arc = self.has(np.array([math.atan2(y, x)]), slack)[0]
         return abs(math.hypot(x, y) - self.radius_mm) if on_arc else math.inf
 
-    def placed(self, where: Map) -> Circle:
-        """It in the work frame."""
+    def in_work_frame(self, where: Map) -> CircleFeature:
+        """Return the circle in the work frame."""
         turn = math.atan2(where.matrix[1, 0], where.matrix[0, 0])
         flip = -1.0 if np.linalg.det(where.matrix) < 0.0 else 1.0
         arcs = np.column_stack([turn + flip * self.arcs[:, 0], flip * self.arcs[:, 1]])
-        return Circle(self.path, where.point(self.centre_mm), where.scale * self.radius_mm, arcs)
+        return CircleFeature(
+            self.path, where.point(self.centre_mm), where.scale * self.radius_mm, arcs
+        )
 
 
-class Edge(Struct, frozen=True, eq=False):
+class EdgeFeature(Struct, frozen=True, eq=False):
     """A straight edge from `start_mm` to `end_mm`."""
 
     path: int
@@ -88,95 +91,99 @@ class Edge(Struct, frozen=True, eq=False):
 
     @property
     def along(self) -> Floats:
-        """(2,) the unit vector from start to end."""
+        """Unit vector (2,) from start to end."""
         vector = np.subtract(self.end_mm, self.start_mm)
         return np.asarray(vector / np.hypot(*vector))
 
     @property
     def length_mm(self) -> float:
-        """Its length."""
+        """Length of the edge."""
         return math.dist(self.start_mm, self.end_mm)
 
     def is_square_to(self, direction: Floats) -> bool:
-        """Whether it is square to a unit vector (2,)."""
+        """True if the edge is perpendicular to a unit vector (2,)."""
         return abs(float(self.along @ direction)) <= SQUARE_RAD
 
     def distance_mm(self, place: Place) -> float:
-        """How far a place is from it."""
+        """Return the distance of a place from the edge."""
         beside = np.subtract(place, self.start_mm)
         at = float(np.clip(beside @ self.along, 0.0, self.length_mm))
         return float(np.hypot(*(beside - at * self.along)))
 
-    def placed(self, where: Map) -> Edge:
-        """It in the work frame."""
-        return Edge(self.path, where.point(self.start_mm), where.point(self.end_mm))
+    def in_work_frame(self, where: Map) -> EdgeFeature:
+        """Return the edge in the work frame."""
+        return EdgeFeature(self.path, where.point(self.start_mm), where.point(self.end_mm))
 
 
-Feature = Circle | Edge
+Feature = CircleFeature | EdgeFeature
 
 
-class Outline(Struct, frozen=True, eq=False):
-    """A whole path, whose profile is inspected: all its circles and edges."""
+class OutlineFeature(Struct, frozen=True, eq=False):
+    """A whole path whose profile is inspected, with all its circles and edges."""
 
     path: int
     features: tuple[Feature, ...]
 
-    def placed(self, where: Map) -> Outline:
-        """It in the work frame."""
-        return Outline(self.path, tuple(each.placed(where) for each in self.features))
+    def in_work_frame(self, where: Map) -> OutlineFeature:
+        """Return the outline in the work frame."""
+        return OutlineFeature(
+            self.path, tuple(each.in_work_frame(where) for each in self.features)
+        )
 
 
-class End(Struct, frozen=True, eq=False):
-    """One end of a distance: the edge itself, the centre of a circle, or the outermost point of a
-    circle in the direction of measuring (`side` +1) or against it (−1)."""
+class DistanceEnd(Struct, frozen=True, eq=False):
+    """One end of a distance: an edge, the centre of a circle, or the outermost point of a circle
+    along the direction of measurement (`side` +1) or against it (−1)."""
 
     feature: Feature
     how: Literal["edge", "centre", "outermost"]
     side: int = 1
 
-    def placed(self, where: Map) -> End:
-        """It in the work frame."""
-        return End(self.feature.placed(where), self.how, self.side)
+    def in_work_frame(self, where: Map) -> DistanceEnd:
+        """Return the end in the work frame."""
+        return DistanceEnd(self.feature.in_work_frame(where), self.how, self.side)
 
 
-class Bound(Struct, frozen=True, eq=False):
-    """A dimension and its features: one circle, edge or outline, or two ends of a distance along
-    the unit vector `direction` (2,), which leads from the first to the second. `drawn_mm` is what
-    the features measure as drawn, 0 for zones."""
+class BoundDimension(Struct, frozen=True, eq=False):
+    """A dimension with its features: one circle, edge or outline, or two ends of a distance along
+    the unit vector `direction` (2,), which points from the first to the second. `drawn_mm` is its
+    size as drawn, 0 for tolerance zones."""
 
     dimension: Dimension
-    of: tuple[Circle | Edge | Outline, ...]
-    ends: tuple[End, ...]
+    of: tuple[CircleFeature | EdgeFeature | OutlineFeature, ...]
+    ends: tuple[DistanceEnd, ...]
     direction: Floats
     drawn_mm: float
 
     @property
     def nominal_mm(self) -> float:
-        """Its nominal value: as the dimension says, or as drawn."""
+        """Nominal value: that of the dimension, or else the drawn size."""
         given = self.dimension.nominal_mm
         return self.drawn_mm if given is None else given
 
     @property
     def features(self) -> tuple[Feature, ...]:
         """All circles and edges on which it depends."""
-        whole = [each.features if isinstance(each, Outline) else (each,) for each in self.of]
+        whole = [
+            each.features if isinstance(each, OutlineFeature) else (each,) for each in self.of
+        ]
         return (*(one for several in whole for one in several), *(e.feature for e in self.ends))
 
-    def placed(self, where: Map) -> Bound:
-        """It in the work frame, where lengths are as in the drawing."""
+    def in_work_frame(self, where: Map) -> BoundDimension:
+        """Return it in the work frame, whose lengths are those of the drawing."""
         direction = where.matrix @ self.direction / where.scale
         places = tuple(where.point(place) for place in self.dimension.places_mm)
-        return Bound(
+        return BoundDimension(
             replace(self.dimension, places_mm=places),
-            tuple(each.placed(where) for each in self.of),
-            tuple(end.placed(where) for end in self.ends),
+            tuple(each.in_work_frame(where) for each in self.of),
+            tuple(end.in_work_frame(where) for end in self.ends),
             direction,
             self.drawn_mm,
         )
 
 
 class Features:
-    """Circles and edges in order, and which of them are where."""
+    """Circles and edges in order, with an index of their boxes."""
 
     def __init__(self, each: Iterable[Feature]) -> None:
         self._each = tuple(each)
@@ -186,15 +193,16 @@ class Features:
         return iter(self._each)
 
     def at(self, place: Place) -> list[Feature]:
-        """Those whose box, widened by BIND_MM, has a place in it: of a circle its centre too."""
+        """Return the features whose box, widened by BIND_MM, contains a place; the box of a circle
+        contains its centre."""
         x, y = place
         around = np.array([[x - BIND_MM, y - BIND_MM, x + BIND_MM, y + BIND_MM]])
         return [self._each[row] for row in self._index.touching(around)[1].tolist()]
 
 
 def _box(feature: Feature) -> tuple[float, float, float, float]:
-    """Left, low, right and high, mm; of an arc that of its whole circle."""
-    if isinstance(feature, Circle):
+    """Return left, low, right and high of a feature, mm; of an arc those of its whole circle."""
+    if isinstance(feature, CircleFeature):
         (x, y), radius = feature.centre_mm, feature.radius_mm
         return x - radius, y - radius, x + radius, y + radius
     (x, y), (to_x, to_y) = feature.start_mm, feature.end_mm
@@ -202,8 +210,8 @@ def _box(feature: Feature) -> tuple[float, float, float, float]:
 
 
 def features_of(paths: Polylines) -> Features:
-    """The circles and edges of all paths, in order; segments in line are one edge, and arcs of
-    one path about one centre are one circle."""
+    """Find the circles and edges of all paths, in order; collinear segments form one edge, and
+    arcs of one path about one centre form one circle."""
     return Features(each for index, path in enumerate(paths) for each in _of_path(index, path))
 
 
@@ -213,7 +221,7 @@ def _of_path(index: int, path: Polyline) -> Iterator[Feature]:
     yield from _edges(index, segments, closed=path.closed)
 
 
-def _circles(index: int, segments: Segments) -> Iterator[Circle]:
+def _circles(index: int, segments: Segments) -> Iterator[CircleFeature]:
     which = np.flatnonzero(segments.is_arc)
     left = segments[which]
     todo = np.arange(len(which))
@@ -224,15 +232,15 @@ def _circles(index: int, segments: Segments) -> Iterator[Circle]:
         todo = todo[gap > SAME_CIRCLE_MM]
         x, y = left.centre[mine].mean(axis=0).tolist()
         arcs = np.column_stack([left.start_angle[mine], left.sweep[mine]])
-        yield Circle(index, (x, y), float(left.radius[mine].mean()), arcs)
+        yield CircleFeature(index, (x, y), float(left.radius[mine].mean()), arcs)
 
 
-def _edges(index: int, segments: Segments, *, closed: bool) -> Iterator[Edge]:
+def _edges(index: int, segments: Segments, *, closed: bool) -> Iterator[EdgeFeature]:
     straight = ~segments.is_arc
     vector = segments.end - segments.start
     unit = vector / np.maximum(np.hypot(vector[:, 0], vector[:, 1]), 1e-300)[:, None]
     before = np.roll(unit, 1, axis=0)
-    turns = np.abs(before[:, 0] * unit[:, 1] - before[:, 1] * unit[:, 0]) > SAME_LINE
+    turns = np.abs(before[:, 0] * unit[:, 1] - before[:, 1] * unit[:, 0]) > SAME_DIRECTION_RAD
     goes_on = straight & np.roll(straight, 1) & ~turns & ((before * unit).sum(axis=1) > 0.0)
     if not closed and len(goes_on):
         goes_on[0] = False
@@ -242,40 +250,43 @@ def _edges(index: int, segments: Segments, *, closed: bool) -> Iterator[Edge]:
         while goes_on[(last + 1) % len(goes_on)] and (last + 1) % len(goes_on) != begin:
             last = (last + 1) % len(goes_on)
         (x, y), (to_x, to_y) = segments.start[begin].tolist(), segments.end[last].tolist()
-        yield Edge(index, (x, y), (to_x, to_y))
+        yield EdgeFeature(index, (x, y), (to_x, to_y))
 
 
-def bind(dimension: Dimension, features: Features, file: str) -> Bound | Finding:
-    """The dimension with its features, or the finding that says why there are none."""
+def bind(dimension: Dimension, features: Features, file: str) -> BoundDimension | Finding:
+    """Find the features of a dimension; return it with them, or the finding that says why there
+    are none."""
     if dimension.kind == "distance":
         return _distance(dimension, features, file)
     here = features.at(dimension.places_mm[0])
     if dimension.kind == "straightness":
         found: list[Feature] = [
-            each for each in here if isinstance(each, Edge) and _near(each, dimension)
+            each for each in here if isinstance(each, EdgeFeature) and _near(each, dimension)
         ]
         return _single(dimension, found, 0.0, file)
     if dimension.kind == "profile":
         paths = sorted({each.path for each in here if _near(each, dimension)})
         if len(paths) != 1:
             return _unbound(dimension, len(paths), file)
-        whole = Outline(paths[0], tuple(each for each in features if each.path == paths[0]))
-        return Bound(dimension, (whole,), (), np.zeros(2), 0.0)
-    circles = [each for each in here if isinstance(each, Circle) and _is_of(each, dimension)]
+        whole = OutlineFeature(paths[0], tuple(each for each in features if each.path == paths[0]))
+        return BoundDimension(dimension, (whole,), (), np.zeros(2), 0.0)
+    circles = [
+        each for each in here if isinstance(each, CircleFeature) and _is_of(each, dimension)
+    ]
     if len(circles) > 1 and dimension.nominal_mm is not None:
         wanted = dimension.nominal_mm * (0.5 if dimension.kind == "diameter" else 1.0)
         circles = [each for each in circles if abs(each.radius_mm - wanted) <= BIND_MM] or circles
-    circles = _preferred(circles)
+    circles = _closed_circle_first(circles)
     drawn = 0.0
     if circles and dimension.kind in ("diameter", "radius"):
         drawn = circles[0].radius_mm * (2.0 if dimension.kind == "diameter" else 1.0)
     return _single(dimension, circles, drawn, file)
 
 
-def _preferred(circles: list[Circle]) -> list[Circle]:
-    """Of circles about one centre the whole one, where there is just one: people mean the hole,
-    not the rounding of the corner around it."""
-    whole = [each for each in circles if each.whole]
+def _closed_circle_first(circles: list[CircleFeature]) -> list[CircleFeature]:
+    """Of circles about one centre return the closed one if there is exactly one: a dimension there
+    is of the hole, not of a fillet around it."""
+    whole = [each for each in circles if each.is_closed]
     return whole if len(whole) == 1 else circles
 
 
@@ -283,8 +294,8 @@ def _near(feature: Feature, dimension: Dimension) -> bool:
     return all(feature.distance_mm(place) <= BIND_MM for place in dimension.places_mm)
 
 
-def _is_of(circle: Circle, dimension: Dimension) -> bool:
-    """Whether each place is its centre or lies on it."""
+def _is_of(circle: CircleFeature, dimension: Dimension) -> bool:
+    """True if each place is the centre of the circle or lies on it."""
     return all(
         math.dist(place, circle.centre_mm) <= BIND_MM or circle.distance_mm(place) <= BIND_MM
         for place in dimension.places_mm
@@ -293,13 +304,13 @@ def _is_of(circle: Circle, dimension: Dimension) -> bool:
 
 def _single(
     dimension: Dimension, found: Sequence[Feature], drawn_mm: float, file: str
-) -> Bound | Finding:
+) -> BoundDimension | Finding:
     if len(found) != 1:
         return _unbound(dimension, len(found), file)
-    return Bound(dimension, (found[0],), (), np.zeros(2), drawn_mm)
+    return BoundDimension(dimension, (found[0],), (), np.zeros(2), drawn_mm)
 
 
-def _distance(dimension: Dimension, features: Features, file: str) -> Bound | Finding:
+def _distance(dimension: Dimension, features: Features, file: str) -> BoundDimension | Finding:
     first, second = dimension.places_mm
     direction = np.subtract(second, first)
     if dimension.direction_rad is not None:
@@ -317,27 +328,27 @@ def _distance(dimension: Dimension, features: Features, file: str) -> Bound | Fi
         ends.append(found[0])
     places = [_place_of(end, direction) for end in ends]
     drawn = float((places[1] - places[0]) @ direction)
-    return Bound(dimension, (), tuple(ends), direction, drawn)
+    return BoundDimension(dimension, (), tuple(ends), direction, drawn)
 
 
-def _place_of(end: End, direction: Floats) -> Floats:
-    """(2,) mm a point of the end as it is drawn."""
-    if isinstance(end.feature, Edge):
+def _place_of(end: DistanceEnd, direction: Floats) -> Floats:
+    """Return a point (2,) mm of the end as drawn."""
+    if isinstance(end.feature, EdgeFeature):
         return np.asarray(end.feature.start_mm)
     beyond = end.side * end.feature.radius_mm if end.how == "outermost" else 0.0
     return np.asarray(end.feature.centre_mm + beyond * direction)
 
 
-def _ends_at(place: Place, direction: Floats, features: Sequence[Feature]) -> list[End]:
-    """What a place, near which these features are, can mean for a measurement along `direction`.
-    Edges come before the circles that go on from them with the same direction."""
-    circles = [each for each in features if isinstance(each, Circle)]
+def _ends_at(place: Place, direction: Floats, features: Sequence[Feature]) -> list[DistanceEnd]:
+    """Return the possible ends at a place near these features for a measurement along `direction`,
+    edges before circles that are tangent to them."""
+    circles = [each for each in features if isinstance(each, CircleFeature)]
     about = [each for each in circles if math.dist(place, each.centre_mm) <= BIND_MM]
-    centres = [End(each, "centre") for each in _preferred(about)]
+    centres = [DistanceEnd(each, "centre") for each in _closed_circle_first(about)]
     edges = [
-        End(each, "edge")
+        DistanceEnd(each, "edge")
         for each in features
-        if isinstance(each, Edge)
+        if isinstance(each, EdgeFeature)
         and each.distance_mm(place) <= BIND_MM
         and each.is_square_to(direction)
     ]
@@ -351,7 +362,7 @@ def _ends_at(place: Place, direction: Floats, features: Sequence[Feature]) -> li
         away = float(spoke @ direction) / each.radius_mm
         # A place that is BIND_MM off has turned by up to BIND_MM / radius.
         if abs(away) >= math.cos(min(SQUARE_RAD + BIND_MM / each.radius_mm, 0.5)):
-            outermost.append(End(each, "outermost", 1 if away > 0.0 else -1))
+            outermost.append(DistanceEnd(each, "outermost", 1 if away > 0.0 else -1))
     return outermost
 
 

@@ -16,12 +16,12 @@ from camtool.arrays import Floats, Ints
 from camtool.errors import OptionError
 from camtool.findings import Finding
 from camtool.inspection.dimensions import Dimension
-from camtool.inspection.features import Bound, Edge, bind, features_of
+from camtool.inspection.features import BoundDimension, EdgeFeature, bind, features_of
 from camtool.inspection.findings import DIMENSION_NOT_CUT
 from camtool.inspection.sizes import (
     Cut,
-    Size,
-    Swept,
+    MachinedSize,
+    SweptSegments,
     cut_of,
     distinct_levels,
     edge_at,
@@ -29,7 +29,7 @@ from camtool.inspection.sizes import (
     size_of,
     sizes_of,
 )
-from camtool.inspection.uncertainty import Variant, edges_of, opposite_edges
+from camtool.inspection.uncertainty import MachineVariant, edges_of, opposite_edges
 from camtool.machine.model import Machine
 from camtool.planning.job import Job, Tool
 from camtool.planning.place import SCALE_SHARE, placements
@@ -41,38 +41,38 @@ from camtool.verification.cuts import CutMoves, row_lengths, sample_cuts
 from camtool.verification.slides import SlideTrace
 
 CHORD_MM = 1e-4
-"""Arcs of the slides' path are chords within this, as far as `MOST_POINTS` allows."""
+"""Arcs of the slides' path are chords within this, as far as `MAX_POINTS` allows."""
 
-MOST_POINTS = 400_000
-"""A path has at most about so many points for inspection: 13 MB."""
+MAX_POINTS = 400_000
+"""Approximate upper bound of the points of a path for inspection: 13 MB."""
 
 
-MOST_AT_ONCE = 1_000_000
+MAX_EDGES_AT_ONCE = 1_000_000
 """Edges of drawn parts that are measured together: 8 MB in each array."""
 
 
 class Inspected(Struct, frozen=True, eq=False):
-    """A dimension in the work frame, how each of its features is cut, and of which copy it is
-    (None where there is one)."""
+    """A dimension in the work frame, the cut of each of its features, and the number of its copy
+    (None for a single part)."""
 
-    bound: Bound
+    bound: BoundDimension
     cuts: tuple[Cut, ...]
     copy: int | None = None
 
     @property
     def name(self) -> str:
-        """The dimension's name, with the number of the copy from 1."""
+        """Name of the dimension, with the number of the copy from 1."""
         name = self.bound.dimension.name
         return name if self.copy is None else f"{name}, copy {self.copy + 1}"
 
 
 class Inspector:
-    """Measures the dimensions of the part that the program of a run makes. `dimensions` are what
-    can be measured, `findings` say why the others cannot."""
+    """Measure the dimensions of the part that the program of a run makes. `dimensions` can be
+    measured; `findings` say why the others cannot."""
 
     def __init__(self, run: Run, dimensions: Iterable[Dimension]) -> None:
-        """`run` has a drawing, a job and a verification. Raises OptionError where its job scales
-        the part: limits hold for the part as it is drawn."""
+        """Take a run with a drawing, a job and a verification. Raises OptionError if its job
+        scales the part, since limits hold for the part as drawn."""
         assert run.drawing is not None
         assert run.job is not None
         assert run.decoded is not None
@@ -83,22 +83,25 @@ class Inspector:
         self._tool = ToolAt(wanted.toolpath, run.job, tool_mm(run.job))
         moves = swept_moves(wanted, self._tool)
         self._points = _points(wanted)
-        self._last: tuple[Machine, Swept] | None = None
+        self._last: tuple[Machine, SweptSegments] | None = None
         self._edges_of: tuple[Machine, float, dict[int, Floats]] | None = None
         found: list[tuple[Dimension, Finding]] = []
         self.dimensions: tuple[Inspected, ...] = tuple(_inspected(run, dimensions, moves, found))
         self.left_out = tuple(found)
 
     def sizes(
-        self, variant: Variant | None = None, left_mm: Mapping[int, float] | None = None
-    ) -> list[Size]:
-        """The sizes of the dimensions on a variant of the machine (None: that of the run). Where a
-        feature is not cut there they are NaN.
+        self, variant: MachineVariant | None = None, left_mm: Mapping[int, float] | None = None
+    ) -> list[MachinedSize]:
+        """Compute the sizes of the dimensions on a variant of the machine (None: that of the run);
+        NaN for features that are not cut.
+
+        `left_mm`: additional allowance on the walls of these paths of the drawing. The path of the
+        tool and the edge that it cuts move outwards by it.
 
         `left_mm`: if so much more is left on the walls of these paths of the drawing. The tool's
         path lies so much farther from them then, and so does the edge that it cuts.
         """
-        lies = self._edges(variant or Variant(self._target.machine))
+        lies = self._edges(variant or MachineVariant(self._target.machine))
         more = left_mm or {}
         sizes = []
         for each in self.dimensions:
@@ -107,11 +110,12 @@ class Inspector:
                 for feature, cut in zip(each.bound.features, each.cuts, strict=True)
             ]
             size = size_of(each.bound, each.cuts, moved)
-            sizes.append(size or Size(math.nan, math.nan, math.nan))
+            sizes.append(size or MachinedSize(math.nan, math.nan, math.nan))
         return sizes
 
-    def _edges(self, variant: Variant) -> dict[int, Floats]:
-        """Where the edge of each cut lies on a variant of the machine, by its `id`."""
+    def _edges(self, variant: MachineVariant) -> dict[int, Floats]:
+        """Compute the position of the edge of each cut on a variant of the machine, by its
+        `id`."""
         known = self._edges_of
         if known is None or known[0] is not variant.machine or known[1] != variant.wider_mm:
             slides = self._slides(variant.machine).wider(0.5 * variant.wider_mm)
@@ -126,20 +130,20 @@ class Inspector:
             known = self._edges_of = variant.machine, variant.wider_mm, lies
         return known[2]
 
-    def values(self, variant: Variant) -> Floats:
-        """(3 D,) mm: of each dimension its best fit, its least and its largest local size."""
+    def values(self, variant: MachineVariant) -> Floats:
+        """Compute best fit, least and largest local size (3 D,) mm of each of D dimensions."""
         sizes = self.sizes(variant)
         return np.array([(each.fit_mm, each.low_mm, each.high_mm) for each in sizes]).reshape(-1)
 
-    def machined(self, variant: Variant) -> Floats:
-        """(T,) mm where the edges of all cuts lie on a variant of the machine, one after the
-        other; NaN where one is not cut."""
+    def machined(self, variant: MachineVariant) -> Floats:
+        """Compute the positions (T,) mm of the edges of all cuts on a variant of the machine, one
+        cut after the other; NaN where one is not cut."""
         lies = self._edges(variant).values()
         return np.concatenate([np.zeros(0), *(each.reshape(-1) for each in lies)])
 
     def measured(self, nodes: Floats, weights: Floats) -> Floats:
-        """(N, 3 D) mm the values of N parts whose edges are mixed with `weights` (N, M) from those
-        of M parts, `nodes` (M, T), as `machined` returns them."""
+        """Compute the values (N, 3 D) mm of N parts whose edges are mixed with the weights (N, M)
+        from the edges `nodes` (M, T) of M parts."""
         cuts = {id(cut): cut for each in self.dimensions for cut in each.cuts}
         own: dict[int, tuple[Floats, Floats]] = {}  # levels, and the nodes' edges there
         begin = 0
@@ -152,7 +156,7 @@ class Inspector:
         for index, each in enumerate(self.dimensions):
             levels = [own[id(cut)][0] for cut in each.cuts]
             simulated = [own[id(cut)][1] for cut in each.cuts]
-            most = max(1, MOST_AT_ONCE // max(one[0].size for one in simulated))
+            most = max(1, MAX_EDGES_AT_ONCE // max(one[0].size for one in simulated))
             for first in range(0, len(weights), most):
                 part = weights[first : first + most]
                 lies = [np.tensordot(part, one, axes=1) for one in simulated]
@@ -161,16 +165,16 @@ class Inspector:
 
     @property
     def edges(self) -> Floats:
-        """(3 D, E, 2) by how much the values change with the place of each machined edge."""
+        """Derivatives (3 D, E, 2) of the values by the position of each machined edge."""
         return edges_of([(3, _edges_of(each.bound)) for each in self.dimensions])
 
     @property
     def tool_diameter_mm(self) -> float:
-        """That of the widest tool; 0 where none has a width."""
+        """Diameter of the widest tool; 0 if none has a width."""
         return 2.0 * float(self._tool.radius.max(initial=0.0))
 
-    def _slides(self, machine: Machine) -> Swept:
-        """What the slides of this machine do with the program."""
+    def _slides(self, machine: Machine) -> SweptSegments:
+        """Simulate the path of the slides of this machine for the program."""
         known = self._last
         if known is None or known[0] is not machine:
             from camtool.verification.verify import Case, VerifyOptions, verify
@@ -182,10 +186,10 @@ class Inspector:
         return known[1]
 
 
-def _edges_of(bound: Bound) -> Floats:
-    """(E, 2) the weights in X and Y of the edges that make a dimension: a centre lies midway
-    between two edges, a zone is as wide as one edge is off. Round features have edges on all
-    sides, which count in X and in Y alike."""
+def _edges_of(bound: BoundDimension) -> Floats:
+    """Return the weights (E, 2) in X and Y of the edges that determine a dimension: a centre is
+    midway between two edges, a zone is as wide as the error of one. Round features have edges on
+    all sides, which count in X and in Y alike."""
     kind = bound.dimension.kind
     if kind == "diameter":
         return opposite_edges(0.25 * math.pi)
@@ -202,7 +206,10 @@ def _edges_of(bound: Bound) -> Floats:
 
 
 def _inspected(
-    run: Run, dimensions: Iterable[Dimension], moves: Swept, found: list[tuple[Dimension, Finding]]
+    run: Run,
+    dimensions: Iterable[Dimension],
+    moves: SweptSegments,
+    found: list[tuple[Dimension, Finding]],
 ) -> Iterable[Inspected]:
     assert run.drawing is not None
     assert run.job is not None
@@ -222,7 +229,7 @@ def _inspected(
             found.append((dimension, bound))
             continue
         for copy, where in enumerate(maps):
-            placed = bound.placed(where)
+            placed = bound.in_work_frame(where)
             cuts = []
             for drawn, feature in zip(bound.features, placed.features, strict=True):
                 key = id(drawn), copy
@@ -237,17 +244,17 @@ def _inspected(
             finding = DIMENSION_NOT_CUT(
                 where=f"{run.drawing.file}, {dimension.source}",
                 name=here.name,
-                what="edge" if isinstance(missing, Edge) else "circle",
+                what="edge" if isinstance(missing, EdgeFeature) else "circle",
             )
             found.append((dimension, finding))
 
 
 class ToolAt:
-    """How wide the tool of each wanted row cuts at the surface."""
+    """Cutting width of the tool of each wanted row at the surface."""
 
     def __init__(self, wanted: Toolpath, job: Job, diameter_mm: float | None) -> None:
-        """The tools of the operations that the wanted moves name; where they name none, one of
-        this diameter (None: without width)."""
+        """Take the tools of the operations that the wanted moves name; without names, one tool of
+        this diameter (None: no width)."""
         rows = np.arange(len(wanted))
         starts, ends = wanted.starts_of(rows)[:, 2], wanted.end[:, 2]
         self.z = np.maximum(starts, ends)
@@ -278,33 +285,34 @@ class ToolAt:
                 self.z[part] = np.where(tapers, np.inf, straight)
 
 
-def swept_moves(wanted: CutMoves, tool: ToolAt) -> Swept:
-    """The cutting moves as segments within `CHORD_MM` of their arcs."""
+def swept_moves(wanted: CutMoves, tool: ToolAt) -> SweptSegments:
+    """Return the cutting moves as segments within `CHORD_MM` of their arcs."""
     arcs = wanted.segments.is_arc
     least = float(wanted.segments.radius[arcs].min()) if arcs.any() else math.inf
     samples = sample_cuts(wanted, min(math.sqrt(8.0 * least * CHORD_MM), 1.0))
     inside = np.flatnonzero(samples.segment[1:] == samples.segment[:-1])
     row = wanted.row[samples.segment[inside]].astype(np.int64)
     a, b = samples.points[inside], samples.points[inside + 1]
-    return Swept(a, b, tool.radius[row], tool.z[row], row)
+    return SweptSegments(a, b, tool.radius[row], tool.z[row], row)
 
 
-def swept_trace(trace: SlideTrace, follows: Ints, tool: ToolAt) -> Swept:
-    """The slides' path where they cut, as segments; `follows` (N,) is the wanted row of each
-    decoded row."""
+def swept_trace(trace: SlideTrace, follows: Ints, tool: ToolAt) -> SweptSegments:
+    """Return the cutting part of the path of the slides as segments; `follows` (N,) is the wanted
+    row of each decoded row."""
     last = np.flatnonzero(trace.cutting)
     last = last[last > 0]
     row = follows[trace.row[last]]
     last, row = last[row >= 0], row[row >= 0]
     a, b = trace.points[last - 1], trace.points[last]
-    return Swept(a, b, tool.radius[row], tool.z[row], row)
+    return SweptSegments(a, b, tool.radius[row], tool.z[row], row)
 
 
 def _points(wanted: CutMoves) -> int:
-    """So many points has the slides' path for chords within `CHORD_MM` of the smallest arc."""
+    """Return the number of points of the path of the slides for chords within `CHORD_MM` of the
+    smallest arc."""
     arcs = wanted.segments.is_arc
     if not arcs.any():
         return TRACE_POINTS
     chord = math.sqrt(8.0 * float(wanted.segments.radius[arcs].min()) * CHORD_MM)
     length = float(row_lengths(wanted.toolpath).sum())
-    return int(min(max(4.0 * length / chord, TRACE_POINTS), MOST_POINTS))
+    return int(min(max(4.0 * length / chord, TRACE_POINTS), MAX_POINTS))

@@ -30,15 +30,15 @@ SIZE_DIGITS = 3
 drawn as 6.0000001 mm is one of 6 mm, the last size of its band."""
 
 SAME_LIMIT_MM = 1e-6
-"""Limits that are said twice, as a class and as numbers, agree within this."""
+"""Limits given both as a class and as numbers must agree within this."""
 
 
 class NotUnderstood(OptionError):
-    """Words that are no limits at all."""
+    """A text that states no limits."""
 
 
-LONGEST_WORDS = 200
-"""Words of limits with more characters are refused unread."""
+MAX_WORDS_CHARS = 200
+"""A longer text is refused without parsing it."""
 
 _INCHES = frozenset(("in", '"', "ft"))
 _UNIT = r'(?:mm|cm|um|µm|μm|in|")'
@@ -56,8 +56,8 @@ _UPWARDS = ("…", "..", "...", "to")
 _EXAMPLES = "write them like H7, ±0.05, +0.1/-0.2 or 19.9 … 20.1"
 
 
-class Words(Struct, frozen=True):
-    """Words of limits as they were understood, before the nominal size is known.
+class LimitsText(Struct, frozen=True):
+    """Limits parsed from text, before the nominal size is known.
 
     One of them, or a class and its deviations: `iso` ("H7", or ""), `deviations_mm` or `sizes_mm`
     (lower, upper). `unit` in which their numbers are ("" where they name none).
@@ -70,12 +70,12 @@ class Words(Struct, frozen=True):
 
     @property
     def in_inches(self) -> bool | None:
-        """Whether they name inches or a metric unit; None where they name neither."""
+        """True if the text names inches, False for a metric unit, None for neither."""
         return self.unit in _INCHES if self.unit else None
 
     def limits(self, nominal_mm: float) -> Limits:
-        """The limits of a dimension of this nominal size, mm; OptionError where a class is not in
-        the tables, or a limit of size is not above 0."""
+        """Return the limits for this nominal size, mm; OptionError if a class is not in the
+        tables, or a limit of size is not above 0."""
         if self.iso:
             found = iso_limits(self.iso, nominal_mm)
             self._check_agreement(found)
@@ -114,8 +114,8 @@ class Words(Struct, frozen=True):
 
 
 def limits_of(words: str, nominal_mm: float, mm_per_unit: float = 1.0) -> Limits:
-    """The limits that words say of a nominal size, mm; numbers without a unit are in one of so
-    many mm. OptionError.
+    """Parse a text to the limits of a nominal size, mm; numbers without a unit are multiplied by
+    `mm_per_unit`. Raises OptionError.
 
     >>> limits_of("H7", 6.0)
     Limits(lower_mm=0.0, upper_mm=0.012, said='H7')
@@ -125,17 +125,17 @@ def limits_of(words: str, nominal_mm: float, mm_per_unit: float = 1.0) -> Limits
     return read_words(words, mm_per_unit).limits(nominal_mm)
 
 
-def read_words(words: str, mm_per_unit: float = 1.0) -> Words:
-    """Words of limits, understood; OptionError where they are not, or contradict themselves.
+def read_words(words: str, mm_per_unit: float = 1.0) -> LimitsText:
+    """Parse a text of limits; OptionError if it is not understood or contradicts itself.
 
     Decimals may have a comma, the sign may be a typographic minus, and ± may be written `%%p` as
     in DXF, or `+-`.
     """
-    if len(words) > LONGEST_WORDS:
+    if len(words) > MAX_WORDS_CHARS:
         raise NotUnderstood(f"limits of {len(words)} characters are not read", mend=_EXAMPLES)
-    text = plain_words(words)
+    text = normalised_words(words)
     if _CLASS.fullmatch(text):
-        return Words(text)
+        return LimitsText(text)
     fit = _FIT.fullmatch(text)
     if fit:
         raise OptionError(
@@ -148,21 +148,22 @@ def read_words(words: str, mm_per_unit: float = 1.0) -> Words:
     return _numbers(text, mm_per_unit)
 
 
-def plain_words(words: str) -> str:
-    """Words with points in decimals, ASCII minus, ± for its other writings, and single spaces."""
+def normalised_words(words: str) -> str:
+    """Normalise a text: points in decimals, ASCII minus, ± for its other spellings, single
+    spaces."""
     text = re.sub(r"%%[pP]|\+\s?/?\s?[-−]", "±", words)
     text = re.sub("[−–]", "-", text)
     text = re.sub(r"(?<=\d),(?=\d)", ".", text)
     return " ".join(text.split())
 
 
-def _numbers(text: str, mm_per_unit: float) -> Words:
-    """Deviations, or limits of size."""
+def _numbers(text: str, mm_per_unit: float) -> LimitsText:
+    """Parse deviations or limits of size."""
     found = _BOTH.fullmatch(text)
     if found:
         unit = found["aunit"] or ""
         value = float(found["a"]) * MM_PER_UNIT.get(unit, mm_per_unit)
-        return Words(deviations_mm=_ordered(-value, value, text), unit=unit)
+        return LimitsText(deviations_mm=_ordered(-value, value, text), unit=unit)
     found = _PAIR.fullmatch(text)
     if not found:
         alone = re.fullmatch(_NUMBER % ("a", "a"), text)
@@ -181,12 +182,12 @@ def _numbers(text: str, mm_per_unit: float) -> Words:
     zero = [name for name in "ab" if not float(found[name])]
     if not signed and not zero:
         up = found["between"] in _UPWARDS
-        return Words(sizes_mm=_ordered(*_up(first, second, up), text, sizes=True), unit=unit)
+        return LimitsText(sizes_mm=_ordered(*_up(first, second, up), text, sizes=True), unit=unit)
     if not {*signed, *zero} >= {"a", "b"} or not signed:
         raise OptionError(
             f"limits {text!r} lack a sign", mend="write deviations like +0.1/-0.2 or +0.1/0"
         )
-    return Words(deviations_mm=_ordered(second, first, text), unit=unit)
+    return LimitsText(deviations_mm=_ordered(second, first, text), unit=unit)
 
 
 def _up(first: float, second: float, upwards: bool) -> tuple[float, float]:
@@ -194,7 +195,7 @@ def _up(first: float, second: float, upwards: bool) -> tuple[float, float]:
 
 
 def _ordered(lower: float, upper: float, text: str, *, sizes: bool = False) -> tuple[float, float]:
-    """Both, -0 being 0; OptionError unless the upper one is above the lower one."""
+    """Return both limits, −0 as 0; OptionError unless the upper one is above the lower one."""
     if not (math.isfinite(lower) and math.isfinite(upper)):
         raise OptionError(f"limits {text!r} are not finite", mend=_EXAMPLES)
     lower, upper = round(lower, 9) + 0.0, round(upper, 9) + 0.0
@@ -211,14 +212,14 @@ def _ordered(lower: float, upper: float, text: str, *, sizes: bool = False) -> t
 
 
 def deviation_words(lower_mm: float, upper_mm: float) -> str:
-    """Deviations in mm as `read_words` reads them: "±0.05", "+0.1/-0.2", "+0.1/0"."""
+    """Format deviations in mm as `read_words` parses them: "±0.05", "+0.1/-0.2", "+0.1/0"."""
     if lower_mm == -upper_mm:
         return f"±{_mm(upper_mm)}"
     return "/".join(f"{'+' if v > 0.0 else ''}{_mm(v)}" for v in (upper_mm, lower_mm))
 
 
 def _mm(value: float) -> str:
-    """A number without an exponent, to a nanometre's thousandth."""
+    """Format a number without an exponent, to a picometre."""
     return f"{round(value, 9) + 0.0:.9f}".rstrip("0").rstrip(".")
 
 
@@ -237,8 +238,8 @@ _SYMMETRIC = "js"
 
 
 def iso_limits(name: str, nominal_mm: float) -> Limits:
-    """The limits of a class such as "H7" for a nominal size, mm; OptionError that names class and
-    size where the tables lack them."""
+    """Return the limits of a class such as "H7" for a nominal size, mm; OptionError with class and
+    size if the tables lack them."""
     from pressfit import fit
 
     found = re.fullmatch(r"([A-Za-z]{1,2})(\d{1,2})", name)
@@ -275,7 +276,7 @@ def _not_in_table(name: str, size_mm: float) -> OptionError:
 # mm for f, m, c, v. None: the standard has no value.
 
 _CLASSES = "fmcv"
-LEAST_GENERAL_MM = 0.5
+MIN_GENERAL_MM = 0.5
 """Smaller nominal sizes have no general tolerance: their limits stand beside them (ISO 2768-1,
 tables 1 and 2, note)."""
 
@@ -298,11 +299,11 @@ _GENERAL = re.compile(r"(?:ISO\s*2768\s*(?:-\s*1\s*)?[-–− ]?\s*)?([fmcv])([H
 
 
 def general_class(words: str) -> str:
-    """The class, f, m, c or v, that "ISO 2768-m" names; OptionError for anything else."""
-    found = _GENERAL.fullmatch(words.strip()) if len(words) <= LONGEST_WORDS else None
+    """Return the class f, m, c or v of "ISO 2768-m"; OptionError for any other text."""
+    found = _GENERAL.fullmatch(words.strip()) if len(words) <= MAX_WORDS_CHARS else None
     if found is None:
         raise OptionError(
-            f"general tolerance {words[:LONGEST_WORDS]!r} is not known",
+            f"general tolerance {words[:MAX_WORDS_CHARS]!r} is not known",
             mend="use ISO 2768-f, ISO 2768-m, ISO 2768-c or ISO 2768-v",
         )
     if found[2]:
@@ -315,11 +316,11 @@ def general_class(words: str) -> str:
 
 
 def general_limits(words: str, kind: Kind, nominal_mm: float) -> Limits | None:
-    """The general tolerance ("ISO 2768-m") of a nominal size, mm; None where the standard has
-    none: for form and position, sizes below LEAST_GENERAL_MM, and the ends of its tables."""
+    """Return the general tolerance ("ISO 2768-m") of a nominal size, mm; None if the standard has
+    none: for form and position, for sizes below MIN_GENERAL_MM and beyond its tables."""
     of = _CLASSES.index(general_class(words))
     size = round(nominal_mm, SIZE_DIGITS)
-    if kind in ZONES or not size >= LEAST_GENERAL_MM:
+    if kind in ZONES or not size >= MIN_GENERAL_MM:
         return None
     table = _TABLE_2 if kind == "radius" else _TABLE_1
     for most, values in table:
@@ -330,9 +331,9 @@ def general_limits(words: str, kind: Kind, nominal_mm: float) -> Limits | None:
 
 
 def limited(dimension: Dimension, drawn_mm: float) -> tuple[Dimension, tuple[Finding, ...]]:
-    """The dimension with nominal value and limits, as far as they are said, once it is known what
-    its drawn feature measures, mm; a finding where the general tolerance has none for it.
-    OptionError where its words do not fit that size."""
+    """Return the dimension with its nominal value and limits, now that the size of its drawn
+    feature is known, mm, and a finding if the general tolerance has none for it. Raises
+    OptionError if its limits do not fit that size."""
     nominal_mm = drawn_mm if dimension.nominal_mm is None else dimension.nominal_mm
     limits = dimension.limits
     findings: tuple[Finding, ...] = ()

@@ -48,8 +48,8 @@ from camtool.arrays import Floats
 from camtool.errors import CamtoolError, OptionError
 from camtool.findings import Severity
 from camtool.inspection.inspector import Inspected, Inspector
-from camtool.inspection.sizes import least
-from camtool.inspection.tolerances import unbound
+from camtool.inspection.sizes import minimise
+from camtool.inspection.tolerances import unbound_findings
 from camtool.inspection.uncertainty import CERTAIN
 from camtool.inspection.verdicts import (
     GUARD,
@@ -77,30 +77,29 @@ if TYPE_CHECKING:
     from camtool.tables import Table
     from camtool.target.registry import LoadedTarget
 
-MOST_CHANGES = 3
-"""Proposals of more changes are not looked at."""
+MAX_CHANGES = 3
+"""Largest number of changes in a proposal."""
 
-MOST_TRIALS = 100
-"""So many programs are tried by default."""
+DEFAULT_TRIALS = 100
 
 FEED_SHARES = (0.5, 0.25)
-"""Feeds that are tried, as parts of the operation's own."""
+"""Feeds that are tried, as shares of the operation's own."""
 
-MOST_LEFT = 0.25
-"""Allowances change by no more than this part of the tool's radius."""
+MAX_LEFT_SHARE = 0.25
+"""Largest change of an allowance, as a share of the radius of the tool."""
 
 FAR_ENOUGH = 3.0
 """A dimension that is within its limits by so many standard uncertainties (99.9 %) needs no more
 allowance."""
 
 PER_MM = 1e-3
-"""ε: what a millimetre of allowance costs, in standard uncertainties."""
+"""ε: cost of a millimetre of allowance, in standard uncertainties."""
 
 STEP_MM = 1e-6
 """The step, mm, whose differences are the slopes of sizes."""
 
 ROUNDS = 8
-"""Tangents at so many allowances at most are taken."""
+"""Most allowances at which tangents are computed."""
 
 SETTLED = 1e-6
 """Rounds end when sizes differ from their tangents by no more, mm."""
@@ -109,24 +108,24 @@ NO_STANDARD_MM = 1e-3
 """The standard uncertainty that stands for one that is not known, mm: sizes are centred then."""
 
 BISECTIONS = 6
-"""Halvings of what a number of the machine would have to be."""
+"""Bisections of the required value of a number of the machine."""
 
 NEEDED_DIGITS = 3
 """Its significant digits."""
 
 REFINED = 2
-"""So often allowances are found anew from how they came out."""
+"""Times that allowances are corrected by the sizes that they gave."""
 
-LARGEST_INPUTS = 2
-"""So many uncertainties, the largest, are asked how small they would have to be."""
+MAX_INPUTS_ASKED = 2
+"""Number of uncertainties, the largest first, whose required value is computed."""
 
 
 # What is asked, and what is tried.
 
 
-class Case(Struct, frozen=True, eq=False):
-    """A drawing, its machine, its job as the tables of a file, and what its dimensions must be.
-    `job_of` reads tables as a job file is read; OptionError for those that are wrong."""
+class MeetingCase(Struct, frozen=True, eq=False):
+    """A drawing, its machine, its job as the tables of a file, and the required dimensions.
+    `job_of` converts tables as a job file is read; OptionError for wrong ones."""
 
     drawing: Drawing
     target: LoadedTarget
@@ -135,8 +134,8 @@ class Case(Struct, frozen=True, eq=False):
     tolerances: Tolerances
 
 
-class Proposal(Struct, frozen=True):
-    """Changes of a job: of keys, of allowances, and of its machine as `--set` says them."""
+class JobChanges(Struct, frozen=True):
+    """Changes of a job: of keys, of allowances, and of its machine as `--set` takes them."""
 
     changes: tuple[Change, ...] = ()
     left: tuple[Left, ...] = ()
@@ -144,21 +143,21 @@ class Proposal(Struct, frozen=True):
 
     @property
     def count(self) -> int:
-        """How many changes they are; allowances are one."""
+        """Number of changes; all allowances together count as one."""
         return len(self.changes) + len(self.settings) + bool(self.left)
 
-    def __add__(self, other: Proposal) -> Proposal:
-        return Proposal(
+    def __add__(self, other: JobChanges) -> JobChanges:
+        return JobChanges(
             self.changes + other.changes, self.left + other.left, self.settings + other.settings
         )
 
 
-class Trial(Struct, frozen=True, eq=False):
-    """A proposal as it came out. `verdicts` of the dimensions, with the `paths` of the drawing
-    that make each; `missing`: how many could not be inspected; `time_s` of the program; `left`:
-    the allowances that should make it better, found from its edges."""
+class MeetingTrial(Struct, frozen=True, eq=False):
+    """The result of a proposal. `verdicts` of the dimensions, with the `paths` of the drawing that
+    form each; `missing`: number of dimensions that could not be inspected; `time_s` of the
+    program; `left`: the allowances that should improve it, computed from its edges."""
 
-    proposal: Proposal
+    proposal: JobChanges
     verdicts: tuple[InspectedReport, ...]
     paths: tuple[tuple[int, ...], ...]
     missing: int
@@ -167,37 +166,37 @@ class Trial(Struct, frozen=True, eq=False):
 
     @property
     def short(self) -> list[int]:
-        """Which dimensions are not in."""
+        """Dimensions that are not within their limits."""
         return [k for k, each in enumerate(self.verdicts) if each.verdict != "in"]
 
     @property
     def holds(self) -> bool:
-        """Whether all dimensions are in."""
+        """True if all dimensions are within their limits."""
         return not self.short and not self.missing
 
     @property
     def score(self) -> tuple[int, int, float]:
-        """The less, the better: how many dimensions cannot be inspected, how many do not hold, and
-        by how many standard uncertainties the worst is short."""
+        """Sort key, less is better: number of dimensions that cannot be inspected, number that do
+        not hold, and the largest shortfall in standard uncertainties."""
         worst = -min(map(margin, self.verdicts), default=math.inf)
         return self.missing, len(self.short), worst
 
     @property
     def binding(self) -> InspectedReport | None:
-        """The dimension that is farthest from holding; None where all were in or missing."""
+        """Dimension that is farthest from holding; None if all are in or missing."""
         return min((self.verdicts[k] for k in self.short), key=margin, default=None)
 
 
 def margin(each: InspectedReport) -> float:
-    """By how many standard uncertainties a dimension with limits is within the nearer one,
-    wherever within their bounds the inputs are that are not known."""
+    """Return by how many standard uncertainties a dimension is within its nearer limit, for the
+    worst values of unknown inputs within their bounds."""
     lower, upper = _limits_mm(each)
     return min(upper - each.high_mm, each.low_mm - lower) / _standard_mm(each)
 
 
 def _limits_mm(each: InspectedReport) -> tuple[float, float]:
-    """The limits, narrower by what is not known but bounded; the lower one −∞ where there is
-    none."""
+    """Return the limits, narrowed by the bounds of unknown inputs; the lower one is −∞ without
+    one."""
     assert each.upper_mm is not None
     narrower = (each.unknown_um or 0.0) / UM_PER_MM
     lower = -math.inf if each.lower_mm is None else each.lower_mm + narrower
@@ -210,8 +209,8 @@ def _standard_mm(each: InspectedReport) -> float:
 
 
 class Need(Struct, frozen=True):
-    """A number of the machine that would have to be better: its key as `--set` has it, what it is,
-    and what it would have to be, in the unit of the key."""
+    """A number of the machine that would have to be better: its key as for `--set`, its name, and
+    the required value in the unit of the key."""
 
     key: str
     now: float
@@ -219,11 +218,11 @@ class Need(Struct, frozen=True):
 
 
 class Certificate(Struct, frozen=True):
-    """Why no proposal holds: the dimension that is farthest from it, the uncertain inputs that are
-    not known and that nothing bounds, and each number of the machine with which all would hold if
-    it alone were better. `exact`: whether all would with every one of these numbers at its
-    best. `together`: names of its contours that others have too, so that one allowance is for
-    all of them."""
+    """The reason why no proposal holds: the dimension that is farthest from it, the uncertain
+    inputs that are unknown and unbounded, and each number of the machine that alone, if it were
+    better, would make all dimensions hold. `exact`: True if all would hold with every one of these
+    numbers at its best. `together`: names of its contours that other contours share, so that one
+    allowance applies to all of them."""
 
     binding: InspectedReport | None
     unknown: tuple[str, ...] = ()
@@ -233,13 +232,13 @@ class Certificate(Struct, frozen=True):
 
 
 class Meeting(Struct, frozen=True, eq=False):
-    """What came out: the job as it was, the best proposal and its `run`, posted (`brief` as
-    `post_drawing` has it) and inspected, how many programs were tried besides the job as it was,
-    and whether they were `all` that had to be. `text`: the job file of the proposal.
-    `certificate`: why it does not hold, None where it does."""
+    """The result of `meet`: the job as it was, the best proposal and its `run`, posted (`brief` as
+    `post_drawing` has it) and inspected, the number of programs tried besides the job as it was,
+    and `all`, True if every necessary one was tried. `text`: the job file of the proposal.
+    `certificate`: the reason why it does not hold, else None."""
 
-    before: Trial
-    after: Trial
+    before: MeetingTrial
+    after: MeetingTrial
     run: Run
     text: str
     trials: int
@@ -248,20 +247,22 @@ class Meeting(Struct, frozen=True, eq=False):
 
     @property
     def holds(self) -> bool:
-        """Whether all dimensions with limits hold."""
+        """True if all dimensions with limits hold."""
         return self.after.holds
 
     @property
     def changed(self) -> bool:
-        """Whether the proposal is not the job as it was."""
+        """True if the proposal differs from the job as it was."""
         return bool(self.after.proposal.count)
 
 
-def meet(case: Case, most: int = MOST_TRIALS, progress: Progress | None = None) -> Meeting:
-    """The cheapest change of the job after which all dimensions hold; without any, the best one
-    and a certificate. Never worse than the start. Raises what `post` and `inspect` raise for the
-    job as it is."""
-    _readable(case)
+def meet(
+    case: MeetingCase, most: int = DEFAULT_TRIALS, progress: Progress | None = None
+) -> Meeting:
+    """Find the cheapest change of the job after which all dimensions hold; if there is none, the
+    best one and a certificate. The result is never worse than the start. Raises the errors of
+    `post` and `inspect` for the job as it is."""
+    _check_readable(case)
     asked = tuple(each for each in case.tolerances.dimensions if each.limits is not None)
     case = replace(case, tolerances=replace(case.tolerances, dimensions=asked))
     bench = Bench(case, progress or Progress())
@@ -269,7 +270,7 @@ def meet(case: Case, most: int = MOST_TRIALS, progress: Progress | None = None) 
     before = bench.first()
     after, every = before, True
     if not before.holds:
-        after, every = cheapest(before, levers(bench, before), bench.tried, most)
+        after, every = find_cheapest(before, levers(bench, before), bench.try_changes, most)
     trials = bench.trials
     run, tables = bench.run_of(after.proposal), bench.tables_of(after.proposal)
     assert run.report is not None
@@ -280,15 +281,15 @@ def meet(case: Case, most: int = MOST_TRIALS, progress: Progress | None = None) 
     return Meeting(before, after, run, text, trials, every, certificate)
 
 
-def _readable(case: Case) -> None:
-    """OptionError for dimensions that no job lets anybody inspect."""
+def _check_readable(case: MeetingCase) -> None:
+    """Raise OptionError for dimensions that cannot be inspected with any job."""
     wanted = [each for each in case.tolerances.dimensions if each.asks]
     read = (
         each
         for each in case.tolerances.findings
         if each.severity is Severity.ERROR or each.code in NOT_INSPECTED
     )
-    lost = [*read, *unbound(case.drawing, wanted)]
+    lost = [*read, *unbound_findings(case.drawing, wanted)]
     if lost:
         more = f" (and {len(lost) - 1} more)" if len(lost) > 1 else ""
         raise OptionError(
@@ -298,17 +299,17 @@ def _readable(case: Case) -> None:
         )
 
 
-Tried = Callable[[Proposal], "Trial | None"]
+Tried = Callable[[JobChanges], "MeetingTrial | None"]
 """Tries a proposal; None for one that cannot be cut."""
 
 
-def cheapest(
-    before: Trial, choices: Sequence[Sequence[Proposal]], tried: Tried, most: int
-) -> tuple[Trial, bool]:
-    """The holding trial with the fewest changes, the first of these; where none holds, that of the
-    best score. Of each of the `choices`, the cheapest of which come first, one is taken at most.
-    And whether all were tried that come before the answer: no more than `most` are."""
-    best, known = before, {Proposal(): before}
+def find_cheapest(
+    before: MeetingTrial, choices: Sequence[Sequence[JobChanges]], tried: Tried, most: int
+) -> tuple[MeetingTrial, bool]:
+    """Return the trial with the fewest changes that holds, the first of several, or else the one
+    with the best score; and True if all proposals before it were tried, at most `max_trials`. At
+    most one of each list in `choices` is applied, the cheapest first."""
+    best, known = before, {JobChanges(): before}
     for count, proposal in enumerate(_proposals(choices, known), start=1):
         if count > most:
             return best, False
@@ -324,21 +325,22 @@ def cheapest(
 
 
 def _proposals(
-    choices: Sequence[Sequence[Proposal]], known: Mapping[Proposal, Trial]
-) -> Iterator[Proposal]:
-    """All up to MOST_CHANGES: of each number of changes first allowances on what was tried with
-    one change less."""
-    for count in range(1, MOST_CHANGES + 1):
+    choices: Sequence[Sequence[JobChanges]], known: Mapping[JobChanges, MeetingTrial]
+) -> Iterator[JobChanges]:
+    """Yield all proposals of up to MAX_CHANGES changes, by their number; for each number the
+    allowances found by a trial with one change less come first."""
+    for count in range(1, MAX_CHANGES + 1):
         for base in list(known.values()):
             if base.proposal.count == count - 1 and base.left and not base.proposal.left:
                 yield replace(base.proposal, left=base.left)
         for some in itertools.combinations(choices, count):
             for each in itertools.product(*some):
-                yield sum(each, Proposal())
+                yield sum(each, JobChanges())
 
 
-def levers(bench: Bench, before: Trial) -> list[list[Proposal]]:
-    """What may be changed, the cheapest first: of each list one at most."""
+def levers(bench: Bench, before: MeetingTrial) -> list[list[JobChanges]]:
+    """Return lists of possible changes, the cheapest first; at most one of each list is
+    applied."""
     job, target = bench.job, bench.case.target
     machine = target.machine
     short = {path for k in before.short for path in before.paths[k]}
@@ -350,40 +352,43 @@ def levers(bench: Bench, before: Trial) -> list[list[Proposal]]:
         *(_other_words("start", row, each) for row, each in mine),
         _job_lever("approach", True, job.approach),
         _job_lever("minimise", "reversals", job.minimise),
-        *(_slower(row, each, machine) for row, each in mine),
+        *(_slower_feeds(row, each, machine) for row, each in mine),
     ]
     for key, values in target.target.ways.items():
         now = _at(machine, key)
-        found.append([Proposal(settings=(f'{key}="{each}"',)) for each in values if each != now])
+        found.append([JobChanges(settings=(f'{key}="{each}"',)) for each in values if each != now])
     return [each for each in found if each]
 
 
-def _job_lever(key: str, value: Any, now: Any) -> list[Proposal]:
-    return [] if now == value else [Proposal((Change(key, value, None, str(now).lower()),))]
+def _job_lever(key: str, value: Any, now: Any) -> list[JobChanges]:
+    return [] if now == value else [JobChanges((Change(key, value, None, str(now).lower()),))]
 
 
 OTHER_WORDS = {"direction": ("climb", "conventional"), "start": ("longest-line", "corner")}
-"""Keys of operations, with what they may be instead."""
+"""Alternative values of keys of operations."""
 
 
-def _other_words(key: str, row: int, operation: Operation) -> list[Proposal]:
-    """The other words for a key of an operation, if its kind has that."""
+def _other_words(key: str, row: int, operation: Operation) -> list[JobChanges]:
+    """Return the alternative values of a key of an operation, if its kind has that key."""
     if not is_known(key, operation.kind):
         return []
     now = getattr(operation, OPERATION[key].field)
     said = now if isinstance(now, str) else f"{now[0]:g},{now[1]:g}"
-    return [Proposal((Change(key, word, row, said),)) for word in OTHER_WORDS[key] if word != now]
+    return [
+        JobChanges((Change(key, word, row, said),)) for word in OTHER_WORDS[key] if word != now
+    ]
 
 
-def _slower(row: int, operation: Operation, machine: Machine) -> list[Proposal]:
-    """Slower feeds of an operation."""
+def _slower_feeds(row: int, operation: Operation, machine: Machine) -> list[JobChanges]:
+    """Return slower feeds of an operation."""
     feed = operation.feed_mm_min or machine.feed.default_mm_min
     words = (f"{share * feed:.6g}mm/min" for share in FEED_SHARES)
-    return [Proposal((Change("feed", word, row, f"{feed:.6g}mm/min"),)) for word in words]
+    return [JobChanges((Change("feed", word, row, f"{feed:.6g}mm/min"),)) for word in words]
 
 
 def _rows(job: Job) -> Iterator[tuple[int, int, Operation]]:
-    """The operations, but for finishing passes, with their rows in the file and in the job."""
+    """Return the operations, except finishing passes, with their rows in the file and in the
+    job."""
     first = [k for k, each in enumerate(job.operations) if each.stage != "finish"]
     return ((row, k, job.operations[k]) for row, k in enumerate(first))
 
@@ -392,10 +397,10 @@ def _rows(job: Job) -> Iterator[tuple[int, int, Operation]]:
 
 
 class JobContours(Struct, frozen=True, eq=False):
-    """The contours of a job by the names of their entities. `cut`: which names the operation in
-    each row of the file takes; `walls`: the same of those that have allowances; `depth`: in how
-    many others each lies; `head`: walls with one head move alike, for an operation cannot be
-    divided; `most_mm`: how far a wall may be moved; `of_path`: the name of each path drawn."""
+    """The contours of a job by the names of their entities. `cut`: names that the operation in
+    each row of the file takes; `walls`: those with allowances; `depth`: number of contours around
+    each; `head`: walls with the same head move alike, since an operation cannot be divided;
+    `max_mm`: largest change of the allowance of a wall; `of_path`: name of each drawn path."""
 
     cut: dict[int, tuple[str, ...]]
     walls: dict[int, tuple[str, ...]]
@@ -405,8 +410,8 @@ class JobContours(Struct, frozen=True, eq=False):
     of_path: tuple[str, ...]
 
     @classmethod
-    def of(cls, case: Case, job: Job) -> JobContours:
-        """Those of a job."""
+    def of(cls, case: MeetingCase, job: Job) -> JobContours:
+        """Collect the contours of a job."""
         placed = place(case.drawing, job)
         sides = Sides.of(placed, job, case.target.machine.defaults.cut_depth_mm)
         depths: dict[str, set[int]] = {}
@@ -425,7 +430,9 @@ class JobContours(Struct, frozen=True, eq=False):
                 continue
             walls[row] = names
             for name in names:
-                most[name] = min(most.get(name, math.inf), MOST_LEFT * operation.tool.radius_mm)
+                most[name] = min(
+                    most.get(name, math.inf), MAX_LEFT_SHARE * operation.tool.radius_mm
+                )
             alone = not (operation.rest or operation.name in rests)
             if not operation.contract.runs_beside:
                 # A contour within another one is an island of its pocket, or bored with it.
@@ -437,18 +444,18 @@ class JobContours(Struct, frozen=True, eq=False):
         return cls(cut, walls, depth, head, most, case.drawing.sources)
 
     def cutting(self, paths: Iterable[int]) -> set[int]:
-        """The rows of the file that cut some paths of the drawing."""
+        """Return the rows of the file that cut some paths of the drawing."""
         names = {self.of_path[path] for path in paths}
         return {row for row, mine in self.cut.items() if names.intersection(mine)}
 
     def together(self, paths: Iterable[int]) -> tuple[str, ...]:
-        """The names of some paths of the drawing that other contours have too."""
+        """Return the names of some paths of the drawing that other contours have too."""
         names = dict.fromkeys(self.of_path[path] for path in paths)
         return tuple(name for name in names if self.of_path.count(name) > 1)
 
     def left(self, by_name: Mapping[str, float]) -> tuple[Left, ...]:
-        """What is left on walls, mm by the names of contours, as parts of operations: inner
-        contours before those around them."""
+        """Return the allowances on walls, mm by the names of contours, as parts of operations:
+        inner contours before those around them."""
         found: list[Left] = []
         for row, names in self.walls.items():
             if not any(by_name.get(name) for name in names):
@@ -470,7 +477,7 @@ class JobContours(Struct, frozen=True, eq=False):
         return tuple(found)
 
     def by_name(self, left: Iterable[Left]) -> dict[str, float]:
-        """The other way round."""
+        """Return the allowances by name, from parts of operations (inverse of `left`)."""
         return {
             name: each.by_mm
             for each in left
@@ -481,8 +488,9 @@ class JobContours(Struct, frozen=True, eq=False):
 def closed_form(
     inspector: Inspector, verdicts: Sequence[InspectedReport | None], contours: JobContours
 ) -> dict[str, float]:
-    """By how much more should be left on the wall of each contour, mm; {} where nothing helps.
-    `verdicts` are those of the inspector's dimensions, None for what could not be measured."""
+    """Compute the additional allowance on the wall of each contour, mm, that centres the sizes
+    best; {} if none helps. `verdicts` are those of the inspector's dimensions, None for those that
+    could not be measured."""
     rows = [(k, each) for k, each in enumerate(verdicts) if each is not None]
     short = {
         contours.of_path[path]
@@ -517,8 +525,8 @@ def closed_form(
 def _best_left(
     sizes: Callable[[Floats], Floats], limits: Floats, standards: Floats, most: Floats
 ) -> Floats:
-    """(C,) the allowances of the linear programme above; `sizes` gives (D, 2) sizes for (C,), and
-    `limits` (D, 2) are the upper and the lower ones, infinite for none."""
+    """Solve the linear programme above for the allowances (C,); `sizes` maps (C,) to sizes (D, 2),
+    and `limits` (D, 2) are the upper and the lower ones, infinite for none."""
     count, dims = len(most), len(limits)
     # x = t_1 … t_D, then what is left and what is taken, both 0 or more, of each contour.
     goal = np.concatenate([-np.ones(dims), np.full(2 * count, PER_MM)])
@@ -542,7 +550,7 @@ def _best_left(
             bound = sign * (here[known, side] - limits[known, side]) - slope @ left
             conditions.append((row, bound))
         rows, bounds = zip(*conditions, strict=True)
-        x = least(goal, np.vstack(rows), np.hstack(bounds))
+        x = minimise(goal, np.vstack(rows), np.hstack(bounds))
         found = x[dims : dims + count] - x[dims + count :]
         expected = here + slopes @ (found - left)
         left = found
@@ -552,7 +560,7 @@ def _best_left(
 
 
 def paths_of(each: Inspected) -> tuple[int, ...]:
-    """The paths of the drawing that make a dimension."""
+    """Return the paths of the drawing that form a dimension."""
     return tuple(dict.fromkeys(feature.path for feature in each.bound.features))
 
 
@@ -560,28 +568,28 @@ def paths_of(each: Inspected) -> tuple[int, ...]:
 
 
 class Bench(Struct, eq=False, dict=True):
-    """Posts and inspects the jobs of proposals; equal programs are judged once."""
+    """Post and inspect the jobs of proposals; equal programs are judged once."""
 
-    case: Case
+    case: MeetingCase
     progress: Progress
     trials: int = 0
-    _known: dict[bytes, Trial] = field(default_factory=dict)
+    _known: dict[bytes, MeetingTrial] = field(default_factory=dict)
     _first: dict[tuple[str, int | None], InspectedReport] = field(default_factory=dict)
 
     @cached_property
     def job(self) -> Job:
-        """The job as it is."""
+        """Job as it is."""
         return self.case.job_of(self.case.tables)
 
     @cached_property
     def contours(self) -> JobContours:
-        """Those of the job as it is."""
+        """Contours of the job as it is."""
         return JobContours.of(self.case, self.job)
 
-    def first(self) -> Trial:
-        """The job as it is. Raises what posting it raises, and OptionError for a program with
-        errors, and where no dimension with limits can be inspected."""
-        run = self._posted(Proposal(), self.case.target)
+    def first(self) -> MeetingTrial:
+        """Try the job as it is. Raises the errors of posting it, and OptionError for a program
+        with errors or if no dimension with limits can be inspected."""
+        run = self._posted(JobChanges(), self.case.target)
         if run.report is None or run.failed:
             wrong = (each for each in run.findings if each.severity is Severity.ERROR)
             said = next((f": {each.message}" for each in wrong), "")
@@ -590,7 +598,7 @@ class Bench(Struct, eq=False, dict=True):
                 file=self.case.drawing.file,
                 mend="" if said else "see what camtool post says of it",
             )
-        trial = self._judged(run, Proposal())
+        trial = self._judge(run, JobChanges())
         if not trial.verdicts:
             raise OptionError(
                 "no dimension with limits can be inspected",
@@ -601,8 +609,8 @@ class Bench(Struct, eq=False, dict=True):
         self._known[_digest(run, self.case.target.machine)] = trial
         return trial
 
-    def tried(self, proposal: Proposal) -> Trial | None:
-        """A proposal as it comes out; None where it cannot be cut, or the program has errors."""
+    def try_changes(self, proposal: JobChanges) -> MeetingTrial | None:
+        """Try a proposal; None if it cannot be cut or the program has errors."""
         self.trials += 1
         self.progress.done += 1
         try:
@@ -612,32 +620,32 @@ class Bench(Struct, eq=False, dict=True):
                 return None
             digest = _digest(run, target.machine)
             if digest not in self._known:
-                self._known[digest] = self._judged(run, proposal)
+                self._known[digest] = self._judge(run, proposal)
         except CamtoolError:
             return None
         return replace(self._known[digest], proposal=proposal)
 
-    def run_of(self, proposal: Proposal) -> Run:
-        """The job of a proposal, posted and inspected."""
+    def run_of(self, proposal: JobChanges) -> Run:
+        """Post and inspect the job of a proposal."""
         return inspect(self._posted(proposal, self._target(proposal)), self.case.tolerances)
 
-    def tables_of(self, proposal: Proposal) -> Table:
-        """The job file of a proposal."""
+    def tables_of(self, proposal: JobChanges) -> Table:
+        """Return the tables of the job file of a proposal."""
         return changed(self.case.tables, proposal.changes, proposal.left)
 
-    def _target(self, proposal: Proposal) -> LoadedTarget:
+    def _target(self, proposal: JobChanges) -> LoadedTarget:
         return self.case.target.with_settings(proposal.settings)
 
-    def _posted(self, proposal: Proposal, target: LoadedTarget) -> Run:
+    def _posted(self, proposal: JobChanges, target: LoadedTarget) -> Run:
         job = self.case.job_of(self.tables_of(proposal))
         return post_drawing(self.case.drawing, job, target, brief=True)
 
-    def _judged(self, run: Run, proposal: Proposal) -> Trial:
-        """How a program comes out. A size beyond its limit is in with half the probability at
-        most: then the simulations that give its uncertainty are left out, and that of the job as
-        it is stands for it."""
+    def _judge(self, run: Run, proposal: JobChanges) -> MeetingTrial:
+        """Judge the program of a proposal. A size beyond its limit is in with a probability of at
+        most one half: then the simulations for its uncertainty are skipped, and the uncertainty of
+        the job as it is is used."""
         inspector = Inspector(run, self.case.tolerances.dimensions)
-        found: list[InspectedReport | None] = list(self._foreseen(inspector))
+        found: list[InspectedReport | None] = list(self._predict_verdicts(inspector))
         beyond = any(each is None or each.verdict == "out" for each in found)
         new = any(_key_of(each) not in self._first for each in inspector.dimensions)
         if new or not beyond:
@@ -647,7 +655,7 @@ class Bench(Struct, eq=False, dict=True):
             ]
         seen = [k for k, each in enumerate(found) if each is not None]
         assert run.report is not None
-        trial = Trial(
+        trial = MeetingTrial(
             proposal,
             verdicts=tuple(each for each in found if each is not None),
             paths=tuple(paths_of(inspector.dimensions[k]) for k in seen),
@@ -665,9 +673,9 @@ class Bench(Struct, eq=False, dict=True):
         whole = {name: round(so_far.get(name, 0.0) + by, LEFT_DIGITS) for name, by in more.items()}
         return replace(trial, left=self.contours.left({**so_far, **whole}))
 
-    def _foreseen(self, inspector: Inspector) -> Iterator[InspectedReport | None]:
-        """The dimensions with their sizes, and what these alone say of them, if they are as sure
-        as those of the job as it is; None for what is not cut, and for what is new."""
+    def _predict_verdicts(self, inspector: Inspector) -> Iterator[InspectedReport | None]:
+        """Return the dimensions with their sizes and the verdicts that follow with the
+        uncertainties of the job as it is; None for those that are not cut or new."""
         for one, size in zip(inspector.dimensions, inspector.sizes(), strict=True):
             known = self._first.get(_key_of(one))
             if known is None or not math.isfinite(size.low_mm + size.high_mm):
@@ -678,8 +686,8 @@ class Bench(Struct, eq=False, dict=True):
             verdict = "in" if within >= GUARD else "out" if within < 0.0 else "undecided"
             yield replace(made, verdict=verdict)
 
-    def certificate(self, best: Trial) -> Certificate:
-        """Why the best trial does not hold."""
+    def certificate(self, best: MeetingTrial) -> Certificate:
+        """Explain why the best trial does not hold."""
         binding = best.binding
         if binding is None:
             return Certificate(None)
@@ -693,8 +701,8 @@ class Bench(Struct, eq=False, dict=True):
         machine = self._target(best.proposal).machine
         mechanics, standards = list(_mechanics(machine)), list(_standards(machine, binding))
         needs = []
-        for each in (*mechanics, *standards[:LARGEST_INPUTS]):
-            needed = self._needed(each, best)
+        for each in (*mechanics, *standards[:MAX_INPUTS_ASKED]):
+            needed = self._needed_value(each, best)
             if needed is not None:
                 needs.append(Need(each.key, each.now, needed))
 
@@ -703,8 +711,9 @@ class Bench(Struct, eq=False, dict=True):
         exactly = bool(needs) or self._holds(best, exact)
         return Certificate(binding, (), tuple(needs), exactly, self.contours.together(paths))
 
-    def _needed(self, number: _Number, best: Trial) -> float | None:
-        """The value nearest to what a number is with which all holds; None for none."""
+    def _needed_value(self, number: _Number, best: MeetingTrial) -> float | None:
+        """Return the value of a number of the machine nearest to its present one with which all
+        dimensions hold; None if there is none."""
 
         def holds(value: float) -> bool:
             return self._holds(best, [number.setting(value)])
@@ -718,25 +727,26 @@ class Bench(Struct, eq=False, dict=True):
         rounded = _rounded(number.at(good), number.best)
         return rounded if holds(rounded) else number.at(good)
 
-    def _holds(self, best: Trial, settings: Sequence[str]) -> bool:
-        """Whether the proposal holds on a machine with other numbers, with the allowances for
-        that."""
-        proposal = best.proposal + Proposal(settings=tuple(settings))
-        trial = self.tried(proposal)
+    def _holds(self, best: MeetingTrial, settings: Sequence[str]) -> bool:
+        """True if the proposal holds on a machine with other numbers, with the allowances for
+        it."""
+        proposal = best.proposal + JobChanges(settings=tuple(settings))
+        trial = self.try_changes(proposal)
         for _ in range(REFINED):
             if trial is None or trial.holds or not trial.left:
                 break
-            trial = self.tried(replace(proposal, left=trial.left))
+            trial = self.try_changes(replace(proposal, left=trial.left))
         return trial is not None and trial.holds
 
 
 def _key_of(each: Inspected) -> tuple[str, int | None]:
-    """What tells a dimension from all others, in any program."""
+    """Return a key that identifies a dimension in every program."""
     return each.bound.dimension.source, each.copy
 
 
 def _digest(run: Run, machine: Machine) -> bytes:
-    """What decides how a program comes out: its bytes, its machine, and which moves were asked."""
+    """Return a digest of everything that determines the result of a program: its bytes, its
+    machine and the planned moves."""
     assert run.program is not None
     assert run.wanted is not None
     digest = hashlib.sha256(run.program.data)
@@ -750,7 +760,7 @@ def _digest(run: Run, machine: Machine) -> bytes:
 
 
 class _Number(Struct, frozen=True):
-    """A number of a machine: its key, what it is, and its best value."""
+    """A number of a machine: its key, its name and its best value."""
 
     key: str
     now: float
@@ -759,7 +769,7 @@ class _Number(Struct, frozen=True):
     """Of a map of backlash, whose mean it is: each cell is as much nearer to the best as that."""
 
     def setting(self, value: float) -> str:
-        """The machine with this value, as `--set` says it."""
+        """Return the machine's setting of this value, as for `--set`."""
         if not self.cells:
             return f"{self.key}={value!r}"
         share = (value - self.best) / (self.now - self.best)
@@ -770,13 +780,14 @@ class _Number(Struct, frozen=True):
         return f"{self.key}={rows}"
 
     def at(self, share: float) -> float:
-        """So far on the way to its best."""
+        """Return the value at this share of the way to its best."""
         return self.now + share * (self.best - self.now)
 
 
 def _mechanics(machine: Machine) -> Iterator[_Number]:
-    """Backlash, scale and squareness, as far as they are not at their best. Backlash is, where it
-    equals what the controller adds at reversals (`camtool.inspection.uncertainty`)."""
+    """Return backlash, scale and squareness, if they are not at their best. Backlash is at its
+    best where it equals the compensation that the controller adds at reversals
+    (`camtool.inspection.uncertainty`)."""
     for index, name in enumerate("xy"):
         axis, cells = (machine.axes.x, machine.axes.y)[index], machine.play_map.used[index]
         ratio = axis.real_step_mm / axis.coded_step_mm
@@ -793,7 +804,8 @@ def _mechanics(machine: Machine) -> Iterator[_Number]:
 
 
 def _standards(machine: Machine, binding: InspectedReport) -> Iterator[_Number]:
-    """The standard uncertainties that contribute to that of a dimension, the largest first."""
+    """Return the standard uncertainties that contribute to that of a dimension, the largest
+    first."""
     for each in binding.contributions:
         scatter = each.input.endswith(REPEATABILITY)
         key = f"{'axes' if scatter else 'uncertainty'}.{each.input}"
@@ -807,14 +819,14 @@ REPEATABILITY = "repeatability_mm"
 
 
 def _at(record: object, key: str) -> object:
-    """The value at a key such as "axes.x.backlash_mm"."""
+    """Return the value at a key such as "axes.x.backlash_mm"."""
     for name in key.split("."):
         record = getattr(record, name)
     return record
 
 
 def _rounded(value: float, best: float) -> float:
-    """The value with few digits, rounded towards the best one."""
+    """Round a value to few digits, towards the best one."""
     off = abs(value - best)
     if off == 0.0:
         return value
@@ -824,12 +836,12 @@ def _rounded(value: float, best: float) -> float:
 
 # In words.
 
-MOST_NAMED = 4
-"""So many contours are named."""
+MAX_NAMED = 4
+"""Most contours named in a message."""
 
 
 def to_text(meeting: Meeting) -> str:
-    """The dimensions before and after, the changes, and the certificate, for people."""
+    """Format the dimensions before and after, the changes and the certificate for people."""
     before = {each.name: each for each in meeting.before.verdicts}
     rows = [("", "limits, mm", "as it is", "", "then", "")]
     for each in meeting.after.verdicts:
@@ -841,7 +853,7 @@ def to_text(meeting: Meeting) -> str:
         "  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip()
         for row in rows
     ]
-    said = list(changes_said(meeting.after.proposal))
+    said = list(change_lines(meeting.after.proposal))
     lines += ["", *(f"change: {line}" for line in said or ["none"])]
     took, takes = meeting.before.time_s, meeting.after.time_s
     lines.append(f"time: {took:.1f} s, then {takes:.1f} s")
@@ -849,12 +861,12 @@ def to_text(meeting: Meeting) -> str:
     plural = "" if meeting.trials == 1 else "s"
     lines.append(f"tried: {meeting.trials} program{plural}{more}")
     if meeting.certificate is not None:
-        lines += ["", *_certified(meeting)]
+        lines += ["", *_certificate_lines(meeting)]
     return "\n".join(lines)
 
 
 def _extreme(each: InspectedReport) -> str:
-    """The predicted size, from the least to the largest."""
+    """Format the predicted size, from the least to the largest."""
     low, high = f"{each.low_mm:.4f}", f"{each.high_mm:.4f}"
     return low if low == high else f"{low} … {high}"
 
@@ -864,15 +876,15 @@ def _limits(each: InspectedReport) -> str:
     return f"{lower}{each.upper_mm:.7g}"
 
 
-def changes_said(proposal: Proposal) -> Iterator[str]:
-    """A line for each change."""
+def change_lines(proposal: JobChanges) -> Iterator[str]:
+    """Return one line for each change."""
     for each in proposal.left:
         if not each.by_mm:
             continue
         more = "more left" if each.by_mm > 0.0 else "less left"
-        names = ", ".join(each.entities[:MOST_NAMED])
-        if len(each.entities) > MOST_NAMED:
-            names += f" and {len(each.entities) - MOST_NAMED} more"
+        names = ", ".join(each.entities[:MAX_NAMED])
+        if len(each.entities) > MAX_NAMED:
+            names += f" and {len(each.entities) - MAX_NAMED} more"
         of = f"the walls of {names}" if names else "all its walls"
         yield (
             f"operation {each.operation + 1}: {abs(each.by_mm):.{LEFT_DIGITS}f} mm {more} on {of}"
@@ -886,8 +898,8 @@ def changes_said(proposal: Proposal) -> Iterator[str]:
         yield f"machine: --set {setting}"
 
 
-def _certified(meeting: Meeting) -> Iterator[str]:
-    """Why it does not hold."""
+def _certificate_lines(meeting: Meeting) -> Iterator[str]:
+    """Return the lines of the certificate."""
     why = meeting.certificate
     assert why is not None
     if why.binding is None:
@@ -923,7 +935,7 @@ def _certified(meeting: Meeting) -> Iterator[str]:
 
 
 def to_data(meeting: Meeting) -> dict[str, Any]:
-    """The same for pipelines: mm and s, standard uncertainties in µm."""
+    """Return the result as data for JSON: mm and s, standard uncertainties in µm."""
     before = {each.name: each for each in meeting.before.verdicts}
     why, proposal = meeting.certificate, meeting.after.proposal
     return {
@@ -988,8 +1000,8 @@ def is_proposal(data: bytes) -> bool:
     return data.startswith((f"# {ALL_HOLD}".encode(), f"# {NOT_ALL_HOLD}".encode()))
 
 
-def _head(case: Case, best: Trial) -> Iterator[str]:
-    """The comments at the top of a job file."""
+def _head(case: MeetingCase, best: MeetingTrial) -> Iterator[str]:
+    """Return the comments at the top of a job file."""
     name = one_line(PurePath(case.drawing.file).name)
     target = case.target.machine.target.name
     count, short = len(best.verdicts) + best.missing, len(best.short) + best.missing
@@ -997,5 +1009,5 @@ def _head(case: Case, best: Trial) -> Iterator[str]:
         yield f"{ALL_HOLD}{name} that has limits holds on {target} ({count})."
     else:
         yield f"{NOT_ALL_HOLD}{name} hold on {target}: {short} of {count} do not."
-    for line in changes_said(best.proposal):
+    for line in change_lines(best.proposal):
         yield one_line(line)

@@ -19,17 +19,24 @@ from camtool.findings import Finding
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.inspection.dimensions import Dimension, Place
-from camtool.inspection.features import Bound, Circle, Edge, Feature, bind, features_of
+from camtool.inspection.features import (
+    BoundDimension,
+    CircleFeature,
+    EdgeFeature,
+    Feature,
+    bind,
+    features_of,
+)
 from camtool.inspection.limits import limited
 from camtool.inspection.tolerances import dimensions_of, measured_by
 from camtool.plain import one_line
 from camtool.tables import quoted
 
-MOST_DIMENSIONS = 200
-"""A file begins with at most so many dimensions; a comment counts the others."""
+MAX_DIMENSIONS = 200
+"""Most dimensions written to a file; a comment counts the others."""
 
 DIGITS = 4
-"""Places and sizes are written with so many decimals of a millimetre."""
+"""Decimals of a millimetre of places and sizes."""
 
 _HEADER = """\
 # The dimensions of a drawing and their limits (docs/tolerances.md). Lengths take units ("6mm",
@@ -40,10 +47,11 @@ _HEADER = """\
 """
 
 
-def proposed(drawing: Drawing) -> tuple[str, tuple[Finding, ...], tuple[DrawingError, ...]]:
-    """The text of a file with the dimensions of this drawing, what was found in its callouts, and
-    whose limits are wrong: these stand there without. What fits nothing that is drawn is a
-    comment. InputError where there is nothing to measure."""
+def propose_file(drawing: Drawing) -> tuple[str, tuple[Finding, ...], tuple[DrawingError, ...]]:
+    """Return the text of a file with the dimensions of this drawing, the findings about its
+    callouts, and the callouts whose limits are wrong: these are written without limits. A
+    dimension that fits no drawn feature is a comment. InputError for a drawing without anything to
+    measure."""
     faults: list[DrawingError] = []
     said, findings = dimensions_of(drawing, faults=faults)
     features = features_of(drawing.paths)
@@ -52,18 +60,18 @@ def proposed(drawing: Drawing) -> tuple[str, tuple[Finding, ...], tuple[DrawingE
     lost: list[tuple[Dimension, Finding]] = []
     for each in said:
         bound = bind(each, features, drawing.file)
-        if isinstance(bound, Bound):
+        if isinstance(bound, BoundDimension):
             known.add(measured_by(bound))
             rows.append(each)
         else:
             lost.append((each, bound))
     left = 0
     for each in _sizes(features, drawing.paths.closed.tolist()):
-        if len(rows) >= MOST_DIMENSIONS:
+        if len(rows) >= MAX_DIMENSIONS:
             left += 1
             continue
         bound = bind(each, features, drawing.file)
-        if isinstance(bound, Bound) and measured_by(bound) not in known:
+        if isinstance(bound, BoundDimension) and measured_by(bound) not in known:
             known.add(measured_by(bound))
             rows.append(limited(each, bound.drawn_mm)[0])
     if not rows and not lost:
@@ -86,7 +94,7 @@ def proposed(drawing: Drawing) -> tuple[str, tuple[Finding, ...], tuple[DrawingE
 
 
 def _row(each: Dimension) -> str:
-    """One [[dimension]]."""
+    """Format one [[dimension]]."""
     lines = ["", "[[dimension]]", f"name = {quoted(each.name)}", f'kind = "{each.kind}"']
     if each.kind == "distance":
         first, second = each.places_mm
@@ -113,7 +121,7 @@ def _pair(place: Place) -> str:
 
 
 def _turned(direction: float) -> str:
-    """x, y or degrees."""
+    """Format a direction: x, y or degrees."""
     degrees = math.degrees(direction) % 180.0
     for name, of in (("x", 0.0), ("y", 90.0), ("x", 180.0)):
         if abs(degrees - of) <= 10.0**-DIGITS:
@@ -122,10 +130,10 @@ def _turned(direction: float) -> str:
 
 
 def _sizes(features: Iterable[Feature], closed: Sequence[bool]) -> Iterator[Dimension]:
-    """The sizes of all paths, path by path: circles, slots, outlines."""
+    """Yield the sizes of all paths, path by path: circles, slots, outlines."""
     paths = [list(of) for _, of in groupby(features, lambda each: each.path)]
-    circles = [of[0] for of in paths if len(of) == 1 and isinstance(of[0], Circle)]
-    whole = [each for each in circles if each.whole]
+    circles = [of[0] for of in paths if len(of) == 1 and isinstance(of[0], CircleFeature)]
+    whole = [each for each in circles if each.is_closed]
     shapes = [of for of in paths if closed[of[0].path] and of[0] not in whole]
     for number, circle in enumerate(whole, 1):
         name, size = f"circle {number}", 2.0 * circle.radius_mm
@@ -144,9 +152,10 @@ def _sizes(features: Iterable[Feature], closed: Sequence[bool]) -> Iterator[Dime
 
 
 def _slot(of: Sequence[Feature]) -> tuple[tuple[Place, Place, float], ...] | None:
-    """From, to and direction of the width and the length of a slot; None for anything else."""
-    ends = [each for each in of if isinstance(each, Circle)]
-    edges = [each for each in of if isinstance(each, Edge)]
+    """Return start, end and direction of the width and of the length of a slot; None for other
+    paths."""
+    ends = [each for each in of if isinstance(each, CircleFeature)]
+    edges = [each for each in of if isinstance(each, EdgeFeature)]
     if len(ends) != 2 or len(edges) != 2:
         return None
     half = all(abs(abs(float(each.arcs[:, 1].sum())) - math.pi) <= 1e-3 for each in ends)
@@ -163,7 +172,7 @@ def _slot(of: Sequence[Feature]) -> tuple[tuple[Place, Place, float], ...] | Non
 
 
 def _overall(name: str, of: Sequence[Feature]) -> Iterator[Dimension]:
-    """The sizes of a path along x and y."""
+    """Return the overall sizes of a path along x and y."""
     for axis, letter in enumerate("xy"):
         direction = np.eye(2)[axis]
         ends = [_outermost(of, direction, side) for side in (-1.0, 1.0)]
@@ -178,10 +187,11 @@ def _overall(name: str, of: Sequence[Feature]) -> Iterator[Dimension]:
 
 
 def _outermost(of: Sequence[Feature], direction: Floats, side: float) -> Place | None:
-    """The place of an edge or an arc that lies farthest out; None where a corner does."""
+    """Return the place of the outermost edge or arc in a direction; None if a corner is farther
+    out."""
     farthest, place = -math.inf, None
     for each in of:
-        if isinstance(each, Edge):
+        if isinstance(each, EdgeFeature):
             at = max(side * float(direction @ end) for end in (each.start_mm, each.end_mm))
             here = _middle(each) if each.is_square_to(direction) else None
         else:
@@ -198,7 +208,7 @@ def _outermost(of: Sequence[Feature], direction: Floats, side: float) -> Place |
     return place
 
 
-def _middle(edge: Edge) -> Place:
+def _middle(edge: EdgeFeature) -> Place:
     return _point(np.add(edge.start_mm, edge.end_mm) / 2.0)
 
 

@@ -33,7 +33,13 @@ import numpy as np
 from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
-from camtool.inspection.features import Bound, Circle, Edge, End, Feature
+from camtool.inspection.features import (
+    BoundDimension,
+    CircleFeature,
+    DistanceEnd,
+    EdgeFeature,
+    Feature,
+)
 from camtool.records import replace
 
 CIRCLE_STATIONS = 360
@@ -47,18 +53,18 @@ REACHED_MM = 5e-4
 narrower than it), or another cut crosses: stations there are not measured. Planned moves are
 exact to a fifth of this."""
 
-FEWEST_SHARE = 0.25
-"""A feature of which less than this is cut is not measured."""
+MIN_CUT_SHARE = 0.25
+"""Least share of a feature that must be cut for it to be measured."""
 
 LEVEL_SHARE = 0.5
 """A depth at which fewer of the stations are cut than this part of those at the surface (the end
 of a ramp) is not measured by itself."""
 
-MOST_LEVELS = 200
+MAX_LEVELS = 200
 """Depths at which a feature is measured; of more (a helix of many arcs) so many, evenly spaced."""
 
 SAME_LEVEL_MM = 1e-6
-"""Depths that differ by no more are one."""
+"""Depths that differ by at most this are equal."""
 
 ON_PATH_SHARE = 0.25
 """A tool whose centre comes nearer to a feature than this part of its radius runs along it: the
@@ -69,11 +75,10 @@ BESIDE_MM = 0.5
 that far from what was planned."""
 
 
-class Swept(Struct, frozen=True, eq=False, dict=True):
-    """Segments of a tool's path, K: from `a` to `b` (K, 2) mm, `radius` (K,) mm of the tool at the
-    surface, the height `z` (K,) mm to which it is cut at least, and the wanted row (K,) that each
-    belongs to. Where the tool tapers, so that its radius is that at the surface alone, `z` is
-    infinite."""
+class SweptSegments(Struct, frozen=True, eq=False, dict=True):
+    """K segments of the path of a tool: from `a` to `b` (K, 2) mm, `radius` (K,) mm of the tool at
+    the surface, the least height `z` (K,) mm to which it cuts, and the wanted row (K,) of each.
+    For a tapered tool, whose radius is that at the surface only, `z` is infinite."""
 
     a: Floats
     b: Floats
@@ -81,14 +86,14 @@ class Swept(Struct, frozen=True, eq=False, dict=True):
     z: Floats
     row: Ints
 
-    def of(self, which: Ints | Bools) -> Swept:
-        """Some of them."""
-        return Swept(
+    def of(self, which: Ints | Bools) -> SweptSegments:
+        """Select the segments of a mask or of indices."""
+        return SweptSegments(
             self.a[which], self.b[which], self.radius[which], self.z[which], self.row[which]
         )
 
-    def of_rows(self, rows: Ints) -> Swept:
-        """Those of some rows (R,), which are sorted."""
+    def of_rows(self, rows: Ints) -> SweptSegments:
+        """Select the segments of some rows (R,), which are sorted."""
         order, row = self._by_row
         first, last = np.searchsorted(row, rows), np.searchsorted(row, rows, side="right")
         many = last - first
@@ -100,15 +105,16 @@ class Swept(Struct, frozen=True, eq=False, dict=True):
         order = np.argsort(self.row, kind="stable")
         return order, self.row[order]
 
-    def wider(self, by_mm: float) -> Swept:
-        """With a tool whose radius is larger by so much; paths without width stay so."""
+    def wider(self, by_mm: float) -> SweptSegments:
+        """Return the segments for a tool whose radius is larger by `by_mm`; paths without width
+        are not changed."""
         radius = np.where(self.radius > 0.0, np.maximum(self.radius + by_mm, 0.0), 0.0)
-        return Swept(self.a, self.b, radius, self.z, self.row)
+        return SweptSegments(self.a, self.b, radius, self.z, self.row)
 
 
 class Stations(Struct, frozen=True, eq=False):
-    """Where a feature is measured: places (S, 2) mm, unit normals (S, 2) towards the tool, and
-    which of them are (S,). `wide`: radians or mm from one to the next."""
+    """Points at which a feature is measured: places (S, 2) mm, unit normals (S, 2) towards the
+    tool, and their indices (S,). `wide`: distance between neighbours, in radians or mm."""
 
     places: Floats
     normals: Floats
@@ -117,10 +123,11 @@ class Stations(Struct, frozen=True, eq=False):
 
 
 class Cut(Struct, frozen=True, eq=False):
-    """How a feature is cut: on which `side` the tool runs (+1: outside of a circle, left of an
-    edge), whether it runs along it (`on_path`), the wanted `rows` that cut it, its stations, and
-    at which of them (L, S) it is cut at each of L depths: by the moves that cut at least to
-    `levels_mm`, falling from the surface (infinite), where all of them count, to the deepest."""
+    """The cut of a feature: the `side` on which the tool runs (+1: outside of a circle, left of an
+    edge), `on_path` if it runs along the feature, the wanted `rows` that cut it, its stations, and
+    the mask (L, S) of stations that are cut at each of L depths. The moves that cut at least to
+    `levels_mm` count at each depth; these fall from the surface (infinite), where all count, to
+    the deepest."""
 
     side: int
     on_path: bool
@@ -131,8 +138,8 @@ class Cut(Struct, frozen=True, eq=False):
 
 
 def stations_of(feature: Feature, side: int) -> Stations:
-    """The stations of a feature."""
-    if isinstance(feature, Circle):
+    """Return the stations of a feature."""
+    if isinstance(feature, CircleFeature):
         wide = 2.0 * math.pi / CIRCLE_STATIONS
         angle = np.arange(0.5 * wide, 2.0 * math.pi, wide)
         spoke = np.column_stack([np.cos(angle), np.sin(angle)])
@@ -155,47 +162,47 @@ SURFACE = np.array([math.inf])
 def envelope(
     feature: Feature,
     stations: Stations,
-    swept: Swept,
-    asked: Bools,
+    swept: SweptSegments,
+    mask: Bools,
     *,
     levels_mm: Floats = SURFACE,
     above_mm: float = 0.0,
 ) -> Floats:
-    """(L, S) mm: where the machined edge lies along each normal at each of L depths, which fall,
-    above 0 where material is left, at the stations that are `asked` (L, S) for; infinite where no
-    segment clears it, or only more than `above_mm` (not 0) above the middle of all.
+    """Compute the position (L, S) mm of the machined edge along each normal at L falling depths,
+    above 0 where material is left, at the stations `mask` (L, S); infinite where no segment
+    clears it, or only more than `above_mm` (not 0) above the middle of all.
 
     Segments that cross a normal themselves come first, which is quick, and gives a bound: of the
     others only those can matter whose discs reach below it.
     """
-    crossing = _envelope(feature, stations, swept, asked, levels_mm, -math.inf)
+    crossing = _envelope(feature, stations, swept, mask, levels_mm, -math.inf)
     bound = math.inf
-    finite = asked & np.isfinite(crossing)
+    finite = mask & np.isfinite(crossing)
     if finite.any() and above_mm:
         middles = [np.median(row[here]) for row, here in zip(crossing, finite, strict=True)
                    if here.any()]  # fmt: skip
         bound = float(max(middles)) + above_mm
-    elif finite.sum() == asked.sum():
+    elif finite.sum() == mask.sum():
         bound = float(crossing[finite].max(initial=-math.inf))
-    rest = _envelope(feature, stations, swept, asked, levels_mm, bound)
+    rest = _envelope(feature, stations, swept, mask, levels_mm, bound)
     return np.minimum(crossing, rest)
 
 
 def _envelope(
     feature: Feature,
     stations: Stations,
-    swept: Swept,
-    asked: Bools,
+    swept: SweptSegments,
+    mask: Bools,
     levels_mm: Floats,
     bound_mm: float,
 ) -> Floats:
-    """(L, S) mm as `envelope`, of the segments that can reach below `bound_mm`; with −∞, of those
-    that cross a normal themselves."""
+    """Compute `envelope` (L, S) mm of the segments that can reach below `bound_mm`; with −∞, of
+    those that cross a normal themselves."""
     found = np.full((len(levels_mm), len(stations.places)), np.inf)
     segment, station = _pairs(feature, stations, swept, bound_mm)
     # The deepest level to which a segment reaches; the shallower ones follow at the end.
     level = np.searchsorted(-levels_mm, -swept.z + SAME_LEVEL_MM, side="right") - 1
-    wanted: Bools = np.asarray(asked.any(axis=0))
+    wanted: Bools = np.asarray(mask.any(axis=0))
     keep = wanted[station] & (level[segment] >= 0)
     segment, station = segment[keep], station[keep]
     if not len(segment):
@@ -223,17 +230,17 @@ def _envelope(
     low = va[moves] - radius[moves] * nv + share * dv
     np.minimum.at(found, (level[moves][crosses], station[moves][crosses]), low[crosses])
     found = np.minimum.accumulate(found[::-1], axis=0)[::-1]
-    found[~asked] = np.inf
+    found[~mask] = np.inf
     return found
 
 
 def _pairs(
-    feature: Feature, stations: Stations, swept: Swept, bound_mm: float
+    feature: Feature, stations: Stations, swept: SweptSegments, bound_mm: float
 ) -> tuple[Ints, Ints]:
-    """The segments and stations that can meet: those of discs that reach the normal below
-    `bound_mm`."""
+    """Return the pairs of segments and stations that can meet: segments whose discs reach the
+    normal below `bound_mm`."""
     count = len(stations.places)
-    if isinstance(feature, Circle):
+    if isinstance(feature, CircleFeature):
         centre = np.asarray(feature.centre_mm)
         from_a, from_b = swept.a - centre, swept.b - centre
         step = from_b - from_a
@@ -259,7 +266,7 @@ def _pairs(
         low, high = np.minimum(*s) - reach, np.maximum(*s) + reach
     first_at = np.ceil(low / stations.wide - 0.5).astype(np.int64)
     last_at = np.floor(high / stations.wide - 0.5).astype(np.int64)
-    if isinstance(feature, Edge):
+    if isinstance(feature, EdgeFeature):
         first_at, last_at = np.maximum(first_at, 0), np.minimum(last_at, count - 1)
     many = np.clip(last_at - first_at + 1, 0, count)
     segment = np.repeat(np.arange(len(many)), many)
@@ -269,8 +276,9 @@ def _pairs(
 
 
 def _reach(radius: Floats, least_v: Floats, bound_mm: float) -> Floats:
-    """(K,) how far to either side a disc can lie below `bound_mm` on a normal, when its centre is
-    no lower than `least_v`: v − √(r² − u²) ≤ bound needs u² ≤ r² − (v − bound)²."""
+    """Compute how far (K,) to either side a disc can lie and still reach below `bound_mm` on a
+    normal, when its centre is no lower than `least_v`: v − √(r² − u²) ≤ bound needs u² ≤ r² − (v −
+    bound)²."""
     if bound_mm == -math.inf:
         return np.zeros(len(radius))
     below = np.maximum(least_v - bound_mm, 0.0)
@@ -280,8 +288,8 @@ def _reach(radius: Floats, least_v: Floats, bound_mm: float) -> Floats:
 # Which moves cut a feature.
 
 
-def cut_of(feature: Feature, wanted: Swept) -> Cut | None:
-    """How the wanted moves cut a feature; None where they do not.
+def cut_of(feature: Feature, wanted: SweptSegments) -> Cut | None:
+    """Find the wanted moves that cut a feature and how; None if none do.
 
     A tool that tapers makes a feature only where it runs along it, or where its edge at the
     surface is the feature itself: a chamfer is none."""
@@ -293,9 +301,10 @@ def cut_of(feature: Feature, wanted: Swept) -> Cut | None:
     return None if walls is None else walls[0]
 
 
-def _cut_of(feature: Feature, wanted: Swept) -> tuple[Cut, float] | None:
-    """How these moves cut a feature, and how far from it, mm; None where they do not."""
-    near = _near(feature, wanted)
+def _cut_of(feature: Feature, wanted: SweptSegments) -> tuple[Cut, float] | None:
+    """Return the cut of a feature by these moves and their distance from it, mm; None if they do
+    not cut it."""
+    near = _near_feature(feature, wanted)
     v, beside = _offsets(feature, wanted, near)
     near, v = near[beside], v[beside]
     if not len(near):
@@ -326,26 +335,26 @@ def _cut_of(feature: Feature, wanted: Swept) -> tuple[Cut, float] | None:
         middles.append(float(np.median(row[here])) if here.any() else math.inf)
         here[here] = np.abs(row[here] - middles[-1]) <= REACHED_MM
     counts = seen.sum(axis=1)
-    if counts[0] < FEWEST_SHARE * stations.measured.sum():
+    if counts[0] < MIN_CUT_SHARE * stations.measured.sum():
         return None
     enough = counts >= LEVEL_SHARE * counts[0]
     cut = Cut(side, on_path, rows, stations, levels[enough], seen[enough])
     return cut, abs(middles[0])
 
 
-def _levels(swept: Swept) -> Floats:
-    """(L,) mm the heights of all moves, falling; of the highest all moves count, and whatever
-    tapers."""
+def _levels(swept: SweptSegments) -> Floats:
+    """Return the heights (L,) mm of all moves, falling; at the highest one all moves count, and
+    all tapered tools."""
     heights = np.unique(np.round(swept.z[np.isfinite(swept.z)] / SAME_LEVEL_MM) * SAME_LEVEL_MM)
     below = heights[:-1][::-1]
-    if len(below) >= MOST_LEVELS:
-        below = below[np.linspace(0, len(below) - 1, MOST_LEVELS - 1).round().astype(np.int64)]
+    if len(below) >= MAX_LEVELS:
+        below = below[np.linspace(0, len(below) - 1, MAX_LEVELS - 1).round().astype(np.int64)]
     return np.concatenate([SURFACE, below])
 
 
-def _near(feature: Feature, swept: Swept) -> Ints:
-    """Segments whose boxes come within reach of the feature's box."""
-    if isinstance(feature, Circle):
+def _near_feature(feature: Feature, swept: SweptSegments) -> Ints:
+    """Select the segments whose boxes come within reach of the box of the feature."""
+    if isinstance(feature, CircleFeature):
         low = np.asarray(feature.centre_mm) - feature.radius_mm
         high = np.asarray(feature.centre_mm) + feature.radius_mm
     else:
@@ -356,11 +365,11 @@ def _near(feature: Feature, swept: Swept) -> Ints:
     return np.flatnonzero(((most >= low - reach) & (least <= high + reach)).all(axis=1))
 
 
-def _offsets(feature: Feature, swept: Swept, which: Ints) -> tuple[Floats, Bools]:
-    """(J,) mm how far the middles of segments are from the feature, above 0 outside of a circle
-    and left of an edge; and which of them lie beside it and within reach."""
+def _offsets(feature: Feature, swept: SweptSegments, which: Ints) -> tuple[Floats, Bools]:
+    """Compute the distances (J,) mm of the midpoints of segments from the feature, above 0 outside
+    of a circle and left of an edge; and the mask of those beside it and within reach."""
     middle = 0.5 * (swept.a[which] + swept.b[which])
-    if isinstance(feature, Circle):
+    if isinstance(feature, CircleFeature):
         spoke = middle - np.asarray(feature.centre_mm)
         v = np.hypot(spoke[:, 0], spoke[:, 1]) - feature.radius_mm
         beside = feature.has(np.arctan2(spoke[:, 1], spoke[:, 0]))
@@ -376,42 +385,45 @@ def _offsets(feature: Feature, swept: Swept, which: Ints) -> tuple[Floats, Bools
 # Sizes of envelopes.
 
 
-class Size(Struct, frozen=True):
-    """A dimension as machined, mm: the least-squares size, and the least and the largest of its
-    local sizes. Of a zone all three are its width."""
+class MachinedSize(Struct, frozen=True):
+    """A dimension as machined, mm: its least-squares size, and the least and the largest of its
+    local sizes. For a tolerance zone all three are its width."""
 
     fit_mm: float
     low_mm: float
     high_mm: float
 
 
-def edge_at(feature: Feature, cut: Cut, swept: Swept) -> Floats:
-    """(L, S) mm where the feature's machined edge lies at each depth, outwards from a circle and
-    to the left of an edge; NaN where it is not cut. `swept` is what the slides do."""
+def edge_at(feature: Feature, cut: Cut, swept: SweptSegments) -> Floats:
+    """Compute the position (L, S) mm of the machined edge of a feature at each depth, outwards
+    from a circle and to the left of an edge; NaN where it is not cut. `swept` is the path of the
+    slides."""
     lies = envelope(feature, cut.stations, swept, cut.seen, levels_mm=cut.levels_mm)
     lies[~np.isfinite(lies)] = np.nan
     return np.asarray(cut.side * lies)
 
 
-def rows_of(swept: Swept, cut: Cut, feature: Feature) -> Swept:
-    """The segments of the slides that belong to the moves that cut a feature, near it."""
+def rows_of(swept: SweptSegments, cut: Cut, feature: Feature) -> SweptSegments:
+    """Select the segments of the slides near a feature that belong to the moves that cut it."""
     mine = swept.of_rows(cut.rows)
-    mine = mine.of(_near(feature, mine))
+    mine = mine.of(_near_feature(feature, mine))
     return replace(mine, radius=np.zeros(len(mine.a))) if cut.on_path else mine
 
 
-def size_of(bound: Bound, cuts: Sequence[Cut], lies: Sequence[Floats]) -> Size | None:
-    """The size of a dimension from how its features are cut and where their machined edges lie
-    (L, S), as `edge_at` says, in the order of `bound.features`; None where one is not cut. Below
-    the deepest cut of one feature it counts as it is there."""
+def size_of(
+    bound: BoundDimension, cuts: Sequence[Cut], lies: Sequence[Floats]
+) -> MachinedSize | None:
+    """Compute the size of a dimension from the cuts of its features and the positions (L, S) of
+    their machined edges, as from `edge_at`, in the order of `bound.features`; None if one is not
+    cut. Below the deepest cut of a feature its deepest edge counts."""
     levels = [cut.levels_mm for cut in cuts]
     found = sizes_of(bound, levels, [each[None] for each in lies])[0]
-    return Size(*found.tolist()) if np.isfinite(found).all() else None
+    return MachinedSize(*found.tolist()) if np.isfinite(found).all() else None
 
 
-def sizes_of(bound: Bound, levels_mm: Sequence[Floats], lies: Sequence[Floats]) -> Floats:
-    """(N, 3) mm the same of N parts at once: best fit, least and largest local size. `lies`
-    (N, L, S) are where the edges of each feature lie at its depths `levels_mm` (L,); NaN where one
+def sizes_of(bound: BoundDimension, levels_mm: Sequence[Floats], lies: Sequence[Floats]) -> Floats:
+    """Compute best fit, least and largest local size (N, 3) mm of N parts at once. `lies` (N, L,
+    S) are the positions of the edges of each feature at its depths `levels_mm` (L,); NaN where one
     is not cut. A station counts if it is cut on all N parts."""
     every = np.unique(np.concatenate(levels_mm))[::-1]
     found: list[Floats] = []
@@ -421,10 +433,10 @@ def sizes_of(bound: Bound, levels_mm: Sequence[Floats], lies: Sequence[Floats]) 
             edges[:, min(int(np.searchsorted(-own, -level)), edges.shape[1] - 1)]
             for own, edges in zip(levels_mm, lies, strict=True)
         ]
-        if last and all(map(_alike, here, last)):
+        if last and all(map(_are_equal, here, last)):
             continue
         last = here
-        if all(_cut_on_all(each).sum() >= FEWEST_STATIONS for each in here):
+        if all(_cut_on_all(each).sum() >= MIN_STATIONS for each in here):
             found.append(_sizes(bound, here))
     if not found:
         return np.full((len(lies[0]), 3), math.nan)
@@ -435,47 +447,47 @@ def sizes_of(bound: Bound, levels_mm: Sequence[Floats], lies: Sequence[Floats]) 
 
 
 def distinct_levels(nodes: Floats) -> Ints:
-    """The depths of a feature at which its edges are not as they are at the next deeper one that
-    is kept, on any of M parts: `nodes` (M, L, S) mm."""
+    """Return the depths of a feature at which its edges differ from those at the next deeper kept
+    depth on any of M parts: `nodes` (M, L, S) mm."""
     kept = [nodes.shape[1] - 1]
     for level in range(nodes.shape[1] - 2, -1, -1):
-        if not _alike(nodes[:, level], nodes[:, kept[-1]]):
+        if not _are_equal(nodes[:, level], nodes[:, kept[-1]]):
             kept.append(level)
     return np.array(kept[::-1])
 
 
-def _alike(one: Floats, other: Floats) -> bool:
-    """True if edges lie alike, so that their sizes are."""
+def _are_equal(one: Floats, other: Floats) -> bool:
+    """True if the edges have equal positions, and therefore equal sizes."""
     return bool(np.allclose(one, other, rtol=0.0, atol=SAME_LEVEL_MM, equal_nan=True))
 
 
-FEWEST_STATIONS = 3
-"""A size needs at least so many stations."""
+MIN_STATIONS = 3
 
 
 def _cut_on_all(off: Floats) -> Bools:
-    """(S,) the stations that are cut on all parts (N, S)."""
+    """Mask (S,) of the stations that are cut on all parts (N, S)."""
     return np.asarray(np.isfinite(off).all(axis=0))
 
 
-def _sizes(bound: Bound, lies: Sequence[Floats]) -> Floats:
-    """(N, 3) mm of N parts whose features have their edges at `lies` (N, S) each."""
+def _sizes(bound: BoundDimension, lies: Sequence[Floats]) -> Floats:
+    """Compute the sizes (N, 3) mm of N parts whose features have their edges at `lies` (N, S)
+    each."""
     kind = bound.dimension.kind
     if kind == "distance":
         first, second = (
             _values(end, each, bound.direction) for end, each in zip(bound.ends, lies, strict=True)
         )
-        return _between(first, second)
+        return _distances_between(first, second)
     if kind == "profile":
         return _zones(2.0 * np.nanmax(np.abs(lies[0]), axis=1))
     feature, off = bound.features[0], lies[0]
     seen = _cut_on_all(off)
-    if isinstance(feature, Edge):
+    if isinstance(feature, EdgeFeature):
         place = np.linspace(-1.0, 1.0, len(seen))[seen]
         table = np.column_stack([np.ones(len(place)), place])
         return _zones(_widths(table, off[:, seen]))
     points = _circle_points(feature, off)
-    centre, radius = fitted_circles(points, np.asarray(feature.centre_mm))
+    centre, radius = fit_circles(points, np.asarray(feature.centre_mm))
     if kind == "position":
         away = centre - np.asarray(feature.centre_mm)
         return _zones(2.0 * np.hypot(away[:, 0], away[:, 1]))
@@ -488,19 +500,19 @@ def _sizes(bound: Bound, lies: Sequence[Floats]) -> Floats:
     if kind == "radius":
         return np.column_stack([radius, rho.min(axis=1), rho.max(axis=1)])
     local = 2.0 * rho
-    if feature.whole and len(angle) >= 0.5 * CIRCLE_STATIONS:
-        local = rho + _interpolated(angle + math.pi, angle, rho, 2.0 * math.pi)
+    if feature.is_closed and len(angle) >= 0.5 * CIRCLE_STATIONS:
+        local = rho + _interpolate(angle + math.pi, angle, rho, 2.0 * math.pi)
     return np.column_stack([2.0 * radius, local.min(axis=1), local.max(axis=1)])
 
 
 def _zones(wide_mm: Floats) -> Floats:
-    """(N, 3) of zones so wide (N,): best fit, least and largest are one."""
+    """Return (N, 3) sizes of zones of these widths (N,): best fit, least and largest are equal."""
     return np.column_stack([wide_mm, wide_mm, wide_mm])
 
 
-def _interpolated(x: Floats, at: Floats, values: Floats, period: float | None = None) -> Floats:
-    """(N, Q) values at x (Q,) by straight lines between those (N, J) at `at` (J,), which may wrap
-    around after a period."""
+def _interpolate(x: Floats, at: Floats, values: Floats, period: float | None = None) -> Floats:
+    """Interpolate values (N, Q) at x (Q,) linearly between those (N, J) at `at` (J,), which may
+    wrap around after a period."""
     number = np.arange(len(at), dtype=np.float64)
     if period is not None:
         at, x = np.mod(at, period), np.mod(x, period)
@@ -516,23 +528,23 @@ def _interpolated(x: Floats, at: Floats, values: Floats, period: float | None = 
     return np.asarray(values[:, left] * (1.0 - share) + values[:, left + 1] * share)
 
 
-def _circle_points(circle: Circle, off: Floats) -> Floats:
-    """(N, J, 2) mm points of machined circles, by angle, where they are cut."""
+def _circle_points(circle: CircleFeature, off: Floats) -> Floats:
+    """Compute points (N, J, 2) mm of machined circles, by angle, where they are cut."""
     stations = stations_of(circle, 1)
     seen = _cut_on_all(off)
     return np.asarray(stations.places[seen] + off[:, seen, None] * stations.normals[seen])
 
 
 CENTRE_ROUNDS = 50
-"""Rounds of a centre at most; three or four are usual."""
+"""Most iterations for a centre; three or four are usual."""
 
 CENTRE_MM = 1e-9
-"""A centre that moves by less is found."""
+"""An iteration that moves the centre by less is the last."""
 
 
-def fitted_circles(points: Floats, near: Floats) -> tuple[Floats, Floats]:
-    """Centres (N, 2) and radii (N,), mm, with the least squares of radial distances to points
-    (N, J, 2); `near` (2,) is a place near the centres.
+def fit_circles(points: Floats, near: Floats) -> tuple[Floats, Floats]:
+    """Fit circles to points (N, J, 2) by least squares of radial distances; return centres (N, 2)
+    and radii (N,), mm. `near` (2,) is a place near the centres.
 
     Gauss-Newton with the derivatives of the first circle about `near`, from which the others
     differ by micrometres: with d = |p − c| and u = (p − c)/d, [u, 1] (δc, R) = d.
@@ -555,18 +567,18 @@ def fitted_circles(points: Floats, near: Floats) -> tuple[Floats, Floats]:
 
 
 class _Values(Struct, frozen=True, eq=False):
-    """The places of one end of a distance on N parts: values (N, J) mm along the direction of
-    measuring, their places (J,) mm across it (None: it is a point), and the values (N,) of its
-    best fit."""
+    """The positions of one end of a distance on N parts: values (N, J) mm along the direction of
+    measurement, their places (J,) mm across it (None: a point), and the values (N,) of its best
+    fit."""
 
     values: Floats
     across: Floats | None
     fit_mm: Floats
 
 
-def _values(end: End, off: Floats, direction: Floats) -> _Values:
+def _values(end: DistanceEnd, off: Floats, direction: Floats) -> _Values:
     feature, seen = end.feature, _cut_on_all(off)
-    if isinstance(feature, Edge):
+    if isinstance(feature, EdgeFeature):
         stations = stations_of(feature, 1)
         points = stations.places[seen] + off[:, seen, None] * stations.normals[seen]
         across = points[0] @ np.array([-direction[1], direction[0]])
@@ -574,22 +586,22 @@ def _values(end: End, off: Floats, direction: Floats) -> _Values:
         return _Values(values, across, values.mean(axis=1))
     points = _circle_points(feature, off)
     if end.how == "centre":
-        middle = fitted_circles(points, np.asarray(feature.centre_mm))[0] @ direction
+        middle = fit_circles(points, np.asarray(feature.centre_mm))[0] @ direction
         return _Values(middle[:, None], None, middle)
     extreme = end.side * (end.side * (points @ direction)).max(axis=1)
     return _Values(extreme[:, None], None, extreme)
 
 
-def _between(first: _Values, second: _Values) -> Floats:
-    """(N, 3) the distance of two ends: point by point where both are edges beside each other,
-    otherwise any point of one from any of the other."""
+def _distances_between(first: _Values, second: _Values) -> Floats:
+    """Compute the distance (N, 3) of two ends: point by point if both are edges side by side,
+    otherwise between any two of their points."""
     fit = second.fit_mm - first.fit_mm
     if first.across is not None and second.across is not None:
         low, high = second.across.min(), second.across.max()
         beside = (first.across >= low) & (first.across <= high)
         if beside.any():
             across = first.across[beside]
-            local = _interpolated(across, second.across, second.values) - first.values[:, beside]
+            local = _interpolate(across, second.across, second.values) - first.values[:, beside]
             return np.column_stack([fit, local.min(axis=1), local.max(axis=1)])
     least = second.values.min(axis=1) - first.values.max(axis=1)
     most = second.values.max(axis=1) - first.values.min(axis=1)
@@ -605,29 +617,33 @@ def _between(first: _Values, second: _Values) -> Floats:
 
 
 def _widths(table: Floats, off: Floats) -> Floats:
-    """(N,) the widths, mm, of the narrowest zones around deviations (N, J) by functions (J, K)."""
+    """Compute the widths (N,) mm of the narrowest zones around deviations (N, J) by functions (J,
+    K)."""
     ones = np.ones((len(table), 1))
     rows = np.vstack([np.hstack([table, ones]), np.hstack([-table, ones])])
     middle = off.mean(axis=1, keepdims=True)
     bounds = np.hstack([off - middle, middle - off])
     goal = np.append(np.zeros(table.shape[1]), 1.0)
-    return np.maximum(2.0 * least_many(goal, rows, bounds)[:, -1], 0.0)
+    return np.maximum(2.0 * minimise_many(goal, rows, bounds)[:, -1], 0.0)
 
 
-LEAST_ROUNDS = 500
-"""Exchanges of a linear programme at most; some ten are usual."""
+MAX_EXCHANGES = 500
+"""Most exchanges of a linear programme; about ten are usual."""
 
-LEAST_SLACK = 1e-12
-"""A condition that is broken by no more than this holds, mm."""
-
-
-def least(goal: Floats, rows: Floats, bounds: Floats) -> Floats:
-    """(K,) the x with the least goal · x for which rows (J, K) x ≥ bounds (J,)."""
-    return np.asarray(least_many(goal, rows, bounds[None])[0])
+VIOLATION_EPS_MM = 1e-12
+"""A condition violated by at most this holds."""
 
 
-def least_many(goal: Floats, rows: Floats, bounds: Floats) -> Floats:
-    """(N, K) the same for N bounds (N, J) of the same rows.
+def minimise(goal: Floats, rows: Floats, bounds: Floats) -> Floats:
+    """Minimise goal · x over x (K,) subject to rows (J, K) x ≥ bounds (J,)."""
+    return np.asarray(minimise_many(goal, rows, bounds[None])[0])
+
+
+def minimise_many(goal: Floats, rows: Floats, bounds: Floats) -> Floats:
+    """Minimise goal · x, x (N, K), for N bounds (N, J) with the same rows.
+
+    Uses the dual simplex method, from a wide box: K conditions hold exactly; the most violated one
+    replaces one of them until none is violated.
 
     By the dual simplex method, from a wide box: K conditions hold exactly; the one that is broken
     most takes the place of one of them, until none is broken.
@@ -640,7 +656,7 @@ def least_many(goal: Floats, rows: Floats, bounds: Floats) -> Floats:
     active = np.tile(np.arange(len(rows), len(every)), (parts, 1))
     found = np.zeros((parts, count))
     open_ = np.arange(parts)
-    for _ in range(LEAST_ROUNDS):
+    for _ in range(MAX_EXCHANGES):
         own = active[open_]
         basis = every[own]
         held = np.take_along_axis(limits[open_], own, axis=1)
@@ -651,11 +667,11 @@ def least_many(goal: Floats, rows: Floats, bounds: Floats) -> Floats:
         turned = np.swapaxes(basis, 1, 2)
         price = np.linalg.solve(turned, np.broadcast_to(goal, x.shape)[..., None])[..., 0]
         change = np.linalg.solve(turned, every[enters][..., None])[..., 0]
-        may = change > LEAST_SLACK
+        may = change > VIOLATION_EPS_MM
         ratio = np.divide(price, change, out=np.full_like(price, np.inf), where=may)
         leaves = ratio.argmin(axis=1)
         each = np.arange(len(open_))
-        goes_on = (short[each, enters] > LEAST_SLACK) & may.any(axis=1)
+        goes_on = (short[each, enters] > VIOLATION_EPS_MM) & may.any(axis=1)
         open_, each = open_[goes_on], each[goes_on]
         if not len(open_):
             break

@@ -23,7 +23,14 @@ from camtool.errors import DrawingError, InputError, OptionError
 from camtool.findings import Finding
 from camtool.geometry.drawing import Callout, Drawing
 from camtool.inspection.dimensions import ZONES, Dimension, Kind, Limits
-from camtool.inspection.features import BIND_MM, Bound, Circle, Features, bind, features_of
+from camtool.inspection.features import (
+    BIND_MM,
+    BoundDimension,
+    CircleFeature,
+    Features,
+    bind,
+    features_of,
+)
 from camtool.inspection.findings import (
     CALLOUT_TEXT,
     COUNT_DIFFERS,
@@ -33,12 +40,12 @@ from camtool.inspection.findings import (
     DIMENSION_TWICE_DIFFERS,
 )
 from camtool.inspection.limits import (
+    LimitsText,
     NotUnderstood,
-    Words,
     deviation_words,
     general_class,
     limited,
-    plain_words,
+    normalised_words,
     read_words,
 )
 from camtool.plain import one_line
@@ -50,8 +57,8 @@ DIFFERS_MM = 0.02
 """A nominal size that is farther from what is drawn is an error. Inches with three decimals are
 rounded by up to 0.0127 mm."""
 
-LARGEST_MM = 1e6
-"""Places and sizes are no larger, mm."""
+MAX_SIZE_MM = 1e6
+"""Largest size or coordinate."""
 
 Length = str | float
 
@@ -66,11 +73,11 @@ def dimensions_of(
     *,
     faults: list[DrawingError] | None = None,
 ) -> tuple[tuple[Dimension, ...], tuple[Finding, ...]]:
-    """The dimensions of a drawing, those of the file (or of what it says) first, with nominal
-    sizes and limits as far as they are known; and what was found on the way. A dimension that
-    fits no feature is among them. Raises CamtoolError for a file or a callout whose limits are
-    wrong, with place and mend; where `faults` is given, those of callouts join it, and the
-    dimension has no limits."""
+    """Collect the dimensions of a drawing, those of the file first, with nominal sizes and limits
+    as far as they are known, and the findings about them. A dimension that fits no feature is
+    included. Raises CamtoolError for a file or a callout whose limits are wrong, with its place
+    and how to correct it; if `faults` is given, the errors of callouts are added to it, and these
+    dimensions have no limits."""
     if isinstance(tolerances_file, Path):
         tolerances_file = read_tolerances(tolerances_file)
     general, asked = tolerances_file or ("", ())
@@ -81,43 +88,46 @@ def dimensions_of(
     with_limits: dict[str, list[Dimension]] = {}
     for each in asked:
         bound = bind(each, features, file)
-        settled = _settled(each, bound, file, findings)
+        settled = _with_limits(each, bound, file, findings)
         holds = known.setdefault(_measures(each, bound), each)
         if holds is each:
             with_limits[each.source] = settled
             dimensions += settled
         for one in settled if holds is not each else ():
-            findings += (_twice(one, other, file) for other in with_limits[holds.source])
+            findings += (
+                _duplicate_finding(one, other, file) for other in with_limits[holds.source]
+            )
     drawn: list[tuple[int, Dimension]] = []
     for place, callout in enumerate(drawing.callouts):
-        measured = replace(_measured(callout), general=general)
+        measured = replace(_measured_dimension(callout), general=general)
         bound = bind(measured, features, file)
         what = _measures(measured, bound)
         if what in known:
-            findings.append(_twice(measured, known[what], file))
+            findings.append(_duplicate_finding(measured, known[what], file))
             continue
-        drawn_mm = bound.drawn_mm if isinstance(bound, Bound) else math.inf
+        drawn_mm = bound.drawn_mm if isinstance(bound, BoundDimension) else math.inf
         # Programs round the places of a dimension: what is drawn counts.
         if abs(drawn_mm - callout.measured_mm) <= DIFFERS_MM:
             measured = replace(measured, nominal_mm=round(drawn_mm, 9))
-        said = _of_callout(callout, measured, file, features, findings, faults)
+        said = _callout_dimensions(callout, measured, file, features, findings, faults)
         drawn += ((place, each) for each in said)
     kept: list[tuple[int, Dimension]] = []
     for place, each in sorted(drawn, key=lambda item: item[1].limits is None):
         bound = bind(each, features, file)
-        if isinstance(bound, Bound):
+        if isinstance(bound, BoundDimension):
             same = known.setdefault(measured_by(bound), each)
             if same is not each:
                 if same.source != each.source:
-                    findings.append(_twice(each, same, file))
+                    findings.append(_duplicate_finding(each, same, file))
                 continue
-        kept += ((place, one) for one in _settled(each, bound, file, findings))
+        kept += ((place, one) for one in _with_limits(each, bound, file, findings))
     dimensions += (each for _, each in sorted(kept, key=lambda item: item[0]))
-    return tuple(_named(dimensions)), tuple(findings)
+    return tuple(_with_unique_names(dimensions)), tuple(findings)
 
 
-def _twice(one: Dimension, holds: Dimension, file: str) -> Finding:
-    """That two dimensions measure the same; of two of the drawing with other limits, a warning."""
+def _duplicate_finding(one: Dimension, holds: Dimension, file: str) -> Finding:
+    """Return the finding that two dimensions measure the same: a warning if both are of the
+    drawing and their limits differ."""
     where = f"{file}, {one.source}"
     ours, theirs = one.limits, holds.limits
     if ours is None or theirs is None or _deviations(ours) == _deviations(theirs):
@@ -128,16 +138,16 @@ def _twice(one: Dimension, holds: Dimension, file: str) -> Finding:
 
 
 def _deviations(limits: Limits) -> tuple[float, float]:
-    """Lower and upper, mm."""
+    """Return lower and upper deviation, mm."""
     return limits.lower_mm, limits.upper_mm
 
 
-def _settled(
-    dimension: Dimension, bound: Bound | Finding, file: str, findings: list[Finding]
+def _with_limits(
+    dimension: Dimension, bound: BoundDimension | Finding, file: str, findings: list[Finding]
 ) -> list[Dimension]:
-    """The dimension with its limits, once the size of its feature is known; none where its nominal
-    size is another one. What fits no feature stays as far as it is known."""
-    drawn = bound.drawn_mm if isinstance(bound, Bound) else dimension.nominal_mm
+    """Return the dimension with its limits, now that the size of its feature is known, or without
+    limits if its nominal size differs. A dimension without a feature keeps what is known."""
+    drawn = bound.drawn_mm if isinstance(bound, BoundDimension) else dimension.nominal_mm
     if drawn is None or dimension.kind in ZONES:
         return [dimension]
     nominal = dimension.nominal_mm
@@ -147,7 +157,7 @@ def _settled(
             DIMENSION_DIFFERS(where=where, measured=drawn, limit=nominal, name=dimension.name)
         )
         return []
-    with _blamed(file, _place_of(dimension)):
+    with _with_place(file, _place_of(dimension)):
         settled, lacks = limited(dimension, drawn)
     findings += lacks
     return [settled]
@@ -158,24 +168,25 @@ def _place_of(dimension: Dimension) -> str:
     return f"{dimension.source}, at ({x:.3f}, {y:.3f}) mm"
 
 
-def unbound(drawing: Drawing, dimensions: Iterable[Dimension]) -> list[Finding]:
-    """Findings of those that fit no feature of the drawing, or several."""
+def unbound_findings(drawing: Drawing, dimensions: Iterable[Dimension]) -> list[Finding]:
+    """Return the findings about dimensions that fit no feature of the drawing, or several."""
     features = features_of(drawing.paths)
     bound = (bind(each, features, drawing.file) for each in dimensions)
     return [each for each in bound if isinstance(each, Finding)]
 
 
-def _measures(dimension: Dimension, bound: Bound | Finding) -> object:
-    """What is measured; of one that fits nothing what it names."""
-    if isinstance(bound, Bound):
+def _measures(dimension: Dimension, bound: BoundDimension | Finding) -> object:
+    """Return a key of what is measured; for a dimension that fits no feature, of the places that
+    it names."""
+    if isinstance(bound, BoundDimension):
         return measured_by(bound)
     places = frozenset((round(x, 3), round(y, 3)) for x, y in dimension.places_mm)
     angle = dimension.direction_rad
     return dimension.kind, places, None if angle is None else round(angle % math.pi, 6)
 
 
-def measured_by(bound: Bound) -> object:
-    """What is measured: the same of two dimensions that are one."""
+def measured_by(bound: BoundDimension) -> object:
+    """Return a key of what is measured, equal for two dimensions of the same feature."""
     if not bound.ends:
         return bound.dimension.kind, tuple(map(id, bound.features))
     x, y = (round(float(part), 3) + 0.0 for part in bound.direction)
@@ -183,8 +194,8 @@ def measured_by(bound: Bound) -> object:
     return ends, (x, y) if (x, y) > (0.0, 0.0) else (0.0 - x, 0.0 - y)
 
 
-def _named(dimensions: Sequence[Dimension]) -> Iterator[Dimension]:
-    """Each with a name of its own."""
+def _with_unique_names(dimensions: Sequence[Dimension]) -> Iterator[Dimension]:
+    """Give every dimension a name of its own."""
     names = [each.name for each in dimensions]
     taken: set[str] = set()
     for each in dimensions:
@@ -229,8 +240,8 @@ class _File(msgspec.Struct, forbid_unknown_fields=True):
 
 
 def read_tolerances(path: Path) -> Asked:
-    """The general tolerance of a file ("" for none) and its dimensions; CamtoolError with file,
-    place and mend for anything that it may not say."""
+    """Read the general tolerance of a file ("" for none) and its dimensions; CamtoolError with
+    file, place and correction for invalid content."""
     file = str(path)
     whole = read_table(path)
     if isinstance(whole.get("dimension"), dict):
@@ -249,7 +260,7 @@ def read_tolerances(path: Path) -> Asked:
             "begins a file",
         )
     if table.general:
-        with _blamed(file, "key general"):
+        with _with_place(file, "key general"):
             general_class(table.general)
     rows = [
         _dimension(convert(row, _Row, file, f"dimension {number}"), number, table.general, path)
@@ -259,8 +270,8 @@ def read_tolerances(path: Path) -> Asked:
 
 
 @contextmanager
-def _blamed(file: str, where: str) -> Iterator[None]:
-    """An error of the block gets file and place."""
+def _with_place(file: str, where: str) -> Iterator[None]:
+    """Add file and place to an error of the block."""
     try:
         yield
     except OptionError as error:
@@ -268,12 +279,12 @@ def _blamed(file: str, where: str) -> Iterator[None]:
 
 
 def _dimension(row: _Row, number: int, general: str, path: Path) -> Dimension:
-    """A dimension as the file says it."""
+    """Convert a row of the file to a dimension."""
     place = f"dimension {number}"
     _check_keys(row, str(path), place)
 
-    def mm(value: Length, key: str, least: float = -LARGEST_MM) -> float:
-        with _blamed(str(path), f"{place}, key {key}"):
+    def mm(value: Length, key: str, least: float = -MAX_SIZE_MM) -> float:
+        with _with_place(str(path), f"{place}, key {key}"):
             return _mm(value, key, least)
 
     pairs = {"at": row.at, "from": row.start, "to": row.to}
@@ -294,7 +305,7 @@ def _dimension(row: _Row, number: int, general: str, path: Path) -> Dimension:
         limits = Limits(0.0, size, f"zone {size:g}")
     nominal = None if row.nominal is None else mm(row.nominal, "nominal", 0.0)
     if row.limits is not None:
-        with _blamed(str(path), f"{place}, key limits"):
+        with _with_place(str(path), f"{place}, key limits"):
             said = read_words(row.limits)
             _check_units(row.nominal, said)
             words = row.limits
@@ -302,7 +313,7 @@ def _dimension(row: _Row, number: int, general: str, path: Path) -> Dimension:
                 limits, words = said.limits(nominal), ""
     direction = None
     if row.direction is not None:
-        with _blamed(str(path), f"{place}, key direction"):
+        with _with_place(str(path), f"{place}, key direction"):
             direction = _direction(row.direction)
     if len(places) == 2 and math.dist(*places) <= BIND_MM:
         raise InputError(
@@ -325,7 +336,7 @@ def _dimension(row: _Row, number: int, general: str, path: Path) -> Dimension:
 
 
 def _check_keys(row: _Row, file: str, place: str) -> None:
-    """InputError for a key that this kind lacks or does not know."""
+    """Raise InputError for a key that this kind lacks or does not know."""
     given = {
         "at": row.at,
         "from": row.start,
@@ -356,16 +367,16 @@ def _check_keys(row: _Row, file: str, place: str) -> None:
 
 def _mm(value: Length, name: str, least: float) -> float:
     found = parse_length(value, name=name) if isinstance(value, str) else float(value)
-    if not least <= found <= LARGEST_MM:
+    if not least <= found <= MAX_SIZE_MM:
         raise OptionError(
-            f"{name} {value!r} is not between {least:g} and {LARGEST_MM:g} mm",
+            f"{name} {value!r} is not between {least:g} and {MAX_SIZE_MM:g} mm",
             mend="correct it or its unit",
         )
     return found
 
 
-def _check_units(nominal: Length | None, words: Words) -> None:
-    """OptionError where one is in inches and the other in millimetres."""
+def _check_units(nominal: Length | None, words: LimitsText) -> None:
+    """Raise OptionError if one is in inches and the other in millimetres."""
     unit = re.sub(r"[\s\d.+/-]", "", nominal) if isinstance(nominal, str) else ""
     if not unit or words.in_inches is None:
         return
@@ -381,7 +392,7 @@ def _unit_name(unit: str) -> str:
 
 
 def _direction(value: Length) -> float:
-    """x, y or an angle, as rad."""
+    """Convert x, y or an angle to rad."""
     if isinstance(value, str) and value.strip().lower() in ("x", "y"):
         return 0.0 if value.strip().lower() == "x" else math.pi / 2.0
     try:
@@ -394,9 +405,9 @@ def _direction(value: Length) -> float:
 # Callouts
 
 
-class Said(Struct, frozen=True):
-    """The text of a callout, understood: `count` of equal features, `sign` "Ø", "R" or "", the
-    nominal size ("<>" is None), the `words` of its limits, and whether the size is only for
+class CalloutText(Struct, frozen=True):
+    """The parsed text of a callout: `count` of equal features, `sign` "Ø", "R" or "", the nominal
+    size (None for "<>"), the `words` of its limits, and `bare` if the size has no tolerance: for
     information, in parentheses, or theoretically exact, in brackets."""
 
     count: int = 1
@@ -407,7 +418,7 @@ class Said(Struct, frozen=True):
 
 
 _NOTES = re.compile(r"(?i)\s*\b(?:typ\.?|thru|through)(?=\s|$)")
-"""Words that say nothing about limits."""
+"""Texts that state no limits."""
 
 _TEXT = re.compile(r"(?:(?P<count>\d{1,3})\s?[xX×]\s*)?(?P<sign>[Ø⌀∅ϕφΦR])?\s*(?P<rest>.*)")
 _NUMBER = r"(?:\d+(?:\.\d*)?|\.\d+)"
@@ -420,32 +431,32 @@ _SIZES = re.compile(rf"{_NUMBER}\s*(?:/|…|\.\.\.?|\bto\b|\s)\s*{_NUMBER}\s*(?:
 _AROUND = {"(": ")", "[": "]"}
 
 
-def read_text(text: str, mm_per_unit: float = 1.0) -> Said | None:
-    """The text of a callout, numbers without a unit in one of so many mm; None where it is not
-    understood.
+def read_text(text: str, mm_per_unit: float = 1.0) -> CalloutText | None:
+    """Parse the text of a callout; numbers without a unit are multiplied by `mm_per_unit`. None if
+    it is not understood.
 
     >>> read_text("4x Ø5 H7")
-    Said(count=4, sign='Ø', nominal_mm=5.0, words='H7', bare=False)
+    CalloutText(count=4, sign='Ø', nominal_mm=5.0, words='H7', bare=False)
     """
-    plain = plain_words(_NOTES.sub("", text)) or "<>"
+    plain = normalised_words(_NOTES.sub("", text)) or "<>"
     bare = _AROUND.get(plain[:1], "") == plain[-1:] != ""
     found = _TEXT.fullmatch(plain[1:-1].strip() if bare else plain)
     if found is None or found["count"] == "0":
         return None
     sign = "Ø" if found["sign"] not in ("R", None) else found["sign"] or ""
-    said = Said(count=int(found["count"] or 1), sign=sign, bare=bare)
+    said = CalloutText(count=int(found["count"] or 1), sign=sign, bare=bare)
     size = _SIZE.fullmatch(found["rest"])
     if size is None:  # limits of size alone: 20.1/19.9
         return replace(said, words=found["rest"]) if _SIZES.fullmatch(found["rest"]) else None
     nominal = None
     if size["size"] != "<>":
         nominal = float(size["size"]) * MM_PER_UNIT.get(size["unit"] or "", mm_per_unit)
-        if not 0.0 < nominal <= LARGEST_MM:
+        if not 0.0 < nominal <= MAX_SIZE_MM:
             return None
     return replace(said, nominal_mm=nominal, words=size["limits"] or "")
 
 
-def _of_callout(
+def _callout_dimensions(
     callout: Callout,
     measured: Dimension,
     file: str,
@@ -453,7 +464,7 @@ def _of_callout(
     findings: list[Finding],
     faults: list[DrawingError] | None,
 ) -> Iterator[Dimension]:
-    """What a callout says of what it measures: one dimension, or as many as its text counts."""
+    """Return the dimensions of a callout: one, or as many as its text counts."""
     where = f"{file}, {callout.source}"
     text = one_line(callout.text)
     if callout.scale != 1.0:
@@ -466,7 +477,7 @@ def _of_callout(
     if said is None:
         findings.append(CALLOUT_TEXT(where=where, text=text))
         return
-    one = _as_said(measured, said.sign)
+    one = _by_sign(measured, said.sign)
     assert one.nominal_mm is not None
     drawn = one.nominal_mm
     nominal = drawn if said.nominal_mm is None else round(said.nominal_mm, 9)
@@ -494,11 +505,11 @@ def _of_callout(
         faults.append(fault)
     alone = said.bare or callout.exact or limits is not None
     one = replace(one, limits=limits, general="" if alone else one.general)
-    yield from _counted(one, said.count, features, where, findings)
+    yield from _repeat_by_count(one, said.count, features, where, findings)
 
 
-def _measured(callout: Callout) -> Dimension:
-    """What a callout measures, without what its text says."""
+def _measured_dimension(callout: Callout) -> Dimension:
+    """Return the dimension that a callout measures, without its text."""
     linear = callout.kind == "linear"
     return Dimension(
         name="",
@@ -513,8 +524,8 @@ def _measured(callout: Callout) -> Dimension:
 _OF_SIGN: dict[str, Kind] = {"Ø": "diameter", "R": "radius"}
 
 
-def _as_said(measured: Dimension, sign: str) -> Dimension:
-    """A text with Ø or R makes a diameter of a radius, and back."""
+def _by_sign(measured: Dimension, sign: str) -> Dimension:
+    """Convert a radius to a diameter if the text has Ø, and back for R."""
     kind = _OF_SIGN.get(sign, measured.kind)
     if measured.kind == "distance" or kind == measured.kind or measured.nominal_mm is None:
         return measured
@@ -522,8 +533,9 @@ def _as_said(measured: Dimension, sign: str) -> Dimension:
     return replace(measured, kind=kind, nominal_mm=share * measured.nominal_mm)
 
 
-def _limits(callout: Callout, said: Said, nominal_mm: float) -> Limits | None:
-    """The limits of its text, else those of its style where the text shows them; None without."""
+def _limits(callout: Callout, said: CalloutText, nominal_mm: float) -> Limits | None:
+    """Return the limits of the text, else those of its style if the text shows them; None without
+    either."""
     if said.words:
         return read_words(said.words, callout.mm_per_unit).limits(nominal_mm)
     shown = not callout.text or "<>" in callout.text
@@ -533,11 +545,11 @@ def _limits(callout: Callout, said: Said, nominal_mm: float) -> Limits | None:
     return read_words(deviation_words(lower, upper)).limits(nominal_mm)
 
 
-def _counted(
+def _repeat_by_count(
     one: Dimension, count: int, features: Features, where: str, findings: list[Finding]
 ) -> Iterator[Dimension]:
-    """The dimension, and the same of the other circles of its size where there are as many as it
-    counts; where there are not, it stands alone and a finding says so."""
+    """Return the dimension and the same of the other circles of its size, if there are as many as
+    it counts; otherwise the dimension alone, with a finding."""
     if count == 1:
         yield one
         return
@@ -546,7 +558,7 @@ def _counted(
     equal = [
         each
         for each in features
-        if isinstance(each, Circle)
+        if isinstance(each, CircleFeature)
         and one.kind != "distance"
         and abs(each.radius_mm - radius) <= BIND_MM
     ]

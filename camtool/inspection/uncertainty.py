@@ -3,9 +3,9 @@
     machine ─inputs_of─▶ Inputs ─propagate─▶ Budget      finite differences of simulations
                               └─monte_carlo─▶ Draws      a simulation for each draw
 
-Whoever asks gives `machined`, a function that simulates a program on a `Variant` (a machine, and
-by how much its tool is wider) and returns where the T machined edges of its part lie, mm; and
-`measure`, which takes K sizes from such edges, mm. All inputs act on a machine along few
+Whoever asks gives `machined`, a function that simulates a program on a `MachineVariant` (a
+machine, and by how much its tool is wider) and returns where the T machined edges of its part lie,
+mm; and `measure`, which takes K sizes from such edges, mm. All inputs act on a machine along few
 *directions*, in which the simulation is repeated:
 
     direction      what is moved                   inputs that move along it, with their factors
@@ -69,16 +69,13 @@ if TYPE_CHECKING:
     from camtool.arrays import Bools, Floats
 
 PROBE_MM = 0.01
-"""The step along a length, mm, where no standard uncertainty is known."""
+"""Steps of the inputs whose standard uncertainty is unknown."""
 
 PROBE_SCALE = 1e-3
-"""The same along a scale."""
 
 PROBE_RAD = 1e-3
-"""The same along squareness, rad."""
 
 PROBE_K = 5.0
-"""The same along the temperature, K."""
 
 ROOM_K = 15.0
 """A workshop is within 20 ± 15 °C, whatever it is: the bound of a temperature that is not known.
@@ -93,21 +90,21 @@ EXPANSIONS_OF_PARTS = (0.0, 2e-4)
 (1.06e-4 to 1.98e-4; Callister, Materials Science and Engineering, table B.6). Softer ones grow by
 more: they must be said."""
 
-MOST_SIGMAS = 3.0
+MAX_SIGMAS = 3.0
 """A temperature whose standard uncertainty is known is off by no more of them."""
 
 NEGLIGIBLE_MM = 1e-5
 """A value depends on an input where such a step changes it by more than this, mm."""
 
 CERTAIN = 1e-12
-"""Standard deviations below this are 0, mm."""
+"""Standard deviations below this are taken as 0."""
 
 
 @dataclass(frozen=True)
-class Variant:
-    """A machine that differs from the one in the file; its tool is wider by `wider_mm` than the
-    job says. Variants of the tool alone have the very machine of the one they vary, so that its
-    motion need not be simulated again."""
+class MachineVariant:
+    """A machine that differs from the one in the file, with a tool that is wider by `wider_mm`
+    than in the job. Variants of the tool alone share the machine object of the original, so that
+    its motion is not simulated again."""
 
     machine: Machine
     wider_mm: float = 0.0
@@ -123,7 +120,7 @@ node of its own, in standard uncertainties: it changes an edge by less than 0.05
 to 1 draw in 700."""
 
 DRAWS = 4096
-"""Machines that are drawn."""
+"""Number of machines drawn at random."""
 
 SEED = 20
 """The draws are the same for every part, so that a budget is deterministic."""
@@ -134,24 +131,23 @@ QUANTILES = 64
 LINEAR_MM = 1e-7
 """A size whose draws all lie within this of a linear function of the inputs is linear, mm."""
 
-Machined = Callable[[Variant], "Floats"]
+Machined = Callable[[MachineVariant], "Floats"]
 """Simulates a variant and returns where the edges of its part lie: (T,) mm."""
 
 Measure = Callable[["Floats", "Floats"], "Floats"]
 """Measures the K sizes of N parts, (N, K) mm, from the edges of M simulated ones (M, T) mm and the
 weights (N, M) with which each part mixes these."""
 
-Values = Callable[[Variant], "Floats"]
+Values = Callable[[MachineVariant], "Floats"]
 """Simulates a variant and measures K sizes of its part: (K,) mm."""
 
-Moved = Callable[[Variant, float], Variant]
+Moved = Callable[[MachineVariant, float], MachineVariant]
 
 
 class Direction(Struct, frozen=True):
-    """A way in which machines vary. `moved` gives the variant that is further along it by so much,
-    which may be as low as `lowest`. `bends`: edges may be far from linear in it, with a kink at
-    `kink`; `distorts`: it makes ellipses of circles, so that their least and their largest
-    diameter are."""
+    """A direction in the space of machines. `moved` returns the variant shifted along it, down to
+    `lowest`. `bends`: edges may be far from linear in it, with a kink at `kink`; `distorts`: it
+    turns circles into ellipses, and affects their least and largest diameters."""
 
     name: str
     moved: Moved
@@ -162,9 +158,9 @@ class Direction(Struct, frozen=True):
 
 
 class Input(Struct, frozen=True):
-    """What is uncertain: `name` as in `[uncertainty]` ("x.backlash_mm", "process_mm"), its `value`
-    on the machine, its `standard` uncertainty in the same unit (None: not known), and a `probe`, a
-    step that shows what depends on it.
+    """An uncertain input: `name` as in `[uncertainty]` ("x.backlash_mm", "process_mm"), its
+    `value` on the machine, its `standard` uncertainty in the same unit (None: unknown), and a
+    `probe`, a step that reveals the values that depend on it.
 
     It moves the machine along `along`, (direction, factor), or the machined edges: then `edges`
     are its shares in X and Y. Where it is not known, `missing` are the keys that would say it, and
@@ -187,18 +183,18 @@ class Input(Struct, frozen=True):
 class Inputs(Struct, frozen=True, dict=True):
     """The uncertain inputs of one machine; `correlation` (P, P) in their order."""
 
-    variant: Variant
+    variant: MachineVariant
     each: tuple[Input, ...]
     correlation: Floats
 
     @property
     def directions(self) -> tuple[Direction, ...]:
-        """Those along which any of the inputs moves the machine."""
+        """Directions along which any of the inputs moves the machine."""
         return tuple(dict.fromkeys(one for each in self.each for one, _ in each.along))
 
     @property
     def factors(self) -> Floats:
-        """(D, P) by how much the machine moves along each direction, for 1 of each input."""
+        """Shift (D, P) of the machine along each direction, per unit of each input."""
         found, directions = np.zeros((len(self.directions), len(self.each))), self.directions
         for column, each in enumerate(self.each):
             for direction, factor in each.along:
@@ -207,24 +203,24 @@ class Inputs(Struct, frozen=True, dict=True):
 
     @property
     def standards(self) -> Floats:
-        """(P,) standard uncertainties, 0 where they are not known."""
+        """Standard uncertainties (P,), 0 for unknown ones."""
         return np.array([each.standard or 0.0 for each in self.each])
 
     @property
     def probes(self) -> Floats:
-        """(P,) steps that show what depends on the inputs that are not known, 0 for others."""
+        """Steps (P,) that reveal the dependence on unknown inputs, 0 for others."""
         return np.array([each.probe if each.standard is None else 0.0 for each in self.each])
 
     @property
     def covariance(self) -> Floats:
-        """(P, P); 0 for what is not known."""
+        """Covariance (P, P); 0 for unknown inputs."""
         joint: Floats = self.correlation * np.outer(self.standards, self.standards)
         return joint
 
     @cached_property
     def root(self) -> Floats:
-        """(P, P) the matrix that makes draws of the inputs of N independent standard normal ones:
-        (N, P) @ root. Of inputs that are not correlated it is diagonal."""
+        """Matrix (P, P) that turns N independent standard normal draws into draws of the inputs:
+        (N, P) @ root. Diagonal for uncorrelated inputs."""
         sizes, axes = np.linalg.eigh(self.correlation)
         square = axes * np.sqrt(np.clip(sizes, 0.0, None)) @ axes.T
         return np.asarray(square * self.standards)
@@ -234,7 +230,7 @@ class Inputs(Struct, frozen=True, dict=True):
 
 
 def inputs_of(machine: Machine, tool_diameter_mm: float) -> Inputs:
-    """All that is uncertain where this machine cuts with such a tool (0: one without a width).
+    """Collect the uncertain inputs of this machine with a tool of this diameter (0: no width).
 
     What nothing depends on is left out: the uncertainty of a compensation of 0, that of a tool
     without width, and scatter that is not modelled. Sizes are predicted without scatter.
@@ -281,7 +277,7 @@ def inputs_of(machine: Machine, tool_diameter_mm: float) -> Inputs:
             scatter = axis.repeatability_mm
             found.append(length(f"{name}.repeatability_mm", 0.0, scatter, edges=shares))
     correlation = said.correlation([each.name for each in found])
-    return Inputs(Variant(machine), tuple(found), correlation)
+    return Inputs(MachineVariant(machine), tuple(found), correlation)
 
 
 def _input(
@@ -298,8 +294,8 @@ def _input(
 
 
 def _temperature(machine: Machine) -> Input:
-    """That of the room, K from 20 °C; not known unless both expansions are. Then the expansions
-    differ by as much as those of the materials can that are not said."""
+    """Return the input of the room temperature, K from 20 °C; unknown unless both expansions are
+    known. Unknown expansions may differ as much as those of all materials do."""
     said = machine.uncertainty
     known = said.part_expansion_per_k, said.machine_expansion_per_k
     usual = EXPANSIONS_OF_PARTS, EXPANSIONS_OF_MACHINES
@@ -321,7 +317,7 @@ def _temperature(machine: Machine) -> Input:
         standard = None
     warmer = ROOM_K
     if said.temperature_k is not None:
-        warmer = min(ROOM_K, MOST_SIGMAS * said.temperature_k)
+        warmer = min(ROOM_K, MAX_SIGMAS * said.temperature_k)
     within = [f"the room is within 20 ± {warmer:g} °C"]
     for what, own, (low, high) in zip(("part", "machine"), known, usual, strict=True):
         if own is None:
@@ -340,7 +336,7 @@ def _temperature(machine: Machine) -> Input:
 
 
 def _with_backlash(name: str) -> Moved:
-    def moved(variant: Variant, by_mm: float) -> Variant:
+    def moved(variant: MachineVariant, by_mm: float) -> MachineVariant:
         machine = variant.machine
         index = "xy".index(name)
         cells = machine.play_map.used[index]
@@ -360,7 +356,7 @@ def _more_play(cells: PlayCells, by_mm: float) -> PlayCells:
 
 
 def _with_scale(name: str) -> Moved:
-    def moved(variant: Variant, by: float) -> Variant:
+    def moved(variant: MachineVariant, by: float) -> MachineVariant:
         axes = variant.machine.axes
         axis = axes.x if name == "x" else axes.y
         axis = replace(axis, real_step_mm=axis.real_step_mm * (1.0 + by))
@@ -369,26 +365,26 @@ def _with_scale(name: str) -> Moved:
     return moved
 
 
-def _grown(variant: Variant, by: float) -> Variant:
+def _grown(variant: MachineVariant, by: float) -> MachineVariant:
     return _with_scale("y")(_with_scale("x")(variant, by), by)
 
 
-def _with_squareness(variant: Variant, by_rad: float) -> Variant:
+def _with_squareness(variant: MachineVariant, by_rad: float) -> MachineVariant:
     mechanics = variant.machine.mechanics
     lean = mechanics.squareness_rad + by_rad
     return _varied(variant, mechanics=replace(mechanics, squareness_rad=lean))
 
 
-def _with_tool(variant: Variant, by_mm: float) -> Variant:
+def _with_tool(variant: MachineVariant, by_mm: float) -> MachineVariant:
     return replace(variant, wider_mm=variant.wider_mm + by_mm)
 
 
-def _varied(variant: Variant, **records: Any) -> Variant:
+def _varied(variant: MachineVariant, **records: Any) -> MachineVariant:
     return replace(variant, machine=replace(variant.machine, **records))
 
 
-def without_scatter(variant: Variant) -> Variant:
-    """The variant whose slides arrive where their axes on average do."""
+def without_scatter(variant: MachineVariant) -> MachineVariant:
+    """Return the variant whose axes arrive at their mean positions."""
     axes = variant.machine.axes
     if not any(axis.repeatability_mm for axis in axes):
         return variant
@@ -402,15 +398,15 @@ def without_scatter(variant: Variant) -> Variant:
 
 
 def opposite_edges(direction_rad: float) -> Floats:
-    """(2, 2) the weights of a width or a diameter that is measured along a direction: its two
-    edges in X and Y."""
+    """Return the weights (2, 2) of a width or a diameter measured along a direction: its two edges
+    in X and Y."""
     along = math.cos(direction_rad), math.sin(direction_rad)
     return np.array([along, (-along[0], -along[1])])
 
 
 def edges_of(features: Sequence[tuple[int, Floats]]) -> Floats:
-    """(K, E, 2) weights from those (E_f, 2) of each of some features, of which so many values are
-    taken, such as a least and a greatest diameter. Features share no edges."""
+    """Return weights (K, E, 2) from the weights (E_f, 2) of some features, each with a number of
+    values, such as a least and a greatest diameter. Features share no edges."""
     rows = sum(count for count, _ in features)
     weights = np.zeros((rows, sum(len(own) for _, own in features), 2))
     row = column = 0
@@ -423,11 +419,11 @@ def edges_of(features: Sequence[tuple[int, Floats]]) -> Floats:
 # Propagation by finite differences.
 
 
-class Contribution(Struct, frozen=True):
-    """What one input adds to the uncertainty of a value. `standard_mm` is the value's standard
-    uncertainty if only this input were uncertain: |sensitivity| times that of the input, and what
-    bends add; `variance_mm2` is its part of the value's variance, with its share of the
-    covariances: these add up, and may be negative."""
+class InputContribution(Struct, frozen=True):
+    """The contribution of one input to the uncertainty of a value. `standard_mm`: standard
+    uncertainty of the value if only this input were uncertain, |sensitivity| × that of the input,
+    and the effect of bends; `variance_mm2`: its share of the variance with its covariances; these
+    shares add up, and may be negative."""
 
     input: Input
     sensitivity: float
@@ -463,18 +459,18 @@ class Budget(Struct, frozen=True, eq=False, dict=True):
 
     @property
     def expected(self) -> Floats:
-        """(K,) mm the values that are expected."""
+        """Expected values (K,) mm."""
         return self.values + self.shifts
 
     @cached_property
     def standards(self) -> Floats:
-        """(K,) mm standard uncertainties, from what is known."""
+        """Standard uncertainties (K,) mm from the known inputs."""
         return np.sqrt(np.clip(np.diag(self.covariance), 0.0, None))
 
     @cached_property
     def at_most(self) -> Floats:
-        """(K, P) mm by how much an input that is not known can change a value: infinite where
-        nothing bounds it, 0 where the value does not depend on it."""
+        """Upper bounds (K, P) mm of the change of a value by an unknown input: infinite without a
+        bound, 0 if the value does not depend on it."""
         most = np.array([each.most / each.probe for each in self.inputs])
         matters = self.probed > NEGLIGIBLE_MM
         return np.where(matters, np.where(matters, self.probed, 1.0) * most, 0.0)
@@ -495,11 +491,11 @@ class Budget(Struct, frozen=True, eq=False, dict=True):
         inside = normals_below(below / scatter) - normals_below(-above / scatter)
         return float(np.maximum(inside, 0.0).mean())
 
-    def contributions(self, value: int) -> tuple[Contribution, ...]:
-        """What the known inputs add to a value, the largest first; those that add nothing are left
-        out."""
+    def contributions(self, value: int) -> tuple[InputContribution, ...]:
+        """Return the contributions of the known inputs to a value, the largest first, without
+        those of 0."""
         found = [
-            Contribution(
+            InputContribution(
                 each,
                 float(self.sensitivities[value, column]),
                 math.sqrt(self.alone[value, column]),
@@ -512,8 +508,7 @@ class Budget(Struct, frozen=True, eq=False, dict=True):
         return tuple(sorted(found, key=lambda each: (-abs(each.variance_mm2), -each.standard_mm)))
 
     def unknown(self, value: int) -> tuple[Input, ...]:
-        """The inputs on which a value depends, and of which it is not known how uncertain they
-        are."""
+        """Return the inputs on which a value depends and whose uncertainty is unknown."""
         return tuple(
             each
             for column, each in enumerate(self.inputs)
@@ -521,8 +516,8 @@ class Budget(Struct, frozen=True, eq=False, dict=True):
         )
 
 
-def _mixed(nodes: Floats, weights: Floats) -> Floats:
-    """(N, T) the edges themselves as sizes."""
+def _edges_as_sizes(nodes: Floats, weights: Floats) -> Floats:
+    """Return the edges (N, T) themselves as sizes."""
     return np.asarray(weights @ nodes)
 
 
@@ -531,7 +526,7 @@ def propagate(
     inputs: Inputs,
     edges: Floats,
     *,
-    measure: Measure = _mixed,
+    measure: Measure = _edges_as_sizes,
     extremes: bool = False,
 ) -> Budget:
     """Return the budget of K values: by at most eleven simulations, fourteen where the values are
@@ -622,8 +617,8 @@ def propagate(
 
 
 def _nodes(direction: Direction, standard: float, probe: float, extremes: bool) -> Floats:
-    """(J,) the places along a direction at which the machine is simulated, ascending, 0 among
-    them; 0 alone where nothing is uncertain."""
+    """Return the ascending positions (J,) along a direction at which the machine is simulated, 0
+    among them; only 0 if nothing is uncertain."""
     twice = direction.bends or (extremes and direction.distorts)
     step = (standard or probe) * (STEP_IN_BENDS if twice and standard else 1.0)
     if not step:
@@ -645,8 +640,8 @@ def _weights_of(
     rows: Sequence[Sequence[int]],
     count: int,
 ) -> Floats:
-    """(N, M) the weights of the M simulated machines in N machines that are `off` (N, D) along the
-    directions: by straight lines between the nodes, which go on beyond the outer ones."""
+    """Compute the weights (N, M) of the M simulated machines in N machines at `off` (N, D) along
+    the directions: piecewise linear between the nodes, extrapolated beyond the outer ones."""
     weights = np.zeros((len(off), count))
     weights[:, 0] = 1.0
     each = np.arange(len(off))
@@ -664,8 +659,9 @@ def _weights_of(
 
 
 def _normals(count: int, draws: int) -> Floats:
-    """(N, P) standard normal draws, each column the middles of N equally likely pieces in a random
-    order (a Latin hypercube), whose covariance is then made exactly the unit matrix."""
+    """Draw standard normal samples (N, P), each column the middles of N equally likely intervals
+    in random order (a Latin hypercube), transformed so that their covariance is exactly the unit
+    matrix."""
     random, middles = np.random.default_rng(SEED), _quantiles(draws)
     columns = [random.permutation(middles) for _ in range(count)]
     every = np.column_stack(columns) if columns else np.zeros((draws, 0))
@@ -674,8 +670,8 @@ def _normals(count: int, draws: int) -> Floats:
 
 
 def _quantiles(count: int) -> Floats:
-    """(Q,) the middles of so many equally likely pieces of a standard normal distribution, scaled
-    to a standard deviation of 1."""
+    """Return the middles (Q,) of Q equally likely intervals of a standard normal distribution,
+    scaled to a standard deviation of 1."""
     from statistics import NormalDist
 
     middles = [NormalDist().inv_cdf((k + 0.5) / count) for k in range(count)]
@@ -684,7 +680,7 @@ def _quantiles(count: int) -> Floats:
 
 
 def _weights(edges: Floats, each: Input) -> Floats:
-    """(K, 2E) the weights of the edges with an input's shares in X and Y."""
+    """Return the weights (K, 2E) of the edges with the shares of an input in X and Y."""
     shared: Floats = edges * np.array(each.edges)
     return shared.reshape(len(edges), -1)
 
@@ -699,21 +695,20 @@ class Draws(Struct, frozen=True, eq=False):
 
     @property
     def standards(self) -> Floats:
-        """(K,) mm."""
+        """Standard deviations (K,) mm."""
         return np.asarray(self.values.std(axis=0, ddof=1))
 
     def probability(self, low: int, high: int, limits: tuple[float, float]) -> float:
-        """The share of the draws in which value `low` is not below the lower limit, and value
-        `high` not above the upper one."""
+        """Return the share of the draws in which value `low` is not below the lower limit and
+        value `high` not above the upper one."""
         lower, upper = limits
         inside = (self.values[:, low] >= lower) & (self.values[:, high] <= upper)
         return float(inside.mean())
 
 
 def monte_carlo(values: Values, inputs: Inputs, edges: Floats, draws: int, seed: int) -> Draws:
-    """The values of so many variants, drawn from the inputs' joint normal distribution, each
-    simulated with its own scatter of the axes. What is not known stays as it is; a backlash below
-    0 becomes 0."""
+    """Simulate variants drawn from the joint normal distribution of the inputs, each with its own
+    scatter of the axes. Unknown inputs keep their value; a backlash below 0 becomes 0."""
     random = np.random.default_rng(seed)
     process = next((each for each in inputs.each if all(each.edges)), None)
     found = []
@@ -739,12 +734,13 @@ def monte_carlo(values: Values, inputs: Inputs, edges: Floats, draws: int, seed:
 
 
 def normal_below(z: float) -> float:
-    """The probability that a standard normal variable is at most z; relative error 1e-15."""
+    """Return the probability that a standard normal variable is at most z; relative error
+    1e-15."""
     return 0.5 * math.erfc(-z / math.sqrt(2.0))
 
 
 def normals_below(z: Floats) -> Floats:
-    """(N,) the same of each z (N,)."""
+    """Return the probabilities (N,) that a standard normal variable is at most each z (N,)."""
     return np.array([normal_below(each) for each in z.tolist()])
 
 
@@ -759,7 +755,8 @@ STEEPNESS = (-FAR, -3.0, 0.0, 3.0, FAR)
 
 
 def both_below(a: float, b: float, correlation: float) -> float:
-    """The probability that two standard normal variables are at most a and b; error below 1e-12.
+    """Return the probability that two standard normal variables are at most a and b; error below
+    1e-12.
 
     Given the first, x, the second is normal about r·x with the variance 1 − r²:
 
@@ -795,9 +792,9 @@ def both_below(a: float, b: float, correlation: float) -> float:
 
 
 def probability(low: float, high: float, covariance: Floats, limits: tuple[float, float]) -> float:
-    """The probability that a lower size is not below the lower limit and an upper one not above
-    the upper limit, both normal with the expectations `low` and `high` and the `covariance`
-    (2, 2). For one size give it twice, with its variance four times. A limit may be infinite."""
+    """Return the probability that a lower size is not below the lower limit and an upper one not
+    above the upper limit, both normal with the expectations `low` and `high` and the `covariance`
+    (2, 2). For one size pass it twice, with its variance four times. A limit may be infinite."""
     lower, upper = limits
     s_low, s_high = (math.sqrt(max(0.0, float(covariance[k, k]))) for k in (0, 1))
     above = _sigmas(low - lower, s_low)
@@ -809,7 +806,7 @@ def probability(low: float, high: float, covariance: Floats, limits: tuple[float
 
 
 def _sigmas(inside: float, standard: float) -> float:
-    """By how many standard deviations something is inside; ±inf where it is certain."""
+    """Return the distance inside a limit in standard deviations; ±inf if it is certain."""
     if standard < CERTAIN:
         return math.inf if inside >= 0.0 else -math.inf
     return inside / standard

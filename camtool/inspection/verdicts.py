@@ -26,7 +26,7 @@ from msgspec import Struct
 from camtool.findings import Finding, Severity
 from camtool.importers.findings import ENTITY_SKIPPED
 from camtool.inspection.dimensions import ZONES, Dimension
-from camtool.inspection.features import Circle, Edge
+from camtool.inspection.features import CircleFeature, EdgeFeature
 from camtool.inspection.findings import (
     DIMENSION_NOT_CUT_THERE,
     DIMENSION_NOT_IN_OUT,
@@ -35,7 +35,7 @@ from camtool.inspection.findings import (
     InspectionCode,
 )
 from camtool.inspection.inspector import Inspected, Inspector
-from camtool.inspection.sizes import Size
+from camtool.inspection.sizes import MachinedSize
 from camtool.inspection.uncertainty import Budget, inputs_of, propagate
 from camtool.records import replace
 from camtool.run import Run
@@ -58,8 +58,8 @@ Required = Literal["in", "not-out"]
 
 
 class Tolerances(Struct, frozen=True):
-    """The dimensions to inspect, the findings of reading them, and what is required of them (None:
-    nothing; they are only told)."""
+    """The dimensions to inspect, the findings of reading them, and the required verdict (None:
+    they are only reported)."""
 
     dimensions: tuple[Dimension, ...]
     findings: tuple[Finding, ...] = ()
@@ -67,9 +67,9 @@ class Tolerances(Struct, frozen=True):
 
 
 def inspect(run: Run, tolerances: Tolerances) -> Run:
-    """The run with the verdicts of its dimensions in its report, and the findings about them. A
-    run without a verification (of a program with errors) is returned as it is. Where something is
-    required, and no dimension with limits was inspected, that is an error.
+    """Add the verdicts of its dimensions to the report of a run, and the findings about them. A
+    run without a verification (of a program with errors) is returned unchanged. If a verdict is
+    required and no dimension with limits was inspected, that is an error.
 
     Raises OptionError where the job scales the part.
     """
@@ -101,7 +101,7 @@ def inspect(run: Run, tolerances: Tolerances) -> Run:
 
 
 def _without_read(findings: Iterable[Finding], run: Run) -> list[Finding]:
-    """The findings but those that dimensions, whose sizes are inspected, were left out."""
+    """Return the findings without those about drawing dimensions that are now inspected."""
     from camtool.importers.dxf.dimensions import CALLOUTS
 
     skipped = () if run.drawing is None else run.drawing.skipped
@@ -125,14 +125,14 @@ hold."""
 
 
 def _as_error(finding: Finding) -> Finding:
-    """The finding, an error if a dimension is not inspected."""
+    """Return the finding, as an error if it says that a dimension is not inspected."""
     wrong = finding.code in NOT_INSPECTED
     return replace(finding, severity=Severity.ERROR) if wrong else finding
 
 
 def verdicts_of(inspector: Inspector, run: Run) -> Iterator[InspectedReport | Finding]:
-    """The verdicts of all dimensions, in order; a finding for one whose feature the slides leave,
-    or may leave on a machine that differs by an uncertainty."""
+    """Return the verdicts of all dimensions, in order, and a finding for each dimension whose
+    feature the slides leave, or may leave on a machine that differs by an uncertainty."""
     if not inspector.dimensions:
         return
     inputs = inputs_of(run.target.machine, inspector.tool_diameter_mm)
@@ -143,13 +143,14 @@ def verdicts_of(inspector: Inspector, run: Run) -> Iterator[InspectedReport | Fi
     measured = np.isfinite([budget.values, budget.standards]).all(axis=0).reshape(-1, 3)
     for index, each in enumerate(inspector.dimensions):
         if measured[index].all():
-            yield _verdict(each, Size(*sizes[index].tolist()), budget, 3 * index)
+            yield _verdict(each, MachinedSize(*sizes[index].tolist()), budget, 3 * index)
         else:
             yield DIMENSION_NOT_CUT_THERE(where=each.bound.dimension.source, name=each.name)
 
 
-def _verdict(each: Inspected, size: Size, budget: Budget, first: int) -> InspectedReport:
-    """The verdict of a dimension whose values are the three from `first` on in the budget."""
+def _verdict(each: Inspected, size: MachinedSize, budget: Budget, first: int) -> InspectedReport:
+    """Return the verdict of a dimension whose values are the three from `first` on in the
+    budget."""
     bound, limits = each.bound, each.bound.dimension.limits
     zone = bound.dimension.kind in ZONES
     lower = upper = None
@@ -196,8 +197,8 @@ def _verdict(each: Inspected, size: Size, budget: Budget, first: int) -> Inspect
 
 
 def _contributions(budget: Budget, value: int) -> tuple[ContributionReport, ...]:
-    """What the inputs contribute to a value: the known ones, the largest first, then those that
-    are not known, first what nothing bounds."""
+    """Return the contributions of the inputs to a value: the known ones, the largest first, then
+    the unknown ones, unbounded ones first."""
     known = (
         ContributionReport(one.input.name, rounded_or_none(one.standard_mm, UM_PER_MM))
         for one in budget.contributions(value)
@@ -216,7 +217,7 @@ def _contributions(budget: Budget, value: int) -> tuple[ContributionReport, ...]
 
 
 def _likely_um(one: ContributionReport) -> float:
-    """A standard uncertainty: that of a uniform distribution where only a bound is known."""
+    """Return a standard uncertainty: that of a uniform distribution if only a bound is known."""
     if one.um is None:
         return math.inf if one.at_most_um is None else one.at_most_um / math.sqrt(3.0)
     return one.um
@@ -225,15 +226,16 @@ def _likely_um(one: ContributionReport) -> float:
 def _decided(
     budget: Budget, first: int, limits: tuple[float | None, float]
 ) -> tuple[float | None, str]:
-    """The verdict on a dimension whose values are the three from `first` on, and the probability
-    to be within its limits: where something is not known the one that is least in favour of the
-    verdict; None where that leaves it open."""
+    """Decide the verdict of a dimension whose values are the three from `first` on, and its
+    probability to be within limits: with unknown inputs the least favourable one; None if they
+    leave the verdict open."""
     low, high = first + 1, first + 2
     lower, upper = -math.inf if limits[0] is None else limits[0], limits[1]
     off_low, off_high = (float(budget.at_most[value].sum()) for value in (low, high))
 
     def chance(share: float) -> float:
-        """With limits that are wider by a share of all that is not known."""
+        """Return the probability with limits widened by a share of the bounds of all unknown
+        inputs."""
         wide = lower - share * off_low, upper + share * off_high
         return budget.probability(low, high, wide)
 
@@ -258,10 +260,10 @@ def _word(chance: float) -> str:
 
 
 def _deciding(
-    size: Size, budget: Budget, limits: tuple[float | None, float | None], first: int
+    size: MachinedSize, budget: Budget, limits: tuple[float | None, float | None], first: int
 ) -> int:
-    """Which of a dimension's values is nearest to its limit, in standard uncertainties, or what is
-    not known changes by most; the best fit where there are no limits."""
+    """Return the index of the value of a dimension that is nearest to its limit, in standard
+    uncertainties, or that unknown inputs change most; the best fit without limits."""
     lower, upper = limits
     if upper is None:
         return first
@@ -278,18 +280,18 @@ def _deciding(
 
 
 def _shown_between(each: Inspected) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Two places in the work frame between which a picture shows the dimension."""
+    """Return two places in the work frame between which a picture shows the dimension."""
     bound, first = each.bound, each.bound.features[0]
     if bound.ends:
         one, other = bound.dimension.places_mm
         return one, other
-    if isinstance(first, Edge):
+    if isinstance(first, EdgeFeature):
         return first.start_mm, first.end_mm
     x, y = first.centre_mm
     away = first.radius_mm * math.sqrt(0.5)
     if bound.dimension.kind in ("diameter", "roundness"):
         return (x - away, y - away), (x + away, y + away)
-    if isinstance(first, Circle) and bound.dimension.kind == "position":
+    if isinstance(first, CircleFeature) and bound.dimension.kind == "position":
         return (x, y), (x, y)
     start, sweep = first.arcs[0].tolist()
     middle = start + 0.5 * sweep
@@ -298,7 +300,8 @@ def _shown_between(each: Inspected) -> tuple[tuple[float, float], tuple[float, f
 
 
 def _findings(verdicts: Iterable[InspectedReport], require: Required | None) -> Iterator[Finding]:
-    """A finding for each dimension that is out or undecided; an error where more is required."""
+    """Return a finding for each dimension that is out or undecided; an error if a verdict is
+    required."""
     for each in verdicts:
         if each.verdict not in ("out", "undecided") or each.upper_mm is None:
             continue

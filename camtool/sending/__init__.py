@@ -1,5 +1,5 @@
-"""Programs to their machines by the machine's own protocol, and virtual machines to try it on.
+"""Sending programs to machines by the machine's own protocol, and virtual machines to test it.
 
-Nothing here knows a machine: its target brings both ends of the wire (`camtool.target.twin` is the
-contract of the virtual one), and these two share no code.
+This package knows no machine: a target supplies both ends of its wire (`camtool.target.twin` is
+the contract of the virtual one), and the two ends share no code.
 """

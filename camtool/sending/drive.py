@@ -1,8 +1,8 @@
-"""A conversation joined to its line, the clock, the journal and the user.
+"""The driver joins a conversation to its line, the clock, the journal and the user.
 
-All that decides what is sent is in the conversation; here bytes are carried, and nothing is
-thought. Before bytes go out the journal says so; only what stops the machine waits for nothing.
-Whatever fails here but the port itself stops the machine before it ends the program.
+The conversation decides what is sent; the driver only carries bytes. The journal records bytes
+before they are sent, except the bytes that stop the machine, which wait for nothing. Any failure
+here, except of the port itself, stops the machine before the program ends.
 """
 
 from __future__ import annotations
@@ -17,26 +17,26 @@ from camtool.errors import OutputError
 from camtool.target.wire import Conversation, Place, Tell, WireState, Write, port_fault
 
 TICK_S = 0.05
-"""The user's wishes and the signals are looked at so often."""
+"""Interval at which requests of the user and signals are read."""
 
-TOLD = "stopping: waiting until it stands (a second Ctrl-C does not wait)"
+STOPPING_MESSAGE = "stopping: waiting until it stands (a second Ctrl-C does not wait)"
 
 REOPEN_S = 60.0
-"""A port that is to come back is waited for so long."""
+"""Time limit for a port that is to come back."""
 
 
-class Wish(Enum):
-    """What the user wants."""
+class Request(Enum):
+    """Requests of the user."""
 
     PAUSE = "pause"
     RESUME = "resume"
     STEP = "step"
     STOP = "stop"
-    CLOSE = "close"  # stop as hard as can be, and wait for nothing
+    CLOSE = "close"  # stop at once by any means, and wait for nothing
 
 
-class Line(Protocol):
-    """What bytes go through (`camtool.sending.line.Line`)."""
+class LineToController(Protocol):
+    """The line to a controller (`camtool.sending.line.OpenPort`)."""
 
     def read(self, wait_s: float) -> bytes: ...
 
@@ -48,53 +48,53 @@ class Line(Protocol):
 
 
 class Record(Protocol):
-    """Where counts are kept (`camtool.sending.journal.Journal`)."""
+    """Storage of counts (`camtool.sending.journal.Journal`)."""
 
     def note(self, place: Place | None = None, **counts: object) -> None: ...
 
 
-def _nothing(_: Conversation) -> None:
+def _watch_nothing(_: Conversation) -> None:
     return
 
 
-def _no_wish() -> Wish | None:
+def _no_wish() -> Request | None:
     return None
 
 
 @dataclass
 class Driver:
-    """Carries a conversation to its end. `speed`: the clock runs so many times as fast as that on
-    the wall, for virtual machines that do the same."""
+    """Carry a conversation over a line to its end. `speed`: ratio of the conversation's clock to
+    real time, for virtual machines with the same ratio."""
 
-    line: Line
+    line: LineToController
     journal: Record | None = None
     block_of: Callable[[int], int] = lambda block: block
-    wish: Callable[[], Wish | None] = _no_wish
-    watch: Callable[[Conversation], None] = _nothing
+    wish: Callable[[], Request | None] = _no_wish
+    watch: Callable[[Conversation], None] = _watch_nothing
     tell: Callable[[str], None] = lambda text: None
     speed: float = 1.0
     place_of: Callable[[Conversation], Place | None] = lambda conversation: conversation.at_mm
     trouble: OutputError | None = field(default=None, init=False)
-    """Why the journal or what the user is shown could not be written, if it could not."""
-    _notes: bool = field(default=True, init=False)
-    _shows: bool = field(default=True, init=False)
+    """The error that kept the journal or the display from being written, if any."""
+    _has_journal: bool = field(default=True, init=False)
+    _has_display: bool = field(default=True, init=False)
     _fault: BaseException | None = field(default=None, init=False)
-    """What else ended it: raised when the machine has been stopped."""
+    """Any other exception that ended it; raised after the machine has been stopped."""
 
     def now(self) -> float:
-        """The time of the conversation, s."""
+        """Return the time of the conversation, s."""
         return time.monotonic() * self.speed
 
     def carry(self, conversation: Conversation) -> WireState:
-        """Hold the conversation; how it ended."""
+        """Hold the conversation and return the state in which it ended."""
         conversation.begin(self.now())
-        going = True
-        while going:
+        is_running = True
+        while is_running:
             try:
-                going = self._act(conversation)
-                if going:
-                    self._hear(conversation)
-                    self._obey(conversation)
+                is_running = self._act(conversation)
+                if is_running:
+                    self._listen(conversation)
+                    self._handle_request(conversation)
             except OSError as error:
                 why, _ = port_fault(error)
                 conversation.lost(f"the port is gone ({why})", self.now())
@@ -105,19 +105,19 @@ class Driver:
                     self._fault = error
                     conversation.stop(self.now())
         self._note(conversation)
-        self._shown(conversation, self.watch, conversation)
+        self._show(conversation, self.watch, conversation)
         if self._fault is not None:
             raise self._fault
         return conversation.state
 
     def _act(self, conversation: Conversation) -> bool:
-        """Do what the conversation wants; False at its end."""
+        """Perform the actions of the conversation; return False at its end."""
         actions = conversation.actions()
         for action in actions:
             if isinstance(action, Tell):
                 continue
             if conversation.state is not WireState.STOPPING and not self._note(conversation):
-                break  # what is not noted must not be sent; the stop is
+                break  # bytes that are not in the journal must not be sent, except the stop
             if isinstance(action, Write):
                 self.line.write(action.data)
             else:
@@ -125,12 +125,12 @@ class Driver:
         self._note(conversation)
         for action in actions:
             if isinstance(action, Tell):
-                self._shown(conversation, self.tell, action.text)
-        self._shown(conversation, self.watch, conversation)
+                self._show(conversation, self.tell, action.text)
+        self._show(conversation, self.watch, conversation)
         return not conversation.ended or conversation.has_actions
 
     def _reopen(self, conversation: Conversation) -> None:
-        """Open the port again as soon as it is there, unless the user stops meanwhile."""
+        """Reopen the port as soon as it exists again, unless the user stops meanwhile."""
         end = time.monotonic() + REOPEN_S
         while not conversation.ended:
             try:
@@ -138,25 +138,26 @@ class Driver:
             except (OSError, ValueError):
                 if time.monotonic() >= end:
                     raise
-                self._obey(conversation)
+                self._handle_request(conversation)
             else:
                 return
 
-    def _shown(self, conversation: Conversation, show: Callable[[Any], None], what: Any) -> None:
-        """Show it to the user. Where that fails, nobody watches the machine any more."""
-        if not self._shows:
+    def _show(self, conversation: Conversation, show: Callable[[Any], None], what: Any) -> None:
+        """Show a value to the user. If that fails, nobody watches the machine, and it is
+        stopped."""
+        if not self._has_display:
             return
         try:
             show(what)
         except BaseException as error:
-            self._shows = False
+            self._has_display = False
             if isinstance(error, OSError):
                 self.trouble = OutputError(f"its output is gone ({error.strerror or error})")
             else:
                 self._fault = error
             conversation.stop(self.now())
 
-    def _hear(self, conversation: Conversation) -> None:
+    def _listen(self, conversation: Conversation) -> None:
         if conversation.ended or conversation.has_actions:
             return
         wait_s = min((conversation.next_s - self.now()) / self.speed, TICK_S)
@@ -167,22 +168,22 @@ class Driver:
         if now >= conversation.next_s:
             conversation.elapsed(now)
 
-    def _obey(self, conversation: Conversation) -> None:
+    def _handle_request(self, conversation: Conversation) -> None:
         wish, now = self.wish(), self.now()
-        if wish is Wish.PAUSE:
+        if wish is Request.PAUSE:
             conversation.pause(now)
-        elif wish is Wish.RESUME:
+        elif wish is Request.RESUME:
             conversation.single = False
             conversation.resume(now)
-        elif wish is Wish.STEP:
+        elif wish is Request.STEP:
             conversation.single = True
             conversation.resume(now)
-        elif wish is Wish.STOP:
+        elif wish is Request.STOP:
             conversation.stop(now)
             if conversation.state is WireState.STOPPING:
                 self._act(conversation)
-                self._shown(conversation, self.tell, TOLD)
-        elif wish is Wish.CLOSE:
+                self._show(conversation, self.tell, STOPPING_MESSAGE)
+        elif wish is Request.CLOSE:
             conversation.hurry(now)
             for action in conversation.actions():
                 if isinstance(action, Write):
@@ -191,22 +192,22 @@ class Driver:
             conversation.lost("camtool was ended before the machine said that it stands", now)
 
     def _note(self, conversation: Conversation) -> bool:
-        """Say in the journal how the conversation stands; when that fails, it is stopped."""
-        if self.journal is None or not self._notes:
+        """Write the counts of the conversation to the journal; if that fails, stop the machine."""
+        if self.journal is None or not self._has_journal:
             return True
         try:
             counts = counts_of(conversation, self.block_of)
             self.journal.note(place=self.place_of(conversation), **counts)
         except OutputError as error:
-            self.trouble, self._notes = error, False
+            self.trouble, self._has_journal = error, False
             conversation.stop(self.now())
             return False
         return True
 
 
 def counts_of(conversation: Conversation, block_of: Callable[[int], int]) -> dict[str, int]:
-    """How far a conversation has come: packets, and the last blocks of the program that are done
-    and that were sent."""
+    """Return the progress of a conversation: packets sent, acknowledged and done, and the last
+    blocks of the program that are done and that were sent."""
     block, sent = conversation.block, conversation.packets[: conversation.sent]
     last = max((packet.block for packet in sent[-1:]), default=-1)
     return {

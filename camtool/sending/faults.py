@@ -1,8 +1,8 @@
-"""A line between two ends, with faults on demand: bytes that are lost, doubled, garbled or late,
+"""A line between two ends with simulated faults: bytes that are lost, doubled, garbled or late,
 and a plug that is pulled.
 
-Faults belong to the line and not to the machine. They are drawn byte by byte from a seed, so that
-a run with faults can be repeated, however its bytes were divided into pieces.
+Faults belong to the line, not to the machine. They are drawn byte by byte from a seed, so that a
+run with faults can be repeated exactly, however its bytes are divided into pieces.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ from camtool.errors import OptionError
 from camtool.target.twin import Twin
 from camtool.units import parse_time
 
-OFTEN: Final = 0.01
-"""How probable a fault is that is asked for without a number."""
+DEFAULT_PROBABILITY: Final = 0.01
+"""Probability of a fault that is requested without a number."""
 
 
 @dataclass(frozen=True)
 class Faults:
-    """What may happen on one direction of a line: each byte is lost, comes twice, or has one of
-    its bits inverted, with these probabilities; what is sent at once comes `late_s` late with the
-    probability `late`; behind `unplug_s` nothing passes."""
+    """Faults of one direction of a line. Each byte is lost, doubled, or has one bit inverted, with
+    the probabilities `drop`, `double` and `garble`; bytes sent together arrive `late_s` late with
+    the probability `late`; after `unplug_s` nothing passes."""
 
     drop: float = 0.0
     double: float = 0.0
@@ -34,7 +34,7 @@ class Faults:
 
     @classmethod
     def of(cls, text: str) -> Faults:
-        """`drop=0.01,double,garble,late=2s,unplug=30s`; OptionError for other text.
+        """Parse `drop=0.01,double,garble,late=2s,unplug=30s`; OptionError for other text.
 
         >>> Faults.of("drop=0.2,late=2s,unplug=1min")
         Faults(drop=0.2, double=0.0, garble=0.0, late=0.01, late_s=2.0, unplug_s=60.0)
@@ -43,11 +43,13 @@ class Faults:
         for part in filter(None, (part.strip() for part in text.split(","))):
             name, has_value, value = part.partition("=")
             if name in ("drop", "double", "garble"):
-                found[name] = _probability(part, value) if has_value else OFTEN
+                found[name] = _probability(part, value) if has_value else DEFAULT_PROBABILITY
             elif name == "late" and has_value:
-                time, _, often = value.partition(":")
+                time, _, probability = value.partition(":")
                 found["late_s"] = parse_time(time)
-                found["late"] = _probability(part, often) if often else OFTEN
+                found["late"] = (
+                    _probability(part, probability) if probability else DEFAULT_PROBABILITY
+                )
             elif name == "unplug" and has_value:
                 found["unplug_s"] = parse_time(value)
             else:
@@ -58,8 +60,8 @@ class Faults:
         return cls(**found)
 
     @property
-    def none(self) -> bool:
-        """Whether the line is without faults."""
+    def is_faultless(self) -> bool:
+        """True if the line is without faults."""
         return self == Faults()
 
     def __str__(self) -> str:
@@ -80,9 +82,9 @@ def _probability(part: str, text: str) -> float:
     return value
 
 
-class Line:
-    """One direction of a line. A byte takes `byte_s` seconds; none overtakes another. `faults` are
-    those of what is sent from now on."""
+class FaultyLine:
+    """One direction of a line. A byte takes `byte_s` seconds, and none overtakes another. `faults`
+    apply to bytes sent from now on."""
 
     def __init__(self, faults: Faults, random: Random, byte_s: float = 0.0) -> None:
         self.faults, self._random, self._byte_s = faults, random, byte_s
@@ -90,7 +92,7 @@ class Line:
         self._free_s = 0.0  # when the last byte will have come
 
     def put(self, data: bytes, now: float) -> None:
-        """Send bytes; those behind the pulling of the plug are lost."""
+        """Send bytes; those after the plug was pulled are lost."""
         faults, random = self.faults, self._random
         if not data:
             return
@@ -106,7 +108,7 @@ class Line:
             self._under_way += [(self._free_s, come)] * copies
 
     def take(self, now: float) -> bytes:
-        """What has come by now."""
+        """Return the bytes that have arrived by now."""
         count = 0
         while count < len(self._under_way) and self._under_way[count][0] <= now:
             count += 1
@@ -114,18 +116,19 @@ class Line:
         return bytes(octet for _, octet in come)
 
     def next_s(self) -> float | None:
-        """When the next byte comes; None: none is under way."""
+        """Return the time at which the next byte arrives; None if none is on its way."""
         return self._under_way[0][0] if self._under_way else None
 
     def _unplugged(self, now: float) -> bool:
         return self.faults.unplug_s is not None and now >= self.faults.unplug_s
 
 
-class Wired:
-    """A twin at the end of a line: `write` to it and `read` what it says, at given times.
+class WiredTwin:
+    """A twin at the end of a line with faults: `write` to it and `read` its answers, at given
+    times.
 
-    `there` are the faults of what goes to the machine, `back` of what comes from it; `paced`:
-    bytes take the time that the machine's rate gives them.
+    `there` are the faults towards the machine, `back` those from it; `paced`: bytes take the
+    time that follows from the baud rate.
     """
 
     def __init__(
@@ -139,8 +142,8 @@ class Wired:
     ) -> None:
         byte_s = twin.byte_s if paced else 0.0
         self.twin = twin
-        self.there = Line(there, Random(f"{seed} there"), byte_s)
-        self.back = Line(back, Random(f"{seed} back"), byte_s)
+        self.there = FaultyLine(there, Random(f"{seed} there"), byte_s)
+        self.back = FaultyLine(back, Random(f"{seed} back"), byte_s)
 
     def connect(self, now: float) -> None:
         """Open the line."""
@@ -154,22 +157,23 @@ class Wired:
         self._run(now)
 
     def read(self, now: float) -> bytes:
-        """What has come from the machine by now, since the last call."""
+        """Return the bytes that have arrived from the machine since the last call."""
         self._run(now)
         return self.back.take(now)
 
     def next_s(self) -> float | None:
-        """When something happens next by itself; None: never."""
+        """Return the time of the next event that happens by itself; None if there is none."""
         times = self.there.next_s(), self.back.next_s(), self.twin.next_s()
         return min((at for at in times if at is not None), default=None)
 
     def turn_s(self) -> float | None:
-        """The same, outputs of a travel left aside: so far a clock that keeps to nothing jumps."""
+        """Return the time of the next event except outputs within a travel: a clock without real
+        time jumps to it."""
         times = self.there.next_s(), self.back.next_s(), self.twin.turn_s()
         return min((at for at in times if at is not None), default=None)
 
     def unplugged(self, now: float) -> bool:
-        """Whether the plug has been pulled."""
+        """True if the plug has been pulled."""
         times = self.there.faults.unplug_s, self.back.faults.unplug_s
         return any(at is not None and now >= at for at in times)
 

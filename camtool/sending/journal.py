@@ -1,12 +1,12 @@
-"""The journal of a program that is sent: how far it has come, as JSON lines that survive a crash.
+"""The journal of a program that is sent: its progress as JSON lines that survive a crash.
 
-The first line says what is sent, by what and where to; each further line how many packets were
-sent, acknowledged and done, the last block that is done for certain and the last one that was
-sent, and the place of the tool (work frame, mm): where the machine says that it is, or else where
-the last block that is done has ended. A line is written before the bytes that it speaks of go out,
-and before the next ones do. After a crash, the last whole line holds. `still` in the last line:
-true if the machine is known to stand at its place. What an earlier program has left is kept until
-something of the new one goes out.
+The first line names the program, the machine and the first block. Each further line has the number
+of packets sent, acknowledged and done, the last block that is done for certain and the last one
+that was sent, and the place of the tool (work frame, mm): as the machine reports it, or else the
+end of the last block that is done. A line is written before its bytes are sent, and again before
+the next ones are. After a crash, the last complete line is valid. `still` in the last line: true
+if the machine is known to stand at its place. The journal of an earlier program is kept until
+something of the new one is sent.
 
     {"journal": 1, "program": "logo.nc", "sha256": "…", "machine": "…", "first": 0, "at": "…"}
     {"s": 1.25, "sent": 12, "acknowledged": 9, "done": 0, "block": -1, "last": 11, …}
@@ -29,20 +29,20 @@ from msgspec import Struct
 from camtool.errors import InputError, OutputError
 
 VERSION = 1
-"""The form of journals: one of another form is refused."""
+"""Version of the format; a journal of another version is refused."""
 SUFFIX = ".journal"
 SYNC_S = 1.0
-"""What it says is brought to the disk itself once in so many seconds, and at the end."""
+"""Interval of fsync, which also runs at the end."""
 
 
 Point = tuple[float, float, float]
 
 
-class Place(Struct, frozen=True):
-    """Where a journal stands: the digest of the program, that of the machine, the target, the
-    first block that is not done for certain (from 0), and whether the program is finished; the
-    last block that was sent (−1: none), the place of the tool (mm, None where the journal does not
-    say) and whether it is known to stand there."""
+class JournalState(Struct, frozen=True):
+    """The state in a journal: digests of the program and of the machine, the target, the first
+    block that is not done for certain (from 0), and True if the program is finished; the last
+    block that was sent (−1: none), the place of the tool (mm, None if unknown) and True if it is
+    known to stand there."""
 
     sha256: str
     machine: str
@@ -55,8 +55,8 @@ class Place(Struct, frozen=True):
 
 
 class Journal:
-    """A journal that is being written. OutputError when it cannot be: nobody would know any more
-    how far the program has come."""
+    """A journal that is being written. Raises OutputError when it cannot be written, since the
+    progress of the program would be lost."""
 
     def __init__(
         self,
@@ -66,8 +66,8 @@ class Journal:
         more: bool = False,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """A new one, which takes the place of an earlier one when something has been sent; with
-        `more`, behind what an earlier one says."""
+        """Begin a journal, which replaces an earlier one as soon as something has been sent; with
+        `more`, append to the earlier one."""
         self.file, self._clock = file, clock
         self._replaces = not more
         self._begun = self._synced = clock()
@@ -82,8 +82,8 @@ class Journal:
         self._add(self._head, sync=True)
 
     def note(self, place: Point | None = None, **counts: Any) -> None:
-        """These counts, with the place of the tool, unless they are what was said last; nothing
-        before something is sent."""
+        """Write these counts with the place of the tool, if they differ from the last ones;
+        nothing is written before something is sent."""
         if counts == self._last or not counts.get("sent"):
             return
         self._last = counts
@@ -95,14 +95,15 @@ class Journal:
         self._add(line, sync=now - self._synced >= SYNC_S)
 
     def _begin_anew(self) -> None:
-        """Drop what an earlier program has left."""
+        """Remove the lines of an earlier program."""
         with suppress(OSError):  # what is no file has nothing to drop
             os.lseek(self._handle, 0, os.SEEK_SET)
             os.ftruncate(self._handle, 0)
         self._add(self._head, sync=False)
 
     def close(self, end: str, why: str, *, still: bool = False, **counts: Any) -> None:
-        """The end, and what was reached; `still`: the machine stands at the place that is said."""
+        """Write the end and its counts; `still`: the machine is known to stand at the place in
+        them."""
         seconds = round(self._clock() - self._begun, 3)
         try:
             line = {"s": seconds, "end": end, "why": why, **counts, "still": still}
@@ -111,7 +112,7 @@ class Journal:
             os.close(self._handle)
 
     def _end_line(self) -> None:
-        """Go to the end; a line that was being written when all ended is given its end."""
+        """Go to the end, and complete a line that was cut short by a crash."""
         if os.lseek(self._handle, 0, os.SEEK_END):
             os.lseek(self._handle, -1, os.SEEK_END)
             if os.read(self._handle, 1) != b"\n":
@@ -153,8 +154,8 @@ class _Line(msgspec.Struct):
     still: bool = False
 
 
-def read_journal(file: Path) -> Place:
-    """Where a journal stands; InputError for a file that is none."""
+def read_journal(file: Path) -> JournalState:
+    """Read the state in a journal; InputError for a file that is none."""
     if file.exists() and not file.is_file():
         raise InputError("is no file that could hold a journal", file=str(file))
     try:
@@ -166,7 +167,7 @@ def read_journal(file: Path) -> Place:
     head = _head(rows[0])
     if head is None:
         raise InputError("is no journal of camtool send", file=str(file))
-    place, new = Place(head.sha256, head.machine, head.target, head.first, False), head
+    place, new = JournalState(head.sha256, head.machine, head.target, head.first, False), head
     for row in rows:
         again = _head(row)
         if again is not None:
@@ -175,15 +176,15 @@ def read_journal(file: Path) -> Place:
         try:
             line = msgspec.json.decode(row, type=_Line)
         except msgspec.DecodeError:
-            continue  # was being written when all ended
+            continue  # cut short by a crash
         if not line.sent and line.end != "finished":
-            continue  # nothing has gone out: what was left before holds
+            continue  # nothing was sent: the earlier state is still valid
         block = max(line.block + 1, new.first)
         if new is head:
             block = max(block, place.block)
         head = new
         last, tool = max(line.last, new.first - 1), line.place
-        place = Place(
+        place = JournalState(
             head.sha256,
             head.machine,
             head.target,
@@ -197,7 +198,8 @@ def read_journal(file: Path) -> Place:
 
 
 def _head(row: bytes) -> _Head | None:
-    """The first line of a journal, None for another; InputError for one of another camtool."""
+    """Parse the first line of a journal, None for another; InputError for one of another
+    camtool."""
     try:
         head = msgspec.json.decode(row, type=_Head)
     except msgspec.DecodeError:

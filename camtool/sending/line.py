@@ -1,4 +1,4 @@
-"""The line to a controller: a serial port, a pseudo-terminal or a socket, held by one process.
+"""The line to a controller: a serial port, a pseudo-terminal or a socket, locked by one process.
 
 pyserial opens all of them: `/dev/ttyUSB0`, `COM3`, `socket://localhost:5007`. Nothing listens on
 the network here.
@@ -23,22 +23,22 @@ from camtool.lock import held
 from camtool.target.wire import port_fault
 
 WRITE_S: Final = 10.0
-"""A port that takes no more bytes for so long is stuck."""
+"""Time limit of a write, after which the port counts as stuck."""
 
-LEAVES_S: Final = 1.0
-"""What was written last, as what stops a machine, has so long to leave the computer."""
+DRAIN_S: Final = 1.0
+"""Time for the last bytes, such as those that stop a machine, to leave the computer."""
 
 REOPEN_S: Final = 0.1
-"""How often a port is looked for that has gone for a while."""
+"""Interval at which a port that is gone is tried again."""
 
-AT_ONCE: Final = 4096
-"""So many bytes are taken from a port at a time."""
+MAX_READ_BYTES: Final = 4096
+"""Most bytes read from a port at a time."""
 
 _FRAMES: Final = ("8N1", "7N1", "8E1", "7E1", "8O1", "7O1", "8N2", "7E2")
 
 
 class Port(Struct, frozen=True):
-    """Which port, and how: `baud` None is for those that have no rate."""
+    """A port and its settings; `baud` None for ports without a rate."""
 
     name: str
     baud: int | None = None
@@ -46,40 +46,40 @@ class Port(Struct, frozen=True):
 
     @property
     def is_virtual(self) -> bool:
-        """Whether it is a socket of this computer or a pseudo-terminal: a rate means nothing."""
+        """True for sockets and pseudo-terminals, which have no rate."""
         if "://" in self.name:
             return True
         return os.path.realpath(self.name).startswith("/dev/pts/")
 
 
-class Line:
-    """An open port. OSError (of pyserial too) when it is gone."""
+class OpenPort:
+    """An open port. Raises OSError (of pyserial too) when it is gone."""
 
     def __init__(self, port: Port) -> None:
         self.port = port
-        self._serial = _opened(port)
+        self._serial = _open_serial(port)
 
     def read(self, wait_s: float) -> bytes:
-        """What has come, after `wait_s` at the latest."""
+        """Return the bytes that have arrived, after at most `wait_s`."""
         self._serial.timeout = max(wait_s, 0.0)
         data = bytes(self._serial.read(1))
         if data:
-            data += bytes(self._serial.read(min(self._serial.in_waiting, AT_ONCE)))
+            data += bytes(self._serial.read(min(self._serial.in_waiting, MAX_READ_BYTES)))
         return data
 
     def write(self, data: bytes) -> None:
-        """Write all of it."""
+        """Write all bytes."""
         self._serial.write(data)
 
     def reopen(self, wait_s: float) -> None:
-        """Close the port for a while, so that the other end sees it, and open it again when it is
-        there, for `wait_s` at the most."""
+        """Close the port for `REOPEN_S`, so that the other end notices, and open it again, with at
+        most `wait_s` of waiting for it."""
         self.close()
         end = time.monotonic() + wait_s
         while True:
             time.sleep(REOPEN_S)
             try:
-                self._serial = _opened(self.port)
+                self._serial = _open_serial(self.port)
             except (OSError, ValueError):
                 if time.monotonic() >= end:
                     raise
@@ -87,18 +87,20 @@ class Line:
                 return
 
     def close(self) -> None:
-        """Close it when what was written has left the computer, after `LEAVES_S` at the latest."""
-        end = time.monotonic() + LEAVES_S
+        """Close the port once all written bytes have left the computer, at the latest after
+        `DRAIN_S`."""
+        end = time.monotonic() + DRAIN_S
         with suppress(OSError, ValueError, AttributeError):  # a socket does not say
             while self._serial.is_open and self._serial.out_waiting and time.monotonic() < end:
-                time.sleep(LEAVES_S / 100.0)
+                time.sleep(DRAIN_S / 100.0)
         with suppress(OSError, ValueError):
             self._serial.close()
 
 
 @contextmanager
-def opened_line(port: Port) -> Iterator[Line]:
-    """The port, opened and held; InputError where it cannot be used, or another camtool has it."""
+def opened_line(port: Port) -> Iterator[OpenPort]:
+    """Open and lock the port within the block; InputError if it cannot be used or another camtool
+    has it."""
     if port.frame not in _FRAMES:
         raise InputError(f"{port.frame!r} is no frame", mend=f"give one of {', '.join(_FRAMES)}")
 
@@ -109,7 +111,7 @@ def opened_line(port: Port) -> Iterator[Line]:
 
     with held(_lock_of(port), taken):
         try:
-            line = Line(port)
+            line = OpenPort(port)
         except (OSError, ValueError) as error:
             why, mend = port_fault(error)
             raise InputError(
@@ -127,7 +129,7 @@ def _lock_of(port: Port) -> Path:
     return Path(tempfile.gettempdir()) / f"camtool-port-{digest}.lock"
 
 
-def _opened(port: Port) -> Any:
+def _open_serial(port: Port) -> Any:
     import serial  # seldom needed
 
     settings: dict[str, Any] = {"timeout": 0.0, "write_timeout": WRITE_S}
@@ -141,24 +143,24 @@ def _opened(port: Port) -> Any:
     return serial.serial_for_url(port.name, **settings)
 
 
-class FoundPort(Struct, frozen=True):
-    """A serial port of this computer: its name, what it says it is, and its hardware id."""
+class SerialPort(Struct, frozen=True):
+    """A serial port of this computer: its name, its description and its hardware id."""
 
     name: str
     description: str
     hardware: str
 
 
-def found_ports() -> list[FoundPort]:
-    """The serial ports of this computer, by name."""
+def list_serial_ports() -> list[SerialPort]:
+    """List the serial ports of this computer, by name."""
     from serial.tools import list_ports
 
     found = [
-        FoundPort(each.device, _said(each.description), _said(each.hwid))
+        SerialPort(each.device, _known_text(each.description), _known_text(each.hwid))
         for each in list_ports.comports()
     ]
     return sorted(found, key=lambda each: each.name)
 
 
-def _said(text: str | None) -> str:
+def _known_text(text: str | None) -> str:
     return "" if text in (None, "n/a") else str(text)

@@ -1,8 +1,8 @@
-"""The page of `send --live`: the predicted path, what of it is acknowledged, and how far that is.
+"""The page of `send --live`: the predicted path, and its acknowledged part in another colour.
 
-It is one self-contained HTML file, which a browser opens from the disk and which asks to be loaded
-again every second; nothing listens on the network for it. The path becomes a list of texts when
-the page is made: what is drawn anew is the beginning of that list.
+It is one self-contained HTML file, which a browser opens from the disk and which reloads itself
+every second; no network port is opened for it. The path is converted to a list of SVG texts once:
+an update writes the beginning of that list.
 """
 
 from __future__ import annotations
@@ -20,28 +20,28 @@ from camtool.arrays import Floats, Ints
 from camtool.target.wire import Place
 from camtool.toolpath.moves import PolarArcs, Toolpath, toolpath_extents
 
-EVERY_S: Final = 1.0
-"""The page is written, and loaded, so often."""
+RELOAD_S: Final = 1.0
+"""Interval at which the page is written and reloaded."""
 
-WIDTH: Final = 900
+WIDTH_PX: Final = 900
 """Larger side of the picture, pixels."""
 
 STEPS_PX: Final = (0.25, 0.5, 1.0, 2.0)
-"""A point is left out where the last drawn one is nearer than this, and arcs become chords as near
-to them: the drawn path is at most twice so far from the tool's. The first with which the page has
-no more than MAX_LINES lines is taken, otherwise the last."""
+"""Least distances between drawn points, and tolerances of the chords of arcs: the drawn path is
+within twice this distance of the tool's. The first with at most MAX_LINES lines is used, else the
+last."""
 
 MAX_LINES: Final = 100_000
-"""So many lines make a page of some megabytes."""
+"""With so many lines the page has some megabytes."""
 
-WIDEST_CHORD_RAD: Final = math.pi / 6.0
+MAX_CHORD_RAD: Final = math.pi / 6.0
 """Turn of the longest chord of an arc."""
 
 MARGIN: Final = 0.04
-"""Around the path, as a part of its larger side."""
+"""Margin around the path, as a share of its larger side."""
 
-ENDS: Final = ("finished", "stopped", "failed")
-"""States behind which the page is not loaded again."""
+END_STATES: Final = ("finished", "stopped", "failed")
+"""States in which the page is no longer reloaded."""
 
 _PAGE: Final = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8">{refresh}<title>{title}</title>
@@ -72,19 +72,19 @@ it is</p></body></html>
 """
 
 
-class _Drawn(Struct, frozen=True, eq=False):
+class _SvgPath(Struct, frozen=True, eq=False):
     """A path from above as pieces of SVG, each with the block that it belongs to (K,)."""
 
     pieces: list[str]
     block: Ints
 
     def until(self, block: int) -> str:
-        """All that belongs to blocks up to this one."""
+        """Return the pieces of all blocks up to this one."""
         return "".join(self.pieces[: int(np.searchsorted(self.block, block, side="right"))])
 
 
 class LivePage:
-    """The page of one program; `decoded` is what is sent."""
+    """The page of one program; `decoded` is the toolpath that is sent."""
 
     def __init__(self, file: Path, title: str, decoded: Toolpath) -> None:
         self.file, self._title = file, title
@@ -96,7 +96,7 @@ class LivePage:
         self._box = f"{left - around:.4f} {-top - around:.4f} {wide:.4f} {high:.4f}"
         self._radius = 0.008 * max(wide, high)
         for step_px in STEPS_PX:
-            self._cuts, rapids = _drawn(path, step_px / WIDTH * max(wide, high))
+            self._cuts, rapids = _svg_paths(path, step_px / WIDTH_PX * max(wide, high))
             if len(self._cuts.pieces) + len(rapids.pieces) <= MAX_LINES:
                 break
         self._ways = "".join(rapids.pieces), "".join(self._cuts.pieces)
@@ -106,7 +106,7 @@ class LivePage:
         self._feeds[~path.is_feed[moves]] = math.inf
 
     def _feed_at(self, block: int) -> str:
-        """The feed of the last move of the blocks up to this one; "" where there is none."""
+        """Return the feed of the last move of the blocks up to this one, "" without one."""
         row = int(np.searchsorted(self._blocks, block, side="right")) - 1
         feed = float(self._feeds[row]) if row >= 0 else math.nan
         return "rapid" if feed == math.inf else f"{feed:g} mm/min" if feed == feed else ""
@@ -121,14 +121,14 @@ class LivePage:
         share: float = 0.0,
         why: str = "",
     ) -> str:
-        """The page; `block`: the last of what is sent that is acknowledged; `place` (x, y, z);
-        `share`: how much of the time is over, 0 to 1."""
+        """Return the page. `block`: the last acknowledged block of what is sent; `place` (x, y, z)
+        of the tool; `share`: share of the time that is over, 0 to 1."""
         rapids, cuts = self._ways
         dot = ""
         if place is not None:
             dot = f'<circle class="place" cx="{place[0]:.4f}" cy="{-place[1]:.4f}" '
             dot += f'r="{self._radius:.4f}"/>'
-        seconds = f'<meta http-equiv="refresh" content="{EVERY_S:g}">'
+        seconds = f'<meta http-equiv="refresh" content="{RELOAD_S:g}">'
         rows = [
             f"<div><dt>{html.escape(name)}</dt><dd>{html.escape(text)}</dd></div>"
             for name, text in ({**facts, "feed": self._feed_at(block)}).items()
@@ -136,7 +136,7 @@ class LivePage:
         ]
         percent = math.floor(100.0 * share)  # 100 only at the end
         return _PAGE.format(
-            refresh="" if state in ENDS else seconds,
+            refresh="" if state in END_STATES else seconds,
             title=html.escape(f"{percent} % {self._title}: {state}"),
             name=html.escape(self._title),
             state=html.escape(state),
@@ -151,19 +151,19 @@ class LivePage:
         )
 
     def write(self, page: str) -> None:
-        """Put the page in the place of the one before, at once; OSError when it cannot be."""
+        """Replace the page at once; OSError when it cannot be written."""
         new = self.file.with_name(f".{self.file.name}.new")
         new.write_text(page, encoding="utf-8")
         new.replace(self.file)
 
 
-def _drawn(path: Toolpath, step_mm: float) -> tuple[_Drawn, _Drawn]:
-    """The cuts and the rapids from above, at most 2 × `step_mm` beside the path of the tool.
-    A line is drawn when it is first gone along: lower passes change nothing."""
+def _svg_paths(path: Toolpath, step_mm: float) -> tuple[_SvgPath, _SvgPath]:
+    """Draw the cuts and the rapids from above, within 2 × `step_mm` of the path of the tool. A
+    line is drawn at its first pass: later passes along it change nothing."""
     points, row = _points(path, step_mm)
     is_feed = path.is_feed[row]
     decimals = max(0, math.ceil(1.0 - math.log10(step_mm)))
-    found: tuple[_Drawn, ...] = ()
+    found: tuple[_SvgPath, ...] = ()
     lines = _lines(path.start[:2].tolist(), points.tolist(), is_feed.tolist(), step_mm)
     for feed in (True, False):
         pieces, blocks, seen = [], [], set()
@@ -181,17 +181,17 @@ def _drawn(path: Toolpath, step_mm: float) -> tuple[_Drawn, _Drawn]:
             pieces.append(("" if at == texts[0] else f"M{texts[0]}") + f"L{texts[1]}")
             blocks.append(latest)
             at = texts[1]
-        found += (_Drawn(pieces, np.array(blocks, dtype=np.int64)),)
+        found += (_SvgPath(pieces, np.array(blocks, dtype=np.int64)),)
     return found[0], found[1]
 
 
 def _points(path: Toolpath, step_mm: float) -> tuple[Floats, Ints]:
-    """(K, 2) mm: points of the moves in order, of arcs as many as chords within `step_mm` need;
-    and the row (K,) that each belongs to."""
+    """Compute points (K, 2) mm along the moves in order, with as many on each arc as chords within
+    `step_mm` need, and the row (K,) of each point."""
     arms = PolarArcs(path, path.is_arc)
     radius = np.maximum(arms.radius, arms.end_radius)
     flat = 1.0 - np.minimum(step_mm / np.maximum(radius, step_mm), 1.0)
-    turn = np.minimum(2.0 * np.arccos(flat), WIDEST_CHORD_RAD)
+    turn = np.minimum(2.0 * np.arccos(flat), MAX_CHORD_RAD)
     count = np.ceil(np.abs(arms.sweep) / turn).astype(np.int64)
     inner = np.maximum(count - 1, 0)
     which = np.repeat(np.arange(len(count)), inner)
@@ -207,8 +207,8 @@ def _points(path: Toolpath, step_mm: float) -> tuple[Floats, Ints]:
 def _lines(
     start: list[float], points: list[list[float]], is_feed: list[bool], step_mm: float
 ) -> list[tuple[list[float], list[float], int]]:
-    """Lines from kept point to kept point, and the number of the latter: those at least `step_mm`
-    from the one before, and all at which cuts or rapids end."""
+    """Return the lines between kept points, each with the index of its end: points at least
+    `step_mm` from the one before, and all points at which cuts or rapids end."""
     found, last = [], start
     for index, (point, feed) in enumerate(zip(points, is_feed, strict=True)):
         ends = index + 1 == len(points) or is_feed[index + 1] != feed

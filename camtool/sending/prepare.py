@@ -1,7 +1,7 @@
-"""From a program to what goes over the line: checked, simulated, cut into packets; and the rest of
-a program from any of its blocks, with a safe way back into the cut.
+"""Preparation of a program for its machine: it is verified, simulated and cut into packets; and
+the rest of a program from any of its blocks, with a safe way back into the cut.
 
-Nothing here opens a port or reads a file.
+This module opens no port and reads no file.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from camtool.errors import MachineError, OptionError, PostError, ProgramError
 from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.pipeline import Judging, read_program, verify_program
 from camtool.records import replace
-from camtool.sending.journal import Place as Left
+from camtool.sending.journal import JournalState
 from camtool.sending.line import Port
 from camtool.simulation.motion import Ledger, Options, still_ledger
 from camtool.target.wire import (
@@ -46,17 +46,16 @@ if TYPE_CHECKING:
     from camtool.target.registry import LoadedTarget
 
 _SETTINGS = re.compile(rb"settings ([0-9a-f]{8})\b")
-"""What programs say of the machine file that they were written for, where their dialect has
-comments."""
+"""The comment in a program with the digest of the machine file that it was written for."""
 
-HEAD = 4096
-"""It stands within so many bytes of their beginning."""
+HEAD_BYTES = 4096
+"""Bytes at the beginning of a program that are searched for it."""
 
 
 class Rest(Struct, frozen=True, eq=False):
     """A program from its block `first` on: `data`, whose first `entry` blocks bring the machine
-    there; `done` (B,): the last block of the program that is done with each of its blocks, −1
-    within the entry."""
+    there; `done` (B,): for each of its blocks, the last block of the program that is done with it,
+    −1 within the entry."""
 
     data: bytes
     first: int
@@ -65,8 +64,8 @@ class Rest(Struct, frozen=True, eq=False):
 
 
 class Consignment(Struct, frozen=True, eq=False):
-    """A program ready to be sent. `run`: the program as verified; `rest`: what is sent where that
-    is not the whole program; `forecast` is of what is sent."""
+    """A program ready to be sent. `run`: the verified program; `rest`: the bytes that are sent
+    instead of the whole program; `forecast`: the simulation of what is sent."""
 
     run: Run
     wire: Wire
@@ -77,34 +76,34 @@ class Consignment(Struct, frozen=True, eq=False):
 
     @property
     def first(self) -> int:
-        """The block with which it begins."""
+        """Block with which it begins."""
         return 0 if self.rest is None else self.rest.first
 
     @property
     def data(self) -> bytes:
-        """What is sent."""
+        """Bytes that are sent."""
         if self.rest is not None:
             return self.rest.data
         return self.run.program.data if self.run.program else b""
 
     @property
     def blocks(self) -> int:
-        """How many the program has."""
+        """Number of blocks of the program."""
         return int(self.run.decoded.block.max(initial=-1)) + 1 if self.run.decoded else 0
 
     @property
     def sha256(self) -> str:
-        """The digest of the program as a whole, hex."""
+        """Digest of the whole program, hexadecimal."""
         return digest(self.run.program.data if self.run.program else b"")
 
     @property
     def seconds(self) -> float:
-        """How long the machine works on what is sent, s."""
+        """Duration of what is sent on the machine, s."""
         return float(sum(packet.seconds for packet in self.packets))
 
     def place_of(self, conversation: Conversation) -> Place | None:
-        """Where the machine says that it is, or else where the last block that is done has
-        ended, in the work frame in which the program begins."""
+        """Return the place that the machine reports, or else the end of the last block that is
+        done, in the work frame in which the program begins."""
         if self.wire.place == "told":
             return conversation.at_mm
         path = self.forecast.decoded
@@ -114,8 +113,8 @@ class Consignment(Struct, frozen=True, eq=False):
 
     @property
     def reach_mm(self) -> tuple[Place, Place] | None:
-        """The lowest and the highest place that its moves reach, in the work frame; None where
-        nothing moves. Where the first move begins is not counted: the tool may stand anywhere."""
+        """Lowest and highest place that its moves reach, in the work frame; None if nothing moves.
+        The start of the first move is not counted: the tool may stand anywhere."""
         path = self.forecast.decoded
         path = path.first(path.executed_rows)
         moves = np.flatnonzero(path.is_motion)
@@ -126,18 +125,19 @@ class Consignment(Struct, frozen=True, eq=False):
         return (x, y, z), (x1, y1, z1)
 
     def block_of(self, sent: int) -> int:
-        """The last block of the program that is done with a block (from 0) of what is sent; −1
-        within the entry."""
+        """Return the last block of the program that is done with block `sent` (from 0) of what is
+        sent; −1 within the entry."""
         return sent if self.rest is None or sent < 0 else int(self.rest.done[sent])
 
 
 def digest(data: bytes) -> str:
-    """SHA-256, hex."""
+    """Return the SHA-256 of the data, hexadecimal."""
     return hashlib.sha256(data).hexdigest()
 
 
 def wire_of(target: LoadedTarget) -> Wire:
-    """The wire of a machine; MachineError, which says why and what instead, where it has none."""
+    """Return the wire of a machine; MachineError with the reason and an alternative if it has
+    none."""
     wire = target.target.wire()
     if isinstance(wire, NoWire):
         name = target.machine.target.name
@@ -146,7 +146,8 @@ def wire_of(target: LoadedTarget) -> Wire:
 
 
 def manner_of(target: LoadedTarget, **how: Any) -> Manner:
-    """How a conversation is held; MachineError for what the controller has no command for."""
+    """Return the settings of a conversation; MachineError for those that the controller has no
+    command for."""
     if how.get("unlock") and not wire_of(target).unlocks:
         raise MachineError(
             f"{target.machine.target.name} has no command to unlock over its line",
@@ -157,8 +158,8 @@ def manner_of(target: LoadedTarget, **how: Any) -> Manner:
 
 
 def port_of(name: str, baud: int | None, wire: Wire, target: LoadedTarget) -> Port:
-    """The port of that name at the rate that is given, or that of the wire, or of the machine
-    file; OptionError where none is known and the port has one."""
+    """Return the port of that name with the given rate, or else that of the wire or of the machine
+    file; OptionError if the port needs a rate and none is known."""
     link = target.machine.link
     rate = baud or wire.baud or (round(link.baud) if link.baud else None)
     port = Port(name, rate, wire.frame)
@@ -168,12 +169,13 @@ def port_of(name: str, baud: int | None, wire: Wire, target: LoadedTarget) -> Po
 
 
 def check_settings(data: bytes, target: LoadedTarget, file: str) -> None:
-    """ProgramError for a program that says that it was written for other values of the machine."""
-    said = _SETTINGS.search(data[:HEAD])
-    if said is None or said[1].decode() == target.machine.short_digest:
+    """Raise ProgramError for a program that names other values of the machine than its file
+    has."""
+    given = _SETTINGS.search(data[:HEAD_BYTES])
+    if given is None or given[1].decode() == target.machine.short_digest:
         return
     raise ProgramError(
-        f"was written for another machine file (settings {said[1].decode()}, the machine has "
+        f"was written for another machine file (settings {given[1].decode()}, the machine has "
         f"{target.machine.short_digest})",
         file=file,
         mend="post it again for this machine, or give the machine file it was made with",
@@ -186,13 +188,13 @@ def consignment(
     *,
     source: str,
     first: int = 0,
-    left: Left | None = None,
+    left: JournalState | None = None,
     tool_at: ToolAt = "",
     progress: Progress | None = None,
 ) -> Consignment:
-    """The program, verified and cut into packets; with `first` (a block, from 0) its rest from
-    there on. `left`: where its journal says that it was left; `tool_at`: where the user says that
-    the tool is then. ProgramError for a program with errors, or for another machine's."""
+    """Verify a program and cut it into packets; with `first` (a block, from 0) its rest from there
+    on. `left`: the state in its journal; `tool_at`: the place of the tool as the user gives it.
+    Raises ProgramError for a program with errors, or for another machine's."""
     wire = wire_of(target)
     check_settings(data, target, source)
     judging = Judging(keep_ledger=True)
@@ -209,15 +211,15 @@ def consignment(
         and tool_at in ("journal", "known")
     ):
         begin_mm = standing.place_mm
-    midway = standing is not None and standing.place_mm is not None
-    midway = midway and wire.place in ("told", "steps") and tool_at != "zero"
-    if first or midway:
+    resumes_midway = standing is not None and standing.place_mm is not None
+    resumes_midway = resumes_midway and wire.place in ("told", "steps") and tool_at != "zero"
+    if first or resumes_midway:
         rest = rest_of(decoded, target, first, data, begin_mm=begin_mm)
         data = rest.data
         decoded = read_program(data, target, source=source).decoded
         assert decoded is not None
         if begin_mm is not None:
-            decoded = _shifted(decoded, np.array(begin_mm))
+            decoded = _shift(decoded, np.array(begin_mm))
         if progress is not None:
             progress.begin(f"simulating {PurePath(source).name}")
         forecast = forecast_of(decoded, target)
@@ -227,14 +229,15 @@ def consignment(
     return Consignment(run, wire, forecast, packets, rest, standing)
 
 
-def _standing(left: Left, decoded: Toolpath, tool_at: ToolAt) -> ResumePoint:
-    """Where the program was left: when it was not stopped, it has done some of what was sent."""
+def _standing(left: JournalState, decoded: Toolpath, tool_at: ToolAt) -> ResumePoint:
+    """Return the point at which the program was left; if it was not stopped, some of the sent
+    blocks are done."""
     under_way = (decoded.block >= left.block - 1) & (decoded.block <= left.last)
     return ResumePoint(left.tool_mm, left.is_still, decoded.end[under_way], tool_at)
 
 
-def _shifted(path: Toolpath, by_mm: Floats) -> Toolpath:
-    """The same path elsewhere; `by_mm` (3,)."""
+def _shift(path: Toolpath, by_mm: Floats) -> Toolpath:
+    """Return the path shifted by `by_mm` (3,)."""
     return replace(
         path,
         start=path.start + by_mm,
@@ -243,13 +246,13 @@ def _shifted(path: Toolpath, by_mm: Floats) -> Toolpath:
     )
 
 
-def tool_at_of(wire: Wire, left: Left, said: ToolAt, name: str) -> tuple[ToolAt, str]:
-    """Where the tool is when a program goes on that was left: what the user has said, or what
-    follows from the journal, and what is to be asked, "" where nothing is. MachineError and
-    OptionError for what the controller or the journal does not allow."""
-    where = f"--tool-at {said}" if said else "--tool-at"
+def tool_at_of(wire: Wire, left: JournalState, given: ToolAt, name: str) -> tuple[ToolAt, str]:
+    """Decide where the tool is when a program resumes: as the user gave it, or as it follows from
+    the journal; and the question to ask the user, "" for none. Raises MachineError and OptionError
+    for answers that the controller or the journal does not allow."""
+    where = f"--tool-at {given}" if given else "--tool-at"
     if wire.place == "homed":
-        if said:
+        if given:
             raise MachineError(f"{name} homes before each piece", where=where, mend="leave it out")
         return "", ""
     unknown = OptionError(
@@ -259,23 +262,26 @@ def tool_at_of(wire: Wire, left: Left, said: ToolAt, name: str) -> tuple[ToolAt,
     )
     sure = left.is_still and left.tool_mm is not None
     if wire.place == "told":
-        if said == "journal" and not sure:
+        if given == "journal" and not sure:
             raise unknown
-        return said, ""
-    if said == "zero" or (not said and left.last < 0):
+        return given, ""
+    if given == "zero" or (not given and left.last < 0):
         return "zero", ""
-    stood = f"the program was left at {place_words(left.tool_mm)} by the simulation"
+    left_words = f"the program was left at {place_words(left.tool_mm)} by the simulation"
     if wire.place == "kept":
-        if said:
+        if given:
             raise MachineError(
                 f"{name} does not say where it stands, and has no command to set its place",
                 where=where,
                 mend="bring the tool to part zero, where the program begins, and give --tool-at "
                 "zero",
             )
-        stood = stood if sure else "nobody knows where the program was left"
-        return "zero", f"{stood}, and it goes on from part zero: does the tool stand there now"
-    if said == "known":
+        left_words = left_words if sure else "nobody knows where the program was left"
+        return (
+            "zero",
+            f"{left_words}, and it goes on from part zero: does the tool stand there now",
+        )
+    if given == "known":
         raise MachineError(
             f"{name} knows only steps",
             where=where,
@@ -284,8 +290,8 @@ def tool_at_of(wire: Wire, left: Left, said: ToolAt, name: str) -> tuple[ToolAt,
         )
     if not sure:
         raise unknown
-    asked = f"{stood}, and goes on from there: has the tool stayed there"
-    return "journal", "" if said else asked
+    asked = f"{left_words}, and goes on from there: has the tool stayed there"
+    return "journal", "" if given else asked
 
 
 def _no_forecast(run: Run) -> Forecast:
@@ -342,13 +348,13 @@ def rest_of(
     *,
     begin_mm: Place | None = None,
 ) -> Rest:
-    """The program (`data`, where it is at hand) from a block (from 0) on, behind an entry, which
-    is the target's own where it has one.
+    """Write the rest of a program from a block (from 0) on, after an entry, which is the target's
+    own where it has one. `data`: the program, if it is at hand.
 
-    It begins as the program does, at part zero, or at `begin_mm`, where part zero is known: up,
-    tool, spindle and coolant on as they are there, across above the place, down to it at the feed
-    of plunges. Behind that come the same moves, which are read back and compared. OptionError for
-    a block that is none, and for one in which nothing moves any more.
+    It begins as the program does, at part zero, or at `begin_mm` if part zero is known: up; tool,
+    spindle and coolant as they are at the block; across above the place; down to it at the plunge
+    feed. Then the same moves follow, which are read back and compared. Raises OptionError for a
+    block that does not exist, and for one after which nothing moves.
     """
     rows = np.flatnonzero(decoded.block >= first)
     blocks = int(decoded.block.max(initial=-1)) + 1
@@ -357,7 +363,7 @@ def rest_of(
     if not 0 <= first < blocks or not len(rows):
         raise OptionError(f"there is no block {first + 1}", mend=f"blocks are 1 to {blocks}")
     low, high = int(rows[0]), decoded.executed_rows
-    if low >= high or not _goes_on(decoded.part(low, high)):
+    if low >= high or not _has_moves(decoded.part(low, high)):
         raise OptionError(f"nothing moves from block {first + 1} on", mend="it is finished")
     machine = target.machine
     own = None if data is None else target.target.rest(data, machine, first)
@@ -370,28 +376,29 @@ def rest_of(
             f"the program sets part zero behind block {first + 1}",
             mend="bring the tool to part zero, and give --tool-at zero",
         )
-    data, again = _written(decoded, low, high, target, begin_mm)
+    data, reread = _write_rest(decoded, low, high, target, begin_mm)
     wanted = decoded.part(low, high)
-    found = _Pairs(wanted, again, target).found()
-    if found is None:
+    pairs = _MovePairs(wanted, reread, target).match()
+    if pairs is None:
         raise PostError(
             f"the rest of the program cannot be written again as it is from block {first + 1} on",
             mend="choose the block at the beginning of a contour",
         )
-    ends, into = found
+    ends, into = pairs
     # A block of the program is done when all moves up to its last one are.
     moves = np.flatnonzero(wanted.is_motion)
     last = np.append(wanted.block[moves[1:]] > wanted.block[moves[:-1]], True)
-    done = np.full(int(again.block.max()) + 1, -1)
-    np.maximum.at(done, again.block[ends[last]], wanted.block[moves[last]])
-    done[: again.block[into]] = -1
-    return Rest(data, first, int(again.block[into]), np.maximum.accumulate(done))
+    done = np.full(int(reread.block.max()) + 1, -1)
+    np.maximum.at(done, reread.block[ends[last]], wanted.block[moves[last]])
+    done[: reread.block[into]] = -1
+    return Rest(data, first, int(reread.block[into]), np.maximum.accumulate(done))
 
 
-def _written(
+def _write_rest(
     decoded: Toolpath, low: int, high: int, target: LoadedTarget, begin_mm: Place | None
 ) -> tuple[bytes, Toolpath]:
-    """The program of an entry and of the rows from `low` to `high`, and that as it is read."""
+    """Write the program of an entry and of the rows from `low` to `high`; return its bytes and the
+    toolpath that is read back from them."""
     entry = _entry(decoded, low, target, begin_mm)
     count = len(entry)
     columns: dict[str, Any] = {
@@ -403,21 +410,21 @@ def _written(
     columns["mode"] = np.concatenate([np.full(count, -1), decoded.mode[low:high]])
     whole = replace(decoded, **columns, findings=(), drawn=None, operations=None)
     if begin_mm is not None:
-        whole = replace(_shifted(whole, -np.array(begin_mm)), start=decoded.start)
+        whole = replace(_shift(whole, -np.array(begin_mm)), start=decoded.start)
     program = target.target.write(whole, target.machine)
-    again = target.target.read(program.data, target.machine)
-    return program.data, again if begin_mm is None else _shifted(again, np.array(begin_mm))
+    reread = target.target.read(program.data, target.machine)
+    return program.data, reread if begin_mm is None else _shift(reread, np.array(begin_mm))
 
 
-def _goes_on(path: Toolpath) -> bool:
-    """Whether anything moves in it."""
+def _has_moves(path: Toolpath) -> bool:
+    """True if anything moves in the path."""
     somewhere = (path.starts != path.end).any(axis=1) | path.is_arc
     return bool((path.is_motion & somewhere).any())
 
 
 def _entry(decoded: Toolpath, low: int, target: LoadedTarget, begin_mm: Place | None) -> Toolpath:
-    """The moves and events that bring the machine from the beginning of the program, or from
-    `begin_mm`, to the begin of a row."""
+    """Build the moves and events that bring the machine from the beginning of the program, or from
+    `begin_mm`, to the start of row `low`."""
     machine = target.machine
     x, y, z = decoded.starts_of(np.array([low]))[0].tolist()
     before = decoded.part(0, low)
@@ -442,7 +449,9 @@ def _entry(decoded: Toolpath, low: int, target: LoadedTarget, begin_mm: Place | 
         after = before.kind[spindle[-1] :]
         moves = np.flatnonzero(before.is_motion[spindle[-1] :])
         waits = np.flatnonzero(after[: moves[0] if len(moves) else None] == Kind.DWELL)
-        spin_up_s = float(before.value[spindle[-1] :][waits].sum())  # as the program waits for it
+        spin_up_s = float(
+            before.value[spindle[-1] :][waits].sum()
+        )  # the program's own wait for it
         if (after == Kind.DWELL).any():
             spin_up_s = max(spin_up_s, machine.spindle.spin_up_s or 0.0)
         if spin_up_s:
@@ -459,7 +468,8 @@ def _entry(decoded: Toolpath, low: int, target: LoadedTarget, begin_mm: Place | 
 
 
 def _plunge_feed(decoded: Toolpath, low: int, target: LoadedTarget) -> float:
-    """mm/min: the feed of the last plunge before the row, else the first, else the machine's."""
+    """Return the feed, mm/min, of the last plunge before the row, else of the first one, else the
+    machine's."""
     machine = target.machine
     drops = (decoded.kind == Kind.LINE) & (decoded.end[:, 2] < decoded.starts[:, 2])
     plunges = np.flatnonzero(drops)
@@ -470,33 +480,33 @@ def _plunge_feed(decoded: Toolpath, low: int, target: LoadedTarget) -> float:
     return min(feed, machine.max_plunge_mm_min)
 
 
-class _Pairs:
-    """The moves of a program (`wanted`) and those of what was written for them, behind an entry
-    (`again`): the same ones, or, where the writer cuts a move into several, lines that lie on it;
-    what is shorter than the resolution of the dialect may be left out."""
+class _MovePairs:
+    """Pairs of moves: those of a program (`wanted`) and those of what was written for them after
+    an entry (`reread`). They are equal, or, where the writer splits a move, lines that lie on it;
+    moves shorter than the resolution of the dialect may be missing."""
 
-    def __init__(self, wanted: Toolpath, again: Toolpath, target: LoadedTarget) -> None:
+    def __init__(self, wanted: Toolpath, reread: Toolpath, target: LoadedTarget) -> None:
         machine = target.machine
-        self._wanted, self._again = wanted, again
-        self._begins, self._others = wanted.starts, again.starts
+        self._wanted, self._again = wanted, reread
+        self._begins, self._others = wanted.starts, reread.starts
         unit = [target.target.unit_mm(machine, axis) for axis in machine.axes]
         self._slack = np.array(unit) + POSITION_EPS_MM
-        self._stray = float(self._slack.max()) + machine.defaults.fit_tolerance_mm
+        self._max_deviation = float(self._slack.max()) + machine.defaults.fit_tolerance_mm
         self._arms = PolarArcs(wanted, wanted.is_arc)
 
-    def found(self) -> tuple[Ints, int] | None:
-        """The row of `again` with which each of the moves that are wanted is done (M,), and its
-        first row that is none of the entry; None where it makes other moves."""
+    def match(self) -> tuple[Ints, int] | None:
+        """Return the last row of `reread` for each wanted move (M,), and its first row after the
+        entry; None if the moves differ."""
         rows = np.flatnonzero(self._wanted.is_motion)
         others = np.flatnonzero(self._again.is_motion)
         tail = others[max(len(others) - len(rows), 0) :]
-        if len(tail) == len(rows) and self._same(rows, tail).all():
+        if len(tail) == len(rows) and self._are_equal(rows, tail).all():
             return tail, int(tail[0])
         ends, at = np.empty(len(rows), dtype=np.int64), len(self._again)
         for k in range(len(rows) - 1, -1, -1):
             row = rows[k : k + 1]
             ends[k], begin = self._last_move(at), None
-            if self._is_nothing(self._wanted, self._begins, row):
+            if self._is_negligible(self._wanted, self._begins, row):
                 continue
             if ends[k] >= 0:
                 begin = self._begin(row, int(ends[k]))
@@ -506,55 +516,58 @@ class _Pairs:
         return np.maximum(ends, at), at
 
     def _last_move(self, at: int) -> int:
-        """The last row in front of `at` that moves, −1 where none does."""
+        """Return the last row before `at` that moves, −1 if none does."""
         at -= 1
-        while at >= 0 and self._is_nothing(self._again, self._others, np.array([at])):
+        while at >= 0 and self._is_negligible(self._again, self._others, np.array([at])):
             at -= 1
         return at
 
     def _begin(self, row: Ints, at: int) -> int | None:
-        """The first of the rows, the last being `at`, that make a wanted move."""
+        """Return the first of the rows, up to and including `at`, that make up a wanted move; None
+        if they do not."""
         part = np.array([at])
-        if self._same(row, part).all():
+        if self._are_equal(row, part).all():
             return at
-        if not self._near(self._wanted.end[row], self._again.end[part]).all():
+        if not self._are_near(self._wanted.end[row], self._again.end[part]).all():
             return None
         while self._lies_on(row, part):
-            if self._near(self._begins[row], self._others[part]).all():
+            if self._are_near(self._begins[row], self._others[part]).all():
                 return int(part[0])
             part = np.array([self._last_move(int(part[0]))])
             if part[0] < 0:
                 return None
         return None
 
-    def _is_nothing(self, path: Toolpath, starts: Floats, row: Ints) -> bool:
-        """Whether a row is no move, or one that the dialect cannot tell from none."""
+    def _is_negligible(self, path: Toolpath, starts: Floats, row: Ints) -> bool:
+        """True if a row is no move, or one shorter than the resolution of the dialect."""
         if path.is_arc[row].any():
             return False
-        return not path.is_motion[row].any() or bool(self._near(starts[row], path.end[row]).all())
+        return not path.is_motion[row].any() or bool(
+            self._are_near(starts[row], path.end[row]).all()
+        )
 
-    def _near(self, ones: Floats, others: Floats) -> Bools:
-        """(K,) of points (K, 3)."""
+    def _are_near(self, ones: Floats, others: Floats) -> Bools:
+        """Mask (K,) of the points (K, 3) that are within the resolution of each other."""
         return np.asarray((np.abs(ones - others) <= self._slack).all(axis=1))
 
-    def _same(self, rows: Ints, others: Ints) -> Bools:
-        """(K,): whether moves are the same."""
-        wanted, again = self._wanted, self._again
-        off = np.nan_to_num(np.abs(wanted.centre[rows] - again.centre[others])).max(axis=1)
-        same: Bools = (wanted.kind[rows] == again.kind[others]) & (off <= self._slack.max())
-        same &= self._near(self._begins[rows], self._others[others])
-        return same & self._near(wanted.end[rows], again.end[others])
+    def _are_equal(self, rows: Ints, others: Ints) -> Bools:
+        """Mask (K,) of equal moves."""
+        wanted, reread = self._wanted, self._again
+        off = np.nan_to_num(np.abs(wanted.centre[rows] - reread.centre[others])).max(axis=1)
+        same: Bools = (wanted.kind[rows] == reread.kind[others]) & (off <= self._slack.max())
+        same &= self._are_near(self._begins[rows], self._others[others])
+        return same & self._are_near(wanted.end[rows], reread.end[others])
 
     def _lies_on(self, row: Ints, part: Ints) -> bool:
-        """Whether a line, or an arc about the same centre, is a part of a wanted move."""
-        wanted, again = self._wanted, self._again
-        rapid = wanted.kind[row] == Kind.RAPID, again.kind[part] == Kind.RAPID
-        if rapid[0] != rapid[1] or not again.is_motion[part].all():
+        """True if a line, or an arc about the same centre, is a part of a wanted move."""
+        wanted, reread = self._wanted, self._again
+        rapid = wanted.kind[row] == Kind.RAPID, reread.kind[part] == Kind.RAPID
+        if rapid[0] != rapid[1] or not reread.is_motion[part].all():
             return False
-        points = np.concatenate([self._others[part], again.end[part]])
-        if again.is_arc[part].any():
-            off = np.abs(wanted.centre[row] - again.centre[part]).max()
-            if wanted.kind[row] != again.kind[part] or off > self._slack.max():
+        points = np.concatenate([self._others[part], reread.end[part]])
+        if reread.is_arc[part].any():
+            off = np.abs(wanted.centre[row] - reread.centre[part]).max()
+            if wanted.kind[row] != reread.kind[part] or off > self._slack.max():
                 return False
         else:
             points = np.concatenate([points, points.mean(axis=0)[None, :]])
@@ -567,11 +580,11 @@ class _Pairs:
             begin, way = self._begins[row[0]], wanted.end[row[0]] - self._begins[row[0]]
             share = np.clip((points - begin) @ way / (way @ way), 0.0, 1.0)
             far = np.linalg.norm(begin + share[:, None] * way - points, axis=1)
-        return bool((far <= self._stray).all())
+        return bool((far <= self._max_deviation).all())
 
 
 def lines_of(one: Consignment, target: LoadedTarget) -> Sequence[tuple[str, str]]:
-    """What a dry run says: (name, words)."""
+    """Return the lines of a dry run: (name, text)."""
     machine, run = target.machine, one.run
     decoded = one.forecast.decoded
     low_high = toolpath_extents(decoded.first(decoded.executed_rows))
@@ -586,7 +599,7 @@ def lines_of(one: Consignment, target: LoadedTarget) -> Sequence[tuple[str, str]
         ("sent", f"{size_bytes} bytes in {len(one.packets)} packets"),
         ("time", f"{clock(one.seconds)} by the simulation"),
         ("travel", f"{size} mm"),
-        ("begin", _stand(one)),
+        ("begin", _begin_words(one)),
     ]
     if one.rest is not None:
         x, y, z = decoded.starts_of(
@@ -607,8 +620,8 @@ def lines_of(one: Consignment, target: LoadedTarget) -> Sequence[tuple[str, str]
     return lines
 
 
-def _stand(one: Consignment) -> str:
-    """Where the tool is to stand when the program begins, or goes on."""
+def _begin_words(one: Consignment) -> str:
+    """Describe where the tool must stand when the program begins or resumes."""
     standing, told = one.standing, one.wire.place == "told"
     tool_at = "zero" if standing is None else standing.tool_at
     if tool_at == "zero":

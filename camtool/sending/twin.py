@@ -1,8 +1,8 @@
 """The host of a virtual controller: a pseudo-terminal or a TCP port, and a clock.
 
-The host is thin: it carries bytes between a port and a `Wired` twin, and says what time it is. One
-client at a time; a new one finds the machine as the last has left it, and opens the line, which
-some controllers take for a reset.
+The host carries bytes between a port and a `WiredTwin`, and keeps the time. It serves one client
+at a time; a new one finds the machine as the last one left it, and opens the line, which resets
+some controllers.
 """
 
 from __future__ import annotations
@@ -17,36 +17,36 @@ from contextlib import suppress
 from typing import Final, Protocol
 
 from camtool.errors import OptionError
-from camtool.sending.faults import Wired
+from camtool.sending.faults import WiredTwin
 
-PORTION: Final = 4096
-"""So many bytes are carried at a time."""
+MAX_WRITE_BYTES: Final = 4096
+"""Bytes carried at a time."""
 
-LOOK_S: Final = 0.02
-"""How often it is looked whether somebody has opened the port, s."""
+POLL_S: Final = 0.02
+"""Interval at which a client is looked for."""
 
 ANSWER_S: Final = 0.001
-"""With no clock to keep, a client has so long to answer what it was told, s."""
+"""Time that a client has to answer before a clock without real time jumps."""
 
 
-class Port(Protocol):
-    """Where clients come."""
+class TwinPort(Protocol):
+    """A port that clients open."""
 
     name: str
-    """What a client opens."""
+    """The name by which a client opens it."""
 
     def client(self) -> int | None:
-        """The file descriptor of the client, None where there is none."""
+        """Return the file descriptor of the client, None without one."""
 
-    def hung_up(self) -> None:
-        """The client has gone, or its plug was pulled."""
+    def hang_up(self) -> None:
+        """Close the connection of a client that is gone, or whose plug was pulled."""
 
     def close(self) -> None:
-        """No client can come any more."""
+        """Close the port for all clients."""
 
 
 class PseudoTerminal:
-    """A pseudo-terminal of this computer; a client is whoever has it open."""
+    """A pseudo-terminal of this computer; its client is the process that has it open."""
 
     def __init__(self) -> None:
         if sys.platform == "win32":
@@ -62,13 +62,13 @@ class PseudoTerminal:
 
     @staticmethod
     def _raw(slave: int) -> None:
-        """No echo, no signals and no changed line ends, even before the client says so."""
+        """Switch off echo, signals and the translation of line ends, even before a client does."""
         import tty
 
         tty.setraw(slave)
 
     def client(self) -> int | None:
-        """The side of the machine, while somebody has the other one open."""
+        """Return the machine's side while a client has the other side open."""
         looking = select.poll()
         looking.register(self._master, select.POLLIN)
         # What the client has written before it closed is still to be read.
@@ -83,11 +83,11 @@ class PseudoTerminal:
             self._open = True
         return self._master
 
-    def hung_up(self) -> None:
-        """Nothing: the client has closed it."""
+    def hang_up(self) -> None:
+        """Do nothing: the client has closed it."""
 
     def close(self) -> None:
-        """Take it away; who has it open reads its end."""
+        """Close the terminal; a client that has it open reads its end."""
         os.close(self._master)
 
 
@@ -106,7 +106,7 @@ class TcpPort:
         self._client: socket.socket | None = None
 
     def client(self) -> int | None:
-        """The client that is served."""
+        """Return the file descriptor of the client that is served."""
         if self._client is None:
             with suppress(BlockingIOError):
                 self._client, _ = self._server.accept()
@@ -114,56 +114,56 @@ class TcpPort:
                 self._client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         return None if self._client is None else self._client.fileno()
 
-    def hung_up(self) -> None:
-        """Wait for the next client."""
+    def hang_up(self) -> None:
+        """Drop the client and wait for the next one."""
         if self._client is not None:
             self._client.close()
         self._client = None
 
     def close(self) -> None:
-        """Listen no more."""
-        self.hung_up()
+        """Stop listening."""
+        self.hang_up()
         self._server.close()
 
 
 class Clock:
-    """Seconds of the machine: `speed` times those of the world; None: it jumps to whatever comes
-    next as soon as nobody says anything."""
+    """Seconds of the machine: `speed` times real seconds; None: it jumps to the next event as soon
+    as no client sends anything."""
 
     def __init__(self, speed: float | None) -> None:
         self.speed = speed
         self._begun, self._now = time.monotonic(), 0.0
 
     def now(self) -> float:
-        """What time it is."""
+        """Return the time of the machine, s."""
         if self.speed is not None:
             self._now = (time.monotonic() - self._begun) * self.speed
         return self._now
 
-    def patience_s(self, at: float | None) -> float:
-        """How long to wait in the world for a client, where something comes at `at`."""
+    def wait_s(self, at: float | None) -> float:
+        """Return the real time to wait for a client if the next event is at `at`."""
         if at is None:
-            return LOOK_S
+            return POLL_S
         if self.speed is None:
             return ANSWER_S
-        return min(max((at - self.now()) / self.speed, 0.0), LOOK_S)
+        return min(max((at - self.now()) / self.speed, 0.0), POLL_S)
 
-    def nobody_spoke(self, at: float | None) -> None:
-        """Nothing came in the meantime."""
+    def skip_to(self, at: float | None) -> None:
+        """Advance a clock without real time to `at`, since no client has sent anything."""
         if self.speed is None and at is not None:
             self._now = max(self._now, at)
 
 
 def serve(
-    wired: Wired,
-    port: Port,
+    wired: WiredTwin,
+    port: TwinPort,
     clock: Clock,
     *,
     once: bool = False,
     each: Callable[[], None] = lambda: None,
 ) -> None:
-    """Carry bytes until the plug is pulled, or with `once` until the first client has gone;
-    `each`: called again and again."""
+    """Carry bytes until the plug is pulled, or with `once` until the first client is gone; `each`
+    is called in every turn."""
     waiting, connected = b"", False
     while not wired.unplugged(clock.now()):
         each()
@@ -174,28 +174,28 @@ def serve(
             connected, waiting = False, b""
             wired.read(clock.now())
             at = wired.turn_s()
-            time.sleep(min(clock.patience_s(at), LOOK_S))
-            clock.nobody_spoke(at)
+            time.sleep(min(clock.wait_s(at), POLL_S))
+            clock.skip_to(at)
             continue
         if not connected:
             connected = True
             wired.connect(clock.now())
         waiting += wired.read(clock.now())
         at = wired.turn_s()
-        patience = 0.0 if waiting else clock.patience_s(at)
+        patience = 0.0 if waiting else clock.wait_s(at)
         readable, writable, _ = select.select([file], [file] if waiting else [], [], patience)
         try:
             if writable:
-                waiting = waiting[os.write(file, waiting[:PORTION]) :]
+                waiting = waiting[os.write(file, waiting[:MAX_WRITE_BYTES]) :]
             if readable:
-                data = os.read(file, PORTION)
+                data = os.read(file, MAX_WRITE_BYTES)
                 if not data:
                     raise ConnectionResetError
                 wired.write(data, clock.now())
         except BlockingIOError:
             continue
         except OSError:
-            port.hung_up()
+            port.hang_up()
             continue
         if not readable and not waiting:
-            clock.nobody_spoke(at)
+            clock.skip_to(at)

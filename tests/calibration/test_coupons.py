@@ -13,8 +13,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from camtool.calibration.coupons import KINDS, Kind, Sheet, dxf, sheet, skeleton, svg
-from camtool.calibration.coupons import Path as Line
+from camtool.calibration.coupons import KINDS, CouponSheet, Kind, dxf, sheet, skeleton, svg
+from camtool.calibration.coupons import SheetPath as Line
 from camtool.calibration.measurements import read_measurements
 from camtool.errors import InputError, OptionError
 from camtool.geometry.measure import extents, path_lengths
@@ -61,7 +61,9 @@ def test_the_run_ups_take_up_the_play_from_either_end(kind: Kind) -> None:
                 assert way[0] > lost or way[1] < -lost
 
 
-def _parts(made: Sheet) -> tuple[tuple[Line, ...], tuple[tuple[str, dict[str, object]], ...]]:
+def _parts(
+    made: CouponSheet,
+) -> tuple[tuple[Line, ...], tuple[tuple[str, dict[str, object]], ...]]:
     return made.paths, made.tables
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from camtool.calibration.calibrate import Calibration, calibrate
-from camtool.calibration.coupons import Sheet, dxf, sheet
-from camtool.calibration.measurements import Added, Lines, Measurements, Regions, RegionsOf
+from camtool.calibration.coupons import CouponSheet, dxf, sheet
+from camtool.calibration.measurements import Added, LinesCoupon, Measurements, Regions, RegionsOf
 from camtool.importers.read import read_drawing
 from camtool.pipeline import post_drawing
 from camtool.planning.job import Job, Operation
@@ -21,7 +21,7 @@ NEAR_MM = 1e-6
 
 
 def slides_at_ends(
-    drawn: Sheet, target: LoadedTarget, folder: Path
+    drawn: CouponSheet, target: LoadedTarget, folder: Path
 ) -> tuple[np.ndarray, np.ndarray]:
     """(R, 2) commanded ends of the rows of the posted coupon, and the slides there."""
     (folder / "coupon.dxf").write_bytes(dxf(drawn))
@@ -37,8 +37,8 @@ def slides_at_ends(
 
 
 def lines_read(
-    drawn: Sheet, commanded: np.ndarray, slides: np.ndarray, grid_mm: float
-) -> list[Lines]:
+    drawn: CouponSheet, commanded: np.ndarray, slides: np.ndarray, grid_mm: float
+) -> list[LinesCoupon]:
     """Each coupon's two lines, from the slides at its corners."""
     found = []
     for path, (_, table) in zip(drawn.paths, drawn.tables, strict=True):
@@ -54,12 +54,12 @@ def lines_read(
             "first_mm": float(places[3] - places[2]),
             "second_mm": float(places[4] - places[5]),
         }
-        found.append(msgspec.convert(read, Lines))
+        found.append(msgspec.convert(read, LinesCoupon))
     return found
 
 
 def calibrated(
-    drawn: Sheet, target: LoadedTarget, before: LoadedTarget, folder: Path
+    drawn: CouponSheet, target: LoadedTarget, before: LoadedTarget, folder: Path
 ) -> Calibration:
     commanded, slides = slides_at_ends(drawn, target, folder)
     step_mm = target.machine.axes.x.coded_step_mm

@@ -11,23 +11,23 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camtool.calibration.calibrate import Calibration, calibrate
-from camtool.calibration.coupons import KINDS, Kind, Sheet, sheet
+from camtool.calibration.coupons import KINDS, CouponSheet, Kind, sheet
 from camtool.calibration.measurements import (
     Added,
-    Circle,
+    CircleCoupon,
     Coupon,
-    Lines,
+    LinesCoupon,
     Measurements,
     RegionsOf,
-    Square,
-    Steps,
+    SquareCoupon,
+    StepsCoupon,
 )
 from camtool.machine.model import CORRELATED_KEYS, Machine
 from camtool.target.registry import load_target
 from tests.oracles import measured
 
 RECORDS: dict[str, type[Coupon]] = {
-    "lines": Lines, "squares": Square, "circles": Circle, "steps": Steps
+    "lines": LinesCoupon, "squares": SquareCoupon, "circles": CircleCoupon, "steps": StepsCoupon
 }  # fmt: skip
 PLAYS = st.floats(0.0, 0.2)
 SCALES = st.floats(0.98, 1.02)
@@ -57,7 +57,7 @@ def guess(machine: Machine, kind: Kind) -> Machine:
 
 
 def found(
-    drawn: Sheet,
+    drawn: CouponSheet,
     machine: Machine,
     *,
     sigma_mm: float = 0.0,

@@ -17,7 +17,7 @@ from camtool.inspection.dimensions import Dimension
 from camtool.inspection.inspector import Inspector
 from camtool.inspection.uncertainty import (
     Inputs,
-    Variant,
+    MachineVariant,
     inputs_of,
     monte_carlo,
     propagate,
@@ -36,7 +36,7 @@ BAND = 1.959964
 # Machines that were calibrated by coupons with known faults.
 
 
-def sizes_of(variant: Variant) -> Floats:
+def sizes_of(variant: MachineVariant) -> Floats:
     """Sizes of parts of a machine, exactly: a width and a height whose edges are reached from
     opposite sides, and both diagonals of a rectangle (camtool/calibration/model.py)."""
     machine = variant.machine
@@ -86,7 +86,7 @@ def calibrations_that_cover(kind: Kind, cases: int) -> Floats:
         budget = propagate(sizes_of, inputs_of(ours, 0.0), none)
         known = {"squareness_rad", "x.scale", "y.scale", "x.backlash_mm", "y.backlash_mm"}
         assert not known & {each.name for row in range(4) for each in budget.unknown(row)}
-        off = np.abs(sizes_of(Variant(machine)) - budget.expected)
+        off = np.abs(sizes_of(MachineVariant(machine)) - budget.expected)
         hits += off <= BAND * budget.standards
     return hits / cases
 

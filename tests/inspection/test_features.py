@@ -10,7 +10,13 @@ from hypothesis import strategies as st
 from camtool.findings import Finding
 from camtool.geometry.polylines import Polyline, Polylines
 from camtool.inspection.dimensions import Dimension, Kind, Place
-from camtool.inspection.features import Bound, Circle, Edge, bind, features_of
+from camtool.inspection.features import (
+    BoundDimension,
+    CircleFeature,
+    EdgeFeature,
+    bind,
+    features_of,
+)
 from camtool.inspection.findings import InspectionCode
 from camtool.planning.place import Map
 
@@ -31,22 +37,22 @@ def plate() -> Polylines:
 FEATURES = features_of(plate())
 
 
-def bound(kind: Kind, *places: Place, direction: float | None = None) -> Bound | Finding:
+def bound(kind: Kind, *places: Place, direction: float | None = None) -> BoundDimension | Finding:
     return bind(Dimension("d", kind, places, "test", direction), FEATURES, "plate.dxf")
 
 
 def test_features_of_a_plate() -> None:
-    circles = [each for each in FEATURES if isinstance(each, Circle)]
-    edges = [each for each in FEATURES if isinstance(each, Edge)]
+    circles = [each for each in FEATURES if isinstance(each, CircleFeature)]
+    edges = [each for each in FEATURES if isinstance(each, EdgeFeature)]
     assert sorted(round(each.radius_mm, 6) for each in circles) == [3, 4, 4, 5, 5, 5, 5]
-    assert [each.whole for each in circles if each.radius_mm < 3.5] == [True]
+    assert [each.is_closed for each in circles if each.radius_mm < 3.5] == [True]
     assert sorted(round(each.length_mm, 6) for each in edges) == [20, 20, 30, 30, 50, 50]
 
 
 def test_segments_in_line_are_one_edge() -> None:
     path = np.array([(0, 0, 0), (10, 0, 0), (30, 0, 0), (30, 10, 0), (0, 10, 0), (0, 4, 0)])
     edges = features_of(Polylines.of([Polyline(path.astype(float), True)]))
-    lengths = sorted(each.length_mm for each in edges if isinstance(each, Edge))
+    lengths = sorted(each.length_mm for each in edges if isinstance(each, EdgeFeature))
     assert lengths == pytest.approx([10, 10, 30, 30])
 
 
@@ -73,7 +79,7 @@ def test_places_bind(
     kind: Kind, places: tuple[Place, ...], direction: float | None, drawn: float
 ) -> None:
     found = bound(kind, *places, direction=direction)
-    assert isinstance(found, Bound)
+    assert isinstance(found, BoundDimension)
     assert found.drawn_mm == pytest.approx(drawn, abs=1e-9)
 
 
@@ -104,7 +110,7 @@ def test_several_that_differ_are_a_finding_unless_a_nominal_value_chooses() -> N
     both = Dimension("d", "diameter", ((0, 0),), "test")
     assert isinstance(bind(both, features, "x"), Finding)
     one = bind(Dimension("d", "diameter", ((0, 0),), "test", None, 10.0), features, "x")
-    assert isinstance(one, Bound)
+    assert isinstance(one, BoundDimension)
     assert one.drawn_mm == pytest.approx(10.0)
 
 
@@ -124,15 +130,15 @@ def test_placed_features_lie_where_the_drawing_comes_to_lie(
     vertices = where.vertices(moved.vertices)
     there = features_of(Polylines(vertices, moved.offsets, moved.closed))
     for drawn, other in zip(FEATURES, there, strict=True):
-        here = drawn.placed(where)
-        if isinstance(here, Circle):
-            assert isinstance(other, Circle)
+        here = drawn.in_work_frame(where)
+        if isinstance(here, CircleFeature):
+            assert isinstance(other, CircleFeature)
             assert here.centre_mm == pytest.approx(other.centre_mm, abs=1e-9)
             assert here.radius_mm == pytest.approx(other.radius_mm, abs=1e-9)
             angles = np.arange(0.01, 6.28, 0.1)
             assert (here.has(angles, 1e-6) == other.has(angles, 1e-6)).all()
         else:
-            assert isinstance(other, Edge)
+            assert isinstance(other, EdgeFeature)
             assert here.start_mm == pytest.approx(other.start_mm, abs=1e-9)
             assert here.end_mm == pytest.approx(other.end_mm, abs=1e-9)
 
@@ -144,9 +150,9 @@ def test_a_hole_is_meant_and_not_the_rounding_around_it() -> None:
     paths = [Polyline(np.array(p, dtype=float), True) for p in (outline, hole)]
     features = features_of(Polylines.of(paths))
     found = bind(Dimension("d", "diameter", ((5, 5),), "test"), features, "x")
-    assert isinstance(found, Bound)
+    assert isinstance(found, BoundDimension)
     assert found.drawn_mm == pytest.approx(4.0)
     across = Dimension("d", "distance", ((5, 5), (30, 10)), "test", 0.0)
     reach = bind(across, features, "x")
-    assert isinstance(reach, Bound)
+    assert isinstance(reach, BoundDimension)
     assert reach.drawn_mm == pytest.approx(25.0)

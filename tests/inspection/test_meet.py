@@ -19,14 +19,14 @@ from camtool.errors import OptionError
 from camtool.inspection.inspector import Inspector
 from camtool.inspection.meet import (
     FAR_ENOUGH,
-    MOST_CHANGES,
+    MAX_CHANGES,
     Bench,
-    Case,
+    JobChanges,
     Meeting,
-    Proposal,
-    Trial,
-    cheapest,
+    MeetingCase,
+    MeetingTrial,
     closed_form,
+    find_cheapest,
     levers,
     meet,
     to_data,
@@ -65,7 +65,7 @@ ROUND = {"name": "round", "kind": "roundness", "at": [15, 20]}
 
 def case(
     tmp_path: Path, dimensions: list[dict[str, Any]], *settings: str, job: str = "", svg: str = SVG
-) -> Case:
+) -> MeetingCase:
     """The plate of `test_verdicts`, or another part, cut by 2 mm on an exact LinuxCNC."""
     drawing = tmp_path / "plate.svg"
     drawing.write_text(svg)
@@ -78,7 +78,7 @@ def case(
         return job_of_tables(tables, tmp_path / "job.toml", Shop())
 
     read = camtool.read_drawing(drawing)
-    return Case(read, target, tables, job_of, Tolerances(*dimensions_of(read, limits)))
+    return MeetingCase(read, target, tables, job_of, Tolerances(*dimensions_of(read, limits)))
 
 
 def text_of_rows(rows: list[dict[str, Any]]) -> str:
@@ -97,36 +97,38 @@ LABELS = ("a", "b", "c", "d")
 
 
 @st.composite
-def worlds(draw: st.DrawFn) -> tuple[list[list[Proposal]], dict[Proposal, Trial | None]]:
+def worlds(
+    draw: st.DrawFn,
+) -> tuple[list[list[JobChanges]], dict[JobChanges, MeetingTrial | None]]:
     """Choices, and how each of their proposals comes out, with and without allowances."""
     sizes = draw(st.lists(st.integers(1, 2), min_size=1, max_size=4))
     choices = [
-        [Proposal((Change(LABELS[k], value),)) for value in range(size)]
+        [JobChanges((Change(LABELS[k], value),)) for value in range(size)]
         for k, size in enumerate(sizes)
     ]
     dice = random.Random(draw(st.integers(0, 10**6)))
     often = draw(st.sampled_from([0.02, 0.1, 0.5]))
     left = (Left(0, 0.01),)
 
-    def trial(proposal: Proposal, more: tuple[Left, ...]) -> Trial | None:
+    def trial(proposal: JobChanges, more: tuple[Left, ...]) -> MeetingTrial | None:
         if dice.random() < 0.1:
             return None
         missing = 0 if dice.random() < often else dice.randint(1, 4)
-        return Trial(proposal, (), (), missing, dice.random(), more if missing else ())
+        return MeetingTrial(proposal, (), (), missing, dice.random(), more if missing else ())
 
-    world: dict[Proposal, Trial | None] = {}
+    world: dict[JobChanges, MeetingTrial | None] = {}
     for some in itertools.product(*([None, *each] for each in choices)):
-        proposal = sum(filter(None, some), Proposal())
+        proposal = sum(filter(None, some), JobChanges())
         world[proposal] = trial(proposal, left if dice.random() < 0.5 else ())
         known = world[proposal]
         if known is not None and known.left:
             world[replace(proposal, left=left)] = trial(replace(proposal, left=left), ())
-    world[Proposal()] = Trial(Proposal(), (), (), 3, 1.0, left)
-    world[Proposal(left=left)] = trial(Proposal(left=left), ())
+    world[JobChanges()] = MeetingTrial(JobChanges(), (), (), 3, 1.0, left)
+    world[JobChanges(left=left)] = trial(JobChanges(left=left), ())
     return choices, world
 
 
-def rank(proposal: Proposal) -> tuple[object, ...]:
+def rank(proposal: JobChanges) -> tuple[object, ...]:
     """Fewer changes first, of as many those with allowances, then in the order of the choices."""
     own = [(LABELS.index(each.key), each.value) for each in proposal.changes]
     return proposal.count, not proposal.left, [key for key, _ in own], [value for _, value in own]
@@ -134,28 +136,28 @@ def rank(proposal: Proposal) -> tuple[object, ...]:
 
 @given(worlds())
 def test_the_search_finds_what_trying_everything_finds(
-    world: tuple[list[list[Proposal]], dict[Proposal, Trial | None]],
+    world: tuple[list[list[JobChanges]], dict[JobChanges, MeetingTrial | None]],
 ) -> None:
     choices, known = world
-    start = known[Proposal()]
+    start = known[JobChanges()]
     assert start is not None
-    asked: list[Proposal] = []
+    asked: list[JobChanges] = []
 
-    def tried(proposal: Proposal) -> Trial | None:
+    def tried(proposal: JobChanges) -> MeetingTrial | None:
         asked.append(proposal)
         return known[proposal]
 
-    found, every = cheapest(start, choices, tried, 1000)
+    found, every = find_cheapest(start, choices, tried, 1000)
     assert every
     assert len(set(asked)) == len(asked)
-    within = [each for each in known.values() if each and each.proposal.count <= MOST_CHANGES]
+    within = [each for each in known.values() if each and each.proposal.count <= MAX_CHANGES]
     holding = [each for each in within if each.holds]
     if holding:
         assert found is min(holding, key=lambda each: rank(each.proposal))
     else:
         assert found.score == min(each.score for each in within)
     # With less trials than it takes, what is found is never worse than the start.
-    some, _ = cheapest(start, choices, lambda proposal: known[proposal], len(asked) // 2)
+    some, _ = find_cheapest(start, choices, lambda proposal: known[proposal], len(asked) // 2)
     assert some.score <= start.score
 
 
@@ -215,7 +217,7 @@ def test_allowances_come_out_as_they_were_foreseen(tmp_path: Path) -> None:
     bench = Bench(case(tmp_path, asked), camtool_progress())
     first = bench.first()
     assert [each.verdict for each in first.verdicts] == ["out", "out", "in", "in"]
-    run = bench.run_of(Proposal())
+    run = bench.run_of(JobChanges())
     inspector = Inspector(run, bench.case.tolerances.dimensions)
     by_name = closed_form(inspector, first.verdicts, bench.contours)
     circle, outline = (by_name[name] for name in sorted(by_name))
@@ -223,7 +225,7 @@ def test_allowances_come_out_as_they_were_foreseen(tmp_path: Path) -> None:
     assert 0.015 <= outline <= 0.03
     by_path = {path: by_name.get(name, 0.0) for path, name in enumerate(bench.contours.of_path)}
     foreseen = inspector.sizes(left_mm=by_path)
-    second = bench.tried(Proposal(left=first.left))
+    second = bench.try_changes(JobChanges(left=first.left))
     assert second is not None
     assert second.holds
     for size, each in zip(foreseen, second.verdicts, strict=True):
@@ -247,14 +249,14 @@ def test_grids_of_allowances_hold_nothing_cheaper(tmp_path: Path, allowance: str
     shift = 0.0 if allowance is None else -0.1
     bench = Bench(case(tmp_path, asked, job=job), camtool_progress())
     first = bench.first()
-    found, _ = cheapest(first, [], bench.tried, 10)
+    found, _ = find_cheapest(first, [], bench.try_changes, 10)
     assert found.holds
     names = sorted({*bench.contours.of_path})
     circle, window, outline = names
     scores = []
     for one, other in itertools.product(np.arange(0.0, 0.03, 0.005) + shift, repeat=2):
         left = bench.contours.left({circle: float(one), outline: float(other), window: shift})
-        trial = bench.tried(Proposal(left=left))
+        trial = bench.try_changes(JobChanges(left=left))
         assert trial is not None
         scores.append(trial.score[2])
     # Beyond FAR_ENOUGH no closed form looks for more.
@@ -340,7 +342,7 @@ def test_what_a_change_makes_measurable_is_counted(tmp_path: Path) -> None:
     bench.case.tables["operations"] = [inner]
     first = bench.first()
     assert (first.missing, [each.name for each in first.verdicts]) == (1, ["bore"])
-    more = bench.tried(Proposal((Change("select", ["closed"], 0),)))
+    more = bench.try_changes(JobChanges((Change("select", ["closed"], 0),)))
     assert more is not None
     assert (more.missing, [each.name for each in more.verdicts]) == (0, ["bore", "width"])
     assert [each.verdict for each in more.verdicts] == ["out", "in"]
@@ -352,18 +354,18 @@ ISLAND = """<svg xmlns="http://www.w3.org/2000/svg" width="50mm" height="40mm" v
 <circle cx="35" cy="20" r="5"/></g></svg>"""
 
 
-def held_with(found: Meeting, made: Case, setting: str) -> bool:
+def held_with(found: Meeting, made: MeetingCase, setting: str) -> bool:
     """Whether the part holds on another machine, by its program and allowances made for that."""
     target = made.target.with_settings([setting])
     bench = Bench(replace(made, target=target), camtool_progress())
-    plain = bench.tried(found.after.proposal)
+    plain = bench.try_changes(found.after.proposal)
     for _ in range(3):
         assert plain is not None
         if plain.holds:
             return True
         if not plain.left:
             return False
-        plain = bench.tried(replace(found.after.proposal, left=plain.left))
+        plain = bench.try_changes(replace(found.after.proposal, left=plain.left))
     return plain is not None and plain.holds
 
 
@@ -420,7 +422,7 @@ def test_play_that_nothing_makes_up_for_is_certified(tmp_path: Path) -> None:
     assert list(needs) == ["axes.x.backlash_mm"]
     needed = needs["axes.x.backlash_mm"].needed
     assert 0.0 < needed < 0.012
-    found = Meeting(first, first, bench.run_of(Proposal()), "", 0, True, why)
+    found = Meeting(first, first, bench.run_of(JobChanges()), "", 0, True, why)
     assert held_with(found, made, f"axes.x.backlash_mm={needed!r}")
     assert not held_with(found, made, f"axes.x.backlash_mm={1.1 * needed!r}")
 

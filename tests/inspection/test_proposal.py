@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from camtool.errors import InputError
 from camtool.geometry.drawing import Drawing
 from camtool.importers.read import read_drawing
-from camtool.inspection.features import Bound, bind, features_of
-from camtool.inspection.proposal import MOST_DIMENSIONS, proposed
+from camtool.inspection.features import BoundDimension, bind, features_of
+from camtool.inspection.proposal import MAX_DIMENSIONS, propose_file
 from camtool.inspection.tolerances import dimensions_of
 from tests.importers.test_dxf import document, drawn
 from tests.inspection.test_tolerances import part, with_text
@@ -23,14 +23,14 @@ SAMPLES = Path(__file__).parents[2] / "samples"
 
 
 def rows(drawing: Drawing) -> list[dict]:
-    text, findings, _ = proposed(drawing)
+    text, findings, _ = propose_file(drawing)
     assert not findings
     return tomllib.loads(text)["dimension"]
 
 
 def read_back(drawing: Drawing, folder: Path):
     file = folder / "tolerances.toml"
-    file.write_text(proposed(drawing)[0], encoding="utf-8")
+    file.write_text(propose_file(drawing)[0], encoding="utf-8")
     return dimensions_of(drawing, file)
 
 
@@ -49,7 +49,7 @@ def test_circles_and_outlines_of_a_part():
 
 
 def test_callouts_come_first_with_their_limits_and_once():
-    text, findings, _ = proposed(drawn(with_text(part(), "%%c6 H7")))
+    text, findings, _ = propose_file(drawn(with_text(part(), "%%c6 H7")))
     assert not findings
     found = tomllib.loads(text)["dimension"]
     assert (found[0]["name"], found[0]["nominal"], found[0]["limits"]) == ("Ø6", "6mm", "H7")
@@ -95,7 +95,7 @@ def test_the_samples_are_read_back_and_every_dimension_binds(name, tmp_path):
     features = features_of(drawing.paths)
     for each in found:
         bound = bind(each, features, name)
-        assert isinstance(bound, Bound), each
+        assert isinstance(bound, BoundDimension), each
         assert bound.drawn_mm == pytest.approx(each.nominal_mm, abs=1e-4)
 
 
@@ -120,29 +120,29 @@ def test_nothing_to_measure_is_one_line():
     doc = document()
     doc.modelspace().add_line((0, 0), (5, 5))
     with pytest.raises(InputError, match="no circles and slots") as told:
-        proposed(drawn(doc))
+        propose_file(drawn(doc))
     assert told.value.mend
 
 
 def test_many_circles_are_counted():
     doc = document()
-    for number in range(MOST_DIMENSIONS + 7):
+    for number in range(MAX_DIMENSIONS + 7):
         doc.modelspace().add_circle((3 * number, 0), 1)
-    text, _, _ = proposed(drawn(doc))
-    assert text.count("[[dimension]]") == MOST_DIMENSIONS
+    text, _, _ = propose_file(drawn(doc))
+    assert text.count("[[dimension]]") == MAX_DIMENSIONS
     assert "# 7 more circles, slots and sizes" in text
 
 
 def test_names_from_texts_stay_text(tmp_path):
     drawing = drawn(with_text(part(), 'see "x" [[dimension]]'))
-    text, findings, _ = proposed(drawing)
+    text, findings, _ = propose_file(drawing)
     assert len(findings) == 1
     assert len(tomllib.loads(text)["dimension"]) == 7
 
 
 def test_a_callout_with_wrong_limits_stands_there_without_them(tmp_path):
     drawing = drawn(with_text(part(), "%%c6 P7"))
-    text, _, (fault,) = proposed(drawing)
+    text, _, (fault,) = propose_file(drawing)
     assert "class P7 of 6 mm" in str(fault)
     assert "class P7 of 6 mm" in text
     found = tomllib.loads(text)["dimension"]

@@ -12,27 +12,33 @@ from scipy.optimize import linprog
 
 from camtool.arrays import Floats
 from camtool.inspection.dimensions import Dimension, Kind
-from camtool.inspection.features import Bound, Circle, Edge, End, Feature
+from camtool.inspection.features import (
+    BoundDimension,
+    CircleFeature,
+    DistanceEnd,
+    EdgeFeature,
+    Feature,
+)
 from camtool.inspection.sizes import (
-    Size,
-    Swept,
+    MachinedSize,
+    SweptSegments,
     cut_of,
     edge_at,
     envelope,
-    least,
+    minimise,
     rows_of,
     size_of,
     stations_of,
 )
 
 WHOLE = np.array([[0.0, 2.0 * math.pi]])
-HOLE = Circle(0, (1.0, 2.0), 3.0, WHOLE)
-EDGE = Edge(0, (0.0, 0.0), (8.0, 6.0))
+HOLE = CircleFeature(0, (1.0, 2.0), 3.0, WHOLE)
+EDGE = EdgeFeature(0, (0.0, 0.0), (8.0, 6.0))
 
 
-def swept(points: Floats, radius: float, row: int = 0, z: float = -1.0) -> Swept:
+def swept(points: Floats, radius: float, row: int = 0, z: float = -1.0) -> SweptSegments:
     count = len(points) - 1
-    return Swept(
+    return SweptSegments(
         points[:-1],
         points[1:],
         np.full(count, radius),
@@ -41,9 +47,11 @@ def swept(points: Floats, radius: float, row: int = 0, z: float = -1.0) -> Swept
     )
 
 
-def joined(*paths: Swept) -> Swept:
+def joined(*paths: SweptSegments) -> SweptSegments:
     names = ("a", "b", "radius", "z", "row")
-    return Swept(*(np.concatenate([getattr(each, name) for each in paths]) for name in names))
+    return SweptSegments(
+        *(np.concatenate([getattr(each, name) for each in paths]) for name in names)
+    )
 
 
 def ring(centre: tuple[float, float], radius: float, count: int = 2000) -> Floats:
@@ -51,7 +59,7 @@ def ring(centre: tuple[float, float], radius: float, count: int = 2000) -> Float
     return np.asarray(centre) + radius * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
-def cleared(feature: Feature, side: int, path: Swept) -> Floats:
+def cleared(feature: Feature, side: int, path: SweptSegments) -> Floats:
     """(S,) where the normal of each station enters what the tool clears, by shapely."""
     lines = shapely.linestrings(np.stack([path.a, path.b], axis=1))
     region = shapely.union_all(shapely.buffer(lines, path.radius[0], quad_segs=256))
@@ -77,7 +85,7 @@ def test_envelopes_are_the_edge_of_what_the_tool_clears(
     feature: Feature, side: int, radius: float, wobble: float, seed: int
 ) -> None:
     random = np.random.default_rng(seed)
-    if isinstance(feature, Circle):
+    if isinstance(feature, CircleFeature):
         points = ring(feature.centre_mm, feature.radius_mm + side * radius, 90)
     else:
         at = np.linspace(0.0, 1.0, 40)[:, None]
@@ -99,7 +107,7 @@ def test_envelopes_are_the_edge_of_what_the_tool_clears(
 @given(feature=st.sampled_from([HOLE, EDGE]), seed=st.integers(0, 10_000))
 def test_at_each_depth_the_moves_count_that_reach_it(feature: Feature, seed: int) -> None:
     random = np.random.default_rng(seed)
-    if isinstance(feature, Circle):
+    if isinstance(feature, CircleFeature):
         points = ring(feature.centre_mm, feature.radius_mm - 1.0, 60)
     else:
         left = np.array([-feature.along[1], feature.along[0]])
@@ -110,7 +118,7 @@ def test_at_each_depth_the_moves_count_that_reach_it(feature: Feature, seed: int
     ]
     path = joined(*passes)
     path = path.of(random.uniform(size=len(path.a)) < 0.8)
-    stations = stations_of(feature, -1 if isinstance(feature, Circle) else 1)
+    stations = stations_of(feature, -1 if isinstance(feature, CircleFeature) else 1)
     levels = np.array([math.inf, -2.0, -3.0, -3.5, -4.0])
     asked = random.uniform(size=(5, len(stations.places))) < 0.9
     found = envelope(feature, stations, path, asked, levels_mm=levels)
@@ -132,8 +140,8 @@ def test_sizes_of_all_depths_count() -> None:
     assert cut.levels_mm.tolist() == [math.inf, -2.0, -3.0]
     lies = edge_at(HOLE, cut, rows_of(joined(*slides), cut, HOLE))
 
-    def size(kind: Kind) -> Size:
-        bound = Bound(Dimension("d", kind, (), "test"), (HOLE,), (), np.zeros(2), 6.0)
+    def size(kind: Kind) -> MachinedSize:
+        bound = BoundDimension(Dimension("d", kind, (), "test"), (HOLE,), (), np.zeros(2), 6.0)
         found = size_of(bound, [cut], [lies])
         assert found is not None
         return found
@@ -182,10 +190,12 @@ def test_what_tapers_is_no_wall(tip: float) -> None:
     assert sign.levels_mm.tolist() == [math.inf]
 
 
-def measured(kind: Kind, feature: Circle | Edge, wanted: Swept, slides: Swept) -> float:
+def measured(
+    kind: Kind, feature: CircleFeature | EdgeFeature, wanted: SweptSegments, slides: SweptSegments
+) -> float:
     cut = cut_of(feature, wanted)
     assert cut is not None
-    bound = Bound(Dimension("d", kind, (), "test"), (feature,), (), np.zeros(2), 0.0)
+    bound = BoundDimension(Dimension("d", kind, (), "test"), (feature,), (), np.zeros(2), 0.0)
     size = size_of(bound, [cut], [edge_at(feature, cut, rows_of(slides, cut, feature))])
     assert size is not None
     return size.fit_mm
@@ -221,7 +231,7 @@ def test_two_point_sizes_of_an_oval_hole() -> None:
     oval = (ring((0.0, 0.0), 2.0) * (1.02, 0.99)) + HOLE.centre_mm
     cut = cut_of(HOLE, wanted)
     assert cut is not None
-    bound = Bound(Dimension("d", "diameter", (), "test"), (HOLE,), (), np.zeros(2), 6.0)
+    bound = BoundDimension(Dimension("d", "diameter", (), "test"), (HOLE,), (), np.zeros(2), 6.0)
     size = size_of(bound, [cut], [edge_at(HOLE, cut, rows_of(swept(oval, 1.0), cut, HOLE))])
     assert size is not None
     assert size.high_mm == pytest.approx(6.08, abs=1e-3)
@@ -241,7 +251,7 @@ def test_what_nothing_cuts_has_no_cut() -> None:
 
 
 def test_widths_between_edges_that_move_apart() -> None:
-    left, right = Edge(0, (0, 0), (0, 10)), Edge(0, (6, 10), (6, 0))
+    left, right = EdgeFeature(0, (0, 0), (0, 10)), EdgeFeature(0, (6, 10), (6, 0))
     paths = [np.array([(1.0, -3.0), (1.0, 13.0)]), np.array([(5.0, 13.0), (5.0, -3.0)])]
     slides = [np.array([(0.9, -3.0), (0.98, 13.0)]), np.array([(5.05, 13.0), (5.05, -3.0)])]
     cuts, lies = [], []
@@ -250,10 +260,10 @@ def test_widths_between_edges_that_move_apart() -> None:
         assert cut is not None
         cuts.append(cut)
         lies.append(edge_at(feature, cut, rows_of(swept(slide, 1.0, row), cut, feature)))
-    bound = Bound(
+    bound = BoundDimension(
         Dimension("d", "distance", (), "test"),
         (),
-        (End(left, "edge"), End(right, "edge")),
+        (DistanceEnd(left, "edge"), DistanceEnd(right, "edge")),
         np.array([1.0, 0.0]),
         6.0,
     )
@@ -274,7 +284,7 @@ def test_narrowest_zones_by_a_linear_programme(seed: int, count: int, unknowns: 
     rows = np.vstack([np.hstack([table, ones]), np.hstack([-table, ones])])
     bounds = np.concatenate([off, -off])
     goal = np.append(np.zeros(unknowns), 1.0)
-    mine = least(goal, rows, bounds)
+    mine = minimise(goal, rows, bounds)
     theirs = linprog(goal, A_ub=-rows, b_ub=-bounds, bounds=(None, None))
     assert (rows @ mine >= bounds - 1e-9).all()
     assert mine[-1] == pytest.approx(theirs.fun, abs=1e-9)

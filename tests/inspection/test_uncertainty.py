@@ -16,7 +16,7 @@ from camtool.arrays import Floats
 from camtool.inspection.uncertainty import (
     Budget,
     Inputs,
-    Variant,
+    MachineVariant,
     both_below,
     edges_of,
     inputs_of,
@@ -79,7 +79,7 @@ def machine_of(
     return replace(machine, uncertainty=said)
 
 
-def directions_of(variant: Variant, machine: Machine) -> Floats:
+def directions_of(variant: MachineVariant, machine: Machine) -> Floats:
     """(6,) by how much a variant is off the machine: lost motion of X and Y, relative scales,
     squareness, tool."""
     ours, its = variant.machine, machine
@@ -95,10 +95,10 @@ def directions_of(variant: Variant, machine: Machine) -> Floats:
     )
 
 
-def linear(machine: Machine, slopes: Floats) -> Callable[[Variant], Floats]:
+def linear(machine: Machine, slopes: Floats) -> Callable[[MachineVariant], Floats]:
     """Values that are linear in all that varies: (K, 6) slopes."""
 
-    def values(variant: Variant) -> Floats:
+    def values(variant: MachineVariant) -> Floats:
         found: Floats = np.arange(len(slopes)) + slopes @ directions_of(variant, machine)
         return found
 
@@ -148,7 +148,7 @@ def test_linear_cases_are_those_of_the_package(slopes: list[list[float]]) -> Non
         assert budget.standards[row] == pytest.approx(each.std_dev, rel=1e-6, abs=1e-9)
 
 
-def bent(variant: Variant) -> Floats:
+def bent(variant: MachineVariant) -> Floats:
     """Sizes as machines make them: widths, a diagonal, a roundness with a sharp bend, a hole."""
     axes, lean = variant.machine.axes, math.tan(variant.machine.mechanics.squareness_rad)
     kx, ky = (axis.real_step_mm / axis.coded_step_mm for axis in (axes.x, axes.y))
@@ -262,9 +262,9 @@ def with_scatter(machine: Machine, x: float, y: float) -> Machine:
 
 def test_sizes_are_predicted_without_scatter_and_edges_have_it() -> None:
     machine = with_scatter(machine_of([0.0] * 8, (), process_mm=0.004), 0.003, 0.001)
-    seen: list[Variant] = []
+    seen: list[MachineVariant] = []
 
-    def values(variant: Variant) -> Floats:
+    def values(variant: MachineVariant) -> Floats:
         seen.append(variant)
         return bent(variant)
 
@@ -282,9 +282,9 @@ def test_sizes_are_predicted_without_scatter_and_edges_have_it() -> None:
 
 def test_the_tool_alone_needs_no_other_motion() -> None:
     machine = machine_of()
-    seen: list[Variant] = []
+    seen: list[MachineVariant] = []
 
-    def values(variant: Variant) -> Floats:
+    def values(variant: MachineVariant) -> Floats:
         seen.append(variant)
         return bent(variant)
 
@@ -301,7 +301,7 @@ def test_backlash_does_not_go_below_zero() -> None:
     machine = machine_of((0.2, 0.003, 2e-4, 0.002, 3e-4, 5e-4, 0.006, 0.001), ())
     seen: list[float] = []
 
-    def values(variant: Variant) -> Floats:
+    def values(variant: MachineVariant) -> Floats:
         seen.append(variant.machine.axes.x.backlash_mm)
         return bent(variant)
 
@@ -324,7 +324,7 @@ def test_cells_of_a_map_err_together() -> None:
     ).machine
     seen: list[Any] = []
 
-    def values(variant: Variant) -> Floats:
+    def values(variant: MachineVariant) -> Floats:
         cells = variant.machine.play_map.x
         assert cells is not None
         seen.append(cells.play_mm[0])
@@ -345,14 +345,14 @@ def test_a_bend_is_not_taken_for_flat() -> None:
     machine = machine_of((0.01, *[0.0] * 7), ())
     base = machine.axes.x.backlash_mm
 
-    def machined(variant: Variant) -> Floats:
+    def machined(variant: MachineVariant) -> Floats:
         return np.array([variant.machine.axes.x.backlash_mm - base])
 
     def measure(nodes: Floats, weights: Floats) -> Floats:
         off = weights @ nodes
         return np.hstack([np.abs(off), off * off, np.maximum(off - 0.004, 0.0)])
 
-    def values(variant: Variant) -> Floats:
+    def values(variant: MachineVariant) -> Floats:
         return np.asarray(measure(machined(variant)[None], np.ones((1, 1)))[0])
 
     inputs = inputs_of(machine, 3.0)
@@ -382,7 +382,7 @@ def test_an_edge_has_a_node_at_its_kink() -> None:
     kink = 0.03 * machine.axes.x.real_step_mm / machine.axes.x.coded_step_mm
     seen: list[float] = []
 
-    def machined(variant: Variant) -> Floats:
+    def machined(variant: MachineVariant) -> Floats:
         lost = variant.machine.axes.x.backlash_mm
         seen.append(lost)
         return np.array([min(lost - kink, 0.0)])
@@ -424,7 +424,7 @@ def test_draws_scatter_as_their_axes_do() -> None:
     """Each draw has a seed of its own, where the machine scatters."""
     seeds: list[int] = []
 
-    def values(variant: Variant) -> Floats:
+    def values(variant: MachineVariant) -> Floats:
         seeds.append(variant.machine.mechanics.seed)
         return np.zeros(1)
 
@@ -433,7 +433,7 @@ def test_draws_scatter_as_their_axes_do() -> None:
     assert set(seeds) == {0}
     monte_carlo(values, inputs_of(with_scatter(quiet, 0.01, 0.0), 3.0), no_edges(1), 20, 1)
     assert len(set(seeds)) == 21
-    assert without_scatter(Variant(quiet)).machine is quiet
+    assert without_scatter(MachineVariant(quiet)).machine is quiet
 
 
 @given(st.floats(0.1, 10.0), SLOPES)
@@ -468,7 +468,7 @@ def exchanged(machine: Machine) -> Machine:
 
 def test_exchanged_axes_exchange_the_budget() -> None:
     machine = machine_of(process_mm=0.002)
-    back = lambda variant: Variant(exchanged(variant.machine), variant.wider_mm)  # noqa: E731
+    back = lambda variant: MachineVariant(exchanged(variant.machine), variant.wider_mm)  # noqa: E731
     one = propagate(bent, inputs_of(machine, 3.0), EDGES)
     other = propagate(
         lambda variant: bent(back(variant)),

@@ -15,7 +15,7 @@ from camtool.inspection.dimensions import Dimension, Kind, Limits, Place
 from camtool.inspection.findings import InspectionCode
 from camtool.inspection.inspector import Inspector
 from camtool.inspection.sizes import edge_at, rows_of, size_of
-from camtool.inspection.uncertainty import DRAWS, Variant
+from camtool.inspection.uncertainty import DRAWS, MachineVariant
 from camtool.inspection.verdicts import SURE, Tolerances, inspect
 from camtool.records import replace
 from camtool.run import Run
@@ -95,7 +95,7 @@ def test_scale_backlash_and_tool_change_sizes_as_they_must(plate: Path) -> None:
     # The tool keeps its width when the slides go farther.
     expected = [40 + 0.001 * 42, 30, 12 + 0.001 * 10]
     assert [each.fit_mm for each in scaled[:3]] == pytest.approx(expected, abs=1e-3)
-    wide = inspector.sizes(Variant(machine, 0.1))
+    wide = inspector.sizes(MachineVariant(machine, 0.1))
     changes = [b.fit_mm - a.fit_mm for a, b in zip(plain, wide, strict=True)]
     assert changes == pytest.approx([-0.1, -0.1, 0.1, 0.1, -0.05, 0.0], abs=1e-3)
     slack = Inspector(posted(plate, "axes.x.backlash_mm=0.06", start="25,4"), ALL).sizes()
@@ -567,7 +567,7 @@ def chances_and_shares(run: Run, asked: list[Dimension], count: int) -> tuple[Fl
         )
         lean = replace(machine.mechanics, squareness_rad=random.normal(0.0, 0.0001))
         drawn = replace(machine, axes=replace(machine.axes, x=x, y=y), mechanics=lean)
-        sizes = inspector.sizes(Variant(drawn, random.normal(0.0, 0.01)))
+        sizes = inspector.sizes(MachineVariant(drawn, random.normal(0.0, 0.01)))
         for k, (size, each) in enumerate(zip(sizes, said, strict=True)):
             assert each.upper_mm is not None
             above = each.lower_mm is None or size.low_mm >= each.lower_mm

@@ -222,8 +222,8 @@ def _run_session(program: Path, image: Path, folder: Path) -> None:
     subprocess.run([program, *names], check=True, timeout=600)
 
 
-class Line:
-    """The firmware at the other end of a line, as `camtool.sending.faults.Wired` is a twin: a
+class FaultyLine:
+    """The firmware at the other end of a line, as `camtool.sending.faults.WiredTwin` is a twin: a
     session that is played again from its beginning with all bytes that have come since. `before`:
     lines that it has been told already."""
 

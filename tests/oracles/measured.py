@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from camtool.calibration.coupons import Path, Sheet
+from camtool.calibration.coupons import CouponSheet, SheetPath
 from camtool.machine.model import Machine
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import ALL
@@ -20,7 +20,9 @@ from camtool.simulation.motion import ALL
 CHORD_RAD = 0.002
 
 
-def readings(sheet: Sheet, machine: Machine, *, backwards: bool = False) -> list[dict[str, Any]]:
+def readings(
+    sheet: CouponSheet, machine: Machine, *, backwards: bool = False
+) -> list[dict[str, Any]]:
     """The tables of the sheet, filled in; `backwards`: open paths are cut from their other end."""
     mechanics = Mechanics(machine, np.zeros(3), ALL)
     return [
@@ -29,7 +31,7 @@ def readings(sheet: Sheet, machine: Machine, *, backwards: bool = False) -> list
     ]
 
 
-def _cut(path: Path, mechanics: Mechanics, backwards: bool) -> tuple[np.ndarray, np.ndarray]:
+def _cut(path: SheetPath, mechanics: Mechanics, backwards: bool) -> tuple[np.ndarray, np.ndarray]:
     """(K, 2) slides along the path, and (V,) the sample that ends at each vertex as drawn."""
     vertices = list(path.vertices)
     if backwards and not path.closed:
@@ -57,7 +59,7 @@ def _dense(start: complex, end: complex, bulge: float) -> np.ndarray:
 
 
 def _read(
-    kind: str, path: Path, table: dict[str, Any], slide: np.ndarray, at: np.ndarray
+    kind: str, path: SheetPath, table: dict[str, Any], slide: np.ndarray, at: np.ndarray
 ) -> dict[str, Any]:
     corners = slide[at]
     if kind == "circles":

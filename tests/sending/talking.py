@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from camtool.sending.faults import Wired
+from camtool.sending.faults import WiredTwin
 from camtool.target.wire import Conversation, Reopen, Write
 
 MOST_TURNS = 10_000
@@ -18,7 +18,7 @@ class Talking:
     a travel is over, which is faster and on a line without faults the same."""
 
     def __init__(
-        self, talk: Conversation, line: Wired, *, coarse: bool = False, now: float = 0.0
+        self, talk: Conversation, line: WiredTwin, *, coarse: bool = False, now: float = 0.0
     ) -> None:
         self.talk, self.line, self.now = talk, line, now
         self.coarse = coarse
@@ -63,7 +63,7 @@ class Talking:
 
 def talked(
     talk: Conversation,
-    line: Wired,
+    line: WiredTwin,
     wish: Wish = lambda talk, now: None,
     *,
     latest_s: float,

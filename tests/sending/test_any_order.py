@@ -23,8 +23,8 @@ from hypothesis.stateful import (
 from camtool.arrays import Floats
 from camtool.errors import MachineError, OptionError
 from camtool.sending.drive import counts_of
-from camtool.sending.faults import Faults, Wired
-from camtool.sending.journal import Place as Left
+from camtool.sending.faults import Faults, WiredTwin
+from camtool.sending.journal import JournalState
 from camtool.sending.prepare import consignment, forecast_of, rest_of, tool_at_of
 from camtool.target.registry import LoadedTarget, load_target
 from camtool.target.twin import Twin
@@ -139,7 +139,7 @@ class Sending(RuleBasedStateMachine):
         target = loaded(self.name)
         self.part = part(self.name)
         self.twin: Any = target.twin(CHOICES.get(self.name, []))
-        self.line = Wired(self.twin, seed=seed)
+        self.line = WiredTwin(self.twin, seed=seed)
         wire: Any = target.target.wire()
         talk = wire.conversation(self.part.packets, target.machine, Manner(single=single))
         self.both = Talking(talk, self.line)
@@ -286,7 +286,7 @@ class Sending(RuleBasedStateMachine):
         twin: Any = target.twin(CHOICES.get(self.name, []))
         wire: Any = target.target.wire()
         talk = wire.conversation(rest.packets, target.machine, Manner())
-        both = Talking(talk, Wired(twin), coarse=True)
+        both = Talking(talk, WiredTwin(twin), coarse=True)
         both.until(BOUND * rest.seconds + 60.0)
         assert talk.state is WireState.FINISHED, talk.why
         assert twin.decoded == rest.blocks
@@ -352,11 +352,11 @@ def stopped_and_gone_on(name: str, seed: int) -> str:
             talk.pause(now)
 
     talk = one.wire.conversation(one.packets, target.machine, Manner())
-    Talking(talk, Wired(twin), coarse=name != "pic-mmh").until(1e5, stopping)
+    Talking(talk, WiredTwin(twin), coarse=name != "pic-mmh").until(1e5, stopping)
     if talk.state is WireState.FINISHED:
         return "finished"
     counts, tool = counts_of(talk, one.block_of), one.place_of(talk)
-    left = Left(
+    left = JournalState(
         one.sha256, "", name, counts["block"] + 1, False, counts["last"], tool, talk.is_still
     )
     step = np.array([axis.coded_step_mm for axis in target.machine.axes])
@@ -378,7 +378,7 @@ def stopped_and_gone_on(name: str, seed: int) -> str:
     before = len(twin.slides.trace)
     standing = second.standing if one.wire.place == "told" else None
     again = one.wire.conversation(second.packets, target.machine, Manner(standing=standing))
-    Talking(again, Wired(twin), coarse=True, now=twin.now).until(2e5)
+    Talking(again, WiredTwin(twin), coarse=True, now=twin.now).until(2e5)
     assert again.state is WireState.FINISHED, (again.why, left, said)
     trace = motion(program, target)
     of = target.target.read(program, target.machine).block[trace.block]
@@ -406,9 +406,9 @@ def test_a_thousand_stopped_programs_go_on(name: str) -> None:
 def test_where_a_machine_stands_that_does_not_say_is_asked(name: str) -> None:
     """And refused where the answer would mean nothing."""
     wire: Any = loaded(name).target.wire()
-    left = Left("", "", name, 3, False, 5, (1.0, 2.0, 3.0), True)
-    lost = Left("", "", name, 3, False, 5, (1.0, 2.0, 3.0), False)
-    new = Left("", "", name, 0, False, -1, None, True)
+    left = JournalState("", "", name, 3, False, 5, (1.0, 2.0, 3.0), True)
+    lost = JournalState("", "", name, 3, False, 5, (1.0, 2.0, 3.0), False)
+    new = JournalState("", "", name, 0, False, -1, None, True)
     tool_at, asked = tool_at_of(wire, left, "", name)
     assert tool_at == STAYS[name]
     assert tool_at_of(wire, new, "", name)[1] == ""

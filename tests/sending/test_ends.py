@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 from camtool.arrays import Floats, Ints
-from camtool.sending.faults import Wired
+from camtool.sending.faults import WiredTwin
 from camtool.sending.journal import read_journal
 from camtool.sending.twin import Clock, PseudoTerminal, serve
 from camtool.target.registry import load_target
@@ -53,7 +53,7 @@ def hosted(twin: Twin, speed: float) -> Iterator[str]:
 
     def work() -> None:
         try:
-            serve(Wired(twin), port, Clock(speed), each=look)
+            serve(WiredTwin(twin), port, Clock(speed), each=look)
         except Over:
             return
 

@@ -10,14 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError
-from camtool.sending.faults import Faults, Line, Wired
+from camtool.sending.faults import Faults, FaultyLine, WiredTwin
 from tests.feeding import made
 
 DATA = bytes(range(256)) * 8
 
 
 def passed(faults: Faults, seed: int, pieces: list[bytes]) -> bytes:
-    line = Line(faults, Random(seed))
+    line = FaultyLine(faults, Random(seed))
     come = b""
     for now, piece in enumerate(pieces):
         line.put(piece, float(now))
@@ -54,7 +54,7 @@ def test_each_fault_comes_as_often_as_asked_for() -> None:
 
 
 def test_bytes_take_their_time_and_none_overtakes_another() -> None:
-    line = Line(Faults(late=1.0, late_s=2.0), Random(0), byte_s=0.5)
+    line = FaultyLine(Faults(late=1.0, late_s=2.0), Random(0), byte_s=0.5)
     line.put(b"ab", 0.0)
     assert [line.take(2.4), line.take(2.5), line.next_s(), line.take(3.0)] == [
         b"",
@@ -66,7 +66,7 @@ def test_bytes_take_their_time_and_none_overtakes_another() -> None:
 
 def test_behind_the_pulling_of_the_plug_nothing_passes() -> None:
     twin, _ = made("pic-mmh")
-    wired = Wired(twin, Faults(unplug_s=10.0), Faults(unplug_s=10.0))
+    wired = WiredTwin(twin, Faults(unplug_s=10.0), Faults(unplug_s=10.0))
     wired.write(b"G54;", 9.0)
     assert wired.read(9.0) == b"G54;"
     wired.write(b"M30;", 10.0)
@@ -79,7 +79,7 @@ def test_a_paced_line_is_as_fast_as_its_machine() -> None:
     twin, _ = made("pic-mmh")
     type(twin).byte_s, before = 0.25, type(twin).byte_s
     try:
-        wired = Wired(twin, paced=True)
+        wired = WiredTwin(twin, paced=True)
     finally:
         type(twin).byte_s = before
     wired.write(b"A;", 0.0)

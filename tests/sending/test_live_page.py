@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from camtool.records import replace
-from camtool.sending.live import MAX_LINES, STEPS_PX, WIDTH, LivePage
+from camtool.sending.live import MAX_LINES, STEPS_PX, WIDTH_PX, LivePage
 from camtool.sending.prepare import consignment
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
@@ -51,7 +51,7 @@ def drawn_beside(text: str, tmp_path: Path) -> float:
     program = program_paths(text)
     page = LivePage(tmp_path / "live.html", "part", read(text.encode())).html("x", {}, 0)
     left, low, right, top = program.box()
-    px_mm = 1.08 * max(right - left, top - low) / WIDTH
+    px_mm = 1.08 * max(right - left, top - low) / WIDTH_PX
     rapids = [path for path in program.rapids if len(path) > 1]
     if rapids:
         assert beside(live_paths(page, "rapid"), rapids) < 0.5 * px_mm
@@ -172,7 +172,7 @@ def test_long_paths_are_thinned_and_keep_their_ends(tmp_path: Path) -> None:
     assert 1_000 < path_of(text, "way").count("L") <= MAX_LINES
     x, y, _ = made.end[-1]
     ends = [float(each) for each in path_of(text, "way").rsplit("L", 1)[1].split()]
-    assert ends == pytest.approx([x, -y], abs=0.1 * STEPS_PX[0] * MAX_LINES / WIDTH)
+    assert ends == pytest.approx([x, -y], abs=0.1 * STEPS_PX[0] * MAX_LINES / WIDTH_PX)
 
 
 def test_an_empty_program_has_a_page(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from camtool.sending.faults import Wired
+from camtool.sending.faults import WiredTwin
 from camtool.sending.journal import read_journal
 from camtool.sending.twin import Clock, PseudoTerminal, serve
 from camtool.target.twin import Twin
@@ -30,7 +30,7 @@ def at_a_port(twin: Twin) -> Iterator[str]:
     """The port at which a machine answers as fast as it can, until the first client has gone."""
     port = PseudoTerminal()
     serving = threading.Thread(
-        target=serve, args=(Wired(twin), port, Clock(None)), kwargs={"once": True}, daemon=True
+        target=serve, args=(WiredTwin(twin), port, Clock(None)), kwargs={"once": True}, daemon=True
     )
     serving.start()
     try:

@@ -25,8 +25,8 @@ import pytest
 
 from camtool.arrays import Floats
 from camtool.records import replace
-from camtool.sending.drive import Driver, Wish
-from camtool.sending.faults import Faults, Wired
+from camtool.sending.drive import Driver, Request
+from camtool.sending.faults import Faults, WiredTwin
 from camtool.sending.prepare import forecast_of
 from camtool.target.registry import LoadedTarget, load_target
 from camtool.target.twin import Twin
@@ -99,7 +99,7 @@ class Work:
             twin.receive(self.before, 0.0)
         talk = self.conversation()
         twin.read_file = lambda name: self.program
-        return Talking(talk, line or Wired(twin, paced=self.paced)), twin
+        return Talking(talk, line or WiredTwin(twin, paced=self.paced)), twin
 
 
 GRBL_STOP_MM = 500.0**2 / 3600.0 / (2.0 * 10.0) + 500.0 / 60.0 * 0.05
@@ -191,7 +191,7 @@ def way_since(twin: Twin, at_s: float, place: Floats) -> float:
 
 
 def stopped_at(
-    work: Work, moment_s: float, fault: Callable[[Wired], None] = lambda line: None
+    work: Work, moment_s: float, fault: Callable[[WiredTwin], None] = lambda line: None
 ) -> tuple[Conversation, Twin]:
     """Stop it then, and see it stop."""
     both, twin = work.begun()
@@ -291,7 +291,7 @@ def test_a_thousand_stops(name: str) -> None:
     check(name, 1000)
 
 
-def all_answers_lost(line: Wired) -> None:
+def all_answers_lost(line: WiredTwin) -> None:
     line.back.faults = Faults(drop=1.0)
 
 
@@ -310,7 +310,7 @@ def test_a_stop_whose_answer_is_lost_is_one_and_is_not_said_to_be(
 def test_a_stop_whose_answer_is_late_is_one(name: str) -> None:
     """As grbl's is that was reset while it homed; it has been silent for long before."""
 
-    def late(line: Wired) -> None:
+    def late(line: WiredTwin) -> None:
         line.back.faults = Faults(late=1.0, late_s=0.4)
 
     talk, twin = stopped_at(WORKS[name], 7.0, late)
@@ -357,7 +357,7 @@ def test_a_second_stop_resets_grbl_at_once() -> None:
     assert "its position is lost" in both.talk.why
 
 
-ENDS = {
+END_STATES = {
     "grbl": Work("grbl", "jog", {"x": 20.0, "feed": 300.0}),
     "linuxcnc": Work("linuxcnc", "jog", {"x": 20.0, "feed": 300.0}),
     "i8751": Work("i8751", "jog", {"x": 20.0}, settings=SETTINGS["i8751"]),
@@ -375,10 +375,10 @@ ENDS = {
 }
 
 
-@pytest.mark.parametrize("name", sorted(ENDS))
+@pytest.mark.parametrize("name", sorted(END_STATES))
 def test_done_is_said_of_a_jog_only_when_it_stands(name: str) -> None:
     """And back again, which pic-mmh begins with steps that it does not report."""
-    work = ENDS[name]
+    work = END_STATES[name]
     both, twin = work.begun()
     both.until(LONG_S)
     wire: Any = work.loaded().target.wire()
@@ -386,7 +386,7 @@ def test_done_is_said_of_a_jog_only_when_it_stands(name: str) -> None:
     talks = [both.talk, wire.command("jog", work.loaded().machine, back, Manner())]
     for talk, x in zip(talks, (work.values["x"], 0.0), strict=True):
         if talk is not both.talk:
-            line = Wired(twin)
+            line = WiredTwin(twin)
             line.read(both.now)
             talk.begin(both.now)
             both.talk, both.line = talk, line
@@ -685,7 +685,7 @@ def test_whatever_fails_around_a_conversation_stops_the_machine(
     driver = Driver(line)
     if where == "tell":
         driver.tell = lambda text: fail()
-        driver.wish = lambda: Wish.STOP if talk.acknowledged > 3 else None
+        driver.wish = lambda: Request.STOP if talk.acknowledged > 3 else None
     elif where == "watch":
         driver.watch = fail
     if isinstance(error, OSError) and where != "read":
@@ -709,7 +709,7 @@ def test_whatever_fails_around_a_conversation_stops_the_machine(
 def test_a_second_stop_closes_the_port_when_all_is_written() -> None:
     """Of a machine that does not say that it stands."""
     line, talk = Recorded(), SMALL.conversation()
-    wishes, write = [Wish.STOP, Wish.CLOSE], line.small.write
+    wishes, write = [Request.STOP, Request.CLOSE], line.small.write
     line.small.write = lambda data, now: write(data, now) if len(wishes) == 2 else []  # type: ignore[method-assign]
     driver = Driver(line, wish=lambda: wishes.pop(0) if talk.acknowledged > 3 and wishes else None)
     assert driver.carry(talk) is WireState.FAILED
@@ -722,7 +722,7 @@ def test_a_port_that_does_not_come_back_holds_up_no_stop() -> None:
     work = replace(WORKS["matlab-router cuts"], settings=settings)
     talk, line = work.conversation(), Recorded()
     line.small.write = lambda data, now: []  # type: ignore[method-assign]
-    driver = Driver(line, wish=lambda: Wish.STOP if line.opens > 1 else None, speed=1e6)
+    driver = Driver(line, wish=lambda: Request.STOP if line.opens > 1 else None, speed=1e6)
     assert driver.carry(talk) is WireState.STOPPED
     assert line.opens == 2
     assert talk.done == 1

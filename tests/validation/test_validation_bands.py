@@ -19,7 +19,7 @@ import numpy as np
 from camtool.arrays import Floats
 from camtool.inspection.uncertainty import (
     Budget,
-    Variant,
+    MachineVariant,
     edges_of,
     inputs_of,
     normal_below,
@@ -168,7 +168,7 @@ def budget_of(part: Part) -> Budget:
     """The bands of its sizes, all of which are scribed with a point."""
     made = part.made()
 
-    def values(variant: Variant) -> Floats:
+    def values(variant: MachineVariant) -> Floats:
         return np.array(part.sizes_of(replace(made, machine=variant.machine)))
 
     edges = edges_of(

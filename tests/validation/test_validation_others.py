@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from camtool.calibration.calibrate import Calibration, calibrate
-from camtool.calibration.measurements import Measurements, Steps, read_measurements
+from camtool.calibration.measurements import Measurements, StepsCoupon, read_measurements
 from camtool.importers.read import read_drawing
 from camtool.machine.model import Machine
 from camtool.pipeline import post_drawing
@@ -64,9 +64,9 @@ def by_five(axis: str) -> Calibration:
     """What the first five turns say."""
     said = read_measurements(MEASURED)
     ((name, coupon),) = [each for each in said.coupons if getattr(each[1], "axis", "") == axis]
-    assert isinstance(coupon, Steps)
+    assert isinstance(coupon, StepsCoupon)
     assert coupon.forward_mm is not None
-    half = Steps(axis=coupon.axis, nominal_mm=coupon.nominal_mm[:5],
+    half = StepsCoupon(axis=coupon.axis, nominal_mm=coupon.nominal_mm[:5],
                  forward_mm=coupon.forward_mm[:5])  # fmt: skip
     some = Measurements(
         said.file, said.target, None, said.compensation_mm, said.regions, ((name, half),)

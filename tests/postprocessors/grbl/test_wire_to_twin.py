@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from camtool.records import replace
-from camtool.sending.faults import Faults, Wired
+from camtool.sending.faults import Faults, WiredTwin
 from camtool.sending.prepare import forecast_of
 from camtool.target.registry import load_target
 from camtool.target.wire import Conversation, Manner, Packet, ResumePoint, WireState
 from tests.feeding import logo, made, same_motion
-from tests.oracles.grbl_firmware import Line, Switch, built, source
+from tests.oracles.grbl_firmware import FaultyLine, Switch, built, source
 from tests.sending.talking import talked
 
 
@@ -38,7 +38,7 @@ def conversation(program: bytes) -> Conversation:
 @cache
 def sent_without_faults() -> tuple[bytes, ...]:
     twin, _ = made("grbl")
-    talked(conversation(logo("grbl")), Wired(twin), latest_s=1000.0)
+    talked(conversation(logo("grbl")), WiredTwin(twin), latest_s=1000.0)
     return tuple(twin.decoded)
 
 
@@ -46,7 +46,7 @@ def test_the_logo_arrives_and_moves_as_verify_says() -> None:
     twin, loaded = made("grbl")
     program = logo("grbl")
     talk = conversation(program)
-    talked(talk, Wired(twin), latest_s=1000.0)
+    talked(talk, WiredTwin(twin), latest_s=1000.0)
     assert talk.state is WireState.FINISHED, talk.why
     same_motion(twin, program, loaded)
 
@@ -57,7 +57,7 @@ def test_faults_never_skip_or_double_a_block(fault: str, seed: int) -> None:
     twin, _ = made("grbl")
     program = logo("grbl")
     talk = conversation(program)
-    talked(talk, Wired(twin, back=Faults.of(fault), seed=seed), latest_s=1000.0)
+    talked(talk, WiredTwin(twin, back=Faults.of(fault), seed=seed), latest_s=1000.0)
     wanted = sent_without_faults()
     assert twin.decoded == list(wanted[: len(twin.decoded)])
     assert talk.state in (WireState.FINISHED, WireState.FAILED)
@@ -73,7 +73,7 @@ def test_a_stop_leaves_nothing_that_moves() -> None:
         if now > 30.0:
             talk.stop(now)
 
-    talked(talk, Wired(twin), wish, latest_s=100.0)
+    talked(talk, WiredTwin(twin), wish, latest_s=100.0)
     assert talk.state is WireState.STOPPED, talk.why
     assert not twin.moves
 
@@ -82,10 +82,10 @@ def test_dwells_are_no_missing_answers_and_missing_ones_are_noticed() -> None:
     program = b"G21 G90\nG1 X1 F500\nG4 P5\nG1 X2\nG4 P3\n"
     twin, _ = made("grbl")
     talk = conversation(program)
-    talked(talk, Wired(twin), latest_s=100.0)
+    talked(talk, WiredTwin(twin), latest_s=100.0)
     assert talk.state is WireState.FINISHED, talk.why
     twin, _ = made("grbl")
-    line, talk = Wired(twin), conversation(program)
+    line, talk = WiredTwin(twin), conversation(program)
 
     def wish(talk: Conversation, now: float) -> None:
         line.back.faults = Faults(drop=1.0 if talk.acknowledged == 2 and now < 6.5 else 0.0)
@@ -109,7 +109,7 @@ def test_short_lines_are_sent_as_fast_as_the_machine_takes_them() -> None:
     talk = wire.conversation(
         tuple(wire.packets(program, loaded.machine, forecast)), loaded.machine, Manner()
     )
-    talked(talk, Wired(twin, paced=True), latest_s=100.0)
+    talked(talk, WiredTwin(twin, paced=True), latest_s=100.0)
     assert talk.state is WireState.FINISHED, talk.why
     times = twin.slides.trace.time_s
     assert times[-1] - times[0] < 1.02 * forecast.seconds.sum()
@@ -171,7 +171,7 @@ def test_conversations_with_the_firmware(
     decoded = loaded.target.read(program, loaded.machine)
     made = tuple(wire.packets(program, loaded.machine, forecast_of(decoded, loaded)))
     talk = wire.conversation(made, loaded.machine, manner)
-    line: Any = Line(firmware, tmp_path, before, switches)
+    line: Any = FaultyLine(firmware, tmp_path, before, switches)
     talked(talk, line, latest_s=100.0)
     assert talk.state is (WireState.FAILED if why else WireState.FINISHED), talk.why
     assert why in talk.why

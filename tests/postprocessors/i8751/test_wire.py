@@ -7,7 +7,7 @@ from functools import cache
 import pytest
 
 from camtool.errors import MachineError
-from camtool.sending.faults import Faults, Wired
+from camtool.sending.faults import Faults, WiredTwin
 from camtool.sending.prepare import Consignment, consignment
 from camtool.target.wire import Conversation, Manner, WireState
 from tests.feeding import same_motion
@@ -51,7 +51,7 @@ def test_each_reading_of_what_is_open(settings: list[str], choices: list[str]) -
     decoded = loaded().target.read(SHORT, loaded().machine)
     data = target.target.write(decoded, target.machine).data
     twin, talk = target.twin(choices), conversation(data, *settings)
-    talked(talk, Wired(twin, paced=True), latest_s=3000.0)
+    talked(talk, WiredTwin(twin, paced=True), latest_s=3000.0)
     assert talk.state is WireState.FINISHED, talk.why
     same_motion(twin, data, target)
 
@@ -61,7 +61,7 @@ def test_an_end_of_a_packet_that_is_stored_too() -> None:
     for choice, state in (("M F", WireState.FINISHED), ("F", WireState.FAILED)):
         one = consignment(SHORT, target, source="a.bin")
         talk = one.wire.conversation(one.packets, target.machine, Manner())
-        talked(talk, Wired(target.twin([f"packet_end={choice}"])), latest_s=3000.0)
+        talked(talk, WiredTwin(target.twin([f"packet_end={choice}"])), latest_s=3000.0)
         assert talk.state is state, talk.why
 
 
@@ -71,7 +71,7 @@ def test_an_end_of_a_packet_that_is_stored_too() -> None:
 def test_faults_never_skip_or_double_a_record(fault: str, seed: int, way: str) -> None:
     twin, faults = loaded().twin(), Faults.of(fault)
     talk = conversation(SHORT, manner=Manner(paced=True))
-    line = Wired(twin, **{way: faults}, seed=seed, paced=True)  # type: ignore[arg-type]
+    line = WiredTwin(twin, **{way: faults}, seed=seed, paced=True)  # type: ignore[arg-type]
     now = talked(talk, line, latest_s=1000.0)
     wanted = consigned(SHORT).packets
     assert talk.state in (WireState.FINISHED, WireState.FAILED)
@@ -108,7 +108,7 @@ def test_a_stop_never_begins_what_is_not_complete(at_s: float) -> None:
         if now >= at_s:
             talk.stop(now)
 
-    talked(talk, Wired(twin, paced=True), wish, latest_s=200.0)
+    talked(talk, WiredTwin(twin, paced=True), wish, latest_s=200.0)
     assert talk.state is WireState.STOPPED, talk.why
     assert not twin.moves
     assert len(twin.decoded) == talk.block + 1
@@ -128,7 +128,7 @@ def test_pauses_are_between_packets(single: bool) -> None:
             rests.append(talk.done)
             talk.resume(now)
 
-    talked(talk, Wired(twin), wish, latest_s=2000.0)
+    talked(talk, WiredTwin(twin), wish, latest_s=2000.0)
     assert talk.state is WireState.FINISHED, talk.why
     assert rests[-5:] == [1, 2, 3, 4, 5]
     same_motion(twin, SHORT, target)
@@ -139,7 +139,7 @@ def test_a_jog_is_a_program_of_its_steps() -> None:
     wire, twin = target.target.wire(), target.twin()
     values = {"x": 10.0, "z": -1.0, "feed": 60.0}
     talk = wire.command("jog", target.machine, values, Manner())  # type: ignore[union-attr]
-    talked(talk, Wired(twin, paced=True), latest_s=1000.0)
+    talked(talk, WiredTwin(twin, paced=True), latest_s=1000.0)
     assert talk.state is WireState.FINISHED, talk.why
     assert twin.slides.commanded_mm == pytest.approx([10.0, 0.0, -1.0])
     for action in ("home", "zero"):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from camtool.errors import MachineError
-from camtool.sending.faults import Wired
+from camtool.sending.faults import WiredTwin
 from camtool.sending.prepare import forecast_of
 from camtool.target.registry import LoadedTarget, load_target
 from camtool.target.wire import Conversation, Manner, ResumePoint, WireState
@@ -45,7 +45,7 @@ def met(
     decoded = loaded.target.read(program, loaded.machine)
     packets = wire.packets(program, loaded.machine, forecast_of(decoded, loaded))
     talk = wire.conversation(packets, loaded.machine, Manner(file=FILE, **manner))
-    talked(talk, Wired(twin), wish, latest_s=2000.0)
+    talked(talk, WiredTwin(twin), wish, latest_s=2000.0)
     return twin, talk, loaded
 
 
@@ -84,7 +84,7 @@ def test_what_is_done_has_been_done() -> None:
     wire: Any = loaded.target.wire()
     packets = wire.packets(PROGRAM, loaded.machine, forecast_of(decoded, loaded))
     talk = wire.conversation(packets, loaded.machine, Manner(file=FILE))
-    talked(talk, Wired(twin), wish, latest_s=100.0)
+    talked(talk, WiredTwin(twin), wish, latest_s=100.0)
     assert talk.state is WireState.FINISHED, talk.why
 
 
@@ -186,7 +186,7 @@ def test_an_abort_at_the_machine_is_no_end() -> None:
     decoded = loaded.target.read(PROGRAM, loaded.machine)
     packets = wire.packets(PROGRAM, loaded.machine, forecast_of(decoded, loaded))
     talk = wire.conversation(packets, loaded.machine, Manner(file=FILE))
-    talked(talk, Wired(twins[0]), wish, latest_s=100.0)
+    talked(talk, WiredTwin(twins[0]), wish, latest_s=100.0)
     assert talk.state is WireState.FAILED
     assert "before the end" in talk.why
 
@@ -203,7 +203,7 @@ def test_the_words_of_the_line_and_names_of_files() -> None:
     wrong = load_target("linuxcnc", settings=["link.password=other"])
     twin = wrong.twin([])
     talk = wire.conversation(packets, loaded.machine, Manner(file=FILE))
-    talked(talk, Wired(twin), latest_s=100.0)
+    talked(talk, WiredTwin(twin), latest_s=100.0)
     assert "password" in talk.why
 
 
@@ -220,7 +220,7 @@ def test_by_hand(action: str, values: dict[str, float]) -> None:
     twin: Any = loaded.twin(["power=on"] if action == "home" else [])
     wire: Any = loaded.target.wire()
     talk = wire.command(action, loaded.machine, values, Manner())
-    talked(talk, Wired(twin), latest_s=200.0)
+    talked(talk, WiredTwin(twin), latest_s=200.0)
     assert talk.state is WireState.FINISHED, talk.why
     if action == "jog":
         assert twin.slides.commanded_mm == pytest.approx([1.5, -2.0, 0.0])

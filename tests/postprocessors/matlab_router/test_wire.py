@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from camtool.errors import MachineError, PostError
-from camtool.sending.faults import Faults, Wired
+from camtool.sending.faults import Faults, WiredTwin
 from camtool.sending.prepare import Consignment, consignment, rest_of
 from camtool.target.registry import LoadedTarget, load_target
 from camtool.target.wire import Conversation, Manner, WireState, Write
@@ -46,7 +46,7 @@ def test_each_form_of_the_logo_arrives_and_moves_as_verify_says() -> None:
     for settings in ((), (STREAM,)):
         target, program = loaded(*settings), logo("matlab-router", *settings)
         twin, talk = target.twin(), conversation(program, *settings)
-        talked(talk, Wired(twin), going_on, latest_s=2000.0, coarse=True)
+        talked(talk, WiredTwin(twin), going_on, latest_s=2000.0, coarse=True)
         assert talk.state is WireState.FINISHED, talk.why
         assert b"".join(twin.decoded) == stream
         same_motion(twin, program, target)
@@ -67,7 +67,7 @@ def test_each_reading_of_what_is_open(echo: str, expected: str, reset: str) -> N
             assert not twin.moves
         going_on(talk, now)
 
-    talked(talk, Wired(twin), wish, latest_s=2000.0, coarse=True)
+    talked(talk, WiredTwin(twin), wish, latest_s=2000.0, coarse=True)
     if (echo, expected) in (("none", "echo"), ("characters", "none")):
         assert talk.state is WireState.FAILED
         assert twin.decoded == []
@@ -99,7 +99,7 @@ def test_the_pauses_are_those_of_the_thesis() -> None:
 def test_with_an_echo_no_job_begins_that_came_back_otherwise(fault: str, seed: int) -> None:
     settings = (STREAM, "link.echo=echo")
     twin, talk = loaded(*settings).twin(["echo=characters"]), conversation(JOBS, *settings)
-    line = Wired(twin, back=Faults.of(fault), seed=seed)
+    line = WiredTwin(twin, back=Faults.of(fault), seed=seed)
     now = talked(talk, line, going_on, latest_s=1000.0, coarse=True)
     assert now < 1000.0
     assert JOBS.startswith(b"".join(twin.decoded))
@@ -113,7 +113,9 @@ def test_with_an_echo_no_job_begins_that_came_back_otherwise(fault: str, seed: i
 def test_digits_that_are_garbled_on_the_way_never_begin_a_job(seed: int) -> None:
     settings = (STREAM, "link.echo=echo")
     twin, talk = loaded(*settings).twin(["echo=characters"]), conversation(JOBS, *settings)
-    talked(talk, Wired(twin, Faults(garble=0.05), seed=seed), going_on, latest_s=2e3, coarse=True)
+    talked(
+        talk, WiredTwin(twin, Faults(garble=0.05), seed=seed), going_on, latest_s=2e3, coarse=True
+    )
     assert JOBS.startswith(b"".join(twin.decoded))
 
 
@@ -127,7 +129,7 @@ def test_a_stop_never_begins_what_is_not_complete(at_s: float, jobs: int) -> Non
         if now >= at_s:
             talk.stop(now)
 
-    talked(talk, Wired(twin), wish, latest_s=100.0, coarse=True)
+    talked(talk, WiredTwin(twin), wish, latest_s=100.0, coarse=True)
     assert talk.state is WireState.STOPPED, talk.why
     assert not twin.moves
     assert len(twin.decoded) == talk.done == jobs
@@ -145,7 +147,7 @@ def test_pauses_are_between_jobs() -> None:
             talk.resume(now)
             going_on(talk, now)
 
-    talked(talk, Wired(twin), wish, latest_s=1000.0, coarse=True)
+    talked(talk, WiredTwin(twin), wish, latest_s=1000.0, coarse=True)
     assert talk.state is WireState.FINISHED
     assert rests == [1]
 

@@ -8,7 +8,7 @@ import pytest
 from camtool_postprocessors.pic_mmh.wire import PicMmhWire
 
 from camtool.errors import MachineError
-from camtool.sending.faults import Faults, Wired
+from camtool.sending.faults import Faults, WiredTwin
 from camtool.sending.prepare import forecast_of
 from camtool.target.registry import LoadedTarget, load_target
 from camtool.target.wire import Conversation, Manner, Packet, WireState
@@ -40,7 +40,7 @@ def test_the_logo_arrives_block_by_block_and_moves_as_verify_says() -> None:
     twin, loaded = made("pic-mmh")
     program = logo("pic-mmh")
     talk = conversation(program, loaded)
-    talked(talk, Wired(twin), latest_s=30_000.0, coarse=True)
+    talked(talk, WiredTwin(twin), latest_s=30_000.0, coarse=True)
     assert talk.state is WireState.FINISHED, talk.why
     assert twin.decoded == executed(program)
     assert twin.commands == [b"BX204;", b"BY178;"]
@@ -60,7 +60,7 @@ def test_the_logo_arrives_block_by_block_and_moves_as_verify_says() -> None:
 def test_each_reading_of_what_is_open(choices: list[str], settings: list[str]) -> None:
     twin, loaded = made("pic-mmh", choices, settings)
     talk = conversation(SHORT, loaded, *settings)
-    talked(talk, Wired(twin), latest_s=2000.0)
+    talked(talk, WiredTwin(twin), latest_s=2000.0)
     assert talk.state is WireState.FINISHED, talk.why
     same_motion(twin, SHORT, loaded)
 
@@ -70,7 +70,7 @@ def test_each_reading_of_what_is_open(choices: list[str], settings: list[str]) -
 def test_faults_never_skip_or_double_a_block(fault: str, seed: int) -> None:
     twin, loaded = made("pic-mmh")
     talk = conversation(SHORT, loaded)
-    line = Wired(twin, back=Faults.of(fault), seed=seed)
+    line = WiredTwin(twin, back=Faults.of(fault), seed=seed)
     now = talked(talk, line, latest_s=2000.0)
     assert twin.decoded == executed(SHORT)[: len(twin.decoded)]
     assert max(talk.block, -1) < len(twin.decoded)
@@ -91,7 +91,7 @@ def test_a_stop_is_at_once_and_nothing_moves_behind_it(at_s: float) -> None:
             stopped.append(now)
             talk.stop(now)
 
-    talked(talk, Wired(twin), wish, latest_s=100.0)
+    talked(talk, WiredTwin(twin), wish, latest_s=100.0)
     assert talk.state is WireState.STOPPED, talk.why
     assert not twin.moves
     times = twin.slides.trace.time_s
@@ -109,7 +109,7 @@ def test_pauses_are_between_blocks() -> None:
             assert not twin.moves
             talk.resume(now)
 
-    talked(talk, Wired(twin), wish, latest_s=2000.0)
+    talked(talk, WiredTwin(twin), wish, latest_s=2000.0)
     assert talk.state is WireState.FINISHED, talk.why
     same_motion(twin, SHORT, loaded)
 

@@ -8,7 +8,7 @@ import pytest
 from camtool_postprocessors.valcnc.wire import ValcncWire
 
 from camtool.errors import MachineError
-from camtool.sending.faults import Faults, Wired
+from camtool.sending.faults import Faults, WiredTwin
 from camtool.sending.prepare import Consignment, consignment
 from camtool.target.registry import load_target
 from camtool.target.wire import Conversation, Manner, WireState, Write
@@ -76,7 +76,7 @@ def test_a_machine_that_hears_nothing_while_it_draws_hears_every_block(
 ) -> None:
     twin, loaded = made("valcnc", ["answer=ok"] if answers else [])
     talk, faults = conversation(answers=answers), Faults.of(fault)
-    talked_with(talk, Wired(twin, faults, faults, paced=True), latest_s=1000.0)
+    talked_with(talk, WiredTwin(twin, faults, faults, paced=True), latest_s=1000.0)
     assert talk.state is WireState.FINISHED, talk.why
     assert b"".join(twin.decoded) == logo("valcnc").replace(b" ", b"")
     same_motion(twin, logo("valcnc"), loaded)
@@ -87,7 +87,7 @@ def test_a_machine_that_hears_nothing_while_it_draws_hears_every_block(
 def test_answers_that_fail_end_it_where_it_stands(fault: str, seed: int) -> None:
     twin, _ = made("valcnc", ["answer=ok"])
     talk = conversation(answers=True)
-    line = Wired(twin, back=Faults.of(fault), seed=seed, paced=True)
+    line = WiredTwin(twin, back=Faults.of(fault), seed=seed, paced=True)
     talked_with(talk, line, latest_s=1000.0)
     whole = logo("valcnc").replace(b" ", b"").splitlines(keepends=True)
     assert twin.decoded == whole[: len(twin.decoded)]
@@ -102,7 +102,7 @@ def test_answers_that_fail_end_it_where_it_stands(fault: str, seed: int) -> None
 def test_a_block_that_is_lost_on_the_way_is_missed_where_it_answers(seed: int) -> None:
     twin, _ = made("valcnc", ["answer=ok", "wrong=block"])
     talk = conversation(answers=True)
-    talked_with(talk, Wired(twin, Faults(drop=0.005), seed=seed, paced=True), latest_s=1000.0)
+    talked_with(talk, WiredTwin(twin, Faults(drop=0.005), seed=seed, paced=True), latest_s=1000.0)
     assert talk.state is WireState.FAILED
     assert len(twin.decoded) <= talk.block + 2
 
@@ -110,7 +110,7 @@ def test_a_block_that_is_lost_on_the_way_is_missed_where_it_answers(seed: int) -
 def test_a_pulled_plug_ends_it_where_it_stands() -> None:
     twin, _ = made("valcnc")
     talk, pulled = conversation(), Faults(unplug_s=20.0)
-    talked_with(talk, Wired(twin, pulled, pulled, paced=True), latest_s=1000.0)
+    talked_with(talk, WiredTwin(twin, pulled, pulled, paced=True), latest_s=1000.0)
     assert talk.state is WireState.FAILED
     assert "plug" in talk.why
     assert talk.block + 1 <= len(twin.decoded) <= talk.block + 2
@@ -127,7 +127,7 @@ def test_a_pause_is_between_blocks_and_goes_on_behind_them() -> None:
             assert not twin.moves
             talk.resume(now)
 
-    talked_with(talk, Wired(twin, paced=True), wish, latest_s=1000.0)
+    talked_with(talk, WiredTwin(twin, paced=True), wish, latest_s=1000.0)
     assert talk.state is WireState.FINISHED, talk.why
     same_motion(twin, logo("valcnc"), loaded)
 
