@@ -440,9 +440,22 @@ def _plunges(step: Step) -> bool:
     operation = step.operation
     if operation.stage == "finish":
         return False
+    if operation.contract.cuts == "over" and _comes_down_beside(step):
+        return False
     if operation.contract.descent == "helix":
         return bool((step.runs.vertices[step.runs.first[:-1], 2] < -POSITION_EPS_MM).any())
     return operation.contract.descent == "passes" and operation.entry.kind == "plunge"
+
+
+def _comes_down_beside(step: Step) -> bool:
+    """True if the tool comes down beside the stock at every run."""
+    stock = step.setting.stock
+    if stock is None or stock.box_mm is None:
+        return False
+    left, low, right, high = stock.box_mm
+    x, y = step.runs.vertices[step.runs.first[:-1], :2].T
+    beside = np.max([left - x, x - right, low - y, y - high], axis=0)
+    return bool((beside >= step.operation.tool.radius_mm - POSITION_EPS_MM).all())
 
 
 def _loose(step: Step, stock: Stock | None, steps: Sequence[Step]) -> Iterator[str]:
