@@ -62,7 +62,7 @@ class ProgramVariant:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison(Shown):
-    """One program run as several variants: `ways` are the variants, `runs` their results, in the
+    """A program run as several variants: `ways` are the variants, `runs` their results, in the
     same order. The picture shows the paths around the largest error."""
 
     source: str
@@ -83,8 +83,8 @@ class Comparison(Shown):
         return tuple(contrast_row(name, each.report) for name, each in self.verdicts.items())
 
     def scene(self) -> Overlay:
-        """The paths of all variants around the largest error: of the slides, or of the commanded
-        positions where only the interpolator differs."""
+        """Return the paths of all variants around the largest error: of the slides, or of the
+        commanded positions where only the interpolator differs."""
         import numpy as np
 
         from camtool.pictures.overlay import Overlay
@@ -114,7 +114,7 @@ class Comparison(Shown):
         return Overlay(PurePath(self.source).name, window, wanted, lines, (note,))
 
     def _window(self, wanted: Toolpath, place: tuple[float, float]) -> Floats:
-        """[[xmin, xmax], [ymin, ymax]] mm that the picture shows."""
+        """Return [[xmin, xmax], [ymin, ymax]] mm that the picture shows."""
         import numpy as np
 
         from camtool.toolpath.moves import toolpath_extents
@@ -149,7 +149,7 @@ def compare_program(
     job: Job | None = None,
     progress: Progress | None = None,
 ) -> Comparison:
-    """The program read and judged as each variant; raises as `verify_program` does."""
+    """Return the program read and judged as each variant; raises as `verify_program` does."""
     runs = [
         verify_program(
             data,
@@ -166,7 +166,7 @@ def compare_program(
 
 
 def variants_of(what: str, load: Load, judging: Judging) -> list[ProgramVariant]:
-    """The variants that `what` names: `interpolators`, `mechanics`, or KEY=VALUE,VALUE,...
+    """Return the variants that `what` names: `interpolators`, `mechanics`, or KEY=VALUE,VALUE,...
 
     OptionError for anything else, and MachineError for values that the machine cannot have.
     """
@@ -190,7 +190,8 @@ def variants_of(what: str, load: Load, judging: Judging) -> list[ProgramVariant]
 
 
 def effects_without(names: Sequence[str]) -> Effects:
-    """All effects of the mechanics but these; OptionError for names that are none of them."""
+    """Return all effects of the mechanics but these; OptionError for names that are none of
+    them."""
     from camtool.simulation.motion import ALL
 
     unknown = [name for name in names if name not in EFFECTS]
@@ -209,7 +210,7 @@ def _interpolators(target: LoadedTarget, judging: Judging) -> list[ProgramVarian
 
 
 def _mechanics(target: LoadedTarget, judging: Judging) -> list[ProgramVariant]:
-    """All of the mechanics, without each part that acts, and without all of them."""
+    """Return all of the mechanics, without each part that acts, and without all of them."""
     from camtool.simulation.motion import IDEAL
 
     return [
@@ -226,7 +227,7 @@ def _mechanics(target: LoadedTarget, judging: Judging) -> list[ProgramVariant]:
 
 
 def _acts_on(effect: str, machine: Machine) -> bool:
-    """Whether this part of the mechanics acts on the machine."""
+    """True if this part of the mechanics acts on the machine."""
     axes = list(machine.axes)
     return {
         "play": any(axis.backlash_mm for axis in axes) or any(machine.play_map.used),
@@ -238,7 +239,7 @@ def _acts_on(effect: str, machine: Machine) -> bool:
 
 
 def _settings(key: str, value: str) -> tuple[str, ...]:
-    """The settings of a key of the machine, or of a short name for X and Y."""
+    """Return the settings of a key of the machine, or of a short name for X and Y."""
     if key in AXES_OF:
         return tuple(f"axes.{axis}.{AXES_OF[key]}={value}" for axis in "xy")
     return (f"{key}={value}",)

@@ -1,1 +1,1 @@
-"""What controllers share: the motion that a machine makes of a toolpath."""
+"""Simulation shared by all controllers: the motion that a machine makes of a toolpath."""

@@ -39,18 +39,19 @@ class ControllerModel(ABC, Generic[ControllerT, DialectT]):
     def run(
         self, toolpath: Toolpath, machine: Machine[ControllerT, DialectT], options: Options
     ) -> Iterator[Chunk]:
-        """The motion in chunks, up to the end of the program. Raises MachineError, and
+        """Yield the motion in chunks, up to the end of the program. Raises MachineError, and
         ProgramError, which names the block (some only when that row is run)."""
 
     @abstractmethod
     def interpolation(
         self, toolpath: Toolpath, machine: Machine[ControllerT, DialectT], options: Options
     ) -> str:
-        """A word for the report: the interpolation of lines and arcs, such as "dsm" or "path"."""
+        """Return a word for the report: the interpolation of lines and arcs, such as "dsm" or
+        "path"."""
 
     def quantised(self, toolpath: Toolpath, machine: Machine[ControllerT, DialectT]) -> Toolpath:
-        """The moves as the controller rounds them before it interpolates, row by row: the error of
-        interpolation is measured from these. ProgramError for rows that it cannot follow.
+        """Return the moves as the controller rounds them before it interpolates, row by row: the
+        error of interpolation is measured from these. ProgramError for rows that it cannot follow.
 
         By default: as they are read, without rounding, and with homing at machine zero.
         """
@@ -58,30 +59,32 @@ class ControllerModel(ABC, Generic[ControllerT, DialectT]):
         return placed(toolpath, np.array(machine.controller.machine_zero_mm, dtype=np.float64))
 
     def spacing_mm(self, toolpath: Toolpath, machine: Machine[ControllerT, DialectT]) -> float:
-        """The approximate distance of samples of the motion in XY, mm; by default a step."""
+        """Return the approximate distance of samples of the motion in XY, mm; by default a
+        step."""
         return min(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
 
     def seconds(
         self, toolpath: Toolpath, machine: Machine[ControllerT, DialectT]
     ) -> Floats | None:
-        """(N,) s that each row takes, without its motion; None for a model that knows them by
-        that alone. Raises as `run`."""
+        """Return (N,) s that each row takes, without its motion; None for a model that knows them
+        by that alone. Raises as `run`."""
         return None
 
     def assumptions(
         self, toolpath: Toolpath, machine: Machine[ControllerT, DialectT]
     ) -> tuple[str, ...]:
-        """What the times and figures assume, one short sentence each."""
+        """Return the assumptions of times and figures, a short sentence each."""
         return ()
 
     def findings(
         self, toolpath: Toolpath, machine: Machine[ControllerT, DialectT], options: Options
     ) -> tuple[Finding, ...]:
-        """Findings that only the model can make."""
+        """Return findings that only the model can make."""
         return ()
 
     def fused_run(
         self, toolpath: Toolpath, machine: Machine[ControllerT, DialectT], options: Options
     ) -> FusedRun | None:
-        """The motion of `run`, judged as it is simulated; None for a model that makes chunks."""
+        """Return the motion of `run`, judged as it is simulated; None for a model that makes
+        chunks."""
         return None

@@ -32,7 +32,7 @@ class Legs(Struct, frozen=True, eq=False):
 
 
 class LegProgram(Struct, frozen=True, eq=False):
-    """What applies to all R rows up to the end of the program: `start` (3,) steps; `waits` (R,) s
+    """The data of all R rows up to the end of the program: `start` (3,) steps; `waits` (R,) s
     of rows without motion; `compensation_s`, the time of each step added at a reversal."""
 
     start: Ints
@@ -51,7 +51,7 @@ class LegRun:
         self._row = -1  # the last row in a ledger
 
     def run(self, blocks: Iterable[Legs]) -> Iterator[Chunk]:
-        """The chunks of all legs, with all rows in their ledgers."""
+        """Yield the chunks of all legs, with all rows in their ledgers."""
         for legs in blocks:
             yield from self._block(legs)
         rows = np.arange(self._row + 1, len(self._standing.waits))
@@ -60,7 +60,7 @@ class LegRun:
             yield Chunk(np.empty(0, dtype=np.int64), NO_SAMPLES, NO_SAMPLES, ledger)
 
     def _still(self, rows: Ints) -> Ledger:
-        """A ledger of rows without motion."""
+        """Return a ledger of rows without motion."""
         ledger = still_ledger(rows)
         ledger.duration_s[:] = self._standing.waits[rows]
         return ledger
@@ -77,7 +77,7 @@ class LegRun:
         self._position = self._position + legs.steps.sum(axis=0)
 
     def _chunk(self, legs: Legs, share: _Share, commanded: Floats) -> Chunk:
-        """The samples of a window, with the ledger of its rows."""
+        """Return the samples of a window, with the ledger of its rows."""
         leg_row = legs.row[share.legs]
         turn = np.flatnonzero(np.diff(leg_row, prepend=-1))
         moving = leg_row[turn]
@@ -113,11 +113,11 @@ class _Share:
         """(J,) passes of each leg within the window."""
 
     def part(self, seconds: Floats) -> Floats:
-        """(J,) s within the window, from the `seconds` (L,) of all legs."""
+        """Return (J,) s within the window, from the `seconds` (L,) of all legs."""
         return np.asarray(seconds[self.legs] * (self.passes / self._whole))
 
     def steps(self, steps: Ints) -> Ints:
-        """(J, 3) steps within the window, from those of all legs (L, 3); see the kernel."""
+        """Return (J, 3) steps within the window, from those of all legs (L, 3); see the kernel."""
         size, whole = np.abs(steps[self.legs]), self._whole[:, None]
         return np.asarray(self._to[:, None] * size // whole - self._from[:, None] * size // whole)
 
@@ -130,12 +130,12 @@ of another must fit 64 bits."""
 
 
 def coded_steps_mm(machine: Machine) -> Floats:
-    """(3,) mm: the step of each axis as the controller assumes it."""
+    """Return (3,) mm: the step of each axis as the controller assumes it."""
     return np.array([axis.coded_step_mm for axis in machine.axes])
 
 
 def check_rows(toolpath: Toolpath, machine: Machine) -> None:
-    """ProgramError, which names the block, for rows that a controller without homing cannot
+    """Raise ProgramError, which names the block, for rows that a controller without homing cannot
     follow."""
     kind, step_mm = toolpath.kind, coded_steps_mm(machine)
     with np.errstate(invalid="ignore"):
@@ -171,7 +171,7 @@ def check_rows(toolpath: Toolpath, machine: Machine) -> None:
 
 
 def waits_s(toolpath: Toolpath, rows: int) -> Floats:
-    """(rows,) s: the dwell of each row; one number, seen as many, where nothing dwells."""
+    """Return (rows,) s: the dwell of each row; one number, seen as many, where nothing dwells."""
     dwells = toolpath.kind[:rows] == Kind.DWELL
     if not dwells.any():
         return np.broadcast_to(0.0, rows)

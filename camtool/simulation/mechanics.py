@@ -42,7 +42,7 @@ class _Varied(Struct, frozen=True):
     seed: int
 
     def at(self, commanded_mm: Floats) -> Floats:
-        """The backlash (K, 3) mm at each position (K, 3) mm."""
+        """Return the backlash (K, 3) mm at each position (K, 3) mm."""
         backlash = np.tile(self.backlash, (len(commanded_mm), 1))
         x, y = commanded_mm[:, 0] - self.zero[0], commanded_mm[:, 1] - self.zero[1]
         for axis, cells in enumerate(self.cells):
@@ -85,13 +85,13 @@ class Mechanics:
 
     @property
     def plain(self) -> bool:
-        """Whether `axes` and `states` hold all of the mechanics: backlash is the same everywhere,
+        """True if `axes` and `states` hold all of the mechanics: backlash is the same everywhere,
         nothing scatters, X and Y are square."""
         return self._varied is None and self._lean == 0.0
 
     def follow(self, commanded_mm: Floats, offsets: Ints) -> tuple[Floats, Ints]:
-        """The positions of the slides (K, 3) mm for the commanded positions (K, 3) mm, which
-        continue those of the last call, and the reversals (R, 3) of the axes in each run
+        """Return the positions of the slides (K, 3) mm for the commanded positions (K, 3) mm,
+        which continue those of the last call, and the reversals (R, 3) of the axes in each run
         offsets[r]:offsets[r+1] of them."""
         slide = np.empty(commanded_mm.shape)
         reversals = np.zeros((len(offsets) - 1, 3), dtype=np.int64)
@@ -117,7 +117,7 @@ def _backlash_mm(axis: Axis, effects: Effects) -> float:
 
 
 def _varied(machine: Machine, effects: Effects, shares: Floats) -> _Varied | None:
-    """The further arguments of `play_varied_fill`; None where `play_fill` is enough."""
+    """Return the further arguments of `play_varied_fill`; None where `play_fill` is enough."""
     axes = list(machine.axes)
     cells = machine.play_map.used if effects.play else (None, None, None)
     scatter = [axis.repeatability_mm if effects.repeatability else 0.0 for axis in axes]

@@ -42,7 +42,7 @@ class Ledger(Struct, frozen=True, eq=False):
 
 
 def still_ledger(rows: Ints) -> Ledger:
-    """The ledger of rows (R,) without motion; its columns may be written to."""
+    """Return the ledger of rows (R,) without motion; its columns may be written to."""
     count = len(rows)
     return Ledger(
         row=rows,
@@ -85,7 +85,7 @@ def one_row(
     reversals: npt.ArrayLike = (0, 0, 0),
     ended: bool = True,
 ) -> Chunk:
-    """A chunk of a single row: samples (K, 3), `steps` and `reversals` (3,)."""
+    """Return a chunk of a single row: samples (K, 3), `steps` and `reversals` (3,)."""
     ledger = Ledger(
         row=np.array([row], dtype=np.int64),
         duration_s=np.array([duration_s], dtype=np.float64),

@@ -62,32 +62,34 @@ class PathModel(ControllerModel[PathController, Any]):
     """The exact-path controller."""
 
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
-        """The motion; ProgramError, which names the block, for rows that cannot be followed."""
+        """Yield the motion; ProgramError, which names the block, for rows that cannot be
+        followed."""
         path = self.quantised(toolpath, machine)
         mechanics = Mechanics(machine, path.start, options.effects)
         return row_chunks(_sampled(path, machine), mechanics, options.chunk_steps)
 
     def seconds(self, toolpath: Toolpath, machine: _Machine) -> Floats:
-        """(N,) s that each row takes."""
+        """Return (N,) s that each row takes."""
         blocks = _sampled(self.quantised(toolpath, machine), machine)
         return row_seconds(blocks, len(toolpath))
 
     def quantised(self, toolpath: Toolpath, machine: _Machine) -> Toolpath:
-        """The moves with their ends on the controller's grid, if it has one."""
+        """Return the moves with their ends on the controller's grid, if it has one."""
         if machine.controller.grid == "none":
             return super().quantised(toolpath, machine)
         return round_to_steps(toolpath, machine)
 
     def spacing_mm(self, toolpath: Toolpath, machine: _Machine) -> float:
-        """A coded step, or more where the program would have more than `MAX_SAMPLES` samples."""
+        """Return a coded step, or more where the program would have more than `MAX_SAMPLES`
+        samples."""
         return sample_spacing_mm(toolpath, machine)
 
     def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
-        """ "path": nothing is interpolated."""
+        """Return "path": nothing is interpolated."""
         return "path"
 
     def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
-        """What the times do not include."""
+        """Return the assumptions of the times, a sentence each."""
         return (
             "the controller follows every line and arc exactly",
             "speeds change at once: there is no acceleration, and compensation takes no time",
@@ -95,7 +97,8 @@ class PathModel(ControllerModel[PathController, Any]):
 
 
 def _sampled(path: Toolpath, machine: Machine) -> Iterator[SampledRows]:
-    """The rows up to the end of the program; ProgramError for those that cannot be followed."""
+    """Yield the rows up to the end of the program; ProgramError for those that cannot be
+    followed."""
     spacing_mm = sample_spacing_mm(path, machine)
     check_rows(path, path.executed_rows)
     return _blocks(path.first(path.executed_rows), machine, spacing_mm)
@@ -110,8 +113,8 @@ def _blocks(path: Toolpath, machine: Machine, spacing_mm: float) -> Iterator[Sam
 
 
 def _durations(path: Toolpath, machine: Machine) -> Floats:
-    """(N,) s of each row. Feeds may be NaN only after the end of the program: `check_rows` refuses
-    others."""
+    """Return (N,) s of each row. Feeds may be NaN only after the end of the program: `check_rows`
+    refuses others."""
     homing = np.isin(path.kind, (Kind.HOME_XY, Kind.HOME_Z))
     speed = np.where(path.is_feed, path.feed, machine.rapid_mm_min)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -126,7 +129,7 @@ def _durations(path: Toolpath, machine: Machine) -> Floats:
 
 
 def round_to_steps(toolpath: Toolpath, machine: Machine) -> Toolpath:
-    """The moves with their ends at the nearest coded steps, and homing at machine zero.
+    """Return the moves with their ends at the nearest coded steps, and homing at machine zero.
 
     Raises ProgramError for arcs without a centre and for positions that cannot be counted. An arc
     shorter than a step, which rounding would turn into a full circle, becomes a line; one that is
@@ -152,8 +155,8 @@ def round_to_steps(toolpath: Toolpath, machine: Machine) -> Toolpath:
 
 
 def _centre_arcs(made: Toolpath, arcs: Ints, sweep: Floats, machine: Machine) -> Toolpath:
-    """The rows `arcs` (J,), which turn by `sweep` (J,), with centres at the same distance from
-    their rounded ends and starts.
+    """Move the centres of the rows `arcs` (J,), which turn by `sweep` (J,) rad, to the same
+    distance from their rounded ends and starts.
 
     With the direction u and the midpoint m of the chord, the nearest such point to the centre c is
     c − ((c − m)·u) u. Its distance from c is the difference of the radii times radius / chord. An
@@ -177,8 +180,8 @@ def _centre_arcs(made: Toolpath, arcs: Ints, sweep: Floats, machine: Machine) ->
 
 
 def _restore_turned_arcs(made: Toolpath, inside_out: Ints, short: Bools) -> Toolpath:
-    """The arcs (J,) that rounding has turned inside out: short ones as lines, long ones as
-    circles."""
+    """Replace arcs that rounding has turned inside out: `short` ones (J,) by lines, the others by
+    full circles."""
     lines, full = inside_out[short], inside_out[~short]
     end, kind, centre = made.end.copy(), made.kind.copy(), made.centre.copy()
     end[full, :2] = made.starts_of(full)[:, :2]
@@ -187,7 +190,7 @@ def _restore_turned_arcs(made: Toolpath, inside_out: Ints, short: Bools) -> Tool
 
 
 def _on_grid(points: Floats, machine: Machine) -> Floats:
-    """Points (..., 3) mm with each coordinate at its nearest coded step."""
+    """Return points (..., 3) mm with each coordinate at its nearest coded step."""
     columns = [
         to_steps(points[..., index], axis.coded_step_mm) * axis.coded_step_mm
         for index, axis in enumerate(machine.axes)

@@ -17,8 +17,8 @@ are exact in a float."""
 
 
 def placed(toolpath: Toolpath, home: Floats) -> Toolpath:
-    """The toolpath with events at the ends of the moves before them, and homing at `home` (3,)
-    mm; the very toolpath where they are there."""
+    """Return the toolpath with events at the ends of the moves before them, and homing at `home`
+    (3,) mm; the very toolpath where they are there."""
     kind, count = toolpath.kind, len(toolpath)
     events = np.flatnonzero(~toolpath.is_motion)
     homes = np.isin(kind[events], (Kind.HOME_XY, Kind.HOME_Z)).any()
@@ -34,15 +34,15 @@ def placed(toolpath: Toolpath, home: Floats) -> Toolpath:
 
 
 def with_ends(toolpath: Toolpath, start: Floats, end: Floats) -> Toolpath:
-    """The toolpath with this start (3,) and these ends (N, 3) mm; the very toolpath where they are
-    its own."""
+    """Return the toolpath with this start (3,) and these ends (N, 3) mm; the very toolpath where
+    they are its own."""
     if (start == toolpath.start).all() and (end == toolpath.end).all():
         return toolpath
     return replace(toolpath, start=start, end=read_only(end))
 
 
 def check_positions(toolpath: Toolpath, machine: Machine) -> None:
-    """ProgramError for an arc without a centre or a position that cannot be counted."""
+    """Raise ProgramError for an arc without a centre or a position that cannot be counted."""
     arcs = np.flatnonzero(toolpath.is_arc)
     bad = np.zeros(len(toolpath), dtype=np.bool_)
     bad[arcs] = ~np.isfinite(toolpath.centre[arcs]).all(axis=1)
@@ -59,8 +59,8 @@ def check_positions(toolpath: Toolpath, machine: Machine) -> None:
 
 
 def check_rows(path: Toolpath, rows: int) -> None:
-    """ProgramError for feed moves without a feed and for events that cannot be followed, in the
-    first `rows` rows."""
+    """Raise ProgramError for feed moves without a feed and for events that cannot be followed, in
+    the first `rows` rows."""
     running = np.arange(len(path)) < rows
     with np.errstate(invalid="ignore"):
         no_feed = path.is_feed & ~((path.feed > 0.0) & np.isfinite(path.feed))
@@ -75,15 +75,15 @@ def check_rows(path: Toolpath, rows: int) -> None:
 
 
 def refuse(toolpath: Toolpath, bad: npt.ArrayLike, message: str, mend: str = "") -> None:
-    """ProgramError for the first row that is `bad` (N,), if there is one."""
+    """Raise ProgramError for the first row that is `bad` (N,), if there is one."""
     rows = np.flatnonzero(bad)
     if len(rows):
         raise ProgramError(message, where=block_of(toolpath, int(rows[0])), mend=mend)
 
 
 def block_of(toolpath: Toolpath, row: int) -> str:
-    """The block (from 1) from which a row was read, and what called it; the row where none was
-    read."""
+    """Return the block (from 1) from which a row was read, and what called it; the row where none
+    was read."""
     block, called = int(toolpath.block[row]), toolpath.text(row)
     if block < 0:
         return f"move {row}"

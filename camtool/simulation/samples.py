@@ -46,11 +46,11 @@ class SampleSource(Protocol):
     def first(self) -> Ints: ...
 
     def window(self, low: int, high: int) -> tuple[Ints, Floats]:
-        """Row (K,) and commanded position (K, 3) mm of the samples low:high."""
+        """Return row (K,) and commanded position (K, 3) mm of the samples low:high."""
 
     def steps(self, bounds: Ints) -> Ints:
-        """(R, 3) steps of the axes within samples bounds[r]:bounds[r+1], which are of the last
-        window."""
+        """Return (R, 3) steps of the axes within samples bounds[r]:bounds[r+1], which are of the
+        last window."""
 
 
 class SampledRows(Struct, frozen=True, eq=False):
@@ -67,7 +67,7 @@ class SampledRows(Struct, frozen=True, eq=False):
 
 
 def row_seconds(blocks: Iterable[SampledRows], rows: int) -> Floats:
-    """(rows,) s that each row takes, 0 for those behind the end of the program."""
+    """Return (rows,) s that each row takes, 0 for those behind the end of the program."""
     seconds = np.zeros(rows)
     for block in blocks:
         seconds[block.low : block.high] = block.seconds
@@ -77,8 +77,9 @@ def row_seconds(blocks: Iterable[SampledRows], rows: int) -> Floats:
 def row_chunks(
     blocks: Iterable[SampledRows], mechanics: Mechanics, chunk_steps: int
 ) -> Iterator[Chunk]:
-    """The chunks of all rows, whose blocks follow one another, each with at most `chunk_steps`
-    samples; the time of a row in several chunks is divided in proportion to its samples."""
+    """Yield the chunks of all rows, whose blocks follow one another, each with at most
+    `chunk_steps` samples; the time of a row in several chunks is divided in proportion to its
+    samples."""
     for block in blocks:
         yield from _chunks(block, mechanics, chunk_steps)
 
@@ -116,18 +117,19 @@ def _chunks(block: SampledRows, mechanics: Mechanics, chunk_steps: int) -> Itera
 
 
 def sample_spacing_mm(toolpath: Toolpath, machine: Machine) -> float:
-    """Distance of samples, mm: the finer coded step of X and Y, or what `MAX_SAMPLES` allows."""
+    """Return distance of samples, mm: the finer coded step of X and Y, or what `MAX_SAMPLES`
+    allows."""
     return spacing_along(move_lengths(toolpath), machine)
 
 
 def spacing_along(length_mm: Floats, machine: Machine) -> float:
-    """The same for rows of so many mm (N,)."""
+    """Return the distance of samples for rows of these lengths (N,) mm, as `sample_spacing_mm`."""
     step = min(machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
     return max(step, float(length_mm.sum()) / MAX_SAMPLES)
 
 
 def move_lengths(toolpath: Toolpath) -> Floats:
-    """(N,) mm: length of each row in space, 0 for events."""
+    """Return (N,) mm: length of each row in space, 0 for events."""
     return toolpath.by_parts(_lengths)
 
 
@@ -158,7 +160,8 @@ class PathSamples:
     """The samples of all rows of a toolpath, numbered from 0 in order; none are stored."""
 
     def __init__(self, toolpath: Toolpath, spacing_mm: float) -> None:
-        """`spacing_mm` is the largest distance between two samples along the path."""
+        """Divide all rows into pieces, sampled no farther apart than `spacing_mm` along the
+        path."""
         self._toolpath = toolpath
         self._arms = PolarArcs(toolpath, toolpath.is_arc)
         length = move_lengths(toolpath)
@@ -173,12 +176,12 @@ class PathSamples:
         """(N+1,) row r owns samples first[r]:first[r+1]; its start is not one of them."""
 
     def window(self, low: int, high: int) -> tuple[Ints, Floats]:
-        """Row (K,) and position (K, 3) mm of the samples low:high."""
+        """Return row (K,) and position (K, 3) mm of the samples low:high."""
         row, share = self.places(low, high)
         return row, self.points(row, share)
 
     def places(self, low: int, high: int) -> tuple[Ints, Floats]:
-        """Row (K,) and share (K,) of its length, in (0, 1], of the samples low:high."""
+        """Return row (K,) and share (K,) of its length, in (0, 1], of the samples low:high."""
         first = int(np.searchsorted(self._offsets, low, side="right")) - 1
         here = slice(first, int(np.searchsorted(self._offsets, high)))
         many = np.diff(np.clip(self._offsets[here.start : here.stop + 1], low, high))
@@ -194,7 +197,7 @@ class PathSamples:
         return np.repeat(self._pieces.row[here], many), share
 
     def points(self, row: Ints, share: Floats) -> Floats:
-        """(K, 3) mm: the points at shares (K,) of the lengths of rows (K,)."""
+        """Return (K, 3) mm: the points at shares (K,) of the lengths of rows (K,)."""
         starts, ends = self._toolpath.starts_of(row), self._toolpath.end.take(row, axis=0)
         points = starts + share[:, None] * (ends - starts)
         kind = self._toolpath.kind[row]
@@ -217,7 +220,7 @@ class CountedSamples(PathSamples):
         self._low = 0
 
     def window(self, low: int, high: int) -> tuple[Ints, Floats]:
-        """Row and position of the samples low:high."""
+        """Return row and position of the samples low:high."""
         row, points = super().window(max(low - 1, 0), high)
         if low == 0:
             steps = self._in_steps(np.concatenate([self._start, points]))
@@ -230,7 +233,7 @@ class CountedSamples(PathSamples):
         return row, points
 
     def steps(self, bounds: Ints) -> Ints:
-        """Steps of each axis between samples of the window."""
+        """Return steps of each axis between samples of the window."""
         return np.diff(self._counts[bounds - self._low], axis=0)
 
     def _in_steps(self, points: Floats) -> Ints:
@@ -239,7 +242,8 @@ class CountedSamples(PathSamples):
 
 
 def _pieces_of_rows(length: Floats, arms: PolarArcs) -> _Pieces:
-    """All pieces in order: one for each straight row with motion, one or more for each arc."""
+    """Return all pieces in order: one for each straight row with motion, one or more for each
+    arc."""
     straight = length > 0.0
     straight[arms.row] = False
     rows = np.flatnonzero(straight)
@@ -255,7 +259,7 @@ def _pieces_of_rows(length: Floats, arms: PolarArcs) -> _Pieces:
 
 
 def _arc_pieces(arms: PolarArcs) -> _Pieces:
-    """Arcs divided at the reversals of their axes.
+    """Return arcs divided at the reversals of their axes.
 
     These lie at angles k·π/2. In the direction of the arc (σ = ±1) from its start at σ·a, the next
     ones are k = ⌊σa/(π/2)⌋ + 1, + 2, ...

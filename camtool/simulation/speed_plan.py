@@ -19,7 +19,7 @@ from camtool.machine.model import Machine
 
 
 class EntryState(Struct, frozen=True):
-    """What the blocks before those of a plan leave to it: the highest speed in the last of them,
+    """The state in which the blocks before a plan leave it: the highest speed in the last of them,
     and the square of the speed, (mm/s)², that they allow behind it; 0 and 0 before the first."""
 
     speed_mm_s: float = 0.0
@@ -41,8 +41,8 @@ class SpeedPlan(Struct, frozen=True, eq=False):
     before: EntryState = FROM_REST
 
     def squares(self, window: int) -> Floats:
-        """(N + 1,) (mm/s)²: the square of the speed at the start of each block, and 0 after the
-        last, for a planner with a buffer of `window` blocks, the current one included."""
+        """Return (N + 1,) (mm/s)²: the square of the speed at the start of each block, and 0 after
+        the last, for a planner with a buffer of `window` blocks, the current one included."""
         from camtool.kernels.motion import entry_speeds
 
         first = np.full(min(len(self.speed_mm_s), 1), self.before.speed_mm_s)
@@ -55,7 +55,7 @@ class SpeedPlan(Struct, frozen=True, eq=False):
         return found
 
     def seconds(self, squares: Floats) -> Floats:
-        """(N,) s: the time of each block, with the `squares` (N + 1,) of its method."""
+        """Return (N,) s: the time of each block, with the `squares` (N + 1,) of its method."""
         a, d, entry = self.acceleration_mm_s2, self.length_mm, np.sqrt(squares)
         first, last = entry[:-1], entry[1:]
         peak = np.minimum(self.speed_mm_s, np.sqrt(a * d + 0.5 * (first**2 + last**2)))
@@ -64,25 +64,26 @@ class SpeedPlan(Struct, frozen=True, eq=False):
         return np.asarray((2.0 * peak - first - last) / a + steady)
 
     def behind(self, count: int, squares: Floats) -> EntryState:
-        """What the first `count` blocks leave to those behind them."""
+        """Return the entry state of the blocks behind the first `count` ones."""
         if count == 0:
             return self.before
         reached = squares[count - 1] + self._gains()[count - 1]
         return EntryState(float(self.speed_mm_s[count - 1]), float(reached))
 
     def _gains(self) -> Floats:
-        """(N,) (mm/s)²: what the square of the speed can change by within each block."""
+        """Return (N,) (mm/s)²: what the square of the speed can change by within each block."""
         return np.asarray(2.0 * self.acceleration_mm_s2 * self.length_mm)
 
 
 def max_along(limit: Floats, unit: Floats) -> Floats:
-    """(B,) the largest value along unit vectors (B, 3) within the limits of three axes (3,)."""
+    """Return (B,) the largest value along unit vectors (B, 3) within the limits of three axes
+    (3,)."""
     with np.errstate(divide="ignore", over="ignore"):
         return np.asarray((limit / np.abs(unit)).min(axis=1, initial=np.inf))
 
 
 def axis_limits(machine: Machine, key: str) -> Floats:
-    """(3,) the limit `key` of each axis; MachineError where one is missing."""
+    """Return (3,) the limit `key` of each axis; MachineError where one is missing."""
     values = []
     for name, axis in zip("xyz", machine.axes, strict=True):
         value: float | None = getattr(axis, key)

@@ -44,8 +44,8 @@ WORST_LISTED = 10
 
 
 def nose_of(job: Job) -> Tool | None:
-    """A tool of the shape with which all operations cut, a V bit or a mill with a nose; None for
-    one that is as wide at its tip, and for several."""
+    """Return a tool of the shape with which all operations cut, a V bit or a mill with a nose;
+    None for one that is as wide at its tip, and for several."""
     tools = [operation.tool for operation in job.operations]
     shapes = {(tool.kind, tool.tip_angle_rad, tool.tip_diameter_mm) for tool in tools}
     noses = {tool.nose_mm for tool in tools}
@@ -56,13 +56,14 @@ def nose_of(job: Job) -> Tool | None:
 
 
 def tool_mm(job: Job) -> float | None:
-    """The diameter of the tool with which all operations cut, mm; None for several or none."""
+    """Return the diameter of the tool with which all operations cut, mm; None for several or
+    none."""
     diameters = {operation.tool.diameter_mm for operation in job.operations}
     return (diameters.pop() or None) if len(diameters) == 1 else None
 
 
 def coverage_of(machine: Machine) -> float:
-    """How far moves of one side may be from those of the other on a machine, mm."""
+    """Return the tolerance of coverage in XY on a machine, mm, without its dialect's stray."""
     axes = (machine.axes.x, machine.axes.y)
     coarse = max(axis.coded_step_mm for axis in axes)
     unit = max(axis.resolution_mm or 0.0 for axis in axes)
@@ -70,7 +71,7 @@ def coverage_of(machine: Machine) -> float:
 
 
 class VerifyOptions(Struct, frozen=True):
-    """How to judge, and what the report says of the program.
+    """Options of verification, and figures of the program for the report.
 
     `interpolator` None: that of the machine. `effects`: the parts of the mechanics that act.
     `tool_diameter_mm`: the tool clears the way for rapids below the stock top; None: not known,
@@ -143,12 +144,13 @@ class Case(Struct, frozen=True, eq=False):
 
     @property
     def coverage_mm(self) -> float:
-        """How far moves of one side may be from those of the other, mm."""
+        """Tolerance of coverage in XY, mm: a move farther from the other side is missing or
+        extra."""
         return coverage_of(self.machine) + self.options.stray_mm
 
     @property
     def depth_mm(self) -> float:
-        """How far heights of one side may be from those of the other, mm."""
+        """Tolerance of coverage in height, mm."""
         z, fit_mm = self.machine.axes.z, self.machine.defaults.fit_tolerance_mm
         steps = max(
             COVERAGE_STEPS * z.coded_step_mm, COVERAGE_RESOLUTIONS * (z.resolution_mm or 0)

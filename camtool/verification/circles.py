@@ -62,8 +62,8 @@ NO_FIGURES = CircleFigures(math.nan, math.nan, math.nan, math.nan)
 
 
 def full_circles(cuts: CutMoves, gap_mm: float) -> list[FullCircle]:
-    """Runs of consecutive level arcs that cut about one centre in one direction and make a full
-    turn; of circles below each other (passes, or a helix and its last turn) the deepest.
+    """Return runs of consecutive level arcs that cut about one centre in one direction and make a
+    full turn; of circles below each other (passes, or a helix and its last turn) the deepest.
 
     `gap_mm`: by how much centres and radii may differ, and how much of the circumference may be
     missing (a writer may close an arc by a line).
@@ -96,7 +96,8 @@ def full_circles(cuts: CutMoves, gap_mm: float) -> list[FullCircle]:
 
 
 def _deepest(circles: list[FullCircle], gap_mm: float) -> list[FullCircle]:
-    """Of circles below each other the deepest, in their order; all of several equally deep."""
+    """Return the deepest of circles below each other, in their order; all of several equally
+    deep."""
     lowest: dict[tuple[object, ...], float] = {}
     keys = []
     for circle in circles:
@@ -122,7 +123,7 @@ def _circle(toolpath: Toolpath, run: Ints, radius: float) -> FullCircle:
 
 
 def circle_figures(bins: Floats, radius_mm: float) -> CircleFigures:
-    """G, F max, F min and D of the bins (720, 9) of `camtool.kernels.judging`."""
+    """Return G, F max, F min and D of the bins (720, 9) of `camtool.kernels.judging`."""
     seen = bins[bins[:, 0] > 0.0]
     if len(seen) < MIN_BINS:
         return NO_FIGURES
@@ -138,13 +139,13 @@ def circle_figures(bins: Floats, radius_mm: float) -> CircleFigures:
 
 
 def mean_points(seen: Floats) -> Floats:
-    """(J, 2) mean points about the programmed centre, of bins (J, 9) that are not empty."""
+    """Return (J, 2) mean points about the programmed centre, of bins (J, 9) that are not empty."""
     return np.asarray(seen[:, 1:3] / seen[:, :1])
 
 
 def mean_radii(bins: Floats) -> Floats:
-    """(B,) mean radius of each of the bins (B, 9) that make a whole turn, NaN for empty ones: the
-    mean point of an arc of angle w lies at sin(w/2)/(w/2) of the radius."""
+    """Return (B,) mean radius of each of the bins (B, 9) that make a whole turn, NaN for empty
+    ones: the mean point of an arc of angle w lies at sin(w/2)/(w/2) of the radius."""
     half = np.pi / len(bins)
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = bins[:, 1:3] / bins[:, :1]
@@ -152,7 +153,8 @@ def mean_radii(bins: Floats) -> Floats:
 
 
 def circular_error(seen: Floats) -> float:
-    """G from bins (J, 9) that are not empty, J ≥ 1; NaN where they do not surround the centre."""
+    """Return G from bins (J, 9) that are not empty, J ≥ 1; NaN where they do not surround the
+    centre."""
     mean = mean_points(seen)
     if not _surrounds(mean):
         return math.nan
@@ -162,13 +164,14 @@ def circular_error(seen: Floats) -> float:
 
 
 def _surrounds(points: Floats) -> bool:
-    """Whether points (J, 2) surround the origin: no angle between neighbours is half a turn."""
+    """True if points (J, 2) surround the origin: every angle between neighbours is below π."""
     angle = np.sort(np.arctan2(points[:, 1], points[:, 0]))
     return bool(np.diff(angle, append=angle[0] + 2.0 * np.pi).max() < np.pi)
 
 
 def least_squares_centre(points: Floats) -> Floats:
-    """Centre (2,) of the circle with the least sum of squared radial distances to points (J, 2).
+    """Return centre (2,) of the circle with the least sum of squared radial distances to points
+    (J, 2).
 
     Gauss-Newton from the origin: with d = |p − c| and u = (p − c)/d, the residual d − R changes by
     −u·δc − δR, so each round solves the 3 × 3 normal equations of [u, 1] (δc, R) = d.
@@ -237,7 +240,7 @@ class BidirectionalFigures(Struct, frozen=True):
 
 
 def reversal_figures(bins: Floats, ccw: bool) -> ReversalFigures:
-    """The reversals of one circle from its bins (B, 9) about the programmed centre."""
+    """Return the reversals of one circle from its bins (B, 9) about the programmed centre."""
     radius = mean_radii(bins)
     with np.errstate(invalid="ignore"):
         least, largest = np.sqrt(bins[:, 3]), np.sqrt(bins[:, 6])
@@ -252,7 +255,7 @@ def reversal_figures(bins: Floats, ccw: bool) -> ReversalFigures:
 def _steps(
     radius: Floats, least: Floats, largest: Floats, turn: int
 ) -> tuple[list[float], list[float]]:
-    """Steps and spikes at the lower edges of the bins at `QUADRANTS_DEG`; `turn` is +1 for
+    """Return steps and spikes at the lower edges of the bins at `QUADRANTS_DEG`; `turn` is +1 for
     growing angles."""
     count = len(radius)
     at = (np.array(QUADRANTS_DEG) * count // 360)[:, None]
@@ -274,7 +277,7 @@ def _steps(
 
 
 def _values(radius: Floats, ccw: bool) -> tuple[float, float]:
-    """B of X and of Y by least squares; NaN when less than half of the bins are filled."""
+    """Return B of X and of Y by least squares; NaN when less than half of the bins are filled."""
     seen = np.isfinite(radius)
     if seen.sum() < len(radius) // 2:
         return math.nan, math.nan
@@ -285,7 +288,8 @@ def _values(radius: Floats, ccw: bool) -> tuple[float, float]:
 
 @cache
 def _terms(count: int, turn: float) -> Floats:
-    """(B, 5) of so many bins: what one unit of c, e_x, e_y, B_x and B_y adds to the radius."""
+    """Return (B, 5): by how much one unit of c, e_x, e_y, B_x and B_y changes the radius in each
+    of `count` bins."""
     angle = (np.arange(count) + 0.5) * (2.0 * np.pi / count)
     cos, sin = np.cos(angle), np.sin(angle)
     # With growing angles, sin > 0 after 0°, and cos < 0 after 90°.
@@ -317,7 +321,7 @@ class CirclePairs:
                     self._partner[first], self._partner[int(second)] = int(second), first
 
     def partner(self, circle: int) -> int | None:
-        """The other circle of the pair; None for a circle without a partner."""
+        """Return the other circle of the pair; None for a circle without a partner."""
         return self._partner.get(circle)
 
     def add(self, circle: int, bins: Floats) -> list[BidirectionalFigures]:
@@ -336,7 +340,8 @@ class CirclePairs:
 
 
 def bidirectional_figures(circle: FullCircle, bins: Floats) -> BidirectionalFigures:
-    """The figures of a circle from the bins (2 B, 9) of both directions; NaN without points."""
+    """Return the figures of a circle from the bins (2 B, 9) of both directions; NaN without
+    points."""
     seen = bins[bins[:, 0] > 0.0]
     if len(seen) == 0:
         return BidirectionalFigures(circle, math.nan, math.nan)

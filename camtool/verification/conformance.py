@@ -1,9 +1,9 @@
-"""Whether a program does what its job asks for: its moves as programmed, before any controller.
+"""Conformance: compare the moves of a program, as programmed, with those that its job asks for.
 
     drawing, job, flags ─plan, write, read─▶ written     the moves that camtool would program
     program ─read─▶ decoded                              the moves that the program holds
 
-A move that is in both with the same numbers is as asked. Every other decoded move must lie where
+A move that is in both with the same numbers conforms. Every other decoded move must lie where
 `written` or the wanted toolpath cuts, and every other written move where `decoded` cuts, within
 the resolution of the dialect. What the dialect makes of the wanted path (chords, ends on its grid,
 stairs) is in `written` already, so the tolerance does not allow for it. The order of contours and
@@ -111,7 +111,7 @@ def conformance_of(
 
 
 def _equal_toolpaths(one: Toolpath, other: Toolpath) -> bool:
-    """Whether two toolpaths are equal, row for row."""
+    """True if two toolpaths are equal, row for row."""
     names = ("kind", "end", "centre", "feed", "value", "start", "mode")
     return one.modes == other.modes and all(
         np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True) for name in names
@@ -126,7 +126,7 @@ and the centres of arcs as well."""
 
 
 class ProgramRequest(Struct, frozen=True, eq=False):
-    """What a job asks of its program.
+    """The moves, feeds and heights that a job asks of its program.
 
     `written`: the moves of the program that camtool would write, as its dialect decodes them;
     `wanted`: the moves from which that is written. `unit_mm`, `unit_z_mm`: the resolution of the
@@ -159,7 +159,8 @@ class Alike(Struct, frozen=True, eq=False):
 
     @classmethod
     def of(cls, decoded: Toolpath, written: Toolpath) -> Alike:
-        """Points are the same within rounding (POSITION_EPS_MM)."""
+        """Number the moves of both sides; points are the same within rounding
+        (POSITION_EPS_MM)."""
         both = np.concatenate([_numbers(decoded), _numbers(written)])
         number = np.unique(both, axis=0, return_inverse=True)[1].reshape(-1)
         return cls(number[: len(decoded)], number[len(decoded) :])
@@ -176,7 +177,8 @@ class Alike(Struct, frozen=True, eq=False):
 
 
 def _numbers(toolpath: Toolpath) -> Ints:
-    """(N, 9) kind and coordinates as whole numbers."""
+    """Return (N, 9) kind and coordinates of each row as whole numbers, in units of
+    POSITION_EPS_MM."""
     centre = np.where(toolpath.is_arc[:, None], toolpath.centre, 0.0)
     places = np.concatenate([toolpath.starts, toolpath.end, centre], axis=1)
     whole = np.rint(places / POSITION_EPS_MM).astype(np.int64)
@@ -228,7 +230,8 @@ def compare_places(
 
 
 def _changed_ends(decoded: Toolpath, written: Toolpath) -> Iterator[Finding]:
-    """MOVES_CHANGED for the same moves as written, some of which end a little elsewhere."""
+    """Yield MOVES_CHANGED for a program with the same moves as written, some of which end a little
+    elsewhere."""
     if not np.array_equal(decoded.kind, written.kind):
         return
     off = np.linalg.norm(decoded.end - written.end, axis=1)
@@ -307,8 +310,8 @@ def _uncovered_findings(
 def _plunge_findings(
     mine: Side, others: tuple[Side, Side], alike: Alike, limits: Limits
 ) -> Iterator[Finding]:
-    """EXTRA_CUT for feeds straight down to where no cut was asked for, except holes, which are
-    compared by `hole_findings`."""
+    """Yield EXTRA_CUT for feeds straight down to where no cut was asked for, except holes, which
+    are compared by `hole_findings`."""
     toolpath = mine.toolpath
     rows = np.flatnonzero(mine.plunges & ~alike.in_written)
     rows = rows[~_is_at_place(toolpath.end[rows, :2], mine.holes.at)]
@@ -329,14 +332,14 @@ def _plunge_findings(
 
 
 def _is_at_place(points: Floats, places: Floats) -> Bools:
-    """(J,) true for points (J, 2) that are one of the places (K, 2)."""
+    """Return (J,) true for points (J, 2) that are one of the places (K, 2)."""
     known = {tuple(place) for place in np.rint(places / POSITION_EPS_MM).astype(int).tolist()}
     mine = np.rint(points / POSITION_EPS_MM).astype(int).tolist()
     return np.array([tuple(point) in known for point in mine], dtype=np.bool_)
 
 
 def _repeated_cuts(mine: Side, other: Side, alike: Alike, limits: Limits) -> Iterator[Finding]:
-    """EXTRA_CUT for whole moves that are cut more often than asked."""
+    """Yield EXTRA_CUT for moves that are cut more often than the job asks."""
     cutting = np.flatnonzero(mine.cuts.is_cut)
     number, first, counts = np.unique(
         alike.decoded[cutting], return_index=True, return_counts=True
@@ -378,7 +381,7 @@ SPINDLE_OFF = 0.0
 """The value of a spindle that is off, and of no tool."""
 
 COOLANTS = ("no coolant", "mist", "flood", "mist and flood")
-"""What cools a cut: mist counts 1, flood 2."""
+"""Names of coolant states: the index is the sum of 1 for mist and 2 for flood."""
 
 
 def compare_settings(
@@ -413,9 +416,9 @@ class _SettingPairs(Struct, frozen=True, eq=False):
     def of(
         cls, mine: Side, other: Side, alike: Alike, pairs: Ints, limits: Limits
     ) -> _SettingPairs:
-        """The given pairs, all rows that are alike, each plunge that is not alike with every
-        written plunge, and each cut without any of these with the written moves at its middle,
-        whatever their direction."""
+        """Pair rows: the given pairs, all rows that are alike, each plunge that is not alike with
+        every written plunge, and each cut without any of these with the written moves at its
+        middle, whatever their direction."""
         at_work, there = mine.cuts.is_cut | mine.plunges, other.cuts.is_cut | other.plunges
         rows, written = np.flatnonzero(at_work), np.flatnonzero(there)
         # One of several written rows that are alike, with the same settings, is enough.
@@ -443,7 +446,8 @@ class _SettingPairs(Struct, frozen=True, eq=False):
         return cls(mine.toolpath, other.toolpath, rows, every)
 
     def unlike(self, same: Bools) -> tuple[Ints, Ints]:
-        """Rows without a pair that is the `same` (P,), each with the written row of one pair."""
+        """Return (R,) rows without a pair that is equal, `same` (P,), and the written row of one
+        pair of each."""
         fine = np.zeros(len(self.decoded), dtype=np.bool_)
         fine[self.pairs[same, 0]] = True
         rows, first = np.unique(self.pairs[:, 0], return_index=True)
@@ -465,19 +469,19 @@ def _settings(toolpath: Toolpath) -> tuple[Floats, Floats, Floats, Ints]:
 
 
 def _last_row(given: Bools) -> Ints:
-    """(N,) the last row up to each where it is `given`, −1 before the first."""
+    """Return (N,) the last row up to each where it is `given`, −1 before the first."""
     return np.asarray(np.maximum.accumulate(np.where(given, np.arange(len(given)), -1)))
 
 
 def _last_value(given: Bools, values: Floats) -> Floats:
-    """(N,) the last `given` value up to each row, SPINDLE_OFF before the first."""
+    """Return (N,) the last `given` value up to each row, SPINDLE_OFF before the first."""
     last = _last_row(given)
     return np.where(last >= 0, np.nan_to_num(values[np.maximum(last, 0)]), SPINDLE_OFF)
 
 
 def _feed_findings(both: _SettingPairs, asked: ProgramRequest) -> Iterator[Finding]:
-    """FEED_DIFFERS: an error for feeds that the job names, a remark for those it leaves to the
-    machine.
+    """Yield FEED_DIFFERS: an error for feeds that the job names, a remark for those it leaves to
+    the machine.
 
     On a machine that applies the feed to its faster axis, the speed along a line is higher by the
     ratio of its length to its run on that axis. A coarse grid changes the direction of short
@@ -506,7 +510,7 @@ def _feed_findings(both: _SettingPairs, asked: ProgramRequest) -> Iterator[Findi
 
 
 def _air_feed_findings(decoded: Toolpath, written: Toolpath) -> Iterator[Finding]:
-    """FEED_DIFFERS, a warning, for moves at a feed where a rapid was written."""
+    """Yield FEED_DIFFERS, a warning, for moves at a feed where a rapid was written."""
     rapids = np.flatnonzero(written.kind == Kind.RAPID)
     feeds = np.flatnonzero(written.is_feed)
     lines = np.flatnonzero(decoded.is_feed & ~decoded.is_arc)
@@ -525,8 +529,8 @@ def _air_feed_findings(decoded: Toolpath, written: Toolpath) -> Iterator[Finding
 
 
 def _speed_ratios(toolpath: Toolpath) -> Floats:
-    """(N,) ratio of the length of a line in XY to its run on the faster axis, 1 to √2; 1 for
-    other rows."""
+    """Return (N,) ratio of the length of a line in XY to its run on the faster axis, 1 to √2; 1
+    for other rows."""
     run = np.abs(toolpath.end - toolpath.starts)[:, :2]
     faster = run.max(axis=1)
     line = ~toolpath.is_arc & (faster > 0.0)
@@ -534,7 +538,7 @@ def _speed_ratios(toolpath: Toolpath) -> Floats:
 
 
 def _spindle_findings(both: _SettingPairs) -> Iterator[Finding]:
-    """SPINDLE_DIFFERS: an error where the job starts the spindle, otherwise a remark."""
+    """Yield SPINDLE_DIFFERS: an error where the job starts the spindle, otherwise a remark."""
     is_, wanted = _settings(both.decoded)[1], _settings(both.written)[1]
     rows, of = both.unlike(is_[both.pairs[:, 0]] == wanted[both.pairs[:, 1]])
     asked = wanted[of] != SPINDLE_OFF
@@ -558,7 +562,7 @@ def _spindle_words(turns: float) -> str:
 
 
 def _tool_findings(both: _SettingPairs) -> Iterator[Finding]:
-    """SETTING_DIFFERS for cuts with another tool than in the written program."""
+    """Yield SETTING_DIFFERS for cuts with another tool than in the written program."""
     is_, wanted = _settings(both.decoded)[2], _settings(both.written)[2]
     rows, of = both.unlike(is_[both.pairs[:, 0]] == wanted[both.pairs[:, 1]])
     asked = wanted[of] != SPINDLE_OFF
@@ -574,7 +578,7 @@ def _tool_findings(both: _SettingPairs) -> Iterator[Finding]:
 
 
 def _coolant_findings(both: _SettingPairs) -> Iterator[Finding]:
-    """SETTING_DIFFERS for cuts with other coolant than in the written program."""
+    """Yield SETTING_DIFFERS for cuts with other coolant than in the written program."""
     is_, wanted = _settings(both.decoded)[3], _settings(both.written)[3]
     rows, of = both.unlike(is_[both.pairs[:, 0]] == wanted[both.pairs[:, 1]])
     asked = wanted[of] != 0
@@ -590,8 +594,8 @@ def _coolant_findings(both: _SettingPairs) -> Iterator[Finding]:
 
 
 def _corner_findings(both: _SettingPairs) -> Iterator[Finding]:
-    """SETTING_DIFFERS for moves whose corners the controller may round farther than in the written
-    program. A program without a mode leaves corners to the machine and is not compared."""
+    """Yield SETTING_DIFFERS for moves whose corners the controller may round farther than in the
+    written program. A program without a mode leaves corners to the machine and is not compared."""
     is_, wanted = _corner_tolerances(both.decoded), _corner_tolerances(both.written)
     looser = is_[both.pairs[:, 0]] > wanted[both.pairs[:, 1]]
     rows, of = both.unlike(~looser)
@@ -607,8 +611,8 @@ def _corner_findings(both: _SettingPairs) -> Iterator[Finding]:
 
 
 def _corner_tolerances(toolpath: Toolpath) -> Floats:
-    """(N,) mm by which the corner at the end of each row may be rounded, or lines merged; NaN
-    where the program leaves that to the machine."""
+    """Return (N,) mm by which the corner at the end of each row may be rounded, or lines merged;
+    NaN where the program leaves that to the machine."""
     tolerances = [
         max(mode.tolerance_mm or np.inf, mode.merging_mm) if mode.corners == "blend" else 0.0
         for mode in toolpath.modes
@@ -619,7 +623,7 @@ def _corner_tolerances(toolpath: Toolpath) -> Floats:
 def _dwell_findings(
     decoded: Toolpath, written: Toolpath, asked: ProgramRequest
 ) -> Iterator[Finding]:
-    """SETTING_DIFFERS where the tool dwells for less than was asked, and where it dwells for
+    """Yield SETTING_DIFFERS where the tool dwells for less than was asked, and where it dwells for
     longer: a warning in the stock, where it rubs, else a remark."""
     wanted, found = (np.flatnonzero(each.kind == Kind.DWELL) for each in (written, decoded))
     limits = np.array([asked.limits_mm[0], asked.limits_mm[0], asked.limits_mm[1]])
@@ -643,8 +647,8 @@ def _dwell_findings(
 def _long_dwell_findings(
     decoded: Toolpath, written: Toolpath, found: Ints, wanted: Ints, limits: Floats
 ) -> Iterator[Finding]:
-    """SETTING_DIFFERS where the tool dwells for longer than was asked; `found` and `wanted` are
-    the rows of dwells."""
+    """Yield SETTING_DIFFERS where the tool dwells for longer than was asked; `found` and `wanted`
+    are the rows of dwells."""
     one, other = found, wanted
     longer: dict[bool, list[tuple[int, float, float]]] = {True: [], False: []}
     seen: set[int] = set()
@@ -675,7 +679,8 @@ def _long_dwell_findings(
 def _clearance_findings(
     mine: Side, other: Side, alike: Alike, asked: ProgramRequest
 ) -> Iterator[Finding]:
-    """CLEARANCE_LOW for rapids in XY below the height asked for, except rapids in `written`."""
+    """Yield CLEARANCE_LOW for rapids in XY below the height asked for, except rapids in
+    `written`."""
     toolpath = mine.toolpath
     if is_flat(other.toolpath):
         return
@@ -700,7 +705,7 @@ def _clearance_findings(
 
 
 def _severity(low_mm: float, asked: ProgramRequest) -> Severity:
-    """An error where the tool touches the stock or the job names the height, else a warning."""
+    """Return ERROR where the tool touches the stock or the job names the height, else WARNING."""
     touching = low_mm <= STOCK_TOP_MM + asked.limits_mm[1]
     return Severity.ERROR if touching or asked.safe_z_named else Severity.WARNING
 
@@ -708,8 +713,8 @@ def _severity(low_mm: float, asked: ProgramRequest) -> Severity:
 def _end_findings(
     decoded: Toolpath, written: Toolpath, asked: ProgramRequest
 ) -> Iterator[Finding]:
-    """END_DIFFERS for a program without END, and for one whose tool ends lower or elsewhere than
-    asked."""
+    """Yield END_DIFFERS for a program without END, and for one whose tool ends lower or elsewhere
+    than asked."""
     if (written.kind == Kind.END).any() and not (decoded.kind == Kind.END).any():
         yield END_DIFFERS_NO_END(
             where=block_name(decoded, len(decoded) - 1) if len(decoded) else ""

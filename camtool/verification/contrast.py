@@ -15,7 +15,7 @@ from camtool.verification.verify import Verification
 
 
 class ContrastRow(msgspec.Struct, frozen=True):
-    """One row of the table; µm, s. `circular_um`: the largest G of the circles. `endless`: the
+    """A row of the table; µm, s. `circular_um`: the largest G of the circles. `endless`: the
     number of arcs whose stop test is never met."""
 
     name: str
@@ -31,7 +31,7 @@ class ContrastRow(msgspec.Struct, frozen=True):
 
 
 def contrast_row(name: str, report: Report) -> ContrastRow:
-    """The row of one report."""
+    """Return the row of one report."""
     error = report.error_um
     circular = [circle.G_um for circle in report.circles if circle.G_um is not None]
     return ContrastRow(
@@ -52,7 +52,7 @@ _HEADS = ("interp.", "mechanics", "total", "rms", "G", "iterations", "reversals"
 
 
 def contrast_table(rows: Sequence[ContrastRow]) -> str:
-    """The rows as aligned text, errors in µm."""
+    """Return the rows as aligned text, errors in µm."""
     cells: list[tuple[str, ...]] = [("µm", *_HEADS, "time")]
     cells += [
         (
@@ -75,12 +75,12 @@ def contrast_table(rows: Sequence[ContrastRow]) -> str:
 
 
 def to_json(rows: Sequence[ContrastRow]) -> str:
-    """The rows as indented JSON with a newline at its end."""
+    """Return the rows as indented JSON with a newline at its end."""
     return json_text(list(rows))
 
 
 def worst_place(verdicts: Iterable[Verification]) -> tuple[float, float]:
-    """(x, y) mm of the largest error of all; part zero when nothing cuts."""
+    """Return (x, y) mm of the largest error of all; part zero when nothing cuts."""
     best, place = -1.0, (0.0, 0.0)
     for verdict in verdicts:
         trace = verdict.trace
@@ -99,8 +99,8 @@ MAX_SHOWN_SAMPLES = 40_000
 def paths_within(
     chunks: Iterable[Chunk], cutting: Bools, window: Floats, *, commanded: bool
 ) -> list[Floats]:
-    """The cutting samples in the window [[xmin, xmax], [ymin, ymax]] mm, as consecutive polylines
-    (n, 2): positions of the slides, or `commanded` positions."""
+    """Return the cutting samples in the window [[xmin, xmax], [ymin, ymax]] mm, as consecutive
+    polylines (n, 2): positions of the slides, or `commanded` positions."""
     paths: list[Floats] = []
     shown, before = 0, np.empty((0, 2))
     open_end = False

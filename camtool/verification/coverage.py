@@ -70,7 +70,7 @@ SAMPLES_AT_ONCE = 1 << 16
 """So many samples are compared with the moves that they were written from in one go."""
 
 Limits = tuple[float, float]
-"""What is near, in XY and in height, mm."""
+"""Tolerances in XY and in height, mm."""
 
 
 class Coverage(Struct, frozen=True, eq=False):
@@ -183,8 +183,9 @@ def cover(
 def _contours_from(
     cuts: CutMoves, wanted: CutMoves, row_from: Indices | None
 ) -> tuple[Ints, Ints]:
-    """(C,) the wanted contour from which all rows of each decoded contour were written, and (W,)
-    the only decoded contour with rows of each wanted contour; ANY_CONTOUR where there is none."""
+    """Return (C,) the wanted contour from which all rows of each decoded contour were written, and
+    (W,) the only decoded contour with rows of each wanted contour; ANY_CONTOUR where there is
+    none."""
     mine = np.full(cuts.contour_count, ANY_CONTOUR, dtype=np.int64)
     theirs = np.full(wanted.contour_count, ANY_CONTOUR, dtype=np.int64)
     if row_from is not None and len(theirs):
@@ -205,9 +206,9 @@ def _contours_from(
 def _nearest_in_own_contour(
     cuts: CutMoves, samples: CutSamples, own: Ints, goal: Goal
 ) -> tuple[NearestMoves, Ints]:
-    """The nearest move of the `own` wanted contour (C,) to each sample (S,), and that contour;
-    ANY_CONTOUR for the samples of contours that have none, or do not lie within the limits of
-    it."""
+    """Return the nearest move of the `own` wanted contour (C,) to each sample (S,), and that
+    contour; ANY_CONTOUR for the samples of contours that have none, or do not lie within the
+    limits of it."""
     count, fit = len(samples.points), np.asarray(own != ANY_CONTOUR)
     found = NearestMoves(np.full(count, np.inf), np.full(count, -1, dtype=np.int64))
     mine = cuts.contour[cuts.row[samples.segment]]
@@ -224,8 +225,9 @@ def _nearest_in_own_contour(
 
 
 def _judged_together(cuts: CutMoves, own: Ints, beside: Ints) -> Indices:
-    """(N,) a number that rows have in common which are judged together: those of one contour,
-    unless all of them are `beside` rows of their `own` one, so that no other decides on any."""
+    """Return (N,) a group number of each row: rows of one contour are judged together, but those
+    of contours all of whose rows lie `beside` rows of their `own` contour are judged one by
+    one."""
     alike, every = (
         np.bincount(cuts.contour[rows], minlength=len(own)) for rows in (beside, cuts.rows)
     )
@@ -235,7 +237,8 @@ def _judged_together(cuts: CutMoves, own: Ints, beside: Ints) -> Indices:
 
 
 def _contours_alike(wanted: CutMoves, beside: Ints, row_from: Indices | None) -> Bools:
-    """(C,) the wanted contours from each of whose rows one was written that lies `beside` it."""
+    """Return (C,) true for wanted contours from each of whose rows one was written that lies
+    `beside` it."""
     alike = np.zeros(wanted.contour_count, dtype=np.bool_)
     if row_from is not None:
         there = np.zeros(len(wanted.contour), dtype=np.bool_)
@@ -248,8 +251,8 @@ def _contours_alike(wanted: CutMoves, beside: Ints, row_from: Indices | None) ->
 def _rows_alike(
     cuts: CutMoves, wanted: CutMoves, limits: Limits, row_from: Indices | None
 ) -> Ints:
-    """The rows that cut along a line or an arc, and alone were written from a move of the same
-    kind beside which they lie: each point of them lies within the limits of it.
+    """Return the rows that cut along a line or an arc, and alone were written from a move of the
+    same kind beside which they lie: each point of them lies within the limits of it.
 
     Two points that run along two lines at once are nowhere farther apart than at one of the ends.
     On two arcs they are no farther apart than both centres and, at one of the ends, both spokes,
@@ -282,7 +285,7 @@ def _rows_alike(
 
 
 def _radius_differences(toolpath: Toolpath, arcs: Ints | Indices) -> Floats:
-    """(J,) mm: how far the ends of these arcs lie from the circles of their starts."""
+    """Return (J,) mm: the distance of the end of each arc from the circle through its start."""
     centre = toolpath.centre[arcs]
     out, back = (
         np.hypot(*(points[:, :2] - centre).T)
@@ -294,8 +297,8 @@ def _radius_differences(toolpath: Toolpath, arcs: Ints | Indices) -> Floats:
 def _fits_contour(
     cuts: CutMoves, own: Ints, others: MoveIndex, limits: Limits, spacing_mm: float
 ) -> Bools:
-    """(C,) the contours of one side that lie within the limits of their `own` contour (C,) of the
-    other side, where they have one."""
+    """Return (C,) true for the contours of one side that lie within the limits of their `own`
+    contour (C,) of the other side, where they have one."""
     fit = np.asarray(own != ANY_CONTOUR)
     limit_mm, depth_mm = limits
     for samples in samples_by_parts(cuts, spacing_mm, np.append(fit, False)[cuts.contour]):
@@ -311,7 +314,7 @@ def _fits_contour(
 # dialect (docs/decisions/0075-one-comparison-of-cuts.md).
 
 PlaceSentences = tuple[Sentence, Sentence, Sentence]
-"""What is said of a sample: far from all cuts, far from those at its depth, or there are none."""
+"""Sentences for a sample far from all cuts, far from those at its depth, and without any cuts."""
 
 _MISSING = CONTOUR_MISSING, CONTOUR_MISSING_AT_DEPTH, CONTOUR_MISSING_NO_CUTS
 _EXTRA = EXTRA_CUT, EXTRA_CUT_AT_DEPTH, EXTRA_CUT_NONE_WANTED
@@ -418,7 +421,7 @@ class Holes(Struct, frozen=True, eq=False):
 
 
 def holes_of(toolpath: Toolpath) -> Holes:
-    """The holes that a toolpath drills, in order."""
+    """Return the holes that a toolpath drills, in order."""
     across = moves_across(toolpath)
     flat = across | (toolpath.kind == Kind.HOME_XY)
     cutting = cutting_rows(toolpath, flat_cuts=False, across=across)
@@ -436,8 +439,8 @@ def holes_of(toolpath: Toolpath) -> Holes:
 
 
 def contours_drilled(cuts: CutMoves, holes: Holes, limits_mm: Limits) -> tuple[Bools, Bools]:
-    """(C,) the contours that are holes on the other side, and (H,) those holes: all of the contour
-    lies within the first limit of the hole, and their depths agree within the second.
+    """Return (C,) the contours that are holes on the other side, and (H,) those holes: all of the
+    contour lies within the first limit of the hole, and their depths agree within the second.
 
     A contour smaller than the resolution of a dialect becomes a plunge, which cuts the same.
     """
@@ -493,8 +496,8 @@ def _unpaired_findings(
     stand: Bools,
     sentences: tuple[Sentence, Sentence],
 ) -> Iterator[Finding]:
-    """A finding for each hole that the other side lacks; `sentences`: for no hole at its position,
-    and for one of another depth."""
+    """Yield a finding for each hole that the other side lacks; `sentences`: for no hole at its
+    position, and for one of another depth."""
     none, other_depth = sentences
     here, paired = _has_hole(holes, others, limits_mm)
     alone = np.flatnonzero(~paired & ~stand).tolist()
@@ -508,8 +511,8 @@ def _unpaired_findings(
 
 
 def _has_hole(holes: Holes, others: Holes, limits_mm: Limits) -> tuple[Bools, Bools]:
-    """(H,), (H,) which holes have one of the others at their position, and which one that is as
-    deep."""
+    """Return (H,) true for holes with one of the others at their position, and (H,) for those with
+    one that is as deep."""
     here, same = np.zeros(len(holes), dtype=np.bool_), np.zeros(len(holes), dtype=np.bool_)
     mine, theirs = near_points(holes.at, others.at, limits_mm[0])
     here[mine] = True
@@ -530,8 +533,8 @@ rounded by up to 1.41 units in all, which turns a longer move by no more than 32
 
 
 def encloses_area(cuts: CutMoves, gap_mm: float) -> Bools:
-    """(C,) contours that enclose an area; others (open paths, paths there and back) may be cut
-    from either end."""
+    """Return (C,) true for contours that enclose an area; others (open paths, paths there and
+    back) may be cut from either end."""
     return np.asarray(loops(cuts, gap_mm)[:, 0] != NO_LOOP)
 
 
@@ -542,8 +545,8 @@ def direction_findings(
     sample_mm: float,
     row_from: Indices | None,
 ) -> Iterator[Finding]:
-    """CUT_OTHER_WAY for contours of a program that are cut in the direction opposite to that of
-    the moves from which it was written, `source`; `row_from` as in `cover`.
+    """Yield CUT_OTHER_WAY for contours of a program that are cut in the direction opposite to that
+    of the moves from which it was written, `source`; `row_from` as in `cover`.
 
     A move beside the one that it was written from, in the same direction, is not turned, nor is a
     row whose middle lies on the contour that it came from, in the same direction; the others are
@@ -576,8 +579,8 @@ def direction_findings(
 
 
 def _same_direction(cuts: CutMoves, source: CutMoves, rows: Ints, row_from: Indices) -> Bools:
-    """(J,) whether the chords of these rows have the direction of those of the rows that they came
-    from, which are alike; none has that of a full circle."""
+    """Return (J,) true where the chords of these rows have the direction of those of the rows they
+    came from; false for full circles."""
     same = np.empty(len(rows), dtype=np.bool_)
     for low in range(0, len(rows), ROWS_AT_ONCE):
         some = rows[low : low + ROWS_AT_ONCE]
@@ -593,8 +596,8 @@ def _same_direction(cuts: CutMoves, source: CutMoves, rows: Ints, row_from: Indi
 def _cosines(
     cuts: CutMoves, samples: CutSamples, others: MoveIndex, found: NearestMoves
 ) -> Floats:
-    """(S,) cosine of the angle between the move of each sample and the move of the other side
-    that was found; 0 where none was."""
+    """Return (S,) cosine of the angle between the move of each sample and the move of the other
+    side that was found; 0 where none was."""
     cosine = np.zeros(len(samples.points))
     known = np.flatnonzero(found.segment >= 0)
     part, there = samples.of(known), found.segment[known]
@@ -628,7 +631,7 @@ class NearPairs(Struct, eq=False):
         return self.cuts.row[self.samples.segment]
 
     def rows_along(self) -> Ints:
-        """(P, 2) rows of both sides that lie on each other and have the same direction."""
+        """Return (P, 2) rows of both sides that lie on each other and have the same direction."""
         along = self.cosine > MIN_SAME_COSINE
         other_rows = self.others.cuts.row[self.move[along]]
         return np.unique(np.column_stack([self.rows[self.point[along]], other_rows]), axis=0)
@@ -637,8 +640,8 @@ class NearPairs(Struct, eq=False):
 def near_pairs(
     cuts: CutMoves, rows: Bools, others: MoveIndex, limits: Limits, sample_mm: float
 ) -> NearPairs:
-    """The cuts of these rows (N,) of one side against the cuts of the other side, at samples about
-    `sample_mm` apart; `limits`: what is near, in XY and in height, mm."""
+    """Pair samples on these rows (N,) of one side, about `sample_mm` apart, with all moves of the
+    other side within the limits."""
     samples = _with_ends(cuts, sample_cuts(cuts, sample_mm, np.flatnonzero(rows[cuts.row])))
     point, move, distance = others.within(samples.points, samples.z, limits)
     nearest = np.full(len(samples.points), np.inf)
@@ -651,8 +654,8 @@ def near_pairs(
 
 
 def _with_ends(cuts: CutMoves, samples: CutSamples) -> CutSamples:
-    """The samples with the last one of each row moved to the programmed end, which need not lie
-    on the circle of an arc."""
+    """Return the samples with the last one of each row moved to the programmed end, which need not
+    lie on the circle of an arc."""
     row = cuts.row[samples.segment]
     last = (samples.segment == cuts.first[row + 1] - 1) & (samples.share == 1.0)
     points = np.where(last[:, None], cuts.toolpath.end[row, :2], samples.points)
@@ -660,7 +663,7 @@ def _with_ends(cuts: CutMoves, samples: CutSamples) -> CutSamples:
 
 
 def headings(segments: Segments, which: Ints, share: Floats) -> Floats:
-    """(J, 2) unit directions of the segments `which` at parts `share` of their lengths."""
+    """Return (J, 2) unit directions of the segments `which` at parts `share` of their lengths."""
     chord = (segments.end - segments.start)[which]
     # The tangent turns evenly from half the sweep before the chord to half the sweep behind it.
     turn = (share - 0.5) * segments.sweep[which]
@@ -669,8 +672,8 @@ def headings(segments: Segments, which: Ints, share: Floats) -> Floats:
 
 
 def reversed_samples(compared: NearPairs, round_trip: Bools, limits: Limits) -> Ints:
-    """The samples on moves that the other side cuts only in the opposite direction; only contours
-    that enclose an area count (`round_trip` (P,) of each pair)."""
+    """Return the samples on moves that the other side cuts only in the opposite direction; only
+    contours that enclose an area count (`round_trip` (P,) of each pair)."""
     cuts, samples, count = compared.cuts, compared.samples, len(compared.distance)
     same = np.zeros(count, dtype=np.bool_)
     same[compared.point[compared.cosine > MIN_SAME_COSINE]] = True
@@ -684,7 +687,7 @@ def reversed_samples(compared: NearPairs, round_trip: Bools, limits: Limits) -> 
 
 
 def reversal_findings(compared: NearPairs, turned: Ints) -> Iterator[Finding]:
-    """One finding for each contour that is cut in the opposite direction."""
+    """Yield a CUT_OTHER_WAY finding for each contour that is cut in the opposite direction."""
     cuts = compared.cuts
     rows = compared.rows[turned]
     first = np.unique(cuts.contour[rows], return_index=True)[1]
@@ -702,12 +705,12 @@ are."""
 
 
 def at_point(point: Floats | tuple[float, float]) -> str:
-    """`(1.234, 5.678) mm`."""
+    """Return `(1.234, 5.678) mm`."""
     return f"({float(point[0]):.3f}, {float(point[1]):.3f}) mm"
 
 
 def block_name(toolpath: Toolpath, row: int) -> str:
-    """`block 12` (from 1, as people count), or `move 12` when no program was read."""
+    """Return `block 12` (from 1, as people count), or `move 12` when no program was read."""
     return block_of(toolpath, row) if toolpath.block[row] >= 0 else f"move {row + 1}"
 
 
@@ -715,8 +718,8 @@ Item = TypeVar("Item")
 
 
 def listed(items: Sequence[Item]) -> Iterator[tuple[Item, int]]:
-    """The items that get a finding each, with the number of those that are left out: 0 for all
-    but the last one."""
+    """Yield the first `FINDINGS_PER_CODE` items, with the number of items left out: 0 for all but
+    the last one."""
     shown = items[:FINDINGS_PER_CODE]
     for number, item in enumerate(shown, start=1):
         yield item, len(items) - len(shown) if number == len(shown) else 0

@@ -1,4 +1,4 @@
-"""Which moves of a toolpath cut, as lines and arcs, and the contours that they form.
+"""The cutting moves of a toolpath as lines and arcs, and the contours that they form.
 
 The rule (`cutting_rows`): a row cuts when it is a feed move (LINE, ARC) that moves in XY and
 begins or ends below the stock top, z < 0. Air moves and plunges straight down do not cut. A
@@ -48,8 +48,8 @@ class CutMoves(Struct, frozen=True, eq=False):
     contour: Indices
 
     def heights(self, which: Ints | Indices) -> Floats:
-        """(J, 2) mm: the heights of the starts and ends of these segments, between which their
-        height changes evenly: the segments of a row are equal parts of it."""
+        """Return (J, 2) mm: the heights of the starts and ends of these segments, between which
+        their height changes evenly: the segments of a row are equal parts of it."""
         row = self.row[which]
         begin, end = self.toolpath.starts_of(row)[:, 2], self.toolpath.end[row, 2]
         of = self.first[row + 1] - self.first[row]
@@ -76,7 +76,7 @@ class CutMoves(Struct, frozen=True, eq=False):
         return np.sort(self.ends_z, axis=1)
 
     def slopes(self, which: Ints) -> Bools:
-        """(J,) true where the height changes along these segments."""
+        """Return (J,) true where the height changes along these segments."""
         begin, end = self.heights(which).T
         return np.asarray(begin != end)
 
@@ -96,7 +96,7 @@ class CutMoves(Struct, frozen=True, eq=False):
         return int(self.contour.max(initial=-1)) + 1
 
     def contour_ends(self) -> tuple[Ints, Ints]:
-        """First and last row of each contour (C,), (C,)."""
+        """Return first and last row of each contour (C,), (C,)."""
         rows = self.rows
         change = np.flatnonzero(np.diff(self.contour[rows]))
         begin = rows[np.concatenate([[0], change + 1])] if len(rows) else rows
@@ -104,15 +104,15 @@ class CutMoves(Struct, frozen=True, eq=False):
         return begin, finish
 
     def closed(self, gap_mm: float) -> Bools:
-        """(C,) true where a contour ends within gap_mm of its start."""
+        """Return (C,) true where a contour ends within gap_mm of its start."""
         begin, finish = self.contour_ends()
         gap = self.toolpath.end[finish, :2] - self.toolpath.starts_of(begin)[:, :2]
         return np.asarray(np.hypot(gap[:, 0], gap[:, 1]) <= gap_mm)
 
 
 def row_lengths(toolpath: Toolpath) -> Floats:
-    """(N,) mm: length of each row in XY, 0 for events; of an arc, its start radius times its
-    sweep."""
+    """Return (N,) mm: length of each row in XY, 0 for events; of an arc, its start radius times
+    its sweep."""
     return toolpath.by_parts(_lengths)
 
 
@@ -126,7 +126,7 @@ def _lengths(toolpath: Toolpath) -> Floats:
 
 
 def rapid_length_mm(toolpath: Toolpath) -> float:
-    """How far the rapids of a toolpath go in XY, mm."""
+    """Return the length of all rapids of a toolpath in XY, mm."""
     return float(row_lengths(toolpath)[toolpath.kind == Kind.RAPID].sum())
 
 
@@ -136,8 +136,8 @@ def is_flat(toolpath: Toolpath) -> bool:
 
 
 def cutting_rows(toolpath: Toolpath, *, flat_cuts: bool, across: Bools | None = None) -> Bools:
-    """(N,) true for the rows that cut, by the rule of this module; false after the END. `across`
-    (N,): the rows that move in XY, where these are known."""
+    """Return (N,) true for the rows that cut, by the rule of this module; false after the END.
+    `across` (N,): the rows that move in XY, where these are known."""
     across = moves_across(toolpath) if across is None else across
     is_drawn_flat = flat_cuts and is_flat(toolpath)
     cutting = across & (toolpath.is_feed if is_drawn_flat else feeds_below_top(toolpath))
@@ -146,12 +146,12 @@ def cutting_rows(toolpath: Toolpath, *, flat_cuts: bool, across: Bools | None = 
 
 
 def moves_across(toolpath: Toolpath) -> Bools:
-    """(N,) true for the rows that move in XY."""
+    """Return (N,) true for the rows that move in XY."""
     return toolpath.by_parts(lambda part: _lengths(part) > POSITION_EPS_MM)
 
 
 def cut_moves(toolpath: Toolpath, *, flat_cuts: bool) -> CutMoves:
-    """The cutting moves of a toolpath as segments; `flat_cuts` as the module says."""
+    """Return the cutting moves of a toolpath as segments; `flat_cuts` as the module says."""
     cutting = cutting_rows(toolpath, flat_cuts=flat_cuts)
     arcs = np.flatnonzero(toolpath.is_arc & cutting)
     sweep = toolpath.sweeps_of(arcs)
@@ -167,9 +167,9 @@ def cut_moves(toolpath: Toolpath, *, flat_cuts: bool) -> CutMoves:
 def _segments(
     toolpath: Toolpath, row: Indices, first: Indices, arcs: tuple[Ints, Floats]
 ) -> Segments:
-    """One segment per part of each row: that of each is `row` (K,), which owns segments
-    first[r]:first[r+1]; `arcs`: the rows (J,) that are arcs, and their sweeps (J,). The points
-    between parts lie on the start's radius."""
+    """Return a segment for each part of each row: segment k is of row `row[k]` (K,), row r owns
+    segments first[r]:first[r+1]. `arcs`: the rows (J,) that are arcs, and their sweeps (J,) rad.
+    Points between the parts of an arc lie at the radius of its start."""
     bulge = np.broadcast_to(np.zeros(1), len(row))
     path = np.broadcast_to(np.int64(0), len(row))  # the segments of a toolpath are all of one
     if not len(arcs[0]) and len(row) and row[0] > 0 and (np.diff(row) == 1).all():
@@ -195,7 +195,7 @@ def _segments(
 
 
 def _rotate(points: Floats, centre: Floats, angle: Floats) -> Floats:
-    """Points (J, 2) turned about their centres (J, 2) by angles (J,) rad."""
+    """Return points (J, 2) turned about their centres (J, 2) by angles (J,) rad."""
     spoke = points - centre
     cos, sin = np.cos(angle), np.sin(angle)
     x = centre[:, 0] + cos * spoke[:, 0] - sin * spoke[:, 1]
@@ -204,7 +204,7 @@ def _rotate(points: Floats, centre: Floats, angle: Floats) -> Floats:
 
 
 def _contours(toolpath: Toolpath, cutting: Bools) -> Indices:
-    """(N,) contour of each row: a new one begins after the tool has left the stock."""
+    """Return (N,) contour of each row: a new one begins after the tool has left the stock."""
     breaks = np.cumsum(toolpath.by_parts(_leaves_stock) & ~cutting, dtype=np.int32)[cutting]
     contour = np.full(len(toolpath), -1, dtype=np.int32)
     contour[cutting] = np.cumsum(np.diff(breaks, prepend=breaks[:1]) != 0, dtype=np.int32)
@@ -212,7 +212,7 @@ def _contours(toolpath: Toolpath, cutting: Bools) -> Indices:
 
 
 def _leaves_stock(toolpath: Toolpath) -> Bools:
-    """(N,) true for homing and for rows that move, but for feeds straight down or up in the
+    """Return (N,) true for homing and for rows that move, but for feeds straight down or up in the
     stock."""
     rises = toolpath.end[:, 2] != toolpath.starts[:, 2]
     flat = _lengths(toolpath) > POSITION_EPS_MM
@@ -232,16 +232,16 @@ class CutSamples(Struct, frozen=True, eq=False):
     share: Floats
 
     def of(self, which: Ints) -> CutSamples:
-        """The samples with these indices."""
+        """Return the samples with these indices."""
         return CutSamples(
             self.points[which], self.segment[which], self.z[which], self.share[which]
         )
 
 
 def sample_cuts(cuts: CutMoves, spacing_mm: float, only: Ints | None = None) -> CutSamples:
-    """Points on the true lines and arcs, about `spacing_mm` apart; with `only`, on those segments
-    alone. The spacing is wider where there would be more than `MAX_SAMPLES` points, but each
-    segment has at least `MIN_PARTS` parts."""
+    """Return points on the true lines and arcs, about `spacing_mm` apart; with `only`, on those
+    segments alone. The spacing is wider where there would be more than `MAX_SAMPLES` points, but
+    each segment has at least `MIN_PARTS` parts."""
     which = np.arange(len(cuts.segments)) if only is None else only
     lengths = segment_lengths(cuts.segments[which])
     spacing = max(spacing_mm, float(lengths.sum()) / MAX_SAMPLES)
@@ -255,9 +255,9 @@ def samples_by_parts(
     at_once: int = MAX_SAMPLES,
     whole: Indices | None = None,
 ) -> Iterator[CutSamples]:
-    """The samples of `sample_cuts` on the rows (N,) that are true, in parts of whole rows, or of
-    rows (N,) with one number `whole`, with about `at_once` samples each, so that memory does not
-    grow with the program. The spacing is that of all cuts."""
+    """Yield the samples of `sample_cuts` on the rows (N,) that are true, in parts of whole rows,
+    or of rows (N,) with one number `whole`, with about `at_once` samples each, so that memory does
+    not grow with the program. The spacing is that of all cuts."""
     taken, parts, ends = _sample_batches(cuts, spacing_mm, rows, at_once, whole)
     for low, high in pairwise([0, *ends, len(taken)]):
         if low < high:
@@ -267,8 +267,8 @@ def samples_by_parts(
 def _sample_batches(
     cuts: CutMoves, spacing_mm: float, rows: Bools, at_once: int, whole: Indices | None
 ) -> tuple[Ints, Indices, list[int]]:
-    """Of `samples_by_parts` the segments (T,), in how many parts each is sampled (T,), and where
-    among them a lot ends that is not the last."""
+    """Return for `samples_by_parts` the segments (T,), the number of parts of each (T,), and the
+    indices at which all batches but the last end."""
     lengths = segment_lengths(cuts.segments)
     spacing = max(spacing_mm, float(lengths.sum()) / MAX_SAMPLES)
     taken = np.flatnonzero(rows[cuts.row])
@@ -282,12 +282,12 @@ def _sample_batches(
 
 
 def _parts(lengths: Floats, spacing_mm: float) -> Ints:
-    """(K,) in how many parts each segment is sampled."""
+    """Return (K,) the number of parts into which each segment is sampled."""
     return np.maximum(np.ceil(lengths / spacing_mm).astype(np.int64), MIN_PARTS)
 
 
 def _samples(cuts: CutMoves, which: Ints, parts: Ints) -> CutSamples:
-    """The ends of the equal parts of the segments `which`."""
+    """Return the ends of the equal parts of the segments `which`."""
     owner = np.repeat(np.arange(len(parts)), parts + 1)
     within = np.arange(len(owner)) - np.repeat(np.cumsum(parts + 1) - parts - 1, parts + 1)
     share, segment = within / parts[owner], which[owner]
@@ -312,8 +312,8 @@ NO_LOOP = -1
 
 
 def loops(cuts: CutMoves, gap_mm: float) -> Ints:
-    """(C, 2) first and last row of the loop of each contour, NO_LOOP where it has none. Points
-    within `gap_mm` of each other count as one."""
+    """Return (C, 2) first and last row of the loop of each contour, NO_LOOP where it has none.
+    Points within `gap_mm` of each other count as one."""
     from camtool.kernels.chaining import latest_near
 
     begin, finish = cuts.contour_ends()
@@ -345,7 +345,7 @@ def loops(cuts: CutMoves, gap_mm: float) -> Ints:
 
 
 def is_in_loop(cuts: CutMoves, found: Ints) -> Bools:
-    """(N,) true for the cutting rows that belong to the loop of their contour."""
+    """Return (N,) true for the cutting rows that belong to the loop of their contour."""
     first, last = found[found[:, 0] != NO_LOOP].T
     inside = np.zeros(len(cuts.contour) + 1, dtype=np.int8)
     inside[first] += 1
@@ -354,7 +354,7 @@ def is_in_loop(cuts: CutMoves, found: Ints) -> Bools:
 
 
 def _is_level(cuts: CutMoves) -> Bools:
-    """(C,) true for contours at one height."""
+    """Return (C,) true for contours at one height."""
     low, high = np.full(cuts.contour_count, np.inf), np.full(cuts.contour_count, -np.inf)
     for begin in range(0, len(cuts.segments), ROWS_AT_ONCE):
         which = np.arange(begin, min(begin + ROWS_AT_ONCE, len(cuts.segments)))
@@ -365,8 +365,8 @@ def _is_level(cuts: CutMoves) -> Bools:
 
 
 def _lengths_and_areas(toolpath: Toolpath, rows: Indices) -> Floats:
-    """(R, 2) the length of each of these moves (R,) in mm, and the signed area in mm² between it
-    and the origin.
+    """Return (R, 2) the length of each of these moves (R,) in mm, and the signed area in mm²
+    between it and the origin.
 
     Green's theorem: half the cross product of the ends of a move, and for an arc of sweep t the
     area (r²/2)(t − sin t) of its circular segment on top.
@@ -384,10 +384,10 @@ def _lengths_and_areas(toolpath: Toolpath, rows: Indices) -> Floats:
 def _longest_loop(
     sums: Floats, places: Floats, latest: Indices, gap_mm: float
 ) -> tuple[int, int] | None:
-    """First and last row, from 0, of the loop of one contour, which begins and whose rows end at
-    `places` (R + 1, 2); `sums` (R + 1, 2) of what `_lengths_and_areas` gives for the rows before
-    each place, and `latest` (R + 1,) the latest place before each that is the same, below 0 for
-    none."""
+    """Return first and last row, from 0, of the loop of one contour, which begins and whose rows
+    end at `places` (R + 1, 2); `sums` (R + 1, 2) of what `_lengths_and_areas` gives for the rows
+    before each place, and `latest` (R + 1,) the latest place before each that is the same, below 0
+    for none."""
     best, most = None, 0.0
     for first in range(0, len(places), ROWS_AT_ONCE):
         high = first + np.flatnonzero(latest[first : first + ROWS_AT_ONCE] >= 0)

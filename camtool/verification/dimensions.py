@@ -39,7 +39,7 @@ SAME_MM = 1e-3
 
 
 class PredictedSize(Struct, frozen=True):
-    """One dimension, such as "part X" or "contour 3 Y", mm. `of_edge`: it is that of the cut
+    """A dimension, such as "part X" or "contour 3 Y", mm. `of_edge`: it is that of the cut
     edge, not of the tool centre's path."""
 
     name: str
@@ -63,11 +63,11 @@ class LoopedCuts(Struct, frozen=True, eq=False):
 
 
 class SlideExtents:
-    """Where the slides are in the rows that determine the sizes, and where they close contours."""
+    """Boxes of the slides' path in the rows that determine sizes, and closure errors."""
 
     def __init__(self, start: Floats, decoded: LoopedCuts, goal: LoopedCuts, match: Match) -> None:
-        """Of the wanted moves `goal`, the slides at `start` (3,) mm before they move; `match` says
-        to which wanted row and contour each decoded row belongs."""
+        """Begin with the slides at `start` (3,) mm; `goal` holds the wanted moves, and `match`
+        says to which wanted row and contour each decoded row belongs."""
         count, contour = goal.cuts.contour_count, match.contour
         self._counts = np.zeros(len(contour), dtype=np.bool_)
         self._begins = self._counts.copy()
@@ -85,7 +85,7 @@ class SlideExtents:
 
     @property
     def known(self) -> bool:
-        """Whether any row determines a size."""
+        """True if any row determines a size."""
         return bool(self._counts.any())
 
     @property
@@ -102,8 +102,9 @@ class SlideExtents:
         return float(np.hypot(gap[:, 0], gap[:, 1]).max()) if len(gap) else math.nan
 
     def add(self, low: int, box: tuple[Floats, Floats], end: Floats) -> None:
-        """The rows from `low` on, which come in order: the slides' lowest and highest positions
-        (R, 2), (R, 2) mm, infinite where they did not move, and last ones (R, 2) mm, NaN there."""
+        """Take the rows from `low` on, which come in order: the lowest and highest positions of
+        the slides (R, 2), (R, 2) mm, infinite where they did not move, and the last ones (R, 2)
+        mm, NaN there."""
         rows = slice(low, low + len(end))
         known = np.isfinite(end[:, 0])
         latest = np.maximum.accumulate(np.where(known, np.arange(1, len(end) + 1), 0))
@@ -124,8 +125,8 @@ class SlideExtents:
 
 
 def sizes(slides: SlideExtents, goal: LoopedCuts, gap_mm: float) -> Iterator[PredictedSize]:
-    """X and Y of the whole part, then of each closed contour of the wanted moves (`goal`), by the
-    extents of the slides.
+    """Yield X and Y of the whole part, then of each closed contour of the wanted moves (`goal`),
+    by the extents of the slides.
 
     Contours to which no row belongs are left out (a finding names them), and so is what makes no
     edge, where edges are known.
@@ -178,8 +179,9 @@ class _Edges(Struct, frozen=True, eq=False):
 
 
 def _edges(goal: LoopedCuts, centre: Floats, slide: Floats) -> _Edges:
-    """The edges that the contours of the wanted moves cut, of which `centre` (C, 2, 2) are the
-    boxes, and `slide` (C, 2, 2) those of the slides; these are the edges where none is known."""
+    """Return the edges that the contours of the wanted moves cut, of which `centre` (C, 2, 2) are
+    the boxes, and `slide` (C, 2, 2) those of the slides; these are the edges where none is
+    known."""
     wanted, drawn = goal.cuts, goal.cuts.toolpath.drawn
     count = len(centre)
     edge = _edge_of(wanted)
@@ -207,7 +209,7 @@ def _edges(goal: LoopedCuts, centre: Floats, slide: Floats) -> _Edges:
 
 
 def _edge_of(wanted: CutMoves) -> Ints:
-    """(C,) the edge of each contour: an index, UNKNOWN_EDGE or NO_EDGE."""
+    """Return (C,) the edge of each contour: an index, UNKNOWN_EDGE or NO_EDGE."""
     drawn, rows = wanted.toolpath.drawn, wanted.rows
     if drawn is None:
         return np.full(wanted.contour_count, UNKNOWN_EDGE)
@@ -217,8 +219,8 @@ def _edge_of(wanted: CutMoves) -> Ints:
 
 
 def _finest_contours(edges: _Edges, seen: Bools) -> Ints:
-    """The contours that decide a size, of those (C,) that are `seen`: where several lines cut one
-    edge, as in roughing and finishing, those of the line that comes nearest to it."""
+    """Return the contours that decide a size, of those (C,) that are `seen`: where several lines
+    cut one edge, as in roughing and finishing, those of the line that comes nearest to it."""
     rows = np.flatnonzero(seen)
     boxes = edges.nominal[rows].reshape(len(rows), 4)
     _, same = np.unique(boxes, axis=0, return_inverse=True)
@@ -228,8 +230,8 @@ def _finest_contours(edges: _Edges, seen: Bools) -> Ints:
 
 
 def _joint_size(boxes: Floats, followed: Bools) -> tuple[Floats, Bools]:
-    """(2,) size in X and Y of all boxes (C, 2, 2) together, and (2,) where it is that of lines
-    which the tool's centre follows."""
+    """Return (2,) size in X and Y of all boxes (C, 2, 2) together, and (2,) where it is that of
+    lines which the tool's centre follows."""
     low, high = boxes[:, :, 0].min(axis=0), boxes[:, :, 1].max(axis=0)
     walls = boxes[~followed]
     if not len(walls):
@@ -239,9 +241,9 @@ def _joint_size(boxes: Floats, followed: Bools) -> tuple[Floats, Bools]:
 
 
 def _is_final_pass(boxes: Floats, lowest: Floats, gap_mm: float) -> Bools:
-    """(C,) true for contours below which no contour of the same box is cut: passes between which
-    the tool leaves the stock are contours of their own. `boxes` (C, 2, 2) and `lowest` (C,) as
-    `_extents` gives them."""
+    """Return (C,) true for contours below which no contour of the same box is cut: passes between
+    which the tool leaves the stock are contours of their own. `boxes` (C, 2, 2) and `lowest` (C,)
+    are as `_extents` gives them."""
     whole = boxes.transpose(0, 2, 1).reshape(-1, 4)
     known = np.isfinite(whole[:, 0])
     keys = np.full(whole.shape, np.iinfo(np.int64).min)
@@ -253,7 +255,8 @@ def _is_final_pass(boxes: Floats, lowest: Floats, gap_mm: float) -> Bools:
 
 
 def _is_looped(goal: LoopedCuts) -> Bools:
-    """(C,) true for contours whose size is that of their loop, not of all that they clear."""
+    """Return (C,) true for contours whose size is that of their loop, not of all that they
+    clear."""
     drawn, edge = goal.cuts.toolpath.drawn, _edge_of(goal.cuts)
     closed = np.asarray(goal.loops[:, 0] != NO_LOOP)
     if drawn is not None:
@@ -262,14 +265,16 @@ def _is_looped(goal: LoopedCuts) -> Bools:
 
 
 def _wanted_rows(goal: LoopedCuts) -> Bools:
-    """(W,) the wanted rows that determine sizes: those of loops, and of contours without one."""
+    """Return (W,) the wanted rows that determine sizes: those of loops, and of contours without
+    one."""
     wanted, looped = goal.cuts, np.append(_is_looped(goal), False)[goal.cuts.contour]
     return np.asarray(wanted.is_cut & (is_in_loop(wanted, goal.loops) | ~looped))
 
 
 def _sized_rows(decoded: LoopedCuts, goal: LoopedCuts, match: Match) -> Ints:
-    """The decoded rows that determine the sizes: for wanted contours with a loop the rows of their
-    decoded loops, where there are any; otherwise the rows that follow a wanted row that does."""
+    """Return the decoded rows that determine the sizes: for wanted contours with a loop the rows
+    of their decoded loops, where there are any; otherwise the rows that follow a wanted row that
+    does."""
     if len(decoded.cuts.rows) == 0 or len(goal.cuts.rows) == 0:
         return np.empty(0, dtype=np.int64)
     of, has_loop = match.contour, np.append(_is_looped(goal), False)
@@ -281,9 +286,9 @@ def _sized_rows(decoded: LoopedCuts, goal: LoopedCuts, match: Match) -> Ints:
 
 
 def _extents(cuts: CutMoves, counts: Bools) -> tuple[Floats, Floats]:
-    """(C, 2, 2) mm: box [[x low, x high], [y low, y high]] of the rows of each contour that count,
-    `counts` (N,), and (C,) mm: the lowest height of their ends; infinite for a contour without
-    any."""
+    """Return (C, 2, 2) mm: box [[x low, x high], [y low, y high]] of the rows of each contour that
+    count, `counts` (N,), and (C,) mm: the lowest height of their ends; infinite for a contour
+    without any."""
     least = np.full((cuts.contour_count, 2), np.inf)
     most = np.full((cuts.contour_count, 2), -np.inf)
     lowest = np.full(cuts.contour_count, np.inf)

@@ -43,7 +43,7 @@ class Figure:
         self._histogram = np.zeros(BINS, dtype=np.int64)
 
     def add(self, errors: Floats, points: Floats, rows: Ints | Indices) -> None:
-        """Errors (J,) mm measured at points (J, 2) mm of these rows (J,)."""
+        """Add errors (J,) mm, measured at points (J, 2) mm of these rows (J,)."""
         if len(errors) == 0:
             return
         self.count += len(errors)
@@ -58,8 +58,8 @@ class Figure:
         self._histogram += np.bincount(bins, minlength=BINS)
 
     def add_rows(self, low: int, largest: Floats, squares: Floats, counts: Ints) -> None:
-        """The errors of the rows from `low` on, but for their sizes: the `largest` (R,) mm of each
-        row, or NaN; sums of squares (R,) mm²; counts (R,) of samples."""
+        """Add the errors of the rows from `low` on, without their histogram: the `largest` (R,) mm
+        of each row, or NaN; sums of squares (R,) mm²; counts (R,) of samples."""
         if counts.any():
             worst = int(np.nanargmax(largest))
             if float(largest[worst]) > self._max:
@@ -68,7 +68,8 @@ class Figure:
         self._squares += float(squares.sum())
 
     def add_sizes(self, histogram: Ints) -> None:
-        """The sizes of these errors: `histogram` (L · BINS,), L numbers for each bin."""
+        """Add the `histogram` (L · BINS,) of errors added by `add_rows`: L numbers for each
+        bin."""
         self._histogram += histogram.reshape(BINS, -1).sum(axis=1)
 
     @property
@@ -112,16 +113,16 @@ class RowBlock(Struct, frozen=True, eq=False):
         return slice(self.low, self.low + len(self.columns))
 
     def count(self, column: int) -> Ints:
-        """(R,) a column of whole numbers."""
+        """Return (R,) a column of whole numbers."""
         return self.columns[:, column].astype(np.int64)
 
     def largest(self, column: int, seen: Bools) -> Floats:
-        """(R,) a column of largest errors, NaN but for the rows that are `seen` (R,)."""
+        """Return (R,) a column of largest errors, NaN but for the rows that are `seen` (R,)."""
         return np.where(seen, self.columns[:, column], np.nan)
 
 
 def empty_columns(count: int) -> Floats:
-    """(count, 19) columns of `camtool.kernels.judging` for rows without samples."""
+    """Return (count, 19) columns of `camtool.kernels.judging` for rows without samples."""
     from camtool.kernels import judging as at
 
     columns = np.zeros((count, at.ROW_COLUMNS))
@@ -164,7 +165,7 @@ class RowFigures:
         self._sum = 0.0
 
     def add(self, block: RowBlock) -> None:
-        """The next rows, all of whose samples are judged."""
+        """Add the next rows, all of whose samples are judged."""
         from camtool.kernels import judging as at
 
         columns = block.columns
@@ -188,7 +189,8 @@ class RowFigures:
         self._add_ends(block.low, columns[:, [at.COMMANDED_X, at.COMMANDED_Y]])
 
     def _add_ends(self, low: int, commanded: Floats) -> None:
-        """The positions of the controller after the next rows, against the ends of the moves."""
+        """Compare the positions of the controller after the next rows with the ends of the
+        moves."""
         off = np.abs(commanded - self._toolpath.end[low : low + len(commanded), :2])
         endless = ~self.books.ended[low : low + len(off)]
         for row in np.flatnonzero(endless).tolist():
@@ -211,7 +213,7 @@ class RowFigures:
 
 
 def _larger_error(most: float, errors: Floats) -> float:
-    """The largest known error, mm; NaN without any."""
+    """Return the largest known error, mm; NaN without any."""
     known = errors[np.isfinite(errors)]
     return float(np.fmax(most, known.max())) if len(known) else most
 
@@ -235,7 +237,8 @@ class LedgerSums:
         self.iterations, self.compensation_s = 0, 0.0
 
     def add(self, ledger: Ledger, is_cut: Bools) -> None:
-        """The ledger of a chunk, with each row at most once; `is_cut` (N,): the rows that cut."""
+        """Add the ledger of a chunk, with each row at most once; `is_cut` (N,): the rows that
+        cut."""
         rows = ledger.row
         if self.ledger is not None:
             self.ledger.add(ledger)
@@ -270,7 +273,7 @@ class Tally(Struct, frozen=True, eq=False):
 
 
 def tally_of(books: LedgerSums, decoded: Toolpath, is_cut: Bools) -> Tally:
-    """The sums over all rows; `is_cut` (N,): the rows that cut."""
+    """Return the sums over all rows; `is_cut` (N,): the rows that cut."""
     dwell = decoded.kind == Kind.DWELL
     return Tally(
         steps=books.steps,
@@ -323,7 +326,7 @@ class ContourSums:
         self._total, self._at = np.full(count, -np.inf), np.zeros((count, 2))
 
     def add(self, block: RowBlock, samples: Ints, errors: tuple[Floats, Floats, Floats]) -> None:
-        """The next rows: `samples` (R,) with a total error; the largest `errors` (R,) of
+        """Add the next rows: `samples` (R,) with a total error; the largest `errors` (R,) of
         interpolation and mechanics, and in all."""
         from camtool.kernels import judging as at
 
@@ -345,7 +348,7 @@ class ContourSums:
         self._at[here] = columns[worst][:, [at.TOTAL_X, at.TOTAL_Y]]
 
     def figures(self) -> Iterator[ContourFigures]:
-        """The figures of each of these contours."""
+        """Yield the figures of each of these contours."""
         every = np.flatnonzero(self._row >= 0)
         for low in range(0, len(every), CONTOURS_AT_ONCE):
             here = every[low : low + CONTOURS_AT_ONCE]
@@ -372,7 +375,7 @@ class WorstRows:
         self.found = np.empty((0, 6))
 
     def add(self, block: RowBlock, errors: tuple[Floats, Floats, Floats]) -> None:
-        """The next rows and their largest `errors` (R,) of interpolation and mechanics, and in
+        """Add the next rows and their largest `errors` (R,) of interpolation and mechanics, and in
         all."""
         from camtool.kernels import judging as at
 
@@ -393,7 +396,8 @@ class MissedEnds:
         self.count, self.row, self.most_mm = 0, -1, 0.0
 
     def add(self, low: int, off: Floats, steps_mm: tuple[float, float]) -> None:
-        """How far (R, 2) mm the controller is beside the ends of the rows from `low` on."""
+        """Add the distances (R, 2) mm of the controller from the ends of the rows from `low`
+        on."""
         missed = np.flatnonzero((off > END_STEPS * np.array(steps_mm)).any(axis=1))
         if len(missed):
             far = np.hypot(*off[missed].T)
@@ -403,7 +407,7 @@ class MissedEnds:
 
 
 def contour_names(cuts: CutMoves) -> list[str]:
-    """`contour 3 (CUT/CIRCLE 3C)` for each contour: they are numbered from 1."""
+    """Return `contour 3 (CUT/CIRCLE 3C)` for each contour: they are numbered from 1."""
     sources = [cuts.toolpath.text(row) for row in cuts.contour_ends()[0].tolist()]
     return [
         f"contour {number}" + (f" ({source})" if source else "")

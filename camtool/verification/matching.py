@@ -72,7 +72,7 @@ class Goal(Struct, frozen=True, eq=False, dict=True):
 
 
 def own_match(cuts: CutMoves, circles: list[FullCircle]) -> Match:
-    """The match of a program without wanted moves: each row belongs to itself."""
+    """Return the match of a program without wanted moves: each row belongs to itself."""
     count = len(cuts.contour)
     row = np.where(cuts.is_cut, np.arange(count, dtype=np.int32), np.int32(-1))
     circle = _circle_of_row(circles, count)
@@ -80,8 +80,9 @@ def own_match(cuts: CutMoves, circles: list[FullCircle]) -> Match:
 
 
 def match_through_compensation(match: Match, of: Ints, goal: Goal) -> Match:
-    """A match with the rows of a compensated toolpath as one with the wanted rows: `of` (S,) is
-    the wanted row of each compensated row. Compensation may divide contours and circles."""
+    """Return the match with the wanted rows from a match with the rows of a compensated toolpath:
+    `of` (S,) is the wanted row of each compensated row. Compensation may divide contours and
+    circles."""
     known = match.row >= 0
     row = np.where(known, of[np.maximum(match.row, 0)], -1) if len(of) else match.row
     contour = np.where(known, goal.moves.cuts.contour[np.maximum(row, 0)], -1)
@@ -100,8 +101,8 @@ def match_through_compensation(match: Match, of: Ints, goal: Goal) -> Match:
 def nearest_at_height(
     samples: CutSamples, choice: Ints | None, moves: MoveIndex, limits_mm: tuple[float, float]
 ) -> tuple[NearestMoves, Bools]:
-    """The move nearest to each sample at its own height; where no move is near at that height, the
-    nearest at any height, and true (S,) where that one is near.
+    """Return the move nearest to each sample at its own height; where no move is near at that
+    height, the nearest at any height, and true (S,) where that one is near.
 
     `choice` (S,): the only contour to compare with, constant along a segment; only its near moves
     are found. None: all contours. `limits_mm`: what is near, in XY and in height.
@@ -123,8 +124,8 @@ def nearest_at_height(
 
 
 def match_contours(cuts: CutMoves, samples: CutSamples, found: NearestMoves, goal: Goal) -> Ints:
-    """(S,) the wanted contour to which the decoded contour of each sample belongs, ANY_CONTOUR for
-    none. `found` is changed in place to the nearest move of that contour."""
+    """Return (S,) the wanted contour to which the decoded contour of each sample belongs,
+    ANY_CONTOUR for none. `found` is changed in place to the nearest move of that contour."""
     wanted = goal.moves
     mine = cuts.contour[cuts.row[samples.segment]]
     belongs = np.full(len(mine), ANY_CONTOUR, dtype=np.int64)
@@ -151,7 +152,8 @@ def match_contours(cuts: CutMoves, samples: CutSamples, found: NearestMoves, goa
 
 
 def _candidates(mine: Indices, nearest: Indices) -> list[Ints]:
-    """For each try (C,): the wanted contour nearest to most samples, then the next, −1 for none.
+    """Return for each try (C,): the wanted contour nearest to most samples, then the next, −1 for
+    none.
 
     `mine` (S,) is the decoded contour of each sample (ascending), `nearest` (S,) the wanted one.
     """
@@ -170,7 +172,7 @@ def _candidates(mine: Indices, nearest: Indices) -> list[Ints]:
 
 
 def empty_match(count: int) -> Match:
-    """That of so many rows that cut nothing; `match_rows` fills it."""
+    """Return the match of `count` rows that cut nothing; `match_rows` fills it."""
     return Match(
         row=np.full(count, -1, dtype=np.int32),
         contour=np.full(count, -1, dtype=np.int32),
@@ -208,13 +210,14 @@ def match_rows(
 
 
 def with_neighbours(match: Match) -> Match:
-    """The match, with the largest distance of the drawing from each row and its neighbours."""
+    """Return the match, with the largest distance of the drawing from each row and its
+    neighbours."""
     return replace(match, off_mm=_with_neighbours(match.off_mm, match.contour))
 
 
 def _with_neighbours(off_mm: Floats, contour: Indices) -> Floats:
-    """The largest value of each row (N,) and of its neighbours in its contour, because slides lag
-    behind."""
+    """Return the largest value of each row (N,) and of its neighbours in its contour, because
+    slides lag behind."""
     rows = np.flatnonzero(contour >= 0)
     most = off_mm.copy()
     for low in range(0, len(rows) - 1, ROWS_AT_ONCE):
@@ -227,8 +230,8 @@ def _with_neighbours(off_mm: Floats, contour: Indices) -> Floats:
 
 
 def _common_values(values: Ints | Indices, offsets: Ints) -> Ints:
-    """(R,) the value of all inner samples of each run, −1 where they differ; at its first and last
-    sample a row touches its neighbours."""
+    """Return (R,) the value of all inner samples of each run, −1 where they differ; at its first
+    and last sample a row touches its neighbours."""
     inner = np.column_stack([offsets[:-1] + 1, offsets[1:] - 1]).ravel()
     low = np.minimum.reduceat(values, inner)[::2]
     high = np.maximum.reduceat(values, inner)[::2]

@@ -49,7 +49,8 @@ TRAVEL_EPS_MM = 1e-6
 def motion_findings(
     cuts: CutMoves, case: Case, tally: Tally, extents: Floats, rows: RowFigures
 ) -> tuple[Finding, ...]:
-    """All findings that need the motion or the machine; `extents` (3, 2) mm of the toolpath."""
+    """Return all findings that need the motion or the machine; `extents` (3, 2) mm of the
+    toolpath."""
     decoded, machine = cuts.toolpath, case.machine
     return (
         *_endless_arcs(decoded, machine, tally),
@@ -78,8 +79,9 @@ def _endless_arcs(decoded: Toolpath, machine: Machine, tally: Tally) -> Iterator
 
 
 def _missed_ends(quantised: Toolpath, case: Case, rows: RowFigures) -> Iterator[Finding]:
-    """Moves that end beside their programmed ends, except endless arcs: a remark where all are
-    within the tolerance of coverage and of the corners that the program allows (G64 P, Q)."""
+    """Yield END_NOT_REACHED for moves that end beside their programmed ends, except endless arcs:
+    a remark where all are within the tolerance of coverage and of the corners that the program
+    allows (G64 P, Q)."""
     missed = rows.missed_by_others
     if missed.count == 0:
         return
@@ -119,8 +121,8 @@ def _rapids_in_stock(decoded: Toolpath, case: Case) -> Iterator[Finding]:
 
 
 def _through_stock(decoded: Toolpath, case: Case) -> list[RapidThroughStock]:
-    """Rapids through stock that the tool has not cleared. Where the tool is not known: all rapids
-    in XY below the stock top, and those straight down to where no feed has been."""
+    """Return rapids through stock that the tool has not cleared. Where the tool is not known: all
+    rapids in XY below the stock top, and those straight down to where no feed has been."""
     diameter = case.options.tool_diameter_mm
     if diameter is not None:
         radius = np.full(len(decoded), 0.5 * diameter)
@@ -134,8 +136,8 @@ def _through_stock(decoded: Toolpath, case: Case) -> list[RapidThroughStock]:
 
 
 def _many_reversals(machine: Machine, tally: Tally, cuts: CutMoves) -> Iterator[Finding]:
-    """Too many reversals for the size of the part: the error at each one does not shrink with the
-    part."""
+    """Yield MANY_REVERSALS where there are too many for the size of the part: the error at each
+    one does not shrink with the part."""
     count, limit = int(tally.cutting_reversals[:2].sum()), machine.limits.max_reversals
     if limit is None or count <= limit:
         return
@@ -146,7 +148,7 @@ def _many_reversals(machine: Machine, tally: Tally, cuts: CutMoves) -> Iterator[
 
 
 def _size_mm(cuts: CutMoves) -> float:
-    """The larger side of the box around the ends of all cuts."""
+    """Return the larger side of the box around the ends of all cuts."""
     if not len(cuts.rows):
         return 0.0
     toolpath = cuts.toolpath

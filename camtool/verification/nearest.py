@@ -50,7 +50,7 @@ class MoveIndex:
         self.cuts = cuts
 
     def contour_of(self, segment: Ints) -> Indices:
-        """(J,) the contour of each of these segments (J,)."""
+        """Return (J,) the contour of each of these segments (J,)."""
         return self.cuts.contour[self.cuts.row[segment]]
 
     @cached_property
@@ -70,10 +70,10 @@ class MoveIndex:
         choice: Ints | None,
         limits_mm: tuple[float, float],
     ) -> NearestMoves:
-        """The nearest move within the first limit in XY, and the second in height at its place
-        nearest to the point (more on slopes, where a shift in XY changes the height), of points
-        (J, 2) at heights (J,) mm; of equally near moves the last. `choice` (J,): the only contour
-        whose moves are found, neighbours of one contour together; None: those of all."""
+        """Return the nearest move within the first limit in XY, and the second in height at its
+        place nearest to the point (more on slopes, where a shift in XY changes the height), of
+        points (J, 2) at heights (J,) mm; of equally near moves the last. `choice` (J,): the only
+        contour whose moves are found, neighbours of one contour together; None: those of all."""
         from camtool.kernels.near import nearest
 
         if len(points) == 0:  # the tables need not be made
@@ -84,7 +84,8 @@ class MoveIndex:
         )
 
     def nearest_of_all(self, points: Floats, height: Floats, from_mm: float) -> NearestMoves:
-        """The nearest move at any distance and height, which is expected within `from_mm`."""
+        """Return the nearest move at any distance and height, which is expected within
+        `from_mm`."""
         found = NearestMoves(
             np.full(len(points), np.inf), np.full(len(points), -1, dtype=np.int64)
         )
@@ -98,14 +99,15 @@ class MoveIndex:
     def within(
         self, points: Floats, height: Floats, limits_mm: tuple[float, float]
     ) -> tuple[Ints, Ints, Floats]:
-        """All pairs (point, move) within the limits, as `nearest` takes them, in order, and their
-        distances in XY, mm."""
+        """Return all pairs (point, move) within the limits, as `nearest` takes them, in order, and
+        their distances in XY, mm."""
         from camtool.kernels.near import pairs
 
         return pairs(self._moves, np.column_stack([points, height]), limits_mm)
 
     def shares(self, points: Floats, which: Ints) -> Floats:
-        """(J,) where on segment which[j] its point nearest to point j lies, from 0 to 1."""
+        """Return (J,) the position along segment which[j], from 0 to 1, of its point nearest to
+        point j."""
         from camtool.kernels import near as at
 
         moves = self._moves
@@ -127,7 +129,8 @@ class MoveIndex:
         return np.asarray(np.clip(along, 0.0, 1.0))
 
     def _runs(self, choice: Ints | None, count: int) -> Ints:
-        """(R, 4) the points, in runs of one choice, and the moves with which they are compared."""
+        """Return (R, 4) the points, in runs of one choice, and the moves with which they are
+        compared."""
         if choice is None:
             return np.array([[0, count, 0, len(self.cuts.segments)]])
         offsets = run_offsets(choice, max(count, 1))
@@ -144,7 +147,7 @@ class MoveIndex:
 
 
 def run_offsets(labels: Ints | Indices, longest: int) -> Ints:
-    """Offsets (G+1,) of the runs of equal labels (J,), cut to at most `longest` items."""
+    """Return offsets (G+1,) of the runs of equal labels (J,), cut to at most `longest` items."""
     if len(labels) == 0:
         return np.zeros(1, dtype=np.int64)
     change = np.concatenate([[0], np.flatnonzero(np.diff(labels)) + 1])
@@ -154,7 +157,7 @@ def run_offsets(labels: Ints | Indices, longest: int) -> Ints:
 
 
 def run_peaks(values: Floats, offsets: Ints) -> Ints:
-    """(G,) index of the first largest value in each run."""
+    """Return (G,) index of the first largest value in each run."""
     run = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
     largest = np.maximum.reduceat(values, offsets[:-1])
     hits = np.flatnonzero(values == largest[run])
@@ -162,6 +165,6 @@ def run_peaks(values: Floats, offsets: Ints) -> Ints:
 
 
 def ranges(first: Ints, count: Ints) -> Ints:
-    """first[0], first[0]+1, … (count[0] of them), first[1], …"""
+    """Return first[0], first[0]+1, … (count[0] of them), first[1], …"""
     skipped = np.cumsum(count) - count
     return np.repeat(first - skipped, count) + np.arange(int(count.sum()))

@@ -1,6 +1,6 @@
-"""Where a drawing lies under a program that others made, and along what of it the program cuts.
+"""Registration: place a drawing under a program of unknown origin, and find the lines it cuts.
 
-    moves of the program ─▶ samples of what cuts
+    moves of the program ─▶ samples of the cuts
     samples, drawing ─▶ shift       where the drawing's zero lies in the program
     samples, drawing ─▶ radius      of each tool: the distance at which its path keeps to the lines
     drawing, radius ─▶ tracks       each contour, and the paths beside it on both sides
@@ -146,7 +146,7 @@ TURNS = (
     ("--rotate 180", -np.eye(2)),
     ("--rotate 270", np.array([[0.0, 1.0], [-1.0, 0.0]])),
 )
-"""What is tried where no shift does: flags, and what they make of the drawing's points."""
+"""Flags, and the matrices that they apply to the drawing: tried where no shift fits."""
 
 SCALES = (
     ("--scale 25.4", 25.4),
@@ -195,9 +195,9 @@ class _Lines(Struct, frozen=True, eq=False):
         segments = Segments.of(paths)
         return cls(paths, segments, Frames.of(segments), path_extents(paths))
 
-    def beside(self, points: Floats) -> tuple[Floats, Floats, Ints]:
-        """(J,) mm: how far points lie from the nearest line, left of it positive; (J, 2): in which
-        direction that grows; (J,): the nearest segment.
+    def signed_distances(self, points: Floats) -> tuple[Floats, Floats, Ints]:
+        """Return (J,) mm the signed distance of points from the nearest line, left of it positive;
+        (J, 2) the unit direction in which it grows; (J,) the nearest segment.
 
         Measured from the start of a segment of curvature k, with the point at x along the tangent
         and y along the left normal, the foot is  atan2(k x, 1 − k y) / k  along.
@@ -223,7 +223,7 @@ class _Lines(Struct, frozen=True, eq=False):
 
 
 class _Path(Struct, frozen=True, eq=False):
-    """What a program cuts, as points (S, 2) mm with the length that each stands for (S,), the row
+    """The cuts of a program as points (S, 2) mm with the length that each stands for (S,), the row
     (S,) and the tool (S,) of each. For its place: boxes (B, 2, 2) of its closed parts, centres
     (A, 2) of its arcs, and its holes (H, 2)."""
 
@@ -253,8 +253,8 @@ class _Path(Struct, frozen=True, eq=False):
             program.holes.at,
         )
 
-    def seen(self, matrix: Floats) -> _Path:
-        """The same, its points mapped by a matrix (2, 2)."""
+    def transform(self, matrix: Floats) -> _Path:
+        """Return the path with its points mapped by a matrix (2, 2)."""
         corners = self.boxes.transpose(0, 2, 1) @ matrix.T
         boxes = np.stack([corners.min(axis=1), corners.max(axis=1)], axis=2)
         grown = abs(float(np.linalg.det(matrix))) ** 0.5
@@ -268,20 +268,20 @@ class _Path(Struct, frozen=True, eq=False):
         )
 
     def near_mm(self, radius_mm: float) -> float:
-        """How near to a track for a tool of a radius a move follows it."""
+        """Return the distance within which a move follows a track of a tool of this radius, mm."""
         size = 0.0 if not len(self.boxes) else float(np.hypot(*np.diff(self.boxes[0])[:, 0]))
         least = min(NEAR_MM, NEAR_SIZE * size) if size else NEAR_MM
         return min(least, NEAR_SHARE * radius_mm) if radius_mm > 0.0 else least
 
-    def fewer(self) -> _Path:
-        """Some of the points, for the search."""
+    def thin(self) -> _Path:
+        """Return at most `SEARCH_POINTS` of the points, evenly chosen."""
         every = max(1, -(-len(self.points) // SEARCH_POINTS))
         return replace(self, points=self.points[::every], length=self.length[::every])
 
 
 def _boxes_of(cuts: CutMoves, limit_mm: float) -> Floats:
-    """(B, 2, 2) mm: the boxes of the loops of all contours, of the whole where one has none; and
-    that of everything first."""
+    """Return (B, 2, 2) mm: the boxes of the loops of all contours, of the whole where one has
+    none; and that of everything first."""
     found = loops(cuts, limit_mm)
     first, last = cuts.contour_ends()
     known = found[:, 0] >= 0
@@ -333,7 +333,7 @@ def register(
     if shift is None:
         return _empty_registration(running, said)
     moved = Polylines.joined([_shift_lines(drawing.paths, shift)]) if any(shift) else drawing.paths
-    return _Follower(program, path, _Lines.of(moved), drawing, limit_mm).result(
+    return _Follower(program, path, _Lines.of(moved), drawing, limit_mm).registration(
         shift, said, tool_diameter_mm, align=align
     )
 
@@ -344,7 +344,7 @@ def _shift_lines(lines: Polylines, shift: tuple[float, float]) -> Polylines:
 
 
 def _tools_of(toolpath: Toolpath) -> Ints:
-    """(N,) the number of the tool of each row, −1 before any is mounted."""
+    """Return (N,) the number of the tool of each row, −1 before any is mounted."""
     changes = toolpath.kind == Kind.TOOL_CHANGE
     latest = np.maximum.accumulate(np.where(changes, np.arange(len(changes)), -1))
     number = np.append(np.nan_to_num(toolpath.value, nan=-1.0), -1.0)
@@ -352,7 +352,7 @@ def _tools_of(toolpath: Toolpath) -> Ints:
 
 
 def _empty_registration(running: Toolpath, said: Sequence[Finding]) -> Registration:
-    """For a program that follows nothing, which `said` says."""
+    """Return the registration of a program that follows nothing, with findings that say so."""
     report = FoundReport(shift_mm=(0.0, 0.0), aligned=False, followed=0.0)
     return Registration((0.0, 0.0), running, tuple(said), report, None)
 
@@ -374,9 +374,8 @@ class _Place(Struct, frozen=True):
 def _find_place(
     path: _Path, lines: _Lines, *, align: bool
 ) -> tuple[tuple[float, float] | None, list[Finding]]:
-    """By how much the drawing is to be moved, None where that does not help, and what is to be
-    said of it."""
-    few = path.fewer()
+    """Return the shift of the drawing (x, y) mm, None where none fits, and findings on it."""
+    few = path.thin()
     here = _Place((0.0, 0.0), _followed_share(few, lines, np.zeros(2)))
     if not align and here.share >= MIN_FOLLOWED_SHARE:
         return here.shift, []
@@ -419,14 +418,14 @@ def _find_place(
 
 
 def _best_other_frame(path: _Path, lines: _Lines) -> tuple[str, _Place] | None:
-    """Another scale, mirror or turn of the drawing with which the path follows it well, as the
-    flag that makes it; None without any."""
+    """Return another scale, mirror or turn of the drawing with which the path follows it well, as
+    the flag that makes it; None without any."""
     found = []
     scales = [
         (flag, size * np.eye(2)) for flag, size in SCALES if _is_about_size(path, lines, size)
     ]
     for flag, matrix in (*TURNS, *scales):
-        other = path.seen(np.linalg.inv(matrix))
+        other = path.transform(np.linalg.inv(matrix))
         here = _Place((0.0, 0.0), _followed_share(other, lines, np.zeros(2)))
         places = (
             [here] if here.share >= MIN_OTHER_SHARE else [here, *_refined_places(other, lines)]
@@ -437,7 +436,7 @@ def _best_other_frame(path: _Path, lines: _Lines) -> tuple[str, _Place] | None:
 
 
 def _is_about_size(path: _Path, lines: _Lines, size: float) -> bool:
-    """Whether what is cut is about so many times as large as the drawing."""
+    """True if the cuts are about `size` times as large as the drawing."""
     if not len(path.boxes) or not len(lines.boxes):
         return False
     about = NEAR_SCALE_RATIO if 0.5 < size < 2.0 else FAR_SCALE_RATIO
@@ -447,7 +446,7 @@ def _is_about_size(path: _Path, lines: _Lines, size: float) -> bool:
 
 
 def _rival_places(best: _Place, found: Sequence[_Place]) -> list[_Place]:
-    """Other places that explain as much."""
+    """Return the other places that explain as much of the path."""
     return [
         each
         for each in found
@@ -457,7 +456,7 @@ def _rival_places(best: _Place, found: Sequence[_Place]) -> list[_Place]:
 
 
 def _refined_places(path: _Path, lines: _Lines) -> list[_Place]:
-    """The best candidates, refined, each once, the best first."""
+    """Return the best candidates, refined, each once, the best first."""
     found: list[_Place] = []
     for shift in _candidate_shifts(path, lines):
         refined = _refine_shift(path, lines, shift)
@@ -468,7 +467,7 @@ def _refined_places(path: _Path, lines: _Lines) -> list[_Place]:
 
 
 def _candidate_shifts(path: _Path, lines: _Lines) -> Floats:
-    """(C, 2) shifts with the most votes."""
+    """Return (C, 2) shifts with the most votes."""
     drawn = _largest_boxes(lines.boxes)
     mine = np.concatenate([path.boxes[:1], _largest_boxes(path.boxes[1:])])
     whole = np.stack([lines.boxes[:, :, 0].min(axis=0), lines.boxes[:, :, 1].max(axis=0)], axis=1)
@@ -514,22 +513,22 @@ def _candidate_shifts(path: _Path, lines: _Lines) -> Floats:
 
 
 def _largest_boxes(boxes: Floats) -> Floats:
-    """The largest boxes, so many as are compared."""
+    """Return the `MAX_MARKS` largest boxes."""
     size = np.diff(boxes)[..., 0].sum(axis=1)
     return boxes[np.argsort(-size, kind="stable")[:MAX_MARKS]]
 
 
 def _centres_of(lines: _Lines) -> Floats:
-    """(K, 2) mm: the centres of all arcs."""
+    """Return (K, 2) mm: the centres of all arcs."""
     arcs = np.flatnonzero(lines.segments.is_arc)
     return np.unique(lines.segments[arcs].centre.round(3), axis=0)
 
 
 def _refine_shift(path: _Path, lines: _Lines, shift: Floats) -> Floats:
-    """A shift, moved until the path keeps to the lines, or to one distance from them."""
+    """Return a shift, moved until the path keeps to the lines, or to one distance from them."""
     shift = np.array(shift, dtype=np.float64)
     for width in WIDTHS_MM:
-        distance, normal, _ = lines.beside(path.points - shift)
+        distance, normal, _ = lines.signed_distances(path.points - shift)
         far = np.abs(distance)
         radius = _peak_distance(far, path.length, width)
         side = np.where(distance < 0.0, -1.0, 1.0)
@@ -548,7 +547,8 @@ def _refine_shift(path: _Path, lines: _Lines, shift: Floats) -> Floats:
 
 
 def _peak_distance(far: Floats, length: Floats, width: float) -> float:
-    """The distance that most of the path keeps, within `width`; 0 where that is the line."""
+    """Return the distance that most of the path keeps, within `width`; 0 where that is the
+    line."""
     bins = max(width, BIN_MM)
     which, counts = _distance_histogram(far, length, bins)
     pairs = counts + np.append(counts[1:], 0.0)
@@ -559,8 +559,8 @@ def _peak_distance(far: Floats, length: Floats, width: float) -> float:
 
 
 def _distance_histogram(far: Floats, length: Floats, bins: float) -> tuple[Ints, Floats]:
-    """The bin of each distance, and the length of the path in each bin; none in the last, which is
-    farther than any tool is wide."""
+    """Return the bin of each distance, and the length of the path in each bin; none in the last,
+    which is farther than any tool is wide."""
     most = int(MAX_RADIUS_MM / bins) + 2
     which = np.minimum(far / bins, most).astype(np.int64)
     counts = np.bincount(which, length, minlength=most + 1).astype(np.float64)
@@ -569,11 +569,11 @@ def _distance_histogram(far: Floats, length: Floats, bins: float) -> tuple[Ints,
 
 
 def _followed_share(path: _Path, lines: _Lines, shift: Floats) -> float:
-    """The part of the path that keeps to the lines, or to one distance from them."""
+    """Return the part of the path that keeps to the lines, or to one distance from them."""
     if len(path.points) == 0:
         drilled = near_points(path.holes - shift, _centres_of(lines), NEAR_MM)[0]
         return len(np.unique(drilled)) / max(len(path.holes), 1)
-    far = np.abs(lines.beside(path.points - shift)[0])
+    far = np.abs(lines.signed_distances(path.points - shift)[0])
     radius = _peak_distance(far, path.length, 2.0 * path.near_mm(0.0))
     near = path.near_mm(radius)
     fine = (np.abs(far - radius) <= near) | (far <= near)
@@ -592,7 +592,7 @@ class _Tracks(Struct, frozen=True, eq=False):
     side: Ints
     sharp: Bools
 
-    def picked(self, which: Ints) -> _Tracks:
+    def select(self, which: Ints) -> _Tracks:
         return _Tracks(
             self.paths.select(which), self.contour[which], self.side[which], self.sharp[which]
         )
@@ -609,7 +609,8 @@ class _Tracks(Struct, frozen=True, eq=False):
 
 
 def _tracks_of(lines: Polylines, radius_mm: float, which: Ints) -> _Tracks:
-    """The tracks beside the contours `which` for a tool of a radius; on them for a radius of 0.
+    """Return the tracks beside the contours `which` for a tool of a radius; on them for a radius
+    of 0.
 
     Closed contours have round and sharp corners outside; an open one has one track that goes
     round it.
@@ -640,14 +641,14 @@ def _tracks_of(lines: Polylines, radius_mm: float, which: Ints) -> _Tracks:
 
 
 def _orient_ccw(lines: Polylines) -> Polylines:
-    """Closed paths, each travelled CCW, whatever the others are."""
+    """Return closed paths, each reversed where it runs clockwise."""
     from camtool.geometry.polylines import lines_reversed
 
     return lines_reversed(lines, np.asarray(signed_areas(lines) < 0.0))
 
 
 def _doubled_path(path: Polyline) -> Polyline:
-    """An open path as a closed one of no width."""
+    """Return an open path as a closed one of no width."""
     from camtool.geometry.polylines import reverse
 
     back = reverse(path).vertices
@@ -655,14 +656,15 @@ def _doubled_path(path: Polyline) -> Polyline:
 
 
 def _is_on_track(points: Floats, tracks: _Tracks, near_mm: float) -> Bools:
-    """(J,) which points lie on a track."""
+    """Return (J,) true for points that lie on a track."""
     if len(tracks.paths) == 0:
         return np.zeros(len(points), dtype=np.bool_)
     return np.asarray(nearest(points, Segments.of(tracks.paths)).distance <= near_mm)
 
 
 def _candidate_radii(far: Floats, length: Floats) -> list[float]:
-    """The distances from the nearest line that much of a path keeps, the most kept first."""
+    """Return the distances from the nearest line that much of a path keeps, the most kept
+    first."""
     which, counts = _distance_histogram(far, length, BIN_MM)
     least = MIN_PEAK_SHARE * float(length.sum())
     found: list[float] = []
@@ -702,7 +704,7 @@ class _Cells(Struct, frozen=True, eq=False):
     cut: Bools
 
     def share(self, count: int) -> Floats:
-        """(T,) the part of each track that is cut."""
+        """Return (T,) the part of each track that is cut."""
         whole = np.bincount(self.track, self.length, minlength=count)
         return np.asarray(
             np.bincount(self.track, self.length * self.cut, minlength=count)
@@ -711,7 +713,8 @@ class _Cells(Struct, frozen=True, eq=False):
 
 
 class _FollowedTracks(Struct, frozen=True, eq=False):
-    """What is followed: tracks, the radius of each (T,), its tool (T,), and its cells."""
+    """The tracks that a program follows, with the radius (T,) mm and the tool (T,) of each, and
+    their cells."""
 
     tracks: _Tracks
     radius_mm: Floats
@@ -733,7 +736,7 @@ class _Follower(Struct, frozen=True, eq=False):
         """The cutting moves of the program."""
         return self.program.cuts
 
-    def result(
+    def registration(
         self,
         shift: tuple[float, float],
         said: Sequence[Finding],
@@ -741,7 +744,7 @@ class _Follower(Struct, frozen=True, eq=False):
         *,
         align: bool,
     ) -> Registration:
-        """All of it; `said` was found before."""
+        """Return the registration; `said` are the findings on the place of the drawing."""
         findings = list(said)
         if align and not findings and np.hypot(*shift) > self.limit_mm:
             findings.append(DRAWING_PLACE_MOVED(x=shift[0], y=shift[1]))
@@ -756,18 +759,18 @@ class _Follower(Struct, frozen=True, eq=False):
             tools.append(FoundTool(number if number >= 0 else None, 2.0 * tried.radius_mm,
                                    tool_diameter_mm is not None))  # fmt: skip
             parts.append((tried, number))
-        chosen = self._chosen(parts)
-        drilled = self._drilled(chosen)
+        chosen = self._join_trials(parts)
+        drilled = self._drilled_circles(chosen)
         wanted, off = self.cuts.toolpath, np.empty(0)
         rows = np.zeros(len(wanted), dtype=np.bool_)
         if chosen is not None:
             follow = _RowTracks.of(self.cuts, chosen, self.path)
             wanted, off, rows = _with_tracks(self, chosen, follow), follow.off, follow.rows
         if chosen is not None or drilled.any():
-            findings += self._not_cut(chosen, drilled)
+            findings += self._not_cut_findings(chosen, drilled)
         if chosen is not None:
-            findings += self._into_parts(chosen, rows)
-        findings += self._beside(rows, off)
+            findings += self._into_part_findings(chosen, rows)
+        findings += self._beside_findings(rows, off)
         beside = float(self._row_lengths()[self.cuts.is_cut & ~rows].sum())
         whole = float(self._row_lengths()[self.cuts.is_cut].sum())
         wrong = any(each.severity == Severity.ERROR for each in findings)
@@ -789,7 +792,7 @@ class _Follower(Struct, frozen=True, eq=False):
         return Registration(shift, wanted, tuple(findings), report, alone or None)
 
     def _row_lengths(self) -> Floats:
-        """(N,) mm: of each row what its segments measure."""
+        """Return (N,) mm: the length of the segments of each row."""
         sizes = segment_lengths(self.cuts.segments)
         found: Floats = np.bincount(self.cuts.row, sizes, minlength=len(self.cuts.contour)).astype(
             np.float64
@@ -799,9 +802,9 @@ class _Follower(Struct, frozen=True, eq=False):
     def _radius(
         self, mine: Ints, given: float | None
     ) -> tuple[_RadiusTrial | None, list[Finding]]:
-        """The radius with which most of the points `mine` follow tracks, and its tracks."""
+        """Return the radius with which most of the points `mine` follow tracks, and its tracks."""
         points, length = self.path.points[mine], self.path.length[mine]
-        far = np.abs(self.lines.beside(points)[0])
+        far = np.abs(self.lines.signed_distances(points)[0])
         found = _candidate_radii(far, length)
         if given is not None:
             kept = min(found, key=lambda each: abs(each - given), default=given)
@@ -809,8 +812,10 @@ class _Follower(Struct, frozen=True, eq=False):
                 said = [TOOL_FOUND_OTHER(measured=2.0 * kept, limit=2.0 * given)]
             else:
                 said = []
-            return self._tried(points, length, given, abs(kept - given) if kept else 0.0), said
-        tries = [self._tried(points, length, each, 0.0) for each in found]
+            return self._try_radius(
+                points, length, given, abs(kept - given) if kept else 0.0
+            ), said
+        tries = [self._try_radius(points, length, each, 0.0) for each in found]
         tries = [each for each in tries if each.length_mm > 0.0]
         if not tries:
             return None, []
@@ -846,32 +851,34 @@ class _Follower(Struct, frozen=True, eq=False):
                 break
         return best, said
 
-    def _tried(self, points: Floats, length: Floats, radius: float, slack: float) -> _RadiusTrial:
-        """The tracks of a radius that are followed, and what of these points follows them."""
+    def _try_radius(
+        self, points: Floats, length: Floats, radius: float, slack: float
+    ) -> _RadiusTrial:
+        """Return the tracks of a radius that are followed, and the points that follow them."""
         near = self.path.near_mm(radius) + slack
         count = len(self.lines.paths)
         every = np.arange(count)
         tracks = _tracks_of(self.lines.paths, 0.0, every)
         if radius > 0.0:
-            reached = self._reached(points, radius, near)
+            reached = self._contours_at(points, radius, near)
             tracks = _Tracks.joined(
                 [tracks, _tracks_of(self.lines.paths, radius, np.flatnonzero(reached))]
             )
         cells = self._cells(tracks, near)
         which = _sides_followed(tracks, cells.share(len(tracks.paths)))
-        tracks = tracks.picked(which)
+        tracks = tracks.select(which)
         follows = _is_on_track(points, tracks, near)
         return _RadiusTrial(radius, tracks, follows, float(length[follows].sum()))
 
-    def _reached(self, points: Floats, radius: float, near: float) -> Bools:
-        """(M,) the contours that any point is as far from as the radius, and those about them."""
+    def _contours_at(self, points: Floats, radius: float, near: float) -> Bools:
+        """Return (M,) true for contours from which any point is as far as the radius."""
         found = np.zeros(len(self.lines.paths), dtype=np.bool_)
-        far, _, segment = self.lines.beside(points)
+        far, _, segment = self.lines.signed_distances(points)
         found[np.unique(self.lines.segments.path[segment[np.abs(far) <= radius + near]])] = True
         return found
 
     def _cells(self, tracks: _Tracks, near: float) -> _Cells:
-        """Points along tracks, and what of the program is near them."""
+        """Return points along tracks, and which of them the program cuts."""
         segments = Segments.of(tracks.paths)
         sizes = segment_lengths(segments)
         spacing = max(TRACK_MM, float(sizes.sum()) / MAX_TRACK_POINTS)
@@ -883,8 +890,8 @@ class _Follower(Struct, frozen=True, eq=False):
         cut = np.isfinite(found.distance)
         return _Cells(segments.path[owner], places, (sizes / parts)[owner], cut)
 
-    def _chosen(self, parts: Sequence[tuple[_RadiusTrial, int]]) -> _FollowedTracks | None:
-        """The tracks of all tools, each once."""
+    def _join_trials(self, parts: Sequence[tuple[_RadiusTrial, int]]) -> _FollowedTracks | None:
+        """Return the tracks of all tools, each once."""
         parts = [(tried, number) for tried, number in parts if len(tried.tracks.paths)]
         if not parts:
             return None
@@ -898,12 +905,12 @@ class _Follower(Struct, frozen=True, eq=False):
         first = [k for k in order if k == int(np.flatnonzero((keys == keys[k]).all(axis=1))[0])
                  or tracks.side[k] != 0]  # fmt: skip
         which = np.array(first, dtype=np.int64)
-        tracks, radius, tool = tracks.picked(which), radius[which], tool[which]
+        tracks, radius, tool = tracks.select(which), radius[which], tool[which]
         near = max(self.path.near_mm(float(each)) for each in radius)
         return _FollowedTracks(tracks, radius, tool, self._cells(tracks, near))
 
-    def _drilled(self, chosen: _FollowedTracks | None) -> Bools:
-        """(M,) the circles in whose middle a hole is drilled, and that are not cut."""
+    def _drilled_circles(self, chosen: _FollowedTracks | None) -> Bools:
+        """Return (M,) the circles in whose middle a hole is drilled, and that are not cut."""
         found = np.zeros(len(self.lines.paths), dtype=np.bool_)
         holes = self.path.holes
         if not len(holes):
@@ -916,8 +923,10 @@ class _Follower(Struct, frozen=True, eq=False):
                 found[index] = near <= max(NEAR_MM, self.limit_mm)
         return found
 
-    def _not_cut(self, chosen: _FollowedTracks | None, drilled: Bools) -> Iterator[Finding]:
-        """A finding for each contour that nothing cuts, and for each that is cut in part."""
+    def _not_cut_findings(
+        self, chosen: _FollowedTracks | None, drilled: Bools
+    ) -> Iterator[Finding]:
+        """Yield a finding for each contour that nothing cuts, and for each that is cut in part."""
         count = len(self.lines.paths)
         cut = np.zeros(count, dtype=np.bool_)
         if chosen is not None:
@@ -948,13 +957,13 @@ class _Follower(Struct, frozen=True, eq=False):
                 more=more,
             )
 
-    def _into_parts(self, chosen: _FollowedTracks, rows: Bools) -> Iterator[Finding]:
-        """A finding for each move that follows nothing and comes nearer to the nearest line than
-        the tool may that cuts along one side of it, or lies on its other side."""
+    def _into_part_findings(self, chosen: _FollowedTracks, rows: Bools) -> Iterator[Finding]:
+        """Yield a finding for each move that follows nothing and comes nearer to the nearest line
+        than the tool may that cuts along one side of it, or lies on its other side."""
         lines, loose = self.lines, np.flatnonzero(~rows[self.path.row])
         if not len(loose):
             return
-        far, _, segment = lines.beside(self.path.points[loose])
+        far, _, segment = lines.signed_distances(self.path.points[loose])
         contour = lines.segments.path[segment]
         ccw = np.zeros(len(lines.paths), dtype=np.bool_)
         closed = np.flatnonzero(lines.paths.closed)
@@ -987,9 +996,9 @@ class _Follower(Struct, frozen=True, eq=False):
                 more=more,
             )
 
-    def _beside(self, rows: Bools, off: Floats) -> Iterator[Finding]:
-        """Findings on cuts that follow nothing, and on those that follow from afar: `off` (J,)
-        mm, by points of the rows (N,) that follow."""
+    def _beside_findings(self, rows: Bools, off: Floats) -> Iterator[Finding]:
+        """Yield findings on cuts that follow nothing, and on those that follow from afar: `off`
+        (J,) mm, by points of the rows (N,) that follow."""
         length, toolpath = self._row_lengths(), self.cuts.toolpath
         loose = np.flatnonzero(self.cuts.is_cut & ~rows)
         if len(loose) and rows.any():
@@ -1003,14 +1012,14 @@ class _Follower(Struct, frozen=True, eq=False):
             yield OFF_DRAWING(measured=float(off.max()), limit=self.limit_mm)
 
     def name(self, index: int) -> str:
-        """What a contour is called."""
+        """Return `layer/entity` of a contour."""
         layer, source = self.drawing.layers[index], self.drawing.sources[index]
         return f"{layer}/{source}"
 
 
 def _sides_followed(tracks: _Tracks, share: Floats) -> Ints:
-    """The tracks that are followed: of each side with enough cut the variant with most of it, and
-    where no side has enough, the best."""
+    """Return the tracks that are followed: of each side with enough cut the variant with most of
+    it, and where no side has enough, the best."""
     best: dict[tuple[int, int, int], int] = {}
     for k, (contour, side) in enumerate(
         zip(tracks.contour.tolist(), tracks.side.tolist(), strict=True)
@@ -1034,7 +1043,7 @@ def _sides_followed(tracks: _Tracks, share: Floats) -> Ints:
 
 
 def _side_counts(chosen: _FollowedTracks | None, drilled: Bools, count: int) -> dict[str, int]:
-    """How many contours are cut on which side."""
+    """Return the number of contours that are cut on each side, drilled, and not cut."""
     found = {"outside": 0, "inside": 0, "on_line": 0}
     cut: set[int] = set()
     if chosen is not None:
@@ -1051,8 +1060,9 @@ def _side_counts(chosen: _FollowedTracks | None, drilled: Bools, count: int) -> 
 
 
 class _RowTracks(Struct, frozen=True, eq=False):
-    """Which rows (N,) follow a track; the track (N,), and the lengths (N,), (N,) mm along it at
-    their starts and ends, the end counted on from the start; `off` (J,) mm as `_Made.wanted`."""
+    """The rows (N,) that follow a track: the track of each (N,), and the lengths (N,), (N,) mm
+    along it at their starts and ends, the end counted on from the start; `off` (J,) mm: the
+    distances of their samples from the tracks."""
 
     rows: Bools
     track: Ints
@@ -1115,7 +1125,7 @@ class _RowTracks(Struct, frozen=True, eq=False):
 
 
 def _as_cuts(paths: Polylines) -> CutMoves:
-    """Paths as moves at height 0, each a contour of its own, a row for each segment."""
+    """Return paths as moves at height 0, each a contour of its own, a row for each segment."""
     segments = Segments.of(paths)
     count = len(segments)
     none = np.full(count, np.nan)
@@ -1134,7 +1144,7 @@ def _as_cuts(paths: Polylines) -> CutMoves:
 
 
 def _with_tracks(of: _Follower, chosen: _FollowedTracks, follow: _RowTracks) -> Toolpath:
-    """The program with the tracks in the place of the moves that follow them."""
+    """Return the program with the tracks in the place of the moves that follow them."""
     from camtool.kernels.passes import lifted
 
     toolpath = of.cuts.toolpath
@@ -1182,7 +1192,7 @@ def _close_turns(kind: Ints, end: Floats) -> None:
 
 
 def _link(end: Sequence[float] | Floats, feed: float, chain: int) -> tuple[Any, ...]:
-    """A line to where what follows begins, as the columns of `_splice_tracks`."""
+    """Return a line to the start of the next chain, as the columns of `_splice_tracks`."""
     centre = np.full((1, 2), np.nan)
     return np.array([Kind.LINE]), np.array([end]), centre, np.array([feed]), chain
 
@@ -1194,7 +1204,8 @@ def _splice_tracks(
     made: tuple[Floats, Ints, Cuts],
     track: Ints,
 ) -> Toolpath:
-    """The rows of the program that follow nothing, and between them the moves along the tracks.
+    """Return the rows of the program that follow nothing, and between them the moves along the
+    tracks.
 
     Chain k stands for the rows from chains[0][k] to chains[1][k], and is on the track track[k].
     What leads to a chain ends where it begins, and what follows it begins where it ends.

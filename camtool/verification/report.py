@@ -111,7 +111,7 @@ class StepCounts(msgspec.Struct, frozen=True):
 
 
 class AxisCounts(msgspec.Struct, frozen=True):
-    """One count per axis."""
+    """A count for each axis."""
 
     x: int
     y: int
@@ -220,8 +220,8 @@ class UnreachedReport(msgspec.Struct, frozen=True):
 
 
 class ShapeReport(msgspec.Struct, frozen=True):
-    """What a round tool removes beside the wanted shape (overcut) and what it leaves of it
-    (undercut), seen from above: areas and depths."""
+    """Overcut, removed beside the wanted shape, and undercut, left of it, of a round tool seen
+    from above: areas and depths."""
 
     tool_diameter_mm: float
     overcut_mm2: float
@@ -251,7 +251,7 @@ class FoundTool(msgspec.Struct, frozen=True):
 
 
 class FoundReport(msgspec.Struct, frozen=True):
-    """What of a drawing a program that others made was found to cut: by how much the drawing was
+    """The lines of a drawing that a program of unknown origin cuts: by how much the drawing was
     moved to lie under it, and whether its place was looked for (`aligned`); the part of the cuts
     that follow it, and the length of those that do not; the tools; on which side how many contours
     are cut; how far the program itself lies from them."""
@@ -275,9 +275,9 @@ COVERAGE = 2.0
 
 
 class ContributionReport(msgspec.Struct, frozen=True):
-    """What one input contributes to the standard uncertainty of a dimension, µm; null where it is
-    not known how well the input is. Then `at_most_um` bounds by how much it can change the
-    dimension `within` what is said there; null where nothing does."""
+    """The contribution of an input to the standard uncertainty of a dimension, µm; null where the
+    uncertainty of the input is not known. Then `at_most_um` bounds by how much it can change the
+    dimension within the range that `within` names; null where nothing bounds it."""
 
     input: str
     um: float | None
@@ -320,7 +320,7 @@ class InspectedReport(msgspec.Struct, frozen=True):
 
     @property
     def asked(self) -> str:
-        """What is asked of it: "Ø5 H7", "roundness zone 0.02"."""
+        """The requirement in words: "Ø5 H7", "roundness zone 0.02"."""
         sign = {"diameter": "Ø", "radius": "R"}.get(self.kind, "")
         nominal = f"{sign}{self.nominal_mm:g}" if self.nominal_mm else self.kind
         return f"{nominal} {self.limits}".rstrip()
@@ -352,11 +352,12 @@ class FindingReport(msgspec.Struct, frozen=True):
 
 
 class PlannedOperation(msgspec.Struct, frozen=True):
-    """How an operation cuts; feeds in mm/min. `spindle_rpm` is None without a speed; `passes` and
-    the depth of the deepest are None for kinds of operation without passes. `coolant`: "off",
-    "mist", "flood" or "both". `tool` is the index of its tool; `tool_name` and `material`, that of
-    its preset, are "" where there are none; the feed per tooth and the speed of the edge are None
-    where the flutes, or the speed, are not known, and the predicted time where it is not."""
+    """Tool, feeds, depth and passes of an operation; feeds in mm/min. `spindle_rpm` is None
+    without a speed; `passes` and the depth of the deepest are None for kinds of operation without
+    passes. `coolant`: "off", "mist", "flood" or "both". `tool` is the index of its tool;
+    `tool_name` and `material`, that of its preset, are "" where there are none; the feed per tooth
+    and the speed of the edge are None where the flutes, or the speed, are not known, and the
+    predicted time where it is not."""
 
     name: str
     kind: str
@@ -463,12 +464,12 @@ class Report(msgspec.Struct, frozen=True):
     inspection: tuple[InspectedReport, ...] = ()
 
     def to_json(self) -> str:
-        """Indented JSON with keys in the order of the record, and a newline at the end."""
+        """Return indented JSON with keys in the order of the record, and a newline at the end."""
         return to_json(self)
 
     def to_text(self, *, findings: bool = True) -> str:
-        """The summary that `camtool post` and `camtool verify` print, without a final newline, and
-        with a line for each finding unless `findings=False`."""
+        """Return the summary that `camtool post` and `camtool verify` print, without a final
+        newline, and with a line for each finding unless `findings=False`."""
         lines = [f"{name:<10} {value}" for name, value in summary_lines(self)]
         for item in self.findings if findings else ():
             place = f" [{item.where}]" if item.where else ""
@@ -476,7 +477,7 @@ class Report(msgspec.Struct, frozen=True):
         return "\n".join(map(one_line, lines))
 
     def worst_text(self) -> str:
-        """The moves with the largest errors, one per line, µm; "" when nothing is cut."""
+        """Return the moves with the largest errors, one per line, µm; "" when nothing is cut."""
         lines = [
             f"{move_name(item.block, item.move):<12} {item.total_um:>9.2f} µm  interpolation"
             f" {um(item.interpolation_um)}, mechanics {um(item.mechanics_um)}"
@@ -487,11 +488,11 @@ class Report(msgspec.Struct, frozen=True):
         return "\n".join(lines)
 
     def to_markdown(self) -> str:
-        """The report as Markdown, for a pull request or a job's record."""
+        """Return the report as Markdown, for a pull request or a job's record."""
         return page_markdown(ReportPage(self.source or self.target, self, self.findings))
 
     def notes(self) -> tuple[str, ...]:
-        """Two short lines beside a picture: target, time and reversals; the error."""
+        """Return two short lines beside a picture: target, time and reversals; the error."""
         total = self.error_um.total
         return (
             f"{self.target}: {duration(self.time_s)}, {self.cutting_reversals} reversals",
@@ -504,12 +505,12 @@ class Report(msgspec.Struct, frozen=True):
         return self.reversals.cutting.x + self.reversals.cutting.y
 
     def with_findings(self, findings: Iterable[Finding]) -> Report:
-        """The same report with these findings."""
+        """Return the same report with these findings."""
         return replace(self, findings=finding_reports(findings))
 
 
 def finding_reports(findings: Iterable[Finding]) -> tuple[FindingReport, ...]:
-    """The findings as records of the report, in order, each once."""
+    """Return the findings as records of the report, in order, each once."""
     return tuple(
         FindingReport(
             code=finding.code.name,
@@ -525,14 +526,15 @@ def finding_reports(findings: Iterable[Finding]) -> tuple[FindingReport, ...]:
 
 
 def rounded_or_none(value: float | None, scale: float = 1.0) -> float | None:
-    """`value` · scale, rounded for the report, never −0; None for values that are not finite."""
+    """Return `value` · scale, rounded for the report, never −0; None for values that are not
+    finite."""
     if value is None or not math.isfinite(value):
         return None
     return round(float(value) * scale, DECIMALS) or 0.0
 
 
 def rounded(value: float) -> float:
-    """A known number, rounded for the report, never −0."""
+    """Return a known number, rounded for the report, never −0."""
     return round(float(value), DECIMALS) or 0.0
 
 
@@ -552,7 +554,7 @@ class Gates:
 def gate_findings(
     report: Report, gates: Gates, findings: Iterable[Finding] = ()
 ) -> Iterator[Finding]:
-    """ABOVE_GATE for each limit that the report, or a gouge among the findings of planning,
+    """Yield ABOVE_GATE for each limit that the report, or a gouge among the findings of planning,
     exceeds, or whose figure is not known."""
     if gates.error_mm is not None:
         yield from _error_gate(report.error_um.total.max, gates.error_mm * UM_PER_MM)
@@ -587,11 +589,11 @@ MAX_OPERATIONS = 24
 """At most this many operations are listed; the others are counted."""
 
 COOLANT_WORDS = {"off": "", "mist": ", mist", "flood": ", flood", "both": ", mist and flood"}
-"""How the summary names what cools an operation."""
+"""Words of the summary for the coolant of an operation."""
 
 
 def clock(seconds: float) -> str:
-    """Seconds as h:mm:ss, rounded to the second.
+    """Return seconds as h:mm:ss, rounded to the second.
 
     >>> clock(3725.4)
     '1:02:05'
@@ -601,7 +603,7 @@ def clock(seconds: float) -> str:
 
 
 def duration(seconds: float) -> str:
-    """Seconds as words, rounded to the second.
+    """Return seconds as words, rounded to the second.
 
     >>> duration(216.0), duration(3725.4), duration(7.2)
     ('3 min 36 s', '1 h 2 min 5 s', '7 s')
@@ -612,7 +614,7 @@ def duration(seconds: float) -> str:
 
 
 def summary_lines(report: Report) -> Iterator[tuple[str, str]]:
-    """(name, value) of each line of the summary."""
+    """Yield (name, value) of each line of the summary."""
     steps, extents = report.steps, report.extents_mm
     how = report.interpolator
     if how in ("dsm", "dda", "stairs"):
@@ -677,7 +679,7 @@ def summary_lines(report: Report) -> Iterator[tuple[str, str]]:
 
 
 def inspected_words(item: InspectedReport) -> str:
-    """A dimension in one line: its limits, its predicted sizes, its verdict."""
+    """Return a dimension in one line: its limits, its predicted sizes, its verdict."""
     words = f"{item.name}: {item.asked}"
     size = f"{item.fit_mm:.4f} mm"
     if item.high_mm > item.low_mm:
@@ -703,7 +705,7 @@ def _unknown_words(item: ContributionReport) -> str:
 
 
 def _chance(probability: float) -> str:
-    """A probability in per cent, never rounded to certainty."""
+    """Return a probability in per cent, never rounded to certainty."""
     share = 100.0 * probability
     if share > 99.9:
         return "over 99.9 %"
@@ -711,7 +713,7 @@ def _chance(probability: float) -> str:
 
 
 def _asked_words(asked: AskedReport) -> str:
-    """How many moves are exactly those that camtool would write."""
+    """Return in words how many moves are exactly those that camtool would write."""
     if asked.alike == asked.moves:
         return f"all {asked.moves} cutting moves are those that camtool writes"
     return (
@@ -721,7 +723,7 @@ def _asked_words(asked: AskedReport) -> str:
 
 
 def _found_words(found: FoundReport) -> Iterator[str]:
-    """What the program cuts of the drawing, with what, and how far beside it."""
+    """Yield in words the part of the drawing that the program cuts, the tool, and its distance."""
     if not found.tools and not found.drilled:
         yield "nothing of the drawing"
         return
@@ -749,7 +751,7 @@ def _found_words(found: FoundReport) -> Iterator[str]:
 
 
 def _operation_words(operations: Sequence[PlannedOperation]) -> Iterator[str]:
-    """Tool, spindle, feeds, depth and passes, one line per operation."""
+    """Yield tool, spindle, feeds, depth and passes, one line per operation."""
     for each in operations[:MAX_OPERATIONS]:
         name = one_line(each.name or each.kind)
         called = one_line(f" {each.tool_name}") if each.tool_name else ""
@@ -775,8 +777,8 @@ def _operation_words(operations: Sequence[PlannedOperation]) -> Iterator[str]:
 
 
 def remarks(report: Report) -> str:
-    """Remarks on the largest error: its reference where it is not the drawing, and gouges, which
-    it does not count."""
+    """Return remarks on the largest error: its reference where it is not the drawing, and gouges,
+    which it does not count."""
     words = "" if report.against == "drawing" else "; to the program's moves: no drawing is known"
     gouges = [each for each in report.findings if each.code == ProgramCode.GOUGE.name]
     if gouges:
@@ -787,8 +789,8 @@ def remarks(report: Report) -> str:
 
 
 def gouged_mm(findings: Iterable[Finding | FindingReport]) -> float:
-    """Lower bound of how deep the tool cuts into what stays, mm, by the findings GOUGE; 0 when
-    none says. Each has the distance from a wall that was found, and that which was needed."""
+    """Return lower bound of how deep the tool cuts into what stays, mm, by the findings GOUGE; 0
+    when none says. Each has the distance from a wall that was found, and that which was needed."""
     return max(
         (
             each.limit - each.measured
@@ -802,19 +804,19 @@ def gouged_mm(findings: Iterable[Finding | FindingReport]) -> float:
 
 
 def _shape_words(shape: ShapeReport) -> str:
-    """Overcut and undercut of a round tool."""
+    """Return overcut and undercut of a round tool in words."""
     over = f"overcut {shape.overcut_um:.2f} µm deep, {shape.overcut_mm2:.4f} mm²"
     under = f"undercut {shape.undercut_um:.2f} µm, {shape.undercut_mm2:.4f} mm²"
     return f"{over}; {under} (tool {shape.tool_diameter_mm:g} mm)"
 
 
 def move_name(block: int | None, move: int) -> str:
-    """A move by its block, or by its own number where there are no blocks."""
+    """Return a move by its block, or by its own number where there are no blocks."""
     return f"block {block}" if block is not None else f"move {move}"
 
 
 def _before_words(report: Report) -> str:
-    """The figures of the same job without measures against reversals and backlash."""
+    """Return the figures of the same job without measures against reversals and backlash."""
     before = report.before
     if before is None or before.time_s is None:
         return "not known: the job without these measures cannot be cut"
@@ -834,7 +836,7 @@ _MaxRmsP95 = tuple[float | None, float | None, float | None]
 
 
 def _by_source(error: Errors) -> dict[str, _MaxRmsP95]:
-    """Maximum, rms and 95th percentile of the error of each source, µm."""
+    """Return maximum, rms and 95th percentile of the error of each source, µm."""
     inside = error.interpolation
     return {
         "fit": (error.fit.max, error.fit.rms, None),
@@ -845,17 +847,17 @@ def _by_source(error: Errors) -> dict[str, _MaxRmsP95]:
 
 
 def um(value: float | None) -> str:
-    """Micrometres with two decimals, a dash for an unknown value."""
+    """Format micrometres with two decimals, a dash for an unknown value."""
     return "–" if value is None else _fixed_decimals(value, 2)
 
 
 def mm(value: float) -> str:
-    """Millimetres with three decimals."""
+    """Format millimetres with three decimals."""
     return _fixed_decimals(value, 3)
 
 
 def percent(value: float | None) -> str:
-    """Per cent with sign, a dash for an unknown value."""
+    """Format per cent with sign, a dash for an unknown value."""
     if value is None:
         return "–"
     text = _fixed_decimals(value, 2)
@@ -863,7 +865,8 @@ def percent(value: float | None) -> str:
 
 
 def _fixed_decimals(value: float, places: int) -> str:
-    """A number with so many decimals and a true minus; what is rounded to zero has no sign."""
+    """Return a number with so many decimals and a true minus; what is rounded to zero has no
+    sign."""
     text = f"{abs(value):.{places}f}"
     return f"−{text}" if value < 0.0 and float(text) else text
 
@@ -916,7 +919,7 @@ class ReportPage(Struct, frozen=True):
 
 
 def setup_rows(setup: Setup) -> tuple[tuple[str, str], ...]:
-    """(name, value) of the machine and the settings, in order."""
+    """Return (name, value) of the machine and the settings, in order."""
     digests = [("machine", f"{setup.machine}, digest {setup.machine_sha256}")]
     if setup.program_sha256 is not None:
         digests.append(("program", f"digest {setup.program_sha256}"))
@@ -927,12 +930,12 @@ def setup_rows(setup: Setup) -> tuple[tuple[str, str], ...]:
 
 
 def shorten(words: str) -> str:
-    """The text, shortened to `NAME_SHOWN` characters."""
+    """Return the text, shortened to `NAME_SHOWN` characters."""
     return words if len(words) <= NAME_SHOWN else words[: NAME_SHOWN - 1] + "…"
 
 
 def page_json(page: ReportPage) -> str:
-    """The report's own keys, with `title`, `verdict` and `setup` before them; indented.
+    """Return the report's own keys, with `title`, `verdict` and `setup` before them; indented.
 
     Where the program could not be judged, only `findings` follow."""
     body: dict[str, Any] = {"title": page.title, "verdict": page.verdict}
@@ -957,8 +960,8 @@ class ReportTable(Struct, frozen=True):
 
 
 def sheets(report: Report) -> Iterator[ReportTable]:
-    """Inspected dimensions, errors by source, sizes, circles, contours and worst moves, without
-    empty tables."""
+    """Yield inspected dimensions, errors by source, sizes, circles, contours and worst moves,
+    without empty tables."""
     every = (
         _inspection_sheet(report),
         _error_sheet(report),
@@ -1038,7 +1041,7 @@ def _both_ways_sheet(report: Report) -> ReportTable:
 
 
 def _contour_sheet(report: Report) -> ReportTable:
-    """The contours, by falling error."""
+    """Return the contours, by falling error."""
     heads = (
         "contour",
         "where",
@@ -1106,7 +1109,8 @@ SETUP_FINDINGS = 6
 
 
 def mounting_lines(report: Report) -> Iterator[tuple[str, str]]:
-    """(name, value) of where the stock lies, how far the program goes, and what it takes."""
+    """Yield (name, value) of the place of the stock, the extents of the program, and its time and
+    tools."""
     planned, extents = report.planned, report.extents_mm
     stock = None if planned is None else planned.stock
     if stock is not None:
@@ -1134,7 +1138,7 @@ def _stock_words(stock: PlannedStock) -> str:
 
 
 def _zero_words(stock: PlannedStock | None, zero: str | tuple[float, float] = "drawing") -> str:
-    """Where X0 Y0 and Z0 are, as seen from the stock and on the drawing."""
+    """Return in words the place of X0 Y0 and Z0 on the stock and on the drawing."""
     places = {
         "drawing": "is the drawing's own zero",
         "lower-left": "is the lower left corner of the contours that are cut",
@@ -1156,7 +1160,7 @@ def _zero_words(stock: PlannedStock | None, zero: str | tuple[float, float] = "d
 
 
 def setup_sheets(planned: Planned) -> Iterator[ReportTable]:
-    """The tools in the order of use, and the operations."""
+    """Yield the tools in the order of use, and the operations."""
     rows = tuple(
         (
             _tool_called(planned, row),
@@ -1172,7 +1176,7 @@ def setup_sheets(planned: Planned) -> Iterator[ReportTable]:
 
 
 def _tool_called(planned: Planned, row: int) -> str:
-    """`1 mill`, or the tool's place in the order where it has neither number nor name."""
+    """Return `1 mill`, or the tool's place in the order where it has neither number nor name."""
     tool = planned.tools[row]
     number = "" if tool.number is None else f"T{tool.number}"
     return f"{number} {tool.name}".strip() or f"({row + 1})"
@@ -1200,7 +1204,7 @@ def _setup_operations(planned: Planned) -> tuple[tuple[str, ...], tuple[tuple[st
 
 
 def gravest_findings(page: ReportPage) -> tuple[FindingReport, ...]:
-    """The findings that one must know at the machine, errors first."""
+    """Return the findings that one must know at the machine, errors first."""
     found = [each for each in page.findings if each.severity in _GRAVEST_FIRST]
     return tuple(sorted(found, key=lambda item: _GRAVEST_FIRST[item.severity]))
 
@@ -1225,7 +1229,8 @@ _BROKEN = {"@": "@<!-- -->", "://": ":<!-- -->//", "www.": "www<!-- -->."}
 
 
 def page_markdown(page: ReportPage) -> str:
-    """The page, at most PAGE_BYTES long; where something is left out, its last line says so."""
+    """Return the page, at most PAGE_BYTES long; where something is left out, its last line says
+    so."""
     kept: list[str] = []
     room = PAGE_BYTES
     for line in _markdown_lines(page):
@@ -1238,7 +1243,7 @@ def page_markdown(page: ReportPage) -> str:
 
 
 def markdown_words(words: str) -> str:
-    """The text, shortened and escaped, as one line of Markdown."""
+    """Return the text, shortened and escaped, as one line of Markdown."""
     line = shorten(one_line(words))
     escaped = "".join("\\" + sign if sign in _MARKS else sign for sign in line)
     for mark, broken in _BROKEN.items():
@@ -1350,7 +1355,7 @@ figure { margin: 1rem 0; } figcaption { opacity: .7; }
 
 
 def page_html(page: ReportPage) -> str:
-    """The page as an HTML document."""
+    """Return the page as an HTML document."""
     return "\n".join(_html_lines(page)) + "\n"
 
 
@@ -1386,7 +1391,7 @@ def _html_lines(page: ReportPage) -> Iterator[str]:
 
 
 def _html_setup(page: ReportPage, report: Report) -> Iterator[str]:
-    """What to take to the machine; printed it fills the first side."""
+    """Yield the setup sheet for the machine; printed it fills the first side."""
     if report.planned is None:
         return
     yield f'<section class="setup"><h2>{SETUP}</h2>'
@@ -1429,7 +1434,8 @@ def _html_findings(page: ReportPage) -> Iterator[str]:
 
 
 def _html_table(sheet: ReportTable, *, with_heads: bool = False) -> Iterator[str]:
-    """The table; `with_heads`: each cell knows its heading, for windows too narrow for columns."""
+    """Yield the table; `with_heads`: each cell knows its heading, for windows too narrow for
+    columns."""
     kinds = ["" if n < sheet.words else ' class="number"' for n in range(len(sheet.heads))]
     heads = zip(kinds, sheet.heads, strict=True)
     yield '<div class="wide"><table class="rows">\n<thead><tr>'

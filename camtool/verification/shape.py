@@ -55,7 +55,7 @@ KEPT_SHARE = 0.25
 """The tolerance of chords for what must stay, as a part of the tolerance for cuts."""
 
 KEPT_SLACK_MM = 1e-3
-"""What must stay is reduced by this at its edges: carvings and tight slots are no more exact."""
+"""Protected areas shrink by this at their edges: carvings and tight slots are no more exact."""
 
 DEPTH_SPACING_MM = 0.02
 """The depth of a strip is measured at points no farther apart than this ..."""
@@ -103,8 +103,8 @@ class Cutter(Struct, frozen=True):
         return min(SHAPE_TOLERANCE_MM, TOLERANCE_SHARE * 0.5 * self.diameter_mm)
 
     def radius_mm(self, z: Floats) -> Floats:
-        """(J,) mm: the radius of the cut at the surface, with the tip at the heights `z` (J,); at
-        the surface itself that of the tip, with which a cut ends there."""
+        """Return (J,) mm: the radius of the cut at the surface, with the tip at the heights `z`
+        (J,); at the surface itself that of the tip, with which a cut ends there."""
         most = 0.5 * self.diameter_mm
         if self.nose is None:
             return np.full(len(z), most)
@@ -120,8 +120,8 @@ class Cutter(Struct, frozen=True):
 
 
 def cutter_of(options: VerifyOptions, cuts: CutMoves) -> Cutter | None:
-    """The tool for these moves. A V bit of unknown diameter is as wide as the deepest cut needs.
-    None without a tool, and for one without width."""
+    """Return the tool for these moves. A V bit of unknown diameter is as wide as the deepest cut
+    needs. None without a tool, and for one without width."""
     diameter = options.tool_diameter_mm or 0.0
     if not diameter and options.nose is not None and len(cuts.ends_z):
         diameter = 2.0 * options.nose.radius_at(max(-float(cuts.ends_z.min()), 0.0))
@@ -129,8 +129,8 @@ def cutter_of(options: VerifyOptions, cuts: CutMoves) -> Cutter | None:
 
 
 def points_wanted(decoded: CutMoves, cutter: Cutter | None) -> int | None:
-    """The number of points that a trace of these moves needs for the shape; None without a tool,
-    and where that would be too many.
+    """Return the number of points that a trace of these moves needs for the shape; None without a
+    tool, and where that would be too many.
 
     Chords of s mm are s²/(8 r) off an arc of radius r, so s ≤ √(8 r tolerance) for the smallest
     arc is enough. A trace has a point every 2 length / points mm, or up to twice as far apart, and
@@ -149,7 +149,7 @@ def points_wanted(decoded: CutMoves, cutter: Cutter | None) -> int | None:
 
 
 class WantedShape(Struct, frozen=True, eq=False):
-    """What a tool should remove, as a region of shapely; how deep (mm) the wanted path itself cuts
+    """The region (of shapely) that a tool should remove; how deep (mm) the wanted path itself cuts
     into what must stay, and where."""
 
     cutter: Cutter
@@ -161,7 +161,7 @@ class WantedShape(Struct, frozen=True, eq=False):
 def wanted_shape(
     cuts: CutMoves, cutter: Cutter, kept: Sequence[ProtectedRegion] = ()
 ) -> WantedShape | None:
-    """What the tool covers along the wanted moves; with `kept`, what it covers along its runs,
+    """Return the region that the tool covers along the wanted moves; with `kept`, along its runs,
     without what must stay. None when nothing is cut."""
     import shapely
 
@@ -190,8 +190,8 @@ def wanted_shape(
 def overcut_findings(
     wanted: WantedShape | None, planned: Collection[Code | TargetCode]
 ) -> Iterator[Finding]:
-    """OVERCUT for a plan that cuts into what must stay, unless GOUGE is among the codes of its
-    findings already."""
+    """Yield OVERCUT for a plan that cuts into what must stay, unless GOUGE is among the codes of
+    its findings already."""
     if wanted is None or wanted.beyond_mm <= OVERCUT_MM or ProgramCode.GOUGE in planned:
         return
     x, y = wanted.at_mm
@@ -216,8 +216,8 @@ def machined_shape(
 def _area_outside(
     one: Any, other: Any, tolerance: float
 ) -> tuple[float, float, tuple[float, float]]:
-    """Area (mm²) of `one` outside `other`, its depth (mm) and its place; 0 for depths within the
-    tolerance of chords."""
+    """Return area (mm²) of `one` outside `other`, its depth (mm) and its place; 0 for depths
+    within the tolerance of chords."""
     import shapely
 
     rest = shapely.difference(one, other)
@@ -242,7 +242,7 @@ def _area_outside(
 
 
 def _boundary_edges(region: Any) -> Any:
-    """The edges of the boundary of a region."""
+    """Return the edges of the boundary of a region."""
     import shapely
 
     rings = shapely.get_rings(shapely.get_parts(region))
@@ -262,7 +262,7 @@ class _Lines(Struct, frozen=True, eq=False):
 
 
 def _swept_area(lines: _Lines, cutter: Cutter) -> Any:
-    """What the tool covers at the surface along lines; None without lines.
+    """Return the region that the tool covers at the surface along lines; None without lines.
 
     Between two neighbouring points the radius of a V bit changes evenly: it covers the convex hull
     of the discs at both; a ball nose on a slope covers a little more than that.
@@ -392,9 +392,8 @@ def _off_chords(points: Floats) -> Floats:
 
 
 def _cutting_moves(kept: ProtectedRegion, cutter: Cutter) -> tuple[Segments, Floats]:
-    """The cutting moves of the runs, and the heights (K, 2) of their ends. Of equal moves at
-    several heights one is enough, unless the tool is narrower
-    at its tip."""
+    """Return the cutting moves of the runs, and the heights (K, 2) of their ends. Of equal moves
+    at several heights one is enough, unless the tool is narrower at its tip."""
     rows = [np.hstack([run[:-1], run[1:]]) for run in kept.runs]
     moves = np.concatenate([np.empty((0, 8)), *rows])
     lowest = np.minimum(moves[:, 2], moves[:, 6])
@@ -407,8 +406,8 @@ def _cutting_moves(kept: ProtectedRegion, cutter: Cutter) -> tuple[Segments, Flo
 
 
 def _protected_area(kept: ProtectedRegion, swept: Any, tolerance: float) -> Any:
-    """What must stay around a region: smaller than drawn by what shall be cut into it, and by
-    `KEPT_SLACK_MM`."""
+    """Return the region that must stay around a swept one: smaller than drawn by the depth that
+    shall be cut into it, and by `KEPT_SLACK_MM`."""
     import shapely
 
     low_x, low_y, high_x, high_y = shapely.bounds(swept).tolist()
@@ -427,7 +426,7 @@ def _protected_area(kept: ProtectedRegion, swept: Any, tolerance: float) -> Any:
 
 
 def _chord_lines(segments: Segments, ends_z: Floats, tolerance: float) -> _Lines:
-    """Lines and arcs as chords, with the heights (K, 2) of their ends."""
+    """Return lines and arcs as chords, with the heights (K, 2) of their ends."""
     radius = np.where(segments.is_arc, segments.radius, 1.0)
     most = 2.0 * np.arccos(np.clip(1.0 - tolerance / np.maximum(radius, tolerance), -1.0, 1.0))
     parts = np.where(segments.is_arc, np.ceil(np.abs(segments.sweep) / most), 1.0)

@@ -1,4 +1,4 @@
-"""One pass over the motion: errors of interpolation and mechanics, circles, and the slides' path.
+"""A pass over the motion: errors of interpolation and mechanics, circles, and the slides' path.
 
 The compiled judge (`camtool.kernels.judging`) takes the samples, from chunks or from a controller
 that is judged as it is simulated, and fills columns of the rows; this module sets its task and
@@ -102,7 +102,7 @@ class SlidePass:
         self._start, self._most = trace.start, trace.most
 
     def add(self, chunk: Chunk) -> None:
-        """The next samples of the program."""
+        """Judge the next samples of the program."""
         from camtool.kernels.judging import judge_samples
 
         self.rows.books.add(chunk.ledger, self._is_cut)
@@ -130,7 +130,7 @@ class SlidePass:
         )
 
     def run(self, steps: FusedRun, progress: Progress) -> None:
-        """All rows of a controller that is judged as it is simulated."""
+        """Judge all rows of a controller that is simulated and judged in one compiled loop."""
         for low, high in pairwise(self._bounds(0, steps.rows)):
             self._close(low)
             ledger = steps.judge(low, high, self._task, self._sums)
@@ -148,8 +148,8 @@ class SlidePass:
         return trace_of(sums, self._start, self._is_cut, self._most)
 
     def _bounds(self, low: int, high: int) -> list[int]:
-        """`low`, `high` and the rows between them before which circles are evaluated or figures
-        summed up."""
+        """Return `low`, `high` and the rows between them before which circles are evaluated or
+        figures summed up."""
         ends = {int(self._last[circle]) + 1 for circle in self._closing}
         inner = sorted(ends.union(range(0, high, ROWS_AT_ONCE)))
         return [low, *(row for row in inner if low < row < high), high]
@@ -185,7 +185,7 @@ class SlidePass:
         columns[:] = empty_columns(len(columns))
 
     def seen(self) -> tuple[SeenCircle, ...]:
-        """The circles that the slides followed, in order; at most `BINS_KEPT`."""
+        """Return the circles that the slides followed, in order; at most `BINS_KEPT`."""
         return tuple(
             SeenCircle(self.circles[circle], self.circle_figures[circle], found, self.bins[circle])
             for circle in sorted(self.bins)
@@ -194,10 +194,10 @@ class SlidePass:
 
 
 class Tasks:
-    """What the rows are judged by, some of them at a time."""
+    """Makes the tasks of the compiled judge, each for a block of rows."""
 
     def __init__(self, paths: Paths, match: Match, slot: Ints) -> None:
-        """`slot` (C,): the bins of each circle."""
+        """Index the wanted moves; `slot` (C,): the bins of each circle."""
         from camtool.kernels.judging import Moves, bin_directions
         from camtool.kernels.move_tree import move_tree
 
@@ -217,7 +217,7 @@ class Tasks:
         self._directions = bin_directions()
 
     def _boxes(self, which: Ints | Indices) -> Floats:
-        """(J, 4) mm: the boxes of these moves that cut."""
+        """Return (J, 4) mm: the boxes of these moves that cut."""
         ends = _ends(self._paths.wanted, self._rows[which])
         segments, (first, last) = self._paths.wanted.segments, np.array(ends, dtype=np.int64)
         boxes, parted = segment_boxes(segments[first]), np.flatnonzero(first < last)
@@ -227,7 +227,7 @@ class Tasks:
         return boxes
 
     def of(self, low: int, high: int) -> Task:
-        """The task of the rows low:high."""
+        """Return the task of the rows low:high."""
         from camtool.kernels.judging import Task
 
         match, toolpath, rows = self._match, self._paths.decoded.toolpath, np.arange(low, high)
@@ -251,7 +251,8 @@ class Tasks:
         )
 
     def _ranges(self, only: Indices) -> Ints:
-        """(R, 2) begin and end (not included) of the contours `only` (R,), or of all moves."""
+        """Return (R, 2) begin and end (not included) of the contours `only` (R,), or of all
+        moves."""
         every = only == ANY_CONTOUR
         low = np.where(every, 0, self._begins[only])
         high = np.where(every, len(self._rows), self._begins[np.where(every, 0, only + 1)])
@@ -272,8 +273,8 @@ def _sums(rows: int, slots: int, trace: TraceSize) -> Sums:
 
 
 def _rows_of_circles(circle: Indices, count: int) -> tuple[Ints, Ints]:
-    """(count,), (count,) first and last row of each circle; last is −1 for a circle without rows.
-    `circle` (N,) is the circle of each row."""
+    """Return (count,), (count,) first and last row of each circle; last is −1 for a circle without
+    rows. `circle` (N,) is the circle of each row."""
     first = np.full(count, len(circle), dtype=np.int64)
     last = np.full(count, -1, dtype=np.int64)
     rows = np.flatnonzero(circle >= 0)
@@ -283,7 +284,7 @@ def _rows_of_circles(circle: Indices, count: int) -> tuple[Ints, Ints]:
 
 
 def _slots(first: Ints, last: Ints) -> Ints:
-    """(C,) the number of the bins that each circle uses: circles with overlapping rows use
+    """Return (C,) the number of the bins that each circle uses: circles with overlapping rows use
     different ones."""
     slot = np.full(len(first), -1, dtype=np.int64)
     busy: list[tuple[int, int]] = []
@@ -305,8 +306,8 @@ def _in_order(first: Ints, last: Ints) -> Iterator[int]:
 
 
 def move_heights(cuts: CutMoves) -> Floats:
-    """(J, 2) mm: the lowest and highest points of the moves that cut; one row, seen as many, where
-    all are at one height."""
+    """Return (J, 2) mm: the lowest and highest points of the moves that cut; one row, seen as
+    many, where all are at one height."""
     rows = cuts.rows
     found = np.empty((len(rows), 2))
     for low in range(0, len(rows), ROWS_AT_ONCE):
@@ -319,12 +320,13 @@ def move_heights(cuts: CutMoves) -> Floats:
 
 
 def _ends(cuts: CutMoves, rows: Ints | Indices) -> tuple[Indices, Indices]:
-    """(J,), (J,) the first and the last segment of each of these rows, which cut."""
+    """Return (J,), (J,) the first and the last segment of each of these rows, which cut."""
     return cuts.first[rows], cuts.first[rows + 1] - 1
 
 
 def shapes(cuts: CutMoves, low: int, high: int) -> Shapes:
-    """Those of the rows low:high that cut, one move for each."""
+    """Return the moves of the rows low:high that cut, one for each, as columns of the compiled
+    judge."""
     from camtool.kernels import judging as at
 
     begin = cuts.first[low]
@@ -378,7 +380,8 @@ class TraceSize(Struct, frozen=True, eq=False):
 
 
 def trace_size(decoded: Toolpath, spacing_mm: float, most: int) -> TraceSize:
-    """A stride for samples about `spacing_mm` apart that keeps about half of `most` points."""
+    """Return a stride for samples about `spacing_mm` apart that keeps about half of `most`
+    points."""
     if most == 0:
         return TraceSize(decoded.start[None, :2], 0, 1)
     lengths = row_lengths(decoded)
@@ -389,9 +392,9 @@ def trace_size(decoded: Toolpath, spacing_mm: float, most: int) -> TraceSize:
 
 
 def trace_of(sums: Sums, start: Floats, cutting: Bools, most: int) -> SlideTrace:
-    """The start (1, 2) mm and the samples that the judge kept, none for a stride of 0. Where they
-    are more than `most` (more rows than points), runs of them are reduced to the sample with the
-    largest error. `cutting` (N,): the rows that cut."""
+    """Return the start (1, 2) mm and the samples that the judge kept, none for a stride of 0.
+    Where they are more than `most` (more rows than points), runs of them are reduced to the sample
+    with the largest error. `cutting` (N,): the rows that cut."""
     from camtool.kernels.judging import WRITTEN, unwritten
 
     written, held = int(sums.pen[WRITTEN]), unwritten(sums.pen)

@@ -90,11 +90,11 @@ class Verification:
     circles: tuple[SeenCircle, ...] = ()
 
     def with_findings(self, findings: tuple[Finding, ...]) -> Verification:
-        """The verification with these findings, in its report too."""
+        """Return the verification with these findings, in its report too."""
         return replace(self, report=self.report.with_findings(findings), findings=findings)
 
     def with_planning(self, planned: Planned, before: Before | None) -> Verification:
-        """The verification with the figures of planning in its report."""
+        """Return the verification with the figures of planning in its report."""
         report = replace(self.report, planned=planned, before=before)
         return replace(self, report=report)
 
@@ -155,8 +155,8 @@ def judge(
 def _compare_cuts(
     case: Case,
 ) -> tuple[Paths, Coverage, Conformance | None, tuple[Finding, ...]]:
-    """What the slides are judged by, and what is known without them: coverage, conformance, and
-    CUT_OTHER_WAY. The tables of the search end here."""
+    """Compare the decoded with the wanted cuts: return the paths by which the slides are judged,
+    coverage, conformance and CUT_OTHER_WAY. The tables of the search are freed on return."""
     # Where the wanted moves have no motion in Z, all feed moves cut.
     flat_cuts = case.wanted is None or is_flat(case.wanted)
     quantised = case.target.model.quantised(case.decoded, case.machine)
@@ -174,7 +174,7 @@ def _compare_cuts(
 
 
 def _with_loops(case: Case, paths: Paths) -> tuple[LoopedCuts, LoopedCuts]:
-    """The decoded and the wanted cuts with their loops."""
+    """Return the decoded and the wanted cuts with their loops."""
     own = LoopedCuts(paths.decoded, loops(paths.decoded, case.coverage_mm))
     if paths.wanted is paths.decoded:
         return own, own
@@ -265,8 +265,8 @@ class ReportBuilder(Struct, frozen=True, eq=False):
         trace: SlideTrace,
         shape: WantedShape | None = None,
     ) -> Report:
-        """The report; `extents` (3, 2) mm of the decoded toolpath, `trace` of the slides, and the
-        wanted `shape`, where it is compared."""
+        """Return the report; `extents` (3, 2) mm of the decoded toolpath, `trace` of the slides,
+        and the wanted `shape`, where it is compared."""
         case, tally = self.case, self.tally
         options = case.options
         link_s = case.machine.link.seconds(options.line_bytes or 0, tally.time_s)
@@ -327,8 +327,8 @@ class ReportBuilder(Struct, frozen=True, eq=False):
         )
 
     def _fit(self) -> record.MaxRms:
-        """The distance of the drawing from the wanted cutting moves, without that of placing it;
-        the rms is over the moves that are not exact."""
+        """Return the distance of the drawing from the wanted cutting moves, without that of
+        placing it; the rms is over the moves that are not exact."""
         drawn, rows = self.goal.cuts.toolpath.drawn, self.goal.cuts.rows
         if self.case.wanted is None or drawn is None or not len(rows):
             return record.MaxRms()
@@ -340,7 +340,7 @@ class ReportBuilder(Struct, frozen=True, eq=False):
         )
 
     def _off_um(self, off_mm: float) -> float | None:
-        """A distance from the drawing; None where none is known."""
+        """Return a distance from the drawing; None where none is known."""
         known = self.case.wanted is not None and self.case.wanted.drawn is not None
         return rounded(off_mm * UM_PER_MM) if known else None
 
@@ -428,7 +428,7 @@ class ReportBuilder(Struct, frozen=True, eq=False):
         )
 
     def _source(self, row: int) -> str:
-        """Layer and entity of the wanted move to which a decoded row belongs."""
+        """Return layer and entity of the wanted move to which a decoded row belongs."""
         wanted = int(self.coverage.match.row[row])
         return self.goal.cuts.toolpath.text(wanted) if wanted >= 0 else ""
 
@@ -465,8 +465,8 @@ class ReportBuilder(Struct, frozen=True, eq=False):
 
 
 def _depth_error_mm(case: Case, cuts: CutMoves) -> float:
-    """The largest difference in height between the slide and the quantised moves, at the ends of
-    rows that cut, mm; NaN when none does.
+    """Return the largest difference in height between the slide and the quantised moves, at the
+    ends of rows that cut, mm; NaN when none does.
 
     Within a row Z does not reverse, and it ends where the program says, so its error follows from
     the ends of the rows alone, whatever the controller does between them.
@@ -484,7 +484,7 @@ def _depth_error_mm(case: Case, cuts: CutMoves) -> float:
 
 
 def assumptions(case: Case) -> tuple[str, ...]:
-    """What the times and figures assume."""
+    """Return the assumptions of times and figures, a sentence each."""
     link = case.machine.link
     assumed = case.target.model.assumptions(case.decoded, case.machine)
     if link.baud is None:
@@ -494,7 +494,7 @@ def assumptions(case: Case) -> tuple[str, ...]:
 
 
 def _block(case: Case, row: int) -> int | None:
-    """The block (from 1) from which a row was read."""
+    """Return the block (from 1) from which a row was read."""
     block = int(case.decoded.block[row])
     return block + 1 if block >= 0 else None
 
@@ -507,12 +507,12 @@ def _max_rms(figure: Figure) -> record.MaxRms:
 
 @cache
 def _version() -> str:
-    """Ours, as it is installed; it stands in a file."""
+    """Return the installed version of camtool."""
     return version("camtool")
 
 
 def _interpolator(case: Case) -> str:
-    """A word for how the controller interpolates lines and arcs."""
+    """Return a word for how the controller interpolates lines and arcs."""
     return case.target.model.interpolation(case.decoded, case.machine, case.simulation)
 
 
