@@ -50,7 +50,7 @@ def svg(sheet: Sheet) -> str:
 
 
 def _svg(shape: Shape) -> str:
-    """One element; its numbers are in the frame of the DXF."""
+    """Write a shape as an element; its numbers are in the frame of the DXF."""
     match shape:
         case Line((x1, y1), (x2, y2)):
             a, b, c, d = (number(value) for value in (x1, y1, x2, y2))

@@ -37,5 +37,5 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @pytest.fixture
 def bless(request: pytest.FixtureRequest) -> bool:
-    """Whether golden files are to be written anew."""
+    """True if golden files are to be written anew (`--bless`)."""
     return bool(request.config.getoption("--bless"))

@@ -28,7 +28,7 @@ def logo(name: str, *settings: str) -> bytes:
 
 
 def motion(program: bytes, loaded: LoadedTarget) -> SlideTrace:
-    """What `verify` simulates: the samples of a program, and the time when each row is over."""
+    """Simulate a program as `verify` does: its samples, and the time at the end of each row."""
     chunks = list(loaded.simulate(loaded.target.read(program, loaded.machine), Options()))
     assert chunks
     rows = np.concatenate([chunk.row for chunk in chunks])

@@ -21,7 +21,7 @@ CHEWED_S = 60
 
 
 def heard_from(running: subprocess.Popen[str], said: str) -> str:
-    """What a process says until it says this (a pattern); AssertionError when it ends first."""
+    """Read the output of a process up to this pattern; AssertionError if it ends first."""
     stream = running.stdout or running.stderr
     assert stream is not None
     heard = ""
@@ -33,8 +33,10 @@ def heard_from(running: subprocess.Popen[str], said: str) -> str:
 
 
 def all_written(terminal: int) -> bytes:
-    """What is written to a pseudo-terminal until its other end is closed; this end is then closed
-    too. The caller has handed its own copy of the other end over and closed it."""
+    """Read a pseudo-terminal until its other end is closed, then close this end too.
+
+    The caller has passed its own copy of the other end on and closed it.
+    """
     written = b""
     with suppress(OSError):  # what Linux says when the other end is closed
         while part := os.read(terminal, 65536):

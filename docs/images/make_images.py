@@ -45,7 +45,7 @@ def commands() -> dict[str, list[str]]:
 
 
 def first_command() -> list[str]:
-    """What the README lets people try: its program goes nowhere here."""
+    """Return the README's first command, with a program that is thrown away."""
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     found = re.search(
         rf"camtool (post .*) -o \S+ --preview {re.escape(FIRST)}$", text, re.MULTILINE

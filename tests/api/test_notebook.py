@@ -22,7 +22,7 @@ SQUARE = "0,0\n4,0\n4,4\n0,4\n0,0\n"
 
 
 def displayed(value: object) -> dict[str, Any]:
-    """What a front end is sent for the value, by its kind."""
+    """Return the data that a front end gets for the value, by MIME type."""
     bundle = {"text/plain": repr(value)}
     for kind, name in KINDS.items():
         method = None if isinstance(value, type) else getattr(value, name, None)
@@ -34,7 +34,7 @@ def displayed(value: object) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def values(tmp_path_factory: pytest.TempPathFactory) -> dict[str, object]:
-    """One of everything that the calls give."""
+    """Make one value of each type that the calls return."""
     file = tmp_path_factory.mktemp("notebook") / "square.csv"
     file.write_text(SQUARE)
     posted = camtool.post(file, "grbl")

@@ -28,7 +28,7 @@ def compared() -> Comparison:
 
 
 def ran(*arguments: str | Path) -> str:
-    """What the command prints on stdout."""
+    """Run the command and return its stdout."""
     done = CliRunner().invoke(
         cli, [*map(str, arguments)], standalone_mode=False, catch_exceptions=False
     )

@@ -67,7 +67,7 @@ def test_a_full_disk_is_the_error_of_that_drawing(tmp_path: Path, small_disk: Pa
 
 @contextmanager
 def files_of_at_most(size: int) -> Iterator[None]:
-    """Where no disk can be filled: no file may become larger."""
+    """Limit the size of files, since a test cannot fill a disk."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
     try:

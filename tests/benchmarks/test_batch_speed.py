@@ -22,7 +22,7 @@ ROUNDS = 1
 
 
 def seconds(folder: Path, out: str, *flags: str) -> tuple[float, str]:
-    """How long the whole command takes, and what it says at the end."""
+    """Return the duration of the whole command, s, and its last line."""
     command = [sys.executable, "-m", "camtool", "batch", "drawings", "-t", "pic-mmh"]
     begin = time.perf_counter()
     done = subprocess.run(

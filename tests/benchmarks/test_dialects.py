@@ -44,7 +44,7 @@ def many_moves(feed: float, reach_mm: float = 4.0) -> Toolpath:
 
 
 def plainly_written(path: Toolpath) -> bytes:
-    """One format for each move, and nothing else."""
+    """Write each move by one format string, as a lower bound of the time."""
     rows = zip(path.kind.tolist(), path.end.tolist(), strict=True)
     return "\n".join(f"G{kind} X{x:.3f} Y{y:.3f}" for kind, (x, y, _) in rows).encode()
 

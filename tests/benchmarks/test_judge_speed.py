@@ -32,7 +32,7 @@ ROUNDS = 5
 
 
 class Sums(ctypes.Structure):
-    """What the twin fills."""
+    """Sums that the C twin fills."""
 
     _fields_ = [
         *[(f"number{k}", ctypes.c_double) for k in range(13)],
@@ -113,7 +113,7 @@ def test_judging_is_as_fast_as_c(tmp_path: Path) -> None:
 
 
 def test_chunks_are_judged_too() -> None:
-    """What other controllers get: their samples, judged; without making them."""
+    """Time the judging of samples as other controllers give them, without making them."""
     from camtool.verification.verify import judge
 
     machine, toolpath = pic_mmh(), circles()

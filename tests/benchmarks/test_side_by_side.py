@@ -36,7 +36,7 @@ CAMTOOL = f"{shlex.quote(sys.executable)} -m camtool"
 
 
 def parts(path: Path) -> None:
-    """Some 40 kB: 60 plates with round corners and a hole each."""
+    """Write 60 plates with round corners and a hole each, about 40 kB."""
     drawing = ezdxf.new(units=4)
     for number in range(60):
         x, y = 30.0 * (number % 10), 20.0 * (number // 10)

@@ -46,7 +46,7 @@ def test_a_sheet_stays_within_its_size_or_is_refused(
 
 @pytest.mark.parametrize("kind", ["lines", "steps", "squares"])
 def test_the_run_ups_take_up_the_play_from_either_end(kind: Kind) -> None:
-    """What lies before the first measured edge goes in + by more than play and compensation."""
+    """The run-up to the first measured edge goes in + by more than play and compensation."""
     machine = load_target("flashcut").machine
     lost = max(machine.axes.x.compensation_mm, machine.axes.y.compensation_mm)
     for line, (_, table) in zip(*_parts(sheet(kind, (40.0, 45.0), machine=machine)), strict=True):

@@ -49,7 +49,7 @@ def machine_of(
 
 
 def guess(machine: Machine, kind: Kind) -> Machine:
-    """What is known of it before: its steps as coded and what its controller adds; and its
+    """Return the machine as known before the calibration: coded steps, compensation, and its
     squareness, where the coupon does not tell it, as rulers along X lean with it."""
     added = (machine.axes.x.compensation_mm, machine.axes.y.compensation_mm)
     lean = 0.0 if kind in TELLS_SQUARENESS else machine.mechanics.squareness_rad
@@ -162,7 +162,7 @@ def found_at(result: Calibration, key: str) -> float:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_covariance_is_that_of_many_calibrations(kind: Kind) -> None:
-    """How the values err together over many draws is what each calibration says."""
+    """The covariance of the values over many draws is the one that each calibration states."""
     machine = machine_of((1.004, 0.997), (0.12, 0.03), (0.1, 0.1), 0.004)
     drawn = sheet(kind, (60.0, 40.0), (1, 1), machine)
     rows, squares = [], []

@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[2]
 
 @dataclass(frozen=True)
 class Done:
-    """What a run left behind."""
+    """Exit code and output of a run."""
 
     returncode: int
     stdout: bytes

@@ -197,8 +197,7 @@ def flags_of(command: click.Command = cli, path: tuple[str, ...] = ()) -> Iterat
 
 @dataclass(frozen=True)
 class Ran:
-    """How a run ended: its exit code (negative: the signal; None: it hung), what it said, and how
-    long it took."""
+    """The end of a run: exit code (negative: the signal; None: it hung), output and duration."""
 
     words: tuple[str, ...]
     code: int | None
@@ -207,7 +206,7 @@ class Ran:
 
     @property
     def fine(self) -> bool:
-        """Whether it ended as every run must, and sent no escape to a terminal."""
+        """True if the run ended as every run must and sent no escape to a terminal."""
         return self.code in (0, 1, 2) and "\x1b" not in self.said
 
     def __str__(self) -> str:

@@ -68,7 +68,7 @@ def test_expressions_are_worked_out() -> None:
 
 @dataclass(frozen=True)
 class Ran:
-    """What a step left behind."""
+    """Exit code, output and files of a step."""
 
     code: int
     log: str
@@ -86,7 +86,7 @@ def step(identifier: str = "run") -> dict[str, Any]:
 def run_step(
     folder: Path, event: dict[str, Any], *, path: str = PATH, name: str = "run", **inputs: str
 ) -> Ran:
-    """One step of the action in this repository, for this event and these inputs."""
+    """Run a step of the action in this repository, for this event and these inputs."""
     there = folder.parent / "runner"
     shutil.rmtree(there, ignore_errors=True)
     there.mkdir()
@@ -138,7 +138,7 @@ def committed(folder: Path, files: dict[str, str]) -> str:
 
 
 def request(base: str) -> dict[str, Any]:
-    """What GitHub says of a pull request."""
+    """Return the event of a pull request as GitHub sends it."""
     return {"pull_request": {"base": {"sha": base}}, "before": "1" * 40}
 
 

@@ -92,7 +92,7 @@ def test_it_makes_what_post_makes(camtool: Run, drawings: Path, tmp_path: Path) 
 
 
 def asked(camtool: Run, pools: list[HerePool], *flags: str) -> list[str]:
-    """What a run over the good drawings made anew."""
+    """Run the good drawings and return the names of those that were made anew."""
     before = len(pools)
     target = () if "-t" in flags else ("-t", "pic-mmh")
     sources = ("drawings/letter.svg", "drawings/in/square.dxf")

@@ -89,7 +89,7 @@ def assert_little_is_loaded(folder: Path) -> None:
 
 
 def on_a_terminal(folder: Path, code: int) -> str:
-    """What the command says on a terminal of 120 columns."""
+    """Return the output of the command on a terminal of 120 columns."""
     ours, theirs = pty.openpty()
     environment = {**os.environ, "COLUMNS": "120", "TERM": "xterm"}
     environment.pop("NO_COLOR", None)

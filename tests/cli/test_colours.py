@@ -26,7 +26,7 @@ WRONG = ("post", "samples/logo.dxf", "-t", "pic-mnh")
 
 
 def on_terminal(*arguments: str, **more: str) -> bytes:
-    """What `camtool ARGUMENTS` writes to a terminal of 120 columns, but for signs of life."""
+    """Return the output on a terminal of 120 columns, without progress lines."""
     kept = {key: value for key, value in os.environ.items() if "COLOR" not in key}
     environment = kept | {"TERM": "xterm-256color", "COLUMNS": "120"} | more
     ours, theirs = pty.openpty()

@@ -27,7 +27,7 @@ def told() -> click.Command:
 
 
 def items(told: click.Command, *line: str) -> list[CompletionItem]:
-    """What may stand for the last word of the line."""
+    """Return the completions of the last word of the line."""
     complete = ShellComplete(told, {}, "camtool", COMPLETE)
     return complete.get_completions(list(line[:-1]), line[-1])
 

@@ -35,7 +35,7 @@ def test_every_machine_can_cut_it(
 
 @pytest.mark.parametrize("target", ["pic-mmh", "flashcut", "grbl"])
 def test_lines_are_cut_as_they_are_drawn(camtool: Run, tmp_path: Path, target: str) -> None:
-    """What is called the first line is cut first."""
+    """The line that is called the first one is cut first."""
     file = tmp_path / "lines.toml"
     camtool("coupon", "lines", "-t", target, "--measurements", file)
     done = camtool("post", "coupon.dxf", "-t", target, *ENGRAVE, "--no-verify", "-o", "p")

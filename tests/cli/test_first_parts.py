@@ -54,7 +54,7 @@ def board() -> shapely.Polygon:
 
 
 def cut_below(moves: list[Move], z: float, radius: float) -> shapely.Geometry:
-    """What the tool of this radius clears at this height, seen from above."""
+    """Return the area that a tool of this radius clears at this height, seen from above."""
     swept = []
     for move in moves:
         if move.rapid:

@@ -104,7 +104,7 @@ main()
 
 
 def on_terminal(*arguments: str, folder: Path) -> bytes:
-    """What a command writes to a terminal, signs and all."""
+    """Return all that a command writes to a terminal, progress lines included."""
     ours, theirs = pty.openpty()
     command = [sys.executable, "-c", SLOWLY, *arguments]
     environment = os.environ | {"TERM": "xterm", "COLUMNS": "100"}
@@ -118,7 +118,7 @@ def on_terminal(*arguments: str, folder: Path) -> bytes:
 
 
 def shown_after(written: bytes) -> list[str]:
-    """What stands on the screen at the end, line by line."""
+    """Return the lines on the screen after the text was written."""
     lines = []
     for line in (
         re.sub(rb"\x1b\[[0-9;]*m", b"", written).decode().replace("\r\n", "\n").split("\n")

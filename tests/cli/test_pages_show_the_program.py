@@ -123,7 +123,7 @@ def test_the_setup_sheet_shows_the_drawing(made: Made, samples: Path, name: str)
 
 
 def pixels(png: bytes, *colours: tuple[int, int, int], near: int = 60) -> Bools:
-    """Which pixels of a picture have nearly one of the colours."""
+    """Mark the pixels of a picture that have nearly one of the colours."""
     rgb = np.array(Image.open(io.BytesIO(png)).convert("RGB")).astype(int)
     alike = [np.abs(rgb - colour).sum(axis=2) < near for colour in colours]
     return np.asarray(np.logical_or.reduce(alike))
@@ -180,7 +180,7 @@ def opened(browser: Any, file: Path, width: int, scheme: str) -> Any:
 @pytest.mark.parametrize(("width", "scheme"), WINDOWS)
 @pytest.mark.parametrize("name", ["mount", pytest.param("plate", marks=pytest.mark.slow)])
 class TestPixels:
-    """What a browser shows."""
+    """Pixels of the pages in a browser."""
 
     pytestmark = BROWSER
 

@@ -195,7 +195,7 @@ def test_programs_must_be_somewhere(camtool: Run, batched: Path) -> None:
 
 
 def taken(hook: str, name: str, **said: str) -> bool:
-    """Whether pre-commit gives this file to the hook, where a configuration says so much."""
+    """True if pre-commit gives this file to the hook, whose configuration names no files."""
     chosen = HOOKS[hook] | said
     return bool(re.search(chosen["files"], name)) and not re.search(chosen["exclude"], name)
 

@@ -68,7 +68,7 @@ class Repository:
 
 @pytest.fixture
 def repository(camtool: Run, tmp_path: Path) -> Repository:
-    """One with a drawing and its program in it."""
+    """A repository with a drawing and its program in it."""
     made = Repository(tmp_path / "repository")
     drawing = made.folder / "drawings" / "two words.svg"
     drawing.write_text(RING.format(radius=10))

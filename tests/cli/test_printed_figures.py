@@ -152,7 +152,7 @@ def draw(paths: tuple[Line, ...], folder: Path, layers: tuple[str, ...] = ()) ->
 
 @dataclass(frozen=True)
 class Made:
-    """What came of a job: the report, its printed forms, and the program."""
+    """The results of a job: the report, its printed forms, and the program."""
 
     report: dict[str, Any]
     forms: dict[str, tuple[Form, int]]
@@ -204,7 +204,7 @@ def _shown(done: Done) -> str:
 
 
 def printed(made: Made) -> Iterator[str]:
-    """What of the printed forms is not what the report says, and what of that contradicts."""
+    """Return the printed figures that differ from the report, and the report's contradictions."""
     for name, (form, most) in made.forms.items():
         yield from (f"{name}: {each}" for each in wrong_lines(made.report, form))
         if most:
@@ -321,7 +321,7 @@ def _sizes(case: Case, made: Made) -> Iterator[str]:
 
 
 def _blank(case: Case, made: Made) -> Iterator[str]:
-    """How large the blank must be: as far as the tool cuts."""
+    """Check the size of the blank, which reaches as far as the tool cuts."""
     if case.asked.kind in ("drill", "chamfer", "vcarve") or case.ball:
         return
     low_x, low_y, high_x, high_y = made.program.exact.removed(case.asked.cutter).bounds
@@ -333,7 +333,7 @@ def _blank(case: Case, made: Made) -> Iterator[str]:
 
 
 def _shapes(case: Case, made: Made) -> Iterator[str]:
-    """What is removed beside the program's own area, and what is left of it, by the slides."""
+    """Check over- and undercut by the path of the slides."""
     shape = made.report["shape"]
     codes = {each["code"] for each in made.report["findings"]}
     if shape is None or codes & {"GOUGE", "OVERCUT"}:  # what must stay is never wanted

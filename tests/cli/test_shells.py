@@ -105,7 +105,7 @@ class Terminal:
         os.write(self.place, keys.encode())
 
     def until(self, what: str) -> str:
-        """What the terminal shows until this comes."""
+        """Read the terminal until this text comes, and return all that was read."""
         shown = b""
         while what.encode() not in shown:
             ready, _, _ = select.select([self.place], [], [], HANG_S)

@@ -140,7 +140,7 @@ def jobs(draw: st.DrawFn) -> Job:
 
 
 def cuts(path: Toolpath) -> list[tuple[float, ...]]:
-    """What is cut: kind, end, centre and feed of each move, in order."""
+    """Return kind, end, centre and feed of each cutting move, in order."""
     rows = np.column_stack([path.kind, path.end, path.centre, path.feed])[path.is_feed]
     return [tuple(row) for row in np.nan_to_num(rows, nan=-1.0).tolist()]
 

@@ -13,7 +13,7 @@ PIC = ("-t", "pic-mmh")
 
 
 def refused(*arguments: str) -> str:
-    """What the command line answers."""
+    """Run a command line that is refused and return its message."""
     import click
 
     from camtool.cli.main import cli

@@ -47,7 +47,7 @@ def file(tmp_path: Path) -> Path:
 
 
 def rounds(file: Path, *steps: Callable[[], object]) -> list[str | None]:
-    """What the file held in each round."""
+    """Return the content of the file in each round."""
     held: list[str | None] = []
 
     def again() -> int:

@@ -37,7 +37,7 @@ PAGES = [ROOT / "README.md", *filter(runnable, sorted(ROOT.glob("docs/**/*.md"))
 
 
 def shell(command: str, folder: Path, before: int) -> tuple[str, int]:
-    """What the command prints, and its exit code; `$?` is that of the one before."""
+    """Run a command and return its output and exit code; `$?` is the previous exit code."""
     environment = os.environ | {
         "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
         "PYTHONUNBUFFERED": "1",
@@ -56,7 +56,7 @@ def shell(command: str, folder: Path, before: int) -> tuple[str, int]:
 
 
 def commands(block: str) -> Iterator[tuple[str, str]]:
-    """(command, what it is said to print) of a block; a command may go on after a backslash."""
+    """Yield each command of a block with its shown output; a backslash continues a command."""
     for part in re.split(r"^\$ ", block, flags=re.MULTILINE)[1:]:
         lines = part.splitlines(keepends=True)
         end = next(row for row, line in enumerate(lines, 1) if not line.endswith("\\\n"))
@@ -64,13 +64,13 @@ def commands(block: str) -> Iterator[tuple[str, str]]:
 
 
 def as_shown(shown: str, came: str) -> str:
-    """What came, or what is shown if that matches it."""
+    """Return the shown text if it matches the output, otherwise the output."""
     lines = (".*?" if line == "...\n" else re.escape(line) for line in shown.splitlines(True))
     return shown if re.fullmatch("".join(lines), came, re.DOTALL) else came
 
 
 def console(block: str, folder: Path) -> str:
-    """The block as its commands make it."""
+    """Run the commands of a block and return it with their output."""
     code, made = 0, []
     for command, shown in commands(block):
         came, code = shell(command, folder, code)
@@ -79,7 +79,7 @@ def console(block: str, folder: Path) -> str:
 
 
 def run_page(text: str, folder: Path) -> str:
-    """The page with what its blocks give."""
+    """Run the blocks of a page and return the page with their output."""
     space: dict[str, Any] = {}
     parts: list[str] = []
     end, printed, after = 0, "", -1

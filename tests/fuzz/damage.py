@@ -47,7 +47,7 @@ def headless(data: bytes, at: int, _choice: int) -> bytes:
 
 
 def flip(data: bytes, at: int, choice: int) -> bytes:
-    """One byte is another one."""
+    """Replace one byte by another."""
     if not data:
         return data
     place = at % len(data)
@@ -61,14 +61,14 @@ def insert(data: bytes, at: int, choice: int) -> bytes:
 
 
 def line(data: bytes, at: int, choice: int) -> bytes:
-    """One line is garbage."""
+    """Replace one line by garbage."""
     lines = data.split(b"\n")
     lines[at % len(lines)] = GARBAGE[choice % len(GARBAGE)]
     return b"\n".join(lines)
 
 
 def number(data: bytes, at: int, choice: int) -> bytes:
-    """One number is another thing."""
+    """Replace one number by something else."""
     places = list(NUMBER.finditer(data))
     if not places:
         return data

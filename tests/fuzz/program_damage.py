@@ -102,7 +102,7 @@ def _text(whole: Whole, kind: str, random: Random) -> bytes | None:
 def _shifted(
     blocks: list[str], moves: Sequence[int], random: Random, unit_mm: float, scale: float
 ) -> list[str] | None:
-    """One coordinate by a few units of the dialect, by some more, or by millimetres."""
+    """Shift one coordinate by a few units of the dialect, by more units, or by millimetres."""
     at = random.choice(moves)
     words = list(WORD.finditer(blocks[at]))
     if not words:
@@ -151,7 +151,7 @@ def _other_feed(match: re.Match[str], random: Random) -> str:
 def _replaced(
     blocks: list[str], random: Random, what: re.Pattern[str], by: Callable[[re.Match[str]], str]
 ) -> list[str] | None:
-    """One place that the pattern finds, in a block that is no comment."""
+    """Replace one match of the pattern, in a block that is no comment."""
     places = [
         (at, match)
         for at, block in enumerate(blocks)
@@ -215,7 +215,7 @@ def _records(whole: Whole, kind: str, random: Random) -> bytes | None:
 
 
 def motors(block: bytearray) -> list[int]:
-    """Where the motors that move begin in a record: X, Y, a wait, Z, a wait."""
+    """Return the offsets of the motors that move in a record: X, Y, a wait, Z, a wait."""
     places, at = [], block.index(0x01)
     for motor in (1, 2, 0, 3, 0):
         if motor == 0:

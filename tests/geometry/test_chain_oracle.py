@@ -53,7 +53,7 @@ def test_it_equals_the_twin(paths: list[Polyline], random: Random, gap: float) -
 
 
 def shapes(found: Chained) -> list[tuple[bool, float, float]]:
-    """What the contours are, whatever their order, start and direction."""
+    """Return the contours in a form that does not depend on order, start and direction."""
     rows = zip(
         found.lines.closed.tolist(),
         np.round(path_lengths(found.lines), 6).tolist(),
@@ -64,7 +64,7 @@ def shapes(found: Chained) -> list[tuple[bool, float, float]]:
 
 
 def branches(found: Chained) -> list[tuple[object, ...]]:
-    """Where ends branch, and the contours for which that matters, whatever their order."""
+    """Return branches and the contours that they affect, in a form without an order."""
     sizes = np.round(path_lengths(found.lines), 6).tolist()
     return [
         (branch.at_mm, branch.ends, sorted(sizes[path] for path in branch.paths))

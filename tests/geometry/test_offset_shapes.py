@@ -286,7 +286,7 @@ def shapes(
 
 
 def apart(paths: list[Polyline]) -> bool:
-    """Whether no two paths meet."""
+    """True if no two paths meet."""
     from camtool.geometry.intersect import self_crossings
 
     return len(self_crossings(Segments.of(Polylines.of(paths)))) == 0

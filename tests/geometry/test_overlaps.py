@@ -127,7 +127,7 @@ def drawings(draw: st.DrawFn) -> list[Polyline]:
 
 
 def covered(points: np.ndarray, lines: Polylines) -> np.ndarray:
-    """How many paths (not segments) each point lies on, by brute force."""
+    """Count the paths (not segments) on which each point lies, by brute force."""
     counts = np.zeros(len(points), dtype=np.int64)
     for one in lines:
         counts += points_to_segments(points, Segments.of(one)).min(axis=1) <= 2.0 * WITHIN

@@ -88,7 +88,7 @@ def test_rounded_chains_stay_within_the_tolerance(steps, tangent, most_turn, dec
 
 
 def is_found_again(rng, decimals):
-    """Whether the arcs of a random chain come back from its rounded chords, end for end."""
+    """True if the arcs of a random chain are recognised in its rounded chords, end for end."""
     count = rng.integers(1, 7)
     radii = rng.permutation([1.0, 1.7, 2.9, 4.4, 7.3, 11.0])
     steps = [

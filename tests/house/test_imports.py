@@ -174,8 +174,10 @@ def module_of(path: Path) -> str:
 
 
 def graph(sources: dict[str, tuple[str, bool]]) -> dict[str, set[str]]:
-    """Which modules each one imports, for typing and late ones too, of name -> (text, whether it
-    is a package)."""
+    """Return the modules that each module imports, inside functions and for typing too.
+
+    `sources` maps a name to the module's text and True if it is a package.
+    """
     arrows: dict[str, set[str]] = {}
     for name, (text, package) in sources.items():
         arrows[name] = set()
@@ -193,7 +195,10 @@ def graph(sources: dict[str, tuple[str, bool]]) -> dict[str, set[str]]:
 
 
 def circles(arrows: dict[str, set[str]]) -> set[str]:
-    """What is left when modules that import none of the rest are taken away, again and again."""
+    """Return the modules in cycles, or that import modules in cycles.
+
+    Modules that import none of the others are removed until no more can be removed.
+    """
     left = {name: set(others) for name, others in arrows.items()}
     while ends := {name for name, others in left.items() if not others}:
         left = {name: others - ends for name, others in left.items() if name not in ends}

@@ -332,7 +332,7 @@ def test_a_tilted_plane_is_counted():
 
 
 def _place(z: complex, at: complex, scale: complex, turn_deg: float) -> complex:
-    """What an INSERT does to a point of its block: scale.real in X, scale.imag in Y."""
+    """Transform a point of a block as its INSERT does: scale.real in X, scale.imag in Y."""
     squeezed = complex(z.real * scale.real, z.imag * scale.imag)
     return at + squeezed * cmath.exp(1j * math.radians(turn_deg))
 

@@ -40,7 +40,7 @@ def box(drawing: Drawing) -> np.ndarray:
 
 
 def same(one: Drawing, other: Drawing) -> bool:
-    """Whether both draw the same curves."""
+    """True if both draw the same curves."""
     return one.paths.vertices.shape == other.paths.vertices.shape and np.allclose(
         one.paths.vertices, other.paths.vertices, rtol=0.0, atol=NEAR_MM
     )
@@ -165,7 +165,7 @@ def test_a_transform_of_a_text_transforms_its_outlines(
 
 
 def start_of(drawing: Drawing, index: int) -> np.ndarray:
-    """Where a path begins, Y down."""
+    """Return the start of a path, Y down."""
     x, y = drawing.paths[index].vertices[0, :2]
     return np.array([x, 100.0 - y])
 

@@ -332,8 +332,8 @@ def test_a_pocket_is_not_divided_from_its_islands(tmp_path: Path, kind: str) -> 
 
 
 def test_what_a_change_makes_measurable_is_counted(tmp_path: Path) -> None:
-    """Where the job as it is leaves a dimension uncut, another job's verdict of it counts: what is
-    told at the end is what stands in the report."""
+    """The verdict of another job counts for a dimension that the original job leaves uncut, and
+    the result states what the report states."""
     bench = Bench(
         case(tmp_path, [limited(BORE, "-0.01/-0.03"), limited(WIDTH, "±0.05")]),
         camtool_progress(),
@@ -355,7 +355,7 @@ ISLAND = """<svg xmlns="http://www.w3.org/2000/svg" width="50mm" height="40mm" v
 
 
 def held_with(found: Meeting, made: MeetingCase, setting: str) -> bool:
-    """Whether the part holds on another machine, by its program and allowances made for that."""
+    """True if the part holds on another machine, with program and allowances made for it."""
     target = made.target.with_settings([setting])
     bench = Bench(replace(made, target=target), camtool_progress())
     plain = bench.try_changes(found.after.proposal)
@@ -394,7 +394,7 @@ def test_a_certificate_names_what_it_would_take(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("apart", [True, False])
 def test_contours_of_one_name_have_one_allowance(tmp_path: Path, apart: bool) -> None:
-    """One window must come out wider, the other narrower."""
+    """Of two windows of one name, one must become wider and the other narrower."""
     ways = ["M5 5h10v10h-10z", "M20 5h10v10h-10z"]
     elements = [
         f'<path id="w{k}" d="{way}"/>' for k, way in enumerate(ways if apart else ["".join(ways)])

@@ -23,8 +23,8 @@ class Stop:
 
 
 def corner(x: int, y: int, clockwise: bool) -> int:
-    """Which quarter the motion runs in, 0 to 3 in the order in which it passes them; a point on an
-    axis belongs to the quarter that it enters."""
+    """Return the quadrant of the motion, 0 to 3 in the order of passage; a point on an axis
+    belongs to the quadrant that the motion enters."""
     if not clockwise:
         x = -x  # seen in a mirror it runs clockwise
     if y > 0 and x >= 0:
@@ -37,7 +37,7 @@ def corner(x: int, y: int, clockwise: bool) -> int:
 
 
 def quarters(start: Point, end: Point, clockwise: bool) -> int:
-    """How many quarters the sweep from start to end enters, 4 for a whole turn."""
+    """Count the quadrants that the sweep from start to end enters, 4 for a whole turn."""
     entered = (corner(*end, clockwise) - corner(*start, clockwise)) % 4
     cross = start[0] * end[1] - start[1] * end[0]
     return 4 if entered == 0 and (-cross if clockwise else cross) <= 0 else entered
@@ -57,7 +57,7 @@ def walked(start: Point, clockwise: bool, error: int) -> list[tuple[Point, int]]
 
 
 def stop(start: Point, end: Point, clockwise: bool, error: int, reading: str) -> Stop:
-    """One arc about (0, 0), D = `error` at the start."""
+    """Run an arc about (0, 0) with D = `error` at the start, and return where it stops."""
     wanted = quarters(start, end, clockwise)
     path = walked(start, clockwise, error)
     if reading == "equal":

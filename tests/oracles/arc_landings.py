@@ -22,7 +22,7 @@ class Form:
     sagitta: float
 
     def represents(self, steps: int) -> bool:
-        """Whether a whole unit means this step."""
+        """True if a whole unit of the dialect represents this step."""
         units = round(abs(steps) * self.units_per_step)
         back = math.floor(units / self.units_per_step + 0.5)
         return back == abs(steps) and units <= self.most_units
@@ -65,7 +65,7 @@ def landing(arc: Arc, form: Form) -> tuple[Point, int] | None:
     first = max(0, near - max(1, math.floor(math.sqrt(4.0 * radius * form.sagitta))))
 
     def fits(k: int) -> bool:
-        """Whether the arc may end after iteration k."""
+        """True if the arc may end after iteration k."""
         written = (form.represents(p + c) for p, c in zip(path[k - 1], arc.centre, strict=True))
         return all(written) and stops(path[k - 1], k, first_of)
 
@@ -91,16 +91,15 @@ def first_times(path: list[Point]) -> dict[Point, int]:
 
 
 def stops(at: Point, iteration: int, first_of: list[dict[Point, int]]) -> bool:
-    """Whether the controller stops at this step at this iteration, and whatever D was, at about
-    this one."""
+    """True if the controller stops at this step at this iteration, and for every D at about this
+    one."""
     return first_of[0][at] == iteration and all(
         abs(each.get(at, -APART) - iteration) <= APART for each in first_of
     )
 
 
 def goes_on(arc: Arc, path: list[Point]) -> bool:
-    """Whether the line from the last step of a piece of path to the arc's end turns no axis
-    round."""
+    """True if the line from the last step of a piece of path to the arc's end reverses no axis."""
     turn = 1 if arc.clockwise else -1
     x, y = path[0]
     heading = [turn * y, -turn * x]

@@ -113,7 +113,7 @@ def _move(name: str, values: list[float], modes: tuple[float, str, float], frame
 
 
 def difference(path: Toolpath, calls: list[Call], *, feeds: bool = True) -> str:
-    """Where a toolpath is another one than the calls say, in words; "" where it is not."""
+    """Describe the first difference of a toolpath from the calls; "" if there is none."""
     wanted = canonical(calls)
     homing = np.isin(path.kind, (Kind.HOME_XY, Kind.HOME_Z))
     rows = np.flatnonzero(path.is_motion | homing)

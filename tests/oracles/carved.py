@@ -47,7 +47,7 @@ def _on_arc(
 
 
 def swept(runs: Iterable[CutRun], slope: float, tip_mm: float, step_mm: float) -> shapely.Geometry:
-    """What a cone (tangent of its half angle, radius of its tip) cuts at z = 0 along the runs."""
+    """Return the area that a cone (tangent of half its angle, radius of its tip) cuts at z = 0."""
     parts = []
     for run in runs:
         points = dense(run, step_mm)

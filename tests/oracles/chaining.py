@@ -24,7 +24,7 @@ class Result:
 
 
 def chained(paths: list[Polyline], gap: float, groups: list[str], styles: list[str]) -> Result:
-    """What `chain` must give."""
+    """Compute the result that `chain` must give, literally."""
     oracle = _Oracle(paths, max(gap, POSITION_EPS_MM), groups, styles)
     oracle.pair()
     oracle.split()
@@ -87,7 +87,7 @@ class _Oracle:
         return self.sizes[end]
 
     def place(self, end: int) -> tuple[float, ...]:
-        """Where an end comes in an order that has nothing to do with the order of drawing."""
+        """Return the sort key of an end, independent of the order of drawing."""
         grid = [round(v / POSITION_EPS_MM) for e in (end, end ^ 1) for v in self.point(e)]
         angle = (self.leaving(end) + math.pi) % (2.0 * math.pi) - math.pi
         return (*grid, round(angle / SAME_TURN_RAD), end)

@@ -22,7 +22,7 @@ CHORDS = 24
 
 
 def makes_a_difference(before: Toolpath, after: Toolpath, *, apart_mm: float, feed: float) -> bool:
-    """Whether `after` differs from `before` by more than `apart_mm`, or by `feed` mm/min."""
+    """True if `after` differs from `before` by more than `apart_mm`, or by `feed` mm/min."""
     one, other = _Work(before, apart_mm), _Work(after, apart_mm)
     if other.ended < one.ended or other.lowest < one.lowest - apart_mm:
         return True
@@ -69,7 +69,7 @@ class _Work:
         self.last = position[2]
 
     def lacks(self, other: _Work, apart_mm: float, feed: float) -> bool:
-        """Whether a chord of this one has none of the other's near that is like it."""
+        """True if a chord of this path has no similar chord of the other one nearby."""
         known = {key for _, _, key, _ in other.chords}
         rest = [chord for chord in self.chords if chord[2] not in known]
         if not rest:

@@ -23,8 +23,8 @@ def point_of(move: Move, share: float) -> Point:
 
 
 def most_uncut(toolpath: Toolpath, row: int, radius: float, parts: int = 60) -> float:
-    """How far the worst point of a rapid's disc is from all that earlier cuts have cleared as
-    deep, about: < 0 when even the nearest edge is so far away."""
+    """Estimate the distance of the worst point of a rapid's disc from all that earlier cuts have
+    cleared to its depth; below 0 if it lies inside by so much."""
     moves = list(toolpath)
     dust = [
         point_of(move, k / parts)

@@ -119,7 +119,7 @@ def _cost(
 
 
 def fewest_chords(points: Floats, tolerance: float) -> int:
-    """How many chords between the points (n, 2) stay within the tolerance: the longest each time,
+    """Count the chords between the points (n, 2) within the tolerance, the longest each time,
     found by doubling and bisection over the points."""
     count, low, last = 0, 0, len(points) - 1
     while low < last:

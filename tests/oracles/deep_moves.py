@@ -96,7 +96,7 @@ class Shop:
 
 
 def everything(size: float, deep: float, feed: float) -> Toolpath:
-    """One of each, beside each other."""
+    """Make one shape of each kind, beside each other."""
     shop = Shop(size, deep, feed)
     shop.profile(size, size)
     shop.bore(3.2 * size, 1.5 * size)

@@ -97,7 +97,7 @@ def follow(
 
 
 def chunk(row: int, samples: Floats, bend: Callable[[Floats], Floats]) -> Chunk:
-    """One chunk with a step, an iteration and a second per sample, and no reversals."""
+    """Make a chunk with a step, an iteration and a second per sample, and no reversals."""
     slide = samples.copy()
     if len(samples):
         slide[:, :2] = bend(samples[:, :2])

@@ -48,7 +48,7 @@ def modal_block(row: Row, before: Row | None, feed: int, decimals: tuple[int, in
 
 @dataclass(frozen=True)
 class Flashcut:
-    """What flashcut's dialect lets a user choose, and the decimals of a feed."""
+    """The options of the dialect flashcut, and the decimals of a feed."""
 
     decimals: int
     kept: int

@@ -63,7 +63,7 @@ def line_string(path: Polyline, per_segment: int) -> shapely.LineString:
 
 
 def sagitta(path: Polyline, per_segment: int) -> float:
-    """How far the true path is from its short chords at most.
+    """Upper bound of the distance between the true path and its short chords.
 
     n chords of an arc lie within radius · sweep² / (8n²); over a given chord c that is largest
     for half a circle: c/2 · π² / (8n²).

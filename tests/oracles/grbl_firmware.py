@@ -69,9 +69,9 @@ def source() -> Path | None:
 
 @dataclass(frozen=True, eq=False)
 class Ran:
-    """What it did: positions (N, 3) steps after each tick with a step, when (N,) s, the PWM of
-    the spindle (N,), 0 while it is off; the time until it stood still, s; for each line the
-    number of its error or 0, and where the parser stood after it, (L, 3) mm."""
+    """The motion of a run: positions (N, 3) steps after each tick with a step, times (N,) s, the
+    PWM of the spindle (N,), 0 while it is off; the time until it stood still, s; for each
+    line the number of its error or 0, and where the parser stood after it, (L, 3) mm."""
 
     steps: Ints
     at_s: Floats
@@ -109,7 +109,7 @@ def built(folder: Path, *, smoothing: bool = True) -> Path:
 
 
 def run(program: Path, data: bytes, settings: dict[str, float], folder: Path) -> Ran:
-    """What it does with lines, after settings such as {"$32": 1}."""
+    """Run lines in the firmware, after settings such as {"$32": 1}, and return its events."""
     before = "".join(f"{name}={value:g}\n" for name, value in settings.items()).encode()
     (folder / "lines").write_bytes(before + data)
     done = subprocess.run(
@@ -161,7 +161,7 @@ class Switch:
 
 @dataclass(frozen=True, eq=False)
 class Played:
-    """What came of a session: for what was sent before the first entry and for each entry, what
+    """The results of a session: for what was sent before the first entry and for each entry, what
     grbl said until the next one and when that line began, s; positions (N, 3) steps after each
     tick that changed them, as grbl has them and as the slides truly are, when (N,) s; and the
     time at the end."""
@@ -256,7 +256,7 @@ class FaultyLine:
         self.played = self._play()
 
     def read(self, now: float) -> bytes:
-        """What has come from it by now, since the last call."""
+        """Return the output since the last call."""
         text = ""
         while (at := self.next_s()) is not None and at <= now:
             text += self._answers[self._taken][1]

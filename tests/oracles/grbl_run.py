@@ -91,8 +91,8 @@ def nearest_step(mm: np.float32, steps_per_mm: np.float32) -> int:
 
 
 def ticks(way: tuple[int, int, int], levels: list[int] | None = None) -> list[tuple[int, ...]]:
-    """Where the axes stand after each event of a block; `levels`: the smoothing of each (0 to
-    3), where an event is made of 2^level ticks."""
+    """Return the positions of the axes after each event of a block; `levels` is the smoothing of
+    each (0 to 3), with which an event has 2^level ticks."""
     most = max(abs(n) for n in way)
     count, steps = most << 3, [abs(n) << 3 for n in way]
     counters, position = [count >> 1] * 3, [0, 0, 0]

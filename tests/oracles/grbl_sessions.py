@@ -240,8 +240,7 @@ def _shifted(each: Sent, by_s: float) -> Sent:
 
 
 def _group(sent: Sequence[Sent], at: int) -> tuple[int, int]:
-    """Which entries, first and behind the last, are the bytes with a time before an entry, or
-    at it."""
+    """Return the range (first, behind the last) of the bytes before an entry, or at it."""
     first = at
     while sent[first].after_s is None:
         first -= 1
@@ -257,7 +256,7 @@ def _says_the_same(one: str, other: str) -> bool:
 
 
 def answers(twin: Twin, sent: Sequence[Sent]) -> list[str]:
-    """What the virtual controller says before the first entry and after each."""
+    """Return the answers of the virtual controller before the first entry and after each."""
     said, now = [twin.connected(0.0)], 0.0
     for each in (*sent, None):
         if each is None or each.after_s is None:
@@ -283,7 +282,7 @@ _FIELD = re.compile(r"([A-Za-z]+):(-?[\d.]+(?:,-?[\d.]+)*)")
 def differences(
     sent: Sequence[Sent], wanted: Sequence[str], found: Sequence[str]
 ) -> Iterator[str]:
-    """Where the answers of two differ."""
+    """Return the entries at which two lists of answers differ."""
     loose = held = False
     for k, (one, other) in enumerate(zip(wanted, found, strict=True)):
         data = b"" if k == 0 else sent[k - 1].data
@@ -343,5 +342,5 @@ def read(file: Path) -> tuple[list[Sent], list[str]]:
 
 
 def said_by(played: Played) -> list[str]:
-    """What the firmware said, in the same form."""
+    """Return the answers of the firmware, in the same form."""
     return ["".join(text for _, text in each) for each in played.said]

@@ -34,7 +34,7 @@ def listing_periods(x: int) -> int:
 
 @dataclass
 class Reading:
-    """One reading of the thesis."""
+    """A reading of the thesis."""
 
     bursts: bool = False
     repeats: bool = False
@@ -67,7 +67,7 @@ class Reading:
 
 @dataclass
 class Done:
-    """What one record did: the places (steps) after each pulse that moved something, and its
+    """The motion of one record: the places (steps) after each pulse that moved something, and its
     seconds."""
 
     places: list[tuple[int, int, int]] = field(default_factory=list)
@@ -75,7 +75,7 @@ class Done:
 
 
 def record(at: tuple[int, int, int], steps: tuple[int, int, int], how: Reading) -> Done:
-    """One record of steps from `at`: X and Y, then Z."""
+    """Run a record of steps from `at`: X and Y, then Z."""
     done, here = Done(), list(at)
     sense = [1 if count > 0 else -1 for count in steps]
     left = [abs(count) for count in steps]

@@ -32,6 +32,6 @@ def set_errors_(move, x, y, errors):
 
 
 def nearest_errors_(x, y, own, only, moves: Moves, out):
-    """Whether there is a move, and how many nodes and moves were looked at."""
+    """Return True if there is a move, and the numbers of nodes and moves that were visited."""
     search = Search(moves)
     return nearest_errors(x, y, own, *only, search, out), search.looked

@@ -36,7 +36,7 @@ def _linkable(base: Point, waiting: list[Point], new: Point, tolerance: float) -
 
 
 def off_line(base: Point, end: Point, point: Point) -> float:
-    """How far a point is from the line between two others."""
+    """Distance of a point from the line between two others."""
     way = [e - b for b, e in zip(base, end, strict=True)]
     along = sum(w * (p - b) for w, p, b in zip(way, point, base, strict=True))
     share = min(max(along / sum(w * w for w in way), 0.0), 1.0)

@@ -40,7 +40,7 @@ def reversals_of(toolpath: Toolpath) -> Floats:
 
 
 def _pieces(toolpath: Toolpath, row: int) -> Iterator[Piece]:
-    """Where each piece of a move begins, and the signs of X and Y on it."""
+    """Yield the start of each monotone piece of a move, and the signs of X and Y on it."""
     x0, y0 = toolpath.starts[row, :2].tolist()
     x1, y1 = toolpath.end[row, :2].tolist()
     sweep = float(toolpath.sweeps()[row]) if toolpath.is_arc[row] else 0.0

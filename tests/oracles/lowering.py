@@ -12,7 +12,7 @@ Point = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Piece:
-    """What a move becomes: its kind, its end, its centre and the row that it came from."""
+    """A piece of a lowered move: its kind, its end, its centre and the row that it came from."""
 
     kind: Kind
     end: Point

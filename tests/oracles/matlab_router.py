@@ -46,6 +46,6 @@ def run_line(
 
 
 def off_line(distance: tuple[int, int], place: tuple[float, float]) -> float:
-    """How far a place is from the straight line to `distance`."""
+    """Distance of a place from the straight line to `distance`."""
     cross = distance[0] * place[1] - distance[1] * place[0]
     return abs(cross) / math.hypot(*distance)

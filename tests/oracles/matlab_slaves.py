@@ -144,7 +144,7 @@ class Slave:
                 self.task, self.done = None, moment
 
     def tick(self, number: int, start: float | None, order: tuple[int, int]) -> None:
-        """One tick of 5 ms from `number` on; the order comes at `start`, if it does."""
+        """Run a tick of 5 ms from `number` on; the order comes at `start`, if there is one."""
         self.interrupt()
         at = 0.0
         while at < 1.0:

@@ -85,7 +85,7 @@ def _read(
 
 
 def _at(stroke: np.ndarray, level: float, axis: int) -> float:
-    """Where the straight line of a stroke across an axis is at a level."""
+    """Return the place at which a stroke across an axis reaches a level."""
     (a, b), across = stroke, 1 - axis
     return float(a[axis] + (b - a)[axis] * (level - a[across]) / (b - a)[across])
 
@@ -109,7 +109,7 @@ def _square(corners: np.ndarray) -> dict[str, Any]:
 def _crossing(
     one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray]
 ) -> np.ndarray:
-    """Where two straight lines cross, each through two places."""
+    """Return the crossing of two straight lines, each through two places."""
     (a, b), (c, d) = one, other
     part = np.linalg.solve(np.column_stack([b - a, c - d]), c - a)[0]
     return a + part * (b - a)

@@ -53,13 +53,13 @@ class PulsedAxis:
     reversals: int = 0
 
     def go(self, sense: int) -> int:
-        """One step of the program, or none (0); the slide."""
+        """Make one step of the program, or none (0), and return the slide."""
         if sense != 0:
             self.pulse(sense)
         return self.slide
 
     def pulse(self, sense: int) -> None:
-        """One step of the program, behind the compensation where it turns."""
+        """Make one step of the program, after the compensation if the axis reverses."""
         pulses = 1
         if sense != self.direction:
             self.direction = sense
@@ -103,7 +103,7 @@ class LiteralAxis:
         self.slide = start * self.scale
 
     def flanks(self, x: float, y: float) -> tuple[float, float]:
-        """How far the slide may be from the motor, to − and to +, at a place of the table."""
+        """Return the distances of slide and motor at which the flanks touch, to − and to +."""
         play = self.play if self.cells is None else cell_play(self.cells, x, y)
         if self.centred:
             return -play / 2, play / 2

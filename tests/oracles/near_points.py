@@ -14,7 +14,7 @@ EQUAL_MM = 1e-6
 
 
 def share_and_distance(point: np.ndarray, segments: Segments, k: int) -> tuple[float, float]:
-    """Where on a segment its place nearest to a point is, from 0 to 1, and how far that is."""
+    """Return the share of a segment (0 to 1) nearest to a point, and the distance."""
     start, end = segments.start[k], segments.end[k]
     if not segments.is_arc[k]:
         way = end - start

@@ -107,7 +107,7 @@ def sagitta(p: Polyline, most_rad: float) -> float:
 
 
 def inside(points: Floats, rings: Sequence[Floats]) -> Bools:
-    """Which points (P, 2) are in an odd number of the rings of chords."""
+    """Mask of the points (P, 2) in an odd number of the rings of chords."""
     odd = np.zeros(len(points), dtype=np.bool_)
     for ring in rings:
         polygon = shapely.Polygon(ring)
@@ -147,7 +147,7 @@ def near_region(p: Polyline, reach_mm: float, most_rad: float) -> shapely.Geomet
 
 
 def offset_region(p: Polyline, distance_mm: float, most_rad: float) -> shapely.Geometry:
-    """What the offset of a simple closed path encloses, as area of shapely, arcs as chords."""
+    """Return the area that the offset of a simple closed path encloses, by shapely."""
     polygon = shapely.Polygon(chords(p, most_rad))
     near = near_region(p, abs(distance_mm), most_rad)
     inward = (distance_mm > 0.0) == ccw(p)
@@ -163,7 +163,7 @@ def rings(region: shapely.Geometry, least_width: float) -> list[shapely.Geometry
 
 
 def far_enough(points: Floats, p: Polyline, distance_mm: float, most_rad: float) -> Bools:
-    """Which points the offset of a simple closed path shall hold inside, by the distance alone.
+    """Mask of the points that the offset of a simple closed path must enclose, by distance alone.
 
     A positive distance of a CCW path: inside it and far enough from it. Else its complement.
     """
@@ -181,7 +181,7 @@ CHORD_RAD = 0.02
 
 
 def distance_complaints(results: Sequence[Polyline], p: Polyline, distance_mm: float) -> list[str]:
-    """What is wrong with the distance of the results from their source, whatever that is."""
+    """Return the faults of the distance of the results from any source."""
     found = []
     for each in results:
         apart = distance(dense(each, 33), p) - abs(distance_mm)

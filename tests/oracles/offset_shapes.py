@@ -38,8 +38,8 @@ Kite = Floats
 
 
 def kites(paths: Sequence[Polyline], d: float, limit: float) -> list[Kite]:
-    """What mitres cover at the right turns of closed paths: two rays along the shifted sides, cut
-    off at limit·d from the corner."""
+    """Return the area of the mitres at right turns of closed paths: two rays along the shifted
+    sides, cut off at limit·d from the corner."""
     found = []
     for p in paths:
         of = pieces(p)
@@ -69,7 +69,7 @@ def _direction(a: Floats, b: Floats, arc: Arc | None, at_end: bool) -> Floats:
 
 
 def region_of(paths: Sequence[Polyline], most_rad: float) -> shapely.Geometry:
-    """What an odd number of the paths hold, arcs as chords."""
+    """Return the area inside an odd number of the paths, arcs as chords."""
     region: shapely.Geometry = shapely.Polygon()
     for p in paths:
         ring = shapely.Polygon(chords(p, most_rad))

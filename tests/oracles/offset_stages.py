@@ -29,7 +29,7 @@ def groups(points: Floats, eps: float) -> list[set[int]]:
 
 
 def valid(slices: Slices, elements: Segments, source: Segments, least: float) -> Bools:
-    """Which slices have no measured point nearer to the source than `least`."""
+    """Mask of the slices without a measured point nearer to the source than `least`."""
     found = np.ones(len(slices), dtype=np.bool_)
     for part in ALONG:
         t = slices.t0 + part * (slices.t1 - slices.t0)

@@ -179,7 +179,7 @@ def embedded_pictures(page: str) -> list[str]:
 
 
 def farthest(points: list[Floats], others: list[Floats]) -> float:
-    """How far the farthest of the points is from the lines through the others, mm."""
+    """Largest distance of the points from the lines through the others, mm."""
     chords = [np.stack([path[:-1], path[1:]], axis=1) for path in _once(others) if len(path) > 1]
     dots = [shapely.points(path) for path in _once(others) if len(path) == 1]
     tree = shapely.STRtree(np.concatenate([*map(shapely.linestrings, chords), *dots]))
@@ -194,14 +194,15 @@ def _once(paths: list[Floats]) -> list[Floats]:
 
 
 def beside(one: list[Floats], other: list[Floats]) -> float:
-    """How far two drawings are from each other at most, mm: each from the other."""
+    """Largest distance between two drawings, mm, in both directions."""
     return max(farthest(one, other), farthest(other, one))
 
 
 def ink_beside(ink: Bools, paths: list[Floats], box: tuple[float, ...]) -> tuple[float, float]:
-    """How many pixels the ink (rows, columns) is from the paths at most, and the paths from the
-    ink, when the `box` (left, low, right, top) of the paths is laid on the extents of the ink,
-    the scale being the same along X and Y."""
+    """Largest distances, in pixels, of ink (rows, columns) from paths and of paths from ink.
+
+    The `box` (left, low, right, top) of the paths is laid on the extents of the ink, with
+    one scale along X and Y."""
     rows, columns = np.nonzero(ink)
     left, low, right, top = box
     across = (columns.max() - columns.min()) / (right - left)

@@ -38,7 +38,7 @@ class Ball(Cutter):
     """A ball nose."""
 
     def radius_at(self, depth: Any) -> Any:
-        """How wide it cuts at the surface with its tip so deep."""
+        """Radius of the cut at the surface with the tip at this depth."""
         above = np.clip(self.radius - np.asarray(depth), 0.0, self.radius)
         return np.where(np.asarray(depth) > 0.0, np.sqrt(self.radius**2 - above**2), 0.0)
 

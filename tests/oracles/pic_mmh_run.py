@@ -44,7 +44,7 @@ class LiteralAxis:
             self.low, self.high = -play, 0.0
 
     def pulse(self, sense: int) -> None:
-        """One step of the program in this sense, with what the controller puts before it."""
+        """Make one step of the program in this sense, with the compensation before it."""
         if sense != self.direction:
             self.direction = sense
             self.reversals += 1
@@ -64,7 +64,7 @@ class LiteralAxis:
 
 @dataclass
 class LiteralRow:
-    """What one row did: samples (x, y, z) in steps and in mm, seconds, passes, sums per axis."""
+    """The motion of a row: samples (x, y, z) in steps and mm, seconds, passes, sums per axis."""
 
     commanded: list[tuple[int, ...]] = field(default_factory=list)
     slide: list[tuple[float, ...]] = field(default_factory=list)
@@ -98,7 +98,7 @@ class LiteralRun:
         return [self.row(move) for move in self.toolpath]
 
     def row(self, move: Move) -> LiteralRow:
-        """One row."""
+        """Run one row."""
         result = LiteralRow()
         before = [(a.pulses, a.reversals) for a in self.axes]
         if move.kind == Kind.DWELL:
@@ -156,7 +156,7 @@ class LiteralRun:
     def output(
         self, move: Move, axes: list[int], place: list[int], pulse: bool, result: LiteralRow
     ) -> None:
-        """One pass: its pulses, its time, its sample."""
+        """Add the pulses, time and sample of one pass."""
         result.passes += 1
         coded = self.axes[axes[0]].axis.coded_step_mm
         if move.feed is None:

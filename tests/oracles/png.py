@@ -39,7 +39,7 @@ def decode(data: bytes) -> npt.NDArray[np.uint8]:
 
 
 def _unfiltered(kind: int, line: bytes, above: bytes, channels: int) -> bytes:
-    """One row with its filter undone (PNG specification, §9.2); all arithmetic modulo 256."""
+    """Undo the filter of a row (PNG specification, §9.2); all arithmetic modulo 256."""
     if kind == 0:
         return line
     # The bytes of the pixels to the left and above left begin with those of an empty pixel.
@@ -62,7 +62,7 @@ def _unfiltered(kind: int, line: bytes, above: bytes, channels: int) -> bytes:
 
 
 def _paeth(a: int, b: int, c: int) -> int:
-    """Which of left, up and corner is nearest to left + up − corner."""
+    """Return whichever of left, up and corner is nearest to left + up − corner."""
     guess = a + b - c
     to_a, to_b, to_c = abs(guess - a), abs(guess - b), abs(guess - c)
     if to_a <= to_b and to_a <= to_c:

@@ -124,7 +124,7 @@ def numbers(words: str) -> list[tuple[float, int]]:
 
 
 def differ(words: str, values: Sequence[float | None], significant: int | None = None) -> str:
-    """What is wrong with the numbers in a text, which should be these; "–" stands for none."""
+    """Describe the numbers of a text that differ from these; "–" stands for none."""
     shown = re.findall(NUMBER + "|–", words)
     if len(shown) != len(values):
         return f"{words!r} shows {len(shown)} numbers instead of {len(values)}"
@@ -323,7 +323,7 @@ def _cut(operation: Json, words: str) -> str:
 
 
 def wrong_lines(report: Json, form: Form) -> Iterator[str]:
-    """What of the lines of a form is not what the report says."""
+    """Return the lines of a form that differ from the report."""
     cuts = form.values("cut")
     operations = report["planned"]["operations"] if report["planned"] else []
     if len(cuts) != len(operations):
@@ -347,7 +347,7 @@ def wrong_lines(report: Json, form: Form) -> Iterator[str]:
 
 
 def wrong_picture(report: Json, form: Form) -> Iterator[str]:
-    """What of the words in the margin of a picture, and on its scale of errors, is not so."""
+    """Return the words in a picture's margin and scale of errors that differ from the report."""
     labels = form.values("label")
     words = " ".join(labels)
     total = report["error_um"]["total"]
@@ -417,7 +417,7 @@ UNITS = {"mm": "_mm", "µm": "_um"}
 
 
 def wrong_tables(report: Json, form: Form, most: int) -> Iterator[str]:
-    """What of the tables of a page is not what the report says; it shows `most` rows of each."""
+    """Return the cells of a page's tables that differ from the report; `most` rows are shown."""
     heads = {head[0]: (head, rows) for head, rows in form.tables}
     for name, rows_of in TABLES.items():
         wanted = rows_of(report)
@@ -457,7 +457,7 @@ def _wrong_operations(report: Json, rows: list[list[str]]) -> Iterator[str]:
 
 
 def contradictions(report: Json) -> Iterator[str]:
-    """What of a report contradicts itself."""
+    """Return the contradictions within a report."""
     split = report["time_split_s"]
     total = split["cutting"] + split["air"] + split["dwell"] + split["link"]
     if abs(total - report["time_s"]) > 1e-3:

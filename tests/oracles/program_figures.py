@@ -36,7 +36,7 @@ class Axis:
     play: float = 0.0
 
     def slide(self, places: Floats) -> Floats:
-        """Where the slide is, for each commanded place, from 0 on."""
+        """Position of the slide for each commanded place, from 0 on."""
         motor, at = places * self.scale, 0.0
         if self.play == 0.0:
             return motor
@@ -122,7 +122,7 @@ class Program:
         return found
 
     def way(self) -> list[float]:
-        """How far each axis goes in all, mm."""
+        """Total way of each axis, mm."""
         found = [0.0, 0.0, 0.0]
         for move in self.moves:
             for axis in range(3):
@@ -131,7 +131,7 @@ class Program:
         return found
 
     def rapid_mm(self) -> float:
-        """How far rapids go in XY."""
+        """Length of all rapids in XY, mm."""
         return sum(move.length for move in self.moves if move.rapid)
 
     def levels(self) -> list[float]:
@@ -141,11 +141,11 @@ class Program:
         return sorted(found, reverse=True)
 
     def deepest(self) -> float:
-        """How deep it goes."""
+        """Largest depth of the program, mm."""
         return -min(move.b[2] for move in self.moves)
 
     def seconds(self, feeds: Sequence[float], rapid_mm_s: float) -> tuple[float, float]:
-        """How long it takes without acceleration, all and cuts alone; `feeds` (K,) mm/min."""
+        """Durations without acceleration, of all moves and of cuts alone; `feeds` (K,) mm/min."""
         total = cutting = 0.0
         cuts = set(self.cuts)
         for k, (move, feed) in enumerate(zip(self.moves, feeds, strict=True)):
@@ -174,7 +174,7 @@ class Program:
         return found  # type: ignore[return-value]
 
     def reversals(self) -> tuple[list[int], list[int]]:
-        """How often X, Y and Z turn, and how often while cutting; a first move in − is a turn."""
+        """Count the reversals of X, Y and Z, all and while cutting; a first move in − counts."""
         cuts = set(self.cuts)
         every, cutting = [0, 0, 0], [0, 0, 0]
         for axis in range(3):
@@ -191,7 +191,7 @@ class Program:
         return every, cutting
 
     def contours(self) -> int:
-        """How many stretches are cut between rapids and moves in the air."""
+        """Count the stretches that are cut between rapids and moves in the air."""
         count, inside = 0, False
         for k, move in enumerate(self.moves):
             if k in set(self.cuts):
@@ -223,7 +223,7 @@ class Program:
 
 
 def _poles(move: Move, axis: int) -> list[float]:
-    """Where an arc is farthest along an axis, in the order of its travel."""
+    """Yield the extreme places of an arc along an axis, in the order of its travel."""
     if move.centre is None or axis == 2:
         return []
     radius = math.dist(move.a[:2], move.centre)

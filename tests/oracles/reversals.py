@@ -33,7 +33,7 @@ def dense(path: Polyline) -> Floats:
 
 
 def turns(values: Floats, least_mm: float) -> int:
-    """How often a way along one axis comes back by `least_mm` or more, point by point."""
+    """Count the reversals by `least_mm` or more along one axis, point by point."""
     found = 0
     direction = 0
     lowest = highest = values[0]  # since the last turn

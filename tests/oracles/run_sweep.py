@@ -38,7 +38,7 @@ def dense(run: CutRun, per_move: int = 48) -> Floats:
 
 
 def swept(runs: Iterable[CutRun], radius: float, below: float = math.inf) -> shapely.Geometry:
-    """What discs of the tool on the runs cover, seen from above; where they are that deep."""
+    """Return the area that the tool covers on runs of at least this depth, seen from above."""
     found = []
     for run in runs:
         places = dense(run)

@@ -65,9 +65,9 @@ def steepest(vertices: Floats) -> float:
 
 
 def cut_over(runs: Iterable[CutRun], places: Floats, step_mm: float) -> tuple[Floats, float]:
-    """How low (J,) the tool gets over each of these places of a contour (J, 2), and the most that
-    it takes away there at a time; points of the run farther than 2 steps from any place count
-    for nothing."""
+    """Return the lowest height (J,) of the tool over these places of a contour (J, 2), and the
+    largest depth that one pass removes there. Points of the run farther than 2 steps from every
+    place are ignored."""
     low = np.zeros(len(places))
     most = 0.0
     for run in runs:

@@ -47,14 +47,14 @@ class Cutter:
     tip: float = 0.0
 
     def rise(self, apart: Floats) -> Floats:
-        """How far above its tip the tool's surface is, so far from its axis; inf beside it."""
+        """Height of the tool's surface over its tip, so far from the axis; inf outside."""
         if self.slope == 0.0:
             return np.where(apart <= self.radius, 0.0, math.inf)
         cone = np.maximum(apart - self.tip, 0.0) / self.slope
         return np.where(apart <= self.radius, cone, math.inf)
 
     def radius_at(self, depth: Floats) -> Floats:
-        """How wide it cuts at the surface with its tip so deep."""
+        """Radius of the cut at the surface with the tip at this depth."""
         if self.slope == 0.0:
             return np.where(depth > 0.0, self.radius, 0.0)
         wide = np.minimum(self.tip + depth * self.slope, self.radius)
@@ -75,7 +75,7 @@ class Move:
 
     @property
     def length(self) -> float:
-        """How far it goes, seen from above."""
+        """Length of the move, seen from above."""
         if self.centre is None:
             return math.hypot(self.b[0] - self.a[0], self.b[1] - self.a[1])
         return abs(self.sweep) * math.hypot(self.a[0] - self.centre[0], self.a[1] - self.centre[1])
@@ -133,7 +133,7 @@ def moves_of(program: str) -> list[Move]:
 
 @dataclass
 class Cut:
-    """What became of one move: the thickest chip it took at once, mm, and about where."""
+    """The cut of one move: the thickest chip it took at once, mm, and about where."""
 
     move: Move
     chip: float

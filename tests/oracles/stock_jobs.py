@@ -74,7 +74,7 @@ class Seen:
 
 
 def complaints(asked: Asked, moves: list[Move], findings: Collection[str]) -> list[str]:
-    """What is wrong with the program; `findings` are the names of the codes that were given."""
+    """Return the faults of the program; `findings` are the names of reported codes."""
     said = set(findings)
     walls = Walls.of(asked.paths)
     seen = _watched(asked, moves, walls)
@@ -151,14 +151,14 @@ def _plunges(asked: Asked, seen: Seen, walls: Walls, said: set[str]) -> Iterator
 
 
 def _free(asked: Asked, walls: Walls, points: Floats) -> Floats:
-    """How far points (J, 2) are from what is to stay; below 0 within it."""
+    """Distances of points (J, 2) from the material that must stay; below 0 inside of it."""
     within = walls.within(points)
     stays = within if asked.kind == "profile" and asked.side != "inside" else ~within
     return np.where(stays, -1.0, 1.0) * walls.distance(points)
 
 
 def _gouges(asked: Asked, seen: Seen, walls: Walls, said: set[str]) -> Iterator[str]:
-    """Where the tool's edge comes into the wall, and how far it strays from all walls."""
+    """Report places at which the tool's edge enters the wall, or strays from all walls."""
     flat = seen.points[:, :2]
     if len(flat) == 0:
         return
@@ -188,7 +188,7 @@ def _at_corner(asked: Asked, walls: Walls, points: Floats) -> Bools:
 
 
 def _left(asked: Asked, seen: Seen, walls: Walls, said: set[str]) -> Iterator[str]:
-    """What the tool could have cut along the walls, or on the floor of a pocket, and did not."""
+    """Report material along walls and on floors that the tool could reach and left."""
     bottom = seen.points[seen.points[:, 2] <= 1e-3 - asked.depth][:, :2]
     place, left, ring = walls.samples(0.25)
     held = asked.tabs is not None
@@ -342,8 +342,8 @@ def _raised(stay: list[Move], top: float) -> Iterator[Floats]:
 
 
 def _is_whole(asked: Asked, seen: Seen, piece: Floats) -> bool:
-    """Whether the stock still stands between both sides of the cut, somewhere on a raised stretch,
-    over the width asked for."""
+    """True if the stock still stands between both sides of the cut, somewhere on a raised stretch,
+    over the required width."""
     assert asked.tabs is not None
     _, width, height = asked.tabs
     flat, reach = piece[:, :2], width + 2.0 * asked.cutter.radius - 0.1
@@ -452,7 +452,7 @@ def _shape(rng: Rng, size: float) -> Path:
 
 
 def _layout(rng: Rng, size: float, gap: float, nested: bool = True) -> tuple[Path, ...]:
-    """One path; two beside each other, `gap` apart; four; or one within another."""
+    """Make one path, two beside each other with this gap, four, or one within another."""
     one = _shape(rng, size)
     wide = max(x for x, _, _ in one)
     kind = int(rng.integers(5 if nested else 3))
@@ -471,7 +471,7 @@ def _layout(rng: Rng, size: float, gap: float, nested: bool = True) -> tuple[Pat
 
 
 def _around(path: Path) -> float:
-    """How long it is, about."""
+    """Approximate length of the path, mm."""
     return 0.1 * len(Walls.of([path]).samples(0.1)[0])
 
 
@@ -484,7 +484,7 @@ def _top(path: Path) -> float:
 
 
 def random_job(rng: Rng) -> Asked:
-    """One operation on a random layout, with random options that belong together."""
+    """Make an operation on a random layout, with random options that fit together."""
     kind = str(
         rng.choice(["profile", "profile", "profile", "pocket", "engrave", "drill", "vcarve"])
     )

@@ -46,7 +46,7 @@ class Picture:
 
 
 def ink(svg: str, zoom: int, fonts: tuple[str, ...] = ()) -> Picture:
-    """What resvg draws of the page at `zoom` times its size, its text in these font files."""
+    """Render the page with resvg at `zoom` times its size, its text in these font files."""
     data = bytes(
         resvg_py.svg_to_bytes(
             svg_string=svg,

@@ -46,7 +46,7 @@ def _moving(rows: Floats) -> Floats:
 
 
 def area_of(region: Polylines) -> shapely.Geometry:
-    """What an odd number of the closed paths enclose."""
+    """Return the area inside an odd number of the closed paths."""
     size = float(np.ptp(region.vertices[:, :2], axis=0).max())
     area = shapely.Polygon()
     for path in region:
@@ -69,7 +69,7 @@ def _chords(path: Polyline, sag_mm: float) -> Floats:
 
 
 def swept(paths: Sequence[Polyline], radius_mm: float, most_rad: float) -> shapely.Geometry:
-    """What a disc covers on its way along the paths."""
+    """Return the area that a disc covers along the paths."""
     parts = [near_region(_divided(path, most_rad), radius_mm, most_rad) for path in paths]
     return shapely.union_all(parts, grid_size=GRID_MM)
 
@@ -93,7 +93,7 @@ def _divided(path: Polyline, most_rad: float) -> Polyline:
 
 
 def opened(area: shapely.Geometry, radius_mm: float, most_rad: float) -> shapely.Geometry:
-    """What discs cover that lie wholly in an area."""
+    """Return the union of all discs that lie wholly in an area."""
     near = swept(_boundary(area), radius_mm, most_rad)
     middle = shapely.difference(area, near, grid_size=GRID_MM)
     around = swept(_boundary(middle), radius_mm, most_rad)
@@ -120,7 +120,7 @@ def _boundary(area: shapely.Geometry) -> list[Polyline]:
 def complaints(
     runs: Sequence[CutRun], region: Polylines, radius_mm: float, z: float, *, share: float = 1e-3
 ) -> list[str]:
-    """What is wrong with runs that shall clear a region down to z with a tool of this radius."""
+    """Return the faults of runs that must clear a region down to z with a tool of this radius."""
     paths, area = at_depth(runs, z), area_of(region)
     found: list[str] = []
     for most_rad in (CHORD_RAD, FINE_CHORD_RAD):
@@ -139,7 +139,7 @@ def complaints(
 
 
 def gouges(runs: Sequence[CutRun], region: Polylines, radius_mm: float) -> list[str]:
-    """How far the tool is nearer to the boundary of the region than its radius, anywhere."""
+    """Largest amount by which the tool is nearer to the region's boundary than its radius."""
     found = []
     for run in runs:
         rows = _moving(run.vertices[:, [0, 1, 3]])

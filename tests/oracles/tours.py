@@ -14,7 +14,7 @@ Point = tuple[float, float]
 
 
 def length(choices: Choices, rows: Sequence[int], start: Point, goal: Point | None) -> float:
-    """What is travelled between the cuts, step by step."""
+    """Length of the travel between the cuts, step by step."""
     at, total = np.array(start), 0.0
     for row in rows:
         total += float(np.hypot(*(choices.entry[row] - at)))
@@ -23,7 +23,7 @@ def length(choices: Choices, rows: Sequence[int], start: Point, goal: Point | No
 
 
 def keeps(choices: Choices, rows: Sequence[int], before: Pairs) -> bool:
-    """Whether each item comes once, and none before one that must precede it."""
+    """True if each item comes once, and none before one that must precede it."""
     items = [int(choices.owner[row]) for row in rows]
     rank = {item: k for k, item in enumerate(items)}
     once = sorted(items) == sorted(set(choices.owner.tolist()))

@@ -71,7 +71,7 @@ def contours(rows: list[dict[str, Any]]) -> list[tuple[Any, ...]]:
 
 
 def missed(rows: list[dict[str, Any]], steps_mm: tuple[float, float]) -> tuple[int, int, float]:
-    """How many rows end beside their ends, and the farthest of them."""
+    """Count the rows that end beside their ends, with the largest distance."""
     beside = [
         one
         for one in rows

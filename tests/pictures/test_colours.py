@@ -86,7 +86,7 @@ def linear(colour: str) -> np.ndarray:
 
 
 def painted(colour: str) -> str:
-    """What takes the place of a colour in the dark palette."""
+    """Return the colour that replaces this one in the dark palette."""
     return colours.darkened(f'fill="{colour}"')[6:-1]
 
 

@@ -252,7 +252,7 @@ def test_many_moves_stay_small(count: int) -> None:
 
 
 def test_the_package_holds_every_file() -> None:
-    """What the page is made of is installed with it."""
+    """All files that the page is made of are installed with the package."""
     root = Path(__file__).parents[2]
     project = tomllib.loads((root / "pyproject.toml").read_text())
     patterns = project["tool"]["setuptools"]["package-data"]["camtool"]

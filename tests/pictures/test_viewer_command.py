@@ -22,7 +22,7 @@ def head(*arguments: str, page: str = "a.html") -> dict[str, object]:
 
 
 def counts(page: dict[str, object]) -> dict[str, int]:
-    """How many numbers each column has."""
+    """Return the length of each column of the page."""
     columns = page["columns"]
     assert isinstance(columns, dict)
     return {name: count for name, (_, _, count) in columns.items()}

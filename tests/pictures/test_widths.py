@@ -60,7 +60,7 @@ def test_several_depths_of_several_operations_have_no_single_width() -> None:
 
 
 def outline(chain: Chain) -> shapely.Polygon:
-    """What a closed chain holds, its arcs in dense chords."""
+    """Return the area of a closed chain, its arcs in dense chords."""
     places = []
     for k, sweep in enumerate(chain.sweep.tolist()):
         spoke = chain.points[k] - chain.centre[k]
@@ -122,7 +122,7 @@ RADII = {1: lambda depth: 0.5, 2: lambda depth: 1.5, 3: lambda depth: depth}
 
 
 def cut_by(text: str) -> shapely.Geometry:
-    """What a program cuts at the surface, from its words alone."""
+    """Return the area that a program cuts at the surface, from its words alone."""
     found, discs = program_paths(text), []
     for path, (first, last), tool in zip(found.cuts, found.z, found.tools, strict=True):
         for (x, y), z in zip(path, np.linspace(first, last, len(path)), strict=True):

@@ -69,7 +69,7 @@ class Shown:
         self.page.wait_for_function("() => !document.body.dataset.waiting")
 
     def pixels(self, canvas: str) -> int:
-        """How many pixels of a canvas are not empty."""
+        """Count the pixels of a canvas that are not empty."""
         self.settled()
         return int(
             self.page.evaluate(
@@ -87,7 +87,7 @@ class Shown:
         )
 
     def place_of(self, x: float, y: float) -> tuple[float, float]:
-        """Where a point of the frame, 0 … 1 of the stage, lies on the page."""
+        """Return the page position of a point of the frame, 0 … 1 of the stage."""
         box = self.page.locator("#stage").bounding_box()
         return box["x"] + x * box["width"], box["y"] + y * box["height"]
 

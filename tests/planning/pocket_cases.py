@@ -82,7 +82,7 @@ def setting_of(diameter_mm: float, **settings: Any) -> Setting:
 
 
 def work_of(paths: Sequence[Polyline], diameter_mm: float, **settings: Any) -> Work:
-    """What `pocket` makes of the paths."""
+    """Plan a pocket of the paths."""
     return pocket(chosen_of(paths), setting_of(diameter_mm, **settings))
 
 
@@ -92,7 +92,7 @@ def runs_of(work: Work) -> list[CutRun]:
 
 
 def region_of(paths: Sequence[Polyline]) -> Polylines:
-    """What the paths enclose, outer ones CCW and islands CW."""
+    """Return the region that the paths enclose, outer ones CCW and islands CW."""
     return oriented(Nesting(Polylines.of(paths)))
 
 
@@ -111,5 +111,5 @@ def shapes(draw: st.DrawFn) -> list[Polyline]:
 
 
 def cross(paths: Sequence[Polyline]) -> bool:
-    """Whether any of the paths meets another one: such pockets are refused."""
+    """True if any of the paths meets another one: such pockets are refused."""
     return any(approach(one, other).distance == 0.0 for one, other in combinations(paths, 2))

@@ -30,7 +30,7 @@ LEAST_TURN_MM = 1e-6
 
 
 def reversals_of(cut: Polyline | CutRun, machine: Machine | None = None) -> tuple[int, int]:
-    """How often X and Y turn round between the first point of a path or run and its last one.
+    """Count the reversals of X and Y between the first point of a path or run and its last one.
 
     What comes back by less than half a step of the machine (`LEAST_TURN_MM` without one) is no
     reversal; nor is the first motion, which an approach takes care of.

@@ -79,7 +79,7 @@ def runs_of(work: Work) -> list[CutRun]:
 
 
 def gouge(work: Work, paths: Sequence[Polyline], setting: Setting) -> float:
-    """How far the cone cuts out of the region at the surface, mm, by true distances."""
+    """Largest distance by which the cone cuts beyond the region at the surface, mm."""
     tool = setting.operation.tool
     assert tool.tip_angle_rad is not None
     boundary = Segments.of(Polylines.of(paths))

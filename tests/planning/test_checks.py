@@ -234,7 +234,7 @@ def box(x: float, y: float, width: float, height: float) -> Polyline:
 
 
 def off_stock(job: Job, *paths: Polyline) -> list[Finding]:
-    """What planning says of the stock."""
+    """Return the findings of planning about the stock."""
     findings = plan(drawing_of(paths), job, path_machine()).findings
     return [each for each in findings if each.code == PlanningCode.OUT_OF_STOCK]
 

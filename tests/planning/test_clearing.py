@@ -69,8 +69,8 @@ def test_no_way_to_another_region() -> None:
 
 
 def are_joined(paths: list[Polyline], ends: list[np.ndarray]) -> bool:
-    """Whether both ends lie on one connected part of what the paths enclose: an island of a
-    lopsided contour may lie beside it, as a region of its own."""
+    """True if both ends lie on one connected part of the area that the paths enclose: an island of
+    a lopsided contour may lie beside it, as a region of its own."""
     whole = Polygon()
     for path in paths:
         whole = whole.symmetric_difference(Polygon(sample(path, 0.02)))

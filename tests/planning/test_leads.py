@@ -131,7 +131,7 @@ def test_a_lead_does_not_cross_a_finger_of_its_own_contour() -> None:
 
 
 def test_an_engraved_line_may_lie_in_what_is_kept() -> None:
-    """What the contour itself cuts is not kept from its leads; other lines are."""
+    """Leads may cross the contour's own cut, but no other lines that must be kept."""
     assert leads(OPEN, None, [OPEN]).findings == ()
     other = Polyline(np.array([[-3, -1, 0], [-3, 1, 0.0]]))
     assert [each.measured for each in leads(OPEN, None, [OPEN, other]).findings] == []

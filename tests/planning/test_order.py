@@ -92,7 +92,7 @@ def ways(draw: st.DrawFn) -> list[Way]:
 
 @st.composite
 def pairs(draw: st.DrawFn, count: int) -> list[tuple[int, int]]:
-    """What comes before what, without circles: from earlier to later in some order."""
+    """Draw precedences without cycles, from earlier to later in a random order."""
     order = draw(st.permutations(range(count)))
     ranks = st.tuples(st.integers(0, count - 1), st.integers(0, count - 1))
     drawn_pairs = draw(st.lists(ranks, max_size=2 * count)) if count else []
@@ -126,7 +126,7 @@ def test_only_contours_wait_for_what_they_hold() -> None:
 
 
 def before_by_pairs(items: list[Item]) -> list[list[int]]:
-    """What must precede what, one item after the other."""
+    """Return the pairs of items of which one must precede the other, item by item."""
     shapes = {id(shape): shape for shape in map(shape_of, items)}
     rank = {key: k for k, key in enumerate(shapes)}
     parent = Nesting(Polylines.of(shapes.values())).levels.parent if shapes else []
@@ -139,7 +139,7 @@ def before_by_pairs(items: list[Item]) -> list[list[int]]:
 
 
 def shape_of(item: Item) -> Polyline:
-    """Where a contour lies: the path that it is a part of, or its own."""
+    """Return the path that a contour is a part of, or its own."""
     assert isinstance(item, Contour)
     return item.outline or item.path
 

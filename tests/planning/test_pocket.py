@@ -41,7 +41,7 @@ QUICK = ["square", "island off the middle", "star", "dumbbell", "keyhole"]
 
 
 def wrong(paths: list[Polyline], diameter_mm: float, **options: object) -> list[str]:
-    """What the oracle finds wrong with the pocket of the paths."""
+    """Return the faults that the oracle finds in the pocket of the paths."""
     runs = runs_of(work_of(paths, diameter_mm, **options))
     return complaints(runs, region_of(paths), 0.5 * diameter_mm, -1.0)
 

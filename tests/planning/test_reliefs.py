@@ -26,7 +26,7 @@ def _ring(path: Polyline) -> np.ndarray:
 
 
 def _tips(path: Polyline, plain: Polyline) -> list[tuple[float, float]]:
-    """What the path visits and the plain one does not."""
+    """Return the vertices that the path visits and the plain one does not."""
     own = {tuple(place) for place in plain.vertices[:, :2].tolist()}
     return [tuple(place) for place in path.vertices[:, :2].tolist() if tuple(place) not in own]
 

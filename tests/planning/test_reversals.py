@@ -249,7 +249,7 @@ def setting_tool(diameter_mm: float) -> Any:
 
 
 def follows(piece: Polyline, path: Polyline) -> bool:
-    """Whether a piece runs in the direction of the path."""
+    """True if a piece runs in the direction of the path."""
     middle = sample(piece, length(piece) / 7.9)[:2]
     along = [
         float(

@@ -144,7 +144,8 @@ def test_an_operation_that_selects_nothing_is_refused() -> None:
 
 
 def test_sides_do_not_depend_on_who_cuts_what() -> None:
-    """One operation for all, or one each for holes, inner and outer contours: the same cuts."""
+    """A job with one operation cuts the same as one with an operation each for holes, inner and
+    outer contours."""
     tool = Tool(diameter_mm=3.0)
     whole = drawn()
     closed = replace(whole, marks=())

@@ -147,7 +147,7 @@ def _noticed(drawing: Drawing, job: Job, machine: Machine, code: Code) -> list[F
 
 
 def _amount(gouge: Finding) -> float:
-    """How deep a gouge is, mm, as its message says."""
+    """Return the depth of a gouge, mm, from its message."""
     return float(gouge.message.split(" cuts ")[1].split(" mm")[0])
 
 

@@ -140,7 +140,7 @@ def test_sides_are_straight_or_slope_as_the_entry_does() -> None:
     ],
 )
 def test_count_and_spacing(tabs: Tabs, wanted: int) -> None:
-    """One each spacing is never farther apart than that."""
+    """Tabs by spacing are never farther apart than the spacing."""
     assert len(tops(SQUARE, contour(SQUARE, tabs))) == wanted
 
 

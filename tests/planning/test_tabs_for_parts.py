@@ -30,7 +30,7 @@ SMALL = _box(100, 20, 104, 24)
 
 
 def _tabbed(job: Job, *paths: Polyline) -> tuple[dict[str, int], list[Finding]]:
-    """How many tabs each contour has: how often its tool comes up to their top."""
+    """Count the tabs of each contour, by the rises of its tool to their top."""
     plan = planned(drawing_of(paths), job, load_target("grbl").machine)
     top = -job.operations[0].depth_mm + job.operations[0].tabs.height_mm
     found: dict[str, int] = {}

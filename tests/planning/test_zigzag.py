@@ -19,7 +19,7 @@ from tests.planning.pocket_cases import SHAPES, cross, region_of, runs_of, shape
 
 
 def wrong(paths: list[Polyline], diameter_mm: float, step_over: float, angle: float) -> list[str]:
-    """What the oracle finds wrong with the zig-zag pocket of the paths."""
+    """Return the faults that the oracle finds in the zigzag pocket of the paths."""
     work = work_of(paths, diameter_mm, pattern="zigzag", step_over=step_over, angle_rad=angle)
     if not work.items:
         return []

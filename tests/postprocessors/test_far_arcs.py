@@ -61,7 +61,7 @@ def arc(
 
 
 def height(across: Floats, chord: float, radius: float) -> Floats:
-    """How far the arc lies beside its chord at `across` mm from its start."""
+    """Height of the arc over its chord at `across` mm from its start."""
     t = across - 0.5 * chord
     end = math.sqrt(radius**2 - 0.25 * chord**2)
     beside = (0.25 * chord**2 - t**2) / (np.sqrt(radius**2 - t**2) + end)

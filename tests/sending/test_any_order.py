@@ -117,7 +117,7 @@ def part(name: str, first: int = 0) -> Part:
 
 
 def outputs_until(twin: Twin, block: int) -> int:
-    """How many outputs its slides have made for the blocks up to this one."""
+    """Count the outputs that the slides have made for the blocks up to this one."""
     of = twin.slides.trace.block
     return int(np.count_nonzero((of >= 0) & (of <= block)))
 
@@ -298,7 +298,7 @@ class Sending(RuleBasedStateMachine):
 
 
 def _unknown(why: str) -> bool:
-    """Whether a failure says that nobody knows whether the machine stands."""
+    """True if a failure states that it is unknown whether the machine stands still."""
     return "switch it off" in why or "plug" in why or "nothing answers" in why
 
 
@@ -336,7 +336,7 @@ tool was brought to part zero."""
 
 
 def stopped_and_gone_on(name: str, seed: int) -> str:
-    """What happened, after all that must hold has been asserted."""
+    """Run one case, assert all that must hold, and return its outcome."""
     chance, target = np.random.default_rng(seed), loaded(name)
     program = PROGRAMS[name].replace(ARC, b"G01X00009.00Y00005.00F08;")
     one = consignment(program, target, source=name)

@@ -21,7 +21,7 @@ from tests.waiting import heard_from
 
 
 def typed(name: str, text: str, *more: str) -> str:
-    """What a console shows to lines from a pipe."""
+    """Return the output of a console for lines from a pipe."""
     twin: Any = load_target(name).twin([])
     with hosted(twin, 20.0) as port:
         command = [sys.executable, "-m", "camtool", "console", name, port, "--baud", "9600", *more]

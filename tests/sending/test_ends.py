@@ -81,7 +81,7 @@ def at_rest(twin: Twin) -> None:
 
 
 def wanted(name: str) -> tuple[Floats, Ints]:
-    """What a program commands: places (K, 3) mm, and the block of each (K,)."""
+    """Return the commanded places of a program, (K, 3) mm, and the block of each, (K,)."""
     loaded = load_target(name)
     trace = motion(PARTS[name], loaded)
     of = loaded.target.read(PARTS[name], loaded.machine).block[trace.block]
@@ -89,7 +89,8 @@ def wanted(name: str) -> tuple[Floats, Ints]:
 
 
 def killed_and_resumed(name: str, folder: Path, seed: int) -> bool:
-    """One program, killed at some time and gone on with; whether the kill came before its end."""
+    """Kill the sending of a program at a random time, resume it, and return True if the kill came
+    before its end."""
     chance, loaded = random.Random(f"{name} {seed}"), load_target(name)
     program = folder / f"part{seed}.txt"
     program.write_bytes(PARTS[name])

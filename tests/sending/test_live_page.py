@@ -47,7 +47,7 @@ def passes(shape: list[tuple[int, int]], count: int) -> str:
 
 
 def drawn_beside(text: str, tmp_path: Path) -> float:
-    """How far the page's cuts are from those of the program, in px of the picture."""
+    """Largest distance between the page's cuts and those of the program, in px of the picture."""
     program = program_paths(text)
     page = LivePage(tmp_path / "live.html", "part", read(text.encode())).html("x", {}, 0)
     left, low, right, top = program.box()

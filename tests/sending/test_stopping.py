@@ -48,7 +48,7 @@ LONG_S = 10_000.0
 
 @dataclass(frozen=True)
 class Work:
-    """What a machine is doing while it is stopped. `action`: a command by hand with `values`, or
+    """The work of a machine that is stopped. `action`: a command by hand with `values`, or
     "send" a `program`; `before`: what another sender has told the machine; `paced`: bytes take
     their time. `first`: what must go out first, by the state that the twin is in ("" stands for
     the others); `way_mm`: how far each slide may still move, by the same, None: to the end of the
@@ -73,7 +73,7 @@ class Work:
         return load_target(self.target, settings=self.settings)
 
     def conversation(self) -> Conversation:
-        """One that nobody has begun; whoever sends has allowed the first packet."""
+        """Make a conversation that has not begun; its sender has allowed the first packet."""
         loaded = self.loaded()
         wire: Any = loaded.target.wire()
         manner = Manner(home=self.home, file=FILE if wire.opens_file else "", checked=self.checked)
@@ -441,7 +441,7 @@ class Running:
         self.process.send_signal(getattr(signal, name))
 
     def ended(self) -> str:
-        """What it has said on stderr when it is over."""
+        """Wait for the end and return the text on stderr."""
         _, said = self.process.communicate(timeout=HANG_S)
         return (said or b"").decode()
 
@@ -1006,7 +1006,7 @@ def rows(title: str) -> dict[str, list[str]]:
 
 
 def measured(work: Work, moment_s: float, line: Any = None, *, stop: bool) -> str:
-    """How far a machine still moves, and how long, when it is stopped or camtool is killed."""
+    """Measure distance and duration of the motion after a stop, or after camtool is killed."""
     both, twin = work.begun(line)
     both.until(moment_s)
     both.line.read(moment_s)

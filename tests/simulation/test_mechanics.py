@@ -69,7 +69,7 @@ def wander(seed: int, count: int = 600) -> Floats:
 
 
 def along(axis: int, *turns: float, parts: int = 500) -> Floats:
-    """One axis over these turning points, the others at 0."""
+    """Move one axis over these turning points, the others at 0."""
     values = np.concatenate(
         [np.linspace(a, b, parts + 1)[1:] for a, b in itertools.pairwise(turns)]
     )
@@ -205,7 +205,7 @@ def test_what_compensation_leaves_at_rest(compensation: float, start: tuple[str,
 
 
 def test_conventions_differ_by_half_the_play_of_the_place() -> None:
-    """Where the slide is engaged: a turn before has taken up the play."""
+    """The conventions differ where the slide is engaged: a turn before has taken up the play."""
     points = along(0, 0.0, 0.8, -0.8, 0.8)
     settings = [setting for setting in EVERYTHING if "repeatab" not in setting]
     plus = slides(path_machine(*settings), points)

@@ -17,7 +17,7 @@ SCATTER = tuple(f"axes.{axis}.repeatability_mm={SIGMA}" for axis in "xyz")
 
 
 def drawn(*settings: str, count: int = COUNT) -> Floats:
-    """How far off the slides (count, 3) stand after each of so many reversals of all axes."""
+    """Errors (count, 3) of the slides after each of so many reversals of all axes."""
     points = np.tile(np.where(np.arange(count) % 2 == 0, -1.0, 1.0)[:, None], (1, 3))
     mechanics = Mechanics(path_machine(*SCATTER, *settings), np.zeros(3), ALL)
     slide, reversals = mechanics.follow(points, np.array([0, count]))

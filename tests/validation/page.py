@@ -47,7 +47,7 @@ def check(
 
 
 def same(line: str, wanted: str, last: float = LAST_PLACES) -> bool:
-    """Whether two lines of a table say the same."""
+    """True if two lines of a table agree within the last digit."""
     if NUMBER.sub("#", line) != NUMBER.sub("#", wanted):
         return False
     pairs = zip(NUMBER.findall(line), NUMBER.findall(wanted), strict=True)
@@ -72,7 +72,7 @@ def _table(heads: Sequence[str], rows: Rows) -> str:
 
 
 def _right(rows: Rows, column: int) -> bool:
-    """Whether a column holds nothing but numbers."""
+    """True if a column holds nothing but numbers."""
     held = [row[column] for row in rows if row[column] not in ("", "–")]
     return bool(held) and all(NUMBER.fullmatch(text) for text in held)
 

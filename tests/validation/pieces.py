@@ -37,7 +37,7 @@ class Piece:
 
     @property
     def motion(self) -> list[RowMotion]:
-        """What each row of the program does."""
+        """Simulate the program and return its motion, row by row."""
         return rows_of(simulate(self.decoded, self.machine))
 
     @property

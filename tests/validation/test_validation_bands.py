@@ -265,8 +265,8 @@ class Compared:
 
     @property
     def needed_um(self) -> float:
-        """What `process_mm`, µm, would have to be besides what it is, so that the deviations were
-        as large as predicted, in the mean of squares; 0 where they are no larger."""
+        """Additional `process_mm`, µm, with which the deviations were as large as predicted, in
+        the mean of squares; 0 if they are no larger."""
         low, high = 0.0, 10.0
         for _ in range(60):
             middle = 0.5 * (low + high)
@@ -324,9 +324,12 @@ def _row(name: str, read: Compared) -> list[str]:
 
 
 def test_what_can_have_a_verdict() -> None:
-    """Where the temperature alone is not known it is bounded, by less than the band is wide: such
-    sizes can be said to hold. The circles of the parallel port, far outside of their bands, are
-    undecided: nothing bounds the process."""
+    """If the temperature alone is unknown, its effect is bounded by less than the width of the
+    band, and such sizes can be said to hold.
+
+    The circles of the parallel port, far outside of their bands, are undecided: nothing bounds
+    the process.
+    """
     decided = set()
     for part in PARTS:
         budget = budget_of(part)

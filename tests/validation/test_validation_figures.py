@@ -34,7 +34,7 @@ def program_of(path: Toolpath, target: LoadedTarget) -> bytes:
 
 
 def run(path: Toolpath, target: LoadedTarget) -> list[RowMotion]:
-    """What each row does that the machine reads out of the program of a toolpath."""
+    """Write, read and simulate a toolpath, and return its motion row by row."""
     decoded = target.target.read(program_of(path, target), target.machine)
     return rows_of(simulate(decoded, target.machine))
 

@@ -171,7 +171,7 @@ def record(programs: list[Path], folder: Path, above: Sequence[Path]) -> None:
 
 
 def recorded(program: Path) -> Line:
-    """What LinuxCNC did, from the first move out of X0 Y0 Z0 to the last."""
+    """Return LinuxCNC's recorded motion, from the first move out of X0 Y0 Z0 to the last."""
     rows = []
     with Path(f"{program}.samples").open(encoding="ascii") as lines:
         for line in lines:
@@ -188,7 +188,7 @@ def recorded(program: Path) -> Line:
 
 
 def predicted(program: Path) -> Line:
-    """What the model does, with about the times of its samples."""
+    """Return the model's motion at about the times of the recorded samples."""
     target = load_target("linuxcnc")
     path = target.target.read_in(program.read_bytes(), target.machine, program.parent)
     points, seconds, now = [np.zeros((1, 3))], [np.zeros(1)], 0.0

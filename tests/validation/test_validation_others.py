@@ -54,14 +54,14 @@ def places_of(decoded: Toolpath, machine: Machine, axis: str) -> np.ndarray:
 
 
 def step_by_five(axis: str) -> float:
-    """What the first five turns say of the step."""
+    """Compute the step from the first five turns."""
     estimate = by_five(axis).estimate("step", axis)
     assert estimate is not None
     return estimate.value
 
 
 def by_five(axis: str) -> Calibration:
-    """What the first five turns say."""
+    """Compute the values of the first five turns."""
     said = read_measurements(MEASURED)
     ((name, coupon),) = [each for each in said.coupons if getattr(each[1], "axis", "") == axis]
     assert isinstance(coupon, StepsCoupon)

@@ -14,7 +14,7 @@ from tests.targets import on, verify
 
 
 def two_squares():
-    """One of 1 mm, one of 2 mm."""
+    """Make two squares, of 1 mm and of 2 mm."""
     b = square(ToolpathBuilder(), 1.0, 1.0, 1.0)
     return square(b, 4.0, 1.0, 2.0).finish()
 

@@ -79,7 +79,7 @@ def judged(name: str, data: bytes, drawing: Drawing, job: Job) -> Verification:
 
 
 def against(verification: Verification) -> list[Finding]:
-    """What the program is not as the job asks for."""
+    """Return the findings about differences of the program from its job."""
     return [
         each
         for each in verification.findings

@@ -94,7 +94,7 @@ def sound(name: str) -> tuple[Whole, Drawing, Job]:
 
 
 def throw(name: str, kind: str, random: Random) -> bytes | None:
-    """One damaged program that can be read and differs; None when the target knows no such."""
+    """Draw a damaged program that can be read and differs; None if there is no such damage."""
     whole = sound(name)[0]
     read, machine = whole.target.target.read, whole.target.machine
     before = read(whole.data, machine)
@@ -114,7 +114,7 @@ def throw(name: str, kind: str, random: Random) -> bytes | None:
 
 
 def found(name: str, data: bytes) -> bool:
-    """Whether `verify --against` would end with exit code 1 (or 2)."""
+    """True if `verify --against` would end with exit code 1 (or 2)."""
     whole, drawing, job = sound(name)
     try:
         run = verify_program(data, whole.target, source="damaged", drawing=drawing, job=job)
@@ -124,7 +124,7 @@ def found(name: str, data: bytes) -> bool:
 
 
 def missed(name: str, seed: int, count: int) -> list[str]:
-    """What was not found of so many damages: kinds, each with the program's changed part."""
+    """Return the damages, of so many, that were not found: kind and changed part."""
     random = Random(f"{name} {seed}")
     lost: list[str] = []
     thrown: Counter[str] = Counter()

@@ -97,7 +97,7 @@ def test_the_centre_of_an_arc_is_a_radius_away() -> None:
 
 
 def drawn(seed: int) -> MoveIndex:
-    """Some dozens of random strokes of lines and arcs, at two depths."""
+    """Draw dozens of random strokes of lines and arcs, at two depths."""
     rng = np.random.default_rng(seed)
     b = ToolpathBuilder()
     for number in range(12):

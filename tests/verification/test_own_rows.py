@@ -81,7 +81,7 @@ def damaged(rng: np.random.Generator, decoded: Toolpath, kind: str) -> tuple[Too
 def compared(
     decoded: Toolpath, wanted: Toolpath, row_from: np.ndarray | None
 ) -> tuple[Coverage, list[object]]:
-    """How both cover each other, and the contours that are cut the other way."""
+    """Compare both toolpaths: their coverage, and the contours that are cut in reverse."""
     mine, other = Side.of(decoded, flat_cuts=False), Side.of(wanted, flat_cuts=False)
     goal = Goal(other.moves, full_circles(other.cuts, LIMIT_MM), LIMIT_MM, DEPTH_MM)
     limits = LIMIT_MM, DEPTH_MM

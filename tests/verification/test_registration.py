@@ -50,8 +50,8 @@ def mount() -> Drawing:
 
 @dataclass(frozen=True)
 class Made:
-    """How a program is made of the drawing: the tool, where its zero lies, depths of its passes,
-    which contours (all), in which order, whether reversed, and a lead from without."""
+    """Choices with which a program is made of the drawing: tool, place of its zero, depths of its
+    passes, contours (all) and their order, reversed or not, and a lead from outside."""
 
     diameter: float = 3.0
     shift: tuple[float, float] = (0.0, 0.0)
@@ -208,7 +208,7 @@ def test_another_drawing_is_followed_nowhere() -> None:
 
 
 def test_a_part_that_fits_in_several_places_is_ambiguous() -> None:
-    """One of the four equal holes alone."""
+    """A program that cuts one of four equal holes fits in four places."""
     result = found(Made(order=(0,), shift=(1.0, 1.0)))
     assert codes(result)[VerificationCode.DRAWING_PLACE] == Severity.ERROR
     assert "as well at" in result.findings[0].message

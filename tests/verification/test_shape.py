@@ -170,7 +170,7 @@ def carved(*places: tuple[float, float, float]) -> Toolpath:
 
 
 def kept_of_run(path: Toolpath, *walls: Polyline, stays: bool = False) -> ProtectedRegion:
-    """One run of these moves, which must leave what is outside of the walls, or within them."""
+    """Make a run of these moves, with walls outside or inside of which material must stay."""
     feeds = path.is_feed
     ends = np.concatenate([path.starts[feeds][:1], path.end[feeds]])
     run = np.column_stack([ends, np.zeros(len(ends))])

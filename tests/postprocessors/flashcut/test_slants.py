@@ -27,7 +27,7 @@ def decoded(path: Toolpath, machine: LoadedTarget) -> Toolpath:
 
 
 def misses_um(path: Toolpath, machine: LoadedTarget) -> float:
-    """How far the controller is from the end of any row, at most, in X or Y."""
+    """Largest distance of the controller from the end of any row, in X or Y, µm."""
     worst = 0.0
     for chunk in simulate(path, machine.machine):
         for k in np.flatnonzero(np.diff(chunk.row, append=-1)).tolist():

@@ -16,7 +16,8 @@ from camtool.toolpath.program import Program
 
 @dataclass(frozen=True)
 class Kinds:
-    """What a dialect can say: its unit in mm, feeds, and whether it has events and a long arc."""
+    """The capabilities of a dialect: its unit in mm, feeds, and whether it has events and a
+    long arc."""
 
     unit_mm: float
     feeds: tuple[float, ...]

@@ -158,7 +158,7 @@ def test_ten_megabytes_on_a_line_are_refused_and_not_chewed(line: bytes) -> None
 
 
 def place_of_fault(data: bytes, lexing: Lexing) -> str | None:
-    """Where the first fault is, None when there is none."""
+    """Return the place of the first fault, or None."""
     try:
         words(data, lexing)
     except ProgramError as error:

@@ -124,7 +124,7 @@ def test_names_of_operations_and_tools_are_never_commands(name: str, text: str) 
 
 @st.composite
 def cut_paths(draw: st.DrawFn) -> tuple[Toolpath, list[float]]:
-    """Some operations of some moves each, and how long each of them cuts, s, move by move."""
+    """Draw operations of a few moves each, with the duration of their cuts, s, move by move."""
     path, seconds = ToolpathBuilder().rapid(z=5.0), []
     for k in range(draw(st.integers(1, 4))):
         path.operation(OperationNote("profile", f"{k}", ToolNote(), 9.0, 9.0, 1.0))
@@ -359,8 +359,8 @@ def test_the_goldens_are_there() -> None:
 
 
 def places_of_changes(name: str, *given: str) -> tuple[list[tuple[float, ...]], list[Finding]]:
-    """Where the axes stand at each change between cuts, by the words of the program alone; and
-    what is said of it."""
+    """Return the positions of the axes at each tool change between cuts, by the words of the
+    program alone, and the findings about it."""
     run = post_drawing(DRAWING, JOB, target(name, *given), check=False)
     assert run.program is not None
     here, places, has_cut = {"X": 0.0, "Y": 0.0, "Z": 0.0}, [], False

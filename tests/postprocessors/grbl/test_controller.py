@@ -280,8 +280,8 @@ def test_a_feed_is_needed() -> None:
 
 @pytest.mark.parametrize("idle_ms", [0, 1, 25, 254])
 def test_each_stop_holds_what_comes_next(idle_ms: int) -> None:
-    """One behind the last block before a wait, however many waits follow; none where nothing
-    moved."""
+    """A stop stands after the last block before a wait, however many waits follow, and none where
+    nothing moved."""
     builder = ToolpathBuilder().event(Kind.SPINDLE_CW, 1000.0).rapid(1.0, 0.0, 0.0)
     builder.line(2.0, 1.0, 0.0, feed=100.0).event(Kind.SPINDLE_OFF).event(Kind.DWELL, 0.1)
     builder.event(Kind.DWELL, 0.1).line(2.0, 3.0, 0.0, feed=100.0).message("on")

@@ -467,7 +467,7 @@ def test_soft_limits_that_are_certain_are_found_before_anything_moves(
 
 
 def test_the_reach_of_a_program_is_that_of_its_moves() -> None:
-    """Where it begins is not among it, and arcs bulge."""
+    """The reach leaves out the start and counts the bulge of arcs."""
     program = b"G21G90\nM3S900\nG0X10Y10Z5\nG1Z-1F100\nG2X20Y10I5J0F200\nG0Z5\n"
     one = consignment(program, TARGET, source="a")
     low, high = one.reach_mm or ((), ())

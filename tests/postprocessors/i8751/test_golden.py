@@ -43,7 +43,7 @@ def test_the_dump_is_that_of_the_packets() -> None:
 
 
 def test_the_worked_examples_of_the_page() -> None:
-    """What the page shows is what is read, and what is written."""
+    """The records on the page are read and written as it shows."""
     page = PAGE.read_text(encoding="utf-8")
     dumps = re.findall(r"```hex\n(.+?)```", page, re.DOTALL)
     assert len(dumps) == 2

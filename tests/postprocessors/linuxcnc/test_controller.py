@@ -262,8 +262,8 @@ def test_an_arc_that_is_a_line_bows_out_by_less_than_the_tolerance() -> None:
 
 
 def test_a_line_begins_in_the_middle_of_an_arc() -> None:
-    """Where its middle still lies on the line before, and its end does not: so the corner is in
-    the middle of its row."""
+    """The middle of the arc still lies on the line before it, and its end does not, so that the
+    corner is in the middle of its row."""
     builder = ToolpathBuilder((0.0, 1.0, 0.0))
     for angle in (0.02, 0.30, 0.42):
         end = (math.sin(angle), math.cos(angle), 0.0)

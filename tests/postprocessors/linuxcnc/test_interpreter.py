@@ -341,7 +341,7 @@ def test_the_cutter_goes_beside_the_path(radius: float, side: int, corners: list
 
 
 def _aside(point: np.ndarray, a: np.ndarray, b: np.ndarray, way: float) -> float:
-    """How far a point lies on a side of a line."""
+    """Signed distance of a point from a line."""
     x, y = (b - a) / np.hypot(*(b - a))
     return float(way * (x * (point[1] - a[1]) - y * (point[0] - a[0])))
 

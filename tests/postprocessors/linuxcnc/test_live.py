@@ -138,7 +138,7 @@ def sampled(folder: Path) -> Floats:
 
 
 def apart_mm(path: Floats, places: Floats) -> float:
-    """How far places lie from a path, mm at the most: in XY, and in XZ."""
+    """Largest distances of places from a path, mm, in XY and in XZ."""
     found = 0.0
     for columns in ([0, 1], [0, 2]):
         line = LineString(path[:, columns])

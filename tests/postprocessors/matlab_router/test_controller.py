@@ -51,7 +51,7 @@ def read(name: str, *settings: str) -> tuple[Toolpath, Machine]:
 
 
 def line(x: float = 0.0, y: float = 0.0, z: float = 0.0, *, counts: int = 480) -> Toolpath:
-    """One line from zero at a speed along it."""
+    """Make a line from zero at a speed along it."""
     return ToolpathBuilder().line(x, y, z, feed=counts * 0.46875).finish()
 
 

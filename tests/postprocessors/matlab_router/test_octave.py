@@ -42,7 +42,7 @@ show("lxy", abs(way).'); show("velxy", round(speed).');
 
 
 def octave(script: str, folder: Path) -> dict[str, list[int]]:
-    """What `show` printed, by name."""
+    """Run the script in Octave and return the values that `show` printed, by name."""
     file = folder / "referee.m"
     file.write_text("1;\n" + SHOW + script, encoding="ascii")
     command = [str(OCTAVE), "--norc", "--quiet", "--no-history", str(file)]

@@ -94,7 +94,7 @@ def test_any_stroke_comes_back_to_the_grid(points: list[Point], form: str) -> No
 
 @given(stroke, st.integers(5, 480))
 def test_a_program_written_again_keeps_its_vertices(points: list[Point], counts: int) -> None:
-    """What was read can be written; every vertex of the first program is one of the second."""
+    """A decoded program can be written; every vertex of the first program is in the second."""
     target = router("speed=path")
     points = kept(points)
     if len(points) < 2:

@@ -75,7 +75,7 @@ def three(**changes: float) -> list[Slave]:
 
 
 def test_the_smallest_lines_in_all_directions() -> None:
-    """One and two chunks, there and back: the quirks of the counter show at reversals."""
+    """Lines of one and two chunks, there and back, show the faults of the counter at reversals."""
     for a in (2, 4):
         for v in (480, 150) if a == 2 else (480,):
             orders = [

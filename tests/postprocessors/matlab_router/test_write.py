@@ -174,8 +174,8 @@ def test_feeds_may_be_limited(speed: str) -> None:
     st.sampled_from(["0.2", "0.1"]),
 )
 def test_no_line_runs_away_stops_or_bends(dx: int, dy: int, counts: int, grid: str) -> None:
-    """What the slaves make of any line stays near it: half a chunk, or a chunk where no finer
-    piece can be sent."""
+    """The slaves stay near any line: within half a chunk, or a chunk where no finer piece can be
+    sent."""
     assume(max(dx, dy) > 2)
     target = router(f"grid_mm={grid}", "odd=kept")
     toolpath = strokes([(0.4, 0.4), (0.4 + dx / 10, 0.4 + dy / 10)], feed=counts * 0.46875)
@@ -199,7 +199,7 @@ def test_no_line_runs_away_stops_or_bends(dx: int, dy: int, counts: int, grid: s
 
 @given(st.lists(st.tuples(st.integers(1, 1000), st.integers(1, 1000)), min_size=2, max_size=12))
 def test_speeds_are_those_of_the_listing(half: list[tuple[int, int]]) -> None:
-    """Where no line had to be split, the arrays are the GUI's own for these points."""
+    """Without lines that had to be split, the arrays are those of the GUI for these points."""
     points = [(2 * x, 2 * y) for x, y in half]
     if all(point == points[0] for point in points):
         return

@@ -188,7 +188,7 @@ def test_large_arcs_end_by_every_reading(reading: str, error: str) -> None:
 
 
 def format_block(move: Move) -> str:
-    """One flat move as the block that says it, wherever its arc would end."""
+    """Write a flat move as a block, wherever its arc would end."""
     code = ("G00", "G01", "G02", "G03")[move.kind]
     numbers = [*zip("XY", move.end[:2], strict=True)]
     if move.centre:

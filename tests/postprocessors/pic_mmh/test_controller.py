@@ -26,7 +26,7 @@ MakeMachine = Callable[..., Machine]
 def rows_of(
     toolpath: Toolpath, machine: Machine, options: Options | None = None
 ) -> list[RowMotion]:
-    """What each row did."""
+    """Return the record of each row of the simulation."""
     return motion_rows.rows_of(simulate(toolpath, machine, options))
 
 

@@ -36,7 +36,7 @@ def arcs(draw: st.DrawFn) -> Arc:
 
 
 def found(arc: Arc, form: Form) -> tuple[tuple[int, int], int] | None:
-    """What the compiled search finds."""
+    """Return the result of the compiled search."""
     table = np.array([[*arc.start, *arc.end, *arc.centre, int(arc.clockwise)]], dtype=np.int64)
     sweep = np.array([arc.sweep_rad])
     x, y, iteration = land(

@@ -25,7 +25,7 @@ def consigned(*, answers: bool = False) -> Consignment:
 
 
 def talked(stop_behind: int = 10**9) -> tuple[Conversation, list[tuple[float, bytes]]]:
-    """What went out, and when."""
+    """Return the sent bytes with their times."""
     one = consigned()
     talk = one.wire.conversation(one.packets, LOADED.machine, Manner())
     out, now = list[tuple[float, bytes]](), 0.0
