@@ -98,7 +98,7 @@ class Font(Struct, frozen=True, eq=False):
     foot: float = 0.0
 
 
-class Wanted(Struct, frozen=True):
+class WantedFont(Struct, frozen=True):
     """A font as a drawing names it: a file, or a family in bold or italic letters."""
 
     file: str = ""
@@ -120,7 +120,7 @@ class Wanted(Struct, frozen=True):
 
 
 @lru_cache(maxsize=_CHOICES_KEPT)
-def font_for(wanted: Wanted, mode: str) -> tuple[Font, str]:
+def font_for(wanted: WantedFont, mode: str) -> tuple[Font, str]:
     """The font to draw with, and the wanted one's name when that is not it ("" otherwise).
 
     mode "stroke" draws all with single strokes, "outline" only what a stroke font is wanted for.
@@ -181,7 +181,7 @@ class _Face(Struct, frozen=True, order=True):
     def italic(self) -> bool:
         return any(word in self.style.lower() for word in ("italic", "oblique"))
 
-    def distance(self, wanted: Wanted) -> tuple[bool, int, int, str]:
+    def distance(self, wanted: WantedFont) -> tuple[bool, int, int, str]:
         """Smaller is more alike."""
         weight = _BOLD if wanted.bold else _REGULAR
         unlike = self.italic is not wanted.italic
@@ -200,7 +200,7 @@ def installed_fonts() -> tuple[_Face, ...]:
     return tuple(sorted(f for f in faces if PurePath(f.path).suffix.lower() in _OUTLINES))
 
 
-def _named(wanted: Wanted) -> _Face | None:
+def _named(wanted: WantedFont) -> _Face | None:
     """The installed font of this family or file name."""
     if wanted.family and (found := _of_family(wanted.family, wanted)) is not None:
         return found
@@ -208,12 +208,12 @@ def _named(wanted: Wanted) -> _Face | None:
     return next((f for f in installed_fonts() if PurePath(f.path).name.lower() == name), None)
 
 
-def _of_family(family: str, wanted: Wanted) -> _Face | None:
+def _of_family(family: str, wanted: WantedFont) -> _Face | None:
     faces = [f for f in installed_fonts() if f.family.lower() == family.lower()]
     return min(faces, key=lambda face: face.distance(wanted), default=None)
 
 
-def _substitutes(wanted: Wanted) -> list[_Face]:
+def _substitutes(wanted: WantedFont) -> list[_Face]:
     """Fonts to try in place of the wanted one, the best first."""
     best = [face for name in SUBSTITUTES if (face := _of_family(name, wanted)) is not None]
     others = sorted(installed_fonts(), key=lambda face: face.distance(wanted))
@@ -337,7 +337,7 @@ class Rule(IntFlag):
     OVER = 4
 
 
-class Look(Struct, frozen=True, eq=False):
+class TextLook(Struct, frozen=True, eq=False):
     """How letters look: `height` of a capital, `slant` = tan(oblique angle)."""
 
     font: Font
@@ -366,7 +366,7 @@ class Ink(Struct, eq=False):
     contours: list[tuple[tuple[int, ...], bool]] = field(default_factory=list)
     missing: Counter[str] = field(default_factory=Counter)
 
-    def write(self, text: str, look: Look, at: tuple[float, float]) -> float:
+    def write(self, text: str, look: TextLook, at: tuple[float, float]) -> float:
         """Draw `text` with its baseline's left end at `at`; the x where the next text begins."""
         x, y = at
         across = look.height * look.width_factor
@@ -383,7 +383,7 @@ class Ink(Struct, eq=False):
             x += look.advance(character)
         return x
 
-    def rule(self, look: Look, span: tuple[float, float], baseline: float) -> None:
+    def rule(self, look: TextLook, span: tuple[float, float], baseline: float) -> None:
         """The lines that `look` draws along a text from x to x."""
         shares = {Rule.UNDER: -RULE_DROP, Rule.THROUGH: 0.5, Rule.OVER: 1.0 + RULE_DROP}
         for rule, share in shares.items():
@@ -391,7 +391,7 @@ class Ink(Struct, eq=False):
                 y = baseline + share * look.height
                 self.line(look, (span[0], y), (span[1], y))
 
-    def line(self, look: Look, start: tuple[float, float], end: tuple[float, float]) -> None:
+    def line(self, look: TextLook, start: tuple[float, float], end: tuple[float, float]) -> None:
         """A straight line: one stroke, or a thin bar among outlines."""
         ends = np.array([start, end], dtype=np.float64)
         if not look.font.outlines:

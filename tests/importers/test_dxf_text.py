@@ -19,7 +19,7 @@ from camtool.importers.findings import DrawingCode
 from camtool.importers.options import ReadOptions
 from camtool.importers.pieces import Unusable
 from camtool.importers.read import read_drawing
-from camtool.importers.text import Wanted, font_for
+from camtool.importers.text import WantedFont, font_for
 
 OUTLINE_FONT = "DejaVuSans.ttf"
 
@@ -132,7 +132,7 @@ def test_alignment_moves_the_text_by_its_width_and_height(
 ) -> None:
     text = new_text("Handle", align, rotation=0.0)
     plain = new_text("Handle")
-    font, _ = font_for(Wanted(OUTLINE_FONT), mode)
+    font, _ = font_for(WantedFont(OUTLINE_FONT), mode)
     width = 5.0 * sum(letter.advance for c in "Handle" if (letter := font.letter(c)))
     if isinstance(up, float):
         share = up

@@ -18,7 +18,7 @@ from camtool.importers.findings import DrawingCode
 from camtool.importers.options import TEXT_SKIPPED, ReadOptions
 from camtool.importers.svg import reader
 from camtool.importers.svg.reader import read
-from camtool.importers.text import Look, Wanted, font_for
+from camtool.importers.text import TextLook, WantedFont, font_for
 from tests.importers.test_dxf_text import MODES, OUTLINE_FONT, needs_font
 from tests.oracles.svg_ink import ink
 
@@ -48,8 +48,8 @@ def same(one: Drawing, other: Drawing) -> bool:
 
 def width(words: str, size: float = 10.0, mode: str = "stroke", **looks: bool) -> float:
     """By the font's own advances."""
-    font, _ = font_for(Wanted(family=FAMILY, **looks), mode)
-    return Look(font, size / font.em).width(words)
+    font, _ = font_for(WantedFont(family=FAMILY, **looks), mode)
+    return TextLook(font, size / font.em).width(words)
 
 
 def refused(body: str, mode: str = "stroke") -> list[str]:
@@ -95,7 +95,7 @@ def test_flowed_text_is_counted() -> None:
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("size", [0.7, 10.0, 31.0])
 def test_the_same_text_in_a_dxf(mode: str, size: float) -> None:
-    font, _ = font_for(Wanted(family=FAMILY), mode)
+    font, _ = font_for(WantedFont(family=FAMILY), mode)
     document = ezdxf.new(units=4)
     document.styles.add("plain", font=OUTLINE_FONT)
     document.modelspace().add_text(

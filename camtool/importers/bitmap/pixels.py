@@ -44,7 +44,7 @@ _BROKEN: tuple[type[Exception], ...] = (
 
 
 @dataclass(frozen=True, eq=False)
-class Picture:
+class PixelPicture:
     """The darkness of its pixels, and how many of them the file says are an inch, None where it
     says nothing; `kind`: PNG or JPEG."""
 
@@ -53,7 +53,7 @@ class Picture:
     kind: str
 
 
-def picture(data: bytes, file: str) -> Picture:
+def picture(data: bytes, file: str) -> PixelPicture:
     """The picture in a file; DrawingError where it is broken or too large."""
     from PIL import Image, ImageOps
 
@@ -74,7 +74,7 @@ def picture(data: bytes, file: str) -> Picture:
             ink = _ink(ImageOps.exif_transpose(image))
         except _BROKEN as error:
             raise _broken(file) from error
-    return Picture(ink, _dpi(said), kind)
+    return PixelPicture(ink, _dpi(said), kind)
 
 
 def _ink(image: Any) -> Ink:

@@ -18,8 +18,8 @@ from camtool.geometry.drawing import Drawing, Skipped, Units
 from camtool.importers.assemble import assemble
 from camtool.importers.bitmap.centre import centre_lines
 from camtool.importers.bitmap.outline import crossings, enclosed, outlines
-from camtool.importers.bitmap.pixels import Ink, Picture, is_square, picture
-from camtool.importers.bitmap.strokes import Strokes, strokes
+from camtool.importers.bitmap.pixels import Ink, PixelPicture, is_square, picture
+from camtool.importers.bitmap.strokes import PixelStrokes, strokes
 from camtool.importers.options import ReadOptions
 from camtool.importers.pieces import Piece
 from camtool.units import MM_PER_UNIT
@@ -83,7 +83,7 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
     )
 
 
-def _units(found: Picture, file: str, options: ReadOptions) -> Units:
+def _units(found: PixelPicture, file: str, options: ReadOptions) -> Units:
     """How large a pixel is; DrawingError where nothing, or more than one thing, says it."""
     width = found.ink.shape[1]
     if options.units is not None:
@@ -169,7 +169,7 @@ def _fill(dark: Bools, line: Floats, hole: bool) -> None:
     dark[rows, columns] = hole
 
 
-def _piece(made: Strokes, closed: bool, number: int, trace: str, mm_per_px: float) -> Piece:
+def _piece(made: PixelStrokes, closed: bool, number: int, trace: str, mm_per_px: float) -> Piece:
     vertices = made.vertices * [mm_per_px, mm_per_px, 1.0]
     return Piece(vertices, closed, trace, "", f"{trace} {number}", off_mm=made.off * mm_per_px)
 

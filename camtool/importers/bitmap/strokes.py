@@ -97,7 +97,7 @@ class _Shape(Struct, frozen=True, eq=False):
         return np.asarray((x * self.way[1] - y * self.way[0]) ** 2)
 
 
-class Strokes(Struct, frozen=True, eq=False):
+class PixelStrokes(Struct, frozen=True, eq=False):
     """`vertices` (n, 3) x, y, bulge; of an open path the last one is its end. `off` (n, 2): the
     largest and the rms distance of the points from the segment that leaves each vertex."""
 
@@ -105,7 +105,7 @@ class Strokes(Struct, frozen=True, eq=False):
     off: Floats
 
 
-def strokes(points: Floats, limit: float, *, closed: bool) -> Strokes:
+def strokes(points: Floats, limit: float, *, closed: bool) -> PixelStrokes:
     """Lines and arcs within `limit` of the points (n, 2); an open path keeps its ends, a closed
     one about its area: the limit is less for thinner shapes."""
     if not closed:
@@ -121,7 +121,7 @@ def strokes(points: Floats, limit: float, *, closed: bool) -> Strokes:
             if abs(found - area) <= AREA_SHARE * abs(area):
                 return made
         limit *= 0.5
-    return Strokes(np.column_stack([ring, np.zeros(len(ring))]), np.zeros((len(ring), 2)))
+    return PixelStrokes(np.column_stack([ring, np.zeros(len(ring))]), np.zeros((len(ring), 2)))
 
 
 def _turned(ring: Floats, ends: list[int], limit: float) -> tuple[Floats, list[int]]:
@@ -145,7 +145,7 @@ def _sharpest(points: Floats) -> int:
     return int(straight.argmin())
 
 
-def _circle(points: Floats) -> Strokes | None:
+def _circle(points: Floats) -> PixelStrokes | None:
     """All points as a circle of two halves."""
     found = _centre(points)
     if found is None:
@@ -155,7 +155,7 @@ def _circle(points: Floats) -> Strokes | None:
     turn = 1.0 if enclosed(points) > 0.0 else -1.0
     vertices = np.array([[radius, 0.0, turn], [-radius, 0.0, turn]])
     vertices[:, :2] += centre
-    return Strokes(vertices, np.tile([off.max(), math.sqrt((off**2).mean())], (2, 1)))
+    return PixelStrokes(vertices, np.tile([off.max(), math.sqrt((off**2).mean())], (2, 1)))
 
 
 def _centre(points: Floats) -> tuple[Floats, float] | None:
@@ -278,7 +278,7 @@ def _reach(points: Floats, first: int, limit: float) -> int:
     return good
 
 
-def _joined(points: Floats, ends: list[int], limit: float, *, closed: bool) -> Strokes:
+def _joined(points: Floats, ends: list[int], limit: float, *, closed: bool) -> PixelStrokes:
     """The chain of the shapes of these runs. Where one of them does not suit its points from
     meeting to meeting, it begins and ends where they do."""
     runs = [
@@ -314,7 +314,7 @@ def _joined(points: Floats, ends: list[int], limit: float, *, closed: bool) -> S
     if not closed:
         rows.append([*places[-1], 0.0])
         off.append([0.0, 0.0])
-    return Strokes(np.array(rows), np.array(off))
+    return PixelStrokes(np.array(rows), np.array(off))
 
 
 def _meeting(one: _Shape, other: _Shape, place: Floats, limit: float) -> Floats:

@@ -19,7 +19,7 @@ import numpy as np
 from msgspec import Struct, field
 
 from camtool.arrays import Bools, Floats, Ints
-from camtool.importers.dxf.tags import Frame, Tags
+from camtool.importers.dxf.tags import DxfSections, Tags
 
 LEAST_VERTICES = 32
 """LWPOLYLINEs of fewer vertices are ezdxf's alone."""
@@ -37,7 +37,7 @@ _VERTEX = (10, 20, 40, 41, 42)
 _HATCHES = frozenset(("HATCH", "MPOLYGON"))
 
 
-class Lines(Struct, frozen=True, eq=False):
+class BulkLines(Struct, frozen=True, eq=False):
     """LINEs by columns: `ends` (K, 2, 3) in the units of the file."""
 
     handles: list[str]
@@ -49,7 +49,7 @@ class Bulk(Struct, frozen=True, eq=False):
     the vertices (K, 5) of the LWPOLYLINE of a handle."""
 
     others: Bools
-    lines: Mapping[str, Lines] = field(default_factory=dict)
+    lines: Mapping[str, BulkLines] = field(default_factory=dict)
     vertices: Mapping[str, Floats] = field(default_factory=dict)
 
     @classmethod
@@ -58,7 +58,7 @@ class Bulk(Struct, frozen=True, eq=False):
         return cls(np.ones(len(tags.codes), dtype=np.bool_))
 
     @classmethod
-    def of(cls, tags: Tags, frame: Frame) -> Bulk:
+    def of(cls, tags: Tags, frame: DxfSections) -> Bulk:
         """What the section of entities has in bulk."""
         part = next((each for each in frame.sections if each.name == "ENTITIES"), None)
         if part is None or part.end is None or frame.faults:
@@ -75,7 +75,7 @@ class Bulk(Struct, frozen=True, eq=False):
         found = cls(others, lines, vertices)
         return found if found._is_plain(tags, frame) else cls.none(tags)
 
-    def _is_plain(self, tags: Tags, frame: Frame) -> bool:
+    def _is_plain(self, tags: Tags, frame: DxfSections) -> bool:
         """Whether handles name one entity each, and no hatch refers to a LINE that is left out."""
         followers = {handle for each in self.lines.values() for handle in each.handles}
         names = {*followers, *self.lines, *self.vertices}
@@ -94,7 +94,7 @@ class Bulk(Struct, frozen=True, eq=False):
         return followers.isdisjoint(tags.values(references))
 
 
-def _lines(tags: Tags, marks: Ints, is_line: Bools, others: Bools) -> dict[str, Lines]:
+def _lines(tags: Tags, marks: Ints, is_line: Bools, others: Bools) -> dict[str, BulkLines]:
     """The LINEs that follow another one and say the same, by the handle of the first; their tags
     leave `others`. Entity k stands from marks[k] to marks[k + 1]."""
     sizes = np.diff(marks)
@@ -108,7 +108,7 @@ def _lines(tags: Tags, marks: Ints, is_line: Bools, others: Bools) -> dict[str, 
     for row, first in enumerate(firsts.tolist()):
         codes = tuple(tags.codes[marks[first] : marks[first + 1]].tolist())
         alike.setdefault(codes, []).append(row)
-    found: dict[str, Lines] = {}
+    found: dict[str, BulkLines] = {}
     for codes, of in alike.items():
         if not _is_simple(codes):
             continue
@@ -125,7 +125,7 @@ def _lines(tags: Tags, marks: Ints, is_line: Bools, others: Bools) -> dict[str, 
             tags.values(marks[heads] + at), begins.tolist(), counts.tolist(), strict=True
         ):
             part = slice(begin, begin + count)
-            found[head] = Lines(handles[part], ends[part].reshape(-1, 2, 3))
+            found[head] = BulkLines(handles[part], ends[part].reshape(-1, 2, 3))
         for k in range(len(codes)):
             others[rows + k] = False
     return found

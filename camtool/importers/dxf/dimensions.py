@@ -22,7 +22,7 @@ from camtool.arrays import Floats
 from camtool.geometry.drawing import Callout
 from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.importers.dxf.load import printable
-from camtool.importers.dxf.shapes import Frame, require
+from camtool.importers.dxf.shapes import WorldMap, require
 from camtool.importers.pieces import Unusable
 
 CALLOUTS = frozenset(("DIMENSION", "ARC_DIMENSION", "LARGE_RADIAL_DIMENSION"))
@@ -55,7 +55,7 @@ _VALUES = {
 
 
 def callout(
-    entity: Any, frame: Frame, mm_per_unit: float, *, layer: str, source: str, paper: bool
+    entity: Any, frame: WorldMap, mm_per_unit: float, *, layer: str, source: str, paper: bool
 ) -> Callout:
     """The callout of a DIMENSION in mm; Unusable, with the reason, for what is none.
 

@@ -24,10 +24,10 @@ import numpy as np
 from msgspec import Struct, field
 
 from camtool.errors import DrawingError
-from camtool.importers.dxf.bulk import Bulk, Lines
+from camtool.importers.dxf.bulk import Bulk, BulkLines
 from camtool.importers.dxf.tags import (
     AGAIN,
-    Frame,
+    DxfSections,
     Tags,
     ascii_tags,
     binary_tags,
@@ -59,7 +59,7 @@ class Loaded(Struct, frozen=True):
     document: Any
     header: dict[str, Any] = field(default_factory=dict)
     repairs: tuple[str, ...] = ()
-    lines: Mapping[str, Lines] = field(default_factory=dict)
+    lines: Mapping[str, BulkLines] = field(default_factory=dict)
 
 
 def load(data: bytes, file: str) -> Loaded:
@@ -160,7 +160,7 @@ def _too_large(what: str, most: int, file: str) -> DrawingError:
     )
 
 
-def _check_whole(tags: Tags, frame: Frame, file: str) -> list[str]:
+def _check_whole(tags: Tags, frame: DxfSections, file: str) -> list[str]:
     """A note when the file ends early; DrawingError unless all its entities are there."""
     if not frame.sections:
         raise DrawingError("is no DXF: it has no section", file=file, mend=AGAIN)

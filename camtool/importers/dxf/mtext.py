@@ -19,9 +19,9 @@ from camtool.importers.pieces import Unusable
 from camtool.importers.text import (
     NUMBERED,
     Ink,
-    Look,
     Rule,
-    Wanted,
+    TextLook,
+    WantedFont,
     finite,
     font_for,
     numbered,
@@ -43,7 +43,7 @@ _CODE_ERRORS = (ValueError, TypeError, LookupError, ArithmeticError)
 
 
 def write_mtext(
-    entity: Any, content: str, look: Look, font: tuple[Wanted, str]
+    entity: Any, content: str, look: TextLook, font: tuple[WantedFont, str]
 ) -> tuple[Ink, list[tuple[str, str]]]:
     """The ink of an MTEXT seen from its insertion point, and its fonts (used, wanted or "").
 
@@ -118,10 +118,10 @@ def _columns(entity: Any) -> Columns:
 class _Reader:
     """Tokens to paragraphs; `fonts` collects what was used."""
 
-    def __init__(self, look: Look, font: tuple[Wanted, str]) -> None:
+    def __init__(self, look: TextLook, font: tuple[WantedFont, str]) -> None:
         self._look = look
         self._wanted, self._mode = font
-        self._known: dict[Any, tuple[Look, str]] = {}
+        self._known: dict[Any, tuple[TextLook, str]] = {}
         self.fonts: list[tuple[str, str]] = []
 
     def paragraphs(self, content: str, share: float) -> Iterator[Paragraph]:
@@ -133,7 +133,7 @@ class _Reader:
         start.width_factor = self._look.width_factor
         start.oblique = math.degrees(math.atan(self._look.slant))
         self._first_face = start.font_face
-        cells: list[Cell] = []
+        cells: list[MTextCell] = []
         ended, context = False, start
         breaks = (TokenType.NEW_PARAGRAPH, TokenType.NEW_COLUMN, TokenType.WRAP_AT_DIMLINE)
         for token in MTextParser(_plain(content), start):
@@ -146,20 +146,20 @@ class _Reader:
             look = self._dressed(context)
             if token.type == TokenType.STACK:
                 upper, lower, bar = token.data
-                cells.append(Cell(look, upper, lower, bar, lift=int(context.align)))
+                cells.append(MTextCell(look, upper, lower, bar, lift=int(context.align)))
             elif token.type == TokenType.WORD:
-                cells.append(Cell(look, token.data, lift=int(context.align)))
+                cells.append(MTextCell(look, token.data, lift=int(context.align)))
             elif token.type == TokenType.TABULATOR:
-                cells.append(Cell(look, " ", glue=Glue.TAB))
+                cells.append(MTextCell(look, " ", glue=Glue.TAB))
             elif token.type == TokenType.NBSP:
-                cells.append(Cell(look, " ", glue=Glue.HARD))
+                cells.append(MTextCell(look, " ", glue=Glue.HARD))
             else:
-                cells.append(Cell(look, " ", glue=Glue.SPACE))
+                cells.append(MTextCell(look, " ", glue=Glue.SPACE))
         if cells:
             yield self._paragraph(cells, context, share, False)
 
     def _paragraph(
-        self, cells: list[Cell], context: Any, share: float, ends_column: bool
+        self, cells: list[MTextCell], context: Any, share: float, ends_column: bool
     ) -> Paragraph:
         said = context.paragraph
         align = said.align.name
@@ -183,13 +183,13 @@ class _Reader:
             ends_column=ends_column,
         )
 
-    def _dressed(self, context: Any) -> Look:
+    def _dressed(self, context: Any) -> TextLook:
         """The look that the codes make."""
         key = context.font_face
         if key not in self._known:
             wanted = self._wanted
             if key is not self._first_face:
-                wanted = Wanted("", key.family, key.is_bold, key.is_italic)
+                wanted = WantedFont("", key.family, key.is_bold, key.is_italic)
             font, other = font_for(wanted, self._mode)
             self._known[key] = replace(self._look, font=font), other
             self.fonts.append((font.name, other))
@@ -233,13 +233,13 @@ class Glue(Enum):
     TAB = "tab"
 
 
-class Cell(Struct, frozen=True, eq=False):
+class MTextCell(Struct, frozen=True, eq=False):
     """A word; a stack of two (`bar` "^" no bar, "/" a bar, "#" a slanted one); or glue.
 
     `lift` is 0 on the baseline of the line, 1 in its middle, 2 at its top.
     """
 
-    look: Look
+    look: TextLook
     text: str
     lower: str = ""
     bar: str = ""
@@ -263,7 +263,7 @@ class Paragraph(Struct, frozen=True, eq=False):
     """`share` 0 left, 0.5 centred, 1 right; indents of the first line, the others, the right edge;
     `stops` of tabs (x, share); `blank` is the height of an empty line."""
 
-    cells: tuple[Cell, ...]
+    cells: tuple[MTextCell, ...]
     share: float
     justified: bool
     indents: tuple[float, float, float]
@@ -273,11 +273,11 @@ class Paragraph(Struct, frozen=True, eq=False):
     ends_column: bool
 
 
-class Line(Struct, frozen=True, eq=False):
+class MTextLine(Struct, frozen=True, eq=False):
     """Cells with the x of their left ends; the last one ends at `right`, `margin` stays free after
     it; `stretch` marks a line that is widened to its column."""
 
-    cells: tuple[tuple[float, Cell], ...]
+    cells: tuple[tuple[float, MTextCell], ...]
     height: float
     right: float
     margin: float
@@ -312,15 +312,15 @@ class Placed(Struct, frozen=True, eq=False):
 
     column: int
     baseline: float
-    line: Line
+    line: MTextLine
 
 
-def wrapped(paragraph: Paragraph, width: float) -> Iterator[Line]:
+def wrapped(paragraph: Paragraph, width: float) -> Iterator[MTextLine]:
     """The lines of a paragraph, no wider than `width` where words allow that (0: one line)."""
     left, following, margin = paragraph.indents
     limit = (width - margin) + WRAP_SLACK * width
     x = left
-    placed: list[tuple[float, Cell]] = []
+    placed: list[tuple[float, MTextCell]] = []
     groups = [*_unbreakable(paragraph.cells), ()]
     for group, ahead in pairwise(groups):
         size = sum(cell.width for cell in group)
@@ -341,13 +341,13 @@ def wrapped(paragraph: Paragraph, width: float) -> Iterator[Line]:
     yield replace(last, ends_column=paragraph.ends_column)
 
 
-def _is_word(cell: Cell) -> bool:
+def _is_word(cell: MTextCell) -> bool:
     return cell.glue is Glue.NONE
 
 
-def _unbreakable(cells: Sequence[Cell]) -> Iterator[tuple[Cell, ...]]:
+def _unbreakable(cells: Sequence[MTextCell]) -> Iterator[tuple[MTextCell, ...]]:
     """Runs of words and hard spaces; each space and tab alone."""
-    run: list[Cell] = []
+    run: list[MTextCell] = []
     for cell in cells:
         if cell.glue in (Glue.SPACE, Glue.TAB):
             if run:
@@ -369,8 +369,8 @@ def _tabbed(x: float, ahead: float, paragraph: Paragraph) -> float:
 
 
 def _line(
-    paragraph: Paragraph, placed: list[tuple[float, Cell]], left: float, *, stretch: bool
-) -> Line:
+    paragraph: Paragraph, placed: list[tuple[float, MTextCell]], left: float, *, stretch: bool
+) -> MTextLine:
     """A line without the spaces at its end."""
     count = len(placed)
     while count and placed[count - 1][1].glue is Glue.SPACE:
@@ -378,10 +378,10 @@ def _line(
     cells = tuple(placed[:count])
     height = max((cell.height for _, cell in cells), default=0.0) or paragraph.blank
     right = cells[-1][0] + cells[-1][1].width if cells else left
-    return Line(cells, height, right, paragraph.indents[2], paragraph.share, stretch)
+    return MTextLine(cells, height, right, paragraph.indents[2], paragraph.share, stretch)
 
 
-def stacked(lines: Sequence[Line], columns: Columns, pitch: Pitch) -> list[Placed]:
+def stacked(lines: Sequence[MTextLine], columns: Columns, pitch: Pitch) -> list[Placed]:
     """Lines below each other, in the next column where one is full or ended."""
     placed: list[Placed] = []
     column, start = 0, True
@@ -399,13 +399,13 @@ def stacked(lines: Sequence[Line], columns: Columns, pitch: Pitch) -> list[Place
     return placed
 
 
-def draw(ink: Ink, line: Line, width: float, at: tuple[float, float]) -> None:
+def draw(ink: Ink, line: MTextLine, width: float, at: tuple[float, float]) -> None:
     """A line into its column, whose left edge at the line's baseline is `at`."""
     spare = width - line.margin - line.right
     gaps = sum(cell.glue is Glue.SPACE for _, cell in line.cells)
     widened = spare / gaps if line.stretch and gaps and spare > 0.0 else 0.0
     shift = at[0] + line.share * spare
-    ruled: list[tuple[float, float, Cell]] = []
+    ruled: list[tuple[float, float, MTextCell]] = []
     for x, cell in line.cells:
         start = shift + x
         if cell.glue is Glue.NONE:
@@ -416,10 +416,10 @@ def draw(ink: Ink, line: Line, width: float, at: tuple[float, float]) -> None:
     _rule(ink, ruled, at[1])
 
 
-def _rule(ink: Ink, cells: Sequence[tuple[float, float, Cell]], baseline: float) -> None:
+def _rule(ink: Ink, cells: Sequence[tuple[float, float, MTextCell]], baseline: float) -> None:
     """Underlines and the like, each in one piece along cells that look alike."""
 
-    def manner(placed: tuple[float, float, Cell]) -> tuple[int, float]:
+    def manner(placed: tuple[float, float, MTextCell]) -> tuple[int, float]:
         return int(placed[2].look.rules), placed[2].look.height
 
     for (rules, _), group in groupby(cells, manner):
@@ -428,7 +428,7 @@ def _rule(ink: Ink, cells: Sequence[tuple[float, float, Cell]], baseline: float)
             ink.rule(run[0][2].look, (run[0][0], run[-1][1]), baseline)
 
 
-def _draw_cell(ink: Ink, cell: Cell, at: tuple[float, float]) -> None:
+def _draw_cell(ink: Ink, cell: MTextCell, at: tuple[float, float]) -> None:
     """A word, or the two of a stack and what divides them."""
     x, y = at
     look = cell.look

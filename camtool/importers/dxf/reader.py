@@ -17,7 +17,7 @@ from camtool.findings import Finding, Severity
 from camtool.geometry.drawing import Drawing, Skipped, Units
 from camtool.importers.assemble import assemble, font_findings
 from camtool.importers.dxf.load import load, quiet, without_collector
-from camtool.importers.dxf.walk import Walk
+from camtool.importers.dxf.walk import DxfWalk
 from camtool.importers.findings import (
     CALLOUT_NOT_READ,
     FILE_REPAIRED,
@@ -37,7 +37,7 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
     with without_collector():
         loaded = load(data, file)
         units, findings = units_of(loaded.header, options)
-        walk = Walk(loaded, file, options)
+        walk = DxfWalk(loaded, file, options)
         with quiet():
             walk.space(_space(loaded.document, options.layout, file), units.mm_per_unit)
     repairs = loaded.repairs

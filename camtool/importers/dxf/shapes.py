@@ -88,16 +88,16 @@ class Plane(Struct, frozen=True, eq=False, dict=True):
         return np.asarray(self.origin + local[:, :1] * self.u + local[:, 1:2] * self.v)
 
 
-class Frame(Struct, frozen=True, eq=False):
+class WorldMap(Struct, frozen=True, eq=False):
     """World to mm: p ↦ p @ linear + offset, with linear (3, 3) and offset (3,)."""
 
     linear: Floats
     offset: Floats
     _planes: dict[tuple[float, ...], Plane] = field(default_factory=dict)
 
-    def placed(self, linear: Floats, offset: Floats) -> Frame:
+    def placed(self, linear: Floats, offset: Floats) -> WorldMap:
         """This frame behind another map."""
-        return Frame(linear @ self.linear, offset @ self.linear + self.offset)
+        return WorldMap(linear @ self.linear, offset @ self.linear + self.offset)
 
     def flat(self, points: Floats) -> Floats:
         """Points (n, 3) as (n, 2) mm; Unusable when they rise."""
@@ -136,7 +136,7 @@ class Frame(Struct, frozen=True, eq=False):
         return Plane.of(u, v, self.offset, up)
 
 
-class Shape(Struct, frozen=True, eq=False):
+class DxfShape(Struct, frozen=True, eq=False):
     """`vertices` (n, 3) mm and `off_mm` of a `Piece`; `lacks` names what was not applied."""
 
     vertices: Floats
@@ -145,14 +145,14 @@ class Shape(Struct, frozen=True, eq=False):
     lacks: str = ""
 
     @classmethod
-    def of(cls, fit: Fit) -> Shape:
+    def of(cls, fit: Fit) -> DxfShape:
         """The arcs that stand for a curve."""
         return cls(fit.vertices, False, fit.off_mm)
 
-    def ring(self) -> Shape:
+    def ring(self) -> DxfShape:
         """The same closed, whose last vertex is its first one."""
         off = None if self.off_mm is None else self.off_mm[:-1]
-        return Shape(self.vertices[:-1], True, off, self.lacks)
+        return DxfShape(self.vertices[:-1], True, off, self.lacks)
 
 
 def require(entity: Any, names: tuple[str, ...]) -> None:
@@ -192,11 +192,11 @@ def fitted(curve: Curve, size: Floats, tolerance_mm: float) -> Fit:
 # Lines, circles, arcs, ellipses and polylines.
 
 __all__ = [
-    "Frame",
+    "DxfShape",
     "Plane",
     "Reader",
-    "Shape",
     "Unusable",
+    "WorldMap",
     "arc",
     "bulged",
     "circle",
@@ -216,25 +216,25 @@ WIDTH = "the width of a line (its middle is the path)"
 
 _FRAME_VERTEX = 16  # flag of a vertex that only steers a splined POLYLINE
 
-Reader = Callable[[Any, Frame, float], Sequence[Shape]]
+Reader = Callable[[Any, WorldMap, float], Sequence[DxfShape]]
 """From entity, frame and tolerance (mm). Raises Unusable, and DrawingError (without file and
 place) for numbers that are none."""
 
 
-def line(entity: Any, frame: Frame, _tolerance_mm: float) -> list[Shape]:
+def line(entity: Any, frame: WorldMap, _tolerance_mm: float) -> list[DxfShape]:
     """LINE."""
     require(entity, ("start", "end"))
     ends = numbers([tuple(entity.dxf.start), tuple(entity.dxf.end)])
-    return [Shape(straight(frame.flat(ends)), closed=False)]
+    return [DxfShape(straight(frame.flat(ends)), closed=False)]
 
 
-def circle(entity: Any, frame: Frame, tolerance_mm: float) -> list[Shape]:
+def circle(entity: Any, frame: WorldMap, tolerance_mm: float) -> list[DxfShape]:
     """CIRCLE."""
     require(entity, ("center", "radius"))
     return [_round(entity, frame, tolerance_mm, 0.0, 2.0 * math.pi)]
 
 
-def arc(entity: Any, frame: Frame, tolerance_mm: float) -> list[Shape]:
+def arc(entity: Any, frame: WorldMap, tolerance_mm: float) -> list[DxfShape]:
     """ARC, counter-clockwise from its start."""
     require(entity, ("center", "radius", "start_angle", "end_angle"))
     start, end = numbers((entity.dxf.start_angle, entity.dxf.end_angle)).tolist()
@@ -242,7 +242,9 @@ def arc(entity: Any, frame: Frame, tolerance_mm: float) -> list[Shape]:
     return [_round(entity, frame, tolerance_mm, math.radians(start), math.radians(sweep))]
 
 
-def _round(entity: Any, frame: Frame, tolerance_mm: float, start: float, sweep: float) -> Shape:
+def _round(
+    entity: Any, frame: WorldMap, tolerance_mm: float, start: float, sweep: float
+) -> DxfShape:
     """A circle or an arc."""
     dxf = entity.dxf
     x, y, z, radius = numbers((*dxf.center, dxf.radius)).tolist()
@@ -254,7 +256,7 @@ def _round(entity: Any, frame: Frame, tolerance_mm: float, start: float, sweep: 
 
 def round_in(
     plane: Plane, of: tuple[float, float, float], start: float, sweep: float, tolerance_mm: float
-) -> Shape:
+) -> DxfShape:
     """Circle or arc of a centre and a radius (x, y, r) in a plane; angles in rad, either way."""
     x, y, radius = of
     centre = plane.origin + x * plane.u + y * plane.v
@@ -264,10 +266,10 @@ def round_in(
     closed = abs(sweep) == 2.0 * math.pi
     turn, sweep = plane.turn + plane.sign * start, plane.sign * sweep
     vertices = arc_vertices(centre, plane.scale * radius, turn, sweep)
-    return Shape(vertices[:-1] if closed else vertices, closed)
+    return DxfShape(vertices[:-1] if closed else vertices, closed)
 
 
-def ellipse(entity: Any, frame: Frame, tolerance_mm: float) -> list[Shape]:
+def ellipse(entity: Any, frame: WorldMap, tolerance_mm: float) -> list[DxfShape]:
     """ELLIPSE."""
     require(entity, ("center", "major_axis", "ratio"))
     dxf = entity.dxf
@@ -291,21 +293,21 @@ def whole_turn(sweep: float) -> float:
     return 2.0 * math.pi if nearly else sweep
 
 
-def elliptic(axes: Floats, start: float, sweep: float, tolerance_mm: float) -> Shape:
+def elliptic(axes: Floats, start: float, sweep: float, tolerance_mm: float) -> DxfShape:
     """Centre and half axes (3, 2): circles and arcs of them exactly, ellipses fitted."""
     centre, u, v = axes
     closed = abs(sweep) == 2.0 * math.pi
     plane = Plane.of(np.append(u, 0.0), np.append(v, 0.0), np.append(centre, 0.0))
     if plane.scale:
         turn = plane.turn + plane.sign * start
-        shape = Shape(arc_vertices(centre, plane.scale, turn, plane.sign * sweep), False)
+        shape = DxfShape(arc_vertices(centre, plane.scale, turn, plane.sign * sweep), False)
     else:
         curve = EllipseCurve(centre, u, v, start, start + sweep)
-        shape = Shape.of(fitted(curve, axes, tolerance_mm))
+        shape = DxfShape.of(fitted(curve, axes, tolerance_mm))
     return shape.ring() if closed else shape
 
 
-def lwpolyline(entity: Any, frame: Frame, tolerance_mm: float) -> list[Shape]:
+def lwpolyline(entity: Any, frame: WorldMap, tolerance_mm: float) -> list[DxfShape]:
     """LWPOLYLINE."""
     dxf = entity.dxf
     rows = numbers(entity.lwpoints.values).reshape(-1, 5)
@@ -315,7 +317,7 @@ def lwpolyline(entity: Any, frame: Frame, tolerance_mm: float) -> list[Shape]:
     return [_with_width(shape) if wide else shape]
 
 
-def polyline(entity: Any, frame: Frame, tolerance_mm: float) -> list[Shape]:
+def polyline(entity: Any, frame: WorldMap, tolerance_mm: float) -> list[DxfShape]:
     """POLYLINE of one line, flat or in space."""
     if entity.get_mode() not in ("AcDb2dPolyline", "AcDb3dPolyline"):
         raise Unusable("is a mesh")
@@ -327,7 +329,7 @@ def polyline(entity: Any, frame: Frame, tolerance_mm: float) -> list[Shape]:
         raise Unusable("has no vertices")
     closed = bool(entity.is_closed)
     if entity.get_mode() == "AcDb3dPolyline":
-        return [Shape(straight(frame.flat(points)), closed)]
+        return [DxfShape(straight(frame.flat(points)), closed)]
     bulges = numbers([corner.get("bulge", 0.0) for corner in corners])
     elevation = float(points[0, 2])
     if entity.dxf.hasattr("elevation"):
@@ -339,11 +341,11 @@ def polyline(entity: Any, frame: Frame, tolerance_mm: float) -> list[Shape]:
     return [_with_width(shape) if any(widths) else shape]
 
 
-def _with_width(shape: Shape) -> Shape:
+def _with_width(shape: DxfShape) -> DxfShape:
     return replace(shape, lacks=WIDTH)
 
 
-def bulged(local: Floats, closed: bool, plane: Plane, tolerance_mm: float) -> Shape:
+def bulged(local: Floats, closed: bool, plane: Plane, tolerance_mm: float) -> DxfShape:
     """A polyline (n, 3) of x, y, bulge in its own plane: exact, or its arcs fitted where the plane
     squeezes circles."""
     if len(local) == 0:
@@ -352,7 +354,7 @@ def bulged(local: Floats, closed: bool, plane: Plane, tolerance_mm: float) -> Sh
     rows[:, :2] = plane.points(local)
     rows[:, 2] = plane.sign * local[:, 2]
     if plane.scale or not local[:, 2].any():
-        return Shape(split_bulges(rows, closed), closed)
+        return DxfShape(split_bulges(rows, closed), closed)
     following = np.roll(local, -1, axis=0)[:, :2]
     arcs = Segments.between(local[:, :2], following, local[:, 2])
     is_arc = arcs.is_arc & (local[:, :2] != following).any(axis=1)
@@ -372,7 +374,7 @@ def bulged(local: Floats, closed: bool, plane: Plane, tolerance_mm: float) -> Sh
         else:
             parts.append(np.array([[row[0], row[1], 0.0]]))
             off.append(np.zeros((1, 2)))
-    return Shape(np.concatenate(parts), closed, np.concatenate(off))
+    return DxfShape(np.concatenate(parts), closed, np.concatenate(off))
 
 
 # Splines, helices and the outlines of text.
@@ -386,7 +388,7 @@ MAX_DEGREE = 25
 _LINE_POINTS = 2  # a Bézier of two control points is a line
 
 
-def spline(entity: Any, frame: Frame, tolerance_mm: float) -> list[Shape]:
+def spline(entity: Any, frame: WorldMap, tolerance_mm: float) -> list[DxfShape]:
     """SPLINE, and HELIX when it does not rise."""
     control = numbers([tuple(point) for point in entity.control_points]).reshape(-1, 3)
     if len(control):
@@ -430,7 +432,7 @@ def through(
 
 def spline_of(
     degree: int, knots: Floats, control: Floats, weights: Floats, tolerance_mm: float
-) -> Shape:
+) -> DxfShape:
     """The spline of control points (n, 2) mm; no `weights` are equal ones. Unusable when these
     do not belong together."""
     if degree > MAX_DEGREE:
@@ -441,13 +443,13 @@ def spline_of(
         curve = SplineCurve(degree, knots, control, weights if len(weights) else None)
     except GeometryError as error:
         raise Unusable(f"has no curve: {error.message}") from error
-    shape = Shape.of(fitted(curve, control, tolerance_mm))
+    shape = DxfShape.of(fitted(curve, control, tolerance_mm))
     ends = shape.vertices[[0, -1], :2]
     closed = len(shape.vertices) > 2 and math.dist(*ends) <= POSITION_EPS_MM
     return shape.ring() if closed else shape
 
 
-def outline(parts: list[Floats], closed: bool, frame: Frame, tolerance_mm: float) -> Shape:
+def outline(parts: list[Floats], closed: bool, frame: WorldMap, tolerance_mm: float) -> DxfShape:
     """Béziers of 2 (a line), 3 or 4 control points (k, 3) in world coordinates, end to end."""
     vertices: list[Floats] = []
     off: list[Floats] = []
@@ -464,7 +466,7 @@ def outline(parts: list[Floats], closed: bool, frame: Frame, tolerance_mm: float
         off.append(fit.off_mm[:count])
     vertices.append(straight(flat[-1:]))
     off.append(np.zeros((1, 2)))
-    return Shape(np.concatenate(vertices), closed, np.concatenate(off))
+    return DxfShape(np.concatenate(vertices), closed, np.concatenate(off))
 
 
 # The outlines of areas: HATCH, MPOLYGON, SOLID, TRACE and 3DFACE.
@@ -474,7 +476,7 @@ _CORNERS = ("vtx0", "vtx1", "vtx2", "vtx3")
 _DRAWN_ORDER = (0, 1, 3, 2)  # SOLID and TRACE keep their corners in the order of the letter Z
 
 
-def hatch(entity: Any, frame: Frame, tolerance_mm: float) -> list[Shape]:
+def hatch(entity: Any, frame: WorldMap, tolerance_mm: float) -> list[DxfShape]:
     """The boundary paths of HATCH and MPOLYGON; edges of one path come as paths of their own.
 
     A boundary that follows other entities of the drawing is left to them.
@@ -487,7 +489,7 @@ def hatch(entity: Any, frame: Frame, tolerance_mm: float) -> list[Shape]:
     own = [path for path in paths if not _follows(path, entity)]
     if not own:
         raise Unusable("has the outline of other entities, which are read")
-    shapes: list[Shape] = []
+    shapes: list[DxfShape] = []
     for path in own:
         if hasattr(path, "edges"):
             shapes.extend(_edge(edge, plane, tolerance_mm) for edge in path.edges)
@@ -512,12 +514,12 @@ def _stands_beside(source: Any, entity: Any) -> bool:
     return source is not None and source.dxf.get("owner") == entity.dxf.get("owner")
 
 
-def _edge(edge: Any, plane: Plane, tolerance_mm: float) -> Shape:
+def _edge(edge: Any, plane: Plane, tolerance_mm: float) -> DxfShape:
     """One edge of a boundary: line, arc, ellipse or spline."""
     kind = edge.type.name
     if kind == "LINE":
         ends = numbers([tuple(edge.start)[:2], tuple(edge.end)[:2]])
-        return Shape(straight(plane.points(ends)), closed=False)
+        return DxfShape(straight(plane.points(ends)), closed=False)
     if kind == "SPLINE":
         return _spline_edge(edge, plane, tolerance_mm)
     x, y = numbers(edge.center).tolist()[:2]
@@ -534,7 +536,7 @@ def _edge(edge: Any, plane: Plane, tolerance_mm: float) -> Shape:
     return elliptic(axes, start, whole_turn(end - start), tolerance_mm)
 
 
-def _spline_edge(edge: Any, plane: Plane, tolerance_mm: float) -> Shape:
+def _spline_edge(edge: Any, plane: Plane, tolerance_mm: float) -> DxfShape:
     """A spline edge by its control points, or through its fit points."""
     control = numbers([tuple(point)[:2] for point in edge.control_points]).reshape(-1, 2)
     weights = numbers([*edge.weights])
@@ -549,7 +551,7 @@ def _spline_edge(edge: Any, plane: Plane, tolerance_mm: float) -> Shape:
     return spline_of(degree, knots, plane.points(control), weights, tolerance_mm)
 
 
-def solid(entity: Any, frame: Frame, _tolerance_mm: float) -> list[Shape]:
+def solid(entity: Any, frame: WorldMap, _tolerance_mm: float) -> list[DxfShape]:
     """SOLID and TRACE: the outline as it is filled, crossed over when its corners are."""
     require(entity, _CORNERS[:3])
     named = [name for name in _CORNERS if entity.dxf.hasattr(name)]
@@ -558,20 +560,20 @@ def solid(entity: Any, frame: Frame, _tolerance_mm: float) -> list[Shape]:
     is_triangle = len(corners) < len(_CORNERS) or (corners[2] == corners[3]).all()
     local = corners[:3] if is_triangle else corners[list(_DRAWN_ORDER)]
     plane = frame.plane(entity.dxf.extrusion, float(corners[0, 2]))
-    return [Shape(straight(plane.points(local)), closed=True)]
+    return [DxfShape(straight(plane.points(local)), closed=True)]
 
 
-def face(entity: Any, frame: Frame, _tolerance_mm: float) -> list[Shape]:
+def face(entity: Any, frame: WorldMap, _tolerance_mm: float) -> list[DxfShape]:
     """3DFACE that is flat: its outline, or those of its edges that are not hidden."""
     require(entity, _CORNERS[:3])
     named = [name for name in _CORNERS if entity.dxf.hasattr(name)]
     corners = frame.flat(numbers([tuple(entity.dxf.get(name)) for name in named]))
     hidden = int(entity.dxf.get("invisible_edges", 0))
     if not hidden:
-        return [Shape(straight(corners), closed=True)]
+        return [DxfShape(straight(corners), closed=True)]
     edges = list(pairwise([*corners, corners[0]]))
     # The last two corners of a triangle are one, and the edge between them is none.
     shown = [edge for k, edge in enumerate(edges) if not hidden >> k & 1 and np.ptp(edge, 0).any()]
     if not shown:
         raise Unusable("has no edge that is shown")
-    return [Shape(straight(np.array(edge)), closed=False) for edge in shown]
+    return [DxfShape(straight(np.array(edge)), closed=False) for edge in shown]

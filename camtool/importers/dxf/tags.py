@@ -199,7 +199,7 @@ class Section(Struct, frozen=True):
     end: int | None
 
 
-class Frame(Struct, frozen=True):
+class DxfSections(Struct, frozen=True):
     """The sections, the index of the end mark (None when it is missing), and what is wrong."""
 
     sections: tuple[Section, ...]
@@ -261,7 +261,7 @@ def ascii_tags(data: bytes, file: str) -> Tags:
     return tags
 
 
-def frame_of(tags: Tags) -> Frame:
+def frame_of(tags: Tags) -> DxfSections:
     """Sections and end mark, and faults of their order."""
     sections: list[Section] = []
     faults: list[str] = []
@@ -288,10 +288,10 @@ def frame_of(tags: Tags) -> Frame:
     if begin is not None:
         faults.append(f"section {name} has no end (ENDSEC)")
         sections.append(Section(name, begin, None))
-    return Frame(tuple(sections), eof, (*faults, *_wrong_names(tags, sections)))
+    return DxfSections(tuple(sections), eof, (*faults, *_wrong_names(tags, sections)))
 
 
-def lost(tags: Tags, frame: Frame) -> list[str]:
+def lost(tags: Tags, frame: DxfSections) -> list[str]:
     """What a damaged group code hides that is itself a group code, in words.
 
     An entity that has two layers is two entities, the mark (0) of one being damaged.
@@ -323,7 +323,7 @@ def _lost_vertices(tags: Tags) -> list[str]:
     return found
 
 
-def header_of(tags: Tags, frame: Frame) -> dict[str, Any]:
+def header_of(tags: Tags, frame: DxfSections) -> dict[str, Any]:
     """The variables of the header that the file itself says, each with its first value."""
     found: dict[str, Any] = {}
     for section in frame.sections:

@@ -25,9 +25,9 @@ from camtool.importers.text import (
     MAX_CHARACTERS,
     NUMBERED,
     Ink,
-    Look,
     Rule,
-    Wanted,
+    TextLook,
+    WantedFont,
     finite,
     font_for,
     lacking,
@@ -45,7 +45,7 @@ _BACKWARD, _UPSIDE_DOWN = 2, 4
 _STACKED_LETTERS = 4
 
 
-class Contour(Struct, frozen=True, eq=False):
+class TextContour(Struct, frozen=True, eq=False):
     """Parts (k, 3) of control points, k = 2 (line), 3 (quadratic) or 4 (cubic), end to end."""
 
     parts: list[Floats]
@@ -59,7 +59,7 @@ class TextShape(Struct, frozen=True, eq=False):
     ("" otherwise); `missing` holds each character that the font lacks, as often as it occurs.
     """
 
-    contours: list[Contour]
+    contours: list[TextContour]
     font: str
     substituted: str
     missing: str
@@ -93,7 +93,7 @@ class _Place(Struct, frozen=True, eq=False):
     u: Floats
     v: Floats
 
-    def contours(self, ink: Ink) -> list[Contour]:
+    def contours(self, ink: Ink) -> list[TextContour]:
         if not ink.points:
             return []
         points = np.concatenate(ink.points) @ np.array([self.u, self.v]) + self.origin
@@ -101,7 +101,7 @@ class _Place(Struct, frozen=True, eq=False):
         for counts, closed in ink.contours:
             ends = list(accumulate(counts, initial=at))
             parts = [points[start:end] for start, end in pairwise(ends)]
-            contours.append(Contour(parts, closed))
+            contours.append(TextContour(parts, closed))
             at = ends[-1]
         return contours
 
@@ -117,7 +117,7 @@ def _text(entity: Any, mode: str) -> TextShape:
         raise Unusable("has its letters one below the other")
     font, substituted = font_for(_wanted(style), mode)
     height, factor, oblique = finite(dxf.height, dxf.width, dxf.oblique)
-    look = Look(font, height, factor, slant(oblique))
+    look = TextLook(font, height, factor, slant(oblique))
     width = sum(look.width(run) for run, _ in runs)
     if not (width > 0.0 and height > 0.0):
         raise Unusable("has no size")
@@ -191,7 +191,7 @@ def _place(entity: Any, width: float) -> tuple[_Place, tuple[float, float]]:
     return _Place(origin, u, v), stretch
 
 
-def _start(entity: Any, look: Look, width: float) -> tuple[float, float]:
+def _start(entity: Any, look: TextLook, width: float) -> tuple[float, float]:
     """Where the baseline begins, seen from the alignment point."""
     halign, valign = int(entity.dxf.halign), int(entity.dxf.valign)
     depth = look.font.descent
@@ -221,7 +221,7 @@ def _mtext(entity: Any, document: Any, mode: str) -> TextShape:
         raise Unusable("has no size")
     wanted = _wanted(style)
     font, _ = font_for(wanted, mode)
-    look = Look(font, height, factor, slant(oblique))
+    look = TextLook(font, height, factor, slant(oblique))
     ink, fonts = write_mtext(entity, content, look, (wanted, mode))
     names = dict.fromkeys(name for name, _ in fonts)
     others = dict.fromkeys(other for _, other in fonts if other)
@@ -263,9 +263,9 @@ def _style(entity: Any, document: Any) -> Any:
     return document.styles.get(name) if document.styles.has_entry(name) else None
 
 
-def _wanted(style: Any) -> Wanted:
+def _wanted(style: Any) -> WantedFont:
     """The font that a text style names."""
     if style is None:
-        return Wanted()
+        return WantedFont()
     family, italic, bold = style.get_extended_font_data()
-    return Wanted(str(style.dxf.font), str(family), bool(bold), bool(italic))
+    return WantedFont(str(style.dxf.font), str(family), bool(bold), bool(italic))

@@ -19,13 +19,13 @@ from msgspec import Struct
 from camtool.arrays import Floats
 from camtool.errors import DrawingError
 from camtool.geometry.drawing import Callout, Mark
-from camtool.importers.dxf.bulk import Lines
+from camtool.importers.dxf.bulk import BulkLines
 from camtool.importers.dxf.dimensions import CALLOUTS, callout
 from camtool.importers.dxf.load import Loaded, printable
 from camtool.importers.dxf.shapes import (
-    Frame,
+    DxfShape,
     Reader,
-    Shape,
+    WorldMap,
     arc,
     circle,
     ellipse,
@@ -48,22 +48,22 @@ MAX_NESTING = 50
 """Largest depth of blocks within blocks."""
 
 _NOWHERE = Piece(np.zeros((0, 3)), False, "", "", "")
-_NO_LINES = Lines([], np.zeros((0, 2, 3)))
+_NO_LINES = BulkLines([], np.zeros((0, 2, 3)))
 
 
-class Scope(Struct, frozen=True, eq=False):
+class DxfScope(Struct, frozen=True, eq=False):
     """What holds in a space or inside an INSERT: `blocks` on the way here, and the `look` of the
     INSERT; `within` ends sources, `source` (of a dimension and the like) stands for them."""
 
-    frame: Frame
-    look: Look | None = None
+    frame: WorldMap
+    look: DxfLook | None = None
     blocks: tuple[str, ...] = ()
     within: str = ""
     source: str = ""
 
 
 @dataclass(eq=False)
-class Walk:
+class DxfWalk:
     """Visits entities and collects what they give."""
 
     loaded: Loaded
@@ -83,12 +83,12 @@ class Walk:
         self._visited = 0
         self._mm_per_unit = 1.0
         self._sizes = BlockSizes(self.loaded.document.blocks)
-        self._looks = Looks.of(self.loaded.document)
+        self._looks = DxfLooks.of(self.loaded.document)
 
     def space(self, space: Any, mm_per_unit: float) -> None:
         """All entities of a space; what other layouts hold is counted."""
         self._mm_per_unit = mm_per_unit
-        self._entities(space, Scope(Frame(mm_per_unit * np.eye(3), np.zeros(3))))
+        self._entities(space, DxfScope(WorldMap(mm_per_unit * np.eye(3), np.zeros(3))))
         self.pieces = [piece for piece in self.pieces if piece is not _NOWHERE]
         for layout in self.loaded.document.layouts:
             if layout.layout_key != space.layout_key:
@@ -98,8 +98,8 @@ class Walk:
                     where = "model space" if layout.is_modelspace else "paper space"
                     self.skipped["entity", f"is in {where}"] += count
 
-    def _entities(self, entities: Iterable[Any], scope: Scope) -> None:
-        lines: list[tuple[int, Any, Look]] = []
+    def _entities(self, entities: Iterable[Any], scope: DxfScope) -> None:
+        lines: list[tuple[int, Any, DxfLook]] = []
         for entity in entities:
             kind, said = entity.dxftype(), vars(entity.dxf)
             look = self._looks.of_entity(said, scope.look)
@@ -120,7 +120,7 @@ class Walk:
         if lines:
             self._lines(lines, scope)
 
-    def _check_shown(self, kind: str, said: dict[str, Any], look: Look) -> None:
+    def _check_shown(self, kind: str, said: dict[str, Any], look: DxfLook) -> None:
         """Unusable when the entity does not show."""
         # An INSERT on a layer that is off still shows what its block has on other layers.
         if look.hidden and (kind != "INSERT" or look.frozen):
@@ -128,7 +128,7 @@ class Walk:
         if said.get("invisible"):
             raise Unusable("is invisible")
 
-    def _entity(self, entity: Any, scope: Scope, look: Look) -> None:
+    def _entity(self, entity: Any, scope: DxfScope, look: DxfLook) -> None:
         """Any entity but a LINE."""
         kind = entity.dxftype()
         if kind in CALLOUTS and not scope.source:
@@ -149,7 +149,7 @@ class Walk:
         else:
             raise Unusable(WHY_UNUSED.get(kind, OTHER))
 
-    def _following(self, entity: Any) -> Lines:
+    def _following(self, entity: Any) -> BulkLines:
         """The LINEs that follow this entity and are no entities of the document."""
         return self.loaded.lines.get(entity.dxf.handle, _NO_LINES)
 
@@ -157,7 +157,7 @@ class Walk:
         """The entity and those that follow it."""
         return 1 + len(self._following(entity).handles)
 
-    def _lines(self, lines: list[tuple[int, Any, Look]], scope: Scope) -> None:
+    def _lines(self, lines: list[tuple[int, Any, DxfLook]], scope: DxfScope) -> None:
         """All LINEs of a scope, each into the place that was kept for it."""
         following = [self._following(entity) for _, entity, _ in lines]
         counts = np.array([1 + len(more.handles) for more in following])
@@ -199,7 +199,9 @@ class Walk:
         if is_flat.any() and not scope.source:
             self.used["LINE"] += int(is_flat.sum())
 
-    def _take(self, shapes: Iterable[Shape], entity: Any, scope: Scope, look: Look) -> None:
+    def _take(
+        self, shapes: Iterable[DxfShape], entity: Any, scope: DxfScope, look: DxfLook
+    ) -> None:
         """The paths of an entity."""
         source = _source(entity, scope)
         for shape in shapes:
@@ -218,7 +220,7 @@ class Walk:
                 self.lacking[entity.dxftype(), shape.lacks] += 1
         self._use(entity, scope)
 
-    def _point(self, entity: Any, scope: Scope, look: Look) -> None:
+    def _point(self, entity: Any, scope: DxfScope, look: DxfLook) -> None:
         """A POINT, wherever high."""
         require(entity, ("location",))
         place = numbers(entity.dxf.location) @ scope.frame.linear + scope.frame.offset
@@ -227,7 +229,7 @@ class Walk:
         self.marks.append(Mark(at_mm, look.layer, look.colour, source, look.line_type))
         self._use(entity, scope)
 
-    def _text(self, entity: Any, scope: Scope, look: Look) -> None:
+    def _text(self, entity: Any, scope: DxfScope, look: DxfLook) -> None:
         """Text, when it is wanted; the template of an attribute shows only outside of blocks."""
         kind = entity.dxftype()
         if kind == "ATTDEF" and scope.blocks and not entity.is_const:
@@ -240,7 +242,7 @@ class Walk:
         if lacks:
             self.fonts[lacks] += 1
 
-    def _callout(self, entity: Any, scope: Scope, look: Look) -> None:
+    def _callout(self, entity: Any, scope: DxfScope, look: DxfLook) -> None:
         """What a dimension says, whether its lines are read or not."""
         source, paper = _source(entity, scope), self.options.layout is not None
         unit_mm = self._mm_per_unit
@@ -253,7 +255,7 @@ class Walk:
         else:
             self.callouts.append(said)
 
-    def _parts(self, entity: Any, scope: Scope, look: Look) -> None:
+    def _parts(self, entity: Any, scope: DxfScope, look: DxfLook) -> None:
         """What a dimension, a multiple line or a proxy is drawn with."""
         # A dimension is drawn by a block of its own, which may hold it again.
         drawn = vars(entity.dxf).get("geometry")
@@ -266,7 +268,7 @@ class Walk:
         )
         self._entities(parts, inner)
 
-    def _insert(self, insert: Any, scope: Scope, look: Look) -> None:
+    def _insert(self, insert: Any, scope: DxfScope, look: DxfLook) -> None:
         """The block of an INSERT at each place of its array, and its attributes."""
         require(insert, ("name", "insert"))
         block = insert.block()
@@ -290,7 +292,7 @@ class Walk:
             self._entities(block, replace(inner, frame=frame))
         self._entities(insert.attribs, scope)
 
-    def _count(self, insert: Any, scope: Scope) -> None:
+    def _count(self, insert: Any, scope: DxfScope) -> None:
         """DrawingError before the blocks of a space become too many."""
         if not scope.blocks:
             self._inserted += self._sizes.inserted(insert)
@@ -303,21 +305,21 @@ class Walk:
         if self._visited > MAX_INSERTED:
             raise _too_many()
 
-    def _use(self, entity: Any, scope: Scope) -> None:
+    def _use(self, entity: Any, scope: DxfScope) -> None:
         if not scope.source:
             self.used[entity.dxftype()] += 1
 
     def _skip(self, kind: str, reason: Unusable, count: int = 1) -> None:
         self.skipped[kind, printable(str(reason))] += count
 
-    def _placed(self, error: DrawingError, entity: Any, look: Look) -> DrawingError:
+    def _placed(self, error: DrawingError, entity: Any, look: DxfLook) -> DrawingError:
         """The error with file and place."""
         error.file = error.file or self.file
         error.where = error.where or f"layer {look.layer}, {_source(entity, None)}"
         return error
 
 
-def _check_nesting(name: str, scope: Scope) -> None:
+def _check_nesting(name: str, scope: DxfScope) -> None:
     """Unusable for a block that holds itself."""
     if name in scope.blocks or len(scope.blocks) >= MAX_NESTING:
         raise Unusable("its block holds itself, or blocks too deep")
@@ -330,7 +332,7 @@ def _too_many() -> DrawingError:
     )
 
 
-def _source(entity: Any, scope: Scope | None) -> str:
+def _source(entity: Any, scope: DxfScope | None) -> str:
     if scope is not None and scope.source:
         return scope.source
     return f"{entity.dxftype()} {entity.dxf.handle}{scope.within if scope is not None else ''}"
@@ -434,8 +436,8 @@ def _virtual(entity: Any) -> Iterable[Any]:
 
 
 def text_shapes(
-    entity: Any, frame: Frame, tolerance_mm: float, mode: str
-) -> tuple[list[Shape], str]:
+    entity: Any, frame: WorldMap, tolerance_mm: float, mode: str
+) -> tuple[list[DxfShape], str]:
     """The lines of a text in mm, and what was wanted and could not be had ("" otherwise)."""
     from camtool.importers.dxf.text import text_strokes
 
@@ -537,7 +539,7 @@ CONTINUOUS = "Continuous"
 _BYBLOCK, _BYLAYER, _WHITE = 0, 256, 7
 
 
-class Look(Struct, frozen=True):
+class DxfLook(Struct, frozen=True):
     """What an entity is drawn with; `hidden` says why it is not shown ("" shown).
 
     `frozen`: an INSERT on its layer shows nothing at all; on one that is merely off it still
@@ -551,34 +553,34 @@ class Look(Struct, frozen=True):
     frozen: bool = False
 
 
-class Looks(Struct):
+class DxfLooks(Struct):
     """The looks of all entities of a document, by what these say of themselves."""
 
-    layers: dict[str, Look]
-    _known: dict[tuple[Any, ...], Look] = msgspec.field(default_factory=dict)
+    layers: dict[str, DxfLook]
+    _known: dict[tuple[Any, ...], DxfLook] = msgspec.field(default_factory=dict)
 
     @classmethod
-    def of(cls, document: Any) -> Looks:
+    def of(cls, document: Any) -> DxfLooks:
         """With the layers of the document's table."""
         return cls({block_key(layer.dxf.name): _layer(layer) for layer in document.layers})
 
-    def of_entity(self, said: dict[str, Any], block: Look | None) -> Look:
+    def of_entity(self, said: dict[str, Any], block: DxfLook | None) -> DxfLook:
         """The look of an entity that says these attributes, in a block placed with `block`."""
         wanted = tuple(said.get(name) for name in ("layer", "color", "true_color", "linetype"))
         key = (*wanted, block)
         look = self._known.get(key)
         if look is None:
-            look = self._known[key] = self._resolved(said, block or Look(), block is not None)
+            look = self._known[key] = self._resolved(said, block or DxfLook(), block is not None)
         return look
 
-    def _resolved(self, said: dict[str, Any], block: Look, inside: bool) -> Look:
+    def _resolved(self, said: dict[str, Any], block: DxfLook, inside: bool) -> DxfLook:
         name = printable(str(said.get("layer") or "0"))
         if inside and name == "0":
             name = block.layer
-        on = self.layers.get(block_key(name), Look(name))
+        on = self.layers.get(block_key(name), DxfLook(name))
         line_type = printable(str(said.get("linetype") or "BYLAYER"))
         by = {"BYLAYER": on.line_type, "BYBLOCK": block.line_type}
-        return Look(
+        return DxfLook(
             on.layer,
             _colour(said.get("color"), said.get("true_color"), on.colour, block.colour),
             by.get(line_type.upper(), line_type),
@@ -587,12 +589,12 @@ class Looks(Struct):
         )
 
 
-def _layer(layer: Any) -> Look:
+def _layer(layer: Any) -> DxfLook:
     """The look that a layer gives."""
     said = vars(layer.dxf)
     name, frozen = printable(str(layer.dxf.name)), bool(layer.is_frozen())
     state = "frozen" if frozen else "off" if layer.is_off() else ""
-    return Look(
+    return DxfLook(
         name,
         _colour(said.get("color"), said.get("true_color"), FOREGROUND, FOREGROUND),
         printable(str(said.get("linetype", CONTINUOUS))),

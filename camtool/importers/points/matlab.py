@@ -26,7 +26,7 @@ from msgspec import Struct
 
 from camtool.arrays import Floats
 from camtool.errors import DrawingError
-from camtool.importers.points.tables import Stroke, Table
+from camtool.importers.points.tables import PointTable, Stroke
 
 MM_PER_UNIT = 0.1
 """The router counts in tenths of a millimetre (thesis L3202)."""
@@ -48,11 +48,11 @@ def is_matlab(text: str, file: str) -> bool:
     return _START.search(text) is not None or PurePath(file).suffix.lower() == ".m"
 
 
-def parse_matlab(text: str, file: str) -> Table:
+def parse_matlab(text: str, file: str) -> PointTable:
     """The router's one stroke; DrawingError naming the line."""
     values = assigned(text, file, _NAMES)
     points, line = _Job(file, values).points()
-    return Table(
+    return PointTable(
         [Stroke(points, f"at line {line}")],
         "0.1 mm",
         MM_PER_UNIT,
@@ -63,7 +63,7 @@ def parse_matlab(text: str, file: str) -> Table:
 class _Job:
     """What the arrays say together."""
 
-    def __init__(self, file: str, values: dict[str, Value]) -> None:
+    def __init__(self, file: str, values: dict[str, MatlabArray]) -> None:
         self.file = file
         self.values = values
         self.sideways = self._is_sideways()
@@ -88,7 +88,7 @@ class _Job:
 
     def _is_sideways(self) -> bool:
         """Whether pairs stand as (n, 2); a (2, 2) is as the others, else as the router has it."""
-        votes: dict[bool, Value] = {}
+        votes: dict[bool, MatlabArray] = {}
         for name in _PAIRS:
             value = self.values.get(name)
             if value is None or value.array.shape == (2, 2):
@@ -179,7 +179,7 @@ class _Job:
                 self.values["size_of_array"],
             )
 
-    def _fail(self, message: str, value: Value) -> NoReturn:
+    def _fail(self, message: str, value: MatlabArray) -> NoReturn:
         self._fail_at(message, value.line)
 
     def _fail_at(self, message: str, line: int, mend: str = "") -> NoReturn:
@@ -210,7 +210,7 @@ _BLOCK = re.compile(r"^[ \t]*[%#]\{[ \t\r]*$.*?(?:^[ \t]*[%#]\}[ \t\r]*$|\Z)", r
 _ONLY_NUMBERS = "camtool reads numbers only and runs nothing: write the arrays as plain numbers"
 
 
-class Value(Struct, frozen=True, eq=False):
+class MatlabArray(Struct, frozen=True, eq=False):
     """An array (rows, columns) and the line on which it is assigned."""
 
     array: Floats
@@ -240,7 +240,7 @@ def _tokens(text: str) -> Iterator[_Token]:
     yield _Token("end", "", line, True)
 
 
-def assigned(text: str, file: str, names: tuple[str, ...]) -> dict[str, Value]:
+def assigned(text: str, file: str, names: tuple[str, ...]) -> dict[str, MatlabArray]:
     """Every assigned array by its name; DrawingError with its line for all that is no number."""
     return _Parser(file, text, names).values()
 
@@ -254,9 +254,9 @@ class _Parser:
         self._rest = _tokens(text)
         self._now = next(self._rest)
 
-    def values(self) -> dict[str, Value]:
+    def values(self) -> dict[str, MatlabArray]:
         """Every assigned array by its name."""
-        found: dict[str, Value] = {}
+        found: dict[str, MatlabArray] = {}
         while self._now.kind != "end":
             token = self._take()
             if token.text in ("\n", ";", ","):
@@ -269,7 +269,7 @@ class _Parser:
                 self._fail(f"{token.text!r} is none of the known arrays", token, self._known())
             if token.text in found:
                 self._fail(f"{token.text} is assigned twice", token, "give one job a file")
-            found[token.text] = Value(self._value(token.text), token.line)
+            found[token.text] = MatlabArray(self._value(token.text), token.line)
         return found
 
     def _value(self, name: str) -> Floats:

@@ -25,8 +25,8 @@ from camtool.importers.points.matlab import is_matlab, parse_matlab
 from camtool.importers.points.tables import (
     NPY_START,
     ZIP_START,
+    PointTable,
     Stroke,
-    Table,
     parse_json,
     parse_lines,
     parse_npy,
@@ -51,7 +51,7 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
     )
 
 
-def _table(data: bytes, file: str) -> Table:
+def _table(data: bytes, file: str) -> PointTable:
     if data.startswith(NPY_START):
         return parse_npy(data, file)
     if data.startswith(ZIP_START):
@@ -78,7 +78,7 @@ def _decoded(data: bytes, file: str) -> str:
     return text
 
 
-def _units(table: Table, options: ReadOptions) -> Units:
+def _units(table: PointTable, options: ReadOptions) -> Units:
     """The caller's unit, else the file's, else mm."""
     if options.units is not None:
         return Units(options.units.lower(), options.mm_per(options.units), "as asked")

@@ -37,7 +37,7 @@ class Stroke(Struct, frozen=True, eq=False):
     layer: str = "0"
 
 
-class Table(Struct, frozen=True, eq=False):
+class PointTable(Struct, frozen=True, eq=False):
     """All strokes of a file, its unit (None when the file names none), and where that comes from.
 
     `mm_per_unit` is needed for a unit that is none of `camtool.units` alone.
@@ -91,7 +91,7 @@ def _lines_of(text: str) -> Iterator[str]:
         begin = end
 
 
-def parse_lines(text: str, file: str) -> Table:
+def parse_lines(text: str, file: str) -> PointTable:
     """The strokes of a text of points; DrawingError naming line and column."""
     return _Lines(file).parse(text)
 
@@ -110,7 +110,7 @@ class _Lines(Struct):
     numbers: array[float] = field(default_factory=lambda: array("d"))
     starts: list[tuple[int, int]] = field(default_factory=list)
 
-    def parse(self, text: str) -> Table:
+    def parse(self, text: str) -> PointTable:
         fresh, may_name = True, True
         pattern: re.Pattern[str] | None = None
         for number, line in enumerate(_lines_of(text), start=1):
@@ -132,7 +132,7 @@ class _Lines(Struct):
                 fresh = False
             self.numbers.extend(self._row(content, number, pattern))
         self._refuse_ambiguous()
-        return Table(self._strokes(), self.unit)
+        return PointTable(self._strokes(), self.unit)
 
     def _strokes(self) -> list[Stroke]:
         points = np.frombuffer(self.numbers, dtype=np.float64).reshape(-1, self.columns)
@@ -319,7 +319,7 @@ _FILE_KEYS = ("units", "strokes")
 _STROKE_KEYS = ("points", "closed", "layer")
 
 
-def parse_json(text: str, file: str) -> Table:
+def parse_json(text: str, file: str) -> PointTable:
     """The strokes of a JSON text and its unit; DrawingError naming the field."""
     try:
         value = json.loads(text, parse_constant=_refuse_constant)
@@ -350,18 +350,20 @@ class _Walker:
     def __init__(self, file: str) -> None:
         self.file = file
 
-    def document(self, value: object) -> Table:
+    def document(self, value: object) -> PointTable:
         if isinstance(value, dict):
             self._known(value, _FILE_KEYS, "")
             rows = self._list(value.get("strokes"), "strokes")
             strokes = [self._stroke(row, f"strokes[{i}]", i) for i, row in enumerate(rows)]
-            return Table(strokes, self._unit(value.get("units")))
+            return PointTable(strokes, self._unit(value.get("units")))
         rows = self._list(value, "the file")
         # [x, y] holds numbers, a stroke holds lists.
         first = rows[0] if rows else None
         if isinstance(first, list) and first and isinstance(first[0], list):
-            return Table([_stroke(self._points(row, f"[{i}]"), i) for i, row in enumerate(rows)])
-        return Table([_stroke(self._points(rows, ""), 0)])
+            return PointTable(
+                [_stroke(self._points(row, f"[{i}]"), i) for i, row in enumerate(rows)]
+            )
+        return PointTable([_stroke(self._points(rows, ""), 0)])
 
     def _stroke(self, value: object, where: str, index: int) -> Stroke:
         if not isinstance(value, dict):
@@ -439,12 +441,12 @@ MAX_MEMBERS = 100_000
 _SAVE = "save it with numpy.save as an array (n, 2) of x, y or (n, 3) of x, y, bulge"
 
 
-def parse_npy(data: bytes, file: str) -> Table:
+def parse_npy(data: bytes, file: str) -> PointTable:
     """The one stroke of an .npy; DrawingError when it is no such array."""
-    return Table([Stroke(_array(data, file, ""), "of the array")])
+    return PointTable([Stroke(_array(data, file, ""), "of the array")])
 
 
-def parse_npz(data: bytes, file: str) -> Table:
+def parse_npz(data: bytes, file: str) -> PointTable:
     """One stroke per array, on the layer of its name; DrawingError when one is no such array."""
     strokes: list[Stroke] = []
     try:
@@ -473,7 +475,7 @@ def parse_npz(data: bytes, file: str) -> Table:
         if isinstance(error, DrawingError):
             raise
         raise _broken(file, error) from error
-    return Table(strokes)
+    return PointTable(strokes)
 
 
 def is_npz(data: bytes) -> bool:

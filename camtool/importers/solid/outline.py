@@ -26,13 +26,13 @@ SECTION_MARGIN = 0.1
 """The plane of a section extends beyond the body by this share of the body's size."""
 
 
-class Outline(Struct, frozen=True, eq=False):
+class SolidOutline(Struct, frozen=True, eq=False):
     """The wires of one face; `kind` is "face", "section", "wire" or "edge"."""
 
     kind: str
     layer: str
     colour: str
-    paths: list[Path]
+    paths: list[EdgePath]
 
 
 class Outlines(Struct, frozen=True, eq=False):
@@ -40,7 +40,7 @@ class Outlines(Struct, frozen=True, eq=False):
     height of the whole model from its lowest to its highest point; of the `missed` bodies nothing
     is drawn, for these reasons."""
 
-    outlines: list[Outline] = field(default_factory=list)
+    outlines: list[SolidOutline] = field(default_factory=list)
     levels: list[float] = field(default_factory=list)
     span: tuple[float, float] = (0.0, 0.0)
     missed: dict[str, int] = field(default_factory=dict)
@@ -56,7 +56,7 @@ def outlines(bodies: list[Body], height: float | None, tolerance: float) -> Outl
             f"{high:.6g}",
             mend="give a --section-z between them",
         )
-    found: list[Outline] = []
+    found: list[SolidOutline] = []
     levels: list[float] = []
     missed: Counter[str] = Counter()
     for body, box in zip(bodies, boxes, strict=True):
@@ -64,7 +64,7 @@ def outlines(bodies: list[Body], height: float | None, tolerance: float) -> Outl
         wires = [_wires(face, tolerance) for face in faces]
         if edges:
             wires.append([edge_path(edge, tolerance) for edge in edges])
-        found.extend(Outline(kind, body.layer, body.colour, paths) for paths in wires)
+        found.extend(SolidOutline(kind, body.layer, body.colour, paths) for paths in wires)
         if not wires:
             missed[_reason(kind, height)] += 1
         if wires and level is not None:
@@ -157,13 +157,13 @@ def _section(shape: Any, box: tuple[float, ...], height: float) -> tuple[list[An
     return [], subshapes(section.Shape(), TopAbs_EDGE) if section.IsDone() else []
 
 
-def _wires(face: Any, tolerance: float) -> list[Path]:
+def _wires(face: Any, tolerance: float) -> list[EdgePath]:
     """Outer and inner wires as closed paths; the edges one by one of a wire that is no ring."""
     from OCP.BRep import BRep_Tool
     from OCP.BRepTools import BRepTools_WireExplorer
     from OCP.TopAbs import TopAbs_EDGE, TopAbs_WIRE
 
-    paths: list[Path] = []
+    paths: list[EdgePath] = []
     for wire in subshapes(face, TopAbs_WIRE):
         walk = BRepTools_WireExplorer(wire, face)
         ring: list[Any] = []
@@ -214,7 +214,7 @@ JOINT_MM = 1e-4
 files of other programs within 1e-5 and more."""
 
 
-class Path(Struct, frozen=True, eq=False):
+class EdgePath(Struct, frozen=True, eq=False):
     """Vertices (n, 3) x, y, bulge and `off` (n, 2) of a `Piece`, in the model's unit."""
 
     vertices: Floats
@@ -222,7 +222,7 @@ class Path(Struct, frozen=True, eq=False):
     off: Floats
 
 
-def edge_path(edge: Any, tolerance: float) -> Path:
+def edge_path(edge: Any, tolerance: float) -> EdgePath:
     """The edge in its own direction, from its first point to its last, both in `vertices`."""
     from OCP.BRepAdaptor import BRepAdaptor_Curve
     from OCP.TopAbs import TopAbs_REVERSED
@@ -237,7 +237,7 @@ def edge_path(edge: Any, tolerance: float) -> Path:
         off = np.zeros((len(exact), 2))
     if edge.Orientation() == TopAbs_REVERSED:
         exact = reversed_vertices(exact)  # and all of one edge is equally far off
-    return Path(exact, False, off)
+    return EdgePath(exact, False, off)
 
 
 def reversed_vertices(vertices: Floats) -> Floats:
@@ -248,21 +248,21 @@ def reversed_vertices(vertices: Floats) -> Floats:
     return back
 
 
-def joined(edges: list[Path]) -> Path:
+def joined(edges: list[EdgePath]) -> EdgePath:
     """Edges one after the other as one closed path; each ends where the next one begins."""
     vertices = np.concatenate([path.vertices[:-1] for path in edges])
     off = [path.off[:-1].copy() for path in edges]
     for row, step in zip(off, _steps(edges).tolist(), strict=True):
         row[-1] += step if step > POSITION_EPS_MM else 0.0
-    return Path(vertices, True, np.concatenate(off))
+    return EdgePath(vertices, True, np.concatenate(off))
 
 
-def follow(edges: list[Path]) -> bool:
+def follow(edges: list[EdgePath]) -> bool:
     """Whether each edge begins where the one before ends, the last one closing the ring."""
     return bool((_steps(edges) <= JOINT_MM).all())
 
 
-def _steps(edges: list[Path]) -> Floats:
+def _steps(edges: list[EdgePath]) -> Floats:
     """(E,) how far from the end of each edge the next one begins."""
     ends = np.array([path.vertices[-1, :2] for path in edges])
     starts = np.array([path.vertices[0, :2] for path in edges])

@@ -91,7 +91,7 @@ class _Rule(Struct, frozen=True):
         return bool(places)
 
 
-class Rules(Struct):
+class CssRules(Struct):
     """All rules of a document, found by what their element must be; `left_out` counts others."""
 
     left_out: int = 0

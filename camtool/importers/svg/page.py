@@ -21,7 +21,7 @@ from camtool.importers.svg.shapes import FONT_UNITS, split_length
 from camtool.importers.svg.style import FONT_PX
 from camtool.importers.svg.transform import (
     Affine,
-    Box,
+    SvgBox,
     parse_view_box,
     scaling,
     translation,
@@ -31,7 +31,7 @@ from camtool.importers.svg.tree import Node
 from camtool.records import replace
 
 
-class Page(Struct, frozen=True):
+class SvgPage(Struct, frozen=True):
     """`to_mm`: user units of the root to mm; `viewport` (width, height) in user units where
     known; the unit, and the findings about it."""
 
@@ -53,7 +53,7 @@ Writer = tuple[str, float]
 """A program whose px have another size, and how many of them are an inch."""
 
 
-def page_of(root: Node, options: ReadOptions, writer: Writer | None = None) -> Page:
+def page_of(root: Node, options: ReadOptions, writer: Writer | None = None) -> SvgPage:
     """The page of the root element; DrawingError when its size or viewBox makes no sense.
 
     Without `options.dpi` a px has the size that the program `writer` gives it.
@@ -74,8 +74,8 @@ def page_of(root: Node, options: ReadOptions, writer: Writer | None = None) -> P
 
 
 def _by_the_file(
-    root: Node, sides: tuple[_Side, _Side], box: Box | None, options: ReadOptions
-) -> Page:
+    root: Node, sides: tuple[_Side, _Side], box: SvgBox | None, options: ReadOptions
+) -> SvgPage:
     """The page by the sizes in the file."""
     width, height = sides
     named = width if width.size_mm is not None else height
@@ -86,21 +86,21 @@ def _by_the_file(
     units = Units(named.unit or "px", options.mm_per(named.unit or "px"), why)
     if box is None:
         px = options.mm_per("px")
-        return Page(_flip(height.size_mm or 0.0) @ scaling(px, px), _size(width, height, px),
+        return SvgPage(_flip(height.size_mm or 0.0) @ scaling(px, px), _size(width, height, px),
                     units, findings)  # fmt: skip
     # A missing side follows from the other one.
     if width.size_mm is None:
         width = _Side("", named.size_mm * box.width / box.height, named.unit)
     elif height.size_mm is None:
         height = _Side("", named.size_mm * box.height / box.width, named.unit)
-    onto = Box(0.0, 0.0, width.size_mm or 0.0, height.size_mm or 0.0)
+    onto = SvgBox(0.0, 0.0, width.size_mm or 0.0, height.size_mm or 0.0)
     inner = view_box_map(box, onto, root.get("preserveAspectRatio"))
     why += f", {inner.a:.6g} mm a user unit"
     units = Units(units.name, units.mm_per_unit, why)
-    return Page(_flip(onto.height) @ inner, (box.width, box.height), units, findings)
+    return SvgPage(_flip(onto.height) @ inner, (box.width, box.height), units, findings)
 
 
-def _asked(width: _Side, height: _Side, box: Box | None, options: ReadOptions) -> Page:
+def _asked(width: _Side, height: _Side, box: SvgBox | None, options: ReadOptions) -> SvgPage:
     """One user unit is the caller's unit; the size in the file is ignored."""
     unit = str(options.units).lower()
     scale = options.mm_per(unit)
@@ -112,18 +112,18 @@ def _asked(width: _Side, height: _Side, box: Box | None, options: ReadOptions) -
     tall = viewport[1] if viewport is not None else 0.0
     shift = translation(-box.x, -box.y) if box is not None else Affine()
     units = Units(unit, scale, f"as asked: one user unit is 1 {unit}")
-    return Page(_flip(tall * scale) @ scaling(scale, scale) @ shift, viewport, units)
+    return SvgPage(_flip(tall * scale) @ scaling(scale, scale) @ shift, viewport, units)
 
 
-def _sizeless(box: Box | None, options: ReadOptions) -> Page:
+def _sizeless(box: SvgBox | None, options: ReadOptions) -> SvgPage:
     """The page has no size: user units are taken as px."""
     px = options.mm_per("px")
     units = Units("px", px, f"no size in the file, taken as {options.px_an_inch:g} px an inch")
     finding = _unitless("the svg has no width and height", options)
     if box is None:
-        return Page(_flip(0.0) @ scaling(px, px), None, units, (finding,))
+        return SvgPage(_flip(0.0) @ scaling(px, px), None, units, (finding,))
     to_mm = _flip(box.height * px) @ scaling(px, px) @ translation(-box.x, -box.y)
-    return Page(to_mm, (box.width, box.height), units, (finding,))
+    return SvgPage(to_mm, (box.width, box.height), units, (finding,))
 
 
 def _side(root: Node, name: str, options: ReadOptions) -> _Side:

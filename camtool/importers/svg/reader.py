@@ -24,19 +24,19 @@ from camtool.importers.assemble import assemble, font_findings
 from camtool.importers.findings import NOT_APPLIED
 from camtool.importers.options import TEXT_SKIPPED, ReadOptions
 from camtool.importers.pieces import MAX_COORDINATE_MM, Piece, Unusable
-from camtool.importers.svg.page import Page, page_of
-from camtool.importers.svg.scope import Scope, frame_of, is_for_us, layer_in, own_transform
+from camtool.importers.svg.page import SvgPage, page_of
+from camtool.importers.svg.scope import SvgScope, frame_of, is_for_us, layer_in, own_transform
 from camtool.importers.svg.shapes import (
     SHAPES,
     Arc,
     Bezier,
     Lengths,
-    Lines,
     Segment,
     Subpath,
+    SvgLines,
     subpaths,
 )
-from camtool.importers.svg.style import LIMITS, Sheet, Style
+from camtool.importers.svg.style import LIMITS, StyleSheet, SvgStyle
 from camtool.importers.svg.transform import Affine, translation
 from camtool.importers.svg.tree import MAX_DEPTH, Node, parse_tree, ready, writer_dpi
 
@@ -48,7 +48,7 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
         content = ready(data)
         root = parse_tree(content)
         page = page_of(root, options, writer_dpi(content))
-        walk = Walk(root, page, options)
+        walk = SvgWalk(root, page, options)
         walk.run()
     except DrawingError as error:
         error.file = error.file or file
@@ -106,17 +106,17 @@ _SILENT = (
 _COUNTED = (*SHAPES, "text", "flowRoot", "image", "use")
 
 
-class Walk:
+class SvgWalk:
     """Visits the tree and collects pieces and counts."""
 
-    def __init__(self, root: Node, page: Page, options: ReadOptions) -> None:
+    def __init__(self, root: Node, page: SvgPage, options: ReadOptions) -> None:
         self.options = options
         self.fitter = CurveFitter(options.tolerance_mm)
         self.pieces: list[Piece] = []
         self.notes = Notes()
         self._root = root
         self._page = page
-        self._sheet = Sheet(root)
+        self._sheet = StyleSheet(root)
         self._by_use = 0
         self._letters = 0
         self._shapes: dict[Node, tuple[list[Subpath], str]] = {}
@@ -129,7 +129,7 @@ class Walk:
     def run(self) -> None:
         """The whole document; the root's size and viewBox are in the page already."""
         root, page = self._root, self._page
-        style = self._sheet.style(root, Style())
+        style = self._sheet.style(root, SvgStyle())
         if style.display == "none":
             self._count(root, "is hidden (display: none)")
             return
@@ -139,15 +139,15 @@ class Walk:
             why = "of <style> not applied: other selectors or media"
             self.notes.changed["rules", why] += self._sheet.left_out
         self._limits(style, "page")
-        self._children(root, Scope(page.to_mm, style, page.viewport))
+        self._children(root, SvgScope(page.to_mm, style, page.viewport))
 
-    def _children(self, node: Node, scope: Scope) -> None:
+    def _children(self, node: Node, scope: SvgScope) -> None:
         """All children, one level deeper."""
         inner = scope._replace(depth=scope.depth + 1)
         for child in node.children:
             self._visit(child, inner)
 
-    def _visit(self, node: Node, scope: Scope) -> None:
+    def _visit(self, node: Node, scope: SvgScope) -> None:
         if scope.depth > MAX_DEPTH:
             raise DrawingError(
                 f"is nested deeper than {MAX_DEPTH} elements, through use", where=node.label
@@ -166,7 +166,7 @@ class Walk:
         elif tag != "defs" and tag not in _SILENT:
             self._count(node, "stands in an element that is not drawn")
 
-    def _drawn(self, node: Node, scope: Scope) -> None:
+    def _drawn(self, node: Node, scope: SvgScope) -> None:
         """A shape, or what is in a group."""
         if node.tag in SHAPES:
             self._shape(node, scope)
@@ -184,7 +184,7 @@ class Walk:
         else:
             self._children(node, scope)
 
-    def _entered(self, node: Node, scope: Scope) -> Scope | None:
+    def _entered(self, node: Node, scope: SvgScope) -> SvgScope | None:
         """The scope inside the element; None, and its shapes counted, when it shows nothing."""
         style = self._sheet.style(node, scope.style)
         if style.display == "none":
@@ -209,12 +209,12 @@ class Walk:
         self._limits(style, node.tag)
         return scope._replace(to_mm=to_mm, style=style, layer=layer_in(node, scope))
 
-    def _limits(self, style: Style, name: str) -> None:
+    def _limits(self, style: SvgStyle, name: str) -> None:
         """Counts what would hide or add something."""
         for limit in style.limits:
             self.notes.changed[f"{limit} of {name}", LIMITS[limit]] += 1
 
-    def _shape(self, node: Node, scope: Scope) -> None:
+    def _shape(self, node: Node, scope: SvgScope) -> None:
         """A shape's subpaths as pieces."""
         style = scope.style
         if style.visibility in ("hidden", "collapse"):
@@ -245,7 +245,9 @@ class Walk:
         self._take(found, fitted, node, scope)
         self.notes.used[node.tag] += 1
 
-    def _take(self, found: list[Subpath], fitted: list[Fitted], node: Node, scope: Scope) -> None:
+    def _take(
+        self, found: list[Subpath], fitted: list[Fitted], node: Node, scope: SvgScope
+    ) -> None:
         """Subpaths of an element, in mm, as pieces."""
         style = scope.style
         source = node.label + (f" by use {scope.uses[-1]}" if scope.uses else "")
@@ -262,11 +264,11 @@ class Walk:
                 )
             )
 
-    def _text(self, node: Node, scope: Scope) -> None:
+    def _text(self, node: Node, scope: SvgScope) -> None:
         """The letters of a text as pieces, all or none."""
         from camtool.importers.svg.text import text_of  # fonts: only where there is text
 
-        def lengths_of(style: Style) -> Lengths:
+        def lengths_of(style: SvgStyle) -> Lengths:
             return self._lengths(scope, style)
 
         try:
@@ -310,7 +312,7 @@ class Walk:
         elif not text.unseen:
             self.notes.left_out["text", "draws nothing"] += 1
 
-    def _subpaths(self, node: Node, scope: Scope) -> tuple[list[Subpath], str]:
+    def _subpaths(self, node: Node, scope: SvgScope) -> tuple[list[Subpath], str]:
         """The shape in user units; paths that are used again are not parsed again."""
         if not scope.uses or node.tag not in ("path", "polyline", "polygon"):
             return subpaths(node, self._lengths(scope, scope.style))
@@ -318,7 +320,7 @@ class Walk:
             self._shapes[node] = subpaths(node, self._lengths(scope, scope.style))
         return self._shapes[node]
 
-    def _use(self, node: Node, scope: Scope) -> None:
+    def _use(self, node: Node, scope: SvgScope) -> None:
         """The element that `use` names, drawn here."""
         reference = node.get("href") or node.get("xlink:href")
         name = reference[1:] if reference.startswith("#") else ""
@@ -347,7 +349,7 @@ class Walk:
         else:
             self._visit(target, inner)
 
-    def _framed(self, node: Node, size: Node, scope: Scope) -> None:
+    def _framed(self, node: Node, size: Node, scope: SvgScope) -> None:
         """An inner svg or a symbol: `size` says how large (the element itself, or its use)."""
         try:
             frame = frame_of(node, size, scope, self._lengths(scope, scope.style))
@@ -365,7 +367,7 @@ class Walk:
                 what = f"pieces reach out of the frame of {node.tag}s"
                 self.notes.changed[what, "which would hide them: they are drawn whole"] += count
 
-    def _lengths(self, scope: Scope, style: Style) -> Lengths:
+    def _lengths(self, scope: SvgScope, style: SvgStyle) -> Lengths:
         return Lengths(self.options, scope.viewport, style.font_px)
 
     def _unreadable(self, node: Node, error: DrawingError) -> None:
@@ -394,8 +396,8 @@ class Walk:
 def _cost(found: list[Subpath]) -> int:
     """Curves, and hundreds of corners."""
     segments = [segment for one in found for segment in one.segments]
-    corners = sum(len(segment.points) for segment in segments if isinstance(segment, Lines))
-    curves = sum(not isinstance(segment, Lines) for segment in segments)
+    corners = sum(len(segment.points) for segment in segments if isinstance(segment, SvgLines))
+    curves = sum(not isinstance(segment, SvgLines) for segment in segments)
     return curves + corners // _CORNERS_A_UNIT
 
 
@@ -467,7 +469,7 @@ class CurveFitter:
         """(n, 3) x, y, bulge in mm, the last one the end, and how far the curves lie from them;
         DrawingError when out of bounds."""
         first = subpath.segments[0]
-        if len(subpath.segments) == 1 and isinstance(first, Lines):
+        if len(subpath.segments) == 1 and isinstance(first, SvgLines):
             points = np.concatenate([subpath.start[None, :], first.points])
             return _in_reach(_straight(to_mm, points)), None
         rows, off = [_straight(to_mm, subpath.start[None, :])], [np.zeros((1, 2))]
@@ -485,7 +487,7 @@ class CurveFitter:
 
     def _segment(self, here: Floats, segment: Segment, to_mm: Affine) -> Fitted:
         """(n, 3) from `here` (2,) mm to the segment's end, both exact."""
-        if isinstance(segment, Lines):
+        if isinstance(segment, SvgLines):
             points = _straight(to_mm, segment.points)
             return np.concatenate([[[here[0], here[1], 0.0]], points]), None
         if isinstance(segment, Bezier):

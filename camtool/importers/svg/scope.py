@@ -9,10 +9,10 @@ from msgspec import Struct
 
 from camtool.arrays import Floats
 from camtool.importers.svg.shapes import Lengths
-from camtool.importers.svg.style import Style
+from camtool.importers.svg.style import SvgStyle
 from camtool.importers.svg.transform import (
     Affine,
-    Box,
+    SvgBox,
     about,
     parse_css_transform,
     parse_origin,
@@ -27,19 +27,19 @@ DEFAULT_LAYER = "0"
 """The layer of what stands in no layer and in no named group."""
 
 
-class Scope(NamedTuple):
+class SvgScope(NamedTuple):
     """What holds for an element: `to_mm` from its user units; the style of its parent; `viewport`
     what % are of; `layer`; `depth` of nesting; `uses` the ids on the way here."""
 
     to_mm: Affine
-    style: Style
+    style: SvgStyle
     viewport: tuple[float, float] | None
     layer: str = DEFAULT_LAYER
     depth: int = 0
     uses: tuple[str, ...] = ()
 
 
-def own_transform(node: Node, style: Style, lengths: Lengths) -> Affine:
+def own_transform(node: Node, style: SvgStyle, lengths: Lengths) -> Affine:
     """Its transform: of its style, else its attribute, about its origin; DrawingError."""
     attribute = node.get("transform")
     if style.transform:
@@ -64,7 +64,7 @@ def is_for_us(node: Node) -> bool:
     )
 
 
-def layer_in(node: Node, scope: Scope) -> str:
+def layer_in(node: Node, scope: SvgScope) -> str:
     """The layer inside this element: an Inkscape layer's label, or the name of a group that
     stands right under the root."""
     if node.tag != "g":
@@ -84,13 +84,13 @@ FRAME_SHARE = 1e-6
 """A piece that leaves a frame by no more of its size lies inside: rounding."""
 
 
-class Frame(Struct, frozen=True):
+class ClipFrame(Struct, frozen=True):
     """`to_mm` from the units inside; `viewport` what % are of inside; `box` in the units outside,
     whose map to mm is `outer`."""
 
     to_mm: Affine
     viewport: tuple[float, float]
-    box: Box
+    box: SvgBox
     outer: Affine
 
     def is_left_by(self, points: Floats) -> bool:
@@ -104,7 +104,7 @@ class Frame(Struct, frozen=True):
         return bool((places < low - slack).any() or (places > high + slack).any())
 
 
-def frame_of(node: Node, size: Node, scope: Scope, lengths: Lengths) -> Frame | None:
+def frame_of(node: Node, size: Node, scope: SvgScope, lengths: Lengths) -> ClipFrame | None:
     """The frame of an inner svg or a symbol, None when nothing of it is to be seen; DrawingError.
 
     `size`: the element that says how large, itself or the `use` that draws it. An svg that a `use`
@@ -118,12 +118,12 @@ def frame_of(node: Node, size: Node, scope: Scope, lengths: Lengths) -> Frame | 
     for name, axis, default in zip(("width", "height"), "xy", whole, strict=True):
         kept = lengths.size(own, name, axis, default) if own else default
         sides.append(lengths.size(size, name, axis, kept))
-    place = Box(x, y, *sides)
+    place = SvgBox(x, y, *sides)
     box = parse_view_box(node.get("viewBox"))
     if box is None:
         inner = (scope.to_mm @ translation(x, y)).checked()
-        return Frame(inner, (sides[0], sides[1]), place, scope.to_mm)
+        return ClipFrame(inner, (sides[0], sides[1]), place, scope.to_mm)
     if not all(sides):
         return None
     inner = scope.to_mm @ view_box_map(box, place, node.get("preserveAspectRatio"))
-    return Frame(inner.checked(), (box.width, box.height), place, scope.to_mm)
+    return ClipFrame(inner.checked(), (box.width, box.height), place, scope.to_mm)

@@ -27,7 +27,7 @@ from camtool.importers.svg.tree import Node
 from camtool.units import MM_PER_UNIT
 
 
-class Lines(Struct, frozen=True, eq=False):
+class SvgLines(Struct, frozen=True, eq=False):
     """Straight segments through `points` (n, 2)."""
 
     points: Floats
@@ -50,7 +50,7 @@ class Arc(Struct, frozen=True, eq=False):
     end: Floats
 
 
-Segment = Lines | Bezier | Arc
+Segment = SvgLines | Bezier | Arc
 
 
 class Subpath(Struct, frozen=True, eq=False):
@@ -291,7 +291,7 @@ class _Pen(Struct):
 
     def _flush(self) -> None:
         if self.corners:
-            self.segments.append(Lines(_pairs(self.corners)))
+            self.segments.append(SvgLines(_pairs(self.corners)))
             self.corners = []
 
 
@@ -414,7 +414,7 @@ def subpaths(node: Node, lengths: Lengths) -> tuple[list[Subpath], str]:
 def _line(node: Node, lengths: Lengths) -> list[Subpath]:
     x1, y1 = lengths.along(node, "x1", "x"), lengths.along(node, "y1", "y")
     x2, y2 = lengths.along(node, "x2", "x"), lengths.along(node, "y2", "y")
-    return [Subpath(np.array([x1, y1]), (Lines(np.array([[x2, y2]])),), False)]
+    return [Subpath(np.array([x1, y1]), (SvgLines(np.array([[x2, y2]])),), False)]
 
 
 def _corners(node: Node) -> tuple[list[Subpath], str]:
@@ -434,7 +434,7 @@ def _corners(node: Node) -> tuple[list[Subpath], str]:
     points = numbers[: len(numbers) // 2 * 2].reshape(-1, 2)
     if len(points) < 2:
         return [], fault
-    return [Subpath(points[0], (Lines(points[1:]),), node.tag == "polygon")], fault
+    return [Subpath(points[0], (SvgLines(points[1:]),), node.tag == "polygon")], fault
 
 
 def _radii(node: Node, lengths: Lengths) -> tuple[float, float]:
@@ -466,7 +466,7 @@ def _rect(node: Node, lengths: Lengths) -> list[Subpath]:
     right, bottom = x + width, y + height
     if rx == 0.0 or ry == 0.0:
         corners = np.array([[x, y], [right, y], [right, bottom], [x, bottom]])
-        return [Subpath(corners[0], (Lines(corners[1:]),), True)]
+        return [Subpath(corners[0], (SvgLines(corners[1:]),), True)]
     # Each corner: where it is entered and left.
     rounds = (
         (complex(right - rx, y), complex(right, y + ry)),
@@ -479,7 +479,7 @@ def _rect(node: Node, lengths: Lengths) -> list[Subpath]:
     segments: list[Segment] = []
     for enter, leave in rounds:
         if enter != here:
-            segments.append(Lines(np.array([[enter.real, enter.imag]])))
+            segments.append(SvgLines(np.array([[enter.real, enter.imag]])))
         segments.append(arc_between(enter, leave, complex(rx, ry), 0.0, 1))
         here = leave
     return [Subpath(start, tuple(segments), True)]

@@ -14,7 +14,7 @@ from msgspec import Struct
 from msgspec.structs import asdict
 
 from camtool.importers.svg.colours import parse_colour
-from camtool.importers.svg.css import Rules, declared
+from camtool.importers.svg.css import CssRules, declared
 from camtool.importers.svg.transform import NUMBER
 from camtool.importers.svg.tree import Node
 from camtool.records import replace
@@ -66,7 +66,7 @@ _FURTHEST_FONT_PX = 1e6
 _UNSEEN = ("none", "transparent")
 
 
-class Style(Struct, frozen=True, dict=True):
+class SvgStyle(Struct, frozen=True, dict=True):
     """The properties of one element, after inheritance; `transform` and its like only where a
     style says them, for attributes of that name are read by the walk. `limits`: the properties of
     LIMITS that the element itself has. `odd`: those of PLAIN_TEXT, and "font-size", that ask for
@@ -128,16 +128,16 @@ _NAMES = ("stroke", "fill", "color", "visibility", "stroke-dasharray", "font-siz
           *LIMITS)  # fmt: skip
 _PROPERTIES = frozenset((*_NAMES, "font"))
 _ATTRIBUTES = tuple(name for name in _NAMES if name not in _SHEET_ONLY)
-_INITIAL = asdict(Style())
+_INITIAL = asdict(SvgStyle())
 _BLANK = {_FIELDS.get(name, name): _INITIAL[_FIELDS.get(name, name)] for name in _NOT_INHERITED}
 
 
-class Sheet:
+class StyleSheet:
     """The styles of a document's elements; `left_out` counts rules that are not applied."""
 
     def __init__(self, root: Node) -> None:
-        self._rules = Rules()
-        self._known: dict[tuple[Style, tuple[tuple[str, str], ...]], Style] = {}
+        self._rules = CssRules()
+        self._known: dict[tuple[SvgStyle, tuple[tuple[str, str], ...]], SvgStyle] = {}
         for node in root.walk():
             if node.tag == "style" and node.get("type", "text/css") in ("text/css", ""):
                 self._rules.read(node.text, _PROPERTIES)
@@ -147,7 +147,7 @@ class Sheet:
         """Rules and blocks whose selectors are not understood."""
         return self._rules.left_out
 
-    def style(self, node: Node, above: Style) -> Style:
+    def style(self, node: Node, above: SvgStyle) -> SvgStyle:
         """The element's style under its parent's; DrawingError when the sheets would take too
         long to apply."""
         attributes = node.attributes
@@ -172,7 +172,7 @@ class Sheet:
         return style
 
 
-def _under(above: Style, values: dict[str, str]) -> Style:
+def _under(above: SvgStyle, values: dict[str, str]) -> SvgStyle:
     """The style of these values; what is missing or "inherit" comes from above."""
     own: dict[str, Any] = dict(_BLANK)
     for name, written in values.items():
@@ -200,7 +200,7 @@ def _under(above: Style, values: dict[str, str]) -> Style:
     return replace(above, **own)
 
 
-def _text_property(name: str, value: str, above: Style, own: dict[str, Any]) -> None:
+def _text_property(name: str, value: str, above: SvgStyle, own: dict[str, Any]) -> None:
     """One of PLAIN_TEXT, or lines along text: the latter add to those of the elements around."""
     if value in ("inherit", "unset", ""):
         return

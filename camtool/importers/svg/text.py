@@ -23,10 +23,19 @@ from msgspec import Struct, field
 from camtool.arrays import Floats
 from camtool.importers.pieces import Unusable
 from camtool.importers.svg.scope import is_for_us
-from camtool.importers.svg.shapes import Bezier, Lengths, Lines, Segment, Subpath
-from camtool.importers.svg.style import Style
+from camtool.importers.svg.shapes import Bezier, Lengths, Segment, Subpath, SvgLines
+from camtool.importers.svg.style import SvgStyle
 from camtool.importers.svg.tree import Node
-from camtool.importers.text import MAX_CHARACTERS, Font, Ink, Look, Rule, Wanted, font_for, lacking
+from camtool.importers.text import (
+    MAX_CHARACTERS,
+    Font,
+    Ink,
+    Rule,
+    TextLook,
+    WantedFont,
+    font_for,
+    lacking,
+)
 
 MAX_FAMILIES = 8
 """At most this many families of a list are tried."""
@@ -50,11 +59,11 @@ _BETWEEN = re.compile(r"[\s,]+")
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class TextRun:
     """Letters of one style and what they draw."""
 
     subpaths: list[Subpath]
-    style: Style
+    style: SvgStyle
 
 
 class Text(Struct, frozen=True, eq=False):
@@ -62,7 +71,7 @@ class Text(Struct, frozen=True, eq=False):
     `lacks`: what fonts lack; `plainer`: weights that fonts are not
     asked for."""
 
-    runs: list[Run]
+    runs: list[TextRun]
     letters: int
     unseen: list[str]
     lacks: list[str]
@@ -71,9 +80,9 @@ class Text(Struct, frozen=True, eq=False):
 
 def text_of(
     node: Node,
-    style: Style,
-    style_of: Callable[[Node, Style], Style],
-    lengths_of: Callable[[Style], Lengths],
+    style: SvgStyle,
+    style_of: Callable[[Node, SvgStyle], SvgStyle],
+    lengths_of: Callable[[SvgStyle], Lengths],
     mode: str,
 ) -> Text:
     """A `text` of this style; `style_of` gives the style of an element within it, under that of
@@ -109,17 +118,17 @@ class _Flow(Struct, eq=False):
     """Letters in order, blanks collapsed, each with its style; `at` has the places that elements
     give to letters by their number."""
 
-    style_of: Callable[[Node, Style], Style]
-    lengths_of: Callable[[Style], Lengths]
+    style_of: Callable[[Node, SvgStyle], SvgStyle]
+    lengths_of: Callable[[SvgStyle], Lengths]
     letters: list[str] = field(default_factory=list)
-    styles: list[Style] = field(default_factory=list)
+    styles: list[SvgStyle] = field(default_factory=list)
     at: dict[int, dict[str, float]] = field(default_factory=dict)
     unseen: dict[str, None] = field(default_factory=dict)
     _after_blank: bool = True
     _by_letter: bool = False
     _recounted: bool = False
 
-    def visit(self, node: Node, style: Style, keep: bool) -> None:
+    def visit(self, node: Node, style: SvgStyle, keep: bool) -> None:
         """What stands in the element, then its places: those of inner elements come first."""
         for name in ("rotate", "textLength"):
             if node.get(name):
@@ -154,7 +163,7 @@ class _Flow(Struct, eq=False):
         if self._by_letter and self._recounted:
             raise Unusable("has a place for each letter, and letters that are combined")
 
-    def _add(self, raw: str, style: Style, keep: bool) -> None:
+    def _add(self, raw: str, style: SvgStyle, keep: bool) -> None:
         """Letters of one style, blanks kept or not."""
         if not raw:
             return
@@ -179,7 +188,7 @@ class _Flow(Struct, eq=False):
             self.styles.append(style)
             self._after_blank = blank and not keep
 
-    def _place(self, node: Node, style: Style, first: int) -> None:
+    def _place(self, node: Node, style: SvgStyle, first: int) -> None:
         lengths = self.lengths_of(style)
         for name, axis in _PLACES:
             given = node.get(name)
@@ -205,8 +214,8 @@ class _Words(Struct, frozen=True, eq=False):
     """Letters of one look from x on, the baseline at y (down)."""
 
     letters: str
-    style: Style
-    look: Look
+    style: SvgStyle
+    look: TextLook
     fonts: tuple[str, str]
     x: float
     y: float
@@ -220,7 +229,7 @@ class _Writer(Struct, eq=False):
     missing: dict[tuple[str, str], set[str]] = field(default_factory=dict)
     plainer: dict[str, None] = field(default_factory=dict)
 
-    def look(self, style: Style) -> tuple[Look, tuple[str, str]]:
+    def look(self, style: SvgStyle) -> tuple[TextLook, tuple[str, str]]:
         """How letters of this style look, and the names of their font and of the wanted one."""
         if style.odd:
             raise Unusable(f"its {min(style.odd)} cannot be applied: convert it to paths")
@@ -233,9 +242,9 @@ class _Writer(Struct, eq=False):
         for word in style.decoration:
             rules |= _RULES.get(word, Rule.NONE)
         self.missing.setdefault((font.name, other), set())
-        return Look(font, style.font_px / font.em, rules=rules), (font.name, other)
+        return TextLook(font, style.font_px / font.em, rules=rules), (font.name, other)
 
-    def _font(self, style: Style) -> tuple[Font, str]:
+    def _font(self, style: SvgStyle) -> tuple[Font, str]:
         """The first installed family of the list; else what stands in for the first of all."""
         weight = _WEIGHTS.get(style.weight, 0)
         if not weight:
@@ -248,7 +257,7 @@ class _Writer(Struct, eq=False):
         named = style.family.split(",", MAX_FAMILIES)[:MAX_FAMILIES]
         families = [family for name in named if (family := _family(name))] or [DEFAULT_FAMILY]
         bold = weight >= _BOLD_FROM
-        wanted = [Wanted(family=family, bold=bold, italic=italic) for family in families]
+        wanted = [WantedFont(family=family, bold=bold, italic=italic) for family in families]
         for one in wanted:
             font, other = font_for(one, self.mode)
             if not other:
@@ -274,7 +283,7 @@ def _chunks(flow: _Flow, writer: _Writer) -> Iterator[list[_Words]]:
     )
     x = y = 0.0
     chunk: list[_Words] = []
-    looks: dict[Style, tuple[Look, tuple[str, str]]] = {}
+    looks: dict[SvgStyle, tuple[TextLook, tuple[str, str]]] = {}
     for first, last in pairwise([*starts, len(flow.letters)]):
         at = flow.at.get(first, {})
         if chunk and ("x" in at or "y" in at):
@@ -295,7 +304,7 @@ def _chunks(flow: _Flow, writer: _Writer) -> Iterator[list[_Words]]:
     yield chunk
 
 
-def _anchored(chunk: list[_Words], writer: _Writer, flow: _Flow) -> Iterator[Run]:
+def _anchored(chunk: list[_Words], writer: _Writer, flow: _Flow) -> Iterator[TextRun]:
     """The words of a chunk drawn, their span [a, b] moved so that its start, middle or end lies
     at the chunk's first letter. Unusable where a dx within it changes that span: the standard
     takes it into account, not all renderers do."""
@@ -318,7 +327,7 @@ def _anchored(chunk: list[_Words], writer: _Writer, flow: _Flow) -> Iterator[Run
             ink.write(words.letters, look, (x, baseline))
             ink.rule(look, (x, words.end + shift), baseline)
             writer.missing[words.fonts].update(ink.missing)
-            yield Run(_subpaths(ink), style)
+            yield TextRun(_subpaths(ink), style)
 
 
 def _subpaths(ink: Ink) -> list[Subpath]:
@@ -345,9 +354,9 @@ def _segments(parts: list[Floats]) -> tuple[Segment, ...]:
             corners.append(part[1])
             continue
         if corners:
-            segments.append(Lines(np.array(corners)))
+            segments.append(SvgLines(np.array(corners)))
             corners = []
         segments.append(Bezier(part[1:]))
     if corners:
-        segments.append(Lines(np.array(corners)))
+        segments.append(SvgLines(np.array(corners)))
     return tuple(segments)

@@ -108,7 +108,7 @@ def parse_numbers(text: str, name: str) -> list[float]:
     return values
 
 
-class Box(Struct, frozen=True):
+class SvgBox(Struct, frozen=True):
     """A rectangle: its corner of least x and y, and its size."""
 
     x: float
@@ -117,20 +117,20 @@ class Box(Struct, frozen=True):
     height: float
 
 
-def parse_view_box(text: str) -> Box | None:
+def parse_view_box(text: str) -> SvgBox | None:
     """viewBox, None when it is not there; DrawingError when it is no box."""
     if not text:
         return None
     numbers = parse_numbers(text, "viewBox")
     if len(numbers) != 4:
         raise DrawingError(f"viewBox holds {len(numbers)} numbers, wanted 4")
-    box = Box(*numbers)
+    box = SvgBox(*numbers)
     if box.width <= 0.0 or box.height <= 0.0:
         raise DrawingError(f"viewBox is {box.width:g} x {box.height:g}: it shows nothing")
     return box
 
 
-def view_box_map(box: Box, onto: Box, align: str) -> Affine:
+def view_box_map(box: SvgBox, onto: SvgBox, align: str) -> Affine:
     """The map of viewBox `box` onto the viewport `onto` by preserveAspectRatio `align`.
 
     meet: scale = min(sx, sy), all is seen; slice: the greater one, all is covered. What is left
