@@ -20,9 +20,9 @@ CYTHON_DOCSTRING = re.compile(
 )
 CYTHON_CONSTANT = re.compile(r"^(?:cdef )?(?:[\w ]+ )?([A-Z_]+)\s*=", re.MULTILINE)
 
-MAX_QUESTIONS = 420
-MAX_SHARED_CLASS_NAMES = 45
-MAX_SUPERLATIVES = 110
+MAX_QUESTIONS = 269
+MAX_SHARED_CLASS_NAMES = 25
+MAX_SUPERLATIVES = 71
 
 
 @functools.cache
