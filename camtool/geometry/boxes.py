@@ -1,8 +1,8 @@
 """Which boxes are near each other: the first, broad look before any exact one.
 
 `BoxIndex` is asked which of its boxes touch others; `box_pairs` and `near_points` stand upon it.
-`touching_boxes` gives the pairs within one set, no more than a bound. `Curves` are segments as
-compiled loops take them, with the tree of boxes that those loops go down themselves.
+`touching_boxes` gives the pairs within one set, no more than a bound. `IndexedCurves` are segments
+as compiled loops take them, with the tree of boxes that those loops go down themselves.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ IN_ORDER = 2048
 NOWHERE = (np.inf, np.inf, -np.inf, -np.inf)
 """A box that touches none."""
 
-MOST_LOOKS = 4_000_000_000
+MAX_COMPARISONS = 4_000_000_000
 """A sweep that would have to examine more pairs of boxes than this is shortened."""
 
 
@@ -99,7 +99,7 @@ def box_pairs(boxes_a: Floats, boxes_b: Floats, *, reach_mm: float) -> Iterator[
     """Yield the rows (J,), (J,) of all boxes xmin, ymin, xmax, ymax no farther apart than
     `reach_mm`, in batches that bound the memory: by the rows of `a`, and for each from left to
     right those of `b`."""
-    one, other = BoxIndex(boxes_b).touching(_widened(boxes_a, reach_mm))
+    one, other = BoxIndex(boxes_b).touching(_grown_boxes(boxes_a, reach_mm))
     low = np.maximum(boxes_a[one, :2], boxes_b[other, :2])
     high = np.minimum(boxes_a[one, 2:], boxes_b[other, 2:])
     near = (low <= high + reach_mm).all(axis=1)
@@ -113,14 +113,14 @@ def box_pairs(boxes_a: Floats, boxes_b: Floats, *, reach_mm: float) -> Iterator[
 def near_points(points: Floats, places: Floats, reach_mm: float | Floats) -> tuple[Ints, Ints]:
     """Return the rows (J,), (J,), in order, of all points (P, 2) and places (K, 2) no farther
     apart than `reach_mm`, which may differ from point to point (P,)."""
-    around = _widened(np.hstack([points, points]), reach_mm)
+    around = _grown_boxes(np.hstack([points, points]), reach_mm)
     one, other = BoxIndex(np.hstack([places, places])).touching(around)
     way = points[one] - places[other]
     near = np.sqrt((way**2).sum(axis=1)) <= np.broadcast_to(reach_mm, len(points))[one]
     return one[near], other[near]
 
 
-def _widened(boxes: Floats, reach_mm: float | Floats) -> Floats:
+def _grown_boxes(boxes: Floats, reach_mm: float | Floats) -> Floats:
     """Return the boxes grown by the reach on all sides, and by one more unit in the last place, so
     that rounding excludes nothing."""
     reach = np.reshape(reach_mm, (-1, 1))
@@ -129,31 +129,31 @@ def _widened(boxes: Floats, reach_mm: float | Floats) -> Floats:
 
 
 def touching_boxes(
-    boxes: Floats, same: Ints, differ: Ints, asked: Bools, *, most: int
+    boxes: Floats, same: Ints, differ: Ints, asked: Bools, *, max_pairs: int
 ) -> tuple[Ints, Ints]:
     """Rows (J,), (J,), the lesser first, of boxes (K, 4) that touch; each pair once.
 
     Both have the same number in `same` (K,), different ones in `differ` (K,), and one of them is
-    `asked` for (K,). No more than `most` pairs, and none of boxes that come late in a sweep that
-    would look at more than MOST_LOOKS: both bound time and memory, far beyond any real drawing.
+    `asked` for (K,). No more than `max_pairs` pairs, and none of boxes that come late in a sweep
+    of more than MAX_COMPARISONS: both bound time and memory, far beyond any real drawing.
     """
     from camtool.kernels.chaining import touching
 
     along_x, along_y = boxes, boxes[:, [1, 0, 3, 2]]
     work, turned, order = min(
-        ((_looks(way), number, np.argsort(way[:, 0], kind="stable"))
+        ((_count_comparisons(way), number, np.argsort(way[:, 0], kind="stable"))
          for number, way in enumerate((along_x, along_y))),
         key=lambda item: item[:2],
     )  # fmt: skip
-    if work > MOST_LOOKS:
-        order = order[: int(len(order) * MOST_LOOKS / work)]
+    if work > MAX_COMPARISONS:
+        order = order[: int(len(order) * MAX_COMPARISONS / work)]
     way = (along_y if turned else along_x)[order]
-    one, other = touching(way, same[order], differ[order], asked[order], most)
+    one, other = touching(way, same[order], differ[order], asked[order], max_pairs)
     one, other = order[one], order[other]
     return np.minimum(one, other), np.maximum(one, other)
 
 
-def _looks(boxes: Floats) -> int:
+def _count_comparisons(boxes: Floats) -> int:
     """Count the pairs of boxes that a sweep along their first column compares."""
     begins = np.sort(boxes[:, 0])
     return int(np.searchsorted(begins, boxes[:, 2], side="right").sum()) - int(
@@ -161,7 +161,7 @@ def _looks(boxes: Floats) -> int:
     )
 
 
-class Curves(Struct, frozen=True, eq=False):
+class IndexedCurves(Struct, frozen=True, eq=False):
     """`rows` (K, 11) of camtool.kernels.offsets, their `boxes` (K, 4) and the `tree` of
     camtool.kernels.offsets over these."""
 
@@ -170,7 +170,7 @@ class Curves(Struct, frozen=True, eq=False):
     tree: Floats
 
     @classmethod
-    def of(cls, segments: Segments, *, margin_mm: float = 0.0) -> Curves:
+    def of(cls, segments: Segments, *, margin_mm: float = 0.0) -> IndexedCurves:
         """Return the segments with boxes that are grown by a margin on all sides."""
         from camtool.kernels.offsets import curve_boxes, tree_of
 

@@ -90,13 +90,13 @@ def chain(
         raise GeometryError(f"a gap of {gap_mm} mm is not 0 or more")
     paths = _Paths.of(lines, kinds or Kinds(groups=groups))
     if lines.closed.all():
-        return Chained(lines, _each_alone(np.arange(len(lines))), (), ())
+        return Chained(lines, _single_members(np.arange(len(lines))), (), ())
     from camtool.kernels.chaining import walk
 
     found = joints(paths.ends, max(gap_mm, POSITION_EPS_MM))
     alone = lines.closed | (found.mates.reshape(-1, 2) < 0).all(axis=1)
-    lots = joined(lines, Chains(*walk(found.mates, ~alone)))
-    result, members = _in_order(lines, np.flatnonzero(alone), lots)
+    lots = join_chains(lines, Chains(*walk(found.mates, ~alone)))
+    result, members = _sorted_chains(lines, np.flatnonzero(alone), lots)
     first = np.array([of[0] for of in members], dtype=np.int64)
     result_ends = Ends.of(result, paths.ends.group[first], paths.ends.style[first])
     names = [paths.layers[index] for index in first.tolist()]
@@ -118,19 +118,19 @@ def numbered(items: Sequence[Hashable] | None, count: int) -> Ints:
     return np.array([numbers.setdefault(item, len(numbers)) for item in items], dtype=np.int64)
 
 
-def _each_alone(paths: Ints) -> tuple[tuple[int, ...], ...]:
+def _single_members(paths: Ints) -> tuple[tuple[int, ...], ...]:
     """Return the members of chains that have one path each."""
     return tuple((index,) for index in paths.tolist())
 
 
-def _in_order(
-    lines: Polylines, alone: Ints, lots: Sequence[Joined]
+def _sorted_chains(
+    lines: Polylines, alone: Ints, lots: Sequence[JoinedChains]
 ) -> tuple[Polylines, tuple[tuple[int, ...], ...]]:
     """Return the paths that are joined to none and all chains, in the order of their first
     members; and the members."""
     if not lots:
-        return lines, _each_alone(alone)
-    members = list(_each_alone(alone))
+        return lines, _single_members(alone)
+    members = list(_single_members(alone))
     least = [alone]
     for lot in lots:
         paths = lot.chains.entries // 2
@@ -143,7 +143,7 @@ def _in_order(
     return whole.select(order), tuple(members[index] for index in order.tolist())
 
 
-def _closed_gaps(lots: Sequence[Joined], layers: Sequence[str]) -> list[Gap]:
+def _closed_gaps(lots: Sequence[JoinedChains], layers: Sequence[str]) -> list[Gap]:
     """Return the bridged gaps, in the order of the first members of their chains."""
     found: list[tuple[int, Gap]] = []
     for lot in lots:
@@ -185,10 +185,10 @@ CLASS_RATIO = 2.0
 SAME_TURN_RAD = 1e-6
 """Turns that differ by less are equal at a branch."""
 
-MOST_PAIRS = 4_000_000
+MAX_PAIRS = 4_000_000
 """More pairs of ends than this are not examined together: nearer ones are joined first."""
 
-MOST_NEIGHBOURS = 64
+MAX_NEIGHBOURS = 64
 """Number of other ends that are examined for each end where very many ends meet at one point."""
 
 
@@ -279,22 +279,22 @@ def joints(ends: Ends, reach: float) -> Joints:
     joining = _Joining.of(ends)
     free = every = np.flatnonzero(np.repeat(ends.is_open, 2))
     alone = np.ones(len(joining.mates), dtype=np.bool_)
-    exact = one, other = _near(ends, every, POSITION_EPS_MM)
+    exact = one, other = _near_pairs(ends, every, POSITION_EPS_MM)
     alone[one], alone[other] = False, False
     # Of very many ends at one point not all pairs are examined at once.
-    while joining.join_clusters(one, other) and len(one) >= MOST_NEIGHBOURS:
+    while joining.join_clusters(one, other) and len(one) >= MAX_NEIGHBOURS:
         free = free[joining.mates[free] < 0]
-        one, other = _near(ends, free, POSITION_EPS_MM)
+        one, other = _near_pairs(ends, free, POSITION_EPS_MM)
     met = frozenset(joining.branches)
     free = every[alone[every]]
     while len(free) and reach > POSITION_EPS_MM:
-        near = _bearable(ends.points[free], reach)
-        one, other = _near(ends, free, near)
-        made = joining.join_clear(*joining.possible(one, other), near)
+        near = _bounded_reach(ends.points[free], reach)
+        one, other = _near_pairs(ends, free, near)
+        made = joining.join_clear(*joining.without_empty_rings(one, other), near)
         if near == reach or made == 0:
             break
         free = free[joining.mates[free] < 0]
-    _split(ends, joining.mates, joining.node, reach)
+    _split_rings(ends, joining.mates, joining.node, reach)
     joining.note_left(alone, exact, reach)
     bridged = frozenset(joining.branches) - met
     return Joints(joining.mates, joining.node, joining.branches, bridged, alone)
@@ -325,18 +325,18 @@ class _Joining(Struct, eq=False):
 
         return join(one, other, self.mates, self.above, self.segments, self.arcs)
 
-    def possible(self, one: Ints, other: Ints) -> tuple[Ints, Ints]:
+    def without_empty_rings(self, one: Ints, other: Ints) -> tuple[Ints, Ints]:
         """Return the pairs without those of both ends of one path that would enclose no area."""
         segments, arcs = self.ends.weights[one // 2].T
-        apart = (one // 2 != other // 2) | (segments > 2) | ((segments == 2) & (arcs > 0))
-        return one[apart], other[apart]
+        encloses = (one // 2 != other // 2) | (segments > 2) | ((segments == 2) & (arcs > 0))
+        return one[encloses], other[encloses]
 
     def join_clusters(self, one: Ints, other: Ints) -> int:
         """Join the ends that lie in twos, and the best pairs where more meet; return how many."""
         label, size = _clusters(len(self.mates), one, other)
         is_branch = size[label[one]] > 2
-        made = self.join(*_in_turn(one[~is_branch], other[~is_branch]))
-        made += self.join(*_ranked(self.ends, one[is_branch], other[is_branch]))
+        made = self.join(*_sorted_pairs(one[~is_branch], other[~is_branch]))
+        made += self.join(*_rank_pairs(self.ends, one[is_branch], other[is_branch]))
         meeting = np.flatnonzero(size[label] > 2)
         self.node[meeting] = label[meeting]
         self.branches.update(_first_ends(self.ends, meeting, label))
@@ -352,14 +352,14 @@ class _Joining(Struct, eq=False):
         if reach <= POSITION_EPS_MM or not free.any():
             return
         every = np.flatnonzero(np.repeat(self.ends.is_open, 2))
-        near = _near(self.ends, every, _bearable(self.ends.points[every], reach))
-        one, other = self.possible(*near)
+        near = _near_pairs(self.ends, every, _bounded_reach(self.ends.points[every], reach))
+        one, other = self.without_empty_rings(*near)
         beside = free[one] != free[other]
         one, other = one[beside], other[beside]
-        joined = np.where(free[one], other, one)
-        joined = joined[self.mates[joined] >= 0]
-        one = np.concatenate([one, joined, exact[0]])
-        other = np.concatenate([other, self.mates[joined], exact[1]])
+        mated = np.where(free[one], other, one)
+        mated = mated[self.mates[mated] >= 0]
+        one = np.concatenate([one, mated, exact[0]])
+        other = np.concatenate([other, self.mates[mated], exact[1]])
         label, size = _clusters(len(self.mates), one, other)
         has_free = np.zeros(len(label), dtype=np.bool_)
         has_free[label[free]] = True
@@ -373,28 +373,28 @@ class _Joining(Struct, eq=False):
     def join_clear(self, one: Ints, other: Ints, reach: float) -> int:
         """Join the ends whose rivals are much farther first (see the top), then the others;
         return how many. All pairs (J,), (J,) are within `reach`."""
-        apart = np.hypot(*(self.ends.points[one] - self.ends.points[other]).T)
-        made, least = 0, float(apart.min(initial=reach))
+        distance = np.hypot(*(self.ends.points[one] - self.ends.points[other]).T)
+        made, least = 0, float(distance.min(initial=reach))
         for k in range(math.ceil(math.log(reach / least, CLASS_RATIO)), -1, -1):
             scale = reach / CLASS_RATIO**k
-            close = apart <= CLASS_RATIO * scale
+            close = distance <= CLASS_RATIO * scale
             label, size = _clusters(len(self.mates), one[close], other[close])
-            clear = (apart <= scale) & (size[label[one]] == 2)
-            made += self.join(*_in_turn(one[clear], other[clear]))
+            clear = (distance <= scale) & (size[label[one]] == 2)
+            made += self.join(*_sorted_pairs(one[clear], other[clear]))
             left = ~clear & (self.mates[one] < 0) & (self.mates[other] < 0)
-            one, other, apart = one[left], other[left], apart[left]
+            one, other, distance = one[left], other[left], distance[left]
             if not len(one):
                 return made
         return made + self.join_clusters(one, other)
 
 
-def _bearable(points: Floats, reach: float) -> float:
-    """Return `reach`, or a smaller distance within which there are at most MOST_PAIRS pairs."""
+def _bounded_reach(points: Floats, reach: float) -> float:
+    """Return `reach`, or a smaller distance within which there are at most MAX_PAIRS pairs."""
     while reach > POSITION_EPS_MM:
         cells = np.floor(points / reach).astype(np.int64)
         mixed = cells[:, 0] * _MIX + cells[:, 1]
         counts = np.unique(mixed, return_counts=True)[1].astype(np.float64)
-        if (counts**2).sum() <= MOST_PAIRS:
+        if (counts**2).sum() <= MAX_PAIRS:
             return reach
         reach = max(0.25 * reach, POSITION_EPS_MM)
     return reach
@@ -403,7 +403,7 @@ def _bearable(points: Floats, reach: float) -> float:
 _MIX = np.int64(0x9E3779B1)
 
 
-def _near(ends: Ends, free: Ints, reach: float) -> tuple[Ints, Ints]:
+def _near_pairs(ends: Ends, free: Ints, reach: float) -> tuple[Ints, Ints]:
     """Return the pairs of free ends within `reach` in one group, the lesser end first."""
     from camtool.kernels.chaining import near_pairs
 
@@ -412,7 +412,7 @@ def _near(ends: Ends, free: Ints, reach: float) -> tuple[Ints, Ints]:
     cells = np.column_stack([ends.group[free // 2], np.floor(points / (reach * _WIDER))])
     cells = cells.astype(np.int64)
     order = np.lexsort((cells[:, 2], cells[:, 1], cells[:, 0]))
-    most = MOST_NEIGHBOURS if reach <= POSITION_EPS_MM else len(free)
+    most = MAX_NEIGHBOURS if reach <= POSITION_EPS_MM else len(free)
     one, other = near_pairs(cells[order], points[order], reach, most)
     one, other = free[order[one]], free[order[other]]
     return np.minimum(one, other), np.maximum(one, other)
@@ -421,7 +421,7 @@ def _near(ends: Ends, free: Ints, reach: float) -> tuple[Ints, Ints]:
 _WIDER = 1.0 + 1e-9
 
 
-def _in_turn(one: Ints, other: Ints) -> tuple[Ints, Ints]:
+def _sorted_pairs(one: Ints, other: Ints) -> tuple[Ints, Ints]:
     """Return pairs of different ends, sorted by their first ones."""
     order = np.argsort(one, kind="stable")
     return one[order], other[order]
@@ -436,16 +436,16 @@ def _clusters(count: int, one: Ints, other: Ints) -> tuple[Ints, Ints]:
     return label, np.bincount(label, minlength=count)
 
 
-def _ranked(ends: Ends, one: Ints, other: Ints) -> tuple[Ints, Ints]:
+def _rank_pairs(ends: Ends, one: Ints, other: Ints) -> tuple[Ints, Ints]:
     """Return pairs at branches, the best first."""
-    apart = np.hypot(*(ends.points[one] - ends.points[other]).T)
+    distance = np.hypot(*(ends.points[one] - ends.points[other]).T)
     with np.errstate(divide="ignore"):
-        steps = np.log(apart / POSITION_EPS_MM) / math.log(CLASS_RATIO)
+        steps = np.log(distance / POSITION_EPS_MM) / math.log(CLASS_RATIO)
     distance = np.maximum(np.floor(steps), -1.0)
     unlike = ends.style[one // 2] != ends.style[other // 2]
     turn = np.abs(wrapped(ends.leaving[one] - ends.leaving[other] - math.pi))
     bend = np.round(turn / SAME_TURN_RAD)
-    place = _places(ends, np.unique(np.concatenate([one, other])))
+    place = _place_ranks(ends, np.unique(np.concatenate([one, other])))
     first = np.minimum(place[one], place[other])
     second = np.maximum(place[one], place[other])
     order = np.lexsort((second, first, bend, unlike, distance))
@@ -457,7 +457,7 @@ def wrapped(angle: Floats) -> Floats:
     return np.asarray((angle + math.pi) % (2.0 * math.pi) - math.pi)
 
 
-def _places(ends: Ends, chosen: Ints) -> Ints:
+def _place_ranks(ends: Ends, chosen: Ints) -> Ints:
     """Return the rank (2M,) of the chosen ends by place, direction and the place of the other
     end."""
     x, y = (np.round(ends.points[chosen] / POSITION_EPS_MM)).T
@@ -473,14 +473,14 @@ def _first_ends(ends: Ends, meeting: Ints, label: Ints) -> dict[int, tuple[int, 
     meet there."""
     if not len(meeting):
         return {}
-    rank = _places(ends, meeting)
+    rank = _place_ranks(ends, meeting)
     order = meeting[np.lexsort((rank[meeting], label[meeting]))]
     number, begin, count = np.unique(label[order], return_index=True, return_counts=True)
     firsts = zip(order[begin].tolist(), count.tolist(), strict=True)
     return dict(zip(number.tolist(), firsts, strict=True))
 
 
-def _split(ends: Ends, mates: Ints, node: Ints, reach: float) -> None:
+def _split_rings(ends: Ends, mates: Ints, node: Ints, reach: float) -> None:
     """Split rings that pass a branch twice there, each walked from its first end by place."""
     if not (node >= 0).any():
         return
@@ -496,7 +496,7 @@ def _split(ends: Ends, mates: Ints, node: Ints, reach: float) -> None:
     both, ring_of = both[order], ring_of[order]
     if not len(both):
         return
-    rank = _places(ends, both)
+    rank = _place_ranks(ends, both)
     order = np.lexsort((rank[both], ring_of))
     first = np.unique(ring_of[order], return_index=True)[1]
     split_loops(both[order][first], mates, node, ends.points, reach, ends.weights)
@@ -530,13 +530,13 @@ class Chains(Struct, frozen=True, eq=False):
         begins = np.concatenate([[0], np.cumsum(counts[chosen])])
         return Chains(self.entries[rows], begins, rings[chosen])
 
-    def apart(self) -> Chains:
+    def as_single_paths(self) -> Chains:
         """Return each path as a chain of its own, travelled as it was drawn."""
         count = len(self.entries)
         return Chains(self.entries & ~1, np.arange(count + 1), np.zeros(count, dtype=np.bool_))
 
 
-class Joined(Struct, frozen=True, eq=False):
+class JoinedChains(Struct, frozen=True, eq=False):
     """Chains as paths; and the bridged gaps: chain (G,), place (G, 2) mm, size (G,) mm."""
 
     chains: Chains
@@ -546,14 +546,14 @@ class Joined(Struct, frozen=True, eq=False):
     gap_size: Floats
 
 
-def joined(lines: Polylines, chains: Chains) -> list[Joined]:
+def join_chains(lines: Polylines, chains: Chains) -> list[JoinedChains]:
     """Return the chains of these open paths as paths, in up to three lots (see the top)."""
-    done: list[Joined] = []
+    done: list[JoinedChains] = []
     left = chains
     for _ in range(2):
         if not len(left):
             return done
-        good, part = _attempt(lines, left)
+        good, part = _try_chains(lines, left)
         if len(part.chains):
             done.append(part)
         # A ring may still be an open chain; an open chain only its pieces.
@@ -561,49 +561,51 @@ def joined(lines: Polylines, chains: Chains) -> list[Joined]:
         open_ones = ~left.rings[~good]
         pieces = again.select(open_ones, again.rings)
         if len(pieces):
-            done.append(_laid(lines, pieces.apart()))
+            done.append(_single_paths(lines, pieces.as_single_paths()))
         left = again.select(~open_ones, again.rings)
     if len(left):
-        done.append(_laid(lines, left.apart()))
+        done.append(_single_paths(lines, left.as_single_paths()))
     return done
 
 
-def _attempt(lines: Polylines, chains: Chains) -> tuple[Bools, Joined]:
+def _try_chains(lines: Polylines, chains: Chains) -> tuple[Bools, JoinedChains]:
     """Return the mask (C,) of the chains that make a path, and these paths."""
-    vertices, counts, gaps = _bridged(lines, chains)
+    vertices, counts, gaps = _chain_vertices(lines, chains)
     good = np.asarray(counts >= 2)
     path = np.repeat(np.arange(len(chains)), counts)
     keep = good[path]
-    made = _columns(vertices[keep], counts[good], chains.rings[good])
+    made = _polylines_of(vertices[keep], counts[good], chains.rings[good])
     empty = made.closed & (np.abs(signed_areas(made)) <= POSITION_EPS_MM * path_lengths(made))
     if empty.any():
         good[np.flatnonzero(good)[empty]] = False
         keep = good[path]
-        made = _columns(vertices[keep], counts[good], chains.rings[good])
+        made = _polylines_of(vertices[keep], counts[good], chains.rings[good])
     number = np.cumsum(good) - 1
     gap_chain, at, size = gaps
     kept = good[gap_chain]
     part = chains.select(good, chains.rings)
-    return good, Joined(part, made, number[gap_chain[kept]], at[kept], size[kept])
+    return good, JoinedChains(part, made, number[gap_chain[kept]], at[kept], size[kept])
 
 
-def _laid(lines: Polylines, chains: Chains) -> Joined:
+def _single_paths(lines: Polylines, chains: Chains) -> JoinedChains:
     """Return chains of one path each, unchanged."""
     none = np.empty(0, dtype=np.int64)
-    return Joined(chains, lines.select(chains.entries // 2), none, np.empty((0, 2)), np.empty(0))
+    return JoinedChains(
+        chains, lines.select(chains.entries // 2), none, np.empty((0, 2)), np.empty(0)
+    )
 
 
-def _columns(vertices: Floats, counts: Ints, closed: Bools) -> Polylines:
+def _polylines_of(vertices: Floats, counts: Ints, closed: Bools) -> Polylines:
     return Polylines(vertices, np.concatenate([[0], np.cumsum(counts)]), closed)
 
 
 _Gaps = tuple[Ints, Floats, Floats]
 
 
-def _bridged(lines: Polylines, chains: Chains) -> tuple[Floats, Ints, _Gaps]:
+def _chain_vertices(lines: Polylines, chains: Chains) -> tuple[Floats, Ints, _Gaps]:
     """Return the vertices (N, 3) of all chains, the number of vertices of each (C,), and the
     bridged gaps."""
-    rows, counts = _rows(lines, chains)
+    rows, counts = _vertex_rows(lines, chains)
     vertices = lines.vertices[rows]
     turned = np.repeat(chains.entries & 1, counts) == 1
     # The segment that left vertex i now leaves vertex i + 1 and bends to the other side.
@@ -618,7 +620,7 @@ def _bridged(lines: Polylines, chains: Chains) -> tuple[Floats, Ints, _Gaps]:
     meets = np.ones(len(chain), dtype=np.bool_)
     meets[(chains.begins[1:] - 1)[~chains.rings]] = False
     end, begin = last[meets], first[following[meets]]
-    drop, gaps = _bridge(vertices, end, begin)
+    drop, gaps = _bridge_gaps(vertices, end, begin)
     keep = np.ones(len(vertices), dtype=np.bool_)
     keep[end[drop]] = False
     owner = np.repeat(chain, counts)
@@ -628,7 +630,7 @@ def _bridged(lines: Polylines, chains: Chains) -> tuple[Floats, Ints, _Gaps]:
     return vertices, made, (chain[meets][wide], at, size)
 
 
-def _rows(lines: Polylines, chains: Chains) -> tuple[Ints, Ints]:
+def _vertex_rows(lines: Polylines, chains: Chains) -> tuple[Ints, Ints]:
     """Return the rows of all vertices in the order of travel, and the number of rows of each
     entry."""
     path, turned = chains.entries // 2, chains.entries % 2
@@ -638,7 +640,7 @@ def _rows(lines: Polylines, chains: Chains) -> tuple[Ints, Ints]:
     return np.repeat(begin, counts) + np.repeat(1 - 2 * turned, counts) * within, counts
 
 
-def _bridge(
+def _bridge_gaps(
     vertices: Floats, end: Ints, begin: Ints
 ) -> tuple[Bools, tuple[Bools, Floats, Floats]]:
     """Move the starts of pieces to the ends of those before them; return the ends that are
@@ -721,11 +723,11 @@ def open_gaps(ends: Ends, lengths: Floats, layers: Sequence[str], gap_mm: float)
         near = _is_gap(ends, lengths, one, other, size) & (
             (one // 2 == other // 2) | (size <= at_random)
         )
-        for a, b, apart in zip(
+        for a, b, distance in zip(
             one[near].tolist(), other[near].tolist(), size[near].tolist(), strict=True
         ):
             x, y = (0.5 * (ends.points[a] + ends.points[b])).tolist()
-            found.setdefault((min(a, b), max(a, b)), Gap((x, y), apart, layers[a // 2]))
+            found.setdefault((min(a, b), max(a, b)), Gap((x, y), distance, layers[a // 2]))
     return [found[key] for key in sorted(found)]
 
 

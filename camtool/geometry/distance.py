@@ -24,7 +24,7 @@ from msgspec import Struct
 from msgspec.structs import astuple
 
 from camtool.arrays import Bools, Floats, Ints
-from camtool.geometry.boxes import Curves, box_pairs
+from camtool.geometry.boxes import IndexedCurves, box_pairs
 from camtool.geometry.measure import path_extents, segment_boxes
 from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.kernels.move_tree import hilbert_order
@@ -52,7 +52,7 @@ class Nearest(Struct, frozen=True, eq=False):
     segment: Ints
 
 
-class Approach(Struct, frozen=True):
+class NearestApproach(Struct, frozen=True):
     """Least distance of two paths, mm, and a point (x, y) of one of them that is as far from the
     other one."""
 
@@ -62,12 +62,12 @@ class Approach(Struct, frozen=True):
 
 def points_to_segments(points: Floats, segments: Segments) -> Floats:
     """Return the distance (P, K) in mm of each point (P, 2) to each line or arc."""
-    return _distance(points[:, None, :], _Rows.of(segments))
+    return _distance(points[:, None, :], _SegmentRows.of(segments))
 
 
 def point_to_segment(points: Floats, segments: Segments) -> Floats:
     """Return the distance (K,) in mm of each point (K, 2) to the line or arc of the same row."""
-    return _distance(points, _Rows.of(segments))
+    return _distance(points, _SegmentRows.of(segments))
 
 
 def nearest(points: Floats, segments: Segments) -> Nearest:
@@ -82,7 +82,7 @@ def nearest(points: Floats, segments: Segments) -> Nearest:
     if len(segments) == 0:
         raise ValueError("no segments to be near to")
     order = hilbert_order(segments.start, segments.end)
-    curves, rows = Curves.of(segments[order]), _Rows.of(segments)
+    curves, rows = IndexedCurves.of(segments[order]), _SegmentRows.of(segments)
     distance = np.empty(len(points))
     segment = np.empty(len(points), dtype=np.int64)
     for begin in range(0, len(points), POINTS_AT_A_TIME):
@@ -99,7 +99,7 @@ def nearest(points: Floats, segments: Segments) -> Nearest:
     return Nearest(distance, segment)
 
 
-def approach(a: Polyline, b: Polyline) -> Approach:
+def approach(a: Polyline, b: Polyline) -> NearestApproach:
     """Compute the least distance of two paths, and a point of one of them at that distance from
     the other; 0 where they cross."""
     first, second = Segments.of(a), Segments.of(b)
@@ -126,9 +126,9 @@ def near_paths(lines: Polylines, others: Polylines, reach_mm: float) -> Iterator
         yield from zip(rows.tolist(), columns.tolist(), strict=True)
 
 
-def _approach(distance: Floats, points: Floats) -> Approach:
+def _approach(distance: Floats, points: Floats) -> NearestApproach:
     at = int(distance.argmin())
-    return Approach(float(distance[at]), (float(points[at, 0]), float(points[at, 1])))
+    return NearestApproach(float(distance[at]), (float(points[at, 0]), float(points[at, 1])))
 
 
 def _box_distance(boxes: Floats, others: Floats) -> Floats:
@@ -139,7 +139,7 @@ def _box_distance(boxes: Floats, others: Floats) -> Floats:
     return np.asarray(np.hypot(apart[..., 0], apart[..., 1]))
 
 
-class _Rows(Struct, frozen=True, eq=False):
+class _SegmentRows(Struct, frozen=True, eq=False):
     """Segments in the form of the formula: A, B, d, 4b, 1−b², c(1+b²), T_A and T_B."""
 
     a: Floats
@@ -152,11 +152,11 @@ class _Rows(Struct, frozen=True, eq=False):
     tangent_b: Floats
 
     @classmethod
-    def of(cls, segments: Segments) -> _Rows:
+    def of(cls, segments: Segments) -> _SegmentRows:
         d, bulge = segments.end - segments.start, segments.bulge
         flat = 1.0 - bulge**2
         # Up to the factor 1 + b², cos(sweep/2) is 1 − b² and sin(sweep/2) is 2b.
-        along, across = flat[:, None] * d, (2.0 * bulge)[:, None] * _turned(d)
+        along, across = flat[:, None] * d, (2.0 * bulge)[:, None] * _turn_left(d)
         return cls(
             a=segments.start,
             b=segments.end,
@@ -168,8 +168,8 @@ class _Rows(Struct, frozen=True, eq=False):
             tangent_b=along + across,
         )
 
-    def __getitem__(self, rows: Ints) -> _Rows:
-        return _Rows(*(column[rows] for column in astuple(self)))
+    def __getitem__(self, rows: Ints) -> _SegmentRows:
+        return _SegmentRows(*(column[rows] for column in astuple(self)))
 
     def power(self, points: Floats) -> Floats:
         from_a = points - self.a
@@ -179,30 +179,30 @@ class _Rows(Struct, frozen=True, eq=False):
     def expanded(self, origin: Floats) -> tuple[Floats, Floats]:
         """power(origin + x) = 4b |x|² + linear·x + constant: its linear (N, 2), constant (N,)."""
         a, b = self.a - origin, self.b - origin
-        linear = -self.four_b[:, None] * (a + b) - 2.0 * self.flat[:, None] * _turned(self.d)
+        linear = -self.four_b[:, None] * (a + b) - 2.0 * self.flat[:, None] * _turn_left(self.d)
         return linear, self.four_b * _dot(a, b) + 2.0 * self.flat * _cross(self.d, a)
 
-    def beside(self, points: Floats) -> Bools:
+    def is_beside(self, points: Floats) -> Bools:
         """True where the nearest point of the full circle or line lies within the segment."""
         after_a = _dot(points - self.a, self.tangent_a) >= 0.0
         before_b = _dot(points - self.b, self.tangent_b) <= 0.0
         return np.asarray(after_a & before_b)
 
 
-def _distance(points: Floats, rows: _Rows) -> Floats:
+def _distance(points: Floats, rows: _SegmentRows) -> Floats:
     """Return the distance of points to segments; both are broadcast against each other."""
     to_a = np.hypot(points[..., 0] - rows.a[..., 0], points[..., 1] - rows.a[..., 1])
     to_b = np.hypot(points[..., 0] - rows.b[..., 0], points[..., 1] - rows.b[..., 1])
     middle = 0.5 * (rows.a + rows.b)
-    normal = _turned(rows.d)
+    normal = _turn_left(rows.d)
     arm = rows.four_b[..., None] * (points - middle) - rows.flat[..., None] * normal
     whole = np.abs(rows.power(points)) / (np.hypot(arm[..., 0], arm[..., 1]) + rows.size)
-    return np.where(rows.beside(points), whole, np.minimum(to_a, to_b))
+    return np.where(rows.is_beside(points), whole, np.minimum(to_a, to_b))
 
 
 def paired_distances(a: Segments, b: Segments) -> tuple[Floats, Floats]:
     """(N,) distances of N pairs of segments, 0 where they cross, and (N, 2) where that is."""
-    rows_a, rows_b = _Rows.of(a), _Rows.of(b)
+    rows_a, rows_b = _SegmentRows.of(a), _SegmentRows.of(b)
     candidates: list[tuple[Floats, Floats]] = []
     for points in (a.start, a.end):
         candidates.append((_distance(points, rows_b), points))
@@ -212,14 +212,16 @@ def paired_distances(a: Segments, b: Segments) -> tuple[Floats, Floats]:
     candidates.append(_toward(b, rows_b, a, rows_a))
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         for points in _common_points(rows_a, rows_b):
-            crosses = rows_a.beside(points) & rows_b.beside(points)
+            crosses = rows_a.is_beside(points) & rows_b.is_beside(points)
             candidates.append((np.where(crosses, 0.0, np.inf), points))
     distances = np.array([distance for distance, _ in candidates])
     best, pair = distances.argmin(axis=0), np.arange(len(a))
     return distances[best, pair], np.array([points for _, points in candidates])[best, pair]
 
 
-def _toward(a: Segments, rows_a: _Rows, b: Segments, rows_b: _Rows) -> tuple[Floats, Floats]:
+def _toward(
+    a: Segments, rows_a: _SegmentRows, b: Segments, rows_b: _SegmentRows
+) -> tuple[Floats, Floats]:
     """From where `a` comes nearest to the centre of the arc `b`, the distance to `b`.
 
     Infinite where `b` is a line, where the centres coincide (then ends are as near), and where
@@ -235,11 +237,11 @@ def _toward(a: Segments, rows_a: _Rows, b: Segments, rows_b: _Rows) -> tuple[Flo
     unit = arm / np.where(apart, length, 1.0)[:, None]
     radius = np.where(a.is_arc, a.radius, 0.0)
     points = np.where(a.is_arc[:, None], a.centre + radius[:, None] * unit, foot)
-    valid = b.is_arc & apart & rows_a.beside(points)
+    valid = b.is_arc & apart & rows_a.is_beside(points)
     return np.where(valid, _distance(points, rows_b), np.inf), points
 
 
-def _common_points(a: _Rows, b: _Rows) -> tuple[Floats, Floats]:
+def _common_points(a: _SegmentRows, b: _SegmentRows) -> tuple[Floats, Floats]:
     """The two points (N, 2) that the whole lines or circles of each pair share; NaN if none.
 
     power(x) = 4b |x|² + l·x + k, and 4b_b·power_a − 4b_a·power_b is linear: the line through both
@@ -256,7 +258,7 @@ def _common_points(a: _Rows, b: _Rows) -> tuple[Floats, Floats]:
     across_length = np.hypot(across[:, 0], across[:, 1])
     unit = across / across_length[:, None]
     foot = -(constant / across_length)[:, None] * unit
-    along = _turned(unit)
+    along = _turn_left(unit)
     rounder = np.abs(b.four_b) >= np.abs(a.four_b)
     four_b = np.where(rounder, b.four_b, a.four_b)
     linear = np.where(rounder[:, None], linear_b, linear_a)
@@ -272,7 +274,7 @@ def _common_points(a: _Rows, b: _Rows) -> tuple[Floats, Floats]:
     )
 
 
-def _turned(vectors: Floats) -> Floats:
+def _turn_left(vectors: Floats) -> Floats:
     """Vectors (..., 2) turned by +90°."""
     return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)
 

@@ -147,7 +147,7 @@ def _healing(drawing: Drawing) -> dict[str, Any]:
 # them, or within an arc. A tree of boxes finds the first (kernels/closest.py); then pairs with an
 # arc whose boxes are as near as that, and pairs whose boxes touch, are measured exactly.
 
-MOST_WALL_PAIRS = 200_000
+MAX_WALL_PAIRS = 200_000
 """At most this many pairs of segments are measured for the narrowest wall."""
 
 _PAIRS_AT_A_TIME = 1 << 14
@@ -196,7 +196,7 @@ def smallest_contour(lines: Polylines) -> Feature | None:
 def narrowest_wall(lines: Polylines) -> Feature | None:
     """The least distance between two closed paths, 0 where they cross; None with fewer than two.
 
-    Where more than MOST_WALL_PAIRS segments lie as near, it is an upper bound.
+    Where more than MAX_WALL_PAIRS segments lie as near, it is an upper bound.
     """
     segments = _closed_segments(lines)
     if segments is None:
@@ -215,11 +215,11 @@ def narrowest_wall(lines: Polylines) -> Feature | None:
     found = Feature(float(best), (x, y), tuple(pair))
     near = touching_boxes(
         _grown(boxes, POSITION_EPS_MM), np.zeros_like(number), number, np.ones(len(number), bool),
-        most=MOST_WALL_PAIRS,
+        max_pairs=MAX_WALL_PAIRS,
     )  # fmt: skip
     arcs = touching_boxes(
         _grown(boxes, 0.5 * best), np.zeros_like(number), number, segments.is_arc,
-        most=MOST_WALL_PAIRS,
+        max_pairs=MAX_WALL_PAIRS,
     )  # fmt: skip
     for one, two in (near, arcs):
         found = _nearer(segments, one, two, found)

@@ -135,7 +135,7 @@ def _fit_pieces(pieces: Pieces, tolerance_mm: float) -> Fit:
 
     vertices, judged, _ = _fitted(nodes, lambda t: samples_between(control, t), tolerance_mm)
     vertices[:, :2] += pieces.origin
-    return _checked(vertices, judged, pieces.ends)
+    return _checked_fit(vertices, judged, pieces.ends)
 
 
 def _fit_any(curve: Curve, tolerance_mm: float) -> Fit:
@@ -151,7 +151,7 @@ def _fit_any(curve: Curve, tolerance_mm: float) -> Fit:
     )
     if len(nodes) == 1:
         return Fit(vertices, *judged)
-    return _checked(vertices, judged, nodes.point[[0, -1]])
+    return _checked_fit(vertices, judged, nodes.point[[0, -1]])
 
 
 def _fitted(
@@ -181,7 +181,7 @@ def _fitted(
     return vertices, judged, nodes
 
 
-def _checked(vertices: Floats, judged: Judged, ends: Floats) -> Fit:
+def _checked_fit(vertices: Floats, judged: Judged, ends: Floats) -> Fit:
     if not (np.isfinite(vertices).all() and math.isfinite(judged[0] + judged[2])):
         raise GeometryError("a point or a tangent of a curve is not finite")
     vertices[-1, :2], vertices[0, :2] = ends[1], ends[0]
@@ -232,7 +232,7 @@ def curve_nodes(curve: Curve, tolerance_mm: float, steps: int) -> Nodes:
         differs = turns(beside, at) > CORNER_ANGLE_RAD
         column[is_break] = np.where(differs[:, None], beside, at)
     _refine(nodes, curve, directions, tolerance_mm)
-    return _merged(nodes)
+    return _merge_nodes(nodes)
 
 
 class _NodeColumns(Struct, eq=False):
@@ -327,7 +327,7 @@ def _too_coarse(nodes: _NodeColumns, rows: Ints, probes: Floats, tolerance_mm: f
     return np.asarray(bends & (size > POSITION_EPS_MM))
 
 
-def _merged(nodes: _NodeColumns) -> Nodes:
+def _merge_nodes(nodes: _NodeColumns) -> Nodes:
     """Merge the nodes at one position into one, which is a corner when the tangents differ."""
     gaps = np.hypot(*np.diff(nodes.point, axis=0).T)
     first = list(range(len(nodes.t)))

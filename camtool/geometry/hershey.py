@@ -81,11 +81,11 @@ def _font() -> MappingProxyType[str, Glyph]:
     del glyphs["\x7f"]
     glyphs[" "] = Glyph((), _SPACE_WIDTH)
     glyphs["-"] = _HYPHEN
-    glyphs.update(_made(glyphs))
+    glyphs.update(_composed_glyphs(glyphs))
     return MappingProxyType(glyphs)
 
 
-def _made(glyphs: dict[str, Glyph]) -> dict[str, Glyph]:
+def _composed_glyphs(glyphs: dict[str, Glyph]) -> dict[str, Glyph]:
     """Signs that the font lacks, on its own grid."""
     u, plus, zero = glyphs["u"], glyphs["+"], glyphs["O"]
     left = min(x for stroke in u.strokes for x, _ in stroke)
@@ -107,14 +107,14 @@ def _made(glyphs: dict[str, Glyph]) -> dict[str, Glyph]:
         "Ø": Glyph((*zero.strokes, slash), zero.advance),
         "⌀": Glyph((*zero.strokes, slash), zero.advance),
         "…": Glyph(tuple(tuple((x + dx, y) for x, y in s) for s, dx in dots), 28.0),
-        "²": _raised(glyphs["2"]),
-        "³": _raised(glyphs["3"]),
+        "²": _raised_glyph(glyphs["2"]),
+        "³": _raised_glyph(glyphs["3"]),
         "→": Glyph((((3, 0), (21, 0)), ((15, -6), (21, 0), (15, 6))), 24.0),
         "—": _DASH,
     }
 
 
-def _raised(glyph: Glyph) -> Glyph:
+def _raised_glyph(glyph: Glyph) -> Glyph:
     strokes = tuple(tuple((0.55 * x, 0.55 * y - 6.0) for x, y in s) for s in glyph.strokes)
     return Glyph(strokes, 0.6 * glyph.advance)
 

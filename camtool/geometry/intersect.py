@@ -28,7 +28,7 @@ from msgspec.structs import astuple
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.boxes import box_pairs, touching_boxes
 from camtool.geometry.drawing import SelfCrossing
-from camtool.geometry.measure import Frames, dot, segment_boxes, turned
+from camtool.geometry.measure import Frames, dot, segment_boxes, turn_left
 from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, Segments
 
 
@@ -63,7 +63,7 @@ def crossings(
         _meetings(frames_a, frames_b, row_a, row_b, position_eps_mm)
         for row_a, row_b in box_pairs(boxes_a, boxes_b, reach_mm=position_eps_mm)
     ]
-    return _joined(parts)
+    return _concatenate(parts)
 
 
 def self_crossings(segments: Segments) -> Crossings:
@@ -76,7 +76,7 @@ def self_crossings(segments: Segments) -> Crossings:
     for row_a, row_b in box_pairs(boxes, boxes, reach_mm=POSITION_EPS_MM):
         once = row_a < row_b
         parts.append(_meetings(frames, frames, row_a[once], row_b[once], POSITION_EPS_MM))
-    found = _joined(parts)
+    found = _concatenate(parts)
     same = segments.path[found.row_a] == segments.path[found.row_b]
     count = np.bincount(segments.path, minlength=1)[segments.path[found.row_a]]
     apart = found.row_b - found.row_a
@@ -93,7 +93,7 @@ def meetings(segments: Segments, row_a: Ints, row_b: Ints) -> tuple[Crossings, B
     return found, ~_touching(found, frames, POSITION_EPS_MM)
 
 
-def _joined(parts: list[Crossings]) -> Crossings:
+def _concatenate(parts: list[Crossings]) -> Crossings:
     none = np.empty(0, dtype=np.int64)
     parts = [*parts, Crossings(none, none, np.empty((0, 2)), np.empty(0), np.empty(0))]
     return Crossings(*map(np.concatenate, zip(*map(astuple, parts), strict=True)))
@@ -110,14 +110,14 @@ def _meetings(a: Frames, b: Frames, row_a: Ints, row_b: Ints, eps: float) -> Cro
     candidates = [*ends, *common]
     found: list[tuple[Floats, Bools, Floats, Floats]] = []
     for points in candidates:
-        on_a, along_a = _within(points, frames_a, eps)
-        on_b, along_b = _within(points, frames_b, eps)
+        on_a, along_a = _locate_on_segments(points, frames_a, eps)
+        on_b, along_b = _locate_on_segments(points, frames_b, eps)
         fresh = on_a & on_b
         for earlier, valid, _, _ in found:
             apart = np.hypot(*(points - earlier).T)
             fresh &= ~(valid & (apart <= 2.0 * eps))
         found.append((points, fresh, along_a, along_b))
-    return _joined(
+    return _concatenate(
         [
             Crossings(
                 row_a[fresh],
@@ -131,7 +131,7 @@ def _meetings(a: Frames, b: Frames, row_a: Ints, row_b: Ints, eps: float) -> Cro
     )
 
 
-def _within(points: Floats, frames: Frames, eps: float) -> tuple[Bools, Floats]:
+def _locate_on_segments(points: Floats, frames: Frames, eps: float) -> tuple[Bools, Floats]:
     """Return the mask of the points that lie on their segment, and their lengths along it; NaN is
     never on it."""
     along = frames.along(points)
@@ -165,7 +165,7 @@ def _common_points(a: Frames, b: Frames) -> tuple[Floats, Floats]:
         size = np.hypot(across[:, 0], across[:, 1])
         unit = across / size[:, None]
         foot = (height / size)[:, None] * unit
-        direction = turned(unit)
+        direction = turn_left(unit)
         # On the line foot + τ direction:  kR τ² − 2 β τ + γ = 0.
         beta = dot(n_round, direction)
         gamma = k_round * dot(foot, foot) - 2.0 * dot(n_round, foot)
@@ -197,7 +197,7 @@ def _angle_and_bend(points: Floats, a: Frames, b: Frames) -> tuple[Floats, Float
     tangent_a = a.tangent_at(a.along(points) / a.length)
     tangent_b = b.tangent_at(b.along(points) / b.length)
     same_way = np.where(dot(tangent_a, tangent_b) < 0.0, -1.0, 1.0)
-    return dot(turned(tangent_a), tangent_b), np.abs(a.curvature - same_way * b.curvature)
+    return dot(turn_left(tangent_a), tangent_b), np.abs(a.curvature - same_way * b.curvature)
 
 
 def _touching(found: Crossings, frames: Frames, eps: float) -> Bools:
@@ -221,10 +221,10 @@ def _touching(found: Crossings, frames: Frames, eps: float) -> Bools:
 PAIRS_AT_A_TIME = 1 << 16
 """Number of pairs of segments that are examined exactly at a time: it bounds the memory."""
 
-MOST_CROSSINGS = 1000
+MAX_CROSSINGS = 1000
 """The search for crossings ends when there are more than this."""
 
-MOST_PAIRS = 4_000_000
+MAX_PAIRS = 4_000_000
 """The search for crossings ends after this many pairs of segments whose boxes touch."""
 
 ALONG_RAD = 1e-6
@@ -235,7 +235,7 @@ crossing."""
 def self_crossings_of(lines: Polylines, layers: Sequence[str]) -> tuple[SelfCrossing, ...]:
     """The places where closed paths cross themselves, path by path, each place once.
 
-    At most about MOST_CROSSINGS.
+    At most about MAX_CROSSINGS.
     """
     if not lines.closed.any():
         return ()
@@ -251,7 +251,7 @@ def self_crossings_of(lines: Polylines, layers: Sequence[str]) -> tuple[SelfCros
             x, y = meets.point[row].tolist()
             key = (path, round(x / _SAME_MM), round(y / _SAME_MM))
             found.setdefault(key, SelfCrossing((x, y), path, layers[path]))
-        if len(found) > MOST_CROSSINGS:
+        if len(found) > MAX_CROSSINGS:
             break
     return tuple(found[key] for key in sorted(found))
 
@@ -265,7 +265,7 @@ def _pairs_of_one_path(segments: Segments) -> Iterator[tuple[Ints, Ints]]:
     margin = 0.5 * POSITION_EPS_MM * np.array([-1.0, -1.0, 1.0, 1.0])
     every = np.ones(len(segments), dtype=np.bool_)
     one, other = touching_boxes(
-        boxes + margin, segments.path, np.arange(len(segments)), every, most=MOST_PAIRS
+        boxes + margin, segments.path, np.arange(len(segments)), every, max_pairs=MAX_PAIRS
     )
     counts = np.bincount(segments.path)[segments.path]
     in_a_row = (other - one == 1) | (other - one == counts[one] - 1)

@@ -108,9 +108,9 @@ def _extremes(segments: Segments) -> tuple[Ints, Floats]:
     first = np.arctan2(chord[:, 1], chord[:, 0]) - 0.5 * sweep
     lowest = np.ceil(np.minimum(first, first + sweep) / quarter)
     tangents = (lowest[:, None] + np.arange(3.0)) * quarter
-    turned = (tangents - first[:, None]) * np.sign(sweep)[:, None]
-    arc, which = np.nonzero((turned > 0.0) & (turned < np.abs(sweep)[:, None]))
-    return rows[arc], point_at(segments, rows[arc], turned[arc, which] / np.abs(sweep[arc]))
+    turn_left = (tangents - first[:, None]) * np.sign(sweep)[:, None]
+    arc, which = np.nonzero((turn_left > 0.0) & (turn_left < np.abs(sweep)[:, None]))
+    return rows[arc], point_at(segments, rows[arc], turn_left[arc, which] / np.abs(sweep[arc]))
 
 
 def path_extents(lines: Polylines) -> Floats:
@@ -144,8 +144,8 @@ def point_at(segments: Segments, row_indices: Ints, t: Floats) -> Floats:
     along[arcs] = ratio * np.cos(turn)
     points = (1.0 - along[:, None]) * start + along[:, None] * end
     chord = end[arcs] - start[arcs]
-    turned = np.column_stack([-chord[:, 1], chord[:, 0]])
-    points[arcs] += (ratio * np.sin(turn))[:, None] * turned
+    turn_left = np.column_stack([-chord[:, 1], chord[:, 0]])
+    points[arcs] += (ratio * np.sin(turn))[:, None] * turn_left
     return np.asarray(points + 0.0)  # no −0
 
 
@@ -196,12 +196,12 @@ class Frames(Struct, frozen=True, eq=False):
         square = segments.bulge**2
         cosine = (1.0 - square) / (1.0 + square)
         sine = 2.0 * segments.bulge / (1.0 + square)
-        tangent = cosine[:, None] * unit - sine[:, None] * turned(unit)
+        tangent = cosine[:, None] * unit - sine[:, None] * turn_left(unit)
         return cls(
             start=segments.start,
             end=segments.end,
             tangent=tangent,
-            normal=turned(tangent),
+            normal=turn_left(tangent),
             curvature=4.0 * segments.bulge / (size * (1.0 + square)),
             length=segment_lengths(segments),
             sweep=segments.sweep,
@@ -244,7 +244,7 @@ class Frames(Struct, frozen=True, eq=False):
         return np.where(before, -chord, chord) * ratio
 
 
-def turned(vectors: Floats) -> Floats:
+def turn_left(vectors: Floats) -> Floats:
     """Vectors (K, 2) turned by +90°."""
     return np.column_stack([-vectors[:, 1], vectors[:, 0]])
 

@@ -34,11 +34,11 @@ STILL_MM = 1e-6
 """Where the discs at both ends and in the middle of a gap are nearer than this, the gap is not
 searched: at the common centre of several arcs any of them may seem to be the partner."""
 
-MOST_ROUNDS = 200
+MAX_ROUNDS = 200
 """Samples are halved, and searched from the other side, no more often than this."""
 
 
-class Trace(Struct, frozen=True, eq=False):
+class MedialTrace(Struct, frozen=True, eq=False):
     """Discs (N rows) along the boundary, by element and place on it: `element` (N,), `t` (N,) in
     0 … 1, the middles `x`, `y` and radii `rho` mm, the `partner` element that each touches
     besides and the place `u` there. The curve between three neighbouring rows of one element and
@@ -55,9 +55,9 @@ class Trace(Struct, frozen=True, eq=False):
     def __len__(self) -> int:
         return len(self.t)
 
-    def rows(self, chosen: Ints | Bools) -> Trace:
+    def rows(self, chosen: Ints | Bools) -> MedialTrace:
         """Return the chosen rows."""
-        return Trace(*(column[chosen] for column in astuple(self)))
+        return MedialTrace(*(column[chosen] for column in astuple(self)))
 
     @property
     def discs(self) -> Floats:
@@ -65,12 +65,14 @@ class Trace(Struct, frozen=True, eq=False):
         return np.column_stack([self.x, self.y, self.rho])
 
 
-def concatenated(traces: list[Trace]) -> Trace:
+def concatenated(traces: list[MedialTrace]) -> MedialTrace:
     """Return the rows of all traces, one trace after the other."""
-    return Trace(*map(np.concatenate, zip(*map(astuple, traces), strict=True)))
+    return MedialTrace(*map(np.concatenate, zip(*map(astuple, traces), strict=True)))
 
 
-def discs_at(boundary: Boundary, element: Ints, t: Floats, guess: Ints | None = None) -> Trace:
+def discs_at(
+    boundary: Boundary, element: Ints, t: Floats, guess: Ints | None = None
+) -> MedialTrace:
     """Compute the largest disc within the region that touches each of these places; `guess` (N,
     2): elements that are likely to be touched besides, which makes it quick. GeometryError where
     nothing ends a disc: paths that lie on each other enclose no region there."""
@@ -89,10 +91,10 @@ def discs_at(boundary: Boundary, element: Ints, t: Floats, guess: Ints | None = 
             where=f"X {x:.4f} Y {y:.4f}",
             mend="take one of them out",
         )
-    return Trace(element, t, result[:, 0], result[:, 1], result[:, 2], partner, result[:, 3])
+    return MedialTrace(element, t, result[:, 0], result[:, 1], result[:, 2], partner, result[:, 3])
 
 
-def medial_trace(region: Polylines, tolerance_mm: float) -> tuple[Boundary, Trace]:
+def medial_trace(region: Polylines, tolerance_mm: float) -> tuple[Boundary, MedialTrace]:
     """Compute the medial trace of a region: closed paths, outer ones CCW, holes CW, that do not
     cross."""
     boundary = Boundary.of(region)
@@ -100,22 +102,24 @@ def medial_trace(region: Polylines, tolerance_mm: float) -> tuple[Boundary, Trac
     t = np.tile(np.linspace(0.0, 1.0, FIRST_SAMPLES), len(boundary))
     trace = discs_at(boundary, element, t)
     open_gaps = _gaps(trace)
-    for _ in range(MOST_ROUNDS):
-        trace, open_gaps = _refined(boundary, trace, open_gaps, tolerance_mm)
+    for _ in range(MAX_ROUNDS):
+        trace, open_gaps = _refine_gaps(boundary, trace, open_gaps, tolerance_mm)
         if not open_gaps.any():
             seen = _seen_from_partners(boundary, trace)
             if len(seen) == 0:
                 break
-            trace, open_gaps = _inserted(trace, seen, np.ones(len(seen), dtype=np.bool_))
+            trace, open_gaps = _insert_rows(trace, seen, np.ones(len(seen), dtype=np.bool_))
     return boundary, trace
 
 
-def _gaps(trace: Trace) -> Bools:
+def _gaps(trace: MedialTrace) -> Bools:
     """Mask (N,) of the rows whose next row belongs to the same element."""
     return np.append(trace.element[1:] == trace.element[:-1], False)
 
 
-def _inserted(trace: Trace, more: Trace, is_open: Bools) -> tuple[Trace, Bools]:
+def _insert_rows(
+    trace: MedialTrace, more: MedialTrace, is_open: Bools
+) -> tuple[MedialTrace, Bools]:
     """Return the trace with more rows, and its gaps that are open: those beside the new rows that
     `is_open` names, except gaps too narrow for another number."""
     both = concatenated([trace, more])
@@ -127,16 +131,16 @@ def _inserted(trace: Trace, more: Trace, is_open: Bools) -> tuple[Trace, Bools]:
     return both, beside & _gaps(both) & (width > np.finfo(np.float64).eps)
 
 
-def _refined(
-    boundary: Boundary, trace: Trace, open_gaps: Bools, tolerance_mm: float
-) -> tuple[Trace, Bools]:
+def _refine_gaps(
+    boundary: Boundary, trace: MedialTrace, open_gaps: Bools, tolerance_mm: float
+) -> tuple[MedialTrace, Bools]:
     """Halve all open gaps once, or cut them where the partner changes; a halved gap stays open
     while the curve deviates from the chord by more than the tolerance."""
     at = np.flatnonzero(open_gaps)
     middle = 0.5 * (trace.t[at] + trace.t[at + 1])
     halves = discs_at(boundary, trace.element[at], middle, _partners(trace, at))
     begin, end = trace.discs[at], trace.discs[at + 1]
-    still = np.maximum(_apart(begin, end), _apart(begin, halves.discs)) <= STILL_MM
+    still = np.maximum(_disc_distance(begin, end), _disc_distance(begin, halves.discs)) <= STILL_MM
     changes = ~still & (trace.partner[at] != trace.partner[at + 1])
     bent = off_chord(halves.discs, begin, end) > tolerance_mm
     bent |= halves.partner != trace.partner[at]
@@ -144,16 +148,16 @@ def _refined(
     low, high = _events(boundary, trace, at[changes])
     more = concatenated([halves.rows(inner), low, high])
     is_open = np.append((bent & ~still)[inner], np.ones(2 * len(low), dtype=np.bool_))
-    return _inserted(trace, more, is_open)
+    return _insert_rows(trace, more, is_open)
 
 
-def _apart(discs: Floats, others: Floats) -> Floats:
+def _disc_distance(discs: Floats, others: Floats) -> Floats:
     """Return the distance (N,) of discs (N, 3) from others: in the plane plus in radius."""
     off = discs - others
     return np.asarray(np.hypot(off[:, 0], off[:, 1]) + np.abs(off[:, 2]))
 
 
-def _events(boundary: Boundary, trace: Trace, at: Ints) -> tuple[Trace, Trace]:
+def _events(boundary: Boundary, trace: MedialTrace, at: Ints) -> tuple[MedialTrace, MedialTrace]:
     """Return the last disc with the partner of row `at`, and the first disc with another one."""
     element, partner, guess = trace.element[at], trace.partner[at], _partners(trace, at)
     low, high = trace.t[at].copy(), trace.t[at + 1].copy()
@@ -164,7 +168,7 @@ def _events(boundary: Boundary, trace: Trace, at: Ints) -> tuple[Trace, Trace]:
     return discs_at(boundary, element, low, guess), discs_at(boundary, element, high, guess)
 
 
-def _partners(trace: Trace, at: Ints) -> Ints:
+def _partners(trace: MedialTrace, at: Ints) -> Ints:
     """(N, 2) the partners at both ends of the gaps behind these rows."""
     return np.column_stack([trace.partner[at], trace.partner[at + 1]])
 
@@ -175,10 +179,10 @@ def off_chord(points: Floats, begin: Floats, end: Floats) -> Floats:
     chord, arm = end - begin, points - begin
     square = (chord**2).sum(axis=1)
     part = np.clip((arm * chord).sum(axis=1) / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
-    return _apart(arm, part[:, None] * chord)
+    return _disc_distance(arm, part[:, None] * chord)
 
 
-def _seen_from_partners(boundary: Boundary, trace: Trace) -> Trace:
+def _seen_from_partners(boundary: Boundary, trace: MedialTrace) -> MedialTrace:
     """Discs at the touching points on partners that show no such partner next to that place."""
     others = trace.partner != trace.element
     element, t, partner = trace.partner[others], trace.u[others], trace.element[others]

@@ -15,9 +15,9 @@ from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.errors import GeometryError
-from camtool.geometry.boxes import BoxIndex, Curves
+from camtool.geometry.boxes import BoxIndex, IndexedCurves
 from camtool.geometry.measure import path_extents, point_at, signed_areas
-from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, Segments, lines_reversed
+from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, Segments, reverse_lines
 
 HOLDERS_AT_A_TIME = 256
 """Closed paths whose boxes are compared with all others together: it bounds the memory."""
@@ -94,13 +94,15 @@ class _Pairs(Struct, frozen=True, eq=False):
         rank = np.full(len(lines), len(closed))
         rank[closed] = np.arange(len(closed))
         places: _Places | None = None
-        for j, within in _within(path_extents(lines), closed) if len(closed) else ():
+        for j, within in _within_boxes(path_extents(lines), closed) if len(closed) else ():
             smaller = within[rank[within] > rank[j]]
             if len(smaller) == 0:
                 continue
             # Most drawings of very many paths hold none within another.
             places = places or _Places.of(lines)
-            for found, on_line in zip(places.held(smaller, j), (False, True), strict=True):
+            for found, on_line in zip(
+                places.contained_paths(smaller, j), (False, True), strict=True
+            ):
                 holder.append(np.full(len(found), j, dtype=np.int32))
                 inner.append(found.astype(np.int32))
                 is_double.append(np.full(len(found), on_line))
@@ -119,7 +121,7 @@ def inside(points: Floats, ring: Segments) -> Bools:
     """Mask (P,) of the points (P, 2) within a closed path; a point on its line may be either."""
     from camtool.kernels.offsets import insides
 
-    curves = Curves.of(ring)
+    curves = IndexedCurves.of(ring)
     return insides(
         np.ascontiguousarray(points, dtype=np.float64), curves.rows, ring.bulge, curves.tree
     )
@@ -150,19 +152,19 @@ class _Places(Struct, frozen=True, eq=False):
             np.searchsorted(owner[order], every),
         )
 
-    def held(self, inner: Ints, j: int) -> tuple[Ints, Ints]:
+    def contained_paths(self, inner: Ints, j: int) -> tuple[Ints, Ints]:
         """Return those of the paths `inner` that have all their points within path j, and those
         that have all of them on its line."""
         from camtool.kernels.offsets import HELD, ON_LINE, holds
 
         ring = self.segments[self.first_segment[j] : self.first_segment[j + 1]]
-        curves = Curves.of(ring)
+        curves = IndexedCurves.of(ring)
         arrays = (curves.rows, ring.bulge, curves.tree)
         said = holds(self.points, self.first_point, arrays, inner, POSITION_EPS_MM)
         return inner[said == HELD], inner[said == ON_LINE]
 
 
-def _within(boxes: Floats, holders: Ints) -> Iterator[tuple[int, Ints]]:
+def _within_boxes(boxes: Floats, holders: Ints) -> Iterator[tuple[int, Ints]]:
     """Yield each of these paths with the paths whose boxes (M, 2, 2) do not reach out of its own:
     their centres lie in it."""
     low, high = boxes[:, :, 0], boxes[:, :, 1]
@@ -194,7 +196,7 @@ def oriented(nest: Nesting) -> Polylines:
         where = f"path {np.argmin(lines.closed)}"
         raise GeometryError("an open path has no inside", where=where, mend="close it")
     is_ccw = signed_areas(lines) > 0.0
-    return lines_reversed(lines, is_ccw != (nest.levels.depth % 2 == 0))
+    return reverse_lines(lines, is_ccw != (nest.levels.depth % 2 == 0))
 
 
 def regions(nest: Nesting) -> list[tuple[int, Polylines]]:

@@ -69,7 +69,7 @@ from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import GeometryError, OptionError
-from camtool.geometry.boxes import BoxIndex, Curves, curve_rows_of
+from camtool.geometry.boxes import BoxIndex, IndexedCurves, curve_rows_of
 from camtool.geometry.measure import (
     Frames,
     dot,
@@ -77,7 +77,7 @@ from camtool.geometry.measure import (
     path_lengths,
     point_at,
     signed_areas,
-    turned,
+    turn_left,
 )
 from camtool.geometry.nesting import inside
 from camtool.geometry.polylines import (
@@ -85,7 +85,7 @@ from camtool.geometry.polylines import (
     Polyline,
     Polylines,
     Segments,
-    lines_reversed,
+    reverse_lines,
 )
 from camtool.kernels.move_tree import hilbert_order
 from camtool.records import replace
@@ -124,8 +124,10 @@ def offset_shape(
     GeometryError for an open path and for a distance that is not finite, OptionError for joins
     that do not exist and a mitre limit below 1.
     """
-    asked = _asked(lines, distance_mm, joins, mitre_limit)
-    return lines if asked is None or len(lines) == 0 else _moved(lines, distance_mm, asked)[0]
+    offset = _checked_offset(lines, distance_mm, joins, mitre_limit)
+    if offset is None or len(lines) == 0:
+        return lines
+    return _offset_paths(lines, distance_mm, offset)[0]
 
 
 def offset_each(
@@ -136,19 +138,19 @@ def offset_each(
 
     Paths that lie so far apart that their offsets cannot meet are offset together.
     """
-    asked = _asked(lines, distance_mm, joins, mitre_limit)
-    if asked is None or len(lines) == 0:
+    offset = _checked_offset(lines, distance_mm, joins, mitre_limit)
+    if offset is None or len(lines) == 0:
         return lines, np.arange(len(lines))
-    longest = 1.0 if math.isinf(asked.limit) else max(asked.limit, 1.0)
+    longest = 1.0 if math.isinf(offset.limit) else max(offset.limit, 1.0)
     boxes = path_extents(lines).transpose(0, 2, 1).reshape(-1, 4)
     made: list[Polyline] = []
     owners: list[Ints] = []
-    for rows in _far_apart(boxes, longest * asked.distance_mm + POSITION_EPS_MM):
+    for rows in _far_apart(boxes, longest * offset.distance_mm + POSITION_EPS_MM):
         some = lines.select(rows)
         meets = np.zeros(len(rows), dtype=np.bool_)
-        meets[np.unique(_met(some))] = True
+        meets[np.unique(_touching_paths(some))] = True
         for each in (rows[~meets], *rows[meets][:, None]):
-            loops, of = _moved(lines.select(each), distance_mm, asked)
+            loops, of = _offset_paths(lines.select(each), distance_mm, offset)
             made += loops
             owners.append(each[of])
     owner = np.concatenate(owners)
@@ -156,7 +158,9 @@ def offset_each(
     return Polylines.of(made).select(order), owner[order]
 
 
-def _asked(lines: Polylines, distance_mm: float, joins: str, mitre_limit: float) -> Offset | None:
+def _checked_offset(
+    lines: Polylines, distance_mm: float, joins: str, mitre_limit: float
+) -> Offset | None:
     """Check a request to offset closed paths, and return it; None where they stay as they are."""
     if joins not in JOINS:
         raise OptionError(f"unknown joins {joins!r}", mend=f"use one of {', '.join(JOINS)}")
@@ -195,13 +199,13 @@ def _far_apart(boxes: Floats, reach_mm: float) -> Iterator[Ints]:
         yield order[group[order] == each]
 
 
-def _moved(lines: Polylines, distance_mm: float, asked: Offset) -> tuple[Polylines, Ints]:
+def _offset_paths(lines: Polylines, distance_mm: float, offset: Offset) -> tuple[Polylines, Ints]:
     """Return the boundary of the region of closed paths moved, and the path that each loop (J,)
     mostly begins along."""
     if distance_mm < 0.0:
-        moved, of = _left_of(lines_reversed(lines), asked)
-        return lines_reversed(moved), of
-    return _left_of(lines, asked)
+        moved, of = _left_of(reverse_lines(lines), offset)
+        return reverse_lines(moved), of
+    return _left_of(lines, offset)
 
 
 class Offset(Struct, frozen=True):
@@ -212,9 +216,9 @@ class Offset(Struct, frozen=True):
     limit: float = math.inf
 
 
-def _left_of(lines: Polylines, asked: Offset) -> tuple[Polylines, Ints]:
+def _left_of(lines: Polylines, offset: Offset) -> tuple[Polylines, Ints]:
     """Return the offset to the left, and the path that each of its loops (J,) begins along."""
-    stages = shape_stages(lines, asked)
+    stages = shape_stages(lines, offset)
     moved, kept = paths_of(stages.loops, stages.kept, stages.trimmed.elements)
     begins = np.array([loop[0] for loop in stages.loops], dtype=np.int64)[kept]
     source = stages.trimmed.source[stages.kept.element[begins]]
@@ -253,19 +257,19 @@ class Stages(Struct, frozen=True, eq=False):
     """(J, 2) the paths at each common point of two, other than between neighbours."""
 
 
-def shape_stages(lines: Polylines, asked: Offset) -> Stages:
+def shape_stages(lines: Polylines, offset: Offset) -> Stages:
     """Compute all stages of the offset of closed paths to the left."""
-    raw = raw_offset(lines, asked)
+    raw = raw_offset(lines, offset)
     source = source_arrays(Segments.of(lines), raw.kites)
-    trimmed = trim_raw(raw, source, asked)
+    trimmed = trim_raw(raw, source, offset)
     elements, others = trimmed.elements, None
     # Only where paths meet can what is on their right end what is on their left.
-    met = _met(lines)
+    met = _touching_paths(lines)
     if len(met):
-        right = raw_offset(lines_reversed(lines), replace(asked, limit=math.inf))
-        others = trim_raw(right, source, asked).elements
+        right = raw_offset(reverse_lines(lines), replace(offset, limit=math.inf))
+        others = trim_raw(right, source, offset).elements
     slices = slice_elements(elements, others)
-    valid = valid_slices(slices, elements, source, asked)
+    valid = valid_slices(slices, elements, source, offset)
     kept = without_dead_ends(without_doubles(slices[valid], elements))
     return Stages(raw, trimmed, slices, valid, kept, trace_loops(kept, elements), met)
 
@@ -278,17 +282,17 @@ def source_arrays(source: Segments, kites: Floats) -> Arrays:
     their tree, the kites (J, 10) of mitres and theirs."""
     from camtool.kernels.offsets import kite_boxes, tree_of
 
-    curves = Curves.of(source)
+    curves = IndexedCurves.of(source)
     return curves.rows, curves.tree, kites, tree_of(kite_boxes(kites))
 
 
-def _met(lines: Polylines) -> Ints:
+def _touching_paths(lines: Polylines) -> Ints:
     """Return the two paths (J, 2) at each common point of closed paths, except those of
     neighbours."""
     from camtool.kernels.offsets import TA, TB, meetings_of, pairs_of
 
     segments = Segments.of(lines)
-    curves = Curves.of(segments, margin_mm=POSITION_EPS_MM)
+    curves = IndexedCurves.of(segments, margin_mm=POSITION_EPS_MM)
     pairs = pairs_of(curves.boxes, curves.tree, curves.boxes, curves.tree, True)
     met, at = meetings_of(curves.rows, curves.rows, pairs, POSITION_EPS_MM)
     one, other = met.T
@@ -330,18 +334,18 @@ class Corners(Struct, frozen=True, eq=False):
         before = frames.tangent_at(np.ones(len(frames.length)))
         following = _next_rows(lines)
         after = frames.tangent[following]
-        turn = np.arctan2(dot(turned(before), after), dot(before, after))
+        turn = np.arctan2(dot(turn_left(before), after), dot(before, after))
         turn = np.where(turn >= np.pi - CUSP_EPS_RAD, turn - 2.0 * np.pi, turn)
         return cls(frames.end, before, after, turn, np.argsort(following, kind="stable"))
 
-    def outer(self, asked: Offset) -> Bools:
+    def outer(self, offset: Offset) -> Bools:
         """Mask (K,) of the corners where the path turns right so much that the shifted segments
         part."""
-        gap = 2.0 * asked.distance_mm * np.sin(-0.5 * self.turn)
+        gap = 2.0 * offset.distance_mm * np.sin(-0.5 * self.turn)
         return np.asarray(gap > NODE_EPS_MM)
 
 
-def arcs_about(corners: Corners, rows: Ints, asked: Offset) -> tuple[Ints, Segments]:
+def arcs_about(corners: Corners, rows: Ints, offset: Offset) -> tuple[Ints, Segments]:
     """Return arcs about the outer corners `rows`, and the corner of each; two where one is above
     π."""
     turn = corners.turn[rows]
@@ -349,10 +353,10 @@ def arcs_about(corners: Corners, rows: Ints, asked: Offset) -> tuple[Ints, Segme
     corner = np.repeat(rows, parts)
     second = np.concatenate([[False], corner[1:] == corner[:-1]])
     sweep = np.repeat(turn / parts, parts)
-    normal, place = turned(corners.before[corner]), corners.place[corner]
-    start = place + asked.distance_mm * _rotated(normal, np.where(second, sweep, 0.0))
-    middle = place + asked.distance_mm * _rotated(normal, sweep)
-    after = place + asked.distance_mm * turned(corners.after[corner])
+    normal, place = turn_left(corners.before[corner]), corners.place[corner]
+    start = place + offset.distance_mm * _rotate_vectors(normal, np.where(second, sweep, 0.0))
+    middle = place + offset.distance_mm * _rotate_vectors(normal, sweep)
+    after = place + offset.distance_mm * turn_left(corners.after[corner])
     last = np.repeat(parts, parts) == second + 1
     end = np.where(last[:, None], after, middle)
     return corner, Segments.between(start, end, np.tan(0.25 * sweep))
@@ -373,31 +377,31 @@ class Mitres(Struct, frozen=True, eq=False):
     kites: Floats
 
     @classmethod
-    def about(cls, corners: Corners, rows: Ints, asked: Offset) -> Mitres:
+    def about(cls, corners: Corners, rows: Ints, offset: Offset) -> Mitres:
         """Return the mitres at the outer corners `rows`."""
-        half, d = -0.5 * corners.turn[rows], asked.distance_mm
-        is_cut = asked.limit * np.cos(half) < 1.0
+        half, d = -0.5 * corners.turn[rows], offset.distance_mm
+        is_cut = offset.limit * np.cos(half) < 1.0
         reach, cut = np.zeros(len(corners.turn)), np.zeros(len(corners.turn), dtype=np.bool_)
         cut[rows] = is_cut
         cosine, sine = np.cos(half), np.sin(half)
-        reach[rows] = d * np.where(is_cut, (asked.limit - cosine) / sine, np.tan(half))
-        before, after = turned(corners.before[rows]), turned(corners.after[rows])
-        middle = _rotated(before, -half)
-        far = np.where(is_cut, asked.limit * d, np.inf)
+        reach[rows] = d * np.where(is_cut, (offset.limit - cosine) / sine, np.tan(half))
+        before, after = turn_left(corners.before[rows]), turn_left(corners.after[rows])
+        middle = _rotate_vectors(before, -half)
+        far = np.where(is_cut, offset.limit * d, np.inf)
         deep = np.full(len(rows), d)
         columns = [corners.place[rows], before, after, middle, deep, far]
         return cls(reach, cut, np.column_stack(columns))
 
-    def lines(self, corners: Corners, is_arc: Bools, asked: Offset) -> tuple[Ints, Segments]:
+    def lines(self, corners: Corners, is_arc: Bools, offset: Offset) -> tuple[Ints, Segments]:
         """Return the lines about the corners that are not parts of shifted lines, and the corner
         of each: on from an arc, across where the mitre is cut off, on to an arc. `is_arc` (K, 2)
         says whether the segments before and after each corner are arcs.
 
         `is_arc` (K, 2) says whether the segments before and after each corner are arcs.
         """
-        d, reach = asked.distance_mm, self.reach[:, None]
-        left = corners.place + d * turned(corners.before)
-        right = corners.place + d * turned(corners.after)
+        d, reach = offset.distance_mm, self.reach[:, None]
+        left = corners.place + d * turn_left(corners.before)
+        right = corners.place + d * turn_left(corners.after)
         near, far = left + reach * corners.before, right - reach * corners.after
         there = self.reach > 0.0
         wanted = np.column_stack([there & is_arc[:, 0], self.cut, there & is_arc[:, 1]])
@@ -407,9 +411,9 @@ class Mitres(Struct, frozen=True, eq=False):
         return corner, Segments.between(start[wanted], end[wanted], np.zeros(len(corner)))
 
 
-def _rotated(vectors: Floats, angle: Floats) -> Floats:
+def _rotate_vectors(vectors: Floats, angle: Floats) -> Floats:
     cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
-    return np.asarray(cosine * vectors + sine * turned(vectors))
+    return np.asarray(cosine * vectors + sine * turn_left(vectors))
 
 
 class RawOffset(Struct, frozen=True, eq=False):
@@ -423,7 +427,7 @@ class RawOffset(Struct, frozen=True, eq=False):
     kites: Floats
 
 
-def raw_offset(lines: Polylines, asked: Offset) -> RawOffset:
+def raw_offset(lines: Polylines, offset: Offset) -> RawOffset:
     """Compute the raw offset to the left of closed paths: all of the offset, and much that is too
     near to them.
 
@@ -434,24 +438,24 @@ def raw_offset(lines: Polylines, asked: Offset) -> RawOffset:
     segments = Segments.of(lines)
     frames = Frames.of(segments)
     corners = Corners.of(frames, lines)
-    outer = np.flatnonzero(corners.outer(asked))
-    rounded, mitred = (outer, outer[:0]) if math.isinf(asked.limit) else (outer[:0], outer)
-    mitres = Mitres.about(corners, mitred, asked)
-    rows, shifted = _shifted(segments, frames, corners, mitres, asked)
-    about, arcs = arcs_about(corners, rounded, asked)
+    outer = np.flatnonzero(corners.outer(offset))
+    rounded, mitred = (outer, outer[:0]) if math.isinf(offset.limit) else (outer[:0], outer)
+    mitres = Mitres.about(corners, mitred, offset)
+    rows, shifted = _shift_segments(segments, frames, corners, mitres, offset)
+    about, arcs = arcs_about(corners, rounded, offset)
     beside = np.column_stack([segments.is_arc, segments.is_arc[_next_rows(lines)]])
-    along, across = mitres.lines(corners, beside, asked)
-    return _in_order([rows, about, along], [shifted, arcs, across], mitres.kites)
+    along, across = mitres.lines(corners, beside, offset)
+    return _merge_by_source([rows, about, along], [shifted, arcs, across], mitres.kites)
 
 
-def _shifted(
-    segments: Segments, frames: Frames, corners: Corners, mitres: Mitres, asked: Offset
+def _shift_segments(
+    segments: Segments, frames: Frames, corners: Corners, mitres: Mitres, offset: Offset
 ) -> tuple[Ints, Segments]:
     """Return the segments at the distance, and the row of each; lines go on to the tips of
     mitres."""
-    start = segments.start + asked.distance_mm * frames.normal
-    end = segments.end + asked.distance_mm * turned(corners.before)
-    left_over = 1.0 - asked.distance_mm * frames.curvature
+    start = segments.start + offset.distance_mm * frames.normal
+    end = segments.end + offset.distance_mm * turn_left(corners.before)
+    left_over = 1.0 - offset.distance_mm * frames.curvature
     apart = np.hypot(*(end - start).T)
     rows = np.flatnonzero((left_over > 0.0) & (apart > NODE_EPS_MM))
     reach = np.where(segments.is_arc, 0.0, mitres.reach)
@@ -461,7 +465,7 @@ def _shifted(
     return rows, Segments.between(start[rows], end[rows], segments.bulge[rows])
 
 
-def _in_order(sources: list[Ints], parts: list[Segments], kites: Floats) -> RawOffset:
+def _merge_by_source(sources: list[Ints], parts: list[Segments], kites: Floats) -> RawOffset:
     """Merge shifted segments and then joins, by their source."""
     source = np.concatenate(sources)
     order = np.argsort(source, kind="stable")
@@ -480,7 +484,7 @@ TRIM_SPARE = 10.0
 cut are judged invalid later."""
 
 
-def trim_raw(raw: RawOffset, source: Arrays, asked: Offset) -> RawOffset:
+def trim_raw(raw: RawOffset, source: Arrays, offset: Offset) -> RawOffset:
     """Remove from the raw offset what is surely too near at both ends of each element.
 
     What goes could never be kept, and what is kept is not cut by it: this only saves cuts, which
@@ -489,14 +493,14 @@ def trim_raw(raw: RawOffset, source: Arrays, asked: Offset) -> RawOffset:
     from camtool.kernels.offsets import trimmed_ends
 
     spare = TRIM_SPARE * VALIDITY_EPS_MM
-    ends = trimmed_ends(curve_rows_of(raw.elements), source, (asked.distance_mm, spare))
+    ends = trimmed_ends(curve_rows_of(raw.elements), source, (offset.distance_mm, spare))
     low, high = ends.T
     keep = np.flatnonzero(low < high)
-    trimmed = _between(raw.elements[keep], low[keep], high[keep])
+    trimmed = _cut_to_fractions(raw.elements[keep], low[keep], high[keep])
     return RawOffset(trimmed, raw.source[keep], raw.join[keep], raw.kites)
 
 
-def _between(elements: Segments, low: Floats, high: Floats) -> Segments:
+def _cut_to_fractions(elements: Segments, low: Floats, high: Floats) -> Segments:
     """Return the part of each element between two fractions; elements that are whole stay the
     same."""
     cut = np.flatnonzero((low != 0.0) | (high != 1.0))
@@ -554,21 +558,21 @@ def slice_elements(elements: Segments, others: Segments | None) -> Slices:
     from camtool.kernels.offsets import TA, TB, X, Y, meetings_of, pairs_of
 
     eps = NODE_EPS_MM
-    own = Curves.of(elements, margin_mm=eps)
+    own = IndexedCurves.of(elements, margin_mm=eps)
     pairs = pairs_of(own.boxes, own.tree, own.boxes, own.tree, True)
     met, at = meetings_of(own.rows, own.rows, pairs, eps)
     rows = [met[:, 0], met[:, 1]]
     found = [at[:, [TA, X, Y]], at[:, [TB, X, Y]]]
     if others is not None:
-        cutting = Curves.of(others, margin_mm=eps)
+        cutting = IndexedCurves.of(others, margin_mm=eps)
         pairs = pairs_of(own.boxes, own.tree, cutting.boxes, cutting.tree, False)
         met, at = meetings_of(own.rows, cutting.rows, pairs, eps)
         rows.append(met[:, 0])
         found.append(at[:, [TA, X, Y]])
-    return _cut(elements, np.concatenate(rows), np.concatenate(found))
+    return _cut_elements(elements, np.concatenate(rows), np.concatenate(found))
 
 
-def _cut(elements: Segments, rows: Ints, found: Floats) -> Slices:
+def _cut_elements(elements: Segments, rows: Ints, found: Floats) -> Slices:
     """Cut the elements at `found` (J, 3), the fraction and the place on the element rows[j]."""
     from camtool.kernels.offsets import in_order
 
@@ -599,7 +603,7 @@ def merge_points(points: Floats, eps_mm: float) -> tuple[Ints, Floats]:
     return node, points[first]
 
 
-def valid_slices(slices: Slices, elements: Segments, source: Arrays, asked: Offset) -> Bools:
+def valid_slices(slices: Slices, elements: Segments, source: Arrays, offset: Offset) -> Bools:
     """Mask (S,) of the slices of which no measured point is too near to the source, or within a
     mitre.
 
@@ -609,7 +613,7 @@ def valid_slices(slices: Slices, elements: Segments, source: Arrays, asked: Offs
     """
     from camtool.kernels.offsets import far_enough
 
-    limits = (asked.distance_mm, VALIDITY_EPS_MM)
+    limits = (offset.distance_mm, VALIDITY_EPS_MM)
     curves = curve_rows_of(elements)
     return far_enough(curves, slices.element, slices.span, source, limits)
 

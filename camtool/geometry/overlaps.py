@@ -54,7 +54,7 @@ def without_overlaps(lines: Polylines, groups: Ints, within_mm: float) -> Unlapp
     found = covers(of, within_mm)
     if not len(found.a):
         return whole
-    left = _left(of, found, within_mm)
+    left = _remaining_spans(of, found, within_mm)
     if not left:
         return whole
     touched = np.zeros(len(lines), dtype=np.bool_)
@@ -64,13 +64,13 @@ def without_overlaps(lines: Polylines, groups: Ints, within_mm: float) -> Unlapp
     for row, spans in left.items():
         path = int(of.path[row])
         for span in spans:
-            parts.append(_part(lines, of, row, span))
+            parts.append(_span_path(lines, of, row, span))
             source.append(np.array([path]))
             kept += span[1] - span[0]
     origin = np.concatenate(source)
     order = np.argsort(origin, kind="stable")
     gone = float(of.length[list(left)].sum()) - kept
-    return Unlapped(_together(parts).select(order), origin[order], len(left), gone)
+    return Unlapped(_join_parts(parts).select(order), origin[order], len(left), gone)
 
 
 def _may_be_loose(lines: Polylines) -> Bools:
@@ -120,7 +120,7 @@ def _intervals(lines: Polylines, groups: Ints, within: float) -> Intervals:
     )
 
 
-def _left(of: Intervals, found: Covers, within: float) -> dict[int, _Spans]:
+def _remaining_spans(of: Intervals, found: Covers, within: float) -> dict[int, _Spans]:
     """Return the remaining spans of each loose interval that is covered by what stays."""
     rank = _ranks(of, np.unique(np.concatenate([found.a, found.b])))
     # A loose interval yields to what is not loose, and to loose ones that rank before it.
@@ -139,7 +139,7 @@ def _left(of: Intervals, found: Covers, within: float) -> dict[int, _Spans]:
         else:
             hidden = [(begin, end)]
         for low, high in hidden:
-            spans = _cut(spans, low, high, within)
+            spans = _subtract_span(spans, low, high, within)
         left[a] = spans
     whole = {a for a, spans in left.items() if spans == [(0.0, float(of.length[a]))]}
     return {a: spans for a, spans in left.items() if a not in whole}
@@ -158,7 +158,7 @@ def _ranks(of: Intervals, rows: Ints) -> Ints:
     return rank
 
 
-def _cut(spans: _Spans, low: float, high: float, within: float) -> _Spans:
+def _subtract_span(spans: _Spans, low: float, high: float, within: float) -> _Spans:
     """Return the spans without low … high; crumbs no longer than `within` go too."""
     if high <= low:
         return spans
@@ -172,7 +172,7 @@ def _cut(spans: _Spans, low: float, high: float, within: float) -> _Spans:
     return cut
 
 
-def _part(lines: Polylines, of: Intervals, row: int, span: tuple[float, float]) -> Polylines:
+def _span_path(lines: Polylines, of: Intervals, row: int, span: tuple[float, float]) -> Polylines:
     """Return a span of a loose interval as a path that runs as the interval was drawn."""
     path = lines[int(of.path[row])].vertices
     begin, end = span
@@ -198,7 +198,7 @@ def _part(lines: Polylines, of: Intervals, row: int, span: tuple[float, float]) 
     return Polylines(vertices, np.array([0, len(vertices)]), np.zeros(1, dtype=np.bool_))
 
 
-def _together(parts: list[Polylines]) -> Polylines:
+def _join_parts(parts: list[Polylines]) -> Polylines:
     """Return all paths of all parts, in order."""
     counts = np.concatenate([np.diff(part.offsets) for part in parts])
     return Polylines(
@@ -215,17 +215,17 @@ def _together(parts: list[Polylines]) -> Polylines:
 # that what is left of it can be found later; all others stay as they are.
 #
 # Two lines lie on each other when they do so within `within_mm` along all they share, two arcs
-# when centres and radii agree within that. What they share must be `SHORTEST_SHARES` times as
-# long, or its direction would not be known well enough to say that they are on one line.
+# when centres and radii agree within that. What they share must be `MIN_SHARED_TOLERANCES` times
+# as long, or its direction would not be known well enough to say that they are on one line.
 
-SHORTEST_SHARES = 32.0
+MIN_SHARED_TOLERANCES = 32.0
 """Intervals that share less than this many times their tolerance count as apart."""
 
 BINS = 50
 """Number of bins into which the directions of lines are sorted; 2/SHORTEST_SHARES rad is less than
 one bin."""
 
-MOST_PAIRS = 2_000_000
+MAX_PAIRS = 2_000_000
 """At most this many pairs of overlapping intervals are examined."""
 
 
@@ -272,7 +272,7 @@ def covers(all_of: Intervals, within_mm: float) -> Covers:
     for part in chain(_on_lines(all_of, within_mm), _on_circles(all_of, within_mm)):
         found.append(part)
         count += len(part.a)
-        if count > MOST_PAIRS:
+        if count > MAX_PAIRS:
             break
     row, place = np.empty(0, dtype=np.int64), np.empty(0)
     every = [Covers(row, row, place, place, place, place), *found]
@@ -288,7 +288,7 @@ def _on_lines(of: Intervals, within_mm: float) -> Iterator[Covers]:
         near = lines[(of_bin - number + 1) % BINS <= 2]
         asked = of.loose[near] & (of_bin[(of_bin - number + 1) % BINS <= 2] == number)
         boxes = _level_boxes(of, near, number * np.pi / BINS, 0.5 * within_mm)
-        pairs = touching_boxes(boxes, of.group[near], of.path[near], asked, most=MOST_PAIRS)
+        pairs = touching_boxes(boxes, of.group[near], of.path[near], asked, max_pairs=MAX_PAIRS)
         for a, b in (pairs, pairs[::-1]):
             wanted = asked[a]
             yield _shared_line(of, near[a[wanted]], near[b[wanted]], within_mm)
@@ -322,7 +322,7 @@ def _shared_line(of: Intervals, a: Ints, b: Ints, within: float) -> Covers:
     off = np.maximum(
         np.abs(aside + slope * (begin - shift)), np.abs(aside + slope * (end - shift))
     )
-    good = (end - begin >= SHORTEST_SHARES * within) & (off <= within)
+    good = (end - begin >= MIN_SHARED_TOLERANCES * within) & (off <= within)
     return Covers(a, b, begin, end, shift, np.where(sense < 0.0, -1.0, 1.0))[good]
 
 
@@ -336,7 +336,7 @@ def _on_circles(of: Intervals, within_mm: float) -> Iterator[Covers]:
     slanted = of.centre[arcs] @ np.array([np.cos(1.0), np.sin(1.0)])
     place = np.column_stack([slanted, of.radius[arcs]])
     boxes = np.concatenate([place - 0.5 * within_mm, place + 0.5 * within_mm], axis=1)
-    pairs = touching_boxes(boxes, of.group[arcs], of.path[arcs], asked, most=MOST_PAIRS)
+    pairs = touching_boxes(boxes, of.group[arcs], of.path[arcs], asked, max_pairs=MAX_PAIRS)
     for one, other in (pairs, pairs[::-1]):
         a, b = arcs[one[asked[one]]], arcs[other[asked[one]]]
         apart = np.hypot(*(of.centre[a] - of.centre[b]).T)
@@ -352,5 +352,5 @@ def _shared_circle(of: Intervals, a: Ints, b: Ints, within: float) -> Iterator[C
     for shift in (ahead * radius, (ahead - turn) * radius):
         begin = np.maximum(shift, 0.0)
         end = np.minimum(shift + of.length[b], of.length[a])
-        good = end - begin >= SHORTEST_SHARES * within
+        good = end - begin >= MIN_SHARED_TOLERANCES * within
         yield Covers(a, b, begin, end, shift, np.ones(len(a)))[good]

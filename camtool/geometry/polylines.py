@@ -50,7 +50,7 @@ class Polyline:
     closed: bool = False
 
     def __post_init__(self) -> None:
-        vertices = _checked(self.vertices, np.array([0, len(self.vertices)]), [self.closed])
+        vertices = _check_vertices(self.vertices, np.array([0, len(self.vertices)]), [self.closed])
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "closed", bool(self.closed))
 
@@ -91,7 +91,7 @@ class Polylines:
     def __post_init__(self) -> None:
         offsets = np.array(self.offsets, dtype=np.int64)
         closed = np.array(self.closed, dtype=np.bool_)
-        vertices = _checked(self.vertices, offsets, closed)
+        vertices = _check_vertices(self.vertices, offsets, closed)
         offsets.flags.writeable = closed.flags.writeable = False
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "offsets", offsets)
@@ -272,7 +272,7 @@ class Segments(Struct, frozen=True, eq=False, dict=True):
         return np.asarray(np.arctan2(spoke[:, 1], spoke[:, 0]))
 
 
-def _checked(vertices: Floats, offsets: Ints, closed: Bools | list[bool]) -> Floats:
+def _check_vertices(vertices: Floats, offsets: Ints, closed: Bools | list[bool]) -> Floats:
     """Return the vertices, read-only and normalised, a copy unless they are read-only and normal
     already; GeometryError when they are no polylines."""
     array = np.asarray(vertices, dtype=np.float64)
@@ -323,7 +323,7 @@ def _refuse(bad: Bools, message: str, offsets: Ints) -> None:
     raise GeometryError(message, where=f"path {path}, vertex {row - int(offsets[path])}")
 
 
-# Polylines reversed, rotated, and begun elsewhere: always new ones.
+# Reversing, rotating and beginning elsewhere: the results are always new polylines.
 
 
 def reverse(p: Polyline) -> Polyline:
@@ -338,7 +338,7 @@ def reverse(p: Polyline) -> Polyline:
     return Polyline(vertices, p.closed)
 
 
-def lines_reversed(lines: Polylines, which: Bools | None = None) -> Polylines:
+def reverse_lines(lines: Polylines, which: Bools | None = None) -> Polylines:
     """Return the paths with all (or those of `which` (M,)) travelled backwards, as `reverse`
     does."""
     if which is not None and not which.any():
@@ -357,7 +357,7 @@ def lines_reversed(lines: Polylines, which: Bools | None = None) -> Polylines:
     return Polylines._trusted(vertices, lines.offsets, lines.closed)
 
 
-def rotated(p: Polyline, angle_rad: float) -> Polyline:
+def rotate(p: Polyline, angle_rad: float) -> Polyline:
     """Return the path turned about (0, 0), CCW positive."""
     cosine, sine = math.cos(angle_rad), math.sin(angle_rad)
     x, y, bulge = p.vertices.T
@@ -365,15 +365,15 @@ def rotated(p: Polyline, angle_rad: float) -> Polyline:
     return Polyline(turned, p.closed)
 
 
-def rolled(p: Polyline, start_index: int) -> Polyline:
+def begin_at(p: Polyline, start_index: int) -> Polyline:
     """Return a closed path begun at another of its vertices; GeometryError for an open one."""
     if not p.closed:
         raise GeometryError("an open path can only begin at an end")
     return Polyline(np.roll(p.vertices, -start_index, axis=0), True)
 
 
-def lines_rolled(lines: Polylines, begins: Ints) -> Polylines:
-    """Return the paths begun at these of their vertices (M,), as `rolled` does; 0 for open
+def begin_lines_at(lines: Polylines, begins: Ints) -> Polylines:
+    """Return the paths begun at these of their vertices (M,), as `begin_at` does; 0 for open
     ones."""
     if not (lines.closed | (begins == 0)).all():
         raise GeometryError("an open path can only begin at an end")

@@ -58,12 +58,14 @@ def recognise_arcs(path: Polyline, tolerance_mm: float) -> tuple[Polyline, int]:
     vertices = path.vertices
     if path.closed:
         vertices = np.concatenate([vertices, vertices[:1]])
-    rows, found = _replaced(vertices, noise, tolerance_mm)
-    if path.closed and found and not _whole(rows):
+    rows, found = _replace_chords(vertices, noise, tolerance_mm)
+    if path.closed and found and not _is_full_circle(rows):
         # Begin anew where an arc ends, so that no arc is cut by where the path began.
         first = found[0][1] % len(path.vertices)
         vertices = np.roll(path.vertices, -first, axis=0)
-        rows, found = _replaced(np.concatenate([vertices, vertices[:1]]), noise, tolerance_mm)
+        rows, found = _replace_chords(
+            np.concatenate([vertices, vertices[:1]]), noise, tolerance_mm
+        )
     if not found:
         return path, 0
     return Polyline(rows[:-1] if path.closed else rows, path.closed), len(found)
@@ -79,7 +81,7 @@ def rounding_noise(points: Floats) -> float:
     return NOISE_MM
 
 
-def _replaced(
+def _replace_chords(
     vertices: Floats, noise: float, tolerance_mm: float
 ) -> tuple[Floats, list[tuple[int, int]]]:
     """Return the open path with its arcs, and the first and last vertex of each before."""
@@ -144,7 +146,7 @@ def _arcs(start: Floats, end: Floats, circle: Floats) -> Iterator[Floats]:
         yield np.array([[*start, bulge], [*middle, bulge], [*end, 0.0]])
 
 
-def _whole(rows: Floats) -> bool:
+def _is_full_circle(rows: Floats) -> bool:
     """True if a closed path became one circle of two halves."""
     return len(rows) == 3 and bool((np.abs(rows[:2, 2]) == 1.0).all())
 
@@ -158,14 +160,14 @@ def _whole(rows: Floats) -> bool:
 # arc arrives or leaves; where arcs do both at different ones, all stays as it was.
 
 
-class Merged(Struct, frozen=True, eq=False):
+class MergedPaths(Struct, frozen=True, eq=False):
     """The paths after merging, and how many segments went."""
 
     lines: Polylines
     count: int
 
 
-def without_tiny(lines: Polylines, limit_mm: float) -> Merged:
+def without_tiny(lines: Polylines, limit_mm: float) -> MergedPaths:
     """Merge the segments below `limit_mm` into their neighbours, with no vertex moved by more than
     that.
 
@@ -175,19 +177,19 @@ def without_tiny(lines: Polylines, limit_mm: float) -> Merged:
     for segments in Segments.lots(lines):
         short[segments.path[segment_lengths(segments) <= limit_mm]] = True
     if not short.any():
-        return Merged(lines, 0)
+        return MergedPaths(lines, 0)
     paths, gone = list(lines), 0
     for index in np.flatnonzero(short).tolist():
         path = paths[index]
-        keep, moved = _merged(path, segment_lengths(Segments.of(path)), limit_mm)
-        made = _made(path, keep, moved)
+        keep, moved = _merge_vertices(path, segment_lengths(Segments.of(path)), limit_mm)
+        made = _path_of(path, keep, moved)
         if made is not None:
             gone += len(path) - len(made)
             paths[index] = made
-    return Merged(Polylines.of(paths), gone)
+    return MergedPaths(Polylines.of(paths), gone)
 
 
-def _merged(path: Polyline, lengths: Floats, limit: float) -> tuple[Ints, Ints]:
+def _merge_vertices(path: Polyline, lengths: Floats, limit: float) -> tuple[Ints, Ints]:
     """Return, for each vertex of the new path, the old one whose place it takes, and the one whose
     bulge it takes."""
     bulges = path.vertices[:, 2]
@@ -214,7 +216,7 @@ def _merged(path: Polyline, lengths: Floats, limit: float) -> tuple[Ints, Ints]:
     return place[keep], bend[keep]
 
 
-def _made(path: Polyline, place: Ints, bend: Ints) -> Polyline | None:
+def _path_of(path: Polyline, place: Ints, bend: Ints) -> Polyline | None:
     """Return the path of these vertices; None when it is no path, or nothing has changed."""
     if len(place) == len(path.vertices) or len(place) < 2:
         return None

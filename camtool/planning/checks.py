@@ -17,7 +17,7 @@ import numpy as np
 from camtool.arrays import Bools, Floats
 from camtool.findings import Finding, Sentence
 from camtool.geometry.measure import extents, path_extents, signed_areas
-from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, lines_reversed
+from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, reverse_lines
 from camtool.machine.model import Machine
 from camtool.planning.findings import (
     CUT_DOUBTFUL,
@@ -517,7 +517,7 @@ def _loose_pieces(step: Step, gone: Container[int]) -> Iterator[Finding]:
         if contour.source in parts or contour.source in gone:
             continue
         path = Polylines.of([contour.path])
-        round_ = lines_reversed(path, signed_areas(path) < 0.0)
+        round_ = reverse_lines(path, signed_areas(path) < 0.0)
         pieces = offset_shape(round_, tool.radius_mm)
         areas = signed_areas(pieces)
         if not len(areas) or areas.max() <= LEAST_PIECE * math.pi * tool.radius_mm**2:

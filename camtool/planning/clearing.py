@@ -35,7 +35,7 @@ from camtool.geometry.polylines import (
     Polylines,
     Segments,
     reverse,
-    rotated,
+    rotate,
 )
 from camtool.planning.paths import MeasuredPath, joined, midpoints, runs_of_true
 
@@ -239,7 +239,7 @@ def zigzag_paths(region: Polylines, scan: Scan) -> list[Floats]:
 
 def strokes_of(region: Polylines, scan: Scan) -> Strokes:
     """The pieces of equally spaced lines, no farther apart than the step, in a region."""
-    turned = Polylines.of([rotated(path, -scan.angle_rad) for path in region])
+    turned = Polylines.of([rotate(path, -scan.angle_rad) for path in region])
     (left, right), (low, high) = extents(turned).tolist()
     count = max(1, math.ceil((high - low) / scan.step_mm))
     y = low + (np.arange(count) + 0.5) * ((high - low) / count)

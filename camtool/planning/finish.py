@@ -26,7 +26,7 @@ from camtool.geometry.polylines import (
     Polyline,
     Polylines,
     Segments,
-    lines_reversed,
+    reverse_lines,
 )
 from camtool.planning.findings import FINISH_IN_PASSES, FINISH_IN_PASSES_WHOLE, PlanningCode
 from camtool.planning.items import Contour, Setting, Step
@@ -71,7 +71,7 @@ def along_walls(
 ) -> list[Contour]:
     """Contours on the boundary of tool centre regions, which are on the left of their paths."""
     conventional = setting.operation.direction == "conventional"
-    lines = lines_reversed(paths) if conventional else paths
+    lines = reverse_lines(paths) if conventional else paths
     return [
         Contour(path, setting, name, source, material_left=conventional)
         for path, name, source in zip(lines, names, sources, strict=True)

@@ -19,7 +19,7 @@ from msgspec import Struct
 from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import OptionError
 from camtool.geometry.nesting import Nesting
-from camtool.geometry.polylines import Polyline, Polylines, lines_reversed, lines_rolled
+from camtool.geometry.polylines import Polyline, Polylines, begin_lines_at, reverse_lines
 from camtool.planning.items import Contour, Fixed, Items, contours_of
 from camtool.planning.paths import flat, joints
 
@@ -107,7 +107,7 @@ def chosen_paths(contours: Sequence[Contour], choices: Choices, rows: Ints) -> P
     closed = lines.closed[owners]
     start = np.where(closed, begins[first + np.where(closed, rank, 0)] - lines.offsets[owners], 0)
     lines = lines.select(owners.tolist())
-    return lines_reversed(lines_rolled(lines, start), ~closed & (rank > 0))
+    return reverse_lines(begin_lines_at(lines, start), ~closed & (rank > 0))
 
 
 def drawn(choices: Choices) -> Ints:

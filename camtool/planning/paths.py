@@ -16,7 +16,7 @@ from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.distance import nearest
-from camtool.geometry.measure import Frames, dot, point_at, segment_lengths, turned
+from camtool.geometry.measure import Frames, dot, point_at, segment_lengths, turn_left
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
 
 QUARTER = math.tan(math.pi / 8.0)
@@ -94,7 +94,7 @@ class MeasuredPath:
         at the start of an open one."""
         frames = Frames.of(self.segments)
         before = np.roll(frames.tangent_at(np.ones(len(self.segments))), 1, axis=0)
-        cross = dot(turned(before), frames.tangent)
+        cross = dot(turn_left(before), frames.tangent)
         turns = np.arctan2(cross, dot(before, frames.tangent))
         if not self.closed:
             turns[0] = 0.0

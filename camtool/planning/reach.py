@@ -19,7 +19,7 @@ from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.findings import Finding
-from camtool.geometry.boxes import Curves
+from camtool.geometry.boxes import IndexedCurves
 from camtool.geometry.distance import nearest
 from camtool.geometry.measure import Frames, extents, point_at, segment_lengths, signed_areas
 from camtool.geometry.nesting import Nesting, regions
@@ -186,7 +186,7 @@ def _split(segments: Segments, points: Floats) -> tuple[Ints, Floats, Floats]:
     """Rows and the parts from .. to (in fractions) into which the points on them divide them."""
     from camtool.kernels.offsets import curves_within, nearest_distances
 
-    curves, points = Curves.of(segments), np.ascontiguousarray(points)
+    curves, points = IndexedCurves.of(segments), np.ascontiguousarray(points)
     away = nearest_distances(points, curves.rows, curves.tree)
     on = (away <= TOGETHER_MM) & ~_at_any(points, segments.start)
     points, away = points[on], away[on]
@@ -209,7 +209,7 @@ def _distances(points: Floats, segments: Segments) -> Floats:
     """(P,) distance of each point (P, 2) from the nearest segment."""
     from camtool.kernels.offsets import nearest_distances
 
-    curves = Curves.of(segments)
+    curves = IndexedCurves.of(segments)
     return nearest_distances(np.ascontiguousarray(points), curves.rows, curves.tree)
 
 

@@ -37,7 +37,7 @@ from camtool.geometry.measure import (
     segment_boxes,
     segment_lengths,
     signed_areas,
-    turned,
+    turn_left,
 )
 from camtool.geometry.offset import offset_each
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
@@ -214,7 +214,7 @@ class _Lines(Struct, frozen=True, eq=False):
         best = np.hypot(apart[..., 0], apart[..., 1]).argmin(axis=0)
         every = np.arange(len(points))
         off, share = apart[best, every], tries[best, every] / frames.length
-        left = turned(frames.tangent_at(share))
+        left = turn_left(frames.tangent_at(share))
         distance = np.hypot(off[:, 0], off[:, 1])
         side = np.where(dot(off, left) < 0.0, -1.0, 1.0)
         known = distance > POSITION_EPS_MM
@@ -642,9 +642,9 @@ def _tracks_of(lines: Polylines, radius_mm: float, which: Ints) -> _Tracks:
 
 def _orient_ccw(lines: Polylines) -> Polylines:
     """Return closed paths, each reversed where it runs clockwise."""
-    from camtool.geometry.polylines import lines_reversed
+    from camtool.geometry.polylines import reverse_lines
 
-    return lines_reversed(lines, np.asarray(signed_areas(lines) < 0.0))
+    return reverse_lines(lines, np.asarray(signed_areas(lines) < 0.0))
 
 
 def _doubled_path(path: Polyline) -> Polyline:

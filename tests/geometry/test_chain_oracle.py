@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from camtool.geometry.chain import Chained, Kinds, chain
 from camtool.geometry.intersect import self_crossings_of
 from camtool.geometry.measure import path_lengths, signed_areas
-from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, reverse, rotated
+from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, reverse, rotate
 from camtool.kernels.chaining import nearest_others
 from tests.oracles.chaining import chained, nearest_other
 from tests.paths import mirrored, moved, scaled
@@ -140,7 +140,7 @@ def test_turned_and_mirrored_drawings_have_as_much_line(
 ) -> None:
     # Ties at a branch are broken by place, so contours may differ, but not what is cut.
     paths = grid_lines(Random(seed))
-    turned = [rotated(mirrored(p) if mirror else p, angle) for p in paths]
+    turned = [rotate(mirrored(p) if mirror else p, angle) for p in paths]
     one, two = chain(Polylines.of(paths), GAP), chain(Polylines.of(turned), GAP)
     assert path_lengths(two.lines).sum() == pytest.approx(path_lengths(one.lines).sum())
     assert sorted(i for of in two.members for i in of) == list(range(len(paths)))

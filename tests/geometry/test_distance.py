@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from camtool.geometry import distance as distances
 from camtool.geometry.distance import approach, nearest, points_to_segments
-from camtool.geometry.polylines import Polyline, Segments, reverse, rolled, rotated
+from camtool.geometry.polylines import Polyline, Segments, begin_at, reverse, rotate
 from tests.oracles.geometry import dense_points, line_string, sagitta
 from tests.paths import mirrored, moved, scaled
 from tests.strategies import coordinates, polylines
@@ -164,7 +164,7 @@ PAIRS = [
 @pytest.mark.parametrize(("a", "b", "wanted"), PAIRS)
 @pytest.mark.parametrize("turn", [0.0, 0.7, 2.5])
 def test_two_paths(a: Polyline, b: Polyline, wanted: float, turn: float) -> None:
-    one, other = rotated(a, turn), rotated(b, turn)
+    one, other = rotate(a, turn), rotate(b, turn)
     for first in (one, reverse(one)):
         for second in (other, reverse(other)):
             assert path_distance(first, second) == pytest.approx(wanted, abs=1e-7)
@@ -204,11 +204,11 @@ def test_the_distance_of_paths_stays_when_both_are_moved_about(
     wanted = path_distance(a, b)
     assert path_distance(b, a) == pytest.approx(wanted, abs=1e-9)
     assert path_distance(reverse(a), b) == pytest.approx(wanted, abs=1e-9)
-    assert path_distance(rotated(a, angle), rotated(b, angle)) == pytest.approx(wanted, abs=1e-7)
+    assert path_distance(rotate(a, angle), rotate(b, angle)) == pytest.approx(wanted, abs=1e-7)
     assert path_distance(mirrored(a), mirrored(b)) == pytest.approx(wanted, abs=1e-9)
     assert path_distance(scaled(a, 3.0), scaled(b, 3.0)) == pytest.approx(3 * wanted, abs=1e-7)
     if a.closed:
-        assert path_distance(rolled(a, start), b) == pytest.approx(wanted, abs=1e-12)
+        assert path_distance(begin_at(a, start), b) == pytest.approx(wanted, abs=1e-12)
 
 
 @given(polylines(max_points=6), polylines(max_points=6), coordinates(40.0))

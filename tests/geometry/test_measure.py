@@ -22,7 +22,7 @@ from camtool.geometry.measure import (
     signed_area,
     signed_areas,
 )
-from camtool.geometry.polylines import Polyline, Polylines, Segments, reverse, rolled, rotated
+from camtool.geometry.polylines import Polyline, Polylines, Segments, begin_at, reverse, rotate
 from tests.oracles.geometry import chord_length, dense_points, polygon, sagitta
 from tests.paths import mirrored, moved, scaled
 from tests.strategies import contours, polylines
@@ -108,9 +108,9 @@ def test_numbers_change_as_they_should_when_a_path_is_moved_about(
 ) -> None:
     size, area = length(path), signed_area(path)
     scale = size * size
-    same = [moved(path, 1000.0, -300.0), rotated(path, angle)]
+    same = [moved(path, 1000.0, -300.0), rotate(path, angle)]
     if path.closed:
-        same.append(rolled(path, start % len(path)))
+        same.append(begin_at(path, start % len(path)))
     for other in same:
         assert length(other) == pytest.approx(size, rel=1e-9)
         assert signed_area(other) == pytest.approx(area, abs=1e-9 * scale)

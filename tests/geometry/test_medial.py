@@ -11,7 +11,7 @@ from hypothesis import assume, given, settings
 from camtool.arrays import Floats
 from camtool.geometry.distance import nearest
 from camtool.geometry.measure import sample
-from camtool.geometry.medial import Boundary, Trace, discs_at, medial_trace
+from camtool.geometry.medial import Boundary, MedialTrace, discs_at, medial_trace
 from camtool.geometry.nesting import Nesting, oriented, regions
 from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.kernels.discs import LENGTH, SWEEP, frame
@@ -41,7 +41,7 @@ def largest_slowly(point: Floats, normal: Floats, boundary: Floats) -> float:
     return float(np.min((arm**2).sum(axis=1)[ahead > 1e-6] / (2.0 * ahead[ahead > 1e-6])))
 
 
-def check_touching(region: Polylines, trace: Trace) -> None:
+def check_touching(region: Polylines, trace: MedialTrace) -> None:
     """Discs lie in the region and touch it: they are as large as their middles are far from it."""
     middles = np.column_stack([trace.x, trace.y])
     far = nearest(middles, Segments.of(region)).distance

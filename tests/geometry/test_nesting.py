@@ -12,7 +12,7 @@ from camtool.errors import GeometryError
 from camtool.geometry.measure import signed_areas
 from camtool.geometry.nesting import Nesting, inside, oriented, regions
 from camtool.geometry.offset import offset_shape
-from camtool.geometry.polylines import Polyline, Polylines, Segments, reverse, rolled, rotated
+from camtool.geometry.polylines import Polyline, Polylines, Segments, begin_at, reverse, rotate
 from tests.oracles.contours import CIRCLE, OBLONG, SQUARE, closed, comb, opened
 from tests.oracles.geometry import polygon, sagitta
 from tests.paths import mirrored, moved, scaled
@@ -86,10 +86,10 @@ def test_arrangements(paths: list[Polyline], parent: list[int], depth: list[int]
     for other in (
         [reverse(p) for p in paths],
         [moved(p, 1234.5, -77.25) for p in paths],
-        [rotated(p, 0.3) for p in paths],
+        [rotate(p, 0.3) for p in paths],
         [mirrored(p) for p in paths],
         [scaled(p, 0.125) for p in paths],
-        [rolled(p, 1) if p.closed else p for p in paths],
+        [begin_at(p, 1) if p.closed else p for p in paths],
     ):
         assert _nested(other) == (parent, depth)
 
@@ -127,7 +127,7 @@ def test_points_level_with_vertices_and_on_chords_count_once(path: Polyline, at:
 
 
 def test_points_on_the_chord_of_an_arc_are_within_the_circle() -> None:
-    for path in (_circle(0, 0, 1), rotated(_circle(0, 0, 1), np.pi / 2), _circle(0.3, 7, 2)):
+    for path in (_circle(0, 0, 1), rotate(_circle(0, 0, 1), np.pi / 2), _circle(0.3, 7, 2)):
         middle = path.vertices[:, :2].mean(axis=0)
         for each in (path, reverse(path)):
             assert inside(middle[None, :], Segments.of(each)).tolist() == [True]
@@ -233,7 +233,7 @@ def test_paths_that_touch() -> None:
     assert areas_of(regions_of(Polylines.of(corner))) == [[100.0], [100.0]]
     diamond = closed((5, 0), (8, 3), (5, 6), (2, 3))
     for start in range(4):
-        found = areas_of(regions_of(Polylines.of([rolled(diamond, start), SQUARE])))
+        found = areas_of(regions_of(Polylines.of([begin_at(diamond, start), SQUARE])))
         assert found == [[100.0, -18.0]]
 
 

@@ -26,7 +26,7 @@ from camtool.geometry.offset import (
     shape_stages,
     trace_loops,
 )
-from camtool.geometry.polylines import Polyline, Polylines, Segments, reverse, rolled, rotated
+from camtool.geometry.polylines import Polyline, Polylines, Segments, begin_at, reverse, rotate
 from tests.geometry.test_offset_random import missing
 from tests.oracles.contours import (
     C_SHAPE,
@@ -163,7 +163,7 @@ def figures(results: list[Polyline], factor: float = 1.0) -> list[tuple[float, .
 
 CHANGES: list[tuple[str, Callable[[Polyline], Polyline], float, float]] = [
     ("reversed", reverse, -1.0, 1.0),
-    ("turned by 90°", lambda p: rotated(p, 0.5 * math.pi), 1.0, 1.0),
+    ("turned by 90°", lambda p: rotate(p, 0.5 * math.pi), 1.0, 1.0),
     ("mirrored", mirrored, -1.0, 1.0),
     ("scaled up", lambda p: scaled(p, 37.0), 37.0, 37.0),
     ("scaled down", lambda p: scaled(p, 0.1), 0.1, 0.1),
@@ -178,7 +178,7 @@ def test_changed_sources_change_nothing_else(p: Polyline, d: float) -> None:
     wanted = figures(offset(p, d))
     changed = [(name, change(p), d * sign, by) for name, change, sign, by in CHANGES]
     step = max(1, len(p) // 7)
-    changed += [(f"from vertex {i}", rolled(p, i), d, 1.0) for i in range(1, len(p), step)]
+    changed += [(f"from vertex {i}", begin_at(p, i), d, 1.0) for i in range(1, len(p), step)]
     for name, source, distance_mm, factor in changed:
         got = figures(offset(source, distance_mm), factor)
         assert len(got) == len(wanted), name
@@ -190,7 +190,7 @@ def test_turned_sources_by_any_angle() -> None:
     for name, p, d, _ in CASES:
         if "exactly" in name or "hair" in name or "collapses" in name:
             continue
-        wanted, got = offset(p, d), offset(rotated(p, 0.7), d)
+        wanted, got = offset(p, d), offset(rotate(p, 0.7), d)
         assert len(got) == len(wanted), name
         areas = [sorted(signed_area(each) for each in some) for some in (got, wanted)]
         assert np.allclose(*areas, rtol=1e-9, atol=1e-7), name

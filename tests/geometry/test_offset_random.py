@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from camtool.geometry.measure import Frames, length, point_at, signed_area
-from camtool.geometry.polylines import Polyline, Segments, reverse, rolled, rotated
+from camtool.geometry.polylines import Polyline, Segments, begin_at, reverse, rotate
 from tests.oracles.contours import RANDOM, is_simple
 from tests.oracles.offset import complaints, distance, distance_complaints
 from tests.paths import mirrored, offset, there_and_back
@@ -61,8 +61,8 @@ def test_changed_contours(
     changed = [
         (offset(reverse(p), -d), -1.0),
         (offset(mirrored(p), -d), -1.0),
-        (offset(rotated(p, angle), d), 1.0),
-        (offset(rolled(p, start % len(p)), d), 1.0),
+        (offset(rotate(p, angle), d), 1.0),
+        (offset(begin_at(p, start % len(p)), d), 1.0),
     ]
     for results, sign in changed:
         assert sum(signed_area(each) for each in results) == pytest.approx(

@@ -19,10 +19,10 @@ from camtool.geometry.polylines import (
     Polyline,
     Polylines,
     Segments,
-    lines_reversed,
+    begin_at,
     reverse,
-    rolled,
-    rotated,
+    reverse_lines,
+    rotate,
 )
 from tests.oracles.contours import (
     CIRCLE,
@@ -122,13 +122,13 @@ def test_changed_shapes_change_nothing_else(paths: list[Polyline], d: float) -> 
     areas, lengths = np.sort(signed_areas(wanted)), np.sort(path_lengths(wanted))
     changed = [
         ("other order", lines.select(range(len(lines) - 1, -1, -1)), 1.0),
-        ("turned", shape([rotated(p, 0.5 * math.pi) for p in paths]), 1.0),
+        ("turned", shape([rotate(p, 0.5 * math.pi) for p in paths]), 1.0),
         ("mirrored", shape([mirrored(p) for p in paths]), 1.0),
         ("scaled", shape([scaled(p, 0.1) for p in paths]), 0.1),
         ("moved", shape([moved(p, 4321.0, -987.0) for p in paths]), 1.0),
     ]
     most = max(len(p) for p in paths)
-    changed += [(f"from {i}", shape([rolled(p, i) for p in paths]), 1.0) for i in range(1, most)]
+    changed += [(f"from {i}", shape([begin_at(p, i) for p in paths]), 1.0) for i in range(1, most)]
     for name, source, factor in changed:
         got = offset_shape(source, d * factor)
         assert len(got) == len(wanted), name
@@ -142,7 +142,7 @@ def test_what_is_left_out_is_the_offset_of_the_rest() -> None:
         lines = shape(paths)
         one, other = (
             offset_shape(lines, d),
-            lines_reversed(offset_shape(lines_reversed(lines), -d)),
+            reverse_lines(offset_shape(reverse_lines(lines), -d)),
         )
         assert np.array_equal(one.offsets, other.offsets)
         assert np.array_equal(one.vertices, other.vertices)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from camtool.geometry.distance import points_to_segments
 from camtool.geometry.measure import path_lengths, sample
 from camtool.geometry.overlaps import SAME_LINE_MM, Unlapped, without_overlaps
-from camtool.geometry.polylines import Polyline, Polylines, Segments, reverse, rotated
+from camtool.geometry.polylines import Polyline, Polylines, Segments, reverse, rotate
 from tests.paths import mirrored
 
 WITHIN = SAME_LINE_MM
@@ -142,7 +142,7 @@ def is_loose(one: Polyline) -> bool:
 def test_the_same_points_are_covered_and_none_twice(
     paths: list[Polyline], angle: float, mirror: bool
 ) -> None:
-    paths = [rotated(mirrored(p) if mirror else p, angle) for p in paths]
+    paths = [rotate(mirrored(p) if mirror else p, angle) for p in paths]
     before = Polylines.of(paths)
     found = without_overlaps(before, np.zeros(len(paths), dtype=np.int64), WITHIN)
     points = np.concatenate([sample(p, 0.31) for p in paths])

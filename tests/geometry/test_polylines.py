@@ -16,9 +16,9 @@ from camtool.geometry.polylines import (
     Polyline,
     Polylines,
     Segments,
+    begin_at,
     reverse,
-    rolled,
-    rotated,
+    rotate,
     without_repeats,
 )
 from tests.oracles.geometry import dense_points
@@ -182,7 +182,7 @@ def test_points_are_moved_turned_mirrored_and_scaled(
     turn = np.array([[cosine, sine], [-sine, cosine]])
     for other, wanted in (
         (moved(path, dx, dy), points + np.array([dx, dy])),
-        (rotated(path, angle), points @ turn),
+        (rotate(path, angle), points @ turn),
         (mirrored(path), points * [-1.0, 1.0]),
         (scaled(path, 3.5), 3.5 * points),
     ):
@@ -191,14 +191,14 @@ def test_points_are_moved_turned_mirrored_and_scaled(
 
 @given(polylines(closed=True), st.integers(-9, 9))
 def test_rolled_begins_at_that_vertex(path: Polyline, start: int) -> None:
-    other = rolled(path, start)
+    other = begin_at(path, start)
     assert np.array_equal(other.start, path.vertices[start % len(path), :2])
-    assert np.array_equal(rolled(other, -start).vertices, path.vertices)
+    assert np.array_equal(begin_at(other, -start).vertices, path.vertices)
 
 
 def test_an_open_path_cannot_begin_in_its_middle() -> None:
     with pytest.raises(GeometryError):
-        rolled(Polyline(np.array([[0.0, 0, 0], [1, 0, 0]])), 1)
+        begin_at(Polyline(np.array([[0.0, 0, 0], [1, 0, 0]])), 1)
 
 
 @given(

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from camtool.geometry.boxes import touching_boxes
 from camtool.geometry.intersect import meetings, self_crossings_of
 from camtool.geometry.measure import segment_boxes
-from camtool.geometry.polylines import Polyline, Polylines, Segments, reverse, rolled, rotated
+from camtool.geometry.polylines import Polyline, Polylines, Segments, begin_at, reverse, rotate
 from tests.paths import mirrored
 from tests.strategies import contours, polylines
 
@@ -58,9 +58,9 @@ CASES = {
 def test_cases(shape: Polyline, count: int) -> None:
     assert len(places(shape)) == count
     assert len(places(reverse(shape))) == count
-    assert len(places(rotated(mirrored(shape), 0.7))) == count
+    assert len(places(rotate(mirrored(shape), 0.7))) == count
     if shape.closed:
-        assert all(len(places(rolled(shape, k))) == count for k in range(len(shape)))
+        assert all(len(places(begin_at(shape, k))) == count for k in range(len(shape)))
 
 
 def test_the_place_and_the_path_are_told() -> None:

@@ -7,7 +7,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from camtool.geometry.boxes import Curves, curve_rows_of
+from camtool.geometry.boxes import IndexedCurves, curve_rows_of
 from camtool.geometry.distance import points_to_segments
 from camtool.geometry.intersect import Crossings, crossings
 from camtool.geometry.measure import point_at, segment_boxes, segment_lengths
@@ -68,7 +68,7 @@ def test_rows_are_the_curves(seed: int) -> None:
 def test_distances(seed: int) -> None:
     rng = np.random.default_rng(seed)
     some = segments(rng, int(rng.integers(1, 60)))
-    curves = Curves.of(some)
+    curves = IndexedCurves.of(some)
     points = rng.uniform(-5.0, 15.0, (60, 2))
     every = points_to_segments(points, some)
     got = offsets.nearest_distances(points, curves.rows, curves.tree)
@@ -95,7 +95,7 @@ def test_meetings(seed: int, grid: bool) -> None:
     rng = np.random.default_rng(seed)
     one, other = segments(rng, 30, grid), segments(rng, 20, grid)
     eps = 1e-8
-    a, b = Curves.of(one, margin_mm=eps), Curves.of(other, margin_mm=eps)
+    a, b = IndexedCurves.of(one, margin_mm=eps), IndexedCurves.of(other, margin_mm=eps)
     for wanted, curves, own in (
         (each_once(crossings(one, one, position_eps_mm=eps)), a, True),
         (crossings(one, other, position_eps_mm=eps), b, False),

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.geometry.measure import sample
-from camtool.geometry.polylines import Polyline, Polylines, reverse, rotated
+from camtool.geometry.polylines import Polyline, Polylines, reverse, rotate
 from camtool.pictures.chains import Chain, chains_box, chains_of, moves_of, path_data
 from camtool.toolpath.builder import ToolpathBuilder
 from tests.oracles.svg_page import Arc, Line, pieces
@@ -116,7 +116,7 @@ def test_the_box_holds_all_points_and_is_touched(
     vertices: list[tuple[float, float, float]], closed: bool
 ) -> None:
     path = Polyline(np.array(vertices), closed)
-    for shape in (path, mirrored(path), reverse(path), rotated(path, 1.0)):
+    for shape in (path, mirrored(path), reverse(path), rotate(path, 1.0)):
         box = chains_box(chains_of(Polylines.of([shape])))
         assert box is not None
         points = sample(shape, 0.05)

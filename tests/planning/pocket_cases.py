@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from camtool.geometry.distance import approach
 from camtool.geometry.nesting import Nesting, oriented
-from camtool.geometry.polylines import Polyline, Polylines, rotated
+from camtool.geometry.polylines import Polyline, Polylines, rotate
 from camtool.operations.pocket.work import pocket
 from camtool.planning.items import Chosen, CutRun, Feeds, Setting, Work
 from camtool.planning.job import Operation, Tool
@@ -107,7 +107,7 @@ def shapes(draw: st.DrawFn) -> list[Polyline]:
         angle = 2.0 * math.pi * place / 3.0
         islands.append(moved(small, 0.6 * math.cos(angle), 0.6 * math.sin(angle)))
     turn = draw(st.floats(0.0, 6.0))
-    return [rotated(path, turn) for path in (outer, *islands)]
+    return [rotate(path, turn) for path in (outer, *islands)]
 
 
 def cross(paths: Sequence[Polyline]) -> bool:

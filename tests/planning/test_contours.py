@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.geometry.measure import length, sample
-from camtool.geometry.polylines import Polyline, Polylines, reverse, rolled, rotated
+from camtool.geometry.polylines import Polyline, Polylines, begin_at, reverse, rotate
 from camtool.planning import contours as module
 from camtool.planning.findings import PlanningCode
 from camtool.planning.items import Contour, CutRun, Feeds, Runs, Setting
@@ -222,7 +222,7 @@ def test_turned_scaled_and_mirrored_contours_give_runs_that_are_so(
 ) -> None:
     first, findings = runs_of(contour(path, **FULL, material_left=left), path)
     turned, noticed = runs_of(
-        contour(rotated(path, angle), **FULL, material_left=left), rotated(path, angle)
+        contour(rotate(path, angle), **FULL, material_left=left), rotate(path, angle)
     )
     assert [each.code for each in noticed] == [each.code for each in findings]
     wanted = _vertices(first)
@@ -258,7 +258,7 @@ def test_turned_scaled_and_mirrored_contours_give_runs_that_are_so(
 def test_the_way_it_is_cut_decides_the_side_of_the_leads(path: Polyline, start: int) -> None:
     """A reversible contour that is cut the other way has its material on the other side."""
     drawn = replace(contour(path, lead_in=Lead("arc", 0.5), reversible=True), material_left=True)
-    way = rolled(reverse(path), start % len(path))
+    way = begin_at(reverse(path), start % len(path))
     runs, findings = runs_of(drawn, way)
     turned = contour(way, lead_in=Lead("arc", 0.5), reversible=True, material_left=False)
     wanted, noticed = runs_of(turned, way)

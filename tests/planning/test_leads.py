@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.geometry.distance import points_to_segments
-from camtool.geometry.polylines import Polyline, Polylines, Segments, reverse, rolled
+from camtool.geometry.polylines import Polyline, Polylines, Segments, begin_at, reverse
 from camtool.planning.findings import PlanningCode
 from camtool.planning.items import Contour, Feeds, Setting
 from camtool.planning.job import Lead, Operation, Tool
@@ -171,7 +171,7 @@ def _left(path: Polyline, points: np.ndarray) -> np.ndarray:
 def test_no_point_of_a_lead_does_harm(
     path: Polyline, start: int, left: bool, kind: str, size: float, off: tuple[float, float]
 ) -> None:
-    path = rolled(path, start % len(path))
+    path = begin_at(path, start % len(path))
     other = moved(path, *off)
     radius = 0.3
     clear = chain_distances(path.start[None], _ring(other))[0] > radius
@@ -197,7 +197,7 @@ def test_no_point_of_a_lead_does_harm(
 
 @given(contours(), st.integers(0, 11), st.booleans())
 def test_leads_meet_the_contour_along_its_tangent(path: Polyline, start: int, left: bool) -> None:
-    path = rolled(path, start % len(path))
+    path = begin_at(path, start % len(path))
     along = MeasuredPath.of(path)
     made = leads(path, left, lead_in=Lead("arc", 0.2), lead_out=Lead("arc", 0.2))
     for lead, wanted, at in (
@@ -267,7 +267,7 @@ def test_no_segment_that_is_near_is_passed_over(
 
 @given(st.one_of(contours(), open_contours()), st.integers(0, 11))
 def test_runs_back(path: Polyline, start: int) -> None:
-    other = rolled(path, start % len(path)) if path.closed else path
+    other = begin_at(path, start % len(path)) if path.closed else path
     assert not runs_back(path, other)
     assert runs_back(path, reverse(other))
     measured = MeasuredPath.of(path)

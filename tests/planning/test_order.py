@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from camtool.arrays import Ints
 from camtool.errors import OptionError
 from camtool.geometry.nesting import Nesting
-from camtool.geometry.polylines import Polyline, Polylines, reverse, rolled
+from camtool.geometry.polylines import Polyline, Polylines, begin_at, reverse
 from camtool.planning import order
 from camtool.planning.items import Contour, CutRun, Feeds, Fixed, Item, Setting, contours_of
 from camtool.planning.job import Operation
@@ -228,7 +228,7 @@ def test_each_variant_of_many_items_is_that_of_the_item(
         if item.path.closed:
             own = np.flatnonzero(joints(Polylines.of([item.path])))
             own = item.starts if len(item.starts) else own
-            wanted += [rolled(item.path, k) for k in own.tolist()]
+            wanted += [begin_at(item.path, k) for k in own.tolist()]
         else:
             wanted += [item.path, reverse(item.path)] if item.reversible else [item.path]
     contours = contours_of(items)

@@ -15,7 +15,7 @@ from camtool.errors import OptionError
 from camtool.findings import Severity
 from camtool.geometry.measure import length, signed_area
 from camtool.geometry.offset import offset_shape
-from camtool.geometry.polylines import Polyline, Polylines, Segments, reverse, rotated
+from camtool.geometry.polylines import Polyline, Polylines, Segments, reverse, rotate
 from camtool.operations.pocket.work import pocket
 from camtool.planning.clearing import Cell, Steps, parts_of, ring_cells
 from camtool.planning.findings import PlanningCode
@@ -80,7 +80,7 @@ def test_many_random_shapes(paths: list[Polyline], diameter_mm: float, step_over
 
 def test_turned_mirrored_and_scaled() -> None:
     paths = SHAPES["letter"]
-    for change in (lambda p: rotated(mirrored(p), 0.4), reverse):
+    for change in (lambda p: rotate(mirrored(p), 0.4), reverse):
         assert wrong([change(path) for path in paths], 0.9, step_over=0.7) == []
     large = [scaled(path, 30.0) for path in paths]
     one = runs_of(work_of(paths, 0.9, step_over=0.7))[0]

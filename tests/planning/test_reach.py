@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from camtool.errors import GeometryError
 from camtool.geometry.distance import nearest
 from camtool.geometry.measure import signed_areas
-from camtool.geometry.polylines import Polyline, Polylines, reverse, rotated
+from camtool.geometry.polylines import Polyline, Polylines, reverse, rotate
 from camtool.planning import reach
 from camtool.planning.reach import Unreached, opened, unreached
 from tests.oracles import swept
@@ -183,7 +183,7 @@ def test_turned_mirrored_and_scaled(kind: str) -> None:
     for path, size in made:
         radius = 0.07 * size
         area = total([path], radius)
-        assert total([rotated(path, 1.0)], radius) == pytest.approx(area, abs=1e-6 * size**2)
+        assert total([rotate(path, 1.0)], radius) == pytest.approx(area, abs=1e-6 * size**2)
         assert total([mirrored(path)], radius) == pytest.approx(area, abs=1e-6 * size**2)
         larger = total([scaled(path, 3.0)], 3.0 * radius)
         assert larger == pytest.approx(9.0 * area, abs=1e-5 * size**2)

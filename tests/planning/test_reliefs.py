@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from camtool.geometry.polylines import Polyline, Polylines, reverse, rolled, rotated
+from camtool.geometry.polylines import Polyline, Polylines, begin_at, reverse, rotate
 from camtool.planning.reliefs import RELIEF_LEAST_MM, relieved
 from tests.oracles.arcs import chain_distances
 from tests.paths import mirrored, moved, scaled
@@ -100,8 +100,8 @@ def test_walls_as_long_are_overcut_along_x() -> None:
     [
         reverse,
         mirrored,
-        lambda p: rolled(p, 3),
-        lambda p: rotated(p, 0.4),
+        lambda p: begin_at(p, 3),
+        lambda p: rotate(p, 0.4),
         lambda p: scaled(p, 1.0),
     ],
 )
@@ -114,7 +114,7 @@ def test_reliefs_turn_with_the_part(kind: str, change) -> None:  # type: ignore[
 
 
 def test_the_path_may_run_against_the_walls() -> None:
-    for walls in (POCKET, reverse(POCKET), rolled(POCKET, 2)):
+    for walls in (POCKET, reverse(POCKET), begin_at(POCKET, 2)):
         assert len(relieved(WITHIN, walls, R, "dogbone", ALONE).path) == 12
 
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from camtool.findings import Severity
 from camtool.geometry.distance import points_to_segments
 from camtool.geometry.measure import length, sample
-from camtool.geometry.polylines import Polyline, Segments, reverse, rolled, rotated
+from camtool.geometry.polylines import Polyline, Segments, begin_at, reverse, rotate
 from camtool.importers.read import read_drawing
 from camtool.machine.model import Machine
 from camtool.pipeline import post_drawing
@@ -104,10 +104,10 @@ def test_no_division_has_fewer_runs(machine: Machine, points: list[tuple[float, 
     ("path", "runs", "error_um", "why"),
     [
         (square(), 2, 0.0, "both halves from the lower left"),
-        (rolled(square(), 1), 2, 0.0, "wherever it is drawn from"),
+        (begin_at(square(), 1), 2, 0.0, "wherever it is drawn from"),
         (reverse(square()), 2, 0.0, "however it is drawn"),
         (circle(), 4, 9.5, "two quarters must drive one axis backward: Y errs less"),
-        (rotated(square(), 0.3), 4, 9.5, "no line along an axis: two more runs"),
+        (rotate(square(), 0.3), 4, 9.5, "no line along an axis: two more runs"),
     ],
 )
 def test_known_divisions(
@@ -208,7 +208,7 @@ def test_mirrored_and_turned_they_are_as_many(machine: Machine, path: Polyline) 
     count = len(divided(path, even))
     quarter = np.array([[0.0, 1.0], [-1.0, 0.0]])
     turned = Polyline(np.column_stack([path.vertices[:, :2] @ quarter, path.vertices[:, 2]]), True)
-    for other in (mirrored(path), reverse(path), rolled(path, 2), turned):
+    for other in (mirrored(path), reverse(path), begin_at(path, 2), turned):
         assert len(divided(other, even)) == count
 
 
@@ -320,14 +320,14 @@ def test_what_only_a_whole_contour_can_have_keeps_it_whole(
 def test_whole_contours_begin_where_most_turns_are(machine: Machine) -> None:
     tabs = Tabs(count=2)
     item = start_of(contour(circle(start_rad=0.3), tabs=tabs), machine)
-    begins = [rolled(item.path, start) for start in item.starts.tolist()]
+    begins = [begin_at(item.path, start) for start in item.starts.tolist()]
     assert len(begins) == 4
     assert {sum(reversals_of(path, machine)) for path in begins} == {3}
     assert sum(reversals_of(circle(start_rad=0.3), machine)) == 4
     # A corner at which both axes turn is better than those where one does.
     wedge = polygon((3.0, 1.0), (1.0, 2.0), (0.0, 0.0))
     item = start_of(contour(wedge, tabs=tabs), machine)
-    assert [rolled(item.path, start).start.tolist() for start in item.starts] == [[0.0, 0.0]]
+    assert [begin_at(item.path, start).start.tolist() for start in item.starts] == [[0.0, 0.0]]
     # Where the operation says where it may begin, it begins at the best of these.
     house = polygon((0.0, 0.0), (2.0, 0.0), (2.5, 2.0), (1.5, 2.5), (1.0, 3.0), (-0.5, 2.0))
     allowed = Contour(house, setting(tabs=tabs), "test", 0, starts=np.array([2, 3, 4]))

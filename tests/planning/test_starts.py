@@ -11,7 +11,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from camtool.geometry.measure import length, signed_area
-from camtool.geometry.polylines import Polyline, reverse, rolled
+from camtool.geometry.polylines import Polyline, begin_at, reverse
 from camtool.planning.contours import START_SNAP_MM, with_starts
 from tests.oracles.arcs import chain_distances, chain_points
 from tests.strategies import contours
@@ -57,7 +57,7 @@ def test_any_vertex_will_do_for_the_nearest_and_for_open_paths() -> None:
 
 def test_the_middle_of_the_longest_line() -> None:
     assert begins(OBLONG, "longest-line") == [[4.5, 0.0]]
-    assert begins(rolled(OBLONG, 2), "longest-line") == [[4.5, 4.0]]
+    assert begins(begin_at(OBLONG, 2), "longest-line") == [[4.5, 4.0]]
     # A longer arc is no line; but without lines it has to do.
     slot = Polyline(np.array([[0, 0, 0], [5, 0, 1.0], [5, 8, 0], [0, 8, 1.0]]), True)
     assert begins(slot, "longest-line") == [[2.5, 0.0]]

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from camtool.errors import OptionError
 from camtool.geometry.measure import length
-from camtool.geometry.polylines import Polyline, reverse, rolled
+from camtool.geometry.polylines import Polyline, begin_at, reverse
 from camtool.planning.findings import PlanningCode
 from camtool.planning.items import Contour, Feeds, Setting
 from camtool.planning.job import Entry, Lead, Operation, Tabs, Tool
@@ -160,7 +160,7 @@ def test_tabs_stand_in_the_middle_of_equal_shares() -> None:
 
 def test_tabs_keep_off_corners_and_the_seam_where_they_can() -> None:
     for start in range(4):
-        path = rolled(OBLONG, start)
+        path = begin_at(OBLONG, start)
         corners = MeasuredPath.of(path).reach
         for count in (2, 3, 4, 5, 6, 7):
             spans = _lengths(path, Tabs(count=count, width_mm=WIDTH))

@@ -35,7 +35,7 @@ from camtool.geometry.polylines import (
     Polyline,
     Polylines,
     Segments,
-    lines_reversed,
+    reverse_lines,
 )
 from camtool.planning.clearing import (
     SLOT_TOLERANCE,
@@ -148,7 +148,7 @@ def _walls(chosen: Chosen, setting: Setting) -> Work:
 
 def kept_by(chosen: Chosen) -> Polylines:
     """The boundary of what the pockets leave, which is on the left of its paths."""
-    return lines_reversed(oriented(chosen.nesting))
+    return reverse_lines(oriented(chosen.nesting))
 
 
 def pockets(chosen: Chosen) -> list[Pocket]:

@@ -24,7 +24,7 @@ from camtool.geometry.polylines import (
     Polyline,
     Polylines,
     Segments,
-    lines_reversed,
+    reverse_lines,
 )
 from camtool.operations.engrave.work import run_together
 from camtool.planning.findings import (
@@ -128,13 +128,13 @@ def _shape(chosen: Chosen, of: list[int], setting: Setting, found: _Found) -> No
 
     lines = chosen.lines.select(of)
     ccw = signed_areas(lines) > 0.0
-    shape = lines_reversed(lines, ccw != chosen.rim[of])
+    shape = reverse_lines(lines, ccw != chosen.rim[of])
     before = len(found.lines)
     _round(chosen, of, shape, setting, found)
     made = found.lines[before:]
     joined = [each for line in made for each in _joined(chosen, line.of, setting)]
     found.findings += shortened_list(joined, UNREACHED_BETWEEN_MORE)
-    free = lines_reversed(shape)
+    free = reverse_lines(shape)
     found.findings += cut_away_findings(shape, setting.operation)
     if setting.operation.beyond_mm:  # it reaches where it is to cut beyond the lines
         free = offset_shape(free, -setting.operation.beyond_mm)
@@ -149,7 +149,7 @@ def _each(chosen: Chosen, closed: list[int], setting: Setting, found: _Found) ->
     from camtool.planning.reach import cut_away_findings
 
     lines = chosen.lines.select(closed)
-    shapes = lines_reversed(lines, (signed_areas(lines) > 0.0) != chosen.rim[closed])
+    shapes = reverse_lines(lines, (signed_areas(lines) > 0.0) != chosen.rim[closed])
     operation = setting.operation
     paths, of = offset_each(
         shapes, -operation.away_mm, joins=operation.joins, mitre_limit=operation.mitre_limit
@@ -304,7 +304,7 @@ def _beside(lines: list[_Line], chosen: Chosen, setting: Setting) -> list[Contou
         turn = (signed_areas(paths) > 0.0) != ccw[first]
     else:
         turn = left == (wanted == "climb")
-    paths = lines_reversed(paths, turn)
+    paths = reverse_lines(paths, turn)
     return [
         Contour(
             path,

@@ -37,12 +37,12 @@ from camtool.errors import GeometryError, OptionError
 from camtool.findings import Finding
 from camtool.geometry.boxes import touching_boxes
 from camtool.geometry.distance import points_to_segments
-from camtool.geometry.intersect import MOST_PAIRS, meetings
+from camtool.geometry.intersect import MAX_PAIRS, meetings
 from camtool.geometry.measure import segment_boxes, signed_area
 from camtool.geometry.medial import (
     HALVINGS,
     Boundary,
-    Trace,
+    MedialTrace,
     concatenated,
     discs_at,
     medial_trace,
@@ -139,7 +139,7 @@ def _crossings(chosen: Chosen) -> Iterator[Finding]:
     rows, nothing = np.arange(len(segments)), np.zeros(len(segments), dtype=np.int64)
     every = np.ones(len(segments), dtype=np.bool_)
     boxes = segment_boxes(segments)
-    one, other = touching_boxes(boxes, nothing, rows, every, most=MOST_PAIRS)
+    one, other = touching_boxes(boxes, nothing, rows, every, max_pairs=MAX_PAIRS)
     if len(one) == 0:
         return
     meets, crosses = meetings(segments, one, other)
@@ -184,7 +184,7 @@ def _carved(region: _Region, setting: Setting, cone: Cone) -> tuple[list[Fixed],
     return [item] if runs else [], findings
 
 
-def _walks(trace: Trace, floor: list[Floats], band: Band, again_mm: float) -> list[Floats]:
+def _walks(trace: MedialTrace, floor: list[Floats], band: Band, again_mm: float) -> list[Floats]:
     """The walks of one band: the grooves, the walls, and the centre of a round region."""
     graph = pruned(graph_of([*grooves(trace, band), *floor]), band.tolerance_mm)
     largest = trace.discs[int(np.argmax(trace.rho))]
@@ -211,7 +211,7 @@ def _run(path: Floats, setting: Setting, cone: Cone, name: str) -> CutRun:
     )
 
 
-def _too_narrow(region: _Region, trace: Trace, cone: Cone) -> Iterator[Finding]:
+def _too_narrow(region: _Region, trace: MedialTrace, cone: Cone) -> Iterator[Finding]:
     """What a flat tip cannot enter: all of the region, or its corners and narrow places."""
     from camtool.planning.reach import unreached
 
@@ -234,7 +234,7 @@ def _too_narrow(region: _Region, trace: Trace, cone: Cone) -> Iterator[Finding]:
 
 
 def _limited(
-    region: _Region, trace: Trace, floor: list[Floats], limit_mm: float
+    region: _Region, trace: MedialTrace, floor: list[Floats], limit_mm: float
 ) -> Iterator[Finding]:
     if floor:
         row = int(np.argmax(trace.rho))
@@ -255,7 +255,7 @@ class Band(Struct, frozen=True):
     tolerance_mm: float
 
 
-def with_level(boundary: Boundary, trace: Trace, level_mm: float) -> Trace:
+def with_level(boundary: Boundary, trace: MedialTrace, level_mm: float) -> MedialTrace:
     """The trace with a row of exactly this radius wherever the radius passes it."""
     near = np.abs(trace.rho - level_mm) <= LEVEL_EPS_MM
     trace = _with_radius(trace, np.where(near, level_mm, trace.rho))
@@ -274,11 +274,11 @@ def with_level(boundary: Boundary, trace: Trace, level_mm: float) -> Trace:
     return both.rows(np.lexsort((both.t, both.element)))
 
 
-def _with_radius(trace: Trace, rho: Floats) -> Trace:
-    return Trace(trace.element, trace.t, trace.x, trace.y, rho, trace.partner, trace.u)
+def _with_radius(trace: MedialTrace, rho: Floats) -> MedialTrace:
+    return MedialTrace(trace.element, trace.t, trace.x, trace.y, rho, trace.partner, trace.u)
 
 
-def grooves(trace: Trace, band: Band) -> list[Floats]:
+def grooves(trace: MedialTrace, band: Band) -> list[Floats]:
     """Pieces (n, 4) of x, y, rho, bulge: the axis within the band, each piece once; an arc
     whose radius changes changes it evenly along its sweep.
 
@@ -294,7 +294,7 @@ def grooves(trace: Trace, band: Band) -> list[Floats]:
     return [_fitted(trace.discs[i : j + 1], tolerance) for i, j in _index_runs(trace, wanted)]
 
 
-def walls(boundary: Boundary, trace: Trace, high_mm: float) -> list[Floats]:
+def walls(boundary: Boundary, trace: MedialTrace, high_mm: float) -> list[Floats]:
     """Pieces (2, 4) of x, y, rho, bulge beside the boundary where discs are larger than high."""
     rho = trace.rho
     least, most = np.minimum(rho[1:], rho[:-1]), np.maximum(rho[1:], rho[:-1])
@@ -318,7 +318,7 @@ def floor_area(pieces: list[Floats]) -> float:
     return total
 
 
-def _index_runs(trace: Trace, wanted: Bools, partners: bool = True) -> list[tuple[int, int]]:
+def _index_runs(trace: MedialTrace, wanted: Bools, partners: bool = True) -> list[tuple[int, int]]:
     """First and last rows of the runs of wanted gaps, within an element (and one partner)."""
     joined = wanted[1:] & wanted[:-1] & (trace.element[2:] == trace.element[:-2])
     if partners:
