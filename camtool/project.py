@@ -1,4 +1,4 @@
-"""What commands take where no flag says otherwise, and machine files found by name.
+"""Defaults of commands from `camtool.toml`, and machine files found by name.
 
 `camtool.toml` in a folder holds for it and all folders in it; another one, in the user's
 configuration folder, holds everywhere:
@@ -37,13 +37,13 @@ TOOLS = "tools.toml"
 """A library of tools, beside a `camtool.toml`."""
 
 NAME = re.compile(r"[a-z0-9][a-z0-9-]*")
-"""What machines are called."""
+"""Valid names of machines."""
 
 _MACHINE = re.compile(r"\s*(?:machine|target)\s*=")
-"""The lines of a `camtool.toml` that say which machine: it has no tables."""
+"""Lines of a `camtool.toml` that name the machine: it has no tables."""
 
 
-class Said(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class ProjectKeys(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The keys of a `camtool.toml`."""
 
     machine: str | None = None
@@ -58,13 +58,13 @@ class Said(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Project(Struct, frozen=True):
-    """The `camtool.toml` files that hold in a folder, nearest first, each with what it says."""
+    """The `camtool.toml` files that apply to a folder, nearest first, each with its keys."""
 
-    files: tuple[tuple[Path, Said], ...]
+    files: tuple[tuple[Path, ProjectKeys], ...]
 
     @property
     def machine(self) -> Path | None:
-        """The machine file by default; None where `target` is said instead, or nothing."""
+        """Default machine file; None if `target` is set instead, or nothing."""
         for file, said in self.files:
             if said.machine is not None:
                 beside = file.parent / said.machine
@@ -75,7 +75,7 @@ class Project(Struct, frozen=True):
 
     @property
     def target(self) -> str | None:
-        """The target by default; None where `machine` is said instead, or nothing."""
+        """Default target; None if `machine` is set instead, or nothing."""
         for _, said in self.files:
             if said.machine is not None or said.target is not None:
                 return said.target
@@ -83,12 +83,12 @@ class Project(Struct, frozen=True):
 
     @property
     def job(self) -> Path | None:
-        """The job file by default."""
-        found = self.said("job")
+        """Default job file."""
+        found = self.value_of("job")
         return None if found is None else found[1].parent / found[0]
 
-    def said(self, key: str) -> tuple[Any, Path] | None:
-        """What the nearest file that has this key says, and the file."""
+    def value_of(self, key: str) -> tuple[Any, Path] | None:
+        """Return the value of a key in the nearest file that has it, and the file."""
         for file, said in self.files:
             if getattr(said, key) is not None:
                 return getattr(said, key), file
@@ -96,13 +96,13 @@ class Project(Struct, frozen=True):
 
     @property
     def libraries(self) -> tuple[Path, ...]:
-        """The libraries of tools, the nearest first: the project's and the user's."""
+        """Libraries of tools, the nearest first: the project's and the user's."""
         folders = dict.fromkeys([*(file.parent for file, _ in self.files), user_folder()])
         return tuple(folder / TOOLS for folder in folders if (folder / TOOLS).is_file())
 
     def machine_named(self, said: str) -> Path:
-        """The machine file of a name; a path is taken as it is. MachineError, with the names that
-        there are, for an unknown one."""
+        """Return the machine file of a name; a path is returned unchanged. MachineError with the
+        known names for an unknown one."""
         if _is_file_name(said):
             return Path(said)
         file = self.find(said)
@@ -118,7 +118,7 @@ class Project(Struct, frozen=True):
         )
 
     def find(self, name: str) -> Path | None:
-        """The machine file of a name; None without one."""
+        """Return the machine file of a name; None without one."""
         for folder in self._folders() if NAME.fullmatch(name) else ():
             file = folder / f"{name}.toml"
             if file.is_file() and _is_machine(file):
@@ -126,8 +126,8 @@ class Project(Struct, frozen=True):
         return None
 
     def machines(self) -> Iterator[tuple[str, Path]]:
-        """The names and files of the user's machines: those of the project and of the
-        configuration folder, where the project has none of that name."""
+        """Yield the names and files of the user's machines: those of the project, and those of the
+        configuration folder whose names the project does not have."""
         found = (file for folder in self._folders() for file in sorted(folder.glob("*.toml")))
         for file in found:
             if file == self.find(file.stem):
@@ -139,53 +139,54 @@ class Project(Struct, frozen=True):
 
 
 def project_of(folder: Path) -> Project:
-    """What holds in this folder. MachineError for a `camtool.toml` that cannot be read."""
+    """Return the settings that apply to this folder. MachineError for a `camtool.toml` that cannot
+    be read."""
     folder = folder.absolute()
     own = next(filter(Path.is_file, (each / FILE for each in (folder, *folder.parents))), None)
     users = user_folder() / FILE
     files = [] if own is None else [own]
     if users != own and users.is_file():
         files.append(users)
-    return Project(tuple((file, _said(file)) for file in files))
+    return Project(tuple((file, _read_keys(file)) for file in files))
 
 
-def _said(file: Path) -> Said:
-    return convert(read_table(file), Said, str(file))
+def _read_keys(file: Path) -> ProjectKeys:
+    return convert(read_table(file), ProjectKeys, str(file))
 
 
 def names_machine(file: Path) -> bool:
-    """Whether a `camtool.toml`, which need not be there, says a machine or a target."""
-    said = _said(file) if file.is_file() else Said()
+    """True if a `camtool.toml`, which need not exist, names a machine or a target."""
+    said = _read_keys(file) if file.is_file() else ProjectKeys()
     return said.machine is not None or said.target is not None
 
 
-def naming(file: Path, name: str) -> str:
-    """The text of a `camtool.toml`, which need not be there, that says this machine; its other
-    lines stay as they are."""
+def text_naming_machine(file: Path, name: str) -> str:
+    """Return the text of a `camtool.toml`, which need not exist, that names this machine; its
+    other lines are kept."""
     said = f'machine = "{name}"'
     if not file.is_file():
         return f"# What camtool takes where no flag says otherwise.\n{said}\n"
-    _said(file)
+    _read_keys(file)
     lines = file.read_text(encoding="utf-8").splitlines()
     rest = [line for line in lines if not _MACHINE.match(line)]
     return "\n".join([said, *rest]) + "\n"
 
 
 def user_folder() -> Path:
-    """Where the user keeps what holds for all projects: `~/.config/camtool` on Linux, and its like
-    elsewhere."""
+    """Return the folder of the user's configuration for all projects: `~/.config/camtool` on
+    Linux, and its counterpart elsewhere."""
     import click
 
     return Path(click.get_app_dir("camtool"))
 
 
 def _is_file_name(said: str) -> bool:
-    """Whether a machine is said by the name of a file, and not by its own."""
+    """True if a machine is given by the name of a file, and not by its own."""
     return NAME.fullmatch(said) is None or Path(said).is_file()
 
 
 def _is_machine(file: Path) -> bool:
-    """Whether a TOML file is that of a machine: it extends a target."""
+    """True if a TOML file is that of a machine: it extends a target."""
     try:
         return isinstance(read_table(file).get("extends"), str)
     except MachineError:

@@ -2,7 +2,7 @@
 
 Machine files, job files and measurements come through here. `read_table` reads a file, `convert`
 makes a record of it: an unknown key, a wrong type or a number out of range is an error that says
-which values are allowed. `written` makes text of tables.
+which values are allowed. `toml_lines` makes text of tables.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ import msgspec.inspect
 from camtool.errors import MachineError
 from camtool.patterns import guess
 
-DEEPEST = 50
+MAX_DEPTH = 50
 """Deepest nesting of tables and lists; those of machines and jobs are five deep at most."""
 
 _PARTS = re.compile(r"[=,{}\[\]\n]")
 """The characters between keys and values of TOML text."""
 
-MOST_SHOWN = 40
+MAX_SHOWN_CHARS = 40
 """Messages do not repeat numbers of more characters."""
 
 Table = dict[str, Any]
@@ -34,8 +34,8 @@ _T = TypeVar("_T")
 
 
 def read_table(path: Path, data: bytes | None = None) -> Table:
-    """A TOML file as nested dicts; MachineError with line and column for a syntax error. `data`:
-    what is in it, where it has been read already."""
+    """Read a TOML file as nested dicts; MachineError with line and column for a syntax error.
+    `data`: its content, if it has been read already."""
     try:
         data = path.read_bytes() if data is None else data
     except (OSError, ValueError) as error:  # ValueError: a name with a null character
@@ -44,29 +44,29 @@ def read_table(path: Path, data: bytes | None = None) -> Table:
             f"cannot be read ({reason})", file=str(path), mend="check the path"
         ) from error
     try:
-        return parsed_table(data.decode())
+        return parse_table(data.decode())
     except UnicodeDecodeError as error:
         raise MachineError("is not UTF-8 text", file=str(path)) from error
     except ValueError as error:  # TOMLDecodeError, or an integer of too many digits
         raise MachineError(f"is no TOML: {error}", file=str(path)) from error
 
 
-def parsed_table(text: str) -> Table:
-    """TOML text as nested dicts; TOMLDecodeError for a syntax error and for nesting deeper than
-    DEEPEST, ValueError for an integer of too many digits."""
+def parse_table(text: str) -> Table:
+    """Parse TOML text to nested dicts; TOMLDecodeError for a syntax error and for nesting deeper
+    than MAX_DEPTH, ValueError for an integer of too many digits."""
     # For a key of n parts tomllib keeps all its n beginnings, n²/2 parts.
-    if any(part.count(".") > DEEPEST for part in _PARTS.split(text)):
-        raise tomllib.TOMLDecodeError(f"a key has more than {DEEPEST} parts")
+    if any(part.count(".") > MAX_DEPTH for part in _PARTS.split(text)):
+        raise tomllib.TOMLDecodeError(f"a key has more than {MAX_DEPTH} parts")
     try:
         table = tomllib.loads(text)
     except RecursionError:
         raise tomllib.TOMLDecodeError("it is nested too deeply") from None
     level: list[Any] = [table]
-    for _ in range(DEEPEST):
+    for _ in range(MAX_DEPTH):
         level = [each for value in level for each in _within(value)]
         if not level:
             return table
-    raise tomllib.TOMLDecodeError(f"it is nested more than {DEEPEST} deep")
+    raise tomllib.TOMLDecodeError(f"it is nested more than {MAX_DEPTH} deep")
 
 
 def _within(value: Any) -> Iterable[Any]:
@@ -76,8 +76,9 @@ def _within(value: Any) -> Iterable[Any]:
 
 
 def convert(table: Mapping[str, Any], kind: type[_T], file: str, at: str = "") -> _T:
-    """`table` as the record `kind`; MachineError naming file, table and key when it is not."""
-    _finite(table, file, at)
+    """Convert `table` to the record `kind`; MachineError with file, table and key when it does not
+    fit."""
+    _refuse_infinite(table, file, at)
     try:
         return msgspec.convert(table, kind)
     except msgspec.ValidationError as error:
@@ -92,7 +93,7 @@ def convert(table: Mapping[str, Any], kind: type[_T], file: str, at: str = "") -
             keys.append(missing[1])
             message = "key is missing"
         elif message.startswith(_OUT_OF_RANGE):
-            message = _outside(kind, table, keys[1:] if at else keys) or message
+            message = _out_of_range(kind, table, keys[1:] if at else keys) or message
         within = keys[1:] if at else keys
         if unknown:
             mend = _mend(kind, table, within[:-1], within[-1])
@@ -115,23 +116,23 @@ _OUT_OF_RANGE = (
 """How messages of msgspec about a number out of range begin."""
 
 
-def _outside(kind: type, table: Mapping[str, Any], keys: Sequence[str]) -> str:
-    """The message for a number out of range at `keys` ("axes", "x", "travel_mm";
-    "play_mm[0][1]"); "" where the range lacks an end."""
-    *_, (about, value) = _down(kind, table, keys)
+def _out_of_range(kind: type, table: Mapping[str, Any], keys: Sequence[str]) -> str:
+    """Return the message for a number out of range at `keys` ("axes", "x", "travel_mm";
+    "play_mm[0][1]"); "" if the range has only one end."""
+    *_, (about, value) = _along(kind, table, keys)
     about = _fitting(about, value)
     if about.ge is None or about.le is None:
         return ""
     said = repr(value)
-    if len(said) > MOST_SHOWN:
+    if len(said) > MAX_SHOWN_CHARS:
         said = f"a number of {len(said)} characters"
     ends = (str(end) if isinstance(end, int) else f"{end:g}" for end in (about.ge, about.le))
     return f"{said} is not between {' and '.join(ends)}"
 
 
 def _choice(kind: type, table: Mapping[str, Any], keys: Sequence[str]) -> str:
-    """Which words are allowed at `keys`, and a guess which was meant; "" where any word is."""
-    *above, (about, value) = _down(kind, table, keys)
+    """Return the allowed words at `keys`, and a suggestion; "" if any word is allowed."""
+    *above, (about, value) = _along(kind, table, keys)
     words = [
         word
         for one in getattr(about, "types", (about,))
@@ -149,8 +150,8 @@ def _choice(kind: type, table: Mapping[str, Any], keys: Sequence[str]) -> str:
     return f"{near}use one of {', '.join(map(str, words))}" if words else ""
 
 
-def _down(kind: type, table: Mapping[str, Any], keys: Sequence[str]) -> Iterator[tuple[Any, Any]]:
-    """Type information and value of a table, and of each part of it along `keys`."""
+def _along(kind: type, table: Mapping[str, Any], keys: Sequence[str]) -> Iterator[tuple[Any, Any]]:
+    """Yield type information and value of a table, and of each part of it along `keys`."""
     about: Any = msgspec.inspect.type_info(kind)
     value: Any = table
     yield about, value
@@ -161,7 +162,7 @@ def _down(kind: type, table: Mapping[str, Any], keys: Sequence[str]) -> Iterator
 
 
 def _part(about: Any, value: Any, key: int | str) -> Any:
-    """Type information of the part `key` of a table or a list with the type `about`."""
+    """Return type information of the part `key` of a table or a list with the type `about`."""
     about = _fitting(about, value)
     if isinstance(about, msgspec.inspect.StructType):
         found = (field.type for field in about.fields if field.encode_name == key)
@@ -172,8 +173,8 @@ def _part(about: Any, value: Any, key: int | str) -> Any:
 
 
 def _fitting(about: Any, value: Any) -> Any:
-    """Of the types that are allowed in one place, the one for this value: the table of its model,
-    or the type beside None."""
+    """Return the one of several allowed types that fits this value: the table of its model, or the
+    type beside None."""
     for one in getattr(about, "types", (about,)):
         if isinstance(one, msgspec.inspect.StructType):
             if one.tag is None or value.get(one.tag_field) == one.tag:
@@ -184,8 +185,8 @@ def _fitting(about: Any, value: Any) -> Any:
 
 
 def _mend(kind: type, values: Any, tables: list[str], key: str) -> str:
-    """A guess which key was meant, and the keys of the table; where each model has a table of its
-    own, the keys of that."""
+    """Suggest a similar key, and list the keys of the table; for models with tables of their own,
+    the keys of that model."""
     record: Any = kind
     for name in tables:
         fields = {f.name: f.type for f in msgspec.structs.fields(record)}
@@ -201,17 +202,17 @@ def _mend(kind: type, values: Any, tables: list[str], key: str) -> str:
     return f"{guess(key, known)}known keys: {', '.join(known)}"
 
 
-def _finite(value: object, file: str, at: str) -> None:
-    """MachineError for inf and nan, which TOML allows and no machine has."""
+def _refuse_infinite(value: object, file: str, at: str) -> None:
+    """Raise MachineError for inf and nan, which TOML allows and no machine has."""
     if isinstance(value, float) and not math.isfinite(value):
         raise MachineError("is not finite", file=file, where=f"key {at}", mend="write a number")
     items: Callable[[], Any] | None = getattr(value, "items", None)
     if items is not None:
         for key, item in items():
-            _finite(item, file, f"{at}.{key}" if at else str(key))
+            _refuse_infinite(item, file, f"{at}.{key}" if at else str(key))
     elif isinstance(value, list):
         for number, item in enumerate(value, 1):
-            _finite(item, file, f"{at} {number}" if isinstance(item, dict) else at)
+            _refuse_infinite(item, file, f"{at} {number}" if isinstance(item, dict) else at)
 
 
 # Tables as text again.
@@ -222,11 +223,11 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+")
 """Keys that need no quotes."""
 
 
-def written(
+def toml_lines(
     table: Mapping[str, Any], notes: Mapping[str, str] | None = None, path: tuple[str, ...] = ()
 ) -> Iterator[str]:
-    """The lines of a table as TOML, its values before its tables and lists of tables; `notes` are
-    comments behind the values of these keys ("axes.x.backlash_mm")."""
+    """Yield the lines of a table as TOML, its values before its tables and lists of tables;
+    `notes` are comments after the values of these keys ("axes.x.backlash_mm")."""
     notes = notes or {}
     tables = {key: value for key, value in table.items() if isinstance(value, dict)}
     lists = {key: value for key, value in table.items() if _are_tables(value)}
@@ -236,7 +237,7 @@ def written(
         yield f"[{'.'.join(map(_key, path))}]"
     yield from _values(values, notes, path)
     for key, value in tables.items():
-        yield from written(value, notes, (*path, key))
+        yield from toml_lines(value, notes, (*path, key))
     for key, rows in lists.items():
         for row in rows:
             yield ""
@@ -261,20 +262,21 @@ def _key(name: str) -> str:
 
 
 def _value(value: Any) -> str:
-    """A value as TOML on one line: text, number, boolean, a list of these, or a table."""
+    """Format a value as TOML on one line: text, number, boolean, a list of these, or a table."""
     if isinstance(value, dict):
         return f"{{{', '.join(f'{_key(key)} = {_value(each)}' for key, each in value.items())}}}"
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(_value, value))}]"
     if isinstance(value, str):
-        return quoted(value)
+        return toml_string(value)
     if isinstance(value, bool):
         return "true" if value else "false"
     return repr(value)
 
 
-def quoted(text: str) -> str:
-    """A TOML string of any text. Halves of surrogate pairs, which no TOML can hold, become "?"."""
+def toml_string(text: str) -> str:
+    """Format any text as a TOML string. Halves of surrogate pairs, which TOML cannot hold, become
+    "?"."""
     return '"' + "".join(map(_escaped, text)) + '"'
 
 

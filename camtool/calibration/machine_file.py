@@ -14,7 +14,7 @@ from typing import Any
 from camtool.calibration.calibrate import Calibration, Estimate
 from camtool.calibration.measurements import Measurements, Regions
 from camtool.machine.model import Machine
-from camtool.tables import Table, written
+from camtool.tables import Table, toml_lines
 
 WITHIN_UNCERTAINTY = 0.02
 """Values are rounded to this part of their uncertainty."""
@@ -50,7 +50,7 @@ def machine_file(
         "# ± is the standard uncertainty.",
         "",
     )
-    return "\n".join([*head, *written(said, notes)]) + "\n"
+    return "\n".join([*head, *toml_lines(said, notes)]) + "\n"
 
 
 def _set_map(

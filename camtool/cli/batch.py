@@ -99,7 +99,7 @@ def batch(
     check_places([*machine.files(), *job.files(), *inspection.files()], [summary])
 
     from camtool.cli.batch_messages import Verbosity
-    from camtool.cli.batch_run import BatchRun, Flags, Running
+    from camtool.cli.batch_run import BatchFlags, BatchRun, RunSettings
     from camtool.cli.batch_work import PostWork
 
     work = PostWork(
@@ -112,7 +112,7 @@ def batch(
         looks=picture,
         require=inspection.require,
     )
-    running = Running(jobs, scheduler, timeout, force, fail_fast)
+    running = RunSettings(jobs, scheduler, timeout, force, fail_fast)
     run = BatchRun(work, Path(out), running, summary, Verbosity(quiet, verbose))
-    flags = Flags(job, inspection, own=not no_own_jobs, inspects=not no_verify)
+    flags = BatchFlags(job, inspection, own=not no_own_jobs, inspects=not no_verify)
     return run.run(sources, flags, machine.files())

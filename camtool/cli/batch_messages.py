@@ -34,13 +34,13 @@ COLOUR = {
 
 
 class Display(Protocol):
-    """Shows every outcome as it comes."""
+    """A display of outcomes."""
 
-    def begins(self) -> None:
-        """The first drawing that is not up to date begins."""
+    def begin(self) -> None:
+        """Called when the first drawing that is not up to date begins."""
 
     def add(self, outcome: Outcome) -> None:
-        """Show one."""
+        """Show one outcome."""
 
     def note(self, text: str) -> None:
         """Show another message, unless quiet."""
@@ -56,45 +56,45 @@ class Verbosity:
 
 @contextmanager
 def display(total: int, verbosity: Verbosity) -> Iterator[Display]:
-    """The bar on a terminal, lines elsewhere."""
+    """Return a progress bar on a terminal, lines elsewhere."""
     if verbosity.quiet or not sys.stderr.isatty():
-        yield Lines(total, verbosity)
+        yield LineDisplay(total, verbosity)
         return
-    bar = Bar(total, verbosity)
+    bar = BarDisplay(total, verbosity)
     try:
         yield bar
     finally:
         bar.close()
 
 
-class Lines:
-    """A line for each drawing."""
+class LineDisplay:
+    """One line for each drawing."""
 
     def __init__(self, total: int, verbosity: Verbosity) -> None:
         self._total = total
         self._verbosity = verbosity
         self._done = 0
 
-    def begins(self) -> None:
-        """Nothing: the first line shows it."""
+    def begin(self) -> None:
+        """Do nothing: the first line shows it."""
 
     def add(self, outcome: Outcome) -> None:
-        """One line, and those of its findings."""
+        """Show one line, and those of its findings."""
         self._done += 1
-        for line in lines_of(outcome, self._verbosity):
+        for line in outcome_lines(outcome, self._verbosity):
             say(line, quiet=False)
         if outcome.state is not OutcomeState.UP_TO_DATE or self._verbosity.verbose:
             place = f"{self._done:>{len(str(self._total))}}/{self._total}"
             say(f"{place} {_line(outcome)}", quiet=self._verbosity.quiet)
 
     def note(self, text: str) -> None:
-        """One line."""
+        """Show one line."""
         say(f"camtool: {text}", quiet=self._verbosity.quiet)
 
 
-class Bar:
-    """A bar with rate and time left, once there is something to do. Errors stand above it on one
-    line each, and in full in the table."""
+class BarDisplay:
+    """A bar with rate and time left, from the first drawing that is not up to date. Errors appear
+    above it on one line each, and in full in the table."""
 
     def __init__(self, total: int, verbosity: Verbosity) -> None:
         self._total = total
@@ -103,19 +103,19 @@ class Bar:
         self._failed = 0
         self._progress: Progress | None = None
 
-    def begins(self) -> None:
+    def begin(self) -> None:
         """Show the bar."""
         self._shown()
 
     def add(self, outcome: Outcome) -> None:
-        """One step further."""
+        """Advance by one drawing."""
         self._done += 1
         self._failed += outcome.state is OutcomeState.FAILED
         if outcome.state is OutcomeState.UP_TO_DATE and self._progress is None:
             return
         progress = self._shown()
         if outcome.error is not None:
-            line = f"failed: {one_line(outcome.source)}: {_why(outcome)}"
+            line = f"failed: {one_line(outcome.source)}: {_reason(outcome)}"
             progress.console.print(line, style="red", no_wrap=True, overflow="ellipsis", **_PLAIN)
         for remark in outcome.remarks if self._verbosity.verbose else ():
             progress.console.print(one_line(remark), **_PLAIN)
@@ -123,11 +123,11 @@ class Bar:
         progress.update(progress.task_ids[0], completed=self._done, failed=failed)
 
     def note(self, text: str) -> None:
-        """One line above the bar."""
+        """Show one line above the bar."""
         self._shown().console.print(f"camtool: {one_line(text)}", **_PLAIN)
 
     def close(self) -> None:
-        """Leave the terminal as it was."""
+        """Restore the terminal."""
         if self._progress is not None:
             self._progress.stop()
 
@@ -143,8 +143,8 @@ _PLAIN: dict[str, Any] = {"markup": False, "highlight": False, "emoji": False}
 """Text that comes from files is no markup."""
 
 
-def lines_of(outcome: Outcome, verbosity: Verbosity) -> list[str]:
-    """The lines for one drawing: its error always, its findings unless quiet."""
+def outcome_lines(outcome: Outcome, verbosity: Verbosity) -> list[str]:
+    """Return the lines for one drawing: its error always, its findings unless quiet."""
     lines = [] if outcome.error is None else [f"camtool: error: {outcome.error}"]
     if verbosity.verbose:
         lines += [f"camtool: {remark}" for remark in outcome.remarks]
@@ -152,7 +152,7 @@ def lines_of(outcome: Outcome, verbosity: Verbosity) -> list[str]:
 
 
 def say_summary(outcomes: Sequence[Outcome], seconds: float, *, quiet: bool) -> None:
-    """The table of what failed (and on a terminal of warnings), and a line of counts."""
+    """Show the table of failed drawings (on a terminal also of warnings), and a line of counts."""
     failed = [each for each in outcomes if each.state is OutcomeState.FAILED]
     warned = [each for each in outcomes if each.warnings and each.state is not OutcomeState.FAILED]
     if sys.stderr.isatty():
@@ -170,14 +170,14 @@ def say_summary(outcomes: Sequence[Outcome], seconds: float, *, quiet: bool) -> 
     warnings = f"; {len(warned)} with warnings (-v shows them)" if warned else ""
     verdicts = _verdict_words(verdicts_of(outcomes))
     say(
-        f"{_counted(len(outcomes), 'drawing')}: {', '.join(parts)}; {seconds:.1f} s{rate}"
+        f"{_count_words(len(outcomes), 'drawing')}: {', '.join(parts)}; {seconds:.1f} s{rate}"
         f"{warnings}{'; dimensions: ' if verdicts else ''}{verdicts}",
         quiet=quiet and not failed,
     )
 
 
 def summary_json(outcomes: Sequence[Outcome], target: str, seconds: float) -> bytes:
-    """The whole batch as JSON; names that are no text keep their bytes as \\udcXX."""
+    """Return the whole batch as JSON; names that are no text keep their bytes as \\udcXX."""
     counts = Counter(each.state for each in outcomes)
     rows: list[dict[str, Any]] = []
     for outcome in outcomes:
@@ -201,14 +201,14 @@ def _line(outcome: Outcome) -> str:
         return f"{outcome.state.value}: {outcome.source}"
     error = outcome.figures.get("error_um")
     figure = "" if error is None else f", error {error:.3g} µm"
-    warned = f", {_counted(outcome.warnings, 'warning')}" if outcome.warnings else ""
+    warned = f", {_count_words(outcome.warnings, 'warning')}" if outcome.warnings else ""
     verdicts = _verdict_words(outcome.verdicts)
     told = f", dimensions: {verdicts}" if verdicts else ""
     return f"made: {outcome.source} → {', '.join(outcome.files)}{figure}{warned}{told}"
 
 
 def verdicts_of(outcomes: Sequence[Outcome]) -> Counter[str]:
-    """The verdicts on all dimensions of all drawings, counted."""
+    """Count the verdicts on all dimensions of all drawings."""
     counts: Counter[str] = Counter()
     for each in outcomes:
         counts.update(each.verdicts)
@@ -216,53 +216,58 @@ def verdicts_of(outcomes: Sequence[Outcome]) -> Counter[str]:
 
 
 def _verdict_words(counts: Mapping[str, int]) -> str:
-    """ "3 in, 1 out", the usual first."""
+    """Return "3 in, 1 out", the usual verdicts first."""
     order = ("in", "out", "undecided", "predicted")
     return ", ".join(f"{counts[each]} {each}" for each in order if counts.get(each))
 
 
-def _counted(number: int, noun: str) -> str:
+def _count_words(number: int, noun: str) -> str:
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def _lines(failed: Sequence[Outcome]) -> None:
-    """Drawing and reason with a bar between."""
+    """Return the lines of a table of drawing and reason, without colours."""
     if not failed:
         return
     listed = failed[:LISTED]
     width = max(len(one_line(each.source)) for each in listed)
     say(f"{'failed':<{width}} | why", quiet=False)
     for each in listed:
-        say(f"{one_line(each.source):<{width}} | {_why(each)}", quiet=False)
+        say(f"{one_line(each.source):<{width}} | {_reason(each)}", quiet=False)
     _say_more(len(failed))
 
 
 def _table(rows: Sequence[Outcome], outcomes: Sequence[Outcome]) -> None:
-    """Drawing and reason in colours, without the folders that all drawings have in common."""
+    """Return a coloured table of drawing and reason, without the folders that all drawings have in
+    common."""
     if not rows:
         return
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
-    base = _common(outcomes)
+    base = _common_folder(outcomes)
     table = Table(title=Text(one_line(base)) if base else None, title_justify="left")
     table.add_column("drawing", ratio=1, overflow="fold")
     table.add_column("")
     table.add_column("why", ratio=2, overflow="fold")
     for each in rows[:LISTED]:
         failed = each.state is OutcomeState.FAILED
-        what = "failed" if failed else _counted(each.warnings, "warning")
+        what = "failed" if failed else _count_words(each.warnings, "warning")
         name = PurePath(each.source).relative_to(base) if base else each.source
         # Errors are shown in full, warnings on one line each: there may be many alike.
-        why = Text(_why(each)) if failed else Text(_why(each), no_wrap=True, overflow="ellipsis")
+        why = (
+            Text(_reason(each))
+            if failed
+            else Text(_reason(each), no_wrap=True, overflow="ellipsis")
+        )
         table.add_row(Text(one_line(str(name))), what, why, style=COLOUR[each.state])
     Console(stderr=True).print(table)
     _say_more(len(rows))
 
 
-def _common(outcomes: Sequence[Outcome]) -> str:
-    """The folder that all drawings share; "" for none."""
+def _common_folder(outcomes: Sequence[Outcome]) -> str:
+    """Return the folder that all drawings share; "" for none."""
     try:
         return os.path.commonpath([PurePath(each.source).parent for each in outcomes])
     except ValueError:  # some paths are absolute, some relative
@@ -274,8 +279,9 @@ def _say_more(rows: int) -> None:
         say(f"… and {rows - LISTED} more; --json FILE names all", quiet=False)
 
 
-def _why(outcome: Outcome) -> str:
-    """The error, or else the first remark, without the drawing's name, which stands before it."""
+def _reason(outcome: Outcome) -> str:
+    """Return the error, or else the first remark, without the name of the drawing, which stands
+    before it."""
     why = one_line(outcome.error or next(iter(outcome.remarks), ""))
     why = why.removeprefix(f"{one_line(outcome.source)}: ")
     return why.removeprefix("error " if outcome.code else "warning ")

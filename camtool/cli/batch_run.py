@@ -50,8 +50,9 @@ EXIT_SIGNAL = 128
 
 
 @dataclass(frozen=True)
-class Running:
-    """How a batch runs: processes here or a cluster, what stops it, what is made anew."""
+class RunSettings:
+    """Settings of a run: local processes or a cluster, the limits, and whether everything is made
+    again."""
 
     jobs: int | None
     scheduler: str | None
@@ -61,8 +62,8 @@ class Running:
 
 
 @dataclass(frozen=True)
-class Flags:
-    """The job and the tolerances of drawings that have none beside them; whether those beside them
+class BatchFlags:
+    """Job and tolerances of drawings that have none beside them; whether the files beside them
     count (`own`), and whether dimensions are inspected at all."""
 
     job: JobFlags
@@ -72,7 +73,7 @@ class Flags:
 
 
 @dataclass(frozen=True)
-class Ordered:
+class OrderedTasks:
     """Tasks with their jobs and tolerances, a text that identifies these (by stem), the drawings
     whose own job or tolerances are wrong, and all files beside drawings that are read."""
 
@@ -83,8 +84,8 @@ class Ordered:
 
 
 @dataclass(frozen=True)
-class Ended:
-    """The outcome of every drawing, sorted, and what kept the run from its end, if anything."""
+class EndedBatch:
+    """The outcome of every drawing, sorted, and the reason why the run ended early, if it did."""
 
     outcomes: Sequence[Outcome]
     error: CamtoolError | None
@@ -92,17 +93,17 @@ class Ended:
 
 @dataclass(frozen=True)
 class LazyPool:
-    """A pool that is made when it has something to do."""
+    """A pool that is created when it gets its first task."""
 
     pool: Callable[[], Pool]
-    begins: Callable[[], None]
+    begin: Callable[[], None]
 
     def results(
         self, tasks: Sequence[DrawingTask]
     ) -> Generator[tuple[DrawingTask, Outputs] | None]:
-        """The results of the pool."""
+        """Yield the results of the pool."""
         pool = self.pool()
-        self.begins()
+        self.begin()
         yield from pool.results(tasks)
 
 
@@ -112,20 +113,20 @@ class BatchRun:
 
     work: PostWork
     out: Path
-    running: Running
+    running: RunSettings
     summary: str | None
     verbosity: Verbosity
 
-    def run(self, sources: Sequence[str], flags: Flags, reads: Sequence[str]) -> int:
-        """Find the drawings, make what is not up to date, report; the exit code. CamtoolError for
-        errors that belong to no single drawing.
+    def run(self, sources: Sequence[str], flags: BatchFlags, reads: Sequence[str]) -> int:
+        """Find the drawings, make those that are not up to date, report; return the exit code.
+        CamtoolError for errors that belong to no single drawing.
 
         `reads` are files that are read besides drawings and jobs.
         """
         try:
             ended, number = self._run(sources, flags, reads)
         except KeyboardInterrupt:  # before the first drawing, or for the second time
-            ended, number = Ended((), None), int(signal.SIGINT)
+            ended, number = EndedBatch((), None), int(signal.SIGINT)
         if number is not None:
             text = "interrupted; written files are complete, and the same command continues"
             say(f"camtool: {text}", quiet=False)
@@ -135,14 +136,14 @@ class BatchRun:
         return int(any(outcome.error is not None for outcome in ended.outcomes))
 
     def _run(
-        self, sources: Sequence[str], flags: Flags, reads: Sequence[str]
-    ) -> tuple[Ended, int | None]:
-        """The outcomes, and the signal that stopped the run."""
+        self, sources: Sequence[str], flags: BatchFlags, reads: Sequence[str]
+    ) -> tuple[EndedBatch, int | None]:
+        """Return the outcomes, and the signal that stopped the run."""
         begin = time.monotonic()
         made = Manifest(self.out).outputs()
         tasks = find_tasks(sources, self.out, made)
-        with stoppable() as stop:
-            ordered = self._ordered(tasks, flags)
+        with record_signals() as stop:
+            ordered = self._order_tasks(tasks, flags)
             reads = [*reads, *flags.job.files(), *flags.inspection.files(), *ordered.reads]
             self._refuse_overwriting(ordered, reads, made)
             _make_folder(self.out)
@@ -156,10 +157,10 @@ class BatchRun:
         return ended, stop.signal
 
     def _refuse_overwriting(
-        self, ordered: Ordered, reads: Sequence[str], made: Collection[Path]
+        self, ordered: OrderedTasks, reads: Sequence[str], made: Collection[Path]
     ) -> None:
-        """OutputError when an output would replace a file that is read or another output, or a
-        picture would replace a file that no batch has `made` there."""
+        """Raise OutputError when an output would replace a file that is read or another output, or
+        a picture would replace a file that no batch wrote (`made`)."""
         own = {task.order.file for task in ordered.tasks} - {None}
         jobs = chain.from_iterable(JobFlags(file).files() for file in sorted(own))
         ours = [str(self.out / name) for name in (MANIFEST, LOCK)]
@@ -184,13 +185,13 @@ class BatchRun:
     def _note(self, text: str) -> None:
         say(f"camtool: {text}", quiet=self.verbosity.quiet)
 
-    def _ordered(self, tasks: Sequence[DrawingTask], flags: Flags) -> Ordered:
-        """The tasks with their jobs and tolerances. What is wrong beside a drawing fails that
-        drawing; what is wrong in --job, --tolerances or the flags fails the whole command. Flags
-        override both jobs."""
-        ordered = Ordered([], {}, [], [])
+    def _order_tasks(self, tasks: Sequence[DrawingTask], flags: BatchFlags) -> OrderedTasks:
+        """Return the tasks with their jobs and tolerances. An error in a file beside a drawing
+        fails that drawing; an error in --job, --tolerances or the flags fails the whole command.
+        Flags override both jobs."""
+        ordered = OrderedTasks([], {}, [], [])
         common_job = cache(partial(_order, flags.job, self.work))
-        common_limits = cache(partial(_asked, flags.inspection.files()))
+        common_limits = cache(partial(_read_tolerances_file, flags.inspection.files()))
         for task in tasks:
             job = own_job(task.path) if flags.own else None
             limits = own_tolerances(task.path) if flags.own and flags.inspects else None
@@ -201,7 +202,7 @@ class BatchRun:
                 if wanted is None:
                     wanted = _order(replace(flags.job, file=str(job)), self.work)
                 if limits is not None:
-                    asked = _asked([str(limits)])
+                    asked = _read_tolerances_file([str(limits)])
             except CamtoolError as error:
                 text = f"{task.source}: {error}"
                 ordered.failed.append(
@@ -214,7 +215,7 @@ class BatchRun:
                 ordered.own[task.stem] = repr(replace(wanted, file=None))
         return ordered
 
-    def _made(self, ordered: Ordered, manifest: Manifest, stop: Stop) -> Ended:
+    def _made(self, ordered: OrderedTasks, manifest: Manifest, stop: Stop) -> EndedBatch:
         done: dict[str, Outcome] = {}
         fault: CamtoolError | None = None
         total = len(ordered.tasks) + len(ordered.failed)
@@ -230,15 +231,15 @@ class BatchRun:
                 fault = error
         for task in ordered.tasks:
             done.setdefault(task.stem, Outcome(task.source, task.stem, OutcomeState.NOT_RUN))
-        return Ended([done[stem] for stem in sorted(done)], fault)
+        return EndedBatch([done[stem] for stem in sorted(done)], fault)
 
     def _outcomes(
-        self, ordered: Ordered, manifest: Manifest, stop: Stop, shown: Display
+        self, ordered: OrderedTasks, manifest: Manifest, stop: Stop, shown: Display
     ) -> Generator[Outcome]:
-        """The outcomes until something stops the run."""
+        """Yield the outcomes until something stops the run."""
         force = self.running.force
         order = BatchSettings(self.out, write_all, self.work.digest(), ordered.own, force)
-        pool = LazyPool(lambda: pool_for(self, shown.note), shown.begins)
+        pool = LazyPool(lambda: pool_for(self, shown.note), shown.begin)
         with closing(run_batch(ordered.tasks, order, manifest, pool)) as outcomes:
             for outcome in chain(ordered.failed, outcomes):
                 if outcome is not None:
@@ -260,7 +261,7 @@ class BatchRun:
 
 
 def pool_for(batch: BatchRun, note: Callable[[str], None]) -> Pool:
-    """What makes the drawings of a run: processes here, or a cluster."""
+    """Return the workers of a run: local processes or a cluster."""
     work, running = batch.work, batch.running
     if running.scheduler is not None:
         from camtool.batches.cluster import ClusterPool
@@ -276,12 +277,12 @@ def pool_for(batch: BatchRun, note: Callable[[str], None]) -> Pool:
 
 
 def _order(job: JobFlags, work: PostWork) -> JobOrder:
-    """The order of a job."""
+    """Return the order of a job."""
     return JobOrder(job.job(work.drawing), job.file)
 
 
-def _asked(files: Sequence[str]) -> Asked | None:
-    """What a file of tolerances says. Many batches have none, and load nothing for it."""
+def _read_tolerances_file(files: Sequence[str]) -> Asked | None:
+    """Read a file of tolerances. Many batches have none, and load nothing for it."""
     if not files:
         return None
     from camtool.inspection.tolerances import read_tolerances
@@ -300,15 +301,15 @@ def _make_folder(out: Path) -> None:
 
 @dataclass
 class Stop:
-    """The signal that asked to stop; None as long as none did."""
+    """The signal that requested a stop; None before one did."""
 
     signal: int | None = None
 
 
 @contextmanager
-def stoppable() -> Iterator[Stop]:
-    """Within the block, the first signal is only recorded, so that no file is left half-written; a
-    second Ctrl-C raises KeyboardInterrupt at once."""
+def record_signals() -> Iterator[Stop]:
+    """Record the first signal within the block without acting on it, so that no file is left
+    half-written; a second Ctrl-C raises KeyboardInterrupt at once."""
     stop = Stop()
     if threading.current_thread() is not threading.main_thread():
         yield stop

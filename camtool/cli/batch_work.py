@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from camtool import __version__
 from camtool.batches.manifest import code_digest, content_digest, digest_of, packages_digest
 from camtool.batches.run import DrawingTask, Outputs
-from camtool.cli.files import sealed
+from camtool.cli.files import seal
 from camtool.cli.options import DrawingFlags, JobFlags
 from camtool.cli.picture_options import PictureFlags
 from camtool.findings import Finding, Severity
@@ -39,8 +39,8 @@ SVG = ".svg"
 
 @dataclass(frozen=True)
 class JobOrder:
-    """The job of one drawing; `file` names what it was read from. `asked` is what its file of
-    tolerances says, None for the dimensions of the drawing alone; nothing is inspected unless
+    """The job of one drawing; `file` is the name of its file. `asked` has the dimensions of its
+    file of tolerances, None for those of the drawing alone; nothing is inspected unless
     `inspects`."""
 
     job: Job
@@ -51,8 +51,9 @@ class JobOrder:
 
 @dataclass(frozen=True)
 class PostWork:
-    """Post one drawing as `camtool post` does; `preview` is an extension, None for no picture, and
-    `looks` says how pictures look; `require` what dimensions must be that are inspected."""
+    """Post one drawing as `camtool post` does; `preview` is an extension, None for no picture;
+    `looks` has the options of pictures; `require` is the required verdict of inspected
+    dimensions."""
 
     target: LoadedTarget
     drawing: DrawingFlags
@@ -65,12 +66,12 @@ class PostWork:
 
     @property
     def extensions(self) -> tuple[str, ...]:
-        """The extensions of what it makes."""
+        """Extensions of its outputs."""
         made = (self.target.machine.target.extension, self.preview, ".json" * self.reports)
         return tuple(each for each in made if each)
 
     def warm(self) -> None:
-        """Load what every drawing needs."""
+        """Load the modules that every drawing needs."""
         from camtool.importers.read import read_bytes
         from camtool.pipeline import post_drawing
         from camtool.planning.job import job_of
@@ -79,7 +80,7 @@ class PostWork:
         post_drawing(drawing, job_of(), self.target, check=self.check)
 
     def make(self, task: DrawingTask, data: bytes | None) -> Outputs:
-        """Program, picture and report of a drawing, none of them when it has an error."""
+        """Make program, picture and report of a drawing; none of them if it has an error."""
         from camtool.importers.read import file_bytes
         from camtool.pipeline import post_drawing
 
@@ -88,7 +89,7 @@ class PostWork:
         # Reports and pictures are UTF-8, which names of files need not be.
         name = task.source.encode("utf-8", "backslashreplace").decode()
         drawing = self.drawing.read(name, self.target.machine, order.job, data)
-        with JobFlags(order.file).blamed():
+        with JobFlags(order.file).name_job_file():
             run = post_drawing(
                 drawing,
                 order.job,
@@ -98,14 +99,14 @@ class PostWork:
                 trace_points=None if self.preview else 0,
             )
             run = self._inspected(run, order)
-        made = _made(task, run)
+        made = _result_of(task, run)
         if made.error is not None:
             return made
         files = dict(self._files(task, run))
         return replace(made, content=content_digest(data), files=files, figures=_figures(run))
 
     def digest(self) -> str:
-        """The digest of all that outputs depend on but drawing and job."""
+        """Return the digest of everything that outputs depend on except drawing and job."""
         import msgspec
 
         target = self.target
@@ -137,7 +138,7 @@ class PostWork:
         if self.preview is not None:
             paint = self.looks.painter(lambda: [run.scene()], quiet=True)
             picture = paint(f"picture{self.preview}")
-            yield self.preview, sealed(picture, task.stem) if self.preview == SVG else picture
+            yield self.preview, seal(picture, task.stem) if self.preview == SVG else picture
         if self.reports and run.report is not None:
             yield ".json", run.report.to_json().encode()
 
@@ -146,9 +147,9 @@ def _is_code(path: Path) -> bool:
     return path.suffix in (".py", ".toml") and path.is_file()
 
 
-def _made(task: DrawingTask, run: Run) -> Outputs:
-    """What a worker reports: the error of a drawing that must not be written, and the worst
-    findings."""
+def _result_of(task: DrawingTask, run: Run) -> Outputs:
+    """Return the result for the client: the error of a drawing that must not be written, and its
+    worst findings."""
 
     def lines(severity: Severity) -> list[Finding]:
         return [each for each in run.findings if each.severity == severity]
@@ -169,7 +170,7 @@ def _made(task: DrawingTask, run: Run) -> Outputs:
 
 
 def _figures(run: Run) -> dict[str, float]:
-    """What the summary says of a drawing."""
+    """Return the figures of a drawing for the summary."""
     program, report = run.program, run.report
     figures: dict[str, float] = {"bytes": len(program.data) if program else 0}
     if report is not None:

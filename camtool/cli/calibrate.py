@@ -66,7 +66,7 @@ def calibrate(
 
 
 def _own_table(machine: str | None, target: str) -> dict[str, Any]:
-    """What the user's machine file says; without one, only what it extends."""
+    """Return the table of the user's machine file; without one, only its key `extends`."""
     from camtool.tables import read_table
 
     return {"extends": target} if machine is None else read_table(Path(machine))

@@ -50,15 +50,15 @@ def check(
     picture.check([preview], DRAWING)
     one = _Check(drawing, report, preview, picture, quiet, verbose)
     if len(sources) == 1:
-        return one.checked(sources[0])
+        return one.check_file(sources[0])
     if report is not None or preview is not None:
         raise click.UsageError("--json and --preview are of one drawing")
-    return max(one.tried(source) for source in sources)
+    return max(one.check_one_of_many(source) for source in sources)
 
 
 @dataclass(frozen=True)
 class _Check:
-    """How drawings are read, and what the user wants to have of one."""
+    """Check drawings with the given options and outputs."""
 
     drawing: DrawingFlags
     report: str | None
@@ -67,16 +67,16 @@ class _Check:
     quiet: bool
     verbose: bool
 
-    def tried(self, source: str) -> int:
-        """One of several drawings; the exit code of an error is a result like another."""
+    def check_one_of_many(self, source: str) -> int:
+        """Check one of several drawings; the exit code of an error is a result like another."""
         try:
-            return self.checked(source)
+            return self.check_file(source)
         except CamtoolError as error:
             say_error(error)
             return error.exit_code
 
-    def checked(self, source: str) -> int:
-        """The facts of one drawing, and whether any of them is an error."""
+    def check_file(self, source: str) -> int:
+        """Show the facts of one drawing; return them, and True if any of them is an error."""
         check_places([source], [self.report, self.preview])
         read = self.drawing.read(source)
         facts = _facts(read)
@@ -99,7 +99,7 @@ class _Check:
 
 
 def _facts(drawing: Drawing) -> dict[str, Any]:
-    """Everything worth knowing, in the order in which it is shown; lengths in mm."""
+    """Return the facts about a drawing in the order of display; lengths in mm."""
     from camtool.geometry.facts import drawing_extents, drawing_facts
 
     (left, right), (bottom, top) = drawing_extents(drawing).tolist()
@@ -144,9 +144,9 @@ MARKS = dict.fromkeys(("not used", "gap", "branch", "crossing", "open"), "warnin
 
 
 def _table(facts: dict[str, Any], *, verbose: bool) -> str:
-    """The facts as lines of a name and a value; `verbose` shows long lists whole."""
-    most = None if verbose else SHOWN
-    rows = [*_head(facts), *_layers(facts, most), *_entities(facts), *_places(facts, most)]
+    """Format the facts as lines of a name and a value; `verbose` shows long lists in full."""
+    max_rows = None if verbose else SHOWN
+    rows = [*_head(facts), *_layers(facts, max_rows), *_entities(facts), *_places(facts, max_rows)]
     return "\n".join(one_line(f"{name:<{NAME_WIDTH}}{value}".rstrip()) for name, value in rows)
 
 
@@ -154,7 +154,7 @@ _Rows = Iterator[tuple[str, str]]
 
 
 def _head(facts: dict[str, Any]) -> _Rows:
-    """Units, size and how much there is."""
+    """Yield units, size and counts."""
     units, size, extents = facts["units"], facts["size_mm"], facts["extents_mm"]
     yield "file", facts["file"]
     yield "units", f"{units['name']} ({units['why']})"
@@ -190,21 +190,23 @@ _SMALLEST = {
 }
 
 
-def _layers(facts: dict[str, Any], most: int | None) -> _Rows:
-    """Layers, colours and line types, where there is a choice."""
-    for name, layer in _first(list(facts["layers"].items()), most):
+def _layers(facts: dict[str, Any], max_rows: int | None) -> _Rows:
+    """Yield layers, colours and line types, if there are several."""
+    for name, layer in _first(list(facts["layers"].items()), max_rows):
         points = f", {layer['marks']} points" if layer["marks"] else ""
         yield "layer", f"{name}: {layer['closed']} closed, {layer['open']} open{points}"
-    yield from _more("layer", facts["layers"], most)
+    yield from _more("layer", facts["layers"], max_rows)
     for key, name, none in (("colours", "colour", "none"), ("line_types", "line type", "plain")):
         if len(facts[key]) > 1:
             counts = list(facts[key].items())
-            listed = ", ".join(f"{count} {word or none}" for word, count in _first(counts, most))
-            yield name, listed + (" …" if most is not None and len(counts) > most else "")
+            listed = ", ".join(
+                f"{count} {word or none}" for word, count in _first(counts, max_rows)
+            )
+            yield name, listed + (" …" if max_rows is not None and len(counts) > max_rows else "")
 
 
 def _entities(facts: dict[str, Any]) -> _Rows:
-    """What of the file was used, what was not, and what was repaired."""
+    """Yield the counts of entities used, not used, and repaired."""
     used = ", ".join(f"{count} {kind}" for kind, count in facts["entities_used"].items())
     yield "entities", used or "none"
     for item in facts["entities_not_used"]:
@@ -219,22 +221,22 @@ def _entities(facts: dict[str, Any]) -> _Rows:
         yield "arcs", f"{facts['arcs_recognised']} recognised in chords"
 
 
-def _places(facts: dict[str, Any], most: int | None) -> _Rows:
-    """Gaps, branches, crossings and open ends, with their places."""
+def _places(facts: dict[str, Any], max_rows: int | None) -> _Rows:
+    """Yield gaps, branches, crossings and open ends, with their places."""
     for key, what in (("gaps", "stays open"), ("closed_gaps", "was closed")):
-        for gap in _first(facts[key], most):
+        for gap in _first(facts[key], max_rows):
             yield "gap", f"{gap['size_mm']:.4g} mm at {_at(gap)} on {gap['layer']}, {what}"
-        yield from _more("gap", facts[key], most)
-    for item in _first(facts["branches"], most):
+        yield from _more("gap", facts[key], max_rows)
+    for item in _first(facts["branches"], max_rows):
         yield "branch", f"{item['ends']} ends at {_at(item)} on {item['layer']}"
-    yield from _more("branch", facts["branches"], most)
-    for item in _first(facts["crossings"], most):
+    yield from _more("branch", facts["branches"], max_rows)
+    for item in _first(facts["crossings"], max_rows):
         yield "crossing", f"of a contour with itself at {_at(item)} on {item['layer']}"
-    yield from _more("crossing", facts["crossings"], most)
+    yield from _more("crossing", facts["crossings"], max_rows)
     ends = list(zip(facts["open_ends"][::2], facts["open_ends"][1::2], strict=True))
-    for begin, end in _first(ends, most):
+    for begin, end in _first(ends, max_rows):
         yield "open", f"from {_at(begin)} to {_at(end)} on {begin['layer']}"
-    yield from _more("open", ends, most)
+    yield from _more("open", ends, max_rows)
 
 
 def _at(item: dict[str, Any]) -> str:
@@ -242,11 +244,11 @@ def _at(item: dict[str, Any]) -> str:
     return f"{x:.4f}, {y:.4f}"
 
 
-def _first(items: list[Any], most: int | None) -> list[Any]:
-    return items if most is None else items[:most]
+def _first(items: list[Any], max_rows: int | None) -> list[Any]:
+    return items if max_rows is None else items[:max_rows]
 
 
-def _more(name: str, items: Any, most: int | None) -> _Rows:
-    """One line for the rows that are not shown."""
-    if most is not None and len(items) > most:
-        yield name, f"and {len(items) - most} more (-v shows all)"
+def _more(name: str, items: Any, max_rows: int | None) -> _Rows:
+    """Return a line with the number of rows that are not shown."""
+    if max_rows is not None and len(items) > max_rows:
+        yield name, f"and {len(items) - max_rows} more (-v shows all)"

@@ -24,7 +24,7 @@ from click.shell_completion import CompletionItem, ShellComplete, add_completion
 from click.types import StringParamType
 
 from camtool.cli import COMPLETE
-from camtool.cli.targets import flat, target_items
+from camtool.cli.targets import flat_lines, target_items
 from camtool.errors import CamtoolError
 
 MAX_SCANNED_BYTES = 20_000_000
@@ -44,7 +44,7 @@ _Answer = Callable[[click.Context, str], Iterable[CompletionItem]]
 
 # The shells.
 
-LINE = "COMP_WORDS"
+LINE_VARIABLE = "COMP_WORDS"
 """Where a script puts its line up to the cursor."""
 
 _BASH = r"""%(complete_func)s() {
@@ -119,12 +119,12 @@ complete --no-files --command %(prog_name)s --arguments "(%(complete_func)s)"
 
 
 class _Shell(ShellComplete):
-    """A shell that hands over its line up to the cursor."""
+    """A shell that passes its line up to the cursor."""
 
     def get_completion_args(self) -> tuple[list[str], str]:
-        """The finished words behind the command, and the one that is being typed."""
+        """Return the finished words after the command, and the one that is being typed."""
         # With one more letter there always is a last word, and a quote is never its end.
-        words = _split(os.environ[LINE] + "x")
+        words = _split(os.environ[LINE_VARIABLE] + "x")
         return words[1:-1], words[-1][:-1]
 
     def format_completion(self, item: CompletionItem[Any]) -> str:
@@ -170,7 +170,7 @@ def _help(item: CompletionItem[Any]) -> str:
 
 
 def _split(line: str) -> list[str]:
-    """The words of a line as a shell takes them; the last one may be unfinished."""
+    """Split the line into words as a shell does; the last one may be unfinished."""
     lexer = shlex.shlex(line, posix=True)
     lexer.whitespace_split = True
     lexer.commenters = ""
@@ -197,14 +197,14 @@ def completion(shell: str) -> int:
 
 
 def answer_shells(command: click.Command) -> None:
-    """Let click answer our shells about this command; for a process that does nothing else."""
+    """Let click answer the supported shells for this command; the process does nothing else."""
     complete_values(command)
     for kind in SHELLS.values():
         add_completion_class(kind)
 
 
 def complete_values(command: click.Command) -> None:
-    """Give every parameter of plain text, of this command and those under it, its completion."""
+    """Give every text parameter of this command and its subcommands its completion."""
     for param in command.params:
         answer = _answer_for(param)
         if answer is not None and type(param.type) is StringParamType:
@@ -218,7 +218,7 @@ def complete_values(command: click.Command) -> None:
 
 
 class _Completed(StringParamType):
-    """Text whose possible values a shell can be given; any text is taken."""
+    """Text with a function that lists possible values for a shell; any text is accepted."""
 
     def __init__(self, answer: _Answer) -> None:
         self._answer = answer
@@ -226,7 +226,7 @@ class _Completed(StringParamType):
     def shell_complete(
         self, ctx: click.Context, param: click.Parameter, incomplete: str
     ) -> list[CompletionItem]:
-        """What may stand here; nothing when that cannot be found out."""
+        """Return the possible values, none if they cannot be found."""
         try:
             return list(self._answer(ctx, incomplete))
         except (CamtoolError, OSError):
@@ -260,7 +260,7 @@ def _targets(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
 
 
 def _layers(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
-    """The layers of the drawing that the line names before, if it is a DXF of text."""
+    """Return the layers of the drawing that the line names before, if it is a DXF of text."""
     # What stands before a flag that still lacks its value has not been given its place.
     named = [*(ctx.params.get(key) or () for key in _DRAWINGS), tuple(ctx.args)]
     given = [Path(name) for names in named for name in _several(names)]
@@ -270,7 +270,7 @@ def _layers(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
 
 
 def _picture_layers(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
-    """The layers of pictures; of several, the one after the last comma."""
+    """Return the layers of pictures; of several, for the one after the last comma."""
     from camtool.pictures.layers import layer_names
 
     before, comma, last = incomplete.rpartition(",")
@@ -284,7 +284,7 @@ def _several(names: str | tuple[str, ...]) -> tuple[str, ...]:
 
 
 def dxf_layers(file: Path) -> set[str]:
-    """The layers that entities of a DXF of text say they are on (group code 8); empty for others.
+    """Return the layers that entities of a text DXF name (group code 8); empty for other files.
 
     Names that cannot be shown, or that are of an encoding other than UTF-8, are left out.
     """
@@ -301,17 +301,17 @@ def dxf_layers(file: Path) -> set[str]:
         elif code == "8" and not (section == "BLOCKS" and value == "0"):
             named.add(value)
         before = value
-    names = map(_read, named)
+    names = map(_decode_name, named)
     return {name for name in names if name and name.isprintable() and UNREADABLE not in name}
 
 
-def _read(name: str) -> str:
-    r"""A name as it is meant: older files write \U+00F6 for what is not ASCII."""
+def _decode_name(name: str) -> str:
+    r"""Decode a name: older files write \U+00F6 for characters that are not ASCII."""
     return re.sub(r"\\U\+([0-9A-Fa-f]{4})", lambda found: chr(int(found[1], 16)), name).strip()
 
 
 def _keys(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
-    """The keys of the machine that the line names before."""
+    """Return the keys of the machine that the line names before."""
     import msgspec
 
     from camtool.target.registry import load_target
@@ -319,13 +319,13 @@ def _keys(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
     target = ctx.params.get("target")
     if isinstance(target, str):
         values: dict[str, Any] = msgspec.to_builtins(load_target(target).machine)
-        for key, _ in flat("", values):
+        for key, _ in flat_lines("", values):
             if key.startswith(incomplete):
                 yield CompletionItem(f"{key}=")
 
 
 def _interpolators(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
-    """What the controller of the target that the line names before has to choose from."""
+    """Return the interpolators of the controller of the target that the line names before."""
     from camtool.target.registry import load_target
 
     target = ctx.params.get("target")

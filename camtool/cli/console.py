@@ -16,7 +16,7 @@ from camtool.cli.messages import say, show_text
 from camtool.cli.options import MachineFlags, talk_options
 
 if TYPE_CHECKING:
-    from camtool.cli.wishes import Wishes
+    from camtool.cli.wishes import UserRequests
     from camtool.sending.drive import Request
     from camtool.sending.line import OpenPort
     from camtool.target.terminal import Terminal
@@ -111,14 +111,15 @@ class _Talk:
         self._code: int | None = None  # the exit code, when the machine stands
 
     def run(self) -> int:
-        """Until one of them ends it; the exit code. Whatever else ends it stops the machine."""
-        from camtool.cli.wishes import Wishes
+        """Run the dialogue until one side ends it; return the exit code. Any exception stops the
+        machine first."""
+        from camtool.cli.wishes import UserRequests
 
         if self._at_terminal:
             self._say(f"{self._terminal.about}; Ctrl-D ends")
-        wishes = Wishes(one_s=0.0)
+        wishes = UserRequests(one_s=0.0)
         code: int | None = None
-        with wishes.caught():
+        with wishes.catch_signals():
             threading.Thread(target=self._read, daemon=True).start()
             if self._terminal.hello:
                 self._line.write(self._terminal.hello)
@@ -139,8 +140,8 @@ class _Talk:
             self._lines.put(text.rstrip("\r\n"))
         self._lines.put(None)
 
-    def _turn(self, wishes: Wishes) -> int | None:
-        """Listen for a moment, then do what is to be done; the exit code at the end."""
+    def _turn(self, wishes: UserRequests) -> int | None:
+        """Listen for a moment, then handle requests; return the exit code at the end."""
         terminal, line = self._terminal, self._line
         data = line.read(TICK_S)
         now = time.monotonic()
@@ -184,7 +185,7 @@ class _Talk:
         return None
 
     def _stop(self, wish: Request, *, by_hand: bool) -> int | None:
-        """Stop the machine; the exit code where nobody waits until it stands."""
+        """Stop the machine; return the exit code if it is not waited for."""
         at_keyboard = self._at_terminal and by_hand
         if self._stops if at_keyboard else wish.value == "close":
             self._line.write(self._terminal.halt())
@@ -192,7 +193,8 @@ class _Talk:
         return self._halt(None if at_keyboard else 1)
 
     def _halt(self, code: int | None) -> int | None:
-        """Tell it to stop; with a code, all ends with that when it stands."""
+        """Tell the machine to stop; with a code, the dialogue ends with it when the machine
+        stands."""
         stop = self._terminal.halt()
         if not stop:
             self._say("nothing stops it over its line: its switch does")
@@ -206,7 +208,7 @@ class _Talk:
         return None
 
     def _stopped(self, now: float, told: float) -> bool:
-        """True when it stands, or nobody knows."""
+        """True when the machine stands, or its state is unknown."""
         terminal = self._terminal
         silent = now - max(told, self._heard) >= CONFIRMS_S
         if terminal.stands:
@@ -248,7 +250,8 @@ class _Talk:
         return None
 
     def _show(self, lines: list[str], *, wait: bool = False) -> None:
-        """Lines on stdout. A reader that takes none holds up nothing, unless it is waited for."""
+        """Show lines on stdout. A full pipe does not delay the dialogue, unless it is waited
+        for."""
         from camtool.cli.wishes import takes_more
 
         self._unshown += lines
@@ -260,7 +263,7 @@ class _Talk:
 
 
 def _unanswered(asked: str, why: str) -> int:
-    """Say that a line has no answer; the exit code."""
+    """Report that a line has no answer; return the exit code."""
     what = f"no answer to {asked!r}" if asked else "the controller does not answer"
     say(f"camtool: error: {what}: {why}; what follows was not sent", quiet=False)
     return 1

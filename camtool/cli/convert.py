@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from camtool.cli.files import read_bytes, shown
+from camtool.cli.files import display_name, read_bytes
 from camtool.cli.life_signs import progress
 from camtool.cli.options import MachineFlags, SectionedCommand, feed, talk_options
 from camtool.cli.picture_options import (
@@ -14,8 +14,8 @@ from camtool.cli.picture_options import (
     picture_name,
     picture_options,
 )
-from camtool.cli.post import Asked, finish
-from camtool.cli.report import Outputs, report_option
+from camtool.cli.post import RequestedOutputs, finish
+from camtool.cli.report import ReportOutputs, report_option
 
 
 @click.command(cls=SectionedCommand, short_help="A program of one machine as that of another.")
@@ -66,13 +66,13 @@ def convert(
     The moves that the first controller decodes are written for the second one, read back,
     simulated and compared with them. Exit code 1 (and no file) when something is wrong.
     """
-    outputs = Outputs(preview, report, page)
+    outputs = ReportOutputs(preview, report, page)
     picture.check(outputs.pictures, UNVERIFIED if no_verify else RESULT)
     before = MachineFlags(source, from_machine, from_set).load()
     after = MachineFlags(target, machine, settings).load()
     reads = [program, str(before.file), str(after.file)]
     reads += [file for file in (from_machine, machine) if file is not None]
-    asked = Asked(program, output, outputs, reads)
+    asked = RequestedOutputs(program, output, outputs, reads)
     asked.check(after.machine.target.extension, verified=not no_verify)
 
     from camtool.pipeline import convert_program
@@ -81,7 +81,7 @@ def convert(
         read_bytes(program),
         before,
         after,
-        file=shown(program),
+        file=display_name(program),
         feed_mm_min=feed_mm_min,
         check=not no_verify,
         progress=progress(),

@@ -28,7 +28,7 @@ SIZE = (50.0, 50.0)
 def _size(
     ctx: click.Context, param: click.Parameter, value: str | None
 ) -> tuple[float, float] | None:
-    """`40x30mm` as two lengths in mm."""
+    """Parse `40x30mm` to two lengths in mm."""
     if value is None:
         return None
     match = re.fullmatch(r"([\d.]+)[x×]([\d.]+)([a-zA-Zµμ\"]*)", value)
@@ -44,7 +44,7 @@ def _size(
 
 
 def _regions(ctx: click.Context, param: click.Parameter, value: str) -> tuple[int, int]:
-    """`3x2` as columns and rows."""
+    """Parse `3x2` to columns and rows."""
     match = re.fullmatch(r"(\d{1,3})x(\d{1,3})", value)
     if match is None:
         raise click.BadParameter(f"{value!r}: write it like 3x2", ctx, param)
@@ -113,7 +113,7 @@ def coupon(
 
 
 def _travel(machine: Machine | None) -> tuple[float, float]:
-    """The machine's table, mm; OptionError when its travel is not known."""
+    """Return the travel of the machine, mm; OptionError if it is not known."""
     if machine is None:
         return SIZE
     x, y = machine.axes.x.travel_mm, machine.axes.y.travel_mm

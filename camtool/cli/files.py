@@ -55,8 +55,8 @@ def write_all(files: dict[str, bytes]) -> None:
 
 
 def check_places(reads: Iterable[str | None], writes: Iterable[str | None]) -> None:
-    """OutputError, before any work is done, as `refuse_same`, and when a place of `writes` cannot
-    be written. None is a file that was not asked for."""
+    """Raise OutputError, before any work is done, as `refuse_same` does, and when a place of
+    `writes` cannot be written. None is a file that was not requested."""
     names = [name for name in writes if name is not None]
     refuse_same(reads, names)
     for name in names:
@@ -65,15 +65,15 @@ def check_places(reads: Iterable[str | None], writes: Iterable[str | None]) -> N
 
 
 def refuse_same(reads: Iterable[str | None], writes: Iterable[str | None]) -> None:
-    """OutputError when a place of `writes` is one of `reads` or another one of `writes`; links of
-    both kinds are seen through."""
-    sources = {_input(name): name for name in reads if name is not None}
+    """Raise OutputError when a place of `writes` is one of `reads` or another one of `writes`,
+    also through symbolic and hard links."""
+    sources = {file_identity(name): name for name in reads if name is not None}
     sources.pop(None, None)
     taken: dict[Hashable, str] = {}
     for name in writes:
         if name is None:
             continue
-        place = _place(name)
+        place = _place_identity(name)
         if place in sources:
             read = sources[place]
             called = "" if read in (name, STDOUT) else f" ({read})"
@@ -89,14 +89,14 @@ def refuse_same(reads: Iterable[str | None], writes: Iterable[str | None]) -> No
 
 
 def check_new(name: str, mend: str = "give another name") -> None:
-    """OutputError when there is such a file already; streams take whatever comes."""
+    """Raise OutputError if the file exists already; streams are always accepted."""
     if os.path.lexists(name) and not _is_stream(name):
         raise OutputError("exists already", file=name, mend=mend)
 
 
 def check_ours(name: str, is_ours: Callable[[bytes], bool]) -> None:
-    """OutputError when a file whose name nobody gave is there, and is not one that the command
-    wrote before."""
+    """Raise OutputError if a file with a default name exists and was not written by the command
+    before."""
     if name == STDOUT or not os.path.lexists(name) or _is_stream(name):
         return
     try:
@@ -110,7 +110,7 @@ def check_ours(name: str, is_ours: Callable[[bytes], bool]) -> None:
 
 
 def _check_file(name: str) -> None:
-    """OutputError when no file can be made or replaced there."""
+    """Raise OutputError when no file can be created or replaced there."""
     place = Path(os.path.realpath(name))
     try:
         if place.is_dir():
@@ -121,16 +121,17 @@ def _check_file(name: str) -> None:
             )
         if not os.access(place.parent, os.W_OK):
             raise OutputError("the folder is not writable", file=name, mend="choose another place")
-        if _there(place) and not os.access(place, os.W_OK):
+        if _exists(place) and not os.access(place, os.W_OK):
             raise OutputError("is write-protected", file=name, mend="choose another place")
     except OSError as error:
         if isinstance(error, OutputError):
             raise
-        raise _refused(name, error) from error
+        raise _write_error(name, error) from error
 
 
-def _there(place: Path) -> bool:
-    """Whether there is a file; OSError when nobody can know: a loop of links, a name too long."""
+def _exists(place: Path) -> bool:
+    """True if the file exists; OSError if that cannot be determined: a loop of links, a name too
+    long."""
     try:
         place.stat()
     except FileNotFoundError:
@@ -138,8 +139,8 @@ def _there(place: Path) -> bool:
     return True
 
 
-def _input(name: str) -> Hashable:
-    """What identifies a file that is read; None for what no output can replace."""
+def file_identity(name: str) -> Hashable:
+    """Return the identity of a file that is read; None for one that no output can replace."""
     try:
         found = os.fstat(sys.stdin.fileno()) if name == STDOUT else Path(name).stat()
     except (OSError, ValueError, AttributeError):  # nothing there, or no file of the system's
@@ -147,8 +148,8 @@ def _input(name: str) -> Hashable:
     return (found.st_dev, found.st_ino) if stat.S_ISREG(found.st_mode) else None
 
 
-def _place(name: str) -> Hashable:
-    """What identifies a place that is written: its file, or its folder and name.
+def _place_identity(name: str) -> Hashable:
+    """Return the identity of a place that is written: its file, or its folder and name.
 
     Names that differ only in case, or in how accents are coded, are taken for one: they are one
     file on other computers, and programs travel.
@@ -188,7 +189,7 @@ def _write_stream(name: str, data: bytes) -> None:
             sys.stdout.buffer.write(data)
             sys.stdout.buffer.flush()
             return
-        with _opened(name) as stream:
+        with _open_stream(name) as stream:
             stream.write(data)
     except BrokenPipeError:
         if name == STDOUT:
@@ -197,12 +198,12 @@ def _write_stream(name: str, data: bytes) -> None:
     except OutputError:
         raise
     except OSError as error:
-        raise _refused("<stdout>" if name == STDOUT else name, error) from error
+        raise _write_error("<stdout>" if name == STDOUT else name, error) from error
 
 
-def _opened(name: str) -> io.BufferedWriter:
-    """A device or a pipe to write to. OutputError for a named pipe without a reader: opening it
-    would wait for one for ever."""
+def _open_stream(name: str) -> io.BufferedWriter:
+    """Open a device or a pipe for writing. OutputError for a named pipe without a reader, since
+    opening it would block for ever."""
     if not stat.S_ISFIFO(Path(name).stat().st_mode):
         return Path(name).open("wb")
     last = time.monotonic() + READER_S
@@ -222,15 +223,15 @@ def _opened(name: str) -> io.BufferedWriter:
             return os.fdopen(handle, "wb")
 
 
-def _refused(name: str, error: OSError) -> OutputError:
+def _write_error(name: str, error: OSError) -> OutputError:
     return OutputError(
         f"cannot be written ({error.strerror})", file=name, mend="choose another place"
     )
 
 
 def _rename(staged: list[tuple[Path, Path]]) -> None:
-    """Every temporary file to its place; when one cannot go there, or at Ctrl-C, those that have
-    gone come back."""
+    """Move every temporary file to its place; if one cannot be moved, or at Ctrl-C, undo the
+    moves."""
     olds: dict[Path, Path | None] = {}
     if len(staged) > 1:
         olds = {place: _second_name(temporary, place) for temporary, place in staged}
@@ -239,7 +240,7 @@ def _rename(staged: list[tuple[Path, Path]]) -> None:
             try:
                 temporary.replace(place)
             except OSError as error:
-                raise _refused(str(place), error) from error
+                raise _write_error(str(place), error) from error
     except BaseException:
         for place, old in olds.items():
             if old is None:
@@ -254,8 +255,8 @@ def _rename(staged: list[tuple[Path, Path]]) -> None:
 
 
 def _second_name(temporary: Path, place: Path) -> Path | None:
-    """A second name for the file at a place, by which it can come back: the place itself where the
-    file system knows no links, None where there is no file."""
+    """Create a second name for the file at a place, by which it can be restored: the place itself
+    if the file system has no links, None if there is no file."""
     if not os.path.lexists(place):
         return None
     old = temporary.with_name(f"{temporary.name}.old")
@@ -267,7 +268,8 @@ def _second_name(temporary: Path, place: Path) -> Path | None:
 
 
 def _stage(place: Path, data: bytes) -> tuple[Path, Path]:
-    """(temporary file holding the data, final place), in the same folder; links are followed."""
+    """Write a temporary file with the data in the folder of its place; return both paths. Links
+    are followed."""
     named, place = str(place), Path(os.path.realpath(place))
     temporary: Path | None = None
     try:
@@ -282,13 +284,13 @@ def _stage(place: Path, data: bytes) -> tuple[Path, Path]:
         if temporary is not None:
             temporary.unlink(missing_ok=True)
         if isinstance(error, OSError):
-            raise _refused(named, error) from error
+            raise _write_error(named, error) from error
         raise
     return temporary, place
 
 
 def _mode_for(place: Path) -> int:
-    """The old file's permissions, or what the user's umask gives a new file."""
+    """Return the permissions of the old file, or those that the umask gives a new file."""
     try:
         return stat.S_IMODE(place.stat().st_mode)
     except OSError:
@@ -300,18 +302,19 @@ def _mode_for(place: Path) -> int:
 # Programs that are read.
 
 
-def shown(name: str) -> str:
-    """The name of a file in messages."""
+def display_name(name: str) -> str:
+    """Return the name of a file for messages."""
     return "<stdin>" if name == STDOUT else name
 
 
 def read_bytes(name: str) -> bytes:
-    """The bytes of a file, or of stdin for `-`; ProgramError when they cannot be read or are too
-    many."""
+    """Read a file, or stdin for `-`; ProgramError when it cannot be read or is too large."""
     if name == STDOUT and sys.stdin is None:
-        raise ProgramError("there is no standard input", file=shown(name), mend="name a file")
+        raise ProgramError(
+            "there is no standard input", file=display_name(name), mend="name a file"
+        )
     source = sys.stdin.buffer if name == STDOUT else Path(name)
-    return program_bytes(source, shown(name))
+    return program_bytes(source, display_name(name))
 
 
 # Pictures that nobody asked for by name carry a seal, by which camtool knows them again.
@@ -323,19 +326,20 @@ def read_bytes(name: str) -> bytes:
 SEAL = b"<!-- camtool: sha256 "
 
 
-def sealed(svg: bytes, maker: str) -> bytes:
-    """The picture with the seal of its maker, the name of a page or of a drawing's outputs."""
+def seal(svg: bytes, maker: str) -> bytes:
+    """Return the picture with the seal of its maker, the name of a page or of the outputs of a
+    drawing."""
     name = os.fsencode(PurePath(maker).name)
     digest = hashlib.sha256(name + b"\n" + svg).hexdigest().encode()
     return svg + SEAL + digest + b" -->\n"
 
 
 def is_foreign(place: str | Path, maker: str) -> bool:
-    """Whether a file lies there that is no unchanged picture of this maker."""
+    """True if the file exists and is no unchanged picture of this maker."""
     if not os.path.lexists(place):
         return False
     try:
         data = Path(place).read_bytes()
     except OSError:  # whatever it is, it is none of ours
         return True
-    return data != sealed(data[: data.rfind(SEAL)], maker)
+    return data != seal(data[: data.rfind(SEAL)], maker)

@@ -14,7 +14,7 @@ from camtool.cli.files import STDOUT
 from camtool.cli.messages import say
 from camtool.cli.options import MachineFlags, SectionedCommand, talk_options
 from camtool.cli.picture_options import PictureFlags
-from camtool.cli.post import Asked, Posting, finish, posting_options
+from camtool.cli.post import Posting, RequestedOutputs, finish, posting_options
 from camtool.records import replace
 
 BEGUN, READ, MADE, DONE = 1, 20, 95, 100
@@ -49,7 +49,7 @@ def filter(source: str, posting: Posting, quiet: bool, verbose: bool) -> int:
     _progress(MADE)
     code = finish(
         run,
-        Asked(source, STDOUT, reads=[*posting.files(source), str(target.file)]),
+        RequestedOutputs(source, STDOUT, reads=[*posting.files(source), str(target.file)]),
         picture=PictureFlags().painter(lambda: [run.scene()], quiet=quiet),
         quiet=quiet,
         verbose=verbose,

@@ -34,9 +34,9 @@ def act(
     quiet: bool,
     unlock: bool = False,
 ) -> int:
-    """Hold the conversation of one command; the exit code. Ctrl-C and q stop the machine, and so
-    does whatever else would end camtool."""
-    from camtool.cli.wishes import Messages, Wishes, keys_of_terminal
+    """Hold the conversation of one command; return the exit code. Ctrl-C, q and any exception stop
+    the machine."""
+    from camtool.cli.wishes import Messages, UserRequests, keys_of_terminal
     from camtool.sending.drive import Driver, Request
     from camtool.sending.line import opened_line
     from camtool.sending.prepare import manner_of, port_of, wire_of
@@ -46,10 +46,10 @@ def act(
     wire = wire_of(target)
     conversation = wire.command(action, target.machine, values, manner_of(target, unlock=unlock))
     with opened_line(port_of(name, baud, wire, target)) as line, keys_of_terminal() as key:
-        wishes = Wishes(key, {"q": Request.STOP})
+        wishes = UserRequests(key, {"q": Request.STOP})
         tell = Messages(quiet=quiet)
         driver = Driver(line, wish=wishes, tell=tell)
-        with wishes.caught():
+        with wishes.catch_signals():
             driver.carry(conversation)
     tell.rest()
     if conversation.state is WireState.FINISHED:
@@ -61,7 +61,7 @@ def act(
 
 
 def axes_of(words: tuple[str, ...]) -> dict[str, float]:
-    """`X1.5 Y-2mm F200` as mm and mm/min by axis; OptionError for other words."""
+    """Parse `X1.5 Y-2mm F200` to mm and mm/min by axis; OptionError for other words."""
     values: dict[str, float] = {}
     for word in words:
         letter, text = word[:1].lower(), word[1:]

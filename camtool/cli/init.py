@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from camtool.cli.files import STDOUT, check_new, check_places, read_bytes, shown, write_all
+from camtool.cli.files import STDOUT, check_new, check_places, display_name, read_bytes, write_all
 from camtool.cli.messages import say
 from camtool.cli.options import decorate, talk_options
 from camtool.errors import MachineError, OptionError
@@ -54,7 +54,7 @@ AXES: dict[str, tuple[str, Callable[[str], float], str]] = {
 
 
 def axis_settings(flag: str, text: str) -> list[ControllerSetting]:
-    """`300x180x45`, or one value for X, Y and Z. OptionError for other text."""
+    """Parse `300x180x45`, or one value for X, Y and Z. OptionError for other text."""
     from camtool.target.contract import ControllerSetting
 
     key, parse, _ = AXES[flag]
@@ -72,7 +72,7 @@ def axis_settings(flag: str, text: str) -> list[ControllerSetting]:
 
 
 def spindle_setting(text: str) -> ControllerSetting:
-    """`10000`, `hand` or `none`."""
+    """Parse `10000`, `hand` or `none`."""
     from camtool.target.contract import ControllerSetting
 
     said, where = FLAG.format("spindle"), f"--spindle {text}"
@@ -82,8 +82,8 @@ def spindle_setting(text: str) -> ControllerSetting:
 
 
 def proposals(target: str, *, switches: bool) -> list[ControllerSetting]:
-    """What camtool proposes for machines that mill, and their target does not say; `switches`: the
-    program switches the spindle."""
+    """Return default settings for milling machines that their target leaves open; `switches`: True
+    if the program switches the spindle."""
     from camtool.target.contract import ControllerSetting
     from camtool.target.registry import find_target
 
@@ -160,7 +160,7 @@ def init(
     It is kept in your configuration folder, or with --project in this one, whose camtool.toml
     then names it. The first machine is the one that commands without --target are for.
     """
-    from camtool.project import FILE, names_machine, naming, user_folder
+    from camtool.project import FILE, names_machine, text_naming_machine, user_folder
 
     if settings is not None and port is not None:
         raise click.UsageError("--settings and --port contradict each other")
@@ -171,7 +171,7 @@ def init(
         name = questions.ask("Name of the machine", PROPOSED)
     if name is None:
         raise click.UsageError("NAME is missing, such as my-3018")
-    target, said = _of_controller(target, settings, port, questions)
+    target, said = _controller_settings(target, settings, port, questions)
     given = {each.key: each for each in said}
     for flag, (key, _, meaning) in AXES.items():
         text = axes[flag.replace("-", "_")]
@@ -192,11 +192,11 @@ def init(
     # That of a project always names it, the user's where it names none.
     default = output is None and (project or not names_machine(names / FILE))
     if default:
-        files[str(names / FILE)] = naming(names / FILE, name).encode()
+        files[str(names / FILE)] = text_naming_machine(names / FILE, name).encode()
     kept = _write(files, settings, force=force)
-    say(f"written: {shown(str(place))}", quiet=quiet)
+    say(f"written: {display_name(str(place))}", quiet=quiet)
     if kept is not None:
-        say(f"the machine that it replaces is kept: {shown(kept)}", quiet=quiet)
+        say(f"the machine that it replaces is kept: {display_name(kept)}", quiet=quiet)
     for each in given.values():
         if each.doubt:
             value = f"{each.key} = {each.value} ({each.said})"
@@ -212,26 +212,28 @@ def init(
 
 
 class Questions:
-    """What is asked of people at a terminal; nothing where they are not `allowed`."""
+    """Questions to the user at a terminal; none unless they are `allowed`."""
 
     def __init__(self, allowed: bool) -> None:
         self.allowed = allowed
 
     def ask(self, text: str, default: str = "") -> str | None:
-        """The answer; None for an empty one without a default, or where nobody is asked."""
+        """Return the answer; None for an empty one without a default, or if no questions are
+        allowed."""
         if not self.allowed:
             return None
         answer = click.prompt(text, default, show_default=bool(default), err=True)
         return str(answer).strip() or None
 
     def ask_one_of(self, text: str, choices: Sequence[str]) -> str | None:
-        """One of the choices; None where nobody is asked."""
+        """Return one of the choices; None if no questions are allowed."""
         if not self.allowed:
             return None
         return str(click.prompt(text, type=click.Choice(choices), err=True))
 
     def ask_axes(self, flag: str, text: str) -> str | None:
-        """Numbers of the axes, as `flag` takes them; asked again until they can be used."""
+        """Return numbers of the axes, as `flag` takes them; the question is repeated until they
+        are valid."""
         while True:
             answer = self.ask(f"{text}; Enter: not known")
             if answer is None:
@@ -244,7 +246,7 @@ class Questions:
             return answer
 
     def ask_lines(self, text: str) -> str:
-        """Lines up to an empty one; a file's name alone stands for its lines."""
+        """Return lines up to an empty one; the name of a file alone stands for its lines."""
         first = self.ask(f"{text}: paste it, end with an empty line; or the name of a file")
         if first is None:
             return ""
@@ -260,14 +262,15 @@ class Questions:
 
 
 def settings_text(name: str) -> str:
-    """A file with a controller's settings (`-` is stdin) as text."""
+    """Read a file with a controller's settings (`-` is stdin) as text."""
     return read_bytes(name).decode("utf-8", "replace")
 
 
-def _of_controller(
+def _controller_settings(
     target: str | None, settings: str | None, port: str | None, questions: Questions
 ) -> tuple[str, Sequence[ControllerSetting]]:
-    """The name of the target, and what its controller says of the machine."""
+    """Return the name of the target, and the settings of the machine that its controller
+    reports."""
     from camtool.target.registry import each_target, find_target, target_names
 
     if port is not None:
@@ -303,9 +306,9 @@ def _of_controller(
 
 
 def machine_text(name: str, target: str, given: Sequence[ControllerSetting], source: str) -> str:
-    """The text of the machine file. MachineError, which names what says it, for a value that no
-    machine has."""
-    from camtool.tables import parsed_table
+    """Return the text of the machine file. MachineError, which names the source of the value, for
+    a value out of range."""
+    from camtool.tables import parse_table
     from camtool.target.registry import list_target, loaded_target
     from camtool.target.template import machine_template
 
@@ -313,9 +316,9 @@ def machine_text(name: str, target: str, given: Sequence[ControllerSetting], sou
     whole = base.file.read_text(encoding="utf-8")
     text = machine_template(name, target, whole, base.needs, given)
     try:
-        loaded_target(target, (parsed_table(text), f"{name}.toml"))
+        loaded_target(target, (parse_table(text), f"{name}.toml"))
     except MachineError as error:
-        wrong = next((each for each in given if _names(error, each.key)), None)
+        wrong = next((each for each in given if _is_about(error, each.key)), None)
         if wrong is not None:
             raise MachineError(
                 f"{error.message} ({wrong.key})",
@@ -328,8 +331,8 @@ def machine_text(name: str, target: str, given: Sequence[ControllerSetting], sou
     return text
 
 
-def _names(error: MachineError, key: str) -> bool:
-    """Whether an error is about this key of a machine file."""
+def _is_about(error: MachineError, key: str) -> bool:
+    """True if an error is about this key of a machine file."""
     table, _, name = key.rpartition(".")
     return error.where == f"table [{table}], key {name}"
 
@@ -338,7 +341,7 @@ def _names(error: MachineError, key: str) -> bool:
 
 
 def _place(name: str, output: str | None, *, project: bool) -> Path:
-    """The file of the machine; a name that it cannot have is refused before."""
+    """Return the file of the machine; an invalid name is refused."""
     from camtool.project import FILE, MACHINES, NAME, user_folder
 
     if not NAME.fullmatch(name) or name == Path(FILE).stem:
@@ -352,8 +355,8 @@ def _place(name: str, output: str | None, *, project: bool) -> Path:
 
 def _write(files: dict[str, bytes], settings: str | None, *, force: bool) -> str | None:
     """Write the machine file, which must be new, and the `camtool.toml` that names it. With
-    `force` an old file stays beside it under another name, which is returned: its numbers may have
-    been measured."""
+    `force` an old file is kept under another name, which is returned: its numbers may have been
+    measured."""
     place, kept = next(iter(files)), None
     if force and Path(place).is_file():
         kept = f"{place}.old"

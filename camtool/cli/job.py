@@ -24,7 +24,7 @@ from camtool.cli.options import (
 from camtool.cli.picture_options import PictureFlags, picture_name
 from camtool.plain import one_line, to_json
 
-MOST_GROUPS = 12
+MAX_GROUPS = 12
 """So many groups of contours of an operation are printed."""
 
 
@@ -136,9 +136,9 @@ def check(
     facts, findings = described(job, read, target)
     files: dict[str, bytes] = {}
     if preview is not None and against is not None:
-        from camtool.cli.preview import Seen
+        from camtool.cli.preview import SceneSource
 
-        scene, _ = Seen(machine, False, True, flags, drawing, preview).scene(against)
+        scene, _ = SceneSource(machine, False, True, flags, drawing, preview).scene(against)
         files[preview] = PictureFlags().painter(lambda: [scene], quiet=quiet)(preview)
     if report is not None:
         facts["findings"] = [
@@ -158,7 +158,7 @@ def check(
 
 
 def _summary(facts: dict[str, Any]) -> Iterator[str]:
-    """What a job says, and what of a drawing it takes, line by line."""
+    """Return the lines about a job, and about the parts of a drawing that it takes."""
     if "extents_mm" in facts:
         axes = facts["extents_mm"].items()
         ranges = (f"{axis} {' … '.join(map(_place, pair))}" for axis, pair in axes)
@@ -179,8 +179,8 @@ def _summary(facts: dict[str, Any]) -> Iterator[str]:
 
 
 def _sides(groups: list[dict[str, Any]]) -> Iterator[str]:
-    """The groups of contours with their sides; the largest where there are many."""
-    shown = sorted(groups, key=lambda group: -group["contours"])[:MOST_GROUPS]
+    """Return the groups of contours with their sides; the largest if there are many."""
+    shown = sorted(groups, key=lambda group: -group["contours"])[:MAX_GROUPS]
     for group in shown:
         yield (
             f"           {group['contours']} on layer {group['layer'] or '(no name)'}"

@@ -23,17 +23,17 @@ from camtool.plain import one_line
 from camtool.progress import Progress
 
 AFTER_S = 1.0
-"""No sign is shown before this."""
+"""Time before the first status line."""
 
 EVERY_S = 0.5
-"""How often the sign changes."""
+"""Interval of updates of the status line."""
 
 _OWN = ("batch",)
 _QUIET = ("-q", "--quiet")
 
 
 class LifeSigns:
-    """The line on `stream` about a `progress`, and the time since which it is counted."""
+    """A status line on `stream` about a `progress`, with the time since `counting` began."""
 
     def __init__(self, stream: TextIO | None, progress: Progress) -> None:
         self.progress = progress
@@ -44,7 +44,7 @@ class LifeSigns:
 
     @contextmanager
     def counting(self) -> Iterator[None]:
-        """Count the time from now to the end of the block; nothing is shown behind it."""
+        """Count the time from now to the end of the block; nothing is shown after it."""
         self.progress.begin("")
         self._begun = time.monotonic()
         try:
@@ -55,7 +55,7 @@ class LifeSigns:
 
     @contextmanager
     def hidden(self) -> Iterator[None]:
-        """Show nothing within the block, where the user is asked."""
+        """Show nothing within the block, in which the user is asked."""
         begun, self._begun = self._begun, None
         self.hide()
         try:
@@ -76,7 +76,7 @@ class LifeSigns:
             self._write(line[: shutil.get_terminal_size().columns - 1])
 
     def hide(self) -> None:
-        """Take the line away."""
+        """Erase the line."""
         if self._shown:
             self._write("")
 
@@ -90,8 +90,8 @@ class LifeSigns:
 
 @contextmanager
 def life_signs(stream: TextIO | None, words: Sequence[str]) -> Iterator[LifeSigns]:
-    """While the block runs, show what is done on `stream` if that is a terminal, unless the
-    `words` of the command line ask for quiet, or the command has signs of its own."""
+    """Show the progress on `stream` within the block, if it is a terminal, unless the `words` of
+    the command line ask for quiet or the command has a display of its own."""
     if stream is None or not _are_wanted(stream, words):
         yield LifeSigns(None, Progress())
         return
@@ -120,17 +120,17 @@ def _are_wanted(stream: TextIO, words: Sequence[str]) -> bool:
 
 
 def signs_of_command() -> LifeSigns:
-    """The signs of the running command; without one, signs that nobody sees."""
+    """Return the status line of the running command, an invisible one without a command."""
     context = click.get_current_context(silent=True)
     found = None if context is None else context.find_object(LifeSigns)
     return LifeSigns(None, Progress()) if found is None else found
 
 
 def progress() -> Progress:
-    """What the running command is doing."""
+    """Return the progress of the running command."""
     return signs_of_command().progress
 
 
 def hide_signs() -> None:
-    """Take the line of the running command away, for another one."""
+    """Erase the status line of the running command, to write another line."""
     signs_of_command().hide()

@@ -79,15 +79,15 @@ COMMANDS = (
 
 
 class _Commands(click.Group):
-    """The group of `COMMANDS`, each of which is loaded when it is called or shown."""
+    """The group of `COMMANDS`, each of which is imported when it is called or shown."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Their names."""
+        """Return the names of the commands."""
         return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """The command of this name. None where there is none; then all are loaded, since click
-        guesses from them what was meant."""
+        """Return the command of this name. For an unknown name return None and load all commands,
+        from which click suggests a similar one."""
         for name in [cmd_name] if cmd_name in COMMANDS else COMMANDS:
             if name not in self.commands:
                 self.add_command(getattr(import_module(f"camtool.cli.{name}"), name))
@@ -129,7 +129,7 @@ def cli() -> None:
 
 
 def main() -> NoReturn:
-    """Run the command line; never returns. One line on stderr for every error."""
+    """Run the command line; never returns. Every error is one line on stderr."""
     _keep_streams()
     _collect_seldom()
     sys.unraisablehook = _repeat_interrupt
@@ -137,7 +137,7 @@ def main() -> NoReturn:
         from camtool.cli.completion import answer_shells
 
         answer_shells(cli)
-    code = _code(debug="--debug" in sys.argv[1:])
+    code = _exit_code(debug="--debug" in sys.argv[1:])
     # All is done: an interruption now would only show a traceback while Python ends.
     with suppress(ValueError):  # not in the main thread
         signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -146,8 +146,8 @@ def main() -> NoReturn:
     sys.exit(code)
 
 
-def _code(*, debug: bool) -> int:
-    """The exit code of the command line."""
+def _exit_code(*, debug: bool) -> int:
+    """Run the command line and return its exit code."""
     try:
         with life_signs(sys.stderr, sys.argv[1:]) as signs:
             return _run(signs)
@@ -186,7 +186,7 @@ def _code(*, debug: bool) -> int:
 
 
 def _is_built() -> bool:
-    """True if the compiled loops lie beside their sources, as where camtool was installed."""
+    """True if the compiled loops lie beside their sources, as in an installation."""
     from importlib.util import find_spec
 
     return find_spec("camtool.kernels._memoryviews") is not None
@@ -223,8 +223,8 @@ def _trace(debug: bool) -> None:
 
 
 def _keep_streams() -> None:
-    """Open /dev/null in place of standard streams that are closed, so that no file gets their
-    numbers and the messages with them. Show characters that the terminal lacks as escapes."""
+    """Open /dev/null in place of closed standard streams, so that no file gets their descriptors
+    and with them the messages. Show characters that the terminal lacks as escapes."""
     for number in range(3):
         try:
             os.fstat(number)
@@ -235,7 +235,7 @@ def _keep_streams() -> None:
 
 
 def _flush(stream: TextIO | None) -> None:
-    """Flush a stream; drop what it does not take, so that Python does not try again."""
+    """Flush a stream; drop data that it does not accept, so that Python does not try again."""
     if stream is None:
         return
     try:
@@ -245,7 +245,7 @@ def _flush(stream: TextIO | None) -> None:
 
 
 def _repeat_interrupt(lost: sys.UnraisableHookArgs) -> None:
-    """Repeat a Ctrl-C that came where Python can raise nothing (while an object is deleted)."""
+    """Repeat a Ctrl-C that came where Python cannot raise it (while an object is deleted)."""
     if issubclass(lost.exc_type, KeyboardInterrupt):
         # Not in here: it would be lost as well.
         threading.Timer(AGAIN_S, os.kill, (os.getpid(), signal.SIGINT)).start()
@@ -254,6 +254,6 @@ def _repeat_interrupt(lost: sys.UnraisableHookArgs) -> None:
 
 
 def _collect_seldom() -> None:
-    """Spare a short run the search for garbage: seldom during it, and never at its end."""
+    """Collect garbage seldom during a short run, and never at its end."""
     gc.set_threshold(GARBAGE_AFTER)
     atexit.register(gc.freeze)

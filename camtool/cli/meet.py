@@ -79,7 +79,7 @@ def meet(
     target = machine.load()
     place = Path(output) if output != STDOUT else Path("job.toml")
     wanted, tables, job_of = job.as_file(drawing, place)
-    with job.blamed():
+    with job.name_job_file():
         read = drawing.read(source, target.machine, wanted)
         dimensions, findings = dimensions_of(read, file)
         asked = Tolerances(dimensions, findings)
@@ -103,7 +103,7 @@ def meet(
 
 
 def _say_end(found: Meeting, source: str, output: str, *, quiet: bool) -> None:
-    """What was written, and whether it holds."""
+    """Report the written file, and whether its job holds."""
     where = "stdout" if output == STDOUT else output
     if found.holds and not found.changed:
         say("every dimension holds as it is: no job was written", quiet=quiet)

@@ -32,9 +32,9 @@ COLOURS = {"error": "red", "warning": "yellow", "info": "cyan"}
 
 
 def say(text: str, *, quiet: bool) -> None:
-    """Show one message on one line, unless quiet; characters that cannot be seen are escaped."""
+    """Show one message on one line, unless quiet; invisible characters are escaped."""
     if not quiet:
-        _echo(tinted(one_line(text)))
+        _echo(tint(one_line(text)))
 
 
 def show_text(text: str, *, err: bool = False) -> None:
@@ -47,14 +47,14 @@ def show_text(text: str, *, err: bool = False) -> None:
 
 
 def _echo(text: str) -> None:
-    """Text on stderr; a full stderr is ignored, since there is nowhere to report it."""
+    """Write text to stderr; a full stderr is ignored, since there is nowhere to report it."""
     hide_signs()
     with suppress(OSError):
         click.echo(text, err=True)
 
 
 def in_colour(stream: TextIO | None) -> bool:
-    """Whether a stream is a terminal whose user has set neither NO_COLOR (no-color.org) nor
+    """True if a stream is a terminal whose user has set neither NO_COLOR (no-color.org) nor
     CLICOLOR=0 (bixense.com/clicolors); a closed stream is None."""
     variable = os.environ.get
     return (
@@ -71,11 +71,11 @@ def say_error(error: CamtoolError) -> None:
     text, mend = one_line(f"camtool: error: {error}"), one_line(" ".join(error.mend.split()))
     if mend and text.endswith(mend) and in_colour(sys.stderr):
         text = text.removesuffix(mend) + click.style(mend, bold=True)
-    _echo(tinted(text))
+    _echo(tint(text))
 
 
-def tinted(text: str) -> str:
-    """The message with its severity in colour, where stderr shows colours."""
+def tint(text: str) -> str:
+    """Colour the severity of a message, if stderr shows colours."""
     if not in_colour(sys.stderr):
         return text
     words = "|".join(COLOURS)
@@ -103,7 +103,7 @@ def say_findings(findings: Iterable[Finding], *, quiet: bool, verbose: bool) -> 
 Marks = Mapping[str, str]
 """The severity of the lines of these names: "error", "warning" or "info"."""
 
-LEAST_WIDTH = 20
+MIN_WIDTH = 20
 """Values are wrapped to the width of the terminal, but never to fewer columns than this."""
 
 REPORT_NAMES = 11
@@ -141,7 +141,7 @@ def show_compared(plain: str, rows: Sequence[ContrastRow]) -> None:
 
 
 def report_marks(findings: Iterable[Finding]) -> dict[str, str]:
-    """The lines of a report's summary that these findings are about, with their severities."""
+    """Return the severities of the lines of the summary that these findings are about."""
     marks: dict[str, str] = {}
     for finding in sorted(findings, key=lambda finding: finding.severity):
         name = _LINES.get(finding.where) or _LINES.get(finding.code.name)
@@ -151,11 +151,11 @@ def report_marks(findings: Iterable[Finding]) -> dict[str, str]:
 
 
 def _line(line: str, name_width: int, marks: Marks, columns: int) -> str:
-    """A name and its value, wrapped below itself."""
+    """Format a name and its value, wrapped below itself."""
     name, value = line[:name_width], line[name_width:]
     mark = marks.get(name.strip())
     colour = None if mark is None else COLOURS[mark]
-    wide = max(columns - name_width, LEAST_WIDTH)
+    wide = max(columns - name_width, MIN_WIDTH)
     parts = textwrap.wrap(value, wide, break_long_words=False, break_on_hyphens=False)
     value = f"\n{' ' * name_width}".join(click.style(part, fg=colour) for part in parts)
     return f"{click.style(name.rstrip(), bold=True, fg=colour)}{name[len(name.rstrip()) :]}{value}"

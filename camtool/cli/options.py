@@ -60,7 +60,7 @@ class SectionOption(click.Option):
 
 
 class SectionedCommand(click.Command):
-    """A command that shows its options section by section, in the order of the first of each."""
+    """A command whose help shows the options by section, in the order of the first of each."""
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the options into the help."""
@@ -85,7 +85,7 @@ def option(section: str, *names: str, **settings: Any) -> Option:
 def gather(
     record: str, make: Callable[..., Any], names: Sequence[str]
 ) -> Callable[[Command], Command]:
-    """A wrapper that takes `names` out of a command's arguments and gives it one record."""
+    """Return a wrapper that replaces the arguments `names` of a command by one record."""
 
     def wrap(command: Command) -> Command:
         @functools.wraps(command)
@@ -99,7 +99,7 @@ def gather(
 
 
 def decorate(command: Command, options: Sequence[Option]) -> Command:
-    """The command with these options, shown in their order."""
+    """Return the command with these options, in their order."""
     for option in reversed(options):
         command = option(command)
     return command
@@ -108,8 +108,8 @@ def decorate(command: Command, options: Sequence[Option]) -> Command:
 def with_flags(
     command: Command, record: str, make: type[Any], options: Sequence[Option]
 ) -> Command:
-    """The command with these options, which reach it as `record`, a dataclass whose fields are
-    named after them."""
+    """Return the command with these options, passed to it as `record`, a dataclass whose fields
+    have their names."""
     names = [each.name for each in fields(make)]
     return decorate(gather(record, make, names)(command), options)
 
@@ -144,8 +144,8 @@ _MACHINE = "Machine"
 
 @dataclass(frozen=True)
 class MachineFlags:
-    """`--target`, `--machine` (a file), `--set`; `by_default` where a `camtool.toml` says which
-    machine, and no flag."""
+    """`--target`, `--machine` (a file), `--set`; `by_default` if a `camtool.toml` names the
+    machine, and no flag does."""
 
     target: str | None
     machine: str | None
@@ -156,9 +156,9 @@ class MachineFlags:
     def of(
         cls, target: str | None, machine: str | None, settings: tuple[str, ...]
     ) -> MachineFlags:
-        """Those of the flags: a machine that is said by its name becomes its file, and so does a
-        target of which the user has a machine with that name; without either, the project's or
-        the user's default holds."""
+        """Resolve the flags: the name of a machine becomes its file, also for a target if the user
+        has a machine with that name; without either flag, the default of the project or the user
+        applies."""
         from camtool.project import project_of
         from camtool.target.registry import target_names
 
@@ -175,7 +175,7 @@ class MachineFlags:
         return cls(target, None, settings)
 
     def load(self) -> LoadedTarget:
-        """The target with the user's file and settings over it."""
+        """Load the target with the user's file and settings over it."""
         from camtool.target.registry import load_target
 
         name = self.name()
@@ -188,11 +188,11 @@ class MachineFlags:
         return load_target(name, machine_file=file, settings=self.settings)
 
     def files(self) -> list[str]:
-        """The user's machine file, if any."""
+        """User's machine file, if any."""
         return [] if self.machine is None else [self.machine]
 
     def name(self) -> str | None:
-        """The target's name, as given or as the machine file says; None without either."""
+        """Name of the target, as given or as in the machine file; None without either."""
         if self.target is not None or self.machine is None:
             return self.target
         from camtool.target.loader import extended_by
@@ -201,7 +201,7 @@ class MachineFlags:
 
 
 def machine_options(command: Command) -> Command:
-    """Adds `machine: MachineFlags`."""
+    """Add `machine: MachineFlags`."""
     options = [
         option(
             _MACHINE, "--target", "-t", metavar="NAME", help="The machine; see camtool targets."
@@ -226,7 +226,7 @@ def machine_options(command: Command) -> Command:
 
 
 def talk_options(command: Command) -> Command:
-    """Adds `quiet: bool` and `verbose: bool`, and `--debug`, which main() looks for itself."""
+    """Add `quiet: bool` and `verbose: bool`, and `--debug`, which main() reads itself."""
     return decorate(
         command,
         [
@@ -254,11 +254,11 @@ class GateFlags:
 
     @property
     def given(self) -> bool:
-        """Whether there is any limit."""
+        """True if there is any limit."""
         return (self.max_error, self.max_reversals, self.max_time) != (None, None, None)
 
     def gates(self) -> Gates | None:
-        """The limits; None when there are none."""
+        """Return the limits; None if there are none."""
         if not self.given:
             return None
         from camtool.verification.report import Gates
@@ -267,7 +267,7 @@ class GateFlags:
 
 
 def gate_options(command: Command) -> Command:
-    """Adds `gates: GateFlags`."""
+    """Add `gates: GateFlags`."""
     return with_flags(
         command,
         "gates",
@@ -309,19 +309,19 @@ class InspectionFlags:
     require: Literal["in", "not-out"] | None = None
 
     def check(self, *, without: str | None) -> None:
-        """A usage error for `--require` alone, and beside a flag (`without`) that leaves nothing
-        to inspect."""
+        """Raise a usage error for `--require` alone, and beside a flag (`without`) that leaves
+        nothing to inspect."""
         if self.require is not None and self.tolerances is None:
             raise click.UsageError("--require needs --tolerances")
         if self.tolerances is not None and without is not None:
             raise click.UsageError(f"{without} leaves nothing to inspect; drop --tolerances")
 
     def files(self) -> list[str]:
-        """The file, if it is one."""
+        """File of tolerances, if there is one."""
         return [] if self.tolerances in (None, DRAWING) else [str(self.tolerances)]
 
-    def inspected(self, run: Run) -> Run:
-        """The run with the verdicts of its dimensions."""
+    def inspect_run(self, run: Run) -> Run:
+        """Return the run with the verdicts of its dimensions."""
         if self.tolerances is None or run.drawing is None:
             return run
         from camtool.inspection.tolerances import dimensions_of
@@ -338,7 +338,7 @@ DRAWING = "drawing"
 
 
 def inspection_options(command: Command) -> Command:
-    """Adds `inspection: InspectionFlags`."""
+    """Add `inspection: InspectionFlags`."""
     return with_flags(
         command,
         "inspection",
@@ -371,8 +371,8 @@ _OF_READING = "read_"
 
 @dataclass(frozen=True)
 class DrawingFlags:
-    """The flags of reading that were given: values of fields of `ReadOptions` and `Selection`, by
-    name."""
+    """Patterns that select what is read (`--layer` to `--line-type`), and fields of ReadOptions,
+    None for flags that are not given."""
 
     given: Mapping[str, Any] = field(default_factory=dict)
 
@@ -393,7 +393,7 @@ class DrawingFlags:
         job: Job | None = None,
         data: bytes | None = None,
     ) -> Drawing:
-        """The drawing (`-` is stdin), of the layers that the job's operations take.
+        """Read the drawing (`-` is stdin), restricted to the layers of the job's operations.
 
         `data` is the file's content where it has been read already. OptionError for a layer or
         colour of the job that the drawing has not, unless flags restrict it.
@@ -410,7 +410,7 @@ class DrawingFlags:
 
 
 def drawing_options(command: Command) -> Command:
-    """Adds `drawing: DrawingFlags`."""
+    """Add `drawing: DrawingFlags`."""
 
     def made(**values: Any) -> DrawingFlags:
         named = ((name.removeprefix(_OF_READING), value) for name, value in values.items())
@@ -452,8 +452,8 @@ ReadJob = Callable[["Table"], "Job"]
 
 @dataclass(frozen=True)
 class JobFlags:
-    """`--job`, `--operation` and the flags that say the same as keys; `given` holds the values of
-    those that were given. `project`: what holds where they say nothing."""
+    """`--job`, `--operation` and the flags that set the same keys; `given` has the values of those
+    that were given. `project`: the defaults of the project."""
 
     file: str | None = None
     operations: tuple[str, ...] = ()
@@ -462,12 +462,12 @@ class JobFlags:
 
     @property
     def is_given(self) -> bool:
-        """True if a flag says something of the job."""
+        """True if a flag sets anything of the job."""
         own = None if self.project is None or self.project.job is None else str(self.project.job)
         return bool(self.operations or self.given) or self.file not in (None, own)
 
     def job(self, drawing: DrawingFlags) -> Job:
-        """The job of the file, with the given flags over it.
+        """Return the job of the file, with the given flags over it.
 
         `--layer` restricts the drawing; a job of one operation takes just that of it.
         """
@@ -475,14 +475,17 @@ class JobFlags:
 
         file = JobTables()
         if self.file is not None:
-            file = read_job_file(Path(self.file), self._piped)
-        job = build_job(file, tables_of_flags(self.given), self.operations, self._shop())
+            file = read_job_file(Path(self.file), self._piped_content)
+        job = build_job(
+            file, tables_of_flags(self.given), self.operations, self._tools_and_defaults()
+        )
         if drawing.layers and len(job.operations) == 1:
             return replace(job, operations=(replace(job.operations[0], layers=drawing.layers),))
         return job
 
     def as_file(self, drawing: DrawingFlags, place: Path) -> tuple[Job, Table, ReadJob]:
-        """The job, its tables as one file at this place, and what makes a job of such tables.
+        """Return the job, its tables as one file at this place, and the function that makes a job
+        of such tables.
 
         Of one operation `--layer` is a part of it. A usage error for `--operation`.
         """
@@ -492,22 +495,26 @@ class JobFlags:
         if self.operations:
             raise click.UsageError("--operation leaves a part of the job; this needs all of it")
         wanted = self.job(drawing)
-        file = JobTables() if self.file is None else read_job_file(Path(self.file), self._piped)
+        file = (
+            JobTables()
+            if self.file is None
+            else read_job_file(Path(self.file), self._piped_content)
+        )
         tables = together(file, tables_of_flags(self.given), place.parent)
         if drawing.layers and len(wanted.operations) == 1:
             tables["operations"][0]["layers"] = list(drawing.layers)
-        read = functools.partial(job_of_tables, place=place, shop=self._shop())
+        read = functools.partial(job_of_tables, place=place, shop=self._tools_and_defaults())
         assert read(tables) == wanted, "a job is not what its file says"
         return wanted, tables, read
 
-    def _shop(self) -> Shop:
-        """The tools that the job may name, and the defaults of the project and the user."""
+    def _tools_and_defaults(self) -> Shop:
+        """Return the tools that the job may name, and the defaults of the project and the user."""
         from camtool.jobs.tools import Shop
         from camtool.keys import Given
 
         if self.project is None:
             return Shop()
-        said = {key: self.project.said(key) for key in ("tool", "material")}
+        said = {key: self.project.value_of(key) for key in ("tool", "material")}
         given = {
             key: None if each is None else Given(each[0], f"key {key}", str(each[1]))
             for key, each in said.items()
@@ -515,41 +522,43 @@ class JobFlags:
         return Shop(self.project.libraries, **given)
 
     def beyond(self, names: Collection[str]) -> list[str]:
-        """What is given of a job beside the keys of these names: `--job` and flags."""
+        """Return the flags of a job that are given beside the keys of these names: `--job` and
+        others."""
         from camtool.jobs.keys import flag_name
 
         flags = [flag_name(name) for name in self.given if name not in names]
         return [*(["--job"] if self.file is not None else []), *flags]
 
     def files(self) -> list[str]:
-        """The job file, its library of tools, and its tool table."""
-        named = (self.file, self._named("tool_library"), self._named("tool_table"))
+        """Job file, its library of tools, and its tool table."""
+        named = (self.file, self._named_file("tool_library"), self._named_file("tool_table"))
         found = () if self.project is None else self.project.libraries
         return [*(file for file in named if file is not None), *map(str, found)]
 
-    def _named(self, key: str) -> str | None:
-        """The file that a flag or a key of the job file names; None without any, and where the
-        job file cannot be read: `job` says why."""
+    def _named_file(self, key: str) -> str | None:
+        """Return the file that a flag or a key of the job file names; None without one, and if the
+        job file cannot be read: `job` reports that."""
         if self.file is None or key in self.given:
             return self.given.get(key)
         from camtool.tables import read_table
 
         try:
-            name = read_table(Path(self.file), self._piped).get(key)
+            name = read_table(Path(self.file), self._piped_content).get(key)
         except MachineError:
             return None
         return str(Path(self.file).parent / name) if isinstance(name, str) else None
 
     @cached_property
-    def _piped(self) -> bytes | None:
-        """What is in a job file that can be read only once, such as `<(...)`; None for others."""
+    def _piped_content(self) -> bytes | None:
+        """Return the content of a job file that can be read only once, such as `<(...)`; None for
+        others."""
         file = Path(str(self.file))
         whole = not file.exists() or file.is_file() or file.is_dir()
         return None if whole else file.read_bytes()
 
     @contextmanager
-    def blamed(self) -> Iterator[None]:
-        """Errors of planning that name an operation name its file too."""
+    def name_job_file(self) -> Iterator[None]:
+        """Add the name of the job file to errors of planning that name an operation."""
         try:
             yield
         except OptionError as error:
@@ -563,7 +572,7 @@ OWN_JOB = ".toml"
 
 
 def own_job(drawing: Path) -> Path | None:
-    """The job file beside a drawing; None without one."""
+    """Return the job file beside a drawing; None without one."""
     if not drawing.name:  # the folder ., which is an error later
         return None
     beside = drawing.with_suffix(OWN_JOB)
@@ -575,13 +584,13 @@ OWN_TOLERANCES = ".tolerances.toml"
 
 
 def own_tolerances(drawing: Path) -> Path | None:
-    """The file of tolerances beside a drawing; None without one."""
+    """Return the file of tolerances beside a drawing; None without one."""
     beside = drawing.parent / f"{drawing.stem}{OWN_TOLERANCES}"
     return beside if beside.is_file() else None
 
 
 def job_options(command: Command) -> Command:
-    """Adds `job: JobFlags`."""
+    """Add `job: JobFlags`."""
 
     def made(job: str | None, operation: tuple[str, ...], **keys: Any) -> JobFlags:
         from camtool.project import project_of
@@ -612,7 +621,7 @@ def job_options(command: Command) -> Command:
 
 
 def _key_flag(section: str, name: str, key: Key) -> Option:
-    """The flag of a key; None unless given, so that defaults apply."""
+    """Return the flag of a key; None unless given, so that defaults apply."""
     settings: dict[str, Any] = {"is_flag": True, "default": None}
     if key.value.choices:
         settings = {"type": click.Choice(key.value.choices)}

@@ -36,12 +36,12 @@ PICTURES = (".svg", ".png", ".html")
 
 
 def is_viewer(name: str) -> bool:
-    """Whether a picture of this name is a page to pan, zoom and play."""
+    """True if a picture of this name is a page with pan, zoom and play."""
     return PurePath(name).suffix.lower() == ".html"
 
 
 def picture_name(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
-    """The name of a picture that we can make."""
+    """Validate the name of a picture."""
     if value is not None and PurePath(value).suffix.lower() not in PICTURES:
         raise click.BadParameter(f"{value!r} ends in none of .svg, .png and .html", ctx, param)
     return value
@@ -49,8 +49,8 @@ def picture_name(ctx: click.Context, param: click.Parameter, value: str | None) 
 
 @dataclass(frozen=True)
 class Canvas:
-    """What a command's pictures can show: moves of a machine or a drawing alone; with the
-    predicted path or without; in layers or without. `more` is what lets them show the rest."""
+    """The possible content of a command's pictures: moves of a machine or a drawing alone; with
+    the predicted path or without; in layers or without. `more` says what would allow the rest."""
 
     more: str = ""
     moves: bool = True
@@ -58,7 +58,7 @@ class Canvas:
     layered: bool = True
 
     def has(self, layer: Layer) -> bool:
-        """Whether its pictures can have the layer."""
+        """True if its pictures can have the layer."""
         if layer.needs == "path":
             return self.predicted
         return layer.needs == "drawing" or self.moves
@@ -85,7 +85,7 @@ class PictureFlags:
 
     @property
     def given(self) -> tuple[str, ...]:
-        """The flags that were given, by name."""
+        """Flags that were given, by name."""
         values = {name: getattr(self, name) for name in FLAGS}
         return tuple(
             f"--{name.replace('_', '-')}"
@@ -95,12 +95,12 @@ class PictureFlags:
 
     @property
     def named(self) -> tuple[str, ...]:
-        """The layers that `--layers` names."""
+        """Layers that `--layers` names."""
         names = (name.strip() for name in (self.layers or "").split(","))
         return tuple(dict.fromkeys(name for name in names if name))
 
     def options(self) -> PictureOptions:
-        """The options of the pictures; OptionError for what makes no picture."""
+        """Return the options of the pictures; OptionError for flags without a valid picture."""
         from camtool.pictures.options import PictureOptions
 
         times = 1.0 if self.exaggerate is None else self.exaggerate
@@ -108,7 +108,7 @@ class PictureFlags:
         return PictureOptions(self.size, self.crop, self.dark, times, layers, self.polar)
 
     def check(self, pictures: Sequence[str | None], canvas: Canvas) -> None:
-        """A usage error for flags that none of the `pictures` can honour, and for flags that
+        """Raise a usage error for flags that none of the `pictures` can honour, and for flags that
         contradict each other; OptionError as `options`."""
         if not self.given:
             return
@@ -128,7 +128,8 @@ class PictureFlags:
         self._check_layers(canvas, self.options())
 
     def _check_errors(self, canvas: Canvas) -> None:
-        """Errors can be shown where they are known; a circle's plot shows nothing else."""
+        """Refuse to show errors where they are not known, and anything beside the plot of a
+        circle."""
         for flag in ("--exaggerate", "--polar"):
             if flag in self.given and not canvas.predicted:
                 raise click.UsageError(f"{flag} needs the predicted path; {canvas.more}")
@@ -154,8 +155,8 @@ class PictureFlags:
             raise click.UsageError("--exaggerate moves the layer path, which is left out")
 
     def painter(self, scenes: Callable[[], Sequence[Scene]], *, quiet: bool = False) -> Painter:
-        """What draws the scenes, several side by side, as a picture file of a given name. It warns
-        about flags that the scenes cannot show."""
+        """Return the function that draws the scenes, several side by side, as a picture file of a
+        given name. It warns about flags that the scenes cannot show."""
         return Painter(scenes, self, quiet)
 
 
@@ -164,8 +165,8 @@ FLAGS = tuple(field.name for field in fields(PictureFlags))
 
 
 def check_beside(flag: str, pictures: Sequence[str | None]) -> None:
-    """A usage error where `flag` shall put two pictures side by side and they are not to be made,
-    or one of them is a viewer."""
+    """Raise a usage error if `flag` puts two pictures side by side and they are not made, or one
+    of them is a viewer."""
     names = [name for name in pictures if name is not None]
     if not names:
         raise click.UsageError(f"{flag}: there is no picture to make; add --preview")
@@ -174,7 +175,7 @@ def check_beside(flag: str, pictures: Sequence[str | None]) -> None:
 
 
 def picture_options(command: Command) -> Command:
-    """Adds `picture: PictureFlags`."""
+    """Add `picture: PictureFlags`."""
     return with_flags(
         command,
         "picture",
@@ -229,7 +230,7 @@ def picture_options(command: Command) -> Command:
 def _crop(
     ctx: click.Context, param: click.Parameter, value: str | None
 ) -> tuple[float, float, float, float] | None:
-    """`10,20,4mm,1/8in` as mm."""
+    """Parse `10,20,4mm,1/8in` to mm."""
     if value is None:
         return None
     try:
@@ -247,8 +248,8 @@ CLOSEUP = "closeup.svg"
 
 @dataclass(frozen=True)
 class Painter:
-    """Draws the pictures of a command, of the scenes that `make` makes when the first picture is
-    asked for; several stand side by side."""
+    """Draw the pictures of a command from the scenes that `make` returns when the first picture is
+    requested; several stand side by side."""
 
     make: Callable[[], Sequence[Scene]]
     flags: PictureFlags
@@ -256,14 +257,14 @@ class Painter:
 
     @cached_property
     def scenes(self) -> Sequence[Scene]:
-        """What is drawn; made once, with a warning for each flag that it cannot show."""
+        """Return the scenes, made once, with a warning for each flag that they cannot show."""
         scenes = self.make()
         for line in self._not_shown(scenes):
             say(f"camtool: warning: {line}", quiet=self.quiet)
         return scenes
 
     def __call__(self, name: str) -> bytes:
-        """The picture, for a file of this name."""
+        """Draw the picture, for a file of this name."""
         scenes, options = self.scenes, self.flags.options()
         progress().begin("drawing the picture")
         if not _judged(scenes):  # the findings say why; the picture shows what there is
@@ -277,7 +278,8 @@ class Painter:
         return render(scenes[0], name, options)
 
     def closeups(self) -> Iterator[tuple[str, bytes]]:
-        """Caption and SVG of what a page shows besides; of the last scene, which is the result."""
+        """Return caption and SVG of the further pictures of a page, of the last scene, which is
+        the result."""
         from camtool.pictures.draw import render
         from camtool.pictures.limits import draw_limits, has_limits
         from camtool.pictures.picture import closeups
@@ -291,7 +293,7 @@ class Painter:
             yield caption, render(self.scenes[-1], CLOSEUP, options)
 
     def stock(self) -> bytes | None:
-        """The SVG of how the stock lies on the machine; None where there is no drawing."""
+        """Draw the SVG of the stock on the machine; None without a drawing."""
         from camtool.pictures.draw import render
         from camtool.pictures.picture import on_stock
 
@@ -299,7 +301,7 @@ class Painter:
         return None if found is None else render(found[0], CLOSEUP, found[1])
 
     def _not_shown(self, scenes: Sequence[Scene]) -> Iterator[str]:
-        """Warnings about empty layers, and about errors where nothing could be judged."""
+        """Yield warnings about empty layers, and about errors if nothing could be judged."""
         for name in self._missing(scenes):
             yield f"--layers {name}: nothing in this picture{layer_of(name).hint}"
         for flag in ("--exaggerate", "--polar"):
@@ -318,5 +320,5 @@ class Painter:
 
 
 def _judged(scenes: Sequence[Scene]) -> bool:
-    """Whether all have a predicted path."""
+    """True if all scenes have a predicted path."""
     return all(scene.trace_points is not None for scene in scenes)

@@ -50,7 +50,7 @@ from camtool.cli.picture_options import (
     picture_name,
     picture_options,
 )
-from camtool.cli.report import Outputs, report_option
+from camtool.cli.report import ReportOutputs, report_option
 from camtool.errors import CamtoolError, OptionError
 from camtool.records import replace
 
@@ -62,8 +62,8 @@ if TYPE_CHECKING:
 
 
 def scenes_of(run: Run, *, before: bool) -> list[Scene]:
-    """The predicted result; with `before`, also that of the job without its measures against
-    reversals and backlash. OptionError where the job has none."""
+    """Return the scene of the predicted result; with `before`, also that of the job without its
+    measures against reversals and backlash. OptionError if the job has none."""
     if not before or run.failed:
         return [run.scene()]
     if run.before is None:
@@ -81,7 +81,7 @@ Made = TypeVar("Made")
 
 @dataclass(frozen=True)
 class Posting:
-    """How drawings are posted."""
+    """The flags of posting drawings."""
 
     machine: MachineFlags
     gates: GateFlags
@@ -91,7 +91,7 @@ class Posting:
     no_verify: bool
 
     def load(self) -> LoadedTarget:
-        """The target; a usage error when the flags contradict each other."""
+        """Load the target; a usage error when the flags contradict each other."""
         if self.no_verify and self.gates.given:
             raise click.UsageError("--no-verify leaves nothing to hold against limits")
         self.inspection.check(without="--no-verify" if self.no_verify else None)
@@ -105,22 +105,22 @@ class Posting:
         on_read: Callable[[], None] | None = None,
         pictures: Sequence[str] = (),
     ) -> Run:
-        """The drawing posted, for pictures of these names; `on_read` is called when it has been
+        """Post the drawing, for pictures of these names; `on_read` is called when it has been
         read."""
         from camtool.pipeline import post_drawing
 
-        run = self._made(post_drawing, source, target, on_read=on_read, pictures=pictures)
-        return self.inspection.inspected(run)
+        run = self._post(post_drawing, source, target, on_read=on_read, pictures=pictures)
+        return self.inspection.inspect_run(run)
 
     def make_by_tool(
         self, source: str, target: LoadedTarget, *, pictures: Sequence[str] = ()
     ) -> tuple[Run, ...]:
-        """The same as a program for each turn of a tool."""
+        """Post the drawing as a program for each turn of a tool."""
         from camtool.pipeline import post_by_tool
 
-        return self._made(post_by_tool, source, target, pictures=pictures)
+        return self._post(post_by_tool, source, target, pictures=pictures)
 
-    def _made(
+    def _post(
         self,
         post: Callable[..., Made],
         source: str,
@@ -135,7 +135,7 @@ class Posting:
         read = self.drawing.read(source, target.machine, wanted)
         if on_read is not None:
             on_read()
-        with self.job.blamed():
+        with self.job.name_job_file():
             return post(
                 read,
                 wanted,
@@ -147,19 +147,19 @@ class Posting:
             )
 
     def files(self, source: str) -> list[str]:
-        """The files that a program is made of: drawing, job, its tool table, tolerances, and
-        machine."""
+        """Return the files that a program is made from: drawing, job, its tool table, tolerances,
+        and machine."""
         return [source, *self.job.files(), *self.inspection.files(), *self.machine.files()]
 
     def of(self, source: str) -> Posting:
-        """The same with the drawing's own job file if it has one, in the place of `--job`; flags
-        are laid over either."""
+        """Return these flags with the drawing's own job file, if it has one, in place of `--job`;
+        flags override either."""
         own = own_job(Path(source))
         return self if own is None else replace(self, job=replace(self.job, file=str(own)))
 
 
 def posting_options(command: Command) -> Command:
-    """Adds `posting: Posting`."""
+    """Add `posting: Posting`."""
     inner = with_flags(command, "posting", Posting, [])
     inner = inspection_options(job_options(drawing_options(inner)))
     inner = machine_options(gate_options(inner))
@@ -220,7 +220,7 @@ def post(
     """
     if watching and STDOUT in (source, output, report, page):
         raise click.UsageError("--watch works on files: neither reads stdin nor writes stdout")
-    outputs = Outputs(preview, report, page)
+    outputs = ReportOutputs(preview, report, page)
     picture.check(outputs.pictures, UNVERIFIED if posting.no_verify else RESULT)
     posting.inspection.check(without=None if split is None else "--split")
     if split is not None and STDOUT in (output or source, preview, page):
@@ -233,7 +233,7 @@ def post(
     def once() -> int:
         target = posting.load()
         reads = [*posting.files(source), str(target.file)]
-        asked = Asked(source, output, outputs, reads)
+        asked = RequestedOutputs(source, output, outputs, reads)
         asked.check(target.machine.target.extension, verified=not posting.no_verify)
         if split is not None:
             runs = posting.make_by_tool(source, target, pictures=outputs.pictures)
@@ -251,28 +251,28 @@ def post(
 
 # How `post` and `convert` end: all files or none, and a short summary.
 
-MOST_PLACEHOLDERS = 2
+MAX_PLACEHOLDERS = 2
 """Of a machine file that leaves out no more than these, its own file is to be completed."""
 
 SHORT = {"flat": "mill", "v": "bit"}
 """What kinds of tools are called in names of files, where not as jobs call them."""
 
-MOST_OF_NAME = 40
+MAX_NAME_CHARS = 40
 """So many characters of a tool's name go into the name of a file."""
 
 
 @dataclass(frozen=True)
-class Asked:
-    """What the user wants written: `source` names the drawing or program that is read, `output`
-    the program that is written; `reads` are all files that are read."""
+class RequestedOutputs:
+    """The requested outputs: `source` is the drawing or program that is read, `output` the program
+    that is written; `reads` are all files that are read."""
 
     source: str
     output: str | None
-    outputs: Outputs = field(default_factory=Outputs)
+    outputs: ReportOutputs = field(default_factory=ReportOutputs)
     reads: Sequence[str] = ()
 
     def check(self, extension: str, *, verified: bool) -> None:
-        """OutputError, before any work is done, when a place cannot be written."""
+        """Raise OutputError, before any work is done, when a place cannot be written."""
         for flag, name in (("--json", self.outputs.report), ("--report", self.outputs.page)):
             if name is not None and not verified:
                 raise click.UsageError(
@@ -281,19 +281,23 @@ class Asked:
         self.outputs.check(self.reads, self.program(extension))
 
     def places(self) -> list[str | None]:
-        """The files of a program whose name is known."""
+        """Files of a program whose name is known."""
         made = self.outputs
         return [self.output, made.preview, made.report, made.page, made.beside]
 
     def program(self, extension: str) -> str:
-        """The program's name; when none is given the source's, here; stdin goes to stdout."""
+        """Return the name of the program; by default that of the source, in this folder; for stdin
+        it is stdout."""
         if self.output is not None:
             return self.output
         return STDOUT if self.source == STDOUT else Path(self.source).stem + extension
 
 
-def finish(run: Run, asked: Asked, *, picture: Painter, quiet: bool, verbose: bool) -> int:
-    """Write what was asked for, and say so; the exit code. `picture` draws the pictures.
+def finish(
+    run: Run, asked: RequestedOutputs, *, picture: Painter, quiet: bool, verbose: bool
+) -> int:
+    """Write the requested files, and report them; return the exit code. `picture` draws the
+    pictures.
 
     With an error, only the page of `--report` is written: it shows what is wrong.
     """
@@ -318,8 +322,8 @@ def finish(run: Run, asked: Asked, *, picture: Painter, quiet: bool, verbose: bo
 
 
 def _check_ours(run: Run, name: str) -> None:
-    """OutputError when a file of a name that nobody gave is no program by camtool, where such
-    programs say so."""
+    """Raise OutputError if a file with a default name exists and is no program by camtool, for
+    dialects whose programs say so."""
     made_elsewhere = run.target.target.made_elsewhere
     assert run.program is not None
     if not made_elsewhere(run.program.data):
@@ -327,7 +331,7 @@ def _check_ours(run: Run, name: str) -> None:
 
 
 def _say_written(run: Run, output: str, *, quiet: bool) -> None:
-    """The summary of a program that was written there."""
+    """Show the summary of a written program."""
     assert run.program is not None
     if run.report is not None and not quiet:
         summary = run.report.to_text(findings=False)
@@ -340,14 +344,14 @@ def _say_written(run: Run, output: str, *, quiet: bool) -> None:
 
 def finish_parts(
     runs: Sequence[Run],
-    asked: Asked,
+    asked: RequestedOutputs,
     pictures: Sequence[Painter],
     *,
     quiet: bool,
     verbose: bool,
 ) -> int:
-    """As `finish`, for the programs of one drawing, each with its own picture and page: all files
-    or none. The JSON is one, and lists the programs."""
+    """Write the programs of one drawing as `finish` does, each with its own picture and page: all
+    files or none. The JSON is one, and lists the programs."""
     findings = dict.fromkeys(finding for run in runs for finding in run.findings)
     say_findings(findings, quiet=quiet, verbose=verbose)
     parts = [_part(run, asked, number, len(runs)) for number, run in enumerate(runs, 1)]
@@ -372,7 +376,7 @@ def finish_parts(
         _check_ours(run, name)
         files |= {name: run.program.data, **part.outputs.files(run, picture)}
     if report is not None:
-        files[report] = _listed(runs, parts)
+        files[report] = _programs_json(runs, parts)
     write_all(files)
     for run, name in zip(runs, names, strict=True):
         _say_written(run, name, quiet=quiet)
@@ -380,22 +384,22 @@ def finish_parts(
 
 
 def _placeholder_words(names: Sequence[str]) -> str:
-    """The note where numbers of the machine are not known."""
+    """Return the note about unknown numbers of the machine."""
     *most, last = names
     said = f"{', '.join(most)} and {last} are placeholders" if most else f"{last} is a placeholder"
     if names == ("backlash",):
         return f"{said}: camtool coupon lines, then camtool calibrate, give yours"
-    if len(names) <= MOST_PLACEHOLDERS:
+    if len(names) <= MAX_PLACEHOLDERS:
         return f"{said}: give them in your machine's file"
     return f"{said}: camtool init makes your machine's file"
 
 
-def _part(run: Run, asked: Asked, number: int, count: int) -> Asked:
-    """What is written of one program of `count`: all names with its number and its tool, which
-    sort as the programs run."""
+def _part(run: Run, asked: RequestedOutputs, number: int, count: int) -> RequestedOutputs:
+    """Return the outputs of one program of `count`: all names with its number and its tool, which
+    sort in the order of the runs."""
     tool = _tool(run)
     kind = "tool" if tool is None else tool.name or SHORT.get(tool.kind, tool.kind)
-    plain = re.sub(r"[^A-Za-z0-9_]+", "-", kind).strip("-")[:MOST_OF_NAME] or "tool"
+    plain = re.sub(r"[^A-Za-z0-9_]+", "-", kind).strip("-")[:MAX_NAME_CHARS] or "tool"
     mark = f"-{number:0{len(str(count))}}-{plain}"
 
     def marked(name: str | None) -> str | None:
@@ -408,17 +412,17 @@ def _part(run: Run, asked: Asked, number: int, count: int) -> Asked:
     made = replace(
         outputs, preview=marked(outputs.preview), page=marked(outputs.page), report=None
     )
-    return Asked(asked.source, marked(program), made, asked.reads)
+    return RequestedOutputs(asked.source, marked(program), made, asked.reads)
 
 
 def _tool(run: Run) -> ToolNote | None:
-    """The tool of a program that has one."""
+    """Return the tool of a program that has one."""
     operations = None if run.wanted is None else run.wanted.operations
     return None if operations is None else operations.notes[0].tool
 
 
-def _listed(runs: Sequence[Run], parts: Sequence[Asked]) -> bytes:
-    """JSON: of each program its file, its tool, its picture and page, and its report."""
+def _programs_json(runs: Sequence[Run], parts: Sequence[RequestedOutputs]) -> bytes:
+    """Return JSON with file, tool, picture, page and report of each program."""
     programs = []
     for run, part in zip(runs, parts, strict=True):
         tool = _tool(run)
@@ -434,8 +438,8 @@ def _listed(runs: Sequence[Run], parts: Sequence[Asked]) -> bytes:
     return f"{json.dumps({'programs': programs}, indent=2, ensure_ascii=False)}\n".encode()
 
 
-def _page_alone(run: Run, outputs: Outputs, picture: Painter) -> dict[str, bytes]:
-    """The files of the page, and the picture of `--preview` if that is what the page shows."""
+def _page_alone(run: Run, outputs: ReportOutputs, picture: Painter) -> dict[str, bytes]:
+    """Return the files of the page, and the picture of `--preview` if the page shows it."""
     files, linked = outputs.page_files(run, picture), outputs.linked
     return files if linked is None or linked in files else {**files, linked: picture(linked)}
 
@@ -469,21 +473,21 @@ def watch(
     try:
         seen = _digests(files)
         say(f"camtool: watching {', '.join(seen)}; Ctrl-C ends", quiet=quiet)
-        _tried(again)
+        _try_once(again)
         while True:
             wait(POLL_S)
-            now = _settled(files, seen, wait)
+            now = _wait_until_stable(files, seen, wait)
             changed = [file for file in now if file not in seen or now[file] != seen[file]]
             seen = now
             if changed:
                 say(f"camtool: changed: {', '.join(changed)}", quiet=quiet)
-                _tried(again)
+                _try_once(again)
     except KeyboardInterrupt:
         say("camtool: watching ended", quiet=quiet)
         return 0
 
 
-def _tried(again: Callable[[], int]) -> None:
+def _try_once(again: Callable[[], int]) -> None:
     try:
         with signs_of_command().counting():
             again()
@@ -491,8 +495,8 @@ def _tried(again: Callable[[], int]) -> None:
         say_error(error)
 
 
-def _settled(files: Files, seen: Digests, wait: Callable[[float], None]) -> Digests:
-    """The content of the files as digests; after a change, once it stays the same."""
+def _wait_until_stable(files: Files, seen: Digests, wait: Callable[[float], None]) -> Digests:
+    """Return the content of the files as digests; after a change, once it no longer changes."""
     now = _digests(files)
     while now != seen:
         wait(SETTLED_S)
@@ -503,7 +507,7 @@ def _settled(files: Files, seen: Digests, wait: Callable[[float], None]) -> Dige
 
 
 def _digests(files: Files) -> Digests:
-    """The content of each file as a digest; None when it cannot be read just now."""
+    """Return the digest of each file; None when it cannot be read at the moment."""
     return {file: _digest(Path(file)) for file in files()}
 
 

@@ -91,7 +91,7 @@ def preview(
     # A viewer plays the program, which needs the times of the machine's model.
     simulate = simulate or (is_viewer(output) and machine.name() is not None)
 
-    seen = Seen(machine, simulate, asks_for_path, job, drawing, output)
+    seen = SceneSource(machine, simulate, asks_for_path, job, drawing, output)
     found = [seen.scene(name) for name in sources]
     painted = picture.painter(lambda: [scene for scene, _ in found], quiet=quiet)
     write_all({output: painted(output)})
@@ -102,17 +102,17 @@ def preview(
 
 
 def _canvas(machine: MachineFlags, *, simulate: bool) -> Canvas:
-    """What the picture can show."""
+    """Return the possible content of the picture."""
     if machine.name() is None:
         return DRAWING
     return RESULT if simulate else Canvas("add --simulate")
 
 
 @dataclass(frozen=True)
-class Seen:
-    """How files are made into scenes, each with the findings of its drawing, or with those of the
-    program where no part can be made of it. `asks_for_path`: a drawing is shown with its toolpath,
-    for a flag says something of it; a machine by default is for programs."""
+class SceneSource:
+    """Convert files to scenes, each with the findings of its drawing, or of the program if it has
+    no drawing. `asks_for_path`: a drawing is shown with its toolpath, since a flag is about it; a
+    default machine is for programs."""
 
     machine: MachineFlags
     simulate: bool
@@ -122,18 +122,20 @@ class Seen:
     output: str
 
     def scene(self, source: str) -> tuple[Scene, Findings]:
-        """A drawing, a program, or the toolpath planned from a drawing."""
+        """Return the scene of a drawing, a program, or the toolpath planned from a drawing."""
         if self.machine.name() is None:
-            return self._of_drawing(source)
+            return self._drawing_scene(source)
         target = self.machine.load()
         if Path(source).suffix.lower() == target.machine.target.extension or self._is_no_drawing(
             source
         ):
-            return self._of_program(source, target), ()
-        return self._of_job(source, target) if self.asks_for_path else self._of_drawing(source)
+            return self._program_scene(source, target), ()
+        return (
+            self._job_scene(source, target) if self.asks_for_path else self._drawing_scene(source)
+        )
 
     def _is_no_drawing(self, source: str) -> bool:
-        """Whether a file's content says that it is none: then it is a program of the target."""
+        """True if the content of a file is no drawing: then it is a program of the target."""
         from camtool.importers.formats import NoDrawingError, find_format
         from camtool.importers.read import file_bytes
 
@@ -148,14 +150,14 @@ class Seen:
             return False
         return False
 
-    def _of_drawing(self, source: str) -> tuple[Scene, Findings]:
+    def _drawing_scene(self, source: str) -> tuple[Scene, Findings]:
         from camtool.pictures.scene import scene_of_drawing
 
         _refuse_program(source)
         read = self.drawing.read(source)
         return scene_of_drawing(read, Path(read.file).name), read.findings
 
-    def _of_program(self, source: str, target: LoadedTarget) -> Scene:
+    def _program_scene(self, source: str, target: LoadedTarget) -> Scene:
         from camtool.pictures.options import points_for
         from camtool.pipeline import Judging, read_program, verify_program
 
@@ -168,7 +170,7 @@ class Seen:
             data, target, source=source, judging=judging, progress=progress()
         ).scene()
 
-    def _of_job(self, source: str, target: LoadedTarget) -> tuple[Scene, Findings]:
+    def _job_scene(self, source: str, target: LoadedTarget) -> tuple[Scene, Findings]:
         from camtool.pictures.options import points_for
         from camtool.pipeline import post_drawing
         from camtool.planning.compensating import compensated
@@ -177,7 +179,7 @@ class Seen:
 
         title, job = Path(source).name, self.job.job(self.drawing)
         read = self.drawing.read(source, target.machine, job)
-        with self.job.blamed():
+        with self.job.name_job_file():
             if self.simulate:
                 run = post_drawing(
                     read,
@@ -196,7 +198,8 @@ class Seen:
 
 
 def _refuse_program(source: str) -> None:
-    """CamtoolError when the file's extension says that it is a program and no target is given."""
+    """Raise CamtoolError when the extension of the file is that of a program and no target is
+    given."""
     from camtool.target.registry import each_target, list_target
 
     for name, listed in each_target(list_target):

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from camtool.cli.files import STDOUT, check_places, is_foreign, sealed
+from camtool.cli.files import STDOUT, check_places, is_foreign, seal
 from camtool.cli.picture_options import FLAGS as PICTURE_FLAGS
 from camtool.cli.picture_options import Painter, is_viewer
 from camtool.errors import OutputError
@@ -40,23 +40,23 @@ its own."""
 
 
 def report_option(command: Any) -> Any:
-    """Adds `page: str | None`, the name of the page that `--report` asks for."""
+    """Add `page: str | None`, the name of the page that `--report` requests."""
     text = "A page: summary, picture, tables, findings; .html, .md or .json; - is Markdown."
     add = click.option("--report", "page", metavar="FILE", callback=_page_name, help=text)
     return add(command)
 
 
 def _page_name(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
-    """The name of a page that we can make; - is Markdown on stdout."""
+    """Validate the name of a page; - is Markdown on stdout."""
     if value not in (None, STDOUT) and PurePath(str(value)).suffix.lower() not in PAGES:
         raise click.BadParameter(f"{value!r} ends in none of {', '.join(PAGES)}", ctx, param)
     return value
 
 
 @dataclass(frozen=True)
-class Outputs:
-    """What the user wants written about a program: a picture, the report as JSON, a page (as named
-    by `--preview`, `--json` and `--report`); None is not wanted."""
+class ReportOutputs:
+    """The requested outputs of a program: a picture, the report as JSON, a page (the values of
+    `--preview`, `--json` and `--report`); None is not requested."""
 
     preview: str | None = None
     report: str | None = None
@@ -64,8 +64,8 @@ class Outputs:
 
     @property
     def linked(self) -> str | None:
-        """The picture that the page links to: the one of `--preview`, unless that is a viewer, or
-        one of the page's own name. None where it links to none."""
+        """Picture that the page links to: that of `--preview`, unless that is a viewer, or one of
+        the page's own name. None if it links to none."""
         if self.page in (None, STDOUT) or PurePath(str(self.page)).suffix.lower() != ".md":
             return None
         if self.preview is not None and not is_viewer(self.preview):
@@ -74,19 +74,19 @@ class Outputs:
 
     @property
     def beside(self) -> str | None:
-        """The picture that the page brings along, which nobody asked for by name."""
+        """Name of the picture written beside the page when no --preview was given."""
         return None if self.linked == self.preview else self.linked
 
     @property
     def pictures(self) -> list[str]:
-        """The pictures to be made, by names of their kind."""
+        """Pictures to draw, by names of their kind."""
         held = self.page is not None and self.page.lower().endswith(".html")
         names = (self.preview, self.beside, EMBEDDED if held else None)
         return [each for each in names if each is not None]
 
     def check(self, reads: Iterable[str | None], *others: str) -> None:
-        """OutputError, before any work is done, when a place of these or of `others` cannot be
-        written, is one of `reads`, or holds a picture that the page did not bring along."""
+        """Raise OutputError, before any work is done, when a place of these or of `others` cannot
+        be written, is one of `reads`, or holds a picture that the page did not write."""
         names = [*others, self.preview, self.report, self.page, self.beside]
         check_places(reads, names)
         if self.beside is not None and is_foreign(self.beside, str(self.page)):
@@ -97,7 +97,7 @@ class Outputs:
             )
 
     def files(self, run: Run, picture: Painter) -> dict[str, bytes]:
-        """All of them; `picture` draws the ones that were asked."""
+        """Return all files; `picture` draws the requested pictures."""
         files: dict[str, bytes] = {}
         if self.preview is not None:
             files[self.preview] = picture(self.preview)
@@ -106,7 +106,7 @@ class Outputs:
         return {**files, **self.page_files(run, picture)}
 
     def page_files(self, run: Run, picture: Painter) -> dict[str, bytes]:
-        """The page, and the picture beside it where it has one of its own."""
+        """Return the page, and the picture beside it if it has one of its own."""
         from camtool.verification.report import page_html, page_json, page_markdown
 
         if self.page is None:
@@ -116,24 +116,24 @@ class Outputs:
             return {name: page_json(_page(run, ())).encode()}
         if name != STDOUT and suffix == ".html":
             pictures = ((_CAPTION, picture(EMBEDDED)), *picture.closeups())
-            shown = tuple((caption, _held(data)) for caption, data in pictures)
+            shown = tuple((caption, _embedded_address(data)) for caption, data in pictures)
             stock = picture.stock()
-            page = _page(run, shown, "" if stock is None else _held(stock))
+            page = _page(run, shown, "" if stock is None else _embedded_address(stock))
             return {name: page_html(page).encode()}
-        links = () if self.linked is None else ((_CAPTION, _from(name, self.linked)),)
+        links = () if self.linked is None else ((_CAPTION, _relative_address(name, self.linked)),)
         files = {name: page_markdown(_page(run, links)).encode()}
         if self.beside is None:
             return files
-        return {**files, self.beside: sealed(picture(self.beside), name)}
+        return {**files, self.beside: seal(picture(self.beside), name)}
 
 
-def _held(svg: bytes) -> str:
-    """The address of a picture that the page itself holds."""
+def _embedded_address(svg: bytes) -> str:
+    """Return the address of a picture embedded in the page."""
     return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"
 
 
-def _from(page_name: str, picture_name: str) -> str:
-    """The picture's address as the page sees it, with forward slashes."""
+def _relative_address(page_name: str, picture_name: str) -> str:
+    """Return the address of the picture relative to the page, with forward slashes."""
     folder = PurePath(page_name).parent
     return PurePath(os.path.relpath(picture_name, folder)).as_posix()
 
@@ -161,7 +161,8 @@ def _setup(run: Run) -> Setup:
 
 
 def _flags_given() -> tuple[tuple[str, str], ...]:
-    """The flags of the running command that say how a program is made or judged, as given."""
+    """Return the given flags of the running command that affect how a program is made or
+    judged."""
     context = click.get_current_context()
     given = click.core.ParameterSource.COMMANDLINE
     return tuple(

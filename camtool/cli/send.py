@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from camtool.cli.files import read_bytes, refuse_same, shown, write_all
+from camtool.cli.files import display_name, read_bytes, refuse_same, write_all
 from camtool.cli.home import UNLOCK
 from camtool.cli.life_signs import progress, signs_of_command
 from camtool.cli.messages import say, say_findings, show_facts, show_text
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from camtool.target.registry import LoadedTarget
     from camtool.target.wire import Conversation, ToolAt, Wire
 
-MOST_NAMED = 5
+MAX_NAMED = 5
 """So many blocks that stop are named."""
 
 NAME_WIDTH = 11
@@ -97,7 +97,7 @@ def send(
     target, data = machine.load(), read_bytes(program)
     place = Path(journal or f"{program}.journal")
     refuse_same([program, *machine.files()], [str(place), live])
-    left = _resumed(place, data, target) if resume else _unfinished(place, data)
+    left = _read_state(place, data, target) if resume else _find_unfinished(place, data)
     begin = left.block if left and resume else (first or 1) - 1
     if first is None and not resume:
         if tool_at:
@@ -120,7 +120,7 @@ def send(
     one = consignment(
         data,
         target,
-        source=shown(program),
+        source=display_name(program),
         first=begin,
         left=left,
         tool_at=tool_at,
@@ -143,13 +143,13 @@ def send(
     line = port_of(port, baud, one.wire, target)
     if speed != 1.0 and not line.is_virtual:
         raise OptionError("a real machine has only its own speed", where="--speed")
-    if not yes and not _agreed():
+    if not yes and not _confirm():
         return 1
-    job = _Job(program, one, target, line, place, live, resume, as_json, quiet)
+    job = _Sending(program, one, target, line, place, live, resume, as_json, quiet)
     return job.run(single=single, home=home, unlock=unlock, speed=speed, yes=yes)
 
 
-def _unfinished(place: Path, data: bytes) -> JournalState | None:
+def _find_unfinished(place: Path, data: bytes) -> JournalState | None:
     """Return the state in the journal of this program, None if there is none or it is finished."""
     from camtool.sending.journal import read_journal
     from camtool.sending.prepare import digest
@@ -182,7 +182,7 @@ def _tool_at(wire: Wire, left: JournalState, said: ToolAt, target: LoadedTarget)
     raise OptionError(asked.partition(": ")[0], where="--resume", mend=mend)
 
 
-def _resumed(place: Path, data: bytes, target: LoadedTarget) -> JournalState:
+def _read_state(place: Path, data: bytes, target: LoadedTarget) -> JournalState:
     """Return the state in a journal; InputError for that of another program."""
     from camtool.sending.journal import read_journal
     from camtool.sending.prepare import digest
@@ -204,7 +204,7 @@ def _resumed(place: Path, data: bytes, target: LoadedTarget) -> JournalState:
 
 
 def _refuse_waiting(one: Consignment, *, single: bool) -> None:
-    """Refuse, where nobody can answer, what would wait for an answer for ever."""
+    """Refuse programs that would wait for an answer if nobody can answer."""
     asks = sum(bool(packet.ask) for packet in one.packets[1:])
     if asks:
         raise click.UsageError(f"it waits for an answer {asks} times: run it at a terminal")
@@ -214,17 +214,17 @@ def _refuse_waiting(one: Consignment, *, single: bool) -> None:
     if stops:
         named = ", ".join(
             f"block {one.block_of(packet.block) + 1} ({packet.data.strip().decode('latin-1')})"
-            for packet in stops[:MOST_NAMED]
+            for packet in stops[:MAX_NAMED]
         )
-        more = f" and {len(stops) - MOST_NAMED} more" if len(stops) > MOST_NAMED else ""
+        more = f" and {len(stops) - MAX_NAMED} more" if len(stops) > MAX_NAMED else ""
         raise click.UsageError(
             f"the program stops until somebody lets it go on, in {named}{more}: run it at a "
             "terminal, or take the stops out"
         )
 
 
-def _agreed() -> bool:
-    """Whether the user, at a terminal, says yes."""
+def _confirm() -> bool:
+    """Ask the user at a terminal; True for yes."""
     if not sys.stdin.isatty():
         raise click.UsageError("nobody can be asked here: give --yes")
     with signs_of_command().hidden():
@@ -236,8 +236,8 @@ def _agreed() -> bool:
 
 
 @dataclass
-class _Job:
-    """One program under way: what the user wants, and what is shown."""
+class _Sending:
+    """The sending of one program: the requests of the user, and the display."""
 
     program: str
     one: Consignment
@@ -255,8 +255,8 @@ class _Job:
     _paged: tuple[float, str] = field(default=(0.0, ""), init=False)
 
     def run(self, *, single: bool, home: bool, unlock: bool, speed: float, yes: bool) -> int:
-        """Send it; the exit code."""
-        from camtool.cli.wishes import Messages, Wishes, keys_of_terminal
+        """Send the program; return the exit code."""
+        from camtool.cli.wishes import Messages, UserRequests, keys_of_terminal
         from camtool.sending.drive import Driver, Request, counts_of
         from camtool.sending.journal import Journal
         from camtool.sending.line import opened_line
@@ -289,7 +289,7 @@ class _Job:
             unlock=unlock,
             late_s=LATE_S * speed,
             paced=real,
-            file=self._laid(),
+            file=self._program_file(),
             standing=one.standing if one.wire.place == "told" else None,
             reach_mm=one.reach_mm,
         )
@@ -300,13 +300,13 @@ class _Job:
         keys |= {"s": Request.STEP, "q": Request.STOP}
         with opened_line(self.port) as line, keys_of_terminal() as key:
             journal = Journal(self.place, self._head(), more=self.more)
-            wishes = Wishes(key, keys)
+            wishes = UserRequests(key, keys)
             self._tell = tell = Messages(quiet=self.quiet)
             driver = Driver(
                 line, journal, one.block_of, wishes, self._watch, tell, speed, one.place_of
             )
             try:
-                with wishes.caught():
+                with wishes.catch_signals():
                     driver.carry(conversation)
             finally:
                 counts = counts_of(conversation, one.block_of)
@@ -330,8 +330,8 @@ class _Job:
         say(f"camtool: error: {one.run.source}: {why}; {done}; --resume goes on", quiet=False)
         return 1
 
-    def _laid(self) -> str:
-        """The path at which what is sent lies, for a controller that opens a file itself."""
+    def _program_file(self) -> str:
+        """Return the path of the file that is sent, for a controller that opens a file itself."""
         one = self.one
         if not one.wire.opens_file:
             return ""
@@ -340,7 +340,7 @@ class _Job:
         file = Path(self.program)
         copy = file.with_name(f"{file.stem}.sent{file.suffix}").resolve()
         write_all({str(copy): one.data})
-        say(f"camtool: it opens {shown(str(copy))}", quiet=self.quiet)
+        say(f"camtool: it opens {display_name(str(copy))}", quiet=self.quiet)
         return str(copy)
 
     def _head(self) -> dict[str, Any]:
@@ -356,7 +356,7 @@ class _Job:
         }
 
     def _watch(self, conversation: Conversation) -> None:
-        """Show where it stands, when that has changed."""
+        """Show the state of the conversation when it has changed."""
         from camtool.cli.wishes import takes_more
         from camtool.verification.report import clock
 
@@ -390,8 +390,8 @@ class _Job:
             self._tell(f"waiting: {conversation.why} (r goes on)")
 
     def _show_page(self, conversation: Conversation, left_s: float) -> None:
-        """Write the live page anew, once a second and when the state changes. A page that cannot
-        be written is given up: the machine is not stopped for it."""
+        """Update the live page, once a second and when the state changes. A page that cannot be
+        written is given up: the machine is not stopped for it."""
         from camtool.sending.live import RELOAD_S
         from camtool.verification.report import clock
 

@@ -57,9 +57,9 @@ def stale(
         if not missing and not _has_program(name):
             say(f"camtool: {name}: has no program", quiet=not verbose)
             continue
-        faults: list[Fault] = []
+        faults: list[StaleProgram] = []
         for drawing in drawings:
-            expected = _posted(drawing, posting, target)
+            expected = _post_now(drawing, posting, target)
             fault = _fault(drawing, name, expected, missing=missing)
             faults += [] if fault is None else [fault]
             if fault is None:  # of several drawings of one name, the program needs to match one
@@ -71,26 +71,28 @@ def stale(
 
 
 @dataclass(frozen=True)
-class Fault:
-    """Why a program is out of date, and the exit code for it."""
+class StaleProgram:
+    """The reason why a program is out of date, and the exit code for it."""
 
     code: int
     words: str
 
 
 def named_drawings(files: Sequence[str]) -> dict[Path, list[Path]]:
-    """The drawings among these files, beside them or in them, by their names without suffix.
+    """Find the drawings of these files: the files themselves, those beside them, or those in
+    folders, by their names without suffix.
 
     A picture of a program may lie beside its drawing as an SVG of the same name, so that one name
     may have several; the likeliest is first. InputError for what is not there.
     """
     names = dict.fromkeys(name for file in files for name in _names(Path(file)))
-    found = {name: _ordered(_beside(name)) for name in names}
+    found = {name: _ordered(_files_named(name)) for name in names}
     return {name: drawings for name, drawings in found.items() if drawings}
 
 
 def drawings_of(files: Sequence[str], programs: Path) -> dict[Path, list[Path]]:
-    """The drawings that a batch of these would take, by the names of their programs in a folder.
+    """Return the drawings that a batch of these would take, by the names of their programs in a
+    folder.
 
     InputError for what is no drawing or not there, OutputError for two of one name, as of a batch.
     """
@@ -122,38 +124,41 @@ def _ordered(files: list[Path]) -> list[Path]:
     return sorted(drawings, key=lambda file: SUFFIXES.index(file.suffix.lower()))
 
 
-def _beside(name: Path) -> list[Path]:
-    """The files of this name with any suffix, sorted."""
+def _files_named(name: Path) -> list[Path]:
+    """Return the files of this name with any suffix, sorted."""
     if not name.parent.is_dir():
         return []
     return sorted(other for other in name.parent.iterdir() if other.with_suffix("") == name)
 
 
 def _has_program(name: Path) -> bool:
-    """Whether a file there may be a program: a dialect may have several suffixes."""
-    return any(file.suffix.lower() not in (*SUFFIXES, OWN_JOB) for file in _beside(name))
+    """True if a file there may be a program: a dialect may have several suffixes."""
+    return any(file.suffix.lower() not in (*SUFFIXES, OWN_JOB) for file in _files_named(name))
 
 
-def _posted(drawing: Path, posting: Posting, target: LoadedTarget) -> Program | Fault:
-    """The program that camtool writes for a drawing now, or why there is none."""
+def _post_now(drawing: Path, posting: Posting, target: LoadedTarget) -> Program | StaleProgram:
+    """Return the program that camtool writes for a drawing now, or the reason why there is
+    none."""
     try:
         run = posting.of(str(drawing)).make(str(drawing), target)
     except CamtoolError as error:
-        return Fault(error.exit_code, str(error))
+        return StaleProgram(error.exit_code, str(error))
     program = run.program
     if run.failed or program is None:
         grave = next(each for each in run.findings if each.severity >= Severity.ERROR)
-        return Fault(1, f"{drawing}: cannot be posted any more: {grave}")
+        return StaleProgram(1, f"{drawing}: cannot be posted any more: {grave}")
     return program
 
 
-def _fault(drawing: Path, name: Path, expected: Program | Fault, *, missing: bool) -> Fault | None:
-    """Why the program of a drawing is out of date; None when it is not."""
-    if isinstance(expected, Fault):
+def _fault(
+    drawing: Path, name: Path, expected: Program | StaleProgram, *, missing: bool
+) -> StaleProgram | None:
+    """Return the reason why the program of a drawing is out of date; None if it is not."""
+    if isinstance(expected, StaleProgram):
         return expected
     place = Path(f"{name}{expected.extension}")
     if not place.is_file():
-        return Fault(1, f"{place}: is not there; post {drawing}") if missing else None
+        return StaleProgram(1, f"{place}: is not there; post {drawing}") if missing else None
     if place.read_bytes() == expected.data:
         return None
-    return Fault(1, f"{place}: is not what camtool writes of {drawing} now; post it again")
+    return StaleProgram(1, f"{place}: is not what camtool writes of {drawing} now; post it again")

@@ -27,11 +27,11 @@ class _Targets(click.Group):
     """`new` is a command; every other word is the name of a target to show."""
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """The command of this name, or the one that shows a target."""
+        """Return the command of this name, or the one that shows a target."""
         return super().get_command(ctx, cmd_name) or show
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-        """The commands and the targets."""
+        """Return the commands and the targets."""
         return [*super().shell_complete(ctx, incomplete), *target_items(incomplete)]
 
 
@@ -96,7 +96,7 @@ def new(name: str, extends: str, output: str | None, quiet: bool, verbose: bool)
 
 
 def target_items(incomplete: str) -> Iterator[CompletionItem]:
-    """The machines, each with its title."""
+    """Return the machines, each with its title."""
     from click.shell_completion import CompletionItem
 
     from camtool.target.registry import each_target, list_target
@@ -140,7 +140,7 @@ def _list(as_json: bool) -> None:
 
 
 def _own_machines(broken: list[CamtoolError]) -> Iterator[dict[str, Any]]:
-    """The user's machines, as rows; errors are appended to `broken`."""
+    """Return the user's machines as rows; errors are appended to `broken`."""
     from camtool.project import project_of
     from camtool.target.loader import extended_by
 
@@ -156,7 +156,7 @@ def _own_machines(broken: list[CamtoolError]) -> Iterator[dict[str, Any]]:
 
 
 def _table(rows: list[dict[str, Any]], own: list[dict[str, Any]]) -> None:
-    """The list as a table, for terminals."""
+    """Format the list as a table, for terminals."""
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
@@ -182,12 +182,12 @@ def _show(name: str, machine: str | None, settings: tuple[str, ...], as_json: bo
     if as_json:
         write_all({STDOUT: to_json(values).encode()})
         return
-    for key, value in flat("", values):
+    for key, value in flat_lines("", values):
         show_text(f"{key} = {to_json(value, indent=0)}".rstrip("\n"))
     for name, cells in (("x", loaded.machine.play_map.x), ("y", loaded.machine.play_map.y)):
         if cells is not None:
             show_text("\n" + "\n".join(_backlash_table(name, cells, loaded.machine)), err=True)
-    unknown = [key for key, value in flat("", values["uncertainty"]) if value is None]
+    unknown = [key for key, value in flat_lines("", values["uncertainty"]) if value is None]
     if unknown:
         show_text(f"\nuncertainties that are not known: {', '.join(unknown)}", err=True)
     for code in loaded.target.codes:
@@ -203,7 +203,7 @@ def _show(name: str, machine: str | None, settings: tuple[str, ...], as_json: bo
 
 
 def _backlash_table(name: str, cells: PlayCells, machine: Machine) -> Iterator[str]:
-    """The cells as they lie on the table: +X to the right, +Y up."""
+    """Format the cells as they lie on the table: +X to the right, +Y up."""
     mean_um = getattr(machine.axes, name).backlash_mm * 1000.0
     instead = "" if machine.play_map.use else f", not used: play_map.use; {mean_um:g} everywhere"
     yield f"backlash of {name.upper()} by region of the table, µm{instead}"
@@ -223,10 +223,10 @@ def _speed(mm_min: float) -> str:
     return f"{mm_min:.4g} mm/min" if math.isfinite(mm_min) else "not known"
 
 
-def flat(prefix: str, table: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Nested tables as `axes.x.travel_mm` lines, as --set takes them."""
+def flat_lines(prefix: str, table: dict[str, Any]) -> list[tuple[str, Any]]:
+    """Yield nested tables as `axes.x.travel_mm` lines, as --set takes them."""
     rows: list[tuple[str, Any]] = []
     for key, value in table.items():
         name = f"{prefix}.{key}" if prefix else key
-        rows.extend(flat(name, value) if isinstance(value, dict) else [(name, value)])
+        rows.extend(flat_lines(name, value) if isinstance(value, dict) else [(name, value)])
     return rows

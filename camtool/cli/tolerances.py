@@ -54,7 +54,7 @@ def new(
     progress().begin("finding what can be measured")
     text, findings, faults = propose_file(read)
     write_all({output: text.encode()})
-    say_findings((*_told(read.findings), *findings), quiet=quiet, verbose=verbose)
+    say_findings((*_relevant_findings(read.findings), *findings), quiet=quiet, verbose=verbose)
     for fault in faults:
         say(f"camtool: warning: {fault}", quiet=quiet)
     where = "stdout" if output == STDOUT else output
@@ -94,7 +94,11 @@ def show(
     if against is not None:
         read = drawing.read(against)
         dimensions, found = dimensions_of(read, Path(file))
-        findings = (*_told(read.findings), *found, *unbound_findings(read, dimensions))
+        findings = (
+            *_relevant_findings(read.findings),
+            *found,
+            *unbound_findings(read, dimensions),
+        )
     if report is not None:
         rows = [_facts(each) for each in dimensions]
         said = msgspec.to_builtins(finding_reports(findings))
@@ -107,16 +111,16 @@ def show(
         raise click.exceptions.Exit(1)
 
 
-def _told(findings: Sequence[Finding]) -> Iterator[Finding]:
-    """Those of reading the drawing, but not that the lines of its dimensions are left out: the
-    dimensions themselves are read here."""
+def _relevant_findings(findings: Sequence[Finding]) -> Iterator[Finding]:
+    """Return the findings of reading the drawing, without those about its ignored dimension lines:
+    the dimensions themselves are read here."""
     for each in findings:
         if each.code != DrawingCode.ENTITY_SKIPPED or " DIMENSION left out" not in each.message:
             yield each
 
 
 def _facts(each: Dimension) -> dict[str, Any]:
-    """A dimension as JSON has it."""
+    """Return a dimension as data for JSON."""
     limits = each.limits
     return {
         "name": each.name,
@@ -132,7 +136,7 @@ def _facts(each: Dimension) -> dict[str, Any]:
 
 
 def _lines(dimensions: Sequence[Dimension]) -> Iterator[str]:
-    """A line for each: name, kind, nominal size, deviations, smallest and largest size."""
+    """Return a line for each: name, kind, nominal size, deviations, smallest and largest size."""
     rows = [_cells(each) for each in dimensions]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:

@@ -26,11 +26,11 @@ class _Tools(click.Group):
     """`new` is a command; every other word is the name of a tool to show."""
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """The command of this name, or the one that shows a tool."""
+        """Return the command of this name, or the one that shows a tool."""
         return super().get_command(ctx, cmd_name) or show
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-        """The commands and the tools."""
+        """Return the commands and the tools."""
         return [*super().shell_complete(ctx, incomplete), *_items(incomplete)]
 
 
@@ -54,7 +54,7 @@ def tools(context: click.Context, as_json: bool, quiet: bool, verbose: bool) -> 
     """
     if context.invoked_subcommand is not None:
         return
-    every = _every()
+    every = _all_tools()
     if as_json:
         rows = [_row(name, *each) for name, each in every.items()]
         write_all({STDOUT: to_json({"tools": rows}).encode()})
@@ -72,7 +72,7 @@ def tools(context: click.Context, as_json: bool, quiet: bool, verbose: bool) -> 
 @click.pass_context
 def show(context: click.Context, as_json: bool, quiet: bool, verbose: bool) -> None:
     """Everything about one tool."""
-    name, every = str(context.info_name), _every()
+    name, every = str(context.info_name), _all_tools()
     if name not in every:
         known = f"known are {', '.join(every)}" if every else "camtool tools new begins a library"
         raise OptionError(f"there is no tool {name!r}", mend=guess(name, every) + known)
@@ -114,8 +114,8 @@ def new(project: bool, output: str | None, quiet: bool, verbose: bool) -> None:
     say(f"written: {where}; put in the tools that you have", quiet=quiet)
 
 
-def _every() -> dict[str, tuple[Described, Path]]:
-    """All tools by name, the nearest of each, with their files."""
+def _all_tools() -> dict[str, tuple[Described, Path]]:
+    """Return all tools by name, the nearest of each, with their files."""
     from camtool.jobs.tools import read_library
     from camtool.project import project_of
 
@@ -129,13 +129,14 @@ def _every() -> dict[str, tuple[Described, Path]]:
 def _items(incomplete: str) -> Iterator[CompletionItem]:
     from click.shell_completion import CompletionItem
 
-    for name, (described, _) in _every().items():
+    for name, (described, _) in _all_tools().items():
         if name.startswith(incomplete):
             yield CompletionItem(name, help=_summary(name, described))
 
 
 def _row(name: str, described: Described, file: Path) -> dict[str, Any]:
-    """A tool as JSON has it: the values of its keys in mm, rad, mm/min, rev/min and m/min."""
+    """Return a tool as data for JSON: the values of its keys in mm, rad, mm/min, rev/min and
+    m/min."""
     from camtool.jobs.keys import PRESET, TOOL
 
     given = described.keys.given
@@ -154,7 +155,7 @@ def _tool(name: str, described: Described) -> Tool:
 
 
 def _derived(tool: Tool, preset: Mapping[str, Any]) -> dict[str, float]:
-    """The feed per tooth, mm, and the speed of the edge, m/min, that follow from a preset."""
+    """Compute the feed per tooth, mm, and the cutting speed, m/min, that follow from a preset."""
     feed, rpm = preset.get("feed_mm_min"), preset.get("spindle_rpm")
     found = {
         "feed_per_tooth_mm": None if feed is None else tool.feed_per_tooth_mm(feed, rpm),
@@ -164,7 +165,7 @@ def _derived(tool: Tool, preset: Mapping[str, Any]) -> dict[str, float]:
 
 
 def _summary(name: str, described: Described) -> str:
-    """`tool 1, end mill 3.175 mm, 2 flutes; for plywood, mdf`."""
+    """Return `tool 1, end mill 3.175 mm, 2 flutes; for plywood, mdf`."""
     from camtool.planning.naming import tool_words
 
     tool = _tool(name, described)

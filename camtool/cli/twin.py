@@ -17,7 +17,7 @@ from camtool.errors import OptionError, OutputError
 if TYPE_CHECKING:
     from camtool.target.twin import SlideTrace, Twin
 
-MOST = "max"
+MAX_SPEED = "max"
 """The speed of a clock that keeps to nothing."""
 
 LOOPBACK = "127.0.0.1"
@@ -28,8 +28,8 @@ COLUMNS = "time_s,block,x_commanded_mm,y_commanded_mm,z_commanded_mm,x_mm,y_mm,z
 
 
 def parse_speed(text: str) -> float | None:
-    """A factor above 0, or `max`: None. OptionError for other text."""
-    if text == MOST:
+    """Parse a factor above 0, or `max` to None. OptionError for other text."""
+    if text == MAX_SPEED:
         return None
     try:
         speed = float(text)
@@ -41,7 +41,7 @@ def parse_speed(text: str) -> float | None:
 
 
 def parse_address(text: str) -> tuple[str, int]:
-    """`5007` (on loopback) or `192.168.1.4:5007`; port 0: any that is free."""
+    """Parse `5007` (on loopback) or `192.168.1.4:5007`; port 0 is any free one."""
     host, _, port = text.rpartition(":")
     if not port.isdigit() or int(port) > 65535:
         raise OptionError(f"--tcp {text!r} is no port", mend="give 5007, or ADDRESS:5007")
@@ -103,7 +103,7 @@ def twin(
     wired = WiredTwin(virtual, faults, faults, seed=seed, paced=factor is not None)
     file = None if trace is None else _opened(trace)
     port: TwinPort = PseudoTerminal() if tcp is None else TcpPort(*parse_address(tcp))
-    journal = _Journal(virtual, file, verbose=verbose)
+    journal = _TraceWriter(virtual, file, verbose=verbose)
     show_text(port.name)
     say(f"camtool: {loaded.target.name} ({virtual.wire}); Ctrl-C ends it", quiet=quiet)
     before = signal.signal(signal.SIGTERM, _interrupted)
@@ -136,15 +136,15 @@ def _opened(name: str) -> TextIO:
     return file
 
 
-class _Journal:
-    """What is written and shown while a twin runs."""
+class _TraceWriter:
+    """The trace that is written and the messages that are shown while a twin runs."""
 
     def __init__(self, virtual: Twin, file: TextIO | None, *, verbose: bool) -> None:
         self._twin, self._file, self._verbose = virtual, file, verbose
         self._shown = 0
 
     def note(self) -> None:
-        """What came since the last call."""
+        """Write and show everything since the last call."""
         done = self._twin.slides.drain()
         if self._file is not None and len(done):
             self._file.write(rows(done))
@@ -154,7 +154,7 @@ class _Journal:
 
 
 def rows(trace: SlideTrace) -> str:
-    """A trace as CSV."""
+    """Return a trace as CSV."""
     columns = zip(
         trace.time_s.tolist(),
         trace.block.tolist(),

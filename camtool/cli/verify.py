@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from camtool.cli.files import STDOUT, read_bytes, shown, write_all
+from camtool.cli.files import STDOUT, display_name, read_bytes, write_all
 from camtool.cli.life_signs import progress
 from camtool.cli.messages import (
     REPORT_NAMES,
@@ -42,7 +42,7 @@ from camtool.cli.picture_options import (
     picture_name,
     picture_options,
 )
-from camtool.cli.report import Outputs, report_option
+from camtool.cli.report import ReportOutputs, report_option
 from camtool.records import replace
 
 if TYPE_CHECKING:
@@ -141,9 +141,9 @@ def verify(
     it cuts, on which side and with what tool (or --tool-diameter), and with --align where the
     drawing lies; then how far it is from them, and what is not cut.
     """
-    wishes = Wishes(Outputs(preview, report, page), picture, beside, quiet, verbose)
+    wishes = VerifyOutputs(ReportOutputs(preview, report, page), picture, beside, quiet, verbose)
     wishes.check(comparing=compare is not None, gated=gates.given)
-    finding = _finds(job, against, align=align, comparing=compare is not None)
+    finding = _finds_contours(job, against, align=align, comparing=compare is not None)
     leaves_none = "--compare" if compare is not None else None
     inspection.check(without=leaves_none)
     if inspection.tolerances is not None and against is None:
@@ -167,16 +167,16 @@ def verify(
     target = machine.load()
     wanted = job.job(drawing)
     read = drawing.read(against, target.machine, wanted) if against else None
-    case = Case(target, judging, read, wanted, finding)
-    with job.blamed():
+    case = VerifySettings(target, judging, read, wanted, finding)
+    with job.name_job_file():
         if compare is not None:
             return _compare(program, _variants(compare, machine, judging), case, wishes)
         return _judge(program, case, inspection, wishes)
 
 
-def _finds(job: JobFlags, against: str | None, *, align: bool, comparing: bool) -> bool:
-    """Whether nothing says how the program cuts, so that this is found; a usage error where that
-    contradicts `--align`."""
+def _finds_contours(job: JobFlags, against: str | None, *, align: bool, comparing: bool) -> bool:
+    """True if no flag says how the program cuts, so that this is found from it; a usage error if
+    that contradicts `--align`."""
     from camtool.jobs.keys import PLACE
 
     said = job.beyond({*PLACE, "tool_diameter"})
@@ -194,7 +194,7 @@ def _finds(job: JobFlags, against: str | None, *, align: bool, comparing: bool) 
 
 
 def _variants(spec: str, machine: MachineFlags, judging: Judging) -> list[ProgramVariant]:
-    """The variants that `--compare SPEC` names; OptionError when it names none."""
+    """Return the variants that `--compare SPEC` names; OptionError if it names none."""
     from camtool.comparison import variants_of
 
     def load(more: Sequence[str]) -> LoadedTarget:
@@ -204,18 +204,18 @@ def _variants(spec: str, machine: MachineFlags, judging: Judging) -> list[Progra
 
 
 @dataclass(frozen=True)
-class Wishes:
-    """What the user wants to have, and how pictures look; `beside` is another program for the
+class VerifyOutputs:
+    """The requested outputs, and options of pictures; `beside` is another program for the
     picture."""
 
-    outputs: Outputs
+    outputs: ReportOutputs
     looks: PictureFlags
     beside: str | None
     quiet: bool
     verbose: bool
 
     def check(self, *, comparing: bool, gated: bool) -> None:
-        """A usage error for flags that contradict each other."""
+        """Raise a usage error for flags that contradict each other."""
         outputs = self.outputs
         if not comparing:
             self.looks.check(outputs.pictures, RESULT)
@@ -234,9 +234,9 @@ class Wishes:
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
-    """How programs are judged: on which machine, by what, against which drawing; `finding`: for
-    those that others made it is found what they cut of it."""
+class VerifySettings:
+    """The settings of judging programs: the machine, the criteria, the drawing; `finding`: for
+    programs by others it is found which contours they cut."""
 
     target: LoadedTarget
     judging: Judging
@@ -244,8 +244,8 @@ class Case:
     job: Job
     finding: bool = False
 
-    def judged(self, file: str) -> Run:
-        """The program in a file, run and judged."""
+    def judge(self, file: str) -> Run:
+        """Run and judge the program in a file."""
         from camtool.pipeline import verify_program
 
         data, judging = read_bytes(file), self.judging
@@ -254,7 +254,7 @@ class Case:
         return verify_program(
             data,
             self.target,
-            source=shown(file),
+            source=display_name(file),
             drawing=self.drawing,
             job=self.job,
             judging=judging,
@@ -262,12 +262,14 @@ class Case:
         )
 
 
-def _judge(file: str, case: Case, inspection: InspectionFlags, wishes: Wishes) -> int:
-    """The verdict on one program, in words and files; the exit code."""
-    run, outputs = inspection.inspected(case.judged(file)), wishes.outputs
+def _judge(
+    file: str, case: VerifySettings, inspection: InspectionFlags, wishes: VerifyOutputs
+) -> int:
+    """Show the verdict on one program and write its files; return the exit code."""
+    run, outputs = inspection.inspect_run(case.judge(file)), wishes.outputs
 
     def scenes() -> list[Scene]:
-        return [run.scene(), *([case.judged(wishes.beside).scene()] if wishes.beside else [])]
+        return [run.scene(), *([case.judge(wishes.beside).scene()] if wishes.beside else [])]
 
     write_all(outputs.files(run, wishes.looks.painter(scenes, quiet=wishes.quiet)))
     to_stdout = STDOUT in (outputs.report, outputs.page)
@@ -282,15 +284,17 @@ def _judge(file: str, case: Case, inspection: InspectionFlags, wishes: Wishes) -
     return 1
 
 
-def _compare(file: str, variants: list[ProgramVariant], case: Case, wishes: Wishes) -> int:
-    """The table of all variants, and their picture; the exit code."""
+def _compare(
+    file: str, variants: list[ProgramVariant], case: VerifySettings, wishes: VerifyOutputs
+) -> int:
+    """Show the table of all variants and write their picture; return the exit code."""
     from camtool.comparison import compare_program
     from camtool.verification.contrast import to_json
 
     found = compare_program(
         read_bytes(file),
         variants,
-        source=shown(file),
+        source=display_name(file),
         drawing=case.drawing,
         job=case.job,
         progress=progress(),

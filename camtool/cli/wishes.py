@@ -35,9 +35,9 @@ SUSPEND = "SIGTSTP"
 """Ctrl-Z. A sender that slept would leave its machine alone."""
 
 
-class Wishes:
-    """The next wish each time it is called, None where there is none. `key` gives the key that was
-    pressed, and `keys` what it means; interrupts within `one_s` are one."""
+class UserRequests:
+    """Return the next request each time it is called, None without one. `key` returns the pressed
+    key, and `keys` maps it to a request; interrupts within `one_s` count as one."""
 
     def __init__(
         self,
@@ -77,9 +77,9 @@ class Wishes:
             return Request.STOP
 
     @contextmanager
-    def caught(self) -> Iterator[None]:
-        """Within the block, signals are wishes. A SIGHUP that is ignored, as nohup has it, stays
-        so."""
+    def catch_signals(self) -> Iterator[None]:
+        """Turn signals into requests within the block. A SIGHUP that is ignored, as under nohup,
+        stays ignored."""
         names = [name for name in (*ENDING, SUSPEND) if hasattr(signal, name)]
         olds = {getattr(signal, name): name for name in names}
         if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
@@ -108,7 +108,7 @@ class Wishes:
 
 
 def _streams() -> Iterator[int]:
-    """The terminal that keys come from, and where output goes."""
+    """Return the terminal that keys come from, and the output streams."""
     for stream in (sys.stdin, sys.stdout, sys.stderr):
         with suppress(AttributeError, OSError, ValueError):  # None, replaced or closed
             if stream is not sys.stdin or stream.isatty():
@@ -116,7 +116,7 @@ def _streams() -> Iterator[int]:
 
 
 def _is_lost(file: int) -> bool:
-    """True if a terminal was closed, or nobody reads from a pipe any more."""
+    """True if a terminal was closed, or a pipe has no reader any more."""
     if not hasattr(select, "poll"):
         return False
     looking = select.poll()
@@ -125,8 +125,8 @@ def _is_lost(file: int) -> bool:
 
 
 def takes_more(stream: TextIO | None) -> bool:
-    """True if a stream can be written to at once. One that cannot, as a terminal after Ctrl-S or a
-    pipe that is full, must not keep a machine waiting."""
+    """True if a stream can be written to at once. One that cannot, such as a terminal after Ctrl-S
+    or a full pipe, must not keep a machine waiting."""
     if stream is None or not hasattr(select, "poll"):
         return True
     looking = select.poll()
@@ -137,7 +137,7 @@ def takes_more(stream: TextIO | None) -> bool:
 
 
 class Messages:
-    """Messages on stderr while a machine works; those for which there is no room wait for it."""
+    """Messages on stderr while a machine works; messages for which there is no room are kept."""
 
     def __init__(self, *, quiet: bool) -> None:
         self._quiet, self._waiting = quiet, list[str]()
@@ -148,7 +148,7 @@ class Messages:
             self.rest(1)
 
     def rest(self, most: int | None = None) -> None:
-        """Those that wait."""
+        """Write the messages that were kept."""
         for each in self._waiting[:most]:
             say(f"camtool: {one_line(each)}", quiet=self._quiet)
         del self._waiting[:most]
@@ -156,8 +156,8 @@ class Messages:
 
 @contextmanager
 def keys_of_terminal() -> Iterator[Callable[[], str]]:
-    """A function that gives the key that was pressed, "" without one; only on a terminal. OSError
-    of it: the terminal is gone."""
+    """Return a function that returns the pressed key, "" without one; None if stdin is no
+    terminal. Its OSError means that the terminal is gone."""
     if sys.platform == "win32" or sys.stdin is None or not sys.stdin.isatty():
         yield lambda: ""
         return

@@ -30,7 +30,7 @@ from camtool.inspection.features import (
 from camtool.inspection.limits import limited
 from camtool.inspection.tolerances import dimensions_of, measured_by
 from camtool.plain import one_line
-from camtool.tables import quoted
+from camtool.tables import toml_string
 
 MAX_DIMENSIONS = 200
 """Most dimensions written to a file; a comment counts the others."""
@@ -95,7 +95,7 @@ def propose_file(drawing: Drawing) -> tuple[str, tuple[Finding, ...], tuple[Draw
 
 def _row(each: Dimension) -> str:
     """Format one [[dimension]]."""
-    lines = ["", "[[dimension]]", f"name = {quoted(each.name)}", f'kind = "{each.kind}"']
+    lines = ["", "[[dimension]]", f"name = {toml_string(each.name)}", f'kind = "{each.kind}"']
     if each.kind == "distance":
         first, second = each.places_mm
         lines += [f"from = {_pair(first)}", f"to = {_pair(second)}"]
@@ -108,7 +108,7 @@ def _row(each: Dimension) -> str:
     if each.limits is None:
         lines.append(f'# limits = "{"H7" if each.kind == "diameter" else "±0.05"}"')
     else:
-        lines.append(f"limits = {quoted(each.limits.said)}")
+        lines.append(f"limits = {toml_string(each.limits.said)}")
     return "\n".join(lines) + "\n"
 
 

@@ -24,7 +24,7 @@ from camtool.keys import Given, Table, length
 from camtool.planning.job import Job
 from camtool.planning.kinds import kind_named
 from camtool.tables import Table as Values
-from camtool.tables import parsed_table, written
+from camtool.tables import parse_table, toml_lines
 
 FILES = ("tool_library", "tool_table")
 """Keys that name files, relative to the job file."""
@@ -170,10 +170,10 @@ def text_of(tables: Values, head: Sequence[str] = ()) -> str:
     if len(tables["operations"]) == 1:
         whole = {key: value for key, value in tables.items() if key != "operations"}
         tables = {**whole, **tables["operations"][0]}
-    body = "\n".join(written(tables)).lstrip("\n")
+    body = "\n".join(toml_lines(tables)).lstrip("\n")
     return "".join(f"# {line}\n" for line in head) + ("\n" if head else "") + body + "\n"
 
 
 def job_of_tables(tables: Values, place: Path, shop: Shop) -> Job:
     """The job that a file of these tables at this place says: its text is read."""
-    return build_job(tables_of(parsed_table(text_of(tables)), place), JobTables(), (), shop)
+    return build_job(tables_of(parse_table(text_of(tables)), place), JobTables(), (), shop)

@@ -28,7 +28,7 @@ from camtool.planning.holes import HOLE_SIZE_MM, circle_of
 from camtool.planning.job import Operation, Stock
 from camtool.planning.sides import CONTINUOUS, Traits
 from camtool.records import replace
-from camtool.tables import quoted
+from camtool.tables import toml_string
 
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
@@ -95,7 +95,7 @@ def _materials(proposal: Proposal) -> Iterator[str]:
     """What is cut, and as comments what else it may be."""
     for name in proposal.materials:
         said = name == proposal.material
-        yield _row(f"{'' if said else '# '}material = {quoted(name)}", "as --material")
+        yield _row(f"{'' if said else '# '}material = {toml_string(name)}", "as --material")
 
 
 def job_template(
@@ -322,11 +322,13 @@ def _text(drawing: Drawing, group: _Group, part: _Part, proposal: Proposal) -> l
     marks = f", {part.marks} points" if part.marks else ""
     text = [
         "[[operations]]",
-        f"name = {quoted(part.name)}",
+        f"name = {toml_string(part.name)}",
         f'kind = "{part.kind}"',
-        _row(f"{group.key} = [{quoted(pattern_of(group.name))}]", f"{_counted(lines)}{marks}"),
+        _row(
+            f"{group.key} = [{toml_string(pattern_of(group.name))}]", f"{_counted(lines)}{marks}"
+        ),
         *(_row(f"{key} = {value}", remark) for key, value, remark in part.keys),
-        f"tool = {quoted(proposal.tool or TOOL_NAME)}",
+        f"tool = {toml_string(proposal.tool or TOOL_NAME)}",
     ]
     if part.kind in ("profile", "bore") and proposal.tool_mm:
         text.append(_row('direction = "climb"', OPERATION["direction"].help))

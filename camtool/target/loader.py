@@ -25,7 +25,7 @@ import msgspec
 
 from camtool.errors import MachineError
 from camtool.machine.model import Machine, PathController, SlideStart, TargetNames
-from camtool.tables import DEEPEST, Table, convert, parsed_table, read_table
+from camtool.tables import MAX_DEPTH, Table, convert, parse_table, read_table
 from camtool.target.contract import Target
 
 NEEDS = "needs"
@@ -176,14 +176,14 @@ def _setting(text: str) -> Table:
     keys = key.strip().split(".")
     if (
         not equals
-        or len(keys) > DEEPEST
+        or len(keys) > MAX_DEPTH
         or not all(re.fullmatch(r"[A-Za-z0-9_-]+", part) for part in keys)
     ):
         raise MachineError(
             f"{text!r} is no setting", where="--set", mend="write --set axes.x.backlash_mm=0.2"
         )
     try:
-        parsed: Any = parsed_table(f"v = {value.strip()}")["v"]
+        parsed: Any = parse_table(f"v = {value.strip()}")["v"]
     except tomllib.TOMLDecodeError:
         parsed = value.strip()
     except ValueError as error:  # a whole number of too many digits

@@ -114,7 +114,7 @@ def machine_template(
 def _rows(
     table: str, rows: Iterable[str], said: dict[str, ControllerSetting], needs: set[str]
 ) -> Iterator[str]:
-    """The lines of one table; what is said of it is taken out of `said`."""
+    """The lines of one table; what is said of it is taken out of `value_of`."""
     backlash = table not in _AXES or f"{table}.backlash_mm" in said
     for row in rows:
         key = _KEY.match(row)

@@ -14,7 +14,7 @@ import pytest
 from camtool.batches.lock import lock_folder
 from camtool.batches.run import DrawingTask, Outputs, Pool
 from camtool.cli import batch_run, batch_work
-from camtool.cli.batch_run import stoppable
+from camtool.cli.batch_run import record_signals
 from camtool.cli.options import DrawingFlags
 from camtool.cli.picture_options import PictureFlags
 from camtool.errors import CamtoolError
@@ -341,14 +341,14 @@ def test_all_that_outputs_depend_on_is_in_the_digest(monkeypatch: pytest.MonkeyP
 
 def test_the_first_signal_is_noted_and_a_second_ctrl_c_waits_for_nothing() -> None:
     before = signal.getsignal(signal.SIGINT)
-    with stoppable() as stop:
+    with record_signals() as stop:
         assert stop.signal is None
         for _ in range(2):
             signal.raise_signal(signal.SIGTERM)
             assert stop.signal == signal.SIGTERM
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
-    with stoppable() as stop:
+    with record_signals() as stop:
         signal.raise_signal(signal.SIGINT)
         assert stop.signal == signal.SIGINT
     assert signal.getsignal(signal.SIGINT) is before

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from camtool.tables import parsed_table
+from camtool.tables import parse_table
 from tests.inspection.test_meet import BORE, KNOWN, WIDTH, limited, text_of_rows
 from tests.inspection.test_verdicts import SVG
 
@@ -51,7 +51,7 @@ def test_a_job_file_and_flags_become_one(camtool, plate):
     asked = (*ASKED[:-2], "--job", "job.toml", "--depth", "0.7mm", "-o", "-", "-q")
     found = camtool(*asked)
     assert found.returncode == 0, found.stderr
-    job = parsed_table(found.stdout.decode())
+    job = parse_table(found.stdout.decode())
     assert job["safe_z"] == "2mm"
     assert {each["depth"] for each in job["operations"]} == {"0.7mm"}
 

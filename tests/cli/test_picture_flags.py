@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 import click
 import pytest
 
-from camtool.cli.files import sealed
+from camtool.cli.files import seal
 from camtool.cli.main import cli
 from camtool.errors import OptionError
 from camtool.pictures.options import PictureOptions
@@ -127,7 +127,7 @@ def test_a_batch_draws_the_same_pictures_and_again_when_they_shall_look_otherwis
     run(*batch, "--size", "300")
     assert Path("build/a.svg").read_bytes() != Path("a.svg").read_bytes()
     run(*batch, *LOOKS)
-    assert Path("build/a.svg").read_bytes() == sealed(Path("a.svg").read_bytes(), "a")
+    assert Path("build/a.svg").read_bytes() == seal(Path("a.svg").read_bytes(), "a")
 
 
 def _path(picture: str) -> bytes:
@@ -196,7 +196,7 @@ def test_the_picture_of_a_page_takes_the_flags_and_the_page_says_nothing_of_them
 ) -> None:
     run("post", drawing, *POST, *LOOKS, "--report", "r.md", "--preview", "viewer.html")
     run("preview", drawing, *POST[:-2], *LOOKS, "--simulate", "-o", "b.svg")
-    assert Path("r.svg").read_bytes() == sealed(Path("b.svg").read_bytes(), "r.md")
+    assert Path("r.svg").read_bytes() == seal(Path("b.svg").read_bytes(), "r.md")
     text = Path("r.md").read_text(encoding="utf-8")
     assert "](r.svg)" in text  # a viewer is no picture to link to
     assert "--tool-diameter" in text

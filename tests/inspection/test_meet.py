@@ -38,7 +38,7 @@ from camtool.inspection.verdicts import Tolerances
 from camtool.jobs.changes import Change, Left, job_of_tables, text_of
 from camtool.jobs.tools import Shop
 from camtool.records import replace
-from camtool.tables import parsed_table
+from camtool.tables import parse_table
 from tests.inspection.test_verdicts import EXACT, SVG
 
 KNOWN = (
@@ -72,7 +72,7 @@ def case(
     limits = tmp_path / "tolerances.toml"
     limits.write_text(text_of_rows(dimensions))
     target = camtool.load_target("linuxcnc", settings=[*EXACT, *KNOWN, *settings])
-    tables = {"operations": [parsed_table(f'tool_diameter = "2mm"\n{job}')]}
+    tables = {"operations": [parse_table(f'tool_diameter = "2mm"\n{job}')]}
 
     def job_of(tables: dict[str, Any]) -> camtool.Job:
         return job_of_tables(tables, tmp_path / "job.toml", Shop())
@@ -82,9 +82,9 @@ def case(
 
 
 def text_of_rows(rows: list[dict[str, Any]]) -> str:
-    from camtool.tables import written
+    from camtool.tables import toml_lines
 
-    return "\n".join(written({"dimension": rows})) + "\n"
+    return "\n".join(toml_lines({"dimension": rows})) + "\n"
 
 
 def limited(dimension: dict[str, Any], limits: str) -> dict[str, Any]:
@@ -314,7 +314,7 @@ def test_only_what_cuts_a_short_dimension_is_changed(tmp_path: Path) -> None:
     assert rows == {None, 0}
     found = meet(made)
     assert found.holds
-    names = [each["name"] for each in parsed_table(found.text)["operations"]]
+    names = [each["name"] for each in parse_table(found.text)["operations"]]
     # Of what lies as deep as each other the one with more left comes where it first is named.
     assert names == ["holes", "holes (2)", "rim"]
 
@@ -328,7 +328,7 @@ def test_a_pocket_is_not_divided_from_its_islands(tmp_path: Path, kind: str) -> 
     found = meet(made)
     assert found.holds
     assert [each.entities for each in found.after.proposal.left] == [()]
-    assert "operations" not in parsed_table(found.text)
+    assert "operations" not in parse_table(found.text)
 
 
 def test_what_a_change_makes_measurable_is_counted(tmp_path: Path) -> None:

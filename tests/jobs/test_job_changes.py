@@ -10,7 +10,7 @@ import pytest
 from camtool.errors import OptionError
 from camtool.jobs.build import JobTables, build_job, read_job_file, tables_of, tables_of_flags
 from camtool.jobs.changes import Change, Left, changed, text_of, together
-from camtool.tables import parsed_table
+from camtool.tables import parse_table
 
 SAMPLES = [
     path
@@ -50,7 +50,7 @@ def written(file: JobTables, flags: JobTables, folder: Path) -> str:
 
 
 def read(text: str, folder: Path) -> JobTables:
-    return tables_of(parsed_table(text), folder / "made.toml")
+    return tables_of(parse_table(text), folder / "made.toml")
 
 
 @pytest.mark.parametrize("given", FLAGS)
@@ -80,7 +80,7 @@ def test_flags_alone_are_a_file(given: dict[str, Any], tmp_path: Path) -> None:
 
 
 def test_layers_of_keys_and_tools_stay(tmp_path: Path) -> None:
-    file = tables_of(parsed_table(KEYED), tmp_path / "job.toml")
+    file = tables_of(parse_table(KEYED), tmp_path / "job.toml")
     for given in ({}, {"depth": "2mm"}, {"tool": "mill"}, {"direction": "climb"}):
         flags = tables_of_flags(given)
         expected = build_job(file, flags)
@@ -107,16 +107,16 @@ def test_files_are_named_from_the_new_folder(
 
 
 def test_changes_take_the_place_of_what_was_said(tmp_path: Path) -> None:
-    tables = parsed_table(KEYED)
+    tables = parse_table(KEYED)
     made = changed(tables, [Change("approach", True), Change("direction", "climb", 1)])
     job = build_job(tables_of(made, tmp_path / "job.toml"), JobTables())
     assert job.approach
     assert [each.direction for each in job.operations] == ["drawn", "climb"]
-    assert tables == parsed_table(KEYED)
+    assert tables == parse_table(KEYED)
 
 
 def test_what_is_left_divides_an_operation(tmp_path: Path) -> None:
-    tables = parsed_table(KEYED + 'name = "outline"\nallowance = "0.1mm"\n')
+    tables = parse_table(KEYED + 'name = "outline"\nallowance = "0.1mm"\n')
     whole = changed(tables, [], [Left(1, 0.02)])
     assert [each.get("allowance") for each in whole["operations"]] == [None, "0.12mm"]
     parts = [Left(1, -0.25, ("CIRCLE 2F",)), Left(1, 0.0, ("LINE [3]", "LINE 4"))]

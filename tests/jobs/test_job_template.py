@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from camtool.geometry.drawing import Drawing, Mark, Units
 from camtool.geometry.polylines import Polyline, Polylines
 from camtool.jobs.build import job_of_file
-from camtool.jobs.template import Proposal, job_template, pattern_of, quoted
+from camtool.jobs.template import Proposal, job_template, pattern_of, toml_string
 from camtool.patterns import matches
 from camtool.planning.job import Job
 from camtool.planning.plan import plan
@@ -131,7 +131,7 @@ def test_names_of_any_kind_are_text_and_nothing_else(tmp_path: Path) -> None:
 
 @given(st.text(st.characters(), max_size=20))
 def test_any_text_is_a_toml_string(text: str) -> None:
-    line = f"a = {quoted(text)} # {text if text.isprintable() else ''}"
+    line = f"a = {toml_string(text)} # {text if text.isprintable() else ''}"
     expected = "".join("?" if "\ud800" <= char <= "\udfff" else char for char in text)
     assert tomllib.loads(line) == {"a": expected}
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from camtool.errors import MachineError
-from camtool.tables import parsed_table
+from camtool.tables import parse_table
 from camtool.target.registry import find_target, load_target, loaded_target
 from camtool.target.template import machine_template
 
@@ -139,7 +139,7 @@ def test_linuxcncs_own_samples() -> None:
             assert "TRAJ" not in each.read_text(errors="replace"), each
             continue
         text = machine_template("tried", "linuxcnc", whole, (), said)
-        axes = loaded_target("linuxcnc", (parsed_table(text), str(each))).machine.axes
+        axes = loaded_target("linuxcnc", (parse_table(text), str(each))).machine.axes
         assert all(axis.max_rate_mm_min for axis in axes)
         loaded += 1
     reasons = ("there is no axis", "the kinematics are", "#INCLUDE", "is missing")
