@@ -57,7 +57,7 @@ def resolved_table(
         table = _overlaid(target, table, extra)
     file = name
     for setting in settings:
-        table, name = _overlaid(target, table, _setting(setting)), f"--set {setting}"
+        table, name = _overlaid(target, table, _parse_setting(setting)), f"--set {setting}"
     _refuse_incomplete(table, file)
     return {key: table[key] for key in table if key != NEEDS}, name
 
@@ -113,10 +113,10 @@ def names_of(base: Table, base_name: str) -> TargetNames:
 def missing_keys(table: Table, name: str) -> tuple[str, ...]:
     """The keys of `needs` that are not in the table, such as "axes.x.coded_step_mm"."""
     keys = convert(table.get(NEEDS, []), list[str], name, NEEDS)
-    return tuple(key for key in keys if not _has(table, key.split(".")))
+    return tuple(key for key in keys if not _has_all(table, key.split(".")))
 
 
-def _has(table: Any, keys: list[str]) -> bool:
+def _has_all(table: Any, keys: list[str]) -> bool:
     for key in keys:
         if not isinstance(table, dict) or key not in table:
             return False
@@ -170,8 +170,9 @@ def _laid_over(below: Table, above: Table) -> Table:
     return merged
 
 
-def _setting(text: str) -> Table:
-    """`axes.x.backlash_mm=0.2` as nested tables; a value that is not TOML is taken as a string."""
+def _parse_setting(text: str) -> Table:
+    """Parse `axes.x.backlash_mm=0.2` to nested tables; a value that is not TOML becomes a
+    string."""
     key, equals, value = text.partition("=")
     keys = key.strip().split(".")
     if (

@@ -155,7 +155,7 @@ class LoadedTarget:
         plain = replace(self, machine=machine_of(self.target, table, name), table=table)
         own = dict(_flat("", plain.values()))
         return [
-            (key, _shown(now.get(key)), _shown(None if key in needs else own.get(key)))
+            (key, _as_text(now.get(key)), _as_text(None if key in needs else own.get(key)))
             for key in {**own, **now}
             if key in needs or now.get(key) != own.get(key)
         ]
@@ -258,11 +258,12 @@ def filter_target() -> str | None:
 
 def find_target(name: str) -> tuple[Target, Path]:
     """The target of this name and its own machine file; raises as `load_target` does."""
-    return _load(_found(name))
+    return _load(_entry_point(name))
 
 
-def _found(name: str) -> EntryPoint:
-    """The entry point of a target; UnknownTargetError, with the nearest names, without one."""
+def _entry_point(name: str) -> EntryPoint:
+    """Return the entry point of a target; UnknownTargetError with the nearest names if there is
+    none."""
     found = {point.name: point for point in entry_points(group=GROUP)}
     if name not in found:
         near = difflib.get_close_matches(name, found, n=3, cutoff=0.4) or sorted(found)
@@ -338,7 +339,7 @@ class Guarded:
         )
 
 
-def _shown(value: Any) -> str:
+def _as_text(value: Any) -> str:
     return NOT_SAID if value is None else json.dumps(value, ensure_ascii=False)
 
 

@@ -103,11 +103,11 @@ def machine_template(
         lines += ["", f"[{table}]"]
         if table in _ABOUT:
             lines.append(f"## {_ABOUT[table]}")
-        lines += [f"# {key} =     # you must say this" for key in _within(table, needed)]
+        lines += [f"# {key} =     # you must say this" for key in _own_keys(table, needed)]
         lines += _rows(table, rows, said, set(needs))
     for table in dict.fromkeys(key.rpartition(".")[0] for key in said):
         lines += ["", f"[{table}]"]
-        lines += [_line(said.pop(f"{table}.{key}"), key) for key in _within(table, said)]
+        lines += [_line(said.pop(f"{table}.{key}"), key) for key in _own_keys(table, said)]
     return "\n".join(lines) + "\n"
 
 
@@ -126,7 +126,7 @@ def _rows(
             yield row
         elif key and path not in needs:
             yield f"# {row}"
-    for name in _within(table, tuple(said)):
+    for name in _own_keys(table, tuple(said)):
         yield _line(said.pop(f"{table}.{name}"), name)
     if not backlash:
         yield _BACKLASH
@@ -139,8 +139,8 @@ def _line(setting: ControllerSetting, key: str) -> str:
     return f"{text:<28}# {setting.said}"
 
 
-def _within(table: str, keys: Iterable[str]) -> list[str]:
-    """The names of the keys that stand in this very table."""
+def _own_keys(table: str, keys: Iterable[str]) -> list[str]:
+    """Return the names of the keys that stand in this very table."""
     parts = (key.rpartition(".") for key in keys)
     return [name for head, _, name in parts if head == table]
 

@@ -73,18 +73,18 @@ class Terminal:
         *lines, self._rest = _ENDS.split(self._rest + data)
         if len(self._rest) > MAX_LINE_BYTES:
             lines, self._rest = [*lines, self._rest], b""
-        return [self._shown(line) for line in lines if line]
+        return [self._with_meaning(line) for line in lines if line]
 
     def left(self) -> list[str]:
         """Return the unfinished line, if there is one, and forget it."""
         rest, self._rest = self._rest, b""
-        return [self._shown(rest)] if rest else []
+        return [self._with_meaning(rest)] if rest else []
 
     def meaning(self, line: str) -> str:
         """Return the explanation of an answer; "" for one that needs none."""
         return ""
 
-    def _shown(self, line: bytes) -> str:
+    def _with_meaning(self, line: bytes) -> str:
         text = "".join(chr(octet) if 0x20 <= octet < 0x7F else f"\\x{octet:02X}" for octet in line)
         meaning = self.meaning(text)
         return f"{text}    {meaning}" if meaning else text

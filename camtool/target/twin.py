@@ -177,7 +177,7 @@ class Slides:
     def trace(self) -> SlideTrace:
         """All that they have done, or since `drain`."""
         if len(self._pieces) != 1:
-            self._pieces = [_joined(self._pieces)]
+            self._pieces = [_join_traces(self._pieces)]
         return self._pieces[0]
 
     def drain(self) -> SlideTrace:
@@ -186,7 +186,7 @@ class Slides:
         return trace
 
 
-def _joined(pieces: Sequence[SlideTrace]) -> SlideTrace:
+def _join_traces(pieces: Sequence[SlideTrace]) -> SlideTrace:
     empty = SlideTrace(
         np.empty(0), np.empty(0, dtype=np.int64), np.empty((0, 3)), np.empty((0, 3))
     )

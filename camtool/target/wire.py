@@ -152,7 +152,7 @@ class ResumePoint(Struct, frozen=True, eq=False):
 
     @property
     def said_mm(self) -> Place | None:
-        """The place at which the controller is to take the tool to stand, None for its own."""
+        """Place at which the controller is told that the tool stands; None for its own."""
         return {"journal": self.place_mm, "zero": (0.0, 0.0, 0.0)}.get(self.tool_at)
 
     def refusal(self, at_mm: Place | None, *, restarted: bool) -> str:

@@ -66,7 +66,7 @@ class FlashcutModel(ControllerModel[FlashcutController, FlashcutDialect]):
     def quantised(self, toolpath: Toolpath, machine: _Machine) -> Toolpath:
         """The moves as the program says them, homing at machine zero: the controller keeps lengths
         and rounds displacements, so that steps are part of its interpolation."""
-        return followed(toolpath, machine)
+        return place_events(toolpath, machine)
 
     def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
         """Both axes by timers of their own."""
@@ -108,7 +108,7 @@ class FlashcutRun:
 
     def __init__(self, toolpath: Toolpath, machine: _Machine, options: Options) -> None:
         controller = machine.controller
-        path = followed(toolpath.first(toolpath.executed_rows), machine)
+        path = place_events(toolpath.first(toolpath.executed_rows), machine)
         check_rows(path, len(path))
         self._rows = len(path)
         self._still_s = waits_s(path, len(path))
@@ -202,8 +202,9 @@ CHORD_GUARD = 1e-9
 """Part of a chord: an arc that exceeds whole chords by less gets no further one."""
 
 
-def followed(toolpath: Toolpath, machine: _Machine) -> Toolpath:
-    """The same with homing at machine zero, and events where the moves before them ended.
+def place_events(toolpath: Toolpath, machine: _Machine) -> Toolpath:
+    """Return the toolpath with homing at machine zero, and with events where the moves before them
+    ended.
 
     ProgramError for arcs without a centre and positions of more steps than can be counted.
     """
@@ -241,8 +242,9 @@ def half_periods(
     return found
 
 
-def _alone(toolpath: Toolpath, x_mm: float, y_mm: float) -> Bools:
-    """(N,) true for rows that move X or Y alone, by their steps of `x_mm` and `y_mm`: no arcs."""
+def _moves_one_axis(toolpath: Toolpath, x_mm: float, y_mm: float) -> Bools:
+    """Mask (N,) of the rows that move X or Y alone, by their steps of `x_mm` and `y_mm`; no
+    arcs."""
     way = np.abs(toolpath.end - toolpath.starts)
     apart = np.minimum(to_steps(way[:, 0], x_mm), to_steps(way[:, 1], y_mm)) == 0
     return np.asarray(~toolpath.is_arc & (apart | (toolpath.kind >= Kind.HOME_XY)))
@@ -276,14 +278,14 @@ class MoveTable(Struct, frozen=True, eq=False):
 
     @classmethod
     def of(cls, toolpath: Toolpath, machine: _Machine) -> MoveTable:
-        """The table of a toolpath that `followed` gave."""
+        """The table of a toolpath that `place_events` gave."""
         per_turn = machine.controller.chords_per_turn
         x, y, z = (axis.coded_step_mm for axis in machine.axes)
         return cls(
             toolpath,
             toolpath.by_parts(lambda part: _chords(part, per_turn)),
             toolpath.by_parts(_rises),
-            half_periods(toolpath, machine, max(x, y), lambda part: _alone(part, x, y)),
+            half_periods(toolpath, machine, max(x, y), lambda part: _moves_one_axis(part, x, y)),
             half_periods(toolpath, machine, z, lambda part: np.ones(len(part), dtype=np.bool_)),
         )
 

@@ -23,7 +23,15 @@ from camtool.records import replace
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 
-from ..gcode.blocks import SURE_PART, Lexing, PlainBlocks, WordBlock, blocks_of, filled, form_of
+from ..gcode.blocks import (
+    SURE_PART,
+    Lexing,
+    PlainBlocks,
+    WordBlock,
+    blocks_of,
+    fill_forward,
+    form_of,
+)
 from .dialect import MAX_MM, STOP_TEXT, FlashcutController, FlashcutDialect, FlashcutMachine
 from .findings import EXECUTED_OTHERWISE, FEED_ABOVE_LIMIT, FEED_HELD, FEED_HELD_ALONE
 from .timers import feeds_of, half_periods_ms, shortest_ms, steps_too_many
@@ -265,12 +273,12 @@ class DecodedMoves:
         has_code = plain.has(words.G_WORD)
         self.kind = np.where(has_code, numbers[:, words.G_WORD], 0.0).astype(np.int64)
         self.is_arc = self.kind >= Kind.ARC_CW
-        self.feed = filled(has_feed, numbers[:, words.F_WORD], feed)
+        self.feed = fill_forward(has_feed, numbers[:, words.F_WORD], feed)
         x, y = numbers[:, words.X_WORD], numbers[:, words.Y_WORD]
         z = sign * numbers[:, words.Z_WORD] + 0.0
         self.end = np.column_stack(
             [
-                filled(plain.has(words.X_WORD + axis), values, position[axis])
+                fill_forward(plain.has(words.X_WORD + axis), values, position[axis])
                 for axis, values in enumerate((x, y, z))
             ]
         )
@@ -337,7 +345,7 @@ def _timer_findings(path: Toolpath, machine: FlashcutMachine) -> Iterator[Findin
         long.add(low + found, extra[found].astype(np.float64))
         rapids = rapids or bool((rows.kind[found] == Kind.RAPID).any())
     if late.count:
-        yield _limited(path, machine, controller, late)
+        yield _slow_feed_finding(path, machine, controller, late)
     if long.count:
         rows = _Rows(path, slice(long.row, long.row + 1), machine)
         shorter = int(rows.steps[0, :2].argmin())
@@ -352,7 +360,7 @@ def _timer_findings(path: Toolpath, machine: FlashcutMachine) -> Iterator[Findin
         )
 
 
-def _limited(
+def _slow_feed_finding(
     path: Toolpath, machine: FlashcutMachine, controller: FlashcutController, late: _Worst
 ) -> Finding:
     """FEED_HELD: cuts whose feed the shortest half period does not let them have."""

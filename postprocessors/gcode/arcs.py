@@ -165,7 +165,7 @@ def _repair(
         return
     whole = bool((wanted.start == wanted.end).all())
     huge = math.dist(wanted.start, wanted.centre) > dialect.arc_most_radius_mm
-    one = None if huge or whole else _recentred(wanted, (begin, stop), kind, dialect)
+    one = None if huge or whole else _recentre(wanted, (begin, stop), kind, dialect)
     two = None if huge or one else _halves(wanted, (begin, stop), kind, dialect)
     if whole and two:
         arcs.pieces[row] = two
@@ -203,7 +203,7 @@ class _Wanted(Struct, frozen=True, eq=False):
         )
 
 
-def _recentred(
+def _recentre(
     wanted: _Wanted, ends: tuple[Ints, Ints], kind: Kind, dialect: GcodeDialect
 ) -> ReplacementRow | None:
     """The arc about the nearest centre that the controller takes; None when there is none close.
@@ -245,17 +245,17 @@ def _halves(
     first = _Wanted(wanted.start, wanted.centre, mid_mm, half)
     second = _Wanted(mid_mm, wanted.centre, wanted.end, half)
     pieces = [
-        _unchanged(first, (begin, mid), kind, dialect)
-        or _recentred(first, (begin, mid), kind, dialect),
-        _unchanged(second, (mid, stop), kind, dialect)
-        or _recentred(second, (mid, stop), kind, dialect),
+        _keep_centre(first, (begin, mid), kind, dialect)
+        or _recentre(first, (begin, mid), kind, dialect),
+        _keep_centre(second, (mid, stop), kind, dialect)
+        or _recentre(second, (mid, stop), kind, dialect),
     ]
     if pieces[0] is None or pieces[1] is None:
         return None
     return [replace(pieces[0], share=0.5), pieces[1]]
 
 
-def _unchanged(
+def _keep_centre(
     wanted: _Wanted, ends: tuple[Ints, Ints], kind: Kind, dialect: GcodeDialect
 ) -> ReplacementRow | None:
     """The arc with its own centre, if the controller takes it."""

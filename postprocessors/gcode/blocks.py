@@ -113,8 +113,8 @@ class PlainBlocks(Struct, frozen=True, eq=False):
         return np.asarray((self.facts[:, words.MASK] >> column) & 1 == 1)
 
 
-def filled(given: Bools, values: Floats, before: float) -> Floats:
-    """(N,) the value that was given last, `before` where none was yet."""
+def fill_forward(given: Bools, values: Floats, before: float) -> Floats:
+    """Return (N,) the last given value up to each row; `before` where none was given yet."""
     latest = np.maximum.accumulate(np.where(given, np.arange(1, len(given) + 1), 0))
     return np.asarray(np.concatenate([[before], values])[latest])
 
@@ -270,11 +270,11 @@ def _fault(raw: str, index: int, line: int, lexing: Lexing) -> ProgramError:
     packed = "".join([raw[at] for at in kept])
     row = _patterns(lexing)[0].match(packed)
     at = row.end() if row else 0
-    message, mend, more = _explained(packed[at:], lexing)
+    message, mend, more = _explain(packed[at:], lexing)
     return _error(message, index, line, kept[at + more] + 1, mend)
 
 
-def _explained(rest: str, lexing: Lexing) -> tuple[str, str, int]:
+def _explain(rest: str, lexing: Lexing) -> tuple[str, str, int]:
     """(message, mend, characters to pass over) for text that begins with no word."""
     sign, shown = rest[0], repr(rest[:SHOWN_CHARS])
     if sign in lexing.letters:

@@ -134,8 +134,8 @@ def _of_operations(
         cuts = f"cuts {duration(float(cutting_s[low:high].sum()))}{how}"
         for line in (
             f"{of}: {note.name or note.kind}",
-            *packed([tool_words(note.tool, unit), *speed]),
-            *packed([*_depth_words(note, unit), cuts]),
+            *pack([tool_words(note.tool, unit), *speed]),
+            *pack([*_depth_words(note, unit), cuts]),
         ):
             yield low, comment(line)
 
@@ -163,7 +163,7 @@ def tool_words(tool: ToolNote, unit: Unit) -> str:
     return f"tool{number}{name} {size}{tip}" if number or name else f"tool: {size}{tip}"
 
 
-def mounting(toolpath: Toolpath, row: int, unit: Unit) -> list[str]:
+def mounting_messages(toolpath: Toolpath, row: int, unit: Unit) -> list[str]:
     """Return the messages for the operator at a tool change by hand; the toolpath's lengths are in
     `unit`."""
     tool = ToolNote(int(toolpath.value[row]))
@@ -179,8 +179,8 @@ def mounting(toolpath: Toolpath, row: int, unit: Unit) -> list[str]:
     ]
 
 
-def packed(parts: Sequence[str]) -> Iterator[str]:
-    """Parts with a dash between them, as many on a line as a comment takes."""
+def pack(parts: Sequence[str]) -> Iterator[str]:
+    """Join parts with dashes, as many on a line as fit into a comment."""
     line = ""
     for part in parts:
         longer = f"{line} - {part}" if line else part

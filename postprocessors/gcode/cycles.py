@@ -144,7 +144,7 @@ def cycle_blocks(
         else:
             code, more = "G81", ""
             if hole.bite is not None:
-                code, more = "G83", f" Q{number(_no_deeper(hole.bite, style))}"
+                code, more = "G83", f" Q{number(_rounded_down(hole.bite, style))}"
             elif hole.dwell_s is not None:
                 code, more = "G82", f" P{format_number(hole.dwell_s, NumberStyle(3, strip=True))}"
             levels = f"Z{number(hole.bottom)} R{number(hole.height)}"
@@ -154,8 +154,8 @@ def cycle_blocks(
     return blocks
 
 
-def _no_deeper(bite: float, style: NumberStyle) -> float:
-    """The bite rounded down to its last decimal, where it has any."""
+def _rounded_down(bite: float, style: NumberStyle) -> float:
+    """Return the depth of a peck rounded down to the last decimal of a coordinate, or None."""
     unit = 10.0**-style.decimals
     return max(float(np.floor(bite / unit + 1e-6)), 1.0) * unit
 

@@ -73,12 +73,12 @@ def format_column(values: Floats, style: NumberStyle) -> list[str]:
     """Values (N,) rounded to the style's decimals, as N texts; ValueError as `units_of`. Zero has
     no minus."""
     return [
-        _shown(value, style)
+        _digits_of(value, style)
         for value in values_of(units_of(values, style.decimals), style.decimals)
     ]
 
 
-def _shown(value: float, style: NumberStyle) -> str:
+def _digits_of(value: float, style: NumberStyle) -> str:
     text = f"{value:.{style.decimals}f}"
     return text.rstrip("0").rstrip(".") if style.strip and style.decimals > 0 else text
 

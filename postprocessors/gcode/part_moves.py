@@ -65,21 +65,21 @@ class PartMoves:
     # Frames
 
     @property
-    def same(self) -> bool:
+    def is_part_frame(self) -> bool:
         """True if the coordinates of the program are those of the part: no shift, turn or scale is
         in force."""
         return self._same
 
-    def place(self, frame: ProgramFrame) -> None:
-        """From here on coordinates are of this frame."""
+    def set_frame(self, frame: ProgramFrame) -> None:
+        """Set the frame of the coordinates that follow."""
         self._frame = frame
         if not self.moved:
             self._base = frame
         base = self._base
         self._same = frame == base
         # part = R(−b)(R(a)(p + shift) + origin − origin_b) − shift_b
-        x, y = turned(*frame.shift[:2], frame.rotation)
-        x, y = turned(
+        x, y = rotate(*frame.shift[:2], frame.rotation)
+        x, y = rotate(
             x + frame.origin[0] - base.origin[0],
             y + frame.origin[1] - base.origin[1],
             -base.rotation,
@@ -92,8 +92,8 @@ class PartMoves:
         angle = math.radians(frame.rotation - base.rotation)
         self._turn = (math.cos(angle), math.sin(angle)) if angle else (1.0, 0.0)
 
-    def part(self, x: float, y: float, z: float) -> Point:
-        """The place in the frame of the part, mm."""
+    def to_part(self, x: float, y: float, z: float) -> Point:
+        """Return the point in the frame of the part, mm."""
         x, y, z = x * self.mm, y * self.mm, z * self.mm
         if self._same:
             return x, y, z
@@ -102,8 +102,9 @@ class PartMoves:
             x, y = x * cos - y * sin, x * sin + y * cos
         return x + dx, y + dy, z + dz
 
-    def near(self, place: Point) -> Point:
-        """The place, with those coordinates of the tool that it has but for rounding."""
+    def snap(self, place: Point) -> Point:
+        """Return the point, with those coordinates of the tool that differ from it by rounding
+        alone."""
         here = self.path.position
         if here == place:
             return here
@@ -117,12 +118,12 @@ class PartMoves:
     def rapid(self, x: float, y: float, z: float) -> None:
         """Straight, as fast as the machine can."""
         self.moved = True
-        self.path.rapid(*self.near(self.part(x, y, z)))
+        self.path.rapid(*self.snap(self.to_part(x, y, z)))
 
     def line(self, x: float, y: float, z: float) -> None:
         """Straight, at the feed."""
         self.moved = True
-        self.path.line(*self.near(self.part(x, y, z)), feed=self.feed)
+        self.path.line(*self.snap(self.to_part(x, y, z)), feed=self.feed)
 
     def arc(self, end: list[float], centre: tuple[float, float], turn: int) -> None:
         """An arc of |turn| turns begun, counter-clockwise where it is above 0: its end and centre
@@ -140,8 +141,8 @@ class PartMoves:
         controller takes it for a full circle is one, and a line to its end."""
         path = self.path
         x, y, z = path.position
-        to = self.near(self.part(*end))
-        middle = self.part(*centre, 0.0)[:2]
+        to = self.snap(self.to_part(*end))
+        middle = self.to_part(*centre, 0.0)[:2]
         own = turn_of((x, y), to[:2], middle)
         same = (x, y) == to[:2]
         ccw = turn > 0
@@ -160,7 +161,7 @@ class PartMoves:
     def _whole_turns(
         self, start: Point, centre: tuple[float, float], ccw: bool, rise: Floats
     ) -> None:
-        """Circles from a point, which end so much above it (K,)."""
+        """Add full circles that begin at a point and end at these heights (K,) above it."""
         count = len(rise)
         end = np.empty((count, 3))
         end[:, :2], end[:, 2] = start[:2], start[2] + rise
@@ -201,7 +202,7 @@ class PartMoves:
         points[:, axes[1]] = centre[1] + radius * np.sin(angle)
         points[:, axes[2]] = begin[2] + share * (end[2] - begin[2])
         points[-1, list(axes)] = end
-        placed = np.column_stack(self.part(*points.T))
+        placed = np.column_stack(self.to_part(*points.T))
         self.path.moves(
             kind=np.full(count, int(Kind.LINE)),
             end=placed,
@@ -219,8 +220,8 @@ class PartMoves:
         return x / self.mm, y / self.mm, z / self.mm
 
 
-def turned(x: float, y: float, degrees: float) -> tuple[float, float]:
-    """A point turned about zero."""
+def rotate(x: float, y: float, degrees: float) -> tuple[float, float]:
+    """Rotate a point about zero."""
     if degrees == 0.0:
         return x, y
     cos, sin = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))

@@ -139,7 +139,7 @@ class PlainRows(Struct, frozen=True, eq=False):
 
 def plain_rows(toolpath: Toolpath, rules: ArcRules) -> PlainRows:
     """The rows of a toolpath (in the program's own lengths) in units, arcs made consistent."""
-    lowered = _halved(toolpath, rules)
+    lowered = _halve_circles(toolpath, rules)
     path = lowered.toolpath
     rows = np.flatnonzero(path.is_arc)
     begin, stop = units_of(path.starts, rules.decimals), units_of(path.end, rules.decimals)
@@ -185,7 +185,7 @@ def arc_findings(rows: PlainRows, place: str) -> Iterator[Finding]:
         yield MOVE_COLLAPSED_PLAIN(measured=dropped + rows.flat, dropped=dropped, flat=rows.flat)
 
 
-def _halved(toolpath: Toolpath, rules: ArcRules) -> LoweredToolpath:
+def _halve_circles(toolpath: Toolpath, rules: ArcRules) -> LoweredToolpath:
     """Full and nearly full circles, whose rounded ends coincide, in halves; other rows
     unchanged."""
     begin = units_of(toolpath.starts, rules.decimals)

@@ -19,7 +19,7 @@ from camtool.machine.model import exceeds
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind
 
-from .blocks import SURE_PART, PlainBlocks, filled
+from .blocks import SURE_PART, PlainBlocks, fill_forward
 from .findings import FEED_ABOVE_LIMIT_IN_WORDS
 
 RAPID, LINE, ARC_CCW = 0, 10, 30
@@ -64,13 +64,15 @@ class PlainMoves:
         has = [plain.has(column) for column in (words.X_WORD, words.Y_WORD, words.Z_WORD)]
         has_i, has_j = plain.has(words.I_WORD), plain.has(words.J_WORD)
         numbers = plain.numbers
-        self.motion = filled(
+        self.motion = fill_forward(
             has_g, np.where(has_g, numbers[:, words.G_WORD] * 10.0, 0.0), state.motion
         ).astype(np.int64)
-        self.feed = filled(has_feed, numbers[:, words.F_WORD] * state.mm, state.feed)
+        self.feed = fill_forward(has_feed, numbers[:, words.F_WORD] * state.mm, state.feed)
         self.end = np.column_stack(
             [
-                filled(has[axis], numbers[:, words.X_WORD + axis] * state.mm, state.position[axis])
+                fill_forward(
+                    has[axis], numbers[:, words.X_WORD + axis] * state.mm, state.position[axis]
+                )
                 for axis in range(3)
             ]
         )

@@ -128,7 +128,7 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: ProgramStyle) -> Pr
     ended = len(toolpath) > 0 and toolpath.kind[-1] == Kind.END
     order = BlockOrder(sent.is_motion)
     order.add(0, [*style.header, *first_mode, *dialect.start_blocks])
-    for at, row in sent.others(events):
+    for at, row in sent.event_rows(events):
         order.add(at, events.blocks[row], row)
     for at, block in changes.items():
         order.add(at, [block])
@@ -348,8 +348,8 @@ class Sent(Struct, frozen=True, eq=False):
         """(M,) true for motions."""
         return np.asarray(self.kind <= Kind.ARC_CCW)
 
-    def others(self, events: Events) -> Iterator[tuple[int, int]]:
-        """The places of events that have a block, and their rows of the toolpath."""
+    def event_rows(self, events: Events) -> Iterator[tuple[int, int]]:
+        """Yield the position of each event that has a block, and its row of the toolpath."""
         for at in np.flatnonzero(~self.is_motion).tolist():
             row = int(self.row[at])
             if row in events.blocks:

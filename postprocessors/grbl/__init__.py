@@ -70,9 +70,9 @@ class Grbl(Target):
 
     def ask_settings(self, port: str) -> str:
         """Its answer to `$$`; MachineError where none comes."""
-        from .settings import asked
+        from .settings import ask_listing
 
-        return asked(port)
+        return ask_listing(port)
 
     def wire(self) -> GrblWire:
         """Lines, as many as its buffer takes."""

@@ -66,13 +66,13 @@ class GrblModel(ControllerModel[GrblController, GrblDialect]):
     def run(self, toolpath: Toolpath, machine: _Machine, options: Options) -> Iterator[Chunk]:
         """The motion, chunk by chunk."""
         path = self.quantised(toolpath, machine)
-        start_mm = _rounded(path.start.astype(np.float32), machine) * coded_steps_mm(machine)
+        start_mm = _nearest_steps(path.start.astype(np.float32), machine) * coded_steps_mm(machine)
         mechanics = Mechanics(machine, start_mm, options.effects)
-        return row_chunks(_followed(path, machine), mechanics, options.chunk_steps)
+        return row_chunks(_rows_to_end(path, machine), mechanics, options.chunk_steps)
 
     def seconds(self, toolpath: Toolpath, machine: _Machine) -> Floats:
         """(N,) s that each row takes."""
-        blocks = _followed(self.quantised(toolpath, machine), machine)
+        blocks = _rows_to_end(self.quantised(toolpath, machine), machine)
         return row_seconds(blocks, len(toolpath))
 
     def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
@@ -91,18 +91,20 @@ class GrblModel(ControllerModel[GrblController, GrblDialect]):
         )
 
 
-def _followed(path: Toolpath, machine: _Machine) -> Iterator[SampledRows]:
-    """The rows up to the end of the program; ProgramError for those that cannot be followed."""
+def _rows_to_end(path: Toolpath, machine: _Machine) -> Iterator[SampledRows]:
+    """Return the rows up to the end of the program; ProgramError for rows that cannot be
+    followed."""
     controller = _controller(machine)
     check_rows(path, path.executed_rows)
-    return sampled(path.first(path.executed_rows), machine, controller)
+    return sample_rows(path.first(path.executed_rows), machine, controller)
 
 
-def sampled(
+def sample_rows(
     path: Toolpath, machine: _Machine, controller: GrblController
 ) -> Iterator[SampledRows]:
-    """All rows, some thousand at a time. With the blocks of these are planned the one before
-    them, for the corner between them, and as many behind them as the ring holds."""
+    """Yield the motion of all rows, some thousand at a time. Planned with each window are the
+    block before it, for the corner between them, and as many blocks behind it as the ring
+    holds."""
     window = controller.buffer_blocks - 1
     parts, stops = blocks_of(path, machine, controller), stops_of(path, controller)
     coming: list[Blocks] = []
@@ -115,7 +117,7 @@ def sampled(
             coming.append(part)
         own = coming.pop(0)
         count, high = len(own), min(low + ROWS_AT_ONCE, len(path))
-        known = joined([last, own, *coming]).part(0, len(last) + count + window)
+        known = join_blocks([last, own, *coming]).part(0, len(last) + count + window)
         plan = speeds_of(known, path, machine, before, len(last), stops)
         squares = plan.squares(window)
         seconds = np.zeros(high - low)
@@ -248,7 +250,7 @@ class Blocks(Struct, frozen=True, eq=False):
         return np.asarray(np.abs(self.way).max(axis=1, initial=0))
 
     def part(self, low: int, high: int) -> Blocks:
-        """The blocks low:high."""
+        """Return the blocks low:high."""
         at = slice(low, high)
         return Blocks(self.row[at], self.target[at], self.start[at], self.way[at])
 
@@ -257,8 +259,8 @@ _NONE = np.empty(0, np.int32)
 NO_BLOCKS = Blocks(_NONE, _NONE, _NONE.reshape(0, 3), _NONE.reshape(0, 3))
 
 
-def joined(parts: list[Blocks]) -> Blocks:
-    """Blocks that follow one another."""
+def join_blocks(parts: list[Blocks]) -> Blocks:
+    """Concatenate blocks that follow one another."""
     return Blocks(
         np.concatenate([part.row for part in parts]),
         np.concatenate([part.target for part in parts]),
@@ -270,7 +272,7 @@ def joined(parts: list[Blocks]) -> Blocks:
 def blocks_of(path: Toolpath, machine: _Machine, controller: GrblController) -> Iterator[Blocks]:
     """The blocks of a program, `ROWS_AT_ONCE` at a time; ProgramError for positions beyond all
     that grbl can count."""
-    begin, asked = _rounded(path.start[None, :].astype(np.float32), machine), 0
+    begin, asked = _nearest_steps(path.start[None, :].astype(np.float32), machine), 0
     for low in range(0, len(path), ROWS_AT_ONCE):
         rows = np.arange(low, min(low + ROWS_AT_ONCE, len(path)))
         blocks, begin, count = blocks_from(begin, path, rows, machine, controller)
@@ -284,7 +286,7 @@ def blocks_from(
     """The blocks of rows (R,), which follow one another, from `begin` (1, 3) steps on; where the
     last of them ends; and how many targets there are."""
     targets = targets_of(path, rows, machine, controller)
-    stop = _rounded(targets.mm, machine)
+    stop = _nearest_steps(targets.mm, machine)
     far = (np.abs(stop) > MAX_STEPS).any(axis=1)
     if far.any():
         row = int(targets.row[far.argmax()])
@@ -301,7 +303,7 @@ def blocks_from(
     return Blocks(*(column.astype(np.int32) for column in columns)), begin, len(way)
 
 
-def _rounded(mm: Singles, machine: _Machine) -> Ints:
+def _nearest_steps(mm: Singles, machine: _Machine) -> Ints:
     """(..., 3) steps: the 32-bit product, to the nearest whole, halves away from zero."""
     steps_per_mm = np.array([1.0 / axis.coded_step_mm for axis in machine.axes], dtype=np.float32)
     product = (mm * steps_per_mm).astype(np.float64)
@@ -371,7 +373,7 @@ class Stops(Struct, frozen=True, eq=False):
     lit: Bools | None
 
     def before(self, blocks: Blocks) -> Bools:
-        """(B,) true for blocks before which the machine stands."""
+        """Mask (B,) of the blocks before which the machine stands."""
         if not len(blocks):
             return np.zeros(0, dtype=np.bool_)
         first, last = int(blocks.row[0]), int(blocks.row[-1])

@@ -182,33 +182,36 @@ class GrblParser:
                 self._placed.add(frame)
         for home, place in dialect.homes_mm.items():
             self._homes[str(home)] = self._machine(place)
-        self._place()
+        self._use_frame()
 
     def _machine(self, place: tuple[float, float, float]) -> list[float]:
         """A place that is given from machine zero."""
         return [a + b for a, b in zip(place, self._zero, strict=True)]
 
     @property
-    def plain(self) -> bool:
+    def reads_columns(self) -> bool:
         """True if blocks of plain moves may now be read by columns."""
         modes = self.modes
         known = modes.motion in (0, 1, 2, 3, 80) and modes.plane == 17 and modes.absolute
         shift = any(self._frames[modes.frame]) or any(self._offset) or self._length
-        return known and modes.feed_mode == 94 and not shift and self.moves.same
+        return known and modes.feed_mode == 94 and not shift and self.moves.is_part_frame
 
-    def went_on(self, motion: int | None, feed: float, at: tuple[float, float, float]) -> None:
-        """Blocks of plain moves were read."""
+    def continue_from(
+        self, motion: int | None, feed: float, at: tuple[float, float, float]
+    ) -> None:
+        """Adopt motion, feed and position behind blocks of plain moves that were read by
+        columns."""
         self.modes.motion = self.modes.motion if motion is None else motion
         self.feed = feed
         if at != tuple(self.position):
-            self._moving()
+            self._note_motion()
         self.position[:] = at
 
     def rewind(self) -> None:
         """M2 and M30 set most modes back; units, feed and offsets stay (`gc_execute_line`)."""
         self.ended = False
         self.modes = ParserModes(motion=1, inches=self.modes.inches)
-        self._place()
+        self._use_frame()
 
     # Steps 1 and 2: the words
 
@@ -545,9 +548,9 @@ class GrblParser:
         if block.flow is not None:
             self._stop(block.flow)
 
-    def _rest(self) -> None:
-        """The machine comes to rest, as before a dwell, and nothing else happens: where grbl
-        waits for its buffer to run empty (`protocol_buffer_synchronize`)."""
+    def _come_to_rest(self) -> None:
+        """Add a dwell of 0 s: the machine comes to rest and nothing else happens, where grbl waits
+        for its buffer to run empty (`protocol_buffer_synchronize`)."""
         self._path.event(Kind.DWELL, 0.0)
 
     def _spindle(self, block: GrblBlock, before: ParserModes) -> None:
@@ -559,7 +562,7 @@ class GrblParser:
         now, said = block.modes.spindle, "spindle" in block.groups
         stays = now is not None and now == before.spindle and block.uses != MOTION
         if self.laser and stays and (changed or self._relights(block, before)):
-            self._rest()
+            self._come_to_rest()
         if said and now is None:
             self._path.event(Kind.SPINDLE_OFF)
         elif now is not None and (said or changed):
@@ -569,38 +572,39 @@ class GrblParser:
 
     @staticmethod
     def _relights(block: GrblBlock, before: ParserModes) -> bool:
-        """In laser mode: whether a block that moves nothing goes from cuts to rapids, or back,
-        under constant power (M3), which is switched with that."""
+        """True if, in laser mode, a block without motion goes from cuts to rapids, or back, under
+        constant power (M3), which switches the power."""
         cuts = (1, 2, 3)
         return before.spindle == Kind.SPINDLE_CW and (
             (before.motion in cuts) != (block.modes.motion in cuts)
         )
 
     def _switch_coolant(self, before: ParserModes) -> None:
-        kind, now = _cooling(before), _cooling(self.modes)
+        kind, now = _coolant_kind(before), _coolant_kind(self.modes)
         changed = (before.mist, before.flood) != (self.modes.mist, self.modes.flood)
         if not self._coolant.kinds:
             self.notes.coolant.append(self.index)
         else:
             self._path.event(now)
         if changed and (kind == now or not self._coolant.kinds):
-            self._rest()
+            self._come_to_rest()
 
     def _change_length(self, length: float) -> None:
         if length != self._length:
-            self._rest()
+            self._come_to_rest()
         self._length = length
-        self._place()
+        self._use_frame()
 
-    def _place(self) -> None:
-        """The frame in force, for the moves that follow: the tip of the tool counts."""
+    def _use_frame(self) -> None:
+        """Set the frame in force for the moves that follow; coordinates are those of the tool
+        tip."""
         frame = self._frames[self.modes.frame]
         x, y, z = (a + b for a, b in zip(frame, self._offset, strict=True))
-        self.moves.place(ProgramFrame((x, y, z)))
+        self.moves.set_frame(ProgramFrame((x, y, z)))
 
     def _change_frame(self) -> None:
-        self._rest()
-        self._place()
+        self._come_to_rest()
+        self._use_frame()
         frame = self.modes.frame
         known = {self._first_frame, frame} <= self._placed
         if self._first_frame not in (None, frame) and not known:
@@ -611,7 +615,7 @@ class GrblParser:
         words = {k: block.numbers["XYZ"[k]] * mm for k in range(3) if "XYZ"[k] in block.numbers}
         once = block.once
         if once in ("G10", "G28.1", "G30.1", "G92", "G92.1"):  # it writes to its memory
-            self._rest()
+            self._come_to_rest()
         if once == "G10":
             self._set_frame(block, words)
         elif once in ("G28", "G30"):
@@ -623,10 +627,10 @@ class GrblParser:
             for k, value in words.items():
                 length = self._length if k == 2 else 0.0
                 self._offset[k] = self.position[k] - frame[k] - value - length
-            self._place()
+            self._use_frame()
         elif once == "G92.1":
             self._offset = [0.0, 0.0, 0.0]
-            self._place()
+            self._use_frame()
 
     def _set_frame(self, block: GrblBlock, words: dict[int, float]) -> None:
         """G10 L2: its zero lies there; L20: the tool stands there in it."""
@@ -644,7 +648,7 @@ class GrblParser:
             self._placed.add(frame)
             if here and self._first_frame is not None:
                 self._placed.add(self._first_frame)
-        self._place()
+        self._use_frame()
 
     def _go_home(self, once: str, words: dict[int, float], target: list[float]) -> None:
         """By way of the coordinates to the stored place, of the axes that are named."""
@@ -664,14 +668,14 @@ class GrblParser:
         feed: float,
     ) -> None:
         motion = block.modes.motion
-        if motion == 0 and block.once == "G53" and self._homing(block, target):
+        if motion == 0 and block.once == "G53" and self._try_homing(block, target):
             return
         if motion < 2 or centre is None:
             if block.modes.feed_mode == 93:
                 feed *= math.dist(target, self.position)
             self._go(Kind.LINE if motion else Kind.RAPID, target, feed)
             return
-        self._moving()
+        self._note_motion()
         axes = PLANES[block.modes.plane * 10]
         moves = self.moves
         off = self._shift()
@@ -700,15 +704,15 @@ class GrblParser:
         rise = target[axes[2]] - self.position[axes[2]]
         return math.hypot(math.hypot(*out) * turn, rise)
 
-    def _homing(self, block: GrblBlock, target: list[float]) -> bool:
-        """G53 G0 to machine zero: the machine has an event of it; whether it was that."""
+    def _try_homing(self, block: GrblBlock, target: list[float]) -> bool:
+        """Add the machine's homing event for G53 G0 to machine zero; True if the block is that."""
         named = tuple(axis for axis in "XYZ" if axis in block.numbers)
         kind = {("X", "Y"): Kind.HOME_XY, ("Z",): Kind.HOME_Z}.get(named)
         if kind is None or any(block.numbers[axis] for axis in named):
             return False
-        self._moving()
+        self._note_motion()
         x, y, z = (a - b for a, b in zip(target, self._shift(), strict=True))
-        self._path.set_position(*self.moves.part(x, y, z)).event(kind)
+        self._path.set_position(*self.moves.to_part(x, y, z)).event(kind)
         self.position[:] = target
         return True
 
@@ -721,13 +725,13 @@ class GrblParser:
         return shift
 
     def _go(self, kind: Kind, target: list[float], feed: float) -> None:
-        self._moving()
+        self._note_motion()
         x, y, z = (a - b for a, b in zip(target, self._shift(), strict=True))
         self.moves.feed = feed
         (self.moves.rapid if kind == Kind.RAPID else self.moves.line)(x, y, z)
         self.position[:] = target
 
-    def _moving(self) -> None:
+    def _note_motion(self) -> None:
         if self._first_frame is None:
             self._first_frame = self.modes.frame
             if any(self._zero):
@@ -743,10 +747,10 @@ class GrblParser:
         else:
             self.notes.pauses.append(self.index)
             if code == 0:
-                self._rest()
+                self._come_to_rest()
 
 
-def _cooling(modes: ParserModes) -> Kind:
+def _coolant_kind(modes: ParserModes) -> Kind:
     if modes.flood:
         return Kind.COOLANT_FLOOD
     return Kind.COOLANT_MIST if modes.mist else Kind.COOLANT_OFF

@@ -83,8 +83,8 @@ class _Reader:
         """The moves, with the findings."""
         number, parser = 0, self.parser
         while number < self._lines.count:
-            if parser.plain and not parser.ended:
-                count, number = self._runs.run(number, self._blocks, self._take)
+            if parser.reads_columns and not parser.ended:
+                count, number = self._runs.run(number, self._blocks, self._decode_plain)
                 self._blocks += count
                 if count:
                     continue
@@ -131,8 +131,9 @@ class _Reader:
         where = f"block {self._blocks + 1}, line {number + 1}, column {column}"
         raise ProgramError(fault.message, where=where, mend=fault.mend) from None
 
-    def _take(self, plain: PlainBlocks) -> int:
-        """Rows of plain blocks, up to the first that is no move which grbl surely does."""
+    def _decode_plain(self, plain: PlainBlocks) -> int:
+        """Add the rows of plain blocks, up to the first that is no move which grbl surely
+        executes."""
         parser, path = self.parser, self.path
         motion = -1 if parser.modes.motion == 80 else 10 * parser.modes.motion
         mm = 25.4 if parser.modes.inches else 1.0
@@ -142,7 +143,7 @@ class _Reader:
             moved = moves.add_to(path, self._fast)
             parser.moves.moved = parser.moves.moved or moved
             last, feed = moves.last
-            parser.went_on(None if last is None else last // 10, feed, path.position)
+            parser.continue_from(None if last is None else last // 10, feed, path.position)
         return moves.count
 
     def _findings(self) -> Iterator[Finding]:

@@ -77,7 +77,7 @@ def settings_of(text: str) -> list[ControllerSetting] | None:
     missing = [f"${number}" for number in _KEYS.values() if number not in said]
     if missing:
         raise MachineError(
-            f"the listing is not whole: {', '.join(missing)} {_be(missing)} missing",
+            f"the listing is not whole: {', '.join(missing)} {_verb(missing)} missing",
             mend="give all that grbl answers to $$",
         )
     made = [
@@ -217,8 +217,9 @@ ANSWER_S = 3.0
 MAX_LINES = 1000
 
 
-def asked(port: str) -> str:
-    """The answer to `$$` at a serial port; MachineError where none comes, or no listing."""
+def ask_listing(port: str) -> str:
+    """Return the answer to `$$` at a serial port; MachineError if none comes, or if it is no
+    listing."""
     import serial  # seldom needed
 
     try:
@@ -260,5 +261,5 @@ def _lines(port: Any, patience_s: float, *ends: str) -> list[str]:
     return rows
 
 
-def _be(things: list[str]) -> str:
+def _verb(things: list[str]) -> str:
     return "is" if len(things) == 1 else "are"

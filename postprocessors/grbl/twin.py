@@ -38,7 +38,7 @@ from .controller import (
     NO_BLOCKS,
     blocks_from,
     dwell_s,
-    joined,
+    join_blocks,
     speeds_of,
     stops_of,
 )
@@ -223,8 +223,8 @@ def _single(value: float | np.float32) -> float:
     return float(np.float32(value))
 
 
-def _shown(value: float, decimals: int) -> str:
-    """A float as `printFloat` (print.c) shows it."""
+def _float_text(value: float, decimals: int) -> str:
+    """Format a float as `printFloat` (print.c) does."""
     single = np.float32
     sign, rest = ("-", -single(value)) if value < 0.0 else ("", single(value))
     for factor in (100.0,) * (decimals // 2) + (10.0,) * (decimals % 2):
@@ -234,8 +234,9 @@ def _shown(value: float, decimals: int) -> str:
     return sign + (f"{digits[:-decimals]}.{digits[-decimals:]}" if decimals else digits)
 
 
-def _read(text: str, at: int) -> tuple[float, int] | None:
-    """A number at a place of a line as `read_float` (nuts_bolts.c) reads it, and where it ends."""
+def _read_float(text: str, at: int) -> tuple[float, int] | None:
+    """Parse a number at a place of a line as `read_float` (nuts_bolts.c) does; its value and its
+    end."""
     found = re.compile(r"([+-]?)(\d*)(\.?)(\d*)").match(text, at)
     assert found is not None
     whole, decimals = found[2], found[4]
@@ -288,7 +289,7 @@ class _Memory:
 
     @staticmethod
     def defaults() -> dict[int, float]:
-        """Those of a new board."""
+        """Return the settings of a new board."""
         values = dict.fromkeys((*WHOLE, *SWITCHES, *REALS), 0.0)
         axes = [first + k for first in AXIS_SETTINGS for k in range(3)]
         return (
@@ -297,17 +298,18 @@ class _Memory:
             | {number: value for number, value in DEFAULTS.items() if number < 100}
         )
 
-    def text(self, which: int, line: bytearray) -> bool:
-        """Read a text into the line; False, and it is emptied, where its sum is wrong."""
+    def load(self, which: int, line: bytearray) -> bool:
+        """Load a text into the line buffer; False, and the text is emptied, if its checksum is
+        wrong."""
         line[:] = self._texts[which]
         if self._sums[which] == _checksum(line):
             return True
         line[0] = 0
-        self.keep(which, line)
+        self.store(which, line)
         return False
 
-    def keep(self, which: int, line: bytearray) -> None:
-        """Write a text: all of the line's bytes, what is left behind its end too."""
+    def store(self, which: int, line: bytearray) -> None:
+        """Store a text: all bytes of the line buffer, those behind its end too."""
         self._texts[which][:] = line
         self._sums[which] = _checksum(line)
 
@@ -323,16 +325,16 @@ class _Memory:
             for text in self._texts:
                 text[:2] = b"\0\0"
 
-    def shown(self, number: int) -> str:
-        """A setting as `$$` shows it."""
+    def setting_text(self, number: int) -> str:
+        """Format a setting as `$$` shows it."""
         value = self.settings[number]
         if number in WHOLE or number in SWITCHES:
             return f"{int(value)}"
-        return _shown(value, 0 if number in RPM else 3)
+        return _float_text(value, 0 if number in RPM else 3)
 
 
 def _checksum(text: bytes | bytearray) -> int:
-    """The sum of eeprom.c, which forgets all but whether it was 0."""
+    """Return the checksum of eeprom.c, which forgets all but whether the sum was 0."""
     total = 0
     for octet in text:
         total = ((1 if total else 0) + octet) % 256
@@ -372,19 +374,19 @@ class _Parser(GrblParser):
         self.actions, self.flow, self.probes, self.jogs = [], None, 0, False
         super().line(text)
 
-    def at(self, place: Sequence[float]) -> None:
-        """The parser stands there."""
+    def set_position(self, place: Sequence[float]) -> None:
+        """Set the position of the parser, mm on the machine."""
         self.position[:] = [_single(value) for value in place]
         self._rows.set_position(*self.position)
         self._rows.drain()
 
-    def shifted(self, axis: int) -> float:
+    def zero_of(self, axis: int) -> float:
         """Return the zero of an axis's program coordinates on the machine, mm."""
         value = _single(self.places[axis] + self.offset[axis])
         return _single(value + self.length) if axis == 2 else value
 
     def _word(self, block: GrblBlock, letter: str, value: float, said: str, at: int) -> None:
-        read = _read(said, 0)
+        read = _read_float(said, 0)
         super()._word(block, letter, value if read is None else read[0], said, at)
 
     def _probe_word(self, block: GrblBlock, hundredths: int, at: int) -> str:
@@ -417,13 +419,13 @@ class _Parser(GrblParser):
                 target[k] = _single(value + self.position[k])
         return target
 
-    def _place(self) -> None:
-        """Moves are written in coordinates of the machine."""
+    def _use_frame(self) -> None:
+        """Do nothing: moves are written in coordinates of the machine."""
 
     def _shift(self) -> list[float]:
         return [0.0, 0.0, 0.0]
 
-    def _homing(self, block: GrblBlock, target: list[float]) -> bool:
+    def _try_homing(self, block: GrblBlock, target: list[float]) -> bool:
         return False
 
     def _jog(self, block: GrblBlock, target: list[float], feed: float) -> None:
@@ -466,7 +468,7 @@ class _Parser(GrblParser):
         if modes.frame != before.frame:
             self.places = list(self._memory.frames[modes.frame])
             do(("offsets",))
-        self._once(block, words, target)
+        self._do_non_modal(block, words, target)
         if moves and modes.motion != 80 and block.once not in ("G28", "G30"):
             self.probes = modes.motion if modes.motion >= PROBES else 0
             if self.probes:
@@ -475,7 +477,9 @@ class _Parser(GrblParser):
                 self._move(block, target, centre, feed)
         self.flow = block.flow if block.flow != 1 else None
 
-    def _once(self, block: GrblBlock, words: dict[int, float], target: list[float]) -> None:
+    def _do_non_modal(
+        self, block: GrblBlock, words: dict[int, float], target: list[float]
+    ) -> None:
         once, do = block.once, self.actions.append
         if once == "G10":
             number = math.trunc(block.numbers.get("P", 0.0))
@@ -574,7 +578,7 @@ class GrblTwin(Twin):
         if self._choices.opening == "nothing":
             return sent
         self.slides.stop(now)
-        self._stands_at(self._first)
+        self._set_steps(self._first)
         self._greeted = True
         self._power_up()
         self._go_on()
@@ -588,12 +592,12 @@ class GrblTwin(Twin):
         """(3,) where it takes itself to stand (`sys_position`)."""
         return np.asarray(self._signs * (self._slide_steps() - self._origin))
 
-    def _stands_at(self, steps: Ints) -> None:
-        """From now on it takes itself to stand there; nothing moves."""
+    def _set_steps(self, steps: Ints) -> None:
+        """Set the steps that it counts as its position; nothing moves."""
         self._origin = self._slide_steps() - self._signs * steps
 
     def _mm(self, steps: Ints) -> list[float]:
-        """Steps as places on the machine, as it computes them."""
+        """Convert steps to positions on the machine, with the firmware's arithmetic."""
         pairs = zip(steps.tolist(), self._steps_per_mm(), strict=True)
         return [_single(np.float32(n) / np.float32(per)) if per else 0.0 for n, per in pairs]
 
@@ -650,7 +654,7 @@ class GrblTwin(Twin):
             self._rx.append(octet)
 
     def _kill(self) -> None:
-        """A reset (`mc_reset`): spindle and coolant stop, and the motors too where they run."""
+        """Reset (`mc_reset`): stop spindle and coolant, and the motors too if they run."""
         if "reset" in self._flags:
             return
         self._flags.add("reset")
@@ -665,7 +669,8 @@ class GrblTwin(Twin):
             self._go_idle()
 
     def _go_idle(self) -> None:
-        """The motors end (`st_go_idle`): unless they stay on, nothing else happens for `$1`."""
+        """End the motion of the motors (`st_go_idle`); unless they stay on, nothing else happens
+        for `$1`."""
         delay = self._memory.settings[1]
         if (delay != ALWAYS_ON or self._alarm or self._state == "Sleep") and self._state != "Home":
             self._motor_s = self.now + delay / 1000.0
@@ -683,11 +688,11 @@ class GrblTwin(Twin):
     def _due(self) -> None:
         if self._touches and self.now >= self._touches[0]:
             self._touches.pop(0)
-            self._touched()
+            self._check_contacts()
         if self._turn_at_s is not None and self.now >= self._turn_at_s:
             self._turn_at_s, self._stopping = None, self._holding
             if self._running:
-                self._aim()
+                self._plan_block()
         if self._running and self.slides.ends_s is None:
             self._block_over()
         if self._motor_s is not None and self.now >= self._motor_s:
@@ -720,7 +725,7 @@ class GrblTwin(Twin):
             if self._greeted:
                 self._say(BANNER)
             try:
-                yield from self._work()
+                yield from self._main_loop()
             except _Abort:
                 self._greeted = self._starting = True
             self._ended = self._running = False
@@ -745,26 +750,26 @@ class GrblTwin(Twin):
         self._turn_at_s = None
         self._touches: list[float] = []
         self._probing = None
-        self._probed = self._away = self._soft = False
+        self._probed = self._away = self._soft_limit_hit = False
         self._probe_steps = np.zeros(3, dtype=np.int64)
         self._feed_percent = self._rapid_percent = self._spindle_percent = 100
         self._wco_in = self._ov_in = 0
         self._stop_override = ""
         self._lit = self._ccw = self._flood = self._mist = False
         self._rpm, self._fresh_rpm = 0.0, False
-        self._piece_s, self._felt, self._ending = self.now, [False] * 3, ""
+        self._piece_s, self._closed_limits, self._ending = self.now, [False] * 3, ""
         self._path = ToolpathBuilder()
         self._parser = _Parser(self._machine, self._path, self._memory)
         self._parser.laser = self._is_set(32)
-        self._stand()
+        self._adopt_position()
 
-    def _stand(self) -> None:
-        """Planner and parser begin where the slides are."""
+    def _adopt_position(self) -> None:
+        """Let planner and parser begin where the slides are."""
         self._planned: Ints = self._steps[None, :]
-        self._parser.at(self._mm(self._steps))
+        self._parser.set_position(self._mm(self._steps))
 
-    def _work(self) -> Wait:
-        """Lines, one after another (`protocol_main_loop`)."""
+    def _main_loop(self) -> Wait:
+        """Execute lines, one after another (`protocol_main_loop`)."""
         if self._is_set(21) and any(self._limits()):
             self._state = "Alarm"
             self._message("Check Limits")
@@ -783,15 +788,15 @@ class GrblTwin(Twin):
                     continue
                 raw, self._raw = bytes(self._raw), bytearray()
                 yield from self._realtime()
-                yield from self._answered(raw)
+                yield from self._execute_and_answer(raw)
             self._start_cycle()
             yield from self._realtime()
             if not self._flags and not self._rx:
                 yield None
 
-    def _answered(self, raw: bytes) -> Wait:
-        """A line, from its bytes to its answer. A reset in the midst of it leaves what it does,
-        and its answer is ok."""
+    def _execute_and_answer(self, raw: bytes) -> Wait:
+        """Execute a line and send its answer. A reset in the midst of it stays in force, and the
+        answer is ok."""
         self._ending = ""
         try:
             code = yield from self._execute(raw)
@@ -804,7 +809,7 @@ class GrblTwin(Twin):
         self._say(f"error:{code}\r\n" if code else "ok\r\n")
 
     def _execute(self, raw: bytes) -> Line:
-        text = _stripped(raw)
+        text = _strip(raw)
         most = self._machine.dialect.line_chars
         kept = text[:most].encode("latin-1")
         self._line[: len(kept) + 1] = kept + b"\0"
@@ -824,9 +829,9 @@ class GrblTwin(Twin):
         return (yield from self._block(text, raw))
 
     def _startup(self) -> Wait:
-        """The lines that it does when it begins or was homed."""
+        """Execute the startup lines, at the beginning and after homing."""
         for which in range(START_LINES):
-            if not self._memory.text(which, self._line):
+            if not self._memory.load(which, self._line):
                 self._say(">:")
                 self._answer(READ_FAILED)
                 continue
@@ -846,10 +851,11 @@ class GrblTwin(Twin):
     # Waiting.
 
     def _realtime(self) -> Wait:
-        """A place where it looks at its flags (`protocol_execute_realtime`)."""
+        """Carry out pending flags, and wait while the machine is suspended
+        (`protocol_execute_realtime`)."""
         yield from self._system()
         if self._suspend:
-            yield from self._suspended()
+            yield from self._wait_suspended()
 
     def _delay(self, seconds: float) -> Wait:
         until = self.now + seconds
@@ -908,12 +914,12 @@ class GrblTwin(Twin):
                 self._resume()
             self._flags.discard("start")
         if "stop" in flags:
-            self._stopped()
+            self._end_cycle()
             self._flags.discard("stop")
         self._override_motion()
         self._override_others()
         if self._stale and self._running and self._turn_at_s is None:
-            self._aim_later()
+            self._replan_later()
 
     def _hold(self, flags: set[str]) -> None:
         """Carry out the real-time commands that stop the machine: hold, jog cancel, door and
@@ -967,14 +973,14 @@ class GrblTwin(Twin):
         """The first segments are made, and the motors wake."""
         self._running, self._phases, self._speed = True, [], 0.0
         self._fresh_rpm = True
-        self._light(self._ring[0])
-        self._aim()
+        self._set_block_power(self._ring[0])
+        self._plan_block()
 
-    def _stopped(self) -> None:
-        """The motors have come to rest."""
+    def _end_cycle(self) -> None:
+        """Carry out the flag of motors that have come to rest."""
         if (
             self._state in ("Hold", "Door", "Sleep")
-            and not self._soft
+            and not self._soft_limit_hit
             and "jog" not in self._suspend
         ):
             if self._holding:
@@ -984,7 +990,7 @@ class GrblTwin(Twin):
         if "jog" in self._suspend:
             self._holding = self._stopping = False
             self._forget_blocks()
-            self._stand()
+            self._adopt_position()
             if self._memory.settings[1] != ALWAYS_ON:
                 self._until_s = self.now + self._memory.settings[1] / 1000.0
         if "ajar" in self._suspend:
@@ -1035,18 +1041,18 @@ class GrblTwin(Twin):
 
     # While it is held, its door is open, or it sleeps (`protocol_exec_rt_suspend`).
 
-    def _suspended(self) -> Wait:
+    def _wait_suspended(self) -> Wait:
         block = self._ring[0] if self._ring else None
         spindle = block.spindle if block else self._parser.modes.spindle
         rpm = block.rpm if block else self._parser.rpm
-        cooled = (self._mist, self._flood) if block else _cooled(self._parser.modes)
+        cooled = (self._mist, self._flood) if block else _coolant_of(self._parser.modes)
         if self._is_set(32):
             self._other_overrides.add(SPINDLE_STOP)
         while self._suspend:
             before = self._snapshot()
             if "held" in self._suspend:
                 if self._state in ("Door", "Sleep"):
-                    yield from self._retracted(spindle, rpm, cooled)
+                    yield from self._wait_retracted(spindle, rpm, cooled)
                 else:
                     self._spindle_while_held(spindle, rpm)
             yield from self._system()
@@ -1056,8 +1062,8 @@ class GrblTwin(Twin):
     def _snapshot(self) -> tuple[Any, ...]:
         return self._state, frozenset(self._suspend), self._stop_override, self._fresh_rpm
 
-    def _retracted(self, spindle: Kind | None, rpm: float, cooled: tuple[bool, bool]) -> Wait:
-        """Stop spindle and coolant; sleep for ever; or wait at the open door, and go on."""
+    def _wait_retracted(self, spindle: Kind | None, rpm: float, cooled: tuple[bool, bool]) -> Wait:
+        """Stop spindle and coolant; then sleep for ever, or wait at the open door and go on."""
         if "retracted" not in self._suspend:
             self._stop_override = ""
             self._spin(None, 0.0)
@@ -1082,7 +1088,7 @@ class GrblTwin(Twin):
             else:
                 self._spin(spindle, rpm)
                 yield from self._dwell(DOOR_SPINDLE_S, held=False)
-        if any(_cooled(self._parser.modes)) and "again" not in self._suspend:
+        if any(_coolant_of(self._parser.modes)) and "again" not in self._suspend:
             self._cool(mist=cooled[0], flood=cooled[1])
             yield from self._dwell(DOOR_COOLANT_S, held=False)
         if "again" not in self._suspend:
@@ -1090,7 +1096,7 @@ class GrblTwin(Twin):
             self._flags.add("start")
 
     def _spindle_while_held(self, spindle: Kind | None, rpm: float) -> None:
-        """The spindle's stop of a held machine, and its end."""
+        """Stop the spindle of a held machine, and start it again."""
         if self._stop_override == "begin":
             if self._parser.modes.spindle is not None:
                 self._spin(None, 0.0)
@@ -1114,7 +1120,8 @@ class GrblTwin(Twin):
     # Spindle and coolant.
 
     def _speed_of(self, rpm: float) -> tuple[float, bool]:
-        """The speed that it says, and whether its output is on (`spindle_compute_pwm_value`)."""
+        """Return the speed that it reports, and whether its output is on
+        (`spindle_compute_pwm_value`)."""
         least, most = self._memory.settings[31], self._memory.settings[30]
         percent = np.float32(0.010) * np.float32(self._spindle_percent)
         asked = _single(np.float32(rpm) * percent)
@@ -1144,9 +1151,9 @@ class GrblTwin(Twin):
             yield from self._synchronise()
             self._spin(spindle, rpm)
 
-    def _light(self, block: _Planned) -> None:
-        """The spindle's output goes with the segments of a block; in laser mode that of M4 with
-        its speed, so that it is off when the block is over."""
+    def _set_block_power(self, block: _Planned) -> None:
+        """Set the spindle's output for the segments of a block; in laser mode that of M4 follows
+        the speed, so that it is off when the block is over."""
         adjusted = self._is_set(32) and block.spindle == Kind.SPINDLE_CCW
         if block.spindle is None:
             self._rpm, self._lit = 0.0, False
@@ -1166,24 +1173,24 @@ class GrblTwin(Twin):
             return _code(fault)
         path = self._path.drain()
         if parser.jogs:
-            return (yield from self._jogged(path, stood))
+            return (yield from self._run_jog(path, stood))
         if raw is not None:
             self.decoded.append(raw)
         if parser.flow in (2, 30):
             self._ending = "[MSG:Pgm End]\r\n"
         power, flow, probes = parser.power, parser.flow, parser.probes
         for action in parser.actions:
-            yield from self._act(*action)
+            yield from self._do_action(*action)
         if probes:
             yield from self._probe(path, probes, stood)
         else:
             for row in range(len(path)):
                 yield from self._line_to(path, row, power, len(self.decoded) - 1)
         if flow is not None:
-            yield from self._flow(flow)
+            yield from self._end_or_pause(flow)
         return OK
 
-    def _act(self, what: str, *values: Any) -> Wait:
+    def _do_action(self, what: str, *values: Any) -> Wait:
         """Carry out an action of a block other than motion."""
         if what == "spindle":
             yield from self._spin_at_rest(*values)
@@ -1206,8 +1213,8 @@ class GrblTwin(Twin):
         yield from self._synchronise()
         self._wco_in = 0
 
-    def _flow(self, flow: int) -> Wait:
-        """M0, M2 and M30."""
+    def _end_or_pause(self, flow: int) -> Wait:
+        """Carry out M0, M2 and M30."""
         yield from self._synchronise()
         if flow == 0:
             if self._state != "Check":
@@ -1223,9 +1230,9 @@ class GrblTwin(Twin):
         self._message("Pgm End")
         self._ending = ""
 
-    def _jogged(self, path: Toolpath, stood: list[float]) -> Line:
-        if self._is_set(20) and self._beyond(self._parser.position):
-            self._parser.at(stood)
+    def _run_jog(self, path: Toolpath, stood: list[float]) -> Line:
+        if self._is_set(20) and self._is_beyond_travel(self._parser.position):
+            self._parser.set_position(stood)
             return BEYOND_TRAVEL
         for row in range(len(path)):
             yield from self._line_to(path, row, self._parser.rpm, -1, jogs=True)
@@ -1234,7 +1241,7 @@ class GrblTwin(Twin):
             self._set_out()
         return OK
 
-    def _beyond(self, target: Sequence[float]) -> bool:
+    def _is_beyond_travel(self, target: Sequence[float]) -> bool:
         """True if a place is beyond the travel, which begins at machine zero and goes down."""
         travel = [self._memory.settings[130 + k] for k in range(3)]
         return any(
@@ -1242,10 +1249,10 @@ class GrblTwin(Twin):
         )
 
     def _soft_check(self, target: Sequence[float]) -> Wait:
-        """A target beyond the travel: hold, then an alarm that only a reset ends."""
-        if not self._beyond(target):
+        """Refuse a target beyond the travel: hold, then raise an alarm that only a reset ends."""
+        if not self._is_beyond_travel(target):
             return
-        self._soft = True
+        self._soft_limit_hit = True
         if self._state == "Run":
             self._flags.add("hold")
             while self._state != "Idle":
@@ -1259,7 +1266,7 @@ class GrblTwin(Twin):
     def _line_to(
         self, path: Toolpath, row: int, power: float, owner: int, *, jogs: bool = False
     ) -> Wait:
-        """A move into the ring, block by block; waits where the ring is full (`mc_line`)."""
+        """Put a move into the ring, block by block; wait while the ring is full (`mc_line`)."""
         if self._is_set(20) and not jogs:
             yield from self._soft_check(path.end[row].tolist())
         if self._state == "Check":
@@ -1277,7 +1284,7 @@ class GrblTwin(Twin):
         last = replace(last, row=np.full(len(last), row, np.int32))
         own = replace(own, row=np.full(len(own), row, np.int32))
         stops = stops_of(path, controller)
-        plan = speeds_of(joined([last, own]), path, machine, FROM_REST, len(last), stops)
+        plan = speeds_of(join_blocks([last, own]), path, machine, FROM_REST, len(last), stops)
         ways = own.way * coded_steps_mm(machine)
         units = ways / np.linalg.norm(ways, axis=1)[:, None]
         highest = max_along(axis_limits(machine, "max_rate_mm_min") / 60.0, units)
@@ -1307,7 +1314,7 @@ class GrblTwin(Twin):
             )
             self._stale = True
             if self._running and self._turn_at_s is None:
-                self._aim()
+                self._plan_block()
 
     # The probe and the switches.
 
@@ -1336,7 +1343,7 @@ class GrblTwin(Twin):
         if self._state == "Check":
             return
         target = list(self._parser.position)
-        self._parser.at(stood)
+        self._parser.set_position(stood)
         yield from self._synchronise()
         self._probed, self._away = False, motion >= PROBES + 2
         if self._touches_probe():
@@ -1367,26 +1374,28 @@ class GrblTwin(Twin):
         self._forget_blocks()
         self._planned = self._steps[None, :]
         self._say(self._probe_report())
-        self._parser.at(self._mm(self._steps) if self._probed else target)
+        self._parser.set_position(self._mm(self._steps) if self._probed else target)
 
     def _probe_report(self) -> str:
-        return f"[PRB:{self._places(self._mm(self._probe_steps))}:{int(self._probed)}]\r\n"
+        return f"[PRB:{self._lengths_text(self._mm(self._probe_steps))}:{int(self._probed)}]\r\n"
 
-    def _touched(self) -> None:
-        """The slides have come to where the probe or a switch changes."""
+    def _check_contacts(self) -> None:
+        """Compare probe and limit switches with their last state, where a travel reaches a
+        contact."""
         if self._probing is not None and self._touches_probe():
             self._probing = None
             self._probe_steps = self._steps
             self._flags.add("cancel")
         limits = self._limits()
-        if limits != self._felt:
-            self._felt = limits
+        if limits != self._closed_limits:
+            self._closed_limits = limits
             if self._is_set(21) and self._state != "Alarm" and not self._alarm:
                 self._kill()
                 self._alarm = HARD_LIMIT
 
-    def _touches_on(self, commanded: Floats, seconds: Floats) -> list[float]:
-        """When, of a travel, the probe or a switch changes: the first time of each."""
+    def _contact_times(self, commanded: Floats, seconds: Floats) -> list[float]:
+        """Return the times at which the probe or a switch changes on a travel: the first time of
+        each."""
         here, found = self.slides.commanded_mm, list[float]()
         path = np.concatenate([here[None, :], commanded])
         eps = 0.5 * self._slide_step_mm
@@ -1400,7 +1409,7 @@ class GrblTwin(Twin):
         for mask in masks:
             changes = np.flatnonzero(mask[1:] != mask[:-1])
             found += (self.now + seconds[changes]).tolist()
-        self._felt = self._limits()
+        self._closed_limits = self._limits()
         return sorted(found)
 
     # Lines that begin with $ (`system_execute_line`).
@@ -1444,7 +1453,7 @@ class GrblTwin(Twin):
             if self._state in ("Run", "Hold"):
                 return NOT_IDLE
             for number in self._memory.settings:
-                self._say(f"${number}={self._memory.shown(number)}\r\n")
+                self._say(f"${number}={self._memory.setting_text(number)}\r\n")
         elif head == "G":
             self._say(f"[GC:{self._modes()}]\r\n")
         elif head == "X":
@@ -1462,7 +1471,7 @@ class GrblTwin(Twin):
         return OK
 
     def _modes(self) -> str:
-        """The modes in force as `$G` shows them."""
+        """Format the modes in force as `$G` shows them."""
         parser = self._parser
         modes = parser.modes
         motion = f"38.{modes.motion - PROBES + 2}" if modes.motion >= PROBES else f"{modes.motion}"
@@ -1471,18 +1480,22 @@ class GrblTwin(Twin):
         words += [f"G{modes.feed_mode}", WORDS[modes.spindle]]
         words += ["M7"] * modes.mist + ["M8"] * modes.flood
         words += [] if modes.mist or modes.flood else ["M9"]
-        words += [f"T{parser.tool}", f"F{self._rate(parser.feed)}", f"S{_shown(parser.rpm, 0)}"]
+        words += [
+            f"T{parser.tool}",
+            f"F{self._rate_text(parser.feed)}",
+            f"S{_float_text(parser.rpm, 0)}",
+        ]
         return " ".join(words)
 
     def _build(self, rest: str) -> int:
-        """`$I` and `$I=`."""
+        """Carry out `$I` and `$I=`."""
         if rest and not rest.startswith("="):
             return BAD_STATEMENT
         if rest:
             self._shift_line(rest[1:])
-            self._memory.keep(START_LINES, self._line)
+            self._memory.store(START_LINES, self._line)
             return OK
-        self._memory.text(START_LINES, self._line)
+        self._memory.load(START_LINES, self._line)
         options = "VM" if self._machine.coolant.mist else "V"
         blocks = self._machine.controller.buffer_blocks - 1
         self._say(f"[VER:{BUILD}:{self._line_text()}]\r\n[OPT:{options},{blocks},{RX_BYTES}]\r\n")
@@ -1503,17 +1516,17 @@ class GrblTwin(Twin):
         return OK
 
     def _start_lines(self, rest: str) -> Line:
-        """`$N` and `$Nx=`, which does the line before it keeps it."""
+        """Carry out `$N` and `$Nx=`, which executes the line before it stores it."""
         if not rest:
             for which in range(START_LINES):
-                if self._memory.text(which, self._line):
+                if self._memory.load(which, self._line):
                     self._say(f"$N{which}={self._line_text()}\r\n")
                 else:
                     self._answer(READ_FAILED)
             return OK
         if self._state != "Idle":
             return NOT_IDLE
-        found = _read(rest, 0)
+        found = _read_float(rest, 0)
         if found is None:
             return BAD_NUMBER
         value, end = found
@@ -1526,17 +1539,17 @@ class GrblTwin(Twin):
             return code
         yield from self._synchronise()
         if _byte(value) < START_LINES:  # beyond, grbl writes over what else is in its memory
-            self._memory.keep(_byte(value), self._line)
+            self._memory.store(_byte(value), self._line)
         return OK
 
     def _assign(self, text: str) -> int:
-        """`$x=value` (`settings_store_global_setting`)."""
-        name = _read(text, 1)
+        """Carry out `$x=value` (`settings_store_global_setting`)."""
+        name = _read_float(text, 1)
         if name is None:
             return BAD_NUMBER
         if text[name[1] : name[1] + 1] != "=":
             return BAD_STATEMENT
-        given = _read(text, name[1] + 1)
+        given = _read_float(text, name[1] + 1)
         if given is None:
             return BAD_NUMBER
         value, end = given
@@ -1575,7 +1588,7 @@ class GrblTwin(Twin):
         settings, stood = self._memory.settings, self._steps
         turned = [int(settings[3]) >> axis & 1 for axis in range(3)]
         self._signs = 1 - 2 * np.array(turned, dtype=np.int64)  # as it was wired for $3=0
-        self._stands_at(stood)
+        self._set_steps(stood)
         axes: dict[str, Any] = {}
         for k, name in enumerate("xyz"):
             given: dict[str, Any] = {"max_rate_mm_min": settings[110 + k]}
@@ -1605,7 +1618,7 @@ class GrblTwin(Twin):
         for axes in ([2], [0, 1]):
             yield from self._find_switches(axes)
         yield from self._realtime()
-        self._stand()
+        self._adopt_position()
         self._state = "Idle"
         if self._memory.settings[1] != ALWAYS_ON:
             yield from self._delay(self._memory.settings[1] / 1000.0)
@@ -1613,7 +1626,7 @@ class GrblTwin(Twin):
         return OK
 
     def _find_switches(self, axes: list[int]) -> Wait:
-        """To the switches of these axes and back, twice, the second time slowly."""
+        """Move to the switches of these axes and back, twice, the second time slowly."""
         settings = self._memory.settings
         sign = [-1 if int(settings[23]) >> axis & 1 else 1 for axis in range(3)]
         search = SEARCH * max(settings[130 + axis] for axis in axes)
@@ -1623,7 +1636,7 @@ class GrblTwin(Twin):
             start = self._steps
             for axis in axes:
                 start[axis] = 0
-            self._stands_at(start)
+            self._set_steps(start)
             yield from self._home_to(axes, [turn * each for each in sign], far, rate, turn > 0)
             yield from self._delay(settings[26] / 1000.0)
         placed = self._steps
@@ -1631,12 +1644,12 @@ class GrblTwin(Twin):
             per_mm = settings[100 + axis]
             mm = -pull_off if sign[axis] > 0 else pull_off - settings[130 + axis]
             placed[axis] = int(math.copysign(math.floor(abs(mm) * per_mm + 0.5), mm))
-        self._stands_at(placed)
+        self._set_steps(placed)
 
     def _home_to(
         self, axes: list[int], sign: list[int], far_mm: float, rate: float, approaches: bool
     ) -> Wait:
-        """Move all axes alike, in an approach each until its switch closes."""
+        """Move all axes alike; in an approach each until its switch closes."""
         step_mm = self._slide_step_mm
         counts = [round(far_mm * self._memory.settings[100 + axis]) for axis in axes]
         whole = max(counts)
@@ -1648,19 +1661,19 @@ class GrblTwin(Twin):
         lasts = list[int]()
         for axis, count in zip(axes, counts, strict=True):
             own = np.minimum(events, count)
-            until = self._closes(axis, sign[axis], count) if approaches else None
+            until = self._steps_to_switch(axis, sign[axis], count) if approaches else None
             lasts.append(count if until is None else until)
             moved[:, axis] = sign[axis] * np.minimum(own, lasts[-1])
             if approaches and until is None:
                 lasts[-1] = whole
         missed = approaches and any(
-            self._closes(axis, sign[axis], count) is None
+            self._steps_to_switch(axis, sign[axis], count) is None
             for axis, count in zip(axes, counts, strict=True)
         )
         last = max(lasts)
         phases = _trapezoid(far_mm, 0.0, speed, ramp, 0.0)
         at = far_mm * events[:last] / max(whole, 1)
-        seconds = _times(phases, at)
+        seconds = _times_at(phases, at)
         total = float(seconds[-1]) if last else 0.0
         travel = Travel(
             (begin + self._signs * moved[:last]) * step_mm, seconds, np.zeros(last), total
@@ -1674,7 +1687,7 @@ class GrblTwin(Twin):
             counted = self._steps
             for axis, count in zip(axes, counts, strict=True):
                 counted[axis] = sign[axis] * min(done, count)
-            self._stands_at(counted)
+            self._set_steps(counted)
         closed = self._limits()
         if "reset" in self._flags:
             self._alarm = HOMING_RESET
@@ -1688,8 +1701,8 @@ class GrblTwin(Twin):
             self._kill()
             yield from self._realtime()
 
-    def _closes(self, axis: int, sign: int, count: int) -> int | None:
-        """After how many steps the switch of an axis closes, which it is asked before each."""
+    def _steps_to_switch(self, axis: int, sign: int, count: int) -> int | None:
+        """Return the steps after which the switch of an axis closes; None if it does not."""
         if self._ends_mm is None:
             return 0 if self._is_set(5) else None
         way = int(self._signs[axis]) * sign
@@ -1702,41 +1715,41 @@ class GrblTwin(Twin):
 
     # Reports.
 
-    def _place(self, mm: float) -> str:
+    def _length_text(self, mm: float) -> str:
         if self._is_set(13):
-            return _shown(_single(np.float32(mm) * np.float32(INCHES_PER_MM)), 4)
-        return _shown(mm, 3)
+            return _float_text(_single(np.float32(mm) * np.float32(INCHES_PER_MM)), 4)
+        return _float_text(mm, 3)
 
-    def _places(self, mm: Sequence[float]) -> str:
-        return ",".join(self._place(value) for value in mm)
+    def _lengths_text(self, mm: Sequence[float]) -> str:
+        return ",".join(self._length_text(value) for value in mm)
 
-    def _rate(self, mm_min: float) -> str:
+    def _rate_text(self, mm_min: float) -> str:
         if self._is_set(13):
-            return _shown(_single(np.float32(mm_min) * np.float32(INCHES_PER_MM)), 1)
-        return _shown(mm_min, 0)
+            return _float_text(_single(np.float32(mm_min) * np.float32(INCHES_PER_MM)), 1)
+        return _float_text(mm_min, 0)
 
     def _frames(self) -> str:
-        """`$#`: what the frames and places are, and the last probe."""
+        """Format frames, stored places and the last probe as `$#` shows them."""
         memory = self._memory
         rows = {f"G{54 + k}": place for k, place in enumerate(memory.frames)}
         rows |= memory.homes | {"G92": self._parser.offset, "TLO": [self._parser.length]}
-        text = "".join(f"[{name}:{self._places(place)}]\r\n" for name, place in rows.items())
+        text = "".join(f"[{name}:{self._lengths_text(place)}]\r\n" for name, place in rows.items())
         return text + self._probe_report()
 
     def _report(self) -> None:
-        """The status report (`report_realtime_status`)."""
+        """Send the status report (`report_realtime_status`)."""
         busy = self._state in ("Home", "Run", "Hold", "Jog", "Door")
         mask = int(self._memory.settings[10])
-        offsets = [self._parser.shifted(k) for k in range(3)]
+        offsets = [self._parser.zero_of(k) for k in range(3)]
         here = self._mm(self._steps)
         if not mask & 1:
             here = [_single(a - b) for a, b in zip(here, offsets, strict=True)]
-        fields = [self.state, f"{'MPos' if mask & 1 else 'WPos'}:{self._places(here)}"]
+        fields = [self.state, f"{'MPos' if mask & 1 else 'WPos'}:{self._lengths_text(here)}"]
         if mask & 2:
             blocks = self._machine.controller.buffer_blocks - 1 - len(self._ring)
             fields.append(f"Bf:{blocks},{RX_BYTES - len(self._rx)}")
         speed = self._speed_ahead() * 60.0 if self._running and self._phases and busy else 0.0
-        fields.append(f"FS:{self._rate(speed)},{_shown(self._rpm, 0)}")
+        fields.append(f"FS:{self._rate_text(speed)},{_float_text(self._rpm, 0)}")
         pins = "P" * self._touches_probe()
         pins += "".join(axis for axis, on in zip("XYZ", self._limits(), strict=True) if on)
         fields += [f"Pn:{pins}"] if pins else []
@@ -1745,7 +1758,7 @@ class GrblTwin(Twin):
         else:
             self._wco_in = 29 if busy else 9
             self._ov_in = max(self._ov_in, 1)
-            fields.append(f"WCO:{self._places(offsets)}")
+            fields.append(f"WCO:{self._lengths_text(offsets)}")
         if self._ov_in > 0:
             self._ov_in -= 1
         else:
@@ -1776,24 +1789,24 @@ class GrblTwin(Twin):
             square = min(most * most, square + 2.0 * block.acceleration * block.length)
         return float(np.sqrt(square))
 
-    def _aim_later(self) -> None:
-        """Plan anew behind the pieces of the block that are fixed already."""
+    def _replan_later(self) -> None:
+        """Schedule a new plan behind the pieces of the block that are fixed already."""
         done = math.floor((self.now - self._piece_s) / SEGMENT_S + SEGMENT_S / 100.0)
         self._turn_at_s = self._piece_s + (done + SEGMENTS) * SEGMENT_S
 
-    def _aim(self) -> None:
-        """Plan the rest of the block that runs, from where it is and as fast as it is."""
+    def _plan_block(self) -> None:
+        """Plan the rest of the current block from its present place and speed."""
         self._stale = False
         block = self._ring[0]
         if self._phases:
-            self._done_mm, self._speed = self._where(self.now)
+            self._done_mm, self._speed = self._progress(self.now)
             self._events += self.slides.done
         else:
             self._piece_s = self.now
         left = max(block.length - self._done_mm, 0.0)
         a, v = block.acceleration, self._speed
         if self._stopping:
-            self._phases = _slowing(left, v, a)
+            self._phases = _slow_down(left, v, a)
         else:
             self._phases = _trapezoid(left, v, self._nominal(block), a, self._exit_speed())
         self._begun_s = self.now
@@ -1809,14 +1822,14 @@ class GrblTwin(Twin):
         at = at[self._events : last]
         travel = Travel(
             commanded[self._events : last],
-            _times(self._phases, at),
+            _times_at(self._phases, at),
             np.zeros(len(at)),
             whole,
         )
         self.slides.begin(travel, self.now, block.block)
-        self._touches = self._touches_on(travel.commanded, travel.seconds)
+        self._touches = self._contact_times(travel.commanded, travel.seconds)
 
-    def _where(self, now: float) -> tuple[float, float]:
+    def _progress(self, now: float) -> tuple[float, float]:
         """Return the distance done of the current block, mm, and its speed."""
         since, done = now - self._begun_s, self._done_mm
         for seconds, v, a in self._phases:
@@ -1827,11 +1840,11 @@ class GrblTwin(Twin):
         return done, _end_speed(self._phases)
 
     def _speed_ahead(self) -> float:
-        """The speed that it reports: that at the end of the pieces that are fixed."""
-        return self._where(self.now + (SEGMENTS - 0.5) * SEGMENT_S)[1]
+        """Return the speed that it reports: that at the end of the pieces that are fixed."""
+        return self._progress(self.now + (SEGMENTS - 0.5) * SEGMENT_S)[1]
 
     def _block_over(self) -> None:
-        """The travel is over: the block, or with a hold only its slowing down."""
+        """End the travel: that of the whole block, or with a hold only its deceleration."""
         block = self._ring[0]
         self._events += self.slides.done
         self._done_mm += _distance(self._phases, sum(each[0] for each in self._phases))
@@ -1849,32 +1862,32 @@ class GrblTwin(Twin):
             self._go_idle()
         else:
             if self._ring[0] is not block:
-                self._light(self._ring[0])
-            self._aim()
+                self._set_block_power(self._ring[0])
+            self._plan_block()
 
 
 LENGTH_EPS_MM: Final = 1e-9
 """Remainder, mm, below which a block counts as done."""
 
 
-def _stripped(raw: bytes) -> str:
-    """A line as `protocol_main_loop` hands it on: capitals, without blanks and comments."""
+def _strip(raw: bytes) -> str:
+    """Return a line as `protocol_main_loop` hands it on: capitals, without blanks and comments."""
     text = re.sub(r"\([^)]*\)?|;.*", "", raw.decode("latin-1"))
     return "".join(sign for sign in text if sign > " " and sign != "/").upper()
 
 
 def _code(fault: LineFault) -> int:
-    """grbl's number of an error; 20, unsupported, for what only this twin does not do."""
+    """Return grbl's number of an error; 20, unsupported, for what only this twin refuses."""
     found = re.search(r"\(error:(\d+)\)", fault.message)
     return int(found[1]) if found else 20
 
 
-def _cooled(modes: ParserModes) -> tuple[bool, bool]:
+def _coolant_of(modes: ParserModes) -> tuple[bool, bool]:
     return modes.mist, modes.flood
 
 
 def _percent(now: int, changes: Mapping[int, int | None], asked: set[int]) -> int:
-    """An override after those real-time bytes that were asked for."""
+    """Return an override after the real-time bytes received."""
     for octet, change in changes.items():
         if octet in asked:
             now = 100 if change is None else now + change
@@ -1885,16 +1898,16 @@ def _percent(now: int, changes: Mapping[int, int | None], asked: set[int]) -> in
 
 
 def _trapezoid(left: float, v: float, nominal: float, a: float, exit_speed: float) -> list[Phase]:
-    """From the speed v over `left` mm: up to `nominal`, and down to `exit_speed` at the end, as
-    far as the acceleration allows."""
+    """Return the phases from the speed v over `left` mm: accelerate to `nominal`, and slow down to
+    `exit_speed` at the end, as far as the acceleration allows."""
     if v * v - 2.0 * a * left >= exit_speed * exit_speed and v > exit_speed:
-        return _slowing(left, v, a)
+        return _slow_down(left, v, a)
     phases: list[Phase] = []
     if v > nominal:
         phases.append(((v - nominal) / a, v, -a))
         left -= (v * v - nominal * nominal) / (2.0 * a)
         if left <= 0.0:
-            return _slowing(left + (v * v - nominal * nominal) / (2.0 * a), v, a)
+            return _slow_down(left + (v * v - nominal * nominal) / (2.0 * a), v, a)
         v = nominal
     exit_speed = min(exit_speed, nominal, float(np.sqrt(v * v + 2.0 * a * left)))
     peak = min(nominal, float(np.sqrt(a * left + 0.5 * (v * v + exit_speed * exit_speed))))
@@ -1905,8 +1918,8 @@ def _trapezoid(left: float, v: float, nominal: float, a: float, exit_speed: floa
     return [phase for phase in phases if phase[0] > 0.0]
 
 
-def _slowing(left: float, v: float, a: float) -> list[Phase]:
-    """Slow down all along, to rest or over `left` mm."""
+def _slow_down(left: float, v: float, a: float) -> list[Phase]:
+    """Return the phases of slowing down all along, to rest or over `left` mm."""
     end = float(np.sqrt(max(v * v - 2.0 * a * left, 0.0)))
     return [((v - end) / a, v, -a)] if v > 0.0 else []
 
@@ -1930,8 +1943,8 @@ def _end_speed(phases: list[Phase]) -> float:
 SPEED_EPS_MM_S: Final = 1e-9
 
 
-def _times(phases: list[Phase], at: Floats) -> Floats:
-    """(K,) seconds from the start until `at` (K,) mm, ascending, are done."""
+def _times_at(phases: list[Phase], at: Floats) -> Floats:
+    """Return the times (K,) s at which `at` (K,) mm, ascending, are covered."""
     times, begin, done = np.zeros(len(at)), 0.0, 0.0
     for k, (seconds, v, a) in enumerate(phases):
         way = v * seconds + 0.5 * a * seconds * seconds

@@ -329,7 +329,7 @@ class GrblConversation(Conversation):
         """By its machine position, so that frames that the program sets do not matter."""
         if self._frame is None or self._machine_mm is None:
             return None
-        return _less(self._machine_mm, self._frame)
+        return _without(self._machine_mm, self._frame)
 
     @property
     def is_still(self) -> bool:
@@ -429,12 +429,14 @@ class GrblConversation(Conversation):
             return
         elif self._phase != "greeting" and not self._homes and now - self._answered >= patience:
             self._fail("it does not answer any more", now)
-        if now >= self._polled + POLL_FACTOR * self.manner.late_s:  # as `_wake` reckons it
+        if (
+            now >= self._polled + POLL_FACTOR * self.manner.late_s
+        ):  # as `_schedule_poll` reckons it
             if self.state is WireState.PAUSING and now - self._halted >= patience / 2.0:
                 self._write(HOLD)
                 self._halted = now
             self._poll(now)
-        self._wake(now)
+        self._schedule_poll(now)
 
     @property
     def _homes(self) -> bool:
@@ -452,9 +454,9 @@ class GrblConversation(Conversation):
             self._due = min(self._due + 1, MAX_REPORTS_DUE)
             self._write(STATUS)
         self._polled = now
-        self._wake(now)
+        self._schedule_poll(now)
 
-    def _wake(self, now: float) -> None:
+    def _schedule_poll(self, now: float) -> None:
         if not self.ended:
             self.next_s = self._polled + POLL_FACTOR * self.manner.late_s
 
@@ -478,8 +480,8 @@ class GrblConversation(Conversation):
         if not line:
             return
         stopping = self.state is WireState.STOPPING
-        if self._phase == "greeting" and not stopping and not _understood(line):
-            self._aside(line)
+        if self._phase == "greeting" and not stopping and not _parse_report(line):
+            self._take_message(line)
             return
         self._known, self._answered = True, now
         status = _STATUS.fullmatch(line)
@@ -494,7 +496,7 @@ class GrblConversation(Conversation):
             if not (stopping and self._reset_sent):  # else its banner follows
                 self._end(WireState.FAILED, self._failing or self._alarm)
         elif line.startswith("[GC:") and line.endswith("]"):
-            self._reported(line, now)
+            self._check_query(line, now)
         elif _SETTING.fullmatch(line) and self._phase == "settings":
             self._listing.append(line)
         elif _PUSHED.fullmatch(line):
@@ -503,11 +505,11 @@ class GrblConversation(Conversation):
             elif _ORIGIN.match(line):
                 self._beyond = ""
         elif _STARTUP.fullmatch(line):
-            self._aside(line)
+            self._take_message(line)
         elif not stopping:
             self._fail(f"an answer that it cannot have meant: {line[:40]!r}", now)
 
-    def _aside(self, line: str) -> None:
+    def _take_message(self, line: str) -> None:
         """Messages and startup lines; in the greeting anything else, which a port may say that
         has just been opened, unless it names another firmware."""
         if self._phase == "greeting" and line.startswith("[MSG:") and "unlock" not in line:
@@ -582,7 +584,7 @@ class GrblConversation(Conversation):
         if self.state is WireState.STOPPING:
             self._stopping(state, now)
         elif self._phase == "greeting":
-            self._greeted(state, now)
+            self._check_first_report(state, now)
         elif state == "Alarm" and not self._locked and not self._unlocks:
             self._end(WireState.FAILED, f"it is locked{self._reasons}: home it or unlock it")
         elif self.state is WireState.PAUSING and still:
@@ -643,12 +645,12 @@ class GrblConversation(Conversation):
                 self._offset = (x, y, z)
             elif name == "WPos":
                 self.place_mm = (x, y, z)
-                self._machine_mm = _less(self.place_mm, _less((0.0, 0.0, 0.0), offset))
+                self._machine_mm = _without(self.place_mm, _without((0.0, 0.0, 0.0), offset))
             else:
                 self._machine_mm = (x, y, z)
-                self.place_mm = _less(self._machine_mm, offset)
+                self.place_mm = _without(self._machine_mm, offset)
 
-    def _greeted(self, state: str, now: float) -> None:
+    def _check_first_report(self, state: str, now: float) -> None:
         """Its first report: only a controller at rest is begun with, and anew, so that nothing of
         an earlier sender is left in its buffer."""
         if state == "Idle":
@@ -692,13 +694,13 @@ class GrblConversation(Conversation):
         """Begin, unless the program is to go on where the controller does not take it to stand."""
         if self._standing is not None:
             at, said = self._machine_mm, self._standing.said_mm
-            place = _less(at, self._offset) if at and self._offset else None
+            place = _without(at, self._offset) if at and self._offset else None
             why = self._standing.refusal(place, restarted=self._restarted)
             if at is None or why:
                 self._end(WireState.FAILED, why or "it does not say where it stands")
                 return
             if said is not None:  # until the next reset: what it remembers stays as it is
-                self._frame = _less(at, said)
+                self._frame = _without(at, said)
                 words = "".join(
                     f"{axis}{value:.4f}" for axis, value in zip("XYZ", said, strict=True)
                 )
@@ -707,7 +709,7 @@ class GrblConversation(Conversation):
         self.state = WireState.SENDING
         self._go_on(now)
 
-    def _reported(self, line: str, now: float) -> None:
+    def _check_query(self, line: str, now: float) -> None:
         """The report of a query: all lines before it must have been answered, and it not."""
         head = self._out_lines[0] if self._out_lines else None
         if self.state is WireState.STOPPING:
@@ -1008,7 +1010,7 @@ class GrblTerminal(Terminal):
         """Of errors, alarms, settings and reports."""
         if line == "ok" or line.startswith("error:"):
             self.due, self._homes = max(self.due - 1, 0), max(self._homes - 1, 0)
-        self.ready = self.ready or _understood(line)
+        self.ready = self.ready or _parse_report(line)
         if line.startswith("Grbl "):
             if self.due and not self._resets:
                 self.failed = "the controller has begun anew"
@@ -1032,12 +1034,12 @@ class GrblTerminal(Terminal):
         return ""
 
 
-def _less(one: Place, other: Place) -> Place:
+def _without(one: Place, other: Place) -> Place:
     (a, b, c), (x, y, z) = one, other
     return a - x, b - y, c - z
 
 
-def _understood(line: str) -> bool:
+def _parse_report(line: str) -> bool:
     return bool(_STATUS.fullmatch(line) or _BANNER.match(line))
 
 

@@ -9,7 +9,7 @@ from camtool.records import replace
 from camtool.toolpath.moves import Kind, Toolpath, mounted_before
 from camtool.toolpath.program import Program
 
-from ..gcode.comments import mounting
+from ..gcode.comments import mounting_messages
 from ..gcode.dialect import UNITS
 from ..gcode.write import (
     COOLANT_OFF,
@@ -40,7 +40,7 @@ def write_program(toolpath: Toolpath, machine: GrblMachine) -> Program:
     unit = UNITS[dialect.units]
 
     def mounted(path: Toolpath, row: int) -> list[str]:
-        return [*before, *mounting(path, row, unit)]
+        return [*before, *mounting_messages(path, row, unit)]
 
     header = tuple(block.format(unit=unit.word) for block in HEADER)
     style = ProgramStyle(

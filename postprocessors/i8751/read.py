@@ -395,7 +395,7 @@ class ListingReader:
                 continue
             indent = len(line) - len(line.lstrip(" \t"))
             if ended:
-                raise self._error(indent, f"{quoted(text)} after END", "remove it")
+                raise self._error(indent, f"{quote_line(text)} after END", "remove it")
             ended = text == LAST_LINE
             if not ended:
                 self._record(text, indent)
@@ -409,19 +409,19 @@ class ListingReader:
     def _record(self, text: str, indent: int) -> None:
         match = _RECORD.fullmatch(text)
         if match is None:
-            raise self._no_record(text, indent)
+            raise self._record_error(text, indent)
         waits = (
             self._wait(match[3], indent + match.start(3)),
             self._wait(match[5], indent + match.start(5)),
         )
         steps = [
-            self._whole(match[group], axis, indent + match.start(group))
+            self._whole_steps(match[group], axis, indent + match.start(group))
             for axis, group in enumerate((1, 2, 4))
         ]
         self._numbers.extend((*steps, *waits))
 
-    def _whole(self, text: str, axis: int, column: int) -> int:
-        """A distance in steps, half a step away from zero."""
+    def _whole_steps(self, text: str, axis: int, column: int) -> int:
+        """Return a distance in steps, half a step away from zero."""
         exact = abs(float(text)) / self._step_mm[axis]
         steps = math.floor(exact + 0.5)
         if steps > self._most:
@@ -444,8 +444,8 @@ class ListingReader:
             )
         return seconds
 
-    def _no_record(self, text: str, indent: int) -> ProgramError:
-        """The first word of a line that is not what it must be."""
+    def _record_error(self, text: str, indent: int) -> ProgramError:
+        """Return the error for the first word of a line that does not fit into a record."""
         at, wanted = 0, "nothing more"
         for number, (letter, value, what) in enumerate(_WORDS):
             word = re.compile((_BETWEEN if number else "") + letter + value).match(text, at)
@@ -456,7 +456,7 @@ class ListingReader:
         blanks = re.compile("[ \t]*").match(text, at)
         column = blanks.end() if blanks else at
         mend = "write a point, no comma" if "," in text[: column + SHOWN_AHEAD] else ""
-        return self._error(indent + column, f"{quoted(text)}: wanted {wanted}", mend)
+        return self._error(indent + column, f"{quote_line(text)}: wanted {wanted}", mend)
 
     def _error(self, column: int, message: str, mend: str) -> ProgramError:
         """ProgramError in the present line at a column from 0."""
@@ -499,7 +499,7 @@ def read_dump(data: bytes, dialect: I8751Dialect) -> Decoded:
     try:
         decoded = PacketReader(stream, dialect).read()
     except ByteFault as fault:
-        raise _placed(fault, runs, lines) from None
+        raise _place_by_offset(fault, runs, lines) from None
     _check_replies(runs, replies(stream, decoded, dialect))
     if lines[-1]:
         raise ProgramError(
@@ -520,7 +520,7 @@ def _runs(lines: list[str]) -> tuple[list[_Run], bytes]:
         match = _LINE.fullmatch(line)
         found = _bytes(match[2]) if match else b""
         if match is None or not found:
-            raise _no_line(number, line)
+            raise _line_error(number, line)
         if int(match[1], 16) != len(stream):
             raise ProgramError(
                 f"offset {match[1]}, but {len(stream):04X} bytes came before",
@@ -541,7 +541,7 @@ def _bytes(text: str) -> bytes:
         return b""
 
 
-def _no_line(number: int, line: str) -> ProgramError:
+def _line_error(number: int, line: str) -> ProgramError:
     """Return the error for a line that is no line of a hex dump, with the column of its first
     wrong character."""
     offset = re.match(r"[0-9A-Fa-f]{4,8}(?=[ \t]|$)", line)
@@ -550,14 +550,14 @@ def _no_line(number: int, line: str) -> ProgramError:
         good = re.match(r"[ \t]*(?:[0-9A-Fa-f]{2}(?:[ \t]+|$))*", line[offset.end() :])
         column = offset.end() + (good.end() if good else 0) + 1
     return ProgramError(
-        f"{quoted(line)} is no line of a hex dump: wanted an offset of four digits or more, bytes "
-        "of two digits, and perhaps a comment behind a semicolon",
+        f"{quote_line(line)} is no line of a hex dump: wanted an offset of four digits or more, "
+        "bytes of two digits, and perhaps a comment behind a semicolon",
         where=f"line {number}, column {column}",
         mend="for a listing, use --set dialect.format=listing",
     )
 
 
-def _placed(fault: ByteFault, runs: list[_Run], lines: list[str]) -> ProgramError:
+def _place_by_offset(fault: ByteFault, runs: list[_Run], lines: list[str]) -> ProgramError:
     """The fault of a byte with the line and column in which the byte stands."""
     run = runs[bisect_right([run.offset for run in runs], fault.offset) - 1]
     inside = fault.offset - run.offset
@@ -584,7 +584,7 @@ def _check_replies(runs: list[_Run], expected: list[str]) -> None:
         unknown = [a if b == "?" else b for a, b in zip(wanted, given, strict=False)]
         if len(given) != len(wanted) or unknown != wanted:
             raise ProgramError(
-                f"replies {quoted(' '.join(given))}, expected {quoted(' '.join(wanted))}",
+                f"replies {quote_line(' '.join(given))}, expected {quote_line(' '.join(wanted))}",
                 where=f"offset {run.offset:04X}, line {run.line}",
                 mend="see dialect.motor_reply and dialect.dwell_reply, or leave out the replies",
             )
@@ -612,6 +612,6 @@ def _line_ends(data: bytes) -> int:
     return max(data.count(b"\n"), data.count(b"\r"))
 
 
-def quoted(text: str) -> str:
-    """A line for a message: quoted, and cut when long."""
+def quote_line(text: str) -> str:
+    """Quote a line for a message, cut when long."""
     return repr(text if len(text) <= SHOWN_CHARS else text[:SHOWN_CHARS] + "…")

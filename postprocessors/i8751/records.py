@@ -145,8 +145,10 @@ class Records(Struct, frozen=True, eq=False):
 def records_of(toolpath: Toolpath, machine: I8751Machine, dialect: I8751Dialect) -> Records:
     """The records of a checked toolpath; PostError when it moves nothing, or far too much."""
     counts = Counts()
-    lowered, row = _lowered(toolpath, slope_step_mm(machine), dialect, counts)
-    deltas = np.diff(_rounded(lowered, machine), axis=0, prepend=np.zeros((1, 3), dtype=np.int64))
+    lowered, row = _lower(toolpath, slope_step_mm(machine), dialect, counts)
+    deltas = np.diff(
+        _nearest_steps(lowered, machine), axis=0, prepend=np.zeros((1, 3), dtype=np.int64)
+    )
     refuse(
         lowered,
         ~lowered.is_motion & deltas.any(axis=1),
@@ -168,7 +170,7 @@ def records_of(toolpath: Toolpath, machine: I8751Machine, dialect: I8751Dialect)
     for index, parts in pieces.items():
         steps[first[index] : first[index] + len(parts)] = parts
     if dialect.z_alone == "with-step":
-        steps = _with_step(steps)
+        steps = _with_x_steps(steps)
     plain = _Plain(steps, owner, lowered, counts)
     records = plain.with_waits(row, first)
     if dialect.z_alone == "with-step" and not records.steps[:, :2].any(axis=1).all():
@@ -179,10 +181,10 @@ def records_of(toolpath: Toolpath, machine: I8751Machine, dialect: I8751Dialect)
     return records
 
 
-def _lowered(
+def _lower(
     toolpath: Toolpath, step_mm: float, dialect: I8751Dialect, counts: Counts
 ) -> tuple[Toolpath, Ints]:
-    """Lines of XY or Z only, and the row of the toolpath that each came from."""
+    """Return lines of XY or Z only, and the row of the toolpath that each came from."""
     two = helices_to_steps(toolpath, step_mm)
     # A rapid in two parts is as good as one; a cut in steps is another cut.
     cut = (np.bincount(two.row, minlength=len(toolpath)) > 1) & toolpath.is_feed
@@ -195,7 +197,7 @@ def _lowered(
     return lines.toolpath, two.row[lines.row]
 
 
-def _rounded(toolpath: Toolpath, machine: I8751Machine) -> Ints:
+def _nearest_steps(toolpath: Toolpath, machine: I8751Machine) -> Ints:
     """(N, 3) ends in whole steps, half away from zero."""
     scaled = toolpath.end / np.array([axis.coded_step_mm for axis in machine.axes])
     return np.asarray((np.sign(scaled) * np.floor(np.abs(scaled) + 0.5)).astype(np.int64))
@@ -206,7 +208,7 @@ def _cut_rows(
 ) -> dict[int, Ints]:
     """The rows that need more than one record, each with the steps (k, 3) of its records."""
     xy = deltas[:, :2]
-    # A step aside (`_with_step`) comes on top.
+    # A step aside (`_with_x_steps`) comes on top.
     most = dialect.most_steps - (1 if dialect.z_alone == "with-step" else 0)
     step_mm = (machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm)
     reach = np.where(toolpath.is_feed, reaches(xy, step_mm, dialect.tolerance_mm), FREE)
@@ -220,7 +222,7 @@ def _cut_rows(
     for row in np.flatnonzero(strays | far).tolist():
         dx, dy, dz = deltas[row].tolist()
         if dz:
-            parts = [(0, 0, part) for part in _chopped(dz, most)]
+            parts = [(0, 0, part) for part in _split_long(dz, most)]
         else:
             line = StepLine(dx, dy, int(reach[row]))
             parts = [(*part, 0) for part in line.pieces(most)]
@@ -239,15 +241,16 @@ def _refuse_too_many(each: Floats) -> None:
         )
 
 
-def _chopped(steps: int, most: int) -> list[int]:
-    """`steps` in parts of at most `most`, the rest last."""
+def _split_long(steps: int, most: int) -> list[int]:
+    """Split `steps` into parts of at most `most`, the rest last."""
     full, rest = divmod(abs(steps), most)
     sign = 1 if steps > 0 else -1
     return [sign * most] * full + ([sign * rest] if rest else [])
 
 
-def _with_step(steps: Ints) -> Ints:
-    """Records in which Z never moves alone: X goes one step aside, and back in the next record.
+def _with_x_steps(steps: Ints) -> Ints:
+    """Return records in which Z never moves alone: X goes one step aside, and back in the next
+    record.
 
     Only for controllers that take no record in which both X and Y stand still (the thesis shows
     none). The step aside is taken back as soon as a record moves X or Y anyway, or at the end.
@@ -299,7 +302,7 @@ class _Plain(Struct, frozen=True, eq=False):
                     given = min(left, MAX_DWELL_BYTE_S - int(waits[record - 1, 1]))
                     waits[record - 1, 1] += given
                     left -= given
-                own += [(record, part, index) for part in _chopped(left, MAX_DWELL_BYTE_S)]
+                own += [(record, part, index) for part in _split_long(left, MAX_DWELL_BYTE_S)]
             elif kind == Kind.MESSAGE:
                 text = self.lowered.texts[int(self.lowered.value[index])]
                 messages.append((record + len(own), text))

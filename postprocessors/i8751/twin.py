@@ -99,13 +99,13 @@ class I8751Twin(Twin):
         """Receive one program after the other, byte by byte, as a coroutine."""
         while True:
             yield from self._key((yield))
-            yield from self._wanted(1)
+            yield from self._receive_one_of(1)
             yield from self._packet()
             again = ACCESS if self._choices.key == "each-packet" else 1
             while (octet := (yield)) != DATA_END:
                 if again == ACCESS:
                     yield from self._key(octet)
-                    octet = yield from self._wanted(1)
+                    octet = yield from self._receive_one_of(1)
                 if octet == 1:
                     yield from self._packet()
             self._out.append(DONE)
@@ -126,7 +126,7 @@ class I8751Twin(Twin):
         while octet != PACKET_END:
             records.append((yield from self._record()))
             full = len(records) == RECORDS_PER_PACKET
-            octet = yield from self._wanted(PACKET_END, *(() if full else (1,)))
+            octet = yield from self._receive_one_of(PACKET_END, *(() if full else (1,)))
         if self._choices.packet_end == "M F":
             self._out += STORED
         self._execute(records)
@@ -136,9 +136,9 @@ class I8751Twin(Twin):
         record = bytearray()
         for motor in (1, 2, 3):
             if motor > 1:
-                yield from self._wanted(motor)
+                yield from self._receive_one_of(motor)
             self._out += self._choices.motor_reply.encode()
-            sense = yield from self._wanted(*SENSES)
+            sense = yield from self._receive_one_of(*SENSES)
             self._out += STORED
             record += bytes([motor, sense])
             for _ in range(0 if sense == STANDS else 2):
@@ -146,7 +146,9 @@ class I8751Twin(Twin):
                 self._out += STORED
             if motor > 1:
                 first, second = self._dwell_replies
-                record.append((yield from self._wanted(self._machine.dialect.dwell_mark_byte)))
+                record.append(
+                    (yield from self._receive_one_of(self._machine.dialect.dwell_mark_byte))
+                )
                 self._out += first
                 record.append((yield))
                 self._out += second
@@ -161,8 +163,8 @@ class I8751Twin(Twin):
         return mark, STORED
 
     @staticmethod
-    def _wanted(*octets: int) -> Generator[None, int, int]:
-        """The next of these that comes."""
+    def _receive_one_of(*octets: int) -> Generator[None, int, int]:
+        """Receive bytes up to the next of these."""
         while (octet := (yield)) not in octets:
             pass
         return octet

@@ -150,7 +150,7 @@ class I8751Terminal(Terminal):
             self._rest = text.encode("latin-1")
             return []
         words = self._WORDS.findall(text)
-        return [self._shown(" ".join(words).encode("latin-1"))] if words else []
+        return [self._with_meaning(" ".join(words).encode("latin-1"))] if words else []
 
     def meaning(self, line: str) -> str:
         """Of its last word."""

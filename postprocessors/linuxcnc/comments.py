@@ -20,22 +20,22 @@ UNKNOWN_SHOWN: Final = "######"
 _PARTS: Final = re.compile(r"%d|%f|%\.(\d)f|#(\d+)|#<([^>]*)>")
 
 
-def obeyed(text: str, given: Parameters) -> str | None:
+def obey_comment(text: str, given: Parameters) -> str | None:
     """Carry out a comment that is a command. Return the text shown to the operator, or None;
     LineFault for a comment that stops the program."""
     word, _, rest = text.partition(",")
     word = word.lower()
     if word == "debug":
-        return expanded(rest, given) if given.stored(DEBUG) > 0.0 else None
+        return expand_parameters(rest, given) if given.stored_value(DEBUG) > 0.0 else None
     if word == "abort":
-        raise LineFault(f"the program stops itself: {expanded(rest, given)}")
+        raise LineFault(f"the program stops itself: {expand_parameters(rest, given)}")
     if word in ("py", "pyrun"):
         raise LineFault("Python of the machine's own, which only it can run")
     return None
 
 
-def expanded(text: str, given: Parameters) -> str:
-    """The text with numbers in place of parameters."""
+def expand_parameters(text: str, given: Parameters) -> str:
+    """Return the text with numbers in place of parameters."""
     decimals = 6
 
     def shown(found: re.Match[str]) -> str:
@@ -56,7 +56,7 @@ def _value(found: re.Match[str], given: Parameters) -> float | None:
     try:
         if found[2] is not None:
             index = int(found[2])
-            return given.numbered(index, 0) if 0 < index < MAX_PARAMETERS else None
-        return given.named("".join(found[3].split()).lower(), 0)
+            return given.value_of_number(index, 0) if 0 < index < MAX_PARAMETERS else None
+        return given.value_of_name("".join(found[3].split()).lower(), 0)
     except LineFault:
         return None

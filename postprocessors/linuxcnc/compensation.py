@@ -74,8 +74,9 @@ class Compensation:
                 move.end = [value * factor for value in move.end]
                 move.centre = move.centre[0] * factor, move.centre[1] * factor
 
-    def off(self, at: list[float]) -> bool:
-        """G40: the last move ends beside its end. Whether the cutter was beside the path."""
+    def switch_off(self, at: list[float]) -> bool:
+        """Carry out G40: the last move ends beside its end. True if the cutter was beside the
+        path."""
         beside = self.active and not self.first
         if beside:
             self._end_at(at[0], at[1])
@@ -88,7 +89,7 @@ class Compensation:
 
     # Moves; each gives where the cutter's centre comes to stand
 
-    def straight(self, kind: Kind, to: list[float], at: list[float]) -> list[float]:
+    def line(self, kind: Kind, to: list[float], at: list[float]) -> list[float]:
         """A straight move to a programmed point, from where the centre stands."""
         return (self._entry_line if self.first else self._line)(kind, to, at)
 
@@ -200,7 +201,7 @@ class Compensation:
             raise LineFault("no arc leads onto the compensated path here")
         self._canon.flush()
         end = [x, y, arc.end[2]]
-        sweep = swept((at[0], at[1]), (cx, cy), arc.turn, (x, y))
+        sweep = sweep_of((at[0], at[1]), (cx, cy), arc.turn, (x, y))
         self._canon.wait(Queued(Kind.ARC_CW, list(end), (cx, cy), arc.turn, sweep=sweep))
         return end
 
@@ -244,7 +245,7 @@ class Compensation:
         else:
             self._canon.flush()
             self._from = at[0], at[1]
-        sweep = swept((op[0], op[1]), arc.centre, arc.turn, (arc.end[0], arc.end[1]))
+        sweep = sweep_of((op[0], op[1]), arc.centre, arc.turn, (arc.end[0], arc.end[1]))
         self._canon.wait(Queued(Kind.ARC_CW, list(end), arc.centre, arc.turn, sweep=sweep))
         self.programmed = list(arc.end)
         return end
@@ -311,11 +312,11 @@ class Compensation:
             raise LineFault("compensation makes an arc of two radii here")
         if move.sweep and start is not None:
             longer = LONGER_MM if self._canon.mm == 1.0 else LONGER_MM / 25.4
-            if abs(swept(start, move.centre, move.turn, (x, y))) > abs(move.sweep) + longer:
+            if abs(sweep_of(start, move.centre, move.turn, (x, y))) > abs(move.sweep) + longer:
                 raise LineFault(_GOUGES)
 
 
-def swept(start: Flat, centre: Flat, turn: int, end: Flat) -> float:
+def sweep_of(start: Flat, centre: Flat, turn: int, end: Flat) -> float:
     """Signed sweep of an arc, rad, full turns included; positive counter-clockwise."""
     alpha = math.atan2(start[1] - centre[1], start[0] - centre[0])
     beta = math.atan2(end[1] - centre[1], end[0] - centre[0])

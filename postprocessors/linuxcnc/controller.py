@@ -76,11 +76,11 @@ class LinuxcncModel(ControllerModel[LinuxcncController, LinuxcncDialect]):
         """The motion, chunk by chunk."""
         path = self.quantised(toolpath, machine)
         mechanics = Mechanics(machine, path.start, options.effects)
-        return row_chunks(_followed(path, machine), mechanics, options.chunk_steps)
+        return row_chunks(_rows_to_end(path, machine), mechanics, options.chunk_steps)
 
     def seconds(self, toolpath: Toolpath, machine: _Machine) -> Floats:
         """(N,) s that each row takes."""
-        blocks = _followed(self.quantised(toolpath, machine), machine)
+        blocks = _rows_to_end(self.quantised(toolpath, machine), machine)
         return row_seconds(blocks, len(toolpath))
 
     def spacing_mm(self, toolpath: Toolpath, machine: _Machine) -> float:
@@ -89,26 +89,27 @@ class LinuxcncModel(ControllerModel[LinuxcncController, LinuxcncDialect]):
 
     def interpolation(self, toolpath: Toolpath, machine: _Machine, options: Options) -> str:
         """Blends, or the path alone."""
-        blends = any(mode.corners == "blend" for mode in _asked(toolpath, machine))
+        blends = any(mode.corners == "blend" for mode in _path_modes(toolpath, machine))
         return "blend" if blends else "path"
 
     def assumptions(self, toolpath: Toolpath, machine: _Machine) -> tuple[str, ...]:
         """Return the assumptions behind figures and times, as sentences for the report."""
         return (
-            *dict.fromkeys(_corners_said(mode) for mode in _asked(toolpath, machine)),
+            *dict.fromkeys(_corner_sentence(mode) for mode in _path_modes(toolpath, machine)),
             "speeds by trapezoids within the limits of the axes, overrides at 100 %",
             "the step generator may be half a step off on each axis, which is not in the figures",
         )
 
 
-def _followed(path: Toolpath, machine: _Machine) -> Iterator[SampledRows]:
-    """The rows up to the end of the program; ProgramError for those that cannot be followed."""
+def _rows_to_end(path: Toolpath, machine: _Machine) -> Iterator[SampledRows]:
+    """Return the rows up to the end of the program; ProgramError for rows that cannot be
+    followed."""
     rows = path.executed_rows
     check_rows(path, rows)
     return _Run(path.first(rows), machine).blocks()
 
 
-def _corners_said(mode: PathMode) -> str:
+def _corner_sentence(mode: PathMode) -> str:
     if mode.corners == "exact-path":
         return "no corner is rounded (G61)"
     if mode.corners == "exact-stop":
@@ -150,13 +151,13 @@ class _Run:
     def blocks(self) -> Iterator[SampledRows]:
         """All rows."""
         wanted = 2 * np.arange(0, len(self._path), ROWS_AT_ONCE)
-        first = sorted({self._with_row(int(k)) for k in np.searchsorted(self._begins, wanted)})
+        first = sorted({self._move_at_row(int(k)) for k in np.searchsorted(self._begins, wanted)})
         for low, high in pairwise([*first, len(self._begins)]):
             if low < high:
                 yield self._block(low, high)
 
-    def _with_row(self, move: int) -> int:
-        """This move, or the first behind it that begins where a row does."""
+    def _move_at_row(self, move: int) -> int:
+        """Return this move, or the first behind it that begins where a row does."""
         while self._place(move) % 2:
             move += 1
         return move
@@ -193,10 +194,10 @@ class _Run:
     def _planned(self, low: int, high: int) -> PlannedWindow:
         """Plan the moves between two places."""
         part, modes = self._path.part(low // 2, (high + 1) // 2), self._rules.modes
-        part, origin = halved(part, modes.merging_mm(part.mode))
+        part, origin = halve_arcs(part, modes.merging_mm(part.mode))
         own = slice(low % 2, len(part) - high % 2)
         part, origin = part.part(own.start, own.stop), origin[own]
-        part, chain = merged(part, modes.merging_mm(part.mode))
+        part, chain = merge_rows(part, modes.merging_mm(part.mode))
         tangents = Tangents(part)
         moves = moves_of(tangents, chain, self._rules)
         return PlannedWindow(origin, tangents, moves, corners_of(moves, tangents, self._rules))
@@ -294,26 +295,31 @@ class LinuxcncSamples(CountedSamples):
         behind = np.flatnonzero(along < self._behind[move])
         corner = move[ahead] + 1
         turn = self._turn[corner]
-        self._overlapped(points, ahead, corner, turn * (1.0 - left[ahead] / self._before[corner]))
+        self._put_overlaps(
+            points, ahead, corner, turn * (1.0 - left[ahead] / self._before[corner])
+        )
         corner = move[behind]
         turn = self._turn[corner]
         later = (1.0 - turn) * along[behind] / self._behind[corner]
-        self._overlapped(points, behind, corner, turn + later)
+        self._put_overlaps(points, behind, corner, turn + later)
 
-    def _overlapped(self, points: Floats, on: Ints, corner: Ints, x: Floats) -> None:
+    def _put_overlaps(self, points: Floats, on: Ints, corner: Ints, x: Floats) -> None:
         """Put points (K, 3) where moves overlap: while the first slows down evenly over its last
         `before` mm, the second speeds up in the first part `ramp` of that time, and goes on, over
         its first `behind` mm. At the part x of the time the tool is where both are, one on top of
         the other; what is before `_turn_of` stands for the end of the first move, the rest for the
         start of the second."""
         first = corner - 1
-        gone = _gone(x, self._ramp[corner])
+        gone = _covered_share(x, self._ramp[corner])
         slowing = self._length[first] - (1.0 - x) ** 2 * self._before[corner]
-        points[on] = self._on(first, slowing)
-        points[on] += self._on(corner, gone * self._behind[corner]) - self._on(corner, 0.0 * x)
+        points[on] = self._unblended_points(first, slowing)
+        points[on] += self._unblended_points(
+            corner, gone * self._behind[corner]
+        ) - self._unblended_points(corner, 0.0 * x)
 
-    def _on(self, move: Ints, along: Floats) -> Floats:
-        """(K, 3) mm: the points so far (K,) along moves (K,), without blends."""
+    def _unblended_points(self, move: Ints, along: Floats) -> Floats:
+        """Return the points (K, 3) mm at these arc lengths (K,) along moves (K,), corners not
+        blended."""
         row = self._row[move]
         arc = self._tangents.path.is_arc[row]
         found = np.empty((len(row), 3))
@@ -435,15 +441,15 @@ def _modes(path: Toolpath, machine: _Machine) -> CornerModes:
             [
                 (mode.corners == "blend", mode.corners == "exact-stop",
                  mode.tolerance_mm or np.inf, mode.merging_mm)
-                for mode in _asked(path, machine)
+                for mode in _path_modes(path, machine)
             ]
         )
     )  # fmt: skip
 
 
-def _asked(path: Toolpath, machine: _Machine) -> tuple[PathMode, ...]:
-    """The modes of the program, and behind them (at −1) that of the machine file where any row
-    leaves it to that."""
+def _path_modes(path: Toolpath, machine: _Machine) -> tuple[PathMode, ...]:
+    """Return the path modes of the program, and last (at −1) that of the machine file, if any row
+    leaves the mode to it."""
     silent = len(path) == 0 or bool((path.mode < 0).any())
     return (*path.modes, _machine_mode(machine)) if silent else path.modes
 
@@ -502,10 +508,10 @@ WAITS = (
 """Before these the machine comes to rest (their preconditions in emctaskmain.cc)."""
 
 
-def halved(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Ints]:
-    """The rows with two lines, over its middle, in the place of each arc that bows out by less
-    than `tolerance_mm` (N,) of its row (ARC_FEED, emccanon.cc), and the row that each is or is
-    half of."""
+def halve_arcs(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Ints]:
+    """Replace each arc that bows out by less than `tolerance_mm` (N,) of its row by two lines over
+    its middle (ARC_FEED, emccanon.cc). Return the rows, and for each the row that it comes
+    from."""
     every = np.arange(len(path))
     arcs = np.flatnonzero(path.is_arc & (tolerance_mm > 0.0))
     if len(arcs) == 0:
@@ -529,7 +535,7 @@ def halved(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Ints]:
     return path.picked(origin, kind=kind, end=end, centre=centre), origin
 
 
-def merged(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Ints]:
+def merge_rows(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Ints]:
     """The rows with the ends of merged lines on their common line, and the line of each row (N,);
     `tolerance_mm` (N,) of each row, 0: it is not merged.
 
@@ -552,7 +558,7 @@ def merged(path: Toolpath, tolerance_mm: Floats) -> tuple[Toolpath, Ints]:
 
 def begins_of(path: Toolpath, modes: CornerModes) -> tuple[Ints, Floats]:
     """The places where moves begin (M,), the first at 0, and the length of each row with its end
-    where `merged` leaves it (N,)."""
+    where `merge_rows` leaves it (N,)."""
     length, begins = np.zeros(len(path)), [np.zeros(1, dtype=np.int32)]
     low, end = 0, 2 * len(path)
     at_once = max(ROWS_AT_ONCE, MOST_IN_CHAIN + 2)  # more than one line has
@@ -560,11 +566,11 @@ def begins_of(path: Toolpath, modes: CornerModes) -> tuple[Ints, Floats]:
         base = low // 2
         part = path.part(base, min(base + at_once, len(path)))
         ends_here = 2 * (base + len(part)) == end
-        part, origin = halved(part, modes.merging_mm(part.mode))
+        part, origin = halve_arcs(part, modes.merging_mm(part.mode))
         place = 2 * (base + origin)
         place[1:] += np.diff(origin) == 0
         part, origin, place = part.part(low % 2, len(part)), origin[low % 2 :], place[low % 2 :]
-        part, chain = merged(part, modes.merging_mm(part.mode))
+        part, chain = merge_rows(part, modes.merging_mm(part.mode))
         # The last line may go on.
         rows = len(part) if ends_here else int(np.searchsorted(chain, chain[-1]))
         own = move_lengths(part)[:rows]
@@ -601,7 +607,7 @@ class PlannerMoves(Struct, frozen=True, eq=False):
 
     @property
     def last(self) -> Bools:
-        """(M,) true for moves behind which the machine waits."""
+        """Mask (M,) of the moves behind which the machine waits."""
         return np.append(self.waits[1:], np.ones(min(len(self.waits), 1), dtype=np.bool_))
 
     def tangential(self, which: Ints, overall: Floats) -> tuple[Floats, Floats]:
@@ -715,7 +721,7 @@ def _arc_limits(
     return highest, overall, highest**2 / turning
 
 
-def _gone(x: Floats, ramp: Floats) -> Floats:
+def _covered_share(x: Floats, ramp: Floats) -> Floats:
     """Fraction of its length that the second of two overlapping moves has covered after the
     fraction x of the time, if it accelerates during the first fraction `ramp`."""
     return np.where(x < ramp, x**2 / (2.0 * ramp), x - 0.5 * ramp) / (1.0 - 0.5 * ramp)
@@ -732,7 +738,7 @@ def _turn_of(before: Floats, behind: Floats, ramp: Floats) -> Floats:
     ramp = np.where(before > 0.0, ramp, 1.0)
     for _ in range(TURN_ROUNDS):
         middle = 0.5 * (low + high)
-        early = (1.0 - middle) ** 2 * before > _gone(middle, ramp) * behind
+        early = (1.0 - middle) ** 2 * before > _covered_share(middle, ramp) * behind
         low, high = np.where(early, middle, low), np.where(early, high, middle)
     return np.where((before > 0.0) & (behind > 0.0), 0.5 * (low + high), 0.5)
 
@@ -855,7 +861,7 @@ class Bends(Struct, frozen=True, eq=False):
         cosine = np.clip(-(self.before * self.after).sum(axis=1), -1.0, 1.0)
         return np.asarray(0.5 * np.arccos(cosine))
 
-    def picked(self, which: Ints) -> Bends:
+    def subset(self, which: Ints) -> Bends:
         """Return a subset of the corners."""
         return Bends(self.before[which], self.after[which])
 
@@ -909,9 +915,9 @@ def _meet(
     normal = np.cross(bends.before, bends.after)
     flat = np.hypot(normal[:, 0], normal[:, 1]) <= COPLANAR * np.linalg.norm(normal, axis=1)
     straight = np.flatnonzero(blends & ~curved)
-    _round_lines(corners, moves, tangents, straight, bends.picked(straight), used, rules)
+    _round_lines(corners, moves, tangents, straight, bends.subset(straight), used, rules)
     bent = np.flatnonzero(blends & curved & flat)
-    _round_arcs(corners, moves, tangents, bent, bends.picked(bent), used, rules)
+    _round_arcs(corners, moves, tangents, bent, bends.subset(bent), used, rules)
     on = np.flatnonzero(blends)
     kink = highest[on] * rules.kink_ratio / part[on]
     _choose(corners, moves, tangents, on, kink, used, rules)

@@ -97,7 +97,7 @@ def drill(machine: InterpreterState, block: LinuxcncBlock, motion: int) -> None:
         hole.at[0] += step[0]
         hole.at[1] += step[1]
         if radius or angle:
-            _turned(hole.at, radius, angle)
+            _polar_step(hole.at, radius, angle)
         over = level if time == 0 and level > top else hole.clear
         machine.go(Kind.RAPID, axes, [*hole.at[:2], over])
         if over > top:
@@ -111,7 +111,7 @@ def drill(machine: InterpreterState, block: LinuxcncBlock, motion: int) -> None:
     machine.motion = motion
 
 
-def _kept(machine: InterpreterState) -> dict[str, float]:
+def _series_words(machine: InterpreterState) -> dict[str, float]:
     return machine.series.words if machine.series is not None else {}
 
 
@@ -137,8 +137,8 @@ def _place(
     return [words.get(name, value) for name, value in zip(names, here, strict=True)]
 
 
-def _turned(at: list[float], radius: float, angle: float) -> None:
-    """A step in polar coordinates."""
+def _polar_step(at: list[float], radius: float, angle: float) -> None:
+    """Return a step in polar coordinates."""
     if at[0] == 0.0 and at[1] == 0.0:
         raise LineFault("a polar step from zero, which has no direction", "@")
     length = math.hypot(at[1], at[0]) + radius
@@ -173,7 +173,7 @@ def _motion_of(
 ) -> tuple[Callable[[_Hole], None], dict[str, float]]:
     """Return the function that makes a hole, from R until the tool is out again, and the words
     that the next hole inherits."""
-    words, series = block.words, _kept(machine)
+    words, series = block.words, _series_words(machine)
     axes = PLANES[machine.plane]
     kept: dict[str, float] = {}
 
@@ -261,7 +261,7 @@ def _back_bore(
     machine: InterpreterState, words: dict[str, float], again: bool, kept: dict[str, float]
 ) -> Callable[[_Hole], None]:
     """G87: beside the hole down through it, over, and up with the spindle turning."""
-    series = _kept(machine) if again else {}
+    series = _series_words(machine) if again else {}
     for letter in "ijk":
         kept[letter] = _word(words, series, letter, letter.upper())
     axes, spindle = PLANES[machine.plane], machine.spindle or Kind.SPINDLE_CW

@@ -76,14 +76,14 @@ class Scanner:
         self.at = found.end()
         return float(text)
 
-    def whole(self) -> Callable[[Parameters], int] | int:
-        """A value that must be a whole number."""
+    def whole_number(self) -> Callable[[Parameters], int] | int:
+        """Read a value that must be a whole number."""
         begin = self.at
         value = self.value()
         if isinstance(value, float):
-            return whole(value, begin)
+            return whole_number(value, begin)
         function = value
-        return lambda given: whole(function(given), begin)
+        return lambda given: whole_number(function(given), begin)
 
     def expression(self) -> Value:
         """[value operator value …]"""
@@ -110,7 +110,7 @@ class Scanner:
             begin = self.at
             self.at += len(name)
             right = self._ranked(self.value(), RANKS[name] + 1)
-            left = _joined(OPERATORS[name], left, right, begin)
+            left = _apply_operator(OPERATORS[name], left, right, begin)
 
     def _operator_at(self, at: int) -> str:
         for name in _BY_LENGTH:
@@ -126,13 +126,13 @@ class Scanner:
         self.at += 1
         if self.text[self.at : self.at + 1] == "<":
             name = self.name()
-            return lambda given: given.named(name, begin)
-        index = self.whole()
+            return lambda given: given.value_of_name(name, begin)
+        index = self.whole_number()
         if isinstance(index, int):
             fixed = check_index(index, begin)
-            return lambda given: given.numbered(fixed, begin)
+            return lambda given: given.value_of_number(fixed, begin)
         computed = index
-        return lambda given: given.numbered(check_index(computed(given), begin), begin)
+        return lambda given: given.value_of_number(check_index(computed(given), begin), begin)
 
     def name(self) -> str:
         """Read the name between < and >."""
@@ -160,8 +160,8 @@ class Scanner:
             if self.text[self.at : self.at + 2] != "/[":
                 raise LineFault("atan wants two expressions: atan[y]/[x]", self.at)
             self.at += 1
-            return _joined(_atan, first, self.expression(), begin)
-        return _applied(FUNCTIONS[name], first, begin)
+            return _apply_operator(_atan, first, self.expression(), begin)
+        return _apply_function(FUNCTIONS[name], first, begin)
 
     def _exists(self) -> Value:
         """exists[#<name>]"""
@@ -174,7 +174,7 @@ class Scanner:
             name = self.name()
             found: Value = lambda given: given.has(name, begin)  # noqa: E731 - it is a value
         else:
-            index = self.whole()
+            index = self.whole_number()
             computed = index if callable(index) else lambda given, fixed=index: fixed
             found = lambda given: float(1 <= computed(given) < MAX_PARAMETERS)  # noqa: E731
         if self.text[self.at : self.at + 1] != "]":
@@ -183,8 +183,8 @@ class Scanner:
         return found
 
 
-def evaluated(value: Value, given: Parameters) -> float:
-    """The number."""
+def evaluate(value: Value, given: Parameters) -> float:
+    """Return the number of a value that may contain parameters."""
     return value if isinstance(value, float) else value(given)
 
 
@@ -195,8 +195,8 @@ def finite(value: float, at: int) -> float:
     return value
 
 
-def whole(value: float, at: int) -> int:
-    """The whole number that is meant; Fault for another one."""
+def whole_number(value: float, at: int) -> int:
+    """Return the whole number that is meant; LineFault for a fraction."""
     low = math.floor(value)
     if value - low > 1.0 - WHOLE:
         return low + 1
@@ -215,8 +215,8 @@ def check_index(index: int, at: int) -> int:
 Binary = Callable[[float, float, int], float]
 
 
-def _joined(operator: Binary, left: Value, right: Value, at: int) -> Value:
-    """An operator applied now where both sides are numbers, else when the line is executed."""
+def _apply_operator(operator: Binary, left: Value, right: Value, at: int) -> Value:
+    """Apply an operator at once if both sides are numbers, else when the line is executed."""
     if isinstance(left, float):
         if isinstance(right, float):
             return operator(left, right, at)
@@ -230,14 +230,14 @@ def _joined(operator: Binary, left: Value, right: Value, at: int) -> Value:
     return lambda given: operator(first(given), other(given), at)
 
 
-def _applied(function: Callable[[float, int], float], inner: Value, at: int) -> Value:
+def _apply_function(function: Callable[[float, int], float], inner: Value, at: int) -> Value:
     if isinstance(inner, float):
         return finite(function(inner, at), at)
     argument = inner
     return lambda given: finite(function(argument(given), at), at)
 
 
-def _divided(left: float, right: float, at: int) -> float:
+def _divide(left: float, right: float, at: int) -> float:
     if right == 0.0:
         raise LineFault("a division by zero", at)
     return left / right
@@ -319,7 +319,7 @@ _TRUTH: Final = {False: 0.0, True: 1.0}
 OPERATORS: Final[dict[str, Binary]] = {
     "**": _power,
     "*": lambda a, b, _: a * b,
-    "/": _divided,
+    "/": _divide,
     "mod": _modulo,
     "+": lambda a, b, _: a + b,
     "-": lambda a, b, _: a - b,

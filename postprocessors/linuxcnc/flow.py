@@ -154,7 +154,7 @@ class Flow:
             if text == "%" and self.percent:
                 if self._seeking is not None:
                     raise LineFault(
-                        f"the program ends, and o<{_own(self._seeking)}> was not found"
+                        f"the program ends, and o<{_own_name(self._seeking)}> was not found"
                     )
                 return None
             if line.delete:
@@ -227,7 +227,7 @@ class Flow:
             self.here = call.called or self.here
             raise LineFault(f"there is no sub o<{self._seeking_sub}>", mend=self.folder.mend)
         if self._seeking is not None:
-            raise LineFault(f"the file ends, and o<{_own(self._seeking)}> was not found")
+            raise LineFault(f"the file ends, and o<{_own_name(self._seeking)}> was not found")
         if self.level:
             raise LineFault(
                 f"the file ends within o<{self.calls[-1].sub}>", mend="end it with endsub"
@@ -313,25 +313,27 @@ class Flow:
         if label in self._labels:
             before = self._labels[label].place
             raise LineFault(
-                f"o<{_own(label)}> is defined a second time: {_of_place(before)} has it"
+                f"o<{_own_name(label)}> is defined a second time: {_of_place(before)} has it"
             )
         self._labels[label] = FlowLabel(kind, TextPosition(self.here.text, self.here.line))
         return self._labels[label]
 
-    def _known(self, label: str) -> FlowLabel:
+    def _label_of(self, label: str) -> FlowLabel:
         found = self._labels.get(label)
         if found is None:
-            raise LineFault(f"no word with the label o<{_own(label)}> has come before")
+            raise LineFault(f"no word with the label o<{_own_name(label)}> has come before")
         return found
 
-    def _once(self, kind: str, label: str, *, after_do: bool = False) -> FlowLabel:
-        """The label of a word that stands in one place only."""
+    def _unique_label(self, kind: str, label: str, *, after_do: bool = False) -> FlowLabel:
+        """Return the label of a word that may stand in one place only."""
         found = self._labels.get(label)
         if found is None:
             return self._save(kind, label)
         other = found.place.line != self.here.line
         if other and not (after_do and found.kind == "do"):
-            raise LineFault(f"the label o<{_own(label)}> is also that of {_of_place(found.place)}")
+            raise LineFault(
+                f"the label o<{_own_name(label)}> is also that of {_of_place(found.place)}"
+            )
         return found
 
     def _go_to(self, label: str) -> None:
@@ -339,7 +341,7 @@ class Flow:
         self.text, self.at = place.text, place.line
 
     def _condition(self, line: ParsedLine, word: _Word) -> float:
-        from .expressions import Scanner, evaluated
+        from .expressions import Scanner, evaluate
 
         if word.condition is None:
             if line.text[word.rest : word.rest + 1] != "[":
@@ -347,7 +349,7 @@ class Flow:
             scanner = Scanner(line.text, word.rest)
             word.condition = scanner.expression()
             word.rest = scanner.at
-        return evaluated(word.condition, self.given)
+        return evaluate(word.condition, self.given)
 
     # Subs
 
@@ -433,7 +435,7 @@ class Flow:
         return seek
 
     def _arguments(self, word: _Word) -> list[float]:
-        from .expressions import Scanner, evaluated
+        from .expressions import Scanner, evaluate
 
         line = self.current
         assert line is not None  # it has the call
@@ -452,35 +454,35 @@ class Flow:
             word.rest = scanner.at
             _check_rest(line, word)
             word.condition = values
-        return [evaluated(value, self.given) for value in word.condition]
+        return [evaluate(value, self.given) for value in word.condition]
 
     def _take_result(self, line: ParsedLine, word: _Word) -> None:
         """The value of `endsub [value]` and `return [value]`."""
         if self._defining is not None:
             return
         if word.kind != "M99" and line.text[word.rest : word.rest + 1] == "[":
-            from .expressions import Scanner, evaluated
+            from .expressions import Scanner, evaluate
 
             if word.condition is None:
                 scanner = Scanner(line.text, word.rest)
                 word.condition = scanner.expression()
                 word.rest = scanner.at
-            self.returned = evaluated(word.condition, self.given)
+            self.returned = evaluate(word.condition, self.given)
         elif word.condition is not None:
-            from .expressions import evaluated
+            from .expressions import evaluate
 
-            self.returned = evaluated(word.condition, self.given)
+            self.returned = evaluate(word.condition, self.given)
         else:
             self.returned = None
 
     def _m98_label(self, word: _Word) -> str:
-        from .expressions import whole
+        from .expressions import whole_number
 
         assert word.words is not None
         words = word.words.block(self.given).words
         if "p" not in words:
             raise LineFault("M98 without the P of its sub", None)
-        return str(whole(words["p"], 0))
+        return str(whole_number(words["p"], 0))
 
     def _times(self, word: _Word) -> int | None:
         assert word.words is not None
@@ -491,12 +493,12 @@ class Flow:
 
     def _branch(self, kind: str, label: str, value: float) -> None:
         if kind == "if":
-            self._once(kind, label)
+            self._unique_label(kind, label)
             self._executed_if = value != 0.0
             self._seeking = None if self._executed_if else label
             return
-        if self._known(label).kind != "if":
-            raise LineFault(f"{kind} without its if: o<{_own(label)}> is another word")
+        if self._label_of(label).kind != "if":
+            raise LineFault(f"{kind} without its if: o<{_own_name(label)}> is another word")
         if kind == "endif":
             self._seeking = None
             self._executed_if = True
@@ -507,7 +509,7 @@ class Flow:
             self._executed_if = True
 
     def _while(self, label: str, value: float) -> None:
-        found = self._once("while", label, after_do=True)
+        found = self._unique_label("while", label, after_do=True)
         self._seeking = None
         if found.kind == "while":
             if value == 0.0:
@@ -518,7 +520,7 @@ class Flow:
             self._breaking = False
 
     def _repeat(self, label: str, value: float) -> None:
-        found = self._once("repeat", label)
+        found = self._unique_label("repeat", label)
         self._seeking = None
         if found.kind != "repeat":
             return
@@ -531,8 +533,10 @@ class Flow:
             found.left = -1
 
     def _leave_loop(self, kind: str, label: str) -> None:
-        if self._known(label).kind not in ("while", "do"):
-            raise LineFault(f"{kind} without its while or do: o<{_own(label)}> is another word")
+        if self._label_of(label).kind not in ("while", "do"):
+            raise LineFault(
+                f"{kind} without its while or do: o<{_own_name(label)}> is another word"
+            )
         if kind == "continue" and self._seeking == label:
             return
         self._seeking = label
@@ -543,8 +547,8 @@ class Flow:
 
     def _end_loop(self, kind: str, label: str) -> None:
         begun = "repeat" if kind == "endrepeat" else "while"
-        if self._known(label).kind != begun:
-            raise LineFault(f"{kind} without its {begun}: o<{_own(label)}> is another word")
+        if self._label_of(label).kind != begun:
+            raise LineFault(f"{kind} without its {begun}: o<{_own_name(label)}> is another word")
         if self._seeking == label:
             self._seeking = None
             if not self._continuing:
@@ -579,7 +583,7 @@ def _word_of(line: ParsedLine) -> _Word:
             from .expressions import Scanner
 
             scanner = Scanner(text, at)
-            label = scanner.whole()
+            label = scanner.whole_number()
             label = str(label) if isinstance(label, int) else label
             at = scanner.at
     for kind in KINDS:
@@ -599,8 +603,8 @@ def _check_rest(line: ParsedLine, word: _Word) -> None:
         at = line.text.find(")", at) + 1
 
 
-def _own(label: str) -> str:
-    """A label without its sub."""
+def _own_name(label: str) -> str:
+    """Return a label without the name of its sub."""
     return label.rsplit("#", 1)[-1]
 
 

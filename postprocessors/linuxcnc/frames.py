@@ -15,7 +15,7 @@ from typing import Final
 from camtool.toolpath.builder import ToolpathBuilder
 
 from ..gcode.faults import LineFault
-from ..gcode.part_moves import ProgramFrame, turned
+from ..gcode.part_moves import ProgramFrame, rotate
 from .dialect import LinuxcncMachine, ToolTableEntry
 from .lines import AXES
 from .parameters import Parameters
@@ -83,7 +83,7 @@ class FrameCodes(InterpreterState, ABC):
     def _stored_place(self, first: int) -> list[float]:
         """Three lengths of parameters from this one on, in units of the program."""
         factor = self._user_mm / self.canon.mm
-        return [self.given.stored(first + k) * factor for k in range(3)]
+        return [self.given.stored_value(first + k) * factor for k in range(3)]
 
     def _store_place(self, first: int, place: list[float]) -> None:
         factor = self.canon.mm / self._user_mm
@@ -94,7 +94,7 @@ class FrameCodes(InterpreterState, ABC):
         self._frame = number
         self.given.set_numbered(5220, float(number))
         self._origin = self._stored_place(5201 + 20 * number)
-        self._rotation = self.given.stored(5210 + 20 * number)
+        self._rotation = self.given.stored_value(5210 + 20 * number)
         self._replace()
 
     def _replace(self) -> None:
@@ -104,18 +104,18 @@ class FrameCodes(InterpreterState, ABC):
         mm = self.canon.mm
         x, y, z = (each * mm for each in self._origin)
         dx, dy, dz = (each * mm for each in self._axis_offset)
-        self.canon.place(ProgramFrame((x, y, z), self._rotation, (dx, dy, dz)))
+        self.canon.set_frame(ProgramFrame((x, y, z), self._rotation, (dx, dy, dz)))
 
     def _on_machine(self) -> list[float]:
         """The position of the tip on the machine, without the tool's length."""
         x, y, z = (a + b for a, b in zip(self.position, self._axis_offset, strict=True))
-        x, y = turned(x, y, self._rotation)
+        x, y = rotate(x, y, self._rotation)
         return [a + b for a, b in zip((x, y, z), self._origin, strict=True)]
 
     def _in_frame(self, place: list[float]) -> list[float]:
         """A place on the machine in coordinates of the program."""
         x, y, z = (a - b for a, b in zip(place, self._origin, strict=True))
-        x, y = turned(x, y, -self._rotation)
+        x, y = rotate(x, y, -self._rotation)
         return [a - b for a, b in zip((x, y, z), self._axis_offset, strict=True)]
 
     def _choose_frame(self, number: int) -> None:
@@ -186,7 +186,7 @@ class FrameCodes(InterpreterState, ABC):
             raise LineFault("another work frame while the cutter's radius is compensated", "g")
         first = 5201 + 20 * number
         here, origin = self._on_machine(), self._stored_place(first)
-        rotation = self.given.stored(first + 9)
+        rotation = self.given.stored_value(first + 9)
         if kind == 20:
             if "r" in words:
                 raise LineFault("R beside G10 L20", "r")
@@ -205,7 +205,7 @@ class FrameCodes(InterpreterState, ABC):
                 self.notes.axes.setdefault(axis.upper(), self.block_index)
         if number == self._frame:
             # LinuxCNC turns the position without its G92 offset here, as this does.
-            x, y = turned(self.position[0], self.position[1], self._rotation)
+            x, y = rotate(self.position[0], self.position[1], self._rotation)
             self.position[:] = [
                 x + self._origin[0],
                 y + self._origin[1],
@@ -213,7 +213,7 @@ class FrameCodes(InterpreterState, ABC):
             ]
             self._use_frame(number)
             x, y, z = (a - b for a, b in zip(self.position, self._origin, strict=True))
-            x, y = turned(x, y, -self._rotation)
+            x, y = rotate(x, y, -self._rotation)
             self.position[:] = x, y, z
 
     def _place_here(
@@ -225,12 +225,12 @@ class FrameCodes(InterpreterState, ABC):
         rotation: float,
     ) -> None:
         x, y, z = (a - b for a, b in zip(here, origin, strict=True))
-        x, y = turned(x, y, -rotation)
-        if self.given.stored(5210):
+        x, y = rotate(x, y, -rotation)
+        if self.given.stored_value(5210):
             dx, dy, dz = self._stored_place(OFFSETS)
             x, y, z = x - dx, y - dy, z - dz
-        old = turned(x, y, rotation)
-        new = turned(words.get("x", x), words.get("y", y), rotation)
+        old = rotate(x, y, rotation)
+        new = rotate(words.get("x", x), words.get("y", y), rotation)
         place = [
             old[0] + origin[0] - new[0],
             old[1] + origin[1] - new[1],
@@ -238,7 +238,7 @@ class FrameCodes(InterpreterState, ABC):
         ]
         self._store_place(5201 + 20 * number, place)
         if number == self._frame:
-            self.position[:2] = turned(self.position[0], self.position[1], self._rotation)
+            self.position[:2] = rotate(self.position[0], self.position[1], self._rotation)
             self._rotation = 0.0
         if {"x", "y", "z"} <= set(words):
             self._set_here.add(number)
@@ -254,7 +254,7 @@ class FrameCodes(InterpreterState, ABC):
         if kind == 1:
             offset = [words.get(axis, old) for axis, old in zip("xyz", offset, strict=True)]
         else:
-            offset = self._touched(kind, words, offset)
+            offset = self._touch_off(kind, words, offset)
         orientation = tool.orientation
         if words.get("q", -1.0) != -1.0:
             orientation = int(words["q"] + 0.5)
@@ -268,24 +268,24 @@ class FrameCodes(InterpreterState, ABC):
         if number == self._loaded:
             self._load(number)
 
-    def _touched(self, kind: int, words: dict[str, float], offset: list[float]) -> list[float]:
-        """The lengths of a tool whose tip has these coordinates here, in the frame in force or
-        (L11) in that of G59.3."""
+    def _touch_off(self, kind: int, words: dict[str, float], offset: list[float]) -> list[float]:
+        """Compute the lengths of a tool whose tip has these coordinates here, in the frame in
+        force or (L11) in that of G59.3."""
         number = 9 if kind == 11 else self._frame
         first = 5201 + 20 * number
-        rotation = self.given.stored(first + 9)
+        rotation = self.given.stored_value(first + 9)
         here = [a + b for a, b in zip(self._on_machine(), self._tool_offset, strict=True)]
         x, y, z = (a - b for a, b in zip(here, self._stored_place(first), strict=True))
-        x, y = turned(x, y, -rotation)
-        if self.given.stored(5210) and kind != 11:
+        x, y = rotate(x, y, -rotation)
+        if self.given.stored_value(5210) and kind != 11:
             dx, dy, dz = self._stored_place(OFFSETS)
             x, y, z = x - dx, y - dy, z - dz
-        ox, oy = turned(offset[0], offset[1], -rotation)
+        ox, oy = rotate(offset[0], offset[1], -rotation)
         if "x" in words:
             ox = x - words["x"]
         if "y" in words:
             oy = y - words["y"]
-        ox, oy = turned(ox, oy, rotation)
+        ox, oy = rotate(ox, oy, rotation)
         return [ox, oy, z - words["z"] if "z" in words else offset[2]]
 
     def _set_length(self, code: int, words: dict[str, float]) -> None:
@@ -304,7 +304,7 @@ class FrameCodes(InterpreterState, ABC):
         elif code == 432:
             new = self._added_length(words)
         dx, dy, dz = (old - each for old, each in zip(self._tool_offset, new, strict=True))
-        dx, dy = turned(dx, dy, -self._rotation)
+        dx, dy = rotate(dx, dy, -self._rotation)
         self._shift_position(dx, dy, dz)
         self._tool_offset = new
         other = "h" in words and int(words["h"]) != self._loaded

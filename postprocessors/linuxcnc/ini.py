@@ -106,7 +106,7 @@ def settings_of(text: str) -> list[ControllerSetting] | None:
 def _unit_mm(ini: _Ini) -> float:
     said = ini.text("TRAJ", "LINEAR_UNITS")
     if said is None:
-        raise MachineError("says no unit", where="[TRAJ] LINEAR_UNITS", mend=_mend(ini))
+        raise MachineError("says no unit", where="[TRAJ] LINEAR_UNITS", mend=_remedy(ini))
     word = re.split(r"[\s;#]", said.lower())[0]
     if word in _UNITS:
         return _UNITS[word]
@@ -167,7 +167,7 @@ def _axis(ini: _Ini, letter: str, joint: str, unit: float) -> list[ControllerSet
             places.append(("TRAJ", "MAX_LINEAR_VELOCITY"))
         said = [(ini.number(*place), place) for place in places]
         if said[0][0] is None and said[1][0] is None:
-            raise MachineError("is missing", where=f"[{axis}] {entry}", mend=_mend(ini))
+            raise MachineError("is missing", where=f"[{axis}] {entry}", mend=_remedy(ini))
         value, place = min((value, place) for value, place in said if value is not None)
         add(key, value * unit * per, *place)
     backlash = ini.number(joint, "BACKLASH")
@@ -191,7 +191,7 @@ def _clean(value: float) -> float:
     return float(f"{value:.12g}")
 
 
-def _mend(ini: _Ini) -> str:
+def _remedy(ini: _Ini) -> str:
     if ini.includes:
         return "put the files of #INCLUDE in their places in a copy, and give that"
     return "give the whole INI file"

@@ -81,9 +81,9 @@ class Interpreter(BlockMoves):
         if lowered.startswith("msg,"):
             self._message(text.lstrip()[4:])
         elif "," in lowered:
-            from .comments import obeyed
+            from .comments import obey_comment
 
-            shown = obeyed(text.lstrip(), self.given)
+            shown = obey_comment(text.lstrip(), self.given)
             if shown is not None:
                 self._message(shown)
 
@@ -285,7 +285,7 @@ class Interpreter(BlockMoves):
 
     def _set_compensation(self, code: int, words: dict[str, float]) -> None:
         if code == 400:
-            if self._compensation is not None and self.compensation.off(self._flat()):
+            if self._compensation is not None and self.compensation.switch_off(self._flat()):
                 self._put(self.compensation.programmed)
                 self._arc_refused = True
             self.given.compensating = False

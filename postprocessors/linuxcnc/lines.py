@@ -81,8 +81,9 @@ _MESSAGES: Final = {
 }
 
 
-def closed(text: str) -> str:
-    """The line as LinuxCNC reads it: without blanks and in small letters, but for comments."""
+def close_up(text: str) -> str:
+    """Return the line as LinuxCNC reads it: without blanks and in small letters, but for
+    comments."""
     if "(" not in text and ";" not in text:
         return text.translate(_BLANKS).lower()
     parts: list[str] = []
@@ -149,12 +150,12 @@ class ParsedLine:
     of words; `begin`: where it begins behind / and N."""
 
     __slots__ = (
-        *("_block", "_compiled", "_items", "begin", "comment", "delete", "flow", "text"),
+        *("_block", "_parse_value", "_items", "begin", "comment", "delete", "flow", "text"),
         "word",
     )
 
     def __init__(self, raw: str) -> None:
-        self.text = text = closed(raw)
+        self.text = text = close_up(raw)
         self.delete = text[:1] == "/"
         at = 1 if self.delete else 0
         if text[at : at + 1] == "n":
@@ -169,7 +170,7 @@ class ParsedLine:
         self.comment: str | None = None
         self._items: list[Item] = []
         self._block: LinuxcncBlock | None = None
-        self._compiled = False
+        self._parse_value = False
 
     @property
     def is_block(self) -> bool:
@@ -183,19 +184,19 @@ class ParsedLine:
         """Its words; Fault where LinuxCNC would stop while it reads them."""
         if self._block is not None:
             return self._block
-        if not self._compiled:
+        if not self._parse_value:
             self._compile()
             if all(isinstance(item.value, float) and item.letter != "#" for item in self._items):
-                self._block = grouped(self._items, self.comment)
+                self._block = group_words(self._items, self.comment)
                 return self._block
-        return self._evaluated(given)
+        return self._evaluate(given)
 
     def place(self, letter: str) -> int | None:
         """Return the column of the last word with this letter; None if there is none."""
         found = [item.at for item in self._items if item.letter == letter]
         return found[-1] if found else None
 
-    def _evaluated(self, given: Parameters) -> LinuxcncBlock:
+    def _evaluate(self, given: Parameters) -> LinuxcncBlock:
         words: list[Item] = []
         settings: list[tuple[int | str, float]] = []
         for item in self._items:
@@ -211,7 +212,7 @@ class ParsedLine:
                 name = item.name(given)
             value = item.value
             settings.append((name, value if isinstance(value, float) else value(given)))
-        block = grouped(words, self.comment)
+        block = group_words(words, self.comment)
         return LinuxcncBlock(block.words, block.g, block.m, block.comment, tuple(settings))
 
     def _compile(self) -> None:
@@ -225,11 +226,11 @@ class ParsedLine:
                     self._items.append(Item(letter, float(found[0]), at))
                     at = found.end()
                     continue
-                value, end = _compiled(text, at + 1, letter)
+                value, end = _parse_value(text, at + 1, letter)
                 self._items.append(Item(letter, value, at))
                 at = end
             elif letter == "#":
-                item, at = _setting(text, at)
+                item, at = _parse_setting(text, at)
                 self._items.append(item)
             elif letter == "(":
                 end = text.find(")", at)
@@ -246,11 +247,11 @@ class ParsedLine:
             else:
                 message = _MESSAGES.get(letter, f"the sign {letter!r} belongs to no word")
                 raise LineFault(message, at)
-        self._compiled = True
+        self._parse_value = True
 
 
-def _compiled(text: str, at: int, letter: str) -> tuple[Value, int]:
-    """A value that is no plain number, and where it ends."""
+def _parse_value(text: str, at: int, letter: str) -> tuple[Value, int]:
+    """Parse a value that is no plain number, and return it with its end."""
     sign = text[at : at + 1]
     if not (sign.isalpha() or (sign and sign in "[#+-")):
         raise LineFault(f"no number after {letter.upper()}", at - 1)
@@ -267,8 +268,8 @@ def _compiled(text: str, at: int, letter: str) -> tuple[Value, int]:
         raise
 
 
-def _setting(text: str, at: int) -> tuple[Item, int]:
-    """#index=value or #<name>=value, and where it ends."""
+def _parse_setting(text: str, at: int) -> tuple[Item, int]:
+    """Parse #index=value or #<name>=value, and return it with its end."""
     from .expressions import Scanner, check_index
     from .parameters import READ_ONLY
 
@@ -284,7 +285,7 @@ def _setting(text: str, at: int) -> tuple[Item, int]:
     if text[at + 1 : at + 2] == "<":
         name = scanner.name()
     else:
-        index = scanner.whole()
+        index = scanner.whole_number()
         if isinstance(index, int):
             fixed = settable(index)
             name = lambda given: fixed  # noqa: E731 - it is a value
@@ -298,8 +299,8 @@ def _setting(text: str, at: int) -> tuple[Item, int]:
     return Item("#", value, at, name), scanner.at
 
 
-def grouped(items: list[Item], comment: str | None) -> LinuxcncBlock:
-    """Words by letter, codes by group; Fault where LinuxCNC refuses them together."""
+def group_words(items: list[Item], comment: str | None) -> LinuxcncBlock:
+    """Sort words by letter and codes by group; LineFault where LinuxCNC refuses them together."""
     words: dict[str, float] = {}
     g: dict[str, int] = {}
     m: dict[str, int] = {}
@@ -363,6 +364,6 @@ def m_code(value: float, at: int) -> int:
 def _whole(value: float, at: int) -> int:
     if value == value // 1:
         return int(value)
-    from .expressions import whole
+    from .expressions import whole_number
 
-    return whole(value, at)
+    return whole_number(value, at)

@@ -98,7 +98,7 @@ def modes_of(state: InterpreterState) -> ActiveModes:
         "spindle mode": state._spindle_mode,
         "arc distance": 901 if state.absolute_centres else 911,
         "lathe diameter": 70 if state.diameters else 80,
-        "axis offsets": 923 if state.given.stored(5210) else 922,
+        "axis offsets": 923 if state.given.stored_value(5210) else 922,
     }
     m = {
         "spindle": spindle_word(state.spindle),

@@ -143,7 +143,7 @@ class BlockMoves(FrameCodes):
                 raise LineFault("G53 while the cutter's radius is compensated", "g")
             kind = Kind.RAPID if motion == 0 else Kind.LINE
             self.effort += COMPENSATION_LINES
-            at = self._compensation.straight(kind, self._flat(end), self._flat())
+            at = self._compensation.line(kind, self._flat(end), self._flat())
             self._put(at)
             return
         if motion == 10:
@@ -160,7 +160,7 @@ class BlockMoves(FrameCodes):
         kinds = {("x", "y"): Kind.HOME_XY, ("z",): Kind.HOME_Z}
         if named in kinds and not any(words[axis] for axis in named):
             self.canon.moved = True
-            self.canon.path.set_position(*self.canon.part(*end)).event(kinds[named])
+            self.canon.path.set_position(*self.canon.to_part(*end)).event(kinds[named])
         else:
             self.canon.rapid(*end)
 
@@ -425,8 +425,8 @@ def _is_cycle(motion: int) -> bool:
 def _arc_length(
     begin: list[float], end: list[float], centre: tuple[float, float], turn: int
 ) -> float:
-    from .compensation import swept
+    from .compensation import sweep_of
 
-    sweep = swept((begin[0], begin[1]), centre, turn, (end[0], end[1]))
+    sweep = sweep_of((begin[0], begin[1]), centre, turn, (end[0], end[1]))
     radius = math.hypot(centre[0] - begin[0], centre[1] - begin[1])
     return math.hypot(radius * sweep, end[2] - begin[2])

@@ -69,8 +69,8 @@ class Parameters:
     def _state(self) -> dict[str, Callable[[], float]]:
         return {**self._names_of(), **self._more}
 
-    def numbered(self, index: int, at: int) -> float:
-        """The value of a number, 0 where it has none yet."""
+    def value_of_number(self, index: int, at: int) -> float:
+        """Return the value of a numbered parameter; 0 if it has none yet."""
         value = self._values.get(index)
         if value is not None:
             return value
@@ -84,12 +84,12 @@ class Parameters:
         self.unset.setdefault(index, self.line)
         return 0.0
 
-    def stored(self, index: int) -> float:
-        """The same for the interpreter itself."""
+    def stored_value(self, index: int) -> float:
+        """Return the value of a numbered parameter for the interpreter itself."""
         return self._values.get(index, 0.0)
 
-    def named(self, name: str, at: int) -> float:
-        """The value of a name."""
+    def value_of_name(self, name: str, at: int) -> float:
+        """Return the value of a named parameter."""
         if name in self._state:
             return self._state[name]()
         value = self._of(name).get(name)
@@ -104,9 +104,9 @@ class Parameters:
         return value
 
     def has(self, name: str, at: int) -> float:
-        """1 where a name has a value."""
+        """Return 1 if a name has a value, else 0."""
         if name.startswith(("_ini[", "_hal[")):
-            return float(bool(self.named(name, at)))
+            return float(bool(self.value_of_name(name, at)))
         return float(name in self._state or name in self._of(name))
 
     def declare(self, name: str, at: int) -> None:

@@ -113,7 +113,7 @@ class _Reader:
         try:
             self._begin()
             while not self.machine.ended:
-                if self._plain():
+                if self._read_plain():
                     continue
                 line = flow.step()
                 if line is None:
@@ -121,18 +121,18 @@ class _Reader:
                 self._execute(line)
         except EndOfFile:
             if self._empty:
-                raise _nothing() from None
+                raise _empty_path() from None
             self._cut_off = True
         except LineFault as fault:
             flow.fail(fault)
         if self._empty and not flow.percent:
-            raise _nothing()
+            raise _empty_path()
         if not self.machine.ended:
             self.machine.end_of_file()
         return self.path.finish(self._findings())
 
     def _begin(self) -> None:
-        """A % alone on the first line that is not blank: another one ends the program."""
+        """Skip the first line if it is a % alone: a second one ends the program."""
         for number in range(self.text.count):
             text = self.text.raw(number).strip()
             if text:
@@ -166,44 +166,45 @@ class _Reader:
 
     # By columns
 
-    def _plain(self) -> bool:
-        """Read plain lines from here on by columns; whether there were any."""
+    def _read_plain(self) -> bool:
+        """Read plain lines from here on by columns; True if there were any."""
         flow = self.flow
-        if flow.seeks or flow.text is not self.text or not self.machine.plain:
+        if flow.seeks or flow.text is not self.text or not self.machine.reads_columns:
             return False
         first = self._blocks
         if self._branches:
             first = self.text.blocks_before(min(flow.at, self.text.count))
-        count, flow.at = self._runs.run(flow.at, first, self._take)
+        count, flow.at = self._runs.run(flow.at, first, self._decode_plain)
         self._blocks += count
         self._empty = self._empty and not count
         return count > 0
 
-    def _take(self, plain: PlainBlocks) -> int:
-        """Rows of plain blocks, up to the first that is no move which LinuxCNC surely does."""
+    def _decode_plain(self, plain: PlainBlocks) -> int:
+        """Add the rows of plain blocks, up to the first that is no move which LinuxCNC surely
+        executes."""
         machine, path = self.machine, self.path
         motion = -1 if machine.motion in (None, 800) else int(machine.motion or 0)
         mm = machine.canon.mm
-        position = machine.canon.near(machine.canon.part(*machine.position))
+        position = machine.canon.snap(machine.canon.to_part(*machine.position))
         state = PlainState(motion, machine.feed_mm, mm, position)
         moves = PlainMoves(plain, state, self._rule)
         if moves.count:
             path.source = self.flow.caller if self.flow.level else ""
             moved = moves.add_to(path, self._fast)
-            machine.went_on(*moves.last, path.position, moved=moved)
+            machine.continue_from(*moves.last, path.position, moved=moved)
         return moves.count
 
     # What is said of the program
 
-    def _behind_end(self) -> list[int]:
-        """Lines (from 1) behind the end, which no controller reads; where there are branches, the
+    def _unread_lines(self) -> list[int]:
+        """Return the lines (from 1) behind the end, which no controller reads; with branches, the
         end that was met need not be the last."""
         if self._branches:
             return []
         behind = range(self.flow.at, self.text.count)
-        return [number + 1 for number in behind if _says(self._raw(number))]
+        return [number + 1 for number in behind if _has_text(self._raw_line(number))]
 
-    def _raw(self, number: int) -> str:
+    def _raw_line(self, number: int) -> str:
         try:
             return self.text.raw(number)
         except LineFault:
@@ -222,7 +223,7 @@ class _Reader:
             yield NO_END_OF_FILE(where=place)
         if notes.speedless:
             yield SPINDLE_SPEED_NOT_SAID(where=block(notes.speedless[0]))
-        behind = self._behind_end()
+        behind = self._unread_lines()
         if behind:
             yield NEVER_READ(where=f"line {behind[0]}", measured=len(behind))
         for sentence, blocks in (
@@ -282,10 +283,10 @@ def _lengths(mounted: list[Mounted], path: Toolpath) -> Iterator[Finding]:
         yield TOOL_LENGTH_NOT_USED(where=f"block {unmeasured[0].block + 1}", tools=tools)
 
 
-def _says(text: str) -> bool:
+def _has_text(text: str) -> bool:
     """True if a line has more than blanks, a % and comments."""
     return text.strip()[:1] not in ("", "%", "(", ";")
 
 
-def _nothing() -> ProgramError:
+def _empty_path() -> ProgramError:
     return ProgramError("the program is empty", mend="a program has blocks such as G0 X1")

@@ -148,7 +148,7 @@ class InterpreterState:
         return self._compensation is not None and self._compensation.side != 0
 
     @property
-    def plain(self) -> bool:
+    def reads_columns(self) -> bool:
         """True if blocks of plain moves may now be read by columns."""
         return (
             self.motion in (None, 0, 10, 20, 30, 800)
@@ -159,14 +159,14 @@ class InterpreterState:
             and not self.diameters
             and not self._compensates
             and not self._arc_refused
-            and self.canon.same
+            and self.canon.is_part_frame
         )
 
-    def went_on(
+    def continue_from(
         self, motion: int | None, feed: float, at: tuple[float, float, float], *, moved: bool
     ) -> None:
-        """Blocks of plain moves were read: the motion and the feed (mm/min) in force behind them,
-        and the place (mm)."""
+        """Adopt motion and feed (mm/min) in force, and position (mm), behind blocks of plain moves
+        that were read by columns."""
         mm = self.canon.mm
         self.motion = self.motion if motion is None else motion
         self.feed_mm = feed

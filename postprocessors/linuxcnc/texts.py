@@ -42,7 +42,7 @@ class ProgramText(ProgramLines):
         self._before: Ints | None = None
 
     def raw(self, number: int) -> str:
-        """The text of a line, without the blanks at its end."""
+        """Return the text of a line, without the blanks at its end."""
         text = self.text(number)
         if len(text) > self._line_chars:
             message = f"the line has more than {self._line_chars} characters"
@@ -82,7 +82,7 @@ class Folder:
             return self._found[label]
         if len(self._found) >= MAX_FILES:
             raise LineFault(f"the program calls more than {MAX_FILES} files")
-        self._found[label] = found = self._opened(label)
+        self._found[label] = found = self._open(label)
         return found
 
     @property
@@ -92,7 +92,7 @@ class Folder:
             return "give the program as a file: its folder is where subs are looked for"
         return f"put the sub into the program or its file into {self._folder}"
 
-    def _opened(self, label: str) -> ProgramText | None:
+    def _open(self, label: str) -> ProgramText | None:
         name = f"{label}{SUFFIX}"
         parts = PurePosixPath(name)
         if parts.is_absolute() or ".." in parts.parts:

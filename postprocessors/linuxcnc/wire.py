@@ -168,7 +168,7 @@ class LinuxcncConversation(Conversation):
             "zero": self._zero,
             "jog": self._jog,
         }
-        self._script, self._fresh = self._held(acts[action]), True
+        self._script, self._fresh = self._session(acts[action]), True
         self._rest, self._asked, self._now = b"", "", 0.0
         self._skips = ""
         """Answers that begin otherwise are passed over."""
@@ -244,10 +244,10 @@ class LinuxcncConversation(Conversation):
             self._go(None, now)
         elif self._aborting or not self._begun:
             more = f"; {UNSURE}" if self._begun else ""
-            why = self._why_aborted or f"no answer to {_shown(self._asked)!r}"
+            why = self._why_aborted or f"no answer to {_without_password(self._asked)!r}"
             self._end(WireState.FAILED, why + more)
         else:
-            self._why_aborted, self._asked = f"no answer to {_shown(self._asked)!r}", ""
+            self._why_aborted, self._asked = f"no answer to {_without_password(self._asked)!r}", ""
             self._abort_at(now)
 
     def _go(self, answer: str | None, now: float) -> None:
@@ -287,7 +287,7 @@ class LinuxcncConversation(Conversation):
         answer = yield f"set {words}"
         name = words.split(" ", 1)[0].upper()
         if answer.upper() != f"SET {name} ACK":
-            raise _Refused(f"it refuses 'set {_shown(words)}': {answer[:60]}")
+            raise _Refused(f"it refuses 'set {_without_password(words)}': {answer[:60]}")
 
     def _place(self) -> Generator[str | float, str, Place]:
         text = yield from self._get("rel_act_pos")
@@ -307,8 +307,8 @@ class LinuxcncConversation(Conversation):
 
     # What is held.
 
-    def _held(self, act: Callable[[], Script]) -> Script:
-        """Greet it, see that it is ready, and act."""
+    def _session(self, act: Callable[[], Script]) -> Script:
+        """Greet it, check that it is ready, and act."""
         answer = yield f"hello {self._link.password} camtool 1.0"
         if not answer.upper().startswith("HELLO ACK"):
             raise _Refused("it does not take the password of its line (link.password)")
@@ -386,10 +386,10 @@ class LinuxcncConversation(Conversation):
             before = now
             if status != "IDLE":
                 busy = True
-                self._reached(line, ran)
+                self._count_done(line, ran)
                 yield from self._obey(status, still >= STILL_REPORTS - 1)
             elif busy or now - begun > POLL_FACTOR * self._poll_s:
-                self._over(line, ran)
+                self._finish(line, ran)
                 return
             yield self._poll_s
 
@@ -414,21 +414,22 @@ class LinuxcncConversation(Conversation):
                 "",
             )  # somebody has let it go on at the machine
 
-    def _reached(self, text: str, ran: float) -> None:
-        """Count what lies before the line that it is at, as far as the time allows it."""
-        line = _whole(text)
+    def _count_done(self, text: str, ran: float) -> None:
+        """Count the lines before the reported one as done, as far as the simulated time allows
+        it."""
+        line = _whole_number(text)
         if self._lines and self._lines[0]:
             at = int(np.searchsorted(self._lines, line))
             possible = int(np.searchsorted(self._ends, ran, side="right"))
             self.acknowledged = max(self.acknowledged, min(at, len(self.packets)))
             self.done = max(self.done, min(at, possible))
 
-    def _over(self, text: str, ran: float) -> None:
-        """It is idle: at the end of the program, or before it."""
+    def _finish(self, text: str, ran: float) -> None:
+        """End the conversation with an idle machine: at the end of the program, or before it."""
         if self._said:
             raise _Refused(f"it has stopped: {self._said}")
         end, total = self.packets[-1].end_mm, float(self._ends[-1])
-        at = int(np.searchsorted(self._lines, _whole(text)))
+        at = int(np.searchsorted(self._lines, _whole_number(text)))
         left = total - float(self._ends[min(at, len(self._ends) - 1)]) if self._lines[0] else 0.0
         place = self.place_mm
         elsewhere = (
@@ -509,15 +510,15 @@ class LinuxcncConversation(Conversation):
         self._end(WireState.FINISHED)
 
 
-def _whole(text: str) -> int:
+def _whole_number(text: str) -> int:
     try:
         return int(text)
     except ValueError:
         raise _Refused(f"a line that is none: {text[:60]!r}") from None
 
 
-def _shown(request: str) -> str:
-    """A request without its password."""
+def _without_password(request: str) -> str:
+    """Return a request without its password."""
     return re.sub(r"^(hello|(?:set )?enable) \S+", r"\1 …", request)
 
 

@@ -167,14 +167,15 @@ class _Run:
             duration_s=seconds,
             compensation_s=np.zeros(len(rows)),
             iterations=np.diff(offsets),
-            steps=self._travelled(count, offsets),
+            steps=self._run_counts(count, offsets),
             reversals=reversals,
             ended=~whole | self._account.ended[rows],
         )
         return Chunk(row, commanded, slide, ledger)
 
-    def _travelled(self, count: Ints, offsets: Ints) -> Ints:
-        """(R, 3) counts from tick to tick of each run, on from where the last chunk ended."""
+    def _run_counts(self, count: Ints, offsets: Ints) -> Ints:
+        """Compute the counts (R, 3) of each run from tick to tick, on from where the last chunk
+        ended."""
         along = np.concatenate([self._count[None, :], count])
         self._count = along[-1]
         way = np.abs(np.diff(along, axis=0)).cumsum(axis=0)
@@ -253,7 +254,7 @@ def lines_of(path: Toolpath, rows: int, machine: _Machine) -> MasterOrders:
     homes = _homing(path, way_mm, machine)
     first = np.flatnonzero((way_mm != 0.0).any(axis=1))
     second = first.copy()
-    tail = _tails(path, way_mm, first)
+    tail = _are_tails(path, way_mm, first)
     second[np.flatnonzero(tail) - 1] = first[tail]
     first, second = first[~tail], second[~tail]
     orders = np.empty((len(first), PART_COUNT + 1), dtype=np.int32)
@@ -265,11 +266,11 @@ def lines_of(path: Toolpath, rows: int, machine: _Machine) -> MasterOrders:
         way[begin != end] += way_mm[end[begin != end]]
         speeds = _speeds(path, way_mm, begin, machine)
         ref = np.where(way < 0.0, -speeds, speeds)
-        amount = _amounts(way, router, machine)
+        amount = _axis_counts(way, router, machine)
         amount = np.where(homes[begin][:, None] & (way != 0.0), HOME_AMOUNT, amount)
         most = _patience(way, ref, amount, machine)
-        part = _parting(path, begin, end, machine)
-        orders[some] = _narrow(np.column_stack([amount, ref, begin, end, most, part]))
+        part = _axis_beyond(path, begin, end, machine)
+        orders[some] = _to_int32(np.column_stack([amount, ref, begin, end, most, part]))
         header[some] |= way[:, 2] != 0.0
     extra = np.where(kind == Kind.DWELL, path.value[:rows], 0.0)
     ends = _ends(header, homes[first], machine)
@@ -278,8 +279,8 @@ def lines_of(path: Toolpath, rows: int, machine: _Machine) -> MasterOrders:
     )
 
 
-def _narrow(orders: Ints) -> Indices:
-    """The same numbers in 32 bits; MachineError for those that do not fit."""
+def _to_int32(orders: Ints) -> Indices:
+    """Convert to 32 bits; MachineError for numbers that do not fit."""
     if np.abs(orders).max(initial=0) > INT32:
         raise MachineError(
             "a position has more counts than 32 bits hold",
@@ -305,7 +306,8 @@ def _check(path: Toolpath, rows: int) -> None:
 
 
 def _homing(path: Toolpath, way_mm: Floats, machine: _Machine) -> Bools:
-    """(R,) rows that go home: homing, and rapids that end there on all that moves."""
+    """Mask (R,) of the rows that go home: homing, and rapids that end there on all axes that
+    move."""
     coded = np.array([axis.coded_step_mm for axis in machine.axes])
     off = np.abs(path.end[: len(way_mm)] - np.array(machine.controller.machine_zero_mm))
     there = ((off <= ON_HOME_COUNTS * coded) | (way_mm == 0.0)).all(axis=1)
@@ -314,9 +316,9 @@ def _homing(path: Toolpath, way_mm: Floats, machine: _Machine) -> Bools:
     return np.asarray(homing | ((kind == Kind.RAPID) & there & (way_mm <= 0.0).all(axis=1)))
 
 
-def _tails(path: Toolpath, way_mm: Floats, first: Ints) -> Bools:
-    """(L,) of the rows `first` those that are the rest of the line before them: where one axis of
-    a line of the program goes on alone."""
+def _are_tails(path: Toolpath, way_mm: Floats, first: Ints) -> Bools:
+    """Mask (L,) of those of the rows `first` that continue the line before them: one axis of a
+    line of the program goes on alone."""
     block, way = path.block[first], way_mm[first]
     flat = (path.kind[first] == Kind.LINE) & (way[:, 2] == 0.0)
     tail = np.zeros(len(first), dtype=np.bool_)
@@ -326,9 +328,9 @@ def _tails(path: Toolpath, way_mm: Floats, first: Ints) -> Bools:
     return tail
 
 
-def _parting(path: Toolpath, first: Ints, second: Ints, machine: _Machine) -> Ints:
-    """(L, 2) the axis that goes on after the end of the first of two rows, and its count there;
-    zeros where there is one row."""
+def _axis_beyond(path: Toolpath, first: Ints, second: Ints, machine: _Machine) -> Ints:
+    """Return (L, 2) the axis that goes on after the end of the first of two rows, and its count
+    there; zeros for a single row."""
     part = np.zeros((len(first), 2), dtype=np.int64)
     both = np.flatnonzero(first != second)
     axis = np.abs(path.end[second] - path.end[first])[both, :2].argmax(axis=1)
@@ -349,15 +351,15 @@ def _speeds(path: Toolpath, way_mm: Floats, first: Ints, machine: _Machine) -> I
     wanted = np.minimum(np.where(np.isfinite(along), along / coded, 0.0), INT16)
     sent = to_steps(wanted, 1.0)
     slanted = np.flatnonzero((wanted[:, 0] > 0.0) & (wanted[:, 1] > 0.0) & (wanted[:, 2] == 0.0))
-    sent[slanted, :2] = _pairs(wanted[slanted, :2])
+    sent[slanted, :2] = _speed_pairs(wanted[slanted, :2])
     rapid_mm = machine.rapid_mm_min / (60.0 * TICKS_PER_S)
     rapid = to_steps(min(rapid_mm, INT16 * coded[0]), float(coded[0]))
     return np.where((path.kind[first] == Kind.LINE)[:, None], sent, rapid)
 
 
-def _pairs(wanted: Floats) -> Ints:
-    """(K, 2) whole speeds whose squares add up to those of `wanted` (K, 2), the nearest to it
-    within `PAIR_COUNTS`; where there are none: each rounded."""
+def _speed_pairs(wanted: Floats) -> Ints:
+    """Return (K, 2) whole speeds whose squares have the same sum as those of `wanted` (K, 2), the
+    nearest within `PAIR_COUNTS`; each rounded where there are none."""
     total = np.rint((wanted**2).sum(axis=1))
     rounded = to_steps(wanted, 1.0)
     slow = wanted.argmin(axis=1)[:, None]
@@ -374,8 +376,8 @@ def _pairs(wanted: Floats) -> Ints:
     return np.asarray(np.where((adds_up.any(axis=1) & exact)[:, None], pair, rounded))
 
 
-def _amounts(way_mm: Floats, router: MatlabRouterController, machine: _Machine) -> Ints:
-    """(L, 3) chunks, or counts as the text has them; 0 where an axis does not move."""
+def _axis_counts(way_mm: Floats, router: MatlabRouterController, machine: _Machine) -> Ints:
+    """Return (L, 3) chunks, or counts as the text has them; 0 where an axis does not move."""
     units = to_steps(np.abs(way_mm), 1.0 / UNITS_PER_MM)
     if router.slaves == "listing":
         return np.asarray(np.where(units > 0, ((units // 2 - 1) & INT16) + 1, 0))
@@ -387,7 +389,7 @@ def _amounts(way_mm: Floats, router: MatlabRouterController, machine: _Machine) 
 
 
 def _patience(way_mm: Floats, ref: Ints, amount: Ints, machine: _Machine) -> Ints:
-    """(L,) ticks after which a line is given up."""
+    """Return (L,) ticks after which a line is given up."""
     coded = np.array([axis.coded_step_mm for axis in machine.axes])
     router = machine.controller
     speed = np.where(amount < 0, np.array(router.home_counts), np.abs(ref))

@@ -201,13 +201,13 @@ def _job_of_arrays(
         values["velxy"].table,
         where,
     )
-    _agree(job, values["xy"].table)
+    _check_repeats(job, values["xy"].table)
     check_job(job, dialect)
     return job
 
 
-def _agree(job: ReadJob, xy: Ints) -> None:
-    """xy repeats the first point, lxy and the signs of velxy."""
+def _check_repeats(job: ReadJob, xy: Ints) -> None:
+    """Check that xy repeats the first point, lxy and the signs of velxy."""
     for axis, name in enumerate(("first_pointx", "first_pointy")):
         if int(job.first[axis]) != int(xy[axis, 0]):
             fail(
@@ -276,7 +276,7 @@ class _Text:
         return _Value(np.array([[self._int(match[0], match.start())]]), match.start())
 
     def listed(self) -> None:
-        """The list of a job's six names."""
+        """Read the list of a job's six names."""
         match = _LIST.match(self.text, self.at)
         if match is None:
             self.fail(self.at, "jobs takes the six names of a job, in their order")
@@ -466,7 +466,7 @@ def listing(data: bytes, machine: MatlabRouterMachine) -> Listing:
     """The blocks of a program that its reader takes."""
     dialect = dialect_of(machine)
     if dialect.format == "stream":
-        jobs = [_streamed(words) for words in _words_of(data, read_stream(data, dialect))]
+        jobs = [_stream_numbers(words) for words in _words_of(data, read_stream(data, dialect))]
     else:
         jobs = [_arrays(job) for job in read_text(data, dialect)]
     if len(jobs) == 1:
@@ -502,8 +502,8 @@ def _words_of(data: bytes, jobs: Iterator[ReadJob]) -> Iterator[list[str]]:
         begin = end
 
 
-def _streamed(words: list[str]) -> list[str]:
-    """The header, then the four numbers of each line."""
+def _stream_numbers(words: list[str]) -> list[str]:
+    """Yield the header, then the four numbers of each line."""
     count = int(words[0])
     body = words[len(HEADER) :]
     head = (f"{name} {word}" for name, word in zip(HEADER, words, strict=False))

@@ -120,7 +120,7 @@ class _Maker:
 
     def lines(self, cuts: CutLines) -> SlaveLines:
         """The cuts as lines that the slaves can run."""
-        return self._straight(self._mended(self._on_grid(cuts)))
+        return self._straight(self._mend(self._on_grid(cuts)))
 
     def _on_grid(self, cuts: CutLines) -> SlaveLines:
         """Vertices at the nearest point of the grid, the first one of a stroke not nearer to home
@@ -137,7 +137,7 @@ class _Maker:
         if count:
             moved = np.hypot(*(units - wanted).T)
             row = int(rows[int(np.argmax(moved))])
-            self.changes.snapped(float(moved.max()) * UNIT_MM, self._toolpath.place(row))
+            self.changes.note_snap(float(moved.max()) * UNIT_MM, self._toolpath.place(row))
         whole = units.astype(np.int64)
         return SlaveLines(whole[:count], whole[count:], cuts.feed, cuts.row, cuts.stroke)
 
@@ -152,10 +152,10 @@ class _Maker:
                     f"{name} {units[line, axis] * UNIT_MM:.1f} mm from home is outside of 0 to"
                     f" {most * UNIT_MM:g} mm",
                     where=self._toolpath.place(int(rows[line])),
-                    mend=self._room(units, axis, most),
+                    mend=self._area_remedy(units, axis, most),
                 )
 
-    def _room(self, units: Floats, axis: int, most: float) -> str:
+    def _area_remedy(self, units: Floats, axis: int, most: float) -> str:
         """Return the remedy that brings everything into the travel of an axis: the place of home,
         or a smaller drawing."""
         low, high = float(units[:, axis].min()), float(units[:, axis].max())
@@ -168,8 +168,8 @@ class _Maker:
         place = ",".join(f"{value:g}" for value in zero)
         return f"use --origin lower-left, or --set controller.machine_zero_mm=[{place}]"
 
-    def _mended(self, lines: SlaveLines) -> SlaveLines:
-        """No distance of 1 and no line of no length."""
+    def _mend(self, lines: SlaveLines) -> SlaveLines:
+        """Remove distances of 1 and lines of no length."""
         if (np.abs(lines.end - lines.start) == 1).any():
             lines = self._without_ones(lines)
         keep = (lines.end != lines.start).any(axis=1)
@@ -177,12 +177,12 @@ class _Maker:
         left = np.unique(lines.stroke[keep])
         for stroke in np.setdiff1d(lines.stroke, left).tolist():
             row = int(lines.row[int(np.searchsorted(lines.stroke, stroke))])
-            self.changes.lost(self._toolpath.place(row))
+            self.changes.note_loss(self._toolpath.place(row))
         return lines.chosen(keep)
 
     def _without_ones(self, lines: SlaveLines) -> SlaveLines:
-        """A vertex one unit from the one before it (in X or Y) moves there; each vertex is moved
-        from its own place, so no error adds up."""
+        """Move a vertex that lies one unit from the one before it (in X or Y) onto it; each vertex
+        moves from its own place, so that no error adds up."""
         starts, ends, strokes = lines.start.tolist(), lines.end.tolist(), lines.stroke.tolist()
         for line, end in enumerate(ends):
             if line and strokes[line] == strokes[line - 1]:
@@ -390,13 +390,13 @@ class LineChanges(Struct):
     feed_off: float = 0.0
     faster: float = 1.0
 
-    def snapped(self, moved_mm: float, place: str) -> None:
-        """A stroke whose worst vertex was moved by this much."""
+    def note_snap(self, moved_mm: float, place: str) -> None:
+        """Note a stroke whose worst vertex was moved by this much."""
         if moved_mm > max(self.snap_mm, SNAP_NOTICE_MM):
             self.snap_mm, self.snap_place = moved_mm, place
 
-    def lost(self, place: str) -> None:
-        """A stroke of which nothing is left on the grid."""
+    def note_loss(self, place: str) -> None:
+        """Note a stroke of which nothing is left on the grid."""
         self.lost_strokes += 1
         self.lost_place = self.lost_place or place
 

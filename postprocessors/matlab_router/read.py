@@ -211,7 +211,7 @@ class DrivenLines:
         self.most_bend = float(lag.max(initial=0.0))
         self.first_bent = int(np.argmax(bent)) if self.bent else 0
         keep = moving.any(axis=1)
-        parted = bent | (both & (_off(distance, speed, along) > MAX_SPEED_ERROR_COUNTS))
+        parted = bent | (both & (_speed_errors(distance, speed, along) > MAX_SPEED_ERROR_COUNTS))
         times = np.where(keep, np.where(parted, 2, 1), 0)
         self.line = np.repeat(np.arange(len(way)), times)
         self.end = points[1:][self.line].astype(np.float64)
@@ -248,8 +248,8 @@ def _lag(distance: Floats, took: Floats, share: Floats) -> Floats:
     return np.asarray(left * other / np.where(length > 0.0, length, 1.0))
 
 
-def _off(distance: Floats, speed: Ints, along: Floats) -> Floats:
-    """(n,) counts by which the speeds are off those that would go straight."""
+def _speed_errors(distance: Floats, speed: Ints, along: Floats) -> Floats:
+    """Return (n,) counts by which the speeds differ from those of a straight line."""
     length = np.hypot(*distance.T)
     straight = distance * (along / np.where(length > 0.0, length, 1.0))[:, None]
     return np.asarray(np.abs(speed - straight).max(axis=1))
@@ -270,7 +270,7 @@ class Worst(Struct):
             self.most = max(self.most, most)
 
     def finding(self, sentence: Sentence, start: float = 0.0) -> list[Finding]:
-        """The finding; none when nothing was beyond."""
+        """Return the finding; none if nothing exceeded the limit."""
         if not self.count:
             return []
         return [sentence(where=self.first, measured=self.most, count=self.count, start=start)]

@@ -105,14 +105,14 @@ class MatlabRouterTwin(Twin):
         if octet == END:
             self._numbers.append(_number(bytes(self._word)))
             self._word.clear()
-            self._look()
+            self._begin_if_complete()
         elif octet in PRINTABLE and len(self._word) < CHARACTERS:
             self._word.append(octet)
             if self._choices.echo == "characters":
                 self._out.append(octet)
 
-    def _look(self) -> None:
-        """Begin when the job is complete. More lines than its arrays have are written beyond them
+    def _begin_if_complete(self) -> None:
+        """Begin when the job is complete. More lines than its arrays hold are written beyond them
         (L4625-4635), and a slave may run away: both hang it here, until it is reset."""
         count = self._numbers[0]
         if not 1 <= count <= self._dialect.max_lines:
@@ -125,7 +125,8 @@ class MatlabRouterTwin(Twin):
             self._begin(ReadJob(number, first, table[:2], table[2:], lambda *_: f"job {number}"))
 
     def _begin(self, job: ReadJob) -> None:
-        """The slaves go on from all that they have done: they were never reset."""
+        """Start the slaves on a job. They go on from all that they have done, since they were
+        never reset."""
         try:
             check_count(job.length.shape[1], job.where, self._dialect)
             check_job(job, self._dialect)

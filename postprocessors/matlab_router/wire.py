@@ -214,19 +214,19 @@ class MatlabRouterConversation(PacketByPacket):
         if self.ended or not text:
             return
         if not self._echo.startswith(text):
-            sent = f", where {self._shown} was to come back" if self._echo else " unasked"
-            self._fail(f"it says {text[:20]!r}{sent}; {self._mend}", now)
+            sent = f", where {self._echo_text} was to come back" if self._echo else " unasked"
+            self._fail(f"it says {text[:20]!r}{sent}; {self._remedy}", now)
             return
         self._echoes, self._echo = True, self._echo[len(text) :]
         if not self._echo:
             self._end_number(now)
 
     @property
-    def _shown(self) -> str:
+    def _echo_text(self) -> str:
         return self._echo.decode("ascii", "replace")
 
     @property
-    def _mend(self) -> str:
+    def _remedy(self) -> str:
         if self._moving:
             return "the job has begun: its switch stops the machine"
         return "the job has not begun, and the master must be reset"
@@ -238,7 +238,7 @@ class MatlabRouterConversation(PacketByPacket):
         if self._moving:
             self._packet_done(now)
         elif self._echo and self._echoes:
-            self._fail(f"{self._shown} does not come back; {self._mend}", now)
+            self._fail(f"{self._echo_text} does not come back; {self._remedy}", now)
         elif self._echo:
             self._end_number(now)
         else:
@@ -249,7 +249,7 @@ class MatlabRouterConversation(PacketByPacket):
         if self._moving and not unsent:
             return False
         self._moving = False
-        self._stopped(f"stopped: {self._mend}")
+        self._stopped(f"stopped: {self._remedy}")
         return True
 
     @property

@@ -176,8 +176,8 @@ def _mark_onward(arc: Ints, count: int, search: LandingSearch) -> None:
         search.onward[k] = 1 if on_x >= 0 and on_y >= 0 else 0
 
 
-def _take(row: int, first: int, search: LandingSearch, out: Ints) -> None:
-    """The landing at this position."""
+def _store_landing(row: int, first: int, search: LandingSearch, out: Ints) -> None:
+    """Store the landing at this position."""
     out[LANDING_X], out[LANDING_Y] = search.path_x[row], search.path_y[row]
     out[ITERATION] = first + row + 1
 
@@ -201,7 +201,7 @@ def _land(arc: Ints, sweep_rad: float, sagitta: float, search: LandingSearch, ou
     _mark_onward(arc, count, search)
     for row in range(count - 1, -1, -1):
         if search.onward[row] == 1 and _lands(arc, row, first, search):
-            _take(row, first, search, out)
+            _store_landing(row, first, search, out)
             return
     if first == 0:
         return
@@ -212,7 +212,7 @@ def _land(arc: Ints, sweep_rad: float, sagitta: float, search: LandingSearch, ou
         nearer = search.onward[row] == 0 and (least < 0 or square < least)
         if nearer and _lands(arc, row, first, search):
             least = square
-            _take(row, first, search, out)
+            _store_landing(row, first, search, out)
     if least >= 0:
         return
     upto, room = first, len(search.path_x)
@@ -222,6 +222,6 @@ def _land(arc: Ints, sweep_rad: float, sagitta: float, search: LandingSearch, ou
         _follow(arc, first, count, search)
         for row in range(count - 1, -1, -1):
             if _lands(arc, row, first, search):
-                _take(row, first, search, out)
+                _store_landing(row, first, search, out)
                 return
         upto = first

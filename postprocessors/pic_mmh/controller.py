@@ -141,8 +141,9 @@ class _Leg(Struct, frozen=True):
     ended: bool = True
 
 
-def _counted(fill: Filler) -> Filler:
-    """The same, which does not end at the end: it may be passed on an earlier turn."""
+def _without_stop(fill: Filler) -> Filler:
+    """Wrap a filler so that it does not stop at the end, which may be passed on an earlier
+    turn."""
 
     def on(buffer: Ints) -> tuple[int, int, bool]:
         filled, passes, _ = fill(buffer)
@@ -181,7 +182,7 @@ class PicMmhRun:
         self._home: Ints = self._steps(home_mm, range(3), named=False)[0]
         self._position: Ints = self._steps(toolpath.start[None, :], range(3), named=False)[0]
         self._said = self._ends.copy()
-        self._stops = self._stopped()
+        self._stops = self._stop_samples()
         self._mechanics = Mechanics(machine, self._position * self._coded_mm, options.effects)
         self._buffer = np.empty((options.chunk_steps, 2), dtype=np.int64)
 
@@ -189,8 +190,8 @@ class PicMmhRun:
         """The chunks of all rows up to the end of the program."""
         for row, number in enumerate(self._toolpath.kind.tolist()):
             kind = Kind(number)
-            still, moved = self._still(row, kind, self._position), False
-            for chunk in self._moving(row, kind):
+            still, moved = self._rest_chunk(row, kind, self._position), False
+            for chunk in self._motion_chunks(row, kind):
                 moved = True
                 yield chunk
             if not moved:
@@ -220,7 +221,7 @@ class PicMmhRun:
             self._mechanics,
         )
 
-    def _stopped(self) -> Ints:
+    def _stop_samples(self) -> Ints:
         """(N,) samples of each arc up to its stop, by `controller.arc_end`; −1 for other rows, and
         where it is "equal". The ends of arcs become their stops: the controller counts steps, and
         goes on from where it is."""
@@ -267,10 +268,11 @@ class PicMmhRun:
         kind = Kind(int(self._toolpath.kind[row]))
         if kind <= Kind.ARC_CCW:
             self._period(row, kind, 0)
-        self._still(row, kind, position)
+        self._rest_chunk(row, kind, position)
 
-    def _moving(self, row: int, kind: Kind) -> Iterator[Chunk]:
-        """Chunks of a row's motion; the controller then stands at the end that it was given."""
+    def _motion_chunks(self, row: int, kind: Kind) -> Iterator[Chunk]:
+        """Yield the chunks of a row's motion; the controller then stands at the end that it was
+        given."""
         if kind in (Kind.HOME_XY, Kind.HOME_Z):
             target = self._position.copy()
             axes = [0, 1] if kind == Kind.HOME_XY else [2]
@@ -330,7 +332,7 @@ class PicMmhRun:
         fill = arc_filler(arc, method, rounded=rounded)
         if self._stops[row] >= 0:
             samples = int(self._stops[row])
-            return _Leg(_counted(fill), samples, (0, 1), origin, sign, period_s)
+            return _Leg(_without_stop(fill), samples, (0, 1), origin, sign, period_s)
         samples, met = arc_reach(arc, arc_filler(arc, method, rounded=rounded))
         return _Leg(fill, samples, (0, 1), origin, sign, period_s, ended=met)
 
@@ -371,8 +373,9 @@ class PicMmhRun:
             ended=ended,
         )
 
-    def _still(self, row: int, kind: Kind, position: Ints) -> Chunk:
-        """A chunk of a row without motion; ProgramError for an event that cannot be followed."""
+    def _rest_chunk(self, row: int, kind: Kind, position: Ints) -> Chunk:
+        """Return the chunk of a row without motion; ProgramError for an event that cannot be
+        followed."""
         seconds = 0.0
         if kind == Kind.DWELL:
             seconds = float(self._toolpath.value[row])
@@ -507,7 +510,9 @@ def arc_end_findings(toolpath: Toolpath, machine: _Machine, arcs: Ints) -> tuple
     if not unsure.any():
         return ()
     apart = {
-        name: max(float(_apart(arcs[unsure], rounded, number).max()) for rounded in (False, True))
+        name: max(
+            float(_end_distances(arcs[unsure], rounded, number).max()) for rounded in (False, True)
+        )
         for name, number in loops.READINGS.items()
         if number != loops.EQUAL
     }
@@ -535,7 +540,7 @@ def _stops(arcs: Ints, rounded: bool, reading: int) -> Ints:
     return out
 
 
-def _apart(arcs: Ints, rounded: bool, reading: int) -> Floats:
-    """(L,) steps from the stop of each arc to its end."""
+def _end_distances(arcs: Ints, rounded: bool, reading: int) -> Floats:
+    """Return (L,) steps from the stop of each arc to its end."""
     stops = _stops(arcs, rounded, reading)[:, [loops.STOP_X, loops.STOP_Y]]
     return np.asarray(np.hypot(*(stops - arcs[:, [loops.END_X, loops.END_Y]]).T))

@@ -144,15 +144,15 @@ class FusedLegs:
             duration_s=np.where(waits, toolpath.value[low:high], 0.0)
             + np.bincount(row, (outputs + added) * period_s, minlength=count),
             compensation_s=np.asarray(np.bincount(row, added * period_s, minlength=count) * 1.0),
-            iterations=_summed(row, counts[:, loops.PASSES : loops.PASSES + 1], count)[:, 0],
-            steps=_summed(row, steps, count),
-            reversals=_summed(row, reversals, count),
+            iterations=_sums_by_row(row, counts[:, loops.PASSES : loops.PASSES + 1], count)[:, 0],
+            steps=_sums_by_row(row, steps, count),
+            reversals=_sums_by_row(row, reversals, count),
             ended=missed == 0,
         )
 
 
-def _summed(row: Ints, numbers: Ints, count: int) -> Ints:
-    """(count, C) sums of the columns of numbers (L, C) by row (L,)."""
+def _sums_by_row(row: Ints, numbers: Ints, count: int) -> Ints:
+    """Return (count, C) sums of the columns of numbers (L, C) by row (L,)."""
     sums = np.zeros((count, numbers.shape[1]), dtype=np.int64)
     np.add.at(sums, row, numbers)
     return sums

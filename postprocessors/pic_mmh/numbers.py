@@ -126,8 +126,8 @@ def numbers_of(toolpath: Toolpath, machine: PicMmhMachine, dialect: PicMmhDialec
     feed_units, finding = _feed_units(toolpath, machine)
     centred = toolpath.is_arc & ~far_arcs(toolpath, machine, dialect)
     centres = np.where(centred[:, None], toolpath.centre, 0.0)
-    end_units, end_steps = _both(toolpath.end, grids)
-    centre_units, centre_steps = _both(centres, grids)
+    end_units, end_steps = _units_and_steps(toolpath.end, grids)
+    centre_units, centre_steps = _units_and_steps(centres, grids)
     return Numbers(
         grids=grids,
         end_units=end_units,
@@ -139,8 +139,10 @@ def numbers_of(toolpath: Toolpath, machine: PicMmhMachine, dialect: PicMmhDialec
     )
 
 
-def _both(values_mm: Floats, grids: tuple[UnitGrid, UnitGrid, UnitGrid]) -> tuple[Ints, Ints]:
-    """Columns of mm as units and as steps, each column by its own axis."""
+def _units_and_steps(
+    values_mm: Floats, grids: tuple[UnitGrid, UnitGrid, UnitGrid]
+) -> tuple[Ints, Ints]:
+    """Convert columns of mm to units and to steps, each column by its own axis."""
     columns = list(zip(grids, values_mm.T, strict=False))
     units = [grid.units(column) for grid, column in columns]
     steps = [grid.steps(column) for (grid, _), column in zip(columns, units, strict=True)]

@@ -416,7 +416,7 @@ class PicMmhTerminal(Terminal):
             elif step:
                 self._steps.append((step, 1))
             else:
-                said += self._counted()
+                said += self._step_summary()
                 self._rest += bytes([octet])
                 if octet == ord(";"):
                     said += super().left()
@@ -424,9 +424,9 @@ class PicMmhTerminal(Terminal):
 
     def left(self) -> list[str]:
         """The outputs that were counted, and what has no end."""
-        return [*self._counted(), *super().left()]
+        return [*self._step_summary(), *super().left()]
 
-    def _counted(self) -> list[str]:
+    def _step_summary(self) -> list[str]:
         steps, self._steps = self._steps, []
         return [f"{count} × {step}" for step, count in steps]
 

@@ -80,7 +80,7 @@ class _Writer:
         given = numbers_of(toolpath, machine, dialect)
         self._feed_finding, grid = given.feed_finding, given.grids[0]
         del given  # as large as the toolpath
-        lowered = self._lowered(grid)
+        lowered = self._lower(grid)
         self._toolpath, self._row = lowered.toolpath, lowered.row
         self._numbers = numbers_of(lowered.toolpath, machine, dialect)
         self._split = np.bincount(lowered.row, minlength=len(toolpath)) > 1
@@ -92,8 +92,9 @@ class _Writer:
         self._before = np.concatenate([np.zeros((1, 3), dtype=np.int64), steps])[: len(steps)]
         self._before[: self._first + 1] = 0
 
-    def _lowered(self, grid: UnitGrid) -> LoweredToolpath:
-        """Arcs whose centre cannot be written as lines, slopes as steps; both are counted."""
+    def _lower(self, grid: UnitGrid) -> LoweredToolpath:
+        """Lower arcs whose centre cannot be written to lines, and slopes to steps; both are
+        counted."""
         toolpath, changes = self._wanted, self._changes
         far = far_arcs(toolpath, self._machine, self._dialect)
         changes.far = int(far.sum())
@@ -145,7 +146,8 @@ class _Writer:
         yield from too_long(data, self._dialect.buffer_chars)
 
     def _place(self, row: int) -> str:
-        """The given row that a row of the lowered toolpath came from."""
+        """Return the row of the given toolpath that a row of the lowered one came from, for
+        messages."""
         return self._wanted.place(int(self._row[row]))
 
     def _words(self, points: Points) -> list[WordColumn]:
@@ -183,7 +185,7 @@ class _Writer:
         refused = np.zeros(len(arcs.row), dtype=np.bool_)
         while True:
             points = self._points_of(arcs, refused)
-            now = self._refused(arcs, points)
+            now = self._refused_landings(arcs, points)
             if (now == refused).all():
                 break
             refused = now
@@ -264,9 +266,9 @@ class _Writer:
             misfit=int(misfit[0]) if len(misfit) else len(path),
         )
 
-    def _refused(self, arcs: StepArcs, points: Points) -> Bools:
-        """(J,) landings with which a reader would take the block for another arc: short arcs can
-        turn into almost full circles by the rounding of their numbers."""
+    def _refused_landings(self, arcs: StepArcs, points: Points) -> Bools:
+        """Mask (J,) of landings with which a reader would take the block for another arc: short
+        arcs can turn into almost full circles by the rounding of their numbers."""
         numbers, grid = self._numbers, self._grid
         units = np.where(
             arcs.at_end[:, None],
@@ -405,7 +407,7 @@ class StepArcs(Struct, frozen=True, eq=False):
 
     @property
     def landed(self) -> Bools:
-        """(J,) whether there is a landing."""
+        """Mask (J,) of the arcs with a landing."""
         return np.asarray(self.landing[:, ITERATION] >= 0)
 
     @property
@@ -453,7 +455,7 @@ class Chords(Struct, frozen=True, eq=False):
     part: Ints
 
     def without(self, arcs: Bools) -> Chords:
-        """Without those of some arcs (J,)."""
+        """Return the chords without those of these arcs (J,)."""
         kept = ~arcs[self.arc]
         return Chords(
             np.where(arcs, 0, self.count), self.end[kept], self.arc[kept], self.part[kept]

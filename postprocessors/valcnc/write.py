@@ -60,9 +60,9 @@ def write_program(toolpath: Toolpath, machine: ValcncMachine) -> Program:
     _check_tools(toolpath)
     scales = scales_of(machine, dialect)
     lowered, split = split_z(toolpath, machine)
-    lowered, squeezed = _arcs_lowered(lowered, scales, machine, dialect)
+    lowered, squeezed = _lower_arcs(lowered, scales, machine, dialect)
     rules = ArcRules(dialect.decimals, "halves", MAX_UNITS, chord_fits=True)
-    rows = plain_rows(_scaled(lowered.toolpath, scales), rules)
+    rows = plain_rows(_in_units(lowered.toolpath, scales), rules)
     of_row = lowered.row[rows.row]
     refuse_too_long(int(np.count_nonzero(rows.moves)), "line")
     data = _text(rows, dialect)
@@ -93,10 +93,11 @@ def _check_tools(toolpath: Toolpath) -> None:
     )
 
 
-def _arcs_lowered(
+def _lower_arcs(
     lowered: LoweredToolpath, scales: Floats, machine: ValcncMachine, dialect: ValcncDialect
 ) -> tuple[LoweredToolpath, list[Finding]]:
-    """Arcs of no more than the dialect's sweep; lines where X and Y are scaled differently."""
+    """Split arcs at the dialect's longest sweep; turn them into lines where X and Y are scaled
+    differently."""
     path = lowered.toolpath
     count = int(path.is_arc.sum())
     if scales[0] == scales[1] or not count:
@@ -108,8 +109,8 @@ def _arcs_lowered(
     return chords.after(lowered), [finding]
 
 
-def _scaled(toolpath: Toolpath, scales: Floats) -> Toolpath:
-    """The toolpath in the units of the program."""
+def _in_units(toolpath: Toolpath, scales: Floats) -> Toolpath:
+    """Return the toolpath in the units of the program."""
     return replace(
         toolpath,
         end=toolpath.end * scales,
@@ -142,13 +143,13 @@ def _check_length(data: bytes, dialect: ValcncDialect) -> None:
 
 
 def _scale_finding(dialect: ValcncDialect) -> Iterator[Finding]:
-    """The warning that a wrong scale makes parts 8 times too large or too small."""
+    """Warn that a wrong scale makes parts 8 times too large or too small."""
     if not dialect.coord_scale_checked:
         yield COORDINATES_SCALED(measured=dialect.coord_scale)
 
 
 def _feed_finding(toolpath: Toolpath, machine: ValcncMachine) -> Iterator[Finding]:
-    """Feeds that the machine will not keep: it has one speed."""
+    """Report feeds that the machine will not keep: it has one speed."""
     speed = machine.max_feed_mm_min
     with np.errstate(invalid="ignore"):
         other = toolpath.is_feed & (np.abs(toolpath.feed - speed) > FEED_TOLERANCE * speed)

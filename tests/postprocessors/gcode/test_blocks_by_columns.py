@@ -47,7 +47,7 @@ def test_modal_blocks(rows: list[Row], strip: bool, numbered: bool, of_feed: int
     events = Events({k + 5: [f"M{k}"] for k in range(0, count, 2)}, (), False, ())
     order = BlockOrder(sent.is_motion)
     order.add(0, ["G90"])
-    for at, row in sent.others(events):
+    for at, row in sent.event_rows(events):
         order.add(at, events.blocks[row], row)
     order.add(count, ["M2"])
     of_row = order.rows(sent.row)

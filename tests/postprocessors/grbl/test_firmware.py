@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from camtool_postprocessors.gcode.faults import LineFault
 from camtool_postprocessors.grbl.parser import GrblParser, ParserNotes
-from camtool_postprocessors.grbl.twin import _stripped
+from camtool_postprocessors.grbl.twin import _strip
 
 from camtool.errors import ProgramError
 from camtool.simulation.motion import IDEAL, Options
@@ -191,7 +191,7 @@ def test_words(firmware: Callable[..., Ran]) -> None:
         ran = firmware(text, {"$110": 9000, "$111": 9000, "$112": 9000, "$120": 900, "$121": 900})
         parser = GrblParser(target.machine, ToolpathBuilder(), ParserNotes())
         for k, line in enumerate(text.splitlines()):
-            stripped, wrong = _stripped(line.encode()), 0
+            stripped, wrong = _strip(line.encode()), 0
             try:
                 if len(stripped) > target.machine.dialect.line_chars:
                     wrong = 11

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from camtool_postprocessors.linuxcnc.controller import halved, merged
+from camtool_postprocessors.linuxcnc.controller import halve_arcs, merge_rows
 from camtool_postprocessors.linuxcnc.steps import merge_lines
 from hypothesis import given
 from hypothesis import strategies as st
@@ -237,12 +237,12 @@ def test_what_is_merged() -> None:
     builder.arc(4.2, 0.0, 0.0, centre=(4.1, -0.1), ccw=False, feed=200.0)
     builder.line(5.0, 0.0, 0.0, feed=200.0).line(6.0, 0.0, 0.0, feed=200.0)
     path = builder.arc(6.2, 0.0, 0.0, centre=(6.1, -5.0), ccw=False, feed=200.0).finish()
-    some, origin = halved(path, np.full(11, 0.01))
+    some, origin = halve_arcs(path, np.full(11, 0.01))
     assert origin.tolist() == [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 10]
-    some, chain = merged(some, np.full(12, 0.01))
+    some, chain = merge_rows(some, np.full(12, 0.01))
     assert chain.tolist() == [0, 1, 1, 1, 2, 3, 4, 5, 6, 6, 6, 6]
     assert some.is_arc.tolist() == [False] * 7 + [True] + [False] * 4
-    assert merged(path, np.zeros(11))[1].tolist() == list(range(11))
+    assert merge_rows(path, np.zeros(11))[1].tolist() == list(range(11))
 
 
 def test_an_arc_that_is_a_line_bows_out_by_less_than_the_tolerance() -> None:
@@ -254,11 +254,11 @@ def test_an_arc_that_is_a_line_bows_out_by_less_than_the_tolerance() -> None:
         middle = (k + 0.5, bow - radius)
         builder.arc(k + 1.0, 0.0, 0.0, centre=middle, ccw=False, feed=100.0)
     path = builder.finish()
-    assert halved(path, np.full(4, 0.0079))[0] is path
-    some, origin = halved(path, np.full(4, 0.0081))
+    assert halve_arcs(path, np.full(4, 0.0079))[0] is path
+    some, origin = halve_arcs(path, np.full(4, 0.0081))
     assert not some.is_arc.any()
     assert origin.tolist() == [0, 0, 1, 1, 2, 2, 3, 3]
-    assert merged(some, np.full(8, 0.0081))[1].tolist() == [0] * 8
+    assert merge_rows(some, np.full(8, 0.0081))[1].tolist() == [0] * 8
 
 
 def test_a_line_begins_in_the_middle_of_an_arc() -> None:
@@ -269,8 +269,8 @@ def test_a_line_begins_in_the_middle_of_an_arc() -> None:
         end = (math.sin(angle), math.cos(angle), 0.0)
         builder.arc(*end, centre=(0.0, 0.0), ccw=False, feed=100.0)
     path = builder.finish()
-    some, _ = halved(path, np.full(3, 0.01))
-    assert merged(some, np.full(6, 0.01))[1].tolist() == [0, 0, 0, 1, 1, 1]
+    some, _ = halve_arcs(path, np.full(3, 0.01))
+    assert merge_rows(some, np.full(6, 0.01))[1].tolist() == [0, 0, 0, 1, 1, 1]
     rows = run(path, in_mode("blend", 0.01))
     assert [row.ended for row in rows] == [True] * 3
     corner = np.array([math.sin(0.16), math.cos(0.16), 0.0])
