@@ -147,9 +147,9 @@ class _Talk:
         now = time.monotonic()
         if data:
             self._heard, self._answered = now, True
-            self._show(terminal.heard(data))
+            self._show(terminal.decode(data))
         elif now - self._heard > QUIET_S:
-            self._show(terminal.left())
+            self._show(terminal.flush())
         wish = wishes()
         if wish is not None:
             return self._stop(wish, by_hand=wishes.by_hand)
@@ -177,7 +177,7 @@ class _Talk:
                 self._say("it would go on without an end: it is told to stop")
                 return self._halt(1)
             return 0
-        data = terminal.typed(text)
+        data = terminal.encode(text)
         if data:
             line.write(data)
             self._asked, self._spoke, self._answered = text, now, False

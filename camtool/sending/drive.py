@@ -97,10 +97,10 @@ class Driver:
                     self._handle_request(conversation)
             except OSError as error:
                 why, _ = port_fault(error)
-                conversation.lost(f"the port is gone ({why})", self.now())
+                conversation.lose_port(f"the port is gone ({why})", self.now())
             except BaseException as error:
                 if self._fault is not None:
-                    conversation.lost("camtool was ended", self.now())
+                    conversation.lose_port("camtool was ended", self.now())
                 else:
                     self._fault = error
                     conversation.stop(self.now())
@@ -127,12 +127,12 @@ class Driver:
             if isinstance(action, Tell):
                 self._show(conversation, self.tell, action.text)
         self._show(conversation, self.watch, conversation)
-        return not conversation.ended or conversation.has_actions
+        return not conversation.is_over or conversation.has_actions
 
     def _reopen(self, conversation: Conversation) -> None:
         """Reopen the port as soon as it exists again, unless the user stops meanwhile."""
         end = time.monotonic() + REOPEN_S
-        while not conversation.ended:
+        while not conversation.is_over:
             try:
                 self.line.reopen(0.0)
             except (OSError, ValueError):
@@ -158,15 +158,15 @@ class Driver:
             conversation.stop(self.now())
 
     def _listen(self, conversation: Conversation) -> None:
-        if conversation.ended or conversation.has_actions:
+        if conversation.is_over or conversation.has_actions:
             return
         wait_s = min((conversation.next_s - self.now()) / self.speed, TICK_S)
         data = self.line.read(max(wait_s, 0.0))
         now = self.now()
         if data:
-            conversation.received(data, now)
+            conversation.receive(data, now)
         if now >= conversation.next_s:
-            conversation.elapsed(now)
+            conversation.tick(now)
 
     def _handle_request(self, conversation: Conversation) -> None:
         wish, now = self.wish(), self.now()
@@ -189,7 +189,7 @@ class Driver:
                 if isinstance(action, Write):
                     self.line.write(action.data)
             self.line.close()
-            conversation.lost("camtool was ended before the machine said that it stands", now)
+            conversation.lose_port("camtool was ended before the machine said that it stands", now)
 
     def _note(self, conversation: Conversation) -> bool:
         """Write the counts of the conversation to the journal; if that fails, stop the machine."""

@@ -148,7 +148,7 @@ class WiredTwin:
     def connect(self, now: float) -> None:
         """Open the line."""
         self._run(now)
-        self.back.put(self.twin.connected(now), now)
+        self.back.put(self.twin.connect(now), now)
 
     def write(self, data: bytes, now: float) -> None:
         """Send bytes to the machine."""
@@ -166,10 +166,10 @@ class WiredTwin:
         times = self.there.next_s(), self.back.next_s(), self.twin.next_s()
         return min((at for at in times if at is not None), default=None)
 
-    def turn_s(self) -> float | None:
+    def wake_s(self) -> float | None:
         """Return the time of the next event except outputs within a travel: a clock without real
         time jumps to it."""
-        times = self.there.next_s(), self.back.next_s(), self.twin.turn_s()
+        times = self.there.next_s(), self.back.next_s(), self.twin.wake_s()
         return min((at for at in times if at is not None), default=None)
 
     def unplugged(self, now: float) -> bool:

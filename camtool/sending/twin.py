@@ -173,7 +173,7 @@ def serve(
                 return
             connected, waiting = False, b""
             wired.read(clock.now())
-            at = wired.turn_s()
+            at = wired.wake_s()
             time.sleep(min(clock.wait_s(at), POLL_S))
             clock.skip_to(at)
             continue
@@ -181,7 +181,7 @@ def serve(
             connected = True
             wired.connect(clock.now())
         waiting += wired.read(clock.now())
-        at = wired.turn_s()
+        at = wired.wake_s()
         patience = 0.0 if waiting else clock.wait_s(at)
         readable, writable, _ = select.select([file], [file] if waiting else [], [], patience)
         try:

@@ -54,9 +54,9 @@ class Terminal:
         """Bytes sent when the port has been opened."""
         self._rest = b""
 
-    def typed(self, line: str) -> bytes:
-        """The bytes of a line that was typed; `\\x13` in it is the byte of that number."""
-        return self.unescaped(line) + self.end
+    def encode(self, line: str) -> bytes:
+        r"""Return the bytes of a typed line; `\x13` in it is the byte of that number."""
+        return self.unescape(line) + self.end
 
     def halt(self) -> bytes:
         """Return the bytes that stop the machine, and note that it was told to stop."""
@@ -67,7 +67,7 @@ class Terminal:
         """True if a line stops the machine, or lets it go on, and waits for no answer."""
         return False
 
-    def heard(self, data: bytes) -> list[str]:
+    def decode(self, data: bytes) -> list[str]:
         """Return the lines to show for these received bytes; an unfinished line is kept for the
         next call."""
         *lines, self._rest = _ENDS.split(self._rest + data)
@@ -75,7 +75,7 @@ class Terminal:
             lines, self._rest = [*lines, self._rest], b""
         return [self._with_meaning(line) for line in lines if line]
 
-    def left(self) -> list[str]:
+    def flush(self) -> list[str]:
         """Return the unfinished line, if there is one, and forget it."""
         rest, self._rest = self._rest, b""
         return [self._with_meaning(rest)] if rest else []
@@ -90,8 +90,8 @@ class Terminal:
         return f"{text}    {meaning}" if meaning else text
 
     @staticmethod
-    def unescaped(line: str) -> bytes:
-        """Text as bytes."""
+    def unescape(line: str) -> bytes:
+        r"""Convert text with escapes such as `\x13` to bytes."""
         parts = _ESCAPE.split(line)
         return b"".join(
             bytes([int(part, 16)]) if k % 2 else part.encode("utf-8")

@@ -4,14 +4,14 @@ A `Twin` is a value with a clock that its caller moves. Bytes come in and go out
 which they do; nothing waits, opens ports or reads a clock, so that thousands of runs can be tested
 in memory and `camtool twin` is a thin host around it.
 
-    out = twin.connected(0.0)
+    out = twin.connect(0.0)
     out += twin.receive(b"G0X1\\n", 0.1)
     while (at := twin.next_s()) is not None:
         out += twin.advance(at)
 
 Time is in seconds of the machine and never goes back. What the machine executed stands in
 `decoded`, what its slides did in `slides.trace`, both comparable with what its target reads and
-simulates; `moves` says whether anything moves now.
+simulates; `is_moving` says whether anything moves now.
 """
 
 from __future__ import annotations
@@ -64,16 +64,16 @@ class Travel(Struct, frozen=True, eq=False):
     def __len__(self) -> int:
         return len(self.seconds)
 
-    def moved(self, by_mm: Floats) -> Travel:
-        """The same elsewhere; `by_mm` (3,)."""
+    def shifted(self, by_mm: Floats) -> Travel:
+        """Return the travel shifted by `by_mm` (3,)."""
         left_at = None if self.left_at is None else self.left_at + by_mm
         return replace(self, commanded=self.commanded + by_mm, left_at=left_at)
 
 
 def travel_of(chunks: Iterable[Chunk], *, by_passes: bool = False) -> Travel:
-    """The motion of a model that was run with `COMMANDED`. The outputs of a row are evenly spread
-    over its time, and a step of compensation takes as long as an output, or as a pass of the
-    interpolator (`by_passes`)."""
+    """Return the motion of a model that was run with `COMMANDED`. The outputs of a row are evenly
+    spread over its time, and a step of compensation takes as long as an output, or as a pass of
+    the interpolator (`by_passes`)."""
     commanded, seconds, added, begin = [np.empty((0, 3))], [np.empty(0)], [np.empty(0)], 0.0
     for chunk in chunks:
         ledger = chunk.ledger
@@ -111,8 +111,8 @@ class Slides:
         self._pieces: list[SlideTrace] = []
 
     def begin(self, travel: Travel, now: float, block: int) -> None:
-        """Set out on a travel, which is that of the block of this index; whatever was under way is
-        left. Compensation steps at reversals delay what follows them."""
+        """Begin a travel, that of the block with this index; one under way is abandoned.
+        Compensation steps at reversals delay what follows them."""
         self.stop(now)
         self._before = self._mechanics.states.copy()
         count = len(travel)
@@ -126,15 +126,15 @@ class Slides:
         self.ends_s = now + travel.total_s + (float(late[-1]) if count else 0.0)
 
     def next_s(self) -> float | None:
-        """When the next output is due, or the end; None where nothing is under way."""
+        """Time of the next output, or of the end; None if nothing is under way."""
         if self.ends_s is None:
             return None
         left = self._times[self.done : self.done + 1]
         return float(left[0]) if len(left) else self.ends_s
 
-    def until(self, now: float) -> tuple[Ints, Ints]:
-        """Do what is due. The steps (K, 3) of the axes in the outputs since the last call, and
-        those of compensation (K, 3) in front of them."""
+    def advance(self, now: float) -> tuple[Ints, Ints]:
+        """Make the outputs that are due. Return the steps (K, 3) of the axes in the outputs since
+        the last call, and those of compensation (K, 3) in front of them."""
         low = self.done
         high = int(np.searchsorted(self._times, now, side="right"))
         high = max(high, low) if self.ends_s is not None else low
@@ -149,33 +149,34 @@ class Slides:
         if self.ends_s is not None and now >= self.ends_s:
             self.ends_s = None
             if self._travel.left_at is not None:
-                self.place(self._travel.left_at)
+                self.set_position(self._travel.left_at)
         way = np.diff(made, axis=0, prepend=before[None, :]) / self._step_mm
         return np.rint(way).astype(np.int64), self._added[low:high]
 
     def stop(self, now: float) -> None:
         """Stop where the slides are now; the rest of the travel is never done."""
-        self.until(now)
+        self.advance(now)
         if self.ends_s is not None:
             self._mechanics.states[:] = self._before
             made = self._travel.commanded[: self.done]
             self._mechanics.follow(made, np.array([0, len(made)]))
         self.ends_s = None
 
-    def place(self, position_mm: Floats) -> None:
-        """The controller takes this (3,) mm for where it stands; nothing moves."""
+    def set_position(self, position_mm: Floats) -> None:
+        """Set the position (3,) mm that the controller believes in; nothing moves."""
         self.commanded_mm = np.array(position_mm, dtype=np.float64)
         self._mechanics.place(self.commanded_mm)
 
     def compensate(self, axis: int, added_mm: float) -> None:
-        """From now on the controller adds so much at each reversal of an axis, in whole steps."""
+        """Set the length that the controller adds at each reversal of an axis from now on, in
+        whole steps."""
         steps = round(added_mm / self._step_mm[axis])
         self._mechanics.compensation_steps[axis] = steps
         self._mechanics.axes[axis, 3] = steps * self._step_mm[axis]
 
     @property
     def trace(self) -> SlideTrace:
-        """All that they have done, or since `drain`."""
+        """All movements, or those since `drain`."""
         if len(self._pieces) != 1:
             self._pieces = [_join_traces(self._pieces)]
         return self._pieces[0]
@@ -200,8 +201,8 @@ def _join_traces(pieces: Sequence[SlideTrace]) -> SlideTrace:
 
 
 class Twin(ABC):
-    """A virtual controller. A target's own overrides `_take`, what it does with a byte, and where
-    it does more by itself than move: `turn_s`, when that is, and `_due`, what."""
+    """A virtual controller. A target overrides `_receive_byte`, which handles a byte, and, if the
+    controller does more by itself than move, `wake_s` (when) and `_wake` (what)."""
 
     wire: ClassVar[str]
     """The line as its terminal programs are told it, such as "115200 8N1"."""
@@ -218,59 +219,58 @@ class Twin(ABC):
         """The time up to which it has run, s."""
         self._out = bytearray()
 
-    def connected(self, now: float) -> bytes:
-        """Somebody opens the line; what the controller says to that."""
+    def connect(self, now: float) -> bytes:
+        """Open the line; return what the controller sends at that."""
         return self.advance(now)
 
     def receive(self, data: bytes, now: float) -> bytes:
-        """Bytes come in; what the controller has sent until then and at once."""
+        """Receive bytes; return what the controller has sent until then and at once."""
         self._run(now)
         for octet in data:
-            self._take(octet)
+            self._receive_byte(octet)
             self._run(now)
-        return self._sent()
+        return self._take_output()
 
     def advance(self, now: float) -> bytes:
-        """Let time pass; what the controller sends meanwhile."""
+        """Let time pass; return what the controller sends meanwhile."""
         self._run(now)
-        return self._sent()
+        return self._take_output()
 
     def next_s(self) -> float | None:
-        """When it may say something next if nothing comes in; None: never. A controller that
-        reports its outputs says something at each; one that does not needs no more than
-        `turn_s`."""
-        times = [at for at in (self.turn_s(), self.slides.next_s()) if at is not None]
+        """Time at which it may send something if nothing comes in; None: never. A controller that
+        reports its outputs sends something at each; one that does not needs only `wake_s`."""
+        times = [at for at in (self.wake_s(), self.slides.next_s()) if at is not None]
         return min(times, default=None)
 
     @property
-    def moves(self) -> bool:
+    def is_moving(self) -> bool:
         """True while slides move or a dwell runs."""
         return self.slides.ends_s is not None
 
     @abstractmethod
-    def _take(self, octet: int) -> None:
-        """A byte has come in at `self.now`."""
+    def _receive_byte(self, octet: int) -> None:
+        """Handle a byte that comes in at `self.now`."""
 
-    def turn_s(self) -> float | None:
-        """When it does something by itself, besides the outputs of a travel; None: never."""
+    def wake_s(self) -> float | None:
+        """Time of its next own action, besides the outputs of a travel; None: never."""
         return self.slides.ends_s
 
-    def _due(self) -> None:  # noqa: B027 - not all do more than move
-        """It is `self.now`, which `turn_s` had said."""
+    def _wake(self) -> None:  # noqa: B027 - not all do more than move
+        """Carry out the action that is due at `self.now`, by `wake_s`."""
 
-    def _pass(self) -> None:
-        """Outputs became due meanwhile."""
-        self.slides.until(self.now)
+    def _make_outputs(self) -> None:
+        """Make the outputs that became due."""
+        self.slides.advance(self.now)
 
     def _run(self, now: float) -> None:
-        while (at := self.turn_s()) is not None and at <= now:
+        while (at := self.wake_s()) is not None and at <= now:
             self.now = max(at, self.now)
-            self._pass()
-            self._due()
+            self._make_outputs()
+            self._wake()
         self.now = max(now, self.now)
-        self._pass()
+        self._make_outputs()
 
-    def _sent(self) -> bytes:
+    def _take_output(self) -> bytes:
         sent = bytes(self._out)
         self._out.clear()
         return sent

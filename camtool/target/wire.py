@@ -7,10 +7,10 @@ thread, so that tests run thousands of faults through it in a second. `camtool.s
 a port.
 
     conversation.begin(now)
-    while not conversation.ended:
+    while not conversation.is_over:
         for action in conversation.actions():  ...   # write, reopen, tell
         ...                                          # wait for bytes, or until .next_s
-        conversation.received(data, now)             # or .elapsed(now), .stop(now) ...
+        conversation.receive(data, now)             # or .tick(now), .stop(now) ...
 
 Three counts of packets say where it stands: those that were `sent`, those that the controller has
 `acknowledged` (or that are taken for acknowledged, where it says nothing), and those that are
@@ -231,17 +231,17 @@ class Conversation(ABC):
         self.sent = self.acknowledged = self.done = 0
         self.place_mm: Place | None = None
         self.next_s = NEVER
-        """The time at which it wants `elapsed`; whoever calls earlier does no harm."""
+        """The time at which it wants `tick`; whoever calls earlier does no harm."""
         self._out: list[Action] = []
 
     @property
-    def ended(self) -> bool:
+    def is_over(self) -> bool:
         """True if the conversation is over."""
         return self.state in ENDS
 
     @property
     def block(self) -> int:
-        """The last block that is done for certain, −1 before the first."""
+        """Index of the last block that is surely done, −1 before the first."""
         return max((packet.block for packet in self.packets[: self.done]), default=-1)
 
     def actions(self) -> list[Action]:
@@ -268,15 +268,15 @@ class Conversation(ABC):
 
     @abstractmethod
     def begin(self, now: float) -> None:
-        """The port is open."""
+        """Begin the conversation: the port is open."""
 
     @abstractmethod
-    def received(self, data: bytes, now: float) -> None:
-        """These bytes have come."""
+    def receive(self, data: bytes, now: float) -> None:
+        """Handle bytes that have come."""
 
     @abstractmethod
-    def elapsed(self, now: float) -> None:
-        """The clock has come to `now`."""
+    def tick(self, now: float) -> None:
+        """Handle the time `now`: waits that are over, answers that are late."""
 
     @abstractmethod
     def pause(self, now: float) -> None:
@@ -296,14 +296,14 @@ class Conversation(ABC):
         """Stop harder than `stop` has done, where the protocol can; nobody waits for the end."""
         self.stop(now)
 
-    def lost(self, why: str, now: float) -> None:
-        """The port is gone: nobody can be told anything any more."""
-        if not self.ended:
+    def lose_port(self, why: str, now: float) -> None:
+        """End the conversation: the port is gone, and nothing can be sent any more."""
+        if not self.is_over:
             self._out.clear()
-            self._end(WireState.FAILED, "; ".join(filter(None, (why, self._alone))))
+            self._end(WireState.FAILED, "; ".join(filter(None, (why, self._unattended))))
 
     @property
-    def _alone(self) -> str:
+    def _unattended(self) -> str:
         """Return what the machine does if the connection is lost now; "" if it stands still."""
         return ""
 
@@ -340,7 +340,7 @@ class PacketByPacket(Conversation):
     @property
     def is_still(self) -> bool:
         """True behind a packet, and where a packet that was stopped has never begun."""
-        behind = self.ended and self.done == self.sent and not self._busy
+        behind = self.is_over and self.done == self.sent and not self._busy
         return behind or (self.state is WireState.STOPPED and not self.halts_within)
 
     def __init__(self, packets: Sequence[Packet], manner: Manner) -> None:
@@ -364,7 +364,7 @@ class PacketByPacket(Conversation):
         return unsent
 
     @property
-    def _alone(self) -> str:
+    def _unattended(self) -> str:
         return self.goes_on if self._busy else ""
 
     def begin(self, now: float) -> None:
@@ -390,7 +390,7 @@ class PacketByPacket(Conversation):
 
     def stop(self, now: float) -> None:
         """Send nothing more; stopped when the packet that is out is done or has been halted."""
-        if self.ended or self.state is WireState.STOPPING:
+        if self.is_over or self.state is WireState.STOPPING:
             return
         unsent = self._unwrite()
         self.state = WireState.STOPPING
@@ -414,7 +414,7 @@ class PacketByPacket(Conversation):
         self._send(packet, now)
 
     def _packet_done(self, now: float) -> None:
-        """The packet that is out has been executed."""
+        """Note that the packet under way has been executed, and go on."""
         self._busy, self.next_s = False, NEVER
         self.done = self.acknowledged = self.sent
         if self.state is WireState.STOPPING:
@@ -427,7 +427,8 @@ class PacketByPacket(Conversation):
             self._go_on(now)
 
     def _stopped(self, known: str = "") -> None:
-        """It stands, as far as anybody knows: `known`, or else `stands`, says how far."""
+        """End the conversation with a machine that stands; `known`, or else `stands`, tells the
+        user how far that is sure."""
         self._busy = False
         if self._failing:
             self._end(WireState.FAILED, self._failing)
@@ -436,7 +437,7 @@ class PacketByPacket(Conversation):
 
     def _fail(self, why: str, now: float) -> None:
         """Stop the machine where the protocol can, and fail."""
-        if self.ended or self._failing:
+        if self.is_over or self._failing:
             return
         self._failing, self.state = why, WireState.STOPPING
         unsent = self._unwrite()

@@ -571,9 +571,9 @@ class GrblTwin(Twin):
         self._motor_s: float | None = None
         self._main = self._forever()
 
-    def connected(self, now: float) -> bytes:
-        """DTR resets the board: as if the power came on. The slides stay where they are, and the
-        place where they are is what it counts from, as when the twin was made."""
+    def connect(self, now: float) -> bytes:
+        """Reset the board by DTR, as if the power came on. The slides stay where they are, and
+        their place there counts as the place at which the twin was made."""
         sent = self.advance(now)
         if self._choices.opening == "nothing":
             return sent
@@ -582,7 +582,7 @@ class GrblTwin(Twin):
         self._greeted = True
         self._power_up()
         self._go_on()
-        return sent + self._sent()
+        return sent + self._take_output()
 
     def _slide_steps(self) -> Ints:
         return np.rint(self.slides.commanded_mm / self._slide_step_mm).astype(np.int64)
@@ -614,7 +614,7 @@ class GrblTwin(Twin):
         self._say(f"[MSG:{text}]\r\n")
 
     @property
-    def moves(self) -> bool:
+    def is_moving(self) -> bool:
         """True while slides move or a dwell runs, but not during a hold."""
         return self.slides.ends_s is not None or self._running or self._dwells
 
@@ -637,7 +637,7 @@ class GrblTwin(Twin):
 
     # Interrupts: bytes, the motors, the switches.
 
-    def _take(self, octet: int) -> None:
+    def _receive_byte(self, octet: int) -> None:
         named = {STATUS: "report", RESUME: "start", HOLD: "hold", DOOR: "door"}
         if octet == RESET:
             self._kill()
@@ -677,15 +677,15 @@ class GrblTwin(Twin):
 
     def next_s(self) -> float | None:
         """It says nothing at an output."""
-        return self.turn_s()
+        return self.wake_s()
 
-    def turn_s(self) -> float | None:
+    def wake_s(self) -> float | None:
         times = [self.slides.ends_s, self._motor_s, self._turn_at_s, *self._touches[:1]]
         if self._until_s > self.now:
             times.append(self._until_s)
         return min((at for at in times if at is not None), default=None)
 
-    def _due(self) -> None:
+    def _wake(self) -> None:
         if self._touches and self.now >= self._touches[0]:
             self._touches.pop(0)
             self._check_contacts()
@@ -699,8 +699,8 @@ class GrblTwin(Twin):
             self._motor_s = None
         self._go_on()
 
-    def _pass(self) -> None:
-        self.slides.until(self.now)
+    def _make_outputs(self) -> None:
+        self.slides.advance(self.now)
         if not (self._running and self.slides.ends_s is None):
             self._go_on()
 

@@ -334,12 +334,14 @@ class GrblConversation(Conversation):
     @property
     def is_still(self) -> bool:
         """True behind a hold that it has confirmed."""
-        return self.state is WireState.FINISHED or (self._stood and self.ended and not self._alarm)
+        return self.state is WireState.FINISHED or (
+            self._stood and self.is_over and not self._alarm
+        )
 
     # What the user wants.
 
     def begin(self, now: float) -> None:
-        """Ask how it stands; a controller that begins anew with the port says so by itself."""
+        """Ask for the state; a controller that resets with the port reports it by itself."""
         self._answered = now
         self._poll(now)
 
@@ -365,7 +367,7 @@ class GrblConversation(Conversation):
 
     def stop(self, now: float) -> None:
         """Feed hold, and a reset when it stands; homing hears nothing but the reset."""
-        if self.ended or self.state is WireState.STOPPING:
+        if self.is_over or self.state is WireState.STOPPING:
             return
         self._unwrite()
         if self._phase != "greeting" and not self._acted:
@@ -382,19 +384,19 @@ class GrblConversation(Conversation):
     def hurry(self, now: float) -> None:
         """Reset it at once, though it moves and its place is lost."""
         self.stop(now)
-        if not self.ended and not self._reset_sent:
+        if not self.is_over and not self._reset_sent:
             self._reset(now)
 
     def _fail(self, why: str, now: float) -> None:
         """Stop, and say why."""
-        if not self.ended and not self._failing:
+        if not self.is_over and not self._failing:
             self._failing = why
             self.stop(now)
         if self.state is WireState.STOPPED:
             self._end(WireState.FAILED, why)
 
     @property
-    def _alone(self) -> str:
+    def _unattended(self) -> str:
         if not self._acted or self._reset_sent:
             return ""
         if self.sent:
@@ -403,9 +405,9 @@ class GrblConversation(Conversation):
 
     # The clock.
 
-    def elapsed(self, now: float) -> None:
-        """Ask for reports, and notice what does not come."""
-        if self.ended:
+    def tick(self, now: float) -> None:
+        """Ask for reports, and notice answers that do not come."""
+        if self.is_over:
             return
         patience = self.manner.patience_s
         if self.state is WireState.STOPPING:
@@ -457,20 +459,20 @@ class GrblConversation(Conversation):
         self._schedule_poll(now)
 
     def _schedule_poll(self, now: float) -> None:
-        if not self.ended:
+        if not self.is_over:
             self.next_s = self._polled + POLL_FACTOR * self.manner.late_s
 
     # What it says.
 
-    def received(self, data: bytes, now: float) -> None:
-        """Line by line."""
-        if self.ended:
+    def receive(self, data: bytes, now: float) -> None:
+        """Handle received bytes, line by line."""
+        if self.is_over:
             return
         if not self._known:
             self._heard = (self._heard + data)[:MAX_UNKNOWN_BYTES]
         *lines, self._rest = (self._rest + data).split(b"\n")
         for line in lines:
-            if not self.ended:
+            if not self.is_over:
                 self._line(line.decode("latin-1").strip("\r"), now)
         if len(self._rest) > MAX_LINE_BYTES:
             self._rest = b""
@@ -510,8 +512,8 @@ class GrblConversation(Conversation):
             self._fail(f"an answer that it cannot have meant: {line[:40]!r}", now)
 
     def _take_message(self, line: str) -> None:
-        """Messages and startup lines; in the greeting anything else, which a port may say that
-        has just been opened, unless it names another firmware."""
+        """Handle messages and startup lines; in the greeting also any other line, which a port
+        that has just been opened may give, unless it names another firmware."""
         if self._phase == "greeting" and line.startswith("[MSG:") and "unlock" not in line:
             self._messages.append(line[5:].rstrip("]"))
         elif self._phase == "greeting" and re.match(r"grbl", line, re.IGNORECASE):
@@ -610,7 +612,7 @@ class GrblConversation(Conversation):
             self._at_rest(now)
 
     def _stopping(self, state: str, now: float) -> None:
-        """It is to stand, and says how far it is: reset it when it does."""
+        """Handle a report while the machine is to stop: reset it when it stands."""
         if self._reset_sent:
             return
         self._moves = self._moves + 1 if state in ("Run", "Jog") else 0
@@ -623,7 +625,8 @@ class GrblConversation(Conversation):
             self._write(JOG_CANCEL + HOLD if state == "Jog" else HOLD)
 
     def _where(self, fields: str, now: float) -> None:
-        """The place in the work frame, of the fields of a report, and whether it slows down."""
+        """Compute the position in the work frame from the fields of a report, and whether it slows
+        down."""
         said = dict(field.split(":", 1) for field in fields.split("|") if field)
         feed, before = said.get("FS", said.get("F", "")).partition(",")[0], self._feed
         self._feed = float(feed) if _FEED.fullmatch(feed) else 0.0
@@ -651,8 +654,8 @@ class GrblConversation(Conversation):
                 self.place_mm = _without(self._machine_mm, offset)
 
     def _check_first_report(self, state: str, now: float) -> None:
-        """Its first report: only a controller at rest is begun with, and anew, so that nothing of
-        an earlier sender is left in its buffer."""
+        """Handle its first report: begin only with a controller at rest, and reset it, so that
+        nothing of an earlier sender is left in its buffer."""
         if state == "Idle":
             if self._resets == 0:
                 self._resets, self._begun = 1, now
@@ -710,7 +713,8 @@ class GrblConversation(Conversation):
         self._go_on(now)
 
     def _check_query(self, line: str, now: float) -> None:
-        """The report of a query: all lines before it must have been answered, and it not."""
+        """Handle the answer to a query: all lines before it must have been answered, and the query
+        not yet."""
         head = self._out_lines[0] if self._out_lines else None
         if self.state is WireState.STOPPING:
             return
@@ -987,12 +991,13 @@ class GrblTerminal(Terminal):
         """Holds, resets and the word to go on."""
         return line.strip().lower() in ("!", "~", "^x", r"\x18", r"\x84", r"\x85")
 
-    def heard(self, data: bytes) -> list[str]:
-        """Reports that only the knocking has asked for are not shown."""
-        return [line for line in super().heard(data) if self._typed or not line.startswith("<")]
+    def decode(self, data: bytes) -> list[str]:
+        """Return the lines to show, without reports that only the knocking asked for."""
+        return [line for line in super().decode(data) if self._typed or not line.startswith("<")]
 
-    def typed(self, line: str) -> bytes:
-        """A real-time byte has no end, and no answer of its own but for the banner of a reset."""
+    def encode(self, line: str) -> bytes:
+        """Return a real-time byte as it is, without an end and without an answer due but for the
+        banner of a reset; other lines as everywhere."""
         word, self._typed = line.strip(), True
         if word in ("?", "!", "~"):
             return word.encode()
@@ -1000,14 +1005,14 @@ class GrblTerminal(Terminal):
             self.due, self._resets, self._homes = 1, True, 0
             return RESET
         if word.lower() in (r"\x84", r"\x85"):
-            return self.unescaped(word)
+            return self.unescape(word)
         self.due += 1
         if word.upper() == "$H":
             self._homes = self.due
-        return super().typed(word)
+        return super().encode(word)
 
     def meaning(self, line: str) -> str:
-        """Of errors, alarms, settings and reports."""
+        """Explain errors, alarms, settings and reports."""
         if line == "ok" or line.startswith("error:"):
             self.due, self._homes = max(self.due - 1, 0), max(self._homes - 1, 0)
         self.ready = self.ready or _parse_report(line)

@@ -74,9 +74,9 @@ class I8751Twin(Twin):
         self._executing: Iterator[tuple[Travel, int]] | None = None
         self._reset()
 
-    def connected(self, now: float) -> bytes:
-        """Somebody opens the line, which says nothing to a controller that stands."""
-        sent = super().connected(now)
+    def connect(self, now: float) -> bytes:
+        """Open the line, which a controller at rest does not notice."""
+        sent = super().connect(now)
         if self._choices.opening == "reset" and self._executing is None:
             self._reset()
         return sent
@@ -85,12 +85,12 @@ class I8751Twin(Twin):
         self._dialogue = self._program()
         next(self._dialogue)
 
-    def _take(self, octet: int) -> None:
+    def _receive_byte(self, octet: int) -> None:
         if self._executing is None:
             self._dialogue.send(octet)
 
-    def _due(self) -> None:
-        if self._executing is not None and not self.moves:
+    def _wake(self) -> None:
+        if self._executing is not None and not self.is_moving:
             self._next_record()
 
     # The dialogue. What it does not wait for is neither stored nor answered; ours.

@@ -135,15 +135,15 @@ class I8751Terminal(Terminal):
     }
     _WORDS: Final = re.compile(f"{READY}|{AGAIN}|.")
 
-    def typed(self, line: str) -> bytes:
-        """Hex digits, or text as everywhere."""
+    def encode(self, line: str) -> bytes:
+        """Return the bytes of hex digits; other text as everywhere."""
         try:
             return bytes.fromhex(line)
         except ValueError:
-            return self.unescaped(line)
+            return self.unescape(line)
 
-    def heard(self, data: bytes) -> list[str]:
-        """All letters, and what the last one means; a word that is not whole is kept."""
+    def decode(self, data: bytes) -> list[str]:
+        """Return all letters and the meaning of the last one; an unfinished word is kept."""
         text = "".join((self._rest + data).decode("latin-1").split())
         self._rest = b""
         if any(word.startswith(text) and word != text for word in (READY, AGAIN)):
@@ -153,7 +153,7 @@ class I8751Terminal(Terminal):
         return [self._with_meaning(" ".join(words).encode("latin-1"))] if words else []
 
     def meaning(self, line: str) -> str:
-        """Of its last word."""
+        """Explain the last word."""
         return self.MEANINGS.get(line.rpartition(" ")[2], "")
 
 
@@ -239,10 +239,10 @@ class I8751Conversation(PacketByPacket):
     def _reply(self) -> str:
         return self._packet_replies[self._at]
 
-    def received(self, data: bytes, now: float) -> None:
-        """The reply to the byte that is out; line ends are passed over."""
+    def receive(self, data: bytes, now: float) -> None:
+        """Handle the reply to the byte just sent; line ends are passed over."""
         text = "".join(data.decode("latin-1").split())
-        if self.ended or not text:
+        if self.is_over or not text:
             return
         if not self._busy:
             self._fail(f"it says {text[:20]!r} without being asked", now)
@@ -280,8 +280,8 @@ class I8751Conversation(PacketByPacket):
         return f"; {UNMOVED}"
 
     @property
-    def _alone(self) -> str:
-        return super()._alone if self._busy and self._executes else ""
+    def _unattended(self) -> str:
+        return super()._unattended if self._busy and self._executes else ""
 
     def _byte_done(self, now: float) -> None:
         packet = self.packets[self.sent - 1]
@@ -291,9 +291,9 @@ class I8751Conversation(PacketByPacket):
         else:
             self._send_byte(now)
 
-    def elapsed(self, now: float) -> None:
-        """A reply has not come, or none was awaited."""
-        if self.ended or not self._busy or now < self.next_s:
+    def tick(self, now: float) -> None:
+        """Send the next byte where no reply was awaited; fail where one has not come."""
+        if self.is_over or not self._busy or now < self.next_s:
             return
         if self._reply in (ANY, NONE):
             self._byte_done(now)

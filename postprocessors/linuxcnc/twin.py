@@ -83,19 +83,19 @@ class LinuxcncTwin(Twin):
         self._greeted = self._enabled = self._verbose = False
         self._echo = True
 
-    def connected(self, now: float) -> bytes:
-        """A new client has to greet again; what runs goes on."""
+    def connect(self, now: float) -> bytes:
+        """Accept a new client, which has to greet again; a running program goes on."""
         sent = self.advance(now)
         self._hang_up()
         return sent
 
     def next_s(self) -> float | None:
         """It says nothing by itself."""
-        return self.turn_s()
+        return self.wake_s()
 
     # Lines.
 
-    def _take(self, octet: int) -> None:
+    def _receive_byte(self, octet: int) -> None:
         if octet not in b"\r\n":
             self._text.append(octet)
             return
@@ -262,7 +262,7 @@ class LinuxcncTwin(Twin):
         path = self._decoded(value.encode() + b"\nM2\n", here=True)
         if path is not None:
             motion = LinuxcncModel().run(path, self._machine, COMMANDED)
-            self.slides.begin(travel_of(motion).moved(self._zero), self.now, -1)
+            self.slides.begin(travel_of(motion).shifted(self._zero), self.now, -1)
         return True
 
     def _open(self, name: str) -> bool:
@@ -296,7 +296,7 @@ class LinuxcncTwin(Twin):
         self.decoded += [lines[number - 1].strip() for number in numbers]
         path = path.first(path.executed_rows)
         chunks = list(LinuxcncModel().run(path, self._machine, COMMANDED))
-        self._travel = travel_of(chunks).moved(self._zero)
+        self._travel = travel_of(chunks).shifted(self._zero)
         ends = np.zeros(len(path))
         for chunk in chunks:
             np.add.at(ends, chunk.ledger.row, chunk.ledger.duration_s)
@@ -359,7 +359,7 @@ class LinuxcncTwin(Twin):
         )
         self.slides.begin(travel, self.now, len(self.decoded) - 1)
 
-    def _due(self) -> None:
+    def _wake(self) -> None:
         if self.slides.ends_s is not None:
             return
         if self._homing:

@@ -198,7 +198,7 @@ class LinuxcncConversation(Conversation):
 
     def stop(self, now: float) -> None:
         """Abort."""
-        if self.ended or self.state is WireState.STOPPING:
+        if self.is_over or self.state is WireState.STOPPING:
             return
         if self._begun:
             self._abort_at(now)
@@ -207,7 +207,7 @@ class LinuxcncConversation(Conversation):
         self._end(WireState.STOPPED, "stopped before it was told to move")
 
     @property
-    def _alone(self) -> str:
+    def _unattended(self) -> str:
         if self._begun and not self._aborting:
             return "LinuxCNC goes on with what it was told: stop it at the machine"
         return ""
@@ -224,21 +224,21 @@ class LinuxcncConversation(Conversation):
 
     # The line and the clock.
 
-    def received(self, data: bytes, now: float) -> None:
-        """Lines; what it echoes is passed over."""
+    def receive(self, data: bytes, now: float) -> None:
+        """Handle received lines; echoes are passed over."""
         *lines, self._rest = _ENDS.split(self._rest + data)
         for line in lines:
             text = line.decode("latin-1").strip()
-            if not text or self.ended or text == self._asked or not self._asked:
+            if not text or self.is_over or text == self._asked or not self._asked:
                 continue
             if not text.upper().startswith(self._skips):
                 continue
             self._asked = self._skips = ""
             self._go(text, now)
 
-    def elapsed(self, now: float) -> None:
-        """Go on after a wait, or miss an answer."""
-        if self.ended or now < self.next_s:
+    def tick(self, now: float) -> None:
+        """Go on after a wait, or notice a missing answer."""
+        if self.is_over or now < self.next_s:
             return
         if not self._asked:
             self._go(None, now)
@@ -551,7 +551,7 @@ class LinuxcncTerminal(Terminal):
         return line.lower().split() in (["set", "abort"], ["set", "estop", "on"])
 
     def meaning(self, line: str) -> str:
-        """Of refusals; of reports, whether it stands."""
+        """Explain refusals, and from reports whether the machine stands."""
         if line.upper().startswith("PROGRAM_STATUS"):
             self._idle = line.upper().endswith(" IDLE")
         if line.upper().startswith("REL_ACT_POS"):

@@ -77,10 +77,10 @@ class MatlabRouterTwin(Twin):
         self._outputs, self._seconds = 0, 0.0  # of all jobs so far
         self._reset()
 
-    def connected(self, now: float) -> bytes:
-        """Somebody opens the port."""
-        sent = super().connected(now)
-        if self._choices.reset == "opening" and not self.moves:
+    def connect(self, now: float) -> bytes:
+        """Open the port."""
+        sent = super().connect(now)
+        if self._choices.reset == "opening" and not self.is_moving:
             self._reset()
         return sent
 
@@ -89,15 +89,15 @@ class MatlabRouterTwin(Twin):
         self._word, self._raw, self._waiting = bytearray(), bytearray(), bytearray()
         self._listens = True
 
-    def _due(self) -> None:
-        if self._choices.reset == "opening" or self.moves:
+    def _wake(self) -> None:
+        if self._choices.reset == "opening" or self.is_moving:
             return
         waiting = self._waiting
         self._reset()
         for octet in waiting:
-            self._take(octet)
+            self._receive_byte(octet)
 
-    def _take(self, octet: int) -> None:
+    def _receive_byte(self, octet: int) -> None:
         if not self._listens:
             self._waiting.append(octet)
             return

@@ -208,10 +208,10 @@ class MatlabRouterConversation(PacketByPacket):
         seconds = packet.seconds - len(HEADER) * header - lines * number
         self.next_s = now + TIME_FACTOR * max(seconds, 0.0) + self._margin_s
 
-    def received(self, data: bytes, now: float) -> None:
-        """Nothing but the digits that were sent may come back."""
+    def receive(self, data: bytes, now: float) -> None:
+        """Compare received bytes with the expected echo; nothing else may come."""
         text = b"".join(data.split())
-        if self.ended or not text:
+        if self.is_over or not text:
             return
         if not self._echo.startswith(text):
             sent = f", where {self._echo_text} was to come back" if self._echo else " unasked"
@@ -231,9 +231,9 @@ class MatlabRouterConversation(PacketByPacket):
             return "the job has begun: its switch stops the machine"
         return "the job has not begun, and the master must be reset"
 
-    def elapsed(self, now: float) -> None:
-        """The next number is due, or the job must be over."""
-        if self.ended or not self._busy or now < self.next_s:
+    def tick(self, now: float) -> None:
+        """Send the next number when it is due, or end a job whose time is over."""
+        if self.is_over or not self._busy or now < self.next_s:
             return
         if self._moving:
             self._packet_done(now)
@@ -253,5 +253,5 @@ class MatlabRouterConversation(PacketByPacket):
         return True
 
     @property
-    def _alone(self) -> str:
-        return super()._alone if self._moving else ""
+    def _unattended(self) -> str:
+        return super()._unattended if self._moving else ""

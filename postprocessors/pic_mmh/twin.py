@@ -82,12 +82,12 @@ class PicMmhTwin(Twin):
         self._joystick: tuple[Ints, float] | None = None  # what runs on until it is stopped
         self._joystick_hz = JOYSTICK_HZ
 
-    def _due(self) -> None:
-        if not self.moves and self._joystick is not None:
+    def _wake(self) -> None:
+        if not self.is_moving and self._joystick is not None:
             self._run_on(*self._joystick)
 
-    def _take(self, octet: int) -> None:
-        if self.moves:
+    def _receive_byte(self, octet: int) -> None:
+        if self.is_moving:
             self._stop()
             if self._choices.interruption == "lost":
                 return
@@ -150,7 +150,7 @@ class PicMmhTwin(Twin):
         if not all(chunk.ledger.ended.all() for chunk in motion):
             # An arc that never ends is left at its nearest approach, as the model leaves it.
             travel = replace(travel, left_at=self._model.quantised(row, self._machine).end[0])
-        self.slides.begin(travel.moved(self._zero), self.now, len(self.decoded) - 1)
+        self.slides.begin(travel.shifted(self._zero), self.now, len(self.decoded) - 1)
 
     def _set_zero(self) -> None:
         """Part zero is here. Machine zero stays where it is."""
@@ -221,9 +221,9 @@ class PicMmhTwin(Twin):
 
     # What is done and reported.
 
-    def _pass(self) -> None:
-        """The bytes of the outputs that became due, and of the compensation in front of them."""
-        steps, added = self.slides.until(self.now)
+    def _make_outputs(self) -> None:
+        """Report the outputs that became due, and the compensation in front of them."""
+        steps, added = self.slides.advance(self.now)
         if self._choices.step_byte == "none" or not len(steps):
             return
         if self._choices.compensation == "reported" and added.any():

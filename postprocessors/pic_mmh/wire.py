@@ -207,7 +207,7 @@ class PicMmhConversation(PacketByPacket):
             self._moves(now)
 
     def _moves(self, now: float) -> None:
-        """The block has been taken: from now on it is executed."""
+        """Note that the block has been accepted: from now on it is executed."""
         packet = self.packets[self.sent - 1]
         self._over = now + packet.seconds
         if self._is_counted_later:
@@ -263,9 +263,9 @@ class PicMmhConversation(PacketByPacket):
         else:
             self.next_s = self._over
 
-    def received(self, data: bytes, now: float) -> None:
-        """First the echo, then the steps."""
-        if self.ended or not data:
+    def receive(self, data: bytes, now: float) -> None:
+        """Handle received bytes: first the echo, then reports of steps."""
+        if self.is_over or not data:
             return
         if self._halting:
             self._ends -= data.count(b";")
@@ -307,9 +307,9 @@ class PicMmhConversation(PacketByPacket):
             return chr(octet) in "XYZxyz"
         return self._link.step_byte == "bits" and 0x40 < octet < 0x80
 
-    def elapsed(self, now: float) -> None:
-        """The block is over, or what should have come has not."""
-        if self.ended or now < self.next_s:
+    def tick(self, now: float) -> None:
+        """End a block whose time is over, or fail where something has not come."""
+        if self.is_over or now < self.next_s:
             return
         if self._halting:
             if self._ends <= 0:
@@ -344,8 +344,8 @@ class PicMmhConversation(PacketByPacket):
         return True
 
     @property
-    def _alone(self) -> str:
-        return "" if self._halting else super()._alone
+    def _unattended(self) -> str:
+        return "" if self._halting else super()._unattended
 
 
 class PicMmhTerminal(Terminal):
@@ -369,9 +369,9 @@ class PicMmhTerminal(Terminal):
         self._steps: list[tuple[str, int]] = []  # kinds of outputs and how many of each
         self._echo = b""  # what is to come back: letters are bytes of steps too
 
-    def typed(self, line: str) -> bytes:
-        """As it is, with its end."""
-        data = self.unescaped(line.strip())
+    def encode(self, line: str) -> bytes:
+        """Return the line with its end."""
+        data = self.unescape(line.strip())
         if data and not data.endswith(self.end):
             data += self.end
         self._echo = data if self._link.echo == "echo" else b""
@@ -399,8 +399,8 @@ class PicMmhTerminal(Terminal):
         """True for the command that stops the machine."""
         return line.strip().rstrip(";") == "A"
 
-    def heard(self, data: bytes) -> list[str]:
-        """The echo as it is; outputs as many at a time as have come."""
+    def decode(self, data: bytes) -> list[str]:
+        """Return the echo as it is, and outputs counted, as many as have come together."""
         said: list[str] = []
         for octet in data:
             echoed = self._echo[:1] == bytes([octet])
@@ -419,12 +419,12 @@ class PicMmhTerminal(Terminal):
                 said += self._step_summary()
                 self._rest += bytes([octet])
                 if octet == ord(";"):
-                    said += super().left()
+                    said += super().flush()
         return said
 
-    def left(self) -> list[str]:
-        """The outputs that were counted, and what has no end."""
-        return [*self._step_summary(), *super().left()]
+    def flush(self) -> list[str]:
+        """Return the counted outputs and the unfinished line."""
+        return [*self._step_summary(), *super().flush()]
 
     def _step_summary(self) -> list[str]:
         steps, self._steps = self._steps, []

@@ -79,16 +79,16 @@ class ValcncTwin(Twin):
         self._drawn = DrawingProgress(np.zeros(3), np.zeros(3, dtype=np.int64))
         self._drawing = False
 
-    def _due(self) -> None:
-        if self._drawing and not self.moves:
+    def _wake(self) -> None:
+        if self._drawing and not self.is_moving:
             self._drawing = False
             if self._choices.answer == "ok":
                 self._out += b"ok\n"
-            while self._kept and not self.moves:
+            while self._kept and not self.is_moving:
                 self._receive(self._kept.pop(0))
 
-    def _take(self, octet: int) -> None:
-        if not self.moves:
+    def _receive_byte(self, octet: int) -> None:
+        if not self.is_moving:
             self._receive(octet)
         elif self._choices.busy == "kept":
             self._kept.append(octet)

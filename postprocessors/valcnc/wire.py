@@ -107,9 +107,10 @@ class ValcncConversation(PacketByPacket):
             self._over += (TIME_FACTOR - 1.0) * packet.seconds + self._margin_s
         self.next_s = self._over
 
-    def received(self, data: bytes, now: float) -> None:
-        """The answer, where one is awaited, and nothing else; otherwise it is shown."""
-        if self.ended or not data.strip():
+    def receive(self, data: bytes, now: float) -> None:
+        """Compare received bytes with the awaited answer; show them to the user where none is
+        awaited."""
+        if self.is_over or not data.strip():
             return
         if not self._awaits:
             self._tell(f"it says: {data.strip()[:60].decode('latin-1')}")
@@ -119,11 +120,11 @@ class ValcncConversation(PacketByPacket):
             self._fail(f"it says {self._said[:60]!r}, which is not the answer", now)
         elif self._said == self._answer:
             self._said, self._answered = b"", True
-            self.elapsed(now)
+            self.tick(now)
 
-    def elapsed(self, now: float) -> None:
-        """The block must be over."""
-        if self.ended or not self._busy or now < self._over:
+    def tick(self, now: float) -> None:
+        """End the block when its time is over."""
+        if self.is_over or not self._busy or now < self._over:
             return
         if self._answered or not self._awaits:
             self._packet_done(now)

@@ -268,7 +268,7 @@ class FaultyLine:
         left = self._answers[self._taken : self._taken + 1]
         return left[0][0] + LATE_S - self._begun_s if left else None
 
-    turn_s = next_s
+    wake_s = next_s
 
     def unplugged(self, now: float) -> bool:
         """Never."""

@@ -257,10 +257,10 @@ def _says_the_same(one: str, other: str) -> bool:
 
 def answers(twin: Twin, sent: Sequence[Sent]) -> list[str]:
     """Return the answers of the virtual controller before the first entry and after each."""
-    said, now = [twin.connected(0.0)], 0.0
+    said, now = [twin.connect(0.0)], 0.0
     for each in (*sent, None):
         if each is None or each.after_s is None:
-            while (at := twin.turn_s()) is not None:
+            while (at := twin.wake_s()) is not None:
                 now = max(now, at)
                 said[-1] += twin.advance(now)
             at_s = now

@@ -30,27 +30,27 @@ class Talking:
         asked again and again."""
         talk, line = self.talk, self.line
         turns, before = 0, self.now
-        while not talk.ended or talk.has_actions:
+        while not talk.is_over or talk.has_actions:
             turns, before = (turns + 1 if self.now == before else 0), self.now
             assert turns < MOST_TURNS, ("time stands still", self.now, talk.state, talk.why)
             self.act()
             if line.unplugged(self.now):
-                talk.lost("the plug was pulled", self.now)
+                talk.lose_port("the plug was pulled", self.now)
                 continue
             data = line.read(self.now)
             if data:
-                talk.received(data, self.now)
+                talk.receive(data, self.now)
             wish(talk, self.now)
-            if talk.ended or talk.has_actions:
+            if talk.is_over or talk.has_actions:
                 continue
-            other = line.turn_s() if self.coarse else line.next_s()
+            other = line.wake_s() if self.coarse else line.next_s()
             at = talk.next_s if other is None else min(talk.next_s, other)
             if at > end_s:
                 self.now = max(self.now, min(end_s, at))
                 return
             self.now = max(self.now, at)
             if self.now >= talk.next_s:
-                talk.elapsed(self.now)
+                talk.tick(self.now)
 
     def act(self) -> None:
         """Do what the conversation wants now."""
@@ -72,5 +72,5 @@ def talked(
     """Hold it to its end; when that was. AssertionError when it has none by `latest_s`."""
     both = Talking(talk, line, coarse=coarse)
     both.until(latest_s, wish)
-    assert talk.ended, (talk.state, talk.why, talk.sent, both.now)
+    assert talk.is_over, (talk.state, talk.why, talk.sent, both.now)
     return both.now

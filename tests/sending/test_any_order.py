@@ -154,7 +154,7 @@ class Sending(RuleBasedStateMachine):
     def time_passes(self, seconds: float) -> None:
         end = self.both.now + seconds
         self.both.until(end)
-        if self.talk.ended and not self.line.unplugged(end):
+        if self.talk.is_over and not self.line.unplugged(end):
             self.line.read(end)  # nobody speaks any more, and the machine goes on as it is
         self.both.now = max(self.both.now, end)
 
@@ -177,25 +177,25 @@ class Sending(RuleBasedStateMachine):
         if before.unplug_s is None:
             line.faults = before
 
-    @precondition(lambda self: not self.talk.ended)
+    @precondition(lambda self: not self.talk.is_over)
     @rule()
     def pause(self) -> None:
         self.talk.pause(self.both.now)
         self.both.act()
 
-    @precondition(lambda self: not self.talk.ended)
+    @precondition(lambda self: not self.talk.is_over)
     @rule()
     def resume(self) -> None:
         self.still = None
         self.talk.resume(self.both.now)
         self.both.act()
 
-    @precondition(lambda self: not self.talk.ended)
+    @precondition(lambda self: not self.talk.is_over)
     @rule(step=st.booleans())
     def single(self, step: bool) -> None:
         self.talk.single = step
 
-    @precondition(lambda self: not self.talk.ended)
+    @precondition(lambda self: not self.talk.is_over)
     @rule()
     def stop(self) -> None:
         self.talk.stop(self.both.now)
@@ -203,7 +203,7 @@ class Sending(RuleBasedStateMachine):
         if self.asked_s is None:
             self.asked_s = self.both.now
 
-    @precondition(lambda self: not self.talk.ended and not self.line.unplugged(self.both.now))
+    @precondition(lambda self: not self.talk.is_over and not self.line.unplugged(self.both.now))
     @rule(likely=st.sampled_from([False, False, True]))
     def the_plug_is_pulled(self, likely: bool) -> None:
         if likely:
@@ -242,14 +242,14 @@ class Sending(RuleBasedStateMachine):
         if not halted:
             self.still = None
             return
-        assert not self.twin.moves, (self.talk.state, self.talk.why)
+        assert not self.twin.is_moving, (self.talk.state, self.talk.why)
         count = len(self.twin.slides.trace)
         assert self.still in (None, count)
         self.still = count
 
     def a_stop_is_quick(self) -> None:
         """As long as a block, and what the machine may be silent."""
-        if self.asked_s is not None and not self.talk.ended:
+        if self.asked_s is not None and not self.talk.is_over:
             longest = max(packet.seconds for packet in self.part.packets)
             assert self.both.now - self.asked_s <= longest + 3.0 * self.talk.manner.patience_s
 
@@ -265,11 +265,11 @@ class Sending(RuleBasedStateMachine):
 
         self.talk.single = False
         self.both.until(self.both.now + BOUND * self.part.seconds + 10.0 * patience_s, going_on)
-        assert self.talk.ended, (self.talk.state, self.talk.why)
+        assert self.talk.is_over, (self.talk.state, self.talk.why)
         self.all_is_well()
         if self.talk.state is WireState.FINISHED:
             assert self.talk.done == len(self.part.packets)
-            assert not self.twin.moves
+            assert not self.twin.is_moving
             if self.true:
                 assert self.twin.decoded == self.part.blocks
         else:

@@ -85,10 +85,10 @@ def test_a_machine_without_a_line_has_no_console() -> None:
 
 def test_any_byte_can_be_typed_and_shown() -> None:
     terminal = Terminal()
-    assert terminal.typed(r"\x13a\x0D") == b"\x13a\x0d\n"
-    assert terminal.heard(b"a\x07b\r\nc") == [r"a\x07b"]
-    assert terminal.left() == ["c"]
-    assert terminal.left() == []
+    assert terminal.encode(r"\x13a\x0D") == b"\x13a\x0d\n"
+    assert terminal.decode(b"a\x07b\r\nc") == [r"a\x07b"]
+    assert terminal.flush() == ["c"]
+    assert terminal.flush() == []
 
 
 @pytest.mark.parametrize(
@@ -99,7 +99,7 @@ def test_real_time_bytes_of_grbl_have_no_end(line: str, data: bytes, due: int) -
     loaded = load_target("grbl")
     wire: Any = loaded.target.wire()
     terminal = wire.terminal(loaded.machine)
-    assert (terminal.typed(line), terminal.due) == (data, due)
+    assert (terminal.encode(line), terminal.due) == (data, due)
 
 
 class Starting(Small):
@@ -186,10 +186,10 @@ def test_what_follows_a_reset_waits_for_its_banner() -> None:
     wire: Any = loaded.target.wire()
     terminal = wire.terminal(loaded.machine)
     assert not terminal.ready
-    terminal.heard(b"\r\nGrbl 1.1h ['$' for help]\r\n")
+    terminal.decode(b"\r\nGrbl 1.1h ['$' for help]\r\n")
     assert terminal.ready
-    terminal.typed("^X")
+    terminal.encode("^X")
     assert terminal.due
-    terminal.heard(b"\r\nGrbl 1.1h ['$' for help]\r\n")
+    terminal.decode(b"\r\nGrbl 1.1h ['$' for help]\r\n")
     assert not terminal.due
     assert not terminal.failed

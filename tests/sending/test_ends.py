@@ -77,7 +77,7 @@ def at_rest(twin: Twin) -> None:
     still = 0
     while still < 5:
         time.sleep(0.05)
-        still = 0 if twin.moves else still + 1
+        still = 0 if twin.is_moving else still + 1
 
 
 def wanted(name: str) -> tuple[Floats, Ints]:
@@ -176,7 +176,7 @@ def test_a_full_disk_stops_the_machine(name: str, room: int, tmp_path: Path) -> 
         )
         stood = len(twin.slides.trace)
         time.sleep(0.3)
-        assert not twin.moves
+        assert not twin.is_moving
         assert len(twin.slides.trace) == stood
     assert done.returncode == 1, done.stderr
     lines = [line for line in done.stderr.splitlines() if line.startswith("camtool: error")]

@@ -93,9 +93,9 @@ class Work:
         of a line."""
         loaded = self.loaded()
         twin: Any = loaded.twin(list(self.choices))
-        twin.slides.place(np.array(self.at))
+        twin.slides.set_position(np.array(self.at))
         if self.before:
-            twin.connected = twin.advance  # its board is not reset when the port is opened
+            twin.connect = twin.advance  # its board is not reset when the port is opened
             twin.receive(self.before, 0.0)
         talk = self.conversation()
         twin.read_file = lambda name: self.program
@@ -197,7 +197,7 @@ def stopped_at(
     both, twin = work.begun()
     talk, line = both.talk, both.line
     both.until(moment_s)
-    if talk.ended:
+    if talk.is_over:
         return talk, twin
     line.read(moment_s)
     now, place, blocks = moment_s, twin.slides.commanded_mm.copy(), len(twin.decoded)
@@ -206,17 +206,17 @@ def stopped_at(
     talk.stop(now)
     actions = talk.actions()
     out = [action.data for action in actions if isinstance(action, Write)]
-    if not talk.ended:
+    if not talk.is_over:
         assert out == first, moment_s
-    if not talk.ended and not first:
+    if not talk.is_over and not first:
         assert any("to its end" in action.text for action in actions if isinstance(action, Tell))
     for data in out:
         line.write(data, now)
     both.now = now
     both.until(now + LONG_S)
-    assert talk.ended
+    assert talk.is_over
     if talk.state is WireState.STOPPED:
-        assert not twin.moves, talk.why
+        assert not twin.is_moving, talk.why
         says = talk.why.startswith("stopped") or talk.why.endswith("says nothing")
         assert says, talk.why
     count = len(twin.slides.trace)
@@ -251,7 +251,7 @@ def stopped_with_lines_to_go(work: Work, which: int) -> tuple[Conversation, Twin
 
     both.line.write = written_now  # type: ignore[method-assign]
     both.until(work.seconds, wish)
-    if not both.talk.ended and times[0] < which:
+    if not both.talk.is_over and times[0] < which:
         times[0] = which + 1
         both.talk.stop(both.now)
     both.until(LONG_S)
@@ -265,7 +265,7 @@ def test_what_was_not_written_yet_is_never_written(name: str) -> None:
         talk, twin, after = stopped_with_lines_to_go(WORKS[name], which)
         assert talk.state in (WireState.STOPPED, WireState.FINISHED)
         assert all(data.startswith(STOPPING) for data in after)
-        assert not twin.moves
+        assert not twin.is_moving
 
 
 def moments(work: Work, count: int, seed: str) -> Sequence[float]:
@@ -303,7 +303,7 @@ def test_a_stop_whose_answer_is_lost_is_one_and_is_not_said_to_be(
     talk, twin = stopped_at(WORKS[name], moment, all_answers_lost)
     assert talk.state is WireState.FAILED
     assert "did not confirm the stop: switch it off" in talk.why
-    assert not twin.moves
+    assert not twin.is_moving
 
 
 @pytest.mark.parametrize("name", ["grbl jogs", "grbl homes", "pic-mmh homes", "linuxcnc jogs"])
@@ -315,7 +315,7 @@ def test_a_stop_whose_answer_is_late_is_one(name: str) -> None:
 
     talk, twin = stopped_at(WORKS[name], 7.0, late)
     assert talk.state is WireState.STOPPED, talk.why
-    assert not twin.moves
+    assert not twin.is_moving
 
 
 def test_a_hold_that_grbl_did_not_hear_is_said_again() -> None:
@@ -339,7 +339,7 @@ def test_one_that_slows_down_for_long_is_not_reset_meanwhile() -> None:
     both.talk.stop(both.now)
     both.until(LONG_S)
     assert both.talk.why == "stopped: it has begun anew, and stands"
-    assert not twin.moves
+    assert not twin.is_moving
     assert way_since(twin, 25.0, np.array([0.0, 0.0, 0.0])) > 90.0  # 10 mm/s at 0.5 mm/s²
 
 
@@ -352,7 +352,7 @@ def test_a_second_stop_resets_grbl_at_once() -> None:
     assert written(both.talk) == [b"\x18"]
     both.line.write(b"\x18", both.now)
     both.until(LONG_S)
-    assert not twin.moves
+    assert not twin.is_moving
     assert both.talk.state is WireState.STOPPED
     assert "its position is lost" in both.talk.why
 
@@ -392,7 +392,7 @@ def test_done_is_said_of_a_jog_only_when_it_stands(name: str) -> None:
             both.talk, both.line = talk, line
             both.until(2.0 * LONG_S)
         assert talk.state is WireState.FINISHED, talk.why
-        assert not twin.moves
+        assert not twin.is_moving
         assert twin.slides.commanded_mm[0] == pytest.approx(x, abs=0.02)
 
 
@@ -409,7 +409,7 @@ def test_done_is_said_of_homing_only_when_it_stands(step: str, echo: str) -> Non
     both.until(LONG_S)
     if step == "bits":
         assert both.talk.state is WireState.FINISHED, both.talk.why
-        assert not twin.moves
+        assert not twin.is_moving
     else:
         assert both.talk.why == "nothing says when it stands, since link.step_byte is none"
 
@@ -459,7 +459,7 @@ def at_work(
     """camtool, when its machine has begun to move. `terminal`: keys come from one, which is also
     that of the process's session."""
     twin: Any = work.loaded().twin(list(work.choices))
-    twin.slides.place(np.array(work.at))
+    twin.slides.set_position(np.array(work.at))
     sent, receive = bytearray(), twin.receive
 
     def heard(data: bytes, now: float) -> bytes:
@@ -519,7 +519,7 @@ def test_every_signal_that_would_end_a_jog_stops_it(name: str) -> None:
         assert it.process.returncode == 1
         assert b"\x85!" in it.sent
         assert it.sent.endswith(b"\x18")
-        assert not it.twin.moves
+        assert not it.twin.is_moving
         assert it.twin.slides.commanded_mm[0] < 149.0
 
 
@@ -529,7 +529,7 @@ def test_a_signal_resets_a_machine_that_homes(name: str) -> None:
         it.signalled(name)
         assert "stopped" in it.ended()
         assert b"$H\n\x18" in it.sent
-        assert not it.twin.moves
+        assert not it.twin.is_moving
         assert it.twin.slides.commanded_mm[2] < -1.0
 
 
@@ -544,7 +544,7 @@ def test_a_signal_stops_a_program(name: str, tmp_path: Path) -> None:
         assert "stopped: it has begun anew, and stands; no block is done" in it.ended()
         assert b"!" in it.sent
         assert it.sent.endswith(b"\x18")
-        assert not it.twin.moves
+        assert not it.twin.is_moving
 
 
 def test_q_stops_a_jog() -> None:
@@ -567,7 +567,7 @@ def test_a_terminal_that_is_closed_stops_the_machine(
         it.keyboard = None
         assert "stopped" in it.ended()
         assert it.sent.endswith(b"\x18")
-        assert not it.twin.moves
+        assert not it.twin.is_moving
 
 
 @pytest.mark.parametrize("stream", ["stdout", "stderr"])
@@ -586,7 +586,7 @@ def test_a_reader_that_goes_away_stops_the_machine(
         it.ended()
         assert it.process.returncode not in (0, -signal.SIGKILL)
         assert it.sent.endswith(b"\x18")
-        assert not it.twin.moves
+        assert not it.twin.is_moving
 
 
 def test_a_reader_that_reads_nothing_keeps_no_machine_waiting(tmp_path: Path) -> None:
@@ -603,7 +603,7 @@ def test_a_reader_that_reads_nothing_keeps_no_machine_waiting(tmp_path: Path) ->
         os.close(writer)
         it.signalled("SIGINT")
         assert "stopped: it has begun anew, and stands" in it.ended()
-        assert not it.twin.moves
+        assert not it.twin.is_moving
     os.close(reader)
 
 
@@ -618,7 +618,7 @@ def test_a_second_interrupt_waits_no_longer_and_still_stops_it() -> None:
         assert "camtool was ended before the machine said that it stands" in said
         while not it.sent.endswith(b"\x18"):  # on its way when the process ended
             time.sleep(0.01)
-        assert not it.twin.moves
+        assert not it.twin.is_moving
 
 
 def test_a_sighup_that_nohup_ignores_stops_nothing() -> None:
@@ -743,7 +743,7 @@ def at_console(name: str, text: str, speed: float = 1.0, *more: str) -> tuple[An
 def test_a_stop_in_a_pipe_waits_for_nothing() -> None:
     twin, said, code = at_console("pic-mmh", "JX+;\nA;\nPX+0003;\n")
     assert code == 0, said
-    assert not twin.moves
+    assert not twin.is_moving
     assert twin.commands == [b"JX+;", b"A;", b"PX+0003;"]
     twin, said, code = at_console("grbl", "G4P900\n!\n^X\n$G\n")
     assert code == 0, said
@@ -755,7 +755,7 @@ def test_what_would_go_on_for_ever_is_stopped_at_the_end_of_a_pipe() -> None:
     assert code == 1
     assert "it would go on without an end: it is told to stop" in said
     assert "it says that it stands" in said
-    assert not twin.moves
+    assert not twin.is_moving
 
 
 def test_steps_that_are_not_reported_are_no_rest() -> None:
@@ -798,7 +798,7 @@ def test_what_ends_a_console_stops_the_machine(
         assert "it says that it stands" in said
         assert it.process.returncode == 1
         assert first in it.sent
-        assert not it.twin.moves
+        assert not it.twin.is_moving
         if name == "grbl":
             assert it.sent.endswith(b"\x18")
 
@@ -807,19 +807,19 @@ def test_a_console_resets_a_machine_that_homes() -> None:
     loaded = load_target("grbl")
     wire: Any = loaded.target.wire()
     terminal = wire.terminal(loaded.machine)
-    terminal.heard(b"\r\nGrbl 1.1h ['$' for help]\r\n")
-    terminal.typed("$G")
-    terminal.typed("$H")
+    terminal.decode(b"\r\nGrbl 1.1h ['$' for help]\r\n")
+    terminal.encode("$G")
+    terminal.encode("$H")
     assert terminal.halt() == b"\x18"
-    terminal.heard(b"ALARM:6\r\n\r\nGrbl 1.1h ['$' for help]\r\n")
+    terminal.decode(b"ALARM:6\r\n\r\nGrbl 1.1h ['$' for help]\r\n")
     assert terminal.stands
-    terminal.typed("$H")
-    terminal.heard(b"ok\r\n")
-    terminal.typed("G1X9")
+    terminal.encode("$H")
+    terminal.decode(b"ok\r\n")
+    terminal.encode("G1X9")
     assert terminal.halt() == b"\x85!"
-    terminal.heard(b"<Hold:1|MPos:1.000,0.000,0.000|FS:9,0>\r\n")
+    terminal.decode(b"<Hold:1|MPos:1.000,0.000,0.000|FS:9,0>\r\n")
     assert not terminal.stands
-    terminal.heard(b"<Hold:0|MPos:1.000,0.000,0.000|FS:0,0>\r\n")
+    terminal.decode(b"<Hold:0|MPos:1.000,0.000,0.000|FS:0,0>\r\n")
     assert terminal.stands
 
 
@@ -829,9 +829,9 @@ def test_a_console_of_linuxcnc_asks_until_the_place_is_the_same() -> None:
     terminal = wire.terminal(loaded.machine)
     assert terminal.halt() == b"set abort\r\n"
     for x, status, stands in ((1, "RUNNING", False), (2, "IDLE", False), (3, "IDLE", False)):
-        terminal.heard(b"PROGRAM_STATUS %s\r\nREL_ACT_POS %d 0 0\r\n" % (status.encode(), x))
+        terminal.decode(b"PROGRAM_STATUS %s\r\nREL_ACT_POS %d 0 0\r\n" % (status.encode(), x))
         assert terminal.stands == stands
-    terminal.heard(b"PROGRAM_STATUS IDLE\r\nREL_ACT_POS 3 0 0\r\n")
+    terminal.decode(b"PROGRAM_STATUS IDLE\r\nREL_ACT_POS 3 0 0\r\n")
     assert terminal.stands
 
 
@@ -896,7 +896,7 @@ class FirmwareLine:
     def next_s(self) -> float | None:
         return self._said[self._read][0] if self._read < len(self._said) else None
 
-    turn_s = next_s
+    wake_s = next_s
 
     def wrote(self, data: bytes) -> bool:
         return any(data == each for _, each in self._sent)
@@ -965,7 +965,7 @@ def test_a_stop_of_the_firmware_at_any_moment(
         both, _ = work.begun(line)
         talk = both.talk
         both.until(moment)
-        assert not talk.ended, (moment, talk.why)
+        assert not talk.is_over, (moment, talk.why)
         homes = line.wrote(b"$H\n") and not line.heard(b"ok")
         before = both.now = max(moment, both.now)
         talk.stop(before)

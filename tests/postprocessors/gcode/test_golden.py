@@ -54,8 +54,6 @@ def test_the_worked_example_of_the_page_is_what_is_sent(name: str, case: str) ->
 
 @pytest.mark.parametrize("name", ["grbl", "linuxcnc"])
 def test_the_page_has_every_option(name: str) -> None:
-    import importlib
-
     page = (ROOT / "docs" / "dialects" / f"{name}.md").read_text(encoding="utf-8")
-    options = importlib.import_module(f"camtool_postprocessors.{name}.dialect").Dialect
+    options = load_target(name).target.dialect
     assert [field for field in options.__struct_fields__ if f"| `{field}` |" not in page] == []

@@ -80,7 +80,7 @@ def test_a_line_is_answered_when_it_is_planned() -> None:
     lines = [b"G1X%dF100\n" % k for k in range(1, 25)]
     sent = b"".join(twin.receive(line, 0.0) for line in lines)
     assert sent == b"ok\r\n" * 15  # places in the ring
-    assert twin.moves
+    assert twin.is_moving
     waiting = sum(map(len, lines[16:]))  # one line is with the parser
     assert f"|Bf:0,{128 - waiting}|" in report(twin, 0.0)
     assert at_rest(twin, 0.0)[0].count(b"ok\r\n") == len(lines) - 15
@@ -122,7 +122,7 @@ def test_errors_have_grbls_numbers_and_change_nothing(line: str, code: int) -> N
     before = reply(twin, "$G")
     assert reply(twin, line) == f"error:{code}"
     assert reply(twin, "$G") == before
-    assert not twin.moves
+    assert not twin.is_moving
 
 
 def test_an_empty_line_is_answered_too() -> None:
@@ -139,7 +139,7 @@ def test_a_hold_slows_down_on_the_path_and_goes_on_to_the_last_step() -> None:
     assert report(twin, 0.7).startswith("<Hold:1|")
     twin.advance(5.0)
     assert report(twin, 5.0).startswith("<Hold:0|MPos:")
-    assert not twin.moves
+    assert not twin.is_moving
     stood = twin.slides.commanded_mm.copy()
     assert 0.0 < stood[0] < 10.0
     twin.advance(60.0)
@@ -207,7 +207,7 @@ def test_a_reset_at_rest_is_none() -> None:
 
 def test_homing_locks_until_it_is_done() -> None:
     twin, _ = made("grbl", ["homing=on"])
-    assert twin.connected(0.0) == BANNER + b"[MSG:'$H'|'$X' to unlock]\r\n"
+    assert twin.connect(0.0) == BANNER + b"[MSG:'$H'|'$X' to unlock]\r\n"
     assert reply(twin, "G0 X1") == "error:9"
     assert reply(twin, "$H") == ""
     assert at_rest(twin, 0.0)[0] == b"ok\r\n"

@@ -115,7 +115,7 @@ def held(
     talk = talk or GrblWire().conversation(packets(), TARGET.machine, manner)
     number, now = 0, 0.0
     talk.begin(now)
-    while not talk.ended or talk.has_actions:
+    while not talk.is_over or talk.has_actions:
         said = list[bytes]()
         for action in talk.actions():
             if isinstance(action, Write):
@@ -126,11 +126,11 @@ def held(
         said += small.run(now)
         for line in said:
             for come in fault(number, line):
-                talk.received(come + b"\r\n", now)
+                talk.receive(come + b"\r\n", now)
             number += 1
         wish(talk, now)
         if now >= talk.next_s:
-            talk.elapsed(now)
+            talk.tick(now)
         assert now < 120.0, (talk.state, talk.why)
     return talk, small
 
@@ -329,7 +329,7 @@ def test_a_locked_one_is_advised_by_its_own_settings(
     small = Small(settings={**LISTING, 22: homing}, closed=closed, locked=True)
     talk = GrblWire().conversation(packets(), TARGET.machine, PLAIN)
     talk.begin(0.0)
-    talk.received(b"".join(line + b"\r\n" for line in (b"Grbl 1.1h ['$' for help]", *says)), 0.0)
+    talk.receive(b"".join(line + b"\r\n" for line in (b"Grbl 1.1h ['$' for help]", *says)), 0.0)
     talk, small = held(small=small, talk=talk)
     assert talk.state is WireState.FAILED
     assert all(each in talk.why for each in words), talk.why
@@ -376,9 +376,9 @@ def test_a_locked_one_is_unlocked_where_that_is_asked_for() -> None:
 def test_what_is_no_grbl_is_named(heard: bytes, words: list[str]) -> None:
     talk = GrblWire().conversation(packets(), TARGET.machine, PLAIN)
     talk.begin(0.0)
-    talk.received(heard, 0.5)
-    while not talk.ended:
-        talk.elapsed(talk.next_s)
+    talk.receive(heard, 0.5)
+    while not talk.is_over:
+        talk.tick(talk.next_s)
     assert talk.state is WireState.FAILED
     assert all(each in talk.why for each in words), talk.why
     assert talk.sent == 0

@@ -62,7 +62,7 @@ def test_faults_never_skip_or_double_a_block(fault: str, seed: int) -> None:
     assert twin.decoded == list(wanted[: len(twin.decoded)])
     assert talk.state in (WireState.FINISHED, WireState.FAILED)
     if talk.state is WireState.FAILED and "unplug" not in fault:
-        assert not twin.moves
+        assert not twin.is_moving
 
 
 def test_a_stop_leaves_nothing_that_moves() -> None:
@@ -75,7 +75,7 @@ def test_a_stop_leaves_nothing_that_moves() -> None:
 
     talked(talk, WiredTwin(twin), wish, latest_s=100.0)
     assert talk.state is WireState.STOPPED, talk.why
-    assert not twin.moves
+    assert not twin.is_moving
 
 
 def test_dwells_are_no_missing_answers_and_missing_ones_are_noticed() -> None:

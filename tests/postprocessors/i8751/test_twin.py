@@ -36,7 +36,7 @@ def test_a_program_is_answered_byte_by_byte() -> None:
     twin = made("line_end=none")
     assert fed(twin, b"\x13") == b"LISTO"
     assert fed(twin, RECORD) == ANSWER
-    assert not twin.moves
+    assert not twin.is_moving
     assert twin.decoded == []
     assert fed(twin, b"\x45") == b"F"
     assert twin.decoded == [RECORD + b"\x45"]
@@ -49,7 +49,7 @@ def test_it_says_f_when_all_has_been_executed() -> None:
     twin = made("line_end=none")
     twin.receive(b"\x13" + RECORD + RECORD, 0.0)
     assert twin.receive(b"\x45", 10.0) == b""
-    assert twin.moves
+    assert twin.is_moving
     said, now = at_rest(twin, 10.0)
     program = b"\x13" + 2 * RECORD + b"\x45\x54"
     whole = loaded().target.read(program, loaded().machine)
@@ -120,7 +120,7 @@ def test_a_reset_forgets_a_packet_that_is_not_complete() -> None:
     for choice, said in (("nothing", b""), ("reset", b"LISTO\r\n")):
         twin = made(f"opening={choice}")
         fed(twin, b"\x13\x01")
-        twin.connected(1.0)
+        twin.connect(1.0)
         assert twin.receive(b"\x13", 1.0) == said
 
 

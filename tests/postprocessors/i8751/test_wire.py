@@ -85,7 +85,7 @@ def test_faults_never_skip_or_double_a_record(fault: str, seed: int, way: str) -
     assert len(twin.decoded) <= talk.block + 1 + 5
     assert (talk.state is WireState.FINISHED) == (taken + b"\x54" == whole and talk.block == 22)
     if talk.state is WireState.FAILED and "reset" in talk.why:
-        assert not twin.moves
+        assert not twin.is_moving
 
 
 def test_an_access_that_is_denied_is_asked_for_again() -> None:
@@ -93,10 +93,10 @@ def test_an_access_that_is_denied_is_asked_for_again() -> None:
     talk.begin(0.0)
     assert len(talk.actions()) == 1
     for _ in range(4):
-        talk.received(b"OT", 1.0)
-        talk.received(b"RO\r\n", 1.0)
+        talk.receive(b"OT", 1.0)
+        talk.receive(b"RO\r\n", 1.0)
         assert [action.data for action in talk.actions()] == [b"\x13"]  # type: ignore[union-attr]
-    talk.received(b"OTRO", 1.0)
+    talk.receive(b"OTRO", 1.0)
     assert talk.state is WireState.FAILED
 
 
@@ -110,7 +110,7 @@ def test_a_stop_never_begins_what_is_not_complete(at_s: float) -> None:
 
     talked(talk, WiredTwin(twin, paced=True), wish, latest_s=200.0)
     assert talk.state is WireState.STOPPED, talk.why
-    assert not twin.moves
+    assert not twin.is_moving
     assert len(twin.decoded) == talk.block + 1
 
 
@@ -124,7 +124,7 @@ def test_pauses_are_between_packets(single: bool) -> None:
         if talk.state is WireState.SENDING and not single:
             talk.pause(now)
         elif talk.state is WireState.PAUSED:
-            assert not twin.moves
+            assert not twin.is_moving
             rests.append(talk.done)
             talk.resume(now)
 
@@ -151,19 +151,19 @@ def test_a_jog_is_a_program_of_its_steps() -> None:
 
 def test_what_a_person_types_and_reads() -> None:
     terminal = loaded().target.wire().terminal(loaded().machine)  # type: ignore[union-attr]
-    assert terminal.typed("13") == b"\x13"
-    assert terminal.typed("01 03 00 64") == b"\x01\x03\x00\x64"
-    assert terminal.typed("\\x13x") == b"\x13x"
-    assert terminal.heard(b"LIS") == []
-    assert terminal.heard(b"TO\r\n") == ["LISTO    the key was right: records may come"]
-    assert terminal.heard(b"BMMM") == ["B M M M    a datum was stored"]
-    assert terminal.heard(b"\r\n") == []
-    assert terminal.heard(b"OTRO") == ["OTRO    this is not the key"]
+    assert terminal.encode("13") == b"\x13"
+    assert terminal.encode("01 03 00 64") == b"\x01\x03\x00\x64"
+    assert terminal.encode("\\x13x") == b"\x13x"
+    assert terminal.decode(b"LIS") == []
+    assert terminal.decode(b"TO\r\n") == ["LISTO    the key was right: records may come"]
+    assert terminal.decode(b"BMMM") == ["B M M M    a datum was stored"]
+    assert terminal.decode(b"\r\n") == []
+    assert terminal.decode(b"OTRO") == ["OTRO    this is not the key"]
 
 
 def test_one_that_says_nothing_at_first_may_have_another_rate() -> None:
     talk = conversation(SHORT)
     talk.begin(0.0)
-    talk.elapsed(talk.next_s)
+    talk.tick(talk.next_s)
     assert talk.state is WireState.FAILED
     assert "is --baud its rate?" in talk.why

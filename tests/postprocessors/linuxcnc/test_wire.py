@@ -146,7 +146,7 @@ def test_a_stop_aborts_and_nothing_moves_behind_it(at_s: float) -> None:
     count = len(twin.slides.trace)
     twin.advance(1000.0)
     assert len(twin.slides.trace) == count
-    assert not twin.moves
+    assert not twin.is_moving
 
 
 @pytest.mark.parametrize(

@@ -26,7 +26,7 @@ def fed(twin: MatlabRouterTwin, *jobs: bytes) -> bytes:
     """Jobs, each behind a reset when the one before is done: what it says."""
     said = b""
     for job in jobs:
-        said += twin.connected(twin.now)
+        said += twin.connect(twin.now)
         said += twin.receive(job, twin.now)
         said += at_rest_quickly(twin, twin.now)[0]
     return said
@@ -63,11 +63,11 @@ def test_each_reading_of_the_thesis(setting: str) -> None:
 def test_homing_begins_on_the_last_number() -> None:
     twin = router()
     twin.receive(JOBS[0][:-1], 0.0)
-    assert not twin.moves
+    assert not twin.is_moving
     twin.advance(1000.0)
-    assert not twin.moves
+    assert not twin.is_moving
     twin.receive(b"\r", 1000.0)
-    assert twin.moves
+    assert twin.is_moving
     twin.advance(1002.0)
     assert twin.slides.trace.commanded[-1, 2] > 1.0
     assert not twin.slides.trace.commanded[:, :2].any()
@@ -77,7 +77,7 @@ def test_the_master_takes_one_job() -> None:
     twin = router()
     twin.receive(JOBS[0], 0.0)
     twin.receive(JOBS[1], 1.0)
-    twin.connected(2.0)  # somebody opens the port while it moves
+    twin.connect(2.0)  # somebody opens the port while it moves
     at_rest(twin, 2.0)
     twin.receive(JOBS[1], twin.now)
     assert twin.decoded == [JOBS[0]]
@@ -105,7 +105,7 @@ def test_an_echo_is_a_choice() -> None:
 def test_what_would_hang_it_or_run_away_hangs_it_until_a_reset(words: bytes) -> None:
     twin = router()
     twin.receive(words + b"\r" * 20, 0.0)
-    assert (twin.decoded, twin.moves) == ([], False)
+    assert (twin.decoded, twin.is_moving) == ([], False)
     assert fed(twin, JOBS[1]) == b""
     assert twin.decoded == [JOBS[1]]
 
@@ -126,7 +126,7 @@ def test_no_bytes_make_it_fall(pieces: list[bytes]) -> None:
     for piece in pieces:
         now = max(now, twin.now)
         twin.receive(piece, now)
-        twin.connected(now)
+        twin.connect(now)
     at_rest_quickly(twin, twin.now)
     assert np.isfinite(twin.slides.commanded_mm).all()
 

@@ -64,14 +64,14 @@ def test_each_reading_of_what_is_open(echo: str, expected: str, reset: str) -> N
     def wish(talk: Conversation, now: float) -> None:
         if talk.state is WireState.WAITING:
             asked.append(talk.why)
-            assert not twin.moves
+            assert not twin.is_moving
         going_on(talk, now)
 
     talked(talk, WiredTwin(twin), wish, latest_s=2000.0, coarse=True)
     if (echo, expected) in (("none", "echo"), ("characters", "none")):
         assert talk.state is WireState.FAILED
         assert twin.decoded == []
-        assert not twin.moves
+        assert not twin.is_moving
         return
     assert talk.state is WireState.FINISHED, talk.why
     assert "goes home on the last number" in asked[0]
@@ -88,7 +88,7 @@ def test_the_pauses_are_those_of_the_thesis() -> None:
     due = [0.0]
     for _ in range(10):
         due.append(talk.next_s)
-        talk.elapsed(talk.next_s)
+        talk.tick(talk.next_s)
     sent = b"".join(each.data for each in talk.actions() if isinstance(each, Write))
     assert sent == b"\r".join(JOBS.split(b"\r")[:10]) + b"\r"
     assert np.allclose(np.diff([*due[1:], talk.next_s]), [0.01] * 3 + [0.001] * 7)
@@ -106,7 +106,7 @@ def test_with_an_echo_no_job_begins_that_came_back_otherwise(fault: str, seed: i
     assert talk.state in (WireState.FINISHED, WireState.FAILED)
     assert (talk.state is WireState.FINISHED) == (len(twin.decoded) == 2 and talk.block == 4)
     if "has not begun" in talk.why:
-        assert not twin.moves
+        assert not twin.is_moving
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -131,7 +131,7 @@ def test_a_stop_never_begins_what_is_not_complete(at_s: float, jobs: int) -> Non
 
     talked(talk, WiredTwin(twin), wish, latest_s=100.0, coarse=True)
     assert talk.state is WireState.STOPPED, talk.why
-    assert not twin.moves
+    assert not twin.is_moving
     assert len(twin.decoded) == talk.done == jobs
 
 
@@ -142,7 +142,7 @@ def test_pauses_are_between_jobs() -> None:
     def wish(talk: Conversation, now: float) -> None:
         going_on(talk, now)
         if talk.state is WireState.PAUSED:
-            assert not twin.moves
+            assert not twin.is_moving
             rests.append(talk.done)
             talk.resume(now)
             going_on(talk, now)
@@ -183,4 +183,4 @@ def test_homing_is_each_jobs_own() -> None:
 
 def test_what_a_person_types() -> None:
     terminal = loaded().target.wire().terminal(loaded().machine)  # type: ignore[union-attr]
-    assert (terminal.hello, terminal.typed("128")) == (b"", b"128\r")
+    assert (terminal.hello, terminal.encode("128")) == (b"", b"128\r")

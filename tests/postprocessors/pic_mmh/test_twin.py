@@ -77,10 +77,10 @@ def test_a_character_stops_what_moves_and_is_received() -> None:
     twin, _ = made("pic-mmh")
     twin.receive(BLOCK, 0.0)
     before = twin.advance(0.2)
-    assert twin.moves
+    assert twin.is_moving
     assert len(before) == len(twin.slides.trace) > 0
     assert twin.receive(b"A;", 0.2) == b"A;"
-    assert not twin.moves
+    assert not twin.is_moving
     assert twin.next_s() is None
     stood = twin.slides.commanded_mm.copy()
     assert twin.advance(100.0) == b""
@@ -109,7 +109,7 @@ def test_the_slides_forget_what_was_not_done() -> None:
 def test_what_it_cannot_decipher_is_ignored_in_silence(string: bytes) -> None:
     twin, _ = made("pic-mmh")
     assert twin.receive(string, 0.0) == string
-    assert (twin.decoded, twin.commands, twin.moves) == ([], [], False)
+    assert (twin.decoded, twin.commands, twin.is_moving) == ([], [], False)
 
 
 def test_a_block_beyond_the_buffer_is_lost() -> None:
@@ -134,9 +134,9 @@ def test_the_joystick_runs_until_a_character_comes() -> None:
     twin, _ = made("pic-mmh", settings=["axes.y.compensation_mm=0"])
     twin.receive(b"&X+Y-;", 0.0)
     twin.advance(100.0)
-    assert twin.moves
+    assert twin.is_moving
     twin.receive(b"A;", 100.0)
-    assert not twin.moves
+    assert not twin.is_moving
     steps = np.rint(twin.slides.commanded_mm * 1000.0 / STEP_UM)
     assert steps.tolist() == [16600, -16600, 0]  # 166 a second: the link
 

@@ -76,7 +76,7 @@ def test_faults_never_skip_or_double_a_block(fault: str, seed: int) -> None:
     assert max(talk.block, -1) < len(twin.decoded)
     assert talk.state in (WireState.FINISHED, WireState.FAILED)
     if talk.state is WireState.FAILED and "unplug" not in fault:
-        assert not twin.moves
+        assert not twin.is_moving
     assert now < 2000.0
 
 
@@ -93,7 +93,7 @@ def test_a_stop_is_at_once_and_nothing_moves_behind_it(at_s: float) -> None:
 
     talked(talk, WiredTwin(twin), wish, latest_s=100.0)
     assert talk.state is WireState.STOPPED, talk.why
-    assert not twin.moves
+    assert not twin.is_moving
     times = twin.slides.trace.time_s
     assert not len(times) or times[-1] <= stopped[0]
 
@@ -106,7 +106,7 @@ def test_pauses_are_between_blocks() -> None:
         if talk.state is WireState.SENDING and talk.sent % 3 == 0:
             talk.pause(now)
         elif talk.state is WireState.PAUSED:
-            assert not twin.moves
+            assert not twin.is_moving
             talk.resume(now)
 
     talked(talk, WiredTwin(twin), wish, latest_s=2000.0)
@@ -127,8 +127,8 @@ def test_one_that_is_not_understood_at_first_may_have_another_rate(heard: bytes)
     packets = [Packet(b"BX204;"), Packet(b"BY178;")]
     talk = PicMmhWire().conversation(packets, loaded.machine, Manner())
     talk.begin(0.0)
-    talk.received(heard, 0.1)
-    while not talk.ended:
-        talk.elapsed(talk.next_s)
+    talk.receive(heard, 0.1)
+    while not talk.is_over:
+        talk.tick(talk.next_s)
     assert talk.state is WireState.FAILED
     assert "is --baud its rate?" in talk.why

@@ -70,7 +70,7 @@ def test_words_that_are_missing_stay_as_the_last_block_left_them() -> None:
 def test_what_it_cannot_decode_is_passed_over_in_silence(line: bytes) -> None:
     twin, _ = made("valcnc")
     assert twin.receive(line + b"\n", 0.0) == b""
-    assert (twin.decoded, twin.commands, twin.moves) == ([], [], False)
+    assert (twin.decoded, twin.commands, twin.is_moving) == ([], [], False)
 
 
 def test_what_the_thesis_gives_no_meaning_is_done_all_the_same() -> None:

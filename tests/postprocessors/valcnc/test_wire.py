@@ -30,13 +30,13 @@ def talked(stop_behind: int = 10**9) -> tuple[Conversation, list[tuple[float, by
     talk = one.wire.conversation(one.packets, LOADED.machine, Manner())
     out, now = list[tuple[float, bytes]](), 0.0
     talk.begin(now)
-    while not talk.ended or talk.has_actions:
+    while not talk.is_over or talk.has_actions:
         out += [(now, action.data) for action in talk.actions() if isinstance(action, Write)]
         if len(out) > stop_behind:
             talk.stop(now)
-        if not talk.ended:
+        if not talk.is_over:
             now = talk.next_s
-            talk.elapsed(now)
+            talk.tick(now)
     return talk, out
 
 
@@ -124,7 +124,7 @@ def test_a_pause_is_between_blocks_and_goes_on_behind_them() -> None:
         if talk.state is WireState.SENDING and talk.sent % 40 == 0:
             talk.pause(now)
         elif talk.state is WireState.PAUSED:
-            assert not twin.moves
+            assert not twin.is_moving
             talk.resume(now)
 
     talked_with(talk, WiredTwin(twin, paced=True), wish, latest_s=1000.0)
@@ -136,13 +136,13 @@ def test_what_it_says_unasked_is_an_error_only_where_answers_are_awaited() -> No
     for answers, state in ((False, WireState.SENDING), (True, WireState.FAILED)):
         talk = conversation(answers=answers)
         talk.begin(0.0)
-        talk.received(b"hello\n", 0.0)
-        talk.elapsed(1.0)
+        talk.receive(b"hello\n", 0.0)
+        talk.tick(1.0)
         assert talk.state is WireState.SENDING
-        talk.received(b"hello\n", 1.0)
+        talk.receive(b"hello\n", 1.0)
         assert talk.state is state, talk.why
 
 
 def test_what_a_person_types() -> None:
     terminal = LOADED.target.wire().terminal(LOADED.machine)  # type: ignore[union-attr]
-    assert (terminal.hello, terminal.typed("G01 X1")) == (b"C\n", b"G01 X1\n")
+    assert (terminal.hello, terminal.encode("G01 X1")) == (b"C\n", b"G01 X1\n")
