@@ -222,64 +222,94 @@ def _run_session(program: Path, image: Path, folder: Path) -> None:
     subprocess.run([program, *names], check=True, timeout=600)
 
 
-class FaultyLine:
-    """The firmware at the other end of a line, as `camtool.sending.faults.WiredTwin` is a twin: a
-    session that is played again from its beginning with all bytes that have come since. `before`:
-    lines that it has been told already."""
+class FirmwareLine:
+    """The firmware at the other end of a line, as `camtool.sending.faults.WiredTwin` is a twin:
+    with each write its session is played anew from the beginning, so that its answers come at its
+    own times. `before`: lines that it has executed already; None: the power has just come on."""
 
     def __init__(
         self,
         program: Path,
+        image: Path,
         folder: Path,
-        before: Sequence[str] = (),
         switches: Sequence[Switch] = (),
+        before: Sequence[str] | None = None,
     ) -> None:
-        self._program, self._folder, self._switches = program, folder, switches
-        self._image = factory(program, folder)
-        self._sent = [Sent(b"\n"), *(Sent(f"{line}\n".encode()) for line in before)]
-        self._answers: list[tuple[float, str]] = []
-        self._taken = self._before = 0
-        self._last: float | None = None  # when the last byte has come
-        self.played = self._play()
-        self._before = len(self._answers)
-        self._begun_s = self.played.seconds - LATE_S  # bytes come later than they are told
-        self._answers = []
+        self._made = program, image, folder, switches
+        self._writes: list[tuple[float, bytes]] = []
+        self._answers: list[tuple[float, bytes]] = []
+        self._read = self._skipped = 0
+        self._begun_s, self._late_s = 0.0, 0.0
+        self._ready_s: float | None = 0.0
+        self._first = [Sent(b"", 0.0)]
+        if before is not None:
+            self._first = [Sent(b"\n"), *(Sent(f"{line}\n".encode()) for line in before)]
+            self._ready_s, self._late_s = None, LATE_S
+        self._play()
+        if before is not None:
+            self._begun_s = self.played.seconds - LATE_S  # bytes come later than they are told
+            self._skipped, self._answers = len(self._answers), []
+
+    def _play(self) -> None:
+        program, image, folder, switches = self._made
+        entries, last = list(self._first), self._ready_s
+        for at, data in self._writes:
+            entries.append(Sent(data, None if last is None else max(at - last, 0.0)))
+            last = max(at, at if last is None else last) + (len(data) - 1) * BYTE_S
+        self.played = played(program, image, entries, folder, switches)
+        self._answers = [
+            (at + self._late_s - self._begun_s, text.encode("latin-1"))
+            for entry in self.played.said
+            for at, text in entry
+        ][self._skipped :]
 
     def connect(self, now: float) -> None:
-        """The port resets nothing: what it was told before holds."""
-
-    def write(self, data: bytes, now: float) -> None:
-        """Send bytes to it."""
-        at = self._begun_s + now
-        self._sent.append(Sent(data, None if self._last is None else max(at - self._last, 0.0)))
-        self._last = max(at, self._last or at) + len(data) * BYTE_S
-        self.played = self._play()
-
-    def read(self, now: float) -> bytes:
-        """Return the output since the last call."""
-        text = ""
-        while (at := self.next_s()) is not None and at <= now:
-            text += self._answers[self._taken][1]
-            self._taken += 1
-        return text.encode("latin-1")
-
-    def next_s(self) -> float | None:
-        """When it says something next by itself."""
-        left = self._answers[self._taken : self._taken + 1]
-        return left[0][0] + LATE_S - self._begun_s if left else None
-
-    wake_s = next_s
+        """The port resets nothing."""
 
     def unplugged(self, now: float) -> bool:
         """Never."""
         return False
 
-    def _play(self) -> Played:
-        done = played(self._program, self._image, self._sent, self._folder, self._switches)
-        self._answers = [each for said in done.said for each in said][self._before :]
-        return done
+    def write(self, data: bytes, now: float) -> None:
+        """Send bytes to it."""
+        self._writes.append((self._begun_s + now, data))
+        self._play()
+
+    def read(self, now: float) -> bytes:
+        """Return the bytes that have come from it by now, since the last call."""
+        come = [text for at, text in self._answers[self._read :] if at <= now]
+        self._read += len(come)
+        return b"".join(come)
+
+    def next_s(self) -> float | None:
+        """Time at which it says something next by itself."""
+        return self._answers[self._read][0] if self._read < len(self._answers) else None
+
+    wake_s = next_s
+
+    def has_written(self, data: bytes) -> bool:
+        """True if these bytes were sent to it in one piece."""
+        return any(data == each for _, each in self._writes)
+
+    def has_read(self, start: bytes) -> bool:
+        """True if an answer that begins like this has been read."""
+        return any(text.startswith(start) for _, text in self._answers[: self._read])
+
+    def way_mm(self, since: float) -> float:
+        """Return the longest way of a slide from then on."""
+        at, slides = self.played.at_s, self.played.slides
+        begin = int(np.searchsorted(at, since, side="right"))
+        before = slides[begin - 1] if begin else np.zeros(3, dtype=np.int64)
+        steps = np.abs(np.diff(slides[begin:], axis=0, prepend=before[None, :]))
+        return float(steps.sum(axis=0).max(initial=0.0)) / STEPS_PER_MM
+
+    def stood_s(self) -> float:
+        """Return the time of its last step."""
+        return float(self.played.at_s[-1]) if len(self.played.at_s) else 0.0
 
 
-BYTE_S = 10.0 / 115200.0
+STEPS_PER_MM = 250
+BYTE_S = 1389 / 16e6
+"""What a byte takes on the line, in ticks of the board."""
 LATE_S = 0.001
 """What it says is heard so much later."""

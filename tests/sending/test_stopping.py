@@ -32,7 +32,15 @@ from camtool.target.registry import LoadedTarget, load_target
 from camtool.target.twin import Twin
 from camtool.target.wire import Conversation, Manner, Tell, WireState, Write
 from tests.feeding import ROOT, logo
-from tests.oracles.grbl_firmware import Sent, Switch, built, factory, played, source
+from tests.oracles.grbl_firmware import (
+    BYTE_S,
+    STEPS_PER_MM,
+    FirmwareLine,
+    Switch,
+    built,
+    factory,
+    source,
+)
 from tests.postprocessors.grbl.test_wire import Small
 from tests.sending.talking import Talking
 from tests.sending.test_any_order import PROGRAMS, SETTINGS
@@ -855,71 +863,6 @@ def test_a_machine_that_nothing_stops_is_said_to_be_one() -> None:
 # grbl's own firmware, which is told what the conversation writes, byte for byte.
 
 
-class FirmwareLine:
-    """The firmware of grbl at the end of a line. With each thing that is written its session is
-    played anew from the beginning, so that its answers come at its own times."""
-
-    def __init__(
-        self, program: Path, image: Path, folder: Path, switches: Sequence[Switch]
-    ) -> None:
-        self._made = program, image, folder, switches
-        self._sent: list[tuple[float, bytes]] = []
-        self._read = 0
-        self._play()
-
-    def _play(self) -> None:
-        program, image, folder, switches = self._made
-        entries, last = [Sent(b"", 0.0)], 0.0
-        for at, data in self._sent:
-            entries.append(Sent(data, max(at - last, 0.0)))
-            last = max(at, last) + (len(data) - 1) * BYTE_S
-        self.played = played(program, image, entries, folder, switches)
-        self._said = [
-            (at, text.encode("latin-1")) for entry in self.played.said for at, text in entry
-        ]
-
-    def connect(self, now: float) -> None:
-        """The power has just come on."""
-
-    def unplugged(self, now: float) -> bool:
-        return False
-
-    def write(self, data: bytes, now: float) -> None:
-        self._sent.append((now, data))
-        self._play()
-
-    def read(self, now: float) -> bytes:
-        come = [text for at, text in self._said[self._read :] if at <= now]
-        self._read += len(come)
-        return b"".join(come)
-
-    def next_s(self) -> float | None:
-        return self._said[self._read][0] if self._read < len(self._said) else None
-
-    wake_s = next_s
-
-    def wrote(self, data: bytes) -> bool:
-        return any(data == each for _, each in self._sent)
-
-    def heard(self, start: bytes) -> bool:
-        return any(text.startswith(start) for _, text in self._said[: self._read])
-
-    def way_mm(self, since: float) -> float:
-        """The longest way of a slide from then on."""
-        at, slides = self.played.at_s, self.played.slides
-        begin = int(np.searchsorted(at, since, side="right"))
-        before = slides[begin - 1] if begin else np.zeros(3, dtype=np.int64)
-        steps = np.abs(np.diff(slides[begin:], axis=0, prepend=before[None, :]))
-        return float(steps.sum(axis=0).max(initial=0.0)) / STEPS_PER_MM
-
-    def stood_s(self) -> float:
-        """When its last step was."""
-        return float(self.played.at_s[-1]) if len(self.played.at_s) else 0.0
-
-
-BYTE_S = 1389 / 16e6
-"""What a byte takes on the line, in ticks of the board."""
-STEPS_PER_MM = 250
 AHEAD_MM = 500.0 / 60.0 * 0.06
 """What the firmware has in its step buffer is done first: five pieces of 10 ms, and the one that
 runs."""
@@ -966,7 +909,7 @@ def test_a_stop_of_the_firmware_at_any_moment(
         talk = both.talk
         both.until(moment)
         assert not talk.is_over, (moment, talk.why)
-        homes = line.wrote(b"$H\n") and not line.heard(b"ok")
+        homes = line.has_written(b"$H\n") and not line.has_read(b"ok")
         before = both.now = max(moment, both.now)
         talk.stop(before)
         both.until(LONG_S)

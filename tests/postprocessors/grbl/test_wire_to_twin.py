@@ -16,7 +16,7 @@ from camtool.sending.prepare import forecast_of
 from camtool.target.registry import load_target
 from camtool.target.wire import Conversation, Manner, Packet, ResumePoint, WireState
 from tests.feeding import logo, made, same_motion
-from tests.oracles.grbl_firmware import FaultyLine, Switch, built, source
+from tests.oracles.grbl_firmware import FirmwareLine, Switch, built, factory, source
 from tests.sending.talking import talked
 
 
@@ -171,7 +171,7 @@ def test_conversations_with_the_firmware(
     decoded = loaded.target.read(program, loaded.machine)
     made = tuple(wire.packets(program, loaded.machine, forecast_of(decoded, loaded)))
     talk = wire.conversation(made, loaded.machine, manner)
-    line: Any = FaultyLine(firmware, tmp_path, before, switches)
+    line: Any = FirmwareLine(firmware, factory(firmware, tmp_path), tmp_path, switches, before)
     talked(talk, line, latest_s=100.0)
     assert talk.state is (WireState.FAILED if why else WireState.FINISHED), talk.why
     assert why in talk.why
