@@ -31,13 +31,6 @@ MOVE_COLLAPSED = Sentence(
     "moves",
     INFO,
 )
-MOVE_COLLAPSED_PLAIN = Sentence(
-    ProgramCode.MOVE_COLLAPSED,
-    "{dropped:# move|# moves} of less than the last decimal {dropped:was|were} left out, {flat:# "
-    "arc|# arcs} flatter than half of it became {flat:a line|lines}",
-    "moves",
-    INFO,
-)
 MOVE_SPLIT = Sentence(
     ProgramCode.MOVE_SPLIT,
     "{count:# feed move|# feed moves} in XY and Z became steps of at most {measured:g} mm, flat "

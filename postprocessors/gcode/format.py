@@ -5,7 +5,7 @@ words, lines that fit. Shared by the dialects that write words of a letter and a
     word_of("X", units, written, NumberStyle(3))         a column of words, "X1.500", "X-0.020"
     format_column(values, NumberStyle(3, strip=True))   ["1.5", "-0.02"], never "-0"
     comment("logo (v2).dxf")                   "(logo _v2_.dxf)"
-    first_too_long(data, 80)                   index of the first line over the limit, or −1
+    check_length(data, 80, "line", mend)       PostError for the first longer line
 
 Readers never use this module, writers never `blocks.py`.
 """
@@ -19,6 +19,7 @@ import numpy as np
 from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
+from camtool.errors import PostError
 from camtool.toolpath.words import WordColumn, line_lengths
 
 MAX_UNITS: Final = 10**15
@@ -99,11 +100,14 @@ def comment(text: str) -> str:
     return f"({_UNSAFE.sub('_', flat)[:COMMENT_CHARS].strip()})"
 
 
-def first_too_long(data: bytes, most_chars: int) -> tuple[int, int]:
-    """Index and characters of the first line of more than `most_chars` characters (line end not
-    counted), or −1 and 0 when all of them fit."""
+def check_length(data: bytes, max_chars: int, unit: str, mend: str) -> None:
+    """Raise PostError for the first line of more than `max_chars` characters (line end not
+    counted); `unit` is the name of a line in messages."""
     lengths = line_lengths(data)
-    if not (lengths > most_chars).any():
-        return -1, 0
-    index = int((lengths > most_chars).argmax())
-    return index, int(lengths[index])
+    if (lengths > max_chars).any():
+        index = int((lengths > max_chars).argmax())
+        raise PostError(
+            f"a {unit} of {lengths[index]} characters, the controller takes {max_chars}",
+            where=f"{unit} {index + 1}",
+            mend=mend,
+        )

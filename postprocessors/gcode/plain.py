@@ -36,7 +36,7 @@ from camtool.toolpath.moves import Kind, Toolpath, are_arcs
 
 from .arcs import FLAT_UNITS, LINE_SAGITTA_UNITS, sagitta_of, turns_of
 from .checks import check
-from .findings import ARC_MENDED_PLAIN, MOVE_COLLAPSED_PLAIN, MOVE_SPLIT
+from .findings import ARC_MENDED_PLAIN, MOVE_COLLAPSED, MOVE_SPLIT
 from .format import units_of
 
 SPREAD_UNITS: Final = 1.0
@@ -182,7 +182,7 @@ def arc_findings(rows: PlainRows, place: str) -> Iterator[Finding]:
         )
     dropped = int(((rows.kind <= Kind.ARC_CCW) & ~rows.moves).sum())
     if dropped or rows.flat:
-        yield MOVE_COLLAPSED_PLAIN(measured=dropped + rows.flat, dropped=dropped, flat=rows.flat)
+        yield MOVE_COLLAPSED(measured=dropped + rows.flat, dropped=dropped, flat=rows.flat)
 
 
 def _halve_circles(toolpath: Toolpath, rules: ArcRules) -> LoweredToolpath:

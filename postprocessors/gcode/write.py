@@ -39,7 +39,7 @@ from .dialect import UNITS, GcodeDialect, Unit, feed_decimals
 from .findings import ARC_MENDED, MOVE_COLLAPSED, VALUE_ROUNDED
 from .format import (
     NumberStyle,
-    first_too_long,
+    check_length,
     format_column,
     format_number,
     values_of,
@@ -148,7 +148,7 @@ def write_modal(toolpath: Toolpath, machine: Machine, style: ProgramStyle) -> Pr
             *(f"{line}\n".encode("ascii") for line in frame),
         ]
     )
-    _check_length(data, dialect)
+    check_length(data, dialect.line_chars, "line", "use fewer decimals, or no block numbers")
     return Program.of_text(
         data,
         machine,
@@ -294,17 +294,6 @@ def _footer(toolpath: Toolpath, events: Events, dialect: GcodeDialect) -> list[s
         *dialect.end_blocks,
         dialect.program_end,
     ]
-
-
-def _check_length(data: bytes, dialect: GcodeDialect) -> None:
-    """PostError for a line that the controller's buffer does not take."""
-    index, length = first_too_long(data, dialect.line_chars)
-    if index >= 0:
-        raise PostError(
-            f"a line of {length} characters, the controller takes {dialect.line_chars}",
-            where=f"line {index + 1}",
-            mend="use fewer decimals, or no block numbers",
-        )
 
 
 def _arc_findings(toolpath: Toolpath, counts: ArcCounts, dropped: int) -> Iterator[Finding]:

@@ -364,8 +364,8 @@ class GrblParser:
             if "P" not in numbers:
                 raise error(28, block.at["G"], "a dwell without P", "write G4 P1.5 for 1.5 s")
             unused.discard("P")
-        axes = [k for k, axis in enumerate("XYZ") if axis in numbers]
-        words = {k: numbers["XYZ"[k]] * mm for k in axes}
+        words = self._words(block)
+        axes = list(words)
         if block.length == "set" and axes != [2]:
             raise error(37, block.at["G"])
         target = self._target(block, words, unused)
@@ -395,6 +395,12 @@ class GrblParser:
             self._jog(block, target, feed)
         else:
             self._execute(block, target, centre, feed)
+
+    def _words(self, block: GrblBlock) -> dict[int, float]:
+        """Return the coordinates of a block by axis, mm."""
+        mm = MM_PER_INCH if block.modes.inches else 1.0
+        said = block.numbers
+        return {k: said[axis] * mm for k, axis in enumerate("XYZ") if axis in said}
 
     def _check_probe(self, target: list[float], axes: list[int]) -> None:
         if not axes:
@@ -611,9 +617,7 @@ class GrblParser:
             self.notes.frames.setdefault(f"G{54 + frame}", self.index)
 
     def _do_once(self, block: GrblBlock, target: list[float]) -> None:
-        mm = MM_PER_INCH if block.modes.inches else 1.0
-        words = {k: block.numbers["XYZ"[k]] * mm for k in range(3) if "XYZ"[k] in block.numbers}
-        once = block.once
+        words, once = self._words(block), block.once
         if once in ("G10", "G28.1", "G30.1", "G92", "G92.1"):  # it writes to its memory
             self._come_to_rest()
         if once == "G10":
@@ -651,14 +655,18 @@ class GrblParser:
         self._use_frame()
 
     def _go_home(self, once: str, words: dict[int, float], target: list[float]) -> None:
-        """By way of the coordinates to the stored place, of the axes that are named."""
-        if once not in self._homes:
-            self.notes.homes.setdefault(once, self.index)
-        home = self._homes.get(once, list(self._zero))
+        """Move by way of the coordinates to the stored place, in the axes that are named."""
+        home = self._home_of(once)
         if words:
             self._go(Kind.RAPID, target, 0.0)
             home = [home[k] if k in words else target[k] for k in range(3)]
         self._go(Kind.RAPID, home, 0.0)
+
+    def _home_of(self, once: str) -> list[float]:
+        """Return the stored place of G28 or G30, mm on the machine."""
+        if once not in self._homes:
+            self.notes.homes.setdefault(once, self.index)
+        return list(self._homes.get(once, self._zero))
 
     def _move(
         self,

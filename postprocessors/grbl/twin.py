@@ -409,7 +409,7 @@ class _Parser(GrblParser):
         if block.once in ("G10", "G92") or block.uses == LENGTH:
             return target
         frame = self._frame_of(block)
-        for k, value in self._words(block).items():
+        for k, value in words.items():
             if block.once == "G53":
                 target[k] = value
             elif block.modes.absolute:
@@ -508,12 +508,8 @@ class _Parser(GrblParser):
             self.offset = [0.0, 0.0, 0.0]
             do(("offsets",))
 
-    def _go_home(self, once: str, words: dict[int, float], target: list[float]) -> None:
-        home = list(self._memory.homes[once])
-        if words:
-            self._go(Kind.RAPID, target, 0.0)
-            home = [home[k] if k in words else target[k] for k in range(3)]
-        self._go(Kind.RAPID, home, 0.0)
+    def _home_of(self, once: str) -> list[float]:
+        return list(self._memory.homes[once])
 
     def rewind(self) -> None:
         """M2 and M30 set most modes back; in check mode the zero of the frame stays."""
@@ -862,6 +858,11 @@ class GrblTwin(Twin):
         while self.now < until:
             yield until
 
+    def _idle_delay(self) -> Wait:
+        """Wait until the motors are switched off, unless they stay on ($1)."""
+        if self._memory.settings[1] != ALWAYS_ON:
+            yield from self._delay(self._memory.settings[1] / 1000.0)
+
     def _synchronise(self) -> Wait:
         """Wait until the ring is empty and the motors stand (`protocol_buffer_synchronize`)."""
         self._start_cycle()
@@ -1066,15 +1067,13 @@ class GrblTwin(Twin):
         """Stop spindle and coolant; then sleep for ever, or wait at the open door and go on."""
         if "retracted" not in self._suspend:
             self._stop_override = ""
-            self._spin(None, 0.0)
-            self._cool(mist=False, flood=False)
+            self._switch_off()
             self._suspend.discard("again")
             self._suspend.add("retracted")
             return
         if self._state == "Sleep":
             self._message("Sleeping")
-            self._spin(None, 0.0)
-            self._cool(mist=False, flood=False)
+            self._switch_off()
             yield from self._delay(self._memory.settings[1] / 1000.0)
             while True:
                 yield from self._system()
@@ -1141,6 +1140,10 @@ class GrblTwin(Twin):
                 rpm = 0.0
             self._rpm, self._lit = self._speed_of(rpm)
         self._ov_in = 0
+
+    def _switch_off(self) -> None:
+        self._spin(None, 0.0)
+        self._cool(mist=False, flood=False)
 
     def _cool(self, *, mist: bool, flood: bool) -> None:
         self._mist, self._flood = mist, flood
@@ -1225,8 +1228,7 @@ class GrblTwin(Twin):
         self._feed_percent = self._rapid_percent = self._spindle_percent = 100
         if self._state != "Check":
             yield from self._offsets_changed()
-            self._spin(None, 0.0)
-            self._cool(mist=False, flood=False)
+            self._switch_off()
         self._message("Pgm End")
         self._ending = ""
 
@@ -1323,10 +1325,13 @@ class GrblTwin(Twin):
         if self._ends_mm is None:
             closed = [False] * 3
         else:
-            low, high = self._ends_mm
-            here, eps = self.slides.commanded_mm, 0.5 * self._slide_step_mm
-            closed = ((here > high + eps) | (here < low - eps)).tolist()
+            closed = self._beyond_switches(self.slides.commanded_mm, self._ends_mm).tolist()
         return [each != self._is_set(5) for each in closed]
+
+    def _beyond_switches(self, mm: Floats, ends_mm: tuple[Floats, Floats]) -> Bools:
+        """Mask (…, 3) of the axes whose slides at `mm` lie beyond the switches at their ends."""
+        (low, high), eps = ends_mm, 0.5 * self._slide_step_mm
+        return np.asarray((mm > high + eps) | (mm < low - eps))
 
     def _touches_probe(self) -> bool:
         """True if the probe counts as touching; $6, and G38.4 and G38.5, invert it."""
@@ -1369,8 +1374,7 @@ class GrblTwin(Twin):
             self._alarm = PROBE_MISSED
         self._probing, self._away = None, False
         yield from self._realtime()
-        if self._memory.settings[1] != ALWAYS_ON:
-            yield from self._delay(self._memory.settings[1] / 1000.0)
+        yield from self._idle_delay()
         self._forget_blocks()
         self._planned = self._steps[None, :]
         self._say(self._probe_report())
@@ -1404,8 +1408,7 @@ class GrblTwin(Twin):
             height = self._choices.probe_mm + self._machine.controller.machine_zero_mm[2]
             masks.append(path[:, 2] <= height + eps[2])
         if self._ends_mm is not None and self._is_set(21):
-            low, high = self._ends_mm
-            masks += list(((path > high + eps) | (path < low - eps)).T)
+            masks += list(self._beyond_switches(path, self._ends_mm).T)
         for mask in masks:
             changes = np.flatnonzero(mask[1:] != mask[:-1])
             found += (self.now + seconds[changes]).tolist()
@@ -1620,8 +1623,7 @@ class GrblTwin(Twin):
         yield from self._realtime()
         self._adopt_position()
         self._state = "Idle"
-        if self._memory.settings[1] != ALWAYS_ON:
-            yield from self._delay(self._memory.settings[1] / 1000.0)
+        yield from self._idle_delay()
         yield from self._startup()
         return OK
 
@@ -1706,10 +1708,8 @@ class GrblTwin(Twin):
         if self._ends_mm is None:
             return 0 if self._is_set(5) else None
         way = int(self._signs[axis]) * sign
-        at = self._slide_steps()[axis] + way * np.arange(count + 1)
-        eps, (low, high) = 0.5 * self._slide_step_mm[axis], self._ends_mm
-        mm = at * self._slide_step_mm[axis]
-        closed = (mm > high[axis] + eps) | (mm < low[axis] - eps)
+        steps = self._slide_steps() + np.outer(way * np.arange(count + 1), np.eye(3)[axis])
+        closed = self._beyond_switches(steps * self._slide_step_mm, self._ends_mm)[:, axis]
         found = np.flatnonzero(closed != self._is_set(5))
         return int(found[0]) if len(found) else None
 

@@ -15,7 +15,7 @@ from typing import Final, NoReturn
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Bools, Floats, Ints
+from camtool.arrays import Ints
 from camtool.bounds import check_count
 from camtool.errors import ProgramError
 from camtool.findings import Finding
@@ -23,6 +23,7 @@ from camtool.machine.model import exceeds
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 
+from ..gcode.blocks import fill_forward
 from . import blocks
 from .dialect import PicMmhMachine
 from .findings import BLOCK_TOO_LONG_READ, FEED_ABOVE_LIMIT
@@ -155,12 +156,6 @@ class _Excess(Struct):
         self.most = max(self.most, value)
 
 
-def _filled(given: Bools, values: Floats, before: float) -> Floats:
-    """(N,) the value that was given last, `before` where none was yet."""
-    latest = np.maximum.accumulate(np.where(given, np.arange(1, len(given) + 1), 0))
-    return np.asarray(np.concatenate([[before], values])[latest])
-
-
 class _Reader:
     """Blocks in, rows out; knows where the tool stands and whether the program has ended."""
 
@@ -212,7 +207,7 @@ class _Reader:
             kind=kind,
             end=np.column_stack(
                 [
-                    _filled(given, mm[:, column], before)
+                    fill_forward(given, mm[:, column], before)
                     for given, column, before in zip(
                         (~deep, ~deep, deep),
                         (blocks.X, blocks.Y, blocks.Z),

@@ -17,7 +17,6 @@ import numpy as np
 
 from camtool.arrays import Floats
 from camtool.bounds import refuse_too_long
-from camtool.errors import PostError
 from camtool.findings import Finding
 from camtool.records import replace
 from camtool.toolpath.lower import LoweredToolpath, arcs_to_lines, arcs_within
@@ -26,7 +25,7 @@ from camtool.toolpath.program import Program
 from camtool.toolpath.refusals import refuse
 from camtool.toolpath.words import WordColumn, texts_of
 
-from ..gcode.format import NumberStyle, first_too_long, word_of
+from ..gcode.format import NumberStyle, check_length, word_of
 from ..gcode.plain import (
     ArcRules,
     PlainRows,
@@ -66,7 +65,7 @@ def write_program(toolpath: Toolpath, machine: ValcncMachine) -> Program:
     of_row = lowered.row[rows.row]
     refuse_too_long(int(np.count_nonzero(rows.moves)), "line")
     data = _text(rows, dialect)
-    _check_length(data, dialect)
+    check_length(data, dialect.block_chars, "block", "use fewer decimals, or check the units")
     first = toolpath.place(int(lowered.row[rows.first])) if rows.first >= 0 else ""
     return Program.of_text(
         data,
@@ -130,16 +129,6 @@ def _text(rows: PlainRows, dialect: ValcncDialect) -> bytes:
         *(word_of(axis, rows.offset[:, at], arc, style) for at, axis in enumerate("IJ")),
     ]
     return texts_of(columns, blanks=True).data
-
-
-def _check_length(data: bytes, dialect: ValcncDialect) -> None:
-    index, length = first_too_long(data, dialect.block_chars)
-    if index >= 0:
-        raise PostError(
-            f"a block of {length} characters, the controller takes {dialect.block_chars}",
-            where=f"block {index + 1}",
-            mend="use fewer decimals, or check the units",
-        )
 
 
 def _scale_finding(dialect: ValcncDialect) -> Iterator[Finding]:

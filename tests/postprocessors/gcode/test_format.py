@@ -5,8 +5,8 @@ import pytest
 from camtool_postprocessors.gcode.format import (
     COMMENT_CHARS,
     NumberStyle,
+    check_length,
     comment,
-    first_too_long,
     format_column,
     format_number,
     units_of,
@@ -14,6 +14,8 @@ from camtool_postprocessors.gcode.format import (
 )
 from hypothesis import given
 from hypothesis import strategies as st
+
+from camtool.errors import PostError
 
 numbers = st.floats(-1e5, 1e5)
 
@@ -88,5 +90,9 @@ def test_no_text_ends_its_comment(text: str) -> None:
 
 
 def test_the_first_line_that_is_too_long() -> None:
-    assert first_too_long(b"aaaaa\nbbbbbb\nccccccc\n", 5) == (1, 6)
-    assert first_too_long(b"aaaaa\n", 5) == (-1, 0)
+    with pytest.raises(
+        PostError, match=r"a line of 6 characters, the controller takes 5"
+    ) as raised:
+        check_length(b"aaaaa\nbbbbbb\nccccccc\n", 5, "line", "")
+    assert raised.value.where == "line 2"
+    check_length(b"aaaaa\n", 5, "line", "")
