@@ -21,8 +21,8 @@ CYTHON_DOCSTRING = re.compile(
 CYTHON_CONSTANT = re.compile(r"^(?:cdef )?(?:[\w ]+ )?([A-Z_]+)\s*=", re.MULTILINE)
 
 MAX_QUESTIONS = 269
-MAX_SHARED_CLASS_NAMES = 25
-MAX_SUPERLATIVES = 71
+MAX_SHARED_CLASS_NAMES = 10
+MAX_SUPERLATIVES = 62
 
 
 @functools.cache
