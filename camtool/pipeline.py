@@ -619,9 +619,9 @@ def _beyond(
 
 def _compensated(wanted: Toolpath, machine: Machine) -> CompensatedToolpath:
     """The moves with which the slides follow `wanted`."""
-    from camtool.planning.compensating import compensated
+    from camtool.planning.compensating import compensate
 
-    return compensated(wanted, machine)
+    return compensate(wanted, machine)
 
 
 def _plain(job: Job) -> Job:

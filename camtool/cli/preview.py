@@ -173,7 +173,7 @@ class SceneSource:
     def _job_scene(self, source: str, target: LoadedTarget) -> tuple[Scene, Findings]:
         from camtool.pictures.options import points_for
         from camtool.pipeline import post_drawing
-        from camtool.planning.compensating import compensated
+        from camtool.planning.compensating import compensate
         from camtool.planning.plan import plan
         from camtool.run import Run
 
@@ -193,7 +193,7 @@ class SceneSource:
             moves = plan(read, job, target.machine)
         run = Run(source=read.file, target=target, drawing=read, job=job, wanted=moves)
         if job.compensate:
-            run = replace(run, decoded=compensated(moves, target.machine).toolpath)
+            run = replace(run, decoded=compensate(moves, target.machine).toolpath)
         return run.scene(title), read.findings
 
 

@@ -21,7 +21,7 @@ from camtool.geometry.boxes import BoxIndex
 from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.inspection.dimensions import Dimension, Place
 from camtool.inspection.findings import DIMENSION_UNBOUND
-from camtool.planning.place import Map
+from camtool.planning.place import AffineMap
 from camtool.records import replace
 
 BIND_MM = 0.01
@@ -72,7 +72,7 @@ class CircleFeature(Struct, frozen=True, eq=False):
         on_arc = self.has(np.array([math.atan2(y, x)]), slack)[0]
         return abs(math.hypot(x, y) - self.radius_mm) if on_arc else math.inf
 
-    def in_work_frame(self, where: Map) -> CircleFeature:
+    def in_work_frame(self, where: AffineMap) -> CircleFeature:
         """Return the circle in the work frame."""
         turn = math.atan2(where.matrix[1, 0], where.matrix[0, 0])
         flip = -1.0 if np.linalg.det(where.matrix) < 0.0 else 1.0
@@ -110,7 +110,7 @@ class EdgeFeature(Struct, frozen=True, eq=False):
         at = float(np.clip(beside @ self.along, 0.0, self.length_mm))
         return float(np.hypot(*(beside - at * self.along)))
 
-    def in_work_frame(self, where: Map) -> EdgeFeature:
+    def in_work_frame(self, where: AffineMap) -> EdgeFeature:
         """Return the edge in the work frame."""
         return EdgeFeature(self.path, where.point(self.start_mm), where.point(self.end_mm))
 
@@ -124,7 +124,7 @@ class OutlineFeature(Struct, frozen=True, eq=False):
     path: int
     features: tuple[Feature, ...]
 
-    def in_work_frame(self, where: Map) -> OutlineFeature:
+    def in_work_frame(self, where: AffineMap) -> OutlineFeature:
         """Return the outline in the work frame."""
         return OutlineFeature(
             self.path, tuple(each.in_work_frame(where) for each in self.features)
@@ -139,7 +139,7 @@ class DistanceEnd(Struct, frozen=True, eq=False):
     how: Literal["edge", "centre", "outermost"]
     side: int = 1
 
-    def in_work_frame(self, where: Map) -> DistanceEnd:
+    def in_work_frame(self, where: AffineMap) -> DistanceEnd:
         """Return the end in the work frame."""
         return DistanceEnd(self.feature.in_work_frame(where), self.how, self.side)
 
@@ -169,7 +169,7 @@ class BoundDimension(Struct, frozen=True, eq=False):
         ]
         return (*(one for several in whole for one in several), *(e.feature for e in self.ends))
 
-    def in_work_frame(self, where: Map) -> BoundDimension:
+    def in_work_frame(self, where: AffineMap) -> BoundDimension:
         """Return it in the work frame, whose lengths are those of the drawing."""
         direction = where.matrix @ self.direction / where.scale
         places = tuple(where.point(place) for place in self.dimension.places_mm)

@@ -113,7 +113,7 @@ def faced(_: Chosen, setting: Setting) -> Work:
     from camtool.planning.items import CutRun, Fixed, Work
     from camtool.planning.job import refuse_endless
     from camtool.planning.naming import key_of
-    from camtool.planning.paths import backwards
+    from camtool.planning.paths import reverse_vertices
 
     operation, stock = setting.operation, setting.stock
     assert stock is not None, "checked"
@@ -133,7 +133,7 @@ def faced(_: Chosen, setting: Setting) -> Work:
     floor = over_floor(ConnectedRegion(region))
     runs: list[CutRun] = []
     for path, _region in clearing_paths(region, operation):
-        inwards = backwards(path)
+        inwards = reverse_vertices(path)
         down = down_for(inwards, None, None, setting)
         runs += lowered(inwards, down, floor, setting, "stock")
     return Work((Fixed(tuple(runs), setting, "stock"),))

@@ -37,7 +37,7 @@ from camtool.geometry.polylines import (
     reverse,
     rotate,
 )
-from camtool.planning.paths import MeasuredPath, joined, midpoints, runs_of_true
+from camtool.planning.paths import MeasuredPath, join_paths, midpoints, true_ranges
 
 SHORTER = (0.95, 0.9, 0.85, 0.8)
 """Parts of the step that are tried where it leaves tips: rings alone make a smoother path."""
@@ -448,7 +448,7 @@ def _from_nearest(along: MeasuredPath, here: Floats) -> tuple[float, float]:
 
 def _chained(parts: list[Floats]) -> Floats:
     """Open paths, each of which begins where the one before it ends, as one."""
-    return tidy(joined(parts))
+    return tidy(join_paths(parts))
 
 
 class ConnectedRegion(Struct, frozen=True, eq=False, dict=True):
@@ -671,7 +671,7 @@ def _runs(along: MeasuredPath, marks: Floats, wanted: Bools) -> list[Polyline]:
             np.where(np.arange(len(begin)) < turn, begin + along.total_mm, begin), -turn
         )
         end = np.roll(np.where(np.arange(len(end)) < turn, end + along.total_mm, end), -turn)
-    first, last = runs_of_true(wanted)
+    first, last = true_ranges(wanted)
     return [
         Polyline(along.piece(low, high))
         for low, high in zip(begin[first].tolist(), end[last - 1].tolist(), strict=True)

@@ -1,4 +1,4 @@
-"""A toolpath bent beforehand, so that the slides come out where it was wanted (`compensated`).
+"""A toolpath bent beforehand, so that the slides come out where it was wanted (`compensate`).
 
 wanted ─linear─▶ as the motors must go: scale and squareness undone, arcs stay arcs
        ─take up─▶ backlash taken up at reversals, and what the controller compensates wrongly
@@ -37,7 +37,7 @@ KICK_STEPS = 1.0
 AHEAD_MM = 1e-9
 """Positions nearer than this are equal."""
 
-LEAST_SHARE = 1e-9
+MIN_SHARE = 1e-9
 """An edge nearer than this share of a segment to its end is that end."""
 
 TURN_EPS_RAD = 1e-9
@@ -46,20 +46,20 @@ TURN_EPS_RAD = 1e-9
 Point = tuple[float, float, float]
 
 
-def compensated(toolpath: Toolpath, machine: Machine) -> CompensatedToolpath:
+def compensate(toolpath: Toolpath, machine: Machine) -> CompensatedToolpath:
     """`toolpath` bent against the scale, squareness and backlash of the machine, so that its
     slides come out where `toolpath` says. Sources of the rows are kept; blocks are not.
 
     What remains: at a reversal that the controller compensates by too much, half of the excess
-    (see `_TakenUp`), and the random part of the mechanics.
+    (see `_BacklashCompensator`), and the random part of the mechanics.
     """
     motors = motor_path(toolpath, machine)
-    bent = _taken_up(motors.toolpath, machine)
-    row = motors.row[bent.row]
-    if toolpath.operations is None or bent.toolpath is toolpath:
-        return CompensatedToolpath(bent.toolpath, row)
+    motion = _take_up_backlash(motors.toolpath, machine)
+    row = motors.row[motion.row]
+    if toolpath.operations is None or motion.toolpath is toolpath:
+        return CompensatedToolpath(motion.toolpath, row)
     operations = toolpath.operations.picked(row)
-    return CompensatedToolpath(replace(bent.toolpath, operations=operations), row)
+    return CompensatedToolpath(replace(motion.toolpath, operations=operations), row)
 
 
 def motor_path(toolpath: Toolpath, machine: Machine) -> CompensatedToolpath:
@@ -82,10 +82,10 @@ def motor_path(toolpath: Toolpath, machine: Machine) -> CompensatedToolpath:
     matrix = scale @ square
     if np.array_equal(matrix, np.eye(3)):
         return CompensatedToolpath(toolpath, np.arange(len(toolpath)))
-    return _Mapped(toolpath, matrix, machine.defaults.fit_tolerance_mm).bent()
+    return _ToolpathMapper(toolpath, matrix, machine.defaults.fit_tolerance_mm).compensate_moves()
 
 
-class _Mapped:
+class _ToolpathMapper:
     """One toolpath mapped by the matrix."""
 
     def __init__(self, toolpath: Toolpath, matrix: Floats, tolerance_mm: float) -> None:
@@ -96,7 +96,7 @@ class _Mapped:
         self._scale = float(sizes.mean())
         self._b = ToolpathBuilder(self._to(tuple(toolpath.start.tolist())))
 
-    def bent(self) -> CompensatedToolpath:
+    def compensate_moves(self) -> CompensatedToolpath:
         sweeps = self._toolpath.sweeps()
         rows: list[int] = []
         for move in self._toolpath:
@@ -180,7 +180,7 @@ class _Drive(Struct):
     sense: int
     step_mm: float
 
-    def asked(self, value: float, sense: int) -> float:
+    def position_for(self, value: float, sense: int) -> float:
         """Return the position that puts the slide on `value` when driven towards `sense`."""
         return value - self.residual.error_mm(sense)
 
@@ -191,26 +191,26 @@ class _Drive(Struct):
             return self.sense
         return 1 if step > 0.0 else -1
 
-    def free(self, begin: float, end: float) -> None:
+    def move_freely(self, begin: float, end: float) -> None:
         """Move in the air to `end`, in the direction that takes the axis to the position for
         it."""
         for sense in (self.sense_of(begin, end), -self.sense_of(begin, end)):
-            to = self.asked(end, sense)
+            to = self.position_for(end, sense)
             if (to - self.at) * sense > 0.0 or (sense == self.sense and to == self.at):
                 self.at, self.sense = to, sense
                 return
 
 
-def _taken_up(toolpath: Toolpath, machine: Machine) -> CompensatedToolpath:
+def _take_up_backlash(toolpath: Toolpath, machine: Machine) -> CompensatedToolpath:
     """Return the positions that a controller must be given for slides on `toolpath` (in motor mm);
     the same toolpath where there is neither backlash nor compensation."""
     regions = _Regions(machine)
-    if not regions.matter:
+    if not regions.has_backlash:
         return CompensatedToolpath(toolpath, np.arange(len(toolpath)))
-    return _TakenUp(toolpath, machine, regions).bent()
+    return _BacklashCompensator(toolpath, machine, regions).compensate_moves()
 
 
-class _TakenUp:
+class _BacklashCompensator:
     """Backlash taken up at reversals, and what a controller compensates wrongly.
 
     Driven in the direction d = ±1 and engaged, a slide stands at an offset from where the
@@ -249,7 +249,7 @@ class _TakenUp:
         ]
         self._b = ToolpathBuilder(self._place())
 
-    def bent(self) -> CompensatedToolpath:
+    def compensate_moves(self) -> CompensatedToolpath:
         rows: list[int] = []
         sweeps = self._toolpath.sweeps()
         for move in self._toolpath:
@@ -257,7 +257,7 @@ class _TakenUp:
             if move.kind == Kind.RAPID:
                 self._enter(move.end)
                 for drive, begin, end in zip(self._drives, move.start, move.end, strict=True):
-                    drive.free(begin, end)
+                    drive.move_freely(begin, end)
                 self._b.rapid(*self._place())
             elif move.kind in (Kind.LINE, Kind.ARC_CW, Kind.ARC_CCW):
                 for segment in monotone_segments(move, float(sweeps[move.index])):
@@ -290,11 +290,11 @@ class _TakenUp:
         self._overshoot(segment, move)
         for drive, begin, end in zip(self._drives, segment.begin, segment.end, strict=True):
             drive.sense = drive.sense_of(begin, end)
-            ask = drive.asked(begin, drive.sense)
+            ask = drive.position_for(begin, drive.sense)
             if (ask - drive.at) * drive.sense > AHEAD_MM:
                 drive.at = ask
         self._line(move)
-        shares = [self._joins(index, segment) for index in range(3)]
+        shares = [self._follow_share(index, segment) for index in range(3)]
         low = 0.0
         for high in sorted({share for share in shares if 0.0 < share < 1.0} | {1.0}):
             self._follow(segment.part(low, high), [share <= low for share in shares], move)
@@ -306,9 +306,11 @@ class _TakenUp:
         back = []
         for drive, begin, end in zip(self._drives, segment.begin, segment.end, strict=True):
             sense = drive.sense_of(begin, end)
-            excess = (drive.at - drive.asked(begin, sense)) * sense
+            excess = (drive.at - drive.position_for(begin, sense)) * sense
             if sense != drive.sense and excess > AHEAD_MM:
-                thrown = (drive.asked(begin, drive.sense) - drive.asked(begin, sense)) * sense
+                thrown = (
+                    drive.position_for(begin, drive.sense) - drive.position_for(begin, sense)
+                ) * sense
                 drive.at -= max(excess - (1.0 - OVERSHOOT) * thrown, 0.0) * sense
                 back.append((drive, sense))
         if back:
@@ -318,17 +320,17 @@ class _TakenUp:
                 drive.sense = sense
             self._line(move)
 
-    def _joins(self, index: int, segment: MonotoneSegment) -> float:
+    def _follow_share(self, index: int, segment: MonotoneSegment) -> float:
         """Return the share of the segment from which on an axis follows it: 0 unless it stands
         ahead."""
         drive = self._drives[index]
         begin, end = segment.begin[index], segment.end[index]
-        ahead = (drive.at - drive.asked(begin, drive.sense)) * drive.sense
+        ahead = (drive.at - drive.position_for(begin, drive.sense)) * drive.sense
         if ahead <= AHEAD_MM:
             return 0.0
         if ahead >= abs(end - begin):
             return 1.0
-        return segment.where(index, drive.at + drive.residual.error_mm(drive.sense))
+        return segment.share_at(index, drive.at + drive.residual.error_mm(drive.sense))
 
     def _follow(self, part: MonotoneSegment, follows: list[bool], move: Move) -> None:
         """Add a part of a segment on which each axis either follows or holds."""
@@ -336,9 +338,9 @@ class _TakenUp:
         for drive, begin, end, moves in zip(
             self._drives, part.begin, part.end, follows, strict=True
         ):
-            offsets.append(drive.asked(0.0, drive.sense))
+            offsets.append(drive.position_for(0.0, drive.sense))
             if moves and begin != end:
-                drive.at = drive.asked(end, drive.sense)
+                drive.at = drive.position_for(end, drive.sense)
         if part.centre is None or not (follows[0] and follows[1]):
             self._line(move)
             return
@@ -384,7 +386,7 @@ class _Regions:
         ]
 
     @property
-    def matter(self) -> bool:
+    def has_backlash(self) -> bool:
         """True if there is backlash or compensation anywhere."""
         cells = [one for table in self._by_cell for row in table for one in row]
         return any(one.matters for one in (*self._plain, *cells))
@@ -412,8 +414,8 @@ class _Regions:
                 for edge in edges[1:-1]:
                     value = edge + self._zero[axis]
                     if low < value < high:
-                        share = segment.where(axis, value)
-                        if LEAST_SHARE < share < 1.0 - LEAST_SHARE:
+                        share = segment.share_at(axis, value)
+                        if MIN_SHARE < share < 1.0 - MIN_SHARE:
                             shares.add(share)
         if len(shares) == 2:
             yield segment
@@ -460,7 +462,7 @@ class MonotoneSegment(Struct, frozen=True):
         angle = math.atan2(y - cy, x - cx) + share * self.sweep_rad
         return cx + radius * math.cos(angle), cy + radius * math.sin(angle), line[2]
 
-    def where(self, axis: int, value: float) -> float:
+    def share_at(self, axis: int, value: float) -> float:
         """Return the share of the length at which an axis that moves has this value; 0 or 1 beyond
         it.
 

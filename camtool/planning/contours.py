@@ -25,17 +25,17 @@ from camtool.planning.leads import NO_LEADS, KeepOut, Leads, leads_of
 from camtool.planning.naming import at_place
 from camtool.planning.paths import MeasuredPath, MeasuredPaths
 from camtool.planning.ramps import (
-    MOST_LAPS,
+    MAX_LAPS,
     ZProfile,
-    apart,
     feeds_along,
     laps,
-    lifted,
+    lift_paths,
+    separate_laps,
     spiral,
     spiral_with_stops,
     to_and_fro,
 )
-from camtool.planning.tabs import Tab, bridges_of, raised, tabs_of
+from camtool.planning.tabs import Tab, bridges_of, raise_profile, tabs_of
 
 CONTOURS_AT_ONCE = 1 << 12
 """Contours measured and lifted together: their measures take about 2 KB each."""
@@ -86,7 +86,7 @@ def runs_of(
     for begin in range(0, len(order), CONTOURS_AT_ONCE):
         rows = range(begin, min(begin + CONTOURS_AT_ONCE, len(order)))
         some = [contours[int(order[row])] for row in rows]
-        made = _cut_of(some, paths.select(rows), keep_out)
+        made = _cut_lot(some, paths.select(rows), keep_out)
         parts.append(made.runs)
         counts += made.counts
         findings += made.findings
@@ -94,16 +94,18 @@ def runs_of(
     return CutContours(Runs.joined(parts), tuple(counts), tuple(findings), tuple(bridges))
 
 
-def _cut_of(contours: Sequence[Contour], paths: Polylines, keep_out: KeepOut) -> CutContours:
+def _cut_lot(contours: Sequence[Contour], paths: Polylines, keep_out: KeepOut) -> CutContours:
     """Return the runs that cut these contours, in their order."""
     passes: list[_Pass] = []
     counts: list[int] = []
     findings: list[Finding] = []
     bridges: list[Bridge] = []
     for contour, along in zip(contours, MeasuredPaths(paths), strict=True):
-        angle, changed = _slope(contour, along)
+        angle, changed = _ramp_angle(contour, along)
         tabs, left_out = tabs_of(contour, along)
-        made, leads = (_round if along.closed else _along)(contour, along, (angle, tabs), keep_out)
+        made, leads = (_closed_passes if along.closed else _open_passes)(
+            contour, along, (angle, tabs), keep_out
+        )
         passes += made
         counts.append(len(made))
         findings += [*changed, *left_out, *leads.findings]
@@ -111,11 +113,11 @@ def _cut_of(contours: Sequence[Contour], paths: Polylines, keep_out: KeepOut) ->
     names = [
         contour.name for contour, count in zip(contours, counts, strict=True) for _ in range(count)
     ]
-    runs = _runs(passes, contours[0].setting.feeds, names)
+    runs = _lift_passes(passes, contours[0].setting.feeds, names)
     return CutContours(runs, tuple(counts), tuple(findings), tuple(bridges))
 
 
-def _runs(passes: Sequence[_Pass], feeds: Feeds, names: Sequence[str]) -> Runs:
+def _lift_passes(passes: Sequence[_Pass], feeds: Feeds, names: Sequence[str]) -> Runs:
     """Return the runs of these names, lifted together where their paths lie in the same
     columns."""
     owner = [k for k, each in enumerate(passes) for _ in each.parts]
@@ -127,7 +129,7 @@ def _runs(passes: Sequence[_Pass], feeds: Feeds, names: Sequence[str]) -> Runs:
     for rows in columns.values():
         paths = passes[owner[rows[0]]].along.paths
         index = [passes[owner[row]].along.index for row in rows]
-        lifts = lifted(paths, index, [parts[row] for row in rows])
+        lifts = lift_paths(paths, index, [parts[row] for row in rows])
         for row, vertices in zip(rows, lifts, strict=True):
             followed[owner[row]].append(vertices)
     led = [_with_leads(each, one.leads) for each, one in zip(followed, passes, strict=True)]
@@ -143,7 +145,7 @@ def _runs(passes: Sequence[_Pass], feeds: Feeds, names: Sequence[str]) -> Runs:
     )
 
 
-def _round(
+def _closed_passes(
     contour: Contour, along: MeasuredPath, heights: Heights, keep_out: KeepOut
 ) -> tuple[list[_Pass], Leads]:
     """Return the passes round a closed contour, and its leads."""
@@ -152,7 +154,7 @@ def _round(
     total = along.total_mm
     stops: list[float] = []
     if angle is None:
-        profiles = apart(total, levels, overlap)
+        profiles = separate_laps(total, levels, overlap)
     else:
         profile, stops = spiral_with_stops(total, levels, overlap, angle)
         profiles = [profile]
@@ -163,11 +165,11 @@ def _round(
         leads = leads_of(contour, along, (profiles[0][0][0], ends[1]), keep_out)
     elif len(leads.away) == len(leads.to) == 0:
         profiles = [laps(total, levels, overlap)]
-    parts = [_split(raised(profile, tabs, total), stops) for profile in profiles]
+    parts = [_split_profile(raise_profile(profile, tabs, total), stops) for profile in profiles]
     return [_Pass(along, each, leads) for each in parts], leads
 
 
-def _split(points: ZProfile, stops: list[float]) -> list[ZProfile]:
+def _split_profile(points: ZProfile, stops: list[float]) -> list[ZProfile]:
     """Split the profile at these lengths."""
     parts: list[ZProfile] = []
     begin = 0
@@ -194,7 +196,7 @@ def _with_leads(parts: list[Floats], leads: Leads) -> Floats:
     return np.concatenate([*rows, last, np.insert(leads.away[1:], 2, last[-1, 2], axis=1)])
 
 
-def _along(
+def _open_passes(
     contour: Contour, along: MeasuredPath, heights: Heights, keep_out: KeepOut
 ) -> tuple[list[_Pass], Leads]:
     """Return the passes along an open contour, whose leads are parts of its path, and these
@@ -215,11 +217,11 @@ def _along(
     profiles = [
         to_and_fro(track.total_mm, each, above[turn], angle) for turn, each in enumerate(passes)
     ]
-    parts = [raised(profile, tabs, None) for profile in profiles]
+    parts = [raise_profile(profile, tabs, None) for profile in profiles]
     return [_Pass(track, [each], NO_LEADS) for each in parts], leads
 
 
-def _slope(contour: Contour, along: MeasuredPath) -> tuple[float | None, list[Finding]]:
+def _ramp_angle(contour: Contour, along: MeasuredPath) -> tuple[float | None, list[Finding]]:
     """Return the angle of the ramp, None for a plunge; and a finding when a plunge stands for a
     ramp."""
     operation = contour.setting.operation
@@ -227,12 +229,12 @@ def _slope(contour: Contour, along: MeasuredPath) -> tuple[float | None, list[Fi
     if operation.entry.kind == "plunge":
         return None, []
     ramp = -contour.setting.levels_mm[-1] / math.tan(angle)
-    if ramp <= MOST_LAPS * along.total_mm:
+    if ramp <= MAX_LAPS * along.total_mm:
         return angle, []
     finding = ENTRY_CHANGED(
         where=at_place(contour.name, along.path.start.tolist()),
         measured=ramp,
-        limit=MOST_LAPS * along.total_mm,
+        limit=MAX_LAPS * along.total_mm,
         length=along.total_mm,
     )
     return None, [finding]

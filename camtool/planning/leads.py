@@ -30,7 +30,7 @@ from camtool.planning.findings import LEAD_LEFT_OUT, LEAD_LEFT_OUT_IN_PART
 from camtool.planning.items import Contour
 from camtool.planning.job import Lead
 from camtool.planning.naming import at_place
-from camtool.planning.paths import QUARTER, MeasuredPath, backwards
+from camtool.planning.paths import QUARTER, MeasuredPath, reverse_vertices
 
 LEAD_SLACK_MM = 1e-5
 """A lead may come nearer to wanted material than the tool's radius by this much."""
@@ -99,7 +99,7 @@ class Border(Struct, frozen=True, eq=False):
         meets = crossings(lead, Segments.of(self.line))
         parts = np.unique(np.concatenate([[0.0, 1.0], meets.ta]))
         rows = np.zeros(len(parts) - 1, dtype=np.int64)
-        left = left_of(self.line, point_at(lead, rows, 0.5 * (parts[:-1] + parts[1:])))
+        left = signed_distances(self.line, point_at(lead, rows, 0.5 * (parts[:-1] + parts[1:])))
         return bool(((left if self.free_left else -left) >= -LEAD_SLACK_MM).all())
 
 
@@ -136,14 +136,16 @@ def leads_of(
     ):
         place = along.at(np.array([length]))[0]
         ahead = sign * (along.directions if sign < 0.0 else along.arrivals)(np.array([length]))[0]
-        vertices, size = _longest(lead, (place, ahead), _bend(sign, side), border)
+        vertices, size = _longest_lead(lead, (place, ahead), _lead_bulge(sign, side), border)
         if size < lead.length_mm and lead.kind != "none":
-            findings.append(_shortened(name, lead, size, at_place(contour.name, place.tolist())))
-        made.append(backwards(vertices) if sign < 0.0 else vertices)
+            findings.append(
+                _shortened_finding(name, lead, size, at_place(contour.name, place.tolist()))
+            )
+        made.append(reverse_vertices(vertices) if sign < 0.0 else vertices)
     return Leads(made[0], made[1], tuple(findings))
 
 
-def _bend(sign: float, material_left: bool | None) -> float:
+def _lead_bulge(sign: float, material_left: bool | None) -> float:
     """Bulge of a lead that goes away from the contour: a quarter arc to the free side.
 
     Seen away from the contour, what is free on the right of the travel is on the right of a
@@ -154,7 +156,7 @@ def _bend(sign: float, material_left: bool | None) -> float:
     return QUARTER * (-sign if material_left else sign)
 
 
-def _longest(
+def _longest_lead(
     lead: Lead, at: tuple[Floats, Floats], bulge: float, border: Border
 ) -> tuple[Floats, float]:
     """Return the longest permitted lead as it leaves its place at the contour; and its size,
@@ -204,7 +206,7 @@ def segments_near(lines: Polylines, place: Floats, reach_mm: float) -> Segments:
     return Segments.between(vertices[keep, :2], ends, vertices[keep, 2], path)
 
 
-def left_of(path: Polyline, points: Floats) -> Floats:
+def signed_distances(path: Polyline, points: Floats) -> Floats:
     """Return the distances (J,) of points (J, 2) from a path, positive to its left, negative to
     its right.
 
@@ -240,7 +242,7 @@ def left_of(path: Polyline, points: Floats) -> Floats:
     return left
 
 
-def _shortened(name: str, lead: Lead, size: float, where: str) -> Finding:
+def _shortened_finding(name: str, lead: Lead, size: float, where: str) -> Finding:
     return (LEAD_LEFT_OUT_IN_PART if size else LEAD_LEFT_OUT)(
         where=where, measured=size, limit=lead.length_mm, lead=name
     )

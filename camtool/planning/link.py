@@ -69,36 +69,36 @@ def link(
         if not runs:
             continue
         builder.source = ""
-        changes = _changes(tool, operation.tool)
+        changes = _is_tool_change(tool, operation.tool)
         if changes:
-            cooled = _cool(builder, cooled, "off")
-            speed = _spin(builder, speed, None, spindle)
+            cooled = _set_coolant(builder, cooled, "off")
+            speed = _set_spindle(builder, speed, None, spindle)
             if tool is not None:
-                _to_change(builder, machine, lowest)
-        builder.operation(_note(setting))
+                _go_to_tool_change(builder, machine, lowest)
+        builder.operation(_operation_note(setting))
         if changes:
             builder.event(Kind.TOOL_CHANGE, float(operation.tool.number or 0))
             approach = approaches() if approaches is not None else None
         tool = operation.tool
-        speed = _spin(builder, speed, setting.spindle_rpm, spindle)
-        cooled = _cool(builder, cooled, operation.coolant)
+        speed = _set_spindle(builder, speed, setting.spindle_rpm, spindle)
+        cooled = _set_coolant(builder, cooled, operation.coolant)
         if builder.position[2] > heights[0]:  # from where tools are changed, not down aslant
             builder.rapid(*_rounded(runs.vertices[0, :2]).tolist())
         for lot in _lots(runs):
-            _cut(builder, lot, done, heights, approach)
+            _add_cuts(builder, lot, done, heights, approach)
         done += len(runs)
     builder.source = ""
-    _cool(builder, cooled, "off")
-    _spin(builder, speed, None, spindle)
+    _set_coolant(builder, cooled, "off")
+    _set_spindle(builder, speed, None, spindle)
     return builder.rapid(*machine.defaults.park_mm).event(Kind.END)
 
 
-def _changes(before: Tool | None, tool: Tool) -> bool:
+def _is_tool_change(before: Tool | None, tool: Tool) -> bool:
     """True if the program must ask for this tool: it has a number, and another was in."""
     return tool.number is not None and (before is None or before.number != tool.number)
 
 
-def _to_change(builder: ToolpathBuilder, machine: Machine, lowest_mm: float) -> None:
+def _go_to_tool_change(builder: ToolpathBuilder, machine: Machine, lowest_mm: float) -> None:
     """Move to where the machine changes tools, up first; where it states none, up as far as a hand
     needs and to where it parks. `lowest_mm`: the lowest Z of the program."""
     x, y, z = builder.position
@@ -120,7 +120,7 @@ def tool_note(tool: Tool) -> ToolNote:
     return ToolNote(tool.number, tool.name, tool.kind, tool.diameter_mm, tool.tip_angle_rad)
 
 
-def _note(setting: Setting) -> OperationNote:
+def _operation_note(setting: Setting) -> OperationNote:
     """Return the description of an operation for the comments of the program."""
     operation, tool = setting.operation, setting.operation.tool
     return OperationNote(
@@ -136,7 +136,7 @@ def _note(setting: Setting) -> OperationNote:
     )
 
 
-def _spin(
+def _set_spindle(
     builder: ToolpathBuilder, speed: float | None, wanted: float | None, spindle: Spindle
 ) -> float | None:
     """Bring the spindle from one speed to another, None being off; return the new speed. Nothing
@@ -152,7 +152,7 @@ def _spin(
     return wanted
 
 
-def _cool(builder: ToolpathBuilder, now: str, wanted: str) -> str:
+def _set_coolant(builder: ToolpathBuilder, now: str, wanted: str) -> str:
     """Change from one way of cooling to another; return the new one."""
     if now != wanted and (wanted == "off" or (now not in ("off", wanted) and wanted != "both")):
         builder.event(Kind.COOLANT_OFF, None)
@@ -203,7 +203,7 @@ def _lots(runs: Runs) -> Iterator[_Lot]:
         begin = end
 
 
-def _cut(
+def _add_cuts(
     builder: ToolpathBuilder,
     lot: _Lot,
     before: int,

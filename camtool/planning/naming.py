@@ -10,7 +10,7 @@ from camtool.machine.model import Machine
 from camtool.planning.job import Operation, Tool
 from camtool.toolpath.wanted import TOOL_SHAPES
 
-MOST_PLACES = 12
+MAX_LISTED = 12
 """At most this many findings of a kind are listed one by one, the others are counted."""
 
 
@@ -80,9 +80,9 @@ def own_numbers(machine: Machine, settings: Sequence[str]) -> str:
 
 
 def shortened_list(findings: Sequence[Finding], more: Sentence) -> list[Finding]:
-    """Return the first `MOST_PLACES` of findings of one kind, and one more that counts the
+    """Return the first `MAX_LISTED` of findings of one kind, and one more that counts the
     others."""
-    listed, rest = list(findings[:MOST_PLACES]), findings[MOST_PLACES:]
+    listed, rest = list(findings[:MAX_LISTED]), findings[MAX_LISTED:]
     if rest:
         listed.append(more(where=rest[0].where, measured=len(rest), severity=rest[0].severity))
     return listed

@@ -21,7 +21,7 @@ from camtool.errors import OptionError
 from camtool.geometry.nesting import Nesting
 from camtool.geometry.polylines import Polyline, Polylines, begin_lines_at, reverse_lines
 from camtool.planning.items import Contour, Fixed, Items, contours_of
-from camtool.planning.paths import flat, joints
+from camtool.planning.paths import flat_path, joints
 
 if TYPE_CHECKING:
     from camtool.kernels.tours import Tour
@@ -32,16 +32,16 @@ Point = tuple[float, float]
 KICKS_EACH = 20
 """Number of kicks for each item: work against length."""
 
-LEAST_KICKS = 700
+MIN_KICKS = 700
 """Number of kicks for few items: the search is still instantaneous."""
 
-MOST_KICKS = 4000
+MAX_KICKS = 4000
 """At most this many kicks for any number of items: less than a second of work."""
 
 SEED = 20_011
 """Seed of the pseudo-random places of the kicks."""
 
-MOST_PLACES = 8
+MAX_PLACES_EACH = 8
 """Number of evenly spread variants that stand for the positions of an item with more of them."""
 
 SHOWN_ITEMS = 5
@@ -102,7 +102,7 @@ def chosen_paths(contours: Sequence[Contour], choices: Choices, rows: Ints) -> P
     rank = rows - choices.first[owners]
     # The places in each closed path where it may begin, the first, the second, and so on.
     lines = _lines_of(contours)
-    begins = np.flatnonzero(_begins(contours, lines))
+    begins = np.flatnonzero(_start_mask(contours, lines))
     first = np.searchsorted(begins, lines.offsets[:-1])[owners]
     closed = lines.closed[owners]
     start = np.where(closed, begins[first + np.where(closed, rank, 0)] - lines.offsets[owners], 0)
@@ -110,7 +110,7 @@ def chosen_paths(contours: Sequence[Contour], choices: Choices, rows: Ints) -> P
     return reverse_lines(begin_lines_at(lines, start), ~closed & (rank > 0))
 
 
-def drawn(choices: Choices) -> Ints:
+def drawn_order(choices: Choices) -> Ints:
     """Rows (M,): all items in the order in which they come, each in its first variant."""
     return choices.first[:-1]
 
@@ -143,10 +143,10 @@ def best_order(
     tree = tree_of(choices.entry)
     rows = nearest_first(tree, ends, first, after_first, after, waits, start)
     if len(rows) < len(choices):
-        raise _circle(set(range(len(choices))) - set(choices.owner[rows].tolist()))
+        raise _cycle_error(set(range(len(choices))) - set(choices.owner[rows].tolist()))
     tour = tour_of(choices, before, rows, start, goal)
     settled(tour)
-    kicks = min(max(KICKS_EACH * len(choices), LEAST_KICKS), MOST_KICKS)
+    kicks = min(max(KICKS_EACH * len(choices), MIN_KICKS), MAX_KICKS)
     kicked(tour, kicks, SEED)
     while True:
         order = tour.item[1:-1]
@@ -160,7 +160,7 @@ def tour_of(choices: Choices, before: Ints, rows: Ints, start: Floats, goal: Flo
     from camtool.kernels.tours import Tour, neighbours, tree_of
 
     count, variants = len(choices), len(choices.owner)
-    turned = _turned(choices)
+    turned = _reversed_rows(choices)
     stays = bool(np.isnan(goal).any())
     goal = start if stays else goal
     outside = [np.tile(start, 2), np.tile(goal, 2)]
@@ -191,7 +191,7 @@ def tour_of(choices: Choices, before: Ints, rows: Ints, start: Floats, goal: Flo
     )
 
 
-def _turned(choices: Choices) -> Ints:
+def _reversed_rows(choices: Choices) -> Ints:
     """Return, for each row (S,), the row of its item with entry and exit exchanged; itself when
     there is none."""
     turned = np.arange(len(choices.owner))
@@ -199,11 +199,11 @@ def _turned(choices: Choices) -> Ints:
     of = choices.owner[rows]
     for item in range(0, len(choices), ITEMS_AT_ONCE):
         some = rows[slice(*np.searchsorted(of, [item, item + ITEMS_AT_ONCE]).tolist())]
-        turned[some] = _turned_among(choices, some)
+        turned[some] = _reversed_rows_among(choices, some)
     return turned
 
 
-def _turned_among(choices: Choices, rows: Ints) -> Ints:
+def _reversed_rows_among(choices: Choices, rows: Ints) -> Ints:
     """Return, for each of these rows (R,), the row of its item with entry and exit exchanged; the
     rows are all of their items that end elsewhere than they begin."""
     if len(rows) == 0:
@@ -219,7 +219,7 @@ def _places(choices: Choices) -> tuple[Floats, Ints]:
     """Return places (N, 2) that stand for the items when neighbours are sought, and their owners
     (N,)."""
     first, variants = choices.first, np.diff(choices.first)
-    step = -(-variants // MOST_PLACES)
+    step = -(-variants // MAX_PLACES_EACH)
     rank = np.arange(len(choices.owner)) - first[choices.owner]
     rows = np.flatnonzero(rank % step[choices.owner] == 0)
     alone = rows[(choices.entry[rows] != choices.exit[rows]).any(axis=1)]
@@ -250,7 +250,7 @@ def _followers(before: Ints, count: int) -> tuple[Ints, Ints]:
     return np.searchsorted(pairs[:, 0], np.arange(count + 1)), pairs[:, 1].copy()
 
 
-def _circle(left: set[int]) -> OptionError:
+def _cycle_error(left: set[int]) -> OptionError:
     names = ", ".join(str(item) for item in sorted(left)[:SHOWN_ITEMS])
     return OptionError(
         f"{len(left)} items each have to be cut before another of them, among them {names}",
@@ -265,12 +265,12 @@ tool goes down and where it comes up."""
 
 def _fixed_ends(items: Items) -> Ends:
     """Return the only variant of each item that is cut as it is."""
-    fixed = [(k, item.runs) for k, item in _fixed(items)]
+    fixed = [(k, item.runs) for k, item in _fixed_items(items)]
     ends = [[runs[0].vertices[0, :2], runs[-1].vertices[-1, :2]] for _, runs in fixed]
     return np.array([k for k, _ in fixed], dtype=np.int64), np.array(ends).reshape(-1, 4)
 
 
-def _fixed(items: Items) -> Iterator[tuple[int, Fixed]]:
+def _fixed_items(items: Items) -> Iterator[tuple[int, Fixed]]:
     """Yield the items that are cut as they are, with their indices."""
     return ((k, item) for k, item in enumerate(items) if isinstance(item, Fixed))
 
@@ -291,7 +291,7 @@ def _contour_ends(items: Items) -> Iterator[Ends]:
     turned."""
     contours, owner = contours_of(items), _contour_rows(items)
     lines = _lines_of(contours)
-    begins = _begins(contours, lines) & np.repeat(lines.closed, np.diff(lines.offsets))
+    begins = _start_mask(contours, lines) & np.repeat(lines.closed, np.diff(lines.offsets))
     of = np.repeat(owner, np.diff(lines.offsets))
     yield of[begins], np.tile(lines.vertices[begins, :2], 2)
     opens = np.flatnonzero(~lines.closed)
@@ -308,7 +308,7 @@ def _contour_ends(items: Items) -> Iterator[Ends]:
     yield owner[opens[turns]], np.hstack([end, np.where(back, end, start)])[turns]
 
 
-def _begins(contours: Sequence[Contour], lines: Polylines) -> Bools:
+def _start_mask(contours: Sequence[Contour], lines: Polylines) -> Bools:
     """Return the mask (N,) of the vertices of `lines`, the paths of the contours, at which these
     may begin."""
     found, offsets = joints(lines), lines.offsets
@@ -355,7 +355,7 @@ def _shapes(items: Items) -> tuple[Polylines, Ints, Ints]:
         shape = np.array([known.setdefault(key, len(known)) for key in keys])
         first = np.unique(shape, return_index=True)[1].tolist()
         lines = Polylines.of(outlines[k] or contours[k].path for k in first)
-    others = [(k, path) for k, item in _fixed(items) for path in _places_of(item)]
+    others = [(k, path) for k, item in _fixed_items(items) for path in _places_of(item)]
     return (
         Polylines.joined([lines, Polylines.of(path for _, path in others)]),
         np.concatenate([shape, len(lines) + np.arange(len(others))]),
@@ -371,4 +371,4 @@ def _places_of(item: Fixed) -> Iterator[Polyline]:
     for run in item.runs:
         x, y = run.vertices[0, :2]
         speck = np.array([[x - SPECK_MM / 2, y, 0.0], [x + SPECK_MM / 2, y, 0.0]])
-        yield flat(run.vertices) or Polyline(speck)
+        yield flat_path(run.vertices) or Polyline(speck)

@@ -22,7 +22,7 @@ from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Seg
 QUARTER = math.tan(math.pi / 8.0)
 """The bulge of a quarter of a circle."""
 
-LARGEST_PART_SWEEP_RAD = 2.0 * np.pi - 1e-3
+MAX_PART_SWEEP_RAD = 2.0 * np.pi - 1e-3
 """Arcs are not put together beyond this, except a whole circle: an end near the start could be
 taken for the other side of it."""
 
@@ -112,19 +112,19 @@ class MeasuredPath:
 
     def at(self, lengths: Floats) -> Floats:
         """Return the places (J, 2) at these lengths (J,) mm."""
-        row, part = self._where(lengths, 0.0)
+        row, part = self._locate(lengths, 0.0)
         return point_at(self.segments, row, part)
 
     def directions(self, lengths: Floats) -> Floats:
         """Return the unit tangents (J, 2) at these lengths (J,) mm; at a vertex, of what follows
         it."""
-        row, part = self._where(lengths, POSITION_EPS_MM)
+        row, part = self._locate(lengths, POSITION_EPS_MM)
         return Frames.of(self.segments[row]).tangent_at(part)
 
     def arrivals(self, lengths: Floats) -> Floats:
         """Return the unit tangents (J, 2) at these lengths (J,) mm; at a vertex, of what leads to
         it."""
-        row, part = self._where(lengths, -POSITION_EPS_MM)
+        row, part = self._locate(lengths, -POSITION_EPS_MM)
         return Frames.of(self.segments[row]).tangent_at(part)
 
     def nearest_to(self, point: tuple[float, float]) -> float:
@@ -157,7 +157,7 @@ class MeasuredPath:
         found = piece(self.paths.tracks, self.index, begin, end)
         return np.ascontiguousarray(found[:, [0, 1, 3]])
 
-    def _where(self, lengths: Floats, ahead_mm: float) -> tuple[Ints, Floats]:
+    def _locate(self, lengths: Floats, ahead_mm: float) -> tuple[Ints, Floats]:
         """Return the segment that is so far ahead of each length, and the part of it at the
         length.
 
@@ -172,7 +172,7 @@ class MeasuredPath:
         return row, np.clip(part, 0.0, 1.0)
 
 
-def backwards(vertices: Floats) -> Floats:
+def reverse_vertices(vertices: Floats) -> Floats:
     """Return vertices (k, n) of an open path, the bulge in the last column, travelled in the other
     direction."""
     back = vertices[::-1].copy()
@@ -181,7 +181,7 @@ def backwards(vertices: Floats) -> Floats:
     return back
 
 
-def joined(paths: Sequence[Floats]) -> Floats:
+def join_paths(paths: Sequence[Floats]) -> Floats:
     """Join open paths (k, n), each of which begins where the one before it ends."""
     return np.concatenate([*(path[:-1] for path in paths[:-1]), paths[-1]])
 
@@ -191,14 +191,14 @@ def midpoints(segments: Segments) -> Floats:
     return point_at(segments, np.arange(len(segments)), np.full(len(segments), 0.5))
 
 
-def runs_of_true(values: Bools) -> tuple[Ints, Ints]:
+def true_ranges(values: Bools) -> tuple[Ints, Ints]:
     """Return the ranges of true values: first indices (J,), and the indices (J,) behind the last
     ones."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], values.astype(np.int64), [0]])))
     return edges[::2], edges[1::2]
 
 
-def flat(vertices: Floats) -> Polyline | None:
+def flat_path(vertices: Floats) -> Polyline | None:
     """Return a run (n, 4) of x, y, z, bulge seen from above, without the moves that lead nowhere
     there; None when it stays at one place."""
     kept: list[Floats] = []
@@ -252,7 +252,7 @@ def cuts(vertices: Floats, feed_mm_min: Floats, first: Ints) -> Cuts:
     run = np.repeat(np.arange(len(first) - 1), np.diff(first) - 1)
     segments = Segments.between(vertices[rows, :2], vertices[rows + 1, :2], vertices[rows, 3], run)
     z, end_z, feed = vertices[rows, 2], vertices[rows + 1, 2], feed_mm_min[rows]
-    heads = np.flatnonzero(_begins(segments, _goes_on(segments, end_z - z, feed)))
+    heads = np.flatnonzero(_begins_move(segments, _continues(segments, end_z - z, feed)))
     if len(heads) == 0:
         return Cuts(run, np.empty((0, 3)), np.empty((0, 2)), np.empty(0, dtype=np.bool_), feed)
     # The longest arc of those that are one knows the centre best.
@@ -271,7 +271,7 @@ def cuts(vertices: Floats, feed_mm_min: Floats, first: Ints) -> Cuts:
     return Cuts(run=run[heads], end=end, centre=centre, ccw=bulge > 0.0, feed=feed[heads])
 
 
-def _begins(segments: Segments, goes_on: Bools) -> Bools:
+def _begins_move(segments: Segments, goes_on: Bools) -> Bools:
     """Mask (n,) of the segments with which a move begins, `goes_on` (n−1,) where one may go on in
     the next: an arc sweeps no more than one may, or a whole circle."""
     begins = np.ones(len(segments), dtype=np.bool_)
@@ -280,7 +280,7 @@ def _begins(segments: Segments, goes_on: Bools) -> Bools:
         if row - 1 != last:
             begin, swept = row - 1, float(segments.sweep[row - 1])
         last, sweep = row, float(segments.sweep[row])
-        if _within(segments, begin, row, swept + sweep):
+        if _is_single_arc(segments, begin, row, swept + sweep):
             begins[row] = False
             swept += sweep
         else:
@@ -288,15 +288,15 @@ def _begins(segments: Segments, goes_on: Bools) -> Bools:
     return begins
 
 
-def _within(segments: Segments, begin: int, last: int, swept: float) -> bool:
+def _is_single_arc(segments: Segments, begin: int, last: int, swept: float) -> bool:
     """True if the rows from `begin` to `last` sweep no more than an arc may, or a whole circle."""
-    if abs(swept) <= LARGEST_PART_SWEEP_RAD:
+    if abs(swept) <= MAX_PART_SWEEP_RAD:
         return True
     apart = segments.end[last] - segments.start[begin]
     return bool(np.hypot(*apart) <= POSITION_EPS_MM and abs(swept) <= 2.0 * np.pi + SLOPE_EPS)
 
 
-def _goes_on(segments: Segments, rise: Floats, feed: Floats) -> Bools:
+def _continues(segments: Segments, rise: Floats, feed: Floats) -> Bools:
     """Mask (n−1,) of the segments that go on in the next: one run, circle, slope and feed."""
     found = _same_arc(segments[:-1], segments[1:]) & (feed[:-1] == feed[1:])
     found &= np.diff(segments.path) == 0

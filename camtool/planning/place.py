@@ -32,20 +32,20 @@ from camtool.planning.findings import POINTS_MERGED
 from camtool.planning.job import Job, Placement
 from camtool.records import replace
 
-MOST_SIZE_MM = 1e5
+MAX_SIZE_MM = 1e5
 """The cut geometry is no larger than this: 100 m, as the longest travel of a machine file."""
 
-MOST_AWAY_MM = 1e6
+MAX_DISTANCE_MM = 1e6
 """The cut geometry is no farther from part zero than this, a kilometre."""
 
-MOST_POINTS = 10_000_000
+MAX_POINTS = 10_000_000
 """Copies make at most this many vertices: far beyond any program, well within memory."""
 
 SCALE_SHARE = 1e-3
 """A drawing counts as read for a scale that differs by no more than this share of it."""
 
 
-class Map(Struct, frozen=True, eq=False):
+class AffineMap(Struct, frozen=True, eq=False):
     """An affine map: p ↦ `matrix` p + `shift`: (2, 2) and (2,), mm; lengths grow `scale` times."""
 
     matrix: Floats
@@ -68,7 +68,7 @@ class Map(Struct, frozen=True, eq=False):
         bulge = 0.0 - vertices[:, 2] if flipped else vertices[:, 2]
         return np.column_stack([self.points(vertices[:, :2]), bulge])
 
-    def moved(self, shift: Floats) -> Map:
+    def moved(self, shift: Floats) -> AffineMap:
         """Return the map followed by a shift (2,) mm."""
         return replace(self, shift=self.shift + shift)
 
@@ -80,16 +80,16 @@ def place(drawing: Drawing, job: Job) -> Drawing:
     Copies come one after the other, row by row: all paths and marks of the first, then of the
     second, whose sources name the copy ("CIRCLE 2F copy 2"). Fit, lower left and centre take the
     box around all that the operations take. What was found on reading stays in the drawing's
-    frame. Points that the scale brings together are merged (`collapsed` counts them). Raises
+    frame. Points that the scale brings together are merged (`collapse_findings` counts them).
     OptionError for an impossible fit, for a scale that leaves no shape at all, and for what is
     larger than any machine.
     """
-    placed = drawing if job.placement == Placement() else _placed(drawing, job)
+    placed = drawing if job.placement == Placement() else _place(drawing, job)
     _refuse_too_large(placed, job.placement)
     return placed
 
 
-def _placed(drawing: Drawing, job: Job) -> Drawing:
+def _place(drawing: Drawing, job: Job) -> Drawing:
     """Return the drawing where the job's placement says, of whatever size."""
     placement = job.placement
     _refuse_too_many(drawing, placement)
@@ -97,10 +97,10 @@ def _placed(drawing: Drawing, job: Job) -> Drawing:
     off = datum_off(drawing, job, maps[0])
     if len(maps) == 1 and _is_identity(maps[0]) and not off:
         return drawing
-    return replace(_repeated(drawing, maps), datum_off_mm=off)
+    return replace(_map_drawing(drawing, maps), datum_off_mm=off)
 
 
-def placements(drawing: Drawing, job: Job) -> list[Map]:
+def placements(drawing: Drawing, job: Job) -> list[AffineMap]:
     """Return the map of each copy of the drawing into the work frame, row by row.
 
     Raises OptionError for an impossible fit.
@@ -118,7 +118,7 @@ def part_scale(drawing: Drawing, job: Job) -> float:
     return _first_map(drawing, job).scale
 
 
-def collapsed(drawing: Drawing, placed: Drawing, job: Job) -> list[Finding]:
+def collapse_findings(drawing: Drawing, placed: Drawing, job: Job) -> list[Finding]:
     """Return a finding for paths that the scale made too small for a shape: points that became
     one, and paths that became a point and are left out (a warning: something drawn is not cut)."""
     columns, rows = job.placement.copies
@@ -138,34 +138,34 @@ def collapsed(drawing: Drawing, placed: Drawing, job: Job) -> list[Finding]:
     ]
 
 
-def _first_map(drawing: Drawing, job: Job) -> Map:
+def _first_map(drawing: Drawing, job: Job) -> AffineMap:
     """Return the mirror, rotation and scale about the drawing's zero."""
-    placement, turned = job.placement, _turned(job.placement)
+    placement, turned = job.placement, _mirror_and_rotation(job.placement)
     scale = placement.scale
     if placement.fit_mm is not None:
         scale = _fitting_scale(placement.fit_mm, _box(drawing, job, turned), drawing.file)
-    return Map(scale * turned.matrix, turned.shift, scale)
+    return AffineMap(scale * turned.matrix, turned.shift, scale)
 
 
-def _turned(placement: Placement) -> Map:
+def _mirror_and_rotation(placement: Placement) -> AffineMap:
     """Return the mirror and rotation about the drawing's zero."""
     cosine, sine = _cosine_and_sine(placement.rotate_rad)
     flip = np.diag([-1.0 if placement.mirror == axis else 1.0 for axis in ("x", "y")])
-    return Map(np.array([[cosine, -sine], [sine, cosine]]) @ flip, np.zeros(2), 1.0)
+    return AffineMap(np.array([[cosine, -sine], [sine, cosine]]) @ flip, np.zeros(2), 1.0)
 
 
 # The box by which a drawing is placed and fitted is that of the arcs that stand for its curves. A
 # side of it lies off that of what was drawn by no more than the segments that reach so far do.
 
 
-def datum_off(drawing: Drawing, job: Job, placed: Map) -> float:
+def datum_off(drawing: Drawing, job: Job, placed: AffineMap) -> float:
     """Return an upper bound of the distance, mm in the work frame, of the drawing that is `placed`
     from where the box of what was drawn would have put it; 0 where no box is asked for."""
     placement = job.placement
     by_box = placement.origin in ("lower-left", "centre")
     if not (by_box or placement.fit_mm) or not drawing.off_mm.any():
         return 0.0
-    turned = _turned(placement)
+    turned = _mirror_and_rotation(placement)
     box, slack = _box(drawing, job, turned), _box_slack(drawing, job, turned)
     if box is None:
         return 0.0
@@ -179,18 +179,18 @@ def datum_off(drawing: Drawing, job: Job, placed: Map) -> float:
         far = math.hypot(*np.abs(box).max(axis=1))
     if placement.fit_mm is not None:
         room = np.array(placement.fit_mm)
-        asked = (room > 0.0) & (size > 0.0)
-        share = slack.sum(axis=1)[asked] / size[asked]
-        scales = room[asked] / size[asked]
+        is_bounded = (room > 0.0) & (size > 0.0)
+        share = slack.sum(axis=1)[is_bounded] / size[is_bounded]
+        scales = room[is_bounded] / size[is_bounded]
         least = scales.min() * (1.0 + share[scales.argmin()])
         off += far * float(share[scales * (1.0 - share) <= least].max())
     return float(placed.scale * off)
 
 
-def _box_slack(drawing: Drawing, job: Job, where: Map) -> Floats:
+def _box_slack(drawing: Drawing, job: Job, where: AffineMap) -> Floats:
     """Return an upper bound (2, 2), mm, of the distance of each side of `_box` from that of what
     was drawn."""
-    paths, marks = taken(drawing, job)
+    paths, marks = rows_taken(drawing, job)
     lines, off = drawing.paths.select(paths), drawing.off_mm[:, 0]
     if len(paths) < len(drawing.paths):
         chosen = np.zeros(len(drawing.paths), dtype=np.bool_)
@@ -247,7 +247,7 @@ def _fitting_scale(fit_mm: tuple[float, float], box: Floats | None, file: str) -
     return float(min(scales))
 
 
-def _origin(drawing: Drawing, job: Job, first: Map, shifts: Floats) -> Floats:
+def _origin(drawing: Drawing, job: Job, first: AffineMap, shifts: Floats) -> Floats:
     """Return the place (2,), before it is moved, that becomes part zero."""
     origin = job.placement.origin
     if not isinstance(origin, str):
@@ -260,13 +260,13 @@ def _origin(drawing: Drawing, job: Job, first: Map, shifts: Floats) -> Floats:
     return np.asarray(low if origin == "lower-left" else 0.5 * (low + high))
 
 
-def _box(drawing: Drawing, job: Job, where: Map) -> Floats | None:
+def _box(drawing: Drawing, job: Job, where: AffineMap) -> Floats | None:
     """Return the box (2, 2) of all that the operations take, mapped by `where`; None when they
     take nothing."""
-    paths, marks = taken(drawing, job)
+    paths, marks = rows_taken(drawing, job)
     boxes = []
     if paths:
-        boxes.append(extents(_lines(drawing.paths.select(paths), [where])[0]))
+        boxes.append(extents(_map_lines(drawing.paths.select(paths), [where])[0]))
     if marks:
         points = where.points(np.array([drawing.marks[index].at_mm for index in marks]))
         boxes.append(np.column_stack([points.min(axis=0), points.max(axis=0)]))
@@ -276,12 +276,12 @@ def _box(drawing: Drawing, job: Job, where: Map) -> Floats | None:
     return np.column_stack([both[:, :, 0].min(axis=0), both[:, :, 1].max(axis=0)])
 
 
-def taken(drawing: Drawing, job: Job) -> tuple[list[int], list[int]]:
+def rows_taken(drawing: Drawing, job: Job) -> tuple[list[int], list[int]]:
     """Return the indices of the paths that any operation takes, and of the marks that any one
     drills."""
     drills = [operation for operation in job.operations if operation.contract.takes == "holes"]
-    takes = _remembered(job.takes)
-    drilled = _remembered(lambda *names: any(drill.takes(*names) for drill in drills))
+    takes = _cached(job.takes)
+    drilled = _cached(lambda *names: any(drill.takes(*names) for drill in drills))
     names = zip(drawing.layers, drawing.colours, strict=True)
     return (
         [index for index, each in enumerate(names) if takes(*each)],
@@ -289,17 +289,17 @@ def taken(drawing: Drawing, job: Job) -> tuple[list[int], list[int]]:
     )
 
 
-def _remembered(takes: Callable[[str, str], bool]) -> Callable[[str, str], bool]:
+def _cached(takes: Callable[[str, str], bool]) -> Callable[[str, str], bool]:
     """Return a function with the same answers that matches each layer and colour only once."""
-    known: dict[tuple[str, str], bool] = {}
+    answers: dict[tuple[str, str], bool] = {}
 
-    def asked(layer: str, colour: str) -> bool:
+    def answer(layer: str, colour: str) -> bool:
         key = (layer, colour)
-        if key not in known:
-            known[key] = takes(layer, colour)
-        return known[key]
+        if key not in answers:
+            answers[key] = takes(layer, colour)
+        return answers[key]
 
-    return asked
+    return answer
 
 
 def _copy_shifts(placement: Placement) -> Floats:
@@ -313,9 +313,9 @@ def _refuse_too_many(drawing: Drawing, placement: Placement) -> None:
     columns, rows = placement.copies
     points = len(drawing.paths.vertices) + len(drawing.unchosen.paths.vertices)
     count = columns * rows * (points + len(drawing.marks))
-    if count > MOST_POINTS:
+    if count > MAX_POINTS:
         raise OptionError(
-            f"{columns} by {rows} copies have {count} points, more than {MOST_POINTS}",
+            f"{columns} by {rows} copies have {count} points, more than {MAX_POINTS}",
             where="key copies",
             mend="make fewer copies",
         )
@@ -328,10 +328,10 @@ def _refuse_too_large(placed: Drawing, placement: Placement) -> None:
     if len(places) == 0:
         return
     size = float(np.ptp(places, axis=0).max())
-    if not size <= MOST_SIZE_MM:
-        key = _what_enlarges(placement)
+    if not size <= MAX_SIZE_MM:
+        key = _enlarging_key(placement)
         raise OptionError(
-            f"what is cut is {size:.4g} mm long, more than {MOST_SIZE_MM:g} mm",
+            f"what is cut is {size:.4g} mm long, more than {MAX_SIZE_MM:g} mm",
             file=placed.file,
             where=f"key {key}" if key else None,
             mend=f"give a smaller {key}"
@@ -339,16 +339,16 @@ def _refuse_too_large(placed: Drawing, placement: Placement) -> None:
             else "give --units, a scale, or with --layer what is to be cut",
         )
     away = float(np.abs(places).max())
-    if away > MOST_AWAY_MM:
+    if away > MAX_DISTANCE_MM:
         raise OptionError(
-            f"what is cut lies {away:.4g} mm from part zero, more than {MOST_AWAY_MM:g} mm",
+            f"what is cut lies {away:.4g} mm from part zero, more than {MAX_DISTANCE_MM:g} mm",
             file=placed.file,
             where="key origin",
             mend="use an origin on what is cut: lower-left or centre",
         )
 
 
-def _what_enlarges(placement: Placement) -> str:
+def _enlarging_key(placement: Placement) -> str:
     """Return the key that makes a drawing large; "" when none does."""
     if placement.scale > 1.0:
         return "scale"
@@ -357,14 +357,14 @@ def _what_enlarges(placement: Placement) -> str:
     return "pitch" if placement.copies != (1, 1) else ""
 
 
-def _is_identity(where: Map) -> bool:
+def _is_identity(where: AffineMap) -> bool:
     return np.array_equal(where.matrix, np.eye(2)) and not where.shift.any()
 
 
-def _repeated(drawing: Drawing, maps: list[Map]) -> Drawing:
+def _map_drawing(drawing: Drawing, maps: list[AffineMap]) -> Drawing:
     """Return the drawing with all that has a place repeated for each map; paths that the scale
     makes a point are left out."""
-    paths, rows, kept = _lines(drawing.paths, maps)
+    paths, rows, kept = _map_lines(drawing.paths, maps)
     off = np.tile(maps[0].scale * drawing.off_mm, (len(maps), 1))
     copy, path = np.divmod(rows, max(1, len(drawing.paths)))
     which = list(zip(copy.tolist(), path.tolist(), strict=True))
@@ -382,14 +382,14 @@ def _repeated(drawing: Drawing, maps: list[Map]) -> Drawing:
             for n, where in enumerate(maps)
             for mark in drawing.marks
         ),
-        gaps=_gaps(drawing.gaps, maps),
-        closed_gaps=_gaps(drawing.closed_gaps, maps),
-        healing=_healing(drawing, maps, rows),
-        unchosen=_around(drawing.unchosen, maps),
+        gaps=_map_gaps(drawing.gaps, maps),
+        closed_gaps=_map_gaps(drawing.closed_gaps, maps),
+        healing=_map_healing(drawing, maps, rows),
+        unchosen=_map_unchosen(drawing.unchosen, maps),
     )
 
 
-def _lines(lines: Polylines, maps: list[Map]) -> tuple[Polylines, Ints, Ints]:
+def _map_lines(lines: Polylines, maps: list[AffineMap]) -> tuple[Polylines, Ints, Ints]:
     """Return the paths under each map, one map after the other, the indices (copy · paths + path)
     of those that remain, and the mask of the vertices that do: points that the scale brings
     together are merged, and a path of one point is dropped.
@@ -425,11 +425,11 @@ def _lines(lines: Polylines, maps: list[Map]) -> tuple[Polylines, Ints, Ints]:
         ) from error
 
 
-def _around(unchosen: Unchosen, maps: list[Map]) -> Unchosen:
+def _map_unchosen(unchosen: Unchosen, maps: list[AffineMap]) -> Unchosen:
     """Return the contours that were not chosen under each map, except those that shrink to
     points."""
     try:
-        paths, rows, _ = _lines(unchosen.paths, maps)
+        paths, rows, _ = _map_lines(unchosen.paths, maps)
     except OptionError:  # nothing is left of them; what is chosen has been placed already
         return Unchosen()
     copy, path = np.divmod(rows, max(1, len(unchosen.paths)))
@@ -446,7 +446,7 @@ def _copy_name(source: str, copy: int) -> str:
     return source if copy == 0 else f"{source} copy {copy + 1}"
 
 
-def _gaps(gaps: tuple[Gap, ...], maps: list[Map]) -> tuple[Gap, ...]:
+def _map_gaps(gaps: tuple[Gap, ...], maps: list[AffineMap]) -> tuple[Gap, ...]:
     return tuple(
         replace(gap, at_mm=where.point(gap.at_mm), size_mm=gap.size_mm * where.scale)
         for where in maps
@@ -454,7 +454,7 @@ def _gaps(gaps: tuple[Gap, ...], maps: list[Map]) -> tuple[Gap, ...]:
     )
 
 
-def _healing(drawing: Drawing, maps: list[Map], rows: Ints) -> Healing:
+def _map_healing(drawing: Drawing, maps: list[AffineMap], rows: Ints) -> Healing:
     """Return the places of branches and crossings of the paths `rows` that are left; the counts of
     what was corrected on reading stay as they were."""
     healing, paths = drawing.healing, len(drawing.paths)

@@ -58,14 +58,14 @@ from camtool.planning.order import (
     best_order,
     choices_of,
     chosen_paths,
-    drawn,
+    drawn_order,
     must_precede,
     travel_mm,
 )
-from camtool.planning.place import SCALE_SHARE, collapsed, place
+from camtool.planning.place import SCALE_SHARE, collapse_findings, place
 from camtool.planning.settings import setting_of
 from camtool.planning.sides import Sides, choose, runs_beside, takes_mark
-from camtool.planning.tabs import between, raised_over_bridges, with_tabs
+from camtool.planning.tabs import middle_of_longest_gap, raised_over_bridges, with_tabs
 from camtool.records import replace
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.findings import ProgramCode
@@ -135,7 +135,7 @@ def _linked(
         approaches = partial(Approaches, machine)
     builder = link(worked, machine, approaches)
     toolpath = builder.finish()
-    findings = collapsed(drawing, placed, job)
+    findings = collapse_findings(drawing, placed, job)
     findings += [finding for step in steps for finding in step.findings]
     findings += _left_over(placed, whole, any(step.runs for step in steps))
     findings += _coarse(drawing, placed)
@@ -234,7 +234,7 @@ def _step(
     findings = of_stage(setting.operation, [*unclear, *work.findings, *sided, *bare])
     findings = [*_text_as_edge(placed, chosen, setting.operation, findings), *findings]
     choices = choices_of(items)
-    before = travel_mm(choices, drawn(choices), *ends)
+    before = travel_mm(choices, drawn_order(choices), *ends)
     if job.minimise == "reversals":
         from camtool.planning.reversing import fewer_reversals
 
@@ -374,7 +374,9 @@ def _begun_between_tabs(contours: list[Contour]) -> list[Contour]:
     for contour in contours:
         tabs = contour.setting.operation.tabs
         if tabs and tabs.at_mm and contour.path.closed and not len(contour.starts):
-            path, starts = with_starts(contour.path, between(contour.path, tabs.at_mm), 0.0)
+            path, starts = with_starts(
+                contour.path, middle_of_longest_gap(contour.path, tabs.at_mm), 0.0
+            )
             contour = replace(contour, path=path, starts=starts)
         made.append(contour)
     return made

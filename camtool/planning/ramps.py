@@ -38,10 +38,10 @@ from camtool.planning.paths import MeasuredPaths
 
 ZProfile = list[tuple[float, float]]
 
-HELIX_LEAST = 0.1
+MIN_HELIX_SHARE = 0.1
 """The smallest useful radius of a helix, over the tool's radius."""
 
-MOST_LAPS = 200.0
+MAX_LAPS = 200.0
 """A ramp longer than this many laps (passes along an open path) is not made."""
 
 
@@ -55,7 +55,9 @@ def laps(total_mm: float, levels_mm: Sequence[float], overlap_mm: float) -> ZPro
     return points
 
 
-def apart(total_mm: float, levels_mm: Sequence[float], overlap_mm: float) -> list[ZProfile]:
+def separate_laps(
+    total_mm: float, levels_mm: Sequence[float], overlap_mm: float
+) -> list[ZProfile]:
     """Return one profile round a closed path for each level."""
     return [[(0.0, z), (total_mm + overlap_mm, z)] for z in levels_mm]
 
@@ -126,7 +128,7 @@ def _zigzag(total_mm: float, above_mm: float, z_mm: float, angle_rad: float) -> 
     return [(leg % 2 * ramp / legs, above_mm - leg * drop) for leg in range(legs)] + [(0.0, z_mm)]
 
 
-def lifted(
+def lift_paths(
     paths: MeasuredPaths, index: Sequence[int], profiles: Sequence[ZProfile]
 ) -> list[Floats]:
     """Return vertices (n, 4) for each run: x, y, z, bulge of the paths of these indices (R,) with

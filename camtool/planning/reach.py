@@ -34,8 +34,8 @@ from camtool.planning.findings import (
 )
 from camtool.planning.items import Setting
 from camtool.planning.job import Operation
-from camtool.planning.naming import MOST_PLACES, shortened_list, tool_name, width_name
-from camtool.planning.paths import MeasuredPath, runs_of_true
+from camtool.planning.naming import MAX_LISTED, shortened_list, tool_name, width_name
+from camtool.planning.paths import MeasuredPath, true_ranges
 
 TOGETHER_MM = 5e-6
 """Two boundaries nearer than this run together: above the error of two offsets in a row."""
@@ -168,7 +168,7 @@ class _Parts(Struct, frozen=True, eq=False):
         turn = int(np.argmin(self.wanted))
         length, away = np.roll(self.length, -turn), np.roll(self.away, -turn)
         begin = np.concatenate([[0.0], np.cumsum(length)]) + self.length[:turn].sum()
-        first, last = runs_of_true(np.roll(self.wanted, -turn))
+        first, last = true_ranges(np.roll(self.wanted, -turn))
         # The path begins with a part that is not wanted, so that every other one is wanted.
         edges = np.column_stack([first, last]).ravel()
         farthest = np.maximum.reduceat(np.append(away, 0.0), edges)[::2]
@@ -310,9 +310,9 @@ def cut_away_findings(kept: Polylines, operation: Operation) -> list[Finding]:
 
 
 def _places(pieces: Sequence[Unreached], called: str) -> Iterator[Finding]:
-    for piece in pieces[:MOST_PLACES]:
+    for piece in pieces[:MAX_LISTED]:
         yield UNREACHED(where=_where(piece), measured=piece.area_mm2, tool=called)
-    rest = pieces[MOST_PLACES:]
+    rest = pieces[MAX_LISTED:]
     if rest:
         area = sum(piece.area_mm2 for piece in rest)
         yield UNREACHED_MORE(where=_where(rest[0]), measured=area, tool=called, places=len(rest))

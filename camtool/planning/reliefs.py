@@ -26,7 +26,7 @@ from camtool.geometry.measure import segment_boxes
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
 from camtool.planning.paths import MeasuredPath
 
-RELIEF_LEAST_MM = 1e-3
+MIN_RELIEF_MM = 1e-3
 """A corner that the tool's edge misses by no more than this gets no relief."""
 
 RELIEF_MATCH_MM = 1e-5
@@ -39,7 +39,7 @@ RELIEF_SLACK_MM = 1e-4
 """A relief may come nearer to other wanted lines than it should by this much."""
 
 
-class Relieved(Struct, frozen=True, eq=False):
+class RelievedPath(Struct, frozen=True, eq=False):
     """The path with its reliefs; `left` (K, 2) mm, the corners that got none because the tool
     would have cut into other wanted lines."""
 
@@ -47,9 +47,9 @@ class Relieved(Struct, frozen=True, eq=False):
     left: Floats
 
 
-def relieved(
+def add_reliefs(
     path: Polyline, original: Polyline, near_mm: float, kind: str, keep_out: Polylines
-) -> Relieved:
+) -> RelievedPath:
     """Return a path of the tool centre with reliefs at the sharp inner corners of the `original`.
 
     `kind` is "dogbone" or "overcut". Reliefs come nowhere nearer than `near_mm` to the lines of
@@ -57,13 +57,13 @@ def relieved(
     what is cut beyond the lines.
     """
     if near_mm == 0.0:
-        return Relieved(path, np.empty((0, 2)))
+        return RelievedPath(path, np.empty((0, 2)))
     along, walls = MeasuredPath.of(path), MeasuredPath.of(original)
     others = Segments.of(Polylines.of([original, *keep_out]))
     reliefs: dict[int, list[Floats]] = {}
     left: list[Floats] = []
-    for corner, vertex in _stands(along, walls, near_mm).items():
-        move = _move(along, vertex, walls, corner, kind)
+    for corner, vertex in _missed_corners(along, walls, near_mm).items():
+        move = _relief_move(along, vertex, walls, corner, kind)
         if _is_clear(move, walls.segments.start[corner], others, near_mm):
             reliefs.setdefault(vertex, []).append(move[1])
         else:
@@ -73,10 +73,10 @@ def relieved(
         for tip in reliefs.get(vertex, []):
             rows += [np.array([*row[:2], 0.0]), np.array([*tip, 0.0])]
         rows.append(row)
-    return Relieved(Polyline(np.array(rows), path.closed), np.array(left).reshape(-1, 2))
+    return RelievedPath(Polyline(np.array(rows), path.closed), np.array(left).reshape(-1, 2))
 
 
-def _stands(along: MeasuredPath, walls: MeasuredPath, near_mm: float) -> dict[int, int]:
+def _missed_corners(along: MeasuredPath, walls: MeasuredPath, near_mm: float) -> dict[int, int]:
     """Return the corners (vertices of the walls) that the tool misses, with the vertex of its path
     at which it stands then: the nearest of those that are equally far from both walls of the
     corner."""
@@ -89,14 +89,16 @@ def _stands(along: MeasuredPath, walls: MeasuredPath, near_mm: float) -> dict[in
             continue
         near = distance <= away + RELIEF_MATCH_MM
         reach = np.hypot(*(walls.segments.start - v).T)
-        missed = near & np.roll(near, 1) & (reach > away + RELIEF_LEAST_MM)
+        missed = near & np.roll(near, 1) & (reach > away + MIN_RELIEF_MM)
         for corner in np.flatnonzero(missed).tolist():
             here = (float(reach[corner]), vertex)
             found[corner] = min(found.get(corner, here), here)
     return {corner: vertex for corner, (_, vertex) in found.items()}
 
 
-def _move(along: MeasuredPath, vertex: int, walls: MeasuredPath, corner: int, kind: str) -> Floats:
+def _relief_move(
+    along: MeasuredPath, vertex: int, walls: MeasuredPath, corner: int, kind: str
+) -> Floats:
     """Return the move (2, 2) from V to where the tool's edge touches the corner."""
     v, c = along.path.vertices[vertex, :2], walls.segments.start[corner]
     away = float(points_to_segments(v[None], walls.segments).min())

@@ -38,7 +38,7 @@ from camtool.planning.findings import (
 )
 from camtool.planning.items import Contour, CutRun, Fixed, Item, Items
 from camtool.planning.job import Operation
-from camtool.planning.paths import flat
+from camtool.planning.paths import flat_path
 from camtool.records import replace
 from camtool.units import UM_PER_MM
 
@@ -112,7 +112,7 @@ def _runs_of(
     )
     closed, levels = contour.path.closed, len(contour.setting.levels_mm)
     count, error_mm = len(reversals[0]) + len(reversals[1]), drawn_error_mm(division)
-    at_start = count - sum(each.within(len(parts)) for each in reversals)
+    at_start = count - sum(each.count_within(len(parts)) for each in reversals)
     runs = 1 if closed or contour.reversible else levels
     counts.before.add(runs, count * levels - at_start, error_mm)
     reason = _stays_whole(contour.setting.operation)
@@ -123,7 +123,7 @@ def _runs_of(
         pieces = division.pieces()
         counts.after.add(len(pieces) * levels, 0, max(piece.error_mm for piece in pieces))
         return [
-            _part(contour, parts.subpath(piece.first, piece.last), piece.backward)
+            _run_of_contour(contour, parts.subpath(piece.first, piece.last), piece.backward)
             for piece in pieces
         ]
     counts.whole.setdefault(reason, []).append(contour.name)
@@ -170,7 +170,7 @@ def _stays_whole(operation: Operation) -> str:
     return ""
 
 
-def _part(contour: Contour, path: Polyline, backward: bool) -> Contour:
+def _run_of_contour(contour: Contour, path: Polyline, backward: bool) -> Contour:
     """Return a run of a contour; one that is the whole of an open contour keeps no other
     outline."""
     left = contour.material_left
@@ -228,7 +228,7 @@ def _no_backlash(machine: Machine) -> Finding:
     return PLAY_NOT_KNOWN_TO_SAVE(where="axes x, y", machine=machine.target.name)
 
 
-class Piece(Struct, frozen=True):
+class RunPiece(Struct, frozen=True):
     """From place `first` to place `last` of the parts (beyond their number on a closed path), cut
     from its end to its start when `backward`; its greatest predicted error, mm; how far off it is
     for the axes driven in their worse direction, mm; its parts' errors times lengths, mm²."""
@@ -281,7 +281,7 @@ class Division(Struct, frozen=True, eq=False):
             parts, reversals, residual, part_errors(parts, residual), lengths, either_direction
         )
 
-    def pieces(self) -> list[Piece]:
+    def pieces(self) -> list[RunPiece]:
         """The runs of the path in its order; together they are the path."""
         if not self.parts.path.closed:
             return _cheapest(self, 0)[1]
@@ -290,16 +290,16 @@ class Division(Struct, frozen=True, eq=False):
             return _cheapest(self, 0)[1]
         first, last = (np.concatenate(column) for column in zip(*reversals, strict=True))
         shortest = int((last - first).argmin())
-        begins = _places(self, int(first[shortest]), int(last[shortest]))
+        begins = _division_places(self, int(first[shortest]), int(last[shortest]))
         return min((_cheapest(self, begin) for begin in begins), key=lambda each: each[0])[1]
 
-    def variants(self, first: int, last: int) -> list[Piece]:
+    def variants(self, first: int, last: int) -> list[RunPiece]:
         """The piece between two places between which no axis reverses, in each direction in
         which it may be cut."""
         directions = (1, -1) if self.either_direction else (1,)
         return [self._piece(first, last, direction) for direction in directions]
 
-    def _piece(self, first: int, last: int, direction: int) -> Piece:
+    def _piece(self, first: int, last: int, direction: int) -> RunPiece:
         index = np.arange(first, last) % len(self.parts)
         columns, spread_mm = [], 0.0
         for reversals, residual in zip(self.reversals, self.residual, strict=True):
@@ -310,7 +310,7 @@ class Division(Struct, frozen=True, eq=False):
                 spread_mm += abs(residual.plus_mm - residual.minus_mm)
         errors = self.errors[index, columns[0], columns[1]]
         weight = float(errors @ self.lengths[index])
-        return Piece(first, last, direction < 0, float(errors.max()), spread_mm, weight)
+        return RunPiece(first, last, direction < 0, float(errors.max()), spread_mm, weight)
 
 
 def part_errors(parts: Parts, residual: tuple[Residual, Residual]) -> Floats:
@@ -350,26 +350,26 @@ Cost = tuple[int, float, float]
 """Pieces, their spread, and their errors over their lengths, summed up."""
 
 
-def _cheapest(division: Division, begin: int) -> tuple[tuple[int, Cost], list[Piece]]:
+def _cheapest(division: Division, begin: int) -> tuple[tuple[int, Cost], list[RunPiece]]:
     """The best division of the path from place `begin` once around, or to the end, with its
     greatest error in ALIKE_MM and its cost."""
-    places = _places(division, begin, begin + len(division.parts))
-    pieces = list(_possible(division, places))
+    places = _division_places(division, begin, begin + len(division.parts))
+    pieces = list(_possible_pieces(division, places))
     greatest = [0.0] + [np.inf] * (len(places) - 1)
     for i, j, piece in pieces:
         greatest[j] = min(greatest[j], max(greatest[i], piece.error_mm))
     best: list[Cost] = [(0, 0.0, 0.0)] + [(len(places), 0.0, 0.0)] * (len(places) - 1)
-    came: list[tuple[int, Piece] | None] = [None] * len(places)
+    came: list[tuple[int, RunPiece] | None] = [None] * len(places)
     for i, j, piece in pieces:
         count, spread, weight = best[i]
         cost = count + 1, spread + piece.spread_mm, weight + piece.weight_mm2
         if piece.error_mm <= greatest[-1] + ALIKE_MM and cost < best[j]:
             best[j], came[j] = cost, (i, piece)
-    return (round(greatest[-1] / ALIKE_MM), best[-1]), _traced(came)
+    return (round(greatest[-1] / ALIKE_MM), best[-1]), _trace_back(came)
 
 
-def _traced(came: Sequence[tuple[int, Piece] | None]) -> list[Piece]:
-    found: list[Piece] = []
+def _trace_back(came: Sequence[tuple[int, RunPiece] | None]) -> list[RunPiece]:
+    found: list[RunPiece] = []
     step = came[-1]
     while step is not None:
         found.append(step[1])
@@ -377,7 +377,7 @@ def _traced(came: Sequence[tuple[int, Piece] | None]) -> list[Piece]:
     return found[::-1]
 
 
-def _possible(division: Division, places: list[int]) -> Iterator[tuple[int, int, Piece]]:
+def _possible_pieces(division: Division, places: list[int]) -> Iterator[tuple[int, int, RunPiece]]:
     """Yield pieces from place i to place j of `places` in all directions, in the order of i: each
     ends before, or on, the first reversal that lies ahead as a whole."""
     reach = _reaches(division, np.array(places, dtype=np.int64))
@@ -402,7 +402,7 @@ def _reaches(division: Division, places: Ints) -> Floats:
     return np.asarray(soonest[np.searchsorted(first[order], places, side="right")])
 
 
-def _places(division: Division, begin: int, end: int) -> list[int]:
+def _division_places(division: Division, begin: int, end: int) -> list[int]:
     """Return the places between two places, these too, at which a path may be divided: the ends of
     all spans, and where an axis of an open path begins or ends to move."""
     count, found = len(division.parts), {begin, end}
@@ -518,7 +518,7 @@ class AxisReversals(Struct, frozen=True, eq=False):
     def __len__(self) -> int:
         return len(self.first)
 
-    def within(self, count: int) -> int:
+    def count_within(self, count: int) -> int:
         """Count the reversals between the first of `count` parts' places and the last: those at
         the start of a closed path do not count."""
         return int(((self.first > 0) & (self.last < count)).sum())
@@ -611,7 +611,9 @@ class Approaches:
     def __init__(self, machine: Machine) -> None:
         self._drives = [
             _Drive(axis, residual)
-            for axis, residual in zip(loosest(machine), residuals(machine), strict=True)
+            for axis, residual in zip(
+                axes_with_largest_backlash(machine), residuals(machine), strict=True
+            )
         ]
 
     def __call__(self, run: CutRun) -> tuple[float, float] | None:
@@ -622,10 +624,11 @@ class Approaches:
         axis. Nothing keeps it within the travel: a nearer one would not do, and the toolpath that
         holds it is checked as a whole.
         """
-        path = flat(run.vertices)
+        path = flat_path(run.vertices)
         places = run.vertices[:1, :2] if path is None else parts_of(path).places
         x, y = (
-            drive.before(places[:, index].tolist()) for index, drive in enumerate(self._drives)
+            drive.approach_from(places[:, index].tolist())
+            for index, drive in enumerate(self._drives)
         )
         return None if (x, y) == (places[0, 0], places[0, 1]) else (x, y)
 
@@ -639,7 +642,7 @@ class _Drive:
         self._at = self._since = math.nan
         self._sense = 0
 
-    def before(self, values: list[float]) -> float:
+    def approach_from(self, values: list[float]) -> float:
         """Return the position, mm, from which the axis comes to a run that takes it to these
         values: their first one when any will do. Afterwards the axis has made the run."""
         start, sense = values[0], self._first_sense(values)
@@ -713,7 +716,7 @@ def backlashes_mm(axis: Axis, cells: PlayCells | None) -> tuple[float, ...]:
     return (axis.backlash_mm,) if cells is None else tuple(chain.from_iterable(cells.play_mm))
 
 
-def loosest(machine: Machine) -> tuple[Axis, Axis]:
+def axes_with_largest_backlash(machine: Machine) -> tuple[Axis, Axis]:
     """Return X and Y with the largest backlash of all regions."""
     x, y, _ = (
         replace(axis, backlash_mm=max(backlashes_mm(axis, cells)))

@@ -47,7 +47,7 @@ from camtool.planning.items import Bridge, Contour, CutRun, Feeds, Runs
 from camtool.planning.job import Operation, Tool, refuse_endless
 from camtool.planning.naming import at_place, key_of, operation_name
 from camtool.planning.paths import QUARTER, MeasuredPath
-from camtool.planning.ramps import ZProfile, feeds_along, lifted
+from camtool.planning.ramps import ZProfile, feeds_along, lift_paths
 from camtool.records import replace
 
 SIDE_ANGLE_RAD = 0.25 * math.pi
@@ -73,7 +73,7 @@ corner."""
 PLACES_PER_TAB = 16.0
 """So many places are tried in the length of a tab."""
 
-MOST_PLACES_ROUND = 2048
+MAX_PLACES_ROUND = 2048
 """No more places than this are tried round a whole contour."""
 
 PLACE_DECIMALS = 9
@@ -132,7 +132,7 @@ def with_tabs(contours: list[Contour]) -> tuple[list[Contour], list[Finding]]:
     if not contours or not contours[0].setting.operation.tabs:
         return contours, []
     if contours[0].setting.operation.tabs.at_mm is not None:
-        return _by_hand(contours), []
+        return _with_tabs_by_hand(contours), []
     parts = [k for k, each in enumerate(contours) if each.path.closed and not _is_hole(each)]
     tabbed = {k for k in parts or range(len(contours)) if _is_long_enough(contours[k])}
     bare = [each for k, each in enumerate(contours) if tabbed and k not in tabbed]
@@ -153,7 +153,7 @@ def with_tabs(contours: list[Contour]) -> tuple[list[Contour], list[Finding]]:
     ], [finding]
 
 
-def _by_hand(contours: list[Contour]) -> list[Contour]:
+def _with_tabs_by_hand(contours: list[Contour]) -> list[Contour]:
     """Return the contours, each with the places of the tabs that are nearest to it; OptionError
     for a place that is near to none."""
     setting = contours[0].setting
@@ -184,7 +184,9 @@ def _by_hand(contours: list[Contour]) -> list[Contour]:
     return made
 
 
-def between(path: Polyline, places: Sequence[tuple[float, float]]) -> tuple[float, float]:
+def middle_of_longest_gap(
+    path: Polyline, places: Sequence[tuple[float, float]]
+) -> tuple[float, float]:
     """Return the place (x, y) mm of a closed path in the middle of its longest piece between these
     places."""
     along = MeasuredPath.of(path)
@@ -208,7 +210,7 @@ def _is_long_enough(contour: Contour) -> bool:
     operation = contour.setting.operation
     total = float(path_lengths(Polylines.of([contour.path]))[0])
     model, foot = _model(operation, contour.setting.levels_mm[-1])
-    count = _wanted(total, operation)
+    count = _tab_count(total, operation)
     return count * (model.end + 2.0 * foot) <= total * (1.0 + COUNT_SLACK)
 
 
@@ -235,7 +237,7 @@ def tabs_of(contour: Contour, along: MeasuredPath) -> tuple[list[Tab], list[Find
         half = 0.5 * along.total_mm
         ranges = [(length - half, length + half) for length in wanted]
     else:
-        count = _count(along.total_mm, operation, model.end + 2.0 * foot)
+        count = _checked_tab_count(along.total_mm, operation, model.end + 2.0 * foot)
         size = along.total_mm / count
         wanted = [(which + 0.5) * size for which in range(count)]
         ranges = [(which * size, (which + 1) * size) for which in range(count)]
@@ -246,7 +248,7 @@ def tabs_of(contour: Contour, along: MeasuredPath) -> tuple[list[Tab], list[Find
     for centre, near in zip(wanted, ranges, strict=True):
         tab = fitting.nearest(centre, near, found)
         if tab is None:
-            findings.append(_left_out(contour, along, centre))
+            findings.append(_left_out_finding(contour, along, centre))
         else:
             found.append(tab)
     return sorted(found, key=lambda tab: tab.begin), findings
@@ -267,7 +269,7 @@ def _model(operation: Operation, bottom_mm: float) -> tuple[Tab, float]:
     return model, model.foot(bottom_mm)
 
 
-def raised(points: ZProfile, tabs: list[Tab], total_mm: float | None) -> ZProfile:
+def raise_profile(points: ZProfile, tabs: list[Tab], total_mm: float | None) -> ZProfile:
     """Return the profile, kept above the tabs; `total_mm`: the length of a closed path, round
     which they come again, None for an open one."""
     if not tabs:
@@ -277,7 +279,7 @@ def raised(points: ZProfile, tabs: list[Tab], total_mm: float | None) -> ZProfil
         # Only passes below its top know of a tab.
         near = [
             tab
-            for tab in _between(tabs, total_mm, min(begin, end), max(begin, end))
+            for tab in _tabs_between(tabs, total_mm, min(begin, end), max(begin, end))
             if min(z_begin, z_end) < tab.top_mm - POSITION_EPS_MM
         ]
         if begin == end:
@@ -300,7 +302,7 @@ def raised(points: ZProfile, tabs: list[Tab], total_mm: float | None) -> ZProfil
     return [point for k, point in enumerate(result) if k == 0 or point != result[k - 1]]
 
 
-def _between(tabs: list[Tab], total_mm: float | None, low: float, high: float) -> list[Tab]:
+def _tabs_between(tabs: list[Tab], total_mm: float | None, low: float, high: float) -> list[Tab]:
     """Return the tabs between two lengths, repeated for each lap of a closed path."""
     if total_mm is None:
         return tabs
@@ -324,10 +326,10 @@ def _breaks(tab: Tab, begin: float, z_begin: float, slope: float) -> list[float]
     return places
 
 
-def _count(total_mm: float, operation: Operation, length_mm: float) -> int:
+def _checked_tab_count(total_mm: float, operation: Operation, length_mm: float) -> int:
     """Return the number of tabs of this length; OptionError when together they are longer than the
     path."""
-    count = _wanted(total_mm, operation)
+    count = _tab_count(total_mm, operation)
     if count * length_mm > total_mm * (1.0 + COUNT_SLACK):
         raise OptionError(
             f"{count} tabs of {length_mm:.4g} mm (with the tool's diameter) are longer than the"
@@ -338,7 +340,7 @@ def _count(total_mm: float, operation: Operation, length_mm: float) -> int:
     return count
 
 
-def _wanted(total_mm: float, operation: Operation) -> int:
+def _tab_count(total_mm: float, operation: Operation) -> int:
     """Return the number of tabs that the operation asks of a path of this length."""
     tabs = operation.tabs
     assert tabs is not None
@@ -382,10 +384,10 @@ class _Fitting(Struct, frozen=True, eq=False):
         nowhere."""
         within = self._places(centre, share)
         anywhere = self._places(centre, (0.0, self.along.total_mm))
-        for clear in (self._straight, self._off_corners, self._bridge_off_corners):
+        for clear in (self._is_straight, self._is_off_corners, self._is_bridge_off_corners):
             for places in (within, anywhere):
                 for place in places[clear(places)].tolist():
-                    tab = self._at(place, others)
+                    tab = self._tab_at(place, others)
                     if tab is not None:
                         return tab
         return None
@@ -395,7 +397,7 @@ class _Fitting(Struct, frozen=True, eq=False):
         closed path are further round."""
         low, high = span
         count = math.ceil(PLACES_PER_TAB * (high - low) / self.model.end)
-        count = min(max(count, 2 * PLACES_PER_SIDE), MOST_PLACES_ROUND)
+        count = min(max(count, 2 * PLACES_PER_SIDE), MAX_PLACES_ROUND)
         places = np.concatenate([[centre], np.linspace(low, high, count + 1)])
         total = self.along.total_mm
         if self.along.path.closed:
@@ -407,29 +409,29 @@ class _Fitting(Struct, frozen=True, eq=False):
         apart = np.round(np.abs(ahead) / total, PLACE_DECIMALS)
         return np.asarray(places[np.lexsort([ahead < 0.0, apart])])
 
-    def _straight(self, places: Floats) -> Bools:
+    def _is_straight(self, places: Floats) -> Bools:
         """Mask (P,) of the lengths at which a tab, its slopes included, lies across no corner and
         no bend."""
         low, high = places - self._reach, places + self._reach
         bend = np.abs(self._heading(high) - self._heading(low))
-        return np.asarray(self._off_corners(places) & (bend <= GENTLE_RAD))
+        return np.asarray(self._is_off_corners(places) & (bend <= GENTLE_RAD))
 
-    def _off_corners(self, places: Floats) -> Bools:
+    def _is_off_corners(self, places: Floats) -> Bools:
         """Mask (P,) of the lengths at which a tab lies across no corner."""
         corners = np.concatenate([self.corners.vertices, self.corners.arcs])
-        return self._clear(places, self._reach, corners)
+        return self._is_clear(places, self._reach, corners)
 
-    def _bridge_off_corners(self, places: Floats) -> Bools:
+    def _is_bridge_off_corners(self, places: Floats) -> Bools:
         """Mask (P,) of the lengths at which a tab lies across no sharp corner, and its bridge not
         round one."""
-        clear = self._clear(places, self._reach, self.corners.sharply)
-        return np.asarray(clear & self._clear(places, self.half_width_mm, self.corners.arcs))
+        clear = self._is_clear(places, self._reach, self.corners.sharply)
+        return np.asarray(clear & self._is_clear(places, self.half_width_mm, self.corners.arcs))
 
     @property
     def _reach(self) -> float:
         return 0.5 * self.model.end + self.foot_mm
 
-    def _clear(self, places: Floats, reach: float, corners: Floats) -> Bools:
+    def _is_clear(self, places: Floats, reach: float, corners: Floats) -> Bools:
         low, high = places - reach, places + reach
         begin, end = corners[:, 0] + TAB_SLACK_MM, corners[:, 1] - TAB_SLACK_MM
         touches = (low[:, None] < end) & (high[:, None] > begin)
@@ -444,17 +446,17 @@ class _Fitting(Struct, frozen=True, eq=False):
         part = (lengths - reach[row]) / np.diff(reach)[row]
         return np.asarray(heading[row] + segments.sweep[row] * np.clip(part, 0.0, 1.0))
 
-    def _at(self, centre: float, others: Sequence[Tab]) -> Tab | None:
+    def _tab_at(self, centre: float, others: Sequence[Tab]) -> Tab | None:
         """Return the tab at a length, None where it has no room there beside others."""
         foot, total = self.foot_mm, self.along.total_mm
-        half = _half(self.along, centre, self.model.end, min(centre, total - centre) - foot)
+        half = _half_length(self.along, centre, self.model.end, min(centre, total - centre) - foot)
         if half is None:
             return None
         tab = Tab(centre - half, centre + half, self.model.top_mm, self.model.fall)
         room = 2.0 * foot - TAB_SLACK_MM
         if any(tab.begin < each.end + room and each.begin < tab.end + room for each in others):
             return None
-        return tab if _stays(self.along, tab) else None
+        return tab if _is_bridge_clear(self.along, tab) else None
 
 
 def _corners(along: MeasuredPath, operation: Operation) -> _Corners:
@@ -477,7 +479,7 @@ def _corners(along: MeasuredPath, operation: Operation) -> _Corners:
     return _Corners(turning(TAB_CORNER_RAD), turning(GENTLE_RAD), arcs)
 
 
-def _half(along: MeasuredPath, centre: float, chord: float, room: float) -> float | None:
+def _half_length(along: MeasuredPath, centre: float, chord: float, room: float) -> float | None:
     """Return half the length about a place whose ends are so far apart; None beyond the room there
     is."""
 
@@ -500,7 +502,7 @@ def _half(along: MeasuredPath, centre: float, chord: float, room: float) -> floa
     return high
 
 
-def _stays(along: MeasuredPath, tab: Tab) -> bool:
+def _is_bridge_clear(along: MeasuredPath, tab: Tab) -> bool:
     """True if no other part of the path comes nearer to the centre of the bridge than its ends."""
     ends = along.at(np.array([tab.begin, tab.end]))
     rest = [(0.0, tab.begin), (tab.end, along.total_mm)]
@@ -515,7 +517,7 @@ def _stays(along: MeasuredPath, tab: Tab) -> bool:
     return True
 
 
-def _left_out(contour: Contour, along: MeasuredPath, length: float) -> Finding:
+def _left_out_finding(contour: Contour, along: MeasuredPath, length: float) -> Finding:
     return TAB_LEFT_OUT(where=at_place(contour.name, along.at(np.array([length]))[0].tolist()))
 
 
@@ -563,15 +565,15 @@ def raised_over_bridges(
         return RaisedRuns(runs, ())
     reach = operation.tool.radius_mm
     index = BoxIndex(np.array([_box(bridge, reach) for bridge in bridges]))
-    made, found = [], _Found()
+    made, found = [], _RaisedBridges()
     for run in runs:
         _, rows = index.touching(np.concatenate(_extent(run))[None])
         near = [bridges[row] for row in rows.tolist()]
-        made.append(_raised(run, near, operation.tool, feeds, found) if near else run)
+        made.append(_raise_run(run, near, operation.tool, feeds, found) if near else run)
     return RaisedRuns(Runs.of(made), tuple(found.findings(operation)))
 
 
-class _Found:
+class _RaisedBridges:
     """The bridges over which runs were raised, and those that a drill goes through."""
 
     def __init__(self) -> None:
@@ -592,8 +594,8 @@ class _Found:
             )
 
 
-def _raised(
-    run: CutRun, near: Sequence[Bridge], tool: Tool, feeds: Feeds, found: _Found
+def _raise_run(
+    run: CutRun, near: Sequence[Bridge], tool: Tool, feeds: Feeds, found: _RaisedBridges
 ) -> CutRun:
     """Return the run kept above the bridges near to it; itself when it is so already."""
     vertices = run.vertices
@@ -605,7 +607,7 @@ def _raised(
     path = vertices[last][:, [0, 1, 3]]
     if is_drilled or np.isnan(run.feed_mm_min).any():
         for bridge in near:
-            _drilled(run, bridge, tool, found)
+            _note_drilled(run, bridge, tool, found)
         return run
     along = MeasuredPath.of(Polyline(path))
     points: ZProfile = list(zip(along.reach[group].tolist(), vertices[:, 2].tolist(), strict=True))
@@ -615,17 +617,17 @@ def _raised(
         low = np.minimum(low, z)
     tabs: list[Tab] = []
     for bridge in near:
-        own = list(_over(along, low, bridge, tool))
+        own = list(_tabs_over(along, low, bridge, tool))
         if own:
             found.shared[id(bridge)] = (bridge, run.name)
         tabs += own
     if not tabs:
         return run
-    (made,) = lifted(along.paths, [along.index], [raised(points, tabs, None)])
+    (made,) = lift_paths(along.paths, [along.index], [raise_profile(points, tabs, None)])
     return replace(run, vertices=made, feed_mm_min=feeds_along(made, feeds))
 
 
-def _drilled(run: CutRun, bridge: Bridge, tool: Tool, found: _Found) -> None:
+def _note_drilled(run: CutRun, bridge: Bridge, tool: Tool, found: _RaisedBridges) -> None:
     place, deep = run.vertices[:1, :2], float(run.vertices[:, 2].min())
     reach = tool.radius_mm - BRIDGE_SLACK_MM
     through = deep < bridge.top_mm and reach > 0.0
@@ -633,7 +635,7 @@ def _drilled(run: CutRun, bridge: Bridge, tool: Tool, found: _Found) -> None:
         found.drilled[id(bridge)] = (bridge, run.name)
 
 
-def _over(along: MeasuredPath, low: Floats, bridge: Bridge, tool: Tool) -> Iterator[Tab]:
+def _tabs_over(along: MeasuredPath, low: Floats, bridge: Bridge, tool: Tool) -> Iterator[Tab]:
     """Yield the pieces of a path, with the lowest z (n,) of each of its segments, where the tool
     would cut into a bridge."""
     is_low = low < bridge.top_mm - POSITION_EPS_MM

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from camtool.planning.order import Choices, best_order, drawn, travel_mm
+from camtool.planning.order import Choices, best_order, drawn_order, travel_mm
 
 pytestmark = pytest.mark.benchmark
 NONE = np.empty((0, 2), dtype=np.int64)
@@ -32,4 +32,4 @@ def test_squares(benchmark: Any, what: str) -> None:
     rows = benchmark.pedantic(lambda: best_order(choices, before), rounds=3, warmup_rounds=1)
     length = travel_mm(choices, rows, ZERO, ZERO)
     benchmark.extra_info["travel_mm"] = length
-    assert length < 0.1 * travel_mm(choices, drawn(choices), ZERO, ZERO)
+    assert length < 0.1 * travel_mm(choices, drawn_order(choices), ZERO, ZERO)

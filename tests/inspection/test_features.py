@@ -18,7 +18,7 @@ from camtool.inspection.features import (
     features_of,
 )
 from camtool.inspection.findings import InspectionCode
-from camtool.planning.place import Map
+from camtool.planning.place import AffineMap
 
 QUARTER = math.tan(math.pi / 8)
 
@@ -125,7 +125,7 @@ def test_placed_features_lie_where_the_drawing_comes_to_lie(
 ) -> None:
     cos, sin = scale * math.cos(turn), scale * math.sin(turn)
     matrix = np.array([[cos, -sin], [sin, cos]]) @ np.diag([-1.0 if flip else 1.0, 1.0])
-    where = Map(matrix, np.array(shift), scale)
+    where = AffineMap(matrix, np.array(shift), scale)
     moved = plate()
     vertices = where.vertices(moved.vertices)
     there = features_of(Polylines(vertices, moved.offsets, moved.closed))

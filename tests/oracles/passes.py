@@ -12,14 +12,14 @@ import numpy as np
 from camtool.arrays import Bools, Floats
 from camtool.geometry.measure import point_at, segment_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Segments
-from camtool.planning.paths import LARGEST_PART_SWEEP_RAD, SLOPE_EPS, backwards
+from camtool.planning.paths import MAX_PART_SWEEP_RAD, SLOPE_EPS, reverse_vertices
 from camtool.planning.ramps import ZProfile
 
 
 def piece(path: Polyline, begin: float, end: float) -> Floats:
     """(k, 3) x, y, bulge of a path from one length to another, backwards when `end` is lower."""
     if end < begin:
-        return backwards(piece(path, end, begin))
+        return reverse_vertices(piece(path, end, begin))
     segments = Segments.of(path)
     reach = np.concatenate([[0.0], np.cumsum(segment_lengths(segments))])
     total, count = float(reach[-1]), len(segments)
@@ -95,7 +95,7 @@ def cuts(vertices: Floats, feed_mm_min: Floats) -> Iterator[Cut]:
 
 
 def _within(segments: Segments, begin: int, last: int, swept: float) -> bool:
-    if abs(swept) <= LARGEST_PART_SWEEP_RAD:
+    if abs(swept) <= MAX_PART_SWEEP_RAD:
         return True
     apart = segments.end[last] - segments.start[begin]
     return bool(np.hypot(*apart) <= POSITION_EPS_MM and abs(swept) <= 2.0 * np.pi + SLOPE_EPS)

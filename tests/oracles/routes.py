@@ -10,7 +10,7 @@ from camtool.geometry.intersect import crossings
 from camtool.geometry.measure import point_at
 from camtool.geometry.polylines import Segments
 from camtool.planning.clearing import ON_LINE_MM, ConnectedRegion
-from camtool.planning.paths import runs_of_true
+from camtool.planning.paths import true_ranges
 
 
 def outside(start: Floats, end: Floats, region: ConnectedRegion) -> list[tuple[float, float]]:
@@ -23,5 +23,5 @@ def outside(start: Floats, end: Floats, region: ConnectedRegion) -> list[tuple[f
     marks = np.unique(np.concatenate([[0.0, 1.0], found.ta]))
     parts = 0.5 * (marks[1:] + marks[:-1])
     points = point_at(line, np.zeros(len(parts), dtype=np.int64), parts)
-    first, last = runs_of_true(~region.holds(points))
+    first, last = true_ranges(~region.holds(points))
     return list(zip(marks[first].tolist(), marks[last].tolist(), strict=True))

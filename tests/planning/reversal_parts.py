@@ -13,7 +13,7 @@ from camtool.machine.model import Machine
 from camtool.planning.items import Contour, CutRun, Feeds, Item, Runs, Setting
 from camtool.planning.job import Job, Operation
 from camtool.planning.link import link
-from camtool.planning.paths import flat
+from camtool.planning.paths import flat_path
 from camtool.planning.reversing import Approaches, least_reversal_mm, parts_of, reversals_along
 from camtool.planning.settings import setting_of
 from camtool.records import replace
@@ -35,7 +35,7 @@ def reversals_of(cut: Polyline | CutRun, machine: Machine | None = None) -> tupl
     What comes back by less than half a step of the machine (`LEAST_TURN_MM` without one) is no
     reversal; nor is the first motion, which an approach takes care of.
     """
-    path = flat(cut.vertices) if isinstance(cut, CutRun) else cut
+    path = flat_path(cut.vertices) if isinstance(cut, CutRun) else cut
     if path is None:
         return 0, 0
     parts = parts_of(path)
@@ -65,10 +65,10 @@ def contour(
 
 
 def run_of(path: Polyline) -> CutRun:
-    flat = path.vertices
+    flat_path = path.vertices
     if path.closed:
-        flat = np.concatenate([flat, flat[:1]])
-    vertices = np.insert(flat, 2, -DEPTH_MM, axis=1)
+        flat_path = np.concatenate([flat_path, flat_path[:1]])
+    vertices = np.insert(flat_path, 2, -DEPTH_MM, axis=1)
     vertices[-1, 3] = 0.0
     return CutRun(vertices, np.full(len(vertices) - 1, 0.8), 0.8, "test")
 

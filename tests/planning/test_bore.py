@@ -18,7 +18,7 @@ from camtool.planning.findings import PlanningCode
 from camtool.planning.holes import HOLE_SIZE_MM
 from camtool.planning.items import CutRun, Feeds, Fixed, Setting, Work
 from camtool.planning.job import Entry, Operation, Tool
-from camtool.planning.ramps import HELIX_LEAST
+from camtool.planning.ramps import MIN_HELIX_SHARE
 from tests.oracles.run_sweep import swept
 from tests.planning.test_drill import chosen_of, circle
 
@@ -69,7 +69,7 @@ def test_the_tool_clears_the_hole_and_nothing_else(
     # Dense places and chords of the buffers leave some micrometres.
     assert floor.buffer(-0.02).within(hole)
     assert hole.buffer(-0.02).within(floor)
-    if 0.5 * diameter - allowance - 1.5 < HELIX_LEAST * 1.5:
+    if 0.5 * diameter - allowance - 1.5 < MIN_HELIX_SHARE * 1.5:
         return  # the tool plunges
     for run in runs:
         heights = run.vertices[:, 2]

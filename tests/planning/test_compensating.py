@@ -15,7 +15,7 @@ from camtool.geometry.polylines import Polyline
 from camtool.machine.model import Machine
 from camtool.planning.compensating import (
     MonotoneSegment,
-    compensated,
+    compensate,
     monotone_segments,
     motor_path,
 )
@@ -91,14 +91,14 @@ def machines(draw: st.DrawFn) -> Machine:
 @given(contours(max_points=6) | open_contours(), machines())
 def test_nothing_is_left_of_play_and_scale(path: Polyline, machine: Machine) -> None:
     wanted = cut(path)
-    assert errors_mm(compensated(wanted, machine).toolpath, wanted, machine).max() < FINE_MM
+    assert errors_mm(compensate(wanted, machine).toolpath, wanted, machine).max() < FINE_MM
 
 
 def test_without_it_the_same_part_is_off_by_the_play() -> None:
     machine = path_machine(FREE, "axes.x.backlash_mm=0.4", "axes.y.backlash_mm=0.4")
     wanted = cut(Polyline(np.array([[0, 0, 0], [5, 1, 0], [1, 6, 0]], dtype=float), True))
     assert errors_mm(wanted, wanted, machine).max() > 0.3
-    assert errors_mm(compensated(wanted, machine).toolpath, wanted, machine).max() < FINE_MM
+    assert errors_mm(compensate(wanted, machine).toolpath, wanted, machine).max() < FINE_MM
 
 
 @example(
@@ -118,7 +118,7 @@ def test_of_too_much_compensation_half_is_left_at_reversals(
     machine = path_machine(FREE, f"controller.start_play={start}", *step, *play, *set_to)
     wanted = cut(path)
     before = errors_mm(wanted, wanted, machine)
-    after = errors_mm(compensated(wanted, machine).toolpath, wanted, machine)
+    after = errors_mm(compensate(wanted, machine).toolpath, wanted, machine)
     # Both axes may turn at the same place, and a step back is a whole step.
     assert after.max() <= 0.5 * math.sqrt(2.0) * excess + 0.009
     assert np.sqrt((after**2).mean()) < np.sqrt((before**2).mean())
@@ -132,7 +132,7 @@ def test_play_by_region() -> None:
     points = [[-5, -4, 0.2], [6, -3, 0], [4, 5, -0.3], [-6, 3, 0.1]]
     wanted = cut(Polyline(np.array(points, dtype=float), True))
     before = errors_mm(wanted, wanted, machine)
-    after = errors_mm(compensated(wanted, machine).toolpath, wanted, machine)
+    after = errors_mm(compensate(wanted, machine).toolpath, wanted, machine)
     assert before.max() > 0.2
     # Near an edge the play of the neighbour may be taken.
     assert np.quantile(after, 0.9) < FINE_MM
@@ -141,7 +141,7 @@ def test_play_by_region() -> None:
 
 def test_a_perfect_machine_gets_what_was_wanted() -> None:
     wanted = cut(Polyline(np.array([[0, 0, 0], [1, 0, 1.0], [1, 1, 0]], dtype=float), True))
-    assert compensated(wanted, path_machine(FREE)).toolpath is wanted
+    assert compensate(wanted, path_machine(FREE)).toolpath is wanted
 
 
 def test_rows_keep_their_sources_feeds_and_events() -> None:
@@ -150,7 +150,7 @@ def test_rows_keep_their_sources_feeds_and_events() -> None:
     b.source = "layer 7"
     b.rapid(1.0, 1.0).line(z=-1.0, feed=5.0).line(2.0, 0.5, feed=7.0).event(Kind.DWELL, 0.5)
     machine = path_machine(FREE, "axes.x.backlash_mm=0.1", "axes.y.backlash_mm=0.1")
-    bent = compensated(b.event(Kind.END).finish(), machine)
+    bent = compensate(b.event(Kind.END).finish(), machine)
     made = bent.toolpath
     assert bent.row.tolist() == [0, 1, 2, 3, 4, 4, 5, 6]
     kinds = [Kind(kind).name for kind in made.kind.tolist()]

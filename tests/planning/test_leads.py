@@ -21,9 +21,9 @@ from camtool.planning.leads import (
     LEAD_SLACK_MM,
     KeepOut,
     leads_of,
-    left_of,
     runs_back,
     segments_near,
+    signed_distances,
 )
 from camtool.planning.paths import MeasuredPath
 from tests.oracles.arcs import chain_distances, chain_points
@@ -221,7 +221,7 @@ def test_left_of_closed_paths(path: Polyline, places: list[tuple[float, float]])
     points = np.array(places)
     wanted = _left(path, points)
     sure = np.abs(wanted) > 1e-3
-    assert left_of(path, points)[sure] == pytest.approx(wanted[sure], abs=1e-6)
+    assert signed_distances(path, points)[sure] == pytest.approx(wanted[sure], abs=1e-6)
 
 
 @given(open_contours(), st.floats(0.0, 1.0), st.sampled_from([-1e-3, 1e-3]))
@@ -231,8 +231,8 @@ def test_left_of_open_paths(path: Polyline, share: float, off: float) -> None:
     where = np.array([share * along.total_mm])
     ahead = along.directions(where)[0]
     point = along.at(where) + off * np.array([[-ahead[1], ahead[0]]])
-    found = left_of(path, point)[0]
-    assert found == pytest.approx(-left_of(reverse(path), point)[0], abs=1e-9)
+    found = signed_distances(path, point)[0]
+    assert found == pytest.approx(-signed_distances(reverse(path), point)[0], abs=1e-9)
     vertex = np.abs(along.reach - where).min()
     if vertex > 0.05:
         # Within a sharp corner another piece may be as near, on the same side.
@@ -241,9 +241,9 @@ def test_left_of_open_paths(path: Polyline, share: float, off: float) -> None:
 
 def test_left_of_beyond_the_ends_of_an_open_path_is_beside_its_tangent() -> None:
     points = np.array([[-3.0, 0.0], [-3.0, 0.5], [-3.0, -0.5], [10.0, 9.0], [9.0, 9.0]])
-    assert left_of(OPEN, points) == pytest.approx([0.0, 0.5, -0.5, 0.0, 1.0])
+    assert signed_distances(OPEN, points) == pytest.approx([0.0, 0.5, -0.5, 0.0, 1.0])
     corner = np.array([[10.5, -0.5], [9.5, 0.5]])
-    assert left_of(OPEN, corner) == pytest.approx([-math.sqrt(0.5), 0.5])
+    assert signed_distances(OPEN, corner) == pytest.approx([-math.sqrt(0.5), 0.5])
 
 
 @given(

@@ -21,7 +21,7 @@ from camtool.planning.order import (
     best_order,
     choices_of,
     chosen_paths,
-    drawn,
+    drawn_order,
     must_precede,
     travel_mm,
 )
@@ -244,15 +244,15 @@ def test_each_variant_of_many_items_is_that_of_the_item(
 
 def test_drawn_is_each_item_in_turn_in_its_first_way() -> None:
     choices = choices_of([box(1, 0, 2, 1), line(2, 0, 3, 0)])
-    assert drawn(choices).tolist() == [0, 4]
-    assert travel_mm(choices, drawn(choices), ZERO, None) == pytest.approx(2.0)
-    assert travel_mm(choices, drawn(choices), ZERO, ZERO) == pytest.approx(5.0)
+    assert drawn_order(choices).tolist() == [0, 4]
+    assert travel_mm(choices, drawn_order(choices), ZERO, None) == pytest.approx(2.0)
+    assert travel_mm(choices, drawn_order(choices), ZERO, ZERO) == pytest.approx(5.0)
 
 
 def test_nothing_needs_no_order() -> None:
     nothing = choices_of([])
     assert best_order(nothing, NONE).tolist() == []
-    assert travel_mm(nothing, drawn(nothing), (0.0, 0.0), (3.0, 4.0)) == 5.0
+    assert travel_mm(nothing, drawn_order(nothing), (0.0, 0.0), (3.0, 4.0)) == 5.0
 
 
 def test_a_circle_of_items_is_refused() -> None:
@@ -366,7 +366,7 @@ def test_turned_variants_that_are_found_some_items_at_a_time(
     choices = Choices(owner, ends[:, :2], ends[:, 2:])
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(order, "ITEMS_AT_ONCE", at_once)
-        turned = order._turned(choices)
+        turned = order._reversed_rows(choices)
     first = np.searchsorted(owner, np.arange(len(items)))
     for row, (of, each) in enumerate(zip(owner.tolist(), ends.tolist(), strict=True)):
         others = items[of]

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from camtool.geometry.measure import length
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines
-from camtool.planning.paths import MeasuredPath, MeasuredPaths, backwards
-from camtool.planning.ramps import lifted
+from camtool.planning.paths import MeasuredPath, MeasuredPaths, reverse_vertices
+from camtool.planning.ramps import lift_paths
 from tests.oracles import passes
 from tests.oracles.arcs import chain_distances, chain_points
 from tests.strategies import contours, open_contours, polylines
@@ -72,7 +72,7 @@ def test_backwards_is_the_same_piece_the_other_way(
     along = MeasuredPath.of(path)
     low, high = begin * along.total_mm, (begin + size) * along.total_mm
     back = along.piece(high, low)
-    assert (backwards(back) == along.piece(low, high)).all()
+    assert (reverse_vertices(back) == along.piece(low, high)).all()
     assert length(Polyline(back)) == pytest.approx(high - low, abs=4e-6)
 
 
@@ -153,7 +153,7 @@ def test_many_paths_are_lifted_as_each_by_itself(
             [(s * along.total_mm, z) for s, (_, z) in zip(shares, points, strict=True)]
         )
     index = range(len(drawn))
-    found = lifted(paths, [*index, *index], [*profiles, *(each[::-1] for each in profiles)])
+    found = lift_paths(paths, [*index, *index], [*profiles, *(each[::-1] for each in profiles)])
     for k, vertices in enumerate(found):
         path, points = drawn[k % len(drawn)][0], profiles[k % len(drawn)]
         wanted = passes.lifted(path, points if k < len(drawn) else points[::-1])

@@ -18,7 +18,7 @@ from camtool.geometry.polylines import Polyline, Segments
 from camtool.planning import place as module
 from camtool.planning.findings import PlanningCode
 from camtool.planning.job import Job, Operation, Placement, job_of
-from camtool.planning.place import collapsed, place, taken
+from camtool.planning.place import collapse_findings, place, rows_taken
 from camtool.records import replace
 from tests.drawings import drawing_of
 from tests.strategies import polylines
@@ -90,8 +90,8 @@ def test_the_box_is_that_of_all_operations_and_of_the_marks_that_are_drilled() -
 
 def test_what_is_taken() -> None:
     made = replace(drawing_of([_circle(0, 0, 1)] * 3, ["A", "B", "a"]), marks=(_mark(0, 0, "A"),))
-    assert taken(made, job_of(layers=("a",))) == ([0, 2], [])
-    assert taken(made, job_of(kind="drill", layers=("a",))) == ([0, 2], [0])
+    assert rows_taken(made, job_of(layers=("a",))) == ([0, 2], [])
+    assert rows_taken(made, job_of(kind="drill", layers=("a",))) == ([0, 2], [0])
 
 
 def test_an_empty_drawing_stays_empty() -> None:
@@ -282,7 +282,7 @@ def test_a_drawing_in_wrong_units_is_refused_and_one_far_from_its_zero_is_not() 
 
 
 def test_copies_beyond_all_measure_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "MOST_POINTS", 8)
+    monkeypatch.setattr(module, "MAX_POINTS", 8)
     made = drawing_of([rectangle(0, 0, 1, 1)])
     place(made, job_of(copies=(2, 1), pitch_mm=(2.0, 2.0)))
     with pytest.raises(OptionError, match="12 points") as caught:
@@ -335,7 +335,7 @@ def test_points_that_the_scale_brings_together_are_one(
     areas = scale**2 * signed_areas(made.paths)
     assert signed_areas(placed.paths) == pytest.approx(areas, abs=1e-5)
     gone = len(made.paths.vertices) - len(placed.paths.vertices)
-    told = collapsed(made, placed, job)
+    told = collapse_findings(made, placed, job)
     assert [each.measured for each in told] == ([float(gone)] if gone else [])
     if scale > 0.05:
         assert gone == 0
@@ -357,7 +357,7 @@ def test_paths_that_become_a_point_are_left_out_and_told() -> None:
     assert placed.layers == ("A", "C", "A", "C")
     assert placed.sources[2].endswith("copy 2")
     assert [each.path for each in placed.healing.crossings] == [1, 3]
-    (told,) = collapsed(made, placed, job)
+    (told,) = collapse_findings(made, placed, job)
     assert (told.code, told.severity) == (PlanningCode.POINTS_MERGED, Severity.WARNING)
     assert "2 paths" in told.message
 

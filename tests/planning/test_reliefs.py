@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.geometry.polylines import Polyline, Polylines, begin_at, reverse, rotate
-from camtool.planning.reliefs import RELIEF_LEAST_MM, relieved
+from camtool.planning.reliefs import MIN_RELIEF_MM, add_reliefs
 from tests.oracles.arcs import chain_distances
 from tests.paths import mirrored, moved, scaled
 
@@ -53,7 +53,7 @@ def triangle(degrees: float) -> tuple[Polyline, Polyline, np.ndarray]:
 @pytest.mark.parametrize("kind", ["dogbone", "overcut"])
 def test_the_edge_reaches_the_corner(degrees: float, kind: str) -> None:
     wedge, path, turn = triangle(degrees)
-    done = relieved(path, wedge, R, kind, ALONE)
+    done = add_reliefs(path, wedge, R, kind, ALONE)
     (tip,) = _tips(done.path, path)
     assert math.hypot(*tip) == pytest.approx(R)
     half = math.radians(0.5 * degrees)
@@ -66,7 +66,7 @@ def test_the_edge_reaches_the_corner(degrees: float, kind: str) -> None:
 
 
 def test_a_dogbone_lies_on_the_bisector_and_an_overcut_along_the_longer_wall() -> None:
-    part = relieved(WITHIN, POCKET, R, "dogbone", ALONE).path
+    part = add_reliefs(WITHIN, POCKET, R, "dogbone", ALONE).path
     off = math.sqrt(0.5)
     assert sorted(_tips(part, WITHIN)) == [
         pytest.approx((off, off)),
@@ -74,12 +74,14 @@ def test_a_dogbone_lies_on_the_bisector_and_an_overcut_along_the_longer_wall() -
         pytest.approx((10 - off, off)),
         pytest.approx((10 - off, 6 - off)),
     ]
-    cut = relieved(WITHIN, POCKET, R, "overcut", ALONE).path
+    cut = add_reliefs(WITHIN, POCKET, R, "overcut", ALONE).path
     assert sorted(_tips(cut, WITHIN)) == [
         pytest.approx(place) for place in ((0, 1), (0, 5), (10, 1), (10, 5))
     ]
     high = Polyline(POCKET.vertices[:, [1, 0, 2]], True)
-    tall = relieved(Polyline(WITHIN.vertices[:, [1, 0, 2]], True), high, R, "overcut", ALONE).path
+    tall = add_reliefs(
+        Polyline(WITHIN.vertices[:, [1, 0, 2]], True), high, R, "overcut", ALONE
+    ).path
     assert sorted(_tips(tall, Polyline(WITHIN.vertices[:, [1, 0, 2]], True))) == [
         pytest.approx(place) for place in ((1, 0), (1, 10), (5, 0), (5, 10))
     ]
@@ -89,7 +91,7 @@ def test_walls_as_long_are_overcut_along_x() -> None:
     square = Polyline(np.array([[0, 0, 0], [6, 0, 0], [6, 6, 0], [0, 6, 0.0]]), True)
     path = Polyline(np.array([[1, 1, 0], [5, 1, 0], [5, 5, 0], [1, 5, 0.0]]), True)
     for way in (path, reverse(path)):
-        assert sorted(_tips(relieved(way, square, R, "overcut", ALONE).path, path)) == [
+        assert sorted(_tips(add_reliefs(way, square, R, "overcut", ALONE).path, path)) == [
             pytest.approx(place) for place in ((0, 1), (0, 5), (6, 1), (6, 5))
         ]
 
@@ -106,8 +108,8 @@ def test_walls_as_long_are_overcut_along_x() -> None:
     ],
 )
 def test_reliefs_turn_with_the_part(kind: str, change) -> None:  # type: ignore[no-untyped-def]
-    plain, done = WITHIN, relieved(WITHIN, POCKET, R, kind, ALONE).path
-    moved_first = relieved(change(plain), change(POCKET), R, kind, ALONE).path
+    plain, done = WITHIN, add_reliefs(WITHIN, POCKET, R, kind, ALONE).path
+    moved_first = add_reliefs(change(plain), change(POCKET), R, kind, ALONE).path
     wanted = change(Polyline(np.array([[*tip, 0] for tip in _tips(done, plain)]), True))
     found = np.array(sorted(_tips(moved_first, change(plain))))
     assert found == pytest.approx(np.array(sorted(wanted.vertices[:, :2].tolist())), abs=1e-9)
@@ -115,7 +117,7 @@ def test_reliefs_turn_with_the_part(kind: str, change) -> None:  # type: ignore[
 
 def test_the_path_may_run_against_the_walls() -> None:
     for walls in (POCKET, reverse(POCKET), begin_at(POCKET, 2)):
-        assert len(relieved(WITHIN, walls, R, "dogbone", ALONE).path) == 12
+        assert len(add_reliefs(WITHIN, walls, R, "dogbone", ALONE).path) == 12
 
 
 def test_rounded_corners_and_outer_ones_get_none() -> None:
@@ -125,13 +127,13 @@ def test_rounded_corners_and_outer_ones_get_none() -> None:
         np.array([[0, 0, 0], [10 - small, 0, quarter], [10, small, 0], [10, 6, 0], [0, 6, 0.0]]),
         True,
     )
-    tips = _tips(relieved(WITHIN, rounded, R, "dogbone", ALONE).path, WITHIN)
+    tips = _tips(add_reliefs(WITHIN, rounded, R, "dogbone", ALONE).path, WITHIN)
     assert len(tips) == 3
     assert not any(x > 9 and y < 1 for x, y in tips)
     # Around the outside: corners that the tool reaches anyway, with round and with sharp joins.
     sharp = Polyline(np.array([[-1, -1, 0], [11, -1, 0], [11, 7, 0], [-1, 7, 0.0]]), True)
     assert (
-        relieved(sharp, POCKET, R, "dogbone", ALONE).path.vertices.tolist()
+        add_reliefs(sharp, POCKET, R, "dogbone", ALONE).path.vertices.tolist()
         == sharp.vertices.tolist()
     )
 
@@ -142,7 +144,7 @@ def test_a_joint_that_is_smooth_is_no_corner() -> None:
         np.array([[0, 0, 0], [10, 0, math.tan(0.25 * 1e-5)], [20, 5e-5, 0], [10, 20, 0.0]]), True
     )
     path = Polyline(np.array([[5, 1, 0], [11, 1, 0], [12, 3, 0.0]]))
-    assert len(relieved(path, shallow, R, "dogbone", ALONE).path) == len(path)
+    assert len(add_reliefs(path, shallow, R, "dogbone", ALONE).path) == len(path)
 
 
 def test_corners_with_arcs() -> None:
@@ -152,7 +154,7 @@ def test_corners_with_arcs() -> None:
     path = Polyline(
         np.array([[-x, 1, 0], [x, 1, math.tan(0.25 * (math.pi - 2 * math.asin(0.25)))]]), True
     )
-    done = relieved(path, part, R, "dogbone", ALONE).path
+    done = add_reliefs(path, part, R, "dogbone", ALONE).path
     tips = _tips(done, path)
     assert len(tips) == 2
     assert (
@@ -165,7 +167,7 @@ def test_corners_with_arcs() -> None:
     # The arc that leaves V still does, after the relief.
     assert np.count_nonzero(done.vertices[:, 2]) == 1
     assert done.vertices[np.flatnonzero(done.vertices[:, 2])[0], :2] == pytest.approx([x, 1])
-    over = _tips(relieved(path, part, R, "overcut", ALONE).path, path)
+    over = _tips(add_reliefs(path, part, R, "overcut", ALONE).path, path)
     assert (
         sorted(math.dist(tip, (math.copysign(5, tip[0]), 0)) for tip in over)
         == [pytest.approx(R)] * 2
@@ -175,7 +177,7 @@ def test_corners_with_arcs() -> None:
 def test_an_allowance_is_left_in_the_corner_too() -> None:
     path = Polyline(np.array([[1.2, 1.2, 0], [8.8, 1.2, 0], [8.8, 4.8, 0], [1.2, 4.8, 0.0]]), True)
     for kind in ("dogbone", "overcut"):
-        tips = _tips(relieved(path, POCKET, R, kind, ALONE).path, path)
+        tips = _tips(add_reliefs(path, POCKET, R, kind, ALONE).path, path)
         assert len(tips) == 4
         for tip in tips:
             corner = (10.0 * (tip[0] > 5), 6.0 * (tip[1] > 3))
@@ -183,15 +185,16 @@ def test_an_allowance_is_left_in_the_corner_too() -> None:
 
 
 def test_a_point_leaves_nothing_in_a_corner() -> None:
-    assert relieved(WITHIN, POCKET, 0.0, "dogbone", ALONE).path is WITHIN
+    assert add_reliefs(WITHIN, POCKET, 0.0, "dogbone", ALONE).path is WITHIN
 
 
 def test_corners_that_are_hardly_missed_get_none() -> None:
     wedge, path, turn = triangle(179.0)
     missed = math.hypot(*turn) - R
-    assert 0.0 < missed < RELIEF_LEAST_MM
+    assert 0.0 < missed < MIN_RELIEF_MM
     assert (
-        relieved(path, wedge, R, "dogbone", ALONE).path.vertices.tolist() == path.vertices.tolist()
+        add_reliefs(path, wedge, R, "dogbone", ALONE).path.vertices.tolist()
+        == path.vertices.tolist()
     )
 
 
@@ -204,7 +207,7 @@ def test_a_relief_does_not_cut_into_other_lines() -> None:
             10.15 + off + gap,
             5.5,
         )
-        done = relieved(WITHIN, POCKET, R, "dogbone", Polylines.of([hole, POCKET]))
+        done = add_reliefs(WITHIN, POCKET, R, "dogbone", Polylines.of([hole, POCKET]))
         assert len(done.left) == left
         if left:
             assert done.left[0].tolist() == [10.0, 6.0]
@@ -234,7 +237,7 @@ def test_triangles(first: float, second: float, kind: str) -> None:
     radius = 2.0 * 0.5 * base * high / sides.sum()
     if radius < 2.0 * R:
         return
-    done = relieved(path, part, R, kind, ALONE)
+    done = add_reliefs(path, part, R, kind, ALONE)
     reached = chain_distances(corners, _ring(done.path)) - R
     assert reached == pytest.approx(np.zeros(3), abs=1e-5)
     assert len(done.left) == 0

@@ -18,7 +18,7 @@ from camtool.planning.findings import PlanningCode
 from camtool.planning.items import Contour, Feeds, Setting
 from camtool.planning.job import Entry, Lead, Operation, Tabs, Tool
 from camtool.planning.paths import MeasuredPath
-from camtool.planning.tabs import raised, tabs_of
+from camtool.planning.tabs import raise_profile, tabs_of
 from tests.oracles.runs import run_points, runs_of, steepest
 from tests.strategies import contours
 
@@ -251,7 +251,7 @@ def test_a_raised_profile_is_the_higher_of_profile_and_tabs(
 ) -> None:
     asked = Tabs(count=3, width_mm=1.0, ramped=ramped)
     tabs = tabs_of(contour(SQUARE, asked), MeasuredPath.of(SQUARE))[0]
-    made = raised(knots, tabs, 48.0)
+    made = raise_profile(knots, tabs, 48.0)
     assert made[0][0] == knots[0][0]
     assert made[0][1] >= knots[0][1]  # on a tab the tool does not go down beside it
 

@@ -18,8 +18,8 @@ the bottom, and leaves for the centre:
 
 CCW the teeth of a spindle that turns CW go with the feed: inside a hole that is climb.
 
-In a hole hardly wider than the tool (ρ below HELIX_LEAST · r) a helix has hundreds of turns, in
-which the axes hardly move and the tool rubs: there the tool plunges in the middle, in pecks no
+In a hole hardly wider than the tool (ρ below MIN_HELIX_SHARE · r) a helix has hundreds of turns,
+in which the axes hardly move and the tool rubs: there the tool plunges in the middle, in pecks no
 deeper than the step down and the tool's diameter, and goes once round at the full depth.
 """
 
@@ -60,7 +60,7 @@ from camtool.planning.items import Chosen, Contour, CutRun, Fixed, Setting, Work
 from camtool.planning.job import Operation
 from camtool.planning.naming import at_place, key_of, operation_name, shortened_list, tool_name
 from camtool.planning.paths import QUARTER
-from camtool.planning.ramps import HELIX_LEAST, feeds_along
+from camtool.planning.ramps import MIN_HELIX_SHARE, feeds_along
 
 CORE_SHARE = 0.9
 """The innermost ring is no larger than this part of the tool's radius, so that no core stays."""
@@ -170,7 +170,7 @@ def _turned(vertices: Floats, hole: Hole, operation: Operation) -> Floats:
 def _is_narrow(hole: Hole, operation: Operation) -> bool:
     """True if there is no room for a useful helix: the tool plunges."""
     wide = 0.5 * _diameter(hole) - operation.away_mm
-    return wide < HELIX_LEAST * operation.tool.radius_mm
+    return wide < MIN_HELIX_SHARE * operation.tool.radius_mm
 
 
 def _peck_mm(operation: Operation) -> float:

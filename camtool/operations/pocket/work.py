@@ -60,8 +60,8 @@ from camtool.planning.finish import along_walls
 from camtool.planning.items import Chosen, CutRun, Fixed, Setting, Work
 from camtool.planning.job import Operation
 from camtool.planning.naming import at_place, key_of, operation_name, tool_name
-from camtool.planning.paths import MeasuredPath, joined
-from camtool.planning.ramps import HELIX_LEAST, feeds_along
+from camtool.planning.paths import MeasuredPath, join_paths
+from camtool.planning.ramps import MIN_HELIX_SHARE, feeds_along
 from camtool.planning.reach import cut_away_findings, unreached, unreached_findings
 
 MOST_STEPS = 10_000
@@ -337,7 +337,7 @@ def down_for(
         room = float(points_to_segments(centre[None, :], whole.segments).min())
         fits = min(wanted, room)
         turns = _descent(setting) / (2.0 * math.pi * max(fits, POSITION_EPS_MM))
-        if fits >= min(HELIX_LEAST * radius, wanted) and turns <= HELIX_MOST_TURNS:
+        if fits >= min(MIN_HELIX_SHARE * radius, wanted) and turns <= HELIX_MOST_TURNS:
             smaller = entry.radius_mm is not None and fits < wanted
             changed = f"a helix of {fits:.4g} mm instead of {wanted:g} mm" if smaller else ""
             return Down(centre, fits, changed=changed)
@@ -378,7 +378,7 @@ def _entry(
         across = link(helix[-1, :2], begin)
         if across is not None:
             flat = _at(across, level)
-            return joined([np.insert(helix, 2, _sloping(helix, heights), axis=1), flat])
+            return join_paths([np.insert(helix, 2, _sloping(helix, heights), axis=1), flat])
     if above == 0.0:
         return np.array([[*begin, level, 0.0]])
     return np.array([[*begin, above, 0.0], [*begin, level, 0.0]])
@@ -403,7 +403,7 @@ def _ramp(path: Floats, length: float, heights: tuple[float, float]) -> Floats:
     laps = max(1, math.ceil(0.5 * length / along.total_mm))
     reach = 0.5 * length / laps
     forth = along.piece(0.0, reach)
-    flat = joined([forth, along.piece(reach, 0.0)] * laps)
+    flat = join_paths([forth, along.piece(reach, 0.0)] * laps)
     return np.insert(flat, 2, _sloping(flat, heights), axis=1)
 
 
@@ -426,7 +426,7 @@ def _at(flat: Floats, z: float) -> Floats:
 
 
 def _run(parts: list[Floats], setting: Setting, name: str) -> CutRun:
-    vertices = joined(parts)
+    vertices = join_paths(parts)
     feeds = setting.feeds
     return CutRun(vertices, feeds_along(vertices, feeds), feeds.plunge_mm_min, name)
 

@@ -274,14 +274,14 @@ def _joined(chosen: Chosen, of: tuple[int, ...], setting: Setting) -> Iterator[F
 
 def _relieved(line: _Line, chosen: Chosen, setting: Setting, findings: list[Finding]) -> _Line:
     """The line with reliefs at the sharp inner corners of the paths that it belongs to."""
-    from camtool.planning.reliefs import relieved
+    from camtool.planning.reliefs import add_reliefs
 
     tool, path = setting.operation.tool, line.path
     for k in line.of:
         others = (np.arange(len(chosen.lines)) != k) & chosen.lines.closed
         keep_out = chosen.lines.select(np.flatnonzero(others).tolist())
         kind, near_mm = setting.operation.corners, tool.radius_mm - setting.operation.beyond_mm
-        done = relieved(path, chosen.lines[k], near_mm, kind, keep_out)
+        done = add_reliefs(path, chosen.lines[k], near_mm, kind, keep_out)
         path = done.path
         findings += (
             NOT_RELIEVED(where=at_place(chosen.names[k], corner), tool=tool_name(tool))

@@ -62,7 +62,7 @@ from camtool.planning.findings import (
 from camtool.planning.items import Chosen, CutRun, Fixed, Setting, Work
 from camtool.planning.job import Operation
 from camtool.planning.naming import at_place, key_of
-from camtool.planning.paths import backwards, joined
+from camtool.planning.paths import join_paths, reverse_vertices
 from camtool.planning.ramps import feeds_along
 from camtool.planning.settings import Cone
 
@@ -320,11 +320,11 @@ def floor_area(pieces: list[Floats]) -> float:
 
 def _index_runs(trace: MedialTrace, wanted: Bools, partners: bool = True) -> list[tuple[int, int]]:
     """First and last rows of the runs of wanted gaps, within an element (and one partner)."""
-    joined = wanted[1:] & wanted[:-1] & (trace.element[2:] == trace.element[:-2])
+    is_joined = wanted[1:] & wanted[:-1] & (trace.element[2:] == trace.element[:-2])
     if partners:
-        joined &= trace.partner[2:] == trace.partner[:-2]
-    first = np.flatnonzero(wanted & ~np.append(False, joined))
-    last = np.flatnonzero(wanted & ~np.append(joined, False))
+        is_joined &= trace.partner[2:] == trace.partner[:-2]
+    first = np.flatnonzero(wanted & ~np.append(False, is_joined))
+    last = np.flatnonzero(wanted & ~np.append(is_joined, False))
     return list(zip(first.tolist(), (last + 1).tolist(), strict=True))
 
 
@@ -469,8 +469,10 @@ def walks(graph: Graph, again_mm: float) -> list[Floats]:
     for circuit in _circuits(ends, len(graph.places)):
         for rows in _cut(circuit, len(graph.pieces)):
             pieces = [(graph.pieces[row], back) for row, back in rows]
-            walk = joined([backwards(piece) if back else piece for piece, back in pieces])
-            result.append(backwards(walk) if walk[-1, 2] < walk[0, 2] else walk)
+            walk = join_paths(
+                [reverse_vertices(piece) if back else piece for piece, back in pieces]
+            )
+            result.append(reverse_vertices(walk) if walk[-1, 2] < walk[0, 2] else walk)
     return result
 
 
