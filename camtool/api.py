@@ -87,7 +87,7 @@ __all__ = [
 # Drawings, jobs and programs from files.
 
 BYTES = "<bytes>"
-"""What messages call a program that was given as bytes."""
+"""The name in messages of a program that was given as bytes."""
 
 
 def _patterns(given: str | Sequence[str]) -> tuple[str, ...]:

@@ -63,14 +63,14 @@ PLANNING = "planning"
 
 @dataclass(frozen=True)
 class Judging:
-    """How a program is judged.
+    """Options of judging a program.
 
-    `found`: what of the drawing it cuts is found from the program, of a job only the place of the
-    drawing and the diameter of its tool are taken; `align`: the place is looked for too.
-    `interpolator` takes the place of the controller's own; `effects` are the parts of the
-    mechanics that act (None: all); exceeding `gates` is a finding. `worst` moves are listed, and
-    `trace_points` of the slides' path are kept (None: the default numbers); `keep_ledger` keeps
-    time, steps and reversals of each row.
+    `found`: the contours of the drawing that the program cuts are found from the program; only the
+    place of the drawing and the diameter of the tool are taken from the job. `align`: the place is
+    found from the program too. `interpolator` replaces the controller's own; `effects` are the
+    parts of the mechanics that act (None: all); exceeding `gates` is a finding. `worst` moves are
+    listed, and `trace_points` of the slides' path are kept (None: the default numbers);
+    `keep_ledger` keeps time, steps and reversals of each row.
     """
 
     interpolator: str | None = None
@@ -84,7 +84,7 @@ class Judging:
 
 
 class _Posting(Struct, frozen=True):
-    """How drawings are posted, as `post_drawing` says."""
+    """The options of `post_drawing`."""
 
     check: bool = True
     gates: Gates | None = None
@@ -490,7 +490,7 @@ def _repeated(program: Program, decoded: Toolpath) -> set[Finding]:
 
 
 def _operations(steps: Sequence[Step]) -> tuple[PlannedOperation, ...]:
-    """How the operations that cut something do it, for the report."""
+    """Return the rows of the report for the operations that cut something."""
     from camtool.planning.checks import deepest_pass
     from camtool.verification.report import PlannedOperation, rounded
 
@@ -681,8 +681,9 @@ def _row_from(program: Program, decoded: Toolpath) -> Indices:
 def _asked(
     job: Job, target: LoadedTarget, planned: Toolpath, compensation: CompensatedToolpath | None
 ) -> ProgramRequest | None:
-    """What the job asks for, as moves of the dialect; None where planning found an error, which
-    is a finding already. `compensation` is `planned` compensated against the mechanics."""
+    """Write and read back the planned moves, to compare a program with what the job asks for; None
+    if planning found an error, which is a finding already. `compensation` is `planned` compensated
+    against the mechanics."""
     from camtool.planning.settings import safe_z_of
     from camtool.verification.conformance import ProgramRequest
 

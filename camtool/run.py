@@ -32,7 +32,7 @@ class Shown(ABC):
 
     @abstractmethod
     def scene(self) -> Scene | Overlay:
-        """What its picture shows."""
+        """Return the content of its picture."""
 
     def _repr_svg_(self) -> str:
         from camtool.pictures.picture import Picture
@@ -42,7 +42,7 @@ class Shown(ABC):
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Run(Shown):
-    """One program of `target`, and all that is known of it; None for what there is not.
+    """A program of `target` with its source and its verification; None for what there is not.
 
     `source` names the drawing, or the file of the program where there is no drawing. `wanted` are
     the moves that `drawing` and `job` ask for, `program` holds the bytes, `decoded` the moves that

@@ -138,7 +138,7 @@ def _unchosen(
 
 
 def _judged(drawing: Drawing, options: ReadOptions) -> list[Finding]:
-    """What the drawing itself shows: its size, its gaps, what was mended."""
+    """Return the findings about the size of the drawing, its gaps, and the repairs."""
     gap_mm = gap_of(options)
     return [
         *size_findings(drawing),
@@ -216,10 +216,10 @@ def cleaned_marks(marks: Sequence[Mark], file: str) -> tuple[tuple[Mark, ...], l
 
 # Findings of a drawing, each with its place.
 
-SMALLEST_MM = 0.05
+MIN_SIZE_MM = 0.05
 """A drawing whose longer side is below this was probably read in the wrong unit."""
 
-LARGEST_MM = 2000.0
+MAX_SIZE_MM = 2000.0
 """A drawing whose longer side is above this was probably read in the wrong unit."""
 
 MAX_GAP_FINDINGS = 20
@@ -231,7 +231,7 @@ MAX_PLACES = 20
 
 
 def counted(skipped: Sequence[Skipped]) -> list[Skipped]:
-    """One row for each kind and reason, in order of first appearance."""
+    """Sum up skipped entities by kind and reason, in order of first appearance."""
     counts: Counter[tuple[str, str]] = Counter()
     for item in skipped:
         counts[item.kind, item.reason] += item.count
@@ -239,7 +239,8 @@ def counted(skipped: Sequence[Skipped]) -> list[Skipped]:
 
 
 def skip_findings(skipped: Sequence[Skipped], dropped: Sequence[Skipped]) -> list[Finding]:
-    """What was left out: the reader's part as warnings, what has no length as information."""
+    """Return warnings for entities that the reader skipped, and remarks for those that were
+    `dropped` because they have no length."""
     return [
         ENTITY_SKIPPED(severity=severity, measured=item.count, kind=item.kind, reason=item.reason)
         for severity, items in ((Severity.WARNING, skipped), (Severity.INFO, dropped))
@@ -259,13 +260,13 @@ def size_findings(drawing: Drawing) -> list[Finding]:
     longest = max(width, height)
     if len(drawing.paths) == 0 and len(drawing.marks) < 2:
         return []
-    if SMALLEST_MM <= longest <= LARGEST_MM:
+    if MIN_SIZE_MM <= longest <= MAX_SIZE_MM:
         return []
-    small = longest < SMALLEST_MM
+    small = longest < MIN_SIZE_MM
     return [
         IMPLAUSIBLE_SIZE(
             measured=longest,
-            limit=SMALLEST_MM if small else LARGEST_MM,
+            limit=MIN_SIZE_MM if small else MAX_SIZE_MM,
             width=width,
             height=height,
             drawn_in=units.name,
@@ -301,7 +302,7 @@ def gap_findings(gaps: Sequence[Gap], gap_mm: float, *, closed: bool) -> list[Fi
 
 
 def healing_findings(healed: Healing, tolerance_mm: float) -> list[Finding]:
-    """What was mended, one finding of each kind; branches and crossings with their places."""
+    """Return a finding for each kind of repair; branches and crossings name their places."""
     found: list[Finding] = []
     if healed.duplicates or healed.overlaps:
         length = healed.duplicates_mm + healed.overlaps_mm
@@ -329,7 +330,8 @@ def _branch_findings(healed: Healing) -> list[Finding]:
 
 
 def _crossing_findings(crossings: Sequence[SelfCrossing]) -> list[Finding]:
-    """One finding for each path that crosses itself, with its first place; the rest counted."""
+    """Return a finding for each path that crosses itself, with its first place; those beyond
+    MAX_PLACES are counted."""
     times = Counter(crossing.path for crossing in crossings)
     first = {crossing.path: crossing for crossing in reversed(crossings)}
     found = []

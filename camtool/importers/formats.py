@@ -1,4 +1,4 @@
-"""Which format the content of a file has; its extension is a hint where the content is silent.
+"""Detect the format of a file by its content; its extension is a hint where that is silent.
 
     binary DXF   the sentinel of AutoCAD Binary DXF
     ASCII DXF    the first line is a group code alone: 0 or 999
@@ -105,7 +105,7 @@ class NoDrawingError(DrawingError):
 
 
 def find_format(data: bytes, suffix: str, file: str) -> str:
-    """One of FORMATS for this content; DrawingError when it is none of them."""
+    """Return the name of the format in FORMATS; NoDrawingError if the content is none of them."""
     suffix = suffix.lower()
     name = _by_bytes(data, file) or _by_text(data, suffix, file)
     if name is None:
@@ -165,12 +165,12 @@ def _by_text(data: bytes, suffix: str, file: str) -> str | None:
 
 
 def is_step(head: str) -> bool:
-    """Whether a text begins as STEP does."""
+    """True if the text begins with the header of STEP."""
     return _STEP_START.match(head) is not None
 
 
 def is_brep(head: str) -> bool:
-    """Whether a file begins as OpenCASCADE's BREP does."""
+    """True if the text begins with the header of OpenCASCADE's BREP."""
     return _BREP_START.match(head) is not None
 
 
@@ -230,7 +230,7 @@ def _refuse_program(head: str, file: str) -> None:
 
 
 def _looks_like_points(head: str) -> bool:
-    """Whether the first line that is no comment holds two fields, and all of it is text."""
+    """True if this is text, and its first line that is no comment begins with two fields."""
     if "\x00" in head or "\ufffd" in head:
         return False
     for line in head.splitlines():

@@ -96,7 +96,7 @@ def _chosen(rows: Floats, chosen: Bools) -> Floats:
 
 
 def is_placed(piece: Piece) -> bool:
-    """Whether every number of a piece is finite, and every point within MAX_COORDINATE_MM."""
+    """True if every number of a piece is finite, and every point within MAX_COORDINATE_MM."""
     vertices = piece.vertices
     near = (np.abs(vertices[:, :2]) <= MAX_COORDINATE_MM).all()
     return bool(near and np.isfinite(vertices).all())
@@ -295,7 +295,7 @@ def _recognised(lines: Polylines, options: ReadOptions) -> tuple[Polylines, int]
 # the ends have the largest one, between the chords of an arc and the arc their middles.
 
 PLACES = (0.0, 0.25, 0.5, 0.75, 1.0)
-"""Where on a segment its distance is measured."""
+"""Parameters of a segment at which its distance is measured."""
 
 
 def off_drawn(pieces: Sequence[Piece], lines: Polylines) -> Floats:

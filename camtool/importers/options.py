@@ -1,4 +1,4 @@
-"""How a drawing is read: one table of options.
+"""The options of reading a drawing, in one table.
 
 `ReadOptions` and its `Selection` are the table: name, type, default and flag of each option. The
 flags of commands are made from it, and `Reading` has the same names and types as keywords of the
@@ -28,10 +28,10 @@ SUFFIXES = (".dxf", ".svg", ".svgz", ".step", ".stp", ".brep", ".brp")
 theirs with other files, so that they must be named or matched by a pattern."""
 
 TEXTS = ("skip", "outline", "stroke")
-"""What becomes of text: left out, the outlines of its font, or the lines of an engraving font."""
+"""The treatment of text: skipped, as outlines of its font, or as lines of an engraving font."""
 
 TRACES = ("outline", "centre")
-"""What becomes of dark shapes in a picture of pixels: their outlines, or their centre lines."""
+"""The treatment of dark shapes in a picture of pixels: outlines or centre lines."""
 
 TEXT_SKIPPED = "is text: read it with --text outline, or --text stroke for engraving"
 """Why text is left out."""
@@ -62,7 +62,7 @@ class Flag:
 
 @dataclass(frozen=True)
 class Selection:
-    """Which entities are read; empty fields choose all.
+    """Patterns that select entities; an empty field selects all.
 
     `layers` and `exclude_layers`: patterns with `*`, `?` and `[…]`, in any case. `colours`:
     "#rrggbb". `line_types`: patterns like those of layers (DASHED, CENTER*).
@@ -86,7 +86,7 @@ class Selection:
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """How to read a drawing; every field has a default that suits most files.
+    """Options of reading; every field has a default that suits most files.
 
     `units`: the unit of the file's numbers, over what the file says (a name of
     `units.MM_PER_UNIT`). `tolerance_mm`: how far fitted arcs may lie from a curve; `gap_mm`: open
@@ -252,7 +252,7 @@ class ReadOptions:
         )
 
     def mm_per(self, unit: str) -> float:
-        """One `unit` in mm; a px is as large as `dpi` makes it."""
+        """Return the length of one `unit` in mm; that of a px follows from `dpi`."""
         name = unit.lower()
         return _MM_PER_INCH / self.px_an_inch if name == "px" else MM_PER_UNIT[name]
 
@@ -262,7 +262,7 @@ DEFAULTS = ReadOptions()
 
 
 class Reading(TypedDict, total=False):
-    """How a drawing is read, as keywords: the fields of `ReadOptions`, and of its `Selection`
+    """Options of reading as keywords: the fields of `ReadOptions`, and of its `Selection`
     (patterns of layers, colours and line types; without patterns, all)."""
 
     units: str | None

@@ -32,7 +32,7 @@ class Unusable(Exception):
 
 
 class Piece(Struct, frozen=True, eq=False):
-    """One entity: `vertices` (n, 3) of x, y, bulge in mm, and where it came from.
+    """An entity: `vertices` (n, 3) of x, y, bulge in mm, and its place in the file.
 
     A closed piece may repeat its first point at its end. `source` begins with the kind of the
     entity ("CIRCLE 2F", "path outline"). `line_type` as a DXF names it, "" elsewhere. `off_mm`
@@ -114,7 +114,8 @@ _Rule = tuple[str, Callable[[Piece], bool]]
 
 
 def _rules(wanted: Selection, pieces: Sequence[Piece], file: str) -> list[_Rule]:
-    """What a chosen piece must fulfil, with the reason for leaving out one that does not."""
+    """Return the conditions of the selection, each with the reason for leaving out a piece that
+    does not fulfil it."""
     rules: list[_Rule] = []
     layers = matching(wanted.layers, (piece.layer for piece in pieces), "layer", file)
     if layers is not None:

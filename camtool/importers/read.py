@@ -36,8 +36,8 @@ def read_drawing(path: Path, *, options: ReadOptions = DEFAULTS) -> Drawing:
 
 
 def content(path: Path) -> tuple[bytes, str]:
-    """What is in a file, and its name in messages; `-` is standard input. DrawingError when there
-    is none."""
+    """Return the content of a file and its name in messages; `-` is standard input. DrawingError
+    if it cannot be read."""
     if str(path) == "-":
         return _standard_input(), STDIN
     return file_bytes(path), str(path)

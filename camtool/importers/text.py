@@ -108,7 +108,7 @@ class WantedFont(Struct, frozen=True):
 
     @property
     def is_stroked(self) -> bool:
-        """Whether it is one of CAD's own stroke fonts: txt, romans.shx, symbols.shp, iso.lff."""
+        """True for CAD's own stroke fonts: txt, romans.shx, symbols.shp, iso.lff."""
         if self.family:
             family = self.family.lower()
             return family.endswith(_SHAPES) or family in _SHAPE_FONTS
@@ -169,7 +169,7 @@ def _stroke_letter(character: str) -> Letter | None:
 
 
 class _Face(Struct, frozen=True, order=True):
-    """One installed font file."""
+    """An installed font file."""
 
     path: str
     family: str
@@ -248,7 +248,8 @@ def _outline_font(path: str) -> Font | None:
 
 
 def _outline(glyphs: Any, capital: float, character: str) -> Letter | None:
-    """One letter of a font whose capitals are this high in its own units."""
+    """Return the outline of a letter, None if the font lacks it; `capital` is the height of its
+    capitals in its own units."""
     if ord(character) not in glyphs.cmap:
         return None
     base = np.array([0.0, float(glyphs.font_measurements.baseline)])
@@ -273,7 +274,8 @@ RULE_SHARE = 0.07
 """Thickness of an underline or a fraction bar in outlines, as a share of the letters' height."""
 
 RULE_DROP = 0.2
-"""How far an underline lies below the baseline, an overline above the capitals (same share)."""
+"""Distance of an underline from the baseline, and of an overline from the capitals (share of the
+height of a capital)."""
 
 NUMBERED = re.compile(r"%%(03[2-9]|0[4-9]\d|1\d\d|2[0-4]\d|25[0-5])", re.ASCII)
 """A character by its number, 32 to 255."""
@@ -301,7 +303,7 @@ def finite(*values: float) -> tuple[float, ...]:
 
 
 def lacking(font: str, substituted: str, missing: str) -> str:
-    """What a font lacks, in words, "" when nothing: `font` draws in place of the font
+    """Describe what a font lacks, "" for nothing: `font` draws in place of the font
     `substituted` ("" when it is the wanted one) and has none of the characters `missing`."""
     notes = []
     if substituted:
@@ -324,7 +326,7 @@ def slant(oblique_deg: float) -> float:
 
 
 def numbered(digits: str) -> str:
-    """What %%nnn stands for: a character of Windows' western code page."""
+    """Return the character of %%nnn in Windows' western code page."""
     return bytes([int(digits)]).decode("cp1252", errors="replace")
 
 
@@ -338,7 +340,7 @@ class Rule(IntFlag):
 
 
 class TextLook(Struct, frozen=True, eq=False):
-    """How letters look: `height` of a capital, `slant` = tan(oblique angle)."""
+    """The look of letters: `height` of a capital, `slant` = tan(oblique angle)."""
 
     font: Font
     height: float
@@ -359,8 +361,8 @@ class TextLook(Struct, frozen=True, eq=False):
 
 
 class Ink(Struct, eq=False):
-    """What has been drawn: `points` (n, 2) of all parts in turn; each contour as the counts of
-    points of its parts, and whether it is closed; the characters that fonts lack."""
+    """The contours of drawn text: `points` (n, 2) of all parts in turn; for each contour the
+    counts of points of its parts, and True if it is closed; the characters that fonts lack."""
 
     points: list[Floats] = field(default_factory=list)
     contours: list[tuple[tuple[int, ...], bool]] = field(default_factory=list)

@@ -12,7 +12,7 @@ from camtool.findings import Code, Severity
 from camtool.geometry.drawing import Drawing, Skipped, Units
 from camtool.geometry.measure import signed_areas
 from camtool.importers import healing
-from camtool.importers.assemble import LARGEST_MM, MAX_GAP_FINDINGS, SMALLEST_MM, assemble
+from camtool.importers.assemble import MAX_GAP_FINDINGS, MAX_SIZE_MM, MIN_SIZE_MM, assemble
 from camtool.importers.findings import DrawingCode
 from camtool.importers.healing import cleaned
 from camtool.importers.options import ReadOptions
@@ -149,8 +149,8 @@ def test_there_and_back_is_one_line() -> None:
 
 
 @pytest.mark.parametrize(
-    ("size", "told"), [(SMALLEST_MM, False), (SMALLEST_MM * 0.99, True), (LARGEST_MM, False),
-                       (LARGEST_MM * 1.01, True)],
+    ("size", "told"), [(MIN_SIZE_MM, False), (MIN_SIZE_MM * 0.99, True), (MAX_SIZE_MM, False),
+                       (MAX_SIZE_MM * 1.01, True)],
 )  # fmt: skip
 def test_implausible_sizes(size: float, told: bool) -> None:
     drawing = put(piece((0, 0), (size, 0)), gap_mm=0.0)

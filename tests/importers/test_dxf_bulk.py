@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from camtool.errors import DrawingError
 from camtool.importers.dxf import load as dxf_load
-from camtool.importers.dxf.bulk import LEAST_VERTICES, Bulk
+from camtool.importers.dxf.bulk import MIN_VERTICES, Bulk
 from camtool.importers.dxf.reader import read
 from camtool.importers.options import ReadOptions
 
@@ -60,7 +60,7 @@ def lines(draw: st.DrawFn, odd: bool) -> list[tuple[int, str]]:
 @st.composite
 def polyline(draw: st.DrawFn, odd: bool) -> list[tuple[int, str]]:
     """An LWPOLYLINE that is long enough to be read in bulk."""
-    corners = [f"{k % 7}.{k}" for k in range(LEAST_VERTICES + draw(st.integers(-1, 3)))]
+    corners = [f"{k % 7}.{k}" for k in range(MIN_VERTICES + draw(st.integers(-1, 3)))]
     tags = [(0, "LWPOLYLINE"), (5, "C1"), (100, "AcDbEntity"), (8, "0"), (100, "AcDbPolyline")]
     tags += [(90, str(len(corners))), (70, draw(st.sampled_from("01"))), (38, "0.0")]
     if draw(st.booleans()):

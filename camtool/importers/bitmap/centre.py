@@ -31,7 +31,7 @@ HOOK_SHARE = 0.6
 stroke's edges; on its way out of a corner it is more."""
 
 MIDDLE_SHARE = 0.93
-"""What lies before the place where a line has this part of the half width there leads into a
+"""The part of a line before the place where it has this share of the half width leads into a
 corner."""
 
 ROUGH_PX = 1.0
@@ -40,10 +40,10 @@ ROUGH_PX = 1.0
 LOOK_BACK = 1.5
 """The direction of a branch is that from its junction to so many half widths away."""
 
-LEAST_LOOK_PX = 4
+MIN_LOOK_PX = 4
 """And at least so many pixels away."""
 
-MOST_ROUNDS = 8
+MAX_ROUNDS = 8
 """Spurs are looked for again, once others are gone, no more often than this."""
 
 Pixel = tuple[int, int]
@@ -196,7 +196,7 @@ def centre_lines(dark: Bools) -> tuple[list[tuple[Floats, bool]], int]:
     through: dict[tuple[int, bool], tuple[int, bool]] = {}
     for node, arms in ends.items():
         width = max(graph.half_width(pixel) for pixel, of in nodes.items() if of == node)
-        look = max(LEAST_LOOK_PX, int(LOOK_BACK * width))
+        look = max(MIN_LOOK_PX, int(LOOK_BACK * width))
         through |= _straight_on(chains, arms, middles[node], look)
     return [
         (_points(path, chains, nodes, middles, height), closed)
@@ -206,7 +206,7 @@ def centre_lines(dark: Bools) -> tuple[list[tuple[Floats, bool]], int]:
 
 def _prune(graph: _Graph) -> None:
     """Take out spurs until none is left."""
-    for _ in range(MOST_ROUNDS):
+    for _ in range(MAX_ROUNDS):
         gone: list[Pixel] = []
         for chain in graph.chains():
             first, last = (len(graph.links[end]) for end in (chain[0], chain[-1]))
@@ -236,7 +236,8 @@ def _without_hook(chain: list[Pixel], graph: _Graph) -> list[Pixel]:
 
 
 def _junctions(graph: _Graph) -> dict[Pixel, int]:
-    """Which junction each pixel with three links or more belongs to; linked ones are one."""
+    """Number the junctions: return the junction of each pixel with three links or more, where
+    linked pixels are one junction."""
     many = {pixel for pixel, links in graph.links.items() if len(links) > 2}
     found: dict[Pixel, int] = {}
     for begin in graph.links:
@@ -267,8 +268,8 @@ def _straight_on(
     middle: tuple[float, float],
     look: int,
 ) -> dict[tuple[int, bool], tuple[int, bool]]:
-    """Which of the ends of chains that meet at a junction go on into each other: the straightest
-    first."""
+    """Pair the ends of chains that meet at a junction, the pair with the smallest turn first; each
+    end is in one pair at most."""
     headings = []
     for chain, last in arms:
         path = chains[chain][::-1] if last else chains[chain]

@@ -48,7 +48,7 @@ _SADDLES = {
 
 
 def crossings(ink: Ink, level: float) -> int:
-    """How many points the lines have: each lies between a dark and a light pixel."""
+    """Count the points of all contours: each lies between a dark and a light pixel."""
     dark = ink >= level
     across = int((dark[:, 1:] != dark[:, :-1]).sum()) + int((dark[1:] != dark[:-1]).sum())
     return across + sum(int(edge.sum()) for edge in (dark[0], dark[-1], dark[:, 0], dark[:, -1]))

@@ -1,4 +1,4 @@
-"""How dark the pixels of a PNG or JPEG are, whatever it is made of.
+"""Read the darkness of the pixels of a PNG or JPEG of any colour model.
 
 Pillow decodes them. Here is decided what a pixel is: colours by their luminance, also CMYK; what
 is transparent over white; 16 bits as they are; a camera held sideways as its EXIF says. The size
@@ -40,7 +40,7 @@ _BROKEN: tuple[type[Exception], ...] = (
     struct.error,
     zlib.error,
 )
-"""What Pillow raises of broken files."""
+"""The exceptions that Pillow raises for broken files."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +106,7 @@ def _dpi(said: Any) -> tuple[float, float] | None:
 
 
 def is_square(dpi: tuple[float, float]) -> bool:
-    """Whether pixels of such a density are square."""
+    """True if pixels of this density are square."""
     return abs(dpi[0] - dpi[1]) <= SQUARE_SHARE * max(dpi)
 
 

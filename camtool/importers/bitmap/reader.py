@@ -24,14 +24,14 @@ from camtool.importers.options import ReadOptions
 from camtool.importers.pieces import Piece
 from camtool.units import MM_PER_UNIT
 
-MOST_POINTS = 200_000
+MAX_POINTS = 200_000
 """Lines of more points than this, one at each edge of a pixel, are no drawing but noise."""
 
 CENTRE_PX = 0.5
 """Pixels that thinning leaves may lie this much farther from a centre line than those of an edge
 from their contour."""
 
-LEAST_RANGE = 0.05
+MIN_DARKNESS_RANGE = 0.05
 """A picture whose pixels differ by less in darkness is of one tone."""
 
 BINS = 256
@@ -45,12 +45,12 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
     units = _units(found, file, options)
     ink = np.float32(1.0) - found.ink if options.invert else found.ink
     _check_tones(ink, options, file)
-    if crossings(ink, options.threshold) > 10 * MOST_POINTS:
+    if crossings(ink, options.threshold) > 10 * MAX_POINTS:
         raise _too_noisy(file)
     lines = outlines(ink, options.threshold)
     areas = np.array([enclosed(line) for line in lines])
     shapes = [line for line, area in zip(lines, areas, strict=True) if _counts(area, options)]
-    if sum(map(len, shapes)) > MOST_POINTS:
+    if sum(map(len, shapes)) > MAX_POINTS:
         raise _too_noisy(file)
     skipped = _skipped("speck", len(lines) - len(shapes), f"under {options.speckle_px:g} pixels")
     limit = max(options.smooth_px, options.tolerance_mm / units.mm_per_unit)
@@ -84,7 +84,7 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
 
 
 def _units(found: PixelPicture, file: str, options: ReadOptions) -> Units:
-    """How large a pixel is; DrawingError where nothing, or more than one thing, says it."""
+    """Return the size of a pixel; DrawingError where no option gives it, or more than one."""
     width = found.ink.shape[1]
     if options.units is not None:
         raise DrawingError(
@@ -125,7 +125,7 @@ def _check_tones(ink: Ink, options: ReadOptions, file: str) -> None:
     if least < options.threshold <= most:
         return
     tone = "darker" if least >= options.threshold else "lighter"
-    if most - least < LEAST_RANGE:
+    if most - least < MIN_DARKNESS_RANGE:
         mend = "it is of one tone: nothing in it can be told from the rest"
     else:
         other = "" if options.invert else ", or --invert where light lines are on dark"
@@ -152,7 +152,7 @@ def _between(ink: Ink) -> float:
 
 
 def _counts(area: float, options: ReadOptions) -> bool:
-    """Whether what encloses this area, pixels, is no speck."""
+    """True if a contour that encloses this area, pixels, is large enough to be drawn."""
     return abs(area) >= options.speckle_px
 
 
@@ -180,7 +180,7 @@ def _skipped(kind: str, count: int, why: str) -> list[Skipped]:
 
 def _too_noisy(file: str) -> DrawingError:
     return DrawingError(
-        f"has more than {MOST_POINTS} pixels on edges: it is too rough to trace",
+        f"has more than {MAX_POINTS} pixels on edges: it is too rough to trace",
         file=file,
         mend="scale it down or blur it, give another --threshold, or a larger --speckle",
     )

@@ -38,7 +38,7 @@ arc, plus `AS_GOOD_PX`."""
 AS_GOOD_PX = 0.02
 """See `AS_GOOD`."""
 
-MOST_SWEEP_RAD = 1.5 * math.pi
+MAX_SWEEP_RAD = 1.5 * math.pi
 """The arc of a run turns by no more than this."""
 
 BACK_PX = 1.5
@@ -62,10 +62,10 @@ MEETING_PX = 0.35
 CORNER_POINTS = 4
 """The sharpest corner is where the path turns most within so many points to either side."""
 
-LEAST_PX = 0.05
+MIN_SEGMENT_PX = 0.05
 """Segments that are shorter are left out."""
 
-FEWEST = 3
+MIN_RUN_POINTS = 3
 """Points of a run that is more than a chord."""
 
 
@@ -192,7 +192,7 @@ def _line(points: Floats) -> _Shape:
 
 def _arc(points: Floats) -> _Shape | None:
     """The arc of least squares along points; None where they run along none."""
-    found = _centre(points) if len(points) > FEWEST else None
+    found = _centre(points) if len(points) > MIN_RUN_POINTS else None
     if found is None:
         return None
     centre, radius = found
@@ -204,7 +204,7 @@ def _arc(points: Floats) -> _Shape | None:
     sweep = float(along[-1])
     ahead = along if sweep >= 0.0 else -along
     back = float((np.maximum.accumulate(ahead) - ahead).max()) * radius
-    if abs(sweep) > MOST_SWEEP_RAD or back > BACK_PX:
+    if abs(sweep) > MAX_SWEEP_RAD or back > BACK_PX:
         return None
     off = np.hypot(*arms.T) - radius
     mean = math.sqrt(float(off @ off) / len(off))
@@ -229,7 +229,7 @@ def _best(points: Floats, limit: float) -> _Shape | None:
 
 
 def _goes_back(points: Floats, line: _Shape) -> bool:
-    """Whether points go back along a line."""
+    """True if the points turn back along the line by more than BACK_PX."""
     along = points @ line.way
     return bool((np.maximum.accumulate(along) - along).max() > BACK_PX)
 
@@ -247,7 +247,8 @@ def _runs(points: Floats, limit: float) -> list[int]:
 
 
 def _parted(points: Floats, here: int, limit: float) -> int:
-    """Where two neighbouring runs part so that their shapes leave the least: about `here`."""
+    """Return the index near `here` at which to divide the points into two runs, so that the sum of
+    squares of the distances from their shapes is least."""
     one, other = (_best(part, limit) or _line(part) for part in (points[:here], points[here:]))
     low, high = max(here - MOVES_BACK, 1), min(here + MOVES_ON, len(points) - 1)
     between = points[low:high]
@@ -261,7 +262,7 @@ def _parted(points: Floats, here: int, limit: float) -> int:
 def _reach(points: Floats, first: int, limit: float) -> int:
     """The end of the longest run from `first` on: by doubling, then by halving."""
     last = len(points)
-    good, step = min(first + FEWEST, last), FEWEST
+    good, step = min(first + MIN_RUN_POINTS, last), MIN_RUN_POINTS
     bad = last + 1
     while good < last:
         ahead = min(good + step, last)
@@ -318,8 +319,8 @@ def _joined(points: Floats, ends: list[int], limit: float, *, closed: bool) -> P
 
 
 def _meeting(one: _Shape, other: _Shape, place: Floats, limit: float) -> Floats:
-    """Where two neighbours meet, or come nearest, beside a place; on the way there, where that is
-    too far."""
+    """Return the point near `place` where two neighbouring shapes meet, or come nearest; at most
+    `limit` + MEETING_PX from `place`."""
     met = place
     for _ in range(MEETINGS):
         met = other.nearest(one.nearest(met))
@@ -345,13 +346,13 @@ class _Run(Struct, frozen=True, eq=False):
         return split_bulges(np.array([[*begin, bulge], [*end, 0.0]]), closed=False)
 
     def far(self, begin: Floats, end: Floats) -> float:
-        """How far its points are from it."""
+        """Return the largest distance of the points from the shape between these ends."""
         from camtool.kernels.fits import furthest_off
 
         return float(furthest_off(np.ascontiguousarray(self.part), self.rows(begin, end)))
 
     def suits(self, begin: Floats, end: Floats, limit: float) -> bool:
-        """Whether its points lie within the limit, and it runs as they do."""
+        """True if the points lie within the limit of the shape, which runs in their direction."""
         if abs(self.shape.sweep) < 0.5 * math.pi:
             way = self.part[-1] - self.part[0]
             if float((end - begin) @ way) < 0.0:
@@ -363,7 +364,7 @@ class _Run(Struct, frozen=True, eq=False):
     ) -> tuple[list[list[float]], list[list[float]]]:
         """The rows without the end, none where that is the begin, and how far points are from
         each; those of its halves, at last its points, where they are too far."""
-        if math.hypot(*(end - begin)) <= LEAST_PX:
+        if math.hypot(*(end - begin)) <= MIN_SEGMENT_PX:
             return [], []
         half = len(self.part) // 2
         if half == 0 or self.suits(begin, end, limit):

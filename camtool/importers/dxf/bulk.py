@@ -1,4 +1,4 @@
-"""What a DXF file has in bulk, by columns: LINEs that differ in their ends alone, and vertices.
+"""Read LINEs that differ in their ends alone, and vertices of polylines, as columns.
 
 ezdxf makes an object of each LINE, eight times as large as its text, and several of each vertex.
 It gets the first of the LINEs that follow one another and say the same of themselves (layer, line
@@ -21,7 +21,7 @@ from msgspec import Struct, field
 from camtool.arrays import Bools, Floats, Ints
 from camtool.importers.dxf.tags import DxfSections, Tags
 
-LEAST_VERTICES = 32
+MIN_VERTICES = 32
 """LWPOLYLINEs of fewer vertices are ezdxf's alone."""
 
 _HANDLE, _HEIGHT, _SUBCLASS, _REFERENCE = 5, 30, 100, 330
@@ -59,7 +59,7 @@ class Bulk(Struct, frozen=True, eq=False):
 
     @classmethod
     def of(cls, tags: Tags, frame: DxfSections) -> Bulk:
-        """What the section of entities has in bulk."""
+        """Take the simple LINEs and the polylines out of the ENTITIES section, as columns."""
         part = next((each for each in frame.sections if each.name == "ENTITIES"), None)
         if part is None or part.end is None or frame.faults:
             return cls.none(tags)
@@ -76,7 +76,7 @@ class Bulk(Struct, frozen=True, eq=False):
         return found if found._is_plain(tags, frame) else cls.none(tags)
 
     def _is_plain(self, tags: Tags, frame: DxfSections) -> bool:
-        """Whether handles name one entity each, and no hatch refers to a LINE that is left out."""
+        """True if each handle names one entity, and no hatch refers to a LINE that is left out."""
         followers = {handle for each in self.lines.values() for handle in each.handles}
         names = {*followers, *self.lines, *self.vertices}
         held = np.isin(tags.codes, _HANDLES)
@@ -149,7 +149,8 @@ def _say_the_same(tags: Tags, rows: Ints, size: int) -> Bools:
 
 
 def _is_simple(codes: tuple[int, ...]) -> bool:
-    """Whether a LINE of these group codes has one handle and two ends, each written in one go."""
+    """True if a LINE of these group codes has one handle and two ends, each with its coordinates
+    in consecutive groups."""
     if codes.count(_HANDLE) != 1 or _HANDLES[1] in codes:
         return False
     if not {*codes[: codes.index(_HANDLE)]}.isdisjoint(_DIVISIONS):
@@ -172,7 +173,7 @@ def _vertices(tags: Tags, begins: Ints, ends: Ints, others: Bools) -> dict[str, 
         codes = tags.codes[begin:end]
         x, *more = (np.flatnonzero(codes == code) for code in _VERTEX)
         handle, subclass = (np.flatnonzero(codes == code) for code in (_HANDLE, _SUBCLASS))
-        if len(x) < LEAST_VERTICES or not np.array_equal(x + 1, more[0]) or len(handle) != 1:
+        if len(x) < MIN_VERTICES or not np.array_equal(x + 1, more[0]) or len(handle) != 1:
             continue
         if not {*codes[: handle[0]].tolist()}.isdisjoint(_DIVISIONS):
             continue

@@ -31,7 +31,7 @@ CALLOUTS = frozenset(("DIMENSION", "ARC_DIMENSION", "LARGE_RADIAL_DIMENSION"))
 SCALE_SHARE = 1e-3
 """DIMLFAC is often rounded: units that differ by less than this share are one."""
 
-LONGEST_TEXT = 2000
+MAX_TEXT_LENGTH = 2000
 """A dimension with a longer text, in characters, is not read as a callout."""
 
 _ROTATED, _ALIGNED, _DIAMETER, _RADIUS = 0, 1, 3, 4
@@ -104,7 +104,8 @@ def _place(point: Floats) -> tuple[float, float]:
 def _measured(
     entity: Any,
 ) -> tuple[Literal["linear", "diameter", "radius"], list[Any], float | None]:
-    """What kind it is, between which two places (in its world), along which angle of its plane."""
+    """Return the kind of a dimension, the two places between which it measures (world units), and
+    the angle in its plane along which it measures, None for the distance itself."""
     dxf = entity.dxf
     if entity.is_dimensional_constraint:
         raise Unusable("is a constraint")
@@ -192,8 +193,8 @@ def _text(entity: Any, style: Mapping[str, Any]) -> str:
     """Its text without codes, "<>" for what it measures; "" where it shows only that."""
     raw = str(entity.dxf.get("text", ""))
     post = str(style.get("dimpost", "") or "")
-    if len(raw) + len(post) > LONGEST_TEXT:
-        raise Unusable(f"has a text of more than {LONGEST_TEXT} characters")
+    if len(raw) + len(post) > MAX_TEXT_LENGTH:
+        raise Unusable(f"has a text of more than {MAX_TEXT_LENGTH} characters")
     if raw and not raw.strip():
         raise Unusable("shows no text")
     from camtool.importers.dxf.mtext import plain_text

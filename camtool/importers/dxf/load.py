@@ -96,7 +96,7 @@ class _Kept(logging.Handler):
         self.messages: list[str] = []
 
     def emit(self, record: logging.LogRecord) -> None:
-        """One more message."""
+        """Keep the message of a record, on one line."""
         self.messages.append(" ".join(record.getMessage().split()))
 
 

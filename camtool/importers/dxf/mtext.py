@@ -225,7 +225,7 @@ WRAP_SLACK = 1e-6
 
 
 class Glue(Enum):
-    """What stands between words."""
+    """The kind of space between two words."""
 
     NONE = ""
     SPACE = "space"
@@ -361,7 +361,7 @@ def _unbreakable(cells: Sequence[MTextCell]) -> Iterator[tuple[MTextCell, ...]]:
 
 
 def _tabbed(x: float, ahead: float, paragraph: Paragraph) -> float:
-    """Where the text after a tab begins, which is `ahead` wide."""
+    """Return the x at which the text after a tab begins; it is `ahead` wide up to the next tab."""
     for stop, share in paragraph.stops:
         if stop > x and stop - share * ahead >= x:
             return stop - share * ahead

@@ -73,7 +73,7 @@ def _space(document: Any, layout: str | None, file: str) -> Any:
 
 
 def _repaired(repairs: tuple[str, ...]) -> list[Finding]:
-    """One finding for all repairs, the first few in full."""
+    """Return one finding for all repairs, which quotes the first REPAIRS_NAMED of them."""
     if not repairs:
         return []
     more = len(repairs) - REPAIRS_NAMED
@@ -82,7 +82,7 @@ def _repaired(repairs: tuple[str, ...]) -> list[Finding]:
 
 
 def _not_applied(lacking: Counter[tuple[str, str]]) -> list[Finding]:
-    """What the paths of some entities leave out."""
+    """Return a finding for each kind of property that was not applied to entities."""
     return [
         NOT_APPLIED_TO_ENTITY(measured=count, kind=kind, what=what)
         for (kind, what), count in lacking.items()

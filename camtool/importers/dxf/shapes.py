@@ -212,7 +212,7 @@ FULL_TURN_RAD = 1e-6
 """An ellipse that lacks less than this of a full turn is closed (files round to 6 digits)."""
 
 WIDTH = "the width of a line (its middle is the path)"
-"""What a polyline with a width lacks afterwards."""
+"""The name of the property that is not applied to a polyline with a width."""
 
 _FRAME_VERTEX = 16  # flag of a vertex that only steers a splined POLYLINE
 
@@ -501,7 +501,8 @@ def hatch(entity: Any, frame: WorldMap, tolerance_mm: float) -> list[DxfShape]:
 
 
 def _follows(path: Any, entity: Any) -> bool:
-    """Whether entities that the drawing holds are the sources of this path."""
+    """True if the path is the boundary of a hatch that is associated with entities of the
+    drawing."""
     handles = path.source_boundary_objects
     database = entity.doc.entitydb if entity.doc is not None else {}
     if not (handles and entity.dxf.get("associative", 0)):
@@ -510,12 +511,12 @@ def _follows(path: Any, entity: Any) -> bool:
 
 
 def _stands_beside(source: Any, entity: Any) -> bool:
-    """Whether `source` is a line or a curve of the same layout or block."""
+    """True if `source` stands in the same layout or block as the entity."""
     return source is not None and source.dxf.get("owner") == entity.dxf.get("owner")
 
 
 def _edge(edge: Any, plane: Plane, tolerance_mm: float) -> DxfShape:
-    """One edge of a boundary: line, arc, ellipse or spline."""
+    """Convert an edge of a boundary: line, arc, ellipse or spline."""
     kind = edge.type.name
     if kind == "LINE":
         ends = numbers([tuple(edge.start)[:2], tuple(edge.end)[:2]])

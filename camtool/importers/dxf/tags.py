@@ -106,7 +106,7 @@ class Tags(ABC):
 
     @cached_property
     def kinds(self) -> list[Any]:
-        """What begins at each of the `marks`."""
+        """Return the name of the entity or section that begins at each of the `marks`."""
         return list(self.values(self.marks))
 
 
@@ -207,7 +207,7 @@ class DxfSections(Struct, frozen=True):
     faults: tuple[str, ...]
 
     def whole(self, name: str) -> bool:
-        """Whether there is a section of this name, each with its end."""
+        """True if there is a section of this name, and each of that name has its end."""
         ends = [part.end for part in self.sections if part.name == name]
         return bool(ends) and None not in ends
 
@@ -292,7 +292,7 @@ def frame_of(tags: Tags) -> DxfSections:
 
 
 def lost(tags: Tags, frame: DxfSections) -> list[str]:
-    """What a damaged group code hides that is itself a group code, in words.
+    """Describe entities and vertices that are lost because a group code is damaged.
 
     An entity that has two layers is two entities, the mark (0) of one being damaged.
     """
@@ -397,7 +397,7 @@ def check_numbers(tags: Tags, file: str, rows: Ints) -> None:
 
 
 def _is_number(code: int) -> bool:
-    """Whether values of this group code are numbers (DXF reference, group code value types)."""
+    """True if values of this group code are numbers (DXF reference, group code value types)."""
     from ezdxf.lldxf.types import POINT_CODES, TYPE_TABLE
 
     return code in POINT_CODES or TYPE_TABLE.get(code, str) in (int, float)

@@ -66,7 +66,7 @@ class TextShape(Struct, frozen=True, eq=False):
 
     @property
     def lacks(self) -> str:
-        """What was wanted and could not be had, "" when nothing."""
+        """The font or characters that are not available, in words; "" if all are."""
         return lacking(self.font, self.substituted, self.missing)
 
 
@@ -156,7 +156,7 @@ def _control(match: re.Match[str]) -> str:
 
 
 def _place(entity: Any, width: float) -> tuple[_Place, tuple[float, float]]:
-    """Where the alignment point and the axes of a text lie, and how it is stretched (x, y)."""
+    """Return the alignment point and the axes of a text, and its stretch (x, y)."""
     dxf = entity.dxf
     mirror = int(dxf.text_generation_flag)
     signs = [-1.0 if mirror & _BACKWARD else 1.0, -1.0 if mirror & _UPSIDE_DOWN else 1.0]
@@ -192,7 +192,7 @@ def _place(entity: Any, width: float) -> tuple[_Place, tuple[float, float]]:
 
 
 def _start(entity: Any, look: TextLook, width: float) -> tuple[float, float]:
-    """Where the baseline begins, seen from the alignment point."""
+    """Return the start of the baseline relative to the alignment point."""
     halign, valign = int(entity.dxf.halign), int(entity.dxf.valign)
     depth = look.font.descent
     share = {1: 0.5, 2: 1.0, _MIDDLE: 0.5}.get(halign, 0.0)

@@ -52,8 +52,9 @@ _NO_LINES = BulkLines([], np.zeros((0, 2, 3)))
 
 
 class DxfScope(Struct, frozen=True, eq=False):
-    """What holds in a space or inside an INSERT: `blocks` on the way here, and the `look` of the
-    INSERT; `within` ends sources, `source` (of a dimension and the like) stands for them."""
+    """The context of entities in a space or inside an INSERT: the map to mm, the `look` of the
+    INSERT, and the `blocks` around. `within` is added to the source of each path; `source`, that
+    of a dimension and the like, replaces the sources of its parts."""
 
     frame: WorldMap
     look: DxfLook | None = None
@@ -243,7 +244,7 @@ class DxfWalk:
             self.fonts[lacks] += 1
 
     def _callout(self, entity: Any, scope: DxfScope, look: DxfLook) -> None:
-        """What a dimension says, whether its lines are read or not."""
+        """Read the dimension with its limits, whether its lines are drawn or not."""
         source, paper = _source(entity, scope), self.options.layout is not None
         unit_mm = self._mm_per_unit
         try:
@@ -256,7 +257,7 @@ class DxfWalk:
             self.callouts.append(said)
 
     def _parts(self, entity: Any, scope: DxfScope, look: DxfLook) -> None:
-        """What a dimension, a multiple line or a proxy is drawn with."""
+        """Walk through the entities that draw a dimension, a multiple line or a proxy."""
         # A dimension is drawn by a block of its own, which may hold it again.
         drawn = vars(entity.dxf).get("geometry")
         name = block_key(drawn or f"{entity.dxftype()} {entity.dxf.handle}")
@@ -399,7 +400,7 @@ WHY_UNUSED = {
 OTHER = "is of a kind that camtool does not read"
 
 MAX_PARTS = 10_000
-"""One entity may be drawn with at most this many parts."""
+"""An entity may be drawn with at most this many parts."""
 
 
 def parts_of(entity: Any) -> list[Any]:
@@ -460,7 +461,7 @@ MAX_INSERTED = 100_000
 
 
 class BlockSizes:
-    """How many entities each block holds, blocks within counted in full."""
+    """The number of entities in each block; nested blocks are counted in full."""
 
     def __init__(self, blocks: Any) -> None:
         self._blocks = blocks
@@ -500,7 +501,7 @@ def matrix(insert: Any) -> Floats:
 
 
 def places(insert: Any) -> Iterator[Floats]:
-    """Where the members of an array stand relative to the first one, (3,) in world units.
+    """Yield the shift of each member of an array from the first one, (3,) in world units.
 
     The array turns with the INSERT, but its spacing is not scaled.
     """
@@ -540,7 +541,7 @@ _BYBLOCK, _BYLAYER, _WHITE = 0, 256, 7
 
 
 class DxfLook(Struct, frozen=True):
-    """What an entity is drawn with; `hidden` says why it is not shown ("" shown).
+    """Layer, colour and line type of an entity; `hidden` says why it is not shown ("" if it is).
 
     `frozen`: an INSERT on its layer shows nothing at all; on one that is merely off it still
     shows what its block has on other layers.

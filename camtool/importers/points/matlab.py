@@ -44,7 +44,7 @@ _START = re.compile(rf"^[ \t]*(?:{'|'.join(_NAMES)})[ \t]*=", re.MULTILINE)
 
 
 def is_matlab(text: str, file: str) -> bool:
-    """Whether the text assigns one of the router's arrays, or the file is named .m."""
+    """True if the text assigns an array of the router, or the file is named .m."""
     return _START.search(text) is not None or PurePath(file).suffix.lower() == ".m"
 
 
@@ -61,7 +61,7 @@ def parse_matlab(text: str, file: str) -> PointTable:
 
 
 class _Job:
-    """What the arrays say together."""
+    """The drawing that the arrays describe together."""
 
     def __init__(self, file: str, values: dict[str, MatlabArray]) -> None:
         self.file = file
@@ -87,7 +87,8 @@ class _Job:
         return np.cumsum([np.array(first, dtype=np.float64), *steps], axis=0), lengths[1]
 
     def _is_sideways(self) -> bool:
-        """Whether pairs stand as (n, 2); a (2, 2) is as the others, else as the router has it."""
+        """True if arrays of pairs are (n, 2) instead of (2, n). A (2, 2) array follows the others;
+        alone it is read as the router reads it."""
         votes: dict[bool, MatlabArray] = {}
         for name in _PAIRS:
             value = self.values.get(name)
@@ -273,7 +274,7 @@ class _Parser:
         return found
 
     def _value(self, name: str) -> Floats:
-        """What stands behind the name, up to the end of its statement."""
+        """Parse the value that is assigned to a name, up to the end of the statement."""
         token = self._take()
         if token.text != "=":
             self._fail(f"{name} is followed by {_shown(token)}", token, _ONLY_NUMBERS)

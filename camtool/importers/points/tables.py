@@ -21,11 +21,11 @@ from camtool.errors import DrawingError
 from camtool.units import MM_PER_UNIT
 
 COLUMNS = (2, 3)
-"""How many numbers a point may have: x, y, or x, y, bulge."""
+"""Numbers of a point: x, y, or x, y, bulge."""
 
 
 class Stroke(Struct, frozen=True, eq=False):
-    """One polyline: `points` (n, 2) or (n, 3) of x, y, bulge in the file's unit.
+    """A polyline: `points` (n, 2) or (n, 3) of x, y, bulge in the file's unit.
 
     `source` says where it stands in the file; `closed` is None when the file does not say: then
     a stroke is closed that ends where it began.
@@ -97,8 +97,9 @@ def parse_lines(text: str, file: str) -> PointTable:
 
 
 class _Lines(Struct):
-    """What the lines so far have shown: the separator `parted` ("" for blanks), `columns`, and
-    where a decimal comma, a decimal point, and a proof of the comma's meaning were first seen."""
+    """The format of a table as far as its lines have shown it: the separator `parted` ("" for
+    blanks), `columns`, and the first lines with a decimal comma, a decimal point, and a proof of
+    the comma's meaning."""
 
     file: str
     parted: str | None = None
@@ -224,7 +225,7 @@ class _Lines(Struct):
             )
 
     def _names(self, content: str, line: int) -> bool:
-        """Whether the line names columns; DrawingError when it names them in another order."""
+        """True if the line names the columns; DrawingError if it names them in another order."""
         parted = next((sign for sign in (";", "\t", ",") if sign in content), "")
         fields = content.split(parted) if parted else content.split()
         found = [_NAME.fullmatch(name) for name in fields]
@@ -267,7 +268,7 @@ class _Lines(Struct):
 
 
 def _separator(content: str, columns: int) -> str:
-    """What separates the fields of this line; "" for blanks."""
+    """Return the separator of the fields of this line; "" for blanks."""
     content = content.strip()
     bare = _QUOTED.sub("0", content)
     if ";" in bare:
@@ -447,7 +448,8 @@ def parse_npy(data: bytes, file: str) -> PointTable:
 
 
 def parse_npz(data: bytes, file: str) -> PointTable:
-    """One stroke per array, on the layer of its name; DrawingError when one is no such array."""
+    """Read each array as a stroke on the layer of its name; DrawingError for an array that is no
+    list of points."""
     strokes: list[Stroke] = []
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
@@ -479,7 +481,7 @@ def parse_npz(data: bytes, file: str) -> PointTable:
 
 
 def is_npz(data: bytes) -> bool:
-    """Whether the first member of this ZIP archive is an array of NumPy."""
+    """True if the first member of this ZIP archive is an array of NumPy."""
     length = int.from_bytes(data[26:28], "little")
     return data.startswith(ZIP_START) and data[30 : 30 + length].endswith(b".npy")
 

@@ -20,11 +20,11 @@ from camtool.errors import DrawingError
 _NO_NAME = re.compile(
     r"(?:COMPOUND|COMPSOLID|SOLID|SHELL|FACE|WIRE|EDGE|VERTEX|Open[_ ]CASCADE.*)?", re.DOTALL
 )
-"""What OpenCASCADE writes as the name of a shape that has none."""
+"""The name that OpenCASCADE writes for a shape without a name."""
 
 
 class Body(Struct, frozen=True, eq=False):
-    """One solid, or a shell, face, wire or edge that belongs to none: a `TopoDS_Shape`."""
+    """A solid, or a shell, face, wire or edge that belongs to none: a `TopoDS_Shape`."""
 
     shape: Any
     layer: str
@@ -84,7 +84,7 @@ def subshapes(shape: Any, kind: Any, outside: Any = None) -> list[Any]:
 
 
 def has_edges(shape: Any) -> bool:
-    """Whether there is anything in the shape that could be drawn."""
+    """True if the shape has an edge, so that something can be drawn."""
     from OCP.TopAbs import TopAbs_EDGE
     from OCP.TopExp import TopExp_Explorer
 

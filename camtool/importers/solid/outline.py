@@ -1,4 +1,4 @@
-"""Which faces of a model are drawn, and their outer and inner wires as lines and arcs.
+"""Choose the faces of a model that are drawn; convert their wires to lines and arcs.
 
 A face is level when it is plane and its normal is vertical. Of a solid the highest level face
 that looks up is taken (and those beside it at the same height), or the faces that the plane of
@@ -123,7 +123,7 @@ def _level(face: Any) -> float | None:
 
 
 def _is_plane(face: Any) -> bool:
-    """Whether the surface is a plane, also when a file writes it as a spline."""
+    """True if the surface is a plane, also where the file writes it as a spline."""
     from OCP.BRep import BRep_Tool
     from OCP.BRepAdaptor import BRepAdaptor_Surface
     from OCP.GeomAbs import GeomAbs_BezierSurface, GeomAbs_BSplineSurface, GeomAbs_Plane
@@ -258,7 +258,7 @@ def joined(edges: list[EdgePath]) -> EdgePath:
 
 
 def follow(edges: list[EdgePath]) -> bool:
-    """Whether each edge begins where the one before ends, the last one closing the ring."""
+    """True if each edge begins where the one before ends, and the last one closes the ring."""
     return bool((_steps(edges) <= JOINT_MM).all())
 
 

@@ -154,7 +154,7 @@ _COLOURS = re.compile(r"\x1b\[[\d;]*m")
 
 
 def outlined(data: bytes, wanted: dict[str, Any], file: str) -> dict[str, Any]:
-    """What `worker.found` gives for these bytes, and a `complaint` of the reader or "".
+    """Run the worker on these bytes; return its answer with a `complaint` of the reader, or "".
 
     DrawingError when the model is damaged; RuntimeError for a fault of camtool itself.
     """
@@ -200,7 +200,7 @@ def _run(request: Path, output: int, seconds: float | None, file: str) -> int:
 
 
 def _answer(answer: Path, code: int, script: bool, file: str) -> dict[str, Any]:
-    """What the worker wrote; without an answer, the worker died of a damaged file."""
+    """Read the answer of the worker; DrawingError without one, since it died of a damaged file."""
     if answer.exists():
         result: dict[str, Any] = json.loads(answer.read_text(encoding="utf-8"))
         return result

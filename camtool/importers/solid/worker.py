@@ -58,7 +58,8 @@ def found(request: dict[str, Any]) -> dict[str, Any]:
 
 
 def _is_of_kernel(error: Exception) -> bool:
-    """Whether OpenCASCADE raised it (its exceptions have no common class), or ran out of room."""
+    """True if OpenCASCADE raised the error (its exceptions have no common class), or ran out of
+    memory."""
     return type(error).__module__.startswith("OCP") or isinstance(
         error, RuntimeError | MemoryError
     )
@@ -79,7 +80,7 @@ def _bodies(request: dict[str, Any]) -> list[Body]:
 
 
 def _holds(body: Body) -> bool:
-    """Whether all faces and edges of the body fit together."""
+    """True if all faces and edges of the body fit together."""
     from OCP.BRepCheck import BRepCheck_Analyzer
 
     return bool(BRepCheck_Analyzer(body.shape).IsValid())

@@ -37,7 +37,7 @@ _Test = tuple[str, str, str]
 
 
 class _Compound(Struct, frozen=True):
-    """What one element must be: tag ("" any), ids, classes and tests of attributes."""
+    """The conditions on an element: tag ("" any), ids, classes and tests of attributes."""
 
     tag: str = ""
     ids: tuple[str, ...] = ()
@@ -73,11 +73,12 @@ class _Rule(Struct, frozen=True):
 
     @property
     def cost(self) -> int:
-        """How much work a match is, about."""
+        """Estimate the work of a match."""
         return 1 if len(self.steps) == 1 else _CHAIN_COST
 
     def matches(self, node: Node) -> bool:
-        """Whether the rule holds for the element: all places of each step, inmost first."""
+        """True if the rule applies to the element; its steps are matched from the element
+        outwards."""
         places = [node] if self.steps[0].matches(node) else []
         for child, step in zip(self.child, self.steps[1:], strict=True):
             if not places:
@@ -216,7 +217,7 @@ def _compound(word: str) -> _Compound | None:
 
 
 def _holds(node: Node, test: _Test) -> bool:
-    """One test of an attribute, as in [name], [name=value], [name~=value], ..."""
+    """True if the element passes a test of an attribute: [name], [name=value], [name~=value] …"""
     name, sign, value = test
     own = node.attributes.get(name)
     if own is None or not sign:

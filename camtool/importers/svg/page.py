@@ -101,7 +101,7 @@ def _by_the_file(
 
 
 def _asked(width: _Side, height: _Side, box: SvgBox | None, options: ReadOptions) -> SvgPage:
-    """One user unit is the caller's unit; the size in the file is ignored."""
+    """Return the page whose user unit is the caller's unit; the size in the file is ignored."""
     unit = str(options.units).lower()
     scale = options.mm_per(unit)
     viewport = _size(width, height, options.mm_per("px"))

@@ -422,7 +422,7 @@ class Notes(Struct):
             self._first[kind, what] = f"{node.label}: {text}"
 
     def skipped(self) -> list[Skipped]:
-        """What was left out, kind by kind."""
+        """Return the elements that were left out, by kind and reason."""
         faults = [
             Skipped(kind, count, f"{what} ({self._first[kind, what]})")
             for (kind, what), count in self._faults.items()

@@ -1,4 +1,4 @@
-"""What holds for an element of an SVG by its place in the document: map, style, layer, frame."""
+"""The context of an element of an SVG by its place in the document: map, style, layer, frame."""
 
 from __future__ import annotations
 
@@ -28,8 +28,9 @@ DEFAULT_LAYER = "0"
 
 
 class SvgScope(NamedTuple):
-    """What holds for an element: `to_mm` from its user units; the style of its parent; `viewport`
-    what % are of; `layer`; `depth` of nesting; `uses` the ids on the way here."""
+    """The context of an element: the map `to_mm` from its user units; the style of its parent; the
+    `viewport` to which percentages refer; `layer`; `depth` of nesting; the ids of the `use`
+    elements around it."""
 
     to_mm: Affine
     style: SvgStyle
@@ -55,7 +56,7 @@ def own_transform(node: Node, style: SvgStyle, lengths: Lengths) -> Affine:
 
 
 def is_for_us(node: Node) -> bool:
-    """Whether the element asks for no other language and for no extension."""
+    """True if the element is for English or any language, and requires no extension."""
     if node.get("requiredExtensions"):
         return False
     languages = node.attributes.get("systemLanguage")
@@ -94,7 +95,7 @@ class ClipFrame(Struct, frozen=True):
     outer: Affine
 
     def is_left_by(self, points: Floats) -> bool:
-        """Whether any of the points (n, 2) mm lies outside."""
+        """True if any of the points (n, 2) mm lies outside."""
         if not (self.box.width and self.box.height and self.outer.determinant):
             return False
         places = self.outer.inverse.points(points)

@@ -222,7 +222,7 @@ class _Pen(Struct):
                 self._straight(kind, relative, numbers)
 
     def arc(self, radii: complex, turn: float, flags: int, to: complex, relative: bool) -> None:
-        """One arc; without a radius it is a line, and nothing when it ends where it starts."""
+        """Add an arc; without a radius it is a line, and nothing if it ends at its start."""
         end = _bounded(to + self.here if relative else to)
         if not max(abs(radii.real), abs(radii.imag), abs(turn)) <= MAX_NUMBER:
             raise DrawingError("path data have an arc that is too large")
@@ -390,8 +390,8 @@ def split_length(text: str, name: str) -> tuple[float, str]:
 
 
 def subpaths(node: Node, lengths: Lengths) -> tuple[list[Subpath], str]:
-    """What the shape draws, in user units, none when it draws nothing; and the fault in its data
-    up to which it is drawn (""). DrawingError when it cannot be drawn at all."""
+    """Return the subpaths of a shape in user units, [] if it draws nothing, and the fault in its
+    data before which they end, or "". DrawingError if it cannot be drawn at all."""
     match node.tag:
         case "path":
             data = node.get("d")

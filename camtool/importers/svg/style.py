@@ -1,4 +1,4 @@
-"""What an SVG element looks like, as far as it decides whether and as what it is drawn.
+"""Styles of SVG elements, as far as they decide whether and as what an element is drawn.
 
 Each over the one before: what is inherited, attributes, rules of `<style>` sheets by their weight,
 the style attribute; what is `!important` over all. Source: Cascading Style Sheets 2.1, chapter 6.
@@ -94,7 +94,7 @@ class SvgStyle(Struct, frozen=True, dict=True):
 
     @property
     def is_painted(self) -> bool:
-        """Whether there is a stroke or a fill to be seen."""
+        """True if there is a visible stroke or fill."""
         return self.stroke not in _UNSEEN or self.fill not in _UNSEEN
 
     @cached_property
@@ -201,7 +201,8 @@ def _under(above: SvgStyle, values: dict[str, str]) -> SvgStyle:
 
 
 def _text_property(name: str, value: str, above: SvgStyle, own: dict[str, Any]) -> None:
-    """One of PLAIN_TEXT, or lines along text: the latter add to those of the elements around."""
+    """Apply a property in PLAIN_TEXT, or text-decoration, which adds to that of the elements
+    around."""
     if value in ("inherit", "unset", ""):
         return
     if name in PLAIN_TEXT:
@@ -213,8 +214,8 @@ def _text_property(name: str, value: str, above: SvgStyle, own: dict[str, Any]) 
 
 
 def _longhands(text: str) -> dict[str, str]:
-    """What `font: [style, variant, weight or stretch] size[/line-height] family` says; a font of
-    the system, or what is no font, makes the size unreadable."""
+    """Split `font: [style, variant, weight or stretch] size[/line-height] family` into its single
+    properties; the size is "?" for a system font and for text that is no font."""
     said = {"font-style": "normal", "font-weight": "normal", "font-variant": "normal",
             "font-stretch": "normal", "font-size": "?", "font-family": ""}  # fmt: skip
     if text.lower() in ("inherit", "initial", "unset"):

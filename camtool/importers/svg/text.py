@@ -129,7 +129,7 @@ class _Flow(Struct, eq=False):
     _recounted: bool = False
 
     def visit(self, node: Node, style: SvgStyle, keep: bool) -> None:
-        """What stands in the element, then its places: those of inner elements come first."""
+        """Add the letters of the element, then their positions, after those of inner elements."""
         for name in ("rotate", "textLength"):
             if node.get(name):
                 raise Unusable(f"has {name}, which is not read: convert it to paths")
@@ -230,7 +230,8 @@ class _Writer(Struct, eq=False):
     plainer: dict[str, None] = field(default_factory=dict)
 
     def look(self, style: SvgStyle) -> tuple[TextLook, tuple[str, str]]:
-        """How letters of this style look, and the names of their font and of the wanted one."""
+        """Return the look of letters of this style, and the names of their font and of the wanted
+        one."""
         if style.odd:
             raise Unusable(f"its {min(style.odd)} cannot be applied: convert it to paths")
         if style.anchor not in _ANCHORS:
@@ -331,7 +332,7 @@ def _anchored(chunk: list[_Words], writer: _Writer, flow: _Flow) -> Iterator[Tex
 
 
 def _subpaths(ink: Ink) -> list[Subpath]:
-    """What was drawn, Y down."""
+    """Convert the contours of letters to subpaths, Y down."""
     if not ink.points:
         return []
     points = np.concatenate(ink.points) * (1.0, -1.0)

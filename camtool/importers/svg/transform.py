@@ -50,7 +50,7 @@ class Affine(Struct, frozen=True):
 
     @property
     def determinant(self) -> float:
-        """How areas grow; negative when the map mirrors."""
+        """The factor by which areas grow; negative if the map mirrors."""
         return self.a * self.d - self.b * self.c
 
     def points(self, points: Floats) -> Floats:
@@ -219,16 +219,16 @@ def _functions(text: str) -> list[tuple[str, str]]:
             raise DrawingError(f"transform {short(text[at:])} is no transform")
         at = match.end()
         found.append((match[1], match[2]))
-        if len(found) > _MOST_FUNCTIONS:
+        if len(found) > _MAX_FUNCTIONS:
             raise DrawingError("transform has too many parts")
     return found
 
 
-_MOST_FUNCTIONS = 1000
+_MAX_FUNCTIONS = 1000
 
 
 def _single(name: str, n: Sequence[float]) -> Affine:
-    """One function of a transform list."""
+    """Return the map of a function in a transform list."""
     match name, len(n):
         case "matrix", 6:
             return Affine(*n)
@@ -248,7 +248,7 @@ def _single(name: str, n: Sequence[float]) -> Affine:
 
 
 def _css_single(name: str, words: list[str], length: Length) -> Affine:
-    """One function of the CSS property; its names are the same in any case."""
+    """Return the map of a function of the CSS property; `name` is in lower case."""
     if name in _LENGTHWISE:
         second = name == "translatey"
         numbers = [length(word, "xy"[(place + second) % 2]) for place, word in enumerate(words)]

@@ -47,7 +47,7 @@ _WRONG_PREFIX = "unbound prefix"
 
 
 class Node(Struct, eq=False):
-    """One SVG element: `tag` without namespace; foreign elements have the tag "". Attributes
+    """An SVG element: `tag` without namespace; foreign elements have the tag "". Attributes
     of SVG itself by name, those of others as "xlink:href", "xml:space", "inkscape:label".
     `text` is what a sheet holds, or the letters in front of the first child of an element within
     a text; `tail` the letters behind such an element."""
@@ -62,7 +62,7 @@ class Node(Struct, eq=False):
 
     @property
     def label(self) -> str:
-        """How messages and sources name it: "path outline" or "path at line 12"."""
+        """The name in messages and sources: "path outline" or "path at line 12"."""
         name = self.get("id")
         return f"{self.tag} {name}" if name else f"{self.tag} at line {self.line}"
 
@@ -194,7 +194,7 @@ class _Builder(ContentHandler):
             self._sheet = []
 
     def _put_letters(self) -> None:
-        """What was read since the last tag, to the element that it stands in or behind."""
+        """Add the letters since the last tag to the element in or behind which they stand."""
         node = self._open[-1]
         letters = "".join(self._letters)
         self._letters = []
@@ -251,7 +251,7 @@ MAX_BYTES = 100_000_000
 GZIP = b"\x1f\x8b"
 
 _HEAD_BYTES = 65_536
-"""Where the XML declaration and the document type are looked for."""
+"""Bytes in which the XML declaration and the document type are searched."""
 
 _MARKS = {
     b"\xef\xbb\xbf": "utf-8",
