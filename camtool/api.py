@@ -265,7 +265,7 @@ def post(
     backlash, scale and squareness; exceeding one of the `gates` is a finding. Raises OptionError,
     and PostError for what the machine or its dialect cannot do. Source: docs/verifying.md.
     """
-    loaded, wanted = as_target(target), _compensating(job, compensate)
+    loaded, wanted = as_target(target), _with_compensation(job, compensate)
     read = as_drawing(drawing, loaded, wanted)
     return post_drawing(read, wanted, loaded, check=check, gates=gates)
 
@@ -286,12 +286,12 @@ def post_by_tool(
     """
     from camtool.pipeline import post_by_tool as by_tool
 
-    loaded, wanted = as_target(target), _compensating(job, compensate)
+    loaded, wanted = as_target(target), _with_compensation(job, compensate)
     read = as_drawing(drawing, loaded, wanted)
     return by_tool(read, wanted, loaded, check=check, gates=gates)
 
 
-def _compensating(job: Job | None, compensate: bool) -> Job:
+def _with_compensation(job: Job | None, compensate: bool) -> Job:
     """The job, which compensates if it says so itself or is told to."""
     wanted = job or Job()
     return replace(wanted, compensate=True) if compensate else wanted
@@ -520,7 +520,7 @@ def preview(
     `titles` replace their own, in order. Raises OptionError for looks that make no picture.
     Source: docs/pictures.md, docs/viewer.md.
     """
-    scenes = [_shown(each).scene() for each in (what, *beside)]
+    scenes = [_as_shown(each).scene() for each in (what, *beside)]
     if len(titles) > len(scenes):
         raise TypeError(f"{len(titles)} titles for {len(scenes)} values")
     for row, title in enumerate(titles):
@@ -534,7 +534,7 @@ def preview(
     return Picture(tuple(scene for scene in scenes if isinstance(scene, Scene)), options)
 
 
-def _shown(what: Any) -> Shown:
+def _as_shown(what: Any) -> Shown:
     """The value as one with a picture."""
     if isinstance(what, Shown):
         return what

@@ -163,7 +163,7 @@ class AnyFinding(Protocol):
 _F = TypeVar("_F", bound=AnyFinding)
 
 
-def summed(findings: Iterable[_F]) -> list[tuple[_F, int]]:
+def summarise_findings(findings: Iterable[_F]) -> list[tuple[_F, int]]:
     """The first findings of each code and severity, in their order; the last of them with the
     number of those that are left out behind it, the others with 0."""
     alike: dict[tuple[object, object], list[_F]] = {}

@@ -116,7 +116,7 @@ def post_drawing(
     how = _Posting(check, gates, trace_points, brief, progress or Progress())
 
     def plain() -> Run | None:
-        other = _plain(job)
+        other = _without_measures(job)
         if brief or other == job:
             return None
         return post_drawing(drawing, other, target, progress=progress)
@@ -125,7 +125,7 @@ def post_drawing(
         return planned(drawing, job, target.machine, undivided=True)
 
     how.progress.begin(PLANNING)
-    return _posted(drawing, planned(drawing, job, target.machine), target, how, plain, whole)
+    return _post_plan(drawing, planned(drawing, job, target.machine), target, how, plain, whole)
 
 
 def post_by_tool(
@@ -154,7 +154,7 @@ def post_by_tool(
 
     @cache
     def plains() -> tuple[Run | None, ...]:
-        other = _plain(job)
+        other = _without_measures(job)
         if other == job:
             return (None,) * len(turns)
         runs = post_by_tool(drawing, other, target, progress=progress)
@@ -167,17 +167,17 @@ def post_by_tool(
 
     runs = []
     for k, plan in enumerate(plans):
-        plain, whole = partial(_kth, plains, k), partial(_kth, wholes, k)
+        plain, whole = partial(_kth_of, plains, k), partial(_kth_of, wholes, k)
         part = f"program {k + 1} of {len(plans)}" if len(plans) > 1 else ""
-        runs.append(replace(_posted(drawing, plan, target, how, plain, whole), part=part))
+        runs.append(replace(_post_plan(drawing, plan, target, how, plain, whole), part=part))
     return tuple(runs)
 
 
-def _kth(several: Callable[[], tuple[T, ...]], k: int) -> T:
+def _kth_of(several: Callable[[], tuple[T, ...]], k: int) -> T:
     return several()[k]
 
 
-def _posted(
+def _post_plan(
     drawing: Drawing,
     plan: Plan,
     target: LoadedTarget,
@@ -195,17 +195,17 @@ def _posted(
     doubtful = doubtful_settings(
         plan.steps, target.machine, job.stock, starts_spindle=target.target.starts_spindle
     )
-    findings = _merged(drawing.findings, wanted.findings, tuple(doubtful))
+    findings = _merge_findings(drawing.findings, wanted.findings, tuple(doubtful))
     if worst(findings) >= Severity.ERROR:
         return replace(run, findings=findings)
     judged = plan if how.check else None
     del plan  # what is not judged needs no stages of it
-    compensation = _compensated(wanted, target.machine) if job.compensate else None
+    compensation = _compensate(wanted, target.machine) if job.compensate else None
     written = wanted if compensation is None else compensation.toolpath
-    program, decoded = _written(written, target, drawing.file, progress)
+    program, decoded = _write_and_read_back(written, target, drawing.file, progress)
     decoded = _with_operations(decoded, written, program)
-    repeated = _repeated(program, decoded)
-    findings = _merged(findings, program.findings, decoded.findings, without=repeated)
+    repeated = _repeated_findings(program, decoded)
+    findings = _merge_findings(findings, program.findings, decoded.findings, without=repeated)
     if judged is None:
         return replace(run, program=program, decoded=decoded, findings=findings)
     from camtool.planning.drawn import kept_of
@@ -216,7 +216,7 @@ def _posted(
     plain = plain_run()
     # Contours that are divided at reversals are judged as the whole contours of the drawing.
     whole = judged
-    if _plain(job) != job and compensation is None:
+    if _without_measures(job) != job and compensation is None:
         whole = whole_plan()
     tool, nose = tool_mm(job), nose_of(job)
     options = VerifyOptions(
@@ -249,11 +249,11 @@ def _posted(
         cut_mm=_cut_mm(wanted),
     )
     del judged, whole  # the paths of the stages are not needed any more
-    verification = _judged(case, program.data, progress)
-    figures = _timed(figures, written, case, verification)
-    beyond = _beyond(verification, how.gates, findings)
-    findings = _merged(findings, verification.findings, beyond, without=repeated)
-    verification = verification.with_planning(figures, _before(plain))
+    verification = _judge_program(case, program.data, progress)
+    figures = _with_times(figures, written, case, verification)
+    beyond = _gate_findings(verification, how.gates, findings)
+    findings = _merge_findings(findings, verification.findings, beyond, without=repeated)
+    verification = verification.with_planning(figures, _before_figures(plain))
     return replace(
         run,
         program=program,
@@ -295,7 +295,7 @@ def verify_program(
     case = Case(decoded, target)
     kept: tuple[ProtectedRegion, ...] = ()
     if drawing is not None and judging.found:
-        case, job = _registered(case, drawing, job or Job(), align=judging.align)
+        case, job = _register_drawing(case, drawing, job or Job(), align=judging.align)
     elif drawing is not None:
         from camtool.planning.drawn import kept_of
         from camtool.planning.plan import planned
@@ -303,9 +303,9 @@ def verify_program(
         wanted, machine = job or Job(), target.machine
         progress.begin(PLANNING)
         plan = planned(drawing, wanted, machine)
-        compensation = _compensated(plan.toolpath, machine) if wanted.compensate else None
-        asked = _asked(wanted, target, plan.toolpath, compensation)
-        if compensation is None and _plain(wanted) != wanted:
+        compensation = _compensate(plan.toolpath, machine) if wanted.compensate else None
+        asked = _program_request(wanted, target, plan.toolpath, compensation)
+        if compensation is None and _without_measures(wanted) != wanted:
             plan = planned(drawing, wanted, machine, undivided=True)
         case = replace(
             case,
@@ -326,8 +326,8 @@ def verify_program(
         trace_points=TRACE_POINTS if judging.trace_points is None else judging.trace_points,
         keep_ledger=judging.keep_ledger,
     )
-    found = _judged(replace(case, options=options), data, progress)
-    beyond = _beyond(found, judging.gates)
+    found = _judge_program(replace(case, options=options), data, progress)
+    beyond = _gate_findings(found, judging.gates)
     if beyond:
         found = found.with_findings((*found.findings, *beyond))
     return replace(
@@ -340,7 +340,7 @@ def verify_program(
     )
 
 
-def _registered(case: Case, drawing: Drawing, job: Job, *, align: bool) -> tuple[Case, Job]:
+def _register_drawing(case: Case, drawing: Drawing, job: Job, *, align: bool) -> tuple[Case, Job]:
     """Return the case with the parts of the drawing that its program cuts as the wanted moves, and
     the job with the place of the drawing and the tool that were found in the program."""
     from camtool.planning.place import place
@@ -400,7 +400,7 @@ def convert_program(
 
     progress = progress or Progress()
     progress.begin(f"reading {PurePath(file).name}")
-    decoded = _decoded(data, source, file)
+    decoded = _decode(data, source, file)
     same = source.machine.target.dialect == target.machine.target.dialect
     wanted = decoded if same else carried_over(decoded)
     if not target.machine.coolant.kinds:
@@ -412,9 +412,9 @@ def convert_program(
     run = Run(source=file, target=target, wanted=wanted)
     if worst(wanted.findings) >= Severity.ERROR:
         return replace(run, findings=wanted.findings)
-    program, again = _written(wanted, target, file, progress)
-    repeated = _repeated(program, again)
-    findings = _merged(wanted.findings, program.findings, again.findings, without=repeated)
+    program, again = _write_and_read_back(wanted, target, file, progress)
+    repeated = _repeated_findings(program, again)
+    findings = _merge_findings(wanted.findings, program.findings, again.findings, without=repeated)
     if not check:
         return replace(run, program=program, decoded=again, findings=findings)
     case = Case(
@@ -425,8 +425,8 @@ def convert_program(
         written_from=wanted,
         row_from=_row_from(program, again),
     )
-    judged = _judged(case, program.data, progress)
-    findings = _merged(findings, judged.findings, without=repeated)
+    judged = _judge_program(case, program.data, progress)
+    findings = _merge_findings(findings, judged.findings, without=repeated)
     return replace(
         run,
         program=program,
@@ -442,7 +442,7 @@ def read_program(data: bytes, target: LoadedTarget, *, source: str) -> Run:
 
     from camtool.toolpath.program import Program
 
-    decoded = _decoded(data, target, source)
+    decoded = _decode(data, target, source)
     mine = target.machine.target
     program = Program(data, mine.extension, mine.name, np.empty(0, dtype=np.int32))
     return Run(
@@ -450,7 +450,7 @@ def read_program(data: bytes, target: LoadedTarget, *, source: str) -> Run:
     )
 
 
-def _decoded(data: bytes, target: LoadedTarget, file: str) -> Toolpath:
+def _decode(data: bytes, target: LoadedTarget, file: str) -> Toolpath:
     try:
         toolpath = target.target.read_in(data, target.machine, _folder_of(file))
     except ProgramError as error:
@@ -468,7 +468,7 @@ def _folder_of(file: str) -> Path | None:
         return None
 
 
-def _written(
+def _write_and_read_back(
     moves: Toolpath, target: LoadedTarget, file: str, progress: Progress
 ) -> tuple[Program, Toolpath]:
     """The program of these moves, which are of a file, and what the target's controller decodes
@@ -483,7 +483,7 @@ def _written(
     return program, target.target.read(program.data, target.machine)
 
 
-def _repeated(program: Program, decoded: Toolpath) -> set[Finding]:
+def _repeated_findings(program: Program, decoded: Toolpath) -> set[Finding]:
     """The findings of the reader that the writer has made too, if in other words."""
     codes = {finding.code for finding in program.findings}
     return {finding for finding in decoded.findings if finding.code in codes}
@@ -545,7 +545,9 @@ def _tools(steps: Sequence[Step]) -> tuple[PlannedTool, ...]:
     )
 
 
-def _timed(planned: Planned, written: Toolpath, case: Case, verification: Verification) -> Planned:
+def _with_times(
+    planned: Planned, written: Toolpath, case: Case, verification: Verification
+) -> Planned:
     """The operations with the time that each takes, from where it has its turn: a change of tools
     and the way to its first cut are its own."""
     import numpy as np
@@ -606,7 +608,7 @@ def _stock(job: Job) -> PlannedStock | None:
     return PlannedStock(stock.thickness_mm, stock.corner_mm, stock.size_mm, stock.through_mm)
 
 
-def _beyond(
+def _gate_findings(
     verification: Verification, gates: Gates | None, findings: Iterable[Finding] = ()
 ) -> tuple[Finding, ...]:
     """A finding for each of the limits that is exceeded."""
@@ -617,19 +619,19 @@ def _beyond(
     return tuple(gate_findings(verification.report, gates, findings))
 
 
-def _compensated(wanted: Toolpath, machine: Machine) -> CompensatedToolpath:
+def _compensate(wanted: Toolpath, machine: Machine) -> CompensatedToolpath:
     """The moves with which the slides follow `wanted`."""
     from camtool.planning.compensating import compensate
 
     return compensate(wanted, machine)
 
 
-def _plain(job: Job) -> Job:
+def _without_measures(job: Job) -> Job:
     """The job without its measures against reversals and backlash."""
     return replace(job, minimise="rapids", approach=False, compensate=False)
 
 
-def _before(plain: Run | None) -> Before | None:
+def _before_figures(plain: Run | None) -> Before | None:
     """The figures of the plain run, for the report."""
     from camtool.verification.report import Before
 
@@ -642,7 +644,7 @@ def _before(plain: Run | None) -> Before | None:
     return Before(cutting.x + cutting.y, air.x + air.y, report.error_um.total.max, report.time_s)
 
 
-def _judged(case: Case, data: bytes, progress: Progress) -> Verification:
+def _judge_program(case: Case, data: bytes, progress: Progress) -> Verification:
     """Simulate and judge a case whose program has these bytes."""
     from camtool.verification.verify import verify
 
@@ -678,7 +680,7 @@ def _row_from(program: Program, decoded: Toolpath) -> Indices:
     return np.asarray(rows[decoded.block.clip(max=last)])
 
 
-def _asked(
+def _program_request(
     job: Job, target: LoadedTarget, planned: Toolpath, compensation: CompensatedToolpath | None
 ) -> ProgramRequest | None:
     """Write and read back the planned moves, to compare a program with what the job asks for; None
@@ -699,14 +701,14 @@ def _asked(
         wanted=wanted,
         unit_mm=max(units[:2]),
         unit_z_mm=units[2],
-        feed_named=_feed_named(job, machine, wanted, _row_from(program, written)),
+        feed_named=_is_feed_named(job, machine, wanted, _row_from(program, written)),
         feed_unit_mm_min=machine.feed.unit_mm_min,
         safe_z_mm=safe_z_of(job, machine),
         safe_z_named=job.safe_z_mm is not None,
     )
 
 
-def _feed_named(job: Job, machine: Machine, wanted: Toolpath, row_from: Indices) -> Bools:
+def _is_feed_named(job: Job, machine: Machine, wanted: Toolpath, row_from: Indices) -> Bools:
     """(N,) true for the written rows whose feed the job names, or which follows from one that it
     names; they were written from the rows `row_from` (N,) of `wanted`."""
     import numpy as np
@@ -723,7 +725,7 @@ def _feed_named(job: Job, machine: Machine, wanted: Toolpath, row_from: Indices)
     return np.asarray(np.isin(wanted.feed[row_from], named) & (row_from >= 0))
 
 
-def _merged(
+def _merge_findings(
     *groups: tuple[Finding, ...], without: Collection[Finding] = ()
 ) -> tuple[Finding, ...]:
     """All findings in order, each once, except those `without`."""

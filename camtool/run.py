@@ -131,7 +131,7 @@ class Run(Shown):
         made = "no program" if self.program is None else f"{len(self.program.data)} bytes"
         error = None if self.report is None else self.report.error_um.total.max
         judged = "" if error is None else f", error {error:.2f} µm at most"
-        return f"<Run of {name} on {target}: {made}{judged}, {_counted(self.findings)}>"
+        return f"<Run of {name} on {target}: {made}{judged}, {_count_findings(self.findings)}>"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -141,7 +141,7 @@ class ShownDrawing(Shown, Drawing):
     @classmethod
     def of(cls, drawing: Drawing) -> ShownDrawing:
         """The drawing as a value with a picture."""
-        return _shown(cls, drawing)
+        return _as_shown(cls, drawing)
 
     def scene(self) -> Scene:
         """The drawing, titled by its file."""
@@ -173,7 +173,7 @@ class ShownToolpath(Shown, Toolpath):
         target: LoadedTarget | None = None,
     ) -> ShownToolpath:
         """The toolpath as a value with a picture, and that from which it was planned."""
-        return _shown(cls, toolpath, drawing=drawing, job=job, target=target)
+        return _as_shown(cls, toolpath, drawing=drawing, job=job, target=target)
 
     def scene(self) -> Scene:
         """The moves over the drawing."""
@@ -191,19 +191,19 @@ class ShownToolpath(Shown, Toolpath):
     def __repr__(self) -> str:
         moves = int((self.kind <= int(Kind.ARC_CCW)).sum())
         name = f" of {self.made_from}" if self.made_from else ""
-        return f"<Toolpath{name}: {moves} moves, {_counted(self.findings)}>"
+        return f"<Toolpath{name}: {moves} moves, {_count_findings(self.findings)}>"
 
 
 _Kind = TypeVar("_Kind", ShownDrawing, ShownToolpath)
 
 
-def _shown(kind: type[_Kind], record: Drawing | Toolpath, **more: object) -> _Kind:
+def _as_shown(kind: type[_Kind], record: Drawing | Toolpath, **more: object) -> _Kind:
     """The record as one of this `kind`, with `more` fields."""
     values = {each.name: getattr(record, each.name) for each in fields(record)}
     return kind(**(values | more))
 
 
-def _counted(findings: tuple[Finding, ...]) -> str:
+def _count_findings(findings: tuple[Finding, ...]) -> str:
     count = len(findings)
     return "no findings" if not count else f"{count} finding{'s' * (count > 1)}"
 

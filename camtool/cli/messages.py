@@ -20,7 +20,7 @@ import click
 
 from camtool.cli.life_signs import hide_signs
 from camtool.errors import CamtoolError
-from camtool.findings import Finding, Severity, summed
+from camtool.findings import Finding, Severity, summarise_findings
 from camtool.plain import one_line
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ def say_findings(findings: Iterable[Finding], *, quiet: bool, verbose: bool) -> 
     for many alike, unless verbose."""
     least = Severity.ERROR if quiet else Severity.INFO if verbose else Severity.WARNING
     shown = [finding for finding in findings if finding.severity >= least]
-    for finding, more in [(each, 0) for each in shown] if verbose else summed(shown):
+    for finding, more in [(each, 0) for each in shown] if verbose else summarise_findings(shown):
         say(f"camtool: {finding}", quiet=False)
         if more:
             name = f"{finding.severity.name.lower()} {finding.code.name}"

@@ -50,9 +50,16 @@ from camtool.importers.findings import (
     SELF_CROSSING_MORE,
     TINY_MERGED,
 )
-from camtool.importers.healing import IS_DRAWN_TWICE, cleaned, gap_of, healed, is_placed, off_drawn
+from camtool.importers.healing import (
+    IS_DRAWN_TWICE,
+    clean_pieces,
+    distance_from_drawn,
+    gap_of,
+    heal_contours,
+    is_placed,
+)
 from camtool.importers.options import ReadOptions, Selection
-from camtool.importers.pieces import MAX_COORDINATE_MM, Piece, selected
+from camtool.importers.pieces import MAX_COORDINATE_MM, Piece, select_pieces
 from camtool.records import replace
 from camtool.units import UM_PER_MM
 
@@ -81,13 +88,13 @@ def assemble(
     """
     every = pieces
     pieces, marks, unwanted = selected_with_marks(every, marks, options.select, file)
-    clean = cleaned(pieces, file)
+    clean = clean_pieces(pieces, file)
     points, repeated = cleaned_marks(marks, file)
     dropped = [*unwanted, *clean.skipped, *repeated]
-    every_skip = counted([*skipped, *dropped])
+    every_skip = sum_skipped([*skipped, *dropped])
     if not len(clean.lines) and not points:
-        raise _nothing(every_skip, file)
-    result = healed(pieces, clean, options)
+        raise _nothing_drawn_error(every_skip, file)
+    result = heal_contours(pieces, clean, options)
     first = [pieces[members[0]] for members in result.members]
     drawing = Drawing(
         paths=result.lines,
@@ -103,18 +110,18 @@ def assemble(
         closed_gaps=result.closed_gaps,
         healing=result.healing,
         line_types=tuple(piece.line_type for piece in first),
-        unchosen=_unchosen(every, pieces, file, options),
-        off_mm=off_drawn(pieces, result.lines),
+        unchosen=_closed_contours_left_out(every, pieces, file, options),
+        off_mm=distance_from_drawn(pieces, result.lines),
         made_for=options.scale,
         callouts=tuple(callouts),
     )
     # What is drawn twice has a finding of its own.
     once = [item for item in clean.skipped if item.reason != IS_DRAWN_TWICE]
     found = [*findings, *skip_findings(skipped, [*unwanted, *once, *repeated])]
-    return replace(drawing, findings=(*found, *_judged(drawing, options)))
+    return replace(drawing, findings=(*found, *_drawing_findings(drawing, options)))
 
 
-def _unchosen(
+def _closed_contours_left_out(
     every: Sequence[Piece], chosen: Sequence[Piece], file: str, options: ReadOptions
 ) -> Unchosen:
     """The closed contours among the pieces that were not chosen.
@@ -126,7 +133,7 @@ def _unchosen(
     others = [piece for piece in every if piece not in kept and is_placed(piece)]
     if not others:
         return Unchosen()
-    found = healed(others, cleaned(others, file), options)
+    found = heal_contours(others, clean_pieces(others, file), options)
     rows = np.flatnonzero(found.lines.closed).tolist()
     first = [others[found.members[row][0]] for row in rows]
     return Unchosen(
@@ -137,7 +144,7 @@ def _unchosen(
     )
 
 
-def _judged(drawing: Drawing, options: ReadOptions) -> list[Finding]:
+def _drawing_findings(drawing: Drawing, options: ReadOptions) -> list[Finding]:
     """Return the findings about the size of the drawing, its gaps, and the repairs."""
     gap_mm = gap_of(options)
     return [
@@ -158,7 +165,7 @@ def _source(members: Sequence[Piece]) -> str:
     return f"{head} + {more} more" if more > 0 else head
 
 
-def _nothing(skipped: Sequence[Skipped], file: str) -> DrawingError:
+def _nothing_drawn_error(skipped: Sequence[Skipped], file: str) -> DrawingError:
     """The error for a drawing without geometry, saying what it held instead."""
     held = ", ".join(f"{item.count} {item.kind} ({item.reason})" for item in skipped)
     return DrawingError(
@@ -186,7 +193,7 @@ def selected_with_marks(
         Piece(nowhere, False, mark.layer, mark.colour, mark.source, mark.line_type): mark
         for mark in marks
     }
-    kept, gone = selected([*pieces, *standing_in], wanted, file)
+    kept, gone = select_pieces([*pieces, *standing_in], wanted, file)
     lines = [piece for piece in kept if piece not in standing_in]
     return lines, [standing_in[piece] for piece in kept if piece in standing_in], gone
 
@@ -230,7 +237,7 @@ MAX_PLACES = 20
 """At most this many branches, and as many crossing paths, get a finding of their own."""
 
 
-def counted(skipped: Sequence[Skipped]) -> list[Skipped]:
+def sum_skipped(skipped: Sequence[Skipped]) -> list[Skipped]:
     """Sum up skipped entities by kind and reason, in order of first appearance."""
     counts: Counter[tuple[str, str]] = Counter()
     for item in skipped:
@@ -244,7 +251,7 @@ def skip_findings(skipped: Sequence[Skipped], dropped: Sequence[Skipped]) -> lis
     return [
         ENTITY_SKIPPED(severity=severity, measured=item.count, kind=item.kind, reason=item.reason)
         for severity, items in ((Severity.WARNING, skipped), (Severity.INFO, dropped))
-        for item in counted(items)
+        for item in sum_skipped(items)
     ]
 
 

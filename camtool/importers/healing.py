@@ -55,7 +55,7 @@ class Cleaned(Struct, frozen=True, eq=False):
     duplicates_mm: float = 0.0
 
 
-def cleaned(pieces: Sequence[Piece], file: str) -> Cleaned:
+def clean_pieces(pieces: Sequence[Piece], file: str) -> Cleaned:
     """The pieces without repeated points, each drawn once, and the count of what went.
 
     DrawingError when a number is not finite or beyond MAX_COORDINATE_MM, or a piece is no path.
@@ -66,7 +66,7 @@ def cleaned(pieces: Sequence[Piece], file: str) -> Cleaned:
     closed = np.array([piece.closed for piece in pieces], dtype=np.bool_)
     keep, repeated = without_repeats(vertices, counts, closed)
     owner = np.repeat(np.arange(len(pieces)), counts)[keep]
-    vertices = _chosen(vertices, keep)
+    vertices = _select_rows(vertices, keep)
     left = np.bincount(owner, minlength=len(pieces))
     long_enough = left >= 2
     closed &= encloses(vertices, owner, left)
@@ -74,7 +74,7 @@ def cleaned(pieces: Sequence[Piece], file: str) -> Cleaned:
     points = _kinds(pieces, long_enough & (repeated > 0), "is repeated", repeated, "point of ")
     rows = np.flatnonzero(long_enough)
     chosen = [pieces[row] for row in rows.tolist()]
-    vertices = _chosen(vertices, long_enough[owner])
+    vertices = _select_rows(vertices, long_enough[owner])
     vertices.flags.writeable = False
     lines = _lines(vertices, left[rows], closed[rows], chosen, file)
     once = _drawn_once(lines, [(piece.layer, piece.colour) for piece in chosen])
@@ -90,7 +90,7 @@ def cleaned(pieces: Sequence[Piece], file: str) -> Cleaned:
     )
 
 
-def _chosen(rows: Floats, chosen: Bools) -> Floats:
+def _select_rows(rows: Floats, chosen: Bools) -> Floats:
     """The chosen rows; the very array where these are all."""
     return rows if chosen.all() else rows[chosen]
 
@@ -167,7 +167,7 @@ def _drawn_once(lines: Polylines, styles: Iterable[tuple[str, str]]) -> Bools:
     segment = segment_numbers(lines.vertices, every, next_vertices(lines.offsets))
     segment[lines.offsets[1:][~lines.closed] - 1] = 0
     kind = 2 * numbered(list(styles), count) + lines.closed
-    key = _mixed(np.add.reduceat(segment, lines.offsets[:-1]) + _mixed(kind.view(np.uint64)))
+    key = _mix_bits(np.add.reduceat(segment, lines.offsets[:-1]) + _mix_bits(kind.view(np.uint64)))
     once = np.zeros(count, dtype=np.bool_)
     once[np.unique(key, return_index=True)[1]] = True
     return once
@@ -185,16 +185,16 @@ def segment_numbers(vertices: Floats, begin: Ints | Indices, end: Ints | Indices
             for rows in (begin, end)
         )
         point, onward = (
-            _mixed(_mixed(place[:, 0].view(np.uint64)) + place[:, 1].view(np.uint64))
+            _mix_bits(_mix_bits(place[:, 0].view(np.uint64)) + place[:, 1].view(np.uint64))
             for place in (grid, ahead)
         )
         bend = np.where(onward < point, -grid[:, 2], grid[:, 2]).view(np.uint64)
-        segment = _mixed(_mixed(np.minimum(point, onward)) + np.maximum(point, onward))
-        found[some] = _mixed(segment + bend)
+        segment = _mix_bits(_mix_bits(np.minimum(point, onward)) + np.maximum(point, onward))
+        found[some] = _mix_bits(segment + bend)
     return found
 
 
-def _mixed(words: _Words) -> _Words:
+def _mix_bits(words: _Words) -> _Words:
     """Numbers scattered over 64 bits (the finalizer of SplitMix64, Steele and others 2014)."""
     word = words + np.uint64(0x9E3779B97F4A7C15)
     word = (word ^ (word >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
@@ -224,15 +224,15 @@ def gap_of(options: ReadOptions) -> float:
     return max(options.gap_mm, POSITION_EPS_MM) if options.chain_gaps else POSITION_EPS_MM
 
 
-def healed(pieces: Sequence[Piece], clean: Cleaned, options: ReadOptions) -> Healed:
+def heal_contours(pieces: Sequence[Piece], clean: Cleaned, options: ReadOptions) -> Healed:
     """The contours of the cleaned pieces."""
     chosen = [pieces[index] for index in clean.piece.tolist()]
     places = [("" if options.across_layers else piece.layer, piece.colour) for piece in chosen]
     within = min(SAME_LINE_MM, options.tolerance_mm)
     single = without_overlaps(clean.lines, numbered(places, len(chosen)), within)
     of = clean.piece[single.source]
-    chained = _chained(pieces, single.lines, of, options)
-    lines, arcs = _recognised(chained.lines, options)
+    chained = _chain_paths(pieces, single.lines, of, options)
+    lines, arcs = _recognise_arcs(chained.lines, options)
     merged = without_tiny(lines, TINY_SHARE * options.tolerance_mm)
     members = _members(chained.members, of)
     return Healed(
@@ -261,7 +261,9 @@ def _members(chains: tuple[tuple[int, ...], ...], of: Ints) -> tuple[tuple[int, 
     return tuple(tuple(dict.fromkeys(rows[index] for index in one)) for one in chains)
 
 
-def _chained(pieces: Sequence[Piece], lines: Polylines, of: Ints, options: ReadOptions) -> Chained:
+def _chain_paths(
+    pieces: Sequence[Piece], lines: Polylines, of: Ints, options: ReadOptions
+) -> Chained:
     """The paths joined, within their layers unless `across_layers`."""
     chosen = [pieces[index] for index in of.tolist()]
     layers = [piece.layer for piece in chosen]
@@ -273,7 +275,7 @@ def _chained(pieces: Sequence[Piece], lines: Polylines, of: Ints, options: ReadO
     return chain(lines, gap_of(options), kinds=kinds)
 
 
-def _recognised(lines: Polylines, options: ReadOptions) -> tuple[Polylines, int]:
+def _recognise_arcs(lines: Polylines, options: ReadOptions) -> tuple[Polylines, int]:
     """The paths with arcs for chords on one circle, if that was asked for; how many arcs."""
     if not options.recognise_arcs:
         return lines, 0
@@ -298,11 +300,11 @@ PLACES = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Parameters of a segment at which its distance is measured."""
 
 
-def off_drawn(pieces: Sequence[Piece], lines: Polylines) -> Floats:
+def distance_from_drawn(pieces: Sequence[Piece], lines: Polylines) -> Floats:
     """(N, 2) mm: the largest and the rms distance between what was drawn as `pieces` and the
     segment that leaves each vertex of the paths made of them."""
     nothing = np.broadcast_to(0.0, (len(lines.vertices), 2))  # one number, seen as many
-    drawn, said = _drawn(pieces)
+    drawn, said = _drawn_segments(pieces)
     if not len(drawn) or not len(lines):
         return nothing
     rows = segment_rows(lines).astype(np.int32)
@@ -319,7 +321,7 @@ def off_drawn(pieces: Sequence[Piece], lines: Polylines) -> Floats:
         found[rows[kept]] = most[np.searchsorted(numbers, made_as[kept])]
     if gone.any() or not kept.all():
         del drawn_as, made_as  # the index takes their room
-        _changed(drawn, said, made, np.flatnonzero(gone), np.flatnonzero(~kept), found)
+        _add_distances(drawn, said, made, np.flatnonzero(gone), np.flatnonzero(~kept), found)
     return found
 
 
@@ -350,7 +352,7 @@ def _is_among(numbers: _Words, others: _Words) -> Bools:
     return np.asarray(ordered[np.minimum(at, len(ordered) - 1, out=at)] == numbers)
 
 
-def _drawn(pieces: Sequence[Piece]) -> tuple[_Joined, Floats]:
+def _drawn_segments(pieces: Sequence[Piece]) -> tuple[_Joined, Floats]:
     """The segments of the pieces that have a length, and how far off the segment that leaves a
     vertex is said to be (N, 2)."""
     lasting = [piece for piece in pieces if len(piece.vertices)]
@@ -371,7 +373,7 @@ def _drawn(pieces: Sequence[Piece]) -> tuple[_Joined, Floats]:
     return _Joined(vertices, rows, following[rows].astype(np.int32)), said
 
 
-def _changed(
+def _add_distances(
     drawn: _Joined, said: Floats, made: _Joined, gone: Ints, new: Ints, off: Floats
 ) -> None:
     """Add to `off` (N, 2), of the segment that leaves each vertex, what `gone` of the drawn

@@ -89,7 +89,7 @@ NO_LINE_TYPE = "continuous"
 """The line type of an entity that names none."""
 
 
-def selected(
+def select_pieces(
     pieces: Sequence[Piece], wanted: Selection, file: str
 ) -> tuple[list[Piece], list[Skipped]]:
     """The chosen pieces in order, and how many of each kind were left out, and why.
@@ -117,18 +117,18 @@ def _rules(wanted: Selection, pieces: Sequence[Piece], file: str) -> list[_Rule]
     """Return the conditions of the selection, each with the reason for leaving out a piece that
     does not fulfil it."""
     rules: list[_Rule] = []
-    layers = matching(wanted.layers, (piece.layer for piece in pieces), "layer", file)
+    layers = matching_names(wanted.layers, (piece.layer for piece in pieces), "layer", file)
     if layers is not None:
         rules.append(("is on a layer that was not asked for", lambda piece: piece.layer in layers))
     away = {piece.layer for piece in pieces if matches(wanted.exclude_layers, piece.layer)}
     if wanted.exclude_layers:
         rules.append(("is on an excluded layer", lambda piece: piece.layer not in away))
-    types = matching(wanted.line_types, map(_line_type, pieces), "line type", file)
+    types = matching_names(wanted.line_types, map(_line_type, pieces), "line type", file)
     if types is not None:
         rules.append(
             ("has a line type that was not asked for", lambda piece: _line_type(piece) in types)
         )
-    colours = matching(wanted.colours, (piece.colour for piece in pieces), "colour", file)
+    colours = matching_names(wanted.colours, (piece.colour for piece in pieces), "colour", file)
     if colours is not None:
         rules.append(
             ("has a colour that was not asked for", lambda piece: piece.colour in colours)
@@ -136,7 +136,7 @@ def _rules(wanted: Selection, pieces: Sequence[Piece], file: str) -> list[_Rule]
     return rules
 
 
-def matching(
+def matching_names(
     patterns: Sequence[str], names: Iterable[str], what: str, file: str
 ) -> set[str] | None:
     """The names that any pattern matches, None without patterns.

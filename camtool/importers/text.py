@@ -130,7 +130,7 @@ def font_for(wanted: WantedFont, mode: str) -> tuple[Font, str]:
         return stroke_font(), ""
     if wanted.is_stroked:
         return stroke_font(), str(wanted)
-    found = _named(wanted)
+    found = _font_named(wanted)
     font = _outline_font(found.path) if found else None
     if font is not None:
         return font, ""
@@ -200,7 +200,7 @@ def installed_fonts() -> tuple[_Face, ...]:
     return tuple(sorted(f for f in faces if PurePath(f.path).suffix.lower() in _OUTLINES))
 
 
-def _named(wanted: WantedFont) -> _Face | None:
+def _font_named(wanted: WantedFont) -> _Face | None:
     """The installed font of this family or file name."""
     if wanted.family and (found := _of_family(wanted.family, wanted)) is not None:
         return found
@@ -302,7 +302,7 @@ def finite(*values: float) -> tuple[float, ...]:
     return numbers
 
 
-def lacking(font: str, substituted: str, missing: str) -> str:
+def describe_lacking(font: str, substituted: str, missing: str) -> str:
     """Describe what a font lacks, "" for nothing: `font` draws in place of the font
     `substituted` ("" when it is the wanted one) and has none of the characters `missing`."""
     notes = []
@@ -325,7 +325,7 @@ def slant(oblique_deg: float) -> float:
     return math.tan(math.radians(max(-MAX_OBLIQUE_DEG, min(MAX_OBLIQUE_DEG, oblique_deg))))
 
 
-def numbered(digits: str) -> str:
+def character_of_number(digits: str) -> str:
     """Return the character of %%nnn in Windows' western code page."""
     return bytes([int(digits)]).decode("cp1252", errors="replace")
 

@@ -14,7 +14,7 @@ from camtool.geometry.measure import signed_areas
 from camtool.importers import healing
 from camtool.importers.assemble import MAX_GAP_FINDINGS, MAX_SIZE_MM, MIN_SIZE_MM, assemble
 from camtool.importers.findings import DrawingCode
-from camtool.importers.healing import cleaned
+from camtool.importers.healing import clean_pieces
 from camtool.importers.options import ReadOptions
 from camtool.importers.pieces import Piece
 
@@ -192,7 +192,7 @@ def test_numbers_that_are_no_place_are_errors(wrong: float, column: int) -> None
 )
 def test_repeats_go_and_the_path_stays(rows: list[tuple[int, int, float]], closed: bool) -> None:
     vertices = np.array(rows, dtype=np.float64)
-    clean = cleaned([Piece(vertices, closed, "0", "", "PATH 1")], "t.dxf")
+    clean = clean_pieces([Piece(vertices, closed, "0", "", "PATH 1")], "t.dxf")
 
     def drawn(path: np.ndarray, closed: bool) -> list[tuple[float, ...]]:
         """Segments that go somewhere: start, end, bulge."""

@@ -17,8 +17,8 @@ from camtool.geometry.drawing import Drawing
 from camtool.geometry.measure import path_lengths, point_at, signed_areas
 from camtool.geometry.polylines import Segments
 from camtool.importers.bitmap import pixels
-from camtool.importers.bitmap.centre import thinned
-from camtool.importers.bitmap.outline import crossings, enclosed, outlines
+from camtool.importers.bitmap.centre import thin
+from camtool.importers.bitmap.outline import crossings, enclosed_area, outlines
 from camtool.importers.bitmap.strokes import MEETING_PX, strokes
 from camtool.importers.options import ReadOptions
 from camtool.importers.read import read_bytes
@@ -166,7 +166,7 @@ def test_lines_at_the_threshold_are_closed_and_enclose_what_is_dark() -> None:
         )
         inside = np.zeros(ink.size)
         for line in sure:
-            sign = math.copysign(1.0, enclosed(line[:-1]))
+            sign = math.copysign(1.0, enclosed_area(line[:-1]))
             inside += sign * shapely.contains(shapely.Polygon(line), centres)
         dark = ink[::-1].ravel()  # rows upwards
         assert np.array_equal(inside, dark)
@@ -230,11 +230,11 @@ def test_thinning_keeps_what_hangs_together() -> None:
     for _ in range(20):
         coarse = rng.random((9, 11)) < 0.6
         dark = np.kron(coarse, np.ones((7, 7), dtype=bool))
-        thin = thinned(dark)
-        assert not (thin & ~dark).any()
-        assert thin.sum() < dark.sum() or not dark.any()
-        assert _parts_and_holes(thin) == _parts_and_holes(dark)
-        assert np.array_equal(thinned(thin), thin)
+        lines = thin(dark)
+        assert not (lines & ~dark).any()
+        assert lines.sum() < dark.sum() or not dark.any()
+        assert _parts_and_holes(lines) == _parts_and_holes(dark)
+        assert np.array_equal(thin(lines), lines)
 
 
 def _parts_and_holes(dark: np.ndarray) -> tuple[int, int]:

@@ -24,7 +24,7 @@ from camtool.geometry.polylines import Polyline
 from camtool.importers import healing
 from camtool.importers.assemble import MAX_PLACES, assemble
 from camtool.importers.findings import DrawingCode
-from camtool.importers.healing import cleaned
+from camtool.importers.healing import clean_pieces
 from camtool.importers.options import ReadOptions, Selection
 from camtool.importers.pieces import Piece
 
@@ -233,7 +233,7 @@ def test_drawn_once_equals_brute_force(
         piece(*((*p, b) for p, b in zip(points, bulges, strict=False)), closed=closed)
         for points in rows
     ]
-    clean = cleaned(pieces, "t.dxf")
+    clean = clean_pieces(pieces, "t.dxf")
 
     def segments(path: Polyline) -> tuple[bool, list[tuple[object, ...]]]:
         """The segments of a path, each the same in both directions, in any order."""
@@ -244,7 +244,7 @@ def test_drawn_once_equals_brute_force(
         ]
         return path.closed, sorted(both if path.closed else both[:-1])
 
-    alone = [cleaned([one], "t.dxf").lines for one in pieces]
+    alone = [clean_pieces([one], "t.dxf").lines for one in pieces]
     wanted = [segments(lines[0]) for lines in alone if len(lines)]
     kept = [segments(path) for path in clean.lines]
     assert len(kept) + clean.duplicates == len(wanted)

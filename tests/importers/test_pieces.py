@@ -6,7 +6,7 @@ import pytest
 from camtool.errors import DrawingError, OptionError
 from camtool.geometry.drawing import Skipped
 from camtool.importers.options import Selection, colour_named
-from camtool.importers.pieces import Piece, selected
+from camtool.importers.pieces import Piece, select_pieces
 
 LINE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
 PIECES = [
@@ -17,7 +17,7 @@ PIECES = [
 
 
 def chosen(**wanted: tuple[str, ...]) -> list[str]:
-    kept, _ = selected(PIECES, Selection(**wanted), "t.dxf")
+    kept, _ = select_pieces(PIECES, Selection(**wanted), "t.dxf")
     return [piece.source for piece in kept]
 
 
@@ -41,7 +41,7 @@ def test_patterns_choose(wanted: dict[str, tuple[str, ...]], sources: list[str])
 
 def test_what_is_left_out_is_counted_with_the_first_reason() -> None:
     wanted = Selection(layers=("cut*",), colours=("#ff0000",))
-    _, gone = selected(PIECES, wanted, "t.dxf")
+    _, gone = select_pieces(PIECES, wanted, "t.dxf")
     assert gone == [
         Skipped("LINE", 1, "has a colour that was not asked for"),
         Skipped("ARC", 1, "is on a layer that was not asked for"),
@@ -51,7 +51,9 @@ def test_what_is_left_out_is_counted_with_the_first_reason() -> None:
 @pytest.mark.parametrize("field", ["layers", "colours", "line_types"])
 def test_a_pattern_that_chooses_nothing_names_what_there_is(field: str) -> None:
     with pytest.raises(DrawingError) as caught:
-        selected(PIECES, Selection(**{field: ("cut", "#ff0000", "DASHED", "misspelt")}), "t.dxf")
+        select_pieces(
+            PIECES, Selection(**{field: ("cut", "#ff0000", "DASHED", "misspelt")}), "t.dxf"
+        )
     assert caught.value.file == "t.dxf"
     assert any(name in caught.value.mend for name in ("Cut inner", "#000000", "CENTER2"))
 

@@ -21,7 +21,7 @@ from camtool.importers.read import read_bytes, read_drawing
 from camtool.importers.solid import reader as solid
 from camtool.importers.solid import reader as solid_process
 from camtool.importers.solid import worker as solid_worker
-from camtool.importers.solid.reader import outlined, step_unit
+from camtool.importers.solid.reader import run_worker, step_unit
 
 b = pytest.importorskip("build123d")
 
@@ -34,7 +34,7 @@ def here(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
         source = tmp_path / "source"
         source.write_bytes(data)
         try:
-            result = solid_worker.found(wanted | {"source": str(source)})
+            result = solid_worker.find_outlines(wanted | {"source": str(source)})
         except DrawingError as error:
             raise DrawingError(
                 error.message, file=file, where=error.where, mend=error.mend
@@ -42,7 +42,7 @@ def here(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
         result = json.loads(json.dumps(result))
         return result | {"complaint": ""}
 
-    monkeypatch.setattr(solid, "outlined", found)
+    monkeypatch.setattr(solid, "run_worker", found)
     monkeypatch.setattr(sys, "path", list(sys.path))
     monkeypatch.setattr(sys, "argv", list(sys.argv))
 
@@ -388,9 +388,9 @@ def test_complaints_of_the_reader_are_told(monkeypatch: pytest.MonkeyPatch) -> N
     answers = "open(json.load(open(sys.argv[1]))['answer'], 'w').write('{}')"
     wanted = {"kind": "step", "file": "f", "height": None, "tolerance": 1e-3}
     monkeypatch.setattr(solid_process, "START", f"import json, sys; {says} {answers}")
-    assert outlined(b"", wanted, "f") == {"complaint": "ERR StepFile : Fails Count : 1"}
+    assert run_worker(b"", wanted, "f") == {"complaint": "ERR StepFile : Fails Count : 1"}
     monkeypatch.setattr(solid_process, "START", f"import json, sys; print('fine'); {answers}")
-    assert outlined(b"", wanted, "f") == {"complaint": ""}
+    assert run_worker(b"", wanted, "f") == {"complaint": ""}
 
 
 def test_a_worker_that_dies_or_hangs_is_a_clean_error(
@@ -399,14 +399,14 @@ def test_a_worker_that_dies_or_hangs_is_a_clean_error(
     wanted = {"kind": "step", "file": "f", "height": None, "tolerance": 1e-3}
     monkeypatch.setattr(solid_process, "START", "import os; os.abort()")
     with pytest.raises(DrawingError, match="damaged so badly that OpenCASCADE fails"):
-        outlined(b"", wanted, "f")
+        run_worker(b"", wanted, "f")
     monkeypatch.setattr(solid_process, "START", "import time; time.sleep(60)")
     monkeypatch.setattr(solid_process, "FILE_SECONDS", 0.2)
     with pytest.raises(DrawingError, match="is not read after 0 s"):
-        outlined(b"", wanted, "f")
+        run_worker(b"", wanted, "f")
     monkeypatch.undo()
     with pytest.raises(RuntimeError, match="KeyError"):
-        outlined(b"", {"kind": "script"}, "f")
+        run_worker(b"", {"kind": "script"}, "f")
 
 
 def test_nothing_of_opencascade_is_loaded_by_the_reader() -> None:

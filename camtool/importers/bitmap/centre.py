@@ -50,7 +50,7 @@ Pixel = tuple[int, int]
 """Row and column."""
 
 
-def thinned(dark: Bools) -> Bools:
+def thin(dark: Bools) -> Bools:
     """(H, W) the pixels that remain of the dark ones."""
     height, width = dark.shape
     wide = width + 2
@@ -174,7 +174,7 @@ class _Graph:
 def centre_lines(dark: Bools) -> tuple[list[tuple[Floats, bool]], int]:
     """The centre lines: points (n, 2) in pixels as in `outline`, and whether they are closed; and
     how many dots are left out, which have no length."""
-    graph = _Graph(thinned(dark), dark)
+    graph = _Graph(thin(dark), dark)
     _prune(graph)
     dots = sum(1 for links in graph.links.values() if not links)
     nodes = _junctions(graph)
@@ -197,7 +197,7 @@ def centre_lines(dark: Bools) -> tuple[list[tuple[Floats, bool]], int]:
     for node, arms in ends.items():
         width = max(graph.half_width(pixel) for pixel, of in nodes.items() if of == node)
         look = max(MIN_LOOK_PX, int(LOOK_BACK * width))
-        through |= _straight_on(chains, arms, middles[node], look)
+        through |= _pair_straightest(chains, arms, middles[node], look)
     return [
         (_points(path, chains, nodes, middles, height), closed)
         for path, closed in _paths(len(chains), chains, through)
@@ -262,7 +262,7 @@ def _middles(nodes: dict[Pixel, int]) -> dict[int, tuple[float, float]]:
     }
 
 
-def _straight_on(
+def _pair_straightest(
     chains: list[list[Pixel]],
     arms: list[tuple[int, bool]],
     middle: tuple[float, float],

@@ -123,7 +123,7 @@ def _places(field: Ink, side: Ints, level: float) -> Floats:
     return np.column_stack([column + ~down * share, row + down * share])
 
 
-def enclosed(points: Floats) -> float:
+def enclosed_area(points: Floats) -> float:
     """The area inside a closed line, positive where that is dark."""
     x, y = (points - points[0]).T
     return float(0.5 * (x * np.roll(y, -1) - np.roll(x, -1) * y).sum())

@@ -64,7 +64,7 @@ def picture(data: bytes, file: str) -> PixelPicture:
         except Image.DecompressionBombError as error:
             raise _too_large("far too many", file) from error
         except _BROKEN as error:
-            raise _broken(file) from error
+            raise _broken_file_error(file) from error
         width, height = image.size
         if width * height > MAX_PIXELS:
             raise _too_large(f"{width} x {height}", file)
@@ -73,7 +73,7 @@ def picture(data: bytes, file: str) -> PixelPicture:
             image.load()
             ink = _ink(ImageOps.exif_transpose(image))
         except _BROKEN as error:
-            raise _broken(file) from error
+            raise _broken_file_error(file) from error
     return PixelPicture(ink, _dpi(said), kind)
 
 
@@ -118,7 +118,7 @@ def _too_large(size: str, file: str) -> DrawingError:
     )
 
 
-def _broken(file: str) -> DrawingError:
+def _broken_file_error(file: str) -> DrawingError:
     return DrawingError(
         "is a broken PNG or JPEG",
         file=file,

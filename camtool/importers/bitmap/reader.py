@@ -17,7 +17,7 @@ from camtool.errors import DrawingError
 from camtool.geometry.drawing import Drawing, Skipped, Units
 from camtool.importers.assemble import assemble
 from camtool.importers.bitmap.centre import centre_lines
-from camtool.importers.bitmap.outline import crossings, enclosed, outlines
+from camtool.importers.bitmap.outline import crossings, enclosed_area, outlines
 from camtool.importers.bitmap.pixels import Ink, PixelPicture, is_square, picture
 from camtool.importers.bitmap.strokes import PixelStrokes, strokes
 from camtool.importers.options import ReadOptions
@@ -48,8 +48,10 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
     if crossings(ink, options.threshold) > 10 * MAX_POINTS:
         raise _too_noisy(file)
     lines = outlines(ink, options.threshold)
-    areas = np.array([enclosed(line) for line in lines])
-    shapes = [line for line, area in zip(lines, areas, strict=True) if _counts(area, options)]
+    areas = np.array([enclosed_area(line) for line in lines])
+    shapes = [
+        line for line, area in zip(lines, areas, strict=True) if _is_large_enough(area, options)
+    ]
     if sum(map(len, shapes)) > MAX_POINTS:
         raise _too_noisy(file)
     skipped = _skipped("speck", len(lines) - len(shapes), f"under {options.speckle_px:g} pixels")
@@ -60,7 +62,7 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
         specks = [
             (abs(area), area < 0.0, line)
             for line, area in zip(lines, areas.tolist(), strict=True)
-            if not _counts(area, options)
+            if not _is_large_enough(area, options)
         ]
         specks.sort(key=lambda speck: speck[0])
         dark = ink >= options.threshold
@@ -129,7 +131,7 @@ def _check_tones(ink: Ink, options: ReadOptions, file: str) -> None:
         mend = "it is of one tone: nothing in it can be told from the rest"
     else:
         other = "" if options.invert else ", or --invert where light lines are on dark"
-        mend = f"--threshold {_between(ink):.2f} lies between its tones{other}"
+        mend = f"--threshold {_otsu_threshold(ink):.2f} lies between its tones{other}"
     raise DrawingError(
         f"is {tone} than the threshold {options.threshold:g} everywhere "
         f"(it is between {least:.2f} and {most:.2f} dark)",
@@ -138,7 +140,7 @@ def _check_tones(ink: Ink, options: ReadOptions, file: str) -> None:
     )
 
 
-def _between(ink: Ink) -> float:
+def _otsu_threshold(ink: Ink) -> float:
     """The darkness that divides pixels into two kinds whose means differ most (Otsu 1979)."""
     counts, edges = np.histogram(ink, BINS, (0.0, 1.0))
     tones = 0.5 * (edges[1:] + edges[:-1])
@@ -151,7 +153,7 @@ def _between(ink: Ink) -> float:
     return float(best.mean())
 
 
-def _counts(area: float, options: ReadOptions) -> bool:
+def _is_large_enough(area: float, options: ReadOptions) -> bool:
     """True if a contour that encloses this area, pixels, is large enough to be drawn."""
     return abs(area) >= options.speckle_px
 

@@ -23,7 +23,7 @@ from camtool.arrays import Floats
 from camtool.geometry.fit import split_bulges
 from camtool.geometry.measure import signed_area
 from camtool.geometry.polylines import Polyline
-from camtool.importers.bitmap.outline import enclosed
+from camtool.importers.bitmap.outline import enclosed_area
 
 SEARCH_SHARE = 0.9
 """Runs are searched within this part of the limit: moving their ends takes a part of the rest."""
@@ -109,13 +109,15 @@ def strokes(points: Floats, limit: float, *, closed: bool) -> PixelStrokes:
     """Lines and arcs within `limit` of the points (n, 2); an open path keeps its ends, a closed
     one about its area: the limit is less for thinner shapes."""
     if not closed:
-        return _joined(points, _runs(points, limit), limit, closed=False)
+        return _chain_of_shapes(points, _runs(points, limit), limit, closed=False)
     circle = _circle(points)
     if circle is not None and circle.off[0, 0] <= limit:
         return circle
-    ring, area = np.roll(points, -_sharpest(points), axis=0), enclosed(points)
+    ring, area = np.roll(points, -_sharpest(points), axis=0), enclosed_area(points)
     for _ in range(HALVINGS):
-        made = _joined(*_turned(ring, _runs(ring, limit), limit), limit, closed=True)
+        made = _chain_of_shapes(
+            *_begin_at_best_division(ring, _runs(ring, limit), limit), limit, closed=True
+        )
         if len(made.vertices) > 1:
             found = signed_area(Polyline(made.vertices, closed=True))
             if abs(found - area) <= AREA_SHARE * abs(area):
@@ -124,13 +126,15 @@ def strokes(points: Floats, limit: float, *, closed: bool) -> PixelStrokes:
     return PixelStrokes(np.column_stack([ring, np.zeros(len(ring))]), np.zeros((len(ring), 2)))
 
 
-def _turned(ring: Floats, ends: list[int], limit: float) -> tuple[Floats, list[int]]:
+def _begin_at_best_division(
+    ring: Floats, ends: list[int], limit: float
+) -> tuple[Floats, list[int]]:
     """A closed path and its runs, begun where the last run and the first leave the least."""
     if len(ends) < 3:
         return ring, [0, len(ring) // 2, len(ring)]
     before, behind = len(ring) - ends[-2], ends[1]
     both = np.concatenate([ring[ends[-2] :], ring[: ends[1]]])
-    moved = _parted(both, before, limit) - before
+    moved = _division_index(both, before, limit) - before
     moved = min(max(moved, 1 - before), behind - 1)
     inner = [end - moved for end in ends[1:-1]]
     return np.roll(ring, -moved, axis=0), [0, *inner, len(ring)]
@@ -152,7 +156,7 @@ def _circle(points: Floats) -> PixelStrokes | None:
         return None
     centre, radius = found
     off = np.abs(np.hypot(*(points - centre).T) - radius)
-    turn = 1.0 if enclosed(points) > 0.0 else -1.0
+    turn = 1.0 if enclosed_area(points) > 0.0 else -1.0
     vertices = np.array([[radius, 0.0, turn], [-radius, 0.0, turn]])
     vertices[:, :2] += centre
     return PixelStrokes(vertices, np.tile([off.max(), math.sqrt((off**2).mean())], (2, 1)))
@@ -242,11 +246,11 @@ def _runs(points: Floats, limit: float) -> list[int]:
         ends.append(_reach(points, ends[-1], within))
     for k in range(1, len(ends) - 1):
         low, high = ends[k - 1], ends[k + 1]
-        ends[k] = low + _parted(points[low:high], ends[k] - low, within)
+        ends[k] = low + _division_index(points[low:high], ends[k] - low, within)
     return ends
 
 
-def _parted(points: Floats, here: int, limit: float) -> int:
+def _division_index(points: Floats, here: int, limit: float) -> int:
     """Return the index near `here` at which to divide the points into two runs, so that the sum of
     squares of the distances from their shapes is least."""
     one, other = (_best(part, limit) or _line(part) for part in (points[:here], points[here:]))
@@ -279,7 +283,9 @@ def _reach(points: Floats, first: int, limit: float) -> int:
     return good
 
 
-def _joined(points: Floats, ends: list[int], limit: float, *, closed: bool) -> PixelStrokes:
+def _chain_of_shapes(
+    points: Floats, ends: list[int], limit: float, *, closed: bool
+) -> PixelStrokes:
     """The chain of the shapes of these runs. Where one of them does not suit its points from
     meeting to meeting, it begins and ends where they do."""
     runs = [
@@ -291,7 +297,7 @@ def _joined(points: Floats, ends: list[int], limit: float, *, closed: bool) -> P
         still[0], still[-1] = points[0], points[-1]
     places = list(still)
     for k in range(0 if closed else 1, len(runs)):
-        places[k] = _meeting(runs[k - 1].shape, runs[k].shape, still[k], limit)
+        places[k] = _meeting_point(runs[k - 1].shape, runs[k].shape, still[k], limit)
     if closed:
         places[-1] = places[0]
     waiting = list(range(len(runs)))
@@ -318,7 +324,7 @@ def _joined(points: Floats, ends: list[int], limit: float, *, closed: bool) -> P
     return PixelStrokes(np.array(rows), np.array(off))
 
 
-def _meeting(one: _Shape, other: _Shape, place: Floats, limit: float) -> Floats:
+def _meeting_point(one: _Shape, other: _Shape, place: Floats, limit: float) -> Floats:
     """Return the point near `place` where two neighbouring shapes meet, or come nearest; at most
     `limit` + MEETING_PX from `place`."""
     met = place

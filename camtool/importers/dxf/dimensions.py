@@ -62,7 +62,7 @@ def callout(
     `mm_per_unit`: the unit of the drawing. `paper`: it is in a layout, where a negative DIMLFAC
     applies too.
     """
-    kind, places, direction = _measured(entity)
+    kind, places, direction = _measured_places(entity)
     plane = frame.plane(entity.dxf.extrusion, 0.0)
     if not plane.scale:
         raise Unusable("stands in a block of unequal scales")
@@ -101,7 +101,7 @@ def _place(point: Floats) -> tuple[float, float]:
     return float(point[0]), float(point[1])
 
 
-def _measured(
+def _measured_places(
     entity: Any,
 ) -> tuple[Literal["linear", "diameter", "radius"], list[Any], float | None]:
     """Return the kind of a dimension, the two places between which it measures (world units), and

@@ -34,7 +34,7 @@ from camtool.importers.dxf.tags import (
     check_numbers,
     frame_of,
     header_of,
-    lost,
+    lost_entities,
 )
 from camtool.importers.formats import BINARY_DXF
 
@@ -75,15 +75,15 @@ def load(data: bytes, file: str) -> Loaded:
     if cut:
         tags = tags.ended(max(part.end for part in frame.sections if part.end is not None) + 1)
         frame = frame_of(tags)
-    notes = [*tags.notes, *cut, *frame.faults, *lost(tags, frame)]
+    notes = [*tags.notes, *cut, *frame.faults, *lost_entities(tags, frame)]
     with quiet() as said, without_collector():
         bulk = Bulk.of(tags, frame)
-        document = None if frame.faults else _plain(tags, bulk, said)
+        document = None if frame.faults else _load_plainly(tags, bulk, said)
         notes.extend(said)
         if document is None or (said and tags.is_text):
             bulk = Bulk.none(tags)
             check_numbers(tags, file, np.arange(len(tags.codes)))
-            document = _recovered(tags, notes, file)
+            document = _recover(tags, notes, file)
     repairs = tuple(printable(note) for note in dict.fromkeys(notes))
     return Loaded(document, header_of(tags, frame), repairs, bulk.lines)
 
@@ -177,7 +177,7 @@ def _check_whole(tags: Tags, frame: DxfSections, file: str) -> list[str]:
     return ["the end mark EOF is missing: what stood behind the entities is left out"]
 
 
-def _plain(tags: Tags, bulk: Bulk, said: list[str]) -> Any:
+def _load_plainly(tags: Tags, bulk: Bulk, said: list[str]) -> Any:
     """The document of ezdxf's ordinary reader, without what is read in bulk; None when it fails
     or finds fault, as `said`."""
     from ezdxf.document import Drawing
@@ -200,7 +200,7 @@ def _plain(tags: Tags, bulk: Bulk, said: list[str]) -> Any:
     return document
 
 
-def _recovered(tags: Tags, notes: list[str], file: str) -> Any:
+def _recover(tags: Tags, notes: list[str], file: str) -> Any:
     """The document of ezdxf's recovery, its repairs added to the notes."""
     from ezdxf.document import Drawing
     from ezdxf.recover import Recover

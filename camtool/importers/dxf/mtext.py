@@ -22,9 +22,9 @@ from camtool.importers.text import (
     Rule,
     TextLook,
     WantedFont,
+    character_of_number,
     finite,
     font_for,
-    numbered,
     slant,
 )
 from camtool.records import replace
@@ -58,14 +58,14 @@ def write_mtext(
     except _CODE_ERRORS as error:
         raise Unusable("has codes in its text that cannot be read") from error
     columns = _columns(entity)
-    lines = [line for paragraph in paragraphs for line in wrapped(paragraph, columns.width)]
+    lines = [line for paragraph in paragraphs for line in wrap_paragraph(paragraph, columns.width)]
     if not any(line.cells for line in lines):
         raise Unusable("is empty")
     finite(*(size for line in lines for size in (line.right, line.height)))
     width = columns.width or max(line.right for line in lines)
     exact = int(entity.dxf.get("line_spacing_style", 1)) == _EXACT_SPACING
     pitch = Pitch(float(entity.dxf.line_spacing_factor), look.height if exact else 0.0)
-    placed = stacked(lines, columns, pitch)
+    placed = stack_lines(lines, columns, pitch)
     total = width + (width + columns.gutter) * placed[-1].column
     depth = min(place.baseline for place in placed)
     anchor = _SHARES[column] * total, _SHARES[row] * depth
@@ -80,7 +80,9 @@ def _plain(content: str) -> str:
     """Codes that MTextParser takes for others: carets that are no control code, and %%nnn."""
     content = _STACK_CARET.sub(r"\1^ ", content)
     content = _BARE_CARET.sub("^ ", content)
-    return NUMBERED.sub(lambda match: _ESCAPED.sub(r"\\\g<0>", numbered(match[1])), content)
+    return NUMBERED.sub(
+        lambda match: _ESCAPED.sub(r"\\\g<0>", character_of_number(match[1])), content
+    )
 
 
 def plain_text(content: str) -> str:
@@ -315,7 +317,7 @@ class Placed(Struct, frozen=True, eq=False):
     line: MTextLine
 
 
-def wrapped(paragraph: Paragraph, width: float) -> Iterator[MTextLine]:
+def wrap_paragraph(paragraph: Paragraph, width: float) -> Iterator[MTextLine]:
     """The lines of a paragraph, no wider than `width` where words allow that (0: one line)."""
     left, following, margin = paragraph.indents
     limit = (width - margin) + WRAP_SLACK * width
@@ -326,7 +328,7 @@ def wrapped(paragraph: Paragraph, width: float) -> Iterator[MTextLine]:
         size = sum(cell.width for cell in group)
         glue = group[0].glue
         if glue is Glue.TAB:
-            x = _tabbed(x, sum(cell.width for cell in ahead), paragraph)
+            x = _tab_position(x, sum(cell.width for cell in ahead), paragraph)
         elif glue is Glue.SPACE:
             placed.append((x, group[0]))
             x += size
@@ -360,7 +362,7 @@ def _unbreakable(cells: Sequence[MTextCell]) -> Iterator[tuple[MTextCell, ...]]:
         yield tuple(run)
 
 
-def _tabbed(x: float, ahead: float, paragraph: Paragraph) -> float:
+def _tab_position(x: float, ahead: float, paragraph: Paragraph) -> float:
     """Return the x at which the text after a tab begins; it is `ahead` wide up to the next tab."""
     for stop, share in paragraph.stops:
         if stop > x and stop - share * ahead >= x:
@@ -381,7 +383,7 @@ def _line(
     return MTextLine(cells, height, right, paragraph.indents[2], paragraph.share, stretch)
 
 
-def stacked(lines: Sequence[MTextLine], columns: Columns, pitch: Pitch) -> list[Placed]:
+def stack_lines(lines: Sequence[MTextLine], columns: Columns, pitch: Pitch) -> list[Placed]:
     """Lines below each other, in the next column where one is full or ended."""
     placed: list[Placed] = []
     column, start = 0, True

@@ -51,9 +51,9 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
         used=dict(walk.used),
         skipped=[Skipped(kind, count, why) for (kind, why), count in walk.skipped.items()],
         findings=[
-            *_repaired(repairs),
+            *_repair_findings(repairs),
             *findings,
-            *_not_applied(walk.lacking),
+            *_not_applied_findings(walk.lacking),
             *_not_callouts(walk.unread),
             *font_findings(walk.fonts),
         ],
@@ -72,7 +72,7 @@ def _space(document: Any, layout: str | None, file: str) -> Any:
     return named[layout.casefold()]
 
 
-def _repaired(repairs: tuple[str, ...]) -> list[Finding]:
+def _repair_findings(repairs: tuple[str, ...]) -> list[Finding]:
     """Return one finding for all repairs, which quotes the first REPAIRS_NAMED of them."""
     if not repairs:
         return []
@@ -81,7 +81,7 @@ def _repaired(repairs: tuple[str, ...]) -> list[Finding]:
     return [FILE_REPAIRED(measured=len(repairs), repairs=text, more=max(more, 0))]
 
 
-def _not_applied(lacking: Counter[tuple[str, str]]) -> list[Finding]:
+def _not_applied_findings(lacking: Counter[tuple[str, str]]) -> list[Finding]:
     """Return a finding for each kind of property that was not applied to entities."""
     return [
         NOT_APPLIED_TO_ENTITY(measured=count, kind=kind, what=what)
@@ -144,7 +144,9 @@ _GUESSES = {
 
 def units_of(header: Mapping[str, Any], options: ReadOptions) -> tuple[Units, list[Finding]]:
     """The unit, and a finding when the file does not say it."""
-    code, measurement = (_whole(header.get(name)) for name in ("$INSUNITS", "$MEASUREMENT"))
+    code, measurement = (
+        _header_number(header.get(name)) for name in ("$INSUNITS", "$MEASUREMENT")
+    )
     said = "no $INSUNITS" if code is None else f"$INSUNITS {code}"
     if options.units is not None:
         unit = options.units.lower()
@@ -162,7 +164,7 @@ def units_of(header: Mapping[str, Any], options: ReadOptions) -> tuple[Units, li
     return Units("mm", 1.0, f"taken as mm: {said}"), [UNITLESS(said=said)]
 
 
-def _whole(value: Any) -> int | None:
+def _header_number(value: Any) -> int | None:
     """A header's number; None when the file does not say it."""
     try:
         return int(float(value))

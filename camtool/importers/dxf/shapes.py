@@ -178,7 +178,7 @@ def straight(points: Floats) -> Floats:
     return np.column_stack([points, np.zeros(len(points))])
 
 
-def fitted(curve: Curve, size: Floats, tolerance_mm: float) -> Fit:
+def fit_arcs(curve: Curve, size: Floats, tolerance_mm: float) -> Fit:
     """Arcs for a curve whose place and size these numbers give."""
     furthest = float(np.abs(size).max())
     if not furthest <= MAX_COORDINATE_MM:  # nor is NaN
@@ -198,13 +198,13 @@ __all__ = [
     "Unusable",
     "WorldMap",
     "arc",
-    "bulged",
     "circle",
     "ellipse",
     "elliptic",
     "line",
     "lwpolyline",
     "polyline",
+    "polyline_with_bulges",
     "require",
 ]
 
@@ -251,10 +251,10 @@ def _round(
     if radius <= 0.0:
         raise Unusable(f"has a radius of {radius:g}")
     plane = frame.plane(dxf.extrusion, z)
-    return round_in(plane, (x, y, radius), start, sweep, tolerance_mm)
+    return circle_or_arc(plane, (x, y, radius), start, sweep, tolerance_mm)
 
 
-def round_in(
+def circle_or_arc(
     plane: Plane, of: tuple[float, float, float], start: float, sweep: float, tolerance_mm: float
 ) -> DxfShape:
     """Circle or arc of a centre and a radius (x, y, r) in a plane; angles in rad, either way."""
@@ -303,7 +303,7 @@ def elliptic(axes: Floats, start: float, sweep: float, tolerance_mm: float) -> D
         shape = DxfShape(arc_vertices(centre, plane.scale, turn, plane.sign * sweep), False)
     else:
         curve = EllipseCurve(centre, u, v, start, start + sweep)
-        shape = DxfShape.of(fitted(curve, axes, tolerance_mm))
+        shape = DxfShape.of(fit_arcs(curve, axes, tolerance_mm))
     return shape.ring() if closed else shape
 
 
@@ -313,7 +313,7 @@ def lwpolyline(entity: Any, frame: WorldMap, tolerance_mm: float) -> list[DxfSha
     rows = numbers(entity.lwpoints.values).reshape(-1, 5)
     plane = frame.plane(dxf.extrusion, float(numbers((dxf.get("elevation", 0.0),))[0]))
     wide = rows[:, 2:4].any() or bool(dxf.get("const_width", 0.0))
-    shape = bulged(rows[:, (0, 1, 4)], bool(entity.closed), plane, tolerance_mm)
+    shape = polyline_with_bulges(rows[:, (0, 1, 4)], bool(entity.closed), plane, tolerance_mm)
     return [_with_width(shape) if wide else shape]
 
 
@@ -335,7 +335,9 @@ def polyline(entity: Any, frame: WorldMap, tolerance_mm: float) -> list[DxfShape
     if entity.dxf.hasattr("elevation"):
         elevation = float(numbers(entity.dxf.elevation)[2])
     plane = frame.plane(entity.dxf.extrusion, elevation)
-    shape = bulged(np.column_stack([points[:, :2], bulges]), closed, plane, tolerance_mm)
+    shape = polyline_with_bulges(
+        np.column_stack([points[:, :2], bulges]), closed, plane, tolerance_mm
+    )
     widths = [part.get(f"{end}_width", 0.0) for part in corners for end in ("start", "end")]
     widths += [entity.dxf.get(f"default_{end}_width", 0.0) for end in ("start", "end")]
     return [_with_width(shape) if any(widths) else shape]
@@ -345,7 +347,9 @@ def _with_width(shape: DxfShape) -> DxfShape:
     return replace(shape, lacks=WIDTH)
 
 
-def bulged(local: Floats, closed: bool, plane: Plane, tolerance_mm: float) -> DxfShape:
+def polyline_with_bulges(
+    local: Floats, closed: bool, plane: Plane, tolerance_mm: float
+) -> DxfShape:
     """A polyline (n, 3) of x, y, bulge in its own plane: exact, or its arcs fitted where the plane
     squeezes circles."""
     if len(local) == 0:
@@ -368,7 +372,7 @@ def bulged(local: Floats, closed: bool, plane: Plane, tolerance_mm: float) -> Dx
             u, v = arcs.radius[k] * plane.u, arcs.radius[k] * plane.v
             ends = float(arcs.start_angle[k]), float(arcs.start_angle[k] + arcs.sweep[k])
             curve = EllipseCurve(centre, u, v, *ends)
-            fit = fitted(curve, np.array([centre, u, v]), tolerance_mm)
+            fit = fit_arcs(curve, np.array([centre, u, v]), tolerance_mm)
             parts.append(fit.vertices[:-1])
             off.append(fit.off_mm[:-1])
         else:
@@ -443,7 +447,7 @@ def spline_of(
         curve = SplineCurve(degree, knots, control, weights if len(weights) else None)
     except GeometryError as error:
         raise Unusable(f"has no curve: {error.message}") from error
-    shape = DxfShape.of(fitted(curve, control, tolerance_mm))
+    shape = DxfShape.of(fit_arcs(curve, control, tolerance_mm))
     ends = shape.vertices[[0, -1], :2]
     closed = len(shape.vertices) > 2 and math.dist(*ends) <= POSITION_EPS_MM
     return shape.ring() if closed else shape
@@ -460,7 +464,7 @@ def outline(parts: list[Floats], closed: bool, frame: WorldMap, tolerance_mm: fl
             vertices.append(straight(control[:1]))
             off.append(np.zeros((1, 2)))
             continue
-        fit = fitted(BezierCurve(control), control, tolerance_mm)
+        fit = fit_arcs(BezierCurve(control), control, tolerance_mm)
         count = max(len(fit.vertices) - 1, 1)
         vertices.append(fit.vertices[:count])
         off.append(fit.off_mm[:count])
@@ -486,7 +490,7 @@ def hatch(entity: Any, frame: WorldMap, tolerance_mm: float) -> list[DxfShape]:
     paths = [path for path in entity.paths if not path.path_type_flags & _TEXT_BOX]
     if not paths:
         raise Unusable("has no outline")
-    own = [path for path in paths if not _follows(path, entity)]
+    own = [path for path in paths if not _is_boundary_of_entities(path, entity)]
     if not own:
         raise Unusable("has the outline of other entities, which are read")
     shapes: list[DxfShape] = []
@@ -496,11 +500,11 @@ def hatch(entity: Any, frame: WorldMap, tolerance_mm: float) -> list[DxfShape]:
         else:
             rows = numbers(path.vertices).reshape(-1, 3)
             # Whether the file says so or not: the outline of an area is closed.
-            shapes.append(bulged(rows, True, plane, tolerance_mm))
+            shapes.append(polyline_with_bulges(rows, True, plane, tolerance_mm))
     return shapes
 
 
-def _follows(path: Any, entity: Any) -> bool:
+def _is_boundary_of_entities(path: Any, entity: Any) -> bool:
     """True if the path is the boundary of a hatch that is associated with entities of the
     drawing."""
     handles = path.source_boundary_objects
@@ -529,7 +533,7 @@ def _edge(edge: Any, plane: Plane, tolerance_mm: float) -> DxfShape:
         if radius <= 0.0:
             raise Unusable(f"has an edge with a radius of {radius:g}")
         sweep = whole_turn(math.radians(end - start))
-        return round_in(plane, (x, y, radius), math.radians(start), sweep, tolerance_mm)
+        return circle_or_arc(plane, (x, y, radius), math.radians(start), sweep, tolerance_mm)
     major, ratio = numbers(edge.major_axis)[:2], float(numbers((edge.ratio,))[0])
     start, end = numbers((edge.start_param, edge.end_param)).tolist()
     local = np.array([[x, y], major, ratio * np.array([-major[1], major[0]])])

@@ -291,7 +291,7 @@ def frame_of(tags: Tags) -> DxfSections:
     return DxfSections(tuple(sections), eof, (*faults, *_wrong_names(tags, sections)))
 
 
-def lost(tags: Tags, frame: DxfSections) -> list[str]:
+def lost_entities(tags: Tags, frame: DxfSections) -> list[str]:
     """Describe entities and vertices that are lost because a group code is damaged.
 
     An entity that has two layers is two entities, the mark (0) of one being damaged.

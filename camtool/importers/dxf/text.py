@@ -28,10 +28,10 @@ from camtool.importers.text import (
     Rule,
     TextLook,
     WantedFont,
+    character_of_number,
+    describe_lacking,
     finite,
     font_for,
-    lacking,
-    numbered,
     slant,
 )
 from camtool.records import replace
@@ -67,7 +67,7 @@ class TextShape(Struct, frozen=True, eq=False):
     @property
     def lacks(self) -> str:
         """The font or characters that are not available, in words; "" if all are."""
-        return lacking(self.font, self.substituted, self.missing)
+        return describe_lacking(self.font, self.substituted, self.missing)
 
 
 def text_strokes(entity: Any, mode: str) -> TextShape:
@@ -115,7 +115,7 @@ def _text(entity: Any, mode: str) -> TextShape:
     style = _style(entity, entity.doc)
     if style is not None and int(style.dxf.flags) & _STACKED_LETTERS:
         raise Unusable("has its letters one below the other")
-    font, substituted = font_for(_wanted(style), mode)
+    font, substituted = font_for(_wanted_font(style), mode)
     height, factor, oblique = finite(dxf.height, dxf.width, dxf.oblique)
     look = TextLook(font, height, factor, slant(oblique))
     width = sum(look.width(run) for run, _ in runs)
@@ -142,7 +142,7 @@ def _runs(raw: str) -> list[tuple[str, Rule]]:
         run = text[at : code.start() if code else None]
         if code:
             at = code.end()
-            run += numbered(code[1]) if code[1] else _SIGNS.get(code[2].lower(), "")
+            run += character_of_number(code[1]) if code[1] else _SIGNS.get(code[2].lower(), "")
         if run:
             runs.append((run, rules))
         if code and code[2]:
@@ -219,7 +219,7 @@ def _mtext(entity: Any, document: Any, mode: str) -> TextShape:
     )
     if not height > 0.0:
         raise Unusable("has no size")
-    wanted = _wanted(style)
+    wanted = _wanted_font(style)
     font, _ = font_for(wanted, mode)
     look = TextLook(font, height, factor, slant(oblique))
     ink, fonts = write_mtext(entity, content, look, (wanted, mode))
@@ -263,7 +263,7 @@ def _style(entity: Any, document: Any) -> Any:
     return document.styles.get(name) if document.styles.has_entry(name) else None
 
 
-def _wanted(style: Any) -> WantedFont:
+def _wanted_font(style: Any) -> WantedFont:
     """The font that a text style names."""
     if style is None:
         return WantedFont()

@@ -288,7 +288,7 @@ class DxfWalk:
             blocks=(*scope.blocks, name),
             within=scope.within or f" in {_source(insert, scope)}",
         )
-        for shift in places(insert):
+        for shift in member_shifts(insert):
             frame = scope.frame.placed(to_world[:3, :3], to_world[3, :3] + shift)
             self._entities(block, replace(inner, frame=frame))
         self._entities(insert.attribs, scope)
@@ -500,7 +500,7 @@ def matrix(insert: Any) -> Floats:
     return np.array(tuple(insert.matrix44())).reshape(4, 4)
 
 
-def places(insert: Any) -> Iterator[Floats]:
+def member_shifts(insert: Any) -> Iterator[Floats]:
     """Yield the shift of each member of an array from the first one, (3,) in world units.
 
     The array turns with the INSERT, but its spacing is not scaled.

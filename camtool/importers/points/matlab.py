@@ -50,7 +50,7 @@ def is_matlab(text: str, file: str) -> bool:
 
 def parse_matlab(text: str, file: str) -> PointTable:
     """The router's one stroke; DrawingError naming the line."""
-    values = assigned(text, file, _NAMES)
+    values = parse_assignments(text, file, _NAMES)
     points, line = _Job(file, values).points()
     return PointTable(
         [Stroke(points, f"at line {line}")],
@@ -241,7 +241,7 @@ def _tokens(text: str) -> Iterator[_Token]:
     yield _Token("end", "", line, True)
 
 
-def assigned(text: str, file: str, names: tuple[str, ...]) -> dict[str, MatlabArray]:
+def parse_assignments(text: str, file: str, names: tuple[str, ...]) -> dict[str, MatlabArray]:
     """Every assigned array by its name; DrawingError with its line for all that is no number."""
     return _Parser(file, text, names).values()
 

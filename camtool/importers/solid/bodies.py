@@ -78,7 +78,7 @@ def subshapes(shape: Any, kind: Any, outside: Any = None) -> list[Any]:
         same = found.setdefault(hash(part), [])
         if not any(part.IsSame(other) for other in same):
             same.append(part)
-            parts.append(_typed(part))
+            parts.append(_as_own_class(part))
         explorer.Next()
     return parts
 
@@ -106,7 +106,7 @@ def colour_of(colour: Any) -> str:
     return "#{:02x}{:02x}{:02x}".format(*(min(max(round(255.0 * c), 0), 255) for c in parts))
 
 
-def _typed(shape: Any) -> Any:
+def _as_own_class(shape: Any) -> Any:
     """The shape as the class of its kind; the binding has other names since version 8."""
     from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SHELL, TopAbs_SOLID, TopAbs_WIRE
     from OCP.TopoDS import TopoDS
@@ -285,18 +285,18 @@ def run_script(data: bytes, file: str) -> list[Body]:
     except SystemExit as error:
         # A script that ends itself without complaint has done its work.
         if error.code not in (None, 0):
-            raise _failed(f"ended itself: {error.code}", error, file) from error
+            raise _script_error(f"ended itself: {error.code}", error, file) from error
     except SyntaxError as error:
         where = f"line {error.lineno}" if error.lineno else None
         raise DrawingError(f"is no Python: {error.msg}", where=where, mend=_MEND) from error
     # Whatever the script raises is a fault of the script.
     except Exception as error:
         what = f"{type(error).__name__}: {error}".rstrip(": ")
-        raise _failed(f"stopped with {what}", error, file) from error
-    return _left(names)
+        raise _script_error(f"stopped with {what}", error, file) from error
+    return _bodies_of_result(names)
 
 
-def _failed(message: str, error: BaseException, file: str) -> DrawingError:
+def _script_error(message: str, error: BaseException, file: str) -> DrawingError:
     """The error with the last line of the script that was being run."""
     lines = [
         frame.lineno
@@ -306,7 +306,7 @@ def _failed(message: str, error: BaseException, file: str) -> DrawingError:
     return DrawingError(message, where=f"line {lines[-1]}" if lines else None, mend=_MEND)
 
 
-def _left(names: dict[str, Any]) -> list[Body]:
+def _bodies_of_result(names: dict[str, Any]) -> list[Body]:
     """The bodies of the first of RESULTS; DrawingError when there is none."""
     name = next((name for name in RESULTS if names.get(name) is not None), None)
     if name is None:

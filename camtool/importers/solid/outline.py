@@ -60,26 +60,26 @@ def outlines(bodies: list[Body], height: float | None, tolerance: float) -> Outl
     levels: list[float] = []
     missed: Counter[str] = Counter()
     for body, box in zip(bodies, boxes, strict=True):
-        kind, faces, edges, level = _taken(body, box, height)
+        kind, faces, edges, level = _choose_faces(body, box, height)
         wires = [_wires(face, tolerance) for face in faces]
         if edges:
             wires.append([edge_path(edge, tolerance) for edge in edges])
         found.extend(SolidOutline(kind, body.layer, body.colour, paths) for paths in wires)
         if not wires:
-            missed[_reason(kind, height)] += 1
+            missed[_why_nothing_drawn(kind, height)] += 1
         if wires and level is not None:
             levels.append(level)
     return Outlines(found, levels, (low, high), dict(missed))
 
 
-def _reason(kind: str, height: float | None) -> str:
+def _why_nothing_drawn(kind: str, height: float | None) -> str:
     """Why nothing of a body is drawn."""
     if height is not None:
         return "is not cut by the section"
     return "has no level face that looks up" if kind == "face" else "is not level"
 
 
-def _taken(
+def _choose_faces(
     body: Body, box: tuple[float, ...], height: float | None
 ) -> tuple[str, list[Any], list[Any], float | None]:
     """Kind, faces, loose edges and height of what is drawn of one body."""
@@ -178,8 +178,8 @@ def _wires(face: Any, tolerance: float) -> list[EdgePath]:
             if not BRep_Tool.Degenerated_s(edge)
         ]
         parts = [part for part in parts if len(part.vertices) > 1]
-        if parts and whole and follow(parts):
-            paths.append(joined(parts))
+        if parts and whole and is_ring(parts):
+            paths.append(join_edges(parts))
         else:
             paths.extend(parts)
     return paths
@@ -248,7 +248,7 @@ def reversed_vertices(vertices: Floats) -> Floats:
     return back
 
 
-def joined(edges: list[EdgePath]) -> EdgePath:
+def join_edges(edges: list[EdgePath]) -> EdgePath:
     """Edges one after the other as one closed path; each ends where the next one begins."""
     vertices = np.concatenate([path.vertices[:-1] for path in edges])
     off = [path.off[:-1].copy() for path in edges]
@@ -257,7 +257,7 @@ def joined(edges: list[EdgePath]) -> EdgePath:
     return EdgePath(vertices, True, np.concatenate(off))
 
 
-def follow(edges: list[EdgePath]) -> bool:
+def is_ring(edges: list[EdgePath]) -> bool:
     """True if each edge begins where the one before ends, and the last one closes the ring."""
     return bool((_steps(edges) <= JOINT_MM).all())
 
@@ -318,7 +318,7 @@ def _free(curve: Any, start: float, end: float) -> Curve:
         from OCP.GeomConvert import GeomConvert
 
         return _spline(GeomConvert.CurveToBSplineCurve_s(curve.Bezier()), start, end)
-    return _asked(curve, start, end)
+    return _sample_curve(curve, start, end)
 
 
 def _spline(spline: Any, start: float, end: float) -> Curve:
@@ -339,7 +339,7 @@ def _spline(spline: Any, start: float, end: float) -> Curve:
     return SplineCurve(spline.Degree(), np.array(knots), control, weights)
 
 
-def _asked(curve: Any, start: float, end: float) -> Curve:
+def _sample_curve(curve: Any, start: float, end: float) -> Curve:
     """Any curve, point by point; it may have corners where its intervals meet."""
     from OCP.GeomAbs import GeomAbs_C1
     from OCP.gp import gp_Pnt, gp_Vec

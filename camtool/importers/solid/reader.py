@@ -58,7 +58,7 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
         "height": height,
         "tolerance": max(options.tolerance_mm / scale, POSITION_EPS_MM),
     }
-    found = outlined(data, wanted, file)
+    found = run_worker(data, wanted, file)
     units = (
         Units("mm", 1.0, unit.why)
         if options.units is None
@@ -70,7 +70,7 @@ def read(data: bytes, file: str, options: ReadOptions) -> Drawing:
         units=units,
         used=dict(Counter(outline["kind"] for outline in found["outlines"])),
         skipped=[Skipped("body", count, why) for why, count in found["missed"].items()],
-        findings=[*_faults(found), *_chosen(found, scale, height)],
+        findings=[*_faults(found), *_section_finding(found, scale, height)],
         options=options,
     )
 
@@ -120,7 +120,7 @@ def _faults(found: dict[str, Any]) -> list[Finding]:
     return findings
 
 
-def _chosen(found: dict[str, Any], scale: float, height: float | None) -> list[Finding]:
+def _section_finding(found: dict[str, Any], scale: float, height: float | None) -> list[Finding]:
     """SECTION_CHOSEN: what was taken, at which height, and how high the model is."""
     if not found["levels"]:
         return []
@@ -153,7 +153,7 @@ _STDERR = 2
 _COLOURS = re.compile(r"\x1b\[[\d;]*m")
 
 
-def outlined(data: bytes, wanted: dict[str, Any], file: str) -> dict[str, Any]:
+def run_worker(data: bytes, wanted: dict[str, Any], file: str) -> dict[str, Any]:
     """Run the worker on these bytes; return its answer with a `complaint` of the reader, or "".
 
     DrawingError when the model is damaged; RuntimeError for a fault of camtool itself.

@@ -26,7 +26,7 @@ def main(request: dict[str, Any]) -> None:
     """Does what is asked and writes the answer, or the error, to the file `request["answer"]`."""
     _limit(None if request["kind"] == "script" else MAX_MEMORY_BYTES)
     try:
-        result = found(request)
+        result = find_outlines(request)
     except CamtoolError as error:
         result = {"error": {"message": error.message, "where": error.where, "mend": error.mend}}
     except Exception:
@@ -34,7 +34,7 @@ def main(request: dict[str, Any]) -> None:
     Path(request["answer"]).write_text(json.dumps(result), encoding="utf-8")
 
 
-def found(request: dict[str, Any]) -> dict[str, Any]:
+def find_outlines(request: dict[str, Any]) -> dict[str, Any]:
     """The outlines of the model in the file `request["source"]`, as plain lists and numbers.
 
     `kind` ("step", "brep", "script"), `height` of a section or None, `tolerance` of fitting;
@@ -44,7 +44,7 @@ def found(request: dict[str, Any]) -> dict[str, Any]:
     try:
         bodies = _bodies(request)
         result = outlines(bodies, request["height"], request["tolerance"])
-        faulty = sum(not _holds(body) for body in bodies)
+        faulty = sum(not _is_valid(body) for body in bodies)
     except GeometryError as error:
         raise DrawingError(
             f"holds a curve that is not valid: {error.message}", mend=_AGAIN
@@ -54,7 +54,7 @@ def found(request: dict[str, Any]) -> dict[str, Any]:
             raise
         message = "OpenCASCADE fails on the model" if script else _DAMAGED
         raise DrawingError(message, mend="correct the script" if script else _AGAIN) from error
-    return _plain(result) | {"faulty": faulty, "bodies": len(bodies)}
+    return _as_plain_lists(result) | {"faulty": faulty, "bodies": len(bodies)}
 
 
 def _is_of_kernel(error: Exception) -> bool:
@@ -79,14 +79,14 @@ def _bodies(request: dict[str, Any]) -> list[Body]:
     return bodies
 
 
-def _holds(body: Body) -> bool:
+def _is_valid(body: Body) -> bool:
     """True if all faces and edges of the body fit together."""
     from OCP.BRepCheck import BRepCheck_Analyzer
 
     return bool(BRepCheck_Analyzer(body.shape).IsValid())
 
 
-def _plain(result: Outlines) -> dict[str, Any]:
+def _as_plain_lists(result: Outlines) -> dict[str, Any]:
     """The outlines without arrays and records."""
     return {
         "levels": result.levels,

@@ -49,7 +49,7 @@ class _Compound(Struct, frozen=True):
             self.tag in ("", node.tag)
             and all(name == node.get("id") for name in self.ids)
             and (not self.classes or set(self.classes) <= set(node.get("class").split()))
-            and all(_holds(node, test) for test in self.tests)
+            and all(_passes_test(node, test) for test in self.tests)
         )
 
 
@@ -106,7 +106,7 @@ class CssRules(Struct):
         """Adds the rules of one sheet that say one of these properties."""
         wanted = frozenset(properties)
         for selectors, body in self._blocks(_without_comments(text)):
-            declarations = declared(body, wanted)
+            declarations = parse_declarations(body, wanted)
             if not declarations:
                 continue
             for selector in selectors.split(","):
@@ -145,7 +145,7 @@ class CssRules(Struct):
                 at = end + 1
 
     def _add(self, selector: str, declarations: Declarations) -> None:
-        parsed = _parsed(selector)
+        parsed = _parse_selector(selector)
         if parsed is None:
             self.left_out += 1
             return
@@ -160,7 +160,7 @@ class CssRules(Struct):
             self._by_tag[last.tag].append(rule)
 
 
-def declared(text: str, wanted: frozenset[str]) -> Declarations:
+def parse_declarations(text: str, wanted: frozenset[str]) -> Declarations:
     """The wanted properties of "name: value; ..."; of two the later wins, or the important one."""
     found: Declarations = {}
     for item in text.split(";"):
@@ -174,7 +174,7 @@ def declared(text: str, wanted: frozenset[str]) -> Declarations:
     return found
 
 
-def _parsed(selector: str) -> tuple[tuple[_Compound, ...], tuple[bool, ...]] | None:
+def _parse_selector(selector: str) -> tuple[tuple[_Compound, ...], tuple[bool, ...]] | None:
     """Steps and links of a selector from the element outwards, None when it has other signs."""
     words = selector.replace(">", " > ").split()
     steps: list[_Compound] = []
@@ -216,7 +216,7 @@ def _compound(word: str) -> _Compound | None:
     return _Compound(tag, tuple(found["#"]), tuple(found["."]), tuple(tests))
 
 
-def _holds(node: Node, test: _Test) -> bool:
+def _passes_test(node: Node, test: _Test) -> bool:
     """True if the element passes a test of an attribute: [name], [name=value], [name~=value] …"""
     name, sign, value = test
     own = node.attributes.get(name)

@@ -16,7 +16,7 @@ from camtool.findings import Finding
 from camtool.geometry.drawing import Units
 from camtool.importers.findings import UNIT_GUESSED_BY_PROGRAM, UNITLESS_PX
 from camtool.importers.options import DPI, ReadOptions
-from camtool.importers.svg.css import declared
+from camtool.importers.svg.css import parse_declarations
 from camtool.importers.svg.shapes import FONT_UNITS, split_length
 from camtool.importers.svg.style import FONT_PX
 from camtool.importers.svg.transform import (
@@ -65,7 +65,7 @@ def page_of(root: Node, options: ReadOptions, writer: Writer | None = None) -> S
     width, height = (_side(root, name, options) for name in ("width", "height"))
     box = parse_view_box(root.get("viewBox"))
     if options.units is not None:
-        return _asked(width, height, box, options)
+        return _page_in_unit(width, height, box, options)
     page = _by_the_file(root, (width, height), box, options)
     if writer is None or not (box is None or page.units.name == "px"):
         return page
@@ -100,7 +100,9 @@ def _by_the_file(
     return SvgPage(_flip(onto.height) @ inner, (box.width, box.height), units, findings)
 
 
-def _asked(width: _Side, height: _Side, box: SvgBox | None, options: ReadOptions) -> SvgPage:
+def _page_in_unit(
+    width: _Side, height: _Side, box: SvgBox | None, options: ReadOptions
+) -> SvgPage:
     """Return the page whose user unit is the caller's unit; the size in the file is ignored."""
     unit = str(options.units).lower()
     scale = options.mm_per(unit)
@@ -128,7 +130,10 @@ def _sizeless(box: SvgBox | None, options: ReadOptions) -> SvgPage:
 
 def _side(root: Node, name: str, options: ReadOptions) -> _Side:
     """A side as the attribute says it, else as the style does (as pages for the web have it)."""
-    text = root.get(name) or declared(root.get("style"), frozenset([name])).get(name, ("",))[0]
+    text = (
+        root.get(name)
+        or parse_declarations(root.get("style"), frozenset([name])).get(name, ("",))[0]
+    )
     if text in ("", "auto"):
         return _Side(text, None, "")
     value, unit = split_length(text, name)

@@ -13,7 +13,7 @@ from camtool.importers.svg.style import SvgStyle
 from camtool.importers.svg.transform import (
     Affine,
     SvgBox,
-    about,
+    about_point,
     parse_css_transform,
     parse_origin,
     parse_transform,
@@ -52,7 +52,7 @@ def own_transform(node: Node, style: SvgStyle, lengths: Lengths) -> Affine:
     else:
         own = Affine() if attribute == "none" else parse_transform(attribute)
     origin = style.transform_origin or node.get("transform-origin")
-    return about(parse_origin(origin, lengths.length), own) if origin else own
+    return about_point(parse_origin(origin, lengths.length), own) if origin else own
 
 
 def is_for_us(node: Node) -> bool:

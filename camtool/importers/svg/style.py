@@ -14,7 +14,7 @@ from msgspec import Struct
 from msgspec.structs import asdict
 
 from camtool.importers.svg.colours import parse_colour
-from camtool.importers.svg.css import CssRules, declared
+from camtool.importers.svg.css import CssRules, parse_declarations
 from camtool.importers.svg.transform import NUMBER
 from camtool.importers.svg.tree import Node
 from camtool.records import replace
@@ -156,7 +156,7 @@ class StyleSheet:
         sheets = self._rules.holding(node)
         own = attributes.get("style")
         if own:
-            sheets.append(declared(own, _PROPERTIES))
+            sheets.append(parse_declarations(own, _PROPERTIES))
         for declarations in sheets:
             for name, (value, important) in declarations.items():
                 chosen = strong if important else values

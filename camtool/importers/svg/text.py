@@ -33,8 +33,8 @@ from camtool.importers.text import (
     Rule,
     TextLook,
     WantedFont,
+    describe_lacking,
     font_for,
-    lacking,
 )
 
 MAX_FAMILIES = 8
@@ -95,11 +95,11 @@ def text_of(
     flow.visit(node, style, _keeps_blanks(node))
     flow.end()
     writer = _Writer(mode)
-    runs = [run for chunk in _chunks(flow, writer) for run in _anchored(chunk, writer, flow)]
+    runs = [run for chunk in _chunks(flow, writer) for run in _draw_chunk(chunk, writer, flow)]
     lacks = [
         text
         for (font, other), missing in writer.missing.items()
-        if (text := lacking(font, other, "".join(sorted(missing))))
+        if (text := describe_lacking(font, other, "".join(sorted(missing))))
     ]
     return Text(runs, len(flow.letters), list(flow.unseen), lacks, list(writer.plainer))
 
@@ -305,7 +305,7 @@ def _chunks(flow: _Flow, writer: _Writer) -> Iterator[list[_Words]]:
     yield chunk
 
 
-def _anchored(chunk: list[_Words], writer: _Writer, flow: _Flow) -> Iterator[TextRun]:
+def _draw_chunk(chunk: list[_Words], writer: _Writer, flow: _Flow) -> Iterator[TextRun]:
     """The words of a chunk drawn, their span [a, b] moved so that its start, middle or end lies
     at the chunk's first letter. Unusable where a dx within it changes that span: the standard
     takes it into account, not all renderers do."""

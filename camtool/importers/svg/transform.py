@@ -203,7 +203,7 @@ def parse_origin(text: str, length: Length) -> tuple[float, float]:
     return places[0], places[1]
 
 
-def about(origin: tuple[float, float], inner: Affine) -> Affine:
+def about_point(origin: tuple[float, float], inner: Affine) -> Affine:
     """The map done about a point instead of (0, 0)."""
     x, y = origin
     return (translation(x, y) @ inner @ translation(-x, -y)).checked()
@@ -239,7 +239,7 @@ def _single(name: str, n: Sequence[float]) -> Affine:
         case "rotate", 1:
             return _rotation(n[0])
         case "rotate", 3:
-            return about((n[1], n[2]), _rotation(n[0]))
+            return about_point((n[1], n[2]), _rotation(n[0]))
         case "skewX", 1:
             return Affine(c=math.tan(math.radians(n[0])))
         case "skewY", 1:
@@ -253,9 +253,9 @@ def _css_single(name: str, words: list[str], length: Length) -> Affine:
         second = name == "translatey"
         numbers = [length(word, "xy"[(place + second) % 2]) for place, word in enumerate(words)]
     elif name in _ANGLED:
-        numbers = [_measured(word, _DEGREES) for word in words]
+        numbers = [_with_unit(word, _DEGREES) for word in words]
     else:
-        numbers = [_measured(word, {"": 1.0, "%": 0.01}) for word in words]
+        numbers = [_with_unit(word, {"": 1.0, "%": 0.01}) for word in words]
     match name, len(numbers):
         case "translatex" | "translatey", 1:
             x, y = (0.0, numbers[0]) if name == "translatey" else (numbers[0], 0.0)
@@ -274,7 +274,7 @@ def _css_single(name: str, words: list[str], length: Length) -> Affine:
     return _single(name, numbers)
 
 
-def _measured(word: str, units: dict[str, float]) -> float:
+def _with_unit(word: str, units: dict[str, float]) -> float:
     """A number times its unit."""
     match = _MEASURE.fullmatch(word)
     unit = match[2].lower() if match else None

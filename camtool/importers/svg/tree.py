@@ -173,7 +173,7 @@ class _Builder(ContentHandler):
             )
         if self._letters:
             self._put_letters()
-        space, tag = _parted(name)
+        space, tag = _split_name(name)
         above = self._open[-1] if self._open else None
         node = Node(tag if space in (SVG, "") else "", _attributes(attributes), line, above)
         if above is not None:
@@ -215,7 +215,7 @@ class _Builder(ContentHandler):
             self._letters.append(content)
 
 
-def _parted(name: str) -> tuple[str, str]:
+def _split_name(name: str) -> tuple[str, str]:
     """Namespace ("" for none) and name; the prefix, where there is one, says nothing."""
     words = name.split(" ")
     return ("", name) if len(words) == 1 else (words[0], words[1])
@@ -229,7 +229,7 @@ def _attributes(attributes: dict[str, str]) -> dict[str, str]:
     named: dict[str, str] = {}
     for name, value in attributes.items():
         if " " in name:
-            space, name = _parted(name)
+            space, name = _split_name(name)
             if space not in _PREFIXES:
                 continue
             name = _PREFIXES[space] + name
@@ -277,11 +277,11 @@ _ILLUSTRATOR = re.compile(rb"Generator: Adobe Illustrator")
 def ready(data: bytes) -> bytes:
     """UTF-8 (or what expat reads itself) without outside references; DrawingError."""
     if data.startswith(GZIP):
-        data = _unpacked(data)
+        data = _unpack(data)
     if len(data) > MAX_BYTES:
         raise _too_large(len(data))
-    data = _decoded(data)
-    head = _DOCTYPE.sub(_blotted, data[:_HEAD_BYTES], count=1)
+    data = _decode(data)
+    head = _DOCTYPE.sub(_blot_document_type, data[:_HEAD_BYTES], count=1)
     return head + data[_HEAD_BYTES:]
 
 
@@ -294,7 +294,7 @@ def writer_dpi(head: bytes) -> tuple[str, float] | None:
     return ("Adobe Illustrator", 72.0) if _ILLUSTRATOR.search(head) else None
 
 
-def _unpacked(data: bytes) -> bytes:
+def _unpack(data: bytes) -> bytes:
     """The content of a gzip file, no more than MAX_BYTES of it."""
     try:
         with gzip.GzipFile(fileobj=BytesIO(data)) as packed:
@@ -315,7 +315,7 @@ def _too_large(size: int) -> DrawingError:
     )
 
 
-def _decoded(data: bytes) -> bytes:
+def _decode(data: bytes) -> bytes:
     """The same text as UTF-8, unless expat knows its encoding."""
     name = next((name for mark, name in _MARKS.items() if data.startswith(mark)), "")
     if not name:
@@ -341,6 +341,6 @@ def _decoded(data: bytes) -> bytes:
     return _DECLARATION.sub(r"\1", text, count=1).encode("utf-8", errors="replace")
 
 
-def _blotted(match: re.Match[bytes]) -> bytes:
+def _blot_document_type(match: re.Match[bytes]) -> bytes:
     """The document type without its reference; lines keep their numbers."""
     return match[1] + b"\n" * match[2].count(b"\n")
