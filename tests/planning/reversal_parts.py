@@ -43,7 +43,7 @@ def reversals_of(cut: Polyline | CutRun, machine: Machine | None = None) -> tupl
     if machine is not None:
         least = least_reversal_mm(machine.axes.x), least_reversal_mm(machine.axes.y)
     x, y = (reversals_along(parts.places[:, axis], path.closed, least[axis]) for axis in (0, 1))
-    return x.within(len(parts)), y.within(len(parts))
+    return x.count_within(len(parts)), y.count_within(len(parts))
 
 
 def setting(levels: int = 1, **operation: Any) -> Setting:

@@ -217,4 +217,4 @@ def test_where_a_stretch_has_a_value(sweep: float, share: float, straight: bool)
     for axis in (0, 1, 2):
         value = part.at(share)[axis]
         if abs(part.end[axis] - part.begin[axis]) > 1e-6:
-            assert part.at(part.where(axis, value))[axis] == pytest.approx(value, abs=1e-12)
+            assert part.at(part.share_at(axis, value))[axis] == pytest.approx(value, abs=1e-12)
