@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
+import pytest
 
 from camtool.arrays import Floats, Ints
 from camtool.simulation.motion import Chunk
@@ -24,6 +25,15 @@ class RowMotion:
     reversals: Ints = field(default_factory=lambda: np.zeros(3, dtype=np.int64))
     ended: bool = True
     parts: int = 0
+
+
+def assert_same_rows(whole: list[RowMotion], parts: list[RowMotion]) -> None:
+    """Fail unless both runs of a program, in chunks of other sizes, are the same row by row."""
+    for one, many in zip(whole, parts, strict=True):
+        for name in ("commanded", "slide", "steps", "reversals", "iterations", "ended"):
+            assert np.array_equal(getattr(one, name), getattr(many, name)), name
+        assert one.duration_s == pytest.approx(many.duration_s)
+        assert one.compensation_s == pytest.approx(many.compensation_s)
 
 
 def rows_of(chunks: Iterable[Chunk]) -> list[RowMotion]:

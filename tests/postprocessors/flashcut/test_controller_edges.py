@@ -5,11 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from camtool_postprocessors.flashcut.dialect import FlashcutController
 
 from camtool.errors import MachineError, ProgramError
 from camtool.kernels.lattice import to_steps
-from camtool.machine.model import Machine, SlideStart
+from camtool.machine.model import Machine
 from camtool.simulation.motion import IDEAL, Options
 from camtool.tables import read_table
 from camtool.toolpath.builder import ToolpathBuilder
@@ -133,14 +132,6 @@ def test_held_are_the_lengths_that_the_program_says() -> None:
     made = machine("controller.machine_zero_mm=[1.0, 2.0, 3.0]")
     held = model_of(made).quantised(path, made)
     assert held.end.tolist() == [[0.1234, 0.0567, 0.0], [1.0, 2.0, 0.0]]
-
-
-def test_the_page_names_every_option() -> None:
-    page = TARGET.parents[2] / "docs" / "controllers" / "flashcut.md"
-    text = page.read_text(encoding="utf-8")
-    own = set(FlashcutController.__struct_fields__) - set(SlideStart.__struct_fields__)
-    assert len(own) == 8
-    assert [name for name in sorted(own) if f"controller.{name}" not in text] == []
 
 
 def test_the_assumptions_name_the_fastest_feed() -> None:

@@ -1,6 +1,5 @@
 """Programs of grbl and linuxcnc byte for byte (`--bless` writes them anew)."""
 
-import re
 from pathlib import Path
 
 import pytest
@@ -43,17 +42,3 @@ def program_of(case: str) -> bytes:
 @pytest.mark.parametrize("case", CASES)
 def test_program(case: str, bless: bool) -> None:
     compare_golden(GOLDEN / case, program_of(case), bless=bless)
-
-
-@pytest.mark.parametrize(("name", "case"), [("grbl", "grbl.nc"), ("linuxcnc", "linuxcnc.ngc")])
-def test_the_worked_example_of_the_page_is_what_is_sent(name: str, case: str) -> None:
-    page = (ROOT / "docs" / "dialects" / f"{name}.md").read_text(encoding="utf-8")
-    (example,) = re.findall(r"```gcode\n(.+?)```", page, re.DOTALL)
-    assert example == (GOLDEN / case).read_text(encoding="ascii")
-
-
-@pytest.mark.parametrize("name", ["grbl", "linuxcnc"])
-def test_the_page_has_every_option(name: str) -> None:
-    page = (ROOT / "docs" / "dialects" / f"{name}.md").read_text(encoding="utf-8")
-    options = load_target(name).target.dialect
-    assert [field for field in options.__struct_fields__ if f"| `{field}` |" not in page] == []

@@ -6,7 +6,6 @@ import re
 
 import numpy as np
 import pytest
-from camtool_postprocessors.i8751.pulses import Firmware
 
 from camtool.errors import ProgramError
 from camtool.machine.model import Machine
@@ -16,7 +15,7 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.corte_recto import walk
 from tests.oracles.i8751_run import Reading, record
-from tests.oracles.motion_rows import RowMotion, rows_of
+from tests.oracles.motion_rows import RowMotion, assert_same_rows, rows_of
 from tests.postprocessors.i8751.machines import ROOT, SAMPLE, STEP_MM, loaded
 from tests.targets import model_of, simulate, verify
 
@@ -105,13 +104,7 @@ def test_the_size_of_chunks_does_not_matter(size: int) -> None:
     made = machine()
     whole, parts = run(in_steps(*moves), made), run(in_steps(*moves), made, chunk_steps=size)
     assert max(row.parts for row in parts) > 1 or size == 1000
-    for one, many in zip(whole, parts, strict=True):
-        assert np.array_equal(one.commanded, many.commanded)
-        assert np.array_equal(one.slide, many.slide)
-        assert np.array_equal(one.steps, many.steps)
-        assert np.array_equal(one.reversals, many.reversals)
-        assert one.duration_s == pytest.approx(many.duration_s)
-        assert one.iterations == many.iterations
+    assert_same_rows(whole, parts)
     chunks = simulate(in_steps(*moves), made, Options(chunk_steps=size))
     assert all(len(chunk.row) <= size for chunk in chunks)
 
@@ -288,12 +281,6 @@ def test_the_longest_record_and_many_short_ones() -> None:
         [chunk.commanded[np.diff(chunk.row, append=-1) != 0] for chunk in chunks]
     )
     assert last == pytest.approx(moves.end)
-
-
-def test_the_page_names_every_option() -> None:
-    page = (ROOT / "docs" / "controllers" / "i8751.md").read_text(encoding="utf-8")
-    keys = Firmware.__struct_fields__
-    assert [key for key in keys if f"`dialect.{key}`" not in page] == []
 
 
 @pytest.mark.parametrize(

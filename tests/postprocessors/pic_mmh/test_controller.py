@@ -122,13 +122,7 @@ def test_the_size_of_chunks_does_not_matter(
     assert all(len(chunk.commanded) <= size for chunk in chunks)
     whole, parts = rows_of(toolpath, machine), motion_rows.rows_of(chunks)
     assert whole[-1].ended == (reading != "equal")
-    for one, many in zip(whole, parts, strict=True):
-        assert np.array_equal(one.commanded, many.commanded)
-        assert np.array_equal(one.slide, many.slide)
-        assert one.duration_s == pytest.approx(many.duration_s)
-        assert one.compensation_s == pytest.approx(many.compensation_s)
-        for name in ("steps", "reversals", "iterations", "ended"):
-            assert np.array_equal(getattr(one, name), getattr(many, name))
+    motion_rows.assert_same_rows(whole, parts)
 
 
 def test_lines_end_on_their_step_and_stay_within_one(machine: Machine) -> None:

@@ -1,7 +1,5 @@
 """A program of every kind of row, byte for byte, in both forms (`--bless` writes it anew)."""
 
-import re
-
 import pytest
 
 from camtool.target.registry import load_target
@@ -32,11 +30,3 @@ def test_program(form: str, bless: bool) -> None:
     target = load_target("pic-mmh", settings=[f"dialect.form={form}"])
     data = target.target.write(part(), target.machine).data
     compare_golden(GOLDEN / f"pic-mmh-{form}.pic", data, bless=bless)
-
-
-def test_the_worked_example_of_the_page_is_what_is_sent() -> None:
-    page = (GOLDEN.parents[1] / "docs" / "dialects" / "pic-mmh.md").read_text(encoding="utf-8")
-    examples = re.findall(r"```pic\n(.+?)```", page, re.DOTALL)
-    assert len(examples) == 2
-    for form, example in zip(("example", "annex"), examples, strict=True):
-        assert example in (GOLDEN / f"pic-mmh-{form}.pic").read_text(encoding="ascii")

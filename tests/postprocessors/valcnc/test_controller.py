@@ -6,15 +6,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from camtool_postprocessors.valcnc.dialect import ValcncController
 
 from camtool.errors import MachineError, ProgramError
-from camtool.machine.model import Machine, SlideStart
+from camtool.machine.model import Machine
 from camtool.simulation.motion import IDEAL, Effects, Options
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
-from tests.oracles.motion_rows import RowMotion, rows_of
+from tests.oracles.motion_rows import RowMotion, assert_same_rows, rows_of
 from tests.oracles.valcnc_run import Valcnc, table_8
 from tests.targets import model_of, simulate, verify
 
@@ -336,13 +335,7 @@ def test_the_size_of_chunks_does_not_matter(size: int) -> None:
     made = machine("axes.x.backlash_mm=0.1", "axes.y.compensation_mm=0.08")
     whole, parts = run(toolpath, made), run(toolpath, made, chunk_steps=size)
     assert max(row.parts for row in parts) > 1 or size == 1000
-    for one, many in zip(whole, parts, strict=True):
-        assert np.array_equal(one.commanded, many.commanded)
-        assert np.array_equal(one.slide, many.slide)
-        assert np.array_equal(one.steps, many.steps)
-        assert np.array_equal(one.reversals, many.reversals)
-        assert one.duration_s == pytest.approx(many.duration_s)
-        assert one.iterations == many.iterations
+    assert_same_rows(whole, parts)
     chunks = simulate(toolpath, made, Options(chunk_steps=size))
     assert all(len(chunk.row) <= size for chunk in chunks)
 
@@ -441,12 +434,6 @@ def test_wrong_options_are_named() -> None:
     for setting in ("step_rate_hz=0", "arc_segment_mm=0", "arc_segments=0", "rounding=up"):
         with pytest.raises(MachineError, match=setting.partition("=")[0]):
             machine(f"controller.{setting}")
-
-
-def test_the_page_names_every_option() -> None:
-    page = (ROOT / "docs" / "controllers" / "valcnc.md").read_text(encoding="utf-8")
-    own = set(ValcncController.__struct_fields__) - set(SlideStart.__struct_fields__)
-    assert [key for key in sorted(own) if f"`controller.{key}`" not in page] == []
 
 
 def test_it_says_where_the_rounding_to_steps_is_open() -> None:
