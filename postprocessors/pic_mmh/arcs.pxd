@@ -41,7 +41,7 @@ cdef void _follow(Int[::1] arc, Int first, Int count, LandingSearch search) noex
 )
 cdef void _mark_onward(Int[::1] arc, Int count, LandingSearch search) noexcept
 
-cdef void _take(Int row, Int first, LandingSearch search, Int[::1] out) noexcept
+cdef void _store_landing(Int row, Int first, LandingSearch search, Int[::1] out) noexcept
 
 @cython.locals(
     radius=double, latest=double, end_x=Int, end_y=Int, low=Int, high=Int, met=Int, near=Int, _=Int, first=Int,
