@@ -22,7 +22,7 @@ from camtool.plain import one_line
 
 
 class Severity(IntEnum):
-    """How grave: an ERROR makes a command exit with 1 and write nothing."""
+    """Severity of a finding: an ERROR makes a command exit with 1 and write nothing."""
 
     INFO = 0
     WARNING = 1
@@ -35,7 +35,10 @@ ERROR: Final = Severity.ERROR
 
 
 class Code(IntEnum):
-    """A code: number, severity (of several the usual one first), what it means, what to do."""
+    """A code: number, severities (the usual one first), its meaning, and the remedy.
+
+    Each room has an enumeration of its own codes, which is a subclass of this one.
+    """
 
     severities: tuple[Severity, ...]
     means: str
@@ -44,7 +47,7 @@ class Code(IntEnum):
     def __new__(
         cls, number: int, severity: Severity | tuple[Severity, ...], means: str, mend: str
     ) -> Self:
-        """A code is its number, and carries what is known of it."""
+        """Return the number with its severities, meaning and remedy as attributes."""
         code = int.__new__(cls, number)
         code._value_ = number
         code.severities = severity if isinstance(severity, tuple) else (severity,)
@@ -64,7 +67,7 @@ class TargetCode:
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing found, with its place, the measured value and the limit where there are any.
+    """A remark, warning or error with its place, the measured value and the limit, if any.
 
     `unit` belongs to both `measured` and `limit` ("mm", "um", "chars", "mm_min", ...).
     """
@@ -84,7 +87,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Sentence:
-    """What is said of a code; called with the numbers, it makes a finding.
+    """The text of a finding of one code; called with the numbers, it makes a finding.
 
     `text` is a format string. `{measured}` and `{limit}` are those of the finding, both in `unit`
     ("mm", "um", "chars", "mm_min", ...); all other names are given as keywords. A choice by number
@@ -92,7 +95,9 @@ class Sentence:
     is one, false none).
     `severity` stands where the code has several and the sentence one; else the caller may say it.
 
-    >>> some = Sentence(Code.HOLE_SIZE, "{measured:# hole is|# holes are} wider than {drill:g} mm")
+    >>> from camtool.planning.findings import PlanningCode
+    >>> text = "{measured:# hole is|# holes are} wider than {drill:g} mm"
+    >>> some = Sentence(PlanningCode.HOLE_SIZE, text)
     >>> print(some(measured=1, drill=3.0, where="layer 0"))
     warning HOLE_SIZE [layer 0]: 1 hole is wider than 3 mm
     """
@@ -111,7 +116,7 @@ class Sentence:
         severity: Severity | None = None,
         **values: float | str,
     ) -> Finding:
-        """The finding with its sentence."""
+        """Return the finding with its message."""
         given = self.severity if severity is None else severity
         return Finding(
             self.code,
@@ -124,15 +129,15 @@ class Sentence:
         )
 
     def words(self, **values: float | str) -> str:
-        """The sentence alone, where several make one finding."""
+        """Return the text alone, where several make one finding."""
         return _TEXTS.vformat(self.text, (), values)
 
 
 class _Texts(Formatter):
-    """Format strings that know the choice by number."""
+    """Format strings with a choice by number: `{count:one|many}`."""
 
     def format_field(self, value: Any, format_spec: str) -> str:
-        """One value as the text has it."""
+        """Return a value as text, or the words that are chosen by it."""
         if "|" not in format_spec:
             return format(value, format_spec)
         *none, one, many = format_spec.split("|")
@@ -144,8 +149,7 @@ _TEXTS: Final = _Texts()
 
 
 MAX_ALIKE = 3
-"""At most this many findings of one code and severity are listed one by one in texts for
-people."""
+"""At most this many findings of one code and severity are listed one by one in texts."""
 
 
 class AnyFinding(Protocol):
@@ -153,19 +157,19 @@ class AnyFinding(Protocol):
 
     @property
     def code(self) -> Code | TargetCode | str:
-        """What was found."""
+        """The code, or its name."""
 
     @property
     def severity(self) -> Severity | str:
-        """How grave it is."""
+        """The severity, or its name."""
 
 
 _F = TypeVar("_F", bound=AnyFinding)
 
 
 def summarise_findings(findings: Iterable[_F]) -> list[tuple[_F, int]]:
-    """The first findings of each code and severity, in their order; the last of them with the
-    number of those that are left out behind it, the others with 0."""
+    """Return the first MAX_ALIKE findings of each code and severity, in their order; the last of
+    each group with the number of those that are left out, the others with 0."""
     alike: dict[tuple[object, object], list[_F]] = {}
     order = list(findings)
     for each in order:
@@ -179,10 +183,10 @@ def summarise_findings(findings: Iterable[_F]) -> list[tuple[_F, int]]:
 
 
 def worst(findings: tuple[Finding, ...] | list[Finding]) -> Severity:
-    """The gravest severity present; INFO when there is no finding."""
+    """Return the highest severity of the findings; INFO without any."""
     return max((f.severity for f in findings), default=Severity.INFO)
 
 
 def and_more(noun: str) -> str:
-    """The end of a sentence of which only the first are listed; `more` is how many are not."""
+    """Return the end of a text that names one of several: `more` counts the others."""
     return f"{{more:|; and # more {noun.removesuffix('s')}|; and # more {noun}}}"

@@ -58,7 +58,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 PLANNING = "planning"
-"""The stage in which a job becomes moves."""
+"""The name of the stage that makes moves of a job."""
 
 
 @dataclass(frozen=True)

@@ -64,7 +64,6 @@ from camtool.records import replace
 from camtool.units import UM_PER_MM
 
 _SOURCES_NAMED = 3
-"""So many members of a chain are named in its source."""
 
 
 def assemble(
@@ -234,7 +233,7 @@ MAX_GAP_FINDINGS = 20
 others."""
 
 MAX_PLACES = 20
-"""At most this many branches, and as many crossing paths, get a finding of their own."""
+"""At most this many branches, and as many crossing paths, are listed one by one."""
 
 
 def sum_skipped(skipped: Sequence[Skipped]) -> list[Skipped]:

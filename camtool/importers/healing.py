@@ -39,7 +39,7 @@ from camtool.importers.options import ReadOptions
 from camtool.importers.pieces import MAX_COORDINATE_MM, MAX_POINTS, Piece, too_many_points
 
 IS_DRAWN_TWICE = "is drawn twice"
-"""Why a piece went that is another one again."""
+"""The reason for leaving out a piece that repeats another one."""
 
 
 class Cleaned(Struct, frozen=True, eq=False):

@@ -34,7 +34,6 @@ TRACES = ("outline", "centre")
 """The treatment of dark shapes in a picture of pixels: outlines or centre lines."""
 
 TEXT_SKIPPED = "is text: read it with --text outline, or --text stroke for engraving"
-"""Why text is left out."""
 
 TOLERANCE_MM = 0.0005
 """Largest distance between a curve and the arcs that stand for it."""
@@ -258,7 +257,6 @@ class ReadOptions:
 
 
 DEFAULTS = ReadOptions()
-"""The options when none are given."""
 
 
 class Reading(TypedDict, total=False):

@@ -285,7 +285,6 @@ MAX_CHARACTERS = 20_000
 MTEXT."""
 
 MAX_CHARACTERS_NAMED = 20
-"""At most this many of the characters that a font lacks are named."""
 
 MAX_NUMBER = 1e60
 """Sizes and places beyond it are refused: products of a few of them would not be finite."""

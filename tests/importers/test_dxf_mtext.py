@@ -193,28 +193,29 @@ def test_an_underline_is_one_line_over_many_words() -> None:
     assert line[:, 1] == pytest.approx([17.0 - 0.6, 17.0 - 0.6])
 
 
-def test_columns_fill_one_after_the_other() -> None:
-    document = ezdxf.new()
-    columns = MTextColumns.new_static_columns(count=2, width=30.0, gutter_width=5.0, height=8.0)
-    mtext = document.modelspace().add_mtext(
-        r"HI\PHI\PHI\PHI", dxfattribs={"char_height": 3.0, "insert": (0.0, 0.0)}
+def in_columns(text: str, count: int, height: float) -> np.ndarray:
+    """Return the points (n, 2) of a text in columns of 30 with gaps of 5 between them."""
+    mtext = (
+        ezdxf.new()
+        .modelspace()
+        .add_mtext(text, dxfattribs={"char_height": 3.0, "insert": (0.0, 0.0)})
+    )
+    columns = MTextColumns.new_static_columns(
+        count=count, width=30.0, gutter_width=5.0, height=height
     )
     mtext.setup_columns(columns)
-    found = points(text_strokes(mtext, "stroke"))
+    return points(text_strokes(mtext, "stroke"))
+
+
+def test_columns_fill_one_after_the_other() -> None:
+    found = in_columns(r"HI\PHI\PHI\PHI", count=2, height=8.0)
     left, right = found[found[:, 0] < 30.0], found[found[:, 0] >= 30.0]
     assert len(left) == len(right)
     assert right == pytest.approx(left + along(35.0))
 
 
 def test_a_column_break_begins_the_next_column() -> None:
-    document = ezdxf.new()
-    columns = MTextColumns.new_static_columns(count=3, width=30.0, gutter_width=5.0, height=90.0)
-    mtext = document.modelspace().add_mtext(
-        r"HI\NHI\NHI", dxfattribs={"char_height": 3.0, "insert": (0.0, 0.0)}
-    )
-    mtext.setup_columns(columns)
-    found = points(text_strokes(mtext, "stroke"))
-    each = np.split(found, 3)
+    each = np.split(in_columns(r"HI\NHI\NHI", count=3, height=90.0), 3)
     assert each[1] == pytest.approx(each[0] + along(35.0))
     assert each[2] == pytest.approx(each[0] + along(70.0))
 

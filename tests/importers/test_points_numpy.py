@@ -18,6 +18,7 @@ from camtool.importers.options import ReadOptions
 from camtool.importers.points import tables as points_numpy
 from camtool.importers.points.reader import read
 from camtool.importers.read import read_bytes
+from tests.fuzz.reading import read_or_refuse
 
 SQUARE = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [0.0, 0.0]])
 
@@ -160,11 +161,4 @@ def test_damaged_files_are_read_or_refused(
     for place, value in changes:
         broken[place % len(broken)] = value
     broken = broken[: cut % (2 * len(broken)) + 1]
-    try:
-        drawing = points(bytes(broken))
-    except DrawingError as error:
-        message = str(error)
-    else:
-        message = ""
-        assert np.isfinite(drawing.paths.vertices).all()
-    assert "\n" not in message
+    read_or_refuse(bytes(broken), "p.npy", ReadOptions(format="points"))

@@ -35,16 +35,17 @@ MIDDLE_SHARE = 0.93
 corner."""
 
 ROUGH_PX = 1.0
-"""Half widths that are counted in pixels differ by so much."""
+"""Half widths that are counted in pixels are uncertain by this much."""
 
 LOOK_BACK = 1.5
-"""The direction of a branch is that from its junction to so many half widths away."""
+"""The direction of a branch is measured from its junction to a point this many half widths
+away."""
 
 MIN_LOOK_PX = 4
-"""And at least so many pixels away."""
+"""That distance is at least this many pixels."""
 
 MAX_ROUNDS = 8
-"""Spurs are looked for again, once others are gone, no more often than this."""
+"""Spurs are removed in at most this many rounds, since removing some lengthens others."""
 
 Pixel = tuple[int, int]
 """Row and column."""

@@ -48,13 +48,14 @@ AREA_SHARE = 0.1
 """A contour encloses what its points enclose, but for this part."""
 
 HALVINGS = 5
-"""So often the limit is halved for a contour that does not."""
+"""The limit is halved at most this many times for a contour whose area differs by more."""
 
 MOVES_BACK, MOVES_ON = 6, 2
-"""So many points before and behind the end of a greedy run are tried as its end."""
+"""Points before and behind the end of a greedy run that are tried as its end."""
 
 MEETINGS = 24
-"""So often a place is put on both neighbours in turns, which leads to where they meet."""
+"""Rounds in which a point is projected onto both neighbours in turn; it converges to the point
+where they meet."""
 
 MEETING_PX = 0.35
 """A corner may lie this much beyond the limit from the points that it joins: pixels cut it."""

@@ -22,7 +22,7 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.importers.dxf.tags import DxfSections, Tags
 
 MIN_VERTICES = 32
-"""LWPOLYLINEs of fewer vertices are ezdxf's alone."""
+"""LWPOLYLINEs of fewer vertices are read by ezdxf."""
 
 _HANDLE, _HEIGHT, _SUBCLASS, _REFERENCE = 5, 30, 100, 330
 _HANDLES = (_HANDLE, 105)

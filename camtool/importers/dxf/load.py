@@ -39,7 +39,6 @@ from camtool.importers.dxf.tags import (
 from camtool.importers.formats import BINARY_DXF
 
 MAX_BYTES = 100_000_000
-"""Larger files are refused."""
 
 MAX_TAGS = 10_000_000
 """Files of more tags (two lines of text each) are refused."""

@@ -28,7 +28,6 @@ from camtool.importers.findings import (
 from camtool.importers.options import ReadOptions
 
 REPAIRS_NAMED = 3
-"""At most this many repairs are named in full."""
 
 
 def read(data: bytes, file: str, options: ReadOptions) -> Drawing:

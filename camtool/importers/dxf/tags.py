@@ -28,7 +28,7 @@ from camtool.records import replace
 
 AGAIN = "export it again from the program that made it, best as DXF R2000 or later"
 
-LARGEST_CODE, UNUSED_CODES = 1071, range(482, 999)
+MAX_CODE, UNUSED_CODES = 1071, range(482, 999)
 """Group codes in files are 0 to 481 and 999 to 1071 (DXF reference)."""
 
 SECTIONS = frozenset(
@@ -37,7 +37,7 @@ SECTIONS = frozenset(
 """Sections that the DXF reference names."""
 
 AT_ONCE = 65536
-"""So many values become Python objects together."""
+"""Number of values that become Python objects together."""
 
 _LAYER, _VARIABLE, _POINT, _COUNT = 8, 9, 10, 90
 _UTF16_MARKS, _UTF8_MARK = (b"\xff\xfe", b"\xfe\xff"), b"\xef\xbb\xbf"
@@ -372,7 +372,7 @@ def _check_codes(tags: Tags, file: str) -> None:
     """DrawingError for the first group code that is none."""
     codes = tags.codes
     unused = (UNUSED_CODES.start <= codes) & (codes < UNUSED_CODES.stop)
-    odd = np.flatnonzero((codes < 0) | (codes > LARGEST_CODE) | unused)
+    odd = np.flatnonzero((codes < 0) | (codes > MAX_CODE) | unused)
     if len(odd):
         row = int(odd[0])
         raise DrawingError(

@@ -45,7 +45,6 @@ from camtool.importers.pieces import Piece, Unusable
 from camtool.records import replace
 
 MAX_NESTING = 50
-"""Largest depth of blocks within blocks."""
 
 _NOWHERE = Piece(np.zeros((0, 3)), False, "", "", "")
 _NO_LINES = BulkLines([], np.zeros((0, 2, 3)))
@@ -400,7 +399,6 @@ WHY_UNUSED = {
 OTHER = "is of a kind that camtool does not read"
 
 MAX_PARTS = 10_000
-"""An entity may be drawn with at most this many parts."""
 
 
 def parts_of(entity: Any) -> list[Any]:

@@ -21,7 +21,6 @@ from camtool.errors import DrawingError
 from camtool.units import MM_PER_UNIT
 
 COLUMNS = (2, 3)
-"""Numbers of a point: x, y, or x, y, bulge."""
 
 
 class Stroke(Struct, frozen=True, eq=False):
@@ -79,7 +78,7 @@ _NAMED_COLUMNS = "give two numbers a line, or name the columns x,y,bulge in the 
 
 
 CHARS_AT_ONCE = 1 << 16
-"""So much of a text is divided into lines at a time: each line is a string of its own."""
+"""Number of characters that are divided into lines at a time: each line is a string."""
 
 
 def _lines_of(text: str) -> Iterator[str]:
@@ -437,7 +436,6 @@ MAX_UNPACKED_BYTES = 1 << 28
 """At most this many bytes are unpacked from one ZIP archive (268 MB: 16 million points)."""
 
 MAX_MEMBERS = 100_000
-"""A ZIP archive with more members is refused."""
 
 _SAVE = "save it with numpy.save as an array (n, 2) of x, y or (n, 3) of x, y, bulge"
 

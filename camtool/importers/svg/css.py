@@ -23,7 +23,7 @@ MAX_MATCHES = 1_000_000
 billions."""
 
 MAX_COMPOUNDS = 8
-"""A selector of more steps than this is no selector of a drawing."""
+"""A selector of more steps than this is not applied."""
 
 Declarations = dict[str, tuple[str, bool]]
 """Property to its value and whether it is !important."""

@@ -327,7 +327,6 @@ _LENGTH = re.compile(rf"({NUMBER.pattern})\s*([A-Za-z]*|%)", re.ASCII)
 _POINTS = re.compile(rf"[ \t\r\n\f,]*+(?>(?:{NUMBER.pattern}[ \t\r\n\f,]*+)*)", re.ASCII)
 _CSS_UNITS = ("px", "pt", "pc", "mm", "cm", "in", "q")
 FONT_UNITS = {"em": 1.0, "ex": 0.5}
-"""Units of the font size."""
 
 
 class Lengths(Struct, frozen=True):

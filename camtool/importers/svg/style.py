@@ -34,7 +34,7 @@ LIMITS = {
     "shape-inside": "is not applied: lines break where tspans begin them",
     "inline-size": "is not applied: lines break where tspans begin them",
 }
-"""Properties that would hide or add something, and what is said of them."""
+"""Properties that would hide or add something, with the words for their findings."""
 
 PLAIN_TEXT: dict[str, tuple[str, ...]] = {
     "letter-spacing": ("normal", "0"),

@@ -38,7 +38,6 @@ from camtool.importers.text import (
 )
 
 MAX_FAMILIES = 8
-"""At most this many families of a list are tried."""
 
 DEFAULT_FAMILY = "sans-serif"
 """The family of a text that names none, as Inkscape takes it; renderers differ."""
