@@ -1,4 +1,9 @@
-"""Reading any drawing: which format it is (`formats`), and its reader."""
+"""Reading any drawing: which format it is (`formats`), and its reader.
+
+A third party adds a format by an entry point of the group `camtool.importers` that names an
+`Importer`, such as a module with its two functions. It is asked about what is none of camtool's
+own formats; docs/formats.md has an example.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +14,7 @@ from typing import TYPE_CHECKING, Protocol, cast
 
 from camtool.bounds import file_bytes as bytes_of
 from camtool.bounds import stream_bytes
-from camtool.errors import DrawingError, OptionError
+from camtool.errors import CamtoolError, DrawingError, OptionError
 from camtool.importers.formats import find_format
 from camtool.importers.options import DEFAULTS, ReadOptions, flags_of
 
@@ -25,9 +30,21 @@ STDIN = "<stdin>"
 _EXPORT_AGAIN = "export the drawing again"
 
 
-class _Reader(Protocol):
+GROUP = "camtool.importers"
+
+
+class Reader(Protocol):
+    """A module that reads one of camtool's own formats."""
+
     def read(self, data: bytes, file: str, options: ReadOptions) -> Drawing:
-        """The Drawing in `data`."""
+        """The Drawing in the content of a file; DrawingError when there is none."""
+
+
+class Importer(Reader, Protocol):
+    """What an entry point of the group `camtool.importers` names."""
+
+    def recognises(self, data: bytes, suffix: str) -> bool:
+        """True if this is the content of a file of its format; `suffix` is that of its name."""
 
 
 def read_drawing(path: Path, *, options: ReadOptions = DEFAULTS) -> Drawing:
@@ -50,11 +67,43 @@ def read_bytes(data: bytes, file: str, options: ReadOptions = DEFAULTS) -> Drawi
     """
     if not data.strip():
         raise DrawingError("is empty", file=file, mend=_EXPORT_AGAIN)
-    name = options.format or find_format(data, Path(file).suffix, file)
+    suffix = Path(file).suffix.lower()
+    try:
+        name = options.format or find_format(data, suffix, file)
+    except DrawingError:
+        drawing = _read_by_others(data, file, suffix, options)
+        if drawing is None:
+            raise
+        return drawing
     if name != "bitmap":
         _refuse_flags_of_pictures(options, file)
     module = importlib.import_module(f"camtool.importers.{name}.reader")
-    return cast(_Reader, module).read(data, file, options.as_drawn())
+    return cast(Reader, module).read(data, file, options.as_drawn())
+
+
+def _read_by_others(data: bytes, file: str, suffix: str, options: ReadOptions) -> Drawing | None:
+    """The Drawing by the first importer of others that recognises the content; None without one.
+
+    DrawingError, which names the plug-in, for one that is broken.
+    """
+    from importlib.metadata import entry_points
+
+    for point in sorted(entry_points(group=GROUP), key=lambda point: point.name):
+        try:
+            importer = cast(Importer, point.load())
+            if importer.recognises(data, suffix):
+                _refuse_flags_of_pictures(options, file)
+                return importer.read(data, file, options.as_drawn())
+        except CamtoolError:
+            raise
+        except Exception as error:  # a plug-in may raise anything
+            raise DrawingError(
+                f"the importer {point.name!r} fails ({type(error).__name__}: {error})",
+                file=file,
+                where=f"plug-in {point.value}",
+                mend="tell whoever made it, or remove the package that brings it",
+            ) from error
+    return None
 
 
 def _refuse_flags_of_pictures(options: ReadOptions, file: str) -> None:
