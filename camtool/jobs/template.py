@@ -1,16 +1,15 @@
 """A job file to fill in: what `camtool job new` writes from the layers of a drawing.
 
-One operation for each layer, or for each colour when there is one layer: drilled where it holds
-small circles and points alone, engraved where every path is open or its name says so, else a
-profile; what is open, closed, text or a point gets an operation of its own. Where the tool is
-known, holes, inner and outer contours do, too. What is larger comes later, so that parts are cut
-free last. Every other key stands there as a comment, with an example.
+Of each layer (of each colour when there is one layer) the kinds of operation take what they
+propose to cut, one after the other: engraving what is text or open, or has a name that says so;
+drilling points and small circles; boring circles wider than the tool; profiles the rest. What is
+larger comes later, so that parts are cut free last. Every other key stands there as a comment,
+with an example.
 """
 
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import PurePath
 from typing import TYPE_CHECKING
@@ -18,43 +17,28 @@ from typing import TYPE_CHECKING
 import numpy as np
 from msgspec import Struct
 
-from camtool.arrays import Ints
-from camtool.geometry.drawing import is_text
 from camtool.geometry.facts import drawing_extents
-from camtool.geometry.measure import extents, path_lengths
+from camtool.geometry.measure import extents
 from camtool.jobs.keys import OPERATION, PLACE, TOOL, WHOLE, is_known
 from camtool.keys import Key
-from camtool.planning.holes import HOLE_SIZE_MM, circle_of
 from camtool.planning.job import Operation, Stock
+from camtool.planning.kinds import function_of, installed_kinds, kind_named
 from camtool.planning.sides import CONTINUOUS, Traits
 from camtool.records import replace
 from camtool.tables import toml_string
 
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
-    from camtool.geometry.polylines import Polyline, Polylines
+    from camtool.geometry.polylines import Polylines
     from camtool.machine.model import Machine
-
-SMALL_HOLE = 0.1
-"""Circles up to this part of the drawing's longer side are taken for holes to drill."""
-
-ENGRAVED = ("engrav", "etch", "scribe")
-"""A layer with one of these in its name is engraved."""
 
 BREAKTHROUGH_MM = 0.3
 """Through cuts are proposed to go so far below the stock."""
 
-MOST_TABS = 4
-"""So many tabs are proposed for an outline."""
-
-TEXT_MM = 0.2
-"""Text is proposed to be engraved so deep."""
-
-LEAST_TAB_MM = 0.5
-"""Lower tabs than this are not proposed."""
-
 TOOL_NAME = "tool"
-_ORDER = ("drill", "engrave", "bore", "profile")
+CUTTING_ORDER = ("over", "at", "along", "within", "beside")
+"""Operations by where they cut: what frees parts comes last."""
+
 _WIDTH = 36
 
 
@@ -110,7 +94,7 @@ def job_template(
     parts = [
         (group, part) for group in groups for part in _parts(drawing, group, max(size), proposal)
     ]
-    parts.sort(key=lambda each: _ORDER.index(each[1].kind))
+    parts.sort(key=lambda each: CUTTING_ORDER.index(kind_named(each[1].kind).cuts))
     lines = [
         *_head(drawing, size, machine),
         *_comments(WHOLE),
@@ -192,123 +176,85 @@ def _extent(drawing: Drawing, group: _Group) -> float:
     return float(np.ptp(extents(lines), axis=1).sum()) if len(lines) else 0.0
 
 
-class _Part(Struct, frozen=True):
-    """What one operation cuts of a group: what it selects of it, and how."""
+class Part(Struct, frozen=True):
+    """An operation that a kind proposes: its name, what it takes of a group (rows of the drawing's
+    paths, and how many single points), and keys as TOML text, each with a remark. `excludes`: the
+    word by which the other operations of the group leave these paths out."""
 
     name: str
     kind: str
     rows: tuple[int, ...]
     marks: int = 0
     keys: tuple[tuple[str, str, str], ...] = ()
-    """Keys that it has, as TOML text, each with a remark."""
+    excludes: str = ""
 
 
-def _parts(drawing: Drawing, group: _Group, size_mm: float, proposal: Proposal) -> list[_Part]:
-    """The operations that a group is cut by."""
-    lines, marks = drawing.paths, len(group.marks)
-    is_letter = [is_text(drawing.sources[row]) for row in group.paths]
-    text = tuple(row for row, yes in zip(group.paths, is_letter, strict=True) if yes)
-    if text:
-        rest = tuple(row for row, yes in zip(group.paths, is_letter, strict=True) if not yes)
-        keys = (
-            ("select", '["text"]', ""),
-            ("depth", f'"{TEXT_MM:g}mm"', "a V bit makes finer letters"),
+class Remaining(Struct, frozen=True):
+    """What of a group no operation takes yet: paths (rows of the drawing's), and how many single
+    points. `name`: that of the layer or colour; `title`: the same for names of operations.
+    `size_mm`: the longer side of the drawing. `is_divided`: operations before take other paths of
+    the group, so that those that follow have to select."""
+
+    drawing: Drawing
+    name: str
+    title: str
+    rows: tuple[int, ...]
+    marks: int
+    size_mm: float
+    proposal: Proposal
+    is_divided: bool = False
+
+    @property
+    def contours(self) -> tuple[int, ...]:
+        """Rows of the closed paths."""
+        return tuple(row for row in self.rows if self.drawing.paths.closed[row])
+
+    def contours_that_are(self, *words: str) -> tuple[int, ...]:
+        """Rows of the closed paths of which all these words of `select` are true."""
+        drawing = self.drawing
+        continuous = [kind.casefold() in CONTINUOUS for kind in drawing.line_types]
+        edges = np.array(continuous, dtype=np.bool_)
+        every = drawing.nesting.among(np.arange(len(drawing.paths)))
+        rows = np.zeros(len(drawing.paths), dtype=np.bool_)
+        rows[list(self.contours)] = True
+        selected = Traits(every, drawing.sources, edges).selected(Operation(select=words), rows)
+        return tuple(np.flatnonzero(selected).tolist())
+
+    def without(self, parts: Sequence[Part]) -> Remaining:
+        """What is left when these operations have taken theirs."""
+        taken = {row for part in parts for row in part.rows}
+        return replace(
+            self,
+            rows=tuple(row for row in self.rows if row not in taken),
+            marks=self.marks - sum(part.marks for part in parts),
+            is_divided=self.is_divided or any(part.rows and not part.excludes for part in parts),
         )
-        letters = _Part(f"{group.called} text", "engrave", text, 0, keys)
-        if not rest and not marks:
-            return [letters]
-        others = _parts(drawing, replace(group, paths=rest), size_mm, proposal)
-        return [letters, *(_without_text(part) for part in others)]
-    rows = np.array(group.paths, dtype=np.int64)
-    closed = lines.closed[rows]
-    small = all(_is_hole(lines[row], SMALL_HOLE * size_mm) for row in group.paths)
-    if any(word in group.name.casefold() for word in ENGRAVED) or (len(rows) and not closed.any()):
-        return [_Part(group.called, "engrave", group.paths, marks)]
-    if small and not proposal.tool_mm:
-        return [_Part(group.called, "drill", group.paths, marks)]
-    found = []
-    if marks:
-        select = (("select", '["point"]', ""),) if len(rows) else ()
-        found.append(_Part(f"{group.called} points", "drill", (), marks, select))
-    if not closed.all():
-        open_ = tuple(rows[~closed].tolist())
-        select = (("select", '["open"]', ""),)
-        found.append(_Part(f"{group.called} open", "engrave", open_, 0, select))
-    contours = rows[closed]
-    if not proposal.tool_mm:
-        select = () if closed.all() else (("select", '["closed"]', ""),)
-        found.append(_Part(group.called, "profile", tuple(contours.tolist()), 0, select))
-        return found
-    return found + _cut_parts(drawing, group, contours, proposal)
 
 
-def _without_text(part: _Part) -> _Part:
-    """The part, which selects no text."""
+def _parts(drawing: Drawing, group: _Group, size_mm: float, proposal: Proposal) -> list[Part]:
+    """The operations that a group is cut by, as the kinds propose them one after the other."""
+    rows, marks = group.paths, len(group.marks)
+    left = Remaining(drawing, group.name, group.called, rows, marks, size_mm, proposal)
+    proposing = [kind for kind in installed_kinds().values() if kind.propose]
+    found: list[Part] = []
+    for kind in sorted(proposing, key=lambda kind: (kind.proposal_rank, kind.name)):
+        if left.rows or left.marks:
+            made: list[Part] = function_of(kind.propose)(left)
+            found += made
+            left = left.without(made)
+    excluded = [part.excludes for part in found if part.excludes]
+    return [part if part.excludes else _excluding(part, excluded) for part in found]
+
+
+def _excluding(part: Part, words: Sequence[str]) -> Part:
+    """The part, which selects what these words too are true of."""
     said = {key: value for key, value, _ in part.keys}.get("select")
-    if said == '["point"]':
+    if not words or said == '["point"]':
         return part
-    words = "" if said is None else f"{said[1:-1]}, "
-    keys = (("select", f'[{words}"not text"]', ""), *(k for k in part.keys if k[0] != "select"))
+    before = "" if said is None else f"{said[1:-1]}, "
+    more = ", ".join(toml_string(word) for word in words)
+    keys = (("select", f"[{before}{more}]", ""), *(k for k in part.keys if k[0] != "select"))
     return replace(part, keys=keys)
-
-
-def _cut_parts(drawing: Drawing, group: _Group, contours: Ints, proposal: Proposal) -> list[_Part]:
-    """Closed contours for a tool of known diameter: circles within parts are drilled where they
-    fit the tool and bored where they are wider, other contours within parts are cut
-    on their inside, and the outer ones last, with tabs."""
-    lines, tool = drawing.paths, proposal.tool_mm
-    continuous = [kind.casefold() in CONTINUOUS for kind in drawing.line_types]
-    edges = np.array(continuous, dtype=np.bool_)
-    own = drawing.nesting.among(np.arange(len(lines)))
-    traits = Traits(own, drawing.sources, edges)
-    mine = np.zeros(len(lines), dtype=np.bool_)
-    mine[contours] = True
-
-    def taken(*words: str) -> Ints:
-        return np.flatnonzero(traits.selected(Operation(select=words), mine))
-
-    found: list[_Part] = []
-    keys: tuple[tuple[str, str, str], ...]
-    round_ = {row: circle_of(lines[row]) for row in taken("inner", "circle").tolist()}
-    circles = {row: circle[1] for row, circle in round_.items() if circle}
-    fits = [row for row, wide in circles.items() if abs(wide - tool) <= HOLE_SIZE_MM]
-    wider = [row for row, wide in circles.items() if wide > tool + HOLE_SIZE_MM]
-    words = '["inner", "circle"]'
-    if fits:
-        size = f'"{tool - HOLE_SIZE_MM:.6g}..{tool + HOLE_SIZE_MM:.6g}mm"'
-        keys = (("select", words, ""), ("select_size", size, "as wide as the tool"))
-        found.append(_Part(f"{group.called} drilled", "drill", tuple(fits), 0, keys))
-    if wider:
-        keys = (
-            ("select", words, ""),
-            ("select_size", f'"{tool + HOLE_SIZE_MM:.6g}mm.."', "wider than the tool"),
-            ("entry", '"helix:3deg"', "how steeply it goes down"),
-        )
-        found.append(_Part(f"{group.called} holes", "bore", tuple(wider), 0, keys))
-    inner = taken("inner", "not circle")
-    if len(inner):
-        keys = (("select", '["inner", "not circle"]', ""), ("entry", '"ramp:3deg"', ""))
-        found.append(_Part(f"{group.called} inner", "profile", tuple(inner.tolist()), 0, keys))
-    outer = taken("outer")
-    if len(outer):
-        keys = (("select", '["outer"]', ""), ("entry", '"ramp:3deg"', ""))
-        if proposal.thickness_mm:
-            # Tabs are measured from the full depth of the cut, which is below the stock.
-            height = min(max(proposal.thickness_mm / 3.0, LEAST_TAB_MM), proposal.thickness_mm)
-            height += proposal.breakthrough_mm
-            count = _tabs_for(lines.select(outer.tolist()), tool)
-            tabs = f'"{count}:{2.0 * tool:.3g}mm:{height:.3g}mm"'
-            if count:
-                keys = (*keys, ("tabs", tabs, "so that it stays where it is; cut them by hand"))
-        found.append(_Part(f"{group.called} outer", "profile", tuple(outer.tolist()), 0, keys))
-    return found
-
-
-def _tabs_for(outlines: Polylines, tool_mm: float) -> int:
-    """How many tabs of twice the tool's diameter each of these outlines has room for, at most
-    MOST_TABS: they leave it at least as much as they take."""
-    shortest = float(path_lengths(outlines).min()) + math.pi * tool_mm
-    return min(MOST_TABS, int(0.5 * shortest / (3.0 * tool_mm)))
 
 
 def _numbered(name: str, number: int) -> str:
@@ -316,7 +262,7 @@ def _numbered(name: str, number: int) -> str:
     return name if number == 1 else f"{name} ({number})"
 
 
-def _text(drawing: Drawing, group: _Group, part: _Part, proposal: Proposal) -> list[str]:
+def _text(drawing: Drawing, group: _Group, part: Part, proposal: Proposal) -> list[str]:
     """The lines of the operation for a part of a group."""
     lines = drawing.paths.select(part.rows)
     marks = f", {part.marks} points" if part.marks else ""
@@ -330,14 +276,15 @@ def _text(drawing: Drawing, group: _Group, part: _Part, proposal: Proposal) -> l
         *(_row(f"{key} = {value}", remark) for key, value, remark in part.keys),
         f"tool = {toml_string(proposal.tool or TOOL_NAME)}",
     ]
-    if part.kind in ("profile", "bore") and proposal.tool_mm:
+    contract = kind_named(part.kind)
+    if contract.leaves_walls and proposal.tool_mm:
         text.append(_row('direction = "climb"', OPERATION["direction"].help))
     if proposal.breakthrough_mm and is_known("breakthrough", part.kind):
         through = f'breakthrough = "{proposal.breakthrough_mm:.6g}mm"'
         text.append(_row(through, "through the stock, and so far into the board below"))
-        if part.kind == "profile" and proposal.tool_mm and not proposal.materials:
+        if contract.runs_beside and proposal.tool_mm and not proposal.materials:
             text.append(f'step_down = "{0.5 * proposal.tool_mm:.3g}mm"')
-    if marks and part.kind != "drill":
+    if marks and contract.takes != "holes":
         text.append("# The points are not cut by this: they need an operation of the kind drill.")
     given = {key for key, _, _ in part.keys} | {line.split(" = ")[0] for line in text}
     if "breakthrough" in given:
@@ -348,11 +295,6 @@ def _text(drawing: Drawing, group: _Group, part: _Part, proposal: Proposal) -> l
         if is_known(name, part.kind) and name not in given
     }
     return [*text, *_comments(known)]
-
-
-def _is_hole(path: Polyline, largest_mm: float) -> bool:
-    circle = circle_of(path)
-    return circle is not None and circle[1] <= largest_mm
 
 
 def _counted(lines: Polylines) -> str:

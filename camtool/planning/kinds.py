@@ -68,8 +68,8 @@ class OperationKind:
     `work` names the function that plans: (Chosen, Setting) -> Work. `settle` names one that
     completes the operation when its job is made: (Operation, Stock | None) -> Operation;
     OptionError for what cannot be. `propose` names one that says what `camtool job new` cuts with
-    it: (camtool.jobs.template.Remaining) -> list of Part; kinds propose by `proposal_rank`, and
-    stand in that order in the new job.
+    it: (camtool.jobs.template.Remaining) -> list of Part. Kinds are asked by `proposal_rank`: each
+    takes of a layer what those before it have left.
 
     The drawing: `takes` is "paths" (all that are selected), "circles" among them, "holes" (circles
     and single points), or "nothing". `cuts` is where the tool runs: "beside" closed contours,

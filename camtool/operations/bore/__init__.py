@@ -5,6 +5,7 @@ from camtool.planning.kinds import COMMON_KEYS, SELECTING_KEYS, WALL_KEYS, Opera
 BORE = OperationKind(
     name="bore",
     work="camtool.operations.bore.work:bore",
+    propose="camtool.operations.bore.proposal:proposed",
     keys=(
         *COMMON_KEYS,
         *SELECTING_KEYS,
@@ -16,6 +17,7 @@ BORE = OperationKind(
         "step_over",
     ),
     rank=3,
+    proposal_rank=3,
     takes="circles",
     cuts="within",
     leaves_walls=True,

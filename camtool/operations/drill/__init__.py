@@ -5,6 +5,7 @@ from camtool.planning.kinds import COMMON_KEYS, SELECTING_KEYS, OperationKind
 DRILL = OperationKind(
     name="drill",
     work="camtool.operations.drill.work:drill",
+    propose="camtool.operations.drill.proposal:proposed",
     keys=(
         *COMMON_KEYS,
         *SELECTING_KEYS,
@@ -15,6 +16,7 @@ DRILL = OperationKind(
         "max_hole",
     ),
     rank=5,
+    proposal_rank=2,
     takes="holes",
     cuts="at",
     descent="pecks",

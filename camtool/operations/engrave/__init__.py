@@ -5,6 +5,7 @@ from camtool.planning.kinds import COMMON_KEYS, SELECTING_KEYS, OperationKind
 ENGRAVE = OperationKind(
     name="engrave",
     work="camtool.operations.engrave.work:engrave",
+    propose="camtool.operations.engrave.proposal:proposed",
     keys=(
         *COMMON_KEYS,
         *SELECTING_KEYS,
@@ -16,6 +17,7 @@ ENGRAVE = OperationKind(
         "start",
     ),
     rank=4,
+    proposal_rank=1,
     cuts="along",
     cut_name="line",
     reason="it is engraved",

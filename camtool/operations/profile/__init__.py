@@ -5,6 +5,7 @@ from camtool.planning.kinds import COMMON_KEYS, SELECTING_KEYS, WALL_KEYS, Opera
 PROFILE = OperationKind(
     name="profile",
     work="camtool.operations.profile.work:profile",
+    propose="camtool.operations.profile.proposal:proposed",
     keys=(
         *COMMON_KEYS,
         *SELECTING_KEYS,
@@ -25,6 +26,7 @@ PROFILE = OperationKind(
         "mitre_limit",
     ),
     rank=1,
+    proposal_rank=4,
     cuts="beside",
     leaves_walls=True,
 )
