@@ -1,4 +1,4 @@
-"""Which boxes are near each other: the first, broad look before any exact one.
+"""Search for pairs of boxes near each other, before anything is computed exactly.
 
 `BoxIndex` is asked which of its boxes touch others; `box_pairs` and `near_points` stand upon it.
 `touching_boxes` gives the pairs within one set, no more than a bound. `IndexedCurves` are segments
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from camtool.kernels.offsets import SegmentTree
 
 PAIRS_AT_A_TIME = 1 << 16
-"""How many pairs of boxes are handled at a time: it bounds the memory."""
+"""Pairs of boxes that are handled together: it bounds the memory."""
 
 FAN = 16
 """Number of boxes in a block of an index."""

@@ -40,7 +40,7 @@ class Chained(Struct, frozen=True, eq=False):
 
 
 class Kinds(Struct, frozen=True):
-    """What is known of paths besides their shape, one item each; None where all are alike.
+    """Properties of paths besides their shape, one item each; None where all are alike.
 
     Paths of different `groups` are never joined. At a branch, paths of one `style` (colour, line
     type) are joined first. `layers` name places; left out, the groups do.

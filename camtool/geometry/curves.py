@@ -20,7 +20,7 @@ from camtool.arrays import Floats
 from camtool.errors import GeometryError
 
 MAX_PIECE_RAD = 0.5 * math.pi
-"""One piece of an ellipse covers no more: its weights would spread its points too unevenly."""
+"""A piece of an ellipse covers at most this: beyond, its weights spread its points unevenly."""
 
 JUMP_SHARE = 1e-9
 """Pieces of a spline that lie apart by more than this share of its size are no curve."""

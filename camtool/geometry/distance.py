@@ -30,7 +30,7 @@ from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.kernels.move_tree import hilbert_order
 
 POINTS_AT_A_TIME = 1 << 14
-"""How many points `nearest` handles at a time: it bounds the memory."""
+"""Points that `nearest` handles together: it bounds the memory."""
 
 NEAREST_SPARE_MM = 1e-9
 """Segments that are farther than the nearest one by no more than this are measured again ..."""
@@ -39,10 +39,10 @@ NEAREST_SPARE = 1e-9
 """... and by no more than this part of the distance."""
 
 PAIRS_AT_A_TIME = 1 << 18
-"""How many pairs of segments `approach` holds at a time: it bounds the memory."""
+"""Pairs of segments that `approach` holds together: it bounds the memory."""
 
 FEW_PAIRS = 256
-"""So few distances are computed one by one: an index of the segments would take longer."""
+"""Up to this many distances are computed one by one: building an index would take longer."""
 
 
 class Nearest(Struct, frozen=True, eq=False):

@@ -109,7 +109,7 @@ class Callout(Struct, frozen=True):
 
 
 class Healing(Struct, frozen=True):
-    """What was corrected on reading, counted, lengths in mm.
+    """Corrections made on reading, counted, lengths in mm.
 
     `duplicates`: pieces drawn twice as a whole and left out; `overlaps`: parts of pieces that
     lie on others and were left out; `tiny_merged`: segments too short to matter that went into

@@ -1,4 +1,4 @@
-"""What a drawing holds, counted: for `camtool check` and for reports."""
+"""Counts and sizes of the contents of a drawing, for `camtool check` and for reports."""
 
 from __future__ import annotations
 

@@ -195,7 +195,7 @@ def _checked_fit(vertices: Floats, judged: Judged, ends: Floats) -> Fit:
 # turns when it is as short as one position (`POSITION_EPS_MM`) is a corner or a cusp.
 
 _ASIDE = tuple(10.0**k for k in range(ASIDE_FROM, ASIDE_TO))
-"""How far aside (share of what is left to the next break) a tangent is looked for."""
+"""Distances aside, as shares of the distance to the next break, at which a tangent is sought."""
 
 
 class Nodes(Struct, frozen=True, eq=False):

@@ -14,7 +14,6 @@ from types import MappingProxyType
 from msgspec import Struct
 
 CAP_UNITS = 21.0
-"""Height of a capital."""
 
 BASELINE = 9.0
 """The y of the baseline (y down)."""

@@ -1,4 +1,4 @@
-"""Where lines and arcs meet, and where closed paths cross themselves.
+"""Intersections of lines and arcs, and self-crossings of closed paths.
 
 Curves are described from their start (`measure.Frames`): with the left normal n there and the
 signed curvature k, a point p of the whole line or circle has k |p−start|² = 2 n·(p−start).

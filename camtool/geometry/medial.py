@@ -28,7 +28,7 @@ FIRST_SAMPLES = 9
 """Number of places on each element at which discs are computed first."""
 
 HALVINGS = 32
-"""How often the gap in which the partner changes is halved: to 1e-10 of an element or less."""
+"""Halvings of the gap in which the partner changes: to 1e-10 of an element or less."""
 
 STILL_MM = 1e-6
 """Where the discs at both ends and in the middle of a gap are nearer than this, the gap is not

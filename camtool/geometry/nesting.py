@@ -24,8 +24,8 @@ HOLDERS_AT_A_TIME = 256
 
 
 class Levels(Struct, frozen=True, eq=False):
-    """Where M paths lie: `parent` (M,), the smallest holder of each, −1 if none; and `depth` (M,),
-    the number of its holders."""
+    """Positions of M paths in the nesting: `parent` (M,), the smallest holder of each, −1 if none;
+    and `depth` (M,), the number of its holders."""
 
     parent: Ints
     depth: Ints

@@ -245,7 +245,7 @@ def _turns_about(points: Floats, lines: Polylines) -> Ints:
 
 
 class Stages(Struct, frozen=True, eq=False):
-    """What each stage of one offset to the left gave: to print, to draw, to test."""
+    """The stages of an offset to the left: to print, to draw, to test."""
 
     raw: RawOffset
     trimmed: RawOffset

@@ -30,7 +30,7 @@ POSITION_EPS_MM = 1e-6
 """Two positions nearer than this are equal."""
 
 SEGMENTS_AT_ONCE = 1 << 16
-"""So many segments are looked at a time where each stands alone: some 10 MB."""
+"""Segments that are handled together where each stands alone: about 10 MB."""
 
 BULGE_EPS = 1e-12
 """|bulge| may exceed 1 by rounding alone, by no more than this, and is then set to ±1; a bulge
@@ -40,7 +40,7 @@ m."""
 
 @dataclass(frozen=True, eq=False)
 class Polyline:
-    """One path: `vertices` (n, 3) of x, y, bulge in mm; n ≥ 2.
+    """A path of lines and arcs: `vertices` (n, 3) of x, y, bulge in mm; n ≥ 2.
 
     The bulge of the last vertex of an open path has no segment and is stored as 0.
     Raises GeometryError when the numbers are no polyline.

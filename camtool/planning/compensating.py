@@ -86,7 +86,7 @@ def motor_path(toolpath: Toolpath, machine: Machine) -> CompensatedToolpath:
 
 
 class _ToolpathMapper:
-    """One toolpath mapped by the matrix."""
+    """A toolpath mapped by the matrix."""
 
     def __init__(self, toolpath: Toolpath, matrix: Floats, tolerance_mm: float) -> None:
         self._toolpath, self._matrix, self._tolerance_mm = toolpath, matrix, tolerance_mm

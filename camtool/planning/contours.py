@@ -47,7 +47,7 @@ START_CORNER_RAD = 0.1
 """A path that turns by more than this at a vertex has a corner there."""
 
 Heights = tuple[float | None, list[Tab]]
-"""What decides the height of the tool: the angle of its ramps (None: it plunges), and the tabs."""
+"""Inputs of the height of the tool: the angle of its ramps (None: it plunges), and the tabs."""
 
 
 class CutContours(Struct, frozen=True, eq=False):

@@ -1,4 +1,4 @@
-"""How the tool comes to a contour and leaves it: along its tangent, or in a quarter arc.
+"""Leads: the tool comes to a contour and leaves it along its tangent, or in a quarter arc.
 
       line                    arc                   T  the direction of travel at the contour
                                    ╭── C            n  the free side, away from what is to stay

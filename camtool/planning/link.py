@@ -26,10 +26,10 @@ CHANGE_HEIGHTS = 5.0
 height above the stock, or as far as its travel goes: a hand must get between."""
 
 VERTICES_AT_ONCE = 1 << 15
-"""So many vertices of runs become moves together: some 10 MB."""
+"""Vertices of runs that become moves together: about 10 MB."""
 
 Approach = Callable[[CutRun], tuple[float, float] | None]
-"""Where the tool comes from at safe height, (x, y) mm, before a run begins; None: anywhere."""
+"""The place from which the tool comes at safe height, (x, y) mm, before a run; None: anywhere."""
 
 
 def _rounded(places: Floats) -> Floats:
@@ -166,9 +166,8 @@ def _set_coolant(builder: ToolpathBuilder, now: str, wanted: str) -> str:
 
 
 class _Lot(Struct, frozen=True, eq=False):
-    """Some of the runs, from run `first` on; whether the first of them was `begun` in the lot
-    before; whether the last one `goes_on` in the next, from the vertex with which this one ends.
-    """
+    """A part of the runs, from run `first` on; `begun`: its first run began in the lot before;
+    `goes_on`: its last run continues in the next lot, from the vertex with which this one ends."""
 
     runs: Runs
     first: int

@@ -1,4 +1,4 @@
-"""How messages of planning name places, tools, operations and keys."""
+"""Names of places, tools, operations and keys in messages of planning."""
 
 from __future__ import annotations
 

@@ -30,26 +30,23 @@ if TYPE_CHECKING:
 Point = tuple[float, float]
 
 KICKS_EACH = 20
-"""Number of kicks for each item: work against length."""
+"""Kicks for each item: more take longer and give shorter travel."""
 
 MIN_KICKS = 700
-"""Number of kicks for few items: the search is still instantaneous."""
+"""Kicks for few items: the search still takes no noticeable time."""
 
 MAX_KICKS = 4000
-"""At most this many kicks for any number of items: less than a second of work."""
+"""Kicks for many items: less than a second of work."""
 
 SEED = 20_011
-"""Seed of the pseudo-random places of the kicks."""
 
 MAX_PLACES_EACH = 8
 """Number of evenly spread variants that stand for the positions of an item with more of them."""
 
-SHOWN_ITEMS = 5
-"""At most this many items are named in an error message."""
-
+MAX_NAMED_ITEMS = 5
 
 ITEMS_AT_ONCE = 1 << 14
-"""Of so many items the variants that are turned ones are found together: some 10 MB."""
+"""Items whose reversed variants are found together: about 10 MB."""
 
 SPECK_MM = 1e-4
 """For the order, a run that stays at one place (a drilled hole) is a line of this length: long
@@ -251,7 +248,7 @@ def _followers(before: Ints, count: int) -> tuple[Ints, Ints]:
 
 
 def _cycle_error(left: set[int]) -> OptionError:
-    names = ", ".join(str(item) for item in sorted(left)[:SHOWN_ITEMS])
+    names = ", ".join(str(item) for item in sorted(left)[:MAX_NAMED_ITEMS])
     return OptionError(
         f"{len(left)} items each have to be cut before another of them, among them {names}",
         mend="let one of them be cut before the others",

@@ -20,7 +20,7 @@ from camtool.geometry.measure import Frames, dot, point_at, segment_lengths, tur
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
 
 QUARTER = math.tan(math.pi / 8.0)
-"""The bulge of a quarter of a circle."""
+"""Bulge of a quarter circle."""
 
 MAX_PART_SWEEP_RAD = 2.0 * np.pi - 1e-3
 """Arcs are not put together beyond this, except a whole circle: an end near the start could be
@@ -60,7 +60,7 @@ class MeasuredPaths:
 
 
 class MeasuredPath:
-    """One path of many with the lengths along it: path `index` of `paths`."""
+    """A path with the lengths along it: path `index` of `paths`."""
 
     def __init__(self, paths: MeasuredPaths, index: int) -> None:
         self.paths, self.index = paths, index

@@ -33,13 +33,13 @@ from camtool.planning.job import Job, Placement
 from camtool.records import replace
 
 MAX_SIZE_MM = 1e5
-"""The cut geometry is no larger than this: 100 m, as the longest travel of a machine file."""
+"""Largest size of the cut geometry: 100 m, as the longest travel of a machine file."""
 
 MAX_DISTANCE_MM = 1e6
-"""The cut geometry is no farther from part zero than this, a kilometre."""
+"""Largest distance of the cut geometry from part zero: a kilometre."""
 
 MAX_POINTS = 10_000_000
-"""Copies make at most this many vertices: far beyond any program, well within memory."""
+"""Vertices of all copies together: far beyond any program, well within memory."""
 
 SCALE_SHARE = 1e-3
 """A drawing counts as read for a scale that differs by no more than this share of it."""

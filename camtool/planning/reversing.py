@@ -634,7 +634,8 @@ class Approaches:
 
 
 class _Drive:
-    """One axis in motion: where it is, in which direction ±1 it moved last, and since where."""
+    """An axis in motion: its position, the direction ±1 of its last move, and where that move
+    began."""
 
     def __init__(self, axis: Axis, residual: Residual) -> None:
         self._residual = residual

@@ -71,10 +71,9 @@ PLACES_PER_SIDE = 32
 corner."""
 
 PLACES_PER_TAB = 16.0
-"""So many places are tried in the length of a tab."""
+"""Places that are tried per length of a tab."""
 
 MAX_PLACES_ROUND = 2048
-"""No more places than this are tried round a whole contour."""
 
 PLACE_DECIMALS = 9
 """Two places are as near when their distances differ in no such decimal of the whole path."""
@@ -357,8 +356,8 @@ def _tab_count(total_mm: float, operation: Operation) -> int:
 
 
 class _Corners(Struct, frozen=True, eq=False):
-    """Where a path is a corner, (C, 2) mm each, from and to: `vertices` where it turns at all,
-    those where it turns `sharply`, and `arcs` on which it goes round corners of the drawing."""
+    """The corners of a path, (C, 2) mm each, from and to: `vertices` where it turns at all, those
+    where it turns `sharply`, and `arcs` on which it goes round corners of the drawing."""
 
     vertices: Floats
     sharply: Floats
@@ -366,8 +365,8 @@ class _Corners(Struct, frozen=True, eq=False):
 
 
 class _Fitting(Struct, frozen=True, eq=False):
-    """What decides where tabs like the `model`, with slopes of `foot_mm`, fit on a path; half the
-    width of the bridge under them, mm."""
+    """The conditions under which tabs like the `model`, with slopes of `foot_mm`, fit on a path;
+    half the width of the bridge under them, mm."""
 
     along: MeasuredPath
     model: Tab
