@@ -48,8 +48,8 @@ class Given:
 
 @dataclass(frozen=True)
 class Value:
-    """What a key may be: `read` makes the field's value of what was given. The help of its flag
-    shows `metavar` or `choices`; a switch has neither. With `tables`, a table
+    """The values that a key may have: `read` makes the field's value of what was given. The help
+    of its flag shows `metavar` or `choices`; a switch has neither. With `tables`, a table
     may give it too."""
 
     read: Callable[[Given], Any]
@@ -252,7 +252,8 @@ def text(value: object) -> str:
 
 
 def word(known: Sequence[str]) -> Callable[[Given], Any]:
-    """One of the known words; the error for another one guesses which was meant."""
+    """Return a reader of one of the known words; the error for another one guesses which was
+    meant."""
 
     def convert(value: object) -> str:
         name = text(value)
@@ -296,5 +297,5 @@ SWITCH = Value(plain(switch))
 
 
 def one_of(known: tuple[str, ...]) -> Value:
-    """One of these words."""
+    """Return the Value of one of these words."""
     return Value(word(known), choices=known)

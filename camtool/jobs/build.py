@@ -309,7 +309,7 @@ def _rested(operations: list[Operation], tables: Sequence[Table]) -> list[Operat
 
 
 def _unknown(name: str, kind: str) -> tuple[str, str]:
-    """What is wrong with a key that a kind of operation does not know, and how to fix it."""
+    """Return message and mend for a key that a kind of operation does not know."""
     known = [key for key in OPERATION if is_known(key, kind)]
     return f"means nothing to the kind {kind}", f"it has: {', '.join(known)}, tool"
 

@@ -1,4 +1,4 @@
-"""What a job does with a drawing, as JSON has it: operations, what they take, and the sides.
+"""The description of a job as JSON: its operations, what they take of a drawing, and the sides.
 
 Contours of one operation, layer, side and reason are one group.
 """
@@ -80,12 +80,12 @@ def _operation(job: Job, index: int) -> dict[str, Any]:
 
 
 def _stages_before(job: Job, index: int) -> int:
-    """How many operations up to this one are the second stage of the one before them."""
+    """Count the operations up to this one that are the second stage of the one before them."""
     return sum(each.stage == "finish" for each in job.operations[: index + 1])
 
 
 def _below(job: Job, operation: Operation) -> float | None:
-    """How far an operation goes below the stock, mm; None where it does not, or is not known."""
+    """Depth of an operation below the stock, mm; None if it ends above, or is not known."""
     if job.stock is None or operation.depth_mm is None:
         return None
     below = operation.depth_mm - job.stock.thickness_mm
@@ -95,7 +95,7 @@ def _below(job: Job, operation: Operation) -> float | None:
 def _groups(
     operation: Operation, chosen: Chosen, sides: Sides, placed: Drawing
 ) -> list[dict[str, Any]]:
-    """How many contours of each layer have the tool on which side, and why."""
+    """Count the contours of each layer by the side on which the tool runs, and by the reason."""
     contract = operation.contract
     if contract.cuts in ("at", "over"):
         return []

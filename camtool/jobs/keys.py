@@ -224,7 +224,8 @@ def _parts(given: Given, keys: Mapping[str, Key], names: Sequence[str]) -> Table
 
 
 def _word_or_place(value: object, known: Sequence[str]) -> str | tuple[float, float]:
-    """One of the words, or a place as a list of two lengths or a text with a comma."""
+    """Return one of the words, or a place given as a list of two lengths or a text with a
+    comma."""
     if isinstance(value, list | tuple):
         return _two(value, length, '["10mm", "5mm"]')
     name = text(value)

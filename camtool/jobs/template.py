@@ -57,7 +57,7 @@ class _Group(Struct, frozen=True):
 
 
 class Proposal(Struct, frozen=True):
-    """What is known of the cut, mm, 0 where it is not: the tool's diameter, the stock's
+    """The known sizes of the cut, mm, 0 where it is not: the tool's diameter, the stock's
     thickness. `tool`: its name in a library, and the materials that it has presets for, which say
     how deep passes are; `material`: the one of them that is cut, where that is said."""
 
@@ -76,7 +76,7 @@ class Proposal(Struct, frozen=True):
 
 
 def _materials(proposal: Proposal) -> Iterator[str]:
-    """What is cut, and as comments what else it may be."""
+    """Yield the row of the material that is cut, and those of the others as comments."""
     for name in proposal.materials:
         said = name == proposal.material
         yield _row(f"{'' if said else '# '}material = {toml_string(name)}", "as --material")
@@ -190,8 +190,8 @@ class Part(Struct, frozen=True):
 
 
 class Remaining(Struct, frozen=True):
-    """What of a group no operation takes yet: paths (rows of the drawing's), and how many single
-    points. `name`: that of the layer or colour; `title`: the same for names of operations.
+    """The part of a group that no operation takes yet: paths (rows of the drawing's), and how many
+    single points. `name`: that of the layer or colour; `title`: the same for names of operations.
     `size_mm`: the longer side of the drawing. `is_divided`: operations before take other paths of
     the group, so that those that follow have to select."""
 
@@ -221,7 +221,7 @@ class Remaining(Struct, frozen=True):
         return tuple(np.flatnonzero(selected).tolist())
 
     def without(self, parts: Sequence[Part]) -> Remaining:
-        """What is left when these operations have taken theirs."""
+        """Return the paths and points that are left when these operations have taken theirs."""
         taken = {row for part in parts for row in part.rows}
         return replace(
             self,

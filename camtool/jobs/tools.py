@@ -57,8 +57,8 @@ class Described(Struct, frozen=True):
 
 
 class Shop(Struct, frozen=True):
-    """What there is besides the job: the files of `libraries`, the nearest first; the tool of
-    operations that say none, and what is cut, where the job does not say it."""
+    """Tools and materials from outside the job: the files of `libraries`, the nearest first; the
+    tool of operations that say none, and what is cut, where the job does not say it."""
 
     libraries: tuple[Path, ...] = ()
     tool: Given | None = None
@@ -178,7 +178,7 @@ class Tools(Struct, frozen=True, dict=True):
     default: Given | None = None
 
     def of(self, layers: Sequence[Table], kind: str) -> Used:
-        """What an operation of this kind cuts with. `layers`: the tables that apply to
+        """Return the tool of an operation of this kind. `layers`: the tables that apply to
         it, the nearest last.
 
         The nearest name or number counts, and single keys (`tool_diameter`) of that layer and

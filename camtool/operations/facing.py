@@ -58,7 +58,8 @@ MAX_OVERHANG_MM = 1000.0
 
 
 def overhang_mm(operation: Operation) -> float:
-    """How far the tool's centre runs beyond each edge of the stock: as given, or its radius."""
+    """Distance of the outermost round of the tool's centre from the stock: as given, or its
+    radius."""
     given: float | None = operation.own_value("overhang")
     return operation.tool.radius_mm if given is None else given
 
@@ -101,7 +102,7 @@ def checked(operation: Operation, stock: Stock | None) -> Operation:
 
 
 def faced(_: Chosen, setting: Setting) -> Work:
-    """One item, the runs that clear the top of the stock at all levels of the setting.
+    """Return one item, the runs that clear the top of the stock at all levels of the setting.
 
     OptionError for a step-over that would take for ever.
     """

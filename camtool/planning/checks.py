@@ -98,7 +98,7 @@ Box = tuple[float, float, float, float]
 def checked(
     toolpath: Toolpath, job: Job, machine: Machine, steps: Sequence[Step] = ()
 ) -> tuple[Finding, ...]:
-    """What no program may do, and what looks like a mistake; () when all is well.
+    """Find what no program may do, and what looks like a mistake; () when all is well.
 
     Errors: an axis beyond its travel, a cut deeper than the stock, a rapid through what is not
     cleared, a feed that the machine cannot make (on slopes: along Z), an operation whose tool the
@@ -136,7 +136,8 @@ def out_of_travel(toolpath: Toolpath, machine: Machine) -> Iterator[Finding]:
 
 
 def _into_travel(toolpath: Toolpath, machine: Machine, name: str) -> str:
-    """How to bring a toolpath into the travel of an axis: what helps here, or a larger machine."""
+    """Say how to bring a toolpath into the travel of an axis: what helps here, or a larger
+    machine."""
     axis = AXES.index(name)
     needed = math.ceil(np.ptp(toolpath_extents(toolpath)[axis]))
     yours = own_numbers(machine, [f"axes.{name.lower()}.travel_mm={needed}"])
@@ -318,7 +319,7 @@ def _radii(toolpath: Toolpath, job: Job) -> tuple[Floats, Floats]:
 
 
 def _cleared_mm(tool: Tool) -> float:
-    """How wide its tip is, which is nothing of a drill."""
+    """Radius of its tip, mm; 0 of a drill."""
     return 0.0 if tool.kind == "drill" else tool.radius_at(0.0)
 
 
@@ -383,8 +384,8 @@ def _place(toolpath: Toolpath, row: int) -> str:
 def doubtful_settings(
     steps: Sequence[Step], machine: Machine, stock: Stock | None, *, starts_spindle: bool
 ) -> list[Finding]:
-    """One finding for all settings that look forgotten or too high in the operations that cut
-    something; no finding when there are none.
+    """Return one finding for all settings that look forgotten or too high in the operations that
+    cut something; no finding when there are none.
 
     A point that follows closed contours and a plunge at the feed of the cut count only where
     programs of the target can start a spindle (`starts_spindle`) and the machine has one: others
@@ -415,7 +416,7 @@ def doubtful_settings(
 
 
 def _doubtful(step: Step, starts_spindle: bool) -> Iterator[str]:
-    """What is doubtful about an operation, each with the flag that changes it."""
+    """Yield what is doubtful about an operation, each with the flag that changes it."""
     operation, feeds, tool = step.operation, step.setting.feeds, step.operation.tool
     wide = operation.away_mm > 0.0
     on_line = operation.contract.runs_beside and operation.side != "on" and not wide
@@ -459,8 +460,8 @@ def _comes_down_beside(step: Step) -> bool:
 
 
 def _loose(step: Step, stock: Stock | None, steps: Sequence[Step]) -> Iterator[str]:
-    """Whether an operation cuts parts out of the stock without tabs, which come loose under the
-    tool; where a finishing pass follows, it cuts at loose parts."""
+    """Yield a doubt if an operation cuts parts out of the stock without tabs, which come loose
+    under the tool; where a finishing pass follows, it cuts at loose parts."""
     operation, closed = step.operation, step.chosen.lines.closed
     if stock is None or operation.stage == "finish" or operation.tabs is not None:
         return
@@ -548,7 +549,7 @@ def _loose_piece(name: str, outline: Polylines, mend: str) -> Finding:
 
 
 def _beyond_tool(step: Step, stock: Stock | None) -> Iterator[str]:
-    """What the tool of an operation is not made for, as far as its file says it."""
+    """Yield what the tool of an operation is not made for, as far as its file says it."""
     operation, tool, setting = step.operation, step.operation.tool, step.setting
     contract, pecks = operation.contract, operation.contract.descent == "pecks"
     depth = -setting.levels_mm[-1]
@@ -576,7 +577,7 @@ def _beyond_tool(step: Step, stock: Stock | None) -> Iterator[str]:
 
 
 def ridge_mm(tool: Tool, step_over: float) -> float:
-    """How high the ridges are that a nose of radius r leaves on a floor, mm.
+    """Height of the ridges that a nose of radius r leaves on a floor, mm.
 
     Halfway between two paths the floor is x = ½ (step − flat) beside the flat of the tool; the
     nose is r − √(r² − x²) above its tip there.
@@ -587,7 +588,7 @@ def ridge_mm(tool: Tool, step_over: float) -> float:
 
 
 def _is_beyond(value: float, limits: tuple[float, float] | None) -> bool:
-    """Whether a number is out of its limits, by more than rounding."""
+    """True if a number is out of its limits, by more than rounding."""
     if limits is None:
         return False
     least, most = limits
@@ -595,5 +596,5 @@ def _is_beyond(value: float, limits: tuple[float, float] | None) -> bool:
 
 
 def deepest_pass(setting: Setting) -> float:
-    """How deep the deepest pass goes at a time, mm."""
+    """Depth of the deepest pass, mm."""
     return float(-np.diff([0.0, *setting.levels_mm]).min())

@@ -342,7 +342,7 @@ def _bands(region: Polylines, radius: float, hair_mm: float) -> list[Polyline]:
 
 
 def _covered(path: Polyline, others: list[Polyline], near_mm: float) -> bool:
-    """Whether all of a path runs beside others: it is the other edge of a band."""
+    """True if all of a path runs beside others: it is the other edge of a band."""
     if not others:
         return False
     points = sample(path, length(path) / BAND_PLACES)
@@ -375,13 +375,13 @@ class LinkedPath:
 
     def __init__(self) -> None:
         self.begin: Floats | None = None
-        """Where the tool would best go down (2,), if anywhere."""
+        """Best place (2,) for the tool to go down, if there is one."""
         self._parts: list[Floats] = []
         self._done: list[Floats] = []
 
     @property
     def here(self) -> Floats | None:
-        """Where the tool is (2,); None before the first stroke."""
+        """Place of the tool (2,); None before the first stroke."""
         return self._parts[-1][-1, :2] if self._parts else None
 
     def cut(self, stroke: Floats, region: ConnectedRegion) -> None:
@@ -428,7 +428,7 @@ class LinkedPath:
             around = region
 
     def _near(self, path: Polyline) -> Floats:
-        """Where the tool is, or would go down, or else the start of a path."""
+        """Place of the tool, or where it would go down, or else the start of a path."""
         if self.here is not None:
             return self.here
         return path.start if self.begin is None else self.begin
@@ -490,7 +490,7 @@ def closest(along: MeasuredPath, point: Floats) -> tuple[float, float]:
 
 
 def _length_to(point: Floats, segments: Segments, row: int) -> float:
-    """How far along a segment its place nearest to a point (2,) is."""
+    """Length along a segment to its place nearest to a point (2,), mm."""
     one = segments[np.array([row])]
     if one.is_arc[0]:
         # Measured from the midpoint of the arc, no angle is near to half a turn.
@@ -537,7 +537,7 @@ def routes(starts: Floats, ends: Floats, region: ConnectedRegion) -> list[Floats
 def _linked(
     start: Floats, end: Floats, outside: list[tuple[float, float]], region: ConnectedRegion
 ) -> Floats | None:
-    """One link, of whose straight line these parts are outside of the region."""
+    """Return one link, of whose straight line these parts are outside of the region."""
     if np.hypot(*(end - start)) <= POSITION_EPS_MM:
         return np.array([[*start, 0.0]])
     rows = [np.array([[*start, 0.0]])]
@@ -636,7 +636,8 @@ def pole(region: Polylines) -> Floats:
 
 
 def outside_parts(lines: Polylines, region: Polylines) -> list[Polyline]:
-    """What of the paths lies outside of a region (even-odd): open pieces, or whole paths."""
+    """Return what of the paths lies outside of a region (even-odd): open pieces, or whole
+    paths."""
     border = Segments.of(region)
     found: list[Polyline] = []
     for path in lines:
@@ -679,7 +680,7 @@ def _runs(along: MeasuredPath, marks: Floats, wanted: Bools) -> list[Polyline]:
 
 
 def scanned(line: Segments, region: Segments) -> tuple[Ints, Floats, Floats]:
-    """What of K straight lines is in a region: rows (J,), and from and to which part of each.
+    """Find what of K straight lines is in a region: rows (J,), and from and to which part of each.
 
     Ascending by row and by part; pieces up to POSITION_EPS_MM are left out.
     """

@@ -58,8 +58,8 @@ alone."""
 
 
 def drawn_of(toolpath: Toolpath, runs: Ints, steps: Sequence[Step], placed: Drawing) -> DrawnEdges:
-    """What is drawn for each row of a toolpath, whose rows are of the runs (N,) of these steps,
-    counted through all of them; the drawing in the work frame."""
+    """Return what is drawn for each row of a toolpath, whose rows are of the runs (N,) of these
+    steps, counted through all of them; the drawing in the work frame."""
     # One number, seen as many, until there is another.
     off = np.broadcast_to(0.0, (len(toolpath), 2))
     edge = np.broadcast_to(np.int64(NO_EDGE), len(toolpath))
@@ -94,8 +94,8 @@ def drawn_of(toolpath: Toolpath, runs: Ints, steps: Sequence[Step], placed: Draw
 def _off(
     toolpath: Toolpath, rows: Ints, step: Step, placed: Drawing
 ) -> Iterator[tuple[Ints, Floats]]:
-    """Some of the rows (R,) at a time, and (R, 2) how far what was drawn lies from the lines that
-    they were planned along, mm; rows that are left out lie on them."""
+    """Yield some of the rows (R,) at a time, and (R, 2) how far what was drawn lies from the lines
+    that they were planned along, mm; rows that are left out lie on them."""
     made = step.operation.contract.path_error_mm
     lines, of = step.chosen.lines, placed.off_mm
     if placed.datum_off_mm:
@@ -310,9 +310,10 @@ def _kept(step: Step) -> Iterator[ProtectedRegion]:
 
 
 def _levels(operation: Operation, depth: Ints) -> Iterator[Bools]:
-    """Which closed contours make one region, of their depths of nesting. With the sides of the
-    nesting all do. Where the job names the side, a contour in another one is cut on that side
-    too, whatever the outer one keeps: those of each depth are a region of their own."""
+    """Yield masks of the closed contours that make one region, of their depths of nesting. With
+    the sides of the nesting all do. Where the job names the side, a contour in another one is cut
+    on that side too, whatever the outer one keeps: those of each depth are a region of their
+    own."""
     if operation.side == "auto":
         yield np.ones(len(depth), dtype=np.bool_)
         return

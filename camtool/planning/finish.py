@@ -104,7 +104,7 @@ def in_passes(
 
 
 def _engaged(contours: list[Contour], operation: Operation, rough: Step) -> tuple[float, str]:
-    """How much there is left beside the wall at most, mm, and where; infinite where nothing was
+    """Return the most that is left beside the wall, mm, and where; infinite where nothing was
     roughed."""
     if not len(rough.runs):
         return math.inf, at_place(contours[0].name, contours[0].path.start.tolist())
@@ -122,7 +122,7 @@ def _engaged(contours: list[Contour], operation: Operation, rough: Step) -> tupl
 
 
 def _paths(step: Step) -> Segments:
-    """Where the tool of a step ran, seen from above."""
+    """Segments along which the tool of a step ran, seen from above."""
     vertices, first = step.runs.vertices, step.runs.first
     start, end = vertices[:-1], vertices[1:]
     goes = np.hypot(*(end - start)[:, :2].T) > 0.0

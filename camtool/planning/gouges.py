@@ -96,8 +96,8 @@ def branch_findings(
 
 
 def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> Iterator[Finding]:
-    """Where the tool, beside one contour, comes over another one, or into the allowance that its
-    operation leaves on that."""
+    """Yield a finding where the tool, beside one contour, comes over another one, or into the
+    allowance that its operation leaves on that."""
     radius, allowance = operation.wall_radius_mm, operation.allowance_mm
     if operation.stage == "rough":
         allowance = 0.0  # what roughing takes of it is not missed
@@ -155,7 +155,8 @@ def _gouges(work: Work, chosen: Chosen, sides: Sides, operation: Operation) -> I
 
 
 def _taken_back(sides: Sides, other: int, path: Polyline) -> float:
-    """How far the wall of a contour is taken back, mm, seen from where another path begins."""
+    """Distance by which the wall of a contour is taken back, mm, seen from where another path
+    begins."""
     without, within = sides.beyond_mm[other].tolist()
     if not (without or within):
         return 0.0
@@ -165,8 +166,9 @@ def _taken_back(sides: Sides, other: int, path: Polyline) -> float:
 
 
 def _beside_pocket(sides: Sides, pocket: Operation) -> Iterator[Finding]:
-    """Where what is cut beyond the lines of a pocket, or a bore, comes over a contour beside it
-    that a profile follows. Where it only opens towards the contour around it, nothing is lost."""
+    """Yield a finding where what is cut beyond the lines of a pocket, or a bore, comes over a
+    contour beside it that a profile follows. Where it only opens towards the contour around it,
+    nothing is lost."""
     cut = sides.cut_by(pocket) & sides.lines.closed
     rows, others = np.flatnonzero(cut), np.flatnonzero(sides.sided() & ~cut)
     lines, walls = (sides.lines.select(each.tolist()) for each in (rows, others))
@@ -211,13 +213,13 @@ def _within(points: Floats, wall: Polyline) -> tuple[Bools, Floats]:
 
 
 def _lies_in(path: Polyline, wall: Polyline) -> bool:
-    """Whether a path lies within a closed one."""
+    """True if a path lies within a closed one."""
     within, away = _parts(path, wall)
     return bool((within | (away <= GOUGE_TOLERANCE_MM)).all())
 
 
 def _cross(one: Polyline, other: Polyline) -> bool:
-    """Whether two closed paths cross, and not only touch."""
+    """True if two closed paths cross, and not only touch."""
     for path, wall in ((one, other), (other, one)):
         within, away = _parts(path, wall)
         clear = away > GOUGE_TOLERANCE_MM
@@ -227,8 +229,8 @@ def _cross(one: Polyline, other: Polyline) -> bool:
 
 
 def _beyond(path: Polyline, wall: Polyline, drawn: Polyline) -> float:
-    """How far the tool's centre gets across a closed line, mm; the side on which most of the drawn
-    contour lies is this side of it."""
+    """Greatest distance of the tool's centre across a closed line, mm; the side on which most of
+    the drawn contour lies is this side of it."""
     length = float(path_lengths(Polylines.of([path]))[0])
     within, away = _within(sample(path, length / SAMPLES_ROUND), wall)
     home, clear = _parts(drawn, wall)
@@ -259,8 +261,9 @@ def _cleared_away(chosen: Chosen, sides: Sides, pocket: Operation) -> Iterator[F
 
 
 def by_uncut(sides: Sides, operation: Operation, rows: Ints) -> Iterator[Finding]:
-    """What follows from uncut closed contours, for those of the operation (`rows`):
-    some have their side because of them, others in spite of those on the layers of frames."""
+    """Yield findings of what follows from uncut closed contours, for those of the operation
+    (`rows`): some have their side because of them, others in spite of those on the layers of
+    frames."""
     seen = sides.seen_by(operation)
     for sentence, turned, around in (
         (SIDE_BY_UNCUT, seen.by_uncut, sides.uncut),

@@ -89,7 +89,7 @@ def circle_of(path: Polyline) -> tuple[tuple[float, float], float] | None:
 
 
 def _turns_once(sweep: Floats) -> bool:
-    """Whether arcs that all turn in one direction make one full turn, and not two."""
+    """True if arcs that all turn in one direction make one full turn, and not two."""
     one_way = bool((sweep > 0.0).all() or (sweep < 0.0).all())
     return one_way and round(abs(float(sweep.sum())) / (2.0 * math.pi)) == 1
 

@@ -1,4 +1,4 @@
-"""What operations make and the order arranges: items, and the runs that they become.
+"""Items, which operations make and the order arranges, and the runs that they become.
 
     operation ─▶ Work: items ─order─▶ items with start and direction ─▶ runs ─link─▶ moves
 
@@ -142,7 +142,7 @@ NO_STARTS.flags.writeable = False
 
 
 class Contour(Struct, frozen=True, eq=False):
-    """One path of the tool centre, to be cut at all levels of its setting.
+    """A path of the tool centre, to be cut at all levels of its setting.
 
     `path` runs as it is to be cut unless `reversible`. `starts`: the vertices of a closed path at
     which it may begin; empty: any that is no joint within an arc. `source`: the index of its path
@@ -195,7 +195,7 @@ def contours_along(
 
 
 class Work(Struct, frozen=True, eq=False):
-    """What an operation made of its paths, and its findings."""
+    """The items that an operation made of its paths, and its findings."""
 
     items: Items
     findings: tuple[Finding, ...] = ()
@@ -222,9 +222,9 @@ class Chosen(Struct, frozen=True, eq=False):
 
 
 class Bridge(Struct, frozen=True, eq=False):
-    """What a tab leaves: `centre` (2,), `ahead` (2,) the direction of its contour there, half its
-    width, half the width of the slot that it spans, mm; its top; `fall` as of its tab; the name of
-    its contour."""
+    """The bridge that a tab leaves: `centre` (2,), `ahead` (2,) the direction of its contour
+    there, half its width, half the width of the slot that it spans, mm; its top; `fall` as of its
+    tab; the name of its contour."""
 
     centre: Floats
     ahead: Floats
@@ -236,7 +236,7 @@ class Bridge(Struct, frozen=True, eq=False):
 
 
 class Step(Struct, frozen=True, eq=False):
-    """What became of one operation: its setting, what it took, its items, the runs in order of
+    """An operation as planned: its setting, what it took, its items, the runs in order of
     cutting with the item that each is of, `owner` (R,), how far rapids go in XY: as drawn, and as
     ordered, mm; and the bridges that its tabs leave."""
 

@@ -19,35 +19,36 @@ from camtool.planning.kinds import OperationKind, function_of, installed_kinds, 
 from camtool.records import replace
 
 SIDES = ("on", "outside", "inside", "auto")
-"""Where the tool of a profile or a chamfer runs: on the line, around it, within it, or as the
-nesting says."""
+"""Sides on which the tool of a profile or a chamfer runs: on the line, around it, within it, or as
+the nesting says."""
 
 DIRECTIONS = ("drawn", "climb", "conventional")
 """The direction of the cut: as drawn, or with the tool's teeth going with or against the feed."""
 
 PATTERNS = ("contour", "zigzag")
-"""How a pocket is cleared: parallel to its contours from inside out, or in straight lines."""
+"""Patterns in which a pocket is cleared: parallel to its contours from inside out, or in straight
+lines."""
 
 JOINS = ("round", "mitre", "sharp")
-"""What the tool centre does about an outer corner: an arc, a corner up to the mitre limit
+"""Path of the tool centre at an outer corner: an arc, a corner up to the mitre limit
 (else cut off), or a corner however long."""
 
 CORNERS = ("none", "dogbone", "overcut")
-"""What is done at inner corners that a round tool cannot fill: nothing; a relief towards the
+"""Reliefs at inner corners that a round tool cannot fill: nothing; a relief towards the
 corner; or along one of its sides."""
 
 ENTRIES = ("plunge", "ramp", "helix")
-"""How the tool goes down: straight, sloping along the contour, or in a helix (pockets; bores
+"""Ways down of the tool: straight, sloping along the contour, or in a helix (pockets; bores
 always)."""
 
 LEADS = ("none", "line", "arc")
-"""How the tool comes to a contour and leaves it."""
+"""Ways of the tool to a contour and away from it."""
 
 STARTS = ("nearest", "longest-line", "corner")
-"""Where a closed contour may begin, if not at a place given by hand."""
+"""Places at which a closed contour may begin, if not at a place given by hand."""
 
 ORIGINS = ("drawing", "lower-left", "centre")
-"""Where part zero lies: at the drawing's own zero, or at a place of the paths that are cut."""
+"""Places of part zero: at the drawing's own zero, or at a place of the paths that are cut."""
 
 SELECTED = (
     "closed",
@@ -60,9 +61,9 @@ SELECTED = (
     "text",
     "not text",
 )
-"""What an operation may take by: closed or open paths; closed ones within no other or an even
-number of others, or within an odd number; full circles, or all but these; single points; what was
-written as text, or all but that."""
+"""Words by which an operation selects: closed or open paths; closed ones within no other or an
+even number of others, or within an odd number; full circles, or all but these; single points; what
+was written as text, or all but that."""
 
 _APART = (
     ("open", ("closed", "outer", "inner", "circle", "point")),
@@ -74,17 +75,16 @@ _APART = (
 """Words that cannot be true of one thing."""
 
 STAGES = ("", "rough", "finish")
-"""What an operation does of one with a finishing pass: all of it (it has none), all but the last
+"""Stages of an operation with a finishing pass: all of it (it has none), all but the last
 pass, or that."""
 
 FINISH_MOST = 0.25
 """A finishing pass takes no more than this part of its tool's diameter."""
 
 COOLANTS = ("off", "mist", "flood", "both")
-"""What cools a cut."""
 
 GOALS = ("rapids", "reversals")
-"""What the order is chosen for: short rapids, or few reversals while cutting."""
+"""Goals of the order: short rapids, or few reversals while cutting."""
 
 FRAMES = ("*border*", "*frame*", "*title*")
 """Layers, by patterns of their names, of what belongs to the sheet of paper."""
@@ -283,11 +283,12 @@ class Tool:
 
     @property
     def nose_mm(self) -> float:
-        """How far above its tip a mill is as wide as its diameter: the radius of its nose, mm."""
+        """Height above its tip at which a mill is as wide as its diameter, mm: the radius of its
+        nose."""
         return {"ball": self.radius_mm, "bull": self.corner_radius_mm}.get(self.kind, 0.0)
 
     def radius_at(self, above_tip_mm: float) -> float:
-        """How wide it is so far above its tip, mm: half of what it cuts at the surface with its
+        """Radius so far above its tip, mm: half of what it cuts at the surface with its
         tip so deep. A drill counts as wide as it is; one of whom only the cone is known grows
         without end."""
         if self.kind == "v" and self.tip_angle_rad is not None:
@@ -299,17 +300,17 @@ class Tool:
         return self.radius_mm - nose + math.sqrt(nose * nose - below * below)
 
     def feed_per_tooth_mm(self, feed_mm_min: float, rpm: float | None) -> float | None:
-        """How far it is fed while an edge takes the place of the one before; None where its flutes
+        """Feed for each cutting edge in a turn, mm; None where its flutes
         or the speed are not known."""
         return feed_mm_min / (rpm * self.flutes) if rpm and self.flutes else None
 
     def edge_speed_m_min(self, rpm: float | None) -> float | None:
-        """How fast its edge moves where it is widest; None without a speed, and for a point."""
+        """Speed of its edge where it is widest, m/min; None without a speed, and for a point."""
         return math.pi * self.diameter_mm * rpm / 1000.0 if rpm and self.diameter_mm else None
 
     @property
     def point_mm(self) -> float:
-        """How far above its tip a mill or a drill is as wide as its diameter, mm."""
+        """Height above its tip at which a mill or a drill is as wide as its diameter, mm."""
         if self.kind != "drill" or self.tip_angle_rad is None:
             return self.nose_mm
         return self.radius_mm / math.tan(0.5 * self.tip_angle_rad)
@@ -758,21 +759,21 @@ class Operation:
 
     @property
     def away_mm(self) -> float:
-        """How far from the drawn line the tool's centre runs beside it, mm."""
+        """Distance of the tool's centre from the drawn line beside which it runs, mm."""
         return self.wall_radius_mm + self.allowance_mm
 
     @property
     def beyond_mm(self) -> float:
-        """How far it cuts beyond the drawn line, mm: by an allowance below 0."""
+        """Distance that it cuts beyond the drawn line, mm: by an allowance below 0."""
         return max(-self.allowance_mm, 0.0)
 
     @property
     def selects(self) -> bool:
-        """Whether it takes less than all that is on its layers and in its colours."""
+        """True if it takes less than all that is on its layers and in its colours."""
         return bool(self.select or self.entities or self.size_mm or self.area_mm2)
 
     def takes(self, layer: str, colour: str) -> bool:
-        """Whether paths of this layer and colour are cut, as far as it does not select them by
+        """True if paths of this layer and colour are cut, as far as it does not select them by
         what they are."""
         return (
             self.contract.takes != "nothing"
@@ -799,7 +800,7 @@ def rested(operations: Sequence[Operation]) -> list[Operation]:
 
 @dataclass(frozen=True)
 class Placement:
-    """How the drawing comes into the work frame, in this order: mirrored ("x" turns the sign of
+    """The way of the drawing into the work frame, in this order: mirrored ("x" turns the sign of
     x, "y" of y), rotated, scaled by `scale` or to fit into `fit_mm` (width, height; 0: any),
     repeated `copies` (columns, rows) times at `pitch_mm`; then `origin` becomes part zero: one
     of ORIGINS, or the place (x, y) mm of the drawing so changed."""
@@ -886,7 +887,7 @@ class Stock:
 
     @property
     def through_mm(self) -> float:
-        """How far below the stock cuts may go, mm."""
+        """Greatest depth of cuts below the stock, mm."""
         if self.spoilboard_mm is not None:
             return self.spoilboard_mm
         return min(THROUGH_MM, THROUGH_SHARE * self.thickness_mm)
@@ -928,7 +929,7 @@ class Job:
         return tuple(dict.fromkeys(every))
 
     def takes(self, layer: str, colour: str) -> bool:
-        """Whether any operation cuts the paths of this layer and colour."""
+        """True if any operation cuts the paths of this layer and colour."""
         return any(operation.takes(layer, colour) for operation in self.operations)
 
 

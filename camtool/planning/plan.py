@@ -216,9 +216,9 @@ def _step(
     sides: Sides,
     rough: Step | None = None,
 ) -> Step:
-    """One operation from what it takes to its runs, for a tool that comes from the first point
-    of its `ends` and goes to the second (None: stays). `rough`: what has cleared the way, where
-    it is a finishing pass."""
+    """Plan one operation from what it takes to its runs, for a tool that comes from the first
+    point of its `ends` and goes to the second (None: stays). `rough`: what has cleared the way,
+    where it is a finishing pass."""
     chosen = choose(placed, setting.operation, sides)
     work: Work = function_of(setting.operation.contract.work)(chosen, setting)
     items, bare = work.items, list[Finding]()
@@ -288,7 +288,7 @@ def _text_as_edge(
 
 
 def _is_divided(job: Job, operation: Operation) -> bool:
-    """Whether contours of the operation are cut as runs, against reversals."""
+    """True if contours of the operation are cut as runs, against reversals."""
     if job.minimise != "reversals":
         return False
     from camtool.planning.reversing import may_divide
@@ -383,7 +383,7 @@ def _begun_between_tabs(contours: list[Contour]) -> list[Contour]:
 
 
 def _end(runs: Runs, here: Point) -> Point:
-    """Where the tool comes up after the runs."""
+    """Return the place (x, y) mm at which the tool comes up after the runs."""
     if not len(runs):
         return here
     x, y = runs.vertices[-1, :2].tolist()
@@ -391,7 +391,7 @@ def _end(runs: Runs, here: Point) -> Point:
 
 
 def _left_over(placed: Drawing, job: Job, cuts: bool) -> list[Finding]:
-    """What is drawn and not cut: points that are not drilled, or all of it."""
+    """Return findings of what is drawn and not cut: points that are not drilled, or all of it."""
     found: list[Finding] = []
     drills = [operation for operation in job.operations if operation.contract.takes == "holes"]
     left = [

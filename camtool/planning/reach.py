@@ -71,7 +71,7 @@ class Unreached(Struct, frozen=True, eq=False):
 
 
 def opened(region: Polylines, tool_radius_mm: float) -> Polylines:
-    """What a disc covers that stays in a region (on the left of its closed paths)."""
+    """Return what a disc covers that stays in a region (on the left of its closed paths)."""
     return offset_shape(offset_shape(region, tool_radius_mm), -tool_radius_mm)
 
 
@@ -272,7 +272,8 @@ def _joined(sections: list[Polyline]) -> list[Polyline]:
 def unreached_findings(
     region: Polylines, setting: Setting, *, hair_mm: float = 0.0
 ) -> list[Finding]:
-    """What a tool within the region (on the left of its closed paths) cannot touch.
+    """Return findings of what a tool within the region (on the left of its closed paths) cannot
+    touch.
 
     Feet of corners are not reported where the operation makes reliefs, nor for chamfers, whose
     bevels are round there. Slots narrower than the
@@ -290,8 +291,9 @@ def unreached_findings(
 
 
 def cut_away_findings(kept: Polylines, operation: Operation) -> list[Finding]:
-    """Where an operation that cuts beyond its lines cuts away what is to stay (on the left of its
-    closed paths) from both sides: what a disc of that radius does not cover, but for corners."""
+    """Return findings where an operation that cuts beyond its lines cuts away what is to stay (on
+    the left of its closed paths) from both sides: what a disc of that radius does not cover, but
+    for corners."""
     beyond = operation.beyond_mm
     if not beyond:
         return []

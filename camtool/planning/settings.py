@@ -51,7 +51,7 @@ class Cone(Struct, frozen=True):
         return min(self.tip_mm + depth_mm * self.slope, self.widest_mm)
 
     def depth_of(self, rho: Floats) -> Floats:
-        """How deep the tip goes to cut these radii at the surface."""
+        """Depths of the tip, mm, at which it cuts these radii at the surface."""
         return np.maximum(rho - self.tip_mm, 0.0) / self.slope
 
 

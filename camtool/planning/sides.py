@@ -224,7 +224,7 @@ class Sides(Struct, eq=False, dict=True):
 
 
 class Traits:
-    """What M paths are, each found out when an operation asks for it. `edges` (M,): those by
+    """Traits of M paths, each found out when an operation asks for it. `edges` (M,): those by
     which outer and inner ones are told."""
 
     def __init__(self, nesting: Nesting, sources: tuple[str, ...], edges: Bools) -> None:
@@ -286,14 +286,14 @@ def _within(sizes: Floats, limits: tuple[float, float]) -> Bools:
 
 
 def is_named(operation: Operation, source: str) -> bool:
-    """Whether an operation takes the entity of this name, such as "CIRCLE 2F": by the whole name,
+    """True if an operation takes the entity of this name, such as "CIRCLE 2F": by the whole name,
     or by what stands behind the kind (the handle, or the id)."""
     names = [source, source.partition(" ")[2]]
     return not operation.entities or any(matches(operation.entities, name) for name in names)
 
 
 def takes_mark(operation: Operation, mark: Mark) -> bool:
-    """Whether an operation takes a single point: it has no size, and is a point only."""
+    """True if an operation takes a single point: it has no size, and is a point only."""
     if operation.size_mm is not None or operation.area_mm2 is not None:
         return False
     if operation.select and operation.select != ("point",):
@@ -302,7 +302,7 @@ def takes_mark(operation: Operation, mark: Mark) -> bool:
 
 
 def _selection(operation: Operation) -> str:
-    """What an operation selects, in words."""
+    """Describe in words what an operation selects."""
     said = list(dict.fromkeys(operation.select))
     for key, limits, unit in (
         ("size", operation.size_mm, "mm"),
@@ -348,7 +348,8 @@ def _runs_along(path: Polyline, other: Polyline) -> bool:
 
 
 def choose(drawing: Drawing, operation: Operation, sides: Sides) -> Chosen:
-    """What the operation takes of a drawing in the work frame, with the sides of that drawing.
+    """Choose what the operation takes of a drawing in the work frame, with the sides of that
+    drawing.
 
     OptionError, naming what there is, when the drawing has something, but nothing of that.
     """

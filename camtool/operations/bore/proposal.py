@@ -1,4 +1,4 @@
-"""What `camtool job new` bores: circles within parts that are wider than the tool."""
+"""Bores that `camtool job new` proposes: circles within parts that are wider than the tool."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from camtool.planning.holes import HOLE_SIZE_MM, circle_of
 
 
 def proposed(left: Remaining) -> list[Part]:
-    """One operation for the circles in which the tool has room to go round."""
+    """Return one operation for the circles in which the tool has room to go round."""
     paths, least = left.drawing.paths, left.proposal.tool_mm + HOLE_SIZE_MM
     if not left.proposal.tool_mm:
         return []

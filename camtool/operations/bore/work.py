@@ -73,7 +73,7 @@ TURN_SLACK = 1e-9
 
 
 def bore(chosen: Chosen, setting: Setting) -> Work:
-    """One Fixed item for each circle that is wider than the tool.
+    """Return one Fixed item for each circle that is wider than the tool.
 
     Circles within another one are bored with it. What is no circle, or has no room for the tool,
     is named in a finding. OptionError for a tool that cuts no width.
@@ -199,7 +199,7 @@ def _plunged(hole: Hole, setting: Setting) -> tuple[tuple[CutRun, ...], list[Fin
 
 
 def _turns(radius_mm: float, depth_mm: float, operation: Operation) -> int:
-    """How many turns it takes down, none of which is too steep or too deep."""
+    """Fewest turns down of which none is too steep or too deep."""
     pitch = 2.0 * math.pi * radius_mm * math.tan(operation.entry.angle_rad)
     if operation.step_down_mm is not None:
         pitch = min(pitch, operation.step_down_mm)

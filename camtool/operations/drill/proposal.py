@@ -1,4 +1,4 @@
-"""What `camtool job new` drills: points, small circles, and circles as wide as the tool."""
+"""Holes that `camtool job new` proposes: points, small circles, circles as wide as the tool."""
 
 from __future__ import annotations
 

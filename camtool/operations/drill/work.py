@@ -36,7 +36,7 @@ from camtool.planning.naming import operation_name
 
 
 def drill(chosen: Chosen, setting: Setting) -> Work:
-    """One Fixed item for each mark and each circle up to the largest hole of the operation.
+    """Return one Fixed item for each mark and each circle up to the largest hole of the operation.
 
     Places that are drawn twice are drilled once; of concentric circles the one nearest to the
     drill's diameter counts. What is no hole for this drill is named in a finding; when nothing
@@ -99,7 +99,7 @@ def _no_circles(names: list[str]) -> Iterator[Finding]:
 
 
 def _other_sizes(holes: list[Hole], operation: Operation) -> Iterator[Finding]:
-    """One finding for each diameter that is not the drill's."""
+    """Yield one finding for each diameter that is not the drill's."""
     wanted = operation.tool.diameter_mm
     by_size: dict[float, list[str]] = {}
     for hole in holes:

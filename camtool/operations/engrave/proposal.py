@@ -1,4 +1,4 @@
-"""What `camtool job new` engraves: text, open lines, and layers whose name says so."""
+"""Engravings that `camtool job new` proposes: text, open lines, and layers whose name says so."""
 
 from __future__ import annotations
 

@@ -84,7 +84,7 @@ Link = Callable[[Floats, Floats], Floats | None]
 
 
 class Pocket(Struct, frozen=True, eq=False):
-    """One region to be cleared, on the left of its closed paths, work frame; the name of its
+    """A region to be cleared, on the left of its closed paths, work frame; the name of its
     outer path and the index of that in the placed drawing."""
 
     region: Polylines
@@ -101,7 +101,8 @@ class Cleared(Struct, frozen=True, eq=False):
 
 
 def pocket(chosen: Chosen, setting: Setting) -> Work:
-    """One item for each region that the closed paths enclose (even-odd), and what stays uncut.
+    """Return one item for each region that the closed paths enclose (even-odd), with findings of
+    what stays uncut.
 
     OptionError for an open path, for paths that cross, and for a tool that cuts no width.
     """
@@ -179,8 +180,8 @@ def _cleared(slots: list[Floats], each: Pocket, setting: Setting) -> Cleared:
 
 
 def _left_mm(setting: Setting) -> float:
-    """What is left beside the edge: the allowance, and of a carving its slopes. The wall of a V
-    bit of half the angle α is z tan α from the edge where it is z deep."""
+    """Distance left beside the edge, mm: the allowance, and of a carving its slopes. The wall of a
+    V bit of half the angle α is z tan α from the edge where it is z deep."""
     operation, carved = setting.operation, setting.operation.rest_of
     if carved is None or carved.contract.rest != "floor" or carved.tool.tip_angle_rad is None:
         return operation.allowance_mm
@@ -313,7 +314,7 @@ def _slot(each: Pocket, slot: Floats, operation: Operation) -> Finding:
 
 
 class Down(Struct, frozen=True, eq=False):
-    """How the tool goes down: the centre (2,) and radius of a helix; or a ramp; or neither (a
+    """The way down of the tool: the centre (2,) and radius of a helix; or a ramp; or neither (a
     plunge). `changed` says what did not fit, "" when all does."""
 
     centre: Floats | None = None
@@ -325,8 +326,8 @@ class Down(Struct, frozen=True, eq=False):
 def down_for(
     path: Floats, around: ConnectedRegion | None, whole: ConnectedRegion | None, setting: Setting
 ) -> Down:
-    """What fits of the entry that is asked for: a helix about the pole of a region that keeps to
-    the whole region; else a ramp along the path; else a plunge."""
+    """Choose what fits of the entry that is asked for: a helix about the pole of a region that
+    keeps to the whole region; else a ramp along the path; else a plunge."""
     entry = setting.operation.entry
     if entry.kind == "plunge":
         return Down()

@@ -1,4 +1,4 @@
-"""What `camtool job new` cuts by profiles: closed contours; with a tool, the outer ones last."""
+"""Profiles that `camtool job new` proposes: closed contours; with a tool, the outer ones last."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ MIN_TAB_HEIGHT_MM = 0.5
 
 
 def proposed(left: Remaining) -> list[Part]:
-    """One operation for all closed contours; where the tool is known, one for those within parts
-    and one for the outer ones, with tabs where the stock is known too."""
+    """Return one operation for all closed contours; where the tool is known, one for those within
+    parts and one for the outer ones, with tabs where the stock is known too."""
     if not left.proposal.tool_mm:
         select = (("select", '["closed"]', ""),) if left.is_divided else ()
         return [Part(left.title, "profile", left.contours, 0, select)] if left.contours else []

@@ -68,7 +68,7 @@ class _Line(Struct, frozen=True, eq=False):
 
 
 class _Found(Struct, eq=False):
-    """What comes together while the paths of an operation are gone through."""
+    """Lines and findings, collected path by path."""
 
     lines: list[_Line] = field(default_factory=list)
     findings: list[Finding] = field(default_factory=list)
@@ -224,7 +224,7 @@ def _sources(paths: Polylines, shape: Polylines) -> list[tuple[int, ...]]:
 
 
 def _is_double(shape: Polylines, place: int) -> bool:
-    """Whether an earlier path of the shape runs along all of this one."""
+    """True if an earlier path of the shape runs along all of this one."""
     segments = Segments.of(shape)
     mine, earlier = segments[segments.path == place], segments[segments.path < place]
     if len(earlier) == 0:

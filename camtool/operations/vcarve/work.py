@@ -101,7 +101,7 @@ class _Region(Struct, frozen=True, eq=False):
 
 
 def vcarve(chosen: Chosen, setting: Setting) -> Work:
-    """One Fixed item for each region: what an even-odd reading of the closed paths fills.
+    """Return one Fixed item for each region: what an even-odd reading of the closed paths fills.
 
     Where paths cross it is not defined what is filled: a finding of severity error, and no items.
     OptionError for an open path and for a tool that is no V bit.
@@ -194,7 +194,8 @@ def _walks(trace: MedialTrace, floor: list[Floats], band: Band, again_mm: float)
 
 
 def _passed_by(pieces: list[Floats], point: Floats) -> float:
-    """How far in the plane pieces pass by a point, mm; inf if there are none."""
+    """Distance of a point from the nearest of the pieces in the plane, mm; inf if there are
+    none."""
     rows = [np.column_stack([piece[:-1], piece[1:, :2]]) for piece in pieces]
     if not rows:
         return math.inf
@@ -212,7 +213,8 @@ def _run(path: Floats, setting: Setting, cone: Cone, name: str) -> CutRun:
 
 
 def _too_narrow(region: _Region, trace: MedialTrace, cone: Cone) -> Iterator[Finding]:
-    """What a flat tip cannot enter: all of the region, or its corners and narrow places."""
+    """Yield a finding for what a flat tip cannot enter: all of the region, or its corners and
+    narrow places."""
     from camtool.planning.reach import unreached
 
     tip, widest = 2.0 * cone.tip_mm, 2.0 * float(trace.rho.max())
@@ -331,7 +333,7 @@ def _index_runs(trace: MedialTrace, wanted: Bools, partners: bool = True) -> lis
 def _wall(
     boundary: Boundary, element: int, part: tuple[float, float], distance_mm: float
 ) -> Floats:
-    """What runs beside a part of an element: a line, or an arc of the same sweep."""
+    """Return the parallel of a part of an element: a line, or an arc of the same sweep."""
     from camtool.kernels.discs import SWEEP, frame
 
     rows = []
@@ -376,7 +378,7 @@ def _bulge(discs: Floats, tolerance_mm: float) -> float | None:
 
 
 def _off_arc(inner: Floats, begin: Floats, end: Floats, bulge: float) -> float:
-    """How far discs lie from an arc along which the radius changes evenly with the sweep."""
+    """Distances of discs from an arc along which the radius changes evenly with the sweep."""
     chord = end[:2] - begin[:2]
     turned = np.array([-chord[1], chord[0]])
     centre = 0.5 * (begin[:2] + end[:2]) + (1.0 - bulge**2) / (4.0 * bulge) * turned
@@ -408,7 +410,7 @@ def graph_of(pieces: list[Floats]) -> Graph:
 
 
 def _extent(piece: Floats) -> float:
-    """How far the piece leaves its start, by its points; above 0 for a full turn."""
+    """Greatest distance of the points of a piece from its start; above 0 for a full turn."""
     return float(np.hypot(*(piece[1:, :2] - piece[0, :2]).T).max())
 
 
