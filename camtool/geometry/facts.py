@@ -144,7 +144,7 @@ def _healing(drawing: Drawing) -> dict[str, Any]:
 # The smallest features of a drawing: radius, segment, contour, and the wall between contours.
 #
 # The least distance between two closed contours that do not cross is met at a vertex of one of
-# them, or within an arc. A tree of boxes finds the first (kernels/closest.py); then pairs with an
+# them, or within an arc. A tree of boxes finds the first (kernels/fits.pyx); then pairs with an
 # arc whose boxes are as near as that, and pairs whose boxes touch, are measured exactly.
 
 MAX_WALL_PAIRS = 200_000

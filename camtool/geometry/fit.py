@@ -1,8 +1,8 @@
 """Curves to tangent-continuous chains of arcs and lines, as few as the tolerance allows.
 
-Nodes are laid on the curve, dense where it bends (`curve_nodes`, kernels/bezier.py); between them
+Nodes are laid on the curve, dense where it bends (`curve_nodes`, kernels/fits.pyx); between them
 the longest biarcs, arcs and lines within the tolerance are chained so that their number is small
-(`kernels/spans.py`). Chains break their tangent only where the curve does.
+(`kernels/fits.pyx`). Chains break their tangent only where the curve does.
 
 Errors are distances from dense points of the true curve to the arcs. The other direction needs no
 measuring: both have the same ends, and while the distance is below the arcs' radii the foot points
@@ -22,16 +22,12 @@ from camtool.errors import GeometryError
 from camtool.geometry.curves import Curve, Pieced, Pieces
 from camtool.geometry.polylines import BULGE_EPS, POSITION_EPS_MM
 from camtool.kernels.fits import (
-    ACCEPTED_SHARE,
     ASIDE_FROM,
     ASIDE_TO,
-    ATTEMPTS,
     CORNER_ANGLE_RAD,
     MAX_NODES,
     MEASURE_STEPS,
     MIN_STEPS,
-    REFINING,
-    SEARCH_SHARE,
     SPAN_TURN_RAD,
     STEP_ERROR_SHARE,
     STEP_TURN_RAD,
@@ -43,6 +39,19 @@ Judged = tuple[float, float, float]
 
 MAX_SIZE_MM = 1e100
 """The products of larger numbers would not be finite."""
+
+SEARCH_SHARE = 0.97
+"""The share of the tolerance that the search may use up: errors peak between nodes."""
+
+ACCEPTED_SHARE = 0.995
+"""A fit is accepted when its measured error is within this share of the tolerance: between the
+points at which it is measured the error may be a little more."""
+
+ATTEMPTS = 8
+"""How often a fit whose measured error is too large is repeated, each time finer."""
+
+REFINING = 1.0 / 8.0
+"""The share of its error that a step between nodes may keep at each further attempt."""
 
 
 class Fit(Struct, frozen=True, eq=False):

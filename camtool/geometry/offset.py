@@ -54,7 +54,7 @@ The result is exact up to these: each point is at the distance from the source w
 POSITION_EPS_MM, and all points that are so on that side are in the result. Loops come in the order
 of the first piece of the source that they run along, and begin there.
 
-All inner loops are compiled (camtool/kernels/offsets.py) and ask trees of boxes, so the time
+All inner loops are compiled (camtool/kernels/offsets.pyx) and ask trees of boxes, so the time
 grows as n log n in the number of segments, and with the number of true meetings.
 """
 

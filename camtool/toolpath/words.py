@@ -15,7 +15,7 @@ import numpy as np
 from msgspec import Struct
 
 from camtool.arrays import Bools, Codes, Ints, Octets
-from camtool.kernels.words import MOST_NUMBER, put_words
+from camtool.kernels.words import MAX_NUMBER_CHARS, put_words
 
 ROWS_AT_ONCE = 1 << 14
 """Blocks formatted at a time, to bound the buffer."""
@@ -80,7 +80,7 @@ def texts_of(columns: Sequence[WordColumn], *, blanks: bool = False, end: str = 
     fixed = np.frombuffer("".join(pieces).encode("ascii"), dtype=np.uint8).copy()
     fixed_ends = np.cumsum([len(piece) for piece in pieces])
     styles = np.array([each.style for each in columns], dtype=np.int64)
-    room = len(fixed) + len(columns) * (MOST_NUMBER + 1)
+    room = len(fixed) + len(columns) * (MAX_NUMBER_CHARS + 1)
     out: Octets = np.empty(ROWS_AT_ONCE * room, dtype=np.uint8)
     count, parts, ends = len(columns[0].units), [], np.zeros(len(columns[0].units), dtype=np.int64)
     begin = 0

@@ -53,7 +53,7 @@ from camtool.simulation.speed_plan import (
 from camtool.toolpath.moves import Kind, PathMode, PolarArcs, Toolpath, are_arcs, read_only
 
 from .dialect import LinuxcncController, LinuxcncDialect
-from .steps import MOST_IN_CHAIN, merge_lines
+from .steps import MAX_CHAIN_POINTS, merge_lines
 
 _Machine = Machine[LinuxcncController, LinuxcncDialect]
 
@@ -561,7 +561,7 @@ def begins_of(path: Toolpath, modes: CornerModes) -> tuple[Ints, Floats]:
     where `merge_rows` leaves it (N,)."""
     length, begins = np.zeros(len(path)), [np.zeros(1, dtype=np.int32)]
     low, end = 0, 2 * len(path)
-    at_once = max(ROWS_AT_ONCE, MOST_IN_CHAIN + 2)  # more than one line has
+    at_once = max(ROWS_AT_ONCE, MAX_CHAIN_POINTS + 2)  # more than one line has
     while low < end:
         base = low // 2
         part = path.part(base, min(base + at_once, len(path)))

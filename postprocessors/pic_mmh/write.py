@@ -27,7 +27,6 @@ from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Program
 from camtool.toolpath.words import WordColumn, line_lengths, texts_of
 
-from .arcs import CLOCKWISE, ITERATION, land
 from .dialect import PicMmhMachine
 from .findings import (
     ARC_MENDED,
@@ -39,6 +38,7 @@ from .findings import (
     VALUE_ROUNDED,
 )
 from .numbers import UnitGrid, check_motion, event_words, far_arcs, numbers_of
+from .steps import CLOCKWISE, ITERATION, land
 
 BUFFER_CHARS: Final = 35
 """Characters of the thesis's buffer (L1740-1742), which cannot have taken its own sample block."""

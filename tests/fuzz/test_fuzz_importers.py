@@ -13,6 +13,8 @@ from tests.fuzz.reading import read_or_refuse
 from tests.fuzz.seeds import BINARIES, TEXTS
 from tests.waiting import no_chewing
 
+pytestmark = pytest.mark.checked
+
 SEEDS = TEXTS | BINARIES
 CHOICES = st.integers(0, 2**20)
 EVERYTHING = {"text": "stroke", "dimensions": True, "recognise_arcs": True, "across_layers": True}

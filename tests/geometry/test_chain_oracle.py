@@ -18,6 +18,8 @@ from camtool.kernels.chaining import nearest_others
 from tests.oracles.chaining import chained, nearest_other
 from tests.paths import mirrored, moved, scaled
 
+pytestmark = pytest.mark.checked
+
 GAP = 0.01
 
 # Points on a coarse lattice, some a hair or half a gap off, so that ends meet in many ways.

@@ -22,6 +22,8 @@ from camtool.kernels.fits import (
 from tests.oracles import arcs
 from tests.oracles.curves import dense_parameters, fewest_arcs, fewest_chords, sharp_points
 
+pytestmark = pytest.mark.checked
+
 TOLERANCE_MM = 0.0005
 JOINT_ANGLE_RAD = 1e-3
 KINDS = ("cubic", "skinny", "cusp", "spline", "ellipse", "odd")

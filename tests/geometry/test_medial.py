@@ -19,6 +19,8 @@ from camtool.operations.vcarve.work import with_level
 from tests.oracles import contours as shapes
 from tests.strategies import contours
 
+pytestmark = pytest.mark.checked
+
 EXACT_MM = 1e-9
 TOLERANCE_MM = 1e-3
 NAMED = ["SQUARE", "ELL", "DUMBBELL", "KEYHOLE", "LENS", "CRESCENT", "NOTCH", "FILLETED", "SLOT"]

@@ -53,6 +53,8 @@ from tests.oracles.contours import (
 from tests.oracles.offset import complaints, distance, distance_complaints
 from tests.paths import mirrored, moved, offset, scaled, there_and_back
 
+pytestmark = pytest.mark.checked
+
 Case = tuple[str, Polyline, float, int]
 
 # name, source (all CCW), distance, how many results: the reason

@@ -15,6 +15,8 @@ from tests.oracles.contours import RANDOM, is_simple
 from tests.oracles.offset import complaints, distance, distance_complaints
 from tests.paths import mirrored, offset, there_and_back
 
+pytestmark = pytest.mark.checked
+
 SIZES = st.floats(-1.0, 2.0).map(lambda power: 10.0**power)
 """0.1 to 100 mm."""
 

@@ -48,6 +48,8 @@ from tests.oracles.offset_shapes import shape_complaints
 from tests.paths import mirrored, moved, offset, scaled
 from tests.strategies import contours
 
+pytestmark = pytest.mark.checked
+
 FRAME = closed((-20, -20), (40, -20), (40, 40), (-20, 40))
 PLATE = [FRAME, CIRCLE, moved(SQUARE, 15, -5), moved(SLOT, 5, 20), closed((-2, 0, 1), (2, 0, 1))]
 PAIR = [SQUARE, moved(SQUARE, 12, 0)]

@@ -18,6 +18,8 @@ from camtool.kernels.fits import MAX_TURN_RAD, circle_of, find_runs
 from tests.oracles import arcs
 from tests.oracles.recognise import explode, least_squares_circle, turns_about
 
+pytestmark = pytest.mark.checked
+
 TOLERANCE_MM = 0.0005
 
 

@@ -1,14 +1,11 @@
 """The house's direction: rooms import only from below, and heavy packages only where used."""
 
 import ast
-import importlib
-import importlib.util
 import re
 import subprocess
 import sys
 import tomllib
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -93,9 +90,26 @@ MACHINES = [path.parent for path in sorted(ROOT.glob("postprocessors/*/machine.t
 
 
 def files() -> list[Path]:
-    found = sorted([*ROOT.glob("camtool/**/*.py"), *ROOT.glob("postprocessors/**/*.py")])
+    found = sorted([*ROOT.glob("camtool/**/*.py*"), *ROOT.glob("postprocessors/**/*.py*")])
+    found = [path for path in found if path.suffix in {".py", ".pyx"}]
     assert len(found) > 100
+    assert any(path.suffix == ".pyx" for path in found)
     return found
+
+
+def source_of(path: Path) -> str:
+    """The text of a Python file; of a Cython file its imports, as Python has them."""
+    text = path.read_text(encoding="utf-8")
+    if path.suffix == ".py":
+        return text
+    imports = re.findall(r"^(?:from \S+ )?c?import (?:\([^)]*\)|.*)", text, re.MULTILINE)
+    return "\n".join(re.sub(r"\bcimport\b", "import", line) for line in imports)
+
+
+def test_cimports_are_imports_too(tmp_path: Path) -> None:
+    file = tmp_path / "loops.pyx"
+    file.write_text("from camtool.cli.post cimport (\n    a,\n    b,\n)\ncdef int k = 0\n")
+    assert broken_rules(source_of(file), "kernels")
 
 
 def room_of(name: str) -> str | None:
@@ -143,7 +157,7 @@ def broken_rules(source: str, room: str) -> list[str]:
 
 @pytest.mark.parametrize("path", files(), ids=lambda p: str(p.relative_to(ROOT)))
 def test_rooms_import_from_below_only(path: Path) -> None:
-    assert broken_rules(path.read_text(encoding="utf-8"), room_of_file(path)) == []
+    assert broken_rules(source_of(path), room_of_file(path)) == []
 
 
 @pytest.mark.parametrize(
@@ -206,10 +220,7 @@ def circles(arrows: dict[str, set[str]]) -> set[str]:
 
 
 def test_no_circle_of_imports() -> None:
-    sources = {
-        module_of(path): (path.read_text(encoding="utf-8"), path.name == "__init__.py")
-        for path in files()
-    }
+    sources = {module_of(path): (source_of(path), path.name == "__init__.py") for path in files()}
     assert circles(graph(sources)) == set()
 
 
@@ -224,10 +235,10 @@ def test_a_circle_would_be_found() -> None:
 
 @pytest.mark.parametrize("folder", MACHINES, ids=lambda path: path.name)
 def test_a_target_never_imports_another(folder: Path) -> None:
-    modules = list(folder.glob("**/*.py"))
+    modules = [path for path in files() if path.is_relative_to(folder)]
     assert folder / "__init__.py" in modules
     for path in modules:
-        assert reached_rooms(path.read_text(encoding="utf-8")) <= {"gcode"}, path.name
+        assert reached_rooms(source_of(path)) <= {"gcode"}, path.name
 
 
 def test_every_target_is_looked_at() -> None:
@@ -241,39 +252,11 @@ def test_every_target_is_looked_at() -> None:
 
 @pytest.mark.parametrize("path", files(), ids=lambda p: str(p.relative_to(ROOT)))
 def test_heavy_packages_are_imported_where_they_are_used(path: Path) -> None:
-    tree = ast.parse(path.read_text(encoding="utf-8"))
+    tree = ast.parse(source_of(path))
     top = [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
     tops = ast.Module(body=list(top), type_ignores=[])
     for line, module in imported(tops, neighbours=room_of_file(path) == "postprocessors"):
         assert module.split(".")[0] not in HEAVY, f"line {line} imports {module}"
-
-
-def build_backend() -> Any:
-    """The module that builds the package."""
-    file = ROOT / "build_backend" / "camtool_build.py"
-    spec = importlib.util.spec_from_file_location("camtool_build", file)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-def test_every_package_is_shipped() -> None:
-    ours = [*ROOT.glob("camtool/**/__init__.py"), *ROOT.glob("postprocessors/**/__init__.py")]
-    there = {".".join(path.parent.relative_to(ROOT).parts) for path in ours}
-    assert set(build_backend().settings()["packages"]) == {
-        re.sub("^postprocessors", "camtool_postprocessors", name) for name in there
-    }
-
-
-def test_every_loop_is_compiled_where_it_runs() -> None:
-    """A module of a checkout shadows the installed one; without its compiled form beside it, it
-    would run a hundred times slower and nobody would know why."""
-    for name in build_backend().compiled_modules():
-        file = importlib.import_module(name).__file__
-        assert file is not None
-        assert not file.endswith(".py"), f"{name}: pip install -e . compiles it"
 
 
 def loaded_by(*arguments: str) -> set[str]:

@@ -4,6 +4,7 @@ docs/benchmarks.md has the times.
 """
 
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -143,3 +144,23 @@ def test_a_short_run_does_not_look_for_garbage() -> None:
     seen = [sum(map(int, look.split())) for look in looks]
     assert seen, "Python tells of every look"
     assert sum(seen) < 5_000  # a hundred thousand, were it left as it is
+
+
+def test_a_checkout_without_compiled_kernels_names_the_command(tmp_path: Path) -> None:
+    """Python puts the folder where it is started before the installed packages."""
+    ignored = shutil.ignore_patterns("*.so", "*.pyd", "__pycache__")
+    shutil.copytree(ROOT / "camtool", tmp_path / "camtool", ignore=ignored)
+    command = ["-m", "camtool", "post", str(ROOT / "samples" / "logo.dxf"), *PIC, "-o", "part.pic"]
+
+    def run(*flags: str) -> subprocess.CompletedProcess[str]:
+        line = [sys.executable, *flags, *command]
+        return subprocess.run(line, capture_output=True, text=True, cwd=tmp_path, check=False)
+
+    shadowed = run()
+    assert shadowed.returncode == 2
+    assert shadowed.stderr.count("\n") == 1
+    assert "kernels of this checkout are not compiled" in shadowed.stderr
+    assert "python -P -m camtool" in shadowed.stderr
+    assert not (tmp_path / "part.pic").exists()
+    assert run("-P").returncode == 0
+    assert (tmp_path / "part.pic").stat().st_size > 0

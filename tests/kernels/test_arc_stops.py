@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 
 from tests.oracles import arc_ends as oracle
 
+pytestmark = pytest.mark.checked
+
 
 def stop(
     start: tuple[int, int], end: tuple[int, int], clockwise: bool, rounded: bool, reading: str

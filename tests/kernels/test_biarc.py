@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from camtool.kernels.fits import biarc, distance_to_arc, longest_span, span_error
 from tests.oracles import arcs
+
+pytestmark = pytest.mark.checked
 
 number = st.floats(-10.0, 10.0, allow_subnormal=False)
 point = st.tuples(number, number)

@@ -18,6 +18,8 @@ from hypothesis import strategies as st
 
 from tests.oracles.controllers import direct_search
 
+pytestmark = pytest.mark.checked
+
 
 def twin(x: int, y: int, clockwise: bool, count: int, error: int = 0) -> np.ndarray:
     """The first positions of the literal loop."""

@@ -1,6 +1,7 @@
 """Which points a ring holds, against its oracle; paths held, against all their points asked."""
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -8,6 +9,8 @@ from camtool.geometry.nesting import inside
 from camtool.geometry.polylines import Polylines, Segments
 from tests.oracles import inside as oracle
 from tests.oracles.contours import CIRCLE, CRESCENT, FILLETED, KEYHOLE, RANDOM, SQUARE, comb
+
+pytestmark = pytest.mark.checked
 
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from(list(RANDOM)))

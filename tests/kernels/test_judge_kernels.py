@@ -31,6 +31,8 @@ from tests.oracles.kernel_doors import (
 )
 from tests.oracles.near_moves import Arc, Line, Move, nearest, random_move
 
+pytestmark = pytest.mark.checked
+
 EPS = 1e-12
 
 part_of_an_array = st.integers(0, 140).flatmap(

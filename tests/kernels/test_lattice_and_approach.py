@@ -17,6 +17,8 @@ from camtool_postprocessors.pic_mmh.steps import (
 from camtool.kernels.lattice import to_steps
 from tests.oracles.controllers import SIGNS, direct_search, first_quadrant, x_grows
 
+pytestmark = pytest.mark.checked
+
 
 def test_hundredths_of_a_micrometre_round_half_away_from_zero() -> None:
     """Every value of the format: n · 0.01 µm is n/14 steps of 0.14 µm, halves included."""

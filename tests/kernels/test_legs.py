@@ -8,6 +8,8 @@ import pytest
 from camtool.kernels.motion import legs_fill
 from tests.oracles.valcnc_run import Place, counter, table_8
 
+pytestmark = pytest.mark.checked
+
 UNIT = np.ones(3)
 
 

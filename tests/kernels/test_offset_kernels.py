@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -30,6 +31,8 @@ from tests.oracles import offset_stages as oracle
 from tests.oracles.contours import RANDOM, gear
 from tests.oracles.offset_shapes import kites
 from tests.paths import offset
+
+pytestmark = pytest.mark.checked
 
 SEEDS = st.integers(0, 2**32 - 1)
 

@@ -10,6 +10,8 @@ from tests.oracles import controllers as twins
 from tests.oracles.controllers import direct_search
 from tests.oracles.mechanics import PulsedAxis
 
+pytestmark = pytest.mark.checked
+
 STEP = 0.00014
 
 

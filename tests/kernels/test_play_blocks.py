@@ -7,6 +7,8 @@ import pytest
 
 from camtool.kernels.play import play_block, play_fill, way_of
 
+pytestmark = pytest.mark.checked
+
 STEP = 0.00014
 
 

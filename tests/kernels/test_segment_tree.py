@@ -10,6 +10,8 @@ from camtool.geometry.distance import points_to_segments
 from camtool.geometry.polylines import Polyline, Polylines, Segments, next_vertices, segment_rows
 from camtool.kernels.offsets import distances_from, segments_within
 
+pytestmark = pytest.mark.checked
+
 
 def drawn(seed: int, count: int) -> Polylines:
     """Paths of lines and arcs about the same places, every other one closed."""

@@ -15,6 +15,8 @@ from camtool_postprocessors.pic_mmh.steps import (
 
 from tests.oracles import controllers as twins
 
+pytestmark = pytest.mark.checked
+
 NOWHERE = (10**9, 10**9)
 STARTS = [(0, 30), (30, 0), (0, -30), (-30, 0)]
 

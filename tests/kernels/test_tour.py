@@ -30,6 +30,8 @@ from camtool.kernels.tours import (
 from camtool.planning.order import Choices, tour_of, travel_mm
 from tests.oracles import tours
 
+pytestmark = pytest.mark.checked
+
 
 def places(count: int, reach: int = 4) -> st.SearchStrategy[list[tuple[int, int]]]:
     """Places with many equal distances among them."""

@@ -18,6 +18,8 @@ from tests.oracles import passes
 from tests.oracles.passes import Cut
 from tests.strategies import polylines
 
+pytestmark = pytest.mark.checked
+
 
 def _arcs(sweeps: list[float], closed: bool = False, radius: float = 2.0) -> Polyline:
     """Arcs of one circle about (1, 1), degrees."""

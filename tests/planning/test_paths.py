@@ -17,6 +17,8 @@ from tests.oracles import passes
 from tests.oracles.arcs import chain_distances, chain_points
 from tests.strategies import contours, open_contours, polylines
 
+pytestmark = pytest.mark.checked
+
 # A half circle, a line, and an arc that bends the other way.
 MIXED = Polyline(np.array([[0, 0, 1.0], [4, 0, 0.0], [4, 6, -0.5], [0, 6, 0.0]]), True)
 

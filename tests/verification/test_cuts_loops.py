@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 from camtool.kernels.chaining import FAR, latest_near
 from tests.oracles import returns
 
+pytestmark = pytest.mark.checked
+
 
 @given(
     st.integers(0, 100),

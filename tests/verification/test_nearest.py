@@ -16,6 +16,8 @@ from camtool.verification.nearest import ANY_CONTOUR, MoveIndex
 from tests.oracles.dense_moves import cut, dense_distance
 from tests.oracles.near_points import near_moves, nearest
 
+pytestmark = pytest.mark.checked
+
 DENSE = 4000
 
 

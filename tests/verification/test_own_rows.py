@@ -18,6 +18,8 @@ from camtool.verification.cuts import cut_moves
 from camtool.verification.matching import Goal
 from camtool.verification.nearest import MoveIndex
 
+pytestmark = pytest.mark.checked
+
 LIMIT_MM, DEPTH_MM, SAMPLE_MM, GRID_MM = 0.005, 0.01, 0.2, 0.001
 
 

@@ -12,6 +12,8 @@ from camtool_postprocessors.flashcut.timers import steps_too_many
 
 from tests.oracles.flashcut_run import Pc
 
+pytestmark = pytest.mark.checked
+
 STEP = 0.0019
 
 

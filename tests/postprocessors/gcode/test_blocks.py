@@ -12,6 +12,8 @@ from camtool.errors import ProgramError
 from camtool.kernels.words import X_WORD
 from tests.waiting import no_chewing
 
+pytestmark = pytest.mark.checked
+
 PARTED = Lexing(letters="GMXYZIJF")
 LOOSE = Lexing(letters="GMXYZIJF", blanks="anywhere")
 BOTH = [PARTED, LOOSE]

@@ -1,6 +1,7 @@
 """Blocks written by columns, against literal loops over the rows."""
 
 import numpy as np
+import pytest
 from camtool_postprocessors.flashcut.write import _Blocks
 from camtool_postprocessors.gcode.plain import PlainRows
 from camtool_postprocessors.gcode.write import BlockOrder, Events, Sent
@@ -12,6 +13,8 @@ from camtool.target.registry import load_target
 from camtool.toolpath.moves import Kind
 from camtool.toolpath.words import texts_of
 from tests.oracles.gcode_blocks import Flashcut, Row, flashcut_blocks, modal_block
+
+pytestmark = pytest.mark.checked
 
 UNITS = st.sampled_from([0, 0, 1, -1, 10, 1500, -2000, 123456])
 FLAGS = st.booleans()

@@ -22,6 +22,8 @@ from tests.oracles.grbl_run import (
     ticks,
 )
 
+pytestmark = pytest.mark.checked
+
 RNG = np.random.default_rng(6)
 STEP_MM = np.array([0.004, 0.005, 0.01])
 

@@ -15,6 +15,8 @@ from camtool.toolpath.moves import COLUMNS, Kind, Toolpath
 from tests.oracles import i8751_packets
 from tests.postprocessors.i8751.machines import OPTIONS, STEP_MM, loaded
 
+pytestmark = pytest.mark.checked
+
 RECORD = bytes.fromhex("01 03 00 64 02 05 00 02 03 04 01 2C 00 00")
 """X 100 steps forward, Y stands, 2 s, Z 300 steps back, no wait."""
 

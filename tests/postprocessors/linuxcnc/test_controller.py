@@ -22,6 +22,8 @@ from tests.oracles.linuxcnc_run import MEASURED, MODES, Measured, Modes, merge, 
 from tests.oracles.motion_rows import RowMotion, rows_of
 from tests.targets import model_of, simulate
 
+pytestmark = pytest.mark.checked
+
 PERIOD = 0.001
 V, A = 30.48, 508.0
 

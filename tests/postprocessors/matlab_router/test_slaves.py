@@ -10,6 +10,8 @@ from scipy.integrate import solve_ivp
 
 from tests.oracles.matlab_slaves import Motor, Slave, TextSlave, run, table
 
+pytestmark = pytest.mark.checked
+
 X = (8.896, 12.2)
 
 

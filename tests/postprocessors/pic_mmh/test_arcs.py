@@ -20,6 +20,8 @@ from tests.oracles import pic_mmh_program as oracle
 from tests.oracles.motion_rows import RowMotion, each_row, rows_of
 from tests.targets import simulate, verify
 
+pytestmark = pytest.mark.checked
+
 STEP_MM = 0.00014
 SEED = 20240607
 EQUAL = ["controller.arc_end=equal"]

@@ -3,11 +3,14 @@
 import math
 
 import numpy as np
-from camtool_postprocessors.pic_mmh.arcs import land
+import pytest
+from camtool_postprocessors.pic_mmh.steps import land
 from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.oracles.arc_landings import Arc, Form, landing
+
+pytestmark = pytest.mark.checked
 
 FORMS = [
     Form(100_000 * 0.00014, 9_999_999, 1.0),

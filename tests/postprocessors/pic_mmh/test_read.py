@@ -14,6 +14,8 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Kind, Move, Toolpath
 
+pytestmark = pytest.mark.checked
+
 THESIS = b"G02X02969.00Y03400.00I03012.00J03040.00F08;"
 ANNEX = b"G02X+02969Y+03400I+03012J+03040F08;"
 

@@ -17,6 +17,8 @@ from tests.oracles.motion_rows import RowMotion, assert_same_rows, rows_of
 from tests.oracles.valcnc_run import Valcnc, table_8
 from tests.targets import model_of, simulate, verify
 
+pytestmark = pytest.mark.checked
+
 ROOT = Path(__file__).parents[3]
 STEP_MM = 0.04
 """8 mm a turn by 200 steps (L1643)."""

@@ -1,0 +1,430 @@
+"""Search for near ends, points and boxes among many, and chains of ends.
+
+Compiled, because each of many is compared with those beside it. Comments above each part say what
+it does.
+"""
+
+from __future__ import annotations
+
+from libc cimport math
+from libc.stdint cimport int32_t, uint8_t
+from camtool.kernels.types cimport Int
+
+import numpy as np
+
+from camtool.arrays import Bools, Floats, Indices, Ints
+
+# Pairs of near ends, which of them are joined, and the chains that the joints make.
+#
+# The two ends of path i are 2i (its start) and 2i + 1 (its end), so `end ^ 1` is the other end of
+# the same path. What makes it exact: nothing is rounded here but the cells of a grid, and cells
+# are only asked for neighbours; distances are compared as they are. `tests/oracles/chaining.py` is
+# the twin.
+
+
+cpdef near_pairs(Int[:, ::1] cells, double[:, ::1] points, double reach, Int most):
+    """Rows (J,), (J,) of all points (E, 2) within `reach` of each other, each pair once.
+
+    `cells` (E, 3): group, column and row of the grid cell of each point, `reach` wide, sorted.
+    No point gets more than `most` pairs with points after it: that bounds time and memory.
+    """
+    cdef Int total
+    cdef Int[::1] one, other, none
+    none = np.empty(0, np.int64)
+    total = _pairs(cells, points, reach, most, none, none)
+    one, other = np.empty(total, np.int64), np.empty(total, np.int64)
+    _pairs(cells, points, reach, most, one, other)
+    return np.asarray(one), np.asarray(other)
+
+
+cdef Int _pairs(
+    Int[:, ::1] cells, double[:, ::1] points, double reach, Int most, Int[::1] one, Int[::1] other
+) noexcept:
+    """Counts the pairs, and writes them when there is room for them.
+
+    Beside a point lie its own cell and the one above, which follow it in the sorted list, and
+    three cells of the next column, whose beginning only moves forward.
+    """
+    cdef Int i, count, low, number, found, after, group, column, row, j
+    count, low, number = 0, 0, len(points)
+    for i in range(number):
+        group, column, row = cells[i, 0], cells[i, 1], cells[i, 2]
+        found = 0
+        while low < number and _before(cells, low, group, column + 1, row - 1):
+            low += 1
+        for after in range(2):
+            j = i + 1 if after == 0 else max(low, i + 1)
+            while (
+                j < number
+                and found < most
+                and cells[j, 0] == group
+                and cells[j, 1] == column + after
+                and cells[j, 2] <= row + 1
+            ):
+                if math.hypot(points[i, 0] - points[j, 0], points[i, 1] - points[j, 1]) <= reach:
+                    if len(one) > 0:
+                        one[count], other[count] = i, j
+                    count += 1
+                    found += 1
+                j += 1
+    return count
+
+
+cdef inline bint _before(Int[:, ::1] cells, Int i, Int group, Int column, Int row) noexcept:
+    if cells[i, 0] != group:
+        return bool(cells[i, 0] < group)
+    if cells[i, 1] != column:
+        return bool(cells[i, 1] < column)
+    return bool(cells[i, 2] < row)
+
+
+cdef Int top(Int[::1] above, Int item) noexcept:
+    """The root of an item's set (union-find with path halving)."""
+    while above[item] != item:
+        above[item] = above[above[item]]
+        item = above[item]
+    return item
+
+
+cpdef clusters(Int count, Int[::1] one, Int[::1] other):
+    """(count,) the least end of all ends that pairs connect with each end."""
+    cdef Int k, i, a, b
+    cdef Int[::1] above
+    above = np.arange(count, dtype=np.int64)
+    for k in range(len(one)):
+        a, b = top(above, one[k]), top(above, other[k])
+        if a < b:
+            above[b] = a
+        elif b < a:
+            above[a] = b
+    for i in range(count):
+        above[i] = top(above, i)
+    return np.asarray(above)
+
+
+cpdef Int join(
+    Int[::1] one, Int[::1] other, Int[::1] mates, Int[::1] above, Int[::1] segments, Int[::1] arcs
+) noexcept:
+    """Joins pairs of free ends in their order into `mates`; how many.
+
+    `above` (paths), `segments` and `arcs` (of each set of joined paths) are updated. A ring
+    around nothing is refused: two lines are one line and its double.
+    """
+    cdef Int joined, k, a, b, s, t
+    joined = 0
+    for k in range(len(one)):
+        a, b = one[k], other[k]
+        if mates[a] >= 0 or mates[b] >= 0:
+            continue
+        s, t = top(above, a // 2), top(above, b // 2)
+        if s == t:
+            if not encloses(segments[s], arcs[s]):
+                continue
+        else:
+            above[t] = s
+            segments[s] += segments[t]
+            arcs[s] += arcs[t]
+        mates[a], mates[b] = b, a
+        joined += 1
+    return joined
+
+
+cdef inline bint encloses(Int segments, Int arcs) noexcept:
+    """False for a ring of so few segments that nothing lies inside."""
+    return segments > 2 or (segments == 2 and arcs > 0)
+
+
+cpdef walk(Int[::1] mates, uint8_t[::1] wanted):
+    """The chains of the wanted paths, each begun at its first path, which is not turned.
+
+    Returns the ends by which the paths are entered, in the order of travel, where each chain
+    begins in them (C + 1,), and which chains are rings (C,).
+    """
+    cdef Int count, index, size, chains, end, start
+    cdef Int[::1] entries, begins
+    cdef uint8_t[::1] rings, seen
+    count = len(wanted)
+    entries, begins = np.empty(count, np.int64), np.empty(count + 1, np.int64)
+    rings, seen = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
+    size, chains = 0, 0
+    for index in range(count):
+        if seen[index] or not wanted[index]:
+            continue
+        begins[chains] = size
+        end = first_end(mates, 2 * index)
+        rings[chains] = end == 2 * index and mates[end] >= 0
+        start = end
+        while end >= 0:
+            entries[size] = end
+            seen[end // 2] = True
+            size += 1
+            end = mates[end ^ 1]
+            if end == start:
+                break
+        chains += 1
+    begins[chains] = size
+    found = np.asarray(rings[:chains]).view(np.bool_)
+    return np.asarray(entries[:size]), np.asarray(begins[: chains + 1]), found
+
+
+cdef Int first_end(Int[::1] mates, Int end) noexcept:
+    """The free end at which the chain that enters a path by `end` begins, `end` for a ring."""
+    cdef Int start
+    start = end
+    while mates[end] >= 0:
+        end = mates[end] ^ 1
+        if end == start:
+            break
+    return end
+
+
+cpdef Int split_loops(
+    Int[::1] starts, Int[::1] mates, Int[::1] node, double[:, ::1] points, double reach,
+    Int[:, ::1] weights
+):
+    """Rings that pass a node twice become two rings there; returns how many were split off.
+
+    Each ring is walked from the end given in `starts`. `node` (ends,) is −1 where only two ends
+    meet; `weights` (paths, 2) are segments and arcs. What has been walked since a node was passed
+    before is a loop: it is closed there, and the rest goes on without it, as long as the ends
+    that then meet lie within `reach`.
+    """
+    cdef Int made, index, start, last, height, end, label, m, k, before, begin, close, segments
+    cdef Int arcs, less, fewer
+    cdef Int[:, ::1] until
+    cdef Int[::1] where, stack
+    cdef bint done, near
+    where = np.full(len(mates), -1, np.int64)
+    stack = np.empty(len(mates) // 2 + 1, np.int64)
+    until = np.zeros((len(stack) + 1, 2), np.int64)
+    made = 0
+    for index in range(len(starts)):
+        start = starts[index]
+        segments, arcs = _ring_weight(start, mates, weights)
+        last = mates[start]
+        height, end, done = 0, start, False
+        while not done:
+            label = node[end]
+            if label >= 0 and where[label] >= 0:
+                k = where[label]
+                less, fewer = until[height, 0] - until[k, 0], until[height, 1] - until[k, 1]
+                begin, close = stack[k], stack[height - 1] ^ 1
+                before = last if k == 0 else stack[k - 1] ^ 1
+                near = (
+                    _apart(points, begin, close) <= reach and _apart(points, before, end) <= reach
+                )
+                if near and encloses(less, fewer) and encloses(segments - less, arcs - fewer):
+                    mates[begin], mates[close] = close, begin
+                    mates[before], mates[end] = end, before
+                    segments, arcs = segments - less, arcs - fewer
+                    made += 1
+                    _forget(stack, k, height, node, where)
+                    height = k
+            stack[height] = end
+            for m in range(2):
+                until[height + 1, m] = until[height, m] + weights[end // 2, m]
+            if label >= 0:
+                where[label] = height
+            height += 1
+            done = end ^ 1 == last
+            end = mates[end ^ 1]
+        _forget(stack, 0, height, node, where)
+    return made
+
+
+cdef (Int, Int) _ring_weight(Int start, Int[::1] mates, Int[:, ::1] weights) noexcept:
+    """Segments and arcs of a whole ring."""
+    cdef Int end, segments, arcs
+    segments, arcs = weights[start // 2, 0], weights[start // 2, 1]
+    end = mates[start ^ 1]
+    while end != start:
+        segments += weights[end // 2, 0]
+        arcs += weights[end // 2, 1]
+        end = mates[end ^ 1]
+    return segments, arcs
+
+
+cdef void _forget(Int[::1] entries, Int low, Int high, Int[::1] node, Int[::1] where) noexcept:
+    """Takes the entries low … high − 1 out of `where` they stand."""
+    cdef Int m, label
+    for m in range(low, high):
+        label = node[entries[m]]
+        if label >= 0 and where[label] == m:
+            where[label] = -1
+
+
+cdef inline double _apart(double[:, ::1] points, Int one, Int other) noexcept:
+    return math.hypot(points[one, 0] - points[other, 0], points[one, 1] - points[other, 1])
+
+
+# The nearest other point of each point, on a grid whose cells are looked at ring by ring.
+#
+# What makes it exact: after ring k of cells around a point's own, every point nearer than k cells
+# has been seen. `tests/oracles/chaining.py` is the twin.
+
+
+cpdef nearest_others(
+    Int[:, ::1] cells, double[:, ::1] points, double size, double least, double reach
+):
+    """For each point (P, 2) the row of the nearest one farther than `least`, and its distance.
+
+    `cells` (P, 2): column and row of the grid cell of each point, `size` wide, sorted. A point
+    with none within `reach` gets −1. Equal distances go to the first row.
+    """
+    cdef Int count, i, ring, column, row, stop, j
+    cdef Int[::1] nearest
+    cdef bint at_side
+    cdef double[::1] distance
+    count = len(points)
+    nearest = np.full(count, -1, np.int64)
+    distance = np.full(count, math.INFINITY)
+    for i in range(count):
+        ring = 0
+        while (ring - 1) * size <= min(distance[i], reach):
+            for column in range(cells[i, 0] - ring, cells[i, 0] + ring + 1):
+                at_side = abs(column - cells[i, 0]) == ring
+                row = cells[i, 1] - ring
+                while row <= cells[i, 1] + ring:
+                    stop = cells[i, 1] + ring if at_side else row
+                    j = _first(cells, column, row)
+                    while j < count and cells[j, 0] == column and cells[j, 1] <= stop:
+                        apart = math.hypot(
+                            points[i, 0] - points[j, 0], points[i, 1] - points[j, 1]
+                        )
+                        if least < apart <= reach and (
+                            apart < distance[i] or (apart == distance[i] and j < nearest[i])
+                        ):
+                            nearest[i], distance[i] = j, apart
+                        j += 1
+                    row = stop + 1 if at_side else row + 2 * ring
+            ring += 1
+    return np.asarray(nearest), np.asarray(distance)
+
+
+cdef Int _first(Int[:, ::1] cells, Int column, Int row) noexcept:
+    """The first sorted cell that is not before (column, row)."""
+    cdef Int low, high, middle
+    low, high = 0, len(cells)
+    while low < high:
+        middle = (low + high) // 2
+        if cells[middle, 0] < column or (cells[middle, 0] == column and cells[middle, 1] < row):
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+# Pairs of boxes that touch, found by a sweep along one axis.
+#
+# Boxes are sorted by where they begin on that axis, so those that may touch a box follow it until
+# one begins beyond its end. What makes it exact: comparisons of the given numbers, nothing else.
+# `camtool.geometry.boxes` chooses the axis on which fewer boxes are looked at.
+
+
+cpdef touching(double[:, ::1] boxes, Int[::1] same, Int[::1] differ, uint8_t[::1] asked, Int most):
+    """Rows (J,), (J,) of boxes (K, 4) low, low, high, high that touch, each pair once.
+
+    `boxes` are sorted by their first column. Both of a pair have the same number in `same`,
+    different ones in `differ`, and at least one of them is `asked` for. No more than `most` pairs.
+    """
+    cdef Int count
+    cdef Int[::1] room, one, other
+    room = np.empty(0, np.int64)
+    count = _touching(boxes, same, differ, asked, most, room, room)
+    one, other = np.empty(count, np.int64), np.empty(count, np.int64)
+    _touching(boxes, same, differ, asked, most, one, other)
+    return np.asarray(one), np.asarray(other)
+
+
+cdef Int _touching(
+    double[:, ::1] boxes, Int[::1] same, Int[::1] differ, uint8_t[::1] asked, Int most,
+    Int[::1] one, Int[::1] other
+) noexcept:
+    """Counts the pairs, and writes them when there is room for them."""
+    cdef Int count, i, j
+    count = 0
+    for i in range(len(boxes)):
+        j = i + 1
+        while j < len(boxes) and boxes[j, 0] <= boxes[i, 2]:
+            if (
+                boxes[j, 1] <= boxes[i, 3]
+                and boxes[i, 1] <= boxes[j, 3]
+                and same[i] == same[j]
+                and differ[i] != differ[j]
+                and (asked[i] or asked[j])
+            ):
+                if count >= most:
+                    return count
+                if len(one) > 0:
+                    one[count], other[count] = i, j
+                count += 1
+            j += 1
+    return count
+
+
+# Where paths come back to: of each point of a path, the latest one before it that is as near.
+#
+# The points of a square cell as wide as the reach are a chain, the latest first, and so are those
+# of all cells with the same slot in the table of chains: distances are compared as they are, so
+# such points only cost time. Around a point its own cell is asked first. What lies before the best
+# point so far is not asked for, so a thousand passes over one point are not compared pair by pair.
+
+# Cells farther than this from the origin count as one.
+cdef double _FAR = 1e15
+FAR = _FAR
+
+# The part of a cell's number that decides its slot.
+cdef Int LOW_BITS = 0xFFFFFFFF
+
+
+cpdef latest_near(double[:, ::1] places, Int[::1] begins, double reach):
+    """(P,) the latest point before each of the points (P, 2) on its path within `reach`, −1 for
+    none. Path k has the points begins[k]:begins[k + 1], `begins` (M + 1,)."""
+    cdef Int slots
+    cdef int32_t[::1] heads, before, latest
+    slots = 16
+    while slots < len(places):
+        slots *= 2
+    heads = np.full(slots, -1, dtype=np.int32)
+    before = np.empty(len(places), dtype=np.int32)
+    latest = np.full(len(places), -1, dtype=np.int32)
+    _latest_near(places, begins, reach, heads, before, latest)
+    return np.asarray(latest)
+
+
+cdef void _latest_near(
+    double[:, ::1] places, Int[::1] begins, double reach, int32_t[::1] heads, int32_t[::1] before,
+    int32_t[::1] latest
+) noexcept:
+    """Fills in `latest`; `heads` are the latest points of the chains, `before` the one before
+    each point."""
+    cdef Int path, first, i, j, column, row, best, beside, above, own
+    cdef double x, y
+    for path in range(len(begins) - 1):
+        first = begins[path]
+        for i in range(first, begins[path + 1]):
+            x, y = places[i, 0], places[i, 1]
+            column, row = _cell(x, reach), _cell(y, reach)
+            best = first - 1
+            for beside in range(3):
+                for above in range(3):
+                    j = heads[_slot(column + (beside + 1) % 3, row + (above + 1) % 3, len(heads))]
+                    while j > best:
+                        if math.hypot(places[j, 0] - x, places[j, 1] - y) <= reach:
+                            best = j
+                        else:
+                            j = before[j]
+            if best >= first:
+                latest[i] = best
+            own = _slot(column + 1, row + 1, len(heads))
+            before[i], heads[own] = heads[own], i
+
+
+cdef inline Int _cell(double place, double size) noexcept:
+    """The number of the cell of that size in which a coordinate lies."""
+    return int(math.floor(min(max(place / size, -_FAR), _FAR)))
+
+
+cdef inline Int _slot(Int column, Int row, Int slots) noexcept:
+    """The slot of a cell, of a power of two of them."""
+    return ((column & LOW_BITS) * 73_856_093 ^ (row & LOW_BITS) * 19_349_663) & (slots - 1)

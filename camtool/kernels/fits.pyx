@@ -1,0 +1,1205 @@
+"""Curves and points as arcs: Bézier pieces cut into nodes, biarcs and arcs over them, arcs found
+in chains of chords, and the segments nearest to points.
+
+Compiled, because each of many is measured against many. What each part does is said above it.
+"""
+
+from __future__ import annotations
+
+from libc cimport math
+from libc.stdint cimport uint8_t
+from camtool.kernels.offsets cimport DEPTH, apart_square, rows_under, tree_of, wait_for_children
+from camtool.kernels.types cimport Int
+
+import numpy as np
+
+from camtool.arrays import Bools, Floats, Ints
+
+# Every number that decides how curves become arcs.
+
+
+# Two positions nearer than this are one, as in `camtool.geometry.polylines`.
+cdef double POSITION_EPS_MM = 1e-6
+
+# A biarc covers no more turning than a half circle (and rounding).
+cdef double _SPAN_TURN_RAD = math.M_PI * (1.0 + 1e-9)
+SPAN_TURN_RAD = _SPAN_TURN_RAD
+
+# One arc or line takes the place of a biarc when both its ends leave the curve's own tangents by
+# no more; two of them make a joint of less than 1e-3 rad.
+cdef double _SINGLE_TURN_RAD = 4e-4
+SINGLE_TURN_RAD = _SINGLE_TURN_RAD
+
+# An arc that leaves its chord by no more is a line.
+cdef double STRAIGHT_SAGITTA_MM = 1e-7
+
+# An arc of a larger radius is written as lines: a centre a kilometre away has no digits left.
+cdef double _MAX_RADIUS_MM = 1e6
+MAX_RADIUS_MM = _MAX_RADIUS_MM
+
+# Those lines leave the arc by no more than this share of the tolerance.
+cdef double FLAT_SHARE = 0.02
+
+cpdef enum:
+    # No arc is cut into more lines.
+    MAX_LINES = 100_000
+
+# Neighbours that leave a common arc or line by no more become one.
+cdef double SAME_ARC_MM = 1e-8
+
+cpdef enum:
+    # Nodes kept for each number of arcs: the furthest, and others evenly short of it.
+    CANDIDATES = 2
+
+cpdef enum:
+    # Points per step between nodes at which the final error is measured.
+    MEASURE_STEPS = 8
+
+# Tangents before and after a node that differ by more make it a corner.
+cdef double _CORNER_ANGLE_RAD = 1e-6
+CORNER_ANGLE_RAD = _CORNER_ANGLE_RAD
+
+# No step between two nodes turns by more, save at a corner.
+cdef double _STEP_TURN_RAD = 0.5
+STEP_TURN_RAD = _STEP_TURN_RAD
+
+# A step's biarc is off by no more than this share of the tolerance: some 16 steps an arc pair.
+cdef double _STEP_ERROR_SHARE = 1.0 / 4096.0
+STEP_ERROR_SHARE = _STEP_ERROR_SHARE
+
+# Shorter than this share of the longest tangent, a tangent has no direction: look beside it.
+cdef double _VANISHING_TANGENT = 1e-9
+VANISHING_TANGENT = _VANISHING_TANGENT
+
+cpdef enum:
+    # Power of ten: how far aside (share of the way to the next break) to look for a direction.
+    ASIDE_FROM = -9
+    # The power of ten at which that look aside gives up.
+    ASIDE_TO = -2
+    # Steps that every curve is cut into at first.
+    MIN_STEPS = 32
+    # No more refining above this many nodes.
+    MAX_NODES = 200_000
+
+
+# Where a piece moves at less than this share of its largest speed, its slowest point is looked
+# for: tips and cusps.
+cdef double SLOW_SHARE = 0.5
+
+cpdef enum:
+    # Rounds of that search: they shrink a bracket by 3e-13.
+    GOLDEN_ROUNDS = 60
+
+# Points, tangents and nodes of rational Bézier pieces.
+#
+# A curve is `pieces` (m, p + 1, 3) of control points x·w, y·w, w, joined end to end, and its
+# parameter runs from 0 to m: the whole part says which piece, the rest where in it.
+# `camtool.geometry.fit` says the same for any curve, and the tests hold the two together;
+# `tests/oracles/curves.py` measures both.
+
+
+# A search for a least value by golden sections keeps this share of its bracket.
+cdef double GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+
+
+cpdef (double, double, double, double) evaluate(
+    double[:, :, ::1] pieces, Int k, double u
+) noexcept:
+    """Position and derivative by u of piece k at u in 0..1: x, y, x', y'.
+
+    Bernstein sums by a Horner scheme for both the piece A and its hodograph A' = p Σ ΔA Bᵖ⁻¹; of
+    the quotient (x, y) = A/w the derivative is (A'w − A w')/w².
+    """
+    cdef Int degree, i
+    degree = pieces.shape[1] - 1
+    v = 1.0 - u
+    x, y, w = pieces[k, 0, 0], pieces[k, 0, 1], pieces[k, 0, 2]
+    dx, dy, dw = pieces[k, 1, 0] - x, pieces[k, 1, 1] - y, pieces[k, 1, 2] - w
+    x, y, w = x * v, y * v, w * v
+    above, slope, last = 1.0, 1.0, u
+    for i in range(1, degree):
+        above *= float(degree - i + 1) / float(i) * u
+        slope *= float(degree - i) / float(i) * u
+        last *= u
+        ax, ay, aw = pieces[k, i, 0], pieces[k, i, 1], pieces[k, i, 2]
+        dx = dx * v + slope * (pieces[k, i + 1, 0] - ax)
+        dy = dy * v + slope * (pieces[k, i + 1, 1] - ay)
+        dw = dw * v + slope * (pieces[k, i + 1, 2] - aw)
+        x, y, w = (x + above * ax) * v, (y + above * ay) * v, (w + above * aw) * v
+    x += last * pieces[k, degree, 0]
+    y += last * pieces[k, degree, 1]
+    w += last * pieces[k, degree, 2]
+    share = float(degree) / (w * w)
+    return x / w, y / w, share * (dx * w - x * dw), share * (dy * w - y * dw)
+
+
+cpdef samples_between(double[:, :, ::1] pieces, double[:] t):
+    """((n − 1) · `MEASURE_STEPS` + 1, 2) positions: so many from each of the parameters t (n,) in
+    0..m on to the next one, and that at the last."""
+    cdef Int i, j, row, k
+    cdef double here
+    cdef double[:, ::1] out
+    out = np.empty(((len(t) - 1) * MEASURE_STEPS + 1, 2))
+    for i in range(len(out)):
+        row, j = i // MEASURE_STEPS, i % MEASURE_STEPS
+        here = t[row]
+        if j > 0:
+            here += float(j) / float(MEASURE_STEPS) * (t[row + 1] - t[row])
+        k = min(int(here), len(pieces) - 1)
+        x, y, _, _ = evaluate(pieces, k, here - float(k))
+        out[i, 0], out[i, 1] = x, y
+    return np.asarray(out)
+
+
+cpdef double speed(double[:, :, ::1] pieces, Int k, double u) noexcept:
+    """The length of the derivative by u."""
+    _, _, dx, dy = evaluate(pieces, k, u)
+    return math.sqrt(dx * dx + dy * dy)
+
+
+cdef (double, double) aside(
+    double[:, :, ::1] pieces, Int k, double u, double side, double least
+) noexcept:
+    """Unit tangent a little before (side −1) or after (+1) u, where the piece is faster than
+    `least`."""
+    cdef Int exponent
+    if u <= 0.0 or u >= 1.0:
+        side = 1.0 if u <= 0.0 else -1.0  # at the ends of a piece look inside
+    for exponent in range(ASIDE_FROM, ASIDE_TO):
+        beside = min(max(u + side * math.pow(10.0, float(exponent)), 0.0), 1.0)
+        _, _, dx, dy = evaluate(pieces, k, beside)
+        length = math.sqrt(dx * dx + dy * dy)
+        if length > least:
+            return dx / length, dy / length
+    return 1.0, 0.0  # the curve stands still here: such nodes are merged
+
+
+cdef double slowest(double[:, :, ::1] pieces, Int k, double low, double high) noexcept:
+    """The u between low and high where the piece moves slowest: golden section."""
+    cdef Int _
+    one, two = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+    at_one, at_two = speed(pieces, k, one), speed(pieces, k, two)
+    for _ in range(GOLDEN_ROUNDS):
+        if at_one < at_two:
+            high, two, at_two = two, one, at_one
+            one = high - GOLDEN * (high - low)
+            at_one = speed(pieces, k, one)
+        else:
+            low, one, at_one = one, two, at_two
+            two = low + GOLDEN * (high - low)
+            at_two = speed(pieces, k, two)
+    return 0.5 * (low + high)
+
+
+cdef first_steps(double[:, :, ::1] pieces, Int k, Int each):
+    """The u (≥ each + 1,) that piece k is cut at first, tips and cusps among them; its speed."""
+    cdef Int i, count, before, after, side
+    cdef double here, u, tip, fastest
+    cdef double[::1] speeds, out
+    speeds = np.empty(each + 1)
+    fastest = 0.0
+    for i in range(each + 1):
+        speeds[i] = speed(pieces, k, float(i) / float(each))
+        fastest = max(fastest, speeds[i])
+    out = np.empty(2 * each + 2)
+    count = 0
+    for i in range(each + 1):
+        here = float(i) / float(each)
+        tip = here
+        before, after = max(i - 1, 0), min(i + 1, each)
+        if speeds[i] <= min(speeds[before], speeds[after]) and speeds[i] < SLOW_SHARE * fastest:
+            tip = slowest(pieces, k, float(before) / float(each), float(after) / float(each))
+        for side in range(2):
+            u = min(tip, here) if side == 0 else max(tip, here)
+            if count == 0 or out[count - 1] < u <= 1.0:
+                out[count] = u
+                count += 1
+    out[0] = 0.0
+    return np.asarray(out[:count]), fastest
+
+
+cdef bint too_coarse(
+    double[:, :, ::1] pieces, Int k, double[:, ::1] before, Int i, double[:, ::1] behind, Int j,
+    double tolerance
+) noexcept:
+    """True if the step between two rows (u, x, y, arrive x, y, leave x, y), row i of those before
+    and row j of those behind, must be halved."""
+    cdef Int turn
+    cdef bint bends
+    cdef double reach, off
+    low, high = before[i, 0], behind[j, 0]
+    middle = 0.5 * (low + high)
+    if not low < middle < high:
+        return False
+    ax, ay, bx, by = before[i, 1], before[i, 2], behind[j, 1], behind[j, 2]
+    leave_x, leave_y, arrive_x, arrive_y = before[i, 5], before[i, 6], behind[j, 3], behind[j, 4]
+    pair = biarc(ax, ay, leave_x, leave_y, bx, by, arrive_x, arrive_y)
+    bends = leave_x * arrive_x + leave_y * arrive_y < math.cos(_STEP_TURN_RAD)
+    reach = 0.0
+    for turn in range(3):
+        # Halfway first, then a quarter and three quarters.
+        share = 0.5 if turn == 0 else 0.25 if turn == 1 else 0.75
+        x, y, _, _ = evaluate(pieces, k, low + share * (high - low))
+        reach = max(reach, abs(x - ax), abs(y - ay), abs(x - bx), abs(y - by))
+        if not bends:
+            off = distance_to_biarc(x, y, ax, ay, bx, by, pair)
+            bends = off > _STEP_ERROR_SHARE * tolerance
+        if bends and reach > POSITION_EPS_MM:
+            return True
+    return False
+
+
+cdef piece_rows(double[:, :, ::1] pieces, Int k, Int each, double tolerance, Int most):
+    """Nodes (n, 7) of piece k: u, x, y, tangents before and after; begun with `each` steps.
+
+    Steps are halved from left to right; the stack holds the right ends of those still to do.
+    """
+    cdef Int count, i, depth, column, last, top
+    cdef bint fine
+    cdef double fastest, least
+    cdef double[:, ::1] stack, out
+    cdef double[::1] grid
+    grid, fastest = first_steps(pieces, k, each)
+    least = _VANISHING_TANGENT * fastest
+    stack = np.empty((64, 7))
+    out = np.empty((512, 7))
+    fill_row(pieces, k, 0.0, least, out, 0)
+    count = 1
+    for i in range(1, len(grid)):
+        fill_row(pieces, k, grid[i], least, stack, 0)
+        depth = 1
+        while depth > 0:
+            last, top = count - 1, depth - 1
+            fine = depth < len(stack) and count < most
+            if fine and too_coarse(pieces, k, out, last, stack, top, tolerance):
+                middle = 0.5 * (out[last, 0] + stack[top, 0])
+                fill_row(pieces, k, middle, least, stack, depth)
+                depth += 1
+                continue
+            if count == len(out):
+                out = np.concatenate([out, out])
+            for column in range(7):
+                out[count, column] = stack[top, column]
+            count += 1
+            depth -= 1
+    return np.asarray(out[:count])
+
+
+cdef void fill_row(
+    double[:, :, ::1] pieces, Int k, double u, double least, double[:, ::1] rows, Int i
+) noexcept:
+    """Write u, x, y, tangent before and tangent after into row i of `rows` (n, 7)."""
+    cdef double dx, dy
+    x, y, dx, dy = evaluate(pieces, k, u)
+    length = math.sqrt(dx * dx + dy * dy)
+    rows[i, 0], rows[i, 1], rows[i, 2] = u, x, y
+    if length > least:
+        rows[i, 3], rows[i, 4] = dx / length, dy / length
+        rows[i, 5], rows[i, 6] = rows[i, 3], rows[i, 4]
+    else:
+        dx, dy = aside(pieces, k, u, -1.0, least)
+        rows[i, 3], rows[i, 4] = dx, dy
+        dx, dy = aside(pieces, k, u, 1.0, least)
+        rows[i, 5], rows[i, 6] = dx, dy
+
+
+cpdef curve_rows(double[:, :, ::1] pieces, Int steps, double tolerance):
+    """Nodes (n, 7) of all pieces, t in 0..m in place of u, and which of them are corners.
+
+    Nodes no farther apart than `POSITION_EPS_MM` become one: it arrives as the first and leaves
+    as the last of them.
+    """
+    cdef Int each, count, k, i, column, last
+    cdef double apart, x, y
+    cdef double[:, ::1] out, rows, grown
+    cdef uint8_t[::1] corner
+    each = max(4, (steps + len(pieces) - 1) // len(pieces))
+    out = np.empty((256, 7))
+    count = 0
+    for k in range(len(pieces)):
+        rows = piece_rows(pieces, k, each, tolerance, max(MAX_NODES - count, 2))
+        if count + len(rows) > len(out):
+            grown = np.empty((2 * (count + len(rows)), 7))
+            grown[:count] = out[:count]
+            out = grown
+        for i in range(len(rows)):
+            last = max(count - 1, 0)
+            apart = math.hypot(rows[i, 1] - out[last, 1], rows[i, 2] - out[last, 2])
+            if count == 0 or apart > POSITION_EPS_MM:
+                out[count, 0] = rows[i, 0] + float(k)
+                for column in range(1, 7):
+                    out[count, column] = rows[i, column]
+                count += 1
+            else:
+                out[last, 5], out[last, 6] = rows[i, 5], rows[i, 6]
+    x, y, _, _ = evaluate(pieces, len(pieces) - 1, 1.0)
+    out[count - 1, 1], out[count - 1, 2] = x, y
+    if count > 1:
+        out[count - 1, 0] = float(len(pieces))
+    corner = np.zeros(count, dtype=np.bool_)
+    for i in range(count):
+        cross = out[i, 3] * out[i, 6] - out[i, 4] * out[i, 5]
+        dot = out[i, 3] * out[i, 5] + out[i, 4] * out[i, 6]
+        corner[i] = abs(math.atan2(cross, dot)) > _CORNER_ANGLE_RAD
+    corner[0] = corner[count - 1] = True
+    return np.asarray(out[:count]), np.asarray(corner).view(np.bool_)
+
+
+# Biarcs, distances to arcs, and how far arcs and biarcs stray from nodes on a curve.
+#
+# What makes it exact: no centre is ever formed, so an arc may be as flat as it likes; for a bulge
+# of 0 each formula becomes the one of the straight line. `tests/oracles/arcs.py` is the twin.
+
+
+cpdef inline double distance_to_arc(
+    double px, double py, double ax, double ay, double bx, double by, double bulge
+) noexcept:
+    """Distance from p to the arc from a to b, |bulge| ≤ 1, to its nearer end beside the arc.
+
+    With w = p − a, u = b − a, n = u turned by +90°, the power of p over the circle and the vector
+    from the centre, both times the bulge, need no centre:
+        b·power = b(w·w − w·u) − (1 − b²)/2 w·n,   q = b(w − u/2) − (1 − b²)/4 n,
+        distance to the circle = |b·power| / (|q| + |u|(1 + b²)/4).
+    p lies beside the arc when it is behind the normal at one of its ends, whose tangents are
+    (1 − b²) u ∓ 2b n.
+    """
+    wx, wy, vx, vy = px - ax, py - ay, px - bx, py - by
+    ux, uy = bx - ax, by - ay
+    rest = 1.0 - bulge * bulge
+    forward = wx * (rest * ux + 2.0 * bulge * uy) + wy * (rest * uy - 2.0 * bulge * ux)
+    behind = vx * (rest * ux - 2.0 * bulge * uy) + vy * (rest * uy + 2.0 * bulge * ux)
+    square = ux * ux + uy * uy
+    if square == 0.0 or forward < 0.0 or behind > 0.0:
+        return math.sqrt(min(wx * wx + wy * wy, vx * vx + vy * vy))
+    power = bulge * (wx * vx + wy * vy) - 0.5 * rest * (wy * ux - wx * uy)
+    qx = bulge * (wx - 0.5 * ux) + 0.25 * rest * uy
+    qy = bulge * (wy - 0.5 * uy) - 0.25 * rest * ux
+    below = math.sqrt(qx * qx + qy * qy) + 0.25 * math.sqrt(square) * (1.0 + bulge * bulge)
+    return abs(power) / below
+
+
+cdef inline double half_angle(double ax, double ay, double bx, double by) noexcept:
+    """tan(α/2) = sin α / (1 + cos α) for the angle α from a to b; NaN when |α| > 90°.
+
+    An arc of sweep s leaves the direction of its chord by s/2, so its bulge tan(s/4) is tan(α/2)
+    with α between tangent and chord.
+    """
+    cosine = ax * bx + ay * by
+    below = math.sqrt((ax * ax + ay * ay) * (bx * bx + by * by)) + cosine
+    if below <= 0.0:
+        return math.NAN
+    bulge = (ax * by - ay * bx) / below
+    if abs(bulge) > 1.0 + 1e-12:
+        return math.NAN
+    return min(max(bulge, -1.0), 1.0)
+
+
+cpdef (double, double, double, double) biarc(
+    double start_x, double start_y, double leave_x, double leave_y, double end_x, double end_y,
+    double arrive_x, double arrive_y
+) noexcept:
+    """Joint x, y and both bulges of the biarc with equal handles; all NaN where there is none.
+
+    Handles of length d reach Q0 = start + d·leave and Q1 = end − d·arrive; the arcs meet in the
+    middle of Q0Q1 when |Q1 − Q0| = 2d. With v = end − start, s = leave + arrive, c = leave·arrive:
+        d²(2 − 2c) + 2d v·s − v·v = 0   ⇒   d = v·v / (v·s + √((v·s)² + 2(1 − c) v·v)).
+    None where no d > 0 does it, or where an arc would be more than a half circle.
+    """
+    vx, vy = end_x - start_x, end_y - start_y
+    square = vx * vx + vy * vy
+    along = vx * (leave_x + arrive_x) + vy * (leave_y + arrive_y)
+    cosine = leave_x * arrive_x + leave_y * arrive_y
+    below = along + math.sqrt(along * along + 2.0 * max(1.0 - cosine, 0.0) * square)
+    if square == 0.0 or below <= 0.0:
+        return math.NAN, math.NAN, math.NAN, math.NAN
+    handle = square / below
+    jx = 0.5 * (start_x + end_x + handle * (leave_x - arrive_x))
+    jy = 0.5 * (start_y + end_y + handle * (leave_y - arrive_y))
+    first = half_angle(leave_x, leave_y, jx - start_x, jy - start_y)
+    second = half_angle(end_x - jx, end_y - jy, arrive_x, arrive_y)
+    if math.isnan(first) or math.isnan(second):
+        return math.NAN, math.NAN, math.NAN, math.NAN
+    return jx, jy, first, second
+
+
+cdef inline double distance_to_biarc(
+    double px, double py, double start_x, double start_y, double end_x, double end_y,
+    (double, double, double, double) pair
+) noexcept:
+    """Distance from p to the nearer of both arcs; infinite when there is no biarc."""
+    jx, jy, first, second = pair
+    if math.isnan(jx):
+        return math.INFINITY
+    one = distance_to_arc(px, py, start_x, start_y, jx, jy, first)
+    two = distance_to_arc(px, py, jx, jy, end_x, end_y, second)
+    return min(one, two)
+
+
+cdef inline (double, double, double, double) over(
+    double[:, ::1] point, double[:, ::1] leave, double[:, ::1] arrive, Int low, Int high
+) noexcept:
+    """The `biarc` over the nodes low..high."""
+    return biarc(
+        point[low, 0],
+        point[low, 1],
+        leave[low, 0],
+        leave[low, 1],
+        point[high, 0],
+        point[high, 1],
+        arrive[high, 0],
+        arrive[high, 1],
+    )
+
+
+cpdef step_errors(
+    double[:, ::1] point, double[:, ::1] leave, double[:, ::1] arrive, Int[::1] rows,
+    double[:, :, ::1] probes
+):
+    """For each step from node rows[i] (k,) to the next: the largest distance of its probes
+    (j, k, 2) from the biarc over the step, infinite when there is none."""
+    cdef Int i, j, a, b
+    cdef double[::1] out
+    out = np.empty(len(rows))
+    for i in range(len(rows)):
+        a, b = rows[i], rows[i] + 1
+        pair = over(point, leave, arrive, a, b)
+        ax, ay, bx, by = point[a, 0], point[a, 1], point[b, 0], point[b, 1]
+        out[i] = 0.0
+        for j in range(len(probes)):
+            off = distance_to_biarc(probes[j, i, 0], probes[j, i, 1], ax, ay, bx, by, pair)
+            out[i] = max(out[i], off)
+    return np.asarray(out)
+
+
+cpdef double span_error(
+    double[:, ::1] point, double[:, ::1] leave, double[:, ::1] arrive, Int low, Int high
+) noexcept:
+    """The largest distance of the nodes between from the biarc over nodes low..high."""
+    cdef Int i
+    cdef double off
+    ax, ay, bx, by = point[low, 0], point[low, 1], point[high, 0], point[high, 1]
+    pair = over(point, leave, arrive, low, high)
+    largest = math.INFINITY if math.isnan(pair[0]) else 0.0
+    for i in range(low + 1, high):
+        off = distance_to_biarc(point[i, 0], point[i, 1], ax, ay, bx, by, pair)
+        largest = max(largest, off)
+    return largest
+
+
+cdef bint span_holds(
+    double[:, ::1] point, double[:, ::1] leave, double[:, ::1] arrive, Int low, Int high,
+    double target
+) noexcept:
+    """True if `span_error` is within the target; stops at the first node that is not."""
+    cdef Int i
+    ax, ay, bx, by = point[low, 0], point[low, 1], point[high, 0], point[high, 1]
+    pair = over(point, leave, arrive, low, high)
+    if math.isnan(pair[0]):
+        return False
+    for i in range(high - 1, low, -1):
+        if distance_to_biarc(point[i, 0], point[i, 1], ax, ay, bx, by, pair) > target:
+            return False
+    return True
+
+
+cdef double arc_error(double[:, ::1] point, Int low, Int high, double bulge) noexcept:
+    """The largest distance of the nodes between from the arc or line over nodes low..high."""
+    cdef Int i
+    ax, ay, bx, by = point[low, 0], point[low, 1], point[high, 0], point[high, 1]
+    largest = 0.0
+    for i in range(low + 1, high):
+        off = distance_to_arc(point[i, 0], point[i, 1], ax, ay, bx, by, bulge)
+        largest = max(largest, off)
+    return largest
+
+
+# The search for the longest arcs and biarcs along nodes on a curve.
+#
+# The error of a biarc grows with the third power of its length, which tells how far to reach next;
+# bisection settles the rest. One arc or line in place of two is taken where the curve is one.
+
+
+cpdef Int longest_span(
+    double[:, ::1] point, double[:, ::1] leave, double[:, ::1] arrive, Int low, Int furthest,
+    Int guess, double target
+) noexcept:
+    """The end node of the longest biarc from node `low` whose error is within `target`.
+
+    error ∝ length³   ⇒   the length that fits is about length · (target / error)^(1/3).
+    That rule leads for a few tries, bisection then; at least one step is taken.
+    """
+    cdef Int best, beyond, high, tries, reach, ahead
+    best, beyond, high, tries = low + 1, furthest + 1, guess, 0
+    while beyond - best > 1:
+        high = min(max(high, best + 1), beyond - 1)
+        error = span_error(point, leave, arrive, low, high)
+        ratio = 4.0 if error == 0.0 else min(4.0, (target / error) ** (1.0 / 3.0))
+        ahead = int(0.98 * ratio * float(high - low))
+        reach = low + ahead
+        if error <= target:
+            best = high
+        else:
+            beyond = high
+        tries += 1
+        high = reach if tries <= 4 and ratio > 0.0 else (best + beyond) // 2
+    return best
+
+
+cdef double single_bulge(
+    double[:, ::1] point, double[:, ::1] leave, double[:, ::1] arrive, Int low, Int high,
+    double target
+) noexcept:
+    """The bulge of the one arc or line that stands for the nodes low..high; NaN for none.
+
+    With α from the first tangent to the chord and β from the chord to the last one, an arc of
+    sweep α + β leaves both tangents by |α − β| / 2.
+    """
+    cdef bint level
+    ux, uy = point[high, 0] - point[low, 0], point[high, 1] - point[low, 1]
+    # |sin α − sin β| ≤ |α − β|: most nodes are told here, without a root.
+    askew = (leave[low, 0] + arrive[high, 0]) * uy - (leave[low, 1] + arrive[high, 1]) * ux
+    if askew * askew > 4.0 * _SINGLE_TURN_RAD * _SINGLE_TURN_RAD * (ux * ux + uy * uy):
+        return math.NAN
+    first = half_angle(leave[low, 0], leave[low, 1], ux, uy)
+    second = half_angle(ux, uy, arrive[high, 0], arrive[high, 1])
+    first, second = 2.0 * math.atan(first), 2.0 * math.atan(second)
+    if not abs(first - second) <= 2.0 * _SINGLE_TURN_RAD:
+        return math.NAN
+    half = 0.5 * (first + second)
+    if math.sqrt(ux * ux + uy * uy) > 2.0 * _MAX_RADIUS_MM * abs(math.sin(half)):
+        # Radius = chord / (2 sin(sweep/2)): too flat for an arc, so a line or nothing.
+        level = max(abs(first), abs(second)) <= _SINGLE_TURN_RAD
+        return 0.0 if level and arc_error(point, low, high, 0.0) <= target else math.NAN
+    bulge = min(max(math.tan(0.5 * half), -1.0), 1.0)
+    return bulge if arc_error(point, low, high, bulge) <= target else math.NAN
+
+
+cdef (Int, double) longest_single(
+    double[:, ::1] point, double[:, ::1] leave, double[:, ::1] arrive, Int low, Int least,
+    Int most, Int guess, double target
+) noexcept:
+    """End node and bulge of the longest single arc or line from `low` that ends after `least`
+    and not after `most`; NaN when there is none.
+
+    Tangents may suit far off and not before (about an axis of symmetry), so all nodes are tried,
+    from the far end of a window of 2 · `guess` nodes that grows as long as its end is reached.
+    """
+    cdef Int beyond, best, high
+    beyond, best, bulge = least, least, math.NAN
+    while best == beyond and beyond < most:
+        least = beyond
+        beyond = min(max(low + 2 * guess, 2 * beyond - low), most)
+        for high in range(beyond, least, -1):
+            found = single_bulge(point, leave, arrive, low, high, target)
+            if not math.isnan(found):
+                best, bulge = high, found
+                break
+        if beyond == least:
+            break
+    return best, bulge
+
+
+cdef furthest_nodes(double[:, ::1] leave, double[:, ::1] arrive, uint8_t[::1] corner):
+    """(n,) the last node that a span from each node may reach: the next corner, or where the curve
+    has turned by `SPAN_TURN_RAD`, to either side."""
+    cdef Int count, i, last
+    cdef Int[::1] out
+    cdef double[::1] turned
+    count = len(leave)
+    turned = np.zeros(count)
+    for i in range(1, count):
+        cross = leave[i - 1, 0] * arrive[i, 1] - leave[i - 1, 1] * arrive[i, 0]
+        dot = leave[i - 1, 0] * arrive[i, 0] + leave[i - 1, 1] * arrive[i, 1]
+        turned[i] = turned[i - 1] + abs(math.atan2(cross, dot))
+    out = np.zeros(count, dtype=np.int64)
+    last = 0
+    for i in range(count - 1):
+        last = max(last, i + 1)
+        while not corner[last] and turned[last + 1] - turned[i] <= _SPAN_TURN_RAD:
+            last += 1
+        out[i] = last
+    return np.asarray(out)
+
+
+cdef (Int, Int, double) furthest_state(
+    double[:, ::1] point, double[:, ::1] leave, double[:, ::1] arrive, Int[::1] limit,
+    Int[::1] states, Int now, Int guess, double target
+) noexcept:
+    """The furthest node at the price that begins at row `now` of `states` (node −1: none), the row
+    whence it is reached, and the bulge of the single arc or line that does it (NaN: a biarc)."""
+    cdef Int row, best, whence, low, begin, high
+    cdef bint first
+    best, whence, bulge = states[now - CANDIDATES], now - CANDIDATES, math.NAN
+    for row in range(max(now - 2 * CANDIDATES, 0), now):
+        low = states[row]
+        if low < 0 or limit[low] <= best:
+            continue
+        if row >= now - CANDIDATES:
+            high, found = longest_single(
+                point, leave, arrive, low, best, limit[low], guess, target
+            )
+            if high > best:
+                best, whence, bulge = high, row, found
+            continue
+        first = row == now - 2 * CANDIDATES
+        if first or span_holds(point, leave, arrive, low, best + 1, target):
+            begin = low + guess if first else best + 2
+            high = longest_span(point, leave, arrive, low, limit[low], begin, target)
+            if high > best:
+                best, whence, bulge = high, row, math.NAN
+    return best, whence, bulge
+
+
+cdef longest_spans(
+    double[:, ::1] point, double[:, ::1] leave, double[:, ::1] arrive, uint8_t[::1] corner,
+    double target
+):
+    """Nodes (s + 1,) between the spans of a chain of few arcs; joint and bulges (s, 4) of each.
+
+    `point`, `leave`, `arrive` (n, 2), `corner` (n,). A span of one arc or line has its bulge in
+    the third column and NaN elsewhere. No span runs past a corner or turns by more than
+    `SPAN_TURN_RAD`.
+
+    Price by price (1, 2, 3 … arcs) the furthest node is found that one arc leads to from a node of
+    the price before, or a biarc from two prices before. A few nodes short of it are kept as well:
+    a span that takes a sharp tip in its middle may have to begin there.
+    """
+    cdef Int count, row, now, guess, m, spans, best, before, low, place, high
+    cdef Int[::1] limit, states, whence, ends
+    cdef double first, jx, jy, second, bulge
+    cdef double[:, ::1] pairs
+    cdef double[::1] bulges
+    count = len(point)
+    limit = furthest_nodes(leave, arrive, corner)
+    states = np.zeros(CANDIDATES * (2 * count + 2), dtype=np.int64)
+    whence = np.zeros(len(states), dtype=np.int64)
+    bulges = np.zeros(len(states))
+    for row in range(1, len(states)):
+        states[row] = -1
+    now, guess = 0, count
+    while states[now] < count - 1:
+        now += CANDIDATES
+        best, row, bulge = furthest_state(point, leave, arrive, limit, states, now, guess, target)
+        before, low, guess = states[now - CANDIDATES], states[row], best - states[row]
+        for m in range(CANDIDATES):
+            place = best - m * (best - before) // CANDIDATES
+            if m > 0:
+                if place <= before or place == states[now + m - 1]:
+                    continue
+                if not math.isnan(bulge):
+                    bulge = single_bulge(point, leave, arrive, low, place, target)
+                    if math.isnan(bulge):
+                        break
+                elif not span_holds(point, leave, arrive, low, place, target):
+                    continue
+            states[now + m], whence[now + m], bulges[now + m] = place, row, bulge
+    spans, row = 0, now
+    while row > 0:
+        spans += 1 if states[row] > states[whence[row]] else 0
+        row = whence[row]
+    ends = np.zeros(spans + 1, dtype=np.int64)
+    pairs = np.empty((spans, 4))
+    row = now
+    while row > 0:
+        low, high, bulge = states[whence[row]], states[row], bulges[row]
+        row = whence[row]
+        if low == high:
+            continue
+        jx, jy, first, second = math.NAN, math.NAN, bulge, math.NAN
+        if math.isnan(bulge):
+            jx, jy, first, second = over(point, leave, arrive, low, high)
+        spans -= 1
+        pairs[spans, 0], pairs[spans, 1], pairs[spans, 3] = jx, jy, second
+        pairs[spans, 2] = 0.0 if math.isnan(first) else first
+        ends[spans + 1] = high
+    return np.asarray(ends), np.asarray(pairs)
+
+
+# Spans of biarcs, arcs and lines as one chain of segments, and its distance from the curve.
+#
+# Vertices are rows x, y, bulge; the last row is the end of the chain.
+
+
+cdef Int lines_for(double ax, double ay, double bx, double by, double bulge, double off) noexcept:
+    """Return the number of lines that replace an arc too flat to be written; 0 if it stays an arc.
+
+    sagitta = |bulge| · chord / 2, radius = chord (1 + b²) / (4 |b|) and each of n lines leaves the
+    arc by sagitta / n².
+    """
+    chord = math.hypot(bx - ax, by - ay)
+    sagitta = 0.5 * abs(bulge) * chord
+    if sagitta <= STRAIGHT_SAGITTA_MM:
+        return 1
+    if chord * (1.0 + bulge * bulge) <= 4.0 * abs(bulge) * _MAX_RADIUS_MM:
+        return 0
+    return int(min(math.ceil(math.sqrt(sagitta / off)), float(MAX_LINES)))
+
+
+cdef chain(double[:, ::1] point, Int[::1] ends, double[:, ::1] pairs, double tolerance):
+    """Rows (n + 1, 3) of all spans and the number of the first row of each (s + 1,).
+
+    Arcs that leave their chord by `STRAIGHT_SAGITTA_MM` or less, and flat ones, are lines.
+    """
+    cdef Int spans, count, s, k, total, i, made, j
+    cdef Int[::1] owner, parts, first
+    cdef double[:, ::1] arcs, rows
+    spans = len(pairs)
+    arcs = np.empty((2 * spans + 1, 3))
+    owner = np.empty(2 * spans + 1, dtype=np.int64)
+    count = 0
+    for s in range(spans):
+        k = ends[s]
+        arcs[count, 0], arcs[count, 1], arcs[count, 2] = point[k, 0], point[k, 1], pairs[s, 2]
+        owner[count] = s
+        count += 1
+        if not math.isnan(pairs[s, 0]):
+            arcs[count, 0], arcs[count, 1], arcs[count, 2] = pairs[s, 0], pairs[s, 1], pairs[s, 3]
+            owner[count] = s
+            count += 1
+    k = ends[spans]
+    arcs[count, 0], arcs[count, 1], arcs[count, 2] = point[k, 0], point[k, 1], 0.0
+    total = 0
+    parts = np.empty(count, dtype=np.int64)
+    for i in range(count):
+        ax, ay, bulge = arcs[i, 0], arcs[i, 1], arcs[i, 2]
+        bx, by = arcs[i + 1, 0], arcs[i + 1, 1]
+        parts[i] = lines_for(ax, ay, bx, by, bulge, FLAT_SHARE * tolerance)
+        total += max(parts[i], 1)
+    rows = np.empty((total + 1, 3))
+    first = np.zeros(spans + 1, dtype=np.int64)
+    made = 0
+    for i in range(count):
+        ax, ay, bulge = arcs[i, 0], arcs[i, 1], arcs[i, 2]
+        if i == 0 or owner[i] != owner[i - 1]:
+            first[owner[i]] = made
+        ux, uy = arcs[i + 1, 0] - ax, arcs[i + 1, 1] - ay
+        for j in range(max(parts[i], 1)):
+            # On a flat arc the point at the share h of the chord lies beside it by 2b·h(1 − h)·u.
+            h = float(j) / float(max(parts[i], 1))
+            off = 2.0 * bulge * h * (1.0 - h)
+            rows[made, 0], rows[made, 1] = ax + h * ux + off * uy, ay + h * uy - off * ux
+            rows[made, 2] = bulge if parts[i] == 0 else 0.0
+            made += 1
+    rows[made, 0], rows[made, 1], rows[made, 2] = point[k, 0], point[k, 1], 0.0
+    first[spans] = made
+    return np.asarray(rows), np.asarray(first)
+
+
+cdef double common_bulge(double[:, ::1] rows, Int one, double end_x, double end_y) noexcept:
+    """The bulge of the one arc or line that both segments lie on which begin at `one` and at the
+    row after it and end there, or NaN."""
+    cdef Int two
+    cdef double bulge, sweep
+    two = one + 1
+    ax, ay, a = rows[one, 0], rows[one, 1], rows[one, 2]
+    bx, by, b = rows[two, 0], rows[two, 1], rows[two, 2]
+    if a * b < 0.0 or (a == 0.0) != (b == 0.0):
+        return math.NAN
+    sweep = 4.0 * (math.atan(a) + math.atan(b))
+    if abs(sweep) > _SPAN_TURN_RAD or (ax == end_x and ay == end_y):
+        return math.NAN
+    bulge = min(max(math.tan(0.25 * sweep), -1.0), 1.0)
+    # Halfway along each segment, where its sagitta is bulge · chord / 2, and at the joint.
+    x, y = ax + 0.5 * (bx - ax + a * (by - ay)), ay + 0.5 * (by - ay - a * (bx - ax))
+    if distance_to_arc(x, y, ax, ay, end_x, end_y, bulge) > SAME_ARC_MM:
+        return math.NAN
+    x, y = bx + 0.5 * (end_x - bx + b * (end_y - by)), by + 0.5 * (end_y - by - b * (end_x - bx))
+    if distance_to_arc(x, y, ax, ay, end_x, end_y, bulge) > SAME_ARC_MM:
+        return math.NAN
+    if distance_to_arc(bx, by, ax, ay, end_x, end_y, bulge) > SAME_ARC_MM:
+        return math.NAN
+    return bulge
+
+
+cdef joined(double[:, ::1] rows, double size):
+    """Neighbours on one circle or line become one; also where each old segment is now.
+
+    A segment no longer than `size` is none: its end takes the place of its begin.
+    """
+    cdef Int count, i, last
+    cdef Int[::1] places
+    cdef double end_x, end_y, bulge
+    cdef double[:, ::1] out
+    out = np.empty((len(rows), 3))
+    places = np.zeros(len(rows) - 1, dtype=np.int64)
+    out[0, 0], out[0, 1], out[0, 2] = rows[0, 0], rows[0, 1], 0.0
+    count = 1
+    for i in range(len(rows) - 1):
+        end_x, end_y = rows[i + 1, 0], rows[i + 1, 1]
+        if math.hypot(end_x - out[count - 1, 0], end_y - out[count - 1, 1]) <= size:
+            places[i] = max(count - 2, 0)
+            continue
+        out[count - 1, 2] = rows[i, 2]
+        if count > 1 and math.hypot(end_x - out[count - 2, 0], end_y - out[count - 2, 1]) > size:
+            bulge = common_bulge(out, count - 2, end_x, end_y)
+            if not math.isnan(bulge):
+                count -= 1
+                out[count - 1, 2] = bulge
+        places[i] = count - 1
+        out[count, 0], out[count, 1], out[count, 2] = end_x, end_y, 0.0
+        count += 1
+    last = len(rows) - 1
+    out[count - 1, 0], out[count - 1, 1], out[count - 1, 2] = rows[last, 0], rows[last, 1], 0.0
+    return np.asarray(out[:count]), np.asarray(places)
+
+
+cdef deviations(
+    double[:, ::1] samples, Int[::1] ends, Int[::1] first, double[:, ::1] vertices, Int[::1] places
+):
+    """Distances (n,) of samples (n, 2) of the curve from the segments of their own span.
+
+    There are equally many samples in each step between nodes, and the last one at the end. Of
+    the columns (spans + 1,) span s owns the nodes ends[s]..ends[s + 1] and the old segments
+    first[s]..first[s + 1], which are now at `places`.
+    """
+    cdef Int each, s, last, i, low, high, row
+    cdef double bulge, nearest, x, y, ax, ay, bx, by
+    cdef double[::1] out
+    each = (len(samples) - 1) // ends[len(ends) - 1]
+    out = np.empty(len(samples))
+    for s in range(len(ends) - 1):
+        low, high = places[first[s]], places[first[s + 1] - 1]
+        last = ends[s + 1] * each + (1 if s == len(ends) - 2 else 0)
+        for i in range(ends[s] * each, last):
+            nearest = math.INFINITY
+            x, y = samples[i, 0], samples[i, 1]
+            for row in range(low, high + 1):
+                ax, ay, bulge = vertices[row, 0], vertices[row, 1], vertices[row, 2]
+                bx, by = vertices[row + 1, 0], vertices[row + 1, 1]
+                nearest = min(nearest, distance_to_arc(x, y, ax, ay, bx, by, bulge))
+            out[i] = nearest
+    return np.asarray(out)
+
+
+cdef (double, double, double) summary(double[:, ::1] samples, double[::1] off) noexcept:
+    """Largest deviation and rms, weighted by length, and length of the curve, mm.
+
+    Between samples i and i + 1 the deviation peaks at or below the meeting of the lines through
+    the two samples before and the two behind: it is concave on each side of a peak, and where the
+    nearest arc changes it has an edge there.
+    """
+    cdef Int i
+    squares, length = 0.0, 0.0
+    largest = off[len(off) - 1]
+    for i in range(len(off) - 1):
+        step = math.hypot(samples[i + 1, 0] - samples[i, 0], samples[i + 1, 1] - samples[i, 1])
+        squares += step * 0.5 * (off[i] * off[i] + off[i + 1] * off[i + 1])
+        length += step
+        largest = max(largest, off[i])
+        if 0 < i < len(off) - 2:
+            rise, fall = off[i] - off[i - 1], off[i + 1] - off[i + 2]
+            if rise > 0.0 and fall > 0.0:
+                share = min(max((off[i + 1] + fall - off[i]) / (rise + fall), 0.0), 1.0)
+                largest = max(largest, min(off[i] + rise * share, off[i + 1] + fall))
+    return largest, math.sqrt(squares / length) if length > 0.0 else 0.0, length
+
+
+# Arcs over nodes on a curve in one call: spans, chain, measure.
+
+
+cpdef fit_nodes(nodes, double[:, ::1] samples, double target, double tolerance):
+    """The chain (n, 3) over `nodes` (points, arriving and leaving tangents (n, 2), corners (n,))
+    and its largest and rms deviation from the samples, and their length, mm."""
+    cdef Int[::1] ends, first, places
+    cdef double[:, ::1] point, arrive, leave, pairs, rows, vertices
+    cdef double[::1] off
+    cdef uint8_t[::1] corner
+    point, arrive, leave, corner = nodes
+    ends, pairs = longest_spans(point, leave, arrive, corner, target)
+    rows, first = chain(point, ends, pairs, tolerance)
+    vertices, places = joined(rows, POSITION_EPS_MM)
+    if len(vertices) == 1:
+        return np.asarray(vertices), (0.0, 0.0, 0.0)
+    off = deviations(samples, ends, first, vertices, places)
+    return np.asarray(vertices), summary(samples, off)
+
+
+# Runs of chords that lie on one circle, along a chain of points.
+#
+# A run grows from its first point by doubling and then bisection, so n points cost O(n log n);
+# every test of a run is a least-squares circle about the run's own middle (Kåsa's, which is
+# linear: minimise Σ (x² + y² − 2ax − 2by − c)²). `tests/oracles/recognise.py` explodes arcs and
+# judges what comes back.
+
+
+cpdef enum:
+    # Points that an arc needs: four chords. Three always lie on a circle, four often do.
+    MIN_POINTS = 5
+
+# One chord of an arc turns by no more: polygons of fewer than sixteen sides stay polygons.
+cdef double _MAX_TURN_RAD = 22.5 * (math.M_PI / 180.0) * (1.0 + 1e-3)
+MAX_TURN_RAD = _MAX_TURN_RAD
+
+# The longest chord of an arc over its shortest one; the first and the last may be shorter.
+cdef double MAX_LENGTH_RATIO = 1.5
+
+# Runs that turn by less in all stay chords.
+cdef double MIN_SWEEP_RAD = 0.02
+
+# Points may lie off the circle by so many times the mean fourth difference of these distances. Of
+# noise it is 7 times the mean (√70 σ); of n points that are off smoothly, as another curve is,
+# about (3π/n)⁴ times the most.
+cdef double ROUGHNESS = 0.5
+
+cpdef enum:
+    # Fewer points than these do not tell noise from another curve: they must lie on the circle
+    # within the noise that is known.
+    ROUGH_POINTS = 12
+
+# The sagitta of a run is at least so many times the noise, or the run is straight.
+cdef double MIN_SAGITTA_NOISES = 8.0
+
+cpdef enum:
+    FAIL = 0, STRAIGHT, ARC
+
+
+cdef bint lengths_agree(double[:, ::1] points, Int low, Int high) noexcept:
+    """True if the chords low..high − 1 have similar lengths; the first and last may be shorter."""
+    cdef Int k
+    least, most = math.INFINITY, 0.0
+    for k in range(low, high):
+        length = math.hypot(points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1])
+        most = max(most, length)
+        if low < k < high - 1:
+            least = min(least, length)
+    return most <= MAX_LENGTH_RATIO * least
+
+
+cdef bint is_straight(double[:, ::1] points, Int low, Int high, double noise) noexcept:
+    """True if the points lie within `noise` of the chord from the first to the last."""
+    cdef Int k
+    ux, uy = points[high, 0] - points[low, 0], points[high, 1] - points[low, 1]
+    length = math.hypot(ux, uy)
+    for k in range(low + 1, high):
+        wx, wy = points[k, 0] - points[low, 0], points[k, 1] - points[low, 1]
+        if abs(ux * wy - uy * wx) > noise * length:
+            return False
+    return length > 0.0
+
+
+cpdef (double, double, double) circle_of(double[:, ::1] points, Int low, Int high) noexcept:
+    """Centre and radius of the least-squares circle; an infinite radius for points on a line."""
+    cdef Int count, k
+    count = high - low + 1
+    mx, my = 0.0, 0.0
+    for k in range(low, high + 1):
+        mx, my = mx + points[k, 0] / float(count), my + points[k, 1] / float(count)
+    uu, uv, vv, ru, rv = 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(low, high + 1):
+        u, v = points[k, 0] - mx, points[k, 1] - my
+        square = u * u + v * v
+        uu, uv, vv = uu + u * u, uv + u * v, vv + v * v
+        ru, rv = ru + 0.5 * square * u, rv + 0.5 * square * v
+    below = uu * vv - uv * uv
+    if not below > 0.0:
+        return mx, my, math.INFINITY
+    a, b = (ru * vv - rv * uv) / below, (rv * uu - ru * uv) / below
+    return mx + a, my + b, math.sqrt(a * a + b * b + (uu + vv) / float(count))
+
+
+cdef (Int, double, double, double, double) judge(
+    double[:, ::1] points, Int low, Int high, double noise, double tolerance, double[::1] off
+) noexcept:
+    """FAIL, STRAIGHT or ARC for the points low..high; of an arc centre, radius, signed sweep.
+    There is room in `off` (n,) for a number of each point."""
+    cdef Int k
+    cdef double rough, fourth, sweep, largest
+    if not lengths_agree(points, low, high):
+        return FAIL, 0.0, 0.0, 0.0, 0.0
+    if is_straight(points, low, high, noise):
+        return STRAIGHT, 0.0, 0.0, 0.0, 0.0
+    cx, cy, radius = circle_of(points, low, high)
+    sweep, rough, largest = 0.0, 0.0, 0.0
+    for k in range(low, high + 1):
+        x, y = points[k, 0] - cx, points[k, 1] - cy
+        off[k - low] = math.hypot(x, y) - radius
+        largest = max(largest, abs(off[k - low]))
+        if k < high:
+            nx, ny = points[k + 1, 0] - cx, points[k + 1, 1] - cy
+            turn = math.atan2(x * ny - y * nx, x * nx + y * ny)
+            if abs(turn) > _MAX_TURN_RAD or turn * sweep < 0.0:
+                return FAIL, 0.0, 0.0, 0.0, 0.0
+            sweep += turn
+    if high - low + 1 >= ROUGH_POINTS:
+        # Not at the ends: a point that no longer belongs to the arc would speak for itself.
+        for k in range(3, high - low - 2):
+            fourth = off[k - 2] - 4.0 * off[k - 1] + 6.0 * off[k] - 4.0 * off[k + 1] + off[k + 2]
+            rough += abs(fourth) / float(high - low - 5)
+    if abs(sweep) > 2.0 * math.M_PI + _MAX_TURN_RAD:
+        return FAIL, 0.0, 0.0, 0.0, 0.0
+    if not largest <= min(tolerance, max(noise, ROUGHNESS * rough)):
+        return FAIL, 0.0, 0.0, 0.0, 0.0
+    sagitta = radius * (1.0 - math.cos(0.5 * min(abs(sweep), math.M_PI)))
+    if abs(sweep) < MIN_SWEEP_RAD or sagitta < MIN_SAGITTA_NOISES * max(noise, largest):
+        return STRAIGHT, 0.0, 0.0, 0.0, 0.0
+    return ARC, cx, cy, radius, sweep
+
+
+cdef (Int, Int, double, double, double, double) longest_run(
+    double[:, ::1] points, Int low, double noise, double tolerance, double[::1] off
+) noexcept:
+    """The last point of the longest run from `low`, and what it is; `low` for none."""
+    cdef Int best, beyond, size, rest, doubled, high, is_
+    cdef double cx, cy, radius, sweep
+    best, beyond, size = low, len(points), MIN_POINTS - 1
+    is_, cx, cy, radius, sweep = FAIL, 0.0, 0.0, 0.0, 0.0
+    while best < len(points) - 1 and low + size < len(points):
+        found = judge(points, low, low + size, noise, tolerance, off)
+        if found[0] != FAIL:
+            best = low + size
+            is_, cx, cy, radius, sweep = found
+        elif size >= 2 * ROUGH_POINTS - 1:
+            beyond = low + size
+            break
+        # A few points may fail by noise that more of them show to be noise.
+        rest = len(points) - 1 - low
+        doubled = 2 * size if size >= ROUGH_POINTS - 1 else max(2 * size, ROUGH_POINTS - 1)
+        size = min(doubled, rest) if size < rest else size + 1
+    while best > low and beyond - best > 1:
+        high = (best + beyond) // 2
+        found = judge(points, low, high, noise, tolerance, off)
+        if found[0] == FAIL:
+            beyond = high
+        else:
+            best = high
+            is_, cx, cy, radius, sweep = found
+    return best, is_, cx, cy, radius, sweep
+
+
+cpdef find_runs(double[:, ::1] points, double noise, double tolerance):
+    """(r, 6) runs of chords on one circle: first and last point, centre, radius, signed sweep.
+
+    A run that is straight so far is passed; the arc behind it begins within its last chords, and
+    is extended backwards as far as it goes.
+    """
+    cdef Int count, low, done, high, is_
+    cdef double cx, cy, radius, sweep
+    cdef double[:, ::1] out
+    cdef double[::1] off
+    out, off = np.empty((len(points) // (MIN_POINTS - 1) + 1, 6)), np.empty(len(points))
+    count, low, done = 0, 0, 0
+    while low + MIN_POINTS <= len(points):
+        high, is_, cx, cy, radius, sweep = longest_run(points, low, noise, tolerance, off)
+        if is_ != ARC:
+            low = max(low + 1, high - MIN_POINTS + 1)
+            continue
+        while low > done:
+            longer = judge(points, low - 1, high, noise, tolerance, off)
+            if longer[0] != ARC:
+                break
+            low -= 1
+            is_, cx, cy, radius, sweep = longer
+        out[count, 0], out[count, 1] = low, high
+        out[count, 2], out[count, 3], out[count, 4], out[count, 5] = cx, cy, radius, sweep
+        count += 1
+        low = done = high
+    return np.asarray(out[:count])
+
+
+cpdef double furthest_off(double[:, ::1] points, double[:, ::1] arcs) noexcept:
+    """The largest distance of points (n, 2) from a chain of arcs (m, 3)."""
+    cdef Int i, row
+    cdef double bulge, nearest, largest, off
+    largest = 0.0
+    for i in range(len(points)):
+        nearest = math.INFINITY
+        for row in range(len(arcs) - 1):
+            ax, ay, bulge = arcs[row, 0], arcs[row, 1], arcs[row, 2]
+            bx, by = arcs[row + 1, 0], arcs[row + 1, 1]
+            off = distance_to_arc(points[i, 0], points[i, 1], ax, ay, bx, by, bulge)
+            nearest = min(nearest, off)
+        largest = max(largest, nearest)
+    return largest
+
+
+# The nearest segment to each of many points; the least distance from a vertex of any path to a
+# segment of another path.
+#
+# A binary tree of boxes stands over the segments in their order; a path is one stretch of them, so
+# a vertex leaves out the nodes that lie within its own path, and those farther than the best
+# distance so far. What makes it exact: only boxes are left out, by their true distance.
+
+
+cpdef (double, Int, Int) closest(
+    const double[:, :] start, const double[:, :] end, double[::1] bulge, double[:, ::1] boxes,
+    Int[::1] path
+):
+    """The distance, the row whose start is nearest to another path, and the row it is near to.
+
+    `start`, `end` (K, 2), `bulge` (K,), `boxes` (K, 4) and the ascending `path` (K,) of the
+    segments. Rows are −1 when there is one path only.
+    """
+    cdef Int count, row, best_row, best_other, first, last, other
+    cdef Int[::1] stack
+    cdef double[:, ::1] tree
+    tree = tree_of(boxes)
+    count = len(bulge)
+    stack = np.empty(DEPTH, np.int64)
+    best, best_row, best_other = math.INFINITY, -1, -1
+    first, last = 0, -1
+    for row in range(count):
+        if row > last:
+            first, last = row, row
+            while last + 1 < count and path[last + 1] == path[row]:
+                last += 1
+        apart, other = _from_point(
+            start[row, 0], start[row, 1], start, end, bulge, tree, first, last, best, stack
+        )
+        if other >= 0:
+            best, best_row, best_other = apart, row, other
+    return best, best_row, best_other
+
+
+cpdef nearest_rows(
+    double[:, ::1] points, const double[:, :] start, const double[:, :] end, double[::1] bulge,
+    double[:, ::1] boxes
+):
+    """(P,) rows of the segments nearest to points (P, 2); quick when neighbours in the list are
+    near. `start`, `end` (K, 2), `bulge` (K,), `boxes` (K, 4), K ≥ 1; where two are as near, the
+    last one keeps its place."""
+    cdef Int other, row, index
+    cdef Int[::1] found, stack
+    cdef double _, x, y, ax, ay, bx, by
+    cdef double[:, ::1] tree
+    tree = tree_of(boxes)
+    found, stack = np.zeros(len(points), np.int64), np.empty(DEPTH, np.int64)
+    row = 0
+    for index in range(len(points)):
+        x, y = points[index, 0], points[index, 1]
+        ax, ay, bx, by = start[row, 0], start[row, 1], end[row, 0], end[row, 1]
+        apart = distance_to_arc(x, y, ax, ay, bx, by, bulge[row])
+        _, other = _from_point(x, y, start, end, bulge, tree, 0, -1, apart, stack)
+        row = other if other >= 0 else row
+        found[index] = row
+    return np.asarray(found)
+
+
+cdef (double, Int) _from_point(
+    double x, double y, const double[:, :] start, const double[:, :] end, double[::1] bulge,
+    double[:, ::1] tree, Int first, Int last, double best, Int[::1] stack
+) noexcept:
+    """The distance to the nearest segment outside first … last that is nearer than the best one
+    so far, and its row; −1 when there is none. `stack` (`DEPTH`,) is room."""
+    cdef Int leaves, found, height, node, row, low, high
+    cdef bint own
+    leaves = len(tree) // 2
+    found = -1
+    height, stack[0] = 1, 1
+    while height > 0:
+        height -= 1
+        node = stack[height]
+        low, high = rows_under(tree, node, len(bulge))
+        own = low >= first and high <= last + 1
+        if low >= high or own or apart_square(tree, node, x, y) >= best * best:
+            continue
+        if node < leaves:
+            height = wait_for_children(tree, node, x, y, stack, height)
+            continue
+        for row in range(low, high):
+            if first <= row <= last:
+                continue
+            ax, ay, bx, by = start[row, 0], start[row, 1], end[row, 0], end[row, 1]
+            apart = distance_to_arc(x, y, ax, ay, bx, by, bulge[row])
+            if apart < best:
+                best, found = apart, row
+    return best, found

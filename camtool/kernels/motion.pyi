@@ -1,0 +1,6 @@
+from camtool.arrays import Floats, Ints
+
+def legs_fill(done: int, begin: Ints, way: Ints, step_mm: Floats, out: Floats) -> None: ...
+def entry_speeds(
+    gain: Floats, limit: Floats, window: int, reached: float, entry: Floats
+) -> None: ...

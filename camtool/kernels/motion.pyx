@@ -1,0 +1,81 @@
+"""Legs of whole steps, and the speeds at which a planner enters its blocks.
+"""
+
+from __future__ import annotations
+
+from camtool.kernels.types cimport Int
+
+from camtool.arrays import Floats, Ints
+
+# Straight legs of whole steps by a counter: one pulse of the axis with most steps per pass.
+#
+# A leg of d = (dx, dy, dz) steps has M = max |d| passes. In each of them every axis adds |d| to
+# its count; a count that reaches M gives a step and loses M. So after pass k an axis has made
+# ⌊k·|d| / M⌋ steps: the axis of M one in every pass, all of them |d| in the end. (ValCNC's CUENTA,
+# its Tabla 8; a leg along an axis or a diagonal is the same with any controller.)
+#
+# Exact, because counts are int64 and k·|d| stays below 2⁶³ for legs below 2³¹ steps; any window
+# can be filled by itself. Compiled, because positions by division are five times slower.
+
+
+cpdef void legs_fill(
+    Int done, Int[:, ::1] begin, Int[:, ::1] way, double[::1] step_mm, double[:, ::1] out
+) noexcept:
+    """Positions after the passes of legs, `out` (n, 3) mm, those of the first from `done` on.
+
+    Each leg starts at `begin` (L, 3) steps and goes by `way` (L, 3) steps, not all of them 0;
+    `step_mm` (3,). `out` may end within a leg, not behind the last one.
+    """
+    cdef Int leg, filled, passes, run, axis, position, k, size, sense, count
+    leg, filled = 0, 0
+    while filled < len(out):
+        passes = max(abs(way[leg, 0]), abs(way[leg, 1]), abs(way[leg, 2]))
+        run = min(passes - done, len(out) - filled)
+        for axis in range(3):
+            size, sense = abs(way[leg, axis]), 1 if way[leg, axis] > 0 else -1
+            position = begin[leg, axis] + sense * (done * size // passes)
+            count, step = done * size % passes, step_mm[axis]
+            for k in range(filled, filled + run):
+                count += size
+                if count >= passes:
+                    count -= passes
+                    position += sense
+                out[k, axis] = float(position) * step
+        filled += run
+        leg += 1
+        done = 0
+
+
+# How fast a planner that sees only so many blocks ahead enters each of them.
+#
+# A planner may enter block j no faster than its limit (squared: limit_j), and never so fast that
+# it could not stop at the end of the last block that it knows of. With e the square of a speed, a
+# the acceleration and d the length of a block:
+#
+#     backward over the known blocks, from rest:   e ← min(limit_j, e + 2 a_j d_j)
+#     forward, from what was reached before:       entry_i² = min(e_i, entry_{i−1}² + 2 a d)
+#
+# When block i is entered the block before it is still in the buffer, which holds `window` blocks:
+# it knows blocks i to i + window − 2. Exact, because the windows are those of a buffer that is
+# always full; what the planner does again at each new block ends at the same numbers.
+#
+# Compiled, because every speed depends on the one before.
+
+
+cpdef void entry_speeds(
+    double[::1] gain, double[::1] limit, Int window, double reached, double[::1] entry
+) noexcept:
+    """Squares of the speeds at the starts of N blocks, `entry` (N,).
+
+    `gain` (N,): what the square of a speed can change by within a block, 2 a d; `limit` (N,): its
+    highest value at the start of the block, 0 where the machine stands before it. `reached`: what
+    the blocks before allow at the start of the first, 0 where there are none.
+    """
+    cdef Int i, j
+    for i in range(len(gain)):
+        planned = 0.0
+        for j in range(min(i + window - 1, len(gain)) - 1, i - 1, -1):
+            planned = min(limit[j], planned + gain[j])
+        reached = min(planned, reached)
+        entry[i] = reached
+        reached += gain[i]

@@ -1,0 +1,1368 @@
+"""Offsets of paths of lines and arcs: trees of boxes, distances, meetings, slices and loops.
+
+Arrays in, arrays out. What each part does is said above it.
+"""
+
+from __future__ import annotations
+
+from libc cimport math
+from libc.stdint cimport uint8_t
+from camtool.kernels.types cimport Int
+
+import numpy as np
+
+from camtool.arrays import Bools, Floats, Indices, Ints
+
+# A binary tree of boxes over rows in their order: what is far away is left out at once.
+#
+# Nodes are in heap order, the root is 1; node i has the children 2i and 2i + 1, and each leaf
+# holds `LEAF` rows that follow each other. Along a path neighbours in the list are neighbours in
+# the plane, so no row needs to be moved; over paths that surround each other stands a tree of
+# `camtool.kernels.move_tree`. What makes it exact: comparisons of the given numbers.
+
+
+cpdef enum:
+    # Rows in a leaf.
+    LEAF = 4
+
+
+cpdef tree_of(double[:, ::1] boxes):
+    """(2L, 4) boxes of the nodes over `boxes` (K, 4); the L leaves are the last."""
+    cdef Int leaves, node, row, k
+    cdef double[:, ::1] tree
+    leaves = 1
+    while leaves * LEAF < len(boxes):
+        leaves *= 2
+    tree = np.empty((2 * leaves, 4))
+    for node in range(2 * leaves):
+        for k in range(2):
+            tree[node, k], tree[node, k + 2] = math.INFINITY, -math.INFINITY
+    for row in range(len(boxes)):
+        _widen(tree, leaves + row // LEAF, boxes, row)
+    for node in range(leaves - 1, 0, -1):
+        _widen(tree, node, tree, 2 * node)
+        _widen(tree, node, tree, 2 * node + 1)
+    return np.asarray(tree)
+
+
+cdef void _widen(double[:, ::1] tree, Int node, double[:, ::1] boxes, Int row) noexcept:
+    cdef Int k
+    for k in range(2):
+        tree[node, k] = min(tree[node, k], boxes[row, k])
+        tree[node, k + 2] = max(tree[node, k + 2], boxes[row, k + 2])
+
+
+cdef (Int, Int) rows_under(double[:, ::1] tree, Int node, Int count) noexcept:
+    """The rows low … high − 1 of `count` in all that a node holds."""
+    cdef Int leaves, span, low
+    leaves = len(tree) // 2
+    span = LEAF
+    while node < leaves:
+        node *= 2
+        span *= 2
+    low = min((node - leaves) * LEAF, count)
+    return low, min(low + span, count)
+
+
+cdef inline double apart_square(double[:, ::1] tree, Int node, double x, double y) noexcept:
+    """Square of the distance of a point from the box of a node."""
+    dx = max(tree[node, 0] - x, 0.0, x - tree[node, 2])
+    dy = max(tree[node, 1] - y, 0.0, y - tree[node, 3])
+    return float(dx * dx + dy * dy)
+
+
+cdef Int wait_for_children(
+    double[:, ::1] tree, Int node, double x, double y, Int[::1] stack, Int height
+) noexcept:
+    """Put the children of a node on a stack of `height` nodes, the one nearer to a point on top;
+    returns the new height."""
+    cdef Int left, right
+    left, right = 2 * node, 2 * node + 1
+    if apart_square(tree, left, x, y) < apart_square(tree, right, x, y):
+        left, right = right, left
+    stack[height], stack[height + 1] = left, right
+    return height + 2
+
+
+cdef inline bint touch(double[:, ::1] one, Int i, double[:, ::1] other, Int j) noexcept:
+    """True if box i of one list and box j of another have a point in common."""
+    return bool(
+        one[i, 0] <= other[j, 2]
+        and other[j, 0] <= one[i, 2]
+        and one[i, 1] <= other[j, 3]
+        and other[j, 1] <= one[i, 3]
+    )
+
+
+# Lines and arcs as rows of numbers that need no centre, for the kernels of offsets.
+#
+# A row holds A, B, the unit tangents t at A and u at B, the signed curvature k (left positive),
+# the length and the sweep. With q = p − A and n, t turned by +90°, the distance of p from the
+# whole line or circle is
+#
+#     |k q·q − 2 n·q| / (1 + |n − k q|),
+#
+# because n − k q is k times the way from p to the centre. What makes it exact: for a curvature of
+# 0 it becomes the formula of the line, and no difference of large numbers is formed on the way
+# there. The vectorised twins are camtool.geometry.measure, distance and measure.
+
+
+cpdef enum:
+    # The columns of a row.
+    AX = 0, AY, BX, BY, TX, TY, UX, UY, BEND, LENGTH, SWEEP
+
+
+cpdef curve_rows(double[:, ::1] start, double[:, ::1] end, double[::1] bulge):
+    """(K, 11) rows of the segments from `start` to `end` (K, 2) with their bulges (K,)."""
+    cdef double[:, ::1] rows
+    cdef Int i
+    rows = np.empty((len(bulge), 11))
+    for i in range(len(bulge)):
+        set_curve_row(rows, i, start[i, 0], start[i, 1], end[i, 0], end[i, 1], bulge[i])
+    return np.asarray(rows)
+
+
+cdef void set_curve_row(
+    double[:, ::1] rows, Int i, double ax, double ay, double bx, double by, double b
+) noexcept:
+    """Row i of the segment from (ax, ay) to (bx, by) with the bulge b."""
+    cdef double dx, dy, chord, grown, cosine, sine, turn
+    dx, dy = bx - ax, by - ay
+    chord = math.hypot(dx, dy)
+    # The tangents are the chord turned by ∓ sweep/2, and b = tan(sweep/4).
+    grown = 1.0 + b * b
+    cosine, sine = (1.0 - b * b) / (grown * chord), 2.0 * b / (grown * chord)
+    rows[i, AX], rows[i, AY], rows[i, BX], rows[i, BY] = ax, ay, bx, by
+    rows[i, TX], rows[i, TY] = cosine * dx + sine * dy, cosine * dy - sine * dx
+    rows[i, UX], rows[i, UY] = cosine * dx - sine * dy, cosine * dy + sine * dx
+    rows[i, BEND] = 4.0 * b / (chord * grown)
+    rows[i, LENGTH], rows[i, SWEEP] = chord, 0.0
+    if b != 0.0:
+        turn = math.atan(b)
+        rows[i, LENGTH], rows[i, SWEEP] = chord * grown * turn / b, 4.0 * turn
+
+
+cpdef curve_boxes(double[:, ::1] curves, double margin):
+    """(K, 4) xmin, ymin, xmax, ymax of boxes that hold each curve, and `margin` more all round.
+
+    An arc lies between its chord and the parallel of it at its height, sin(sweep/4)² · 2/k.
+    """
+    cdef double[:, ::1] boxes
+    cdef Int i
+    boxes = np.empty((len(curves), 4))
+    for i in range(len(curves)):
+        ax, ay, bx, by = curves[i, AX], curves[i, AY], curves[i, BX], curves[i, BY]
+        px = py = 0.0
+        if curves[i, BEND] != 0.0:
+            height = 2.0 * math.sin(0.25 * curves[i, SWEEP]) ** 2 / curves[i, BEND]
+            chord = math.hypot(bx - ax, by - ay)
+            px, py = height * (by - ay) / chord, -height * (bx - ax) / chord
+        boxes[i, 0] = min(ax, bx) + min(px, 0.0) - margin
+        boxes[i, 1] = min(ay, by) + min(py, 0.0) - margin
+        boxes[i, 2] = max(ax, bx) + max(px, 0.0) + margin
+        boxes[i, 3] = max(ay, by) + max(py, 0.0) + margin
+    return np.asarray(boxes)
+
+
+cdef inline double gap_to(double[:, ::1] curves, Int i, double x, double y) noexcept:
+    """Distance of a point from the whole line or circle of row i."""
+    qx, qy = x - curves[i, AX], y - curves[i, AY]
+    nx, ny, bend = -curves[i, TY], curves[i, TX], curves[i, BEND]
+    power = bend * (qx * qx + qy * qy) - 2.0 * (nx * qx + ny * qy)
+    wx, wy = nx - bend * qx, ny - bend * qy
+    return float(abs(power) / (1.0 + math.sqrt(wx * wx + wy * wy)))
+
+
+cdef inline double distance_to(double[:, ::1] curves, Int i, double x, double y) noexcept:
+    """Distance of a point from row i: from its nearer end beside it (|sweep| ≤ π)."""
+    cdef bint ahead
+    qx, qy = x - curves[i, AX], y - curves[i, AY]
+    rx, ry = x - curves[i, BX], y - curves[i, BY]
+    ahead = qx * curves[i, TX] + qy * curves[i, TY] >= 0.0
+    if ahead and rx * curves[i, UX] + ry * curves[i, UY] <= 0.0:
+        return gap_to(curves, i, x, y)
+    return math.sqrt(min(qx * qx + qy * qy, rx * rx + ry * ry))
+
+
+cpdef double along(double[:, ::1] curves, Int i, double x, double y) noexcept:
+    """Length along row i from its start to a point on its line or circle; negative before it.
+
+    The chord to the point makes half the swept angle with the tangent; points before the start
+    show as half angles beyond the middle of what remains of the circle.
+    """
+    cdef bint before
+    cdef double half, chord
+    qx, qy = x - curves[i, AX], y - curves[i, AY]
+    ahead = curves[i, TX] * qx + curves[i, TY] * qy
+    if curves[i, BEND] == 0.0:
+        return float(ahead)
+    chord = math.sqrt(qx * qx + qy * qy)
+    beside = curves[i, TX] * qy - curves[i, TY] * qx
+    half = math.atan2(math.copysign(1.0, curves[i, BEND]) * beside, ahead)
+    before = half > 0.5 * math.M_PI + 0.25 * abs(curves[i, SWEEP]) or half < -0.5 * math.M_PI
+    half = math.M_PI - abs(half) if before else abs(half)
+    if half != 0.0:
+        chord *= half / math.sin(half)
+    return float(-chord if before else chord)
+
+
+cpdef inline (double, double) point_on(double[:, ::1] curves, Int i, double t) noexcept:
+    """The point of row i at the fraction t of its length.
+
+    After the length s the chord from A is turned by half = k s/2 and s · sin(half)/half long.
+    """
+    if t == 1.0:
+        return curves[i, BX], curves[i, BY]
+    s = t * curves[i, LENGTH]
+    half = 0.5 * t * curves[i, SWEEP]
+    if half != 0.0:
+        s *= math.sin(half) / half
+    cosine, sine = math.cos(half), math.sin(half)
+    tx, ty = curves[i, TX], curves[i, TY]
+    x = curves[i, AX] + s * (cosine * tx - sine * ty)
+    return x, curves[i, AY] + s * (cosine * ty + sine * tx)
+
+
+# How deep points are in what mitres cover.
+#
+# About a corner c with the normals n1 and n2 of both its sides, a mitre at the distance d covers
+#
+#     { c + q :  n1·q ≤ d,  n2·q ≤ d,  m·q ≤ far,  q ahead of side 1 and behind side 2 },
+#
+# with the middle m of both normals: a kite, or what is left of one that is cut off. It is convex,
+# so a point is as deep in it as it is from the nearest of these five lines. The depth changes by
+# no more than the way. What makes it exact: a tree of boxes leaves out only kites that a point is
+# not in.
+
+
+cpdef enum:
+    # The columns of a kite.
+    CX = 0, CY, N1X, N1Y, N2X, N2Y, MX, MY, DEEP, FAR
+
+
+cpdef kite_boxes(double[:, ::1] kites):
+    """(J, 4) boxes xmin, ymin, xmax, ymax that hold the kites (J, 10)."""
+    cdef double[:, ::1] boxes
+    cdef Int i
+    boxes = np.empty((len(kites), 4))
+    for i in range(len(kites)):
+        cx, cy, deep = kites[i, CX], kites[i, CY], kites[i, DEEP]
+        # From the corner to the tip, or to both ends of the cut: no farther than this.
+        cosine = kites[i, N1X] * kites[i, MX] + kites[i, N1Y] * kites[i, MY]
+        if kites[i, FAR] == math.INFINITY:
+            wide = deep / cosine
+        else:
+            sine = math.sqrt(max(1.0 - cosine * cosine, 0.0))
+            wide = math.hypot(deep, (kites[i, FAR] - deep * cosine) / sine)
+        boxes[i, 0], boxes[i, 1] = cx - wide, cy - wide
+        boxes[i, 2], boxes[i, 3] = cx + wide, cy + wide
+    return np.asarray(boxes)
+
+
+cdef inline double depth_in(double[:, ::1] kites, Int i, double x, double y) noexcept:
+    """Return the depth (mm) of a point in kite i; below 0 outside it."""
+    qx, qy = x - kites[i, CX], y - kites[i, CY]
+    n1x, n1y, n2x, n2y = kites[i, N1X], kites[i, N1Y], kites[i, N2X], kites[i, N2Y]
+    out = min(kites[i, DEEP] - n1x * qx - n1y * qy, kites[i, DEEP] - n2x * qx - n2y * qy)
+    out = min(out, kites[i, FAR] - kites[i, MX] * qx - kites[i, MY] * qy)
+    return float(min(out, n1y * qx - n1x * qy, n2x * qy - n2y * qx))
+
+
+cpdef double deepest(
+    double[:, ::1] kites, double[:, ::1] tree, double x, double y, double best, double enough,
+    Int[::1] stack
+) noexcept:
+    """Return the largest depth (mm) of a point in a kite, or `best` if none is deeper.
+
+    Any depth above `enough` will do. `stack` (`DEPTH`,) is a scratch buffer.
+    """
+    cdef Int leaves, height, node, low, row
+    if len(kites) == 0:
+        return best
+    leaves = len(tree) // 2
+    height, stack[0] = 1, 1
+    while height > 0:
+        height -= 1
+        node = stack[height]
+        if apart_square(tree, node, x, y) > 0.0:
+            continue
+        if node < leaves:
+            stack[height], stack[height + 1] = 2 * node + 1, 2 * node
+            height += 2
+            continue
+        low = (node - leaves) * LEAF
+        for row in range(low, min(low + LEAF, len(kites))):
+            best = max(best, depth_in(kites, row, x, y))
+        if best > enough:
+            return best
+    return best
+
+
+# How near points of raw elements are to the source: elements trimmed, slices judged.
+#
+# What makes it exact: a tree of boxes leaves out only what is too far away, by its true distance.
+# The twins, with every distance to every segment, are in tests/oracles/offset_stages.py.
+
+
+cpdef enum:
+    # How often the end of an element is moved on, at most.
+    TRIM_ROUNDS = 40
+
+# An end that moves on by less than this share of its element is left where it is.
+cdef double TRIM_STEP_SHARE = 0.02
+
+Near = tuple[Floats, Floats, Floats, Floats]
+"""The curves of a source and the tree over them; the kites of its mitres and their tree."""
+
+cpdef enum:
+    # Room for the curves that can be too near to an element; where there are more, all are asked.
+    GATHERED = 32
+
+# Where on a slice its distance is measured; the middle first, as it settles most of them.
+PLACES = (0.5, 0.03, 0.97, 0.2, 0.8, 0.35, 0.65)
+
+
+cdef double least_below(
+    double[:, ::1] curves, double[:, ::1] tree, double x, double y, double best, double enough,
+    Int[::1] stack, double[::1] apart
+) noexcept:
+    """Distance of a point from the nearest curve, or `best` when none is nearer than that.
+
+    Any distance below `enough` will do. `stack` and `apart` (`DEPTH`,) are scratch buffers.
+    """
+    cdef Int leaves, height, node, low, row, near, far
+    leaves = len(tree) // 2
+    height, stack[0], apart[0] = 1, 1, apart_square(tree, 1, x, y)
+    while height > 0:
+        height -= 1
+        node = stack[height]
+        if apart[height] >= best * best:
+            continue
+        if node < leaves:
+            near, far = 2 * node, 2 * node + 1
+            to_near, to_far = apart_square(tree, near, x, y), apart_square(tree, far, x, y)
+            if to_far < to_near:
+                near, far, to_near, to_far = far, near, to_far, to_near
+            stack[height], apart[height] = far, to_far
+            stack[height + 1], apart[height + 1] = near, to_near
+            height += 2
+            continue
+        low = (node - leaves) * LEAF
+        for row in range(low, min(low + LEAF, len(curves))):
+            best = min(best, distance_to(curves, row, x, y))
+        if best < enough:
+            return best
+    return best
+
+
+cpdef nearest_distances(double[:, ::1] points, double[:, ::1] curves, double[:, ::1] tree):
+    """(P,) distance of each point (P, 2) from the nearest curve."""
+    cdef double[::1] found, apart
+    cdef Int i
+    cdef Int[::1] stack
+    found = np.empty(len(points))
+    stack, apart = np.empty(DEPTH, np.int64), np.empty(DEPTH)
+    for i in range(len(points)):
+        x, y = points[i, 0], points[i, 1]
+        found[i] = least_below(curves, tree, x, y, math.INFINITY, 0.0, stack, apart)
+    return np.asarray(found)
+
+
+cdef twice_the_room(Int[:, ::1] found):
+    """The same pairs (J, 2), and room for as many more."""
+    cdef Int[:, ::1] more
+    more = np.empty((2 * len(found), 2), np.int64)
+    more[: len(found)] = found
+    return more
+
+
+cpdef curves_within(
+    double[:, ::1] points, double[::1] reach, double[:, ::1] curves, double[:, ::1] tree
+):
+    """(J, 2) pairs of a point (P, 2) and a curve that is no farther from it than `reach` (P,), in
+    the order of the points."""
+    cdef Int[:, ::1] found
+    cdef Int[::1] stack
+    cdef Int i, leaves, count, height, node, low, row
+    found = np.empty((len(points) + LEAF, 2), np.int64)
+    stack = np.empty(DEPTH, np.int64)
+    leaves, count = len(tree) // 2, 0
+    for i in range(len(points)):
+        x, y, limit = points[i, 0], points[i, 1], reach[i]
+        height, stack[0] = 1, 1
+        while height > 0:
+            height -= 1
+            node = stack[height]
+            if apart_square(tree, node, x, y) > limit * limit:
+                continue
+            if node < leaves:
+                stack[height], stack[height + 1] = 2 * node + 1, 2 * node
+                height += 2
+                continue
+            if count + LEAF > len(found):
+                found = twice_the_room(found)
+            low = (node - leaves) * LEAF
+            for row in range(low, min(low + LEAF, len(curves))):
+                if distance_to(curves, row, x, y) <= limit:
+                    found[count, 0], found[count, 1] = i, row
+                    count += 1
+    return np.asarray(found[:count])
+
+
+# Which segments lie beside points, of so many that their rows are not stored.
+#
+# Rows take 88 bytes a segment. Here those of a leaf are made from ends and bulges when a point
+# comes near its box, and stay until another leaf takes their place, so that a segment has no more
+# than its part of the tree (`camtool.kernels.move_tree`) and its place in it. Points that follow
+# each other along a path come near the same few leaves.
+
+
+cpdef enum:
+    # The rows of so many leaves are kept: 180 kB.
+    LEAVES_KEPT = 256
+
+
+cdef class SegmentTree:
+    """K segments between the rows `begin` and `end` (K,) of `vertices` (N, 3) of x, y and the
+    bulge of the segment that leaves; `nodes` (2L, 6) over the `order` (K,) of them, `leaf` of
+    which a leaf holds."""
+
+    cdef const double[:, :] vertices
+    cdef double[:, ::1] nodes, rows
+    cdef const int[:] begin, end, order
+    cdef Int[::1] kept
+    cdef Int leaf
+
+    def __init__(
+        self,
+        vertices: Floats,
+        ends: tuple[Indices, Indices],
+        nodes: Floats,
+        order: Indices,
+        leaf: int,
+    ) -> None:
+        self.vertices, self.nodes, self.order = vertices, nodes, order
+        self.begin, self.end = ends
+        self.leaf = leaf
+        self.rows = np.empty((LEAVES_KEPT * leaf, 11))
+        self.kept = np.full(LEAVES_KEPT, -1)
+
+
+cdef (Int, Int) _rows_of(SegmentTree tree, Int leaf) noexcept:
+    """Return the begin and end of the rows of a leaf; compute them if they are not cached."""
+    cdef Int slot, first, last, k, at, begin, end
+    cdef double ax, ay, bx, by
+    slot = leaf % LEAVES_KEPT
+    first = slot * tree.leaf
+    last = first + min(tree.leaf, len(tree.order) - leaf * tree.leaf)
+    if tree.kept[slot] == leaf:
+        return first, last
+    tree.kept[slot] = leaf
+    for k in range(first, last):
+        at = tree.order[leaf * tree.leaf + k - first]
+        begin, end = tree.begin[at], tree.end[at]
+        ax, ay = tree.vertices[begin, 0], tree.vertices[begin, 1]
+        bx, by = tree.vertices[end, 0], tree.vertices[end, 1]
+        set_curve_row(tree.rows, k, ax, ay, bx, by, tree.vertices[begin, 2])
+    return first, last
+
+
+cpdef distances_from(double[:, ::1] points, SegmentTree tree):
+    """(P,) distance of each point (P, 2) from the nearest segment; inf where there is none."""
+    cdef double[::1] found, apart
+    cdef Int[::1] stack
+    cdef double[:, ::1] nodes, rows
+    cdef Int leaves, i, height, node, low, high, k, near, far
+    cdef double x, y, best, to_near, to_far
+    found = np.empty(len(points))
+    stack, apart = np.empty(DEPTH, np.int64), np.empty(DEPTH)
+    nodes, rows, leaves = tree.nodes, tree.rows, len(tree.nodes) // 2
+    for i in range(len(points)):
+        x, y, best = points[i, 0], points[i, 1], math.INFINITY
+        height, stack[0], apart[0] = 1, 1, apart_square(nodes, 1, x, y)
+        while height > 0:
+            height -= 1
+            node = stack[height]
+            if apart[height] >= best * best:
+                continue
+            if node >= leaves:
+                low, high = _rows_of(tree, node - leaves)
+                for k in range(low, high):
+                    best = min(best, distance_to(rows, k, x, y))
+                continue
+            near, far = 2 * node, 2 * node + 1
+            to_near, to_far = apart_square(nodes, near, x, y), apart_square(nodes, far, x, y)
+            if to_far < to_near:
+                near, far, to_near, to_far = far, near, to_far, to_near
+            stack[height], apart[height] = far, to_far
+            stack[height + 1], apart[height + 1] = near, to_near
+            height += 2
+        found[i] = best
+    return np.asarray(found)
+
+
+cpdef segments_within(double[:, ::1] points, double[::1] reach, SegmentTree tree):
+    """(J, 2) pairs of a point (P, 2) and a segment that is no farther from it than `reach` (P,),
+    in the order of the points."""
+    cdef Int[:, ::1] found
+    cdef Int[::1] stack
+    cdef double[:, ::1] nodes, rows
+    cdef Int leaves, count, i, height, node, low, high, k
+    cdef double x, y, limit
+    found = np.empty((len(points) + tree.leaf, 2), np.int64)
+    stack = np.empty(DEPTH, np.int64)
+    nodes, rows, leaves, count = tree.nodes, tree.rows, len(tree.nodes) // 2, 0
+    for i in range(len(points)):
+        x, y, limit = points[i, 0], points[i, 1], reach[i]
+        height, stack[0] = 1, 1
+        while height > 0:
+            height -= 1
+            node = stack[height]
+            if apart_square(nodes, node, x, y) > limit * limit:
+                continue
+            if node < leaves:
+                stack[height], stack[height + 1] = 2 * node + 1, 2 * node
+                height += 2
+                continue
+            if count + tree.leaf > len(found):
+                found = twice_the_room(found)
+            low, high = _rows_of(tree, node - leaves)
+            for k in range(low, high):
+                if distance_to(rows, k, x, y) <= limit:
+                    found[count, 0] = i
+                    found[count, 1] = tree.order[(node - leaves) * tree.leaf + k - low]
+                    count += 1
+    return np.asarray(found[:count])
+
+
+cpdef Int gathered(
+    double[:, ::1] curves, double[:, ::1] tree, double x, double y, double reach, Int[::1] rows,
+    Int[::1] stack
+) noexcept:
+    """Write the curves nearer to a point than `reach` into `rows`, and return their number.
+
+    −1 if `rows` is too short for them. `stack` (`DEPTH`,) is a scratch buffer.
+    """
+    cdef Int leaves, count, height, node, low, row
+    leaves, count = len(tree) // 2, 0
+    height, stack[0] = 1, 1
+    while height > 0:
+        height -= 1
+        node = stack[height]
+        if apart_square(tree, node, x, y) >= reach * reach:
+            continue
+        if node < leaves:
+            stack[height], stack[height + 1] = 2 * node + 1, 2 * node
+            height += 2
+            continue
+        low = (node - leaves) * LEAF
+        for row in range(low, min(low + LEAF, len(curves))):
+            if distance_to(curves, row, x, y) < reach:
+                if count == len(rows):
+                    return -1
+                rows[count] = row
+                count += 1
+    return count
+
+
+cdef double _too_near(
+    double[:, ::1] curves, double[:, ::1] tree, double[:, ::1] kites, double[:, ::1] kite_tree,
+    Int[::1] rows, Int count, double x, double y, double distance, double spare, double enough,
+    Int[::1] stack, double[::1] apart
+) noexcept:
+    """By how much more than `spare` a point is too near to the source, or too deep in a kite.
+
+    0 when it is not; any number above `enough` will do. `rows` are those of the curves that can be
+    nearer than the distance, `count` how many: −1 for all. `stack` and `apart` (`DEPTH`,) are
+    room.
+    """
+    cdef Int k
+    least = distance - spare
+    if count < 0:
+        short = least - least_below(curves, tree, x, y, least, least - enough, stack, apart)
+    else:
+        short = 0.0
+        for k in range(count):
+            short = max(short, least - distance_to(curves, rows[k], x, y))
+    if short > enough or len(kites) == 0:
+        return short
+    return deepest(kites, kite_tree, x, y, short + spare, enough + spare, stack) - spare
+
+
+cpdef trimmed_ends(double[:, ::1] elements, near, (double, double) limits):
+    """(K, 2) fractions between which each element may be far enough from the source.
+
+    The distance from the source, and the depth in a kite, change by no more than the way along an
+    element: where it falls short by s, all is too near for the length s from there. `limits` are
+    the distance, and by how much the ends that stay may be too near. Low is not below high where
+    nothing is left.
+    """
+    cdef double[:, ::1] ends, curves, tree, kites, kite_tree
+    cdef Int i, count, way, _
+    cdef Int[::1] rows, stack
+    cdef double[::1] apart
+    curves, tree, kites, kite_tree = near
+    distance, spare = limits
+    ends = np.empty((len(elements), 2))
+    rows, stack, apart = np.empty(GATHERED, np.int64), np.empty(DEPTH, np.int64), np.empty(DEPTH)
+    for i in range(len(elements)):
+        low, high, length = 0.0, 1.0, elements[i, LENGTH]
+        x, y = point_on(elements, i, 0.5)
+        count = gathered(curves, tree, x, y, distance + 0.5 * length, rows, stack)
+        for way in range(2):
+            for _ in range(TRIM_ROUNDS):
+                x, y = point_on(elements, i, low if way == 0 else high)
+                enough = (high - low) * length
+                step = (
+                    _too_near(
+                        curves,
+                        tree,
+                        kites,
+                        kite_tree,
+                        rows,
+                        count,
+                        x,
+                        y,
+                        distance,
+                        spare,
+                        enough,
+                        stack,
+                        apart,
+                    )
+                    / length
+                )
+                if step <= TRIM_STEP_SHARE * (high - low):
+                    break
+                if way == 0:
+                    low += step
+                else:
+                    high -= step
+                if low >= high:
+                    break
+            if low >= high:
+                break
+        ends[i, 0], ends[i, 1] = low, high
+    return np.asarray(ends)
+
+
+cpdef far_enough(
+    double[:, ::1] elements, Int[::1] element, double[:, ::1] span, near, (double, double) limits
+):
+    """(S,) true for the slices of which no measured point is too near to the source.
+
+    Slice i runs on row element[i] from the fraction span[i, 0] to span[i, 1]. `limits` are the
+    distance, and by how much a point may be too near.
+    """
+    cdef double[::1] places, apart
+    cdef uint8_t[::1] valid
+    cdef Int i, last, whole, count, k, row
+    cdef double[:, ::1] curves, tree, kites, kite_tree
+    cdef Int[::1] rows, stack
+    curves, tree, kites, kite_tree = near
+    distance, spare = limits
+    places = np.array(PLACES)
+    valid = np.ones(len(element), np.bool_)
+    rows, stack, apart = np.empty(GATHERED, np.int64), np.empty(DEPTH, np.int64), np.empty(DEPTH)
+    last, whole = -1, -1
+    for i in range(len(element)):
+        row, t0, part = element[i], span[i, 0], span[i, 1] - span[i, 0]
+        length = elements[row, LENGTH]
+        if row != last:
+            # No other curve is too near to any point of the element.
+            x, y = point_on(elements, row, 0.5)
+            last = row
+            whole = gathered(curves, tree, x, y, distance + 0.5 * length, rows, stack)
+        count = whole
+        for k in range(len(places)):
+            x, y = point_on(elements, row, t0 + places[k] * part)
+            short = _too_near(
+                curves,
+                tree,
+                kites,
+                kite_tree,
+                rows,
+                count,
+                x,
+                y,
+                distance,
+                spare,
+                0.0,
+                stack,
+                apart,
+            )
+            if short > 0.0:
+                valid[i] = False
+                break
+            if k == 0 and whole < 0:
+                reach = distance + 0.5 * part * length
+                count = gathered(curves, tree, x, y, reach, rows, stack)
+    return np.asarray(valid).view(np.bool_)
+
+
+# Where many lines and arcs meet: pairs from a tree of boxes, each pair met exactly.
+#
+# The rules are those of camtool.geometry.intersect, which is the vectorised twin: the four ends
+# and the two common points of the whole curves are measured, and count when they are within eps of
+# both curves and of the range of both, and not within 2 eps of one that counted before; and, which
+# is more than there, when the curves part by more than eps on the way from one that counted
+# before.
+
+
+cpdef enum:
+    # The columns of a meeting: its place, and the fractions of both curves there.
+    X = 0, Y, TA, TB
+    # Two curves have four ends and two common points.
+    MAX_MEETINGS = 6
+
+
+cpdef pairs_of(
+    double[:, ::1] boxes, double[:, ::1] tree, double[:, ::1] others, double[:, ::1] other_tree,
+    bint own
+):
+    """(J, 2) rows of `boxes` and of `others` that touch; a tree stands over each.
+
+    `own` says that both are the same: then each pair comes once, the lesser row first. Nodes of
+    both trees are looked at in pairs, so that what two large boxes tell is told once.
+    """
+    cdef Int first, last, other_first, other_last, leaves, other_leaves, count, height, i, a, b
+    cdef Int child, low, far_low, j, far
+    cdef Int[:, ::1] pairs
+    cdef Int[::1] left, right
+    pairs = np.empty((4 * len(boxes) + 16, 2), np.int64)
+    leaves, other_leaves, count = len(tree) // 2, len(other_tree) // 2, 0
+    left, right = np.empty(4 * DEPTH, np.int64), np.empty(4 * DEPTH, np.int64)
+    height, left[0], right[0] = 1, 1, 1
+    while height > 0:
+        height -= 1
+        a, b = left[height], right[height]
+        if not touch(tree, a, other_tree, b):
+            continue
+        if a < leaves or b < other_leaves:
+            # The children of each, or itself when it is a leaf.
+            first, last = (2 * a, 2 * a + 2) if a < leaves else (a, a + 1)
+            other_first, other_last = (2 * b, 2 * b + 2) if b < other_leaves else (b, b + 1)
+            for child in range(first, last):
+                for far in range(other_first, other_last):
+                    if not own or child <= far:
+                        left[height], right[height] = child, far
+                        height += 1
+            continue
+        low, far_low = (a - leaves) * LEAF, (b - other_leaves) * LEAF
+        for i in range(low, min(low + LEAF, len(boxes))):
+            for j in range(far_low, min(far_low + LEAF, len(others))):
+                if (not own or i < j) and touch(boxes, i, others, j):
+                    if count == len(pairs):
+                        pairs = np.concatenate([pairs, pairs])
+                    pairs[count, 0], pairs[count, 1] = i, j
+                    count += 1
+    return np.asarray(pairs[:count])
+
+
+cpdef meetings_of(double[:, ::1] a, double[:, ::1] b, Int[:, ::1] pairs, double eps):
+    """The rows (J, 2) of a and b, and the meetings (J, 4), of the pairs (P, 2) of rows."""
+    cdef Int room, count, k, more, m, i, j
+    cdef Int[:, ::1] rows
+    cdef double[:, ::1] found
+    room = len(pairs) + MAX_MEETINGS + 16
+    rows, found = np.empty((room, 2), np.int64), np.empty((room, 4))
+    count = 0
+    for k in range(len(pairs)):
+        i, j = pairs[k, 0], pairs[k, 1]
+        if count + MAX_MEETINGS > len(rows):
+            rows, found = np.concatenate([rows, rows]), np.concatenate([found, found])
+        more = _meet(a, b, i, j, eps, found, count)
+        for m in range(count, count + more):
+            rows[m, 0], rows[m, 1] = i, j
+        count += more
+    return np.asarray(rows[:count]), np.asarray(found[:count])
+
+
+cdef Int _meet(
+    double[:, ::1] a, double[:, ::1] b, Int i, Int j, double eps, double[:, ::1] found, Int at
+) noexcept:
+    """Write the intersections of row i of a and row j of b into `found` from row `at` on, and
+    return their number."""
+    cdef Int count, k
+    count = 0
+    for k in range(4):
+        if k < 2:
+            x, y = (a[i, AX], a[i, AY]) if k == 0 else (a[i, BX], a[i, BY])
+        else:
+            x, y = (b[j, AX], b[j, AY]) if k == 2 else (b[j, BX], b[j, BY])
+        count += _taken(a, b, i, j, x, y, eps, found, at, count)
+    # Row j of b is to be the rounder one.
+    if abs(b[j, BEND]) < abs(a[i, BEND]):
+        x, y, other_x, other_y = _common_points(b, a, j, i)
+    else:
+        x, y, other_x, other_y = _common_points(a, b, i, j)
+    for _ in range(2):
+        # No NaN passes: curves that miss each other by far have no common points.
+        if gap_to(a, i, x, y) <= eps and not _known(a, b, i, j, x, y, eps, found, at, count):
+            count += _taken(a, b, i, j, x, y, eps, found, at, count)
+        x, y = other_x, other_y
+    return count
+
+
+cdef bint _known(
+    double[:, ::1] a, double[:, ::1] b, Int i, Int j, double x, double y, double eps,
+    double[:, ::1] found, Int at, Int count
+) noexcept:
+    """True if the curves stay within eps of each other from a common point to all of the shorter
+    one, or to a meeting found before: one of `count` in the rows of `found` from `at` on.
+
+    At the angle θ and with curvatures that differ by k they are θ s + k s²/2 apart after s, at
+    most. There rounding alone would place a crossing: where they are tangent at an end, anywhere
+    within the root of its own rounding.
+    """
+    cdef Int k
+    ax, ay = _tangent_after(a, i, along(a, i, x, y))
+    bx, by = _tangent_after(b, j, along(b, j, x, y))
+    way = -1.0 if ax * bx + ay * by < 0.0 else 1.0
+    angle, bend = abs(ax * by - ay * bx), abs(a[i, BEND] - way * b[j, BEND])
+    s = min(a[i, LENGTH], b[j, LENGTH])
+    if angle * s + 0.5 * bend * s * s <= eps:
+        return True
+    for k in range(at, at + count):
+        s = math.hypot(found[k, X] - x, found[k, Y] - y)
+        if angle * s + 0.5 * bend * s * s <= eps:
+            return True
+    return False
+
+
+cdef Int _taken(
+    double[:, ::1] a, double[:, ::1] b, Int i, Int j, double x, double y, double eps,
+    double[:, ::1] found, Int at, Int count
+) noexcept:
+    """1 when the point is a meeting, which is then written down, else 0; `count` of them are in
+    the rows of `found` from `at` on."""
+    cdef Int row, k
+    if not (gap_to(a, i, x, y) <= eps and gap_to(b, j, x, y) <= eps):
+        return 0
+    on_a, on_b = along(a, i, x, y), along(b, j, x, y)
+    if not (-eps <= on_a <= a[i, LENGTH] + eps and -eps <= on_b <= b[j, LENGTH] + eps):
+        return 0
+    for k in range(at, at + count):
+        if math.hypot(found[k, X] - x, found[k, Y] - y) <= 2.0 * eps:
+            return 0
+    row = at + count
+    found[row, X], found[row, Y] = x, y
+    found[row, TA] = _fraction(on_a, a[i, LENGTH], eps)
+    found[row, TB] = _fraction(on_b, b[j, LENGTH], eps)
+    return 1
+
+
+cdef inline double _fraction(double length, double whole, double eps) noexcept:
+    """Fraction of the whole length, exactly 0 or 1 within eps of an end."""
+    if length >= whole - eps:
+        return 1.0
+    return 0.0 if length <= eps else length / whole
+
+
+cdef inline (double, double) _tangent_after(double[:, ::1] curves, Int i, double length) noexcept:
+    turn = length * curves[i, SWEEP] / curves[i, LENGTH]
+    cosine, sine = math.cos(turn), math.sin(turn)
+    tx, ty = curves[i, TX], curves[i, TY]
+    return cosine * tx - sine * ty, cosine * ty + sine * tx
+
+
+cdef (double, double, double, double) _common_points(
+    double[:, ::1] a, double[:, ::1] b, Int i, Int j
+) noexcept:
+    """The two points that the whole curves share (intersect.py derives them); NaN if none. Row j
+    of b is the rounder one.
+
+    Where they miss each other, both are the point of the common line nearest to the rounder one.
+    """
+    # All is told from the start of the rounder one.
+    k_flat, k_round = a[i, BEND], b[j, BEND]
+    nx, ny, mx, my = -b[j, TY], b[j, TX], -a[i, TY], a[i, TX]
+    wx, wy = a[i, AX] - b[j, AX], a[i, AY] - b[j, AY]
+    ratio = 0.0 if k_round == 0.0 else k_flat / k_round
+    across_x, across_y = mx + k_flat * wx - ratio * nx, my + k_flat * wy - ratio * ny
+    height = 0.5 * k_flat * (wx * wx + wy * wy) + mx * wx + my * wy
+    size = math.hypot(across_x, across_y)
+    ux, uy = across_x / size, across_y / size
+    fx, fy = height / size * ux, height / size * uy
+    # On the line foot + τ (−uy, ux):  k τ² − 2 β τ + γ = 0.
+    beta = ny * ux - nx * uy
+    gamma = k_round * (fx * fx + fy * fy) - 2.0 * (nx * fx + ny * fy)
+    root = beta * beta - k_round * gamma
+    stable = beta + math.copysign(math.sqrt(max(root, 0.0)), beta)
+    two = gamma / stable if root > 0.0 or k_round == 0.0 else stable / k_round
+    one = two if k_round == 0.0 else stable / k_round
+    ox, oy = b[j, AX] + fx, b[j, AY] + fy
+    return ox - one * uy, oy + one * ux, ox - two * uy, oy + two * ux
+
+
+# Raw elements cut at their meetings: nodes, slices between them, and slices that lead nowhere.
+#
+# What makes it exact: nothing is computed here but distances of points to be merged; the rest is
+# counting. The twins are in tests/oracles/offset_stages.py.
+
+
+cpdef enum:
+    # A point looks for no more than this many points to merge with: where more than that come
+    # together, as where a circle of chords collapses, they chain up all the same.
+    MAX_MERGED = 64
+
+
+cpdef merged(double[:, :] points, double[::1] skew, Int[::1] order, double eps):
+    """The node (P,) of each point (P, 2), and the first point (N,) of each node.
+
+    Points within `eps` of each other share a node, and so do chains of them. `order` sorts the
+    points by `skew` (P,), which differs between two points by no more than their distance.
+    """
+    cdef Int[::1] group, first, node
+    cdef Int i, count, j, root, one, hits, other, low, high
+    group = np.empty(len(points), np.int64)
+    for i in range(len(points)):
+        group[i] = i
+    for i in range(len(order)):
+        one, hits = order[i], 0
+        for j in range(i + 1, len(order)):
+            other = order[j]
+            if skew[other] - skew[one] > eps or hits == MAX_MERGED:
+                break
+            apart_x, apart_y = points[one, 0] - points[other, 0], points[one, 1] - points[other, 1]
+            if apart_x * apart_x + apart_y * apart_y <= eps * eps:
+                hits += 1
+                low, high = _root(group, one), _root(group, other)
+                group[max(low, high)] = min(low, high)
+    first, node = np.empty(len(points), np.int64), np.empty(len(points), np.int64)
+    count = 0
+    for i in range(len(points)):
+        root = _root(group, i)
+        if root == i:
+            first[count], node[i] = i, count
+            count += 1
+        else:
+            # Every root is less than its members, and has its number already.
+            node[i] = node[root]
+    return np.asarray(node), np.asarray(first[:count])
+
+
+cdef Int _root(Int[::1] group, Int i) noexcept:
+    """The least member of the group of i."""
+    while group[i] != i:
+        group[i] = group[group[i]]
+        i = group[i]
+    return i
+
+
+cdef grouped(Int[::1] keys, Int count):
+    """Rows (R,) by their key below `count`, in their order, and where each key begins."""
+    cdef Int[::1] begins, rows
+    cdef Int row, key
+    begins = np.zeros(count + 1, np.int64)
+    for row in range(len(keys)):
+        begins[keys[row] + 1] += 1
+    for key in range(count):
+        begins[key + 1] += begins[key]
+    rows = np.empty(len(keys), np.int64)
+    # Each begin moves on to its end, which is where the next one begins.
+    for row in range(len(keys)):
+        rows[begins[keys[row]]] = row
+        begins[keys[row]] += 1
+    for key in range(count, 0, -1):
+        begins[key] = begins[key - 1]
+    begins[0] = 0
+    return np.asarray(rows), np.asarray(begins)
+
+
+cpdef in_order(Int[::1] keys, double[::1] t, Int count):
+    """Rows (R,) by their key below `count`, then by t (R,), then as they come (a shell sort)."""
+    cdef Int key, gap, i, row, j
+    cdef Int[::1] rows, begins, some
+    rows, begins = grouped(keys, count)
+    for key in range(count):
+        some = rows[begins[key] : begins[key + 1]]
+        gap = len(some) // 2
+        while gap > 0:
+            for i in range(gap, len(some)):
+                row, j = some[i], i
+                while j >= gap and _after(t, some[j - gap], row):
+                    some[j] = some[j - gap]
+                    j -= gap
+                some[j] = row
+            gap //= 2
+    return np.asarray(rows)
+
+
+cdef bint _after(double[::1] t, Int one, Int other) noexcept:
+    return bool(t[one] > t[other] or (t[one] == t[other] and one > other))
+
+
+cpdef doubles_left(
+    double[:, ::1] elements, Int[::1] element, double[::1] middle_t, ends, double eps
+):
+    """(S,) false for repeated slices, and for both of a pair that runs the same way to and fro.
+
+    `ends` holds the nodes (S,) that each slice runs from and to, and how many nodes there are.
+    Slices between the same nodes are the same when their middles are within `eps`.
+    """
+    cdef uint8_t[::1] keep
+    cdef Int[::1] near, from_node, to_node, rows, begins
+    cdef Int row, node, count, k, far, m, other
+    from_node, to_node, count = ends
+    keep = np.ones(len(element), np.bool_)
+    near = np.empty(len(element), np.int64)
+    for row in range(len(element)):
+        near[row] = min(from_node[row], to_node[row])
+    rows, begins = grouped(near, count)
+    for node in range(count):
+        for k in range(begins[node], begins[node + 1]):
+            row = rows[k]
+            far = max(from_node[row], to_node[row])
+            for m in range(k + 1, begins[node + 1]):
+                other = rows[m]
+                if not keep[row]:
+                    break
+                if not keep[other] or max(from_node[other], to_node[other]) != far:
+                    continue
+                ax, ay = point_on(elements, element[row], middle_t[row])
+                bx, by = point_on(elements, element[other], middle_t[other])
+                if math.hypot(ax - bx, ay - by) <= eps:
+                    keep[other] = False
+                    keep[row] = from_node[row] == from_node[other]
+    return np.asarray(keep).view(np.bool_)
+
+
+cpdef leading_on(Int[::1] from_node, Int[::1] to_node, Int count):
+    """(S,) true for the slices that others lead to and lead on from, when all else is gone."""
+    cdef bint ends_here
+    cdef Int first, last, node, height, k, row, end, side
+    cdef uint8_t[::1] keep
+    cdef Int[::1] stack, leaving, first_leaving, arriving, first_arriving, leave, arrive
+    keep = np.ones(len(from_node), np.bool_)
+    leaving, first_leaving = grouped(from_node, count)
+    arriving, first_arriving = grouped(to_node, count)
+    leave, arrive = np.empty(count, np.int64), np.empty(count, np.int64)
+    for node in range(count):
+        leave[node] = first_leaving[node + 1] - first_leaving[node]
+        arrive[node] = first_arriving[node + 1] - first_arriving[node]
+    stack = np.empty(2 * len(from_node) + count, np.int64)
+    height = 0
+    for node in range(count):
+        if (leave[node] == 0) != (arrive[node] == 0):
+            stack[height] = node
+            height += 1
+    while height > 0:
+        height -= 1
+        node = stack[height]
+        ends_here = leave[node] == 0
+        first = first_arriving[node] if ends_here else first_leaving[node]
+        last = first_arriving[node + 1] if ends_here else first_leaving[node + 1]
+        for k in range(first, last):
+            row = arriving[k] if ends_here else leaving[k]
+            if keep[row]:
+                keep[row] = False
+                leave[from_node[row]] -= 1
+                arrive[to_node[row]] -= 1
+                for side in range(2):
+                    end = from_node[row] if side == 0 else to_node[row]
+                    if (leave[end] == 0) != (arrive[end] == 0):
+                        stack[height] = end
+                        height += 1
+    return np.asarray(keep).view(np.bool_)
+
+
+# Kept slices followed to loops, and loops written down as clean vertices.
+#
+# The twins are in tests/oracles/offset_stages.py.
+
+
+# A turn at a node this near to a full right turn is taken as a full left one.
+cdef double U_TURN_EPS_RAD = 1e-3
+
+
+cpdef traced(double[:, ::1] elements, Int[::1] element, double[:, ::1] span, ends):
+    """Rows (R,) of the slices of all loops, loop by loop, and where each begins (L + 1,).
+
+    Slice i runs on row element[i] from the fraction span[i, 0] to span[i, 1]; `ends` holds the
+    nodes (S,) that each slice runs from and to, and how many nodes there are. No loop passes a
+    node twice. Where several slices leave a node, the leftmost one is taken.
+    """
+    cdef uint8_t[::1] unused
+    cdef Int[::1] seen, from_node, to_node, leaving, first, path, rows, begins, ways
+    cdef Int node, loops, start, count, length, last, chosen, low, k
+    from_node, to_node, count = ends
+    leaving, first = grouped(from_node, count)
+    unused = np.ones(len(element), np.bool_)
+    seen = np.empty(count, np.int64)
+    for node in range(count):
+        seen[node] = -1
+    path, length = np.empty(len(element), np.int64), 0
+    rows, begins = np.empty(len(element), np.int64), np.zeros(len(element) + 1, np.int64)
+    loops = 0
+    for start in range(len(element)):
+        if not unused[start]:
+            continue
+        unused[start] = False
+        path[0], length = start, 1
+        seen[from_node[start]] = 0
+        while length > 0:
+            last = path[length - 1]
+            node = to_node[last]
+            if seen[node] >= 0:
+                low = seen[node]
+                begins[loops + 1] = begins[loops] + length - low
+                for k in range(low, length):
+                    rows[begins[loops] + k - low] = path[k]
+                    # This node too: what is left of the path may leave it once more.
+                    seen[from_node[path[k]]] = -1
+                loops += 1
+                length = low
+                continue
+            ways = leaving[first[node] : first[node + 1]]
+            chosen = _leftmost(elements, element, span, last, unused, ways)
+            if chosen < 0:
+                seen[from_node[last]] = -1
+                length -= 1
+                continue
+            seen[node] = length
+            path[length] = chosen
+            length += 1
+            unused[chosen] = False
+    return np.asarray(rows[: begins[loops]]), np.asarray(begins[: loops + 1])
+
+
+cdef Int _leftmost(
+    double[:, ::1] elements, Int[::1] element, double[:, ::1] span, Int last, uint8_t[::1] unused,
+    Int[::1] ways
+) noexcept:
+    """The unused one of the slices `ways` that turns left the most when `last` led there; turning
+    right back is left back. −1 when there is none."""
+    cdef Int k, best, others, way
+    best, most, others = -1, -math.INFINITY, 0
+    for k in range(len(ways)):
+        way = ways[k]
+        if unused[way]:
+            best = way if others == 0 else best
+            others += 1
+    if others < 2:
+        return best
+    ax, ay = _tangent(elements, element[last], span[last, 1])
+    for k in range(len(ways)):
+        way = ways[k]
+        if unused[way]:
+            bx, by = _tangent(elements, element[way], span[way, 0])
+            turn = math.atan2(ax * by - ay * bx, ax * bx + ay * by)
+            if turn <= U_TURN_EPS_RAD - math.M_PI:
+                turn = math.M_PI
+            if turn > most:
+                best, most = way, turn
+    return best
+
+
+cdef (double, double) _tangent(double[:, ::1] elements, Int i, double t) noexcept:
+    turn = t * elements[i, SWEEP]
+    cosine, sine = math.cos(turn), math.sin(turn)
+    tx, ty = elements[i, TX], elements[i, TY]
+    return cosine * tx - sine * ty, cosine * ty + sine * tx
+
+
+cpdef written(slices, double[:, ::1] nodes, double[::1] sweeps, runs, double eps):
+    """Vertices (V, 3) of runs of slices that follow each other, and where each begins (L + 1,).
+
+    `slices` are the element, span and both nodes (S,) of each slice, `sweeps` those of the
+    elements. `runs` are the rows of all runs, where each begins, and whether it is closed. Slices
+    of one element become one again; segments up to `eps` go. A run of which nothing is left has
+    no vertices.
+    """
+    cdef double[:, ::1] vertices, span
+    cdef Int[::1] offsets, element, from_node, to_node, rows, begins, ways
+    cdef Int run, first, low, count, k, last, row
+    cdef uint8_t[::1] closed
+    element, span, from_node, to_node = slices
+    rows, begins, closed = runs
+    vertices = np.empty((len(rows) + len(closed), 3))
+    offsets = np.zeros(len(closed) + 1, np.int64)
+    for run in range(len(closed)):
+        ways = rows[begins[run] : begins[run + 1]]
+        first = _first(element, span, ways) if closed[run] else 0
+        low = count = offsets[run]
+        for k in range(len(ways)):
+            row, last = (
+                ways[(first + k) % len(ways)],
+                ways[(first + k + len(ways) - 1) % len(ways)],
+            )
+            if k == 0 or not _goes_on(element, span, last, row):
+                vertices[count, 0] = nodes[from_node[row], 0]
+                vertices[count, 1] = nodes[from_node[row], 1]
+                begin = span[row, 0]
+                count += 1
+            sweep = sweeps[element[row]] * (span[row, 1] - begin)
+            vertices[count - 1, 2] = math.tan(0.25 * sweep)
+        if not closed[run]:
+            last = ways[len(ways) - 1]
+            vertices[count, 0] = nodes[to_node[last], 0]
+            vertices[count, 1] = nodes[to_node[last], 1]
+            vertices[count, 2] = 0.0
+            count += 1
+        offsets[run + 1] = low + _cleaned(vertices[low:count], closed[run], eps)
+    return np.asarray(vertices[: offsets[len(closed)]]), np.asarray(offsets)
+
+
+cdef bint _goes_on(Int[::1] element, double[:, ::1] span, Int last, Int row) noexcept:
+    """True if a slice continues along the element of the one before it."""
+    return bool(element[last] == element[row] and span[row, 0] >= span[last, 1])
+
+
+cdef Int _first(Int[::1] element, double[:, ::1] span, Int[::1] ways) noexcept:
+    """Return the index at which a closed run may begin: not within an element."""
+    cdef Int k
+    for k in range(len(ways)):
+        if not _goes_on(element, span, ways[k - 1 if k > 0 else len(ways) - 1], ways[k]):
+            return k
+    return 0
+
+
+cdef Int _cleaned(double[:, ::1] vertices, bint closed, double eps):
+    """Remove segments up to `eps`, and return the number of vertices that are left, the first ones.
+
+    Each shrinks to its middle; the ends of an open path stay. 0 when nothing is left.
+    """
+    cdef Int count, left, row, place, height, following, earlier, k
+    cdef uint8_t[::1] there
+    cdef Int[::1] after, before, stack
+    count = left = len(vertices)
+    after, before = np.empty(count, np.int64), np.empty(count, np.int64)
+    stack, height = np.empty(3 * count, np.int64), count
+    for row in range(count):
+        after[row], before[row], stack[row] = row + 1, row - 1, count - 1 - row
+    after[count - 1] = 0 if closed else -1
+    before[0] = count - 1 if closed else -1
+    there = np.ones(count, np.bool_)
+    while height > 0:
+        height -= 1
+        row = stack[height]
+        following, earlier = after[row], before[row]
+        if not there[row] or following < 0 or _length(vertices, row, following) > eps:
+            continue
+        if left <= 2:
+            return 0
+        # The first and the last vertex of an open path have none before and none after them.
+        if after[following] >= 0:
+            part = 0.5 if earlier >= 0 else 0.0
+            for k in range(2):
+                vertices[following, k] += (1.0 - part) * (
+                    vertices[row, k] - vertices[following, k]
+                )
+        there[row] = False
+        left -= 1
+        before[following] = earlier
+        stack[height] = following
+        height += 1
+        if earlier >= 0:
+            after[earlier] = following
+            stack[height] = earlier
+            height += 1
+    place = 0
+    for row in range(count):
+        if there[row]:
+            for k in range(3):
+                vertices[place, k] = vertices[row, k]
+            place += 1
+    return left
+
+
+cdef double _length(double[:, ::1] vertices, Int one, Int other) noexcept:
+    return math.hypot(vertices[one, 0] - vertices[other, 0], vertices[one, 1] - vertices[other, 1])
+
+
+# Which points a closed path of lines and arcs holds, by a ray to the right over a tree of boxes.
+#
+# A point is inside when it is inside the polygon of the chords, or between a chord and its arc,
+# but not both. Only segments whose boxes the ray meets can say anything about either. A point
+# exactly on a chord is taken as a hair up and to the right of it. What makes it exact: products of
+# the given numbers, and their signs. `tests/oracles/inside.py` is the twin, over all segments.
+
+
+cpdef enum:
+    # What is said of a path: some of it is outside; inside; all of it is on the line itself.
+    OUT = 0, HELD, ON_LINE
+
+
+cpdef insides(
+    double[:, ::1] points, double[:, ::1] curves, double[::1] bulge, double[:, ::1] tree
+):
+    """(P,) true for the points (P, 2) within a closed path; on the line either may come out.
+
+    `curves` (K, 11) and `tree` as in offset_curves and box_tree, `bulge` (K,).
+    """
+    cdef Int i
+    cdef uint8_t[::1] found
+    cdef Int[::1] stack
+    found, stack = np.empty(len(points), np.bool_), np.empty(DEPTH, np.int64)
+    for i in range(len(points)):
+        found[i] = is_inside(curves, bulge, tree, points[i, 0], points[i, 1], stack)
+    return np.asarray(found).view(np.bool_)
+
+
+cdef bint is_inside(
+    double[:, ::1] curves, double[::1] bulge, double[:, ::1] tree, double x, double y,
+    Int[::1] stack
+) noexcept:
+    """True if a closed path encloses a point; `stack` (`DEPTH`,) is a scratch buffer."""
+    cdef Int leaves, height, node, low, row
+    cdef bint odd
+    leaves, odd = len(tree) // 2, False
+    height, stack[0] = 1, 1
+    while height > 0:
+        height -= 1
+        node = stack[height]
+        if tree[node, 2] < x or tree[node, 1] > y or tree[node, 3] < y:
+            continue
+        if node < leaves:
+            stack[height], stack[height + 1] = 2 * node + 1, 2 * node
+            height += 2
+            continue
+        low = (node - leaves) * LEAF
+        for row in range(low, min(low + LEAF, len(curves))):
+            odd = odd != _counts(curves, row, bulge[row], x, y)
+    return bool(odd)
+
+
+cdef inline bint _counts(double[:, ::1] curves, Int i, double bulge, double x, double y) noexcept:
+    """True if either a ray to the right crosses the chord or the point lies between chord and arc."""
+    cdef bint crosses, in_circle, on_left
+    ax, ay, bx, by = curves[i, AX], curves[i, AY], curves[i, BX], curves[i, BY]
+    dx, dy = bx - ax, by - ay
+    side = dx * (y - ay) - dy * (x - ax)
+    crosses = (ay > y) != (by > y) and (side > 0.0 if by > ay else side < 0.0)
+    if bulge == 0.0:
+        return bool(crosses)
+    # A positive bulge lies to the right of its chord. Within the circle its power is negative.
+    power = 4.0 * bulge * ((x - ax) * (x - bx) + (y - ay) * (y - by))
+    power -= 2.0 * (1.0 - bulge * bulge) * side
+    in_circle = power < 0.0 if bulge > 0.0 else power > 0.0
+    hair = dx if dy == 0.0 else -dy
+    on_left = (hair if side == 0.0 else side) > 0.0
+    return bool(crosses != (in_circle and on_left == (bulge < 0.0)))
+
+
+cpdef holds(double[:, ::1] points, Int[::1] begins, ring, Int[::1] paths, double eps):
+    """(N,) OUT, HELD or ON_LINE for each of `paths` (N,): path k has the points begins[k] … of
+    `points` (P, 2).
+
+    `ring` holds curves, bulge and tree of a closed path; what is within `eps` of its line is
+    neither outside nor inside.
+    """
+    cdef Int[::1] said, stack
+    cdef Int n, k
+    cdef double[:, ::1] curves, tree
+    cdef double[::1] bulge, apart
+    curves, bulge, tree = ring
+    said = np.empty(len(paths), np.int64)
+    stack, apart = np.empty(DEPTH, np.int64), np.empty(DEPTH)
+    for n in range(len(paths)):
+        said[n] = ON_LINE
+        for k in range(begins[paths[n]], begins[paths[n] + 1]):
+            x, y = points[k, 0], points[k, 1]
+            if least_below(curves, tree, x, y, 2.0 * eps, eps, stack, apart) <= eps:
+                continue
+            if not is_inside(curves, bulge, tree, x, y, stack):
+                said[n] = OUT
+                break
+            said[n] = HELD
+    return np.asarray(said)

@@ -1,0 +1,6 @@
+from camtool.arrays import Floats, Ints
+
+def steps_taken(way: Ints, events: Ints) -> Ints: ...
+def step_lines_fill(
+    blocks: tuple[Ints, Ints], first: tuple[int, int], step_mm: Floats, out: Floats
+) -> None: ...

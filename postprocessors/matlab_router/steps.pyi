@@ -1,0 +1,36 @@
+from typing import NamedTuple
+
+from camtool.arrays import Bools, Floats, Indices, Ints
+
+COUNT: int
+HOME_AMOUNT: int
+PART_COUNT: int
+PLACE: int
+SECOND_ROW: int
+SHOWN: int
+TABLE_COUNTS: int
+TARGET: int
+TURN: int
+
+class Program(NamedTuple):
+    lines: Indices
+    pauses: Floats
+    axes: Floats
+    table: Ints
+    lag: float
+    text: bool
+
+class State(NamedTuple):
+    motors: Floats
+    slaves: Ints
+    clock: Ints
+    begin: Floats
+
+class Account(NamedTuple):
+    ticks: Floats
+    loops: Ints
+    ended: Bools
+
+def slaves_fill(
+    program: Program, state: State, account: Account, out: Ints, row: Ints
+) -> tuple[int, bool]: ...

@@ -1,0 +1,507 @@
+"""The loops of the Matlab router's slaves: speed loops with integers, motors, and their master.
+
+Compiled, because every tick depends on the one before.
+What each part does is said above it.
+"""
+
+from __future__ import annotations
+
+from libc cimport math
+from libc.stdint cimport uint8_t
+from camtool.kernels.types cimport Int
+
+from typing import NamedTuple
+
+from camtool.arrays import Bools, Floats, Indices, Ints
+
+# What the kernel of the Matlab router's slaves is told and keeps: arrays, and their columns.
+
+
+cpdef enum:
+    # Columns of `Program.axes`.
+    GAIN = 0, TAU, FRICTION, KID, KPD, CHUNK, PHASE, HOME_SPEED
+    # Columns of `State.motors`: counts, counts in a tick, moments in ticks, percent, for the text.
+    PLACE = 0, SPEED, BEGIN, DONE, DRIVE, SPEED_BEFORE
+    # Columns of `State.slaves`.
+    COUNT = 0, UP, WRAPS, STAGE, LEFT, SHOWN, SEEN, SUM, REF, NEXT_REF, TARGET
+    # What a slave does, in its column STAGE; FOLLOWING is the text's way of running a line.
+    STILL = 0, WAITING, CRUISING, SLOWING, HOMING, FOLLOWING
+    # Columns of `Program.lines` behind the amounts and the speeds of three axes.
+    FIRST_ROW = 6, SECOND_ROW, MAX_TICKS, PART_AXIS, PART_COUNT
+    # The amount of an axis that goes home.
+    HOME_AMOUNT = -1
+    # Counts that an encoder shows; the program takes 1023 for each.
+    TURN = 1024
+    # The last counts of a line, which run by the table.
+    TABLE_COUNTS = 1000
+    # `TURN` is a power of two: what is shown, and how many turns lie below, are bits of a count.
+    TURN_BITS = 10
+
+
+# More counts than any motion has.
+cdef Int NEVER = 1LL << 40
+
+# The sign of an int of 32 bits, and all its bits.
+cdef Int SIGN_OF_INT32 = 1LL << 31
+cdef Int BITS_OF_INT32 = (1LL << 32) - 1
+
+
+class Program(NamedTuple):
+    """Commands and settings of the slaves.
+
+    lines (L, 11), of 32 bits: amount of each axis (chunks; counts when `text`; `HOME_AMOUNT`; 0),
+    its speed with sign, the row of its samples, the row of those from where an axis (its number)
+    has passed a count on, the ticks after which it is given up, that axis and that count. pauses
+    (L,) ticks behind each, at least 1, and negative where the next line begins on a tick; axes
+    (3, 8); table (1001,); lag: ticks by which Y begins after X; text: the chapters' way instead of
+    the listing's.
+    """
+
+    lines: Indices
+    pauses: Floats
+    axes: Floats
+    table: Ints
+    lag: float
+    text: bool
+
+
+class State(NamedTuple):
+    """State between two calls: motors (3, 6), slaves (3, 11); clock (3,): tick,
+    line, row of the line before; begin (2,) of the line and of its second row, in ticks."""
+
+    motors: Floats
+    slaves: Ints
+    clock: Ints
+    begin: Floats
+
+
+class Account(NamedTuple):
+    """Results of the rows so far: ticks (N,) that they took, loops (N,) of the slaves, ended (N,)."""
+
+    ticks: Floats
+    loops: Ints
+    ended: Bools
+
+
+# The programs of the Matlab router's slaves: the interrupt every 5 ms, and the main loop.
+#
+# The slaves below say what they do. Whole numbers, but for the text's loop, whose gains
+# are none; every number of the listing is an int32 at most.
+
+
+cdef Int _int32(Int value) noexcept:
+    """As it stands in a signed int of 32 bits."""
+    return ((value + SIGN_OF_INT32) & BITS_OF_INT32) - SIGN_OF_INT32
+
+
+cdef void listed_loop(
+    double[::1] motor, Int[::1] slave, double[::1] axis, Int[::1] table
+) noexcept:
+    """The interrupt of the listing: L5496-5584."""
+    cdef Int phase, shown, change, drive, left, fast, speed, ref, kid, kpd
+    phase = int(axis[PHASE])
+    shown = (slave[COUNT] + phase) & (TURN - 1)
+    change = shown - slave[SHOWN] if slave[UP] == 1 else slave[SHOWN] - shown
+    slave[SHOWN] = shown
+    if change >= 0:
+        slave[SEEN] = change
+    if slave[STAGE] == SLOWING:
+        left = int(axis[CHUNK])
+        left -= _seen_way(slave, axis, slave[UP])
+        fast = table[min(max(left, 0), TABLE_COUNTS)]
+        slave[REF] = fast if slave[NEXT_REF] >= 0 else -fast
+    speed, ref = slave[SEEN], slave[REF]
+    kid, kpd = int(axis[KID]), int(axis[KPD])
+    slave[SUM] = _int32(slave[SUM] + (abs(ref) - speed) * kid)
+    drive = int(motor[DRIVE])
+    drive = _int32(drive + slave[SUM] - speed * kpd)
+    drive = 0 if drive < 0 else min(drive // 1000, 100)
+    drive = drive if ref > 0 else -drive if ref < 0 else 0
+    motor[DRIVE] = float(drive)
+
+
+cdef void text_loop(double[::1] motor, Int[::1] slave, double[::1] axis, Int top) noexcept:
+    """Equations 4.15-4.18 and 4.27: the reference by the way that is left, and the loop in its
+    velocity form. Nothing drives an axis that has arrived."""
+    speed = float(slave[COUNT] - slave[SHOWN])
+    slave[SHOWN] = slave[COUNT]
+    if slave[STAGE] == FOLLOWING:
+        left = float(slave[TARGET] - slave[COUNT])
+        most = float(abs(slave[REF]))
+        ref = min(most, float(top) * math.sqrt(abs(left) / float(TABLE_COUNTS)))
+        ref = math.copysign(ref if abs(left) < float(TABLE_COUNTS) else most, left)
+        change = axis[KID] * (ref - speed) - axis[KPD] * (speed - motor[SPEED_BEFORE])
+        motor[DRIVE] = min(max(motor[DRIVE] + change / 1000.0, -100.0), 100.0)
+    motor[SPEED_BEFORE] = speed
+
+
+cdef Int _seen_way(Int[::1] slave, double[::1] axis, Int up) noexcept:
+    """Posi of the main loop, when the counter's direction is `up`."""
+    cdef Int phase, shown
+    phase = int(axis[PHASE])
+    shown = (slave[COUNT] + phase) & (TURN - 1)
+    return int((shown if up == 1 else TURN - 1 - shown) + (TURN - 1) * slave[WRAPS])
+
+
+cdef Int to_go_of(Int[::1] slave, double[::1] axis, Int sense) noexcept:
+    """Counts in the direction `sense` until the loop that the slave is in ends.
+
+    Posi does not fall: within the turn number k it is c + 1023 k, c = 0 … 1023. It first reaches
+    T in the turn k' = ⌈T / 1023⌉ − 1, or in the present one, at c' = max(T − 1023 k', 0).
+    """
+    cdef Int stage, wanted, up, wraps, here, turn, way, left
+    cdef bint ahead
+    stage = slave[STAGE]
+    if stage == FOLLOWING:
+        left = slave[TARGET] - slave[COUNT]
+        left = left if slave[NEXT_REF] >= 0 else -left
+        ahead = sense == (1 if slave[NEXT_REF] >= 0 else -1)
+        return int(left) if left <= 0 or ahead else NEVER
+    if stage != CRUISING and stage != SLOWING:
+        return NEVER
+    wanted = int(axis[CHUNK])
+    if stage == CRUISING:
+        wanted += 1 if slave[LEFT] > 1 else -TABLE_COUNTS
+    up = slave[UP]
+    if sense != 0:
+        up = 1 if sense > 0 else 0
+    wraps = slave[WRAPS]
+    here = _seen_way(slave, axis, up) - (TURN - 1) * wraps
+    turn = max(wraps, (max(wanted, 0) + TURN - 2) // (TURN - 1) - 1)
+    way = (turn - wraps) * TURN + max(wanted - (TURN - 1) * turn, 0) - here
+    # The direction is that of the last count: a motor that turns back must count first.
+    return int(way) if up == slave[UP] else int(max(way, 1))
+
+
+cdef void next_stage(double[::1] motor, Int[::1] slave, double moment) noexcept:
+    """The count that the slave waited for has come."""
+    if slave[STAGE] == CRUISING and slave[LEFT] > 1:
+        slave[LEFT] -= 1
+        slave[WRAPS] = 0
+    elif slave[STAGE] == CRUISING:
+        slave[STAGE] = SLOWING
+    else:
+        slave[STAGE], slave[REF], slave[SEEN], slave[WRAPS] = STILL, 0, 0, 0
+        motor[DONE], motor[DRIVE] = moment, 0.0
+
+
+cdef void start_line(double[::1] motor, Int[::1] slave, bint text) noexcept:
+    """The master's word to go. The text's distances add up, so that what an axis went too far is
+    taken back by its next line; the listing's begin where the axis is."""
+    cdef Int amount
+    slave[WRAPS], slave[REF] = 0, slave[NEXT_REF]
+    amount = slave[LEFT]
+    motor[DONE] = motor[BEGIN]
+    if amount == HOME_AMOUNT:
+        slave[STAGE] = HOMING
+    elif text:
+        slave[STAGE] = FOLLOWING
+        slave[TARGET] += amount if slave[NEXT_REF] >= 0 else -amount
+        slave[NEXT_REF] = -1 if slave[TARGET] < slave[COUNT] else 1
+    else:
+        slave[STAGE] = CRUISING
+
+
+# The slaves of the Matlab router: three speed loops with integers, three motors, one master.
+#
+# Time runs in ticks of 5 ms, places in counts of the encoder. At each tick every slave measures
+# its speed and sets a drive u (percent); between two ticks the motor does
+#
+#     τ dω/dt = A u' − ω,   u' = u − friction · sign ω        (G(s) = A / (τ s + 1), eq. 4.32)
+#
+# Since u is held from tick to tick, this has a closed form (zero-order hold), with V = A u':
+#
+#     ω(t) = V + (ω₀ − V) e^(−t/τ)
+#     θ(t) = θ₀ + V t + (ω₀ − V) τ (1 − e^(−t/τ))
+#
+# which at t = 1 tick is the pulse transfer function A (1 − q) / (z − q), q = e^(−1/τ), eq. 4.34.
+# It holds between the moments at which something changes within a tick, and these are solved for:
+# where the motor turns back, ω = 0 at t = τ ln(1 − ω₀/V), and where the main loop of a slave sees
+# the count that it waits for. So nothing depends on a step width.
+#
+# The loop of the listing (L5496-5584): shown = count mod 1024; the difference of two ticks is the
+# speed, unless the counter wrapped between them, when the old speed is kept. Then, all int32:
+#
+#     sum += (|ref| − speed) kid,   u = (u + sum − speed kpd) / 1000, cut to 0 … 100, sign of ref
+#
+# The main loop (L5589-5729) compares Posi = shown + 1023 · wraps, or (1023 − shown) + 1023 · wraps
+# downwards, with the counts of a chunk; wraps count in either direction, and the counter is never
+# cleared. The last 1000 counts of a line run at the speeds of a table.
+#
+# Exact, because all that the slaves compute is whole numbers, and the motion is no approximation
+# but for the rounding of floats. Compiled, because every tick depends on the one before.
+
+
+# A moment within a tick is found when a step of the search is shorter than this part of it.
+cdef double MOMENT_EPS = 1e-12
+
+cpdef enum:
+    # More steps than halving a tick down to `MOMENT_EPS` takes.
+    SEARCHES = 80
+
+# A motor without drive that would coast for less than this stands.
+cdef double REST_COUNTS = 1e-6
+
+
+cdef double _moment(double way, double speed, double aim, double tau, double most) noexcept:
+    """When a motor at `speed` that tends to `aim` has gone `way`; it has by `most`."""
+    cdef Int _
+    cdef double low, high, moment, better
+    low, high, moment = 0.0, most, 0.5 * most
+    for _ in range(SEARCHES):
+        fade = -math.expm1(-moment / tau)
+        miss = aim * moment + (speed - aim) * tau * fade - way
+        if (miss > 0.0) == (way > 0.0):
+            high = moment
+        else:
+            low = moment
+        rate = speed + (aim - speed) * fade
+        better = moment - miss / rate if rate != 0.0 else low
+        if not low < better < high:
+            better = 0.5 * (low + high)
+        if abs(better - moment) <= MOMENT_EPS:
+            return better
+        moment = better
+    return moment
+
+
+cdef (double, bint) _glide(
+    double[::1] motor, Int[::1] slave, double[::1] axis, double aim, Int sense, double ticks,
+    Int to_go
+) noexcept:
+    """Move one way (`sense`) for so many ticks at most, and so many counts until the loop ends,
+    without a turn; returns the ticks it took and whether the loop ends there."""
+    cdef Int count, new, phase
+    cdef bint reached
+    cdef double end, fade
+    place, speed, tau, count = motor[PLACE], motor[SPEED], axis[TAU], slave[COUNT]
+    fade = -math.expm1(-ticks / tau)
+    end = place + aim * ticks + (speed - aim) * tau * fade
+    if sense > 0:
+        new = int(math.floor(end))
+        new = max(count, new)
+    else:
+        new = int(math.ceil(end))
+        new = min(count, new - 1)
+    reached = sense * (new - count) >= to_go
+    if reached:
+        new = count + sense * to_go
+        end = float(new) if sense > 0 else float(new + 1)
+        ticks = _moment(end - place, speed, aim, tau, ticks) if end != place else 0.0
+        fade = -math.expm1(-ticks / tau)
+    if new != count:
+        phase = int(axis[PHASE])
+        slave[UP] = 1 if sense > 0 else 0
+        slave[WRAPS] += abs(((new + phase) >> TURN_BITS) - ((count + phase) >> TURN_BITS))
+        slave[COUNT] = new
+    motor[PLACE], motor[SPEED] = end, speed + (aim - speed) * fade
+    return ticks, reached
+
+
+cdef double _home(
+    double[::1] motor, Int[::1] slave, double[::1] axis, double at, Int tick
+) noexcept:
+    """Run home evenly from `at` in a tick, and stand there; returns the time within the tick."""
+    cdef Int phase, count, k
+    needed = max(motor[PLACE], 0.0) / axis[HOME_SPEED]
+    if needed > 1.0 - at:
+        motor[PLACE] -= axis[HOME_SPEED] * (1.0 - at)
+        count = int(math.floor(motor[PLACE]))
+        slave[COUNT] = count
+        return 1.0
+    for k in range(len(motor)):
+        motor[k] = 0.0
+    for k in range(len(slave)):
+        slave[k] = 0
+    motor[DONE] = float(tick) + at + needed
+    phase = int(axis[PHASE])
+    slave[SHOWN] = phase
+    return float(at + needed)
+
+
+cdef void _advance(
+    double[::1] motor, Int[::1] slave, double[::1] axis, Int tick, bint text
+) noexcept:
+    """Advance one motor by one tick, from event to event."""
+    cdef Int sense, to_go
+    cdef bint turns, reached
+    cdef double toward, at, until, ticks
+    at = 0.0
+    while at < 1.0:
+        until = 1.0
+        if slave[STAGE] == WAITING:
+            until = min(motor[BEGIN] - float(tick), 1.0)
+            if until <= at:
+                start_line(motor, slave, text)
+                continue
+        if slave[STAGE] == HOMING:
+            at = _home(motor, slave, axis, at, tick)
+            continue
+        speed, drive = motor[SPEED], motor[DRIVE]
+        pushed = drive if speed != 0.0 else drive if abs(drive) > axis[FRICTION] else 0.0
+        toward = speed if speed != 0.0 else pushed
+        sense = 1 if toward > 0.0 else -1 if toward < 0.0 else 0
+        to_go = to_go_of(slave, axis, sense)
+        if to_go <= 0:
+            next_stage(motor, slave, float(tick) + at)
+            continue
+        if sense == 0:
+            at = until
+            continue
+        aim = axis[GAIN] * (drive - float(sense) * axis[FRICTION])
+        ticks, turns = until - at, False
+        if speed * aim < 0.0:
+            back = axis[TAU] * math.log1p(-speed / aim)
+            ticks, turns = min(ticks, back), back <= ticks
+        took, reached = _glide(motor, slave, axis, aim, sense, ticks, to_go)
+        if reached:
+            next_stage(motor, slave, float(tick) + at + took)
+            at += took
+        else:
+            at = at + ticks if turns else until
+            if turns:
+                motor[SPEED] = 0.0
+    if motor[DRIVE] == 0.0 and abs(motor[SPEED]) * axis[TAU] < REST_COUNTS:
+        motor[SPEED] = 0.0
+
+
+cdef class Slaves:
+    """Arrays of a program, its state and its results, as the loops read them."""
+
+    cdef int[:, ::1] lines
+    cdef Int[:, ::1] slaves
+    cdef Int[::1] table, clock, loops
+    cdef double[:, ::1] axes, motors
+    cdef double[::1] pauses, begin, ticks
+    cdef uint8_t[::1] ended
+    cdef double lag
+    cdef bint text
+
+    def __init__(self, program: Program, state: State, account: Account) -> None:
+        self.lines, self.pauses, self.axes, self.table, self.lag, self.text = program
+        self.motors, self.slaves, self.clock, self.begin = state
+        self.ticks, self.loops, self.ended = account
+
+
+cdef void _open(Slaves all_, Int line) noexcept:
+    """The slaves wait for the word to run a line."""
+    cdef Int index
+    cdef int[:, ::1] lines
+    cdef Int[:, ::1] slaves
+    cdef double[:, ::1] motors
+    cdef double[::1] begin
+    lines, motors, slaves, begin = all_.lines, all_.motors, all_.slaves, all_.begin
+    for index in range(3):
+        motors[index, BEGIN] = begin[0] + (all_.lag if index == 1 else 0.0)
+        motors[index, DONE] = begin[0]
+        slaves[index, LEFT] = lines[line, index]
+        slaves[index, NEXT_REF] = lines[line, 3 + index]
+        slaves[index, STAGE] = WAITING if slaves[index, LEFT] != 0 else STILL
+
+
+cdef void _close(Slaves all_, Int line, Int tick) noexcept:
+    """All slaves have answered: account for the line, and tell when the next one begins."""
+    cdef int[:, ::1] lines
+    cdef double[:, ::1] motors
+    cdef double[::1] begin
+    lines, motors, begin = all_.lines, all_.motors, all_.begin
+    done = max(motors[0, DONE], motors[1, DONE], motors[2, DONE])
+    pause = all_.pauses[line]
+    after = max(done + abs(pause), float(tick))
+    if pause < 0.0:
+        after = math.ceil(after)
+    parted = min(begin[1], after) if begin[1] > begin[0] else after
+    all_.ticks[lines[line, FIRST_ROW]] += parted - begin[0]
+    all_.ticks[lines[line, SECOND_ROW]] += after - parted
+    begin[0] = after
+    all_.clock[2] = lines[line, SECOND_ROW]
+
+
+cdef Int _row(Slaves all_, Int line, Int tick) noexcept:
+    """Whose sample the places at a tick are: the start of a row is none of it."""
+    cdef Int first, second, axis, ahead
+    cdef int[:, ::1] lines
+    cdef double[::1] begin
+    lines, begin = all_.lines, all_.begin
+    if line == len(lines) or float(tick) <= begin[0]:
+        return int(all_.clock[2])
+    first, second = lines[line, FIRST_ROW], lines[line, SECOND_ROW]
+    if first != second and begin[1] <= begin[0]:
+        axis = lines[line, PART_AXIS]
+        ahead = all_.slaves[axis, COUNT] - lines[line, PART_COUNT]
+        if (ahead if lines[line, 3 + axis] >= 0 else -ahead) > 0:
+            begin[1] = float(tick)
+    if begin[1] > begin[0]:
+        return int(second)
+    return int(first)
+
+
+cdef bint _all_still(Int[:, ::1] slaves) noexcept:
+    """True if all slaves have answered."""
+    cdef bint moving
+    moving = slaves[0, STAGE] != STILL or slaves[1, STAGE] != STILL or slaves[2, STAGE] != STILL
+    return not moving
+
+
+cdef void _given_up(double[:, ::1] motors, Int[:, ::1] slaves, Int tick) noexcept:
+    """Somebody switches off what has not arrived."""
+    cdef Int index
+    for index in range(3):
+        if slaves[index, STAGE] != STILL:
+            slaves[index, STAGE], slaves[index, REF] = STILL, 0
+            slaves[index, TARGET] = slaves[index, COUNT]
+            motors[index, DONE], motors[index, DRIVE] = float(tick), 0.0
+
+
+cpdef (Int, bint) slaves_fill(program, state, account, Int[:, ::1] out, Int[::1] row):
+    """Counts of the axes at each tick into `out` (n, 3), the rows that they belong to into `row`
+    (n,), until these are full or all lines have run and their last pause is over.
+
+    `state` goes on from call to call; `account` grows. Returns samples filled, and whether that
+    was all.
+    """
+    cdef Int top, count, filled, tick, line, index
+    cdef int[:, ::1] lines
+    cdef Int[:, ::1] slaves
+    cdef Int[::1] table, slave, clock
+    cdef Slaves all_
+    cdef bint text
+    cdef double[:, ::1] motors, axes
+    cdef double[::1] begin, motor, axis
+    all_ = Slaves(program, state, account)
+    lines, axes, table, begin = all_.lines, all_.axes, all_.table, all_.begin
+    motors, slaves, clock, text = all_.motors, all_.slaves, all_.clock, all_.text
+    top = table[TABLE_COUNTS]
+    count, filled = len(lines), 0
+    tick, line = clock[0], clock[1]
+    while filled < len(out) and (line < count or float(tick) < begin[0]):
+        if tick == 0 and count > 0:
+            _open(all_, 0)
+        for index in range(3):
+            motor, slave, axis = motors[index], slaves[index], axes[index]
+            if slave[STAGE] == HOMING:
+                motor[DRIVE] = 0.0
+            elif text:
+                text_loop(motor, slave, axis, top)
+            else:
+                listed_loop(motor, slave, axis, table)
+            _advance(motor, slave, axis, tick, text)
+        tick += 1
+        row[filled] = _row(all_, line, tick)
+        all_.loops[row[filled]] += 1
+        for index in range(3):
+            out[filled, index] = slaves[index, COUNT]
+        filled += 1
+        if line == count or float(tick) < begin[0]:
+            continue
+        if float(tick) - begin[0] > float(lines[line, MAX_TICKS]):
+            if not _all_still(slaves):
+                all_.ended[lines[line, SECOND_ROW]] = False
+            _given_up(motors, slaves, tick)
+        if _all_still(slaves):
+            _close(all_, line, tick)
+            line += 1
+            if line < count:
+                _open(all_, line)
+    clock[0], clock[1] = tick, line
+    return filled, line == count and float(tick) >= begin[0]
