@@ -8,7 +8,7 @@ import pytest
 from camtool_postprocessors.i8751.pulses import Firmware
 
 from camtool.machine.model import SlideStart
-from camtool.target.registry import load_target
+from camtool.target.registry import find_target
 from tests.postprocessors.golden import GOLDEN, compare_golden
 
 DOCS = GOLDEN.parents[1] / "docs"
@@ -45,7 +45,7 @@ def test_the_worked_examples_of_a_page_are_what_is_sent(name: str) -> None:
 )
 def test_a_page_names_every_option(page: str, form: str) -> None:
     kind, name = page.split("/")
-    target = load_target(name).target
+    target, _ = find_target(name)
     keys = set(target.dialect.__struct_fields__)
     if name == "i8751":
         keys = set(Firmware.__struct_fields__)
