@@ -12,7 +12,7 @@ import numpy as np
 import camtool
 from camtool.simulation.motion import Options
 from camtool.target.registry import LoadedTarget, load_target
-from camtool.target.twin import SlideTrace, Twin
+from camtool.target.twin import Twin, TwinTrace
 
 ROOT = Path(__file__).parents[1]
 
@@ -27,7 +27,7 @@ def logo(name: str, *settings: str) -> bytes:
     return run.program.data
 
 
-def motion(program: bytes, loaded: LoadedTarget) -> SlideTrace:
+def motion(program: bytes, loaded: LoadedTarget) -> TwinTrace:
     """Simulate a program as `verify` does: its samples, and the time at the end of each row."""
     chunks = list(loaded.simulate(loaded.target.read(program, loaded.machine), Options()))
     assert chunks
@@ -35,7 +35,7 @@ def motion(program: bytes, loaded: LoadedTarget) -> SlideTrace:
     total = np.zeros(1 + max(int(chunk.ledger.row.max(initial=-1)) for chunk in chunks))
     for chunk in chunks:
         np.add.at(total, chunk.ledger.row, chunk.ledger.duration_s)
-    return SlideTrace(
+    return TwinTrace(
         np.cumsum(total)[rows],
         rows,
         np.concatenate([chunk.commanded for chunk in chunks]),

@@ -15,7 +15,7 @@ from camtool.cli.options import MachineFlags, talk_options
 from camtool.errors import OptionError, OutputError
 
 if TYPE_CHECKING:
-    from camtool.target.twin import SlideTrace, Twin
+    from camtool.target.twin import Twin, TwinTrace
 
 MAX_SPEED = "max"
 """The speed of a clock that keeps to nothing."""
@@ -153,7 +153,7 @@ class _TraceWriter:
         self._shown = len(self._twin.decoded)
 
 
-def rows(trace: SlideTrace) -> str:
+def rows(trace: TwinTrace) -> str:
     """Return a trace as CSV."""
     columns = zip(
         trace.time_s.tolist(),

@@ -34,7 +34,7 @@ COMMANDED: Final = Options(effects=Effects(False, False, False, False, False))
 which outlive a block."""
 
 
-class SlideTrace(Struct, frozen=True, eq=False):
+class TwinTrace(Struct, frozen=True, eq=False):
     """Movements of the slides, K outputs in order: `time_s` (K,), the index (K,) in `Twin.decoded`
     of the block that asked for it (−1: a command), the position (K, 3) mm that the controller
     commanded and that of the slides (K, 3) mm, both in the work frame of when the power came
@@ -108,7 +108,7 @@ class Slides:
         self.done = 0
         """Count of outputs of the last travel that were made."""
         self._block = -1
-        self._pieces: list[SlideTrace] = []
+        self._pieces: list[TwinTrace] = []
 
     def begin(self, travel: Travel, now: float, block: int) -> None:
         """Begin a travel, that of the block with this index; one under way is abandoned.
@@ -144,7 +144,7 @@ class Slides:
             self.done, self.commanded_mm = high, made[-1]
             owner = np.full(high - low, self._block, dtype=np.int64)
             self._pieces.append(
-                SlideTrace(self._times[low:high], owner, made, self._slide[low:high])
+                TwinTrace(self._times[low:high], owner, made, self._slide[low:high])
             )
         if self.ends_s is not None and now >= self.ends_s:
             self.ends_s = None
@@ -175,24 +175,22 @@ class Slides:
         self._mechanics.axes[axis, 3] = steps * self._step_mm[axis]
 
     @property
-    def trace(self) -> SlideTrace:
+    def trace(self) -> TwinTrace:
         """All movements, or those since `drain`."""
         if len(self._pieces) != 1:
             self._pieces = [_join_traces(self._pieces)]
         return self._pieces[0]
 
-    def drain(self) -> SlideTrace:
+    def drain(self) -> TwinTrace:
         """Return the movements since the last call, and forget them."""
         trace, self._pieces = self.trace, []
         return trace
 
 
-def _join_traces(pieces: Sequence[SlideTrace]) -> SlideTrace:
-    empty = SlideTrace(
-        np.empty(0), np.empty(0, dtype=np.int64), np.empty((0, 3)), np.empty((0, 3))
-    )
+def _join_traces(pieces: Sequence[TwinTrace]) -> TwinTrace:
+    empty = TwinTrace(np.empty(0), np.empty(0, dtype=np.int64), np.empty((0, 3)), np.empty((0, 3)))
     pieces = [empty, *pieces]
-    return SlideTrace(
+    return TwinTrace(
         np.concatenate([piece.time_s for piece in pieces]),
         np.concatenate([piece.block for piece in pieces]),
         np.concatenate([piece.commanded for piece in pieces]),

@@ -1138,7 +1138,7 @@ MIN_THETA_RAD = np.pi / 12.0
 
 
 class _Side(Struct, frozen=True, eq=False):
-    """One of the two moves at K corners, in the plane as complex numbers: its tangent there, of
+    """Either of the two moves at K corners, in the plane as complex numbers: its tangent there, of
     arcs the circle that touches it (`centre`, `radius`), the `sign` by which a blend's radius
     counts where it touches it from inside (−1) or outside (1), and the angle `most` that a blend
     may use; so much of the move counts, `longest` mm, and by so much θ is `less`."""
