@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack
 from camtool.bounds import program_bytes
 from camtool.calibration.calibrate import Calibration, to_text
 from camtool.calibration.calibrate import calibrate as calibrated
+from camtool.calibration.measurements import Measurements, read_measurements
 from camtool.comparison import Comparison, ProgramVariant, compare_program, variants_of
 from camtool.errors import CamtoolError, OptionError
 from camtool.geometry.drawing import Drawing
@@ -27,13 +28,16 @@ from camtool.pictures.options import PictureOptions
 from camtool.pictures.picture import Picture
 from camtool.pictures.scene import Scene
 from camtool.pipeline import Judging, convert_program, post_drawing, verify_program
+from camtool.pipeline import post_by_tool as by_tool
 from camtool.planning.job import Job, Operation, Placement, Stock, Tool
 from camtool.planning.job import job_of as made
 from camtool.records import replace
 from camtool.run import Run, Shown, ShownDrawing, ShownToolpath
 from camtool.simulation.motion import Effects
+from camtool.tables import read_table
 from camtool.target.loader import extended_by
 from camtool.target.registry import ListedTarget, LoadedTarget, each_target, list_target
+from camtool.target.registry import load_target as loaded
 from camtool.toolpath.moves import Toolpath
 from camtool.toolpath.program import Program
 from camtool.verification.report import Gates
@@ -199,8 +203,6 @@ def load_target(
     `settings`: {"axes.x.backlash_mm": 0.2}, or a list as for `--set`. The suffix of a key says its
     unit. Raises UnknownTargetError (with the nearest names) and MachineError.
     """
-    from camtool.target.registry import load_target as loaded
-
     if isinstance(settings, Mapping):
         settings = [f"{key}={_as_toml(value)}" for key, value in settings.items()]
     file = None if machine is None else Path(machine)
@@ -284,8 +286,6 @@ def post_by_tool(
     All of them are planned together, in one work frame; each is complete, and judged alone against
     what its operations ask for. Raises as `post` does. Source: docs/verifying.md.
     """
-    from camtool.pipeline import post_by_tool as by_tool
-
     loaded, wanted = as_target(target), _with_compensation(job, compensate)
     read = as_drawing(drawing, loaded, wanted)
     return by_tool(read, wanted, loaded, check=check, gates=gates)
@@ -467,9 +467,6 @@ def calibrate(
     `machine_file` of the result is the text of a new one. Raises InputError, which names file,
     table and key, OptionError and MachineError. Source: docs/calibration.md.
     """
-    from camtool.calibration.measurements import Measurements, read_measurements
-    from camtool.tables import read_table
-
     own = None if machine is None else Path(machine)
     if not isinstance(measurements, Measurements):
         measurements = read_measurements(Path(measurements))

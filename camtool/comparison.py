@@ -14,7 +14,10 @@ from camtool.patterns import guess
 from camtool.pipeline import Judging, verify_program
 from camtool.records import replace
 from camtool.run import Run, Shown
+from camtool.simulation.motion import ALL, IDEAL, Options
+from camtool.toolpath.moves import toolpath_extents
 from camtool.units import UM_PER_MM
+from camtool.verification.cuts import cut_moves
 
 if TYPE_CHECKING:
     from camtool.arrays import Floats
@@ -88,9 +91,7 @@ class Comparison(Shown):
         import numpy as np
 
         from camtool.pictures.overlay import Overlay
-        from camtool.simulation.motion import ALL, Options
         from camtool.verification.contrast import paths_within, worst_place
-        from camtool.verification.cuts import cut_moves
 
         commanded = all(each.judging.interpolator is not None for each in self.ways)
         first, decoded = self.ways[0].target, self.runs[0].decoded
@@ -116,8 +117,6 @@ class Comparison(Shown):
     def _window(self, wanted: Toolpath, place: tuple[float, float]) -> Floats:
         """Return [[xmin, xmax], [ymin, ymax]] mm that the picture shows."""
         import numpy as np
-
-        from camtool.toolpath.moves import toolpath_extents
 
         machines = [each.target.machine for each in self.ways]
         step = max(max(each.axes.x.coded_step_mm, each.axes.y.coded_step_mm) for each in machines)
@@ -192,8 +191,6 @@ def variants_of(what: str, load: Load, judging: Judging) -> list[ProgramVariant]
 def effects_without(names: Sequence[str]) -> Effects:
     """Return all effects of the mechanics but these; OptionError for names that are none of
     them."""
-    from camtool.simulation.motion import ALL
-
     unknown = [name for name in names if name not in EFFECTS]
     if unknown:
         raise OptionError(
@@ -211,8 +208,6 @@ def _interpolators(target: LoadedTarget, judging: Judging) -> list[ProgramVarian
 
 def _mechanics(target: LoadedTarget, judging: Judging) -> list[ProgramVariant]:
     """Return all of the mechanics, without each part that acts, and without all of them."""
-    from camtool.simulation.motion import IDEAL
-
     return [
         ProgramVariant("as it is", target, judging),
         *(

@@ -23,9 +23,22 @@ from msgspec import Struct, field
 from camtool.bounds import TooLongError
 from camtool.errors import ProgramError
 from camtool.findings import Finding, Severity, worst
+from camtool.planning.job import Job
 from camtool.progress import Progress
 from camtool.records import replace
 from camtool.run import Run
+from camtool.simulation.motion import ALL
+from camtool.toolpath.moves import toolpath_extents
+from camtool.toolpath.program import Program
+from camtool.verification.case import (
+    TRACE_POINTS,
+    WORST_LISTED,
+    Case,
+    VerifyOptions,
+    coverage_of,
+    nose_of,
+    tool_mm,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -209,7 +222,6 @@ def _post_plan(
     if judged is None:
         return replace(run, program=program, decoded=decoded, findings=findings)
     from camtool.planning.drawn import kept_of
-    from camtool.verification.case import TRACE_POINTS, Case, VerifyOptions, nose_of, tool_mm
     from camtool.verification.cuts import rapid_length_mm
     from camtool.verification.report import Planned, rounded
 
@@ -276,17 +288,6 @@ def verify_program(
 ) -> Run:
     """Any program of the target, simulated and judged, against `drawing` planned with `job` if it
     is given. ProgramError names file, block and column."""
-    from camtool.planning.job import Job
-    from camtool.simulation.motion import ALL
-    from camtool.verification.case import (
-        TRACE_POINTS,
-        WORST_LISTED,
-        Case,
-        VerifyOptions,
-        nose_of,
-        tool_mm,
-    )
-
     judging, progress = judging or Judging(), progress or Progress()
     progress.begin(f"reading {PurePath(source).name}")
     run = read_program(data, target, source=source)
@@ -344,7 +345,6 @@ def _register_drawing(case: Case, drawing: Drawing, job: Job, *, align: bool) ->
     """Return the case with the parts of the drawing that its program cuts as the wanted moves, and
     the job with the place of the drawing and the tool that were found in the program."""
     from camtool.planning.place import place
-    from camtool.verification.case import coverage_of, tool_mm
     from camtool.verification.cuts import is_flat
     from camtool.verification.registration import register
 
@@ -396,7 +396,6 @@ def convert_program(
     column.
     """
     from camtool.toolpath.lower import at_feed, carried_over, within_feeds, without_coolant
-    from camtool.verification.case import Case, VerifyOptions
 
     progress = progress or Progress()
     progress.begin(f"reading {PurePath(file).name}")
@@ -439,8 +438,6 @@ def convert_program(
 def read_program(data: bytes, target: LoadedTarget, *, source: str) -> Run:
     """A program as the controller decodes it, not judged; ProgramError names the file too."""
     import numpy as np
-
-    from camtool.toolpath.program import Program
 
     decoded = _decode(data, target, source)
     mine = target.machine.target
@@ -573,7 +570,6 @@ def _cut_mm(wanted: Toolpath) -> tuple[float, float, float, float] | None:
     None where nothing is cut, or nobody knows by which operation."""
     import numpy as np
 
-    from camtool.toolpath.moves import toolpath_extents
     from camtool.toolpath.rapids import feeds_below_top
     from camtool.verification.cuts import is_flat
 

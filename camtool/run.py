@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, TypeVar
 from camtool.errors import PostError
 from camtool.findings import Finding, Severity, worst
 from camtool.geometry.drawing import Drawing
+from camtool.geometry.measure import extents
 from camtool.toolpath.moves import Kind, Toolpath
 
 if TYPE_CHECKING:
@@ -209,8 +210,6 @@ def _count_findings(findings: tuple[Finding, ...]) -> str:
 
 
 def _size(drawing: Drawing) -> str:
-    from camtool.geometry.measure import extents
-
     if not len(drawing.paths):
         return "no lines"
     (left, right), (low, high) = extents(drawing.paths).tolist()

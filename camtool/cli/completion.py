@@ -26,6 +26,7 @@ from click.types import StringParamType
 from camtool.cli import COMPLETE
 from camtool.cli.targets import flat_lines, target_items
 from camtool.errors import CamtoolError
+from camtool.pictures.layers import layer_names
 
 MAX_SCANNED_BYTES = 20_000_000
 """Layers of larger drawings are not looked for: the answer would take longer than typing."""
@@ -271,8 +272,6 @@ def _layers(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
 
 def _picture_layers(ctx: click.Context, incomplete: str) -> Iterator[CompletionItem]:
     """Return the layers of pictures; of several, for the one after the last comma."""
-    from camtool.pictures.layers import layer_names
-
     before, comma, last = incomplete.rpartition(",")
     for name in layer_names():
         if name.startswith(last):

@@ -27,7 +27,7 @@ from camtool.cli.life_signs import progress
 from camtool.errors import MachineError, OptionError
 from camtool.importers.options import Flag, ReadOptions, Selection, flags_of, options_of
 from camtool.jobs.keys import FLAGS, flag_name
-from camtool.keys import Key
+from camtool.keys import Given, Key
 from camtool.records import replace
 from camtool.units import parse_feed, parse_length, parse_time
 
@@ -81,18 +81,30 @@ def option(section: str, *names: str, **settings: Any) -> Option:
 
 # Groups of flags as records.
 
+_GROUPS = "gathered_groups"
+"""Attribute of a wrapped command: the records that it is called with, and their flags."""
+
 
 def gather(
     record: str, make: Callable[..., Any], names: Sequence[str]
 ) -> Callable[[Command], Command]:
-    """Return a wrapper that replaces the arguments `names` of a command by one record."""
+    """Return a wrapper that replaces the arguments `names` of a command by one record.
+
+    The records of a command that is wrapped several times are made in one call.
+    """
 
     def wrap(command: Command) -> Command:
-        @functools.wraps(command)
-        def called(**arguments: Any) -> Any:
-            picked = {name: arguments.pop(name) for name in names}
-            return command(**{record: make(**picked)}, **arguments)
+        groups = {**getattr(command, _GROUPS, {}), record: (make, names)}
+        body = getattr(command, "__wrapped__", command) if len(groups) > 1 else command
 
+        @functools.wraps(body)
+        def called(**arguments: Any) -> Any:
+            for each, (record_of, flags) in reversed(groups.items()):
+                arguments[each] = record_of(**{flag: arguments.pop(flag) for flag in flags})
+            return body(**arguments)
+
+        vars(called).update(vars(command))
+        setattr(called, _GROUPS, groups)
         return cast("Command", called)
 
     return wrap
@@ -510,7 +522,6 @@ class JobFlags:
     def _tools_and_defaults(self) -> Shop:
         """Return the tools that the job may name, and the defaults of the project and the user."""
         from camtool.jobs.tools import Shop
-        from camtool.keys import Given
 
         if self.project is None:
             return Shop()
@@ -524,8 +535,6 @@ class JobFlags:
     def beyond(self, names: Collection[str]) -> list[str]:
         """Return the flags of a job that are given beside the keys of these names: `--job` and
         others."""
-        from camtool.jobs.keys import flag_name
-
         flags = [flag_name(name) for name in self.given if name not in names]
         return [*(["--job"] if self.file is not None else []), *flags]
 
@@ -538,9 +547,10 @@ class JobFlags:
     def _named_file(self, key: str) -> str | None:
         """Return the file that a flag or a key of the job file names; None without one, and if the
         job file cannot be read: `job` reports that."""
+        from camtool.tables import read_table
+
         if self.file is None or key in self.given:
             return self.given.get(key)
-        from camtool.tables import read_table
 
         try:
             name = read_table(Path(self.file), self._piped_content).get(key)

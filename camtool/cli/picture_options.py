@@ -19,6 +19,7 @@ from camtool.cli.messages import say
 from camtool.cli.options import Command, option, with_flags
 from camtool.errors import OptionError
 from camtool.pictures.layers import Layer, chosen, layer_names, layer_of, layers_in
+from camtool.pictures.options import PictureOptions
 from camtool.records import replace
 from camtool.units import parse_length
 
@@ -101,8 +102,6 @@ class PictureFlags:
 
     def options(self) -> PictureOptions:
         """Return the options of the pictures; OptionError for flags without a valid picture."""
-        from camtool.pictures.options import PictureOptions
-
         times = 1.0 if self.exaggerate is None else self.exaggerate
         layers = chosen(self.named, self.no_layer) if self.named or self.no_layer else None
         return PictureOptions(self.size, self.crop, self.dark, times, layers, self.polar)

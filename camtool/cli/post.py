@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePath
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -52,6 +52,7 @@ from camtool.cli.picture_options import (
 )
 from camtool.cli.report import ReportOutputs, report_option
 from camtool.errors import CamtoolError, OptionError
+from camtool.pictures.options import points_for
 from camtool.records import replace
 
 if TYPE_CHECKING:
@@ -74,9 +75,6 @@ def scenes_of(run: Run, *, before: bool) -> list[Scene]:
         )
     name = run.title
     return [run.before.scene(f"{name}, before"), run.scene(f"{name}, after")]
-
-
-Made = TypeVar("Made")
 
 
 @dataclass(frozen=True)
@@ -109,7 +107,12 @@ class Posting:
         read."""
         from camtool.pipeline import post_drawing
 
-        run = self._post(post_drawing, source, target, on_read=on_read, pictures=pictures)
+        wanted = self.job.job(self.drawing)
+        read = self.drawing.read(source, target.machine, wanted)
+        if on_read is not None:
+            on_read()
+        with self.job.name_job_file():
+            run = post_drawing(read, wanted, target, **self._settings(pictures))
         return self.inspection.inspect_run(run)
 
     def make_by_tool(
@@ -118,33 +121,19 @@ class Posting:
         """Post the drawing as a program for each turn of a tool."""
         from camtool.pipeline import post_by_tool
 
-        return self._post(post_by_tool, source, target, pictures=pictures)
-
-    def _post(
-        self,
-        post: Callable[..., Made],
-        source: str,
-        target: LoadedTarget,
-        *,
-        on_read: Callable[[], None] | None = None,
-        pictures: Sequence[str] = (),
-    ) -> Made:
-        from camtool.pictures.options import points_for
-
         wanted = self.job.job(self.drawing)
         read = self.drawing.read(source, target.machine, wanted)
-        if on_read is not None:
-            on_read()
         with self.job.name_job_file():
-            return post(
-                read,
-                wanted,
-                target,
-                check=not self.no_verify,
-                gates=self.gates.gates(),
-                trace_points=points_for(pictures),
-                progress=progress(),
-            )
+            return post_by_tool(read, wanted, target, **self._settings(pictures))
+
+    def _settings(self, pictures: Sequence[str]) -> dict[str, Any]:
+        """Return the settings of posting, for pictures of these names."""
+        return {
+            "check": not self.no_verify,
+            "gates": self.gates.gates(),
+            "trace_points": points_for(pictures),
+            "progress": progress(),
+        }
 
     def files(self, source: str) -> list[str]:
         """Return the files that a program is made from: drawing, job, its tool table, tolerances,

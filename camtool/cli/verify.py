@@ -43,6 +43,8 @@ from camtool.cli.picture_options import (
     picture_options,
 )
 from camtool.cli.report import ReportOutputs, report_option
+from camtool.jobs.keys import PLACE
+from camtool.pictures.options import points_for
 from camtool.records import replace
 
 if TYPE_CHECKING:
@@ -152,7 +154,6 @@ def verify(
     wishes.outputs.check([program, against, beside, *read_files])
 
     from camtool.comparison import effects_without
-    from camtool.pictures.options import points_for
     from camtool.pipeline import Judging
 
     judging = Judging(
@@ -177,8 +178,6 @@ def verify(
 def _finds_contours(job: JobFlags, against: str | None, *, align: bool, comparing: bool) -> bool:
     """True if no flag says how the program cuts, so that this is found from it; a usage error if
     that contradicts `--align`."""
-    from camtool.jobs.keys import PLACE
-
     said = job.beyond({*PLACE, "tool_diameter"})
     if align and against is None:
         raise click.UsageError("--align needs --against DRAWING")

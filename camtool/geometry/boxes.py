@@ -14,6 +14,7 @@ import numpy as np
 from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Indices, Ints
+from camtool.geometry.measure import segment_boxes
 from camtool.geometry.polylines import Segments
 from camtool.kernels.move_tree import LEAF, hilbert_order, move_tree
 
@@ -204,7 +205,6 @@ def curve_rows_of(segments: Segments) -> Floats:
 def moves_of(segments: Segments, heights: Floats) -> Moves:
     """Return the segments with the heights of their starts and ends (K, 2) mm, as
     `camtool.kernels.near` takes them."""
-    from camtool.geometry.measure import segment_boxes
     from camtool.kernels import near as at
 
     rows = np.flatnonzero(segments.bulge)

@@ -22,6 +22,7 @@ from camtool.errors import GeometryError
 from camtool.geometry.drawing import Branch, Gap
 from camtool.geometry.measure import path_lengths, signed_areas
 from camtool.geometry.polylines import POSITION_EPS_MM, Polylines
+from camtool.kernels.chaining import clusters, join, near_pairs, nearest_others, split_loops, walk
 
 
 class Chained(Struct, frozen=True, eq=False):
@@ -91,7 +92,6 @@ def chain(
     paths = _Paths.of(lines, kinds or Kinds(groups=groups))
     if lines.closed.all():
         return Chained(lines, _single_members(np.arange(len(lines))), (), ())
-    from camtool.kernels.chaining import walk
 
     found = joints(paths.ends, max(gap_mm, POSITION_EPS_MM))
     alone = lines.closed | (found.mates.reshape(-1, 2) < 0).all(axis=1)
@@ -321,8 +321,6 @@ class _Joining(Struct, eq=False):
 
     def join(self, one: Ints, other: Ints) -> int:
         """Join these pairs in their order, if both ends are free; return how many were."""
-        from camtool.kernels.chaining import join
-
         return join(one, other, self.mates, self.above, self.segments, self.arcs)
 
     def without_empty_rings(self, one: Ints, other: Ints) -> tuple[Ints, Ints]:
@@ -405,8 +403,6 @@ _MIX = np.int64(0x9E3779B1)
 
 def _near_pairs(ends: Ends, free: Ints, reach: float) -> tuple[Ints, Ints]:
     """Return the pairs of free ends within `reach` in one group, the lesser end first."""
-    from camtool.kernels.chaining import near_pairs
-
     points = ends.points[free]
     # Wider than the reach by a hair, so that rounding cannot put near points two cells apart.
     cells = np.column_stack([ends.group[free // 2], np.floor(points / (reach * _WIDER))])
@@ -430,8 +426,6 @@ def _sorted_pairs(one: Ints, other: Ints) -> tuple[Ints, Ints]:
 def _clusters(count: int, one: Ints, other: Ints) -> tuple[Ints, Ints]:
     """Return the least end of each end's cluster, and for each such end the number of ends in
     it."""
-    from camtool.kernels.chaining import clusters
-
     label = clusters(count, one, other)
     return label, np.bincount(label, minlength=count)
 
@@ -484,7 +478,6 @@ def _split_rings(ends: Ends, mates: Ints, node: Ints, reach: float) -> None:
     """Split rings that pass a branch twice there, each walked from its first end by place."""
     if not (node >= 0).any():
         return
-    from camtool.kernels.chaining import split_loops, walk
 
     entries, begins, rings = walk(mates, ends.is_open)
     ring = np.repeat(np.arange(len(rings)), np.diff(begins))
@@ -754,8 +747,6 @@ def _spacing(points: Floats) -> float:
 def _nearest_ends(points: Floats, reach: float) -> tuple[Ints, Ints, Floats]:
     """Return rows (J,), the row of the nearest other point (J,) and its distance (J,), within
     reach."""
-    from camtool.kernels.chaining import nearest_others
-
     spread = points.max(axis=0) - points.min(axis=0)
     spacing = float(np.sqrt(spread[0] * spread[1] / len(points)))
     size = min(max(spacing, reach / FINEST_CELLS), reach)

@@ -28,6 +28,7 @@ from camtool.geometry.boxes import IndexedCurves, box_pairs
 from camtool.geometry.measure import path_extents, segment_boxes
 from camtool.geometry.polylines import Polyline, Polylines, Segments
 from camtool.kernels.move_tree import hilbert_order
+from camtool.kernels.offsets import curves_within, nearest_distances
 
 POINTS_AT_A_TIME = 1 << 14
 """Points that `nearest` handles together: it bounds the memory."""
@@ -77,8 +78,6 @@ def nearest(points: Floats, segments: Segments) -> Nearest:
     A tree over the segments gives those that are hardly farther than the nearest one, and the
     formula above decides among them.
     """
-    from camtool.kernels.offsets import curves_within, nearest_distances
-
     if len(segments) == 0:
         raise ValueError("no segments to be near to")
     order = hilbert_order(segments.start, segments.end)

@@ -23,6 +23,7 @@ from camtool.geometry.measure import (
     segment_lengths,
 )
 from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, Segments
+from camtool.kernels.fits import closest
 from camtool.records import replace
 
 
@@ -201,7 +202,6 @@ def narrowest_wall(lines: Polylines) -> Feature | None:
     segments = _closed_segments(lines)
     if segments is None:
         return None
-    from camtool.kernels.fits import closest
 
     boxes = segment_boxes(segments)
     # The tree wants paths numbered in the order in which they stand here.

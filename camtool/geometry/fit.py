@@ -32,6 +32,10 @@ from camtool.kernels.fits import (
     STEP_ERROR_SHARE,
     STEP_TURN_RAD,
     VANISHING_TANGENT,
+    curve_rows,
+    fit_nodes,
+    samples_between,
+    step_errors,
 )
 
 Judged = tuple[float, float, float]
@@ -131,8 +135,6 @@ def split_bulges(vertices: Floats, closed: bool) -> Floats:
 
 def _fit_pieces(pieces: Pieces, tolerance_mm: float) -> Fit:
     """Rational pieces, about their origin."""
-    from camtool.kernels.fits import curve_rows, samples_between
-
     if not np.abs(pieces.control).max() <= MAX_SIZE_MM:
         raise GeometryError("a point or a tangent of a curve is not finite")
     control = np.ascontiguousarray(pieces.control)
@@ -173,8 +175,6 @@ def _fitted(
     A fit whose error turns out too large is done again over finer nodes, since errors peak
     between them; if that is not enough, with less of the tolerance as well.
     """
-    from camtool.kernels.fits import fit_nodes
-
     target, steps, fineness = SEARCH_SHARE * tolerance, MIN_STEPS, tolerance
     for attempt in range(ATTEMPTS):
         nodes = nodes_of(fineness, steps)
@@ -326,8 +326,6 @@ def _refine(
 def _too_coarse(nodes: _NodeColumns, rows: Ints, probes: Floats, tolerance_mm: float) -> Bools:
     """Mask of the steps that must be halved, by points (j, steps, 2) of the curve within each
     step."""
-    from camtool.kernels.fits import step_errors
-
     error = step_errors(nodes.point, nodes.leave, nodes.arrive, rows, probes)
     away = probes[0] - nodes.point[rows], probes[0] - nodes.point[rows + 1]
     size = np.maximum(np.hypot(*away[0].T), np.hypot(*away[1].T))

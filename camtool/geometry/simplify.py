@@ -25,6 +25,7 @@ from msgspec import Struct
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.measure import segment_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
+from camtool.kernels.fits import MIN_POINTS, find_runs, furthest_off
 
 NOISE_MM = 1e-7
 """Points of exact drawings lie on their circle within this."""
@@ -50,8 +51,6 @@ def recognise_arcs(path: Polyline, tolerance_mm: float) -> tuple[Polyline, int]:
     lines stay. An arc of more than a half circle counts once, though it is written as two; so
     does a whole circle.
     """
-    from camtool.kernels.fits import MIN_POINTS
-
     if len(path.vertices) < MIN_POINTS:
         return path, 0
     noise = min(rounding_noise(path.vertices[:, :2]), tolerance_mm)
@@ -85,8 +84,6 @@ def _replace_chords(
     vertices: Floats, noise: float, tolerance_mm: float
 ) -> tuple[Floats, list[tuple[int, int]]]:
     """Return the open path with its arcs, and the first and last vertex of each before."""
-    from camtool.kernels.fits import MIN_POINTS, find_runs, furthest_off
-
     keep = np.ones(len(vertices), dtype=np.bool_)
     found: list[tuple[int, int]] = []
     inserted: list[tuple[int, Floats]] = []

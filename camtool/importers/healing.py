@@ -19,6 +19,7 @@ from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.errors import DrawingError, GeometryError
+from camtool.geometry.boxes import segment_tree
 from camtool.geometry.chain import Chained, Kinds, chain, numbered
 from camtool.geometry.drawing import Gap, Healing, Skipped
 from camtool.geometry.intersect import self_crossings_of
@@ -34,9 +35,10 @@ from camtool.geometry.polylines import (
     segment_rows,
     without_repeats,
 )
-from camtool.geometry.simplify import without_tiny
+from camtool.geometry.simplify import recognise_arcs, without_tiny
 from camtool.importers.options import ReadOptions
 from camtool.importers.pieces import MAX_COORDINATE_MM, MAX_POINTS, Piece, too_many_points
+from camtool.kernels.offsets import distances_from, segments_within
 
 IS_DRAWN_TWICE = "is drawn twice"
 """The reason for leaving out a piece that repeats another one."""
@@ -279,7 +281,6 @@ def _recognise_arcs(lines: Polylines, options: ReadOptions) -> tuple[Polylines, 
     """The paths with arcs for chords on one circle, if that was asked for; how many arcs."""
     if not options.recognise_arcs:
         return lines, 0
-    from camtool.geometry.simplify import recognise_arcs
 
     made = [recognise_arcs(path, options.tolerance_mm) for path in lines]
     return Polylines.of(path for path, _ in made), sum(count for _, count in made)
@@ -394,9 +395,6 @@ def _near(
     """For some of the segments `which` at a time: which of them (P,) each point along them is on,
     and how far (P,) mm the nearest of the others is from it; and pairs (J,), (J,) of a point and
     one of the others that is no farther from it than so many times that."""
-    from camtool.geometry.boxes import segment_tree
-    from camtool.kernels.offsets import distances_from, segments_within
-
     if not len(which):
         return
     tree = segment_tree(others.vertices, others.begin, others.end)

@@ -7,6 +7,7 @@ misspelt layer must not leave a part of the work undone.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from functools import partial
 from typing import TYPE_CHECKING
 
 from camtool.errors import OptionError
@@ -33,9 +34,7 @@ def read_for_job(data: bytes, file: str, options: ReadOptions, job: Job) -> Draw
     chosen, wanted = options.select, layers_of(job)
     options = replace(options, select=replace(chosen, layers=chosen.layers or wanted))
     try:
-        drawing = read_to_scale(
-            lambda scale: read_bytes(data, file, replace(options, scale=scale)), job
-        )
+        drawing = read_to_scale(partial(read_bytes, data, file), options, job)
     except NoMatchError as error:
         if chosen.layers or error.pattern not in wanted:
             raise
@@ -45,14 +44,16 @@ def read_for_job(data: bytes, file: str, options: ReadOptions, job: Job) -> Draw
     return drawing
 
 
-def read_to_scale(read: Callable[[float], Drawing], job: Job) -> Drawing:
-    """The drawing that `read` gives for the scale of the part, which is the job's; where the job
-    fits the drawing into a size, that follows from a first look at what is drawn."""
+def read_to_scale(
+    read: Callable[[ReadOptions], Drawing], options: ReadOptions, job: Job
+) -> Drawing:
+    """Read a drawing at the scale of the part, which is the job's; if the job fits the drawing
+    into a size, the scale is computed from a first reading."""
     if job.placement.fit_mm is None:
-        return read(job.placement.scale)
+        return read(replace(options, scale=job.placement.scale))
     from camtool.planning.place import SCALE_SHARE, part_scale
 
-    drawing = read(1.0)
+    drawing = read(replace(options, scale=1.0))
     for _ in range(MOST_LOOKS - 1):
         try:
             scale = part_scale(drawing, job)
@@ -60,7 +61,7 @@ def read_to_scale(read: Callable[[float], Drawing], job: Job) -> Drawing:
             return drawing
         if abs(scale - drawing.made_for) <= SCALE_SHARE * drawing.made_for:
             return drawing
-        drawing = read(scale)
+        drawing = read(replace(options, scale=scale))
     return drawing
 
 

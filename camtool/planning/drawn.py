@@ -28,8 +28,10 @@ import numpy as np
 from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
+from camtool.geometry.boxes import segment_tree
 from camtool.geometry.measure import extents, path_extents
-from camtool.geometry.polylines import Polylines, Segments, reverse
+from camtool.geometry.polylines import Polylines, Segments, next_vertices, reverse, segment_rows
+from camtool.kernels.offsets import distances_from, segments_within
 from camtool.planning.items import Contour, Runs, Setting, Step, contours_of
 from camtool.planning.job import Operation, Tool
 from camtool.planning.sides import runs_beside
@@ -106,9 +108,6 @@ def _off(
         if made:
             yield rows, np.full((len(rows), 2), made)
         return
-    from camtool.geometry.boxes import segment_tree
-    from camtool.geometry.polylines import next_vertices, segment_rows
-    from camtool.kernels.offsets import distances_from, segments_within
 
     begin = segment_rows(lines).astype(np.int32)
     end = next_vertices(lines.offsets)[begin].astype(np.int32)

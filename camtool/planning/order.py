@@ -20,6 +20,15 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import OptionError
 from camtool.geometry.nesting import Nesting
 from camtool.geometry.polylines import Polyline, Polylines, begin_lines_at, reverse_lines
+from camtool.kernels.tours import (
+    Tour,
+    best_rows,
+    kicked,
+    nearest_first,
+    neighbours,
+    settled,
+    tree_of,
+)
 from camtool.planning.items import Contour, Fixed, Items, contours_of
 from camtool.planning.paths import flat_path, joints
 
@@ -126,14 +135,12 @@ def best_order(
     """
     if len(choices) == 0:
         return np.empty(0, dtype=np.int64)
-    from camtool.kernels.tours import best_rows
 
     start = np.array(from_point, dtype=np.float64)
     goal = np.array((np.nan, np.nan) if to_point is None else to_point, dtype=np.float64)
     ends, first = np.column_stack([choices.entry, choices.exit]), choices.first
     if len(choices) == 1 and not len(before):
         return best_rows(ends, first, np.zeros(1, dtype=np.int64), start, goal)
-    from camtool.kernels.tours import kicked, nearest_first, settled, tree_of
 
     after_first, after = _followers(before, len(choices))
     waits = np.bincount(after, minlength=len(choices))
@@ -154,8 +161,6 @@ def best_order(
 
 def tour_of(choices: Choices, before: Ints, rows: Ints, start: Floats, goal: Floats) -> Tour:
     """Return the tour of these rows, with the tables that the search uses."""
-    from camtool.kernels.tours import Tour, neighbours, tree_of
-
     count, variants = len(choices), len(choices.owner)
     turned = _reversed_rows(choices)
     stays = bool(np.isnan(goal).any())

@@ -33,6 +33,7 @@ import numpy as np
 from camtool.arrays import Floats
 from camtool.geometry.measure import segment_lengths
 from camtool.geometry.polylines import Segments
+from camtool.kernels.passes import lifted as lift
 from camtool.planning.items import Feeds
 from camtool.planning.paths import MeasuredPaths
 
@@ -133,8 +134,6 @@ def lift_paths(
 ) -> list[Floats]:
     """Return vertices (n, 4) for each run: x, y, z, bulge of the paths of these indices (R,) with
     these profiles (R,)."""
-    from camtool.kernels.passes import lifted as lift
-
     first = np.concatenate([[0], np.cumsum([len(points) for points in profiles])])
     points = np.array([point for points in profiles for point in points]).reshape(-1, 2)
     length, z = np.ascontiguousarray(points.T)

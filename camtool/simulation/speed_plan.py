@@ -15,6 +15,7 @@ from msgspec import Struct
 
 from camtool.arrays import Floats
 from camtool.errors import MachineError
+from camtool.kernels.motion import entry_speeds
 from camtool.machine.model import Machine
 
 
@@ -43,8 +44,6 @@ class SpeedPlan(Struct, frozen=True, eq=False):
     def squares(self, window: int) -> Floats:
         """Return (N + 1,) (mm/s)²: the square of the speed at the start of each block, and 0 after
         the last, for a planner with a buffer of `window` blocks, the current one included."""
-        from camtool.kernels.motion import entry_speeds
-
         first = np.full(min(len(self.speed_mm_s), 1), self.before.speed_mm_s)
         highest = np.concatenate([first, self.speed_mm_s[:-1]])
         np.minimum(highest, self.speed_mm_s, out=highest)

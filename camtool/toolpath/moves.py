@@ -288,18 +288,15 @@ def _as_column(
     """Return the column if it is read-only and of this type, else a read-only copy. ValueError for
     another shape."""
     column: np.ndarray[Any, Any] = given
-    if not (isinstance(given, np.ndarray) and given.dtype == dtype and _is_read_only(given)):
+    owner = getattr(given, "base", None)
+    owner = given if owner is None else owner  # a view is as final as the array that owns its data
+    is_final = isinstance(owner, np.ndarray) and owner.flags.owndata and not owner.flags.writeable
+    is_column = isinstance(given, np.ndarray) and given.dtype == dtype
+    if not (is_final and is_column and not given.flags.writeable):
         column = read_only(np.array(given, dtype=dtype))
     if column.shape != shape:
         raise ValueError(f"column {name} has shape {column.shape}, wanted {shape}")
     return column
-
-
-def _is_read_only(column: np.ndarray[Any, Any]) -> bool:
-    """True if neither the array nor the array that it is a view of can be written."""
-    owner = column if column.base is None else column.base
-    own = isinstance(owner, np.ndarray) and bool(owner.flags.owndata)
-    return own and not owner.flags.writeable and not column.flags.writeable
 
 
 def rows_of(column: Column, row: Ints) -> Column:

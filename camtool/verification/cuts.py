@@ -21,6 +21,7 @@ from msgspec import Struct
 from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.geometry.measure import point_at, segment_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
+from camtool.kernels.chaining import latest_near
 from camtool.toolpath.moves import ROWS_AT_ONCE, Kind, Toolpath, are_arcs
 from camtool.toolpath.rapids import feeds_below_top
 
@@ -314,8 +315,6 @@ NO_LOOP = -1
 def loops(cuts: CutMoves, gap_mm: float) -> Ints:
     """Return (C, 2) first and last row of the loop of each contour, NO_LOOP where it has none.
     Points within `gap_mm` of each other count as one."""
-    from camtool.kernels.chaining import latest_near
-
     begin, finish = cuts.contour_ends()
     found = np.full((len(begin), 2), NO_LOOP, dtype=np.int64)
     whole = cuts.closed(gap_mm) & _is_level(cuts)

@@ -19,6 +19,7 @@ import numpy as np
 from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Indices, Ints
+from camtool.kernels import judging as at
 from camtool.kernels.judging import BEFORE_FIRST, BINS, SHIFT, leading_bits
 from camtool.simulation.motion import Ledger, still_ledger
 from camtool.toolpath.moves import Kind, Toolpath, are_arcs
@@ -123,8 +124,6 @@ class RowBlock(Struct, frozen=True, eq=False):
 
 def empty_columns(count: int) -> Floats:
     """Return (count, 19) columns of `camtool.kernels.judging` for rows without samples."""
-    from camtool.kernels import judging as at
-
     columns = np.zeros((count, at.ROW_COLUMNS))
     columns[:, [at.LOW_X, at.LOW_Y]] = np.inf
     columns[:, [at.HIGH_X, at.HIGH_Y]] = -np.inf
@@ -166,8 +165,6 @@ class RowFigures:
 
     def add(self, block: RowBlock) -> None:
         """Add the next rows, all of whose samples are judged."""
-        from camtool.kernels import judging as at
-
         columns = block.columns
         samples, known = block.count(at.SAMPLES), block.count(at.KNOWN)
         if self.books.ledger is not None:
@@ -328,8 +325,6 @@ class ContourSums:
     def add(self, block: RowBlock, samples: Ints, errors: tuple[Floats, Floats, Floats]) -> None:
         """Add the next rows: `samples` (R,) with a total error; the largest `errors` (R,) of
         interpolation and mechanics, and in all."""
-        from camtool.kernels import judging as at
-
         contour = self._match.contour[block.rows]
         known = np.flatnonzero((samples > 0) & (contour >= 0))
         of, columns = contour[known], block.columns[known]
@@ -377,8 +372,6 @@ class WorstRows:
     def add(self, block: RowBlock, errors: tuple[Floats, Floats, Floats]) -> None:
         """Add the next rows and their largest `errors` (R,) of interpolation and mechanics, and in
         all."""
-        from camtool.kernels import judging as at
-
         inner, lag, total = errors
         known = np.flatnonzero(~np.isnan(total))
         known = known[np.lexsort((known, -total[known]))][: self._count]

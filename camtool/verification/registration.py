@@ -40,7 +40,14 @@ from camtool.geometry.measure import (
     turn_left,
 )
 from camtool.geometry.offset import offset_each
-from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
+from camtool.geometry.polylines import (
+    POSITION_EPS_MM,
+    Polyline,
+    Polylines,
+    Segments,
+    reverse,
+    reverse_lines,
+)
 from camtool.planning.holes import circle_of
 from camtool.planning.paths import Cuts, MeasuredPaths
 from camtool.planning.paths import cuts as joined_moves
@@ -642,15 +649,11 @@ def _tracks_of(lines: Polylines, radius_mm: float, which: Ints) -> _Tracks:
 
 def _orient_ccw(lines: Polylines) -> Polylines:
     """Return closed paths, each reversed where it runs clockwise."""
-    from camtool.geometry.polylines import reverse_lines
-
     return reverse_lines(lines, np.asarray(signed_areas(lines) < 0.0))
 
 
 def _doubled_path(path: Polyline) -> Polyline:
     """Return an open path as a closed one of no width."""
-    from camtool.geometry.polylines import reverse
-
     back = reverse(path).vertices
     return Polyline(np.concatenate([path.vertices[:-1], back[:-1]]), closed=True)
 

@@ -19,6 +19,20 @@ from msgspec import Struct
 from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.errors import ProgramError
 from camtool.geometry.measure import segment_boxes
+from camtool.kernels import judging as at
+from camtool.kernels.judging import (
+    BINS,
+    WRITTEN,
+    Moves,
+    Sums,
+    Task,
+    bin_directions,
+    empty_bins,
+    judge_samples,
+    new_pen,
+    unwritten,
+)
+from camtool.kernels.move_tree import move_tree
 from camtool.progress import Progress
 from camtool.simulation.controller import FusedRun
 from camtool.simulation.motion import Chunk
@@ -103,8 +117,6 @@ class SlidePass:
 
     def add(self, chunk: Chunk) -> None:
         """Judge the next samples of the program."""
-        from camtool.kernels.judging import judge_samples
-
         self.rows.books.add(chunk.ledger, self._is_cut)
         if len(chunk.row) == 0:
             return
@@ -170,14 +182,11 @@ class SlidePass:
             self.both_ways += self._pairs.add(circle, bins)
             if len(self.bins) < BINS_KEPT:
                 self.bins[circle] = bins.copy()
-            from camtool.kernels.judging import empty_bins
 
             bins[:] = empty_bins(1)[0]
 
     def _sum_up(self) -> None:
         """Sum up the figures of the rows of the present task, and clear their columns."""
-        from camtool.kernels import judging as at
-
         low, columns = self._task.low, self._sums.rows[: len(self._task.rows)]
         self.rows.add(RowBlock(low, columns, self._is_cut[low : low + len(columns)]))
         lowest, highest = columns[:, [at.LOW_X, at.LOW_Y]], columns[:, [at.HIGH_X, at.HIGH_Y]]
@@ -198,9 +207,6 @@ class Tasks:
 
     def __init__(self, paths: Paths, match: Match, slot: Ints) -> None:
         """Index the wanted moves; `slot` (C,): the bins of each circle."""
-        from camtool.kernels.judging import Moves, bin_directions
-        from camtool.kernels.move_tree import move_tree
-
         self._paths, self._match = paths, match
         self._slot = np.append(slot, -1)  # the last one is for none, −1
         row = paths.wanted.row  # an arc of more than a half circle has two segments
@@ -228,8 +234,6 @@ class Tasks:
 
     def of(self, low: int, high: int) -> Task:
         """Return the task of the rows low:high."""
-        from camtool.kernels.judging import Task
-
         match, toolpath, rows = self._match, self._paths.decoded.toolpath, np.arange(low, high)
         cuts = self._paths.decoded.is_cut[low:high]
         of_row = np.where(cuts, np.cumsum(cuts) - 1, -1)
@@ -260,8 +264,6 @@ class Tasks:
 
 
 def _sums(rows: int, slots: int, trace: TraceSize) -> Sums:
-    from camtool.kernels.judging import BINS, Sums, empty_bins, new_pen
-
     room = 2 * trace.most + rows if trace.stride else 0
     return Sums(
         rows=empty_columns(min(rows, ROWS_AT_ONCE)),
@@ -327,8 +329,6 @@ def _ends(cuts: CutMoves, rows: Ints | Indices) -> tuple[Indices, Indices]:
 def shapes(cuts: CutMoves, low: int, high: int) -> Shapes:
     """Return the moves of the rows low:high that cut, one for each, as columns of the compiled
     judge."""
-    from camtool.kernels import judging as at
-
     begin = cuts.first[low]
     segments = cuts.segments[begin : cuts.first[high]]
     first, last = _ends(cuts, low + np.flatnonzero(cuts.contour[low:high] >= 0))
@@ -395,8 +395,6 @@ def trace_of(sums: Sums, start: Floats, cutting: Bools, most: int) -> SlideTrace
     """Return the start (1, 2) mm and the samples that the judge kept, none for a stride of 0.
     Where they are more than `most` (more rows than points), runs of them are reduced to the sample
     with the largest error. `cutting` (N,): the rows that cut."""
-    from camtool.kernels.judging import WRITTEN, unwritten
-
     written, held = int(sums.pen[WRITTEN]), unwritten(sums.pen)
     sums.trace[written : written + len(held)] = held
     count = written + len(held) + 1

@@ -13,6 +13,7 @@ import pytest
 
 from camtool.api import as_drawing, read_drawing, verify
 from camtool.arrays import Floats
+from camtool.importers.options import ReadOptions
 from camtool.jobs.drawing import read_to_scale
 from camtool.pipeline import post_drawing
 from camtool.planning.findings import PlanningCode
@@ -225,7 +226,9 @@ def test_the_tolerance_is_of_the_part_whatever_brings_it_to_its_size(tmp_path: P
 
     def made(job: Job, **reading: str) -> Run:
         read = read_to_scale(
-            lambda scale: read_drawing(file, target=loaded, scale=scale, **reading), job
+            lambda options: read_drawing(file, target=loaded, scale=options.scale, **reading),
+            ReadOptions(),
+            job,
         )
         return post_drawing(read, job, loaded)
 

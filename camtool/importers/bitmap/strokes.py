@@ -24,6 +24,7 @@ from camtool.geometry.fit import split_bulges
 from camtool.geometry.measure import signed_area
 from camtool.geometry.polylines import Polyline
 from camtool.importers.bitmap.outline import enclosed_area
+from camtool.kernels.fits import furthest_off
 
 SEARCH_SHARE = 0.9
 """Runs are searched within this part of the limit: moving their ends takes a part of the rest."""
@@ -354,8 +355,6 @@ class _Run(Struct, frozen=True, eq=False):
 
     def far(self, begin: Floats, end: Floats) -> float:
         """Return the largest distance of the points from the shape between these ends."""
-        from camtool.kernels.fits import furthest_off
-
         return float(furthest_off(np.ascontiguousarray(self.part), self.rows(begin, end)))
 
     def suits(self, begin: Floats, end: Floats, limit: float) -> bool:
