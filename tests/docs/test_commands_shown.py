@@ -1,4 +1,4 @@
-"""Every command line that a page shows is one that camtool takes.
+"""camtool takes every command line that a page shows.
 
 Blocks `sh`, `console`, `make` and those without a language are read for lines that begin with
 `camtool`; what stands behind three spaces or more is a remark. The commands parse them.
@@ -36,7 +36,7 @@ ARROW = "▶"
 
 @dataclass(frozen=True)
 class Line:
-    """A command line of a page, whose whole text is `around` it. `remark`: something may stand
+    """A command line of a page; `around` is the page's whole text. `remark`: a remark may stand
     behind it; a line that `test_examples.py` runs has its output below it instead."""
 
     page: str
@@ -49,7 +49,7 @@ class Line:
 
 
 def lines_of(name: str, text: str) -> Iterator[Line]:
-    """The lines of a page's blocks that begin with camtool, continued ones as one."""
+    """Yield the lines of a page's blocks that begin with camtool; continued lines are joined."""
     for match in BLOCK.finditer(text):
         if match[2] not in LANGUAGES:
             continue
@@ -62,7 +62,7 @@ def lines_of(name: str, text: str) -> Iterator[Line]:
 
 
 def words_of(text: str) -> list[str]:
-    """The words of the first command of a shell line, without redirections."""
+    """Return the words of the first command of a shell line, without redirections."""
     lexer = shlex.shlex(text, posix=True, punctuation_chars=True)
     lexer.whitespace_split = True
     words: list[str] = []
@@ -76,7 +76,7 @@ def words_of(text: str) -> list[str]:
 
 
 def parsed(words: list[str], monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
-    """The parameters of the commands in a line; click.ClickException when it is none."""
+    """Parse a line and return the parameters of its commands; click.ClickException if it fails."""
     taken: list[dict[str, Any]] = []
     with monkeypatch.context() as patch:
         patch.setattr(click.Command, "invoke", lambda _, ctx: taken.append(ctx.params))
@@ -85,13 +85,13 @@ def parsed(words: list[str], monkeypatch: pytest.MonkeyPatch) -> list[dict[str, 
 
 
 def readings(line: Line) -> list[str]:
-    """The line, and what stands before its remark."""
+    """Return the line as a whole, and the line without its last remark."""
     remarks = list(REMARK.finditer(line.text)) if line.remark else []
     return [line.text, *(line.text[: each.start()] for each in remarks[-1:])]
 
 
 def refused(line: Line, monkeypatch: pytest.MonkeyPatch) -> str:
-    """Why a line is not taken; "" when it is."""
+    """Return the reason why camtool refuses a line; "" if it takes the line."""
     why = ""
     for text in readings(line):
         try:
@@ -104,7 +104,7 @@ def refused(line: Line, monkeypatch: pytest.MonkeyPatch) -> str:
 
 
 def _unknown(line: Line, taken: list[dict[str, Any]]) -> str:
-    """A machine or a sample that there is not."""
+    """Return the fault of a line that names a machine or sample that does not exist, or ""."""
     named = {
         name: str(value)
         for params in taken
@@ -131,7 +131,7 @@ def test_the_lines_of_blocks_are_taken(page: Path, monkeypatch: pytest.MonkeyPat
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the files that the pages speak of."""
+    """Make a folder with the files that the pages mention."""
     place = tmp_path_factory.mktemp("pages")
     samples = place / "samples"
     shutil.copytree(ROOT / "samples", samples)
@@ -182,7 +182,7 @@ def test_lines_run(line: Line, folder: Path, monkeypatch: pytest.MonkeyPatch) ->
 
 
 def wrong_words(text: str) -> str:
-    """Why what stands in a line of text is no part of a command; "" when it is."""
+    """Return the fault of a command quoted within a sentence; "" if it exists with its flags."""
     try:
         words = words_of(text)
     except ValueError as error:

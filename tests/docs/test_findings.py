@@ -29,7 +29,7 @@ HUNDREDS = (1, 2, 3, 4, 5)
 
 
 def modules() -> dict[str, list[str]]:
-    """The modules of codes and sentences by machine; those of camtool's rooms by ""."""
+    """Return the modules of codes and sentences by machine; those of camtool's rooms by ""."""
     rooms = sorted(path.parent.name for path in ROOT.glob("camtool/*/findings.py"))
     assert rooms == sorted(ROOMS)
     machines = sorted(path.parent.name for path in ROOT.glob("postprocessors/*/findings.py"))
@@ -39,7 +39,7 @@ def modules() -> dict[str, list[str]]:
 
 
 def catalogues() -> dict[str, dict[str, Sentence]]:
-    """The sentences by name, of camtool ("") and of each machine that has some."""
+    """Return the sentences by name, of camtool ("") and of each machine that has some."""
     return {
         machine: {
             name: value
@@ -52,7 +52,7 @@ def catalogues() -> dict[str, dict[str, Sentence]]:
 
 
 def codes() -> list[Code]:
-    """Every numbered code of every room, by number."""
+    """Return all numbered codes of all rooms, by number."""
     enums = [
         value
         for names in modules().values()
@@ -65,7 +65,7 @@ def codes() -> list[Code]:
 
 @cache
 def sources() -> dict[str, ast.Module]:
-    """All of the code but the catalogues."""
+    """Yield all files of the code except the catalogues."""
     files = [*ROOT.glob("camtool/**/*.py"), *ROOT.glob("postprocessors/**/*.py")]
     return {
         str(path.relative_to(ROOT)): ast.parse(path.read_text(encoding="utf-8"))
@@ -75,7 +75,7 @@ def sources() -> dict[str, ast.Module]:
 
 
 def tables() -> str:
-    """The tables of codes and of sentences."""
+    """Return the tables of codes and of sentences in Markdown."""
     made = (
         "\n## Codes\n\n| number | code | severity | means | what to do |\n|---|---|---|---|---|\n"
     )
@@ -105,7 +105,7 @@ def _grave(sentence: Sentence) -> str:
 
 
 def _readable(sentence: Sentence) -> str:
-    """The sentence with … for each value."""
+    """Return the sentence with … in place of each value."""
     made = ""
     for text, name, spec, _ in Formatter().parse(sentence.text):
         made += text
@@ -167,8 +167,8 @@ def _is_name(node: ast.AST) -> bool:
     return isinstance(node, ast.Name)
 
 
-def said() -> Iterator[tuple[str, list[Sentence], set[str]]]:
-    """Place, sentence (or those that are chosen from there) and keywords of each call by name."""
+def calls_of_sentences() -> Iterator[tuple[str, list[Sentence], set[str]]]:
+    """Yield place, possible sentences and keywords of each call of a sentence by its name."""
     known = catalogues()
     for file, tree in sources().items():
         parts = Path(file).parts
@@ -183,7 +183,7 @@ def said() -> Iterator[tuple[str, list[Sentence], set[str]]]:
 
 
 def _called(node: ast.expr) -> list[str]:
-    """`A` of `A(...)` and of `A.words(...)`; both of `(A if … else B)(...)`."""
+    """Return called names: `A` of `A(...)` and `A.words(...)`, both of `(A if … else B)(...)`."""
     if isinstance(node, ast.IfExp):
         return _called(node.body) + _called(node.orelse)
     if isinstance(node, ast.Attribute) and node.attr == "words":
@@ -192,7 +192,7 @@ def _called(node: ast.expr) -> list[str]:
 
 
 def test_callers_give_the_numbers_that_a_sentence_has_places_for() -> None:
-    calls = list(said())
+    calls = list(calls_of_sentences())
     assert len(calls) > 100
     for place, sentences, given in calls:
         wanted = set[str]()

@@ -18,14 +18,14 @@ TREES = ("camtool/", "postprocessors/", "tests/", "samples/", "docs/")
 
 
 def rows(text: str) -> list[list[str]]:
-    """The cells of every row of the text's tables, but heads and rules."""
+    """Return the cells of every row of the text's tables, without rules."""
     lines = [line for line in text.splitlines() if line.startswith("|")]
     cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
     return [each for each in cells if not set("".join(each)) <= set("-")]
 
 
 def missing(text: str) -> Iterator[str]:
-    """Files that the tables name and that are not there; a bare name lies beside the one that
+    """Yield files that the tables name and that do not exist; a bare name lies beside the one that
     stands before it in its row, or below it."""
     for cells in rows(text):
         folder = ROOT
@@ -66,7 +66,7 @@ def stale_names(text: str) -> Iterator[str]:
 
 
 def test_names_of_the_overview_exist() -> None:
-    """A renaming may leave a few behind: whoever reads the page next mends them."""
+    """A renaming elsewhere may leave a few stale names here."""
     stale = list(stale_names(OVERVIEW))
     assert len(stale) <= MAX_STALE_NAMES, stale
     text = "`camtool.run.Run` `camtool.run.Nobody` `link.nobody` `camtool.nowhere.f`"

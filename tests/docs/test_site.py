@@ -29,7 +29,7 @@ SETTINGS = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
 
 
 class Silent(http.server.SimpleHTTPRequestHandler):
-    """Serves files, and says nothing of it."""
+    """Serves files without a log."""
 
     def log_message(self, *_: object) -> None:
         return
@@ -110,7 +110,7 @@ def test_the_reference_has_every_name() -> None:
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The site, built without a warning."""
+    """Build the site without a warning and return its folder."""
     for package in ("material", "mkdocstrings"):
         if importlib.util.find_spec(package) is None:
             pytest.skip(f"{package} is not installed: pip install '.[docs]'")
@@ -137,7 +137,7 @@ def test_the_site_has_its_references_and_needs_no_network(site: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(not Path(CHROMIUM).exists(), reason=f"{CHROMIUM} is not installed")
 def test_pages_are_whole_in_a_browser(site: Path) -> None:
-    """Every page as a phone shows it: no error, no picture missing, nothing wider than that."""
+    """Every page fits the width of a phone, with all of its pictures and without errors."""
     playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
     handler = functools.partial(Silent, directory=str(site))
     server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)

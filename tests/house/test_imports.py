@@ -98,7 +98,7 @@ def files() -> list[Path]:
 
 
 def source_of(path: Path) -> str:
-    """The text of a Python file; of a Cython file its imports, as Python has them."""
+    """Return the text of a Python file; of a Cython file its imports, in the syntax of Python."""
     text = path.read_text(encoding="utf-8")
     if path.suffix == ".py":
         return text
@@ -113,7 +113,7 @@ def test_cimports_are_imports_too(tmp_path: Path) -> None:
 
 
 def room_of(name: str) -> str | None:
-    """The room of a module name such as camtool.geometry.fit; None for foreign modules."""
+    """Return the room of a module name such as camtool.geometry.fit; None for foreign modules."""
     head, _, rest = name.partition(".")
     if head == "camtool_postprocessors":
         return "postprocessors"
@@ -126,7 +126,7 @@ def room_of_file(path: Path) -> str:
 
 
 def imported(tree: ast.AST, *, neighbours: bool = False) -> list[tuple[int, str]]:
-    """(line, module) of every import in the tree, wherever it stands."""
+    """Return (line, module) of every import in the tree, inside functions too."""
     found: list[tuple[int, str]] = []
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
@@ -174,14 +174,14 @@ def test_the_rule_can_be_broken(source: str, room: str) -> None:
 
 
 def reached_rooms(source: str) -> set[str]:
-    """The folders of postprocessors/ that a module in one of them imports from, but its own."""
+    """Return the other folders of postprocessors/ from which a module in one of them imports."""
     nodes = ast.walk(ast.parse(source))
     far = [node for node in nodes if isinstance(node, ast.ImportFrom) and node.level > 1]
     return {str(node.module).split(".")[0] for node in far}
 
 
 def module_of(path: Path) -> str:
-    """The name under which a file is imported."""
+    """Return the name under which a file is imported."""
     parts = path.relative_to(ROOT).with_suffix("").parts
     parts = ("camtool_postprocessors", *parts[1:]) if parts[0] == "postprocessors" else parts
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
@@ -260,7 +260,7 @@ def test_heavy_packages_are_imported_where_they_are_used(path: Path) -> None:
 
 
 def loaded_by(*arguments: str) -> set[str]:
-    """Top-level packages that a run of `camtool ARGUMENTS` has loaded when it ends."""
+    """Return the top-level packages that a run of `camtool ARGUMENTS` has loaded when it ends."""
     code = (
         "import sys, atexit; sys.argv = ['camtool', *sys.argv[1:]]; "
         "atexit.register(lambda: print('LOADED', *{m.split('.')[0] for m in sys.modules})); "

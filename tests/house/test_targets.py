@@ -19,8 +19,8 @@ def files() -> list[Path]:
 
 
 def words(tree: ast.AST) -> Iterator[tuple[int, str]]:
-    """(line, word) of every identifier, and of every literal that is one word: keys, names of
-    modules. Sentences may have a target as their example."""
+    """Yield (line, word) of every identifier, and of every literal that is a single word, such as
+    a key. Sentences may have a target as their example."""
     for node in ast.walk(tree):
         line = getattr(node, "lineno", 0)
         match node:

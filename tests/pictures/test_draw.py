@@ -97,11 +97,11 @@ def test_no_two_labels_touch_and_all_are_on_the_page(scene: Scene) -> None:
     swatches = [] if legend is None else swatch_boxes(legend)
     boxes = list(svg_page.label_boxes(root).items())
     for (name, box), (other, other_box) in combinations(boxes, 2):
-        assert apart(box, other_box), (name, other)
+        assert have_a_gap(box, other_box), (name, other)
     for name, box in boxes:
         assert 0.0 < box[0] < box[2] < page[2], name
         assert 0.0 < box[1] < box[3] < page[3], name
-        assert all(apart(box, swatch) for swatch in swatches), name
+        assert all(have_a_gap(box, swatch) for swatch in swatches), name
 
 
 def test_labels_stay_out_of_the_plot(scene: Scene) -> None:
@@ -111,7 +111,7 @@ def test_labels_stay_out_of_the_plot(scene: Scene) -> None:
     numbers = {g.get("aria-label") for layer in inside if layer is not None for g in layer.iter()}
     for name, box in svg_page.label_boxes(root).items():
         if name[0] != "nothing to draw" and name[0] not in numbers:
-            assert apart(box, plot), name
+            assert have_a_gap(box, plot), name
 
 
 def test_the_scale_bar_has_room(scene: Scene) -> None:
@@ -121,8 +121,8 @@ def test_the_scale_bar_has_room(scene: Scene) -> None:
     points = [q for piece in svg_page.pieces(line.attrib["d"]) for q in (piece.begin, piece.end)]
     bar_box = svg_page.box(points)
     legend = svg_page.group(root, "legend")
-    assert all(apart(bar_box, box) for box in svg_page.label_boxes(root).values())
-    assert legend is None or all(apart(bar_box, box) for box in swatch_boxes(legend))
+    assert all(have_a_gap(bar_box, box) for box in svg_page.label_boxes(root).values())
+    assert legend is None or all(have_a_gap(bar_box, box) for box in swatch_boxes(legend))
 
 
 def swatch_boxes(legend: Element) -> list[Box]:
@@ -135,7 +135,7 @@ def swatch_boxes(legend: Element) -> list[Box]:
     return found
 
 
-def apart(a: Box, b: Box) -> bool:
+def have_a_gap(a: Box, b: Box) -> bool:
     return a[2] <= b[0] or b[2] <= a[0] or a[3] <= b[1] or b[3] <= a[1]
 
 
@@ -314,7 +314,7 @@ def test_no_two_labels_touch_at_any_size(name: str, size: int) -> None:
     page = [float(part) for part in root.attrib["viewBox"].split()]
     boxes = list(svg_page.label_boxes(root).items())
     for (one, box), (other, other_box) in combinations(boxes, 2):
-        assert apart(box, other_box), (one, other)
+        assert have_a_gap(box, other_box), (one, other)
     assert all(0.0 < box[0] < box[2] < page[2] and box[1] > 0.0 for _, box in boxes)
 
 
