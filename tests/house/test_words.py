@@ -20,9 +20,9 @@ CYTHON_DOCSTRING = re.compile(
 )
 CYTHON_CONSTANT = re.compile(r"^(?:cdef )?(?:[\w ]+ )?([A-Z_]+)\s*=", re.MULTILINE)
 
-MAX_QUESTIONS = 269
-MAX_SHARED_CLASS_NAMES = 10
-MAX_SUPERLATIVES = 62
+MAX_QUESTIONS = 136
+MAX_SHARED_CLASS_NAMES = 5
+MAX_SUPERLATIVES = 32
 
 
 @functools.cache
