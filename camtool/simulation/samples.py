@@ -27,7 +27,6 @@ MAX_SAMPLES = 1_000_000
 """Samples are a coded step apart, or farther where a program would have more samples than this."""
 
 ROWS_AT_ONCE = 1 << 14
-"""So many rows are sampled together."""
 
 SPACING_EPS = 1e-6
 """Samples may be farther apart by this part of their spacing, because of rounding."""

@@ -58,7 +58,6 @@ class CircleFigures(Struct, frozen=True):
 
 
 NO_FIGURES = CircleFigures(math.nan, math.nan, math.nan, math.nan)
-"""Figures of a circle that the slides did not follow."""
 
 
 def full_circles(cuts: CutMoves, gap_mm: float) -> list[FullCircle]:

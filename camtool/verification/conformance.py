@@ -377,8 +377,8 @@ FEED_SHARE = 0.5
 DWELL_S = 0.0005
 """A dwell is too short when it is shorter by more than this."""
 
-SPINDLE_OFF = 0.0
-"""The value of a spindle that is off, and of no tool."""
+SPINDLE_OFF = NO_TOOL = 0.0
+"""The speed of a spindle that is off, and the number of no tool."""
 
 COOLANTS = ("no coolant", "mist", "flood", "mist and flood")
 """Names of coolant states: the index is the sum of 1 for mist and 2 for flood."""
@@ -474,9 +474,9 @@ def _last_row(given: Bools) -> Ints:
 
 
 def _last_value(given: Bools, values: Floats) -> Floats:
-    """Return (N,) the last `given` value up to each row, SPINDLE_OFF before the first."""
+    """Return (N,) the last `given` value up to each row, 0 before the first."""
     last = _last_row(given)
-    return np.where(last >= 0, np.nan_to_num(values[np.maximum(last, 0)]), SPINDLE_OFF)
+    return np.where(last >= 0, np.nan_to_num(values[np.maximum(last, 0)]), 0.0)
 
 
 def _feed_findings(both: _SettingPairs, asked: ProgramRequest) -> Iterator[Finding]:
@@ -497,16 +497,22 @@ def _feed_findings(both: _SettingPairs, asked: ProgramRequest) -> Iterator[Findi
     share = np.where(turned > 0.0, 2.0 * FEED_SHARE, FEED_SHARE)
     off = np.abs(is_ - wanted) > share * asked.feed_unit_mm_min + wanted * turned
     rows, of = both.unlike(~off)
-    named = asked.feed_named[of]
-    for is_asked, which in ((True, named), (False, ~named)):
+    for is_asked, row, other_row, moves in _by_severity(rows, of, asked.feed_named[of]):
+        yield (FEED_DIFFERS if is_asked else FEED_DIFFERS_OWN)(
+            where=block_name(both.decoded, row),
+            measured=both.decoded.feed[row],
+            limit=both.written.feed[other_row],
+            moves=moves,
+        )
+
+
+def _by_severity(rows: Ints, of: Ints, asked: Bools) -> Iterator[tuple[bool, int, int, int]]:
+    """Divide rows (R,), compared with written rows `of` (R,), into those whose setting the job
+    asks for, `asked` (R,), and the others: yield for each part that has any whether it is asked
+    for, its first row, the written row of that, and the number of its rows."""
+    for is_asked, which in ((True, asked), (False, ~asked)):
         if which.any():
-            row = int(rows[which][0])
-            yield (FEED_DIFFERS if is_asked else FEED_DIFFERS_OWN)(
-                where=block_name(both.decoded, row),
-                measured=both.decoded.feed[row],
-                limit=both.written.feed[of][which][0],
-                moves=int(which.sum()),
-            )
+            yield is_asked, int(rows[which][0]), int(of[which][0]), int(which.sum())
 
 
 def _air_feed_findings(decoded: Toolpath, written: Toolpath) -> Iterator[Finding]:
@@ -541,18 +547,15 @@ def _spindle_findings(both: _SettingPairs) -> Iterator[Finding]:
     """Yield SPINDLE_DIFFERS: an error where the job starts the spindle, otherwise a remark."""
     is_, wanted = _settings(both.decoded)[1], _settings(both.written)[1]
     rows, of = both.unlike(is_[both.pairs[:, 0]] == wanted[both.pairs[:, 1]])
-    asked = wanted[of] != SPINDLE_OFF
-    for is_asked, which in ((True, asked), (False, ~asked)):
-        if which.any():
-            row, limit = int(rows[which][0]), float(wanted[of][which][0])
-            yield (SPINDLE_DIFFERS if is_asked else SPINDLE_DIFFERS_UNASKED)(
-                where=block_name(both.decoded, row),
-                measured=is_[row],
-                limit=limit,
-                moves=int(which.sum()),
-                turning=_spindle_words(float(is_[row])),
-                wanted=_spindle_words(limit),
-            )
+    for is_asked, row, other_row, moves in _by_severity(rows, of, wanted[of] != SPINDLE_OFF):
+        yield (SPINDLE_DIFFERS if is_asked else SPINDLE_DIFFERS_UNASKED)(
+            where=block_name(both.decoded, row),
+            measured=is_[row],
+            limit=wanted[other_row],
+            moves=moves,
+            turning=_spindle_words(float(is_[row])),
+            wanted=_spindle_words(float(wanted[other_row])),
+        )
 
 
 def _spindle_words(turns: float) -> str:
@@ -565,32 +568,26 @@ def _tool_findings(both: _SettingPairs) -> Iterator[Finding]:
     """Yield SETTING_DIFFERS for cuts with another tool than in the written program."""
     is_, wanted = _settings(both.decoded)[2], _settings(both.written)[2]
     rows, of = both.unlike(is_[both.pairs[:, 0]] == wanted[both.pairs[:, 1]])
-    asked = wanted[of] != SPINDLE_OFF
-    for is_asked, which in ((True, asked), (False, ~asked)):
-        if which.any():
-            row = int(rows[which][0])
-            yield (SETTING_DIFFERS_TOOL if is_asked else SETTING_DIFFERS_TOOL_UNASKED)(
-                where=block_name(both.decoded, row),
-                measured=is_[row],
-                limit=wanted[of][which][0],
-                moves=int(which.sum()),
-            )
+    for is_asked, row, other_row, moves in _by_severity(rows, of, wanted[of] != NO_TOOL):
+        yield (SETTING_DIFFERS_TOOL if is_asked else SETTING_DIFFERS_TOOL_UNASKED)(
+            where=block_name(both.decoded, row),
+            measured=is_[row],
+            limit=wanted[other_row],
+            moves=moves,
+        )
 
 
 def _coolant_findings(both: _SettingPairs) -> Iterator[Finding]:
     """Yield SETTING_DIFFERS for cuts with other coolant than in the written program."""
     is_, wanted = _settings(both.decoded)[3], _settings(both.written)[3]
     rows, of = both.unlike(is_[both.pairs[:, 0]] == wanted[both.pairs[:, 1]])
-    asked = wanted[of] != 0
-    for is_asked, which in ((True, asked), (False, ~asked)):
-        if which.any():
-            row = int(rows[which][0])
-            yield (SETTING_DIFFERS_COOLANT if is_asked else SETTING_DIFFERS_COOLANT_UNASKED)(
-                where=block_name(both.decoded, row),
-                moves=int(which.sum()),
-                coolant=COOLANTS[int(is_[row])],
-                wanted=COOLANTS[int(wanted[of][which][0])],
-            )
+    for is_asked, row, other_row, moves in _by_severity(rows, of, wanted[of] != 0):
+        yield (SETTING_DIFFERS_COOLANT if is_asked else SETTING_DIFFERS_COOLANT_UNASKED)(
+            where=block_name(both.decoded, row),
+            moves=moves,
+            coolant=COOLANTS[int(is_[row])],
+            wanted=COOLANTS[int(wanted[other_row])],
+        )
 
 
 def _corner_findings(both: _SettingPairs) -> Iterator[Finding]:

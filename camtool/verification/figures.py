@@ -27,7 +27,6 @@ from camtool.verification.cuts import CutMoves
 from camtool.verification.matching import Match
 
 PERCENTILE = 0.95
-"""The percentile of the errors that the report calls p95."""
 
 
 class Figure:

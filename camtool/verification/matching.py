@@ -24,7 +24,6 @@ from camtool.verification.cuts import CutMoves, CutSamples
 from camtool.verification.nearest import ANY_CONTOUR, MoveIndex, NearestMoves, ranges, run_offsets
 
 MAX_CONTOUR_TRIES = 4
-"""At most this many wanted contours are tried for each decoded contour."""
 
 MIN_LIMIT_MM = 1e-6
 """Moves nearer than this are found even when the tolerance is 0."""

@@ -83,16 +83,13 @@ NEAR_SIZE = 0.003
 """... and of the size of all that the program cuts, for small things have small details."""
 
 MAX_RADIUS_MM = 30.0
-"""Tools are not wider than twice this."""
 
 BIN_MM = 0.01
-"""Distances to the nearest line are counted in bins of this width."""
 
 MIN_PEAK_SHARE = 0.04
 """A distance is a candidate for the radius when this part of the path keeps it."""
 
 MAX_CANDIDATES = 6
-"""So many distances are tried."""
 
 MIN_WALL_SHARE = 0.3
 """A smaller distance along the same contours is the wall, and the larger ones clear the way to it,
@@ -123,7 +120,6 @@ VOTE_MM = 0.25
 """Shifts that differ by less are one candidate."""
 
 MAX_PLACES = 16
-"""So many candidates are refined."""
 
 MIN_FOLLOWED_SHARE = 0.5
 """A drawing lies where its program cuts when this part of the cuts follows its lines."""

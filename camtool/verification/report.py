@@ -586,10 +586,8 @@ def _error_gate(found_um: float | None, limit_um: float) -> Iterator[Finding]:
 # The report as lines of text.
 
 MAX_OPERATIONS = 24
-"""At most this many operations are listed; the others are counted."""
 
 COOLANT_WORDS = {"off": "", "mist": ", mist", "flood": ", flood", "both": ", mist and flood"}
-"""Words of the summary for the coolant of an operation."""
 
 
 def clock(seconds: float) -> str:
@@ -1100,7 +1098,6 @@ def _point_words(at_mm: tuple[float, float]) -> str:
 # What to take to the machine: the stock and its zero, tools, operations, warnings.
 
 SETUP = "At the machine"
-"""The heading of this part of a page."""
 
 _GRAVEST_FIRST = {"error": 0, "warning": 1}
 
