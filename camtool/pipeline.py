@@ -58,7 +58,7 @@ if TYPE_CHECKING:
     from camtool.verification.conformance import ProgramRequest
     from camtool.verification.registration import Registration
     from camtool.verification.report import (
-        Before,
+        BaselineReport,
         Gates,
         Planned,
         PlannedOperation,
@@ -627,17 +627,19 @@ def _without_measures(job: Job) -> Job:
     return replace(job, minimise="rapids", approach=False, compensate=False)
 
 
-def _before_figures(plain: Run | None) -> Before | None:
+def _before_figures(plain: Run | None) -> BaselineReport | None:
     """The figures of the plain run, for the report."""
-    from camtool.verification.report import Before
+    from camtool.verification.report import BaselineReport
 
     if plain is None:
         return None
     if plain.verification is None or plain.failed:
-        return Before()
+        return BaselineReport()
     report = plain.verification.report
     cutting, air = report.reversals.cutting, report.reversals.air
-    return Before(cutting.x + cutting.y, air.x + air.y, report.error_um.total.max, report.time_s)
+    return BaselineReport(
+        cutting.x + cutting.y, air.x + air.y, report.error_um.total.max, report.time_s
+    )
 
 
 def _judge_program(case: Case, data: bytes, progress: Progress) -> Verification:

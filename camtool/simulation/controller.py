@@ -16,7 +16,7 @@ from camtool.arrays import Floats
 from camtool.findings import Finding
 from camtool.machine.model import ControllerT, DialectT, Machine
 from camtool.simulation.motion import Chunk, Ledger, Options
-from camtool.simulation.rows import check_positions, placed
+from camtool.simulation.rows import check_positions, with_event_positions
 from camtool.toolpath.moves import Toolpath
 
 
@@ -56,7 +56,9 @@ class ControllerModel(ABC, Generic[ControllerT, DialectT]):
         By default: as they are read, without rounding, and with homing at machine zero.
         """
         check_positions(toolpath, machine)
-        return placed(toolpath, np.array(machine.controller.machine_zero_mm, dtype=np.float64))
+        return with_event_positions(
+            toolpath, np.array(machine.controller.machine_zero_mm, dtype=np.float64)
+        )
 
     def spacing_mm(self, toolpath: Toolpath, machine: Machine[ControllerT, DialectT]) -> float:
         """Return the approximate distance of samples of the motion in XY, mm; by default a

@@ -35,7 +35,7 @@ from camtool.records import replace
 from camtool.simulation.controller import ControllerModel
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import Chunk, Options
-from camtool.simulation.rows import check_positions, check_rows, placed, with_ends
+from camtool.simulation.rows import check_positions, check_rows, with_ends, with_event_positions
 from camtool.simulation.samples import (
     ROWS_AT_ONCE,
     CountedSamples,
@@ -137,7 +137,7 @@ def round_to_steps(toolpath: Toolpath, machine: Machine) -> Toolpath:
     """
     check_positions(toolpath, machine)
     home = np.array(machine.controller.machine_zero_mm, dtype=np.float64)
-    exact = placed(toolpath, home)
+    exact = with_event_positions(toolpath, home)
     home = _on_grid(home, machine)
     start = _on_grid(exact.start, machine)
     end = exact.by_parts(lambda part: _on_grid(part.end, machine))
@@ -151,7 +151,7 @@ def round_to_steps(toolpath: Toolpath, machine: Machine) -> Toolpath:
         if not inside_out.any():
             return made
         short = np.abs(sweeps[inside_out]) < np.pi
-        made = placed(_restore_turned_arcs(made, arcs[inside_out], short), home)
+        made = with_event_positions(_restore_turned_arcs(made, arcs[inside_out], short), home)
 
 
 def _centre_arcs(made: Toolpath, arcs: Ints, sweep: Floats, machine: Machine) -> Toolpath:

@@ -16,7 +16,7 @@ MAX_PATH_STEPS = 1 << 40
 are exact in a float."""
 
 
-def placed(toolpath: Toolpath, home: Floats) -> Toolpath:
+def with_event_positions(toolpath: Toolpath, home: Floats) -> Toolpath:
     """Return the toolpath with events at the ends of the moves before them, and homing at `home`
     (3,) mm; the very toolpath where they are there."""
     kind, count = toolpath.kind, len(toolpath)

@@ -62,7 +62,7 @@ class SpeedPlan(Struct, frozen=True, eq=False):
         steady = np.maximum(d - ramps, 0.0) / peak
         return np.asarray((2.0 * peak - first - last) / a + steady)
 
-    def behind(self, count: int, squares: Floats) -> EntryState:
+    def entry_after(self, count: int, squares: Floats) -> EntryState:
         """Return the entry state of the blocks behind the first `count` ones."""
         if count == 0:
             return self.before

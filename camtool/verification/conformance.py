@@ -35,7 +35,7 @@ from camtool.verification.coverage import (
     block_name,
     compare_holes,
     encloses_area,
-    listed,
+    first_items,
     near_pairs,
     reversal_findings,
     reversed_samples,
@@ -98,7 +98,7 @@ def conformance_of(
         return Conformance(moves=count, alike=count)
     other = Side.of(asked.written.first(asked.written.executed_rows), flat_cuts=flat_cuts)
     wanted = Side.of(asked.wanted.first(asked.wanted.executed_rows), flat_cuts=flat_cuts)
-    alike = Alike.of(mine.toolpath, other.toolpath)
+    alike = MatchingMoves.of(mine.toolpath, other.toolpath)
     place = compare_places(mine, other, wanted, alike, asked, sample_mm)
     settings = compare_settings(mine, other, alike, place.pairs, asked)
     return Conformance(
@@ -150,7 +150,7 @@ class ProgramRequest(Struct, frozen=True, eq=False):
         return LIMIT_UNITS * self.unit_mm, LIMIT_UNITS * self.unit_z_mm
 
 
-class Alike(Struct, frozen=True, eq=False):
+class MatchingMoves(Struct, frozen=True, eq=False):
     """A number (N,) for each move of two sides, equal for moves of the same kind, start, end and
     centre."""
 
@@ -158,7 +158,7 @@ class Alike(Struct, frozen=True, eq=False):
     written: Ints
 
     @classmethod
-    def of(cls, decoded: Toolpath, written: Toolpath) -> Alike:
+    def of(cls, decoded: Toolpath, written: Toolpath) -> MatchingMoves:
         """Number the moves of both sides; points are the same within rounding
         (POSITION_EPS_MM)."""
         both = np.concatenate([_numbers(decoded), _numbers(written)])
@@ -203,7 +203,12 @@ class PlaceComparison(Struct, frozen=True, eq=False):
 
 
 def compare_places(
-    mine: Side, other: Side, wanted: Side, alike: Alike, asked: ProgramRequest, sample_mm: float
+    mine: Side,
+    other: Side,
+    wanted: Side,
+    alike: MatchingMoves,
+    asked: ProgramRequest,
+    sample_mm: float,
 ) -> PlaceComparison:
     """Compare `mine`, the decoded side, with `other`, the written side, and the reverse."""
     limits = asked.limits_mm
@@ -249,7 +254,9 @@ def _changed_ends(decoded: Toolpath, written: Toolpath) -> Iterator[Finding]:
 def _near_wanted(there: NearPairs, wanted: MoveIndex, limits: Limits) -> None:
     """Mark samples near a wanted move as near, even where the writer would move otherwise."""
     rest = np.flatnonzero(np.isinf(there.distance))
-    point, _, distance = wanted.within(there.samples.points[rest], there.samples.z[rest], limits)
+    point, _, distance = wanted.pairs_within(
+        there.samples.points[rest], there.samples.z[rest], limits
+    )
     np.minimum.at(there.distance, rest[point], distance)
 
 
@@ -265,7 +272,7 @@ def _written_from_cut(
     share = wanted.shares(part.points[known], move)
     begin, end = wanted.cuts.heights(move).T
     places = point_at(wanted.cuts.segments, move, share)
-    point, _, distance = decoded.within(places, begin + share * (end - begin), limits)
+    point, _, distance = decoded.pairs_within(places, begin + share * (end - begin), limits)
     np.minimum.at(back.distance, rest[point], distance)
 
 
@@ -308,7 +315,7 @@ def _uncovered_findings(
 
 
 def _plunge_findings(
-    mine: Side, others: tuple[Side, Side], alike: Alike, limits: Limits
+    mine: Side, others: tuple[Side, Side], alike: MatchingMoves, limits: Limits
 ) -> Iterator[Finding]:
     """Yield EXTRA_CUT for feeds straight down to where no cut was asked for, except holes, which
     are compared by `hole_findings`."""
@@ -318,12 +325,12 @@ def _plunge_findings(
     fine = np.zeros(len(rows), dtype=np.bool_)
     for other in others:
         ends = toolpath.end[rows]
-        fine[other.moves.within(ends[:, :2], ends[:, 2], limits)[0]] = True
+        fine[other.moves.pairs_within(ends[:, :2], ends[:, 2], limits)[0]] = True
         deep = other.toolpath.end[other.plunges]
         one, plunge = near_points(ends[:, :2], deep[:, :2], limits[0])
         fine[one[deep[plunge, 2] <= ends[one, 2] + limits[1]]] = True
     bad = rows[~fine]
-    for row, more in listed(bad.tolist()):
+    for row, more in first_items(bad.tolist()):
         yield EXTRA_CUT_PLUNGE(
             where=f"{block_name(toolpath, row)} at {at_point(toolpath.end[row])}",
             measured=toolpath.end[row, 2],
@@ -338,7 +345,9 @@ def _is_at_place(points: Floats, places: Floats) -> Bools:
     return np.array([tuple(point) in known for point in mine], dtype=np.bool_)
 
 
-def _repeated_cuts(mine: Side, other: Side, alike: Alike, limits: Limits) -> Iterator[Finding]:
+def _repeated_cuts(
+    mine: Side, other: Side, alike: MatchingMoves, limits: Limits
+) -> Iterator[Finding]:
     """Yield EXTRA_CUT for moves that are cut more often than the job asks."""
     cutting = np.flatnonzero(mine.cuts.is_cut)
     number, first, counts = np.unique(
@@ -353,11 +362,11 @@ def _repeated_cuts(mine: Side, other: Side, alike: Alike, limits: Limits) -> Ite
     half = np.full(len(rows), 0.5)
     middle = point_at(mine.cuts.segments, segment, half)
     z = mine.cuts.heights(segment).mean(axis=1)
-    point, move, _ = other.moves.within(middle, z, limits)
+    point, move, _ = other.moves.pairs_within(middle, z, limits)
     moves = np.column_stack([point, other.cuts.row[move]])
     lie = np.bincount(np.unique(moves, axis=0)[:, 0], minlength=len(rows))
     bad = np.flatnonzero(counts[more_often] > np.maximum(lie, 1))
-    for place, more in listed(bad.tolist()):
+    for place, more in first_items(bad.tolist()):
         row = int(rows[place])
         times, limit = int(counts[more_often][place]), max(int(lie[place]), 1)
         yield EXTRA_CUT_AGAIN(
@@ -385,7 +394,7 @@ COOLANTS = ("no coolant", "mist", "flood", "mist and flood")
 
 
 def compare_settings(
-    mine: Side, other: Side, alike: Alike, pairs: Ints, asked: ProgramRequest
+    mine: Side, other: Side, alike: MatchingMoves, pairs: Ints, asked: ProgramRequest
 ) -> tuple[Finding, ...]:
     """Compare feeds, spindle, tool, coolant, corners, dwells, clearance and end; `pairs` (P, 2)
     are rows of both sides that lie on each other, besides those that are alike."""
@@ -414,7 +423,7 @@ class _SettingPairs(Struct, frozen=True, eq=False):
 
     @classmethod
     def of(
-        cls, mine: Side, other: Side, alike: Alike, pairs: Ints, limits: Limits
+        cls, mine: Side, other: Side, alike: MatchingMoves, pairs: Ints, limits: Limits
     ) -> _SettingPairs:
         """Pair rows: the given pairs, all rows that are alike, each plunge that is not alike with
         every written plunge, and each cut without any of these with the written moves at its
@@ -440,12 +449,12 @@ class _SettingPairs(Struct, frozen=True, eq=False):
         segment = mine.cuts.first[alone].astype(np.int64)
         middle = point_at(mine.cuts.segments, segment, np.full(len(alone), 0.5))
         z = mine.cuts.heights(segment).mean(axis=1)
-        point, move, _ = other.moves.within(middle, z, limits)
+        point, move, _ = other.moves.pairs_within(middle, z, limits)
         beside = np.column_stack([alone[point], other.cuts.row[move]])
         every = np.concatenate([paired, np.unique(beside, axis=0)])
         return cls(mine.toolpath, other.toolpath, rows, every)
 
-    def unlike(self, same: Bools) -> tuple[Ints, Ints]:
+    def differing(self, same: Bools) -> tuple[Ints, Ints]:
         """Return (R,) rows without a pair that is equal, `same` (P,), and the written row of one
         pair of each."""
         fine = np.zeros(len(self.decoded), dtype=np.bool_)
@@ -496,7 +505,7 @@ def _feed_findings(both: _SettingPairs, asked: ProgramRequest) -> Iterator[Findi
     turned = np.abs(slant / other - 1.0)
     share = np.where(turned > 0.0, 2.0 * FEED_SHARE, FEED_SHARE)
     off = np.abs(is_ - wanted) > share * asked.feed_unit_mm_min + wanted * turned
-    rows, of = both.unlike(~off)
+    rows, of = both.differing(~off)
     for is_asked, row, other_row, moves in _by_severity(rows, of, asked.feed_named[of]):
         yield (FEED_DIFFERS if is_asked else FEED_DIFFERS_OWN)(
             where=block_name(both.decoded, row),
@@ -546,7 +555,7 @@ def _speed_ratios(toolpath: Toolpath) -> Floats:
 def _spindle_findings(both: _SettingPairs) -> Iterator[Finding]:
     """Yield SPINDLE_DIFFERS: an error where the job starts the spindle, otherwise a remark."""
     is_, wanted = _settings(both.decoded)[1], _settings(both.written)[1]
-    rows, of = both.unlike(is_[both.pairs[:, 0]] == wanted[both.pairs[:, 1]])
+    rows, of = both.differing(is_[both.pairs[:, 0]] == wanted[both.pairs[:, 1]])
     for is_asked, row, other_row, moves in _by_severity(rows, of, wanted[of] != SPINDLE_OFF):
         yield (SPINDLE_DIFFERS if is_asked else SPINDLE_DIFFERS_UNASKED)(
             where=block_name(both.decoded, row),
@@ -567,7 +576,7 @@ def _spindle_words(turns: float) -> str:
 def _tool_findings(both: _SettingPairs) -> Iterator[Finding]:
     """Yield SETTING_DIFFERS for cuts with another tool than in the written program."""
     is_, wanted = _settings(both.decoded)[2], _settings(both.written)[2]
-    rows, of = both.unlike(is_[both.pairs[:, 0]] == wanted[both.pairs[:, 1]])
+    rows, of = both.differing(is_[both.pairs[:, 0]] == wanted[both.pairs[:, 1]])
     for is_asked, row, other_row, moves in _by_severity(rows, of, wanted[of] != NO_TOOL):
         yield (SETTING_DIFFERS_TOOL if is_asked else SETTING_DIFFERS_TOOL_UNASKED)(
             where=block_name(both.decoded, row),
@@ -580,7 +589,7 @@ def _tool_findings(both: _SettingPairs) -> Iterator[Finding]:
 def _coolant_findings(both: _SettingPairs) -> Iterator[Finding]:
     """Yield SETTING_DIFFERS for cuts with other coolant than in the written program."""
     is_, wanted = _settings(both.decoded)[3], _settings(both.written)[3]
-    rows, of = both.unlike(is_[both.pairs[:, 0]] == wanted[both.pairs[:, 1]])
+    rows, of = both.differing(is_[both.pairs[:, 0]] == wanted[both.pairs[:, 1]])
     for is_asked, row, other_row, moves in _by_severity(rows, of, wanted[of] != 0):
         yield (SETTING_DIFFERS_COOLANT if is_asked else SETTING_DIFFERS_COOLANT_UNASKED)(
             where=block_name(both.decoded, row),
@@ -595,7 +604,7 @@ def _corner_findings(both: _SettingPairs) -> Iterator[Finding]:
     written program. A program without a mode leaves corners to the machine and is not compared."""
     is_, wanted = _corner_tolerances(both.decoded), _corner_tolerances(both.written)
     looser = is_[both.pairs[:, 0]] > wanted[both.pairs[:, 1]]
-    rows, of = both.unlike(~looser)
+    rows, of = both.differing(~looser)
     if len(rows):
         row, limit = int(rows[0]), float(wanted[of][0])
         yield (SETTING_DIFFERS_CORNERS if limit else SETTING_DIFFERS_NO_CORNERS)(
@@ -674,7 +683,7 @@ def _long_dwell_findings(
 
 
 def _clearance_findings(
-    mine: Side, other: Side, alike: Alike, asked: ProgramRequest
+    mine: Side, other: Side, alike: MatchingMoves, asked: ProgramRequest
 ) -> Iterator[Finding]:
     """Yield CLEARANCE_LOW for rapids in XY below the height asked for, except rapids in
     `written`."""

@@ -382,7 +382,7 @@ def uncovered_findings(
 ) -> Iterator[Finding]:
     """Yield a finding for each of these contours of `cuts`; `place` names the block or contour."""
     elsewhere, other_depth, nothing = sentences
-    for part, more in listed(parts):
+    for part, more in first_items(parts):
         known = np.isfinite(part.distance)
         sentence = (other_depth if part.wrong_depth else elsewhere) if known else nothing
         yield sentence(
@@ -501,7 +501,7 @@ def _unpaired_findings(
     none, other_depth = sentences
     here, paired = _has_hole(holes, others, limits_mm)
     alone = np.flatnonzero(~paired & ~stand).tolist()
-    for hole, more in listed(alone):
+    for hole, more in first_items(alone):
         row = int(holes.row[hole])
         yield (other_depth if here[hole] else none)(
             where=f"{block_name(holes.toolpath, row)} at {at_point(holes.at[hole])}",
@@ -643,7 +643,7 @@ def near_pairs(
     """Pair samples on these rows (N,) of one side, about `sample_mm` apart, with all moves of the
     other side within the limits."""
     samples = _with_ends(cuts, sample_cuts(cuts, sample_mm, np.flatnonzero(rows[cuts.row])))
-    point, move, distance = others.within(samples.points, samples.z, limits)
+    point, move, distance = others.pairs_within(samples.points, samples.z, limits)
     nearest = np.full(len(samples.points), np.inf)
     np.minimum.at(nearest, point, distance)
     here = headings(cuts.segments, samples.segment[point], samples.share[point])
@@ -691,7 +691,7 @@ def reversal_findings(compared: NearPairs, turned: Ints) -> Iterator[Finding]:
     cuts = compared.cuts
     rows = compared.rows[turned]
     first = np.unique(cuts.contour[rows], return_index=True)[1]
-    for place, more in listed(first.tolist()):
+    for place, more in first_items(first.tolist()):
         row = int(rows[place])
         at = at_point(compared.samples.points[turned[place]])
         yield CUT_OTHER_WAY(where=f"{block_name(cuts.toolpath, row)} near {at}", more=more)
@@ -717,7 +717,7 @@ def block_name(toolpath: Toolpath, row: int) -> str:
 Item = TypeVar("Item")
 
 
-def listed(items: Sequence[Item]) -> Iterator[tuple[Item, int]]:
+def first_items(items: Sequence[Item]) -> Iterator[tuple[Item, int]]:
     """Yield the first `FINDINGS_PER_CODE` items, with the number of items left out: 0 for all but
     the last one."""
     shown = items[:FINDINGS_PER_CODE]

@@ -104,7 +104,7 @@ class CutMoves(Struct, frozen=True, eq=False):
         finish = rows[np.concatenate([change, [len(rows) - 1]])] if len(rows) else rows
         return begin, finish
 
-    def closed(self, gap_mm: float) -> Bools:
+    def is_closed(self, gap_mm: float) -> Bools:
         """Return (C,) true where a contour ends within gap_mm of its start."""
         begin, finish = self.contour_ends()
         gap = self.toolpath.end[finish, :2] - self.toolpath.starts_of(begin)[:, :2]
@@ -317,7 +317,7 @@ def loops(cuts: CutMoves, gap_mm: float) -> Ints:
     Points within `gap_mm` of each other count as one."""
     begin, finish = cuts.contour_ends()
     found = np.full((len(begin), 2), NO_LOOP, dtype=np.int64)
-    whole = cuts.closed(gap_mm) & _is_level(cuts)
+    whole = cuts.is_closed(gap_mm) & _is_level(cuts)
     found[whole] = np.column_stack([begin, finish])[whole]
     rows = np.flatnonzero(cuts.is_cut & ~np.append(whole, True)[cuts.contour]).astype(np.int32)
     begins = np.flatnonzero(np.diff(cuts.contour[rows], prepend=-1))

@@ -84,7 +84,7 @@ class SlideExtents:
         self._places = np.full((2, len(begin), 2), np.nan)
 
     @property
-    def known(self) -> bool:
+    def has_sizes(self) -> bool:
         """True if any row determines a size."""
         return bool(self._counts.any())
 
@@ -131,7 +131,7 @@ def sizes(slides: SlideExtents, goal: LoopedCuts, gap_mm: float) -> Iterator[Pre
     Contours to which no row belongs are left out (a finding names them), and so is what makes no
     edge, where edges are known.
     """
-    if not slides.known:
+    if not slides.has_sizes:
         return
     centre, lowest = _extents(goal.cuts, _wanted_rows(goal))
     slide = slides.boxes

@@ -21,7 +21,7 @@ from camtool.toolpath.rapids import (
 )
 from camtool.units import UM_PER_MM
 from camtool.verification.case import Case
-from camtool.verification.coverage import at_point, block_name, holes_of, listed
+from camtool.verification.coverage import at_point, block_name, first_items, holes_of
 from camtool.verification.cuts import CutMoves
 from camtool.verification.figures import RowFigures, Tally
 from camtool.verification.findings import (
@@ -67,7 +67,7 @@ def motion_findings(
 
 def _endless_arcs(decoded: Toolpath, machine: Machine, tally: Tally) -> Iterator[Finding]:
     coded = np.array([machine.axes.x.coded_step_mm, machine.axes.y.coded_step_mm])
-    for (row, place), more in listed(list(tally.endless_arcs.items())):
+    for (row, place), more in first_items(list(tally.endless_arcs.items())):
         missed = np.hypot(*((np.array(place) - decoded.end[row, :2]) / coded))
         yield (ARC_MISSES_END if math.isfinite(missed) else ARC_MISSES_END_FAR)(
             where=f"{block_name(decoded, row)}, end {at_point(decoded.end[row])}",
@@ -110,7 +110,7 @@ def _out_of_travel(machine: Machine, extents: Floats) -> Iterator[Finding]:
 
 
 def _rapids_in_stock(decoded: Toolpath, case: Case) -> Iterator[Finding]:
-    for one, more in listed(_through_stock(decoded, case)):
+    for one, more in first_items(_through_stock(decoded, case)):
         yield RAPID_IN_STOCK_IN_PROGRAM(
             where=f"{block_name(decoded, one.row)} near {at_point(one.at_mm)}",
             measured=one.z_mm,

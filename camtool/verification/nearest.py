@@ -96,7 +96,7 @@ class MoveIndex:
             rest, limit = rest[np.isinf(near.distance)], limit * LIMIT_GROWTH
         return found
 
-    def within(
+    def pairs_within(
         self, points: Floats, height: Floats, limits_mm: tuple[float, float]
     ) -> tuple[Ints, Ints, Floats]:
         """Return all pairs (point, move) within the limits, as `nearest` takes them, in order, and

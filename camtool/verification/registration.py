@@ -54,7 +54,7 @@ from camtool.planning.paths import cuts as joined_moves
 from camtool.records import replace
 from camtool.toolpath.moves import Kind, Toolpath, are_arcs
 from camtool.toolpath.wanted import UNKNOWN_EDGE, DrawnEdges
-from camtool.verification.coverage import Side, at_point, block_name, listed
+from camtool.verification.coverage import Side, at_point, block_name, first_items
 from camtool.verification.cuts import CutMoves, loops, moves_across, sample_cuts
 from camtool.verification.findings import (
     CUT_INTO_PART,
@@ -930,7 +930,7 @@ class _Follower(Struct, frozen=True, eq=False):
         cut = np.zeros(count, dtype=np.bool_)
         if chosen is not None:
             cut[np.unique(chosen.tracks.contour)] = True
-        for index, more in listed(np.flatnonzero(~cut & ~drilled).tolist()):
+        for index, more in first_items(np.flatnonzero(~cut & ~drilled).tolist()):
             yield NOT_CUT(
                 where=at_point(self.lines.boxes[index].mean(axis=1)),
                 contour=self.name(index),
@@ -946,7 +946,7 @@ class _Follower(Struct, frozen=True, eq=False):
         order = np.lexsort((left, tracks.contour))
         first = order[np.flatnonzero(np.diff(tracks.contour[order], prepend=-1))]
         some = first[left[first] >= MIN_LEFT_MM]
-        for track, more in listed(some.tolist()):
+        for track, more in first_items(some.tolist()):
             at = cells.places[(cells.track == track) & ~cells.cut]
             yield NOT_CUT_PART(
                 where=at_point(at[len(at) // 2]),
@@ -985,7 +985,7 @@ class _Follower(Struct, frozen=True, eq=False):
         order = np.lexsort((-deep, row))
         worst = order[np.flatnonzero(np.diff(row[order], prepend=-1))]
         bad = worst[deep[worst] > max(self.limit_mm, self.path.near_mm(0.0))]
-        for k, more in listed(bad.tolist()):
+        for k, more in first_items(bad.tolist()):
             place = at_point(self.path.points[loose[k]])
             yield CUT_INTO_PART(
                 where=f"{block_name(self.cuts.toolpath, int(row[k]))} at {place}",

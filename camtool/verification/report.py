@@ -414,7 +414,7 @@ class Planned(msgspec.Struct, frozen=True):
     cut_mm: tuple[float, float, float, float] | None = None
 
 
-class Before(msgspec.Struct, frozen=True):
+class BaselineReport(msgspec.Struct, frozen=True):
     """The same job without `--minimise reversals`, `--approach` and `--compensate`: reversals of
     X and Y, the largest predicted error, the time. Null where that job cannot be made."""
 
@@ -451,7 +451,7 @@ class Report(msgspec.Struct, frozen=True):
     interpolator: str
     camtool_version: str
     planned: Planned | None = None
-    before: Before | None = None
+    before: BaselineReport | None = None
     contour_errors: tuple[ContourReport, ...] = ()
     bidirectional: tuple[BothWaysReport, ...] = ()
     unreached: UnreachedReport | None = None

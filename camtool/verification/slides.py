@@ -193,7 +193,7 @@ class SlidePass:
         self.extents.add(low, (lowest, highest), columns[:, [at.END_X, at.END_Y]])
         columns[:] = empty_columns(len(columns))
 
-    def seen(self) -> tuple[SeenCircle, ...]:
+    def seen_circles(self) -> tuple[SeenCircle, ...]:
         """Return the circles that the slides followed, in order; at most `BINS_KEPT`."""
         return tuple(
             SeenCircle(self.circles[circle], self.circle_figures[circle], found, self.bins[circle])

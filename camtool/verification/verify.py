@@ -51,7 +51,7 @@ from camtool.verification.figures import (
 from camtool.verification.matching import Goal, match_through_compensation, own_match
 from camtool.verification.motion_findings import motion_findings
 from camtool.verification.report import (
-    Before,
+    BaselineReport,
     Planned,
     Report,
     finding_reports,
@@ -93,7 +93,7 @@ class Verification:
         """Return the verification with these findings, in its report too."""
         return replace(self, report=self.report.with_findings(findings), findings=findings)
 
-    def with_planning(self, planned: Planned, before: Before | None) -> Verification:
+    def with_planning(self, planned: Planned, before: BaselineReport | None) -> Verification:
         """Return the verification with the figures of planning in its report."""
         report = replace(self.report, planned=planned, before=before)
         return replace(self, report=report)
@@ -149,7 +149,7 @@ def judge(
     result = ReportBuilder(case, cuts, looped, coverage, slides, tally, conformance)
     report = result.report(extents, findings, trace, shape)
     follows = coverage.match.row
-    return Verification(report, trace, findings, rows, wanted, follows, slides.seen())
+    return Verification(report, trace, findings, rows, wanted, follows, slides.seen_circles())
 
 
 def _compare_cuts(

@@ -32,7 +32,7 @@ from camtool.simulation.controller import ControllerModel
 from camtool.simulation.legs import waits_s
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import NO_SAMPLES, Chunk, Ledger, Options
-from camtool.simulation.rows import check_positions, check_rows, placed, refuse
+from camtool.simulation.rows import check_positions, check_rows, refuse, with_event_positions
 from camtool.toolpath.moves import Kind, Toolpath
 
 from .dialect import FlashcutController, FlashcutDialect
@@ -216,7 +216,9 @@ def place_events(toolpath: Toolpath, machine: _Machine) -> Toolpath:
     spoke = toolpath.centre[arcs] - toolpath.starts_of(arcs)[:, :2]
     far[arcs] |= (np.abs(spoke) > most[:2]).any(axis=1)
     refuse(toolpath, far, "a position is beyond all that the controller can count")
-    return placed(toolpath, np.array(machine.controller.machine_zero_mm, dtype=np.float64))
+    return with_event_positions(
+        toolpath, np.array(machine.controller.machine_zero_mm, dtype=np.float64)
+    )
 
 
 def half_periods(

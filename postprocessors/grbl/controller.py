@@ -129,7 +129,7 @@ def sample_rows(
         seconds[dwells - low] = [dwell_s(value) for value in path.value[dwells].tolist()]
         samples = GrblSamples(own, np.arange(low, high + 1), machine)
         yield SampledRows(low, high, low, samples, seconds, iterates=True)
-        before, low = plan.behind(count, squares), high
+        before, low = plan.entry_after(count, squares), high
         last = own.part(count - 1, count) if count else last
 
 

@@ -219,7 +219,7 @@ class _Run:
         last = int(np.searchsorted(rests, done))
         before_s = 0.0 if last else self._since_rest_s
         self._since_rest_s = before_s + float(seconds[since[last] : done].sum())
-        self._before = plan.behind(done, squares)
+        self._before = plan.entry_after(done, squares)
         periods = np.rint(runs / period_s) + REST_PERIODS
         seconds[rests] += periods * period_s - runs
         return seconds

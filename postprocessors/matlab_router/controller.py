@@ -30,7 +30,7 @@ from camtool.records import replace
 from camtool.simulation.controller import ControllerModel
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import NO_SAMPLES, Chunk, Ledger, Options
-from camtool.simulation.rows import placed, refuse
+from camtool.simulation.rows import refuse, with_event_positions
 from camtool.toolpath.moves import Kind, Toolpath
 
 from .dialect import MatlabRouterController, MatlabRouterDialect, dialect_of
@@ -74,7 +74,7 @@ class MatlabRouterModel(ControllerModel[MatlabRouterController, MatlabRouterDial
         home = np.array(machine.controller.machine_zero_mm)
         far = (np.abs(toolpath.end - home) > MAX_DISTANCE_UNITS * UNIT_MM).any(axis=1)
         refuse(toolpath, far, "a position is beyond all that the controller can count")
-        end = placed(toolpath, home).end
+        end = with_event_positions(toolpath, home).end
         coded = [axis.coded_step_mm for axis in machine.axes]
         columns = [
             to_steps((end - home)[:, index], step) * step for index, step in enumerate(coded)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from camtool.simulation.rows import placed
+from camtool.simulation.rows import with_event_positions
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import (
     ROWS_AT_ONCE,
@@ -195,6 +195,10 @@ def test_nothing_is_copied_where_nothing_changes() -> None:
     path = ToolpathBuilder().rapid(z=5).event(Kind.DWELL, 1.0).line(4, feed=10).finish()
     assert path.first(3) is path
     assert len(path.first(2)) == 2
-    assert placed(path, np.zeros(3)) is path
+    assert with_event_positions(path, np.zeros(3)) is path
     home = ToolpathBuilder().rapid(1, 1).event(Kind.HOME_XY).event(Kind.END).finish()
-    assert placed(home, np.array([7.0, 8.0, 9.0])).end[:, :2].tolist() == [[1, 1], [7, 8], [7, 8]]
+    assert with_event_positions(home, np.array([7.0, 8.0, 9.0])).end[:, :2].tolist() == [
+        [1, 1],
+        [7, 8],
+        [7, 8],
+    ]

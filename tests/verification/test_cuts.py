@@ -64,8 +64,8 @@ def test_closed_contours() -> None:
     b = square(ToolpathBuilder(), 0, 0, 1)
     cut(b, 5, 5).line(6, 5, feed=1).line(5, 5.004, feed=1)
     cuts = cut_moves(b.finish(), flat_cuts=False)
-    assert cuts.closed(1e-6).tolist() == [True, False]
-    assert cuts.closed(0.005).tolist() == [True, True]
+    assert cuts.is_closed(1e-6).tolist() == [True, False]
+    assert cuts.is_closed(0.005).tolist() == [True, True]
 
 
 @pytest.mark.parametrize("ccw", [True, False])

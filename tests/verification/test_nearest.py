@@ -135,7 +135,7 @@ def test_the_search_finds_what_a_plain_loop_finds(seed: int, limit: float) -> No
     for window in (0.0, 0.01, math.inf):
         limits = limit, window
         found = target.nearest(points, heights, None, limits)
-        point, move, distance = target.within(points, heights, limits)
+        point, move, distance = target.pairs_within(points, heights, limits)
         listed = []
         for k in range(len(points)):
             near = near_moves(target.cuts, points[k], heights[k], limits)
@@ -203,7 +203,7 @@ def test_where_nothing_may_be_compared_the_distance_is_infinite() -> None:
     ):
         assert np.isinf(found.distance).all()
         assert (found.segment == -1).all()
-    assert none.within(points, heights, (1.0, 1.0))[0].tolist() == []
+    assert none.pairs_within(points, heights, (1.0, 1.0))[0].tolist() == []
 
 
 def crossing(rng: np.random.Generator, count: int) -> tuple[Segments, np.ndarray]:
