@@ -113,7 +113,7 @@ _OUT_OF_RANGE = (
     *(f"Expected `{of}` {than}" for of in ("int", "float") for than in "<>"),
     "Number out of range",  # a whole one that is no float
 )
-"""How messages of msgspec about a number out of range begin."""
+"""Beginnings of messages of msgspec about a number out of range."""
 
 
 def _out_of_range(kind: type, table: Mapping[str, Any], keys: Sequence[str]) -> str:

@@ -1,1 +1,1 @@
-"""What coupons say of a machine: drawings, measurements, and the numbers they give."""
+"""Calibration of a machine by coupons: drawings, measurements, and the resulting numbers."""

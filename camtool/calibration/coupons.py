@@ -434,7 +434,7 @@ HOW: dict[Kind, tuple[str, ...]] = {
         "the others; backward_mm: from the same mark to those of the other row.",
     ),
 }
-"""What to measure, as comments of the file."""
+"""Instructions for measuring, as comments of the file."""
 
 
 def skeleton(sheet: CouponSheet, machine: Machine | None) -> str:

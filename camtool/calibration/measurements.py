@@ -69,7 +69,7 @@ class RegionsOf(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Coupon(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What every coupon may have besides its lengths; `region` names the part of the table in
+    """Keys that every coupon may have besides its lengths; `region` names the part of the table in
     which it lies."""
 
     kind: ClassVar[str]

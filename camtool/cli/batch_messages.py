@@ -1,4 +1,5 @@
-"""What `camtool batch` shows: a bar on a terminal, plain lines elsewhere, a table at the end."""
+"""The display of `camtool batch`: a bar on a terminal, plain lines elsewhere, a table at the
+end."""
 
 from __future__ import annotations
 
@@ -68,7 +69,7 @@ def display(total: int, verbosity: Verbosity) -> Iterator[Display]:
 
 
 class LineDisplay:
-    """One line for each drawing."""
+    """A line for each drawing."""
 
     def __init__(self, total: int, verbosity: Verbosity) -> None:
         self._total = total

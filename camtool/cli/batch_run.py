@@ -1,4 +1,4 @@
-"""One run of `camtool batch`: finds the drawings, makes those that are not up to date, and reports
+"""The run of `camtool batch`: finds the drawings, makes those that are not up to date, and reports
 the outcome of each.
 
 It stands apart from the command, so that `camtool --help`, which loads all commands, loads
@@ -109,7 +109,7 @@ class LazyPool:
 
 @dataclass(frozen=True)
 class BatchRun:
-    """One run of the command."""
+    """A run of the command."""
 
     work: PostWork
     out: Path

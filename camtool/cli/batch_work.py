@@ -1,4 +1,4 @@
-"""What `camtool batch` does with one drawing: what `post` does, its files as bytes."""
+"""The work of `camtool batch` on one drawing: as `post` does, with its files as bytes."""
 
 from __future__ import annotations
 

@@ -140,7 +140,7 @@ NAME_WIDTH = 10
 """Columns before the values."""
 
 MARKS = dict.fromkeys(("not used", "gap", "branch", "crossing", "open"), "warning")
-"""What in the facts of a drawing somebody should look at."""
+"""Facts of a drawing that are marked as needing attention."""
 
 
 def _table(facts: dict[str, Any], *, verbose: bool) -> str:

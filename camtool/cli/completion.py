@@ -32,7 +32,7 @@ MAX_SCANNED_BYTES = 20_000_000
 """Layers of larger drawings are not looked for: the answer would take longer than typing."""
 
 UNREADABLE = "\ufffd"
-"""What stands for bytes that are not UTF-8."""
+"""Replacement of bytes that are not UTF-8."""
 
 _FILES = {"FILE", "DRAWING", "DRAWINGS", "PROGRAM", "PICTURE", "MEASUREMENTS"}
 _FOLDERS = {"FOLDER"}
@@ -46,7 +46,7 @@ _Answer = Callable[[click.Context, str], Iterable[CompletionItem]]
 # The shells.
 
 LINE_VARIABLE = "COMP_WORDS"
-"""Where a script puts its line up to the cursor."""
+"""Environment variable with the line up to the cursor."""
 
 _BASH = r"""%(complete_func)s() {
     local answer value
@@ -129,7 +129,7 @@ class _Shell(ShellComplete):
         return words[1:-1], words[-1][:-1]
 
     def format_completion(self, item: CompletionItem[Any]) -> str:
-        """One line: the kind and the value."""
+        """Return a line of the kind and the value."""
         return f"{item.type},{item.value}"
 
 

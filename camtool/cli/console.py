@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from camtool.target.terminal import Terminal
 
 TICK_S = 0.05
-"""How long is listened before what is typed is looked at, s."""
+"""Time to listen to the controller before the keyboard is read, s."""
 
 QUIET_S = 0.3
 """An answer is over when nothing has come for so long, s."""

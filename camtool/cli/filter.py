@@ -18,7 +18,7 @@ from camtool.cli.post import Posting, RequestedOutputs, finish, posting_options
 from camtool.records import replace
 
 BEGUN, READ, MADE, DONE = 1, 20, 95, 100
-"""What the progress bar shows, per cent: begun, read, made and judged, written."""
+"""Percentages of the progress bar: begun, read, made and judged, written."""
 
 
 @click.command(cls=SectionedCommand, short_help="LinuxCNC opens a drawing.")

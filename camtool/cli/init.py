@@ -23,7 +23,7 @@ PROPOSED = "my-machine"
 """The name that is proposed for a machine."""
 
 FLAG = "--{} at camtool init"
-"""What says a value that a flag or an answer gave."""
+"""Source named in errors about a value from a flag or an answer."""
 
 
 # Numbers of the three axes.

@@ -1,4 +1,4 @@
-"""What a command shows to people: messages and findings, summaries in colour.
+"""Output of commands for people: messages and findings, summaries in colour.
 
 Messages always go to stderr, so that stdout stays for machines. Streams that are no terminal get
 the same words without colours. Colours are click's and not rich's: loading rich takes a tenth of

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 _PICTURE = "Picture"
 OF_ALL = ("--size", "--crop", "--dark")
-"""What every still picture has."""
+"""Content of every still picture."""
 
 PICTURES = (".svg", ".png", ".html")
 """Kinds of pictures, by the ends of their names."""

@@ -244,7 +244,7 @@ MAX_PLACEHOLDERS = 2
 """Of a machine file that leaves out no more than these, its own file is to be completed."""
 
 SHORT = {"flat": "mill", "v": "bit"}
-"""What kinds of tools are called in names of files, where not as jobs call them."""
+"""Short names of kinds of tools in names of files; other kinds keep their name."""
 
 MAX_NAME_CHARS = 40
 """So many characters of a tool's name go into the name of a file."""
@@ -438,7 +438,7 @@ def _page_alone(run: Run, outputs: ReportOutputs, picture: Painter) -> dict[str,
 # counts when the content stays the same for a while: an editor may write in several steps.
 
 POLL_S = 0.4
-"""How often files are looked at."""
+"""Interval at which files are checked for changes."""
 
 SETTLED_S = 0.2
 """For how long the files must stay the same before a change counts."""

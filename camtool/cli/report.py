@@ -1,4 +1,4 @@
-"""What is written about a program: its picture, its report as JSON, and a page.
+"""Outputs about a program: its picture, its report as JSON, and a page.
 
 A page (`--report`) is HTML, Markdown or JSON. HTML holds its picture. Markdown links to a picture
 beside it: the one of `--preview`, or else an SVG of the page's own name, which never takes the

@@ -1,4 +1,4 @@
-"""What is inspected: dimensions with limits, as drawings and tolerance files say them."""
+"""Dimensions with limits, from drawings and tolerance files."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ Kind = Literal[
     "roundness",
     "profile",
 ]
-"""What is measured. "distance" is between two edges, two centres, or an edge and a centre: widths
-are distances."""
+"""Kinds of dimensions. "distance" is between two edges, two centres, or an edge and a centre:
+widths are distances."""
 
 ZONES: Final = ("position", "straightness", "roundness", "profile")
 """Kinds that are the widths of zones of ISO 1101: nothing nominal, and no lower limit."""

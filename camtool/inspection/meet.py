@@ -1,4 +1,4 @@
-"""What would make the dimensions of a part hold: the cheapest change of its job, or why none does.
+"""Find the cheapest change of a job with which all dimensions hold, or the reason why none does.
 
 A trial is a job file: it is read, posted, read back from its bytes, simulated and inspected, as
 `camtool post --job FILE --tolerances …` would. What a trial may change:

@@ -64,7 +64,7 @@ Length = str | float
 
 
 Asked = tuple[str, tuple[Dimension, ...]]
-"""What a file of tolerances says: the general tolerance ("" for none), and its dimensions."""
+"""Content of a file of tolerances: the general tolerance ("" for none), and its dimensions."""
 
 
 def dimensions_of(

@@ -1,4 +1,4 @@
-"""How sure predicted sizes are: from what is uncertain in a machine to a budget of each size.
+"""Uncertainty of predicted sizes: from uncertain inputs of a machine to a budget of each size.
 
     machine ─inputs_of─▶ Inputs ─propagate─▶ Budget      finite differences of simulations
                               └─monte_carlo─▶ Draws      a simulation for each draw

@@ -1,4 +1,4 @@
-"""Whether dimensions hold: verdicts by ISO 14253-1, from predicted sizes and their uncertainty.
+"""Verdicts on dimensions by ISO 14253-1, from predicted sizes and their uncertainty.
 
 A dimension holds when its least local size is not below the lower limit and its largest not above
 the upper one (ISO 14405-1: limits are of two-point sizes unless a drawing says otherwise). With P
@@ -54,7 +54,7 @@ GUARD = 1.6449
 """A size that is within one limit by this many standard uncertainties is so with 95 %."""
 
 Required = Literal["in", "not-out"]
-"""What `--require` asks of every dimension with limits."""
+"""Values of `--require`: the verdict that every dimension with limits must have."""
 
 
 class Tolerances(Struct, frozen=True):

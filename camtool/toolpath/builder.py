@@ -38,7 +38,7 @@ class ToolpathBuilder:
         self.block = -1
         """Program block given to the rows that follow."""
         self.mode: PathMode | None = None
-        """How the rows that follow meet their corners; None: as the machine does."""
+        """Path mode of the rows that follow; None: the default of the machine."""
         self.run = -1
         """Index of the run in the plan for the rows that follow; −1: links between runs."""
         self._start = start

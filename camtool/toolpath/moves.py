@@ -42,7 +42,7 @@ ROWS_AT_ONCE = 1 << 15
 
 
 class Kind(IntEnum):
-    """What a row does; `value` (unit) is the event's argument where it has one."""
+    """Kind of a row; `value` (unit) is the argument of an event, if it has one."""
 
     RAPID = 0
     LINE = 1
@@ -67,7 +67,7 @@ Corners = Literal["blend", "exact-path", "exact-stop"]
 
 
 class PathMode(Struct, frozen=True):
-    """How a program asks for corners to be met.
+    """A program's request for the treatment of corners.
 
     "blend": rounded within `tolerance_mm` (0: as far as the moves allow), lines in a row taken for
     one within `merging_mm` (0: never); "exact-path": met, without a stop where they hardly bend;
