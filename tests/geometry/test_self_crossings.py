@@ -112,7 +112,7 @@ def test_boxes_that_touch_equal_brute_force(
     rows = np.arange(len(boxes))
     same = segments.path if within else np.zeros_like(rows)
     asked = rows % 3 > 0
-    one, other = touching_boxes(boxes, same, rows, asked, most=10**6)
+    one, other = touching_boxes(boxes, same, rows, asked, max_pairs=10**6)
     wanted = {
         (i, j)
         for i in rows.tolist()
@@ -129,5 +129,5 @@ def test_boxes_that_touch_equal_brute_force(
 def test_no_more_pairs_than_wanted() -> None:
     boxes = np.zeros((50, 4))
     rows = np.arange(50)
-    one, _ = touching_boxes(boxes, np.zeros_like(rows), rows, rows >= 0, most=100)
+    one, _ = touching_boxes(boxes, np.zeros_like(rows), rows, rows >= 0, max_pairs=100)
     assert len(one) == 100
