@@ -76,11 +76,11 @@ FEED_TOLERANCE = 1e-6
 MOST_LISTED = 10
 """At most this many rapids are listed; the last finding counts the others."""
 
-BEYOND_MOST = 0.25
+MAX_BEYOND_SHARE = 0.25
 """An allowance that takes a tool farther beyond a line than this part of its radius looks like a
 mistake: corrections of wear and play are hundredths of millimetres."""
 
-LEAST_PIECE = 0.25
+MIN_PIECE_SHARE = 0.25
 """The smallest piece that comes loose within a contour, as a share of the area of the tool's disc:
 smaller ones go away with the chips."""
 
@@ -422,7 +422,7 @@ def _doubtful(step: Step, starts_spindle: bool) -> Iterator[str]:
     on_line = operation.contract.runs_beside and operation.side != "on" and not wide
     if starts_spindle and on_line and step.chosen.lines.closed.any():
         yield CUT_DOUBTFUL_WIDTH.words()
-    if operation.beyond_mm > BEYOND_MOST * tool.radius_mm:
+    if operation.beyond_mm > MAX_BEYOND_SHARE * tool.radius_mm:
         yield CUT_DOUBTFUL_BEYOND.words(beyond=operation.beyond_mm)
     deepest = deepest_pass(step.setting)
     finishes = operation.stage == "finish"  # beside the wall, in what is roughed
@@ -521,7 +521,7 @@ def _loose_pieces(step: Step, gone: Container[int]) -> Iterator[Finding]:
         round_ = reverse_lines(path, signed_areas(path) < 0.0)
         pieces = offset_shape(round_, tool.radius_mm)
         areas = signed_areas(pieces)
-        if not len(areas) or areas.max() <= LEAST_PIECE * math.pi * tool.radius_mm**2:
+        if not len(areas) or areas.max() <= MIN_PIECE_SHARE * math.pi * tool.radius_mm**2:
             continue
         largest = pieces.select([int(areas.argmax())])
         mend = "give it tabs in an operation of its own, or clear it with a pocket"

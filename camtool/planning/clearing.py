@@ -42,7 +42,7 @@ from camtool.planning.paths import MeasuredPath, join_paths, midpoints, true_ran
 SHORTER = (0.95, 0.9, 0.85, 0.8)
 """Parts of the step that are tried where it leaves tips: rings alone make a smoother path."""
 
-MOST_MARGIN = 0.5
+MAX_MARGIN_SHARE = 0.5
 """The largest distance that is left for the ring along the walls, over the tool's radius."""
 
 SLOT_TOLERANCE = 1e-3
@@ -58,7 +58,7 @@ BEYOND = 3.0
 """Distance of a slot's beginning from the region of the true tool, in hairs: sharp corners extend
 outwards."""
 
-SLOT_LEAST = 0.5
+MIN_SLOT_SHARE = 0.5
 """The shortest perimeter of a band that counts as a slot, over the tool's diameter."""
 
 BAND_PLACES = 200
@@ -221,7 +221,7 @@ def zigzag_paths(region: Polylines, scan: Scan) -> list[Floats]:
     Several paths only where rounding hides the link from one stroke to the next (`LinkedPath`).
     """
     whole, linked = ConnectedRegion(region), LinkedPath()
-    margin = min(scan.radius_mm - 0.5 * scan.step_mm, MOST_MARGIN * scan.radius_mm)
+    margin = min(scan.radius_mm - 0.5 * scan.step_mm, MAX_MARGIN_SHARE * scan.radius_mm)
     for part in parts_of(offset_shape(region, margin)):
         strokes = strokes_of(part, scan)
         order = _order(strokes)
@@ -338,7 +338,7 @@ def _bands(region: Polylines, radius: float, hair_mm: float) -> list[Polyline]:
         edges = outside_parts(thinner, offset_shape(true, -BEYOND * hair_mm))
     else:
         edges = list(thinner)
-    return [path for path in edges if length(path) >= 2.0 * SLOT_LEAST * radius]
+    return [path for path in edges if length(path) >= 2.0 * MIN_SLOT_SHARE * radius]
 
 
 def _covered(path: Polyline, others: list[Polyline], near_mm: float) -> bool:

@@ -36,7 +36,7 @@ from camtool.planning.settings import levels
 from camtool.records import replace
 from camtool.toolpath.findings import ProgramCode
 
-ENGAGED_MOST = 0.5
+MAX_ENGAGED_SHARE = 0.5
 """What a finishing pass meets, in a corner too, is no more than this part of its diameter: all
 that may be left on the wall is twice as much in a corner of 60 degrees."""
 
@@ -87,7 +87,7 @@ def in_passes(
     if not contours:
         return contours, []
     most, where = _engaged(contours, operation, rough)
-    if most <= ENGAGED_MOST * operation.tool.diameter_mm + POSITION_EPS_MM:
+    if most <= MAX_ENGAGED_SHARE * operation.tool.diameter_mm + POSITION_EPS_MM:
         return contours, []
     depth = -setting.levels_mm[-1]
     try:

@@ -78,7 +78,7 @@ STAGES = ("", "rough", "finish")
 """Stages of an operation with a finishing pass: all of it (it has none), all but the last
 pass, or that."""
 
-FINISH_MOST = 0.25
+MAX_FINISH_SHARE = 0.25
 """A finishing pass takes no more than this part of its tool's diameter."""
 
 COOLANTS = ("off", "mist", "flood", "both")
@@ -113,13 +113,13 @@ eleven days; and a million of what has no unit."""
 LEAST = 1e-6
 """The least value of a number above 0, in any unit: a nanometre."""
 
-MOST_WIDE_MM = 1000.0
+MAX_WIDTH_MM = 1000.0
 """No tool is wider than a metre, and no allowance is larger."""
 
 FARTHEST_MM = 1e9
 """Positions in a drawing are no farther from its zero (a thousand kilometres, as in maps)."""
 
-MOST_MOVES = 1_000_000
+MAX_MOVES = 1_000_000
 """Passes, pecks and laps that make more moves than this of a drawing are taken as a mistake: a
 program of some 25 MB."""
 
@@ -166,9 +166,9 @@ def finite(name: str, value: float, unit: str, most: float | None = None) -> Non
 def refuse_endless(moves: float, where: str, asked: str, mend: str) -> None:
     """OptionError when so many moves are estimated to result from what was `asked`, such as
     "10000 passes"."""
-    if moves > MOST_MOVES:
+    if moves > MAX_MOVES:
         raise OptionError(
-            f"{asked} would make {moves:.3g} moves, more than {MOST_MOVES:,}",
+            f"{asked} would make {moves:.3g} moves, more than {MAX_MOVES:,}",
             where=where,
             mend=mend,
         )
@@ -249,9 +249,9 @@ class Tool:
     materials: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        at_least_zero("tool diameter", self.diameter_mm, "mm", MOST_WIDE_MM)
-        at_least_zero("tip diameter", self.tip_diameter_mm, "mm", MOST_WIDE_MM)
-        at_least_zero("corner radius", self.corner_radius_mm, "mm", MOST_WIDE_MM)
+        at_least_zero("tool diameter", self.diameter_mm, "mm", MAX_WIDTH_MM)
+        at_least_zero("tip diameter", self.tip_diameter_mm, "mm", MAX_WIDTH_MM)
+        at_least_zero("corner radius", self.corner_radius_mm, "mm", MAX_WIDTH_MM)
         above_zero("number of flutes", self.flutes, "")
         above_zero("cutting length", self.cutting_length_mm, "mm")
         one_of("kind of tool", self.kind, TOOL_KINDS)
@@ -488,7 +488,7 @@ class Operation:
         for speed in (self.spindle_rpm, self.finish_spindle_rpm):
             if speed:
                 above_zero("spindle speed", speed, "rev/min")
-        finite("allowance", self.allowance_mm, "mm", MOST_WIDE_MM)
+        finite("allowance", self.allowance_mm, "mm", MAX_WIDTH_MM)
         at_least_zero("overlap", self.overlap_mm, "mm")
         at_least_zero("dwell", self.dwell_s, "s")
         finite("angle", self.angle_rad, "rad")
@@ -558,12 +558,12 @@ class Operation:
                 where=f"{named}key finish_tool",
                 mend="give one that is no wider",
             )
-        if rough.diameter_mm > 0.0 and self.finish_mm > FINISH_MOST * last.diameter_mm:
+        if rough.diameter_mm > 0.0 and self.finish_mm > MAX_FINISH_SHARE * last.diameter_mm:
             raise OptionError(
                 f"{self.finish_mm:g} mm is more than a quarter of the tool of"
                 f" {last.diameter_mm:g} mm, which takes it at the full depth",
                 where=f"{named}key finish",
-                mend=f"give {FINISH_MOST * last.diameter_mm:.4g} mm or less",
+                mend=f"give {MAX_FINISH_SHARE * last.diameter_mm:.4g} mm or less",
             )
 
     def after(self, others: Sequence[Operation]) -> Operation:

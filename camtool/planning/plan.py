@@ -73,7 +73,7 @@ from camtool.toolpath.moves import Toolpath
 
 HOME: Point = (0.0, 0.0)
 
-MOST_OVERLAPS = 20
+MAX_OVERLAPS = 20
 """A contour may overlap its own start by at most this many times its length: once is enough."""
 
 
@@ -335,13 +335,13 @@ def _refuse_endless(items: Items, setting: Setting) -> None:
     closed = [path for path in paths if path.closed]
     if operation.overlap_mm > 0.0 and closed:
         shortest = float(path_lengths(Polylines.of(closed)).min())
-        if operation.overlap_mm > MOST_OVERLAPS * shortest:
+        if operation.overlap_mm > MAX_OVERLAPS * shortest:
             raise OptionError(
                 f"an overlap of {operation.overlap_mm:g} mm goes"
                 f" {operation.overlap_mm / shortest:.3g} times round a contour of"
                 f" {shortest:.4g} mm",
                 where=key_of(operation, "overlap"),
-                mend=f"give {MOST_OVERLAPS * shortest:.4g} mm or less",
+                mend=f"give {MAX_OVERLAPS * shortest:.4g} mm or less",
             )
 
 

@@ -43,7 +43,7 @@ TOGETHER_MM = 5e-6
 SAME_PLACE_MM = 2e-5
 """Ends of sections nearer than this are at one place."""
 
-LEAST_FOOT = 1e-3
+MIN_FOOT_SHARE = 1e-3
 """Pieces smaller than this part of the tool's disc are left out: the foot of a square corner is
 0.068 of it, that of a corner of 156 degrees is just so large."""
 
@@ -79,12 +79,13 @@ def unreached(region: Polylines, tool_radius_mm: float) -> list[Unreached]:
     """The pieces of a region that a disc within it does not cover, the largest first.
 
     The region is on the left of its closed paths, which may also be the holes of an endless one.
-    Pieces smaller than LEAST_FOOT of the disc's area are left out. GeometryError for open paths.
+    Pieces smaller than MIN_FOOT_SHARE of the disc's area are left out. GeometryError for open
+    paths.
     """
     if tool_radius_mm <= POSITION_EPS_MM or len(region) == 0:
         return []
     reached = opened(region, tool_radius_mm)
-    least = LEAST_FOOT * np.pi * tool_radius_mm**2
+    least = MIN_FOOT_SHARE * np.pi * tool_radius_mm**2
     parting = PARTING * math.sqrt(2.0 * tool_radius_mm * TOGETHER_MM)
     left = Nesting(_without(region, reached, least, parting))
     pieces = [piece for _, piece in regions(left)]

@@ -21,7 +21,7 @@ from camtool.planning.naming import key_of, operation_name, own_numbers
 PASS_SLACK = 1e-9
 """Steps may exceed the step down by this part of it, by rounding, before a pass is added."""
 
-MOST_PASSES = 10_000
+MAX_PASSES = 10_000
 """More passes than this are taken as a mistake."""
 
 
@@ -207,7 +207,7 @@ def levels(
 
     Steps are equal and no larger than `step_down_mm` (None: one step); with `last_pass_mm` the
     last one is that, and the others are equal. OptionError for numbers not above 0, a last pass
-    above the step down or the depth, and more than MOST_PASSES.
+    above the step down or the depth, and more than MAX_PASSES.
 
     >>> levels(1.0, 0.4, None)
     (-0.3333333333333333, -0.6666666666666666, -1.0)
@@ -232,9 +232,9 @@ def levels(
     if rest_mm <= PASS_SLACK * depth_mm:
         return (-depth_mm,)
     passes = rest_mm / step * (1.0 - PASS_SLACK)
-    if passes > MOST_PASSES:
+    if passes > MAX_PASSES:
         raise OptionError(
-            f"{step:g} mm makes more than {MOST_PASSES} passes of {depth_mm:g} mm",
+            f"{step:g} mm makes more than {MAX_PASSES} passes of {depth_mm:g} mm",
             where="key step_down",
             mend="give a larger step",
         )

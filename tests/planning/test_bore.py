@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from camtool.errors import OptionError
 from camtool.findings import Severity
 from camtool.geometry.polylines import Polyline
-from camtool.operations.bore.work import CORE_SHARE, MOST_TURNS, bore, radii
+from camtool.operations.bore.work import CORE_SHARE, MAX_TURNS, bore, radii
 from camtool.planning.findings import PlanningCode
 from camtool.planning.holes import HOLE_SIZE_MM
 from camtool.planning.items import CutRun, Feeds, Fixed, Setting, Work
@@ -79,7 +79,7 @@ def test_the_tool_clears_the_hole_and_nothing_else(
         turns = np.count_nonzero(np.diff(heights)) / 4.0
         pitch = depth / turns
         steepest = 2.0 * math.pi * radius * math.tan(angle)
-        if turns < MOST_TURNS:
+        if turns < MAX_TURNS:
             assert pitch <= steepest * (1.0 + 1e-6)
             assert step_down is None or pitch <= step_down * (1.0 + 1e-6)
         # The last turn is whole and flat, and the tool leaves for the centre.
@@ -141,7 +141,7 @@ def test_a_helix_gets_so_many_turns_and_no_more() -> None:
     assert finding.code == PlanningCode.ENTRY_CHANGED
     assert "at most 200 turns: its slope is 1.82°, not 3°" in finding.message
     (run,) = runs_of(work)
-    assert np.count_nonzero(np.diff(run.vertices[:, 2])) == 4 * MOST_TURNS
+    assert np.count_nonzero(np.diff(run.vertices[:, 2])) == 4 * MAX_TURNS
 
 
 @pytest.mark.parametrize("direction", ["climb", "conventional"])

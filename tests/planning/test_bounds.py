@@ -3,7 +3,7 @@
 import pytest
 
 from camtool.errors import OptionError
-from camtool.planning.job import MOST_MOVES, Tabs, refuse_endless
+from camtool.planning.job import MAX_MOVES, Tabs, refuse_endless
 from camtool.planning.plan import plan
 from camtool.records import replace
 from tests.oracles.path_machine import path_machine
@@ -42,6 +42,6 @@ def test_many_passes_of_much_are_too_much_where_few_of_little_are_not() -> None:
 
 
 def test_the_limit_itself_is_allowed() -> None:
-    refuse_endless(MOST_MOVES, "key depth", "it", "less")
+    refuse_endless(MAX_MOVES, "key depth", "it", "less")
     with pytest.raises(OptionError, match="1,000,000"):
-        refuse_endless(MOST_MOVES + 1, "key depth", "it", "less")
+        refuse_endless(MAX_MOVES + 1, "key depth", "it", "less")

@@ -46,7 +46,7 @@ def total(paths: list[Polyline], radius: float) -> float:
 def with_all_feet(region: Polylines, radius: float) -> list[Unreached]:
     """The pieces, those at the bluntest corners too."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(reach, "LEAST_FOOT", 0.0)
+        patch.setattr(reach, "MIN_FOOT_SHARE", 0.0)
         return unreached(region, radius)
 
 

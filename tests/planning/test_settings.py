@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError
-from camtool.planning.settings import MOST_PASSES, carved_levels, levels
+from camtool.planning.settings import MAX_PASSES, carved_levels, levels
 
 depths = st.floats(1e-3, 100.0)
 shares = st.floats(0.02, 1.0)
@@ -65,7 +65,7 @@ def test_steps_are_equal_and_no_larger_than_asked(
         (math.inf, None, None, "depth"),
         (1.0, 0.0, None, "step_down"),
         (1.0, -0.1, None, "step_down"),
-        (1.0, 0.5 / MOST_PASSES, None, "step_down"),
+        (1.0, 0.5 / MAX_PASSES, None, "step_down"),
         (1.0, 1e-320, None, "step_down"),
         (1.0, 0.5, 0.0, "last_pass"),
         (1.0, 0.5, 0.6, "last_pass"),

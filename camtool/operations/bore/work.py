@@ -65,7 +65,7 @@ from camtool.planning.ramps import MIN_HELIX_SHARE, feeds_along
 CORE_SHARE = 0.9
 """The innermost ring is no larger than this part of the tool's radius, so that no core stays."""
 
-MOST_TURNS = 200
+MAX_TURNS = 200
 """A helix of more turns than this is made steeper."""
 
 TURN_SLACK = 1e-9
@@ -141,14 +141,14 @@ def _runs(hole: Hole, setting: Setting) -> tuple[tuple[CutRun, ...], list[Findin
     runs, found = [], list[Finding]()
     for radius in radii(wide, operation.tool.radius_mm, step):
         wanted = _turns(radius, depth, operation)
-        turns = min(wanted, MOST_TURNS)
+        turns = min(wanted, MAX_TURNS)
         if wanted > turns and not found:
             angle = math.degrees(math.atan2(depth / turns, 2.0 * math.pi * radius))
             found.append(
                 ENTRY_CHANGED_STEEPER(
                     where=at_place(hole.name, hole.at_mm),
                     measured=angle,
-                    limit=MOST_TURNS,
+                    limit=MAX_TURNS,
                     wanted=math.degrees(operation.entry.angle_rad),
                 )
             )

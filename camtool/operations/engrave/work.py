@@ -24,10 +24,10 @@ from camtool.planning.naming import at_place, key_of
 CHORD_RAD = math.pi / 18.0
 """Arcs are chords of this angle where the distance of lines is measured: 0.4 % of the radius."""
 
-LEAST_BETWEEN = 0.1
+MIN_GAP_SHARE = 0.1
 """Lines nearer to each other than this part of the groove touch."""
 
-LEAST_FROM_END = 0.5
+MIN_GAP_SHARE_AT_ENDS = 0.5
 """... and so do those of which one ends so near to the other: strokes of letters are drawn so."""
 
 
@@ -91,7 +91,7 @@ def _narrow_places(lines: Any, closed: Bools, width: float) -> list[tuple[float,
         for end in (0, 1):
             away = shapely.distance(ends[rows, end], spans)
             at_end |= np.where(np.isnan(away), False, away < POSITION_EPS_MM)
-    at_end &= gaps < LEAST_FROM_END * width
+    at_end &= gaps < MIN_GAP_SHARE_AT_ENDS * width
     beside = [
         shapely.length(
             shapely.intersection(lines[a], shapely.buffer(lines[b], 1.5 * gaps[at_end]))
@@ -100,7 +100,7 @@ def _narrow_places(lines: Any, closed: Bools, width: float) -> list[tuple[float,
     ]
     # A line that ends there leaves at once; parallel ones stay beside each other.
     at_end[at_end] = np.minimum(*beside) <= 2.0 * gaps[at_end]
-    touching = at_end | (gaps < LEAST_BETWEEN * width)
+    touching = at_end | (gaps < MIN_GAP_SHARE * width)
     group = _connected(len(lines), near[touching], other[touching])
     apart = (group[near] != group[other]) & (gaps < width * (1.0 - WIDTH_SLACK))
     found = [
@@ -117,7 +117,7 @@ def _enclosed(lines: Any, width: float) -> Iterator[tuple[float, Any]]:
     each, mm, and its middle."""
     import shapely
 
-    least = LEAST_BETWEEN * width
+    least = MIN_GAP_SHARE * width
     thin = shapely.buffer(shapely.multilinestrings(list(lines)), 0.5 * least)
     rings = [hole for part in shapely.get_parts(thin) for hole in shapely.get_rings(part)[1:]]
     faces = shapely.polygons(rings) if rings else np.empty(0, dtype=object)

@@ -64,19 +64,19 @@ from camtool.planning.paths import MeasuredPath, join_paths
 from camtool.planning.ramps import MIN_HELIX_SHARE, feeds_along
 from camtool.planning.reach import cut_away_findings, unreached, unreached_findings
 
-MOST_STEPS = 10_000
+MAX_STEPS = 10_000
 """More steps than this across a pocket are taken as a mistake."""
 
-HELIX_MOST = 0.5
+MAX_HELIX_SHARE = 0.5
 """Default of the largest radius of a helix, over the tool's radius."""
 
-HELIX_MOST_TURNS = 200
+MAX_HELIX_TURNS = 200
 """A helix of more turns than this at one level is not made."""
 
 REST_OVERLAP = 0.02
 """The tool that cleared before counts as wider by this part, so that its cut is overlapped."""
 
-RAMP_MOST_LAPS = 20
+MAX_RAMP_LAPS = 20
 """A ramp that would go back and forth on the whole path more often than this becomes a plunge."""
 
 Link = Callable[[Floats, Floats], Floats | None]
@@ -274,9 +274,9 @@ def _check_step(chosen: Chosen, operation: Operation) -> None:
     """OptionError for a step-over that would take for ever."""
     step = operation.step_over * operation.tool.diameter_mm
     size = float(np.ptp(extents(chosen.lines), axis=1).max()) if len(chosen.lines) else 0.0
-    if size > MOST_STEPS * step:
+    if size > MAX_STEPS * step:
         raise OptionError(
-            f"a step-over of {step:g} mm makes more than {MOST_STEPS} rings in {size:g} mm",
+            f"a step-over of {step:g} mm makes more than {MAX_STEPS} rings in {size:g} mm",
             file=chosen.file,
             where=key_of(operation, "step_over"),
             mend="give a larger step-over, or a larger tool",
@@ -333,17 +333,17 @@ def down_for(
         return Down()
     if entry.kind == "helix" and around is not None and whole is not None:
         radius = setting.operation.tool.radius_mm
-        wanted = HELIX_MOST * radius if entry.radius_mm is None else entry.radius_mm
+        wanted = MAX_HELIX_SHARE * radius if entry.radius_mm is None else entry.radius_mm
         centre = pole(around.boundary)
         room = float(points_to_segments(centre[None, :], whole.segments).min())
         fits = min(wanted, room)
         turns = _descent(setting) / (2.0 * math.pi * max(fits, POSITION_EPS_MM))
-        if fits >= min(MIN_HELIX_SHARE * radius, wanted) and turns <= HELIX_MOST_TURNS:
+        if fits >= min(MIN_HELIX_SHARE * radius, wanted) and turns <= MAX_HELIX_TURNS:
             smaller = entry.radius_mm is not None and fits < wanted
             changed = f"a helix of {fits:.4g} mm instead of {wanted:g} mm" if smaller else ""
             return Down(centre, fits, changed=changed)
     changed = "a ramp instead of a helix" if entry.kind == "helix" else ""
-    if 0.5 * _descent(setting) <= RAMP_MOST_LAPS * MeasuredPath.of(Polyline(path)).total_mm:
+    if 0.5 * _descent(setting) <= MAX_RAMP_LAPS * MeasuredPath.of(Polyline(path)).total_mm:
         return Down(ramp=True, changed=changed)
     return Down(changed=f"a plunge instead of a {entry.kind}")
 

@@ -78,14 +78,14 @@ FIT_SHARE = 0.75
 """Share of the tolerance for lines and arcs through samples of the axis; the error between the
 samples takes less than the rest."""
 
-FEWEST_FOR_ARC = 5
+MIN_ARC_SAMPLES = 5
 """An arc is fitted through three of at least this many samples."""
 
-LEAST_SWEEP_RAD = 1e-4
+MIN_SWEEP_RAD = 1e-4
 """Samples that turn by less do not become an arc: its centre would be too far away for exact
 numbers."""
 
-MOST_SWEEP_RAD = 2.0
+MAX_SWEEP_RAD = 2.0
 """An arc of the axis that turns farther is divided."""
 
 MEET_MM = 1e-4
@@ -364,14 +364,14 @@ def _bulge(discs: Floats, tolerance_mm: float) -> float | None:
     begin, end = discs[:1], discs[-1:]
     if len(inner) == 0 or off_chord(inner, begin, end).max() <= tolerance_mm:
         return 0.0
-    if len(discs) < FEWEST_FOR_ARC:
+    if len(discs) < MIN_ARC_SAMPLES:
         return None
     # The arc through begin, a point P and end turns by 2·(π − angle at P); bulge = tan(turn / 4).
     middle = discs[len(discs) // 2, :2]
     to_begin, to_end = begin[0, :2] - middle, end[0, :2] - middle
     across = to_begin[0] * to_end[1] - to_begin[1] * to_end[0]
     sweep = 2.0 * (np.pi - abs(np.arctan2(across, to_begin @ to_end)))
-    if not LEAST_SWEEP_RAD <= sweep <= MOST_SWEEP_RAD:
+    if not MIN_SWEEP_RAD <= sweep <= MAX_SWEEP_RAD:
         return None
     bulge = float(np.copysign(np.tan(0.25 * sweep), -across))
     return bulge if _off_arc(inner, begin[0], end[0], bulge) <= tolerance_mm else None
