@@ -20,9 +20,9 @@ CYTHON_DOCSTRING = re.compile(
 )
 CYTHON_CONSTANT = re.compile(r"^(?:cdef )?(?:[\w ]+ )?([A-Z_]+)\s*=", re.MULTILINE)
 
-MAX_QUESTIONS = 5
-MAX_SHARED_CLASS_NAMES = 3
-MAX_SUPERLATIVES = 20
+MAX_QUESTIONS = 2
+MAX_SHARED_CLASS_NAMES = 2
+MAX_SUPERLATIVES = 6
 
 
 @functools.cache
