@@ -50,7 +50,7 @@ cdef Int _pairs(
     for i in range(number):
         group, column, row = cells[i, 0], cells[i, 1], cells[i, 2]
         found = 0
-        while low < number and _before(cells, low, group, column + 1, row - 1):
+        while low < number and _is_before(cells, low, group, column + 1, row - 1):
             low += 1
         for after in range(2):
             j = i + 1 if after == 0 else max(low, i + 1)
@@ -70,7 +70,7 @@ cdef Int _pairs(
     return count
 
 
-cdef inline bint _before(Int[:, ::1] cells, Int i, Int group, Int column, Int row) noexcept:
+cdef inline bint _is_before(Int[:, ::1] cells, Int i, Int group, Int column, Int row) noexcept:
     if cells[i, 0] != group:
         return bool(cells[i, 0] < group)
     if cells[i, 1] != column:
@@ -211,7 +211,7 @@ cpdef Int split_loops(
                 begin, close = stack[k], stack[height - 1] ^ 1
                 before = last if k == 0 else stack[k - 1] ^ 1
                 near = (
-                    _apart(points, begin, close) <= reach and _apart(points, before, end) <= reach
+                    _distance(points, begin, close) <= reach and _distance(points, before, end) <= reach
                 )
                 if near and encloses(less, fewer) and encloses(segments - less, arcs - fewer):
                     mates[begin], mates[close] = close, begin
@@ -253,7 +253,7 @@ cdef void _forget(Int[::1] entries, Int low, Int high, Int[::1] node, Int[::1] w
             where[label] = -1
 
 
-cdef inline double _apart(double[:, ::1] points, Int one, Int other) noexcept:
+cdef inline double _distance(double[:, ::1] points, Int one, Int other) noexcept:
     return math.hypot(points[one, 0] - points[other, 0], points[one, 1] - points[other, 1])
 
 

@@ -435,7 +435,7 @@ cdef inline double distance_to_biarc(
     return min(one, two)
 
 
-cdef inline (double, double, double, double) over(
+cdef inline (double, double, double, double) biarc_between(
     double[:, ::1] point, double[:, ::1] leave, double[:, ::1] arrive, Int low, Int high
 ) noexcept:
     """The `biarc` over the nodes low..high."""
@@ -462,7 +462,7 @@ cpdef step_errors(
     out = np.empty(len(rows))
     for i in range(len(rows)):
         a, b = rows[i], rows[i] + 1
-        pair = over(point, leave, arrive, a, b)
+        pair = biarc_between(point, leave, arrive, a, b)
         ax, ay, bx, by = point[a, 0], point[a, 1], point[b, 0], point[b, 1]
         out[i] = 0.0
         for j in range(len(probes)):
@@ -478,7 +478,7 @@ cpdef double span_error(
     cdef Int i
     cdef double off
     ax, ay, bx, by = point[low, 0], point[low, 1], point[high, 0], point[high, 1]
-    pair = over(point, leave, arrive, low, high)
+    pair = biarc_between(point, leave, arrive, low, high)
     largest = math.INFINITY if math.isnan(pair[0]) else 0.0
     for i in range(low + 1, high):
         off = distance_to_biarc(point[i, 0], point[i, 1], ax, ay, bx, by, pair)
@@ -493,7 +493,7 @@ cdef bint span_holds(
     """True if `span_error` is within the target; stops at the first node that is not."""
     cdef Int i
     ax, ay, bx, by = point[low, 0], point[low, 1], point[high, 0], point[high, 1]
-    pair = over(point, leave, arrive, low, high)
+    pair = biarc_between(point, leave, arrive, low, high)
     if math.isnan(pair[0]):
         return False
     for i in range(high - 1, low, -1):
@@ -707,7 +707,7 @@ cdef longest_spans(
             continue
         jx, jy, first, second = math.NAN, math.NAN, bulge, math.NAN
         if math.isnan(bulge):
-            jx, jy, first, second = over(point, leave, arrive, low, high)
+            jx, jy, first, second = biarc_between(point, leave, arrive, low, high)
         spans -= 1
         pairs[spans, 0], pairs[spans, 1], pairs[spans, 3] = jx, jy, second
         pairs[spans, 2] = 0.0 if math.isnan(first) else first

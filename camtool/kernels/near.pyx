@@ -276,7 +276,7 @@ cdef Int _divided(Int low, Int high, Int axis, double middle, Near near) noexcep
     return split
 
 
-cdef inline double _apart(Near near, Int k, double x, double y, double z) noexcept:
+cdef inline double _distance(Near near, Int k, double x, double y, double z) noexcept:
     """The distance of a point from a move; inf beyond the limits."""
     cdef Int arc
     cdef double from_z, rise, window, ax, ay, bx, by, share, dx, dy, px, py, square, apart, sine
@@ -339,7 +339,7 @@ cdef void _compare(Int low, Int high, Int first, Int last, Near near) noexcept:
         point, best, count = order[i], math.INFINITY, 0
         x, y, z = points[point, 0], points[point, 1], points[point, 2]
         for n in range(first, last):
-            away = _apart(near, candidates[n], x, y, z)
+            away = _distance(near, candidates[n], x, y, z)
             apart[n - first] = away
             best = away if away < best else best
             count += 1 if away < math.INFINITY else 0
@@ -367,7 +367,7 @@ cdef void _list(
         at = near.move[point]
         x, y, z = points[point, 0], points[point, 1], points[point, 2]
         for n in range(first, last):
-            away = _apart(near, candidates[n], x, y, z)
+            away = _distance(near, candidates[n], x, y, z)
             if away < math.INFINITY:
                 found[at], distance[at] = candidates[n], away
                 at += 1

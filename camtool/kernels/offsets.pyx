@@ -184,7 +184,7 @@ cdef inline double distance_to(double[:, ::1] curves, Int i, double x, double y)
     return math.sqrt(min(qx * qx + qy * qy, rx * rx + ry * ry))
 
 
-cpdef double along(double[:, ::1] curves, Int i, double x, double y) noexcept:
+cpdef double arc_length_at(double[:, ::1] curves, Int i, double x, double y) noexcept:
     """Length along row i from its start to a point on its line or circle; negative before it.
 
     The chord to the point makes half the swept angle with the tangent; points before the start
@@ -565,16 +565,16 @@ cpdef Int gathered(
     return count
 
 
-cdef double _too_near(
+cdef double _violation(
     double[:, ::1] curves, double[:, ::1] tree, double[:, ::1] kites, double[:, ::1] kite_tree,
     Int[::1] rows, Int count, double x, double y, double distance, double spare, double enough,
     Int[::1] stack, double[::1] apart
 ) noexcept:
-    """By how much more than `spare` a point is too near to the source, or too deep in a kite.
+    """Return how far, mm, a point violates the offset distance beyond the slack `spare`.
 
-    0 when it is not; any number above `enough` will do. `rows` are those of the curves that can be
-    nearer than the distance, `count` how many: −1 for all. `stack` and `apart` (`DEPTH`,) are
-    room.
+    0 if it does not; the search stops at any number above `enough`. It is too near to the source, or
+    too deep in a kite. `rows` are those of the curves that can be nearer than the distance, `count`
+    their number, −1 for all. `stack`, `apart` (`DEPTH`,): scratch buffers.
     """
     cdef Int k
     least = distance - spare
@@ -614,7 +614,7 @@ cpdef trimmed_ends(double[:, ::1] elements, near, (double, double) limits):
                 x, y = point_on(elements, i, low if way == 0 else high)
                 enough = (high - low) * length
                 step = (
-                    _too_near(
+                    _violation(
                         curves,
                         tree,
                         kites,
@@ -675,7 +675,7 @@ cpdef far_enough(
         count = whole
         for k in range(len(places)):
             x, y = point_on(elements, row, t0 + places[k] * part)
-            short = _too_near(
+            short = _violation(
                 curves,
                 tree,
                 kites,
@@ -789,7 +789,7 @@ cdef Int _meet(
             x, y = (a[i, AX], a[i, AY]) if k == 0 else (a[i, BX], a[i, BY])
         else:
             x, y = (b[j, AX], b[j, AY]) if k == 2 else (b[j, BX], b[j, BY])
-        count += _taken(a, b, i, j, x, y, eps, found, at, count)
+        count += _store_intersection_if_new(a, b, i, j, x, y, eps, found, at, count)
     # Row j of b is to be the rounder one.
     if abs(b[j, BEND]) < abs(a[i, BEND]):
         x, y, other_x, other_y = _common_points(b, a, j, i)
@@ -797,13 +797,13 @@ cdef Int _meet(
         x, y, other_x, other_y = _common_points(a, b, i, j)
     for _ in range(2):
         # No NaN passes: curves that miss each other by far have no common points.
-        if gap_to(a, i, x, y) <= eps and not _known(a, b, i, j, x, y, eps, found, at, count):
-            count += _taken(a, b, i, j, x, y, eps, found, at, count)
+        if gap_to(a, i, x, y) <= eps and not _is_stored(a, b, i, j, x, y, eps, found, at, count):
+            count += _store_intersection_if_new(a, b, i, j, x, y, eps, found, at, count)
         x, y = other_x, other_y
     return count
 
 
-cdef bint _known(
+cdef bint _is_stored(
     double[:, ::1] a, double[:, ::1] b, Int i, Int j, double x, double y, double eps,
     double[:, ::1] found, Int at, Int count
 ) noexcept:
@@ -815,8 +815,8 @@ cdef bint _known(
     within the root of its own rounding.
     """
     cdef Int k
-    ax, ay = _tangent_after(a, i, along(a, i, x, y))
-    bx, by = _tangent_after(b, j, along(b, j, x, y))
+    ax, ay = _tangent_after(a, i, arc_length_at(a, i, x, y))
+    bx, by = _tangent_after(b, j, arc_length_at(b, j, x, y))
     way = -1.0 if ax * bx + ay * by < 0.0 else 1.0
     angle, bend = abs(ax * by - ay * bx), abs(a[i, BEND] - way * b[j, BEND])
     s = min(a[i, LENGTH], b[j, LENGTH])
@@ -829,16 +829,16 @@ cdef bint _known(
     return False
 
 
-cdef Int _taken(
+cdef Int _store_intersection_if_new(
     double[:, ::1] a, double[:, ::1] b, Int i, Int j, double x, double y, double eps,
     double[:, ::1] found, Int at, Int count
 ) noexcept:
-    """1 when the point is a meeting, which is then written down, else 0; `count` of them are in
-    the rows of `found` from `at` on."""
+    """Store the point and return 1 if both curves pass within eps of it and it is not stored yet,
+    else return 0; `count` intersections are in the rows of `found` from `at` on."""
     cdef Int row, k
     if not (gap_to(a, i, x, y) <= eps and gap_to(b, j, x, y) <= eps):
         return 0
-    on_a, on_b = along(a, i, x, y), along(b, j, x, y)
+    on_a, on_b = arc_length_at(a, i, x, y), arc_length_at(b, j, x, y)
     if not (-eps <= on_a <= a[i, LENGTH] + eps and -eps <= on_b <= b[j, LENGTH] + eps):
         return 0
     for k in range(at, at + count):
@@ -980,7 +980,7 @@ cpdef in_order(Int[::1] keys, double[::1] t, Int count):
         while gap > 0:
             for i in range(gap, len(some)):
                 row, j = some[i], i
-                while j >= gap and _after(t, some[j - gap], row):
+                while j >= gap and _is_after(t, some[j - gap], row):
                     some[j] = some[j - gap]
                     j -= gap
                 some[j] = row
@@ -988,7 +988,7 @@ cpdef in_order(Int[::1] keys, double[::1] t, Int count):
     return np.asarray(rows)
 
 
-cdef bint _after(double[::1] t, Int one, Int other) noexcept:
+cdef bint _is_after(double[::1] t, Int one, Int other) noexcept:
     return bool(t[one] > t[other] or (t[one] == t[other] and one > other))
 
 

@@ -180,12 +180,12 @@ cdef double[:, ::1] grown(double[:, ::1] vertices, Int count, Int wanted):
     return np.asarray(more)
 
 
-cdef Int follow(
+cdef Int write_piece(
     Tracks tracks, Int path, double begin, double end, Int first, Int last, double[:, ::1] out,
     Int at
 ) noexcept:
-    """Write the vertices of a piece of a path behind the one at `at` of `out`, where it begins and
-    which takes its first bulge; the row of its last vertex. The z is the length of the piece so
+    """Write the vertices of a piece of a path behind row `at` of `out`, its start, which takes the
+    first bulge; return the row of its last vertex. The z is the length of the piece so
     far. `first` and `last`: the piece's `span` from the lower length to the higher one."""
     cdef bint back
     cdef double low, high, done, begins, stops, after, _, whole, part, bulge, x, y, from_x, from_y
@@ -230,7 +230,7 @@ cpdef piece(Tracks tracks, Int path, double begin, double end):
     out = np.empty((last - first + 2, 4))
     out[0, 0], out[0, 1] = start_of(tracks, path, begin, end, first, last)
     out[0, 2] = 0.0
-    follow(tracks, path, begin, end, first, last, out, 0)
+    write_piece(tracks, path, begin, end, first, last, out, 0)
     return np.asarray(out)
 
 
@@ -267,7 +267,7 @@ cpdef lifted(Tracks tracks, Int[::1] path, Int[::1] first, double[::1] length, d
             low, high = span(tracks, of, min(begin, end), max(begin, end))
             out = grown(out, at + 1, at + 3 + high - low)
             was, here = at, out[at, 2]
-            at = follow(tracks, of, begin, end, low, high, out, at)
+            at = write_piece(tracks, of, begin, end, low, high, out, at)
             total = out[at, 2]
             for j in range(was + 1, at + 1):
                 out[j, 2] = below + (above - below) * out[j, 2] / total

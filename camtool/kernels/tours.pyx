@@ -359,7 +359,7 @@ cpdef void switch(Branches tree, Int row, Int change) noexcept:
         node = (node - 1) // 2
 
 
-cdef inline double _apart(Branches tree, Int node, double x, double y) noexcept:
+cdef inline double _box_distance_square(Branches tree, Int node, double x, double y) noexcept:
     """Squared distance from a point to a node's box."""
     dx = max(tree.box[node, 0] - x, x - tree.box[node, 2], 0.0)
     dy = max(tree.box[node, 1] - y, y - tree.box[node, 3], 0.0)
@@ -371,7 +371,7 @@ cdef Int _halves_wait(
 ) noexcept:
     """Let the halves of a node wait, the nearer one on top; how many wait then."""
     cdef bint left_first
-    left_first = _apart(tree, 2 * node + 1, x, y) <= _apart(tree, 2 * node + 2, x, y)
+    left_first = _box_distance_square(tree, 2 * node + 1, x, y) <= _box_distance_square(tree, 2 * node + 2, x, y)
     waiting[top] = 2 * node + (2 if left_first else 1)
     waiting[top + 1] = 2 * node + (1 if left_first else 2)
     return top + 2
@@ -388,7 +388,7 @@ cpdef Int nearest_row(Branches tree, Int[::1] on, double x, double y) noexcept:
     while top > 0:
         top -= 1
         node = waiting[top]
-        if tree.live[node] == 0 or _apart(tree, node, x, y) > best:
+        if tree.live[node] == 0 or _box_distance_square(tree, node, x, y) > best:
             continue
         if node < leaves:
             top = _halves_wait(tree, node, x, y, waiting, top)
@@ -425,7 +425,7 @@ cpdef Int nearest_owners(
         node = waiting[top]
         left, right = tree.box[node, 0] - x, tree.box[node, 2] - x
         below, above = tree.box[node, 1] - y, tree.box[node, 3] - y
-        if _apart(tree, node, x, y) > apart[most - 1] or not (
+        if _box_distance_square(tree, node, x, y) > apart[most - 1] or not (
             _looks_to(quarter, right, above)
             or _looks_to(quarter, left, above)
             or _looks_to(quarter, left, below)
@@ -463,7 +463,7 @@ cdef void _enter(Int[::1] found, double[::1] apart, Int most, Int owner, double 
     """Put an owner into the sorted list of `most`, or move it up when it is there already."""
     cdef Int at, k
     at = most - 1
-    if not _before(distance, owner, found, apart, at):
+    if not _is_before(distance, owner, found, apart, at):
         return
     for k in range(most):
         if found[k] == owner:
@@ -471,13 +471,13 @@ cdef void _enter(Int[::1] found, double[::1] apart, Int most, Int owner, double 
                 return
             at = k
             break
-    while at > 0 and _before(distance, owner, found, apart, at - 1):
+    while at > 0 and _is_before(distance, owner, found, apart, at - 1):
         found[at], apart[at] = found[at - 1], apart[at - 1]
         at -= 1
     found[at], apart[at] = owner, distance
 
 
-cdef inline bint _before(
+cdef inline bint _is_before(
     double distance, Int owner, Int[::1] found, double[::1] apart, Int at
 ) noexcept:
     """True if an owner comes before the one at an index: nearer, or as near and with the smaller

@@ -1042,12 +1042,12 @@ cdef (Int, bint) _passed(
     return entered, near
 
 
-cdef wide _follow(
+cdef wide _move_slide(
     Int[::1] leg, Int axis, Int way, Int[::1] steps, Int at, double step_mm, double[::1] play,
     double[::1] state, Int[::1] counts, double[::1] commanded, double[::1] slide
 ) noexcept:
-    """Let the slide of X or Y follow `steps` (n,) about the origin of the leg, which run `way`
-    from `at` on, and count."""
+    """Move the slide of X or Y by `steps` (n,) about the origin of the leg, in the direction `way`
+    from `at` on, and count steps and reversals."""
     cdef Int origin, k, way_on, count
     count = len(steps)
     origin = leg[ORIGIN_X + axis]
@@ -1147,10 +1147,10 @@ cdef void _judge_leg(
             count[ENDED] = 1 if met else 0
         if filled == 0:
             continue
-        _follow(
+        _move_slide(
             leg, 0, way_x, path_x, at_x, step_mm, axes[0], states[0], count, judge.x, judge.slide_x
         )
-        _follow(
+        _move_slide(
             leg, 1, way_y, path_y, at_y, step_mm, axes[1], states[1], count, judge.y, judge.slide_y
         )
         at_x, at_y = path_x[filled - 1], path_y[filled - 1]

@@ -63,7 +63,7 @@ def test_rows_are_the_curves(seed: int) -> None:
         wanted = point_at(some, np.arange(len(some)), np.full(len(some), t))
         got = [offsets.point_on(rows, i, t) for i in range(len(some))]
         assert np.allclose(got, wanted, atol=1e-13)
-        lengths = [offsets.along(rows, i, *p) for i, p in enumerate(wanted)]
+        lengths = [offsets.arc_length_at(rows, i, *p) for i, p in enumerate(wanted)]
         assert np.allclose(lengths, t * segment_lengths(some), atol=1e-11)
 
 
