@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from camtool.planning.job import Job, Operation
 
 
-MOST_LOOKS = 4
+MAX_LOOKS = 4
 """A drawing whose scale follows from its own size is read no more often than this: each reading
 knows its size within the tolerance of the previous one."""
 
@@ -54,7 +54,7 @@ def read_to_scale(
     from camtool.planning.place import SCALE_SHARE, part_scale
 
     drawing = read(replace(options, scale=1.0))
-    for _ in range(MOST_LOOKS - 1):
+    for _ in range(MAX_LOOKS - 1):
         try:
             scale = part_scale(drawing, job)
         except OptionError:  # planning reports it, with its place in the job

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from camtool.errors import OptionError
 
-SMALLEST_PX, LARGEST_PX = 16, 20_000
+MIN_PX, MAX_PX = 16, 20_000
 """Least and greatest width of a picture."""
 
 SVG_WIDTH_PX, PNG_WIDTH_PX = 1000, 1200
@@ -18,7 +18,7 @@ POINTS_OF_A_PAGE = 400_000
 """Most points of the slides' path that the viewer gets: enough for the ends of 200,000 moves and
 the largest error within each."""
 
-LEAST_TIMES, MOST_TIMES = 1.0, 1e6
+MIN_TIMES, MAX_TIMES = 1.0, 1e6
 """Least and greatest factor of errors that are drawn larger."""
 
 
@@ -43,10 +43,10 @@ class PictureOptions:
     def __post_init__(self) -> None:
         if self.size_px is not None:
             check_width(self.size_px)
-        if not LEAST_TIMES <= self.exaggerate <= MOST_TIMES:
+        if not MIN_TIMES <= self.exaggerate <= MAX_TIMES:
             raise OptionError(
                 f"errors cannot be drawn {self.exaggerate:g} times as large",
-                mend=f"take {LEAST_TIMES:g} to {MOST_TIMES:g}",
+                mend=f"take {MIN_TIMES:g} to {MAX_TIMES:g}",
             )
         crop = self.crop_mm
         if crop is not None and not (
@@ -68,10 +68,10 @@ AS_USUAL = PictureOptions()
 
 def check_width(width_px: int) -> None:
     """OptionError for a width that no picture has."""
-    if not SMALLEST_PX <= width_px <= LARGEST_PX:
+    if not MIN_PX <= width_px <= MAX_PX:
         raise OptionError(
             f"a picture cannot be {width_px} pixels wide",
-            mend=f"take {SMALLEST_PX} to {LARGEST_PX}",
+            mend=f"take {MIN_PX} to {MAX_PX}",
         )
 
 

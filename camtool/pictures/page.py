@@ -26,7 +26,7 @@ from camtool.pictures.colours import (
 )
 from camtool.pictures.content import Content
 from camtool.pictures.layers import SWATCH, LegendEntry, legend_of
-from camtool.pictures.options import SMALLEST_PX, SVG_WIDTH_PX, PictureOptions
+from camtool.pictures.options import MIN_PX, SVG_WIDTH_PX, PictureOptions
 from camtool.pictures.svg import Look, PathData, element, number, one_line, title
 from camtool.pictures.text import TextStyle
 from camtool.pictures.view import (
@@ -122,7 +122,7 @@ def mat(box: PageBox, width: float, height: float) -> str:
     """Paper round the plot of a page, which hides what leaves the plot. A clip would do the same,
     but takes the renderer as long as all lines together."""
     path = PathData()
-    paper = PageBox(0.0, 0.0, width, height + math.ceil(width / SMALLEST_PX))
+    paper = PageBox(0.0, 0.0, width, height + math.ceil(width / MIN_PX))
     for each in (paper, box):
         path.move(each.left, each.top)
         path.line(each.right, each.top)

@@ -35,7 +35,7 @@ ARROWS_APART = 60.0
 other."""
 
 MIN_LENGTH_WITH_ARROW = 90.0
-MOST_WITH_ARROW, MOST_ON_ONE = 150, 4
+MAX_WITH_ARROW, MAX_ON_ONE = 150, 4
 MARKS_OF_FULL_SIZE = 120
 MIN_MARK = 0.3
 TIE_DECIMALS = 4
@@ -141,8 +141,8 @@ class Plot(Struct, frozen=True):
         lengths = [float(chain.lengths().sum()) * view.scale for chain in chains]
         long = [index for index, length in enumerate(lengths) if length >= MIN_LENGTH_WITH_ARROW]
         data, taken = PathData(), list[Place]()
-        for index in long[:: 1 + len(long) // MOST_WITH_ARROW]:
-            wanted = min(1 + int(lengths[index] / ARROW_EVERY), MOST_ON_ONE)
+        for index in long[:: 1 + len(long) // MAX_WITH_ARROW]:
+            wanted = min(1 + int(lengths[index] / ARROW_EVERY), MAX_ON_ONE)
             for place in range(wanted):
                 point, heading = _along(chains[index], place / wanted, (place + 1) / wanted)
                 at = view.page(*point)

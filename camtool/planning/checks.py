@@ -73,7 +73,7 @@ LIMIT_SLACK = 1e-6
 FEED_TOLERANCE = 1e-6
 """A feed may exceed its limit by this part of it, by rounding alone."""
 
-MOST_LISTED = 10
+MAX_LISTED = 10
 """At most this many rapids are listed; the last finding counts the others."""
 
 MAX_BEYOND_SHARE = 0.25
@@ -328,15 +328,15 @@ def _rapids_in_stock(toolpath: Toolpath, job: Job) -> Iterator[Finding]:
     cuts, sweeps = _radii(toolpath, job)
     solid = None if job.stock is None else job.stock.box_mm
     found = rapids_through_stock(toolpath, Reach(cuts, sweeps, solid))
-    more = len(found) - MOST_LISTED
-    for number, one in enumerate(found[:MOST_LISTED], 1):
+    more = len(found) - MAX_LISTED
+    for number, one in enumerate(found[:MAX_LISTED], 1):
         x, y = one.at_mm
         yield RAPID_IN_STOCK(
             where=f"{_place(toolpath, one.row)} near ({x:.3f}, {y:.3f}) mm",
             measured=one.z_mm,
             limit=STOCK_TOP_MM,
             depth=STOCK_TOP_MM - one.z_mm,
-            more=max(more, 0) if number == MOST_LISTED else 0,
+            more=max(more, 0) if number == MAX_LISTED else 0,
         )
 
 

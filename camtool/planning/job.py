@@ -106,17 +106,17 @@ rounded by a corner radius, a V bit, a drill."""
 MILLS = ("flat", "ball", "bull")
 """Those that are as wide as their shank but for their nose."""
 
-MOST = {"mm": 1e5, "mm/min": 1e7, "rev/min": 1e7, "s": 1e6, "rad": 1e6, "": 1e6}
-"""The most that a number of this unit may be, as in `camtool.machine.ranges`: 100 m, 167 m/s,
+MAX_BY_UNIT = {"mm": 1e5, "mm/min": 1e7, "rev/min": 1e7, "s": 1e6, "rad": 1e6, "": 1e6}
+"""Upper bounds of numbers by their unit, as in `camtool.machine.ranges`: 100 m, 167 m/s,
 eleven days; and a million of what has no unit."""
 
-LEAST = 1e-6
-"""The least value of a number above 0, in any unit: a nanometre."""
+MIN_POSITIVE = 1e-6
+"""Numbers above 0 are no smaller, in any unit: a nanometre."""
 
 MAX_WIDTH_MM = 1000.0
 """No tool is wider than a metre, and no allowance is larger."""
 
-FARTHEST_MM = 1e9
+MAX_POSITION_MM = 1e9
 """Positions in a drawing are no farther from its zero (a thousand kilometres, as in maps)."""
 
 MAX_MOVES = 1_000_000
@@ -133,9 +133,10 @@ def above_zero(name: str, value: float | None, unit: str) -> None:
             f"{_said(name, value, unit)} is not above 0",
             mend=f"give a {name} above 0, or leave it out",
         )
-    if value < LEAST:
+    if value < MIN_POSITIVE:
         raise OptionError(
-            f"{_said(name, value, unit)} is less than {LEAST:g}", mend=f"give a larger {name}"
+            f"{_said(name, value, unit)} is less than {MIN_POSITIVE:g}",
+            mend=f"give a larger {name}",
         )
     _at_most(name, value, unit, None)
 
@@ -175,7 +176,7 @@ def refuse_endless(moves: float, where: str, asked: str, mend: str) -> None:
 
 
 def _at_most(name: str, value: float, unit: str, most: float | None) -> None:
-    limit = MOST[unit] if most is None else most
+    limit = MAX_BY_UNIT[unit] if most is None else most
     if value > limit:
         raise OptionError(
             f"{_said(name, value, unit)} is more than {limit:g}", mend=f"give a smaller {name}"
@@ -203,7 +204,7 @@ def refuse_range(key: str, limits: tuple[float, float] | None, named: str = "") 
 
 
 def _refuse_fit(fit_mm: tuple[float, float]) -> None:
-    _refuse_beyond("fit", fit_mm, 0.0, MOST["mm"])
+    _refuse_beyond("fit", fit_mm, 0.0, MAX_BY_UNIT["mm"])
     if not any(fit_mm):
         raise OptionError(
             f"fit {fit_mm[0]:g} by {fit_mm[1]:g} mm gives neither a width nor a height",
@@ -370,7 +371,7 @@ class Tabs:
         above_zero("tab height", self.height_mm, "mm")
         for place in self.at_mm or ():
             for coordinate in place:
-                finite("place of a tab", coordinate, "mm", FARTHEST_MM)
+                finite("place of a tab", coordinate, "mm", MAX_POSITION_MM)
         if self.at_mm == ():
             raise OptionError("an empty list gives no tab", mend="leave tabs out")
         given = [each for each in (self.count, self.spacing_mm, self.at_mm) if each is not None]
@@ -468,7 +469,7 @@ class Operation:
             one_of("start", self.start, STARTS)
         else:
             for place in self.start:
-                finite("start", place, "mm", FARTHEST_MM)
+                finite("start", place, "mm", MAX_POSITION_MM)
         for name, value, unit in (
             ("feed", self.feed_mm_min, "mm/min"),
             ("plunge feed", self.plunge_feed_mm_min, "mm/min"),
@@ -695,7 +696,7 @@ class Operation:
                 mend='leave allowance out, or give side = "auto"',
             )
         last = self.finish_tool or self.tool
-        if min(self.wall_radius_mm, last.radius_mm) + self.allowance_mm < LEAST:
+        if min(self.wall_radius_mm, last.radius_mm) + self.allowance_mm < MIN_POSITIVE:
             wide = f"a tool of {last.diameter_mm:g} mm" if last.diameter_mm else "a point"
             mend = f"more than {-last.radius_mm:g} mm" if last.diameter_mm else "0 or more"
             raise OptionError(
@@ -833,9 +834,9 @@ class Placement:
                     where="key scale",
                     mend="give one of the two",
                 )
-        _refuse_beyond("pitch", self.pitch_mm, -MOST["mm"], MOST["mm"])
+        _refuse_beyond("pitch", self.pitch_mm, -MAX_BY_UNIT["mm"], MAX_BY_UNIT["mm"])
         if not isinstance(self.origin, str):
-            _refuse_beyond("origin", self.origin, -FARTHEST_MM, FARTHEST_MM)
+            _refuse_beyond("origin", self.origin, -MAX_POSITION_MM, MAX_POSITION_MM)
         for what, count, pitch in zip(
             ("columns", "rows"), self.copies, self.pitch_mm, strict=True
         ):

@@ -947,7 +947,7 @@ def page_json(page: ReportPage) -> str:
 # The tables of a Report as rows of text, for Markdown and HTML.
 
 
-class ReportTable(Struct, frozen=True):
+class ReportSheet(Struct, frozen=True):
     """A table: `noun` is what its rows are called, `words` the number of leading columns with text
     (the others hold numbers). Cells are not escaped."""
 
@@ -957,7 +957,7 @@ class ReportTable(Struct, frozen=True):
     words: int = 1
 
 
-def sheets(report: Report) -> Iterator[ReportTable]:
+def sheets(report: Report) -> Iterator[ReportSheet]:
     """Yield inspected dimensions, errors by source, sizes, circles, contours and worst moves,
     without empty tables."""
     every = (
@@ -972,7 +972,7 @@ def sheets(report: Report) -> Iterator[ReportTable]:
     return (sheet for sheet in every if sheet.rows)
 
 
-def _inspection_sheet(report: Report) -> ReportTable:
+def _inspection_sheet(report: Report) -> ReportSheet:
     limits, sizes = ("lower mm", "upper mm"), ("least mm", "fit mm", "largest mm")
     heads = ("inspected", "verdict", "most from", "not known", *limits, *sizes, "± µm", "in")
     rows = tuple(
@@ -991,17 +991,17 @@ def _inspection_sheet(report: Report) -> ReportTable:
         )
         for item in report.inspection
     )
-    return ReportTable("dimensions", heads, rows, words=4)
+    return ReportSheet("dimensions", heads, rows, words=4)
 
 
-def _error_sheet(report: Report) -> ReportTable:
+def _error_sheet(report: Report) -> ReportSheet:
     total = report.error_um.total
     figures = {**_by_source(report.error_um), "total": (total.max, total.rms, total.p95)}
     rows = tuple((name, *map(um, three)) for name, three in figures.items())
-    return ReportTable("sources", ("error by source", "max µm", "rms µm", "p95 µm"), rows)
+    return ReportSheet("sources", ("error by source", "max µm", "rms µm", "p95 µm"), rows)
 
 
-def _dimension_sheet(report: Report) -> ReportTable:
+def _dimension_sheet(report: Report) -> ReportSheet:
     heads = ("dimension", "nominal mm", "predicted mm", "error")
     rows = tuple(
         (
@@ -1012,10 +1012,10 @@ def _dimension_sheet(report: Report) -> ReportTable:
         )
         for item in report.dimensions
     )
-    return ReportTable("dimensions", heads, rows)
+    return ReportSheet("dimensions", heads, rows)
 
 
-def _circle_sheet(report: Report) -> ReportTable:
+def _circle_sheet(report: Report) -> ReportSheet:
     heads = ("circle at mm", "way", "radius mm", "G µm", "Fmax µm", "Fmin µm", "D µm", "fit µm")
     rows = tuple(
         (
@@ -1026,19 +1026,19 @@ def _circle_sheet(report: Report) -> ReportTable:
         )
         for item in report.circles
     )
-    return ReportTable("circles", heads, rows, words=2)
+    return ReportSheet("circles", heads, rows, words=2)
 
 
-def _both_ways_sheet(report: Report) -> ReportTable:
+def _both_ways_sheet(report: Report) -> ReportSheet:
     heads = ("circle both ways round, at mm", "radius mm", "G(b) µm", "D µm")
     rows = tuple(
         (_point_words(item.centre_mm), f"{item.radius_mm:.4f}", um(item.Gb_um), um(item.D_um))
         for item in report.bidirectional
     )
-    return ReportTable("circles", heads, rows)
+    return ReportSheet("circles", heads, rows)
 
 
-def _contour_sheet(report: Report) -> ReportTable:
+def _contour_sheet(report: Report) -> ReportSheet:
     """Return the contours, by falling error."""
     heads = (
         "contour",
@@ -1063,10 +1063,10 @@ def _contour_sheet(report: Report) -> ReportTable:
         )
         for item in sorted(report.contour_errors, key=lambda item: -item.max_um)
     )
-    return ReportTable("contours", heads, rows, words=2)
+    return ReportSheet("contours", heads, rows, words=2)
 
 
-def _worst_sheet(report: Report) -> ReportTable:
+def _worst_sheet(report: Report) -> ReportSheet:
     heads = (
         "worst moves",
         "where",
@@ -1088,7 +1088,7 @@ def _worst_sheet(report: Report) -> ReportTable:
         )
         for item in report.worst
     )
-    return ReportTable("moves", heads, rows, words=3)
+    return ReportSheet("moves", heads, rows, words=3)
 
 
 def _point_words(at_mm: tuple[float, float]) -> str:
@@ -1156,7 +1156,7 @@ def _zero_words(stock: PlannedStock | None, zero: str | tuple[float, float] = "d
     return f"X0 Y0 is {across} and {along} the lower left corner of the stock{too}; Z0 is its top"
 
 
-def setup_sheets(planned: Planned) -> Iterator[ReportTable]:
+def setup_sheets(planned: Planned) -> Iterator[ReportSheet]:
     """Yield the tools in the order of use, and the operations."""
     rows = tuple(
         (
@@ -1168,8 +1168,8 @@ def setup_sheets(planned: Planned) -> Iterator[ReportTable]:
         for row, tool in enumerate(planned.tools)
     )
     heads = ("tool", "shape", "sticks out more than mm", "edges mm")
-    yield ReportTable("tools", heads, rows, words=2)
-    yield ReportTable("operations", *_setup_operations(planned), words=4)
+    yield ReportSheet("tools", heads, rows, words=2)
+    yield ReportSheet("operations", *_setup_operations(planned), words=4)
 
 
 def _tool_called(planned: Planned, row: int) -> str:
@@ -1298,7 +1298,7 @@ def _markdown_findings(page: ReportPage) -> Iterator[str]:
         yield ""
 
 
-def _markdown_table(sheet: ReportTable) -> Iterator[str]:
+def _markdown_table(sheet: ReportSheet) -> Iterator[str]:
     numbers = len(sheet.heads) - sheet.words
     yield f"| {' | '.join(sheet.heads)} |"
     yield "|" + "---|" * sheet.words + "---:|" * numbers
@@ -1430,7 +1430,7 @@ def _html_findings(page: ReportPage) -> Iterator[str]:
     yield from _html_more(len(page.findings), "findings")
 
 
-def _html_table(sheet: ReportTable, *, with_heads: bool = False) -> Iterator[str]:
+def _html_table(sheet: ReportSheet, *, with_heads: bool = False) -> Iterator[str]:
     """Yield the table; `with_heads`: each cell knows its heading, for windows too narrow for
     columns."""
     kinds = ["" if n < sheet.words else ' class="number"' for n in range(len(sheet.heads))]

@@ -20,9 +20,9 @@ CYTHON_DOCSTRING = re.compile(
 )
 CYTHON_CONSTANT = re.compile(r"^(?:cdef )?(?:[\w ]+ )?([A-Z_]+)\s*=", re.MULTILINE)
 
-MAX_QUESTIONS = 2
-MAX_SHARED_CLASS_NAMES = 2
-MAX_SUPERLATIVES = 6
+MAX_QUESTIONS = 1
+MAX_SHARED_CLASS_NAMES = 0
+MAX_SUPERLATIVES = 0
 
 
 @functools.cache

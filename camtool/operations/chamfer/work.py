@@ -27,7 +27,7 @@ from camtool.operations.profile.work import profile
 from camtool.planning.findings import NOT_CHAMFERED, NOTHING_DRAWN_TO_CHAMFER
 from camtool.planning.holes import named
 from camtool.planning.items import Chosen, Setting, Work
-from camtool.planning.job import LEAST, THROUGH_SLACK, Operation, Stock
+from camtool.planning.job import MIN_POSITIVE, THROUGH_SLACK, Operation, Stock
 from camtool.planning.naming import operation_name
 from camtool.records import replace
 
@@ -65,7 +65,7 @@ def chamfered(operation: Operation, _: Stock | None) -> Operation:
             where=where,
             mend="give a smaller chamfer or tip_offset, or a wider bit",
         )
-    if operation.depth_mm is not None and abs(operation.depth_mm - depth) > LEAST:
+    if operation.depth_mm is not None and abs(operation.depth_mm - depth) > MIN_POSITIVE:
         raise OptionError(
             f"a depth of {operation.depth_mm:g} mm is given too, but the chamfer makes it"
             f" {depth:.4g} mm",
