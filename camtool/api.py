@@ -385,12 +385,14 @@ def verify(
     job: Job | None = None,
     judging: Judging | None = None,
 ) -> Run:
-    """Any program of the target, simulated with its controller and mechanics, and judged.
+    """Simulate a program on the target's controller and mechanics, and judge the result.
 
-    `program`: its bytes or its file. With `against`, the path of the slides is compared with that
-    drawing, planned with `job`, and the program with what the job asks for: cuts, direction,
-    feeds, spindle, tool, clearance, end. `report` holds errors in µm, sizes in mm, times in s.
-    Raises ProgramError with block and column, and OptionError. Source: docs/verifying.md.
+    `program`: its bytes, a Program, or the path of its file. With `against`, that drawing is
+    planned with `job`; the simulated path of the machine's slides is compared with the plan, and
+    the program is checked against what the job asks for: cuts, direction, feeds, spindle, tool,
+    clearance, end. A failed check is in `report`, not raised. `report` holds errors
+    in µm, sizes in mm, times in s. Raises ProgramError with block and column, and OptionError.
+    Source: docs/verifying.md.
     """
     loaded, wanted = as_target(target), job or Job()
     data, source = as_bytes(program)

@@ -180,7 +180,10 @@ def _is_stream(name: str) -> bool:
 
 
 def _write_stream(name: str, data: bytes) -> None:
-    """Write the data to a stream; BrokenPipeError where the reader of stdout is gone."""
+    """Write all data to stdout or to a named pipe or device, and flush it.
+
+    Raises BrokenPipeError if the program that reads stdout has ended, else OutputError.
+    """
     if name == STDOUT and sys.stdout is None:
         raise OutputError("is closed", file="<stdout>", mend="give a file name")
     try:

@@ -183,7 +183,11 @@ def _tool_at(wire: Wire, left: JournalState, said: ToolAt, target: LoadedTarget)
 
 
 def _read_state(place: Path, data: bytes, target: LoadedTarget) -> JournalState:
-    """Return the state in a journal; InputError for that of another program."""
+    """Read from a journal how far sending this program has come.
+
+    Raises InputError for the journal of another program or another machine file, and OptionError
+    if the program was finished.
+    """
     from camtool.sending.journal import read_journal
     from camtool.sending.prepare import digest
 

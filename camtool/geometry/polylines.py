@@ -366,7 +366,7 @@ def rotate(p: Polyline, angle_rad: float) -> Polyline:
 
 
 def begin_at(p: Polyline, start_index: int) -> Polyline:
-    """Return a closed path begun at another of its vertices; GeometryError for an open one."""
+    """Return a closed path with this vertex as its start; GeometryError for an open path."""
     if not p.closed:
         raise GeometryError("an open path can only begin at an end")
     return Polyline(np.roll(p.vertices, -start_index, axis=0), True)

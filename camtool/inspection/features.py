@@ -332,7 +332,10 @@ def _distance(dimension: Dimension, features: Features, file: str) -> BoundDimen
 
 
 def _place_of(end: DistanceEnd, direction: Floats) -> Floats:
-    """Return a point (2,) mm of the end as drawn."""
+    """Return the drawn point (2,) mm at which this end of a distance lies.
+
+    The start of an edge, the centre of a circle, or its outermost point along `direction`.
+    """
     if isinstance(end.feature, EdgeFeature):
         return np.asarray(end.feature.start_mm)
     beyond = end.side * end.feature.radius_mm if end.how == "outermost" else 0.0

@@ -102,8 +102,8 @@ def choices_of(items: Items) -> Choices:
 
 
 def chosen_paths(contours: Sequence[Contour], choices: Choices, rows: Ints) -> Polylines:
-    """Return the paths of the contours that own these rows (R,), in that order: begun where the
-    row says, and in that direction."""
+    """Return a path for each of these rows (R,) of `choices`: the contour to which the row
+    belongs, with the start and the direction that the row gives."""
     owners = choices.owner[rows]
     rank = rows - choices.first[owners]
     # The places in each closed path where it may begin, the first, the second, and so on.

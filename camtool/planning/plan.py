@@ -96,11 +96,11 @@ def plan(drawing: Drawing, job: Job, machine: Machine) -> Toolpath:
 
 
 def planned(drawing: Drawing, job: Job, machine: Machine, *, undivided: bool = False) -> Plan:
-    """The plan with all its stages; see `plan`.
+    """Plan the drawing and return the result of every stage; see `plan`.
 
-    `undivided`: what the program is held against. Contours that are cut as runs against reversals
-    are whole again, those that stay whole are cut from the starts that were chosen for them (on
-    which their ramps, leads and tabs depend), and nothing is approached.
+    `undivided`: return the plan with which verification compares a program. Contours that were
+    divided into runs to avoid axis reversals are left whole. Those that were not keep their chosen
+    start points, on which ramps, leads and tabs depend. No approach moves are added.
     """
     placed = place(drawing, job)
     sides = Sides.of(placed, job, machine.defaults.cut_depth_mm)

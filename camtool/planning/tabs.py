@@ -459,7 +459,7 @@ class _Fitting(Struct, frozen=True, eq=False):
 
 
 def _corners(along: MeasuredPath, operation: Operation) -> _Corners:
-    """Return the corners of a path of this operation."""
+    """Find the corners and tight arcs along a path, from which tabs keep clear."""
     reach, total = along.reach, along.total_mm
     bend = np.abs(along.turns)
 

@@ -106,7 +106,7 @@ class TcpPort:
         self._client: socket.socket | None = None
 
     def client(self) -> int | None:
-        """Return the file descriptor of the client that is served."""
+        """Return the file descriptor of the client being served, None if there is none."""
         if self._client is None:
             with suppress(BlockingIOError):
                 self._client, _ = self._server.accept()

@@ -129,8 +129,12 @@ class MoveIndex:
         return np.asarray(np.clip(along, 0.0, 1.0))
 
     def _runs(self, choice: Ints | None, count: int) -> Ints:
-        """Return (R, 4) the points, in runs of one choice, and the moves with which they are
-        compared."""
+        """Group consecutive points that are compared with the same contour.
+
+        Returns a row for each group, (R, 4): its first point and the end of its points, the first
+        move and the end of the moves of that contour. Without `choice`, all `count` points are one
+        group, which is compared with all moves.
+        """
         if choice is None:
             return np.array([[0, count, 0, len(self.cuts.segments)]])
         offsets = run_offsets(choice, max(count, 1))

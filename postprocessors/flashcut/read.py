@@ -391,7 +391,11 @@ class _Rows:
         )
 
     def fastest_feeds(self, controller: FlashcutController) -> tuple[Floats, Bools]:
-        """(K,) mm/min at the shortest half period, and which rows move one axis alone."""
+        """Return the highest feed of each row, and which rows move one axis alone; both (K,).
+
+        The feed, mm/min, is that at the shortest half period of the steps that the controller can
+        make.
+        """
         moves = self.steps != 0
         alone = (moves.sum(axis=1) == 1) & (self.kind < Kind.ARC_CW)
         step_mm = np.where(moves[:, 2] & alone, self.step_mm[2], self.step_mm[:2].max())

@@ -64,7 +64,7 @@ class I8751(Target):
         return I8751Wire()
 
     def twin_settings(self) -> type[I8751TwinSettings]:
-        """Return the record of what its thesis leaves open of the wire."""
+        """Return the class of settings for what the thesis leaves open of the serial protocol."""
         from .twin import I8751TwinSettings
 
         return I8751TwinSettings

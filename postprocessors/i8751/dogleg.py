@@ -68,7 +68,10 @@ class StepLine(Struct, frozen=True):
     reach: int = FREE
 
     def pieces(self, most: int) -> list[tuple[int, int]]:
-        """Steps (dx, dy) of records that follow the line, none of more than `most` steps."""
+        """Split the line into records and return the steps (dx, dy) of each, in order.
+
+        They add up to the whole line; none has more than `most` steps along an axis.
+        """
         long, short = max(abs(self.dx), abs(self.dy)), min(abs(self.dx), abs(self.dy))
         x_is_long = abs(self.dx) >= abs(self.dy)
         right, up = (1 if self.dx >= 0 else -1), (1 if self.dy >= 0 else -1)

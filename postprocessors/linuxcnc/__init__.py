@@ -56,7 +56,7 @@ class Linuxcnc(Target):
         return self.read_in(data, machine, None)
 
     def read_in(self, data: bytes, machine: LinuxcncMachine, folder: Path | None) -> Toolpath:
-        """The same, with subs from files in a folder."""
+        """Decode a program as `read` does, with subroutines from files in `folder`."""
         from .read import read_program
 
         return read_program(data, machine, folder)

@@ -125,7 +125,11 @@ class _Moves:
         return self._path.event(Kind.END).finish(self._findings.findings())
 
     def _lines(self, job: ReadJob, done: Executed, z: float) -> None:
-        """Add one row for each line; two if its speeds bend it by more than the tolerance."""
+        """Add one row for each line at height `z`.
+
+        Two rows, up to a kink and after it, where the axes do not arrive together and the path is
+        thereby off the straight line by more than the tolerance.
+        """
         run = DrivenLines(done.points, np.abs(job.speed.T), self._dialect.bend_tolerance_mm)
         self._findings.bent.add(
             run.bent, run.most_bend * UNIT_MM, f"job {job.number}, line {run.first_bent + 1}"

@@ -119,7 +119,10 @@ class Numbers(Struct, frozen=True, eq=False):
 
 
 def numbers_of(toolpath: Toolpath, machine: PicMmhMachine, dialect: PicMmhDialect) -> Numbers:
-    """All numbers of a toolpath; PostError for the first that cannot be written or done."""
+    """Convert a toolpath to the integers of the program: units of the format, steps and feeds.
+
+    Raises PostError for the first that the format cannot hold or the machine cannot do.
+    """
     x, y, z = (UnitGrid.of(dialect, axis.coded_step_mm) for axis in machine.axes)
     grids = (x, y, z)
     _check_coordinates(toolpath, grids)

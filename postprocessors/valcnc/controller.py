@@ -205,7 +205,11 @@ class _Pieces:
         return row, points
 
     def _angles(self, toolpath: Toolpath, count: int) -> Floats:
-        """(J, 5) of `arc_angles` of all arcs; ProgramError for an arc that has none."""
+        """Return the five values of `arc_angles` for each arc of the first `count` rows, (J, 5).
+
+        Raises ProgramError for an arc about its own start, or with a chord longer than its
+        diameter.
+        """
         if not len(self._arc_rows):
             return np.zeros((0, 5))
         angles = np.zeros((count, 5))

@@ -118,9 +118,13 @@ class _Reader:
         self.at = end
 
     def take(self, plain: PlainBlocks) -> int:
-        """Decode plain blocks by columns, up to the first that is not surely what `block` would
-        make of it: one with all words of a line or an arc in their order, which moves Z by itself,
-        and whose arc has one radius and less than `NEARLY_DIAMETER`. How many were decoded."""
+        """Decode the first plain blocks at once, as columns, and return how many were decoded.
+
+        It stops at the first block for which `block` might return something else. A block is sure
+        if it has all words of a line or an arc in their order and does not move Z together with X
+        or Y, and if the ends of its arc are equally far from the centre, and nearer to each other
+        than `NEARLY_DIAMETER`.
+        """
         numbers, form = plain.numbers, plain.facts[:, words.FORM]
         line, arc = form == form_of("GXYZ"), form == form_of("GXYZIJ")
         kind = np.where(line | arc, numbers[:, words.G_WORD], 0.0).astype(np.int64)

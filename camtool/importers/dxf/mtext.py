@@ -45,9 +45,11 @@ _CODE_ERRORS = (ValueError, TypeError, LookupError, ArithmeticError)
 def write_mtext(
     entity: Any, content: str, look: TextLook, font: tuple[WantedFont, str]
 ) -> tuple[Ink, list[tuple[str, str]]]:
-    """The ink of an MTEXT seen from its insertion point, and its fonts (used, wanted or "").
+    """Draw the text of an MTEXT: return its lines relative to the insertion point, and its fonts.
 
-    `look` is that of its text style, `font` the font wanted by that and the mode. Raises Unusable.
+    Fonts are pairs: the one used, and the one asked for if it was replaced, else "". `look` comes
+    from the text style; `font` is the font that the style asks for, and the mode of text. Raises
+    Unusable if the text is empty, or has codes that cannot be read.
     """
     reader = _Reader(look, font)
     row, column = divmod(int(entity.dxf.attachment_point) - 1, 3)

@@ -569,7 +569,10 @@ def solid(entity: Any, frame: WorldMap, _tolerance_mm: float) -> list[DxfShape]:
 
 
 def face(entity: Any, frame: WorldMap, _tolerance_mm: float) -> list[DxfShape]:
-    """3DFACE that is flat: its outline, or those of its edges that are not hidden."""
+    """Return the closed outline of a flat 3DFACE, or only its visible edges if some are hidden.
+
+    Raises Unusable if the face is not flat, or has no visible edge.
+    """
     require(entity, _CORNERS[:3])
     named = [name for name in _CORNERS if entity.dxf.hasattr(name)]
     corners = frame.flat(numbers([tuple(entity.dxf.get(name)) for name in named]))
