@@ -480,12 +480,15 @@ def at_work(
     master = slave = None
     if terminal:
         master, slave = pty.openpty()
+        pipes = {"stdin": slave, **pipes}
 
-        def taken() -> None:
+    def prepare() -> None:
+        signal.signal(signal.SIGHUP, signal.SIG_DFL)  # ignored where the tests run under nohup
+        if terminal:
             os.setsid()
             fcntl.ioctl(0, termios.TIOCSCTTY, 0)
 
-        pipes = {"stdin": slave, "preexec_fn": taken, **pipes}
+    pipes = {"preexec_fn": prepare, **pipes}
     pipes = {"stdin": subprocess.DEVNULL, "stderr": subprocess.PIPE, **pipes}
     with hosted(twin, 1.0) as port:
         of = [work.target, port] if words[0] == "console" else ["-t", work.target, "--port", port]
