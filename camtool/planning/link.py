@@ -132,6 +132,7 @@ def _operation_note(setting: Setting) -> OperationNote:
         depth_mm=-setting.levels_mm[-1],
         spindle_rpm=setting.spindle_rpm,
         passes=len(setting.levels_mm) if operation.contract.descent == "passes" else None,
+        drills=operation.contract.descent == "pecks",
         peck_mm=operation.peck_mm,
     )
 

@@ -43,13 +43,17 @@ def refuse_start(toolpath: Toolpath) -> None:
 def refuse_two_radii(toolpath: Toolpath, max_mm: float) -> None:
     """Refuse arcs whose radii at start and end differ by more than `max_mm`."""
     spread = radius_spread(toolpath)
+    centred = np.isfinite(toolpath.centre).all(axis=1)
+    refuse(
+        toolpath, toolpath.is_arc & ~centred, "an arc without a centre", "give the arc a centre"
+    )
     with np.errstate(invalid="ignore"):
         bad = toolpath.is_arc & ~(spread <= max_mm)
     refuse(
         toolpath,
         bad,
-        lambda row: f"start and end differ by {spread[row]:g} mm in their distance to the centre",
-        "give the arc one radius",
+        lambda row: f"the radii at start and end of an arc differ by {spread[row]:.4f} mm",
+        f"they may differ by {max_mm:g} mm",
     )
 
 

@@ -68,7 +68,8 @@ class ToolNote(Struct, frozen=True):
 
 class OperationNote(Struct, frozen=True):
     """An operation as described in a program. `spindle_rpm`: None without a speed; `passes`: None
-    for kinds of operation without passes; `peck_mm`: depth of one peck of a drill."""
+    for kinds of operation without passes; `drills`: True if the tool goes straight down at single
+    places; `peck_mm`: depth of one peck."""
 
     kind: str
     name: str
@@ -78,6 +79,7 @@ class OperationNote(Struct, frozen=True):
     depth_mm: float
     spindle_rpm: float | None = None
     passes: int | None = None
+    drills: bool = False
     peck_mm: float | None = None
 
 

@@ -10,7 +10,7 @@ from camtool.arrays import Ints
 from camtool.findings import Finding
 from camtool.machine.model import Machine
 from camtool.toolpath.moves import Kind, Toolpath
-from camtool.toolpath.refusals import radius_spread, refuse, refuse_start
+from camtool.toolpath.refusals import refuse, refuse_start, refuse_two_radii
 
 from .dialect import MM, Unit, feed_decimals
 from .findings import FEED_ROUNDED
@@ -31,7 +31,7 @@ def check(toolpath: Toolpath, machine: Machine) -> None:
     refuse_start(toolpath)
     far = np.abs(toolpath.end).max(axis=1, initial=0.0) > MAX_MM
     refuse(toolpath, far, f"a coordinate beyond {MAX_MM:g} mm", "check the units")
-    _check_arcs(toolpath)
+    refuse_two_radii(toolpath, ARC_RADIUS_SPREAD_MM)
     _check_feeds(toolpath, machine)
 
 
@@ -61,20 +61,6 @@ def feed_units(
         whole=1.0 / scale,
     )
     return units, [finding]
-
-
-def _check_arcs(toolpath: Toolpath) -> None:
-    """Arcs have a centre, and one radius."""
-    is_arc, spread = toolpath.is_arc, radius_spread(toolpath)
-    with np.errstate(invalid="ignore"):
-        centred = np.abs(toolpath.centre).max(axis=1, initial=0.0) < np.inf
-        refuse(toolpath, is_arc & ~centred, "an arc without a centre", "give the arc a centre")
-        refuse(
-            toolpath,
-            is_arc & (spread > ARC_RADIUS_SPREAD_MM),
-            lambda row: f"the radii at start and end of an arc differ by {spread[row]:.4f} mm",
-            f"they may differ by {ARC_RADIUS_SPREAD_MM:g} mm",
-        )
 
 
 def _check_feeds(toolpath: Toolpath, machine: Machine) -> None:

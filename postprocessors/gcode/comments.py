@@ -145,7 +145,7 @@ def _depth_words(note: OperationNote, unit: Unit) -> Iterator[str]:
     if note.passes is not None and note.passes > 1:
         deep += f" in {note.passes} passes"
     yield deep if note.peck_mm is None else f"{deep} by {_length(note.peck_mm, unit)}"
-    feed = "" if note.kind == "drill" else f"feed {note.feed_mm_min / unit.mm:.5g} "
+    feed = "" if note.drills else f"feed {note.feed_mm_min / unit.mm:.5g} "
     yield f"{feed}plunge {note.plunge_mm_min / unit.mm:.5g} {unit.name}/min"
 
 

@@ -56,7 +56,7 @@ def holes_of(toolpath: Toolpath) -> list[CycleHole]:
     return [
         hole
         for note, low, high in zip(operations.notes, operations.begin.tolist(), ends, strict=True)
-        if note.kind == "drill"
+        if note.drills
         for hole in _holes(toolpath, low, high)
     ]
 

@@ -4,9 +4,9 @@
 
 Everything that can be refused by its numbers alone is refused before the first block is made
 (`numbers.py`). A row begins at the step where the row before it ended, whatever blocks that took;
-so every arc is planned from there by itself (`arcs.py`), and ends where the next row begins. A
-point is where one block may bring the tool: a block is sent only when it moves the controller's
-own step position.
+so every arc is planned from there by itself (`land` in `steps.pyx`), and ends where the next row
+begins. A point is where one block may bring the tool: a block is sent only when it moves the
+controller's own step position.
 """
 
 from __future__ import annotations

@@ -236,9 +236,9 @@ REFUSED = {
     ),
     "arc": (
         ToolpathBuilder().arc(1, 0, centre=(0.4, 0), ccw=True, feed=9),
-        "start and end differ by 0.2 mm",
+        "radii at start and end of an arc differ by 0.2000 mm",
     ),
-    "no centre": (nan_arc(), "start and end differ by nan mm"),
+    "no centre": (nan_arc(), "an arc without a centre; give the arc a centre"),
     "moving event": (
         ToolpathBuilder().rapid(1).set_position(2, 0, 0).event(Kind.DWELL, 1),
         "a DWELL cannot move the tool",

@@ -191,7 +191,7 @@ REFUSED = {
     ),
     "arc without centre": (
         builder().arc(1, 0, centre=(math.nan, 0), ccw=True, feed=1),
-        "distance to the centre",
+        "an arc without a centre; give the arc a centre",
     ),
     "arc of two radii": (builder().arc(1, 0, centre=(0.4, 0), ccw=True, feed=1), "differ by 0.2"),
     "spindle too fast": (builder().event(Kind.SPINDLE_CW, 10000), "spindle speed 10000"),
