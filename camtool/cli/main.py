@@ -17,7 +17,6 @@ import threading
 import traceback
 from contextlib import suppress
 from importlib import import_module
-from pathlib import Path
 from typing import NoReturn, TextIO
 
 import click
@@ -27,7 +26,6 @@ from camtool.cli import COMPLETE
 from camtool.cli.life_signs import LifeSigns, life_signs
 from camtool.cli.messages import say, say_error
 from camtool.errors import CamtoolError, InputError, OutputError
-from camtool.plain import one_line
 
 EXIT_BAD_INPUT = 2
 EXIT_FAULT = 3
@@ -168,28 +166,12 @@ def _exit_code(*, debug: bool) -> int:
         return EXIT_PIPE
     except Exception as error:
         _trace(debug)
-        if isinstance(error, ImportError) and not _is_built():
-            folder = Path(__file__).parents[2]
-            say(
-                f"camtool: error: {one_line(str(folder))}: camtool is taken from this folder, "
-                "where its compiled loops are not built; run camtool (not python -m camtool), or "
-                "leave the folder, or run pip install --editable . there",
-                quiet=False,
-            )
-            return EXIT_BAD_INPUT
         say(
             f"camtool: fault in camtool itself ({type(error).__name__}: {error}); "
             "please report it with the output of the same command with --debug",
             quiet=False,
         )
         return EXIT_FAULT
-
-
-def _is_built() -> bool:
-    """True if the compiled loops lie beside their sources, as in an installation."""
-    from importlib.util import find_spec
-
-    return find_spec("camtool.kernels._memoryviews") is not None
 
 
 def _run(signs: LifeSigns) -> int:

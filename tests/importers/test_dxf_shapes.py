@@ -485,7 +485,7 @@ def test_line_types_come_from_entity_layer_or_block():
     space.add_line((0, 4), (1, 4))
     space.add_blockref("B", (0, 9), dxfattribs={"layer": "CUT", "linetype": "DOT"})
     loaded = dxf.load(data_of(doc), "a.dxf")
-    walk = dxf.Walk(loaded, "a.dxf", OPTIONS)
+    walk = dxf.DxfWalk(loaded, "a.dxf", OPTIONS)
     walk.space(loaded.document.modelspace(), 1.0)
     found = [(piece.line_type, piece.layer) for piece in walk.pieces]
     assert found == [

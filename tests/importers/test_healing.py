@@ -5,9 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import math
-import sys
 from random import Random
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -173,9 +171,7 @@ def test_arcs_are_recognised_when_asked_after_loose_chords_were_joined(
         assert tolerance_mm == 0.002
         return path, 2
 
-    stand_in = ModuleType("camtool.geometry.simplify")
-    stand_in.recognise_arcs = recognise_arcs  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "camtool.geometry.simplify", stand_in)
+    monkeypatch.setattr("camtool.importers.healing.recognise_arcs", recognise_arcs)
     lines = [piece(a, b) for a, b in itertools.pairwise(SQUARE)]
     assert put(*lines).healing.arcs_recognised == 0
     assert seen == []
