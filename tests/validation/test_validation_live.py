@@ -82,7 +82,6 @@ OF_PLANNER = {
     "performance/wheels": SHORT,
     "diagnostic/lineno-test": "a dwell before the first move, which the recording leaves out",
     "interp_state/sloc_testing": "stops, each of them late on a busy computer",
-    "performance/cap": "not found; at rapids of some tenths of a millimetre",
     "quick-tests/axis_letter": "0.08 s lost at the first stop, on a busy computer",
     "quick-tests/zero_length_move": "0.3 s in all: two stops, 6 ms",
 }
