@@ -179,10 +179,10 @@ def _head(facts: dict[str, Any]) -> _Rows:
     for name, found in facts["smallest"].items():
         if found is not None:
             x, y = found["at_mm"]
-            yield "smallest", f"{_MIN_SIZE[name]} {found['size_mm']:.4g} mm at {x:.4f}, {y:.4f}"
+            yield "smallest", f"{_SIZE_WORDS[name]} {found['size_mm']:.4g} mm at {x:.4f}, {y:.4f}"
 
 
-_MIN_SIZE = {
+_SIZE_WORDS = {
     "radius": "radius",
     "segment": "line or arc, length",
     "contour": "contour, width",

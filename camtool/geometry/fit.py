@@ -52,7 +52,7 @@ ACCEPTED_SHARE = 0.995
 points at which it is measured the error may be a little more."""
 
 ATTEMPTS = 8
-"""How often a fit whose measured error is too large is repeated, each time finer."""
+"""Repetitions of a fit whose measured error is too large, each time finer."""
 
 REFINING = 1.0 / 8.0
 """The share of its error that a step between nodes may keep at each further attempt."""

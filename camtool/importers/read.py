@@ -41,7 +41,7 @@ class Reader(Protocol):
 
 
 class Importer(Reader, Protocol):
-    """What an entry point of the group `camtool.importers` names."""
+    """A reader of a file format, named by an entry point of the group `camtool.importers`."""
 
     def recognises(self, data: bytes, suffix: str) -> bool:
         """True if this is the content of a file of its format; `suffix` is that of its name."""

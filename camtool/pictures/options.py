@@ -1,4 +1,4 @@
-"""How a picture looks: its size, its part of the plane, its palette, its layers."""
+"""The look of a picture: its size, its part of the plane, its palette, its layers."""
 
 from __future__ import annotations
 

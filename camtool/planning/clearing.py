@@ -135,8 +135,8 @@ def _next_ring(region: Polylines, steps: Steps) -> tuple[Polylines, list[Polylin
 
 
 def _tips(core: Polylines, shrunk: Polylines, steps: Steps) -> list[Polyline]:
-    """What of the boundary of `core`, the region shrunk by the tool's radius, the tool does not
-    cover from within the next ring."""
+    """Return the parts of the boundary of `core`, the region shrunk by the tool's radius, that the
+    tool does not cover from within the next ring."""
     if len(core) == 0 or len(shrunk) == 0:
         return list(core)
     return outside_parts(core, offset_shape(shrunk, -steps.radius_mm))

@@ -319,7 +319,7 @@ class Tool:
 
 @dataclass(frozen=True)
 class Entry:
-    """How the tool goes down; a ramp or helix slopes by `angle_rad`, a helix has `radius_mm`
+    """The way down of the tool; a ramp or helix slopes by `angle_rad`, a helix has `radius_mm`
     (None: as large as fits, half the tool's at most)."""
 
     kind: str = "plunge"
@@ -339,7 +339,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class Lead:
-    """How a contour is reached or left: a line along its tangent of `length_mm`, or a quarter
+    """The way to a contour or away from it: a line along its tangent of `length_mm`, or a quarter
     arc of that radius."""
 
     kind: str = "none"
@@ -383,7 +383,7 @@ class Tabs:
 
 @dataclass(frozen=True)
 class Operation:
-    """How some of the paths are cut.
+    """A cut: the paths that it takes, its tool, depths, feeds and strategy.
 
     `layers`, `colours`: patterns of the paths that it takes, empty for all. `allowance_mm` is
     left on the wall of a profile, pocket or bore; below 0 so much is cut beyond the line, less
@@ -896,10 +896,12 @@ class Stock:
 
 @dataclass(frozen=True)
 class Job:
-    """How a drawing is cut. `approach`: every cut starts after a move that takes up the backlash
-    of both axes. `minimise`: one of GOALS. `compensate`: what is written is bent beforehand
-    against the mechanics of its machine. `frames`: patterns of the layers whose contours, where
-    they are not cut, are no edges of parts. Operations with a breakthrough get their depth,
+    """A job: all that is to be cut of a drawing.
+
+    `approach`: every cut starts after a move that takes up the backlash of both axes. `minimise`:
+    one of GOALS. `compensate`: what is written is bent beforehand against the mechanics of its
+    machine. `frames`: patterns of the layers whose contours, where they are not cut, are no edges
+    of parts. Operations with a breakthrough get their depth,
     those with a finishing pass become two. Raises OptionError for what no job can be."""
 
     operations: tuple[Operation, ...] = field(default_factory=lambda: (Operation(),))

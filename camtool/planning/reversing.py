@@ -684,7 +684,7 @@ def least_reversal_mm(axis: Axis) -> float:
 
 
 class Residual(Struct, frozen=True):
-    """What backlash and its compensation leave over on one axis: the error of its slide in mm when
+    """Backlash that compensation leaves over on one axis: the error of its slide in mm when
     driven towards − and towards +; `matters`: there is backlash or compensation; `better`: the
     direction ±1 of the smaller error (where both are alike, the one in which the axis is engaged
     at first).

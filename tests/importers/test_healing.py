@@ -381,10 +381,26 @@ def is_ring(path: Polyline, rows: list[list[float]], within: float) -> bool:
     )
 
 
-@pytest.mark.parametrize("gap", [0.0, 1e-5, 0.003, 0.01, 0.05, 0.5])
-@settings(derandomize=True)  # one seed of some thousands fails at 0.5 mm: see below
+@pytest.mark.parametrize("gap", [0.0, 1e-5, 0.003, 0.01, 0.05])
 @given(seed=st.integers(0, 10**9))
 def test_exploded_outlines_are_joined_as_they_were_drawn(gap: float, seed: int) -> None:
+    check_exploded_outlines(gap, seed)
+
+
+@settings(derandomize=True)
+@given(seed=st.integers(0, 10**9))
+def test_exploded_outlines_with_a_wide_gap(seed: int) -> None:
+    """The same seeds each time: one of some thousands fails, that of the next test."""
+    check_exploded_outlines(0.5, seed)
+
+
+@pytest.mark.xfail(strict=True, reason="a gap of 0.5 mm joins an outline in another way")
+def test_an_outline_that_a_wide_gap_joins_in_another_way() -> None:
+    check_exploded_outlines(0.5, 223768752)
+
+
+def check_exploded_outlines(gap: float, seed: int) -> None:
+    """Explode outlines at random, and compare what healing joins with what was drawn."""
     random = Random(seed)
     rings = [outline_with_specks(random, 10.0, (0.0, 0.0))]
     # An island, and one beside it by less than the gap.
@@ -405,9 +421,3 @@ def test_exploded_outlines_are_joined_as_they_were_drawn(gap: float, seed: int) 
     assert not [
         f for f in drawing.findings if f.code in (DrawingCode.GAP_CLOSED, ContourCode.BRANCHED)
     ]
-
-
-@pytest.mark.xfail(strict=True, reason="a gap of 0.5 mm joins an outline in another way")
-def test_an_outline_that_a_wide_gap_joins_in_another_way() -> None:
-    drawn = test_exploded_outlines_are_joined_as_they_were_drawn
-    drawn.hypothesis.inner_test(gap=0.5, seed=223768752)

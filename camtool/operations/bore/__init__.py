@@ -5,7 +5,7 @@ from camtool.planning.kinds import COMMON_KEYS, SELECTING_KEYS, WALL_KEYS, Opera
 BORE = OperationKind(
     name="bore",
     work="camtool.operations.bore.work:bore",
-    propose="camtool.operations.bore.proposal:proposed",
+    propose="camtool.operations.bore.proposal:propose",
     keys=(
         *COMMON_KEYS,
         *SELECTING_KEYS,

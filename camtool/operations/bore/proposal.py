@@ -6,7 +6,7 @@ from camtool.jobs.template import Part, Remaining
 from camtool.planning.holes import HOLE_SIZE_MM, circle_of
 
 
-def proposed(left: Remaining) -> list[Part]:
+def propose(left: Remaining) -> list[Part]:
     """Return one operation for the circles in which the tool has room to go round."""
     paths, least = left.drawing.paths, left.proposal.tool_mm + HOLE_SIZE_MM
     if not left.proposal.tool_mm:

@@ -5,7 +5,7 @@ from camtool.planning.kinds import COMMON_KEYS, SELECTING_KEYS, OperationKind
 DRILL = OperationKind(
     name="drill",
     work="camtool.operations.drill.work:drill",
-    propose="camtool.operations.drill.proposal:proposed",
+    propose="camtool.operations.drill.proposal:propose",
     keys=(
         *COMMON_KEYS,
         *SELECTING_KEYS,

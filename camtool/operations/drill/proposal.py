@@ -9,7 +9,7 @@ SMALL_HOLE = 0.1
 """Without a tool, circles up to this part of the drawing's longer side are taken for holes."""
 
 
-def proposed(left: Remaining) -> list[Part]:
+def propose(left: Remaining) -> list[Part]:
     """Holes at the points, and in the circles that are small, or fit the tool."""
     paths, tool = left.drawing.paths, left.proposal.tool_mm
     circles = {row: circle_of(paths[row]) for row in left.rows}

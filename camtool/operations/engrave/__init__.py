@@ -5,7 +5,7 @@ from camtool.planning.kinds import COMMON_KEYS, SELECTING_KEYS, OperationKind
 ENGRAVE = OperationKind(
     name="engrave",
     work="camtool.operations.engrave.work:engrave",
-    propose="camtool.operations.engrave.proposal:proposed",
+    propose="camtool.operations.engrave.proposal:propose",
     keys=(
         *COMMON_KEYS,
         *SELECTING_KEYS,

@@ -12,7 +12,7 @@ LAYER_WORDS = ("engrav", "etch", "scribe")
 TEXT_DEPTH_MM = 0.2
 
 
-def proposed(left: Remaining) -> list[Part]:
+def propose(left: Remaining) -> list[Part]:
     """Engravings of the letters, and of the open paths or of all that is left."""
     sources, closed = left.drawing.sources, left.drawing.paths.closed
     found: list[Part] = []

@@ -5,7 +5,7 @@ from camtool.planning.kinds import COMMON_KEYS, SELECTING_KEYS, WALL_KEYS, Opera
 PROFILE = OperationKind(
     name="profile",
     work="camtool.operations.profile.work:profile",
-    propose="camtool.operations.profile.proposal:proposed",
+    propose="camtool.operations.profile.proposal:propose",
     keys=(
         *COMMON_KEYS,
         *SELECTING_KEYS,

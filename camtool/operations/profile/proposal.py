@@ -13,7 +13,7 @@ MAX_TABS = 4
 MIN_TAB_HEIGHT_MM = 0.5
 
 
-def proposed(left: Remaining) -> list[Part]:
+def propose(left: Remaining) -> list[Part]:
     """Return one operation for all closed contours; where the tool is known, one for those within
     parts and one for the outer ones, with tabs where the stock is known too."""
     if not left.proposal.tool_mm:
