@@ -113,6 +113,23 @@ def test_random_pockets_grow(paths: list[Polyline], diameter_mm: float, share: f
     assert complaints(runs, wanted, 0.5 * diameter_mm, -1.0) == []
 
 
+def test_an_island_that_is_cut_away_wholly_keeps_nothing_beside_it() -> None:
+    """It lies so near to the wall that a tool that goes round it would not get through."""
+    paths = [_triangle(0.0, 2.0), _triangle(0.6, 0.03125)]
+    wanted = offset_shape(region_of(paths), -0.125)
+    assert len(wanted) == 1
+    runs = runs_of(work_of(paths, 1.0, allowance_mm=-0.125))
+    assert complaints(runs, wanted, 0.5, -1.0) == []
+    finishing = work_of(paths, 1.0, allowance_mm=-0.125, stage="finish")
+    assert len(finishing.items) == 1
+
+
+def _triangle(x: float, radius_mm: float) -> Polyline:
+    angles = np.arange(3) * math.tau / 3
+    rows = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(3)])
+    return Polyline(rows * radius_mm + [x, 0.0, 0.0], closed=True)
+
+
 @pytest.mark.parametrize("kind", ["profile", "pocket"])
 def test_a_finishing_pass_cuts_beyond_what_was_roughed(kind: str) -> None:
     run = posted(

@@ -138,7 +138,8 @@ def _walls(chosen: Chosen, setting: Setting) -> Work:
     findings: list[Finding] = []
     for each in pockets(chosen):
         wanted = offset_shape(each.region, operation.allowance_mm)
-        walls = offset_shape(each.region, operation.away_mm)
+        region = _without_lost_islands(each.region, operation.beyond_mm)
+        walls = offset_shape(region, operation.away_mm)
         paths += walls
         names += [each.name] * len(walls)
         sources += [each.source] * len(walls)
@@ -201,6 +202,7 @@ def _tool_regions(region: Polylines, setting: Setting) -> list[Polylines]:
     shrunk by r, is what R − r covers of the region shrunk by r.
     """
     operation = setting.operation
+    region = _without_lost_islands(region, operation.beyond_mm)
     tool_region = offset_shape(region, operation.tool.radius_mm + _left_mm(setting))
     wider = operation.rest_of
     if wider is None or wider.contract.rest == "floor":
@@ -208,6 +210,23 @@ def _tool_regions(region: Polylines, setting: Setting) -> list[Polylines]:
     reached_mm = (1.0 + REST_OVERLAP) * wider.tool.radius_mm
     pieces = unreached(tool_region, reached_mm - operation.tool.radius_mm)
     return [piece.outline for piece in pieces]
+
+
+def _without_lost_islands(region: Polylines, beyond_mm: float) -> Polylines:
+    """Return the region without the islands that a cut beyond the lines takes away wholly.
+
+    The tool need not go round them: between such an island and the wall it would leave material.
+    The larger ones are an error of the job (`cut_away_findings`).
+    """
+    if not beyond_mm:
+        return region
+    islands = region.select(range(1, len(region)))
+    kept = [
+        row
+        for row, island in enumerate(reverse_lines(islands), start=1)
+        if len(offset_shape(Polylines.of([island]), beyond_mm))
+    ]
+    return region.select([0, *kept])
 
 
 def _nearest_next(groups: list[list[CutRun]]) -> list[CutRun]:
