@@ -27,7 +27,7 @@ BASE = {
 SHARED = BASE | {"geometry", "kernels", "machine", "toolpath"}
 TARGETS = SHARED | {"simulation", "target"}
 JUDGE = TARGETS | {"importers", "planning"}
-MADE = JUDGE | {"verification", "pictures", "run", "pipeline", "comparison"}
+MADE = JUDGE | {"stock", "verification", "pictures", "run", "pipeline", "comparison"}
 
 # Which rooms each room may import from (besides itself); docs/overview.md draws it.
 ALLOWED = {
@@ -51,16 +51,17 @@ ALLOWED = {
     "importers": SHARED,
     "planning": SHARED,
     "simulation": SHARED,
+    "stock": SHARED | {"simulation", "planning", "target"},
     "target": SHARED | {"simulation", "project"},
     "postprocessors": TARGETS,
-    "verification": JUDGE,
-    "pictures": JUDGE | {"verification"},
+    "verification": JUDGE | {"stock"},
+    "pictures": JUDGE | {"stock", "verification"},
     "calibration": TARGETS,
     "jobs": TARGETS | {"importers", "planning"},
     "operations": SHARED | {"planning", "jobs"},
-    "run": JUDGE | {"verification", "pictures"},
-    "pipeline": JUDGE | {"verification", "run"},
-    "comparison": JUDGE | {"verification", "pictures", "run", "pipeline"},
+    "run": JUDGE | {"stock", "verification", "pictures"},
+    "pipeline": JUDGE | {"stock", "verification", "run"},
+    "comparison": JUDGE | {"stock", "verification", "pictures", "run", "pipeline"},
     "inspection": MADE - {"pictures"} | {"jobs"},
     "batches": MADE,
     "sending": MADE,

@@ -1,0 +1,69 @@
+"""The profile of a tool: the height of its surface above its tip, by the distance from its axis.
+
+    flat of radius `flat_mm`, then a round corner of radius `corner_mm` or a cone that rises by
+    `rise` for each millimetre, up to the radius of the tool; above it the tool is a cylinder.
+
+          d ≤ flat                 0
+          round corner c           c − √(c² − (d − flat)²)
+          cone                     (d − flat) · rise
+          d > radius               no cut
+
+Every profile is convex and does not fall with the distance. The compiled loops of
+`camtool.kernels.stock` rely on both: along a straight move the height over a point is then a convex
+function of the place on the move.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from msgspec import Struct
+
+from camtool.arrays import Floats
+from camtool.planning.job import Tool
+
+MAX_CONE_RADIUS_MM = 1e3
+"""Radius of a V bit of which only the cone is known."""
+
+
+class CutterProfile(Struct, frozen=True):
+    """The profile of a tool, mm; `rise` is the cotangent of half the angle of its cone, 0 without
+    a cone. A tool with a radius of 0 cuts nothing."""
+
+    radius_mm: float
+    flat_mm: float
+    corner_mm: float = 0.0
+    rise: float = 0.0
+
+    @property
+    def columns(self) -> tuple[float, float, float, float]:
+        """Radius, flat, corner and rise: a row of the table that the compiled loops read."""
+        return self.radius_mm, self.flat_mm, self.corner_mm, self.rise
+
+    @property
+    def full_mm(self) -> float:
+        """Height above the tip at which the tool is as wide as its radius, mm."""
+        return self.corner_mm or (self.radius_mm - self.flat_mm) * self.rise
+
+    def heights(self, distance: Floats) -> Floats:
+        """Return the heights of the surface over the tip at distances from the axis; inf beyond
+        the radius."""
+        out = np.maximum(distance - self.flat_mm, 0.0)
+        if self.corner_mm:
+            below = np.minimum(out, self.corner_mm)
+            z = self.corner_mm - np.sqrt(np.maximum(self.corner_mm**2 - below**2, 0.0))
+        else:
+            z = out * self.rise
+        return np.where(distance <= self.radius_mm, z, np.inf)
+
+
+def cutter_profile(tool: Tool) -> CutterProfile:
+    """Return the profile of a tool. A V bit or a drill without a known angle counts as flat, which
+    cuts more than the tool does."""
+    angle = tool.tip_angle_rad
+    if tool.kind in ("v", "drill") and angle is not None:
+        radius = tool.radius_mm or MAX_CONE_RADIUS_MM
+        flat = 0.5 * tool.tip_diameter_mm if tool.kind == "v" else 0.0
+        return CutterProfile(radius, flat, rise=1.0 / math.tan(0.5 * angle))
+    return CutterProfile(tool.radius_mm, tool.radius_mm - tool.nose_mm, corner_mm=tool.nose_mm)
