@@ -13,9 +13,9 @@ os.environ["XDG_CONFIG_HOME"] = "/nonexistent"
 # Commands that tests start would compile all sources anew, each time.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
-# Hypothesis draws some values from the constants of all modules that are loaded, and which those are
-# depends on the tests that ran before in the same process: examples would differ from run to run.
-setattr(providers, "is_local_module_file", lambda path: False)
+# Hypothesis draws some values from the constants of all modules that are loaded. Which those are
+# depends on the tests that ran before in the same process: examples would differ between runs.
+providers.is_local_module_file = lambda path: False
 
 # No deadline: speed is no matter of tests here.
 settings.register_profile(

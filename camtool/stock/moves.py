@@ -16,8 +16,8 @@ from camtool.stock.cutters import CutterProfile
 
 
 class StockMoves(Struct, frozen=True, eq=False):
-    """M straight moves of tips, in the order of cutting, mm in the work frame (Z is 0 at the top of
-    the stock, and upwards).
+    """M straight moves of tips, in the order of cutting, mm in the work frame (Z is 0 at the top
+    of the stock, and upwards).
 
     `start`, `end` (M, 3); `row` (M,): the row of the decoded toolpath of each, ascending; `rapid`
     (M,): True for moves that should not touch the stock; `tool` (M,): the index of its cutter in
