@@ -1,0 +1,400 @@
+"""Exact heights of the stock after straight moves of tools, and bounds of them over squares.
+
+Arrays in, arrays out; mm. The height that a move leaves over a point is the least of z + profile
+(distance) along it, and the height of the stock is the least over all moves and its top. Three
+facts make bounds over a square:
+
+- Over a disc the least height that a move leaves is exactly the height at its middle under a tool
+  whose profile begins so much farther out.
+- The height of a move is a convex function of the point, so over a square its greatest value is at
+  a corner.
+- So is every mean of the heights of two moves, and the stock lies below each such mean. Between
+  two passes the slopes of both cancel in it, so the bound errs by the square of the square's size
+  instead of by the size itself.
+
+`tests/oracles/stock_heights.py` is the twin.
+"""
+
+from __future__ import annotations
+
+from libc cimport math
+from camtool.kernels.types cimport Int
+
+import numpy as np
+
+from camtool.arrays import Floats, Ints
+
+cdef enum:
+    FAN = 8  # children of a node, and moves of a leaf
+    DEPTH = 24  # levels of a tree, at most: 8 to the 24 is more than any computer holds
+    NEAREST = 8  # moves that are kept for the means of pairs
+
+# Columns of a move: start, unit direction in the plane, length in the plane, slope.
+cdef enum:
+    AX, AY, AZ, UX, UY, LONG, SLOPE, COLUMNS
+
+# Columns of a node: box of the tips, lowest tip, widest tool, first move in the order of cutting,
+# and the least and the greatest tool, which are one where the node has one tool.
+cdef enum:
+    LOW_X, LOW_Y, HIGH_X, HIGH_Y, LOWEST, WIDEST, EARLIEST, TOOL, LAST_TOOL, NODE_COLUMNS
+
+# Columns of a tool.
+cdef enum:
+    RADIUS, FLAT, CORNER, RISE, TOOL_COLUMNS
+
+# A sloping move of a bull nose: halvings of the place on the move at which it is lowest.
+cdef int HALVINGS = 54
+
+
+cdef inline double profile(const double* tool, double apart, double grow) noexcept nogil:
+    """Height of a tool's surface over its tip at a distance from its axis."""
+    cdef double out = apart - tool[FLAT] - grow
+    if out <= 0.0:
+        return 0.0
+    if tool[CORNER] > 0.0:
+        if out >= tool[CORNER]:
+            return tool[CORNER]
+        return tool[CORNER] - math.sqrt(tool[CORNER] * tool[CORNER] - out * out)
+    return out * tool[RISE]
+
+
+cdef inline double downhill(
+    const double* tool, double aside, double steep, double most, double grow
+) noexcept nogil:
+    """Distance downhill, from the place on a sloping line that is nearest to a point `aside` of it
+    to the one where the tool is lowest over the point; `most` at most."""
+    cdef double flat = tool[FLAT] + grow, corner = tool[CORNER]
+    cdef double low, high, middle, apart, out
+    cdef int k
+    low = math.sqrt(flat * flat - aside * aside) if aside < flat else 0.0
+    if corner <= 0.0:
+        if tool[RISE] <= 0.0 or steep >= tool[RISE]:
+            return most
+        middle = aside * steep / math.sqrt(tool[RISE] * tool[RISE] - steep * steep)
+        return min(max(low, middle), most)
+    if flat == 0.0:
+        middle = max(corner * corner - aside * aside, 0.0) / (1.0 + steep * steep)
+        return min(steep * math.sqrt(middle), most)
+    high = most
+    for k in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        apart = math.sqrt(aside * aside + middle * middle)
+        out = apart - flat
+        # The slope of the profile there against that of the line, without a division by zero.
+        if out > 0.0 and (
+            out >= corner
+            or out * middle > steep * apart * math.sqrt(corner * corner - out * out)
+        ):
+            high = middle
+        else:
+            low = middle
+    return 0.5 * (low + high)
+
+
+cdef inline double height_of(
+    const double* move, const double* tool, double x, double y, double grow
+) noexcept nogil:
+    """Least height to which a move cuts a point, with the profile begun `grow` farther out; inf
+    where the tool does not get."""
+    cdef double wide = tool[RADIUS] + grow
+    cdef double px = x - move[AX], py = y - move[AY]
+    cdef double along, aside, s, apart, reach, low, high
+    if wide <= 0.0:
+        return math.INFINITY
+    if move[LONG] == 0.0:
+        apart = math.sqrt(px * px + py * py)
+        return move[AZ] + profile(tool, apart, grow) if apart <= wide else math.INFINITY
+    aside = math.fabs(px * move[UY] - py * move[UX])
+    if aside > wide:
+        return math.INFINITY
+    along = px * move[UX] + py * move[UY]
+    if move[SLOPE] == 0.0:
+        s = min(max(along, 0.0), move[LONG]) - along
+        apart = math.sqrt(aside * aside + s * s)
+        return move[AZ] + profile(tool, apart, grow) if apart <= wide else math.INFINITY
+    reach = math.sqrt(wide * wide - aside * aside)
+    low, high = max(0.0, along - reach), min(move[LONG], along + reach)
+    if low > high:
+        return math.INFINITY
+    s = downhill(tool, aside, math.fabs(move[SLOPE]), reach, grow)
+    s = along - s if move[SLOPE] > 0.0 else along + s
+    s = min(max(s, low), high)
+    apart = math.sqrt(aside * aside + (s - along) * (s - along))
+    return move[AZ] + move[SLOPE] * s + profile(tool, min(apart, wide), grow)
+
+
+cdef class StockTree:
+    """The moves (M, 7) in the order of a curve through the plane, the tool (M,) and the number in
+    the order of cutting (M,) of each; tools (T, 4); the nodes (N, 7) of all levels, the root's
+    last, where level l begins at levels[l]. `top`: the height of what is not cut."""
+
+    cdef double[:, ::1] moves, nodes, tools
+    cdef Int[::1] tool, number, levels
+    cdef readonly double top
+    cdef int height
+
+    def __init__(
+        self, moves: Floats, tool: Ints, number: Ints, tools: Floats, top: float
+    ) -> None:
+        self.moves, self.tool, self.number, self.tools = moves, tool, number, tools
+        self.top = top
+        nodes, levels = _nodes(
+            np.asarray(moves), np.asarray(tool), np.asarray(number), np.asarray(tools)
+        )
+        self.nodes, self.levels = nodes, levels
+        self.height = len(levels) - 1
+
+    def heights(self, points: Floats, before: Ints | None = None, double grow=0.0):
+        """(J,) heights of the stock over points (J, 2), and (J,) the move in the order of cutting
+        that is lowest there, −1 for none; after the first `before` (J,) moves only. Profiles begin
+        `grow` farther out, or nearer where it is below 0."""
+        cdef double[:, ::1] at = np.ascontiguousarray(points, dtype=np.float64)
+        cdef Py_ssize_t k, count = at.shape[0]
+        cdef double[::1] found = np.empty(count)
+        cdef Int[::1] which = np.empty(count, dtype=np.int64)
+        cdef Int[::1] until
+        cdef bint timed = before is not None
+        cdef Int last = -1, row
+        if timed:
+            until = np.ascontiguousarray(before, dtype=np.int64)
+        with nogil:
+            for k in range(count):
+                row = -1
+                found[k] = self.lowest(
+                    at[k, 0], at[k, 1], grow, self.top, until[k] if timed else -1, &row, last
+                )
+                last = row
+                which[k] = self.number[row] if row >= 0 else -1
+        return np.asarray(found), np.asarray(which)
+
+    def least(self, squares: Floats, double grow=0.0):
+        """(K,) the least height over the disc round each square: middle and half a side (K, 3)."""
+        cdef double[:, ::1] at = np.ascontiguousarray(squares, dtype=np.float64)
+        cdef Py_ssize_t k, count = at.shape[0]
+        cdef double[::1] found = np.empty(count)
+        cdef Int last = -1, row
+        with nogil:
+            for k in range(count):
+                row = -1
+                found[k] = self.lowest(
+                    at[k, 0], at[k, 1], at[k, 2] * math.sqrt(2.0) + grow, self.top, -1, &row, last
+                )
+                last = row
+        return np.asarray(found)
+
+    def greatest(self, squares: Floats, tilt: Floats | None = None, double grow=0.0):
+        """(K,) an upper bound of the heights over each square: middle and half a side (K, 3). With
+        `tilt` (K, 2) it is one of the heights over the plane through 0 at the middle that rises so
+        much for each mm of x and y."""
+        cdef double[:, ::1] at = np.ascontiguousarray(squares, dtype=np.float64)
+        cdef double[:, ::1] slope
+        cdef Py_ssize_t k, count = at.shape[0]
+        cdef double[::1] found = np.empty(count)
+        cdef Int last = -1
+        slope = np.zeros((count, 2)) if tilt is None else np.ascontiguousarray(tilt)
+        with nogil:
+            for k in range(count):
+                found[k] = self.bound(&at[k, 0], &slope[k, 0], grow, &last)
+        return np.asarray(found)
+
+    cdef inline double nearer(
+        self, const double* node, double x, double y, double room, double grow
+    ) noexcept nogil:
+        """Lower bound of what the moves of a node leave within `room` of a point; inf where none
+        of them gets."""
+        cdef double dx = max(max(node[LOW_X] - x, x - node[HIGH_X]), 0.0)
+        cdef double dy = max(max(node[LOW_Y] - y, y - node[HIGH_Y]), 0.0)
+        cdef double wide = node[WIDEST] + grow + room
+        if wide <= 0.0 or dx * dx + dy * dy > wide * wide:
+            return math.INFINITY
+        if node[TOOL] != node[LAST_TOOL]:
+            return node[LOWEST]
+        return node[LOWEST] + profile(
+            &self.tools[<Int>node[TOOL], 0], math.sqrt(dx * dx + dy * dy), grow + room
+        )
+
+    cdef double lowest(
+        self, double x, double y, double grow, double top, Int before, Int* which, Int guess
+    ) noexcept nogil:
+        """Least height over a point, below `top`, and the row of the move there. `guess`: a move
+        that may be low there."""
+        cdef Int stack[FAN * DEPTH]
+        cdef int levels[FAN * DEPTH]
+        cdef int count = 0, level
+        cdef Int node, child, end, row
+        cdef double best = top, z
+        if self.height == 0:
+            return best
+        if guess >= 0 and (before < 0 or self.number[guess] < before):
+            z = height_of(&self.moves[guess, 0], &self.tools[self.tool[guess], 0], x, y, grow)
+            if z < best:
+                best, which[0] = z, guess
+        stack[0], levels[0], count = 0, self.height - 1, 1
+        while count:
+            count -= 1
+            node, level = stack[count], levels[count]
+            row = self.levels[level] + node
+            if before >= 0 and self.nodes[row, EARLIEST] >= before:
+                continue
+            if not self.nearer(&self.nodes[row, 0], x, y, 0.0, grow) < best:
+                continue
+            end = min(FAN * (node + 1), self.members(level))
+            if level == 0:
+                for child in range(FAN * node, end):
+                    if self.moves[child, AZ] + min(
+                        self.moves[child, SLOPE] * self.moves[child, LONG], 0.0
+                    ) >= best or (before >= 0 and self.number[child] >= before):
+                        continue
+                    z = height_of(
+                        &self.moves[child, 0], &self.tools[self.tool[child], 0], x, y, grow
+                    )
+                    if z < best:
+                        best, which[0] = z, child
+            else:
+                for child in range(FAN * node, end):
+                    stack[count], levels[count] = child, level - 1
+                    count += 1
+        return best
+
+    cdef inline Int members(self, int level) noexcept nogil:
+        """Number of children that the nodes of a level have together."""
+        if level == 0:
+            return self.moves.shape[0]
+        return self.levels[level] - self.levels[level - 1]
+
+    cdef double bound(
+        self, const double* square, const double* tilt, double grow, Int* guess
+    ) noexcept nogil:
+        """Upper bound of the heights over a square, and over a plane."""
+        cdef double x = square[0], y = square[1], half = square[2]
+        cdef double steep = half * (math.fabs(tilt[0]) + math.fabs(tilt[1]))
+        cdef Int stack[FAN * DEPTH]
+        cdef int levels[FAN * DEPTH]
+        cdef double corner[NEAREST][4]
+        cdef double now[4]
+        cdef double mean[NEAREST]
+        cdef int count = 0, level, kept = 0, k, j
+        cdef Int node, child, end, row, middle = -1
+        cdef double best = self.top + steep, z, room = half * math.sqrt(2.0), average
+        if self.height == 0:
+            return best
+        self.lowest(x, y, grow, self.top, -1, &middle, guess[0])
+        if middle < 0:
+            return best
+        guess[0] = middle
+        best = min(best, self.corners(middle, square, tilt, grow, now))
+        stack[0], levels[0], count = 0, self.height - 1, 1
+        while count:
+            count -= 1
+            node, level = stack[count], levels[count]
+            row = self.levels[level] + node
+            if not self.nearer(&self.nodes[row, 0], x, y, room, grow) - steep < best:
+                continue
+            end = min(FAN * (node + 1), self.members(level))
+            if level:
+                for child in range(FAN * node, end):
+                    stack[count], levels[count] = child, level - 1
+                    count += 1
+                continue
+            for child in range(FAN * node, end):
+                if self.moves[child, AZ] + min(
+                    self.moves[child, SLOPE] * self.moves[child, LONG], 0.0
+                ) - steep >= best:
+                    continue
+                z = self.corners(child, square, tilt, grow, now)
+                if z == math.INFINITY:
+                    continue
+                best = min(best, z)
+                # The moves that are lowest on the whole are kept for the means.
+                average = now[0] + now[1] + now[2] + now[3]
+                k = kept if kept < NEAREST else NEAREST - 1
+                if kept == NEAREST and average >= mean[k]:
+                    continue
+                while k > 0 and mean[k - 1] > average:
+                    mean[k] = mean[k - 1]
+                    for j in range(4):
+                        corner[k][j] = corner[k - 1][j]
+                    k -= 1
+                mean[k] = average
+                for j in range(4):
+                    corner[k][j] = now[j]
+                if kept < NEAREST:
+                    kept += 1
+        for k in range(kept):
+            for j in range(k):
+                best = mean_bound(corner[k], corner[j], best)
+        return best
+
+    cdef inline double corners(
+        self, Int move, const double* square, const double* tilt, double grow, double* found
+    ) noexcept nogil:
+        """Heights of a move over a plane at the corners of a square, and the greatest of them."""
+        cdef double* tool = &self.tools[self.tool[move], 0]
+        cdef double* columns = &self.moves[move, 0]
+        cdef double most = -math.INFINITY, dx, dy
+        cdef int k
+        for k in range(4):
+            dx = square[2] if k & 1 else -square[2]
+            dy = square[2] if k & 2 else -square[2]
+            found[k] = height_of(columns, tool, square[0] + dx, square[1] + dy, grow)
+            found[k] -= tilt[0] * dx + tilt[1] * dy
+            most = max(most, found[k])
+            if most == math.INFINITY:
+                break
+        return most
+
+
+cdef inline double mean_bound(const double* one, const double* other, double best) noexcept nogil:
+    """Least over all means of two moves of the greatest value at four corners, or `best` where
+    that is less: at an end or where the lines of two corners cross."""
+    cdef double share, rise, most, value
+    cdef int k, j, c
+    for k in range(4):
+        for j in range(k):
+            rise = (one[k] - other[k]) - (one[j] - other[j])
+            if rise == 0.0:
+                continue
+            share = (other[j] - other[k]) / rise
+            if not 0.0 < share < 1.0:
+                continue
+            most = -math.INFINITY
+            for c in range(4):
+                value = other[c] + share * (one[c] - other[c])
+                most = max(most, value)
+            best = min(best, most)
+    return best
+
+
+def _nodes(moves: Floats, tool: Ints, number: Ints, tools: Floats) -> tuple[Floats, Ints]:
+    """The nodes of all levels, and where each level begins, with the end of the last."""
+    count = len(moves)
+    if not count:
+        return np.empty((0, NODE_COLUMNS)), np.zeros(1, dtype=np.int64)
+    end_x = moves[:, AX] + moves[:, UX] * moves[:, LONG]
+    end_y = moves[:, AY] + moves[:, UY] * moves[:, LONG]
+    level = np.column_stack(
+        [
+            np.minimum(moves[:, AX], end_x),
+            np.minimum(moves[:, AY], end_y),
+            np.maximum(moves[:, AX], end_x),
+            np.maximum(moves[:, AY], end_y),
+            moves[:, AZ] + np.minimum(moves[:, SLOPE] * moves[:, LONG], 0.0),
+            tools[tool, RADIUS],
+            number,
+            tool,
+            tool,
+        ]
+    )
+    parts, begins, total = [], [0], 0
+    while True:
+        first = np.arange(0, len(level), FAN)
+        low = np.minimum.reduceat(level, first)
+        high = np.maximum.reduceat(level, first)
+        level = np.column_stack(
+            [low[:, :2], high[:, 2:4], low[:, 4], high[:, 5], low[:, 6:8], high[:, 8]]
+        )
+        parts.append(level)
+        total += len(level)
+        begins.append(total)
+        if len(level) == 1:
+            return np.ascontiguousarray(np.concatenate(parts)), np.array(begins, dtype=np.int64)

@@ -1,0 +1,157 @@
+"""Exact heights of the stock after a program, and proved bounds of how far they are from others.
+
+No grid: the height over a point is the least of z + profile(distance) over all moves. The greatest
+value of a difference of heights over a region is bracketed by branch and bound. Squares whose
+upper bound does not exceed the greatest value found so far by more than the tolerance are done;
+the others are divided in four. What is printed as proved is the greatest upper bound of all
+squares that are done.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from msgspec import Struct
+
+from camtool.arrays import Floats
+from camtool.kernels.move_tree import hilbert_order
+from camtool.kernels.stock import StockTree
+from camtool.stock.moves import StockMoves
+
+TOP_MM = 0.0
+"""Height of the top of the stock in the work frame."""
+
+TOLERANCE_MM = 1e-3
+"""Width of a bracket, unless another one is asked for."""
+
+FIRST_SQUARES = 1024
+"""Squares into which a region is divided at first, about."""
+
+SQUARES_AT_ONCE = 4096
+"""Squares that are bounded in one call of the compiled loops."""
+
+MAX_SQUARES = 4_000_000
+"""A search ends after this many squares: its bracket is then wider, and says so."""
+
+MIN_HALF_MM = 1e-9
+"""Squares are not divided further: floats end here."""
+
+
+def stock_tree(moves: StockMoves, top_mm: float = TOP_MM) -> StockTree:
+    """Index the moves for searches of heights; tools that cut no width are left out."""
+    number = np.flatnonzero(moves.table[moves.tool, 0] > 0.0)
+    start, end = moves.start[number], moves.end[number]
+    apart = end - start
+    length = np.hypot(apart[:, 0], apart[:, 1])
+    flat = length > 0.0
+    safe = np.where(flat, length, 1.0)
+    low = np.where(flat, start[:, 2], np.minimum(start[:, 2], end[:, 2]))
+    columns = np.column_stack(
+        [
+            start[:, :2],
+            low,
+            np.where(flat[:, None], apart[:, :2] / safe[:, None], 0.0),
+            length,
+            np.where(flat, apart[:, 2] / safe, 0.0),
+        ]
+    )
+    order = hilbert_order(start[:, :2], end[:, :2]) if len(number) else number
+    return StockTree(
+        np.ascontiguousarray(columns[order]),
+        np.ascontiguousarray(moves.tool[number][order].astype(np.int64)),
+        np.ascontiguousarray(number[order].astype(np.int64)),
+        moves.table,
+        top_mm,
+    )
+
+
+class Bracket(Struct, frozen=True):
+    """The greatest value of a function over a region: at least `low`, which it has at `at_mm`, and
+    at most `high`. `squares`: how many were looked at."""
+
+    low: float
+    high: float
+    at_mm: tuple[float, float]
+    squares: int = 0
+
+    @property
+    def value(self) -> float:
+        """Middle of the bracket."""
+        return 0.5 * (self.low + self.high)
+
+    @property
+    def margin(self) -> float:
+        """Half the width of the bracket: the value is proved to so much."""
+        return 0.5 * (self.high - self.low)
+
+
+def greatest_value(
+    value: Callable[[Floats], Floats],
+    upper: Callable[[Floats], Floats],
+    box: tuple[float, float, float, float],
+    tolerance: float = TOLERANCE_MM,
+    floor: float = -np.inf,
+    max_squares: int = MAX_SQUARES,
+) -> Bracket:
+    """Bracket the greatest value of a function over a box (low x, low y, high x, high y).
+
+    `value` gives it at points (J, 2); `upper` gives upper bounds over squares, whose middle and
+    half a side are the rows of (K, 3), −inf for squares that are of no interest. Values below
+    `floor` are not of interest: where all are, the bracket is (−inf, floor).
+    """
+    squares = _first_squares(box)
+    best, place, proved, seen = (
+        -np.inf,
+        (0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3])),
+        floor,
+        0,
+    )
+    pile = [(squares, np.full(len(squares), np.inf))]
+    while pile:
+        squares, bounds = pile.pop()
+        hopeful = bounds > max(best, floor) + tolerance
+        proved = max(proved, float(bounds[~hopeful].max(initial=-np.inf)))
+        squares = squares[hopeful]
+        if len(squares) > SQUARES_AT_ONCE:
+            bounds = bounds[hopeful]
+            pile.append((squares[:-SQUARES_AT_ONCE], bounds[:-SQUARES_AT_ONCE]))
+            squares = squares[-SQUARES_AT_ONCE:]
+        if not len(squares):
+            continue
+        seen += len(squares)
+        found = value(squares[:, :2])
+        row = int(np.argmax(found))
+        if found[row] > best:
+            best, place = float(found[row]), (float(squares[row, 0]), float(squares[row, 1]))
+        bounds = np.maximum(upper(squares), found)
+        ends = (squares[:, 2] <= MIN_HALF_MM) | (seen >= max_squares)
+        open_ = (bounds > max(best, floor) + tolerance) & ~ends
+        proved = max(proved, float(bounds[~open_].max(initial=-np.inf)))
+        if open_.any():
+            quarters = _quarters(squares[open_])
+            bounds = np.repeat(bounds[open_], 4)
+            # The most promising squares are looked at first: they raise the best value soon.
+            order = np.argsort(bounds, kind="stable")
+            pile.append((quarters[order], bounds[order]))
+    if best <= floor:
+        best = -np.inf
+    return Bracket(best, max(proved, best), place, seen)
+
+
+def _first_squares(box: tuple[float, float, float, float]) -> Floats:
+    """Return squares (K, 3) that cover a box."""
+    wide, high = box[2] - box[0], box[3] - box[1]
+    side = max(np.sqrt(wide * high / FIRST_SQUARES), max(wide, high) / FIRST_SQUARES, 1e-6)
+    columns, rows = max(1, int(np.ceil(wide / side))), max(1, int(np.ceil(high / side)))
+    x = box[0] + (np.arange(columns) + 0.5) * side
+    y = box[1] + (np.arange(rows) + 0.5) * side
+    grid = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    return np.column_stack([grid, np.full(len(grid), 0.5 * side)])
+
+
+def _quarters(squares: Floats) -> Floats:
+    half = 0.5 * squares[:, 2]
+    signs = np.array([[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]])
+    middles = squares[:, None, :2] + signs * half[:, None, None]
+    return np.column_stack([middles.reshape(-1, 2), np.repeat(half, 4)])
