@@ -365,6 +365,71 @@ cdef inline double mean_bound(const double* one, const double* other, double bes
     return best
 
 
+def thinned(points: Floats, row: Ints, start: Floats, double beside):
+    """(J,) the samples that stay of points (K, 3) of the rows (K,): the last one of each row, and
+    so many between that every sample lies within `beside` of the straight move between those that
+    stay before and behind it. `start` (3,): the place before the first sample.
+
+    From each kept sample the move is drawn twice as far again and again, as long as all samples
+    between lie beside it; then the last doubling is halved down.
+    """
+    cdef double[:, ::1] at = np.ascontiguousarray(np.concatenate([start[None], points]))
+    cdef Int[::1] of = np.ascontiguousarray(row, dtype=np.int64)
+    cdef Py_ssize_t count = of.shape[0], anchor = 0, end, good, span, kept = 0, last
+    cdef Int[::1] found = np.empty(count, dtype=np.int64)
+    with nogil:
+        end = 0
+        while anchor < count:
+            # Sample k stands in row k + 1 of `at`; samples anchor to end - 1 are of one row.
+            if end <= anchor:
+                end = anchor + 1
+                while end < count and of[end] == of[anchor]:
+                    end += 1
+            good, span = anchor + 1, 2
+            while good < end:
+                last = min(anchor + span, end)
+                if not lies_beside(at, anchor, last, beside):
+                    break
+                good, span = last, 2 * span
+            last = min(anchor + span, end)
+            while last - good > 1:
+                span = (good + last) // 2
+                if lies_beside(at, anchor, span, beside):
+                    good = span
+                else:
+                    last = span
+            found[kept] = good - 1
+            kept += 1
+            anchor = good
+    return np.asarray(found[:kept])
+
+
+cdef inline bint lies_beside(
+    double[:, ::1] at, Py_ssize_t begin, Py_ssize_t end, double beside
+) noexcept nogil:
+    """True if all points between two lie within a distance of the line from one to the other."""
+    cdef double[3] way
+    cdef double[3] off
+    cdef double square = 0.0, share, apart
+    cdef Py_ssize_t k
+    cdef int c
+    for c in range(3):
+        way[c] = at[end, c] - at[begin, c]
+        square += way[c] * way[c]
+    for k in range(begin + 1, end):
+        share = 0.0
+        for c in range(3):
+            off[c] = at[k, c] - at[begin, c]
+            share += off[c] * way[c]
+        share = min(max(share / square, 0.0), 1.0) if square > 0.0 else 0.0
+        apart = 0.0
+        for c in range(3):
+            apart += (off[c] - share * way[c]) * (off[c] - share * way[c])
+        if apart > beside * beside:
+            return False
+    return True
+
+
 def _nodes(moves: Floats, tool: Ints, number: Ints, tools: Floats) -> tuple[Floats, Ints]:
     """The nodes of all levels, and where each level begins, with the end of the last."""
     count = len(moves)

@@ -117,7 +117,15 @@ def _go_to_tool_change(builder: ToolpathBuilder, machine: Machine, lowest_mm: fl
 
 def tool_note(tool: Tool) -> ToolNote:
     """Return a tool as a program names it."""
-    return ToolNote(tool.number, tool.name, tool.kind, tool.diameter_mm, tool.tip_angle_rad)
+    return ToolNote(
+        tool.number,
+        tool.name,
+        tool.kind,
+        tool.diameter_mm,
+        tool.tip_angle_rad,
+        tool.tip_diameter_mm,
+        tool.corner_radius_mm,
+    )
 
 
 def _operation_note(setting: Setting) -> OperationNote:

@@ -22,6 +22,7 @@ from msgspec import Struct
 
 from camtool.arrays import Floats
 from camtool.planning.job import Tool
+from camtool.toolpath.wanted import ToolNote
 
 MAX_CONE_RADIUS_MM = 1e3
 """Radius of a V bit of which only the cone is known."""
@@ -58,12 +59,13 @@ class CutterProfile(Struct, frozen=True):
         return np.where(distance <= self.radius_mm, z, np.inf)
 
 
-def cutter_profile(tool: Tool) -> CutterProfile:
+def cutter_profile(tool: Tool | ToolNote) -> CutterProfile:
     """Return the profile of a tool. A V bit or a drill without a known angle counts as flat, which
     cuts more than the tool does."""
-    angle = tool.tip_angle_rad
+    angle, radius = tool.tip_angle_rad, 0.5 * tool.diameter_mm
     if tool.kind in ("v", "drill") and angle is not None:
-        radius = tool.radius_mm or MAX_CONE_RADIUS_MM
         flat = 0.5 * tool.tip_diameter_mm if tool.kind == "v" else 0.0
-        return CutterProfile(radius, flat, rise=1.0 / math.tan(0.5 * angle))
-    return CutterProfile(tool.radius_mm, tool.radius_mm - tool.nose_mm, corner_mm=tool.nose_mm)
+        rise = 1.0 / math.tan(0.5 * angle)
+        return CutterProfile(radius or MAX_CONE_RADIUS_MM, flat, rise=rise)
+    nose = {"ball": radius, "bull": tool.corner_radius_mm}.get(tool.kind, 0.0)
+    return CutterProfile(radius, radius - nose, corner_mm=nose)

@@ -57,13 +57,16 @@ TOOL_SHAPES = {
 
 class ToolNote(Struct, frozen=True):
     """A tool as described in a program: its shape as in jobs ("flat", "v", "drill", ...), its
-    diameter (0: no width) and the full angle of its tip, None without a tip."""
+    diameter (0: no width), the full angle of its tip, None without a tip, and the diameter of a
+    flat at the tip and the radius of its corner, mm."""
 
     number: int | None = None
     name: str = ""
     kind: str = "flat"
     diameter_mm: float = 0.0
     tip_angle_rad: float | None = None
+    tip_diameter_mm: float = 0.0
+    corner_radius_mm: float = 0.0
 
 
 class OperationNote(Struct, frozen=True):

@@ -1,0 +1,114 @@
+"""The moves of the tools that the simulated slides make, and which tool makes each of them.
+
+The samples of a simulation are thinned to straight moves, so that every sample lies within
+`THIN_MM` or a step of the axes of them; samples themselves lie on the path, which bends away from
+the line between two of them by spacing² / 8 r at most.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from msgspec import Struct
+
+from camtool.arrays import Floats, Ints
+from camtool.errors import OptionError
+from camtool.kernels.stock import thinned
+from camtool.planning.job import Job
+from camtool.simulation.motion import Options
+from camtool.stock.cutters import CutterProfile, cutter_profile
+from camtool.stock.moves import StockMoves
+from camtool.target.registry import LoadedTarget
+from camtool.toolpath.moves import Kind, Toolpath
+
+THIN_MM = 5e-4
+"""Samples may lie so far beside the moves that stand for them ..."""
+
+THIN_STEPS = 1.0
+"""... or this many steps of the coarsest axis: steps are stairs beside a sloping line."""
+
+
+class ToolsOfRows(Struct, frozen=True, eq=False):
+    """The different cutters of a program, and the index of that of each of its N rows."""
+
+    cutters: tuple[CutterProfile, ...]
+    index: Ints
+
+
+def tools_of_rows(decoded: Toolpath, job: Job | None) -> ToolsOfRows:
+    """Return the cutter of each row of a program: that of its operation where the program was
+    planned, else the one tool of the job, else the tool of the job with the number of the last
+    tool change. OptionError where a tool is not known."""
+    if decoded.operations is not None and decoded.operations.notes:
+        notes = decoded.operations.notes
+        row = np.searchsorted(decoded.operations.begin, np.arange(len(decoded)), side="right") - 1
+        return _of_profiles([cutter_profile(note.tool) for note in notes], row.clip(min=0))
+    tools = {each.tool: cutter_profile(each.tool) for each in (job.operations if job else ())}
+    if len(set(tools.values())) == 1:
+        profile = next(iter(tools.values()))
+        if profile.radius_mm > 0.0:
+            return _of_profiles([profile], np.zeros(len(decoded), dtype=np.int64))
+    numbers = {tool.number: profile for tool, profile in tools.items() if tool.number is not None}
+    changes = np.flatnonzero(decoded.kind == Kind.TOOL_CHANGE)
+    if not numbers or not len(changes):
+        raise OptionError(
+            "the shape of the tool is not known, so the stock is not either",
+            where=decoded.made_from,
+            mend="give --tool-diameter, or the job that it was made with (--job)",
+        )
+    called = [int(value) for value in decoded.value[changes].tolist()]
+    for number in called:
+        if number not in numbers:
+            known = ", ".join(map(str, sorted(numbers)))
+            raise OptionError(
+                f"the program calls tool {number}; the job has {known}",
+                where=decoded.made_from,
+                mend=f"give an operation of the job a tool with number = {number}",
+            )
+    row = np.searchsorted(changes, np.arange(len(decoded)), side="right") - 1
+    return _of_profiles([numbers[number] for number in called], row.clip(min=0))
+
+
+def _of_profiles(profiles: list[CutterProfile], row: Ints) -> ToolsOfRows:
+    """Return the different ones of profiles, and for each row, whose profile is `row` (N,), its
+    index among these."""
+    cutters = tuple(dict.fromkeys(profiles))
+    index = np.array([cutters.index(each) for each in profiles], dtype=np.int64)
+    return ToolsOfRows(cutters, index[row])
+
+
+def slide_moves(
+    decoded: Toolpath, target: LoadedTarget, tools: ToolsOfRows, options: Options | None = None
+) -> StockMoves:
+    """Simulate a program and return the moves of the tips that its slides make. Raises what
+    `LoadedTarget.simulate` raises."""
+    machine = target.machine
+    axes = (machine.axes.x, machine.axes.y, machine.axes.z)
+    step_mm = max(abs(axis.coded_step_mm) for axis in axes)
+    beside_mm = max(THIN_MM, THIN_STEPS * step_mm)
+    points, rows = [decoded.start[None]], [np.zeros(1, dtype=np.int64)]
+    for chunk in target.simulate(decoded, options):
+        if len(chunk.row):
+            kept = thinned(chunk.slide, chunk.row, points[-1][-1], beside_mm)
+            points.append(chunk.slide[kept])
+            rows.append(chunk.row[kept])
+    path, row = np.concatenate(points), np.concatenate(rows)[1:].astype(np.int64)
+    moved = (path[1:] != path[:-1]).any(axis=1)
+    bend_mm = _bend_mm(decoded, target.model.spacing_mm(decoded, machine))
+    return StockMoves(
+        path[:-1][moved],
+        path[1:][moved],
+        row[moved],
+        (decoded.kind == Kind.RAPID)[row[moved]],
+        tools.index[row[moved]],
+        tools.cutters,
+        beside_mm + bend_mm,
+    )
+
+
+def _bend_mm(decoded: Toolpath, spacing_mm: float) -> float:
+    """Return the distance by which arcs bend away from the lines between their samples, mm."""
+    arcs = np.flatnonzero(decoded.is_arc)
+    if not len(arcs):
+        return 0.0
+    radius: Floats = np.hypot(*(decoded.end[arcs, :2] - decoded.centre[arcs]).T)
+    return float((np.minimum(spacing_mm, 2.0 * radius) ** 2 / (8.0 * radius)).max(initial=0.0))
