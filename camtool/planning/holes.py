@@ -154,6 +154,29 @@ def circles_of(chosen: Chosen) -> tuple[list[Hole], list[str]]:
     return holes, others
 
 
+def largest_hole_mm(operation: Operation) -> float:
+    """Diameter up to which an operation drills circles, mm; inf for a drill of no width."""
+    if operation.max_hole_mm is not None:
+        return operation.max_hole_mm
+    return operation.tool.diameter_mm or math.inf
+
+
+def drilled_holes(
+    chosen: Chosen, operation: Operation
+) -> tuple[list[Hole], list[Hole], list[str]]:
+    """Return the holes that an operation drills, each place once; the circles that are too large
+    for it; and the names of the paths that are no circles."""
+    circles, others = circles_of(chosen)
+    limit = largest_hole_mm(operation) + HOLE_SIZE_MM
+    small = [hole for hole in circles if (hole.diameter_mm or 0.0) <= limit]
+    large = [hole for hole in circles if (hole.diameter_mm or 0.0) > limit]
+    marks = [
+        Hole((float(x), float(y)), None, name)
+        for (x, y), name in zip(chosen.points, chosen.point_names, strict=True)
+    ]
+    return each_once([*marks, *small], operation.tool.diameter_mm), large, others
+
+
 def named(names: list[str]) -> str:
     """The first few names, and how many more there are."""
     more = len(names) - NAMES_SHOWN

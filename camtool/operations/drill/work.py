@@ -8,7 +8,6 @@ diameter needs a depth greater by the height of the cone, ½·diameter / tan(½�
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -23,8 +22,8 @@ from camtool.planning.findings import (
 from camtool.planning.holes import (
     HOLE_SIZE_MM,
     Hole,
-    circles_of,
-    each_once,
+    drilled_holes,
+    largest_hole_mm,
     named,
     peck_depths,
     pecks,
@@ -43,15 +42,8 @@ def drill(chosen: Chosen, setting: Setting) -> Work:
     is left that is an error.
     """
     operation = setting.operation
-    circles, others = circles_of(chosen)
-    limit = _largest(operation)
-    small = [hole for hole in circles if (hole.diameter_mm or 0.0) <= limit + HOLE_SIZE_MM]
-    large = [hole for hole in circles if hole not in small]
-    marks = [
-        Hole((float(x), float(y)), None, name)
-        for (x, y), name in zip(chosen.points, chosen.point_names, strict=True)
-    ]
-    holes = each_once([*marks, *small], operation.tool.diameter_mm)
+    holes, large, others = drilled_holes(chosen, operation)
+    limit = largest_hole_mm(operation)
     findings = [
         *_too_large(large, limit),
         *_no_circles(others),
@@ -74,13 +66,6 @@ def _run(hole: Hole, setting: Setting) -> CutRun:
     vertices, feeds = pecks(hole.at_mm, depths, setting)
     down = setting.feeds.plunge_mm_min
     return CutRun(vertices, np.array(feeds), down, hole.name, operation.dwell_s)
-
-
-def _largest(operation: Operation) -> float:
-    """Circles up to this diameter are drilled."""
-    if operation.max_hole_mm is not None:
-        return operation.max_hole_mm
-    return operation.tool.diameter_mm or math.inf
 
 
 def _too_large(holes: list[Hole], limit: float) -> Iterator[Finding]:

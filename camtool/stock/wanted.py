@@ -1,0 +1,424 @@
+"""The wanted solid: how low and how high the stock may be at each point, from drawing and job.
+
+At a point (x, y) nothing may be cut below `low`, and nothing may stand above `high`:
+
+    gouge = low − height of the stock,    leftover = height of the stock − high.
+
+Both are made of what the job takes of the drawing, never of the planned moves, so that faults of
+the planning are found as well as those of a program. Each operation brings layers. A layer is
+drawn lines, a side of them, and a depth that depends on nothing but the distance s from the lines,
+counted inwards; so it is exact at every point and has exact limits over a box.
+
+    depth(s) = min(depth, base + rise · s)    for 0 ≤ s ≤ reach
+
+    operation         may be cut (low)                         must be cut (high)
+    pocket, bore      region less the allowance, to its depth  that region opened by the tool
+    rest of another   the same; on a carved floor less the     the same
+                      slopes of the carving
+    profile beside    the waste beside the wall, as far as     the kerf: one tool width about the
+                      the tool and its leads reach; reliefs    path of the tool's centre
+    with tabs         the same                                 the same, higher by the tabs
+    on the line       one tool width about the line, and its   one tool width about the line
+                      leads
+    engraving         the groove of the tool about the line    the same
+    drill             disc of the drill, with its cone         the same
+    vcarve            slope of the bit from the edge inwards,  the same where the bit reaches the
+                      to the depth that width or depth allow   floor, less its flat tip
+    chamfer           slope of the bit from w beyond the line  groove of the bit about its path
+    facing            everywhere, to its depth                 the stock
+
+Where several operations cut, the lowest of their heights counts, of both kinds. Elsewhere `low` is
+the stock top, and `high` is not limited. A round nose leaves feet at walls and ridges on floors:
+there `high` is asked only where its corner has passed, and higher by the ridge.
+
+Walls are vertical steps: a tool that runs a micrometre beside its path would cut the full depth
+too deep there. Errors in the plane are judged by other figures, so `low` begins `wall_mm` beyond
+the wall and `high` ends as much before it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+
+import numpy as np
+from msgspec import Struct
+
+from camtool.arrays import Floats, Ints
+from camtool.geometry.boxes import IndexedCurves
+from camtool.geometry.distance import near_paths
+from camtool.geometry.measure import signed_areas
+from camtool.geometry.nesting import Nesting, oriented
+from camtool.geometry.offset import SHARP_LIMIT, offset_each, offset_shape
+from camtool.geometry.polylines import (
+    POSITION_EPS_MM,
+    Polyline,
+    Polylines,
+    Segments,
+    reverse_lines,
+)
+from camtool.kernels.move_tree import hilbert_order
+from camtool.planning.checks import ridge_mm
+from camtool.planning.holes import HOLE_SIZE_MM, circle_of, drilled_holes
+from camtool.planning.items import Chosen, Step
+from camtool.planning.job import MILLS, Operation
+from camtool.planning.reliefs import add_reliefs
+from camtool.planning.settings import Cone
+from camtool.planning.sides import runs_beside
+from camtool.stock.cutters import cutter_profile
+from camtool.toolpath.rapids import STOCK_TOP_MM
+
+INSIDE, OUTSIDE, ABOUT = 1, -1, 0
+"""Sides of a layer's lines: within closed ones (even-odd), beyond them, or on both sides of any
+lines alike, whose distance from the shift is then counted inwards."""
+
+DEFAULT_WALL_MM = 0.01
+"""Width of the band beside a wall in which nothing is judged, if it is not given."""
+
+DIAGONAL = math.sqrt(2.0)
+"""Of a square over its side: also by how much farther apart rings of a pocket are at a corner."""
+
+NOSE_SHARE = 0.5
+"""Of the groove of a round nose, the share of its corner beside the flat that must be cut."""
+
+FAR_MM = 1e9
+"""Distance from lines where there are none."""
+
+POINT_MM = 2e-6
+"""Length of the line that stands for a point: lines need one."""
+
+
+class WantedLayer(Struct, frozen=True, eq=False, dict=True):
+    """A region that one operation may cut, or must: a depth by the distance s from `lines`, mm,
+    counted inwards of their `side` and increased by `shift_mm`. `name`: that of the operation."""
+
+    name: str
+    lines: Polylines
+    side: int
+    shift_mm: float
+    base_mm: float
+    rise: float
+    depth_mm: float
+    reach_mm: float = math.inf
+
+    @cached_property
+    def segments(self) -> Segments:
+        """The K lines and arcs, near ones one after the other."""
+        segments = Segments.of(self.lines)
+        return segments[hilbert_order(segments.start, segments.end)]
+
+    @cached_property
+    def curves(self) -> IndexedCurves:
+        """The same in a tree; with `segments.bulge` what `camtool.kernels.offsets` searches."""
+        return IndexedCurves.of(self.segments)
+
+    def inwards(self, points: Floats) -> Floats:
+        """Return the distances s (N,) of points (N, 2), mm: the shift included."""
+        from camtool.kernels.offsets import insides, nearest_distances
+
+        if not len(self.lines):
+            return np.full(len(points), FAR_MM if self.side == OUTSIDE else -FAR_MM)
+        points = np.ascontiguousarray(points, dtype=np.float64)
+        away = nearest_distances(points, self.curves.rows, self.curves.tree)
+        if self.side == ABOUT:
+            return np.asarray(self.shift_mm - away)
+        bulge = np.ascontiguousarray(self.segments.bulge)
+        within = insides(points, self.curves.rows, bulge, self.curves.tree)
+        return np.asarray(self.shift_mm + np.where(within == (self.side == INSIDE), away, -away))
+
+    def depths(self, least: Floats, most: Floats, wall_mm: float) -> tuple[Floats, Floats]:
+        """Return the least and the greatest depth (N,), mm, for s between `least` and `most` (N,),
+        with ends that are moved outwards by `wall_mm`; −inf where the layer says nothing: as least
+        if it says nothing for some s, as greatest if for all."""
+        low, high = least + wall_mm, most + wall_mm
+        shallow = np.minimum(self.base_mm + self.rise * np.maximum(low, 0.0), self.depth_mm)
+        deepest = np.maximum(np.minimum(high, self.reach_mm), 0.0)
+        deep = np.minimum(self.base_mm + self.rise * deepest, self.depth_mm)
+        end = self.reach_mm + 2.0 * wall_mm
+        return (
+            np.where((low >= 0.0) & (high <= end), np.maximum(shallow, 0.0), -np.inf),
+            np.where((high >= 0.0) & (low <= end), np.maximum(deep, 0.0), -np.inf),
+        )
+
+
+class WantedSolid(Struct, frozen=True, eq=False):
+    """The layers of what may be cut and of what must be, and the width of the band beside walls
+    in which nothing is judged, mm."""
+
+    may: tuple[WantedLayer, ...]
+    must: tuple[WantedLayer, ...]
+    wall_mm: float = DEFAULT_WALL_MM
+
+    def bands(self, points: Floats) -> Floats:
+        """Return low and high (N, 2), mm in the work frame, at points (N, 2) mm; high is inf where
+        nothing must be cut."""
+        low, high = np.full(len(points), STOCK_TOP_MM), np.full(len(points), np.inf)
+        for layers, edge, wall_mm in self._sides(low, high):
+            for layer in layers:
+                s = layer.inwards(points)
+                np.minimum(edge, -layer.depths(s, s, wall_mm)[1], out=edge)
+        return np.column_stack([low, high])
+
+    def bounds(self, squares: Floats) -> Floats:
+        """Return limits (N, 4), mm, of the bands over squares (N, 3) of middle and half a side:
+        the least and the greatest low, and the least and the greatest high."""
+        half = DIAGONAL * squares[:, 2]
+        low, high = np.full((2, len(squares)), STOCK_TOP_MM), np.full((2, len(squares)), np.inf)
+        for layers, edges, wall_mm in self._sides(low, high):
+            for layer in layers:
+                s = layer.inwards(squares[:, :2])
+                shallow, deep = layer.depths(s - half, s + half, wall_mm)
+                np.minimum(edges, -np.stack([deep, shallow]), out=edges)
+        return np.column_stack([*low, *high])
+
+    def cut_by(self, point: tuple[float, float]) -> str:
+        """Return the name of the operation that may cut the lowest at a point (x, y) mm, or else
+        of the one whose edge is nearest; "" without operations."""
+        at = np.array([point])
+        found = [
+            (*(-each[0] for each in layer.depths(s, s, self.wall_mm)[:0:-1]), -s[0], layer.name)
+            for layer in self.may
+            for s in (layer.inwards(at),)
+        ]
+        return min(found)[-1] if found else ""
+
+    def _sides(
+        self, low: Floats, high: Floats
+    ) -> tuple[tuple[tuple[WantedLayer, ...], Floats, float], ...]:
+        return (self.may, low, self.wall_mm), (self.must, high, -self.wall_mm)
+
+
+def wanted_solid(steps: Sequence[Step], wall_mm: float = DEFAULT_WALL_MM) -> WantedSolid:
+    """Return the solid that the operations of a plan leave, from what each took of the drawing and
+    its setting; what cuts no width leaves all."""
+    may: list[WantedLayer] = []
+    must: list[WantedLayer] = []
+    for step in steps:
+        if step.operation.tool.radius_at(-step.setting.levels_mm[-1]) > 0.0:
+            maker = _Layers(step)
+            may += maker.may()
+            must += maker.must()
+    return WantedSolid(tuple(may), tuple(must), wall_mm)
+
+
+class _Layers:
+    """The layers of an operation."""
+
+    def __init__(self, step: Step) -> None:
+        self.operation: Operation = step.operation
+        self.chosen: Chosen = step.chosen
+        self.stock = step.setting.stock
+        self.depth_mm = -step.setting.levels_mm[-1]
+        self.name = step.operation.name or step.operation.kind
+        self.closed: Ints = np.flatnonzero(step.chosen.lines.closed)
+
+    def may(self) -> Iterator[WantedLayer]:
+        """Yield the layers of what may be cut."""
+        operation, contract, depth = self.operation, self.operation.contract, self.depth_mm
+        if contract.cuts == "over":
+            yield self._straight(Polylines.of([]), OUTSIDE, depth)
+        elif contract.cuts == "at":
+            yield from self._holes()
+        elif contract.cuts == "within" and contract.leaves_walls:
+            yield self._straight(self._region(), INSIDE, depth, shift_mm=-self._left_mm)
+        elif contract.cuts == "within":
+            yield self._carved(0.0, to_walls=False)
+        elif runs_beside(operation):
+            yield from self._waste()
+            yield from self._reliefs()
+            yield from self._grooves(self._lines(closed=False), self._leads_mm, whole=True)
+        else:
+            yield from self._grooves(self._lines(), self._leads_mm, whole=True)
+
+    def must(self) -> Iterator[WantedLayer]:
+        """Yield the layers of what must be cut."""
+        operation, contract, tool = self.operation, self.operation.contract, self.operation.tool
+        if contract.cuts == "over":
+            if self.stock is not None and self.stock.box_mm is not None and tool.kind in MILLS:
+                left, low, right, high = self.stock.box_mm
+                corners = [[left, low, 0], [right, low, 0], [right, high, 0], [left, high, 0]]
+                box = Polyline(np.array(corners, dtype=np.float64), closed=True)
+                yield self._straight(Polylines.of([box]), INSIDE, self._floor_mm)
+        elif contract.cuts == "at":
+            yield from self._holes()
+        elif contract.cuts == "within" and contract.leaves_walls:
+            if tool.kind in MILLS:
+                region = offset_shape(self._region(), self._left_mm + tool.radius_mm)
+                region = offset_shape(region, -tool.radius_mm)
+                yield self._straight(region, INSIDE, self._floor_mm, shift_mm=-tool.nose_mm)
+        elif contract.cuts == "within":
+            yield self._carved(0.5 * tool.tip_diameter_mm, to_walls=True)
+        elif runs_beside(operation):
+            yield from self._grooves(self._centre_paths(), 0.0, whole=False)
+            yield from self._grooves(self._lines(closed=False), 0.0, whole=False)
+        else:
+            yield from self._grooves(self._lines(), 0.0, whole=False)
+
+    def _straight(
+        self, lines: Polylines, side: int, depth_mm: float, **more: float
+    ) -> WantedLayer:
+        """A layer with vertical walls."""
+        shift = more.pop("shift_mm", 0.0)
+        return WantedLayer(self.name, lines, side, shift, depth_mm, 0.0, depth_mm, **more)
+
+    def _lines(self, *, closed: bool | None = None) -> Polylines:
+        """The chosen lines; the open or the closed ones alone."""
+        lines = self.chosen.lines
+        if closed is None:
+            return lines
+        return lines.select(np.flatnonzero(lines.closed == closed).tolist())
+
+    def _region(self) -> Polylines:
+        """The region that is cleared, on the left of its closed paths: of bores the circles that
+        are wide enough, the outermost of those within each other."""
+        nesting = self.chosen.nesting.among(self.closed)
+        if self.operation.contract.takes != "circles":
+            return oriented(nesting)
+        least = 2.0 * self.operation.away_mm + HOLE_SIZE_MM
+        circles = [(row, circle_of(path)) for row, path in enumerate(nesting.lines)]
+        wide = np.array([row for row, each in circles if each and each[1] > least], dtype=np.int64)
+        bored = nesting.among(wide)
+        outer = bored.lines.select(np.flatnonzero(bored.levels.depth == 0).tolist())
+        return reverse_lines(outer, signed_areas(outer) < 0.0)
+
+    @property
+    def _left_mm(self) -> float:
+        """Material left beside the walls of a region, mm: the allowance, and on a carved floor
+        the slopes of the carving."""
+        carved = self.operation.rest_of
+        if carved is None or carved.contract.rest != "floor" or carved.tool.tip_angle_rad is None:
+            return self.operation.allowance_mm
+        slope = math.tan(0.5 * carved.tool.tip_angle_rad)
+        return self.operation.allowance_mm + self.depth_mm * slope
+
+    @property
+    def _floor_mm(self) -> float:
+        """The depth at least of a floor, with the ridges of a round nose at a square corner."""
+        tool, step_over = self.operation.tool, self.operation.step_over
+        return self.depth_mm - ridge_mm(tool, min(DIAGONAL * step_over, 1.0))
+
+    @property
+    def _leads_mm(self) -> float:
+        leads = (self.operation.lead_in, self.operation.lead_out)
+        return max(each.length_mm if each.kind != "none" else 0.0 for each in leads)
+
+    def _holes(self) -> Iterator[WantedLayer]:
+        """The discs of drilled holes."""
+        holes = drilled_holes(self.chosen, self.operation)[0]
+        points = [
+            Polyline(np.array([[x, y, 0.0], [x + POINT_MM, y, 0.0]])) for x, y in
+            (hole.at_mm for hole in holes)
+        ]  # fmt: skip
+        return self._grooves(Polylines.of(points), 0.0, whole=True)
+
+    def _carved(self, tip_mm: float, *, to_walls: bool) -> WantedLayer:
+        """The slopes of a carving, less the flat tip of its bit; `to_walls`: only as far from the
+        edge as the bit is wide, since a floor beyond that is left."""
+        cone = Cone.of(self.operation)
+        radius = cone.radius_at(self.depth_mm)
+        return WantedLayer(
+            self.name,
+            self._lines(closed=True),
+            INSIDE,
+            0.0,
+            -tip_mm / cone.slope,
+            1.0 / cone.slope,
+            (radius - cone.tip_mm) / cone.slope,
+            radius if to_walls else math.inf,
+        )
+
+    def _waste(self) -> Iterator[WantedLayer]:
+        """The waste beside the walls: as far as the tool and its leads reach, and its centre on
+        the joins of corners."""
+        operation, tool = self.operation, self.operation.tool
+        reach = 2.0 * tool.radius_mm
+        if operation.joins != "round":
+            limit = operation.mitre_limit if operation.joins == "mitre" else SHARP_LIMIT
+            reach = max(reach, operation.away_mm * limit + tool.radius_mm)
+        for lines, side in self._walls():
+            if operation.contract.breaks_edges:
+                width, rise = operation.chamfer_mm or 0.0, cutter_profile(tool).rise
+                reach = 2.0 * (operation.wall_radius_mm + width) + self._leads_mm
+                yield WantedLayer(self.name, lines, side, width, 0.0, rise, self.depth_mm, reach)
+                continue
+            shift, reach_mm = -operation.allowance_mm, reach + self._leads_mm
+            yield self._straight(lines, side, self.depth_mm, shift_mm=shift, reach_mm=reach_mm)
+
+    def _walls(self) -> Iterator[tuple[Polylines, int]]:
+        """Yield closed lines that bound one region, and the side of them where the waste is.
+
+        With the sides of the nesting all do, but those whose side is the other one because of
+        contours that were not chosen; where the job names the side, those of each depth of
+        nesting do, so that a contour in another one is cut on that side too.
+        """
+        chosen, closed = self.chosen, self.closed
+        depth, rim = chosen.nesting.among(closed).levels.depth, chosen.rim[closed]
+        if self.operation.side == "auto":
+            turned = (depth % 2 == 0) != rim
+            groups = [(~turned, OUTSIDE), (turned, INSIDE)]
+        else:
+            groups = [
+                ((depth == level) & (rim == is_rim), OUTSIDE if is_rim else INSIDE)
+                for level in np.unique(depth).tolist()
+                for is_rim in (True, False)
+            ]
+        for mine, side in groups:
+            if mine.any():
+                yield chosen.lines.select(closed[mine].tolist()), side
+
+    def _centre_paths(self) -> Polylines:
+        """The paths of the tool's centre beside the walls."""
+        operation, made = self.operation, list[Polylines]()
+        joins, limit = operation.joins, operation.mitre_limit
+        for lines, side in self._walls():
+            nested = Nesting(lines)
+            kept = oriented(nested) if side == OUTSIDE else reverse_lines(oriented(nested))
+            if operation.side == "auto":
+                paths = offset_shape(kept, -operation.away_mm, joins=joins, mitre_limit=limit)
+            else:
+                paths, _ = offset_each(kept, -operation.away_mm, joins=joins, mitre_limit=limit)
+            made.append(paths)
+        return Polylines.joined(made)
+
+    def _reliefs(self) -> Iterator[WantedLayer]:
+        """Yield the grooves of reliefs, which enter the part at its inner corners."""
+        operation, moves = self.operation, list[Polyline]()
+        if operation.corners == "none":
+            return
+        paths, walls = self._centre_paths(), self._lines(closed=True)
+        near_mm = operation.tool.radius_mm - operation.beyond_mm
+        nothing = Polylines.of([])
+        for one, other in near_paths(paths, walls, operation.away_mm + POSITION_EPS_MM):
+            path, kind = paths[one], operation.corners
+            relieved = add_reliefs(path, walls[other], near_mm, kind, nothing).path.vertices
+            own = {tuple(place) for place in path.vertices[:, :2].tolist()}
+            ends = np.roll(relieved, -1, axis=0)
+            moves += [
+                Polyline(np.array([here, there]))
+                for here, there in zip(relieved, ends, strict=True)
+                if tuple(there[:2].tolist()) not in own
+            ]
+        yield from self._grooves(Polylines.of(moves), 0.0, whole=True)
+
+    def _grooves(self, lines: Polylines, more_mm: float, *, whole: bool) -> Iterator[WantedLayer]:
+        """Yield the groove of the tool about lines: the `whole` one and `more_mm` to both sides,
+        or what of it must be cut: higher by the tabs, and not the foot of a round nose."""
+        if not len(lines):
+            return
+        tool, depth = self.operation.tool, self.depth_mm
+        profile = cutter_profile(tool)
+        radius, base, rise = tool.radius_at(depth), depth, 0.0
+        if profile.rise and not more_mm:
+            radius = min(profile.radius_mm, profile.flat_mm + depth / profile.rise)
+            base, rise = depth - (radius - profile.flat_mm) * profile.rise, profile.rise
+        elif profile.corner_mm and not whole:
+            beside = NOSE_SHARE * (radius - profile.flat_mm)
+            radius = profile.flat_mm + beside
+            corner = profile.corner_mm
+            depth -= corner - math.sqrt(corner * corner - beside * beside)
+            base = depth
+        if not whole and self.operation.tabs is not None:
+            base -= self.operation.tabs.height_mm
+            depth -= self.operation.tabs.height_mm
+        yield WantedLayer(self.name, lines, ABOUT, radius + more_mm, base, rise, depth)
