@@ -8,11 +8,25 @@ known to within what this distance does to it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
+from camtool.errors import OptionError
+from camtool.planning.job import Tool
+from camtool.planning.link import tool_note
 from camtool.stock.cutters import CutterProfile
+from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.wanted import Operations
+
+SAGITTA_MM = 1e-3
+"""Greatest distance between an arc and the chords that stand for it."""
+
+ROUNDED_DECIMALS = 9
+"""Ends of chords are rounded to this many decimals of a mm: processors differ in the last digit of
+a sine."""
 
 
 class StockMoves(Struct, frozen=True, eq=False):
@@ -51,3 +65,77 @@ class StockMoves(Struct, frozen=True, eq=False):
     def table(self) -> Floats:
         """The cutters (T, 4) as the compiled loops read them."""
         return np.array([each.columns for each in self.cutters], dtype=np.float64).reshape(-1, 4)
+
+
+def stock_moves_of_toolpath(
+    toolpath: Toolpath, tool: Ints, cutters: tuple[CutterProfile, ...]
+) -> StockMoves:
+    """Return the moves of a toolpath as its rows say, arcs as chords within SAGITTA_MM; `tool`
+    (N,): the index of the cutter of each row."""
+    count = np.zeros(len(toolpath), dtype=np.int64)
+    count[toolpath.is_motion] = 1
+    count[toolpath.executed_rows :] = 0
+    arcs = np.flatnonzero(toolpath.is_arc & (count > 0))
+    sweep, radius = np.zeros(len(toolpath)), np.zeros(len(toolpath))
+    sweep[arcs] = toolpath.sweeps_of(arcs)
+    spoke = toolpath.starts_of(arcs)[:, :2] - toolpath.centre[arcs]
+    radius[arcs] = np.hypot(spoke[:, 0], spoke[:, 1])
+    most = 2.0 * np.arccos(1.0 - np.minimum(SAGITTA_MM / np.maximum(radius[arcs], 1e-9), 1.0))
+    count[arcs] = np.maximum(np.ceil(np.abs(sweep[arcs]) / most), 1.0)
+    row = np.repeat(np.arange(len(toolpath)), count)
+    step = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count) + 1
+    end = toolpath.end[row]
+    # Ends of chords within an arc; the last one keeps the end that the program gives.
+    inner = step < count[row]
+    of = row[inner]
+    part = step[inner] / count[of]
+    starts = toolpath.starts_of(of)
+    spoke = starts[:, :2] - toolpath.centre[of]
+    cosine, sine = np.cos(sweep[of] * part), np.sin(sweep[of] * part)
+    x = toolpath.centre[of, 0] + spoke[:, 0] * cosine - spoke[:, 1] * sine
+    y = toolpath.centre[of, 1] + spoke[:, 0] * sine + spoke[:, 1] * cosine
+    z = starts[:, 2] + part * (toolpath.end[of, 2] - starts[:, 2])
+    end[inner] = np.round(np.column_stack([x, y, z]), ROUNDED_DECIMALS)
+    start = np.empty_like(end)
+    first = step == 1
+    start[first] = toolpath.starts_of(row[first])
+    start[~first] = end[:-1][~first[1:]]
+    rapid = np.asarray(toolpath.kind[row] == Kind.RAPID)
+    beside = SAGITTA_MM if len(arcs) else 0.0
+    return StockMoves(start, end, row, rapid, tool[row], cutters, beside)
+
+
+def tools_of_rows(
+    toolpath: Toolpath, tools: Sequence[Tool], plan: Operations | None = None
+) -> tuple[Ints, tuple[Tool, ...]]:
+    """Return which tool cuts each row (N,), as an index of the tools that are returned with it.
+
+    `tools`: those of the job, in the order of its operations; `plan`: the operations of the
+    toolpath as planned, if a plan is there. OptionError where several tools cut and neither the
+    toolpath nor the plan says which.
+    """
+    plan = toolpath.operations or plan
+    notes = {tool_note(each): each for each in tools}
+    if plan is not None and all(each.tool in notes for each in plan.notes):
+        tools = [notes[each.tool] for each in plan.notes]
+    known = tuple(dict.fromkeys(tools))
+    if len(known) == 1:
+        return np.zeros(len(toolpath), dtype=np.int64), known
+    if toolpath.operations is not None and len(tools) == len(toolpath.operations.notes):
+        index = np.array([known.index(each) for each in tools])
+        begin = toolpath.operations.begin
+        turn = np.searchsorted(begin, np.arange(len(toolpath)), side="right") - 1
+        return index[turn.clip(min=0)], known
+    changes = np.flatnonzero(toolpath.kind == Kind.TOOL_CHANGE)
+    number = {each.number: k for k, each in reversed(list(enumerate(known)))}
+    asked = [number.get(int(value)) for value in toolpath.value[changes]]
+    if known and len(changes) and None not in asked:
+        # Before the first change stands the tool of the first operation.
+        index = np.array([known.index(tools[0]), *asked], dtype=np.int64)
+        turn = np.searchsorted(changes, np.arange(len(toolpath)), side="right")
+        return index[turn], known
+    raise OptionError(
+        "which tool cuts which move is not known",
+        where="the stock",
+        mend="name the tool, such as --tool-diameter 3mm, or give a job file with its tools",
+    )

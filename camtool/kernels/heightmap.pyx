@@ -1,0 +1,388 @@
+"""Height maps of the stock: straight moves of a tool cut a grid of heights.
+
+A cell is cut to the least of z + profile(distance) over the moves, at its centre. Along a move of
+length L that rises by m for each millimetre, let `along` be the foot of the centre on the move's
+line and a its distance from it. The tip at s leaves z(s) + profile(√(a² + (along − s)²)), which is
+convex in s (`camtool.stock.cutters`), so its least value lies at
+
+    s = along − u sign(m),  clipped to 0 … L and to where the tool covers the centre,
+
+with u where the profile rises as steeply as the move. For a level move u is 0, and the distance
+is that from the segment: along a row of cells it is √(c² + (p + q i)²) in each of three parts.
+
+      flat      u = √(R² − a²): the rim
+      cone      u = a |m| / √(rise² − m²), no less than √(flat² − a²), no more than the rim
+      ball      u = √((r² − a²) m² / (1 + m²))
+      bull      by Newton's steps in a bracket, to NEAR_SHARE of the corner: the height errs by
+                the square of that
+
+A move that begins where the one before ended, with the same tool, cuts nothing new behind its
+start: these cells are left out. Loops hold no state but the heights, so equal moves give equal
+bytes on every processor.
+"""
+
+from __future__ import annotations
+
+from libc cimport math
+from camtool.kernels.types cimport Int
+
+
+cdef enum:
+    RADIUS, FLAT, CORNER, RISE
+    MAX_STEPS = 60
+
+
+cdef double LEVEL_MM = 1e-7  # a smaller change of height is none
+cdef double SHORT_MM = 1e-9  # a shorter move is a plunge
+cdef double NEAR_SHARE = 1e-5
+
+
+cdef struct Cutter:
+    double radius, flat, corner, rise
+    double reach  # distance up to which the move in hand can cut below the top
+
+
+cdef struct Row:
+    # A row of cells; the centre of cell i lies at x0 + i · cell. `owner` is NULL where not wanted.
+    float* height
+    int* owner
+    double x0, cell
+    int move
+
+
+cpdef void cut_heights(
+    float[:, ::1] heights, int[:, ::1] owner, tuple origin, double[:, ::1] starts,
+    double[:, ::1] ends, Int[::1] tool, double[:, ::1] cutters, Int first
+) noexcept:
+    """Lower `heights` (NY, NX) to what the moves leave; row 0 is the lowest in Y.
+
+    `origin`: x and y, mm, of the centre of cell (0, 0), and the width of a cell. Moves run from
+    `starts` (M, 3) to `ends` (M, 3), with the tool `tool` (M,) of `cutters` (T, 4), columns as
+    `camtool.stock.cutters.CutterProfile.columns`. `owner` (NY, NX), or (0, 0), gets `first` plus
+    the number of the move that cut a cell deepest, the earliest of several.
+    """
+    cdef double x0, y0, cell, ax, ay, az, bx, by, bz, run, slope, ux, uy, skip
+    cdef Int k, ny, nx
+    cdef bint joined, wanted
+    cdef Cutter cutter
+    cdef Row row
+    x0, y0, cell = origin
+    ny, nx = heights.shape[0], heights.shape[1]
+    wanted = owner.shape[0] > 0
+    row.owner = NULL
+    row.x0, row.cell = x0, cell
+    for k in range(tool.shape[0]):
+        ax, ay, az = starts[k, 0], starts[k, 1], starts[k, 2]
+        bx, by, bz = ends[k, 0], ends[k, 1], ends[k, 2]
+        if not _reaches(&cutter, cutters, tool[k], min(az, bz)):
+            continue
+        joined = k > 0 and tool[k] == tool[k - 1] and (
+            ends[k - 1, 0] == ax and ends[k - 1, 1] == ay and ends[k - 1, 2] == az
+        )
+        run = math.sqrt((bx - ax) * (bx - ax) + (by - ay) * (by - ay))
+        if run < SHORT_MM:
+            run = slope = 0.0
+            ux, uy = 1.0, 0.0
+            bx, by = ax, ay
+            joined = joined and az <= bz
+            az = bz = min(az, bz)
+        else:
+            slope = (bz - az) / run
+            ux, uy = (bx - ax) / run, (by - ay) / run
+            if abs(bz - az) <= LEVEL_MM:
+                slope = 0.0
+                joined = joined and az <= bz
+                az = bz = min(az, bz)
+        row.move = <int> (first + k)
+        low = _index(math.ceil((min(ay, by) - cutter.reach - y0) / cell), ny)
+        high = _index(math.floor((max(ay, by) + cutter.reach - y0) / cell) + 1.0, ny)
+        for j in range(low, high):
+            row.height = &heights[j, 0]
+            if wanted:
+                row.owner = &owner[j, 0]
+            if slope == 0.0:
+                _cut_level(&row, nx, &cutter, ax, ay, az, run, ux, uy, y0 + j * cell, joined)
+            else:
+                skip = _behind(&cutter, slope) if joined else -math.INFINITY
+                _cut_slope(&row, nx, &cutter, ax, ay, az, run, ux, uy, slope, y0 + j * cell, skip)
+
+
+cdef bint _reaches(Cutter* cutter, double[:, ::1] cutters, Int tool, double z) noexcept:
+    """Store the cutter, and how far from its axis it cuts below the top with its tip at z; False
+    where it cuts nothing."""
+    cdef double below
+    cutter.radius, cutter.flat = cutters[tool, RADIUS], cutters[tool, FLAT]
+    cutter.corner, cutter.rise = cutters[tool, CORNER], cutters[tool, RISE]
+    cutter.reach = cutter.radius
+    if not z < 0.0 or not cutter.radius > 0.0:
+        return False
+    if cutter.corner > 0.0:
+        below = max(cutter.corner + z, 0.0)
+        cutter.reach = cutter.flat + math.sqrt(cutter.corner * cutter.corner - below * below)
+    elif cutter.rise > 0.0:
+        cutter.reach = min(cutter.radius, cutter.flat - z / cutter.rise)
+    return True
+
+
+cdef double _behind(Cutter* cutter, double slope) noexcept:
+    """Cells whose foot lies before this place on a joined move are cut deepest at its start."""
+    cdef double most = cutter.radius
+    if slope >= 0.0:
+        return 0.0
+    if cutter.corner > 0.0:
+        if cutter.flat == 0.0:
+            most = -slope / math.sqrt(1.0 + slope * slope) * cutter.corner
+    elif -slope < cutter.rise:
+        most = max(
+            cutter.flat,
+            -slope / math.sqrt(cutter.rise * cutter.rise - slope * slope) * cutter.radius,
+        )
+    return -min(most, cutter.radius)
+
+
+cdef inline Int _index(double place, Int count) noexcept:
+    """The number of a cell, no less than 0 and no more than `count`; 0 for NaN."""
+    if not place > 0.0:
+        return 0
+    return count if place >= count else <Int> place
+
+
+cdef inline Int _from(Row* row, Int nx, double x) noexcept:
+    """The first cell whose centre is not left of x."""
+    return _index(math.ceil((x - row.x0) / row.cell), nx)
+
+
+cdef (double, double) _span(
+    double ax, double ay, double run, double ux, double uy, double y, double reach
+) noexcept:
+    """The part of the line at height y that lies within `reach` of a move; inf, −inf if none."""
+    cdef double left, right, half, off, low, high
+    left, right = math.INFINITY, -math.INFINITY
+    off = y - ay
+    if abs(off) <= reach:
+        half = math.sqrt(reach * reach - off * off)
+        left, right = ax - half, ax + half
+    off = y - (ay + run * uy)
+    if abs(off) <= reach:
+        half = math.sqrt(reach * reach - off * off)
+        left, right = min(left, ax + run * ux - half), max(right, ax + run * ux + half)
+    if uy != 0.0:  # the two sides: where they begin and end beside the ends
+        # Points of the sides: a ± reach · (−uy, ux) + s · u; at height y this is one s each.
+        low, high = y - ay - reach * ux, y - ay + reach * ux
+        if 0.0 <= low / uy <= run:
+            half = ax - reach * uy + low / uy * ux
+            left, right = min(left, half), max(right, half)
+        if 0.0 <= high / uy <= run:
+            half = ax + reach * uy + high / uy * ux
+            left, right = min(left, half), max(right, half)
+    return left, right
+
+
+cdef void _cut_level(
+    Row* row, Int nx, Cutter* cutter, double ax, double ay, double z, double run,
+    double ux, double uy, double y, bint joined
+) noexcept:
+    """Cut a row with a level move; a joined one only before its start."""
+    cdef double left, right, half, off, x, bx, by, other
+    cdef Int low, high, begin, end
+    left, right = _span(ax, ay, run, ux, uy, y, cutter.reach)
+    low, high = _from(row, nx, left), _from(row, nx, right)
+    if left > right or low >= high:
+        return
+    if cutter.corner == 0.0 and cutter.rise == 0.0:
+        off = y - ay
+        if not joined or abs(off) >= cutter.reach:
+            _lower_flat(row, low, high, z)
+            return
+        half = math.sqrt(cutter.reach * cutter.reach - off * off)
+        _lower_flat(row, low, _from(row, high, ax - half), z)
+        _lower_flat(row, max(low, _from(row, high, ax + half)), high, z)
+        return
+    # The cells begin … end have their feet between the ends of the move.
+    bx, by = ax + run * ux, ay + run * uy
+    begin, end = low, high
+    if abs(ux) > SHORT_MM:
+        x = ax - (y - ay) * uy / ux
+        other = x + run / ux
+        begin = max(low, _from(row, high, min(x, other)))
+        end = max(begin, _from(row, high, max(x, other)))
+        if ux < 0.0:
+            if not joined:
+                _lower(row, end, high, cutter, z, y - ay, row.x0 - ax, row.cell)
+            _lower(row, low, begin, cutter, z, y - by, row.x0 - bx, row.cell)
+        else:
+            if not joined:
+                _lower(row, low, begin, cutter, z, y - ay, row.x0 - ax, row.cell)
+            _lower(row, end, high, cutter, z, y - by, row.x0 - bx, row.cell)
+    elif (y - ay) * uy < 0.0:
+        if not joined:
+            _lower(row, low, high, cutter, z, y - ay, row.x0 - ax, row.cell)
+        return
+    elif (y - ay) * uy > run:
+        _lower(row, low, high, cutter, z, y - by, row.x0 - bx, row.cell)
+        return
+    _lower(row, begin, end, cutter, z, 0.0, (y - ay) * ux - (row.x0 - ax) * uy, -row.cell * uy)
+
+
+cdef void _lower_flat(Row* row, Int low, Int high, double z) noexcept:
+    """Lower the cells low:high to z."""
+    cdef float* height = row.height
+    cdef int* owner = row.owner
+    cdef float cut = <float> z
+    cdef int move = row.move
+    cdef Int i
+    if owner != NULL:
+        for i in range(low, high):
+            owner[i] = move if cut < height[i] else owner[i]
+            height[i] = cut if cut < height[i] else height[i]
+    else:
+        for i in range(low, high):
+            height[i] = cut if cut < height[i] else height[i]
+
+
+cdef void _lower(
+    Row* row, Int low, Int high, Cutter* cutter, double z, double c, double p, double q
+) noexcept:
+    """Lower the cells low:high to z and the profile at the distance √(c² + (p + q i)²)."""
+    cdef float* height = row.height
+    cdef int* owner = row.owner
+    cdef int move = row.move
+    cdef double corner = cutter.corner, flat = cutter.flat, rise = cutter.rise
+    cdef double square = corner * corner, d, w
+    cdef double cc = c * c
+    cdef float cut
+    cdef int i, begin = <int> low, stop = <int> high
+    if corner > 0.0 and flat == 0.0:
+        for i in range(begin, stop):
+            d = p + q * i
+            w = square - (cc + d * d)
+            cut = <float> (z + corner - math.sqrt(w if w > 0.0 else 0.0))
+            if owner != NULL:
+                owner[i] = move if cut < height[i] else owner[i]
+            height[i] = cut if cut < height[i] else height[i]
+    elif corner > 0.0:
+        for i in range(begin, stop):
+            d = p + q * i
+            w = math.sqrt(cc + d * d) - flat
+            w = w if w > 0.0 else 0.0
+            w = square - w * w
+            cut = <float> (z + corner - math.sqrt(w if w > 0.0 else 0.0))
+            if owner != NULL:
+                owner[i] = move if cut < height[i] else owner[i]
+            height[i] = cut if cut < height[i] else height[i]
+    else:
+        for i in range(begin, stop):
+            d = p + q * i
+            w = math.sqrt(cc + d * d) - flat
+            cut = <float> (z + rise * (w if w > 0.0 else 0.0))
+            if owner != NULL:
+                owner[i] = move if cut < height[i] else owner[i]
+            height[i] = cut if cut < height[i] else height[i]
+
+
+cdef void _cut_slope(
+    Row* row, Int nx, Cutter* cutter, double ax, double ay, double z, double run,
+    double ux, double uy, double slope, double y, double skip
+) noexcept:
+    """Cut a row with a sloping move; cells whose foot lies before `skip` are left out."""
+    cdef double left, right, first, along, aside, square, rim, u, s, near = -1.0
+    cdef double radius = cutter.radius, flat = cutter.flat, corner = cutter.corner
+    cdef double rise = cutter.rise, steep = abs(slope), ratio = math.INFINITY
+    cdef double sign = 1.0 if slope > 0.0 else -1.0
+    cdef float* height = row.height
+    cdef int* owner = row.owner
+    cdef double x0 = row.x0 - ax, cell = row.cell, off = y - ay, best
+    cdef float cut
+    cdef int i, low, high, move = row.move
+    left, right = _span(ax, ay, run, ux, uy, y, cutter.reach)
+    if skip > -math.INFINITY:
+        if abs(ux) > SHORT_MM:
+            first = ax + (skip - off * uy) / ux
+            left, right = (max(left, first), right) if ux > 0.0 else (left, min(right, first))
+        elif off * uy < skip:
+            return
+    if not left <= right:
+        return
+    low, high = <int> _from(row, nx, left), <int> _from(row, nx, right)
+    if corner > 0.0:
+        ratio = steep / math.sqrt(1.0 + steep * steep)
+    elif steep < rise:
+        ratio = steep / math.sqrt(rise * rise - steep * steep)
+    if corner > 0.0 and flat == 0.0 or corner == 0.0 and rise == 0.0:
+        # A ball, or a flat tool, whose ratio is 1. In one branch, and so several cells at once.
+        ratio = sign * ratio if corner > 0.0 else sign
+        for i in range(low, high):
+            along = (x0 + i * cell) * ux + off * uy
+            aside = off * ux - (x0 + i * cell) * uy
+            square = radius * radius - aside * aside
+            square = square if square > 0.0 else 0.0
+            s = along - ratio * math.sqrt(square)
+            s = s if s > 0.0 else 0.0
+            s = s if s < run else run
+            square = square - (along - s) * (along - s)
+            square = square if square > 0.0 and corner > 0.0 else 0.0
+            cut = <float> (z + slope * s + corner - math.sqrt(square))
+            if owner != NULL:
+                owner[i] = move if cut < height[i] else owner[i]
+            height[i] = cut if cut < height[i] else height[i]
+        return
+    for i in range(low, high):
+        along = (x0 + i * cell) * ux + off * uy
+        aside = off * ux - (x0 + i * cell) * uy
+        square = aside * aside
+        rim = math.sqrt(max(radius * radius - square, 0.0))
+        if corner > 0.0:
+            best = z + slope * min(max(along - sign * rim, 0.0), run) + _profile(cutter, square)
+            if best >= height[i]:  # no place on the move could cut it deeper
+                continue
+            u = near = _bull(corner, flat, steep, square, rim, near)
+        else:
+            u = ratio * abs(aside) if ratio < math.INFINITY else rim
+            if square < flat * flat:
+                u = max(u, math.sqrt(flat * flat - square))
+            u = min(u, rim)
+        s = min(max(along - sign * u, 0.0), run)
+        u = along - s
+        cut = <float> (z + slope * s + _profile(cutter, square + u * u))
+        if cut < height[i]:
+            height[i] = cut
+            if owner != NULL:
+                owner[i] = move
+
+
+cdef inline double _profile(Cutter* cutter, double square) noexcept:
+    """Height of the tool over its tip at the distance √square, within its radius."""
+    cdef double w = max(math.sqrt(square) - cutter.flat, 0.0)
+    if cutter.corner > 0.0:
+        w = max(cutter.corner * cutter.corner - w * w, 0.0)
+        return cutter.corner - math.sqrt(w)
+    return w * cutter.rise
+
+
+cdef double _bull(
+    double corner, double flat, double steep, double square, double rim, double near
+) noexcept:
+    """The u at which a bull nose rises as steeply as the move: w u = steep · d · q, with
+    d² = a² + u², w = d − flat and q² = corner² − w². `near`: where to begin."""
+    cdef double low, high, u, d, w, q, off, rate, wanted
+    cdef int k
+    low = math.sqrt(max(flat * flat - square, 0.0))
+    high = max(rim, low)
+    u = near if low < near < high else 0.5 * (low + high)
+    for k in range(MAX_STEPS):
+        d = math.sqrt(square + u * u)
+        w = max(d - flat, 0.0)
+        q = math.sqrt(max(corner * corner - w * w, 0.0))
+        off = w * u - steep * d * q
+        if off < 0.0:
+            low = u
+        else:
+            high = u
+        rate = w + u * u / d - steep * u * (q / d - w / q)
+        wanted = u - off / rate
+        if not low < wanted < high:  # NaN as well
+            wanted = 0.5 * (low + high)
+        if abs(wanted - u) <= NEAR_SHARE * corner:
+            return wanted
+        u = wanted
+    return u
