@@ -59,6 +59,7 @@ COMMANDS = (
     "init",
     "job",
     "jog",
+    "measure",
     "meet",
     "ports",
     "post",

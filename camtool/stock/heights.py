@@ -34,6 +34,15 @@ SQUARES_AT_ONCE = 4096
 MAX_SQUARES = 4_000_000
 """A search ends after this many squares: its bracket is then wider, and says so."""
 
+VOLUME_SHARE = 0.01
+"""Width of the bounds of a volume, as a part of it, unless another one is asked for."""
+
+MIN_VOLUME_MM3 = 1e-6
+"""Volumes are not told more exactly than to this."""
+
+MAX_VOLUME_SQUARES = 400_000
+"""Squares that a volume is divided into, at most: its bounds are then wider."""
+
 MIN_HALF_MM = 1e-9
 """Squares are not divided further: floats end here."""
 
@@ -93,12 +102,14 @@ def greatest_value(
     tolerance: float = TOLERANCE_MM,
     floor: float = -np.inf,
     max_squares: int = MAX_SQUARES,
+    enough: float = np.inf,
 ) -> Bracket:
     """Bracket the greatest value of a function over a box (low x, low y, high x, high y).
 
     `value` gives it at points (J, 2); `upper` gives upper bounds over squares, whose middle and
     half a side are the rows of (K, 3), −inf for squares that are of no interest. Values below
-    `floor` are not of interest: where all are, the bracket is (−inf, floor).
+    `floor` are not of interest: where all are, the bracket is (−inf, floor). A value above
+    `enough` ends the search, and the bracket is then wider.
     """
     squares = _first_squares(box)
     best, place, proved, seen = (
@@ -125,7 +136,7 @@ def greatest_value(
         if found[row] > best:
             best, place = float(found[row]), (float(squares[row, 0]), float(squares[row, 1]))
         bounds = np.maximum(upper(squares), found)
-        ends = (squares[:, 2] <= MIN_HALF_MM) | (seen >= max_squares)
+        ends = (squares[:, 2] <= MIN_HALF_MM) | (seen >= max_squares) | (best > enough)
         open_ = (bounds > max(best, floor) + tolerance) & ~ends
         proved = max(proved, float(bounds[~open_].max(initial=-np.inf)))
         if open_.any():
@@ -137,6 +148,67 @@ def greatest_value(
     if best <= floor:
         best = -np.inf
     return Bracket(best, max(proved, best), place, seen)
+
+
+def integral(
+    least: Callable[[Floats], Floats],
+    most: Callable[[Floats], Floats],
+    box: tuple[float, float, float, float],
+    share: float = VOLUME_SHARE,
+    slack: float = MIN_VOLUME_MM3,
+    max_squares: int = MAX_VOLUME_SQUARES,
+) -> Bracket:
+    """Return the integral of a function over a box between two bounds, to a share of it or to
+    `slack`, whichever is more.
+
+    `least` and `most` give bounds of the function over squares (K, 3). The squares where they are
+    farthest apart are divided again and again. The place is that of the square with the most.
+    """
+    squares = _within(_first_squares(box), box)
+    low, high = _parts(squares, least, most, box)
+    while True:
+        total = float(low.sum()), float(high.sum())
+        wanted = max(share * total[1], slack)
+        gaps = high - low
+        if total[1] - total[0] <= wanted or len(squares) >= max_squares:
+            break
+        order = np.argsort(gaps)
+        # The squares with the smallest gaps stay, as long as these make half of what may stay.
+        small = np.cumsum(gaps[order]) <= 0.5 * wanted
+        room = max(1, (max_squares - len(squares)) // 3)
+        chosen = order[~small][-room:]
+        kept = np.ones(len(squares), dtype=np.bool_)
+        kept[chosen] = False
+        quarters = _within(_quarters(squares[chosen]), box)
+        parts = _parts(quarters, least, most, box)
+        squares = np.concatenate([squares[kept], quarters])
+        low, high = np.append(low[kept], parts[0]), np.append(high[kept], parts[1])
+    x, y = squares[int(np.argmax(high)), :2].tolist()
+    return Bracket(total[0], total[1], (x, y), len(squares))
+
+
+def _within(squares: Floats, box: tuple[float, float, float, float]) -> Floats:
+    """Return the squares that reach into a box."""
+    return squares[_sizes(squares, box) > 0.0]
+
+
+def _sizes(squares: Floats, box: tuple[float, float, float, float]) -> Floats:
+    """Return the areas (K,) of squares within a box."""
+    low = np.maximum(squares[:, :2] - squares[:, 2:], box[:2])
+    high = np.minimum(squares[:, :2] + squares[:, 2:], box[2:])
+    sides = np.maximum(high - low, 0.0)
+    return np.asarray(sides[:, 0] * sides[:, 1])
+
+
+def _parts(
+    squares: Floats,
+    least: Callable[[Floats], Floats],
+    most: Callable[[Floats], Floats],
+    box: tuple[float, float, float, float],
+) -> tuple[Floats, Floats]:
+    """Return bounds (K,) of the integral over each of some squares."""
+    size = _sizes(squares, box)
+    return size * least(squares), size * most(squares)
 
 
 def _first_squares(box: tuple[float, float, float, float]) -> Floats:

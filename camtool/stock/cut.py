@@ -1,0 +1,225 @@
+"""The stock that a program leaves: heights with their margins, sections, and what is cut
+differently from another stock.
+
+Two stocks are compared in plane and depth at once. Where one program cuts a wall a micrometre
+beside the other, heights differ by the whole depth, in a strip as thin. So the question is
+whether the surface of the one lies within a distance of the surface of the other: over a point it
+does where, of the other, all tools begun so much farther out cut no higher than that much above
+the one. The least distance with which this holds everywhere is the distance of the two stocks; it
+is measured in the plane and along Z alike, whichever is more.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from msgspec import Struct
+
+from camtool.arrays import Floats, Ints
+from camtool.kernels.stock import StockTree
+from camtool.planning.job import Job
+from camtool.simulation.motion import Options
+from camtool.stock.heights import Bracket, greatest_value, integral, stock_tree
+from camtool.stock.moves import StockMoves
+from camtool.stock.slides import slide_moves, tools_of_rows
+from camtool.target.registry import LoadedTarget
+from camtool.toolpath.moves import Toolpath
+
+SECTION_POINTS = 512
+"""Points of a section before it is refined."""
+
+SECTION_MM = 1e-3
+"""Between two points of a section the stock is as near as this to the line between them, ..."""
+
+SECTION_STEP_MM = 1e-3
+"""... or the two are no farther apart than this: at a wall."""
+
+MAX_TRIAL_SQUARES = 2_000_000
+"""A trial of one distance looks at no more squares: walls that lie just at it take most. The
+bracket is then wider."""
+
+DIFFERENCE_SHARE = 1e-3
+"""Volumes of differences are told to this part of the volume that is cut."""
+
+Box = tuple[float, float, float, float]
+"""Low x, low y, high x and high y, mm."""
+
+
+class CutStock(Struct, frozen=True, eq=False):
+    """The stock after a program: the moves that cut it, their index, the box of the stock in the
+    plane, mm, and the height of its bottom, mm (None: not known)."""
+
+    moves: StockMoves
+    tree: StockTree
+    box_mm: Box
+    bottom_mm: float | None = None
+
+    def heights(self, points: Floats) -> Floats:
+        """Return the heights (J,) mm over points (J, 2)."""
+        z, _ = self.tree.heights(points)
+        return z
+
+    def bounds(self, points: Floats) -> Floats:
+        """Return the lowest and the highest height (J, 2) mm that there may be over points (J, 2),
+        since the slides may be `moves.beside_mm` beside the moves."""
+        beside = self.moves.beside_mm
+        low, _ = self.tree.heights(points, None, beside)
+        high, _ = self.tree.heights(points, None, -beside)
+        return np.column_stack([low - beside, np.minimum(high + beside, self.tree.top)])
+
+    def rows_at(self, points: Floats) -> Ints:
+        """Return the row (J,) of the decoded toolpath that cuts deepest over points (J, 2); −1
+        where nothing is cut."""
+        _, which = self.tree.heights(points)
+        return np.where(which >= 0, self.moves.row[which.clip(min=0)], -1)
+
+    def section(self, axis: str, at_mm: float) -> Floats:
+        """Return the profile (P, 2) of the stock where an axis, "x" or "y", has a value: places
+        along the other axis and heights, mm. Between two rows the stock is within `SECTION_MM` of
+        the line from one to the other, as far as the middle shows, or they stand at a wall."""
+        low, high = (self.box_mm[1::2]) if axis == "x" else (self.box_mm[0::2])
+        place = np.linspace(low, high, SECTION_POINTS)
+        z = self.heights(_across(axis, at_mm, place))
+        while True:
+            middle = 0.5 * (place[:-1] + place[1:])
+            level = self.heights(_across(axis, at_mm, middle))
+            bent = np.abs(level - 0.5 * (z[:-1] + z[1:])) > SECTION_MM
+            bent &= np.diff(place) > SECTION_STEP_MM
+            if not bent.any():
+                return np.column_stack([place, z])
+            place = np.insert(place, np.flatnonzero(bent) + 1, middle[bent])
+            z = np.insert(z, np.flatnonzero(bent) + 1, level[bent])
+
+    @property
+    def lowest(self) -> Bracket:
+        """Proved bracket of the greatest depth below the top, mm."""
+        top = self.tree.top
+        return greatest_value(
+            lambda at: top - self.tree.heights(at)[0],
+            lambda squares: top - self.tree.least(squares),
+            self.box_mm,
+        )
+
+    def removed_mm3(self, share: float = 0.01) -> Bracket:
+        """Return the volume that is cut out of the stock within its box and above its bottom, mm³,
+        between two bounds."""
+        top, bottom = self.tree.top, -math.inf if self.bottom_mm is None else self.bottom_mm
+        return integral(
+            lambda squares: top - np.maximum(self.tree.greatest(squares), bottom),
+            lambda squares: top - np.maximum(self.tree.least(squares), bottom),
+            self.box_mm,
+            share,
+        )
+
+
+def _across(axis: str, at_mm: float, place: Floats) -> Floats:
+    """Return points (J, 2) of a section."""
+    level = np.full(len(place), at_mm)
+    return np.column_stack([level, place] if axis == "x" else [place, level])
+
+
+def cut_stock(
+    decoded: Toolpath, target: LoadedTarget, job: Job | None, options: Options | None = None
+) -> CutStock:
+    """Simulate a program and return the stock after it. OptionError where the tools are not known;
+    raises besides what `LoadedTarget.simulate` raises."""
+    moves = slide_moves(decoded, target, tools_of_rows(decoded, job), options)
+    stock = None if job is None else job.stock
+    box = None if stock is None else stock.box_mm
+    bottom = None if stock is None else -stock.thickness_mm
+    return CutStock(moves, stock_tree(moves), box or _box_of(moves), bottom)
+
+
+def _box_of(moves: StockMoves) -> Box:
+    """Return the box of all that the tools cut; that of all moves where nothing is cut."""
+    cuts = np.minimum(moves.start[:, 2], moves.end[:, 2]) < 0.0
+    chosen = moves.select(cuts) if cuts.any() else moves
+    wide = chosen.table[chosen.tool, 0][:, None]
+    if not len(chosen):
+        return 0.0, 0.0, 1.0, 1.0
+    low = (np.minimum(chosen.start, chosen.end)[:, :2] - wide).min(axis=0)
+    high = (np.maximum(chosen.start, chosen.end)[:, :2] + wide).max(axis=0)
+    return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+
+
+class StockDifference(Struct, frozen=True):
+    """What the second of two stocks has cut differently from the first.
+
+    `deeper`, `shallower`: the greatest distance, mm, by which the second cuts where the first does
+    not, and the reverse, each with its place; `more_mm3`, `less_mm3`: the volumes of these.
+    """
+
+    deeper: Bracket
+    shallower: Bracket
+    more_mm3: Bracket
+    less_mm3: Bracket
+
+    @property
+    def distance_mm(self) -> float:
+        """The distance of the two stocks, mm: its upper bound."""
+        return max(self.deeper.high, self.shallower.high)
+
+
+def difference_of(first: CutStock, second: CutStock, tolerance_mm: float) -> StockDifference:
+    """Compare two stocks; distances are proved to `tolerance_mm`."""
+    box = _around(first.box_mm, second.box_mm)
+    slack_mm3 = DIFFERENCE_SHARE * max(first.removed_mm3().high, second.removed_mm3().high)
+    return StockDifference(
+        _distance(first.tree, second.tree, box, tolerance_mm),
+        _distance(second.tree, first.tree, box, tolerance_mm),
+        _volume_between(first.tree, second.tree, box, slack_mm3),
+        _volume_between(second.tree, first.tree, box, slack_mm3),
+    )
+
+
+def _around(one: Box, other: Box) -> Box:
+    low, high = np.minimum(one, other)[:2].tolist(), np.maximum(one, other)[2:].tolist()
+    return low[0], low[1], high[0], high[1]
+
+
+def _distance(one: StockTree, other: StockTree, box: Box, tolerance_mm: float) -> Bracket:
+    """Return the greatest distance of what `other` cuts from what `one` cuts or leaves free."""
+
+    def beyond(distance: float, enough: float = math.inf) -> Bracket:
+        return greatest_value(
+            lambda at: one.heights(at, None, distance)[0] - distance - other.heights(at)[0],
+            lambda squares: (
+                one.greatest(squares, None, distance) - distance - other.least(squares)
+            ),
+            box,
+            0.5 * tolerance_mm,
+            floor=0.0,
+            max_squares=MAX_TRIAL_SQUARES,
+            enough=enough,
+        )
+
+    found = beyond(tolerance_mm)
+    if found.low <= 0.0:
+        return Bracket(0.0, tolerance_mm + found.high, found.at_mm, found.squares)
+    # No distance is more than a difference in depth; where it is less, a wall has moved.
+    low, place, squares = tolerance_mm, found.at_mm, found.squares
+    high = low + found.high
+    while high - low > tolerance_mm:
+        middle = 2.0 * low if high > 4.0 * low else 0.5 * (low + high)
+        found = beyond(middle, 0.0)
+        squares += found.squares
+        if found.low > 0.0:
+            low, place = middle, found.at_mm
+        elif middle + found.high < high:
+            high = middle + found.high
+        else:
+            break
+    return Bracket(low, high, place, squares)
+
+
+def _volume_between(one: StockTree, other: StockTree, box: Box, slack_mm3: float) -> Bracket:
+    """Return the volume that `other` cuts below `one`, mm³, to 1 % or `slack_mm3`."""
+
+    def least(squares: Floats) -> Floats:
+        return np.maximum(one.least(squares) - other.greatest(squares), 0.0)
+
+    def most(squares: Floats) -> Floats:
+        return np.maximum(one.greatest(squares) - other.least(squares), 0.0)
+
+    return integral(least, most, box, slack=slack_mm3)
