@@ -15,6 +15,7 @@ import sys
 import sysconfig
 from pathlib import Path
 
+import Cython
 from Cython.Compiler import Options
 from setuptools import Extension, find_packages, setup
 from setuptools.command.build_ext import build_ext
@@ -23,9 +24,11 @@ from setuptools.command.build_ext import build_ext
 # Smaller arrays halve the cost of calls and slices. Read when Cython.Build is imported.
 Options.buffer_max_dims = 4
 from Cython.Build import cythonize  # noqa: E402
+from Cython.Build.Dependencies import DependencyTree  # noqa: E402
 
 FOLDERS = {"camtool": "camtool", "camtool_postprocessors": "postprocessors"}
 CHECKED = os.environ.get("CAMTOOL_CHECKED", "")
+CYTHON = Path(Cython.__file__).parent
 BUILD = Path("build", f"checked-{CHECKED}" if CHECKED else "cython")
 
 DIRECTIVES = {
@@ -48,6 +51,15 @@ elif CHECKED:
     kinds = "undefined,float-cast-overflow" + (",address" if CHECKED == "address" else "")
     FLAGS += ["-O1", "-fno-wrapv", f"-fsanitize={kinds}", "-fsanitize-undefined-trap-on-error"]
     FLAGS += ["-DCAMTOOL_CHECKED"]
+
+
+def changed_at(_: DependencyTree, file: str) -> float:
+    """Return when a file changed, 0 for Cython's own, which pip unpacks anew for each build."""
+    return 0.0 if Path(file).is_relative_to(CYTHON) else Path(file).stat().st_mtime
+
+
+# What another version of Cython made, cythonize translates anew in any case.
+DependencyTree.timestamp = changed_at
 
 
 def packages() -> list[str]:
