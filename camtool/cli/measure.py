@@ -6,7 +6,6 @@ import json
 from typing import TYPE_CHECKING, Any
 
 import click
-import numpy as np
 
 from camtool.cli.files import STDOUT, check_places, display_name, read_bytes, write_all
 from camtool.cli.messages import say, show_text
@@ -138,6 +137,8 @@ def _facts(
     with_volume: bool,
 ) -> dict[str, Any]:
     """Return all figures as JSON."""
+    import numpy as np
+
     facts: dict[str, Any] = {"beside_um": round(stock.moves.beside_mm * UM_PER_MM, 3)}
     if points:
         at = np.array(points)
@@ -189,6 +190,8 @@ def _text(
     with_volume: bool,
 ) -> str:
     """Return the figures for people."""
+    import numpy as np
+
     lines = []
     if points:
         at = np.array(points)
