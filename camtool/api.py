@@ -34,6 +34,8 @@ from camtool.planning.job import job_of as made
 from camtool.records import replace
 from camtool.run import Run, Shown, ShownDrawing, ShownToolpath
 from camtool.simulation.motion import Effects
+from camtool.stock.cut import CutStock
+from camtool.stock.cut import cut_stock as stock_after
 from camtool.tables import read_table
 from camtool.target.loader import extended_by
 from camtool.target.registry import ListedTarget, LoadedTarget, each_target, list_target
@@ -53,6 +55,7 @@ __all__ = [
     "Calibration",
     "CamtoolError",
     "Comparison",
+    "CutStock",
     "Drawing",
     "Effects",
     "Gates",
@@ -73,6 +76,7 @@ __all__ = [
     "calibrate",
     "compare",
     "convert",
+    "cut_stock",
     "inspect",
     "job_of",
     "load_target",
@@ -372,6 +376,19 @@ def convert(
     before, after = as_target(from_), as_target(to)
     data, source = as_bytes(program)
     return convert_program(data, before, after, file=source, feed_mm_min=feed_mm_min, check=check)
+
+
+def cut_stock(run: Run, job: Job | None = None) -> CutStock:
+    """The stock after the program of a run, cut by the simulated path of the slides.
+
+    `heights(points)` gives the exact height over points (J, 2), 0 at the top, and `bounds(points)`
+    what it may be; `section("x", 20.0)` a profile, `removed_mm3()` the volume between two bounds.
+    The tools are those of the run's job, or of `job`. Raises OptionError where a tool is not
+    known. Source: docs/stock.md.
+    """
+    if run.decoded is None or run.target is None:
+        raise OptionError("a run without a program leaves no stock", mend="post a drawing")
+    return stock_after(run.decoded, run.target, run.job if job is None else job)
 
 
 # Verification of programs, comparison of variants, and calibration of machines.

@@ -54,6 +54,7 @@ COMMANDS = (
     "console",
     "convert",
     "coupon",
+    "diff",
     "filter",
     "home",
     "init",

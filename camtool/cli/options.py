@@ -23,8 +23,9 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar, cast
 
 import click
 
+from camtool.cli.files import STDOUT
 from camtool.cli.life_signs import progress
-from camtool.errors import MachineError, OptionError
+from camtool.errors import DrawingError, MachineError, OptionError
 from camtool.importers.options import Flag, ReadOptions, Selection, flags_of, options_of
 from camtool.jobs.keys import FLAGS, flag_name
 from camtool.keys import Given, Key
@@ -419,6 +420,26 @@ class DrawingFlags:
         if job is None:
             return read_bytes(data, file, options)
         return read_for_job(data, file, options, job)
+
+    def is_program(self, name: str, target: LoadedTarget) -> bool:
+        """True if a file has the extension of the target's programs, or a content that is no
+        drawing. `--format` says that it is one, and stdin is taken for one."""
+        from camtool.importers.formats import NoDrawingError, find_format
+        from camtool.importers.read import file_bytes
+
+        suffix = Path(name).suffix
+        if suffix.lower() == target.machine.target.extension:
+            return True
+        if name == STDOUT or self.format is not None:
+            return False
+        data = file_bytes(Path(name))
+        try:
+            find_format(data, suffix, name)
+        except NoDrawingError:
+            return True
+        except DrawingError:  # a drawing with something wrong: its reader says what
+            return False
+        return False
 
 
 def drawing_options(command: Command) -> Command:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from camtool.cli.files import STDOUT, check_places, read_bytes, write_all
+from camtool.cli.files import check_places, read_bytes, write_all
 from camtool.cli.life_signs import progress
 from camtool.cli.messages import say, say_findings
 from camtool.cli.options import (
@@ -31,7 +31,7 @@ from camtool.cli.picture_options import (
     picture_name,
     picture_options,
 )
-from camtool.errors import CamtoolError, DrawingError
+from camtool.errors import CamtoolError
 from camtool.findings import Finding
 from camtool.records import replace
 
@@ -126,29 +126,11 @@ class SceneSource:
         if self.machine.name() is None:
             return self._drawing_scene(source)
         target = self.machine.load()
-        if Path(source).suffix.lower() == target.machine.target.extension or self._is_no_drawing(
-            source
-        ):
+        if self.drawing.is_program(source, target):
             return self._program_scene(source, target), ()
         return (
             self._job_scene(source, target) if self.asks_for_path else self._drawing_scene(source)
         )
-
-    def _is_no_drawing(self, source: str) -> bool:
-        """True if the content of a file is no drawing: then it is a program of the target."""
-        from camtool.importers.formats import NoDrawingError, find_format
-        from camtool.importers.read import file_bytes
-
-        if source == STDOUT or self.drawing.format is not None:
-            return False
-        data = file_bytes(Path(source))
-        try:
-            find_format(data, Path(source).suffix, source)
-        except NoDrawingError:
-            return True
-        except DrawingError:  # a drawing with something wrong: its reader says what
-            return False
-        return False
 
     def _drawing_scene(self, source: str) -> tuple[Scene, Findings]:
         from camtool.pictures.scene import scene_of_drawing

@@ -35,7 +35,10 @@ SECTION_MM = 1e-3
 SECTION_STEP_MM = 1e-3
 """... or the two are no farther apart than this: at a wall."""
 
-MAX_TRIAL_SQUARES = 2_000_000
+TRIAL_SHARE = 0.2
+"""Distances of two stocks are told to this part of the limit."""
+
+MAX_TRIAL_SQUARES = 4_000_000
 """A trial of one distance looks at no more squares: walls that lie just at it take most. The
 bracket is then wider."""
 
@@ -161,16 +164,30 @@ class StockDifference(Struct, frozen=True):
         return max(self.deeper.high, self.shallower.high)
 
 
-def difference_of(first: CutStock, second: CutStock, tolerance_mm: float) -> StockDifference:
-    """Compare two stocks; distances are proved to `tolerance_mm`."""
+def difference_of(first: CutStock, second: CutStock, limit_mm: float) -> StockDifference:
+    """Compare two stocks. Distances that do not exceed the limit are told as that much at most,
+    others to `TRIAL_SHARE` of it."""
     box = _around(first.box_mm, second.box_mm)
     slack_mm3 = DIFFERENCE_SHARE * max(first.removed_mm3().high, second.removed_mm3().high)
+    # What both cut is no difference: of each only the moves that the other has not are compared.
+    more, less = _own_moves(second.moves, first.moves), _own_moves(first.moves, second.moves)
     return StockDifference(
-        _distance(first.tree, second.tree, box, tolerance_mm),
-        _distance(second.tree, first.tree, box, tolerance_mm),
-        _volume_between(first.tree, second.tree, box, slack_mm3),
-        _volume_between(second.tree, first.tree, box, slack_mm3),
+        _distance(first.tree, more, box, limit_mm),
+        _distance(second.tree, less, box, limit_mm),
+        _volume_between(first.tree, more, box, slack_mm3),
+        _volume_between(second.tree, less, box, slack_mm3),
     )
+
+
+def _own_moves(moves: StockMoves, other: StockMoves) -> StockTree:
+    """Return the index of those moves that are not also, to the last bit, among the others."""
+
+    def rows(each: StockMoves) -> Floats:
+        return np.hstack([each.start, each.end, each.table[each.tool]])
+
+    known = set(map(bytes, rows(other)))
+    own = np.array([bytes(row) not in known for row in rows(moves)], dtype=np.bool_)
+    return stock_tree(moves.select(own))
 
 
 def _around(one: Box, other: Box) -> Box:
@@ -178,8 +195,9 @@ def _around(one: Box, other: Box) -> Box:
     return low[0], low[1], high[0], high[1]
 
 
-def _distance(one: StockTree, other: StockTree, box: Box, tolerance_mm: float) -> Bracket:
+def _distance(one: StockTree, other: StockTree, box: Box, limit_mm: float) -> Bracket:
     """Return the greatest distance of what `other` cuts from what `one` cuts or leaves free."""
+    tolerance_mm = TRIAL_SHARE * limit_mm
 
     def beyond(distance: float, enough: float = math.inf) -> Bracket:
         return greatest_value(
@@ -194,11 +212,12 @@ def _distance(one: StockTree, other: StockTree, box: Box, tolerance_mm: float) -
             enough=enough,
         )
 
-    found = beyond(tolerance_mm)
+    found = beyond(limit_mm - tolerance_mm)
     if found.low <= 0.0:
-        return Bracket(0.0, tolerance_mm + found.high, found.at_mm, found.squares)
+        high = limit_mm - tolerance_mm + found.high
+        return Bracket(0.0, high, found.at_mm, found.squares)
     # No distance is more than a difference in depth; where it is less, a wall has moved.
-    low, place, squares = tolerance_mm, found.at_mm, found.squares
+    low, place, squares = limit_mm - tolerance_mm, found.at_mm, found.squares
     high = low + found.high
     while high - low > tolerance_mm:
         middle = 2.0 * low if high > 4.0 * low else 0.5 * (low + high)

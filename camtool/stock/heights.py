@@ -40,7 +40,7 @@ VOLUME_SHARE = 0.01
 MIN_VOLUME_MM3 = 1e-6
 """Volumes are not told more exactly than to this."""
 
-MAX_VOLUME_SQUARES = 400_000
+MAX_VOLUME_SQUARES = 100_000
 """Squares that a volume is divided into, at most: its bounds are then wider."""
 
 MIN_HALF_MM = 1e-9

@@ -37,7 +37,8 @@ class ToolsOfRows(Struct, frozen=True, eq=False):
 def tools_of_rows(decoded: Toolpath, job: Job | None) -> ToolsOfRows:
     """Return the cutter of each row of a program: that of its operation where the program was
     planned, else the one tool of the job, else the tool of the job with the number of the last
-    tool change. OptionError where a tool is not known."""
+    tool change (before the first one, that of the first operation). OptionError where a tool is
+    not known."""
     if decoded.operations is not None and decoded.operations.notes:
         notes = decoded.operations.notes
         row = np.searchsorted(decoded.operations.begin, np.arange(len(decoded)), side="right") - 1
@@ -64,8 +65,9 @@ def tools_of_rows(decoded: Toolpath, job: Job | None) -> ToolsOfRows:
                 where=decoded.made_from,
                 mend=f"give an operation of the job a tool with number = {number}",
             )
-    row = np.searchsorted(changes, np.arange(len(decoded)), side="right") - 1
-    return _of_profiles([numbers[number] for number in called], row.clip(min=0))
+    # Before the first change the tool of the first operation is mounted.
+    mounted = [next(iter(tools.values())), *(numbers[number] for number in called)]
+    return _of_profiles(mounted, np.searchsorted(changes, np.arange(len(decoded)), side="right"))
 
 
 def _of_profiles(profiles: list[CutterProfile], row: Ints) -> ToolsOfRows:

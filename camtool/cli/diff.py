@@ -1,0 +1,198 @@
+"""`camtool diff`: what two programs, machines, jobs or drawings cut differently."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from camtool.cli.files import STDOUT, check_places, display_name, read_bytes, write_all
+from camtool.cli.life_signs import progress
+from camtool.cli.messages import say, say_findings, show_text
+from camtool.cli.options import (
+    DrawingFlags,
+    JobFlags,
+    MachineFlags,
+    SectionedCommand,
+    drawing_options,
+    job_options,
+    length,
+    machine_options,
+    talk_options,
+)
+from camtool.records import replace
+
+if TYPE_CHECKING:
+    from camtool.run import Run
+    from camtool.stock.cut import CutStock, StockDifference
+    from camtool.stock.heights import Bracket
+
+DEFAULT_LIMIT_MM = 0.01
+"""Stocks that differ by no more count as equal."""
+
+
+@click.command(cls=SectionedCommand, short_help="What two programs or jobs cut differently.")
+@click.argument("first", metavar="A")
+@click.argument("second", metavar="[B]", required=False)
+@machine_options
+@click.option("--other-target", metavar="NAME", help="The machine of B, if it is another one.")
+@click.option("--other-machine", metavar="NAME", help="Your own machine for B.")
+@click.option("--other-job", metavar="FILE", help="The job file of B, if it is another one.")
+@click.option(
+    "--max-difference",
+    "limit",
+    metavar="LENGTH",
+    callback=length,
+    help="Exit code 1 when A and B are farther apart, in plane or depth; default 0.01mm.",
+)
+@click.option("--json", "report", metavar="FILE", help="The figures as JSON; - is stdout.")
+@job_options
+@drawing_options
+@talk_options
+def diff(
+    first: str,
+    second: str | None,
+    machine: MachineFlags,
+    other_target: str | None,
+    other_machine: str | None,
+    other_job: str | None,
+    limit: float | None,
+    report: str | None,
+    job: JobFlags,
+    drawing: DrawingFlags,
+    quiet: bool,
+    verbose: bool,
+) -> int:
+    """Compare the stock after A with the stock after B: where, how far and how much more is cut.
+
+    A and B are programs of the machine, or drawings, which are posted with the job. Without B, A
+    is compared with itself under another machine or job. The distance is proved: no point of the
+    one surface is farther from the other, in the plane or along Z. Exit code 1 when it is more
+    than --max-difference, or cannot be proved to be less.
+    """
+    is_other = other_target is not None or other_machine is not None
+    if second is None and other_job is None and not is_other:
+        raise click.UsageError(
+            "nothing to compare with: give B, --other-job, --other-target or --other-machine"
+        )
+    sources = [first, second, other_job, *machine.files(), *job.files()]
+    check_places(sources, [report])
+    limit_mm = DEFAULT_LIMIT_MM if limit is None else limit
+    if not limit_mm > 0.0:
+        raise click.UsageError("--max-difference must be above 0")
+
+    from camtool.stock.cut import difference_of
+
+    other = MachineFlags.of(other_target, other_machine, ()) if is_other else machine
+    sides = [
+        _Side(first, machine, job, drawing),
+        _Side(
+            first if second is None else second,
+            other,
+            job if other_job is None else replace(job, file=other_job),
+            drawing,
+        ),
+    ]
+    stocks = [side.stock(quiet=quiet, verbose=verbose) for side in sides]
+    if any(stock is None for stock in stocks):
+        return 1
+    one, two = (stock for stock in stocks if stock is not None)
+    progress().begin("comparing")
+    found = difference_of(one, two, limit_mm)
+    differs = max(found.deeper.low, found.shallower.low) > limit_mm or (
+        found.distance_mm > limit_mm * (1.0 + 1e-9)
+    )
+    facts = _facts(found, stocks, limit_mm, differs=differs)
+    if report is not None:
+        write_all({report: (json.dumps(facts, indent=2) + "\n").encode()})
+    if not quiet and report != STDOUT:
+        show_text(_text(found, [side.name for side in sides]))
+    if differs:
+        say(
+            f"camtool: the two differ by more than {limit_mm:g} mm",
+            quiet=quiet,
+        )
+    return int(differs)
+
+
+class _Side:
+    """One side of the comparison: a file, its machine and its job."""
+
+    def __init__(
+        self, file: str, machine: MachineFlags, job: JobFlags, drawing: DrawingFlags
+    ) -> None:
+        self.file, self.machine, self.job, self.drawing = file, machine, job, drawing
+
+    @property
+    def name(self) -> str:
+        """The name of the file, with that of the job and the machine."""
+        names = [display_name(self.file), self.job.file, self.machine.name()]
+        return ", ".join(name for name in names if name)
+
+    def stock(self, *, quiet: bool, verbose: bool) -> CutStock | None:
+        """Return the stock after the program of this side; None where the job has errors, which
+        are said."""
+        from camtool.stock.cut import cut_stock
+
+        job = self.job.job(self.drawing)
+        with self.job.name_job_file():
+            run = self._run()
+            say_findings(run.findings, quiet=quiet, verbose=verbose)
+            if run.failed or run.decoded is None:
+                say(f"camtool: error: {self.name}: its errors above come first", quiet=False)
+                return None
+            return cut_stock(run.decoded, self.machine.load(), job)
+
+    def _run(self) -> Run:
+        """Return the program of this side, read or made."""
+        from camtool.pipeline import post_drawing, read_program
+
+        target = self.machine.load()
+        if self.drawing.is_program(self.file, target):
+            return read_program(read_bytes(self.file), target, source=display_name(self.file))
+        job = self.job.job(self.drawing)
+        read = self.drawing.read(self.file, target.machine, job)
+        return post_drawing(read, job, target, check=False, progress=progress())
+
+
+def _facts(
+    found: StockDifference, stocks: Sequence[CutStock | None], limit_mm: float, *, differs: bool
+) -> dict[str, Any]:
+    """Return the figures as JSON."""
+
+    def bracket(one: Bracket) -> dict[str, Any]:
+        return {
+            "between_mm": [round(one.low, 6), round(one.high, 6)],
+            "at_mm": [round(value, 4) for value in one.at_mm],
+        }
+
+    return {
+        "differs": differs,
+        "limit_mm": limit_mm,
+        "deeper": bracket(found.deeper),
+        "shallower": bracket(found.shallower),
+        "more_mm3": [round(found.more_mm3.low, 6), round(found.more_mm3.high, 6)],
+        "less_mm3": [round(found.less_mm3.low, 6), round(found.less_mm3.high, 6)],
+        "beside_um": [
+            round(1000.0 * stock.moves.beside_mm, 3) for stock in stocks if stock is not None
+        ],
+    }
+
+
+def _text(found: StockDifference, names: Sequence[str]) -> str:
+    """Return the figures for people."""
+    lines = [f"A  {names[0]}", f"B  {names[1]}"]
+    for words, one, volume in (
+        ("B cuts more", found.deeper, found.more_mm3),
+        ("B cuts less", found.shallower, found.less_mm3),
+    ):
+        if one.low <= 0.0:
+            lines.append(f"{words}: nowhere by more than {one.high:.4f} mm")
+            continue
+        x, y = one.at_mm
+        far = f"{one.value:.4f} mm (proved to ±{one.margin:.4f})"
+        much = f"{volume.low:.4g} to {volume.high:.4g} mm³"
+        lines.append(f"{words}: by {far} near X {x:.3f} Y {y:.3f}, {much}")
+    return "\n".join(lines)
