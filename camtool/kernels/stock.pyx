@@ -11,6 +11,8 @@ facts make bounds over a square:
 - So is every mean of the heights of two moves, and the stock lies below each such mean. Between
   two passes the slopes of both cancel in it, so the bound errs by the square of the square's size
   instead of by the size itself.
+- The mean of a convex function over a square is at least its value at the middle, and at most the
+  mean of its values at the corners (Hermite and Hadamard).
 
 `tests/oracles/stock_heights.py` is the twin.
 """
@@ -197,6 +199,47 @@ cdef class StockTree:
                 found[k] = self.bound(&at[k, 0], &slope[k, 0], grow, &last)
         return np.asarray(found)
 
+    def means(self, squares: Floats, double bottom=-math.INFINITY):
+        """(K,), (K,) bounds of the mean height over each square: middle and half a side (K, 3); the
+        stock ends at a bottom."""
+        cdef double[:, ::1] at = np.ascontiguousarray(squares, dtype=np.float64)
+        cdef Py_ssize_t k, count = at.shape[0]
+        cdef double[::1] low = np.empty(count)
+        cdef double[::1] high = np.empty(count)
+        cdef Int last = -1
+        with nogil:
+            for k in range(count):
+                low[k], high[k] = self.top, self.top
+                self.mean_of(&at[k, 0], bottom, &last, &low[k], &high[k])
+        return np.asarray(low), np.asarray(high)
+
+    cdef void mean_of(
+        self, const double* square, double bottom, Int* guess, double* low, double* high
+    ) noexcept nogil:
+        """Bounds of the mean height over a square: those of the move that is lowest at its middle,
+        if no other is lower anywhere; else the least and the greatest height."""
+        cdef double x = square[0], y = square[1], half = square[2], most, other, average
+        cdef double room = half * math.sqrt(2.0)
+        cdef double[2] level
+        cdef double[4] now
+        cdef Int row = -1, ignored = -1
+        cdef int k
+        cdef double middle = self.lowest(x, y, 0.0, self.top, -1, &row, guess[0])
+        level[0], level[1] = 0.0, 0.0
+        if row >= 0:
+            guess[0] = row
+            most = self.corners(row, square, level, 0.0, now)
+            if most <= self.top:
+                other = self.lowest(x, y, room, self.top, -1, &ignored, -1, row)
+                average = 0.0
+                for k in range(4):
+                    average += 0.25 * max(now[k], bottom)
+                if other >= most:
+                    low[0], high[0] = max(middle, bottom), average
+                    return
+        low[0] = max(self.lowest(x, y, room, self.top, -1, &ignored, guess[0]), bottom)
+        high[0] = max(self.bound(square, level, 0.0, guess), bottom)
+
     cdef inline double nearer(
         self, const double* node, double x, double y, double room, double grow
     ) noexcept nogil:
@@ -214,10 +257,18 @@ cdef class StockTree:
         )
 
     cdef double lowest(
-        self, double x, double y, double grow, double top, Int before, Int* which, Int guess
+        self,
+        double x,
+        double y,
+        double grow,
+        double top,
+        Int before,
+        Int* which,
+        Int guess,
+        Int skipped=-1,
     ) noexcept nogil:
         """Least height over a point, below `top`, and the row of the move there. `guess`: a move
-        that may be low there."""
+        that may be low there; one may be `skipped`."""
         cdef Int stack[FAN * DEPTH]
         cdef int levels[FAN * DEPTH]
         cdef int count = 0, level
@@ -244,6 +295,8 @@ cdef class StockTree:
                     if self.moves[child, AZ] + min(
                         self.moves[child, SLOPE] * self.moves[child, LONG], 0.0
                     ) >= best or (before >= 0 and self.number[child] >= before):
+                        continue
+                    if child == skipped:
                         continue
                     z = height_of(
                         &self.moves[child, 0], &self.tools[self.tool[child], 0], x, y, grow

@@ -108,12 +108,16 @@ class CutStock(Struct, frozen=True, eq=False):
         """Return the volume that is cut out of the stock within its box and above its bottom, mm³,
         between two bounds."""
         top, bottom = self.tree.top, -math.inf if self.bottom_mm is None else self.bottom_mm
-        return integral(
-            lambda squares: top - np.maximum(self.tree.greatest(squares), bottom),
-            lambda squares: top - np.maximum(self.tree.least(squares), bottom),
-            self.box_mm,
-            share,
-        )
+
+        def means(squares: Floats) -> tuple[Floats, Floats]:
+            low, high = self.tree.means(squares, bottom)
+            return top - high, top - low
+
+        def extremes(squares: Floats) -> tuple[Floats, Floats]:
+            low, high = self.tree.least(squares), self.tree.greatest(squares)
+            return top - np.maximum(high, bottom), top - np.maximum(low, bottom)
+
+        return integral(means, extremes, self.box_mm, share)
 
 
 def _across(axis: str, at_mm: float, place: Floats) -> Floats:
@@ -235,10 +239,8 @@ def _distance(one: StockTree, other: StockTree, box: Box, limit_mm: float) -> Br
 def _volume_between(one: StockTree, other: StockTree, box: Box, slack_mm3: float) -> Bracket:
     """Return the volume that `other` cuts below `one`, mm³, to 1 % or `slack_mm3`."""
 
-    def least(squares: Floats) -> Floats:
-        return np.maximum(one.least(squares) - other.greatest(squares), 0.0)
+    def extremes(squares: Floats) -> tuple[Floats, Floats]:
+        least = np.maximum(one.least(squares) - other.greatest(squares), 0.0)
+        return least, np.maximum(one.greatest(squares) - other.least(squares), 0.0)
 
-    def most(squares: Floats) -> Floats:
-        return np.maximum(one.greatest(squares) - other.least(squares), 0.0)
-
-    return integral(least, most, box, slack=slack_mm3)
+    return integral(extremes, extremes, box, slack=slack_mm3)

@@ -150,9 +150,13 @@ def greatest_value(
     return Bracket(best, max(proved, best), place, seen)
 
 
+MeanBounds = Callable[[Floats], tuple[Floats, Floats]]
+"""Lower and upper bounds (K,), (K,) of a function over squares (K, 3)."""
+
+
 def integral(
-    least: Callable[[Floats], Floats],
-    most: Callable[[Floats], Floats],
+    means: MeanBounds,
+    extremes: MeanBounds,
     box: tuple[float, float, float, float],
     share: float = VOLUME_SHARE,
     slack: float = MIN_VOLUME_MM3,
@@ -161,11 +165,12 @@ def integral(
     """Return the integral of a function over a box between two bounds, to a share of it or to
     `slack`, whichever is more.
 
-    `least` and `most` give bounds of the function over squares (K, 3). The squares where they are
-    farthest apart are divided again and again. The place is that of the square with the most.
+    `means` bounds the mean of the function over squares, `extremes` its values, for squares that
+    lie partly outside of the box. The squares where the bounds are farthest apart are divided
+    again and again. The place is that of the square with the most.
     """
-    squares = _within(_first_squares(box), box)
-    low, high = _parts(squares, least, most, box)
+    squares = _first_squares(box)
+    low, high = _parts(squares, means, extremes, box)
     while True:
         total = float(low.sum()), float(high.sum())
         wanted = max(share * total[1], slack)
@@ -179,36 +184,31 @@ def integral(
         chosen = order[~small][-room:]
         kept = np.ones(len(squares), dtype=np.bool_)
         kept[chosen] = False
-        quarters = _within(_quarters(squares[chosen]), box)
-        parts = _parts(quarters, least, most, box)
+        quarters = _quarters(squares[chosen])
+        lows, highs = _parts(quarters, means, extremes, box)
         squares = np.concatenate([squares[kept], quarters])
-        low, high = np.append(low[kept], parts[0]), np.append(high[kept], parts[1])
+        low, high = np.append(low[kept], lows), np.append(high[kept], highs)
     x, y = squares[int(np.argmax(high)), :2].tolist()
     return Bracket(total[0], total[1], (x, y), len(squares))
 
 
-def _within(squares: Floats, box: tuple[float, float, float, float]) -> Floats:
-    """Return the squares that reach into a box."""
-    return squares[_sizes(squares, box) > 0.0]
-
-
-def _sizes(squares: Floats, box: tuple[float, float, float, float]) -> Floats:
-    """Return the areas (K,) of squares within a box."""
+def _parts(
+    squares: Floats,
+    means: MeanBounds,
+    extremes: MeanBounds,
+    box: tuple[float, float, float, float],
+) -> tuple[Floats, Floats]:
+    """Return bounds (K,), (K,) of the integral over the part of each square in a box."""
     low = np.maximum(squares[:, :2] - squares[:, 2:], box[:2])
     high = np.minimum(squares[:, :2] + squares[:, 2:], box[2:])
     sides = np.maximum(high - low, 0.0)
-    return np.asarray(sides[:, 0] * sides[:, 1])
-
-
-def _parts(
-    squares: Floats,
-    least: Callable[[Floats], Floats],
-    most: Callable[[Floats], Floats],
-    box: tuple[float, float, float, float],
-) -> tuple[Floats, Floats]:
-    """Return bounds (K,) of the integral over each of some squares."""
-    size = _sizes(squares, box)
-    return size * least(squares), size * most(squares)
+    size = sides[:, 0] * sides[:, 1]
+    whole = size >= 4.0 * squares[:, 2] ** 2 * (1.0 - 1e-9)
+    bounds = np.zeros((2, len(squares)))
+    bounds[:, whole] = means(squares[whole])
+    part = ~whole & (size > 0.0)
+    bounds[:, part] = extremes(squares[part])
+    return size * bounds[0], size * bounds[1]
 
 
 def _first_squares(box: tuple[float, float, float, float]) -> Floats:

@@ -97,6 +97,24 @@ def test_bounds_hold_everywhere_in_a_square(seed: int, count: int, size: float) 
 
 
 @settings(max_examples=20)
+@given(seed=st.integers(0, 10_000), count=st.integers(1, 100), size=st.floats(1e-3, 1.0))
+def test_means_lie_between_their_bounds(seed: int, count: int, size: float) -> None:
+    tree = stock_tree(random_moves(seed, count))
+    rng = np.random.default_rng(seed)
+    squares = np.column_stack([rng.uniform(0.0, 10.0, (30, 2)), np.full(30, size)])
+    bottom = float(rng.choice([-1.0, -math.inf]))
+    low, high = tree.means(squares, bottom)
+    places = (np.arange(40) + 0.5) / 20.0 - 1.0
+    grid = np.stack(np.meshgrid(places, places), axis=-1).reshape(-1, 2)
+    for square, least, most in zip(squares, low.tolist(), high.tolist(), strict=True):
+        z = np.maximum(tree.heights(square[:2] + grid * size)[0], bottom)
+        # The mean of a grid is off by a cell of its border at walls, and by its bend elsewhere.
+        slack = 0.06 * float(np.ptp(z)) + 1e-12
+        assert least - slack <= z.mean() <= most + slack
+        assert most - least <= float(np.ptp(z)) * 3.0 + 3.0 * size
+
+
+@settings(max_examples=20)
 @given(seed=st.integers(0, 10_000), grow=st.floats(-0.05, 0.05))
 def test_a_grown_profile_holds_moves_that_lie_beside(seed: int, grow: float) -> None:
     moves = random_moves(seed, 50)
