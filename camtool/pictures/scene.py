@@ -43,7 +43,9 @@ class Scene:
     The drawing is in the work frame. trace_points (T, 2) mm is the predicted path of the slides,
     trace_error_mm (T,) its distance from the wanted path, trace_cutting (T,) whether the tool cuts
     between the point before and this one (None: always); errors count only there. travel_mm is the
-    size of the table's travel from (0, 0), stock_mm the stock's left, lower, right and upper edge.
+    size of the table's travel from (0, 0), stock_mm the stock's left, lower, right and upper edge,
+    thickness_mm its thickness. `tools` are the tools with the first row of the turn of each, ()
+    where they are not known.
     `wanted` are the lines and arcs with which the trace
     was compared, `worst` the places of its largest errors, mm, the largest first; `tool_mm` is the
     diameter of the tool, if there is only one, and `nose` a tool that is as wide as it is deep,
@@ -72,6 +74,8 @@ class Scene:
     rounds: tuple[Round, ...] = ()
     playback: Callable[[], Playback] | None = None
     stock_mm: tuple[float, float, float, float] | None = None
+    thickness_mm: float | None = None
+    tools: tuple[tuple[int, Tool], ...] = ()
     tabs: tuple[tuple[float, float], ...] = ()
     inspected: tuple[InspectedReport, ...] = ()
 
@@ -231,6 +235,8 @@ def scene_of(
         trace_cutting=trace.cutting if trace is not None else None,
         travel_mm=_travel(toolpath, machine),
         stock_mm=None if job is None or job.stock is None else job.stock.box_mm,
+        thickness_mm=None if job is None or job.stock is None else job.stock.thickness_mm,
+        tools=_turns(job, toolpath) if job and toolpath else (),
         notes=verification.report.notes() if verification is not None else (),
         wanted=verification.wanted.segments if verification is not None else None,
         worst=tuple(one.at_mm for one in worst),
@@ -297,9 +303,12 @@ def _width_mm(job: Job, toolpath: Toolpath | None) -> float | None:
 
 def _turns(job: Job, toolpath: Toolpath) -> tuple[tuple[int, Tool], ...]:
     """The tools that cut in turn, each with the first row of its turn; () where the toolpath does
-    not say which operation cuts."""
+    not say which of several cuts."""
     from camtool.planning.link import tool_note
 
+    first = job.operations[0].tool if job.operations else None
+    if first and all(each.tool == first for each in job.operations):
+        return ((0, first),)
     if toolpath.operations is None:
         return ()
     tools = {tool_note(each.tool): each.tool for each in job.operations}

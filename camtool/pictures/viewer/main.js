@@ -111,8 +111,7 @@ class Pointer {
     place.addEventListener("wheel", (event) => {
       event.preventDefault();
       const lines = event.deltaMode === 1 ? 30 : 1;
-      stage.view.zoom(Math.exp(-event.deltaY * lines * WHEEL_RATE), ...at(event));
-      stage.changed();
+      stage.shown.zoom(Math.exp(-event.deltaY * lines * WHEEL_RATE), ...at(event));
     }, { passive: false });
     place.addEventListener("pointerdown", (event) => {
       place.setPointerCapture(event.pointerId);
@@ -120,7 +119,7 @@ class Pointer {
       this.travel = 0;
     });
     place.addEventListener("pointermove", (event) => {
-      if (this.fingers.has(event.pointerId)) this.drag(event.pointerId, at(event));
+      if (this.fingers.has(event.pointerId)) this.drag(event, at(event));
       else this.hover(...at(event));
     });
     const lift = (event) => {
@@ -130,22 +129,31 @@ class Pointer {
     place.addEventListener("pointerup", lift);
     place.addEventListener("pointercancel", lift);
     place.addEventListener("pointerleave", () => hovered(-1, -1, 0, 0));
-    place.addEventListener("dblclick", () => stage.fit());
+    place.addEventListener("dblclick", () => stage.shown.fit());
+    place.addEventListener("contextmenu", (event) => event.preventDefault());
   }
 
-  drag(id, [x, y]) {
-    const { view } = this.stage, [oldX, oldY] = this.fingers.get(id);
+  /** One finger or the left button drags, which turns the view in depth; two fingers, another
+   * button or Shift move it, and the distance of two fingers zooms. */
+  drag(event, [x, y]) {
+    const { shown } = this.stage, id = event.pointerId, [oldX, oldY] = this.fingers.get(id);
     this.travel += Math.hypot(x - oldX, y - oldY);
+    this.fingers.set(id, [x, y]);
     const other = [...this.fingers].find(([finger]) => finger !== id);
     if (other) {
       const [u, v] = other[1], before = Math.hypot(oldX - u, oldY - v);
-      if (before > 0) view.zoom(Math.hypot(x - u, y - v) / before, u, v);
-    } else view.pan(x - oldX, y - oldY);
-    this.fingers.set(id, [x, y]);
-    this.stage.changed();
+      shown.pan((x - oldX) / 2, (y - oldY) / 2);
+      if (before > 0) shown.zoom(Math.hypot(x - u, y - v) / before, (x + u) / 2, (y + v) / 2);
+    } else if (event.buttons > 1 || event.shiftKey) shown.pan(x - oldX, y - oldY);
+    else shown.drag(x - oldX, y - oldY);
   }
 
   hover(px, py) {
+    if (this.stage.shown !== this.stage) {
+      const found = this.stage.depth.under(px, py);
+      this.hovered(found ? found.row : -1, -1, px, py, found);
+      return;
+    }
     const { view, layers, grids, run } = this.stage, reach = REACH_PX / view.scale;
     const x = view.mmX(px), y = view.mmY(py);
     // Moves that are done come before those that are not.
@@ -159,16 +167,31 @@ class Pointer {
 
 /** Do what a key means; false for a key without a meaning. */
 function pressed(event, { stage, player, panel }) {
-  const { view } = stage, middle = [view.width / 2, view.height / 2];
-  const pan = (dx, dy) => { view.pan(dx * KEY_PAN_PX, dy * KEY_PAN_PX); stage.changed(); };
-  const zoom = (factor) => { view.zoom(factor, ...middle); stage.changed(); };
+  const { view, shown } = stage, middle = [view.width / 2, view.height / 2];
+  const pan = (dx, dy) => shown.pan(dx * KEY_PAN_PX, dy * KEY_PAN_PX);
+  const zoom = (factor) => shown.zoom(factor, ...middle);
   const step = (rows) => player && player.toRow(player.run.row + rows);
   const arrows = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
   if (event.shiftKey && arrows[event.key]) { pan(...arrows[event.key]); return true; }
+  if (shown !== stage) {
+    if (arrows[event.key]) {
+      const [across, down] = arrows[event.key];
+      shown.turn(shown.azimuth - across * KEY_TURN, shown.elevation + down * KEY_TURN);
+      shown.changed();
+      return true;
+    }
+    if (event.key === "l" || SIDES[event.key]) {
+      if (event.key === "l") find("path-shown").click();
+      else shown.from(event.key);
+      return true;
+    }
+  }
   const actions = {
     " ": () => player && player.toggle(),
     ArrowLeft: () => step(-1),
     ArrowRight: () => step(1),
+    ",": () => step(-1),
+    ".": () => step(1),
     PageUp: () => step(-100),
     PageDown: () => step(100),
     Home: () => player && player.toStart(),
@@ -178,8 +201,9 @@ function pressed(event, { stage, player, panel }) {
     "+": () => zoom(KEY_ZOOM),
     "=": () => zoom(KEY_ZOOM),
     "-": () => zoom(1 / KEY_ZOOM),
-    0: () => stage.fit(),
-    f: () => stage.fit(),
+    0: () => shown.fit(),
+    f: () => shown.fit(),
+    g: () => find("in-depth").hidden || find("in-depth").click(),
     e: () => panel.nextColour(),
     m: () => panel.nextTimes(1),
     M: () => panel.nextTimes(-1),
@@ -204,6 +228,7 @@ function begin() {
   const layers = new Layers(head, columns), run = new Run(columns.move_seconds);
   const stage = new Stage(find("stage"), tracks, layers, run);
   stage.grids = lazyGrids(tracks);
+  if (head.stock) stage.depth = new Depth(stage, head, columns, run);
 
   const panel = new LayerPanel(layers, () => stage.changed());
   const listing = new Listing(head, columns, (row) => player.toRow(row));
@@ -216,10 +241,10 @@ function begin() {
   };
   if (tracks.moves.count) player = new Player(run, moved);
   else document.body.classList.add("still");
-  showTables(head, (row) => { player.toRow(row); centre(stage, tracks.moves, row); });
+  showTables(head, (row) => { player.toRow(row); centre(stage, row); });
 
-  const hovered = (move, drawn, px, py) => {
-    stage.hover = { moves: move, drawing: drawn };
+  const hovered = (move, drawn, px, py, at) => {
+    stage.hover = { moves: move, drawing: drawn, at };
     showTip({ head, columns, run, listing }, stage.hover, px, py);
     stage.soon("hover");
   };
@@ -258,8 +283,37 @@ function listen(parts) {
   };
   window.addEventListener("beforeprint", print(true));
   window.addEventListener("afterprint", print(false));
-  find("fit").addEventListener("click", () => stage.fit());
+  find("fit").addEventListener("click", () => stage.shown.fit());
+  listenDepth(stage);
   find("help-button").addEventListener("click", () => showHelp(find("help").hidden));
+}
+
+/** The switch between plan and depth, and the section. */
+function listenDepth(stage) {
+  const button = find("in-depth"), { depth } = stage;
+  button.hidden = !depth;
+  if (!depth) return;
+  button.addEventListener("click", () => {
+    if (!depth.start()) {
+      find("no-depth").hidden = false;
+      button.disabled = true;
+      return;
+    }
+    depth.isOn = !depth.isOn;
+    button.setAttribute("aria-pressed", String(depth.isOn));
+    stage.place.classList.toggle("deep", depth.isOn);
+    find("section").hidden = !depth.isOn;
+    find("tip").hidden = true;
+    stage.wantsAll = true;
+    stage.soon("all");
+  });
+  find("side").addEventListener("change", () => depth.from(find("side").value));
+  find("section").addEventListener("input", () => {
+    depth.hasPath = find("path-shown").checked;
+    depth.section = { axis: find("section-axis").value, share: Number(find("section-at").value) / 1000 };
+    find("section-at").disabled = !depth.section.axis;
+    depth.changed();
+  });
 }
 
 function showHelp(isShown) {
@@ -267,9 +321,8 @@ function showHelp(isShown) {
   find("help-button").setAttribute("aria-expanded", String(isShown));
 }
 
-function centre(stage, moves, row) {
-  [stage.view.x, stage.view.y] = moves.at(row, 1);
-  stage.changed();
+function centre(stage, row) {
+  stage.shown.show(row);
   stage.place.scrollIntoView({ block: "nearest" });
 }
 
@@ -281,14 +334,15 @@ function showMove(head, columns, run) {
 /** The facts of what lies under the cursor, beside the cursor. */
 function showTip({ head, columns, run, listing }, hover, px, py) {
   const tip = find("tip"), block = hover.moves >= 0 ? columns.move_block[hover.moves] : -1;
-  tip.hidden = hover.moves < 0 && hover.drawing < 0;
+  tip.hidden = hover.moves < 0 && hover.drawing < 0 && !hover.at;
   const now = columns.move_block.length ? columns.move_block[run.row] : 0;
   listing.show(block >= 0 ? block : now, block >= 0 ? block : now);
   if (tip.hidden) return;
   const moved = hover.moves >= 0 ? moveFacts(head, columns, run, hover.moves) : [];
   const drawn = hover.drawing >= 0 ? drawnFacts(head, columns, hover.drawing) : [];
-  tip.replaceChildren(factTable([...moved, ...drawn]));
-  const place = find("stage"), right = px > place.clientWidth / 2, low = py > place.clientHeight / 2;
+  const place = hover.at ? [["place", `X ${hover.at.x.toFixed(2)}  Y ${hover.at.y.toFixed(2)}  Z ${hover.at.z.toFixed(3)} mm`]] : [];
+  tip.replaceChildren(factTable([...place, ...moved, ...drawn]));
+  const stage = find("stage"), right = px > stage.clientWidth / 2, low = py > stage.clientHeight / 2;
   tip.style.left = `${px + (right ? -14 - tip.offsetWidth : 14)}px`;
   tip.style.top = `${py + (low ? -14 - tip.offsetHeight : 14)}px`;
 }

@@ -49,9 +49,11 @@ from camtool.pictures.viewer.columns import (
     part_columns,
     traced_of,
 )
+from camtool.stock.cutters import cutter_profile
+from camtool.toolpath.moves import toolpath_extents
 from camtool.units import UM_PER_MM
 
-SCRIPTS = ("data.js", "paint.js", "stage.js", "panel.js", "main.js")
+SCRIPTS = ("data.js", "paint.js", "stage.js", "solid.js", "depth.js", "panel.js", "main.js")
 """The files of the script in their order; the last one starts it."""
 
 SCRIPTED = frozenset(
@@ -122,7 +124,29 @@ def _head(content: Content, run: Playback | None, traced: Traced) -> dict[str, o
             for place, off in zip(scene.worst, traced.worst_off.tolist(), strict=True)
         ],
         "travel_mm": scene.travel_mm,
+        "stock": None if run is None else _stock(scene),
+        "cutters": [(row, *cutter_profile(tool).columns) for row, tool in scene.tools],
         "ambiguous": [] if drawing is None else _ambiguous(drawing),
+    }
+
+
+MIN_FLOOR_MM = 1.0
+"""Without a stock in the job, so much stays below the deepest cut."""
+
+
+def _stock(scene: Scene) -> dict[str, object] | None:
+    """The box of the stock, left, lower, right and upper edge, and its bottom, mm. What the job
+    does not say is as large as the cuts with their tools; None without moves."""
+    toolpath = scene.toolpath
+    if toolpath is None or not toolpath.is_motion.any():
+        return None
+    (left, right), (low, high), (deepest, _) = toolpath_extents(toolpath).tolist()
+    wide = [tool.radius_at(max(-deepest, 0.0)) for _, tool in scene.tools]
+    more = max([*wide, 0.02 * max(right - left, high - low), 0.1])
+    deepest = min(deepest, 0.0)
+    return {
+        "box": scene.stock_mm or (left - more, low - more, right + more, high + more),
+        "bottom": -(scene.thickness_mm or max(-1.2 * deepest, MIN_FLOOR_MM - deepest)),
     }
 
 

@@ -56,7 +56,7 @@ function clock(seconds) {
 const SORTS = ["rapid", "feed", "plunge"];
 const COLOURS = [
   "paper", "ink", "quiet", "grid", "drawing", "feed", "rapid", "plunge", "pale", "tool", "pick",
-  "swept", "travel", "wanted",
+  "swept", "travel", "wanted", "stock", "cut", "section",
 ];
 
 /** The page's colours of now: light or dark as the system prefers, light on paper. */
@@ -304,6 +304,27 @@ class Stage {
     this.resting = 0;
   }
 
+  drag(dx, dy) { this.pan(dx, dy); }
+
+  pan(dx, dy) {
+    this.view.pan(dx, dy);
+    this.changed();
+  }
+
+  zoom(factor, px, py) {
+    this.view.zoom(factor, px, py);
+    this.changed();
+  }
+
+  /** Look at the end of a move. */
+  show(row) {
+    [this.view.x, this.view.y] = this.moves.at(row, 1);
+    this.changed();
+  }
+
+  /** The plan or the view in depth, whichever is shown. */
+  get shown() { return this.depth && this.depth.isOn ? this.depth : this; }
+
   /** Move and scale the old picture to its place in the new view. */
   slide() {
     const { painted: old, view } = this, factor = view.scale / old.scale;
@@ -329,6 +350,10 @@ class Stage {
 
   paint() {
     const begin = performance.now(), colours = palette();
+    if (this.depth && this.depth.isOn) {
+      this.paintDepth(colours);
+      return;
+    }
     if (this.wantsAll) {
       this.wantsAll = false;
       this.paintPlan(colours);
@@ -343,6 +368,15 @@ class Stage {
     this.paintOver(colours);
     if (this.layers.printing) this.join();
     if (!this.frame && !this.resting) delete document.body.dataset.waiting;
+    document.body.dataset.painted = String(Number(document.body.dataset.painted || 0) + 1);
+  }
+
+  /** Paint the view in depth, and again while there is more to cut. */
+  paintDepth(colours) {
+    if (this.wantsAll) this.depth.restyle();
+    this.wantsAll = false;
+    if (!this.depth.paint(colours)) this.soon("moved");
+    if (!this.frame) delete document.body.dataset.waiting;
     document.body.dataset.painted = String(Number(document.body.dataset.painted || 0) + 1);
   }
 

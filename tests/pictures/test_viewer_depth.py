@@ -1,0 +1,233 @@
+"""The viewer in depth: the stock that its script cuts, beside one that shares nothing with it, and
+what a browser shows of it."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from importlib import resources
+from typing import Any
+
+import numpy as np
+import pytest
+
+from camtool.arrays import Floats
+from camtool.pictures.scene import Scene
+from camtool.pictures.viewer.page import viewer_page
+from camtool.planning.job import Tool
+from camtool.records import replace
+from camtool.stock.cutters import cutter_profile
+from camtool.toolpath.builder import ToolpathBuilder
+from camtool.toolpath.moves import Toolpath
+from tests.oracles.stock import Cutter, Move, Stock
+from tests.pictures.viewer_browser import NEEDS_BROWSER, browser, shown
+from tests.pictures.viewer_pages import busy, head_of
+
+__all__ = ["browser", "shown"]
+
+BOX = (-2.0, -3.0, 18.0, 12.0)
+MILL, BIT, BALL = Tool(3.0), Tool(6.0, "v", math.radians(60.0), 0.4), Tool(4.0, "ball")
+BULL = Tool(4.0, "bull", corner_radius_mm=1.0)
+
+
+def random_path(seed: int) -> Toolpath:
+    """Lines, level arcs, ramps, plunges and rapids in a box of 16 × 9 mm."""
+    draws = np.random.default_rng(seed)
+    path = ToolpathBuilder().rapid(0.0, 0.0, 2.0)
+    for _ in range(30):
+        x, y = draws.uniform([0.0, 0.0], [16.0, 9.0]).tolist()
+        z = float(draws.uniform(-2.0, 0.5))
+        kind = int(draws.integers(5))
+        if kind == 0:
+            path.rapid(z=2.0).rapid(x, y).line(z=z, feed=100.0)
+        elif kind == 1:
+            path.line(x, y, z, feed=100.0)
+        elif kind == 2:
+            start = path.finish().end[-1]
+            middle = 0.5 * (start[:2] + np.array([x, y]))
+            path.arc(x, y, centre=(*middle.tolist(),), ccw=bool(draws.integers(2)), feed=100.0)
+        else:
+            path.line(x, y, feed=100.0)
+    return path.finish()
+
+
+def scene_of_cuts(path: Toolpath, *turns: tuple[int, Tool]) -> Scene:
+    return busy(Scene("cuts", toolpath=path, tools=turns, stock_mm=BOX, thickness_mm=3.0))
+
+
+def cut_by(script: Callable[[str], Any], path: Toolpath, tool: Tool, *rows: int) -> list[Floats]:
+    """Cut up to the ends of the rows in turn with the page's script: heights (ny, nx) each."""
+    names = ("data.js", "solid.js")
+    folder = resources.files("camtool.pictures.viewer")
+    text = "\n".join(folder.joinpath(name).read_text() for name in names)
+    arcs = np.flatnonzero(path.is_arc)
+    given = {
+        "from": path.starts[:, :2].ravel().tolist(),
+        "to": path.end[:, :2].ravel().tolist(),
+        "arcs": arcs.tolist(),
+        "bends": np.column_stack([path.centre, path.sweeps()])[arcs].ravel().tolist(),
+        "z": [float(path.start[2]), *path.end[:, 2].tolist()],
+        "cutter": cutter_profile(tool).columns,
+        "box": BOX,
+        "rows": rows,
+    }
+    made = script(
+        f"""() => {{
+          {text}
+          const given = {json.dumps(given)}, from = Float64Array.from(given.from);
+          const track = new Track(from, Float64Array.from(given.to), given.arcs, given.bends);
+          const turns = [[0, new Cutter(given.cutter)]];
+          const solid = new Solid(given.box, turns, track, given.z, 20000);
+          const all = given.rows.map((row) => {{
+            solid.toward(row, 1);
+            return Array.from(solid.heights);
+          }});
+          return {{ nx: solid.nx, ny: solid.ny, all }};
+        }}"""
+    )
+    return [np.array(each).reshape(made["ny"], made["nx"]) for each in made["all"]]
+
+
+def cut_slowly(path: Toolpath, tool: Tool, shape: tuple[int, ...], row: int) -> Floats:
+    """The same stock of needles at the same places, by the oracle; a tool with a round corner by
+    the dense points of its path."""
+    stock = Stock((0.0, 0.0), (1.0, 1.0))
+    stock.x = np.linspace(BOX[0], BOX[2], shape[1])
+    stock.y = np.linspace(BOX[1], BOX[3], shape[0])
+    stock.height = np.zeros(shape)
+    angle = tool.tip_angle_rad
+    slope = 0.0 if angle is None else math.tan(0.5 * angle)
+    cutter = Cutter(tool.radius_mm, slope, 0.5 * tool.tip_diameter_mm)
+    for k in range(row + 1):
+        centre = (*path.centre[k].tolist(),) if path.is_arc[k] else None
+        sweep = float(path.sweeps()[k]) if path.is_arc[k] else 0.0
+        start, end = path.starts[k].tolist(), path.end[k].tolist()
+        move = Move(False, (*start,), (*end,), k, centre, sweep)
+        if tool.kind not in ("ball", "bull"):
+            stock.cut(move, cutter)
+            continue
+        length = math.dist(start, end) if centre is None else abs(sweep) * 10.0
+        for x, y, z in move.at(np.linspace(0.0, 1.0, 2 + int(length / 0.05))).tolist():
+            d = np.hypot(stock.x[None, :] - x, stock.y[:, None] - y)
+            nose = tool.nose_mm
+            out = np.clip(d - (tool.radius_mm - nose), 0.0, nose)
+            high = z + nose - np.sqrt(nose**2 - out**2)
+            stock.height = np.where(
+                d <= tool.radius_mm, np.minimum(stock.height, high), stock.height
+            )
+    return stock.height
+
+
+@pytest.mark.parametrize("tool", [MILL, BIT, BALL, BULL], ids=lambda tool: str(tool.kind))
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
+class TestCutting:
+    """Heights of the page's script beside those of the oracle."""
+
+    pytestmark = NEEDS_BROWSER
+
+    def test_the_script_cuts_as_the_oracle(self, browser: Any, tool: Tool, seed: int) -> None:
+        path, page = random_path(seed), browser.new_page()
+        last = len(path) - 1
+        ends = [last // 3, last, last // 2, 3, last]
+        found = cut_by(page.evaluate, path, tool, *ends)
+        page.close()
+        assert found[1].min() < -1.0
+        for row, heights in zip(ends, found, strict=True):
+            slow = cut_slowly(path, tool, heights.shape, row)
+            apart = np.abs(heights - slow)
+            # A needle at the very edge of a tool is cut or not by rounding, or by the chord of an
+            # arc: beside it another one is as high.
+            assert np.quantile(apart, 0.995) < 0.01, row
+            assert (apart > 0.02).mean() < 0.004, row
+        np.testing.assert_array_equal(found[1], found[4])
+
+
+def picture(view: Any) -> bytes:
+    view.settled()
+    return bytes(view.page.locator("#stage").screenshot())
+
+
+class TestShown:
+    """The page in a browser."""
+
+    pytestmark = NEEDS_BROWSER
+
+    @pytest.fixture
+    def view(self, shown: Any) -> Any:
+        view = shown(scene_of_cuts(random_path(3), (0, MILL), (12, BIT)))
+        view.press("g")
+        view.settled()
+        return view
+
+    def test_it_turns_zooms_and_returns(self, view: Any) -> None:
+        before = picture(view)
+        seen = {before}
+        for keys in (("ArrowLeft",), ("ArrowUp",), ("+",), ("Shift+ArrowLeft",), ("s",), ("7",)):
+            view.press(*keys)
+            seen.add(picture(view))
+        assert len(seen) == 7
+        view.press("i")
+        assert picture(view) == before
+        view.page.mouse.move(*view.place_of(0.5, 0.5))
+        view.page.mouse.down()
+        view.page.mouse.move(*view.place_of(0.7, 0.6))
+        view.page.mouse.up()
+        view.page.mouse.move(0, 0)
+        assert picture(view) not in seen
+        view.press("g")
+        assert view.pixels("plan") > 0
+        assert picture(view) not in seen
+
+    def test_the_slider_cuts_and_fills_again(self, view: Any) -> None:
+        whole = picture(view)
+        view.page.locator("#slider").fill("3000")
+        assert picture(view) != whole
+        view.press("End")
+        assert picture(view) == whole
+
+    def test_section_path_and_colours_change_it(self, view: Any) -> None:
+        seen = {picture(view)}
+        view.page.select_option("#section-axis", "y")
+        seen.add(picture(view))
+        view.page.locator("#section-at").fill("300")
+        seen.add(picture(view))
+        view.press("l")
+        seen.add(picture(view))
+        view.press("e")
+        seen.add(picture(view))
+        assert len(seen) == 5
+
+    def test_the_place_under_the_mouse_and_its_move(self, view: Any) -> None:
+        view.press("t")
+        view.settled()
+        view.page.mouse.move(*view.place_of(0.5, 0.5))
+        tip = view.text("#tip")
+        assert "place\nX 8." in tip
+        assert "block" in tip
+
+    def test_without_webgl_the_plan_stays_and_says_so(self, shown: Any) -> None:
+        view = shown(scene_of_cuts(random_path(3), (0, MILL)))
+        view.page.evaluate("() => { HTMLCanvasElement.prototype.getContext = () => null; }")
+        view.press("g")
+        assert "WebGL 2" in view.text("#tools")
+        assert view.page.locator("#plan").is_visible()
+
+
+def test_the_head_has_the_stock_and_each_tool() -> None:
+    head = head_of(
+        viewer_page(scene_of_cuts(random_path(3), (0, MILL), (12, BIT))).decode("utf-8")
+    )
+    assert head["stock"] == {"box": [*BOX], "bottom": -3.0}
+    cutters = head["cutters"]
+    assert isinstance(cutters, list)
+    assert [row for row, *_ in cutters] == [0, 12]
+    assert cutters[0][1:] == [1.5, 1.5, 0.0, 0.0]
+    assert cutters[1][1:] == pytest.approx([3.0, 0.2, 0.0, math.sqrt(3.0)])
+
+
+def test_without_a_stock_it_is_as_large_as_the_cuts() -> None:
+    path = ToolpathBuilder().rapid(0.0, 0.0, 2.0).line(10.0, 4.0, -1.5, feed=50.0).finish()
+    scene = replace(scene_of_cuts(path, (0, MILL)), stock_mm=None, thickness_mm=None)
+    stock = head_of(viewer_page(scene).decode("utf-8"))["stock"]
+    assert stock == {"box": [-1.5, -1.5, 11.5, 5.5], "bottom": -2.5}
