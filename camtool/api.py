@@ -512,7 +512,8 @@ class Looks(TypedDict, total=False):
     `size_px` is its width, `crop_mm` the rectangle (x, y, width, height) that it shows,
     `exaggerate` the factor by which deviations from the wanted path are enlarged, `layers` the
     names of the layers to show, `polar` the number (from 1) of the circle whose radial errors are
-    plotted instead.
+    plotted instead. `view`: "plan" (the moves from above), or the stock after them: "iso",
+    "front", "side", "top", "leftover" or "gouge".
     """
 
     size_px: int | None
@@ -521,6 +522,7 @@ class Looks(TypedDict, total=False):
     exaggerate: float
     layers: frozenset[str] | None
     polar: int | None
+    view: str
 
 
 def preview(

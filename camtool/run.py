@@ -122,6 +122,8 @@ class Run(Shown):
             machine=self.target.machine,
             listing=self.listing,
             tabs=() if self.wanted is None else self.wanted.tabs_mm,
+            wanted=self.wanted,
+            target=self.target,
         )
 
     def __str__(self) -> str:

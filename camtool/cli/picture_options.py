@@ -19,7 +19,7 @@ from camtool.cli.messages import say
 from camtool.cli.options import Command, option, with_flags
 from camtool.errors import OptionError
 from camtool.pictures.layers import Layer, chosen, layer_names, layer_of, layers_in
-from camtool.pictures.options import PictureOptions
+from camtool.pictures.options import VIEWS, PictureOptions
 from camtool.records import replace
 from camtool.units import parse_length
 
@@ -73,9 +73,10 @@ OVERLAY = Canvas("drop --compare", layered=False)
 
 @dataclass(frozen=True)
 class PictureFlags:
-    """`--size` (px), `--crop` (x, y, width, height in mm), `--dark`, `--exaggerate`, `--layers`,
-    `--no-layer`, `--polar`."""
+    """`--view`, `--size` (px), `--crop` (x, y, width, height in mm), `--dark`, `--exaggerate`,
+    `--layers`, `--no-layer`, `--polar`."""
 
+    view: str | None = None
     size: int | None = None
     crop: tuple[float, float, float, float] | None = None
     dark: bool = False
@@ -104,7 +105,8 @@ class PictureFlags:
         """Return the options of the pictures; OptionError for flags without a valid picture."""
         times = 1.0 if self.exaggerate is None else self.exaggerate
         layers = chosen(self.named, self.no_layer) if self.named or self.no_layer else None
-        return PictureOptions(self.size, self.crop, self.dark, times, layers, self.polar)
+        view = self.view or "plan"
+        return PictureOptions(self.size, self.crop, self.dark, times, layers, self.polar, view)
 
     def check(self, pictures: Sequence[str | None], canvas: Canvas) -> None:
         """Raise a usage error for flags that none of the `pictures` can honour, and for flags that
@@ -117,6 +119,10 @@ class PictureFlags:
         if all(map(is_viewer, names)):
             raise click.UsageError(
                 f"{flags}: an .html page has switches of its own; name a .svg or .png, or drop it"
+            )
+        if self.view not in (None, "plan") and not canvas.moves:
+            raise click.UsageError(
+                f"--view {self.view}: nothing cuts the stock here; {canvas.more}"
             )
         if self.layers is not None and not self.named:
             raise click.UsageError("--layers names no layer")
@@ -180,6 +186,12 @@ def picture_options(command: Command) -> Command:
         "picture",
         PictureFlags,
         [
+            option(
+                _PICTURE,
+                "--view",
+                type=click.Choice(VIEWS),
+                help="The moves from above (plan), or the stock after them.  [plan]",
+            ),
             option(
                 _PICTURE,
                 "--size",

@@ -145,12 +145,13 @@ class SceneSource:
 
         progress().begin(f"reading {Path(source).name}")
         data = read_bytes(source)
+        job = self.job.job(self.drawing) if self.job.is_given else None
         if not self.simulate:
-            return read_program(data, target, source=source).scene()
-        judging = Judging(trace_points=points_for([self.output]))
-        return verify_program(
-            data, target, source=source, judging=judging, progress=progress()
-        ).scene()
+            run = read_program(data, target, source=source)
+        else:
+            judging = Judging(trace_points=points_for([self.output]))
+            run = verify_program(data, target, source=source, judging=judging, progress=progress())
+        return replace(run, job=job).scene()
 
     def _job_scene(self, source: str, target: LoadedTarget) -> tuple[Scene, Findings]:
         from camtool.pictures.options import points_for

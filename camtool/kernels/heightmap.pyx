@@ -386,3 +386,93 @@ cdef double _bull(
             return wanted
         u = wanted
     return u
+
+
+cpdef void project(
+    float[:, ::1] heights, tuple grid, tuple camera, double wall, int[:, ::1] cell,
+    float[:, ::1] level
+) noexcept:
+    """Find the cell that each pixel shows, seen from afar along one direction.
+
+    `grid`: x and y, mm, of the centre of cell (0, 0) of `heights` (NY, NX), and the width of a
+    cell. `camera`: the horizontal direction of the view (fx, fy) of length 1, the sine and the
+    cosine of its elevation, the picture's u and v, mm, in the middle of pixel (0, 0), and mm from
+    pixel to pixel. On the picture u = x fy − y fx and v = z cosine + (x fx + y fy) sine. `cell`
+    (H, W) gets the number of the cell, NX · row + column, or −1 beside the map; for a point of a
+    wall, higher than `wall` mm, ~(the number of the cell before it). `level` (H, W) gets the height of the point, mm.
+    Row 0 is the lowest.
+
+    Each column of pixels is a walk away from the viewer, from cell to cell; what is higher on the
+    picture than all before is seen.
+    """
+    cdef double x0, y0, size, fx, fy, sine, cosine, u0, v0, pixel, u, t, last, next_x, next_y
+    cdef double foot, low, high, before, z
+    cdef Int ny, nx, i, j, row, rows, column, here, there, done, until
+    x0, y0, size = grid
+    fx, fy, sine, cosine, u0, v0, pixel = camera
+    ny, nx = heights.shape[0], heights.shape[1]
+    x0, y0 = x0 - 0.5 * size, y0 - 0.5 * size
+    rows = cell.shape[0]
+    for column in range(cell.shape[1]):
+        for row in range(rows):
+            cell[row, column] = -1
+            level[row, column] = 0.0
+        u = u0 + column * pixel
+        # The walk is at u (fy, −fx) + t (fx, fy), within the map between t and last.
+        t, last = -math.INFINITY, math.INFINITY
+        t, last = _within(u * fy, fx, x0, x0 + nx * size, t, last)
+        t, last = _within(-u * fx, fy, y0, y0 + ny * size, t, last)
+        if not t < last:
+            continue
+        i = _index((u * fy + t * fx - x0) / size, nx - 1)
+        j = _index((t * fy - u * fx - y0) / size, ny - 1)
+        done, here = 0, -1  # pixels below `done` are seen already
+        before = 0.0
+        while t < last and 0 <= i < nx and 0 <= j < ny:
+            there = j * nx + i
+            z = heights[j, i]
+            # Where the walk leaves the cell.
+            next_x = _border(x0, size, i, fx, u * fy)
+            next_y = _border(y0, size, j, fy, -u * fx)
+            foot = t * sine
+            t = max(t, min(next_x, next_y, last))
+            low = (foot + z * cosine - v0) / pixel
+            high = (t * sine + z * cosine - v0) / pixel
+            if here >= 0 and z > before:  # what rises between the cell before and this one
+                until = _index(math.ceil(low), rows)
+                for row in range(done, until):
+                    cell[row, column] = ~<int> here if z - before > wall else <int> there
+                    level[row, column] = <float> min(
+                        max((v0 + row * pixel - foot) / cosine, before), z
+                    )
+                done = max(done, until)
+            elif here < 0:
+                done = _index(math.ceil(low), rows)
+            until = _index(math.ceil(high), rows)
+            for row in range(done, until):
+                cell[row, column] = <int> there
+                level[row, column] = <float> z
+            done = max(done, until)
+            here, before = there, z
+            if next_x <= next_y:
+                i += 1 if fx > 0.0 else -1
+            else:
+                j += 1 if fy > 0.0 else -1
+
+
+cdef inline double _border(double first, double size, Int k, double way, double start) noexcept:
+    """The t at which start + t · way leaves the cell k; inf if it never does."""
+    if abs(way) < 1e-12:
+        return math.INFINITY
+    return (first + (k + 1 if way > 0.0 else k) * size - start) / way
+
+
+cdef (double, double) _within(
+    double start, double way, double low, double high, double first, double last
+) noexcept:
+    """The part of first … last in which start + t · way lies between low and high."""
+    cdef double one, other
+    if abs(way) < 1e-12:
+        return (first, last) if low <= start < high else (1.0, 0.0)
+    one, other = (low - start) / way, (high - start) / way
+    return max(first, min(one, other)), min(last, max(one, other))

@@ -74,6 +74,11 @@ def draw_beside(scenes: Sequence[Scene], options: PictureOptions = AS_USUAL) -> 
     """The scenes as SVG text; equal input gives equal bytes. ValueError when there are none."""
     if not scenes:
         raise ValueError("no scene to draw")
+    if options.view != "plan":
+        raise OptionError(
+            f"the view {options.view} shows one stock, not {len(scenes)}",
+            mend="make a picture of each, or drop --view",
+        )
     if options.polar is not None:
         return _polars(scenes, options.polar, options)
     contents = _alike([content_of(scene, options) for scene in scenes])

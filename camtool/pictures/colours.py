@@ -93,7 +93,7 @@ def sequential(fraction: float, *, dark: bool = False) -> str:
     steps = list(pairwise(_DARK_ANCHORS if dark else _ANCHORS))
     index = min(int(fraction * len(steps)), len(steps) - 1)
     share = fraction * len(steps) - index
-    low, high = (_channels(colour) for colour in steps[index])
+    low, high = (channels(colour) for colour in steps[index])
     mixed = (round(a + (b - a) * share) for a, b in zip(low, high, strict=True))
     return "#" + "".join(f"{channel:02x}" for channel in mixed)
 
@@ -114,5 +114,6 @@ def darkened(svg: str) -> str:
     return _PAINT.sub(lambda found: f'{found[1]}="{instead[found[2]]}"', svg)
 
 
-def _channels(colour: str) -> tuple[int, int, int]:
+def channels(colour: str) -> tuple[int, int, int]:
+    """Red, green and blue of "#rrggbb", 0 … 255."""
     return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)

@@ -49,6 +49,10 @@ def draw(scene: Scene, options: PictureOptions = AS_USUAL) -> str:
     """The scene as SVG text; OptionError for a circle that it does not have."""
     if options.polar is not None:
         return draw_polar(scene, options.polar, options)
+    if options.view != "plan":
+        from camtool.pictures.solid import draw_solid
+
+        return draw_solid(scene, options)
     content = content_of(scene, options)
     page = page_of(content, page_width(options.size_px or SVG_WIDTH_PX))
     view, sizes = page.view, (page.width, page.height)

@@ -18,20 +18,25 @@ POINTS_OF_A_PAGE = 400_000
 """Most points of the slides' path that the viewer gets: enough for the ends of 200,000 moves and
 the largest error within each."""
 
+VIEWS = ("plan", "iso", "front", "side", "top", "leftover", "gouge")
+"""Views: the moves from above; the stock after the program, aslant, from the front, from the right
+and from above; and, by colour, where it is higher or lower than wanted."""
+
 MIN_TIMES, MAX_TIMES = 1.0, 1e6
 """Least and greatest factor of errors that are drawn larger."""
 
 
 @dataclass(frozen=True)
 class PictureOptions:
-    """`size_px` is the width, None: as usual. `crop_mm` (x, y, width, height): only this part of
-    the plane, with more beside or above it where it is very long or very high. `dark`: on a dark
-    ground. `exaggerate`: the factor by which the distance of the predicted path from the wanted
-    one is drawn larger. `polar`: the plot of the radial errors of this circle, from 1, in place of
+    """`view`: one of VIEWS, the plane picture of moves or a picture of the stock. `size_px` is
+    the width, None: as usual. `crop_mm` (x, y, width, height): only this part of the plane,
+    with more beside or above it where it is very long or very high. `dark`: on a dark ground.
+    `exaggerate`: the factor by which the distance of the predicted path from the wanted one is
+    drawn larger. `polar`: the plot of the radial errors of this circle, from 1, in place of
     the picture. `layers`: the names of the layers to show, None: the usual ones.
 
     OptionError for a size or a part that makes no picture, a factor out of range, and a part,
-    a factor or layers with `polar`."""
+    a factor or layers with `polar` or a view of the stock."""
 
     size_px: int | None = None
     crop_mm: tuple[float, float, float, float] | None = None
@@ -39,6 +44,7 @@ class PictureOptions:
     exaggerate: float = 1.0
     layers: frozenset[str] | None = None
     polar: int | None = None
+    view: str = "plan"
 
     def __post_init__(self) -> None:
         if self.size_px is not None:
@@ -60,6 +66,13 @@ class PictureOptions:
             raise OptionError(
                 "a circle is plotted alone: without crop and layers, and with a factor of its own",
                 mend="drop polar, or crop_mm, exaggerate and layers",
+            )
+        if self.view not in VIEWS:
+            raise OptionError(f"unknown view {self.view!r}", mend=f"use one of {', '.join(VIEWS)}")
+        if self.view != "plan" and (self.exaggerate, self.layers, self.polar) != (1.0, None, None):
+            raise OptionError(
+                f"the view {self.view} shows the stock alone",
+                mend="drop view, or exaggerate, layers and polar",
             )
 
 

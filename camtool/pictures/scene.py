@@ -24,6 +24,8 @@ from camtool.toolpath.moves import Kind, Toolpath, toolpath_extents
 if TYPE_CHECKING:
     from camtool.machine.model import Machine
     from camtool.planning.job import Job, Tool
+    from camtool.stock.moves import StockMoves
+    from camtool.target.registry import LoadedTarget
     from camtool.toolpath.program import Listing
     from camtool.verification.report import InspectedReport, Report
     from camtool.verification.verify import Verification
@@ -52,7 +54,8 @@ class Scene:
     where that changes along the path; `turns` are the tools of several, each with the row of the
     toolpath from which on it cuts; `rounds` are full circles with their errors.
     `tabs` are the places of tabs, mm; `inspected` the dimensions with their verdicts. `playback`
-    gives how the toolpath runs; only the viewer calls it.
+    gives how the toolpath runs; only the viewer calls it. `cut` gives the moves that cut the
+    stock; only views of the stock call it.
 
     With a trace the picture leaves out rapids and plunges, and feeds are pale. ValueError when the
     trace is incomplete or not finite.
@@ -78,6 +81,7 @@ class Scene:
     tools: tuple[tuple[int, Tool], ...] = ()
     tabs: tuple[tuple[float, float], ...] = ()
     inspected: tuple[InspectedReport, ...] = ()
+    cut: Callable[[], StockPair] | None = None
 
     def __post_init__(self) -> None:
         points, error = self.trace_points, self.trace_error_mm
@@ -126,6 +130,18 @@ class Round(Struct, frozen=True, eq=False):
         found[seen, 1] = np.hypot(mean[:, 0], mean[:, 1]) * (half / np.sin(half))
         found[seen, 2] = np.sqrt(bins[:, 6])
         return found - self.radius_mm
+
+
+class StockPair(Struct, frozen=True, eq=False):
+    """The moves that cut the stock, and those that should, None where these are not known; the
+    left, lower, right and upper edge of the stock and its thickness, mm. `known`: the job gives
+    this block; otherwise it is as large as the cuts need."""
+
+    moves: StockMoves
+    wanted: StockMoves | None
+    box_mm: tuple[float, float, float, float]
+    thickness_mm: float
+    known: bool
 
 
 class TableLine(Struct, frozen=True):
@@ -207,11 +223,14 @@ def scene_of(
     machine: Machine | None = None,
     listing: Callable[[], Listing | None] | None = None,
     tabs: tuple[tuple[float, float], ...] = (),
+    wanted: Toolpath | None = None,
+    target: LoadedTarget | None = None,
 ) -> Scene:
     """The scene of what is given; with a verification, of the predicted path as well.
 
     `job` places the drawing in the work frame; `listing` gives the program's lines to the viewer;
-    `tabs` are the places (x, y) mm of tabs.
+    `tabs` are the places (x, y) mm of tabs. `wanted` are the moves that the program should make.
+    With a verification and a `target` the simulated slides cut the stock.
     """
     if drawing is not None and toolpath is None:
         return scene_of_drawing(drawing, title)
@@ -247,7 +266,56 @@ def scene_of(
         tabs=tabs,
         inspected=() if verification is None else verification.report.inspection,
         playback=_playback(toolpath, verification, machine, listing),
+        cut=_stock_pair(toolpath, job, wanted, target if verification is not None else None),
     )
+
+
+BESIDE_SHARE, BELOW_SHARE = 0.06, 0.25
+"""A stock that is not known reaches so far beyond the cuts (a share of their longer side), and so
+far below them (a share of their depth)."""
+
+
+def _stock_pair(
+    toolpath: Toolpath | None,
+    job: Job | None,
+    wanted: Toolpath | None,
+    target: LoadedTarget | None,
+) -> Callable[[], StockPair] | None:
+    """The function that gives the moves that cut the stock."""
+    if toolpath is None:
+        return None
+
+    def pair() -> StockPair:
+        from camtool.stock.cut import cut_box
+        from camtool.stock.moves import stock_moves_of_toolpath
+        from camtool.stock.slides import slide_moves, tools_of_rows
+
+        def as_planned(path: Toolpath) -> StockMoves:
+            tools = tools_of_rows(path, job)
+            return stock_moves_of_toolpath(path, tools.index, tools.cutters)
+
+        plan = None if wanted is None else wanted.operations
+        tools = tools_of_rows(toolpath, job, plan)
+        if target is not None:
+            moves = slide_moves(toolpath, target, tools)
+        else:
+            moves = stock_moves_of_toolpath(toolpath, tools.index, tools.cutters)
+        stock = None if job is None else job.stock
+        box, depth = None if stock is None else stock.box_mm, 0.0
+        if stock is not None:
+            depth = stock.thickness_mm
+        elif len(moves):
+            depth = max(-(1.0 + BELOW_SHARE) * float(moves.end[:, 2].min()), 0.0)
+        known = box is not None
+        if box is None:
+            left, bottom, right, top = cut_box(moves)
+            by = BESIDE_SHARE * max(right - left, top - bottom)
+            box = left - by, bottom - by, right + by, top + by
+        other = wanted is not None and wanted is not toolpath
+        beside = as_planned(wanted) if other and wanted is not None else None
+        return StockPair(moves, beside, box, depth or 1.0, known)
+
+    return pair
 
 
 def rounds_of(verification: Verification) -> tuple[Round, ...]:

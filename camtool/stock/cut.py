@@ -135,10 +135,10 @@ def cut_stock(
     stock = None if job is None else job.stock
     box = None if stock is None else stock.box_mm
     bottom = None if stock is None else -stock.thickness_mm
-    return CutStock(moves, stock_tree(moves), box or _box_of(moves), bottom)
+    return CutStock(moves, stock_tree(moves), box or cut_box(moves), bottom)
 
 
-def _box_of(moves: StockMoves) -> Box:
+def cut_box(moves: StockMoves) -> Box:
     """Return the box of all that the tools cut; that of all moves where nothing is cut."""
     cuts = np.minimum(moves.start[:, 2], moves.end[:, 2]) < 0.0
     chosen = moves.select(cuts) if cuts.any() else moves

@@ -8,18 +8,12 @@ known to within what this distance does to it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
-from camtool.errors import OptionError
-from camtool.planning.job import Tool
-from camtool.planning.link import tool_note
 from camtool.stock.cutters import CutterProfile
 from camtool.toolpath.moves import Kind, Toolpath
-from camtool.toolpath.wanted import Operations
 
 SAGITTA_MM = 1e-3
 """Greatest distance between an arc and the chords that stand for it."""
@@ -103,39 +97,3 @@ def stock_moves_of_toolpath(
     rapid = np.asarray(toolpath.kind[row] == Kind.RAPID)
     beside = SAGITTA_MM if len(arcs) else 0.0
     return StockMoves(start, end, row, rapid, tool[row], cutters, beside)
-
-
-def tools_of_rows(
-    toolpath: Toolpath, tools: Sequence[Tool], plan: Operations | None = None
-) -> tuple[Ints, tuple[Tool, ...]]:
-    """Return which tool cuts each row (N,), as an index of the tools that are returned with it.
-
-    `tools`: those of the job, in the order of its operations; `plan`: the operations of the
-    toolpath as planned, if a plan is there. OptionError where several tools cut and neither the
-    toolpath nor the plan says which.
-    """
-    plan = toolpath.operations or plan
-    notes = {tool_note(each): each for each in tools}
-    if plan is not None and all(each.tool in notes for each in plan.notes):
-        tools = [notes[each.tool] for each in plan.notes]
-    known = tuple(dict.fromkeys(tools))
-    if len(known) == 1:
-        return np.zeros(len(toolpath), dtype=np.int64), known
-    if toolpath.operations is not None and len(tools) == len(toolpath.operations.notes):
-        index = np.array([known.index(each) for each in tools])
-        begin = toolpath.operations.begin
-        turn = np.searchsorted(begin, np.arange(len(toolpath)), side="right") - 1
-        return index[turn.clip(min=0)], known
-    changes = np.flatnonzero(toolpath.kind == Kind.TOOL_CHANGE)
-    number = {each.number: k for k, each in reversed(list(enumerate(known)))}
-    asked = [number.get(int(value)) for value in toolpath.value[changes]]
-    if known and len(changes) and None not in asked:
-        # Before the first change stands the tool of the first operation.
-        index = np.array([known.index(tools[0]), *asked], dtype=np.int64)
-        turn = np.searchsorted(changes, np.arange(len(toolpath)), side="right")
-        return index[turn], known
-    raise OptionError(
-        "which tool cuts which move is not known",
-        where="the stock",
-        mend="name the tool, such as --tool-diameter 3mm, or give a job file with its tools",
-    )

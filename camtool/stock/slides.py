@@ -19,6 +19,7 @@ from camtool.stock.cutters import CutterProfile, cutter_profile
 from camtool.stock.moves import StockMoves
 from camtool.target.registry import LoadedTarget
 from camtool.toolpath.moves import Kind, Toolpath
+from camtool.toolpath.wanted import Operations
 
 THIN_MM = 5e-4
 """Samples may lie so far beside the moves that stand for them ..."""
@@ -34,19 +35,22 @@ class ToolsOfRows(Struct, frozen=True, eq=False):
     index: Ints
 
 
-def tools_of_rows(decoded: Toolpath, job: Job | None) -> ToolsOfRows:
+def tools_of_rows(
+    decoded: Toolpath, job: Job | None, plan: Operations | None = None
+) -> ToolsOfRows:
     """Return the cutter of each row of a program: that of its operation where the program was
-    planned, else the one tool of the job, else the tool of the job with the number of the last
-    tool change (before the first one, that of the first operation). OptionError where a tool is
-    not known."""
+    planned, else the one tool of the job, or of the `plan` of this program, else the tool of the
+    job with the number of the last tool change (before the first one, that of the first
+    operation). OptionError where a tool is not known."""
     if decoded.operations is not None and decoded.operations.notes:
         notes = decoded.operations.notes
         row = np.searchsorted(decoded.operations.begin, np.arange(len(decoded)), side="right") - 1
         return _of_profiles([cutter_profile(note.tool) for note in notes], row.clip(min=0))
     tools = {each.tool: cutter_profile(each.tool) for each in (job.operations if job else ())}
-    if len(set(tools.values())) == 1:
-        profile = next(iter(tools.values()))
-        if profile.radius_mm > 0.0:
+    planned = {cutter_profile(note.tool) for note in (plan.notes if plan else ())}
+    for profiles in (planned, set(tools.values())):
+        profile = next(iter(profiles), None)
+        if len(profiles) == 1 and profile is not None and profile.radius_mm > 0.0:
             return _of_profiles([profile], np.zeros(len(decoded), dtype=np.int64))
     numbers = {tool.number: profile for tool, profile in tools.items() if tool.number is not None}
     changes = np.flatnonzero(decoded.kind == Kind.TOOL_CHANGE)

@@ -163,6 +163,7 @@ _BESIDE = {
     "--tool-table-units": ("--tool-table", "tool.tbl", "--tool", "1"),
     "--operation": ("--job", "job.toml"),
     "--section-z": ("--format", "svg"),
+    "--view": ("--preview", "p.svg", "--tool-diameter", "1mm"),
     "--size": ("--preview", "p.svg"),
     "--crop": ("--preview", "p.svg"),
     "--exaggerate": ("--preview", "p.svg"),

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from camtool.arrays import Floats
 from camtool.errors import OptionError
-from camtool.planning.job import Tool
+from camtool.planning.job import Job, Operation, Tool
 from camtool.planning.link import tool_note
-from camtool.stock.cutters import CutterProfile
+from camtool.stock.cutters import CutterProfile, cutter_profile
 from camtool.stock.heightmap import (
     MAX_CELLS,
     NO_MOVE,
@@ -23,15 +23,11 @@ from camtool.stock.heightmap import (
     height_map,
 )
 from camtool.stock.heights import stock_tree
-from camtool.stock.moves import (
-    SAGITTA_MM,
-    StockMoves,
-    stock_moves_of_toolpath,
-    tools_of_rows,
-)
+from camtool.stock.moves import SAGITTA_MM, StockMoves, stock_moves_of_toolpath
+from camtool.stock.slides import tools_of_rows
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
-from camtool.toolpath.wanted import OperationNote
+from camtool.toolpath.wanted import OperationNote, Operations
 from tests.oracles import stock_heights as slow
 from tests.stock.cuts import CUTTERS, moves_of
 
@@ -199,31 +195,34 @@ def test_arcs_become_chords_within_their_sagitta() -> None:
 
 MILL = Tool(3.0, number=1)
 BIT = Tool(6.0, kind="v", tip_angle_rad=1.0, number=2, tip_diameter_mm=0.2)
+BOTH = Job((Operation(tool=MILL), Operation(tool=BIT)))
 
 
 def two_tools(*, plan: bool, changes: bool) -> Toolpath:
     builder = ToolpathBuilder().rapid(z=5.0)
     for tool in (MILL, BIT):
         if plan:
-            note = OperationNote("profile", "", tool_note(tool), 1.0, 1.0, 1.0)
-            builder.operation(note)
-        if changes and tool is not MILL:
+            builder.operation(OperationNote("profile", "", tool_note(tool), 1.0, 1.0, 1.0))
+        if changes and tool is BIT:
             builder.event(Kind.TOOL_CHANGE, float(tool.number or 0))
         builder.line(1.0, 1.0, -1.0, feed=100.0).line(2.0, 2.0, 1.0, feed=100.0)
     return builder.finish()
 
 
-def test_tools_of_rows() -> None:
-    planned = two_tools(plan=True, changes=False)
-    tool, known = tools_of_rows(planned, [MILL, BIT])
-    assert known == (MILL, BIT)  # with the tip that notes of a program do not have
-    assert tool.tolist() == [0, 0, 0, 1, 1]
-    changed = two_tools(plan=False, changes=True)
-    tool, known = tools_of_rows(changed, [MILL, BIT], planned.operations)
-    assert known == (MILL, BIT)
-    assert tool.tolist() == [0, 0, 0, 1, 1, 1]
+def test_the_first_tool_needs_no_change() -> None:
+    planned = tools_of_rows(two_tools(plan=True, changes=False), None)
+    assert planned.cutters == (cutter_profile(MILL), cutter_profile(BIT))
+    assert planned.index.tolist() == [0, 0, 0, 1, 1]
+    changed = tools_of_rows(two_tools(plan=False, changes=True), BOTH)
+    assert changed.cutters == planned.cutters
+    assert changed.index.tolist() == [0, 0, 0, 1, 1, 1]
+
+
+def test_a_program_for_one_of_the_tools_of_a_job() -> None:
     bare = two_tools(plan=False, changes=False)
-    assert tools_of_rows(bare, [BIT, BIT])[1] == (BIT,)
-    for tools in ([MILL, BIT], []):
-        with pytest.raises(OptionError, match="--tool-diameter"):
-            tools_of_rows(bare, tools)
+    with pytest.raises(OptionError, match="--tool-diameter"):
+        tools_of_rows(bare, BOTH)
+    of_bit = Operations(
+        (OperationNote("profile", "", tool_note(BIT), 1.0, 1.0, 1.0),), np.zeros(1, dtype=np.int64)
+    )
+    assert tools_of_rows(bare, BOTH, of_bit).cutters == (cutter_profile(BIT),)

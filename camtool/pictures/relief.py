@@ -1,0 +1,368 @@
+"""Shaded pictures of a height map: light, shadows, and the colour of the material.
+
+Pixels are computed with sums, products, quotients and roots alone, which all processors round
+alike. Colours are mixed as light (squares of the values of the page) and written as its roots.
+The map stands on a board; where the stock is cut through, the board is seen.
+"""
+
+from __future__ import annotations
+
+import base64
+import math
+import struct
+import zlib
+
+import numpy as np
+import numpy.typing as npt
+from msgspec import Struct
+
+from camtool.arrays import Floats, Octets
+from camtool.kernels.heightmap import project
+from camtool.pictures.colours import channels
+from camtool.stock.heightmap import HeightMap
+from camtool.stock.moves import StockMoves
+
+Heights = npt.NDArray[np.float32]
+
+SAMPLES = 2
+"""Pixels are computed so many times finer, in each direction, than they are written."""
+
+THROUGH_MM = 1e-4
+"""What is left of the stock, if thinner, is none."""
+
+TOP, DEEP, SIDE = "#ecd2a6", "#b07a45", "#d3a973"
+"""Colours of the material: its top, the deepest floors, and between them the walls."""
+
+AMBIENT, SKY, KEY = 0.30, 0.18, 0.62
+"""Light from everywhere, from above, and from the lamp."""
+
+PENUMBRA = 0.012
+"""Width of the edge of a shadow, as a share of the map."""
+
+NEARBY = ((0.012, 0.30), (0.035, 0.28), (0.1, 0.25))
+"""Distances within which neighbours take light, as shares of the map, and how much of it."""
+
+WALL_CELLS = 4.0
+"""A step from cell to cell higher than so many of them is a wall; a lower one is a slope."""
+
+WALL_REACHES = (3, 2)
+"""Cells over which heights are averaged for the direction of a wall."""
+
+GLOSS = 0.05
+"""How much lighter and darker the marks of a tool are, by the direction in which it cut."""
+
+
+class Camera(Struct, frozen=True):
+    """A view along the horizontal direction `away` (x, y) of length 1, from above the table by the
+    angle with this `sine`; the lamp stands in the direction `lamp` (to the right, away from the
+    viewer), `rise` times as high as it is far away."""
+
+    away: tuple[float, float]
+    sine: float
+    lamp: tuple[float, float]
+    rise: float
+
+    @property
+    def cosine(self) -> float:
+        return math.sqrt(1.0 - self.sine * self.sine)
+
+    def place(self, x: float, y: float, z: float) -> tuple[float, float]:
+        """The place on the picture, mm, to the right and up."""
+        fx, fy = self.away
+        return x * fy - y * fx, z * self.cosine + (x * fx + y * fy) * self.sine
+
+    @property
+    def light(self) -> tuple[float, float, float]:
+        """Direction to the lamp, of length 1."""
+        (fx, fy), (right, away) = self.away, self.lamp
+        x, y = right * fy + away * fx, away * fy - right * fx
+        size = math.sqrt((x * x + y * y) * (1.0 + self.rise * self.rise))
+        return x / size, y / size, self.rise / math.sqrt(1.0 + self.rise * self.rise)
+
+
+_HALF = math.sqrt(0.5)
+CAMERAS = {
+    "iso": Camera((_HALF, _HALF), math.sqrt(1.0 / 3.0), (-1.0, 0.25), 1.15),
+    "front": Camera((0.0, 1.0), 0.5, (-1.0, 0.3), 1.15),
+    "side": Camera((-1.0, 0.0), 0.5, (-1.0, 0.3), 1.15),
+    "top": Camera((0.0, 1.0), 1.0, (-0.8, 0.7), 1.9),
+}
+"""Views by name. In "iso" lengths along all three axes are seen at one scale."""
+
+
+class Stage(Struct, frozen=True, eq=False):
+    """What is lit: heights (NY, NX) mm of the stock and of the board around it, `margin` cells
+    wide; the heights of the board (`bottom_mm`) and of the deepest floor (`deep_mm`). `marks`
+    (NY, NX): how the marks of the tool catch the light, −1 … 1. `tint` (NY, NX, 3): the light of
+    the colours of floors, in place of those of the material."""
+
+    heights: Heights
+    corner_mm: tuple[float, float]
+    cell_mm: float
+    bottom_mm: float
+    deep_mm: float
+    margin: int = 0
+    marks: Heights | None = None
+    tint: Heights | None = None
+
+
+def stage_of(
+    found: HeightMap, thickness_mm: float, moves: StockMoves | None, margin: float
+) -> Stage:
+    """The map on a board, with `margin` (a share of its longer side) of the board around it."""
+    bottom = -thickness_mm
+    heights = np.where(found.heights <= bottom + THROUGH_MM, bottom, found.heights)
+    rows, columns = heights.shape
+    pad = math.ceil(margin * max(rows, columns))
+    marks = None
+    if moves is not None and found.owner is not None:
+        marks = np.pad(_marks(found, moves), ((pad, pad), (pad, pad)))
+    return Stage(
+        np.pad(heights, pad, constant_values=bottom).astype(np.float32),
+        (found.corner_mm[0] - pad * found.cell_mm, found.corner_mm[1] - pad * found.cell_mm),
+        found.cell_mm,
+        bottom,
+        float(found.heights.min(initial=0.0)),
+        pad,
+        marks,
+    )
+
+
+def _marks(found: HeightMap, moves: StockMoves) -> Heights:
+    """Return how much the marks of the tool catch the light (NY, NX), −1 … 1: the cosine of twice
+    the angle between the cut and the diagonal; 0 where nothing cut, or straight down."""
+    way = moves.end[:, :2] - moves.start[:, :2]
+    square = way[:, 0] * way[:, 0] + way[:, 1] * way[:, 1]
+    catch = np.where(
+        square > 0.0, 2.0 * way[:, 0] * way[:, 1] / np.where(square > 0.0, square, 1.0), 0.0
+    )
+    table = np.append(catch, 0.0).astype(np.float32)
+    assert found.owner is not None
+    return np.asarray(table[found.owner])
+
+
+def light_of(colour: str) -> Floats:
+    """The light (3,) of a colour "#rrggbb"."""
+    return np.array(channels(colour), dtype=np.float64) ** 2 / 255.0**2
+
+
+def floor_colours(count: int) -> Octets:
+    """The colours (count, 3) of floors in the open, from the top to the deepest."""
+    share = np.arange(count)[:, None] / (count - 1)
+    top, low = light_of(TOP), light_of(DEEP)
+    light = AMBIENT + SKY + KEY * CAMERAS["iso"].light[2]
+    mixed = np.clip((top + (low - top) * share) * light, 0.0, 1.0)
+    return np.asarray((np.sqrt(mixed) * 255.0 + 0.5).astype(np.uint8))
+
+
+def picture_of(
+    stage: Stage,
+    camera: Camera,
+    window: tuple[float, float, float, float],
+    sizes: tuple[int, int],
+    ground: str,
+) -> Octets:
+    """The picture (H, W, 3) of a window (left, low, right, high; mm on the picture) with `sizes`
+    (W, H) pixels; the board has the colour `ground`."""
+    wide, high = sizes[0] * SAMPLES, sizes[1] * SAMPLES
+    pixel = (window[2] - window[0]) / wide
+    cell = np.empty((high, wide), dtype=np.int32)
+    level = np.empty((high, wide), dtype=np.float32)
+    half = 0.5 * stage.cell_mm
+    project(
+        stage.heights,
+        (stage.corner_mm[0] + half, stage.corner_mm[1] + half, stage.cell_mm),
+        (
+            *camera.away,
+            camera.sine,
+            camera.cosine,
+            window[0] + 0.5 * pixel,
+            window[1] + 0.5 * pixel,
+            pixel,
+        ),
+        WALL_CELLS * stage.cell_mm,
+        cell,
+        level,
+    )
+    colours = _colours(stage, camera, cell, level, light_of(ground))
+    # The mean of the light of SAMPLES² points; the first row of a picture is its highest.
+    mean = sum(
+        colours[i::SAMPLES, j::SAMPLES] for i in range(SAMPLES) for j in range(SAMPLES)
+    ) / np.float32(SAMPLES * SAMPLES)
+    return np.asarray((np.sqrt(mean) * 255.0 + 0.5).astype(np.uint8)[::-1])
+
+
+def _colours(
+    stage: Stage, camera: Camera, cell: npt.NDArray[np.int32], level: Heights, ground: Floats
+) -> Heights:
+    """The light (H, W, 3) of each pixel."""
+    beside = cell == -1
+    wall = (cell < 0) & ~beside
+    number = np.where(wall, ~cell, np.maximum(cell, 0))
+    flat, steep = _facing(stage, camera)
+    lit = np.where(wall, steep.ravel()[number], flat.ravel()[number])
+    size = stage.cell_mm * max(stage.heights.shape)
+    shade = _shadows(stage.heights, camera.light, stage.cell_mm).ravel()[number]
+    clear = np.clip((level - shade) / np.float32(PENUMBRA * size) + 1.0, 0.0, 1.0)
+    open_sky = _openness(stage, size).ravel()[number]
+    # A wall is as open as its foot below, and as the top above.
+    foot = stage.heights.ravel()[number]
+    deep = np.clip((level - foot) / np.float32(0.06 * size), 0.0, 1.0)
+    open_sky = open_sky + np.where(wall, (1.0 - open_sky) * deep, 0.0)
+    light = AMBIENT * open_sky + SKY * open_sky * open_sky + KEY * lit * clear
+    share = np.clip(level / np.float32(min(stage.deep_mm, -1e-6)), 0.0, 1.0)[..., None]
+    top, low, side = (light_of(each).astype(np.float32) for each in (TOP, DEEP, SIDE))
+    material = top + (low - top) * share
+    material = np.where(wall[..., None], side + (low - side) * (0.5 * share), material)
+    board = (level <= np.float32(stage.bottom_mm + THROUGH_MM)) & ~wall
+    if stage.marks is not None:
+        light = light * (1.0 + GLOSS * np.where(wall, 0.0, stage.marks.ravel()[number]))
+    if stage.tint is not None:
+        tint = stage.tint.reshape(-1, 3)[number]
+        material = np.where(wall[..., None], material, tint)
+    # The board gives back what the lamp gives it in the open.
+    open_board = AMBIENT + SKY + KEY * camera.light[2]
+    light = np.where(
+        board, open_board + (light - open_board) * _fade(stage).ravel()[number], light
+    )
+    material = np.where(
+        board[..., None], ground.astype(np.float32) / np.float32(open_board), material
+    )
+    out = material * light[..., None].astype(np.float32)
+    out[beside] = ground
+    return np.asarray(np.clip(out, 0.0, 1.0), dtype=np.float32)
+
+
+def _facing(stage: Stage, camera: Camera) -> tuple[Heights, Heights]:
+    """Return how far each cell (NY, NX) faces the lamp, 0 … 1: as a floor, and as a wall."""
+    heights, cell = stage.heights, np.float32(stage.cell_mm)
+    flat = _towards(_lesser(heights, 1) / cell, _lesser(heights, 0) / cell, camera)
+    smooth = heights
+    for reach in WALL_REACHES:
+        smooth = _mean(_mean(smooth, reach, 0), reach, 1)
+    steep = _towards(_central(smooth, 1) / cell, _central(smooth, 0) / cell, camera)
+    return flat, steep
+
+
+def _towards(x: Heights, y: Heights, camera: Camera) -> Heights:
+    lx, ly, lz = (np.float32(part) for part in camera.light)
+    facing = (lz - x * lx - y * ly) / np.sqrt(1.0 + x * x + y * y)
+    return np.asarray(np.clip(facing, 0.0, 1.0))
+
+
+def _lesser(heights: Heights, axis: int) -> Heights:
+    """The lesser of the steps to both neighbours, 0 where they differ in sign: floors beside walls
+    stay level."""
+    step = np.diff(heights, axis=axis)
+    none = np.zeros_like(heights.take([0], axis=axis))
+    behind = np.concatenate([none, step], axis=axis)
+    ahead = np.concatenate([step, none], axis=axis)
+    least = np.minimum(np.abs(behind), np.abs(ahead))
+    return np.asarray(np.where(behind * ahead > 0.0, np.where(ahead > 0.0, least, -least), 0.0))
+
+
+def _central(heights: Heights, axis: int) -> Heights:
+    """Half the step between both neighbours."""
+    return np.asarray(0.5 * (np.roll(heights, -1, axis) - np.roll(heights, 1, axis)))
+
+
+def _mean(heights: Heights, reach: int, axis: int) -> Heights:
+    """The mean of 2 · reach + 1 cells along an axis; edges repeat."""
+    widths = [(0, 0), (0, 0)]
+    widths[axis] = (reach + 1, reach)
+    total = np.cumsum(np.pad(heights, widths, mode="edge"), axis=axis, dtype=np.float64)
+    count = 2 * reach + 1
+    size = total.shape[axis]
+    low = total.take(range(size - count), axis=axis)
+    high = total.take(range(count, size), axis=axis)
+    return np.asarray((high - low) / count, dtype=np.float32)
+
+
+def _shadows(heights: Heights, light: tuple[float, float, float], cell_mm: float) -> Heights:
+    """The height (NY, NX) below which the lamp does not shine."""
+    x, y, z = light
+    if abs(x) > abs(y):
+        return np.ascontiguousarray(
+            _shadows(np.ascontiguousarray(heights.T), (y, x, z), cell_mm).T
+        )
+    order = range(len(heights)) if y < 0.0 else range(len(heights) - 1, -1, -1)
+    shift = x / abs(y)
+    drop = np.float32(z / abs(y) * cell_mm)
+    whole = math.floor(shift)
+    part = np.float32(shift - whole)
+    count = heights.shape[1]
+    index = np.clip(np.arange(count) + whole, 0, count - 1)
+    beyond = np.clip(index + 1, 0, count - 1)
+    out = np.empty_like(heights)
+    before = np.full(count, -np.inf, dtype=np.float32)
+    first = True
+    for row in order:
+        if not first:
+            before = (before[index] * (1.0 - part) + before[beyond] * part) - drop
+        out[row] = before if not first else heights[row]
+        before = np.maximum(out[row], heights[row])
+        first = False
+    return out
+
+
+def _openness(stage: Stage, size_mm: float) -> Heights:
+    """The share of the sky (NY, NX) that neighbours leave to each cell, about."""
+    heights = stage.heights
+    open_sky = np.ones_like(heights)
+    for share, weight in NEARBY:
+        reach_mm = share * size_mm
+        step = max(1, int(reach_mm / stage.cell_mm / 6.0))
+        thin = heights[::step, ::step]
+        reach = max(1, round(reach_mm / (stage.cell_mm * step)))
+        for _ in range(2):
+            thin = _mean(_mean(thin, reach, 0), reach, 1)
+        around = _enlarged(thin, step, heights.shape)
+        taken = np.clip((around - heights) / np.float32(0.5 * reach_mm), 0.0, 1.0)
+        open_sky *= 1.0 - np.float32(weight) * taken
+    return open_sky
+
+
+def _fade(stage: Stage) -> Heights:
+    """1 (NY, NX) over the stock, falling to 0 at the edges of the board."""
+    parts = []
+    for count in stage.heights.shape:
+        edge = np.minimum(np.arange(count), np.arange(count)[::-1]).astype(np.float32)
+        parts.append(np.clip(edge / np.float32(max(stage.margin, 1)), 0.0, 1.0))
+    return np.asarray(np.minimum(parts[0][:, None], parts[1][None, :]))
+
+
+def _enlarged(thin: Heights, step: int, shape: tuple[int, ...]) -> Heights:
+    """The values between cells that lie `step` apart, from one to the next in a straight line."""
+    for axis in (0, 1):
+        place = np.arange(shape[axis], dtype=np.float32) / np.float32(step)
+        low = np.minimum(place.astype(np.int64), thin.shape[axis] - 1)
+        high = np.minimum(low + 1, thin.shape[axis] - 1)
+        part = (place - low).astype(np.float32).reshape((-1, 1) if axis == 0 else (1, -1))
+        thin = thin.take(low, axis) * (1.0 - part) + thin.take(high, axis) * part
+    return np.asarray(thin, dtype=np.float32)
+
+
+def png_of(pixels: Octets) -> bytes:
+    """The bytes of a PNG of pixels (H, W, 3)."""
+    high, wide, _ = pixels.shape
+    rows = np.zeros((high, 1 + 3 * wide), dtype=np.uint8)
+    # Each row as differences from the row above (filter 2 of the format): half as many bytes.
+    rows[:, 0] = 2
+    plain = pixels.reshape(high, -1)
+    rows[0, 1:] = plain[0]
+    rows[1:, 1:] = plain[1:] - plain[:-1]
+    parts = [
+        (b"IHDR", struct.pack(">IIBBBBB", wide, high, 8, 2, 0, 0, 0)),
+        (b"IDAT", zlib.compress(rows.tobytes(), 6)),
+        (b"IEND", b""),
+    ]
+    chunks = [
+        struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+        for name, data in parts
+    ]
+    return b"\x89PNG\r\n\x1a\n" + b"".join(chunks)
+
+
+def data_uri(png: bytes) -> str:
+    """The address under which an SVG holds a PNG."""
+    return "data:image/png;base64," + base64.b64encode(png).decode("ascii")

@@ -1,0 +1,448 @@
+"""Pictures of the stock after a program: its shaded height map on a page.
+
+`iso`, `front` and `side` show the block from outside, with its sizes along its edges; `top`,
+`leftover` and `gouge` show it from above, with axes. The raster is a PNG within the SVG; all that
+is written stands in the SVG itself.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from msgspec import Struct
+
+from camtool.arrays import Floats, Octets
+from camtool.errors import OptionError
+from camtool.pictures import text
+from camtool.pictures.chains import chains_of, path_data
+from camtool.pictures.colours import (
+    BINS,
+    FRAME,
+    OUTLINE,
+    PAPER,
+    QUIET,
+    bin_colours,
+    channels,
+    on_dark,
+)
+from camtool.pictures.layers import LegendEntry, line_swatch
+from camtool.pictures.options import SVG_WIDTH_PX, PictureOptions
+from camtool.pictures.page import (
+    BAR_GAP,
+    BAR_WIDTH,
+    HEAD_GAP,
+    LEGEND_DROP,
+    NAME_LIFT,
+    TICK_CAP,
+    axes_around,
+    fitted,
+    foot_of,
+    legend_rows,
+    mat,
+    scale_bar,
+    sheet,
+    table_of,
+    title_and_notes,
+)
+from camtool.pictures.relief import (
+    CAMERAS,
+    SAMPLES,
+    Camera,
+    Stage,
+    data_uri,
+    floor_colours,
+    light_of,
+    picture_of,
+    png_of,
+    stage_of,
+)
+from camtool.pictures.scene import Scene, StockPair
+from camtool.pictures.svg import Look, PathData, element, number
+from camtool.pictures.text import TextStyle
+from camtool.pictures.view import (
+    CROP_SHAPES,
+    MARGIN,
+    TALLEST,
+    WIDEST,
+    PageBox,
+    View,
+    decimals_of,
+    fit,
+    multiples,
+    page_width,
+    round_step,
+)
+from camtool.records import replace
+from camtool.stock.heightmap import Box, HeightMap, cell_for, height_map
+
+MAP_CELLS = 3_000_000
+"""Cells of a height map, at most: 12 MB, and as much for the moves that cut them."""
+
+BOARD_SHARE = 0.14
+"""Width of the board around the stock, as a share of its longer side."""
+
+AROUND_SHARE = 0.04
+"""Room around the stock in its picture, as a share of its longer side."""
+
+LABEL_ROOM = 34.0
+"""Room on the page beside the block for its sizes."""
+
+ISO_SCALE = math.sqrt(2.0 / 3.0)
+"""Lengths on the picture over lengths along the axes, in the view "iso"."""
+
+BESIDE_CELLS = 1
+"""Heights within so many cells are taken together where two stocks are compared: a wall that is
+moved by less than a cell is no difference of heights."""
+
+MIN_SHOWN_MM = 2e-3
+"""Smaller differences of heights have no colour."""
+
+MAX_BAR = 320.0
+"""Greatest height of the bar of depths."""
+
+BAR_STEPS = 200
+GREY = "#b9bec4"
+FROM_ABOVE = ("top", "leftover", "gouge")
+BAR_NAMES = {"leftover": "left (mm)", "gouge": "too deep (mm)"}
+GHOST_PEN = 1.3
+
+
+class Solid(Struct, frozen=True, eq=False):
+    """What a picture of the stock shows: the block and its moves, the map of the part that is
+    shown, where that part ends in X and Y, and how much (NY, NX) mm it is higher or lower than
+    wanted, None if not asked for."""
+
+    pair: StockPair
+    found: HeightMap
+    ends_mm: tuple[float, float]
+    off_mm: Floats | None = None
+
+    @property
+    def deepest_mm(self) -> float:
+        """Depth of the deepest cut that is shown, mm; no more than the thickness."""
+        return min(-float(self.found.heights.min(initial=0.0)), self.pair.thickness_mm)
+
+
+def draw_solid(scene: Scene, options: PictureOptions) -> str:
+    """SVG text of a view of the stock; OptionError where moves or tools are not known, or the
+    wanted moves of the views that need them."""
+    if scene.cut is None:
+        raise OptionError(
+            f"the view {options.view} shows the stock, and nothing cuts it here",
+            mend="give the machine of the toolpath (--target), or drop --view",
+        )
+    pair = scene.cut()
+    width = page_width(options.size_px or SVG_WIDTH_PX)
+    window = _window(pair, options)
+    solid = _solid(pair, window, options)
+    head, down = title_and_notes(scene.title, _notes(solid, options), width)
+    if options.view in FROM_ABOVE:
+        return _from_above(scene, solid, options, head, down)
+    return _from_outside(scene, solid, options, head, down)
+
+
+def _window(pair: StockPair, options: PictureOptions) -> Box:
+    """The part of the plane that is shown, mm."""
+    if options.crop_mm is not None:
+        x, y, wide, high = options.crop_mm
+        return x, y, x + wide, y + high
+    left, bottom, right, top = pair.box_mm
+    pad = AROUND_SHARE * max(right - left, top - bottom)
+    return left - pad, bottom - pad, right + pad, top + pad
+
+
+def _solid(pair: StockPair, window: Box, options: PictureOptions) -> Solid:
+    """The map of the part of the stock in a window, as fine as the picture."""
+    side = max(window[2] - window[0], window[3] - window[1])
+    # From above, what lies beside the window throws shadows into it.
+    by = 0.1 * side if options.view in FROM_ABOVE else 0.0
+    low, high = np.array(window[:2]) - by, np.array(window[2:]) + by
+    box = (*np.maximum(low, pair.box_mm[:2]).tolist(), *np.minimum(high, pair.box_mm[2:]).tolist())
+    if box[0] >= box[2] or box[1] >= box[3]:
+        raise OptionError(
+            f"the stock is not in the part from ({window[0]:g}, {window[1]:g}) to "
+            f"({window[2]:g}, {window[3]:g}) mm",
+            where="--crop",
+            mend="it lies between ({:g}, {:g}) and ({:g}, {:g}) mm".format(*pair.box_mm),
+        )
+    pixels = (options.size_px or SVG_WIDTH_PX) * SAMPLES
+    cell = max(side / pixels, cell_for(box, MAP_CELLS))
+    found = height_map(pair.moves, box, cell, owners=True)
+    if options.view not in BAR_NAMES:
+        return Solid(pair, found, box[2:])
+    if pair.wanted is None:
+        raise OptionError(
+            f"the view {options.view} compares the stock with the wanted one, which is not known",
+            mend="give the drawing and its job (verify --against), or use --view top",
+        )
+    wanted = height_map(pair.wanted, box, cell)
+    heights = found.heights.clip(-pair.thickness_mm)
+    others = wanted.heights.clip(-pair.thickness_mm)
+    if options.view == "leftover":
+        off = heights - _extreme(others, np.maximum)
+    else:
+        off = _extreme(others, np.minimum) - heights
+    return Solid(pair, found, box[2:], off.astype(np.float64))
+
+
+def _extreme(heights: np.ndarray, of: np.ufunc) -> np.ndarray:
+    """The greatest or the least height within BESIDE_CELLS of each cell."""
+    for axis in (0, 1):
+        pad = [(0, 0), (0, 0)]
+        pad[axis] = (BESIDE_CELLS, BESIDE_CELLS)
+        wide, count = np.pad(heights, pad, mode="edge"), heights.shape[axis]
+        for step in range(2 * BESIDE_CELLS + 1):
+            part = wide.take(range(step, step + count), axis)
+            heights = part if step == 0 else of(heights, part)
+    return heights
+
+
+def _notes(solid: Solid, options: PictureOptions) -> tuple[str, ...]:
+    """The size of the stock, the deepest cut, and the greatest difference."""
+    left, bottom, right, top = solid.pair.box_mm
+    sizes = (right - left, top - bottom, solid.pair.thickness_mm)
+    said = " × ".join(number(size, 2) for size in sizes)
+    guessed = "" if solid.pair.known else ", as large as the cuts need"
+    deep = number(-float(solid.found.heights.min(initial=0.0)), 3)
+    through = solid.pair.known and solid.deepest_mm >= solid.pair.thickness_mm
+    notes = [f"stock {said} mm{guessed}; cut {deep} mm deep{', through it' if through else ''}"]
+    if solid.off_mm is not None:
+        most = float(solid.off_mm.max(initial=0.0))
+        how = "higher" if options.view == "leftover" else "lower"
+        which = f"nowhere more than {number(MIN_SHOWN_MM, 3)} mm {how} than wanted"
+        if most > MIN_SHOWN_MM:
+            row, column = divmod(int(solid.off_mm.argmax()), solid.off_mm.shape[1])
+            x, y = solid.found.x[column], solid.found.y[row]
+            which = f"up to {number(most, 3)} mm {how} than wanted, at ({x:.2f}, {y:.2f}) mm"
+        cell = number(solid.found.cell_mm, 3)
+        notes.append(f"{which}; walls beside their place by less than {cell} mm are not shown")
+    return tuple(notes)
+
+
+def _from_above(
+    scene: Scene, solid: Solid, options: PictureOptions, head: str, down: float
+) -> str:
+    """The page of a view with axes."""
+    width = page_width(options.size_px or SVG_WIDTH_PX)
+    left, bottom, right, top = _window(solid.pair, options)
+    shapes = (WIDEST, TALLEST) if options.crop_mm is None else CROP_SHAPES
+    bar = _bar_of(solid, options)
+    shown = np.array([[left, right], [bottom, top]])
+    view, ticks = fitted(shown, down + HEAD_GAP, width, shapes, lambda _: bar.width)
+    entries = _entries(scene, options)
+    table, bar_y = table_of(entries, view, view.box)
+    legend_y = view.box.bottom + LEGEND_DROP
+    sizes = (width, foot_of(table, legend_y))
+    return sheet(
+        scene.title,
+        sizes,
+        options,
+        _raster(_stage(solid, bar, options), CAMERAS["top"], view, view.box, options),
+        _ghost(scene, CAMERAS["top"], view) if options.view != "top" else "",
+        mat(view.box, *sizes),
+        head,
+        axes_around(view, ticks),
+        bar.draw(view.box),
+        legend_rows(table, view.box.left, legend_y),
+        scale_bar(view, view.box.right, bar_y),
+    )
+
+
+def _from_outside(
+    scene: Scene, solid: Solid, options: PictureOptions, head: str, down: float
+) -> str:
+    """The page of a view of the block with its sizes."""
+    width = page_width(options.size_px or SVG_WIDTH_PX)
+    camera, bar = CAMERAS[options.view], _bar_of(solid, options)
+    corners = _corners(solid, camera)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    box_right = width - MARGIN - bar.width
+    thick = text.width(_thickness(solid), TICK_CAP) + 8.0
+    room = LABEL_ROOM * float(high[0] - low[0]) / (box_right - MARGIN - thick)
+    shown = np.column_stack([low - np.array([0.0, room]), high + np.array([0.0, 0.5 * room])])
+    view = fit(shown, MARGIN, down + 20.0, box_right - thick, (0.2, 0.8))
+    all_across = PageBox(0.0, down, width, view.box.bottom + 20.0)
+    entries = _entries(scene, options)
+    along = replace(view, scale=view.scale * ISO_SCALE) if options.view == "iso" else view
+    table, bar_y = table_of(entries, along, view.box)
+    legend_y = view.box.bottom + LEGEND_DROP - 30.0
+    sizes = (width, foot_of(table, legend_y))
+    return sheet(
+        scene.title,
+        sizes,
+        options,
+        _raster(_stage(solid, bar, options), camera, view, all_across, options),
+        _ghost(scene, camera, view),
+        head,
+        _sizes(solid, camera, view),
+        bar.draw(PageBox(view.box.left, view.box.top, box_right, view.box.bottom)),
+        legend_rows(table, view.box.left, legend_y),
+        scale_bar(along, view.box.right, bar_y - 30.0),
+    )
+
+
+def _stage(solid: Solid, bar: MmBar, options: PictureOptions) -> Stage:
+    """The stage of the picture, with the colours of differences."""
+    stage = stage_of(solid.found, solid.pair.thickness_mm, solid.pair.moves, BOARD_SHARE)
+    if solid.off_mm is None:
+        return stage
+    index = np.minimum((solid.off_mm / bar.top * BINS).astype(np.int64), BINS - 1)
+    lights = np.array([light_of(colour) for colour in bin_colours(dark=options.dark)])
+    tint = np.where(
+        (solid.off_mm > MIN_SHOWN_MM)[..., None], lights[index.clip(min=0)], light_of(GREY)
+    )
+    pad = stage.margin
+    tint = np.pad(tint.astype(np.float32), ((pad, pad), (pad, pad), (0, 0)))
+    return replace(stage, tint=tint)
+
+
+def _raster(
+    stage: Stage, camera: Camera, view: View, box: PageBox, options: PictureOptions
+) -> str:
+    """The image that fills a box of the page, its pixels those of the picture as it is written."""
+    size_px = options.size_px or SVG_WIDTH_PX
+    per_unit = size_px / page_width(size_px)
+    left, right = math.floor(box.left * per_unit), math.ceil(box.right * per_unit)
+    top, foot = math.floor(box.top * per_unit), math.ceil(box.bottom * per_unit)
+    (u, _), (_, v) = view.x_range, view.y_range
+    per_mm = view.scale * per_unit
+    first = u - (view.box.left * per_unit - left) / per_mm
+    last = v + (view.box.top * per_unit - top) / per_mm
+    wide, high = right - left, foot - top
+    window = (first, last - high / per_mm, first + wide / per_mm, last)
+    paper = on_dark(PAPER) if options.dark else PAPER
+    pixels = picture_of(stage, camera, window, (wide, high), paper)
+    look: Look = {"x": left / per_unit, "y": top / per_unit}
+    look |= {"width": wide / per_unit, "height": high / per_unit}
+    return element("image", {"id": "stock", **look, "href": data_uri(png_of(pixels))})
+
+
+def _ghost(scene: Scene, camera: Camera, view: View) -> str:
+    """The drawn contours on the top of the stock."""
+    if scene.drawing is None or not len(scene.drawing.paths):
+        return ""
+    # The plane of the drawing, as the camera sees it: three places give the matrix.
+    zero = view.page(*camera.place(0.0, 0.0, 0.0))
+    sides = [view.page(*camera.place(x, y, 0.0)) for x, y in ((1.0, 0.0), (0.0, 1.0))]
+    parts = [f"{side[k] - zero[k]:.9g}" for side in sides for k in (0, 1)]
+    matrix = f"matrix({' '.join(parts)} {zero[0]:.9g} {zero[1]:.9g})"
+    pen: Look = {"fill": "none", "stroke": OUTLINE, "stroke-width": view.mm(GHOST_PEN)}
+    data = path_data(chains_of(scene.drawing.paths))
+    lines = element("path", {"d": data, **pen, "stroke-opacity": "0.55"})
+    return element("g", {"id": "ghost", "transform": matrix}, lines)
+
+
+def _entries(scene: Scene, options: PictureOptions) -> list[LegendEntry]:
+    """The legend."""
+    if scene.drawing is None or not len(scene.drawing.paths) or options.view == "top":
+        return []
+    return [LegendEntry(line_swatch(OUTLINE, GHOST_PEN), "drawing")]
+
+
+# The sizes of the block, and the bar of depths or differences.
+
+
+def _corners(solid: Solid, camera: Camera) -> Floats:
+    """The corners of the block (8, 2) on the picture, mm: X changes first, then Y, then Z."""
+    (left, right), (bottom, top) = _extents(solid)
+    heights = (-solid.pair.thickness_mm, 0.0)
+    return np.array(
+        [camera.place(x, y, z) for z in heights for y in (bottom, top) for x in (left, right)]
+    )
+
+
+def _extents(solid: Solid) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Ends of the block that is shown in X and in Y, mm; the map may reach beyond it by less than
+    a cell."""
+    left, bottom = solid.found.corner_mm
+    right, top = solid.ends_mm
+    return (left, right), (bottom, top)
+
+
+def _sizes(solid: Solid, camera: Camera, view: View) -> str:
+    """The width, the depth and the thickness of the block beside its lower edges."""
+    corners = [view.page(*place) for place in _corners(solid, camera).tolist()]
+    across, along = ((high - low) for low, high in _extents(solid))
+    names = (f"{number(across, 1)} mm", f"{number(along, 1)} mm")
+    # Edges of the foot along X and along Y, those nearer to the viewer; and the upright one at the
+    # right.
+    edges = [
+        max(((corners[a], corners[b]) for a, b in pairs), key=lambda ends: ends[0][1] + ends[1][1])
+        for pairs in (((0, 1), (2, 3)), ((0, 2), (1, 3)))
+    ]
+    right = max(range(4), key=lambda corner: corners[corner][0] + 1e-3 * corners[corner][1])
+    labels = []
+    for (one, other), name in zip(edges, names, strict=True):
+        if abs(one[0] - other[0]) < 1.0:  # seen from its end
+            continue
+        slope = (other[1] - one[1]) / (other[0] - one[0])
+        anchor = "middle" if abs(slope) < 0.1 else ("start" if slope < 0.0 else "end")
+        x, y = 0.5 * (one[0] + other[0]), 0.5 * (one[1] + other[1])
+        by = {"middle": (0.0, 26.0), "start": (10.0, 20.0), "end": (-10.0, 20.0)}[anchor]
+        labels.append(text.label(name, (x + by[0], y + by[1]), TextStyle(TICK_CAP, QUIET, anchor)))
+    x = corners[right][0] + 8.0
+    y = 0.5 * (corners[right][1] + corners[right + 4][1]) + 0.5 * TICK_CAP
+    labels.append(text.label(_thickness(solid), (x, y), TextStyle(TICK_CAP, QUIET)))
+    return element("g", {"id": "sizes"}, *labels)
+
+
+def _thickness(solid: Solid) -> str:
+    return f"{number(solid.pair.thickness_mm, 2)} mm"
+
+
+class MmBar(Struct, frozen=True, eq=False):
+    """A bar of colours (N, 3) for 0 to `top` mm, with its name; `down`: 0 is at its upper end."""
+
+    name: str
+    top: float
+    colours: Octets
+    down: bool
+
+    @property
+    def labels(self) -> list[tuple[float, str]]:
+        """Round numbers, and the greatest value."""
+        step = round_step(self.top / 4.0)
+        decimals = decimals_of(step)
+        round_ones = multiples(0.0, self.top, step)
+        shown = [(value, number(value, decimals)) for value in round_ones]
+        if self.top - round_ones[-1] > 0.3 * step:
+            shown.append((self.top, number(self.top, decimals + 1)))
+        return shown
+
+    @property
+    def width(self) -> float:
+        """Width that it needs right of the plot."""
+        widest = max(text.width(name, TICK_CAP) for _, name in self.labels)
+        return BAR_GAP + max(BAR_WIDTH + 12.0 + widest, text.width(self.name, TICK_CAP))
+
+    def draw(self, box: PageBox) -> str:
+        """The bar right of the plot, no higher than MAX_BAR."""
+        height = min(box.height - 2.0 * NAME_LIFT, MAX_BAR)
+        left, top = box.right + BAR_GAP, 0.5 * (box.top + box.bottom - height)
+        sides: Look = {"x": left, "y": top, "width": BAR_WIDTH, "height": height}
+        column = self.colours if self.down else self.colours[::-1]
+        pixels = np.repeat(column[:, None, :], 2, axis=1)
+        look: Look = {"preserveAspectRatio": "none", "href": data_uri(png_of(pixels))}
+        ticks, parts = PathData(), [element("image", {**sides, **look})]
+        for value, name in self.labels:
+            share = value / self.top if self.down else 1.0 - value / self.top
+            y = top + share * height
+            ticks.move(left + BAR_WIDTH, y)
+            ticks.line(left + BAR_WIDTH + 5.0, y)
+            at = (left + BAR_WIDTH + 12.0, y + TICK_CAP / 2.0)
+            parts.append(text.label(name, at, TextStyle(TICK_CAP, QUIET)))
+        pen: Look = {"fill": "none", "stroke": FRAME, "stroke-width": 1.4}
+        parts += [element("rect", {**sides, **pen}), element("path", {"d": str(ticks), **pen})]
+        parts.append(text.label(self.name, (left, top - NAME_LIFT), TextStyle(TICK_CAP, QUIET)))
+        return element("g", {"id": "mm-scale"}, *parts)
+
+
+def _bar_of(solid: Solid, options: PictureOptions) -> MmBar:
+    """The bar of a picture: depths, or differences from the wanted heights."""
+    if solid.off_mm is None:
+        return MmBar("depth (mm)", solid.deepest_mm or 1.0, floor_colours(BAR_STEPS), True)
+    colours = [channels(colour) for colour in bin_colours(dark=options.dark)]
+    rows = np.repeat(np.array(colours, dtype=np.uint8), 8, axis=0)
+    top = max(float(solid.off_mm.max(initial=0.0)), 10.0 * MIN_SHOWN_MM)
+    return MmBar(BAR_NAMES[options.view], top, rows, False)
