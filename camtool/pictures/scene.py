@@ -370,15 +370,22 @@ def _width_mm(job: Job, toolpath: Toolpath | None) -> float | None:
 
 
 def _turns(job: Job, toolpath: Toolpath) -> tuple[tuple[int, Tool], ...]:
-    """The tools that cut in turn, each with the first row of its turn; () where the toolpath does
-    not say which of several cuts."""
+    """The tools that cut in turn, each with the first row of its turn: those of the operations of
+    a plan, else those of the job with the numbers that the program calls; () where it calls others
+    of several, or none."""
     from camtool.planning.link import tool_note
 
     first = job.operations[0].tool if job.operations else None
     if first and all(each.tool == first for each in job.operations):
         return ((0, first),)
     if toolpath.operations is None:
-        return ()
+        numbers = {each.tool.number: each.tool for each in reversed(job.operations)}
+        changes = np.flatnonzero(toolpath.kind == Kind.TOOL_CHANGE)
+        called = [int(number) for number in toolpath.value[changes].tolist()]
+        if first is None or not called or not {*called} <= {*numbers}:
+            return ()
+        mounted = [first, *(numbers[number] for number in called)]
+        return tuple(zip([0, *changes.tolist()], mounted, strict=True))
     tools = {tool_note(each.tool): each.tool for each in job.operations}
     notes = [note.tool for note in toolpath.operations.notes]
     if not all(note in tools for note in notes):

@@ -14,7 +14,7 @@ from camtool.pictures.content import content_of
 from camtool.pictures.draw import draw, render
 from camtool.pictures.scene import scene_of
 from camtool.pictures.viewer.page import viewer_page
-from camtool.pipeline import post_drawing
+from camtool.pipeline import post_drawing, read_program
 from camtool.planning.job import Job, Operation, Tool
 from camtool.records import replace
 from camtool.target.registry import load_target
@@ -149,6 +149,20 @@ def test_cuts_of_several_tools_are_as_wide_as_each_cuts() -> None:
     assert cut.difference(swept.buffer(0.02)).is_empty
     assert swept.difference(cut.buffer(0.02)).is_empty
     assert "width of cuts: 1 mm, 3 mm, V bit" in draw(scene)
+
+
+def test_tools_of_a_program_from_a_file_are_those_of_its_job() -> None:
+    target = load_target("linuxcnc")
+    run = post_drawing(drawing_of([SQUARE]), SEVERAL, target)
+    assert run.program is not None
+    read = read_program(run.program.data, target, source="a.ngc")
+    assert read.scene().turns == ()
+    tools = [tool for _, tool in replace(read, job=SEVERAL).scene().turns]
+    mounted = list(dict.fromkeys(tool for _, tool in run.scene().turns))
+    assert list(dict.fromkeys(tools)) == mounted
+    assert "width of cuts: 1 mm, 3 mm, V bit" in draw(replace(read, job=SEVERAL).scene())
+    other = replace(SEVERAL, operations=SEVERAL.operations[:2])
+    assert replace(read, job=other).scene().turns == ()
 
 
 def test_the_viewer_knows_the_width_of_each_of_several_tools() -> None:
