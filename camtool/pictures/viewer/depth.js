@@ -7,9 +7,11 @@ const CHORD_TURN = 0.12;
 const CUT_MS = 12;
 const ORBIT_PX = 0.008;
 const KEY_TURN = Math.PI / 24;
-/** Frames slower than this are painted with fewer pixels until the view rests. */
-const SLOW_FRAME_MS = 30;
-const LEAST_SHARPNESS = 0.4;
+/** While frames take longer than this, they are painted coarser, until the view rests: with every
+ * 2nd, 4th … height, and a smaller share of the pixels. */
+const SLOW_FRAME_MS = 28;
+const DETAILS = [[1, 1], [2, 0.8], [4, 0.6], [8, 0.5], [8, 0.35]];
+const FULL_AFTER_MS = 250;
 /** [azimuth, elevation] by key: from the front, the side, the top, and between all of them. */
 const SIDES = {
   f: [0, 0], 1: [0, 0], s: [Math.PI / 2, 0], 3: [Math.PI / 2, 0],
@@ -33,10 +35,11 @@ const SURFACE = `#version 300 es
 precision highp float;
 ${PLACE}${GROUND}
 in vec2 tile;
+uniform int stride;
 out vec3 at;
 void main() {
   ivec2 last = textureSize(heights, 0) - 1;
-  ivec2 node = min(ivec2(tile) + ivec2(gl_VertexID % ${RIM}, gl_VertexID / ${RIM}), last);
+  ivec2 node = min(ivec2(tile) + stride * ivec2(gl_VertexID % ${RIM}, gl_VertexID / ${RIM}), last);
   float high = texelFetch(heights, node, 0).r;
   at = vec3(grid.xy + vec2(node) * grid.zw, high > bottom ? high : bottom * 1.002);
   gl_Position = place(at);
@@ -200,7 +203,7 @@ class Depth {
     this.canvas = find("solid");
     this.isOn = false;
     this.section = { axis: "", share: 0.5 };
-    this.sharpness = 1;
+    this.detail = 0;
     this.moves = stage.moves;
     const count = this.moves.count;
     this.z = new Float64Array(count + 1);
@@ -214,7 +217,7 @@ class Depth {
   /** Start WebGL; false where the browser does not have it. */
   start() {
     if (this.gl) return true;
-    const gl = this.canvas.getContext("webgl2", { antialias: true, alpha: true });
+    const gl = this.canvas.getContext("webgl2", { antialias: false, alpha: false });
     if (!gl) return false;
     this.gl = gl;
     const { box, bottom } = this.head.stock;
@@ -258,10 +261,7 @@ class Depth {
       for (let i = 0, a = j * RIM; i < TILE; i++, a++) faces.push(a, a + 1, a + RIM, a + RIM, a + 1, a + RIM + 1);
     }
     this.faces = faces.length - this.fan;
-    this.across = Math.ceil((nx - 1) / TILE);
-    this.upwards = Math.ceil((ny - 1) / TILE);
-    this.isLevel = new Uint8Array(this.across * this.upwards);
-    this.tiles = { buffer: gl.createBuffer(), level: 0, rough: 0 };
+    this.tiles = { buffer: gl.createBuffer(), level: 0, rough: 0, size: 0 };
     this.mesh = gl.createVertexArray();
     gl.bindVertexArray(this.mesh);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
@@ -412,7 +412,7 @@ class Depth {
 
   /** Upload the rows that have changed, and find the tiles that are level. */
   upload() {
-    const { gl, solid, tiles, isLevel, across, upwards, layers } = this, { nx, heights, by, dirty: [from, to] } = solid;
+    const { gl, solid, layers } = this, { nx, heights, by, dirty: [from, to] } = solid;
     if (to < from) return;
     gl.activeTexture(gl.TEXTURE0);
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, from, nx, to - from + 1, gl.RED, gl.FLOAT, heights, from * nx);
@@ -422,22 +422,30 @@ class Depth {
       gl.activeTexture(gl.TEXTURE1);
       gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, from, nx, to - from + 1, gl.RED_INTEGER, gl.UNSIGNED_BYTE, bins, from * nx);
     }
+    this.sortTiles(from, to);
+    solid.clean();
+  }
+
+  /** Find the tiles that are level, of those that touch the rows from … to. */
+  sortTiles(from, to) {
+    const { solid: { nx, ny }, tiles } = this, size = TILE * DETAILS[this.detail][0];
+    const across = Math.ceil((nx - 1) / size), upwards = Math.ceil((ny - 1) / size), anew = size !== tiles.size;
+    if (anew) Object.assign(tiles, { size, isLevel: new Uint8Array(across * upwards) });
     const level = [], rough = [];
     for (let r = 0; r < upwards; r++) {
       for (let c = 0; c < across; c++) {
-        const tile = r * across + c;
-        if (r * TILE <= to && (r + 1) * TILE >= from) isLevel[tile] = this.isTileLevel(c * TILE, r * TILE) ? 1 : 0;
-        (isLevel[tile] ? level : rough).push(c * TILE, r * TILE);
+        const tile = r * across + c, isTouched = r * size <= to && (r + 1) * size >= from;
+        if (anew || isTouched) tiles.isLevel[tile] = this.isTileLevel(c * size, r * size, size) ? 1 : 0;
+        (tiles.isLevel[tile] ? level : rough).push(c * size, r * size);
       }
     }
     this.fill(tiles.buffer, new Float32Array([...level, ...rough]));
     tiles.level = level.length / 2;
     tiles.rough = rough.length / 2;
-    solid.clean();
   }
 
-  isTileLevel(i0, j0) {
-    const { nx, ny, heights } = this.solid, i1 = Math.min(i0 + TILE, nx - 1), j1 = Math.min(j0 + TILE, ny - 1);
+  isTileLevel(i0, j0, size) {
+    const { nx, ny, heights } = this.solid, i1 = Math.min(i0 + size, nx - 1), j1 = Math.min(j0 + size, ny - 1);
     const high = heights[j0 * nx + i0];
     for (let j = j0; j <= j1; j++) for (let k = j * nx + i0; k <= j * nx + i1; k++) if (heights[k] !== high) return false;
     return true;
@@ -452,16 +460,41 @@ class Depth {
     return [k ? 0 : sense, k ? sense : 0, 0, sense * at];
   }
 
+  /** Paint coarser while frames follow each other too slowly, and wholly when the view rests. */
+  adapt() {
+    const now = performance.now(), took = now - this.before;
+    this.before = now;
+    clearTimeout(this.resting);
+    this.resting = 0;
+    const before = this.detail;
+    if (this.isResting) this.detail = 0;
+    else if (took < 6 * FULL_AFTER_MS) {
+      this.pace = 0.6 * (this.pace || took) + 0.4 * Math.min(took, FULL_AFTER_MS);
+      if (this.pace > SLOW_FRAME_MS && this.detail < DETAILS.length - 1) {
+        this.detail++;
+        this.pace = SLOW_FRAME_MS;
+      }
+    }
+    this.isResting = false;
+    if (before !== this.detail) this.sortTiles(1, 0);
+    if (!this.detail) return;
+    this.resting = setTimeout(() => {
+      this.isResting = true;
+      this.changed();
+    }, FULL_AFTER_MS);
+  }
+
   /** Cut to where the program is; false while there is more to cut. */
   paint(colours) {
-    const { gl, canvas, stage, run } = this, ratio = (window.devicePixelRatio || 1) * this.sharpness;
+    this.adapt();
+    const { gl, canvas, stage, run } = this, ratio = (window.devicePixelRatio || 1) * DETAILS[this.detail][1];
     const { clientWidth: width, clientHeight: height } = stage.place;
     const [wide, tall] = [width, height].map((size) => Math.max(1, Math.round(size * ratio)));
     if (canvas.width !== wide || canvas.height !== tall) [canvas.width, canvas.height] = [wide, tall];
     const isCut = this.solid.toward(run.row, run.share, performance.now() + CUT_MS);
     this.upload();
     gl.viewport(0, 0, wide, tall);
-    gl.clearColor(0, 0, 0, 0);
+    gl.clearColor(...rgb(colours.paper), 1);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.disable(gl.BLEND);
     this.scales = [(2 * this.scale) / width, (2 * this.scale) / height, 0.2 / this.most];
@@ -502,6 +535,7 @@ class Depth {
     };
     let at = this.use(surface);
     styled(0, at, [0, 0, 1]);
+    gl.uniform1i(at.stride, DETAILS[this.detail][0]);
     gl.bindVertexArray(this.mesh);
     gl.bindBuffer(gl.ARRAY_BUFFER, tiles.buffer);
     gl.enable(gl.POLYGON_OFFSET_FILL);

@@ -3,6 +3,8 @@
 const SLIDER_STEPS = 10000;
 const WHOLE_SECONDS = 20;
 const WAITED_MS = 250;
+/** While it plays, words are written no more often than this: they cost more than the picture. */
+const WORDS_MS = 120;
 
 class Player {
   constructor(run, moved) {
@@ -43,6 +45,7 @@ class Player {
   pause() {
     this.playing = false;
     this.label();
+    this.show();
   }
 
   label() {
@@ -82,11 +85,17 @@ class Player {
   }
 
   show() {
+    const now = performance.now(), isSoon = this.playing && now - this.told < WORDS_MS;
+    if (!isSoon) this.tell();
+    this.moved(!isSoon);
+  }
+
+  tell() {
+    this.told = performance.now();
     const { run } = this, share = run.total ? run.time / run.total : 1;
     this.slider.value = String(Math.round(share * SLIDER_STEPS));
     this.slider.setAttribute("aria-valuetext", `${clock(run.time)}, move ${run.row + 1}`);
     find("clock").textContent = `${clock(run.time)} of ${clock(run.total)}`;
-    this.moved();
   }
 }
 
@@ -233,11 +242,12 @@ function begin() {
   const panel = new LayerPanel(layers, () => stage.changed());
   const listing = new Listing(head, columns, (row) => player.toRow(row));
   let player = null;
-  const moved = () => {
+  const moved = (isTold) => {
+    stage.soon("moved");
+    if (!isTold) return;
     showMove(head, columns, run);
     const block = columns.move_block[run.row];
     listing.show(block, block);
-    stage.soon("moved");
   };
   if (tracks.moves.count) player = new Player(run, moved);
   else document.body.classList.add("still");

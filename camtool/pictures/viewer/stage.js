@@ -376,7 +376,7 @@ class Stage {
     if (this.wantsAll) this.depth.restyle();
     this.wantsAll = false;
     if (!this.depth.paint(colours)) this.soon("moved");
-    if (!this.frame) delete document.body.dataset.waiting;
+    if (!this.frame && !this.depth.resting) delete document.body.dataset.waiting;
     document.body.dataset.painted = String(Number(document.body.dataset.painted || 0) + 1);
   }
 
