@@ -19,6 +19,9 @@ PARTS = 64
 """A line becomes so many chords, an arc eight times as many: of a whole turn these are 2e-5 of its
 radius off."""
 
+POINT_MM = 0.1
+"""Lines of pictures have a point each so far, and `PARTS` of them at most."""
+
 _WORD = re.compile(r"([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))")
 
 
@@ -76,9 +79,9 @@ def program_paths(text: str) -> Paths:
     return found
 
 
-def straight(begin: list[float], end: list[float]) -> Floats:
+def straight(begin: list[float], end: list[float], parts: int = PARTS) -> Floats:
     """(K, 2) points from end to end."""
-    return np.linspace(begin, end, PARTS + 1)
+    return np.linspace(begin, end, parts + 1)
 
 
 def _turned(
@@ -116,7 +119,8 @@ def svg_paths(element: svg_page.Element, flipped: bool = False) -> list[Floats]:
                 radii = piece.radius, piece.radius
                 found.append(bent(piece.centre, radii, math.atan2(y, x), piece.sweep))
             else:
-                found.append(straight(list(piece.begin), list(piece.end)))
+                parts = min(PARTS, math.ceil(math.dist(piece.begin, piece.end) / POINT_MM) or 1)
+                found.append(straight(list(piece.begin), list(piece.end), parts))
     return [points * (1.0, -1.0) for points in found] if flipped else found
 
 
