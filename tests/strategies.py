@@ -8,14 +8,24 @@ open_contours()   the same with one segment left out
 from __future__ import annotations
 
 import math
+import os
+from typing import Any
 
 import numpy as np
+from hypothesis import settings
 from hypothesis import strategies as st
 
 from camtool.geometry.polylines import Polyline
 
 GRID_MM = 1e-3
 """Random points lie on a grid, so that two of them are equal or clearly apart."""
+
+
+def examples(usual: int, nightly: int, **more: Any) -> settings:
+    """Return the settings of a property: so many examples, of which each costs much; with the
+    profile `nightly` as many as that says."""
+    many = os.environ.get("HYPOTHESIS_PROFILE") == "nightly"
+    return settings(max_examples=nightly if many else usual, **more)
 
 
 def coordinates(reach_mm: float = 20.0) -> st.SearchStrategy[float]:

@@ -30,6 +30,7 @@ from tests.oracles.swept import swept as covered
 from tests.planning.pocket_cases import SHAPES, cross, region_of, runs_of, shapes, work_of
 from tests.planning.test_profile import R, _box, _circle, _codes, contours
 from tests.strategies import contours as star_contours
+from tests.strategies import examples
 
 EXACT = "dialect.path=exact-path"
 KEPT_MM = 6e-4
@@ -101,7 +102,7 @@ def test_a_pocket_grows(shape: str, pattern: str) -> None:
         assert complaints(runs, region, 0.65, -1.0) != []
 
 
-@settings(max_examples=8)
+@examples(6, 150)
 @given(paths=shapes(), diameter_mm=st.floats(0.3, 2.5), share=st.floats(0.01, 0.25))
 def test_random_pockets_grow(paths: list[Polyline], diameter_mm: float, share: float) -> None:
     assume(not cross(paths))

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError
@@ -36,6 +36,7 @@ from tests.planning.pocket_cases import (
     shapes,
     work_of,
 )
+from tests.strategies import examples
 
 QUICK = ["square", "island off the middle", "star", "dumbbell", "keyhole"]
 
@@ -60,18 +61,9 @@ def test_every_shape(shape: str, diameter_mm: float, step_over: float) -> None:
     assert wrong(SHAPES[shape], diameter_mm, step_over=step_over) == []
 
 
-@settings(max_examples=5)
+@examples(3, 150)
 @given(paths=shapes(), diameter_mm=st.floats(0.3, 2.5), step_over=st.floats(0.2, 1.0))
 def test_random_shapes(paths: list[Polyline], diameter_mm: float, step_over: float) -> None:
-    runs = runs_of(work_of(paths, diameter_mm, step_over=step_over))
-    if runs:
-        assert complaints(runs, region_of(paths), 0.5 * diameter_mm, -1.0) == []
-
-
-@pytest.mark.slow
-@settings(max_examples=150)
-@given(paths=shapes(), diameter_mm=st.floats(0.1, 3.0), step_over=st.floats(0.15, 1.0))
-def test_many_random_shapes(paths: list[Polyline], diameter_mm: float, step_over: float) -> None:
     assume(not cross(paths))
     runs = runs_of(work_of(paths, diameter_mm, step_over=step_over))
     if runs:

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from camtool.geometry.measure import length, signed_area
@@ -16,6 +16,7 @@ from camtool.planning.clearing import Scan, strokes_of, zigzag_paths
 from tests.oracles.contours import CIRCLE, DUMBBELL, SQUARE
 from tests.oracles.swept import at_depth, complaints, gouges
 from tests.planning.pocket_cases import SHAPES, cross, region_of, runs_of, shapes, work_of
+from tests.strategies import examples
 
 
 def wrong(paths: list[Polyline], diameter_mm: float, step_over: float, angle: float) -> list[str]:
@@ -48,28 +49,14 @@ def test_every_shape(shape: str, angle: float, step_over: float) -> None:
     assert wrong(SHAPES[shape], 1.1, step_over, angle) == []
 
 
-@settings(max_examples=4)
-@given(
-    paths=shapes(),
-    diameter_mm=st.floats(0.4, 2.5),
-    step_over=st.floats(0.3, 1.0),
-    angle=st.floats(-4.0, 4.0),
-)
-def test_random_shapes(
-    paths: list[Polyline], diameter_mm: float, step_over: float, angle: float
-) -> None:
-    assert wrong(paths, diameter_mm, step_over, angle) == []
-
-
-@pytest.mark.slow
-@settings(max_examples=150)
+@examples(4, 150)
 @given(
     paths=shapes(),
     diameter_mm=st.floats(0.2, 3.0),
     step_over=st.floats(0.2, 1.0),
     angle=st.floats(-4.0, 4.0),
 )
-def test_many_random_shapes(
+def test_random_shapes(
     paths: list[Polyline], diameter_mm: float, step_over: float, angle: float
 ) -> None:
     assume(not cross(paths))

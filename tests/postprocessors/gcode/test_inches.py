@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, given
 
 from camtool.errors import MachineError
 from camtool.pipeline import post_drawing, verify_program
@@ -16,6 +16,7 @@ from tests.oracles.rs274 import interpreted, motions, motions_of, needs_rs274
 from tests.postprocessors.gcode.parts import part, toolpaths
 from tests.postprocessors.gcode.test_operations import DRAWING, JOB
 from tests.postprocessors.golden import GOLDEN, compare_golden
+from tests.strategies import examples
 
 TARGETS = ("grbl", "linuxcnc")
 LAST_MM = 25.4e-5
@@ -79,7 +80,7 @@ def test_operations_and_stops_speak_inches(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", TARGETS)
-@settings(max_examples=60)
+@examples(30, 2000)
 @given(path=toolpaths())
 def test_what_is_read_is_what_was_written(name: str, path: Toolpath) -> None:
     """Each move to half of the last decimal, as many moves, and feeds that are no higher."""
@@ -132,7 +133,7 @@ class TestReferee:
     pytestmark = needs_rs274
 
     @pytest.mark.parametrize("name", TARGETS)
-    @settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
+    @examples(15, 2000, suppress_health_check=[HealthCheck.function_scoped_fixture])
     @given(path=toolpaths())
     def test_random_programs(self, name: str, path: Toolpath, tmp_path: Path) -> None:
         target = inches(name)

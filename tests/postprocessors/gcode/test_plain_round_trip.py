@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from msgspec import structs
 
@@ -13,11 +13,10 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.postprocessors.gcode.plain_parts import KINDS, anywhere, judge, on_grid, part
+from tests.strategies import examples
 
 TARGETS = sorted(KINDS)
 LOADED = {name: load_target(name) for name in TARGETS}
-THOROUGH = settings(max_examples=10_000, deadline=None, suppress_health_check=list(HealthCheck))
-USUAL = settings(max_examples=200)
 
 
 ROW_BY_ROW = LOADED | {"flashcut": load_target("flashcut", settings=["dialect.rapids=straight"])}
@@ -40,32 +39,16 @@ def check_same(name: str, wanted: Toolpath) -> None:
 
 
 @pytest.mark.parametrize("name", TARGETS)
-@USUAL
+@examples(100, 10_000)
 @given(data=st.data())
 def test_what_can_be_said_comes_back(name: str, data: st.DataObject) -> None:
     check_same(name, data.draw(on_grid(KINDS[name])))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", TARGETS)
-@THOROUGH
-@given(data=st.data())
-def test_what_can_be_said_comes_back_thoroughly(name: str, data: st.DataObject) -> None:
-    check_same(name, data.draw(on_grid(KINDS[name])))
-
-
-@pytest.mark.parametrize("name", TARGETS)
-@USUAL
+@examples(100, 10_000)
 @given(data=st.data())
 def test_anything_comes_back_within_a_unit(name: str, data: st.DataObject) -> None:
-    judge(LOADED[name], data.draw(anywhere(KINDS[name])), KINDS[name].unit_mm)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", TARGETS)
-@THOROUGH
-@given(data=st.data())
-def test_anything_comes_back_within_a_unit_thoroughly(name: str, data: st.DataObject) -> None:
     judge(LOADED[name], data.draw(anywhere(KINDS[name])), KINDS[name].unit_mm)
 
 

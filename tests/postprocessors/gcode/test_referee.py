@@ -4,7 +4,7 @@ readers make of it, and what our writers were given. Skipped where LinuxCNC is n
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, given
 
 from camtool.errors import ProgramError
 from camtool.findings import Severity
@@ -16,6 +16,7 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.rs274 import compare, interpreted, motions, needs_rs274, run_rs274
 from tests.postprocessors.gcode.parts import part, toolpaths
+from tests.strategies import examples
 
 pytestmark = needs_rs274
 
@@ -67,7 +68,7 @@ def test_the_logo(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", TARGETS)
-@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(20, 2000, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(path=toolpaths())
 def test_random_programs(name: str, path: Toolpath, tmp_path: Path) -> None:
     target = load_target(name)

@@ -12,6 +12,7 @@ from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Program
 from tests.oracles.gcode_paths import farthest_mm
 from tests.postprocessors.gcode.parts import part, toolpaths
+from tests.strategies import examples
 
 TARGETS = ("grbl", "linuxcnc")
 UNIT_MM = 0.001
@@ -73,17 +74,9 @@ def check_random(path: Toolpath, name: str, *options: str) -> None:
 
 
 @pytest.mark.parametrize("name", TARGETS)
-@settings(max_examples=150)
+@examples(60, 10_000)
 @given(path=toolpaths())
 def test_random_paths_come_back(name: str, path: Toolpath) -> None:
-    check_random(path, name)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", TARGETS)
-@settings(max_examples=10_000)
-@given(path=toolpaths())
-def test_ten_thousand_random_paths_come_back(name: str, path: Toolpath) -> None:
     check_random(path, name)
 
 

@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from camtool_postprocessors.grbl import controller as grbl
 from camtool_postprocessors.linuxcnc import controller as linuxcnc
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from camtool.target.registry import load_target
 from camtool.toolpath import moves
 from tests.oracles.motion_rows import RowMotion, rows_of
+from tests.strategies import examples
 
 
 def wheel(steps: list[int]) -> str:
@@ -62,7 +63,7 @@ def motion(target: str, program: str, ahead: int) -> list[RowMotion]:
     ahead=st.sampled_from([3, 4, 20]),
 )
 @example(pieces=[f"G1 X{0.4 * k:.1f}" for k in range(9)], modes=[], at_once=1, ahead=20)
-@settings(deadline=None)
+@examples(25, 2000)
 def test_how_many_moves_are_planned_together_changes_nothing(
     target: str, pieces: list[str], modes: list[int], at_once: int, ahead: int
 ) -> None:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.errors import PostError
@@ -15,6 +15,7 @@ from camtool.toolpath.moves import Kind, Toolpath
 from camtool.toolpath.program import Program
 from tests.oracles.corte_recto import farthest, walk
 from tests.postprocessors.i8751.machines import OPTIONS, STEP_MM, loaded
+from tests.strategies import examples
 
 FORMATS = ("packets", "listing", "hex")
 TOLERANCE_MM = 0.05
@@ -111,7 +112,7 @@ def check_places(given_path: Toolpath, program: Program, read: Toolpath, places:
 
 @pytest.mark.parametrize("form", FORMATS)
 @given(made=wanted())
-@settings(max_examples=100)
+@examples(40, 10_000)
 def test_every_place_comes_back(form: str, made: Wanted) -> None:
     path = made.finish()
     both = write_and_read(TARGETS[form, ""], path)
@@ -125,19 +126,8 @@ def test_every_place_comes_back(form: str, made: Wanted) -> None:
     assert read.block[-1] == len(program.row_of_block) - 1
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("form", FORMATS)
-@given(made=wanted())
-@settings(max_examples=10_000)
-def test_every_place_comes_back_nightly(form: str, made: Wanted) -> None:
-    path = made.finish()
-    both = write_and_read(TARGETS[form, ""], path)
-    if both is not None:
-        check_places(path, *both, made.places)
-
-
 @given(made=wanted(dwells=False), option=st.sampled_from(OPTIONS), form=st.sampled_from(FORMATS))
-@settings(max_examples=200)
+@examples(100, 10_000)
 def test_with_every_other_reading_of_the_thesis(made: Wanted, option: str, form: str) -> None:
     path = made.finish()
     both = write_and_read(TARGETS[form, option], path)
@@ -155,6 +145,7 @@ def test_with_every_other_reading_of_the_thesis(made: Wanted, option: str, form:
 
 
 @given(made=wanted())
+@examples(20, 2000)
 def test_the_formats_say_the_same(made: Wanted) -> None:
     path = made.finish()
     both = [write_and_read(TARGETS[form, ""], path) for form in FORMATS]

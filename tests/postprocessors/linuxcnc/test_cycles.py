@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
 from camtool.errors import ProgramError
@@ -20,6 +20,7 @@ from camtool.toolpath.moves import Kind, Toolpath
 from tests.drawings import drawing_of
 from tests.oracles.rs274 import PRINTED_MM, interpreted, motions, motions_of, needs_rs274
 from tests.postprocessors.golden import GOLDEN, compare_golden
+from tests.strategies import examples
 
 HEAD = "G17 G21 G90 G94 F100\nG64 P0.01\n"
 
@@ -201,7 +202,7 @@ def hole_jobs(draw: st.DrawFn) -> tuple[Job, list[str]]:
     return replace(made, operations=(bore, made.operations[1])), given
 
 
-@settings(max_examples=40, deadline=None)
+@examples(15, 500)
 @given(case=hole_jobs())
 def test_cycles_drill_the_same_holes(case: tuple[Job, list[str]]) -> None:
     """To the same bottom at the same feed, in bites that are no deeper; and nothing else."""
@@ -264,7 +265,7 @@ class TestReferee:
                 theirs, motions(interpreted(planned.data, tmp_path)), rtol=1e-6, atol=PRINTED_MM
             )
 
-    @settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+    @examples(50, 2000, suppress_health_check=[HealthCheck.function_scoped_fixture])
     @given(text=series())
     def test_the_moves_are_theirs(self, text: str, tmp_path: Path) -> None:
         try:

@@ -19,7 +19,7 @@ from tests.oracles.canonical import canonical, difference
 from tests.oracles.rs274 import interpreted, needs_rs274
 from tests.postprocessors.linuxcnc.programs import Maker
 
-SOME, ALL = 150, 5000
+SOME, ALL = 70, 5000
 
 # What the reader refuses although rs274 takes it, and why.
 STRICTER = {

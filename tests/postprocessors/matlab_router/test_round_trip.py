@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from camtool.findings import Severity, worst
@@ -17,6 +17,7 @@ from tests.postprocessors.matlab_router.parts import (
     router,
     strokes,
 )
+from tests.strategies import examples
 
 GRID_MM = 0.2
 
@@ -61,20 +62,12 @@ def check_exact(target: LoadedTarget, paths: list[list[Point]], feed: float) -> 
 
 
 @pytest.mark.parametrize("form", ["m", "stream"])
+@examples(60, 10_000)
 @given(paths=st.lists(stroke, min_size=1, max_size=4), counts=st.integers(1, 480))
 def test_strokes_on_the_grid_come_back(form: str, paths: list[list[Point]], counts: int) -> None:
     paths = [points for points in map(kept, paths) if len(points) > 1]
     if paths:
         check_exact(router(f"format={form}"), paths, counts * 0.46875)
-
-
-@pytest.mark.slow
-@settings(max_examples=10_000)
-@given(paths=st.lists(stroke, min_size=1, max_size=4), counts=st.integers(1, 480))
-def test_strokes_on_the_grid_come_back_slow(paths: list[list[Point]], counts: int) -> None:
-    paths = [points for points in map(kept, paths) if len(points) > 1]
-    if paths:
-        check_exact(router(), paths, counts * 0.46875)
 
 
 @given(points=rough_stroke, form=st.sampled_from(["m", "stream"]))
