@@ -275,7 +275,9 @@ class _Sending:
             left += packet.seconds
         self._left = [left, *reversed(self._left)]
         if self.live is not None:
-            self._page = LivePage(Path(self.live), one.run.source, one.forecast.decoded)
+            listing = one.run.listing if one.rest is None else None
+            decoded = one.forecast.decoded
+            self._page = LivePage(Path(self.live), one.run.source, decoded, listing)
             try:
                 self._page.write(self._page.html("opening", {}, -1))
             except OSError as error:
@@ -396,11 +398,12 @@ class _Sending:
     def _show_page(self, conversation: Conversation, left_s: float) -> None:
         """Update the live page, once a second and when the state changes. A page that cannot be
         written is given up: the machine is not stopped for it."""
-        from camtool.sending.live import RELOAD_S
         from camtool.verification.report import clock
 
         state, now = conversation.state.value, time.monotonic()
-        if self._page is None or (now - self._paged[0] < RELOAD_S and state == self._paged[1]):
+        if self._page is None:
+            return
+        if now - self._paged[0] < self._page.every_s and state == self._paged[1]:
             return
         self._paged = now, state
         done = self.one.packets[: conversation.acknowledged]

@@ -124,12 +124,9 @@ def svg_paths(element: svg_page.Element, flipped: bool = False) -> list[Floats]:
     return [points * (1.0, -1.0) for points in found] if flipped else found
 
 
-def live_paths(page: str, name: str) -> list[Floats]:
-    """The lines of a path of the page of `send --live`: "way", "rapid" or "done"."""
-    svg = svg_page.parse(page[page.index("<svg") : page.index("</svg>") + 6])
-    path = next(each for each in svg.iter("path") if each.get("class") == name)
-    path.tag = f"{svg_page.SVG}path"
-    return svg_paths(path, flipped=True)
+def live_rows(page: str) -> int:
+    """How many rows of the viewer's page of `send --live` are done."""
+    return int(json.loads(_of(page, "sent"))["row"]) + 1
 
 
 def viewer_column(page: str, name: str) -> Floats:
@@ -141,8 +138,8 @@ def viewer_column(page: str, name: str) -> Floats:
     return np.cumsum(numbers) if kind == "d1" else numbers
 
 
-def viewer_paths(page: str) -> Paths:
-    """The moves of the viewer's page."""
+def viewer_paths(page: str, rows: int | None = None) -> Paths:
+    """The moves of the viewer's page, or of its first rows."""
 
     def column(name: str) -> Floats:
         return viewer_column(page, name)
@@ -155,6 +152,8 @@ def viewer_paths(page: str) -> Paths:
     for row, (kind, end) in enumerate(
         zip(column("move_kind").tolist(), column("move_end").reshape(-1, 3).tolist(), strict=True)
     ):
+        if rows is not None and row >= rows:
+            break
         if kind <= 3:
             points = straight(at[:2], end[:2]) if at[:2] != end[:2] else np.array([at[:2]])
             if kind >= 2:

@@ -164,9 +164,10 @@ in vec3 at;
 in vec4 paint;
 out vec4 seen;
 uniform int isLine;
+uniform vec4 over;
 void main() {
   if (paint.a < 0.01) discard;
-  vec3 tone = isLine == 1 ? paint.rgb : lit(paint.rgb, normalize(cross(dFdx(at), dFdy(at))));
+  vec3 tone = over.a > 0.0 ? over.rgb : isLine == 1 ? paint.rgb : lit(paint.rgb, normalize(cross(dFdx(at), dFdy(at))));
   seen = vec4(tone * paint.a, paint.a);
 }`;
 
@@ -210,7 +211,8 @@ class Depth {
     for (let row = 0; row < count; row++) this.z[row + 1] = columns.move_end[3 * row + 2];
     this.z[0] = columns.move_start.length ? columns.move_start[2] : 0;
     this.turns = head.cutters.map(([row, ...profile]) => [row, new Cutter(profile)]);
-    this.hasPath = false;
+    // Without a tool there is nothing else to see.
+    this.hasPath = find("path-shown").checked = !this.turns.length;
     this.turn(...SIDES.i);
   }
 
@@ -564,13 +566,17 @@ class Depth {
   }
 
   /** The moves that are done, in their colours, and those to come, pale. */
-  paintLines() {
+  paintLines(colours) {
     const { gl, run, first, moves } = this, at = this.use(this.given);
     if (!moves.count || !this.hasPath) return;
     gl.bindVertexArray(this.lines.array);
     gl.uniform3f(at.shift, 0, 0, 0);
     gl.uniform1i(at.isLine, 1);
-    gl.drawArrays(gl.LINES, 0, first[run.row + (run.share === 1 ? 1 : 0)]);
+    const done = first[run.row + (run.share === 1 ? 1 : 0)];
+    gl.uniform4f(at.over, 0, 0, 0, 0);
+    gl.drawArrays(gl.LINES, 0, done);
+    gl.uniform4f(at.over, ...rgb(colours.pale), 1);
+    gl.drawArrays(gl.LINES, done, first[moves.count] - done);
   }
 
   /** The tool where it is, in its shape. */
@@ -582,10 +588,11 @@ class Depth {
     const key = `${turns.findIndex((one) => one[1] === cutter)} ${colours.tool}`;
     if (this.shaped !== key) this.shapeTool(cutter, rgb(colours.tool));
     this.shaped = key;
-    const at = this.use(this.given), [x, y] = moves.at(run.row, run.share);
+    const at = this.use(this.given), high = z[run.row] + run.share * (z[run.row + 1] - z[run.row]);
     gl.bindVertexArray(this.tool.array);
-    gl.uniform3f(at.shift, x, y, z[run.row] + run.share * (z[run.row + 1] - z[run.row]));
+    gl.uniform3fv(at.shift, run.place || [...moves.at(run.row, run.share), high]);
     gl.uniform1i(at.isLine, 0);
+    gl.uniform4f(at.over, 0, 0, 0, 0);
     gl.enable(gl.CULL_FACE);
     gl.drawArrays(gl.TRIANGLES, 0, this.toolCount);
     gl.disable(gl.CULL_FACE);

@@ -263,7 +263,43 @@ function begin() {
   };
   new Pointer(stage, hovered, clicked);
   listen({ stage, player, panel });
+  if (find("sent")) follow(JSON.parse(find("sent").textContent), stage, player);
   document.body.dataset.ready = "yes";
+}
+
+const UNTOUCHED_MS = 1500;
+
+/** Show how far a program is that is being sent, and load the page again for the next state, with
+ * the view as it is; not while somebody touches it. */
+function follow(sent, stage, player) {
+  document.title = sent.title;
+  const { run, view, depth } = stage, kept = history.state || {};
+  if (sent.row < 0) run.toNothing();
+  else run.toRow(sent.row);
+  run.place = sent.place;
+  if (player) player.show();
+  find("controls").hidden = Boolean(sent.again_ms);
+  if (kept.view) Object.assign(view, kept.view);
+  if (kept.depth && depth) {
+    find("in-depth").click();
+    depth.turn(kept.depth.azimuth, kept.depth.elevation);
+    Object.assign(depth, kept.depth);
+  }
+  stage.changed();
+  if (!sent.again_ms) return;
+  let touched = -Infinity;
+  for (const name of ["pointerdown", "pointermove", "wheel", "keydown", "input"]) {
+    window.addEventListener(name, (event) => {
+      if (name !== "pointermove" || event.buttons) touched = performance.now();
+    }, { passive: true });
+  }
+  setInterval(() => {
+    if (performance.now() - touched < UNTOUCHED_MS) return;
+    const { x, y, scale, isFitted } = view, flat = isFitted ? null : { x, y, scale, isFitted };
+    const deep = depth && depth.isOn ? { azimuth: depth.azimuth, elevation: depth.elevation, centre: depth.centre, scale: depth.scale } : null;
+    history.replaceState({ view: flat, depth: deep }, "");
+    location.reload();
+  }, sent.again_ms);
 }
 
 /** Grids are made when they are first needed: so the page opens sooner. */

@@ -68,9 +68,10 @@ MIN_TOP_UM = 1e-3
 _SLOT = re.compile(r"\{([a-z]+)\}")
 
 
-def viewer_page(scene: Scene) -> bytes:
+def viewer_page(scene: Scene, live: str = "") -> bytes:
     """The HTML file of a scene, UTF-8. Without a playback in the scene every move runs at its
-    feed. ValueError when the playback is that of another toolpath."""
+    feed. `live`: HTML of the state of a program that is being sent. ValueError when the playback
+    is that of another toolpath."""
     run, content = _run(scene), content_of(scene)
     traced = traced_of(scene, run, _top_um(scene, run))
     rows, columns = _rows(content)
@@ -86,6 +87,7 @@ def viewer_page(scene: Scene) -> bytes:
         "style": style,
         "script": script,
         "circles": circles_of(scene),
+        "live": live,
         "head": _json({"columns": named, **_head(content, run, traced), "rows": rows}),
         "columns": base64.b64encode(data).decode("ascii"),
     }

@@ -286,7 +286,7 @@ function paintDrills(ctx, view, layers, colours) {
 
 /** The tool where it is now, and the part of its move that is done. */
 function paintTool(ctx, view, moves, run, toolMm, colours) {
-  const [x, y] = moves.at(run.row, run.share), px = view.px(x), py = view.py(y);
+  const [x, y] = run.place || moves.at(run.row, run.share), px = view.px(x), py = view.py(y);
   ctx.setLineDash([]);
   if (run.share < 1) {
     const arc = moves.arc(run.row);

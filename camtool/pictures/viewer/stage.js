@@ -14,6 +14,7 @@ class Run {
   begins(row) { return row > 0 ? this.ends[row - 1] : 0; }
 
   toTime(time) {
+    this.place = null;
     this.time = Math.min(this.total, Math.max(0, time));
     let low = 0, high = this.count - 1;
     while (low < high) {
@@ -28,6 +29,7 @@ class Run {
 
   /** To the end of a move. */
   toRow(row) {
+    this.place = null;
     this.row = Math.min(this.count - 1, Math.max(0, row));
     this.share = 1;
     this.time = this.ends[this.row];
@@ -37,6 +39,9 @@ class Run {
     this.toTime(0);
     this.share = this.time === this.ends[this.row] ? 1 : 0;
   }
+
+  /** Before the first move. */
+  toNothing() { this.time = this.row = this.share = 0; }
 
   toEnd() { this.toRow(this.count - 1); }
 
