@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -22,9 +23,12 @@ from camtool.cli.options import (
     machine_options,
     talk_options,
 )
+from camtool.cli.picture_options import is_viewer, picture_name
 from camtool.records import replace
+from camtool.units import UM_PER_MM
 
 if TYPE_CHECKING:
+    from camtool.pictures.scene import Scene
     from camtool.run import Run
     from camtool.stock.cut import CutStock, StockDifference
     from camtool.stock.heights import Bracket
@@ -48,6 +52,13 @@ DEFAULT_LIMIT_MM = 0.01
     help="Exit code 1 when A and B are farther apart, in plane or depth; default 0.01mm.",
 )
 @click.option("--json", "report", metavar="FILE", help="The figures as JSON; - is stdout.")
+@click.option(
+    "--preview",
+    metavar="FILE",
+    callback=picture_name,
+    help="Picture of where B cuts more, or less if that is more, .svg or .png; .html has both "
+    "stocks and both differences.",
+)
 @job_options
 @drawing_options
 @talk_options
@@ -60,6 +71,7 @@ def diff(
     other_job: str | None,
     limit: float | None,
     report: str | None,
+    preview: str | None,
     job: JobFlags,
     drawing: DrawingFlags,
     quiet: bool,
@@ -78,7 +90,7 @@ def diff(
             "nothing to compare with: give B, --other-job, --other-target or --other-machine"
         )
     sources = [first, second, other_job, *machine.files(), *job.files()]
-    check_places(sources, [report])
+    check_places(sources, [report, preview])
     limit_mm = DEFAULT_LIMIT_MM if limit is None else limit
     if not limit_mm > 0.0:
         raise click.UsageError("--max-difference must be above 0")
@@ -95,20 +107,29 @@ def diff(
             drawing,
         ),
     ]
-    stocks = [side.stock(quiet=quiet, verbose=verbose) for side in sides]
-    if any(stock is None for stock in stocks):
-        return 1
-    one, two = (stock for stock in stocks if stock is not None)
+    stocks = []
+    for side in sides:
+        stock = side.stock(quiet=quiet, verbose=verbose)
+        if stock is None:
+            return 1
+        stocks.append(stock)
     progress().begin("comparing")
-    found = difference_of(one, two, limit_mm)
-    differs = max(found.deeper.low, found.shallower.low) > limit_mm or (
-        found.distance_mm > limit_mm * (1.0 + 1e-9)
-    )
-    facts = _facts(found, stocks, limit_mm, differs=differs)
+    found = difference_of(stocks[0], stocks[1], limit_mm)
+    differs = found.distance_mm > limit_mm * (1.0 + 1e-9)
+    names = [side.name for side in sides]
+    files: dict[str, bytes] = {}
     if report is not None:
-        write_all({report: (json.dumps(facts, indent=2) + "\n").encode()})
-    if not quiet and report != STDOUT:
-        show_text(_text(found, [side.name for side in sides]))
+        facts = _facts(found, stocks, limit_mm, differs=differs)
+        files[report] = (json.dumps(facts, indent=2) + "\n").encode()
+    if preview is not None:
+        pair = (stocks[0], stocks[1])
+        if is_viewer(preview):
+            files[preview] = _page(pair, names, _text(found, names)).encode()
+        else:
+            files[preview] = _picture(pair, found, names, preview)
+    write_all(files)
+    if not quiet and STDOUT not in files:
+        show_text(_text(found, names))
     if differs:
         say(
             f"camtool: the two differ by more than {limit_mm:g} mm",
@@ -158,7 +179,7 @@ class _Side:
 
 
 def _facts(
-    found: StockDifference, stocks: Sequence[CutStock | None], limit_mm: float, *, differs: bool
+    found: StockDifference, stocks: Sequence[CutStock], limit_mm: float, *, differs: bool
 ) -> dict[str, Any]:
     """Return the figures as JSON."""
 
@@ -175,9 +196,7 @@ def _facts(
         "shallower": bracket(found.shallower),
         "more_mm3": [round(found.more_mm3.low, 6), round(found.more_mm3.high, 6)],
         "less_mm3": [round(found.less_mm3.low, 6), round(found.less_mm3.high, 6)],
-        "beside_um": [
-            round(1000.0 * stock.moves.beside_mm, 3) for stock in stocks if stock is not None
-        ],
+        "beside_um": [round(UM_PER_MM * stock.moves.beside_mm, 3) for stock in stocks],
     }
 
 
@@ -196,3 +215,60 @@ def _text(found: StockDifference, names: Sequence[str]) -> str:
         much = f"{volume.low:.4g} to {volume.high:.4g} mm³"
         lines.append(f"{words}: by {far} near X {x:.3f} Y {y:.3f}, {much}")
     return "\n".join(lines)
+
+
+def _scene(cut: CutStock, other: CutStock, title: str, against: str = "wanted") -> Scene:
+    """Return the scene of a stock, beside another one."""
+    from camtool.pictures.scene import Scene, StockPair
+    from camtool.stock.cut import box_around
+
+    box = box_around(cut.box_mm, other.box_mm)
+    lowest = [float(each.moves.end[:, 2].min(initial=0.0)) for each in (cut, other)]
+    known = cut.bottom_mm is not None
+    thickness = -cut.bottom_mm if cut.bottom_mm is not None else -1.25 * min(*lowest, -1e-3)
+    pair = StockPair(cut.moves, other.moves, box, thickness, known, against)
+    return Scene(title, cut=lambda: pair)
+
+
+def _picture(
+    stocks: tuple[CutStock, CutStock], found: StockDifference, names: Sequence[str], file: str
+) -> bytes:
+    """Return the picture of the greater of the two differences."""
+    from camtool.pictures.draw import render
+    from camtool.pictures.options import PictureOptions
+
+    more = found.deeper.high >= found.shallower.high
+    scene = _scene(stocks[1], stocks[0], f"{names[1]} against {names[0]}", "A")
+    return render(scene, file, PictureOptions(view="gouge" if more else "leftover"))
+
+
+def _page(stocks: tuple[CutStock, CutStock], names: Sequence[str], text: str) -> str:
+    """Return a page with both stocks and both differences; texts of names are escaped."""
+    from camtool.pictures.draw import draw
+    from camtool.pictures.options import PictureOptions
+
+    first, second = stocks
+    shown = [
+        (_scene(first, second, f"A: {names[0]}"), "iso"),
+        (_scene(second, first, f"B: {names[1]}"), "iso"),
+        (_scene(second, first, "B cuts deeper", "A"), "gouge"),
+        (_scene(second, first, "B cuts less", "A"), "leftover"),
+    ]
+    figures = "\n".join(
+        f"<figure>{draw(scene, PictureOptions(view=view))}</figure>" for scene, view in shown
+    )
+    title = html.escape(f"{names[0]} and {names[1]}")
+    return (
+        '<!doctype html>\n<html lang="en"><meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{title}</title>\n<style>{_STYLE}</style>\n<h1>{title}</h1>\n"
+        f"<pre>{html.escape(text)}</pre>\n<main>\n{figures}\n</main>\n</html>\n"
+    )
+
+
+_STYLE = (
+    "body{font:16px system-ui,sans-serif;margin:1rem;background:#fff;color:#16202b}"
+    "main{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(30rem,100%),1fr));gap:1rem}"
+    "figure{margin:0}svg{width:100%;height:auto}pre{white-space:pre-wrap}"
+    "h1{font-size:1.2rem;overflow-wrap:anywhere}"
+)

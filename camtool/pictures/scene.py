@@ -135,13 +135,14 @@ class Round(Struct, frozen=True, eq=False):
 class StockPair(Struct, frozen=True, eq=False):
     """The moves that cut the stock, and those that should, None where these are not known; the
     left, lower, right and upper edge of the stock and its thickness, mm. `known`: the job gives
-    this block; otherwise it is as large as the cuts need."""
+    this block; otherwise it is as large as the cuts need. `against`: a word for what should be."""
 
     moves: StockMoves
     wanted: StockMoves | None
     box_mm: tuple[float, float, float, float]
     thickness_mm: float
     known: bool
+    against: str = "wanted"
 
 
 class TableLine(Struct, frozen=True):

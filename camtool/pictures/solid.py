@@ -210,11 +210,12 @@ def _notes(solid: Solid, options: PictureOptions) -> tuple[str, ...]:
     if solid.off_mm is not None:
         most = float(solid.off_mm.max(initial=0.0))
         how = "higher" if options.view == "leftover" else "lower"
-        which = f"nowhere more than {number(MIN_SHOWN_MM, 3)} mm {how} than wanted"
+        which = f"nowhere more than {number(MIN_SHOWN_MM, 3)} mm {how} than {solid.pair.against}"
         if most > MIN_SHOWN_MM:
             row, column = divmod(int(solid.off_mm.argmax()), solid.off_mm.shape[1])
             x, y = solid.found.x[column], solid.found.y[row]
-            which = f"up to {number(most, 3)} mm {how} than wanted, at ({x:.2f}, {y:.2f}) mm"
+            than = f"{number(most, 3)} mm {how} than {solid.pair.against}"
+            which = f"up to {than}, at ({x:.2f}, {y:.2f}) mm"
         cell = number(solid.found.cell_mm, 3)
         notes.append(f"{which}; walls beside their place by less than {cell} mm are not shown")
     return tuple(notes)

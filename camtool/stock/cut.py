@@ -171,7 +171,7 @@ class StockDifference(Struct, frozen=True):
 def difference_of(first: CutStock, second: CutStock, limit_mm: float) -> StockDifference:
     """Compare two stocks. Distances that do not exceed the limit are told as that much at most,
     others to `TRIAL_SHARE` of it."""
-    box = _around(first.box_mm, second.box_mm)
+    box = box_around(first.box_mm, second.box_mm)
     slack_mm3 = DIFFERENCE_SHARE * max(first.removed_mm3().high, second.removed_mm3().high)
     # What both cut is no difference: of each only the moves that the other has not are compared.
     more, less = _own_moves(second.moves, first.moves), _own_moves(first.moves, second.moves)
@@ -194,7 +194,8 @@ def _own_moves(moves: StockMoves, other: StockMoves) -> StockTree:
     return stock_tree(moves.select(own))
 
 
-def _around(one: Box, other: Box) -> Box:
+def box_around(one: Box, other: Box) -> Box:
+    """Return the box of two boxes."""
     low, high = np.minimum(one, other)[:2].tolist(), np.maximum(one, other)[2:].tolist()
     return low[0], low[1], high[0], high[1]
 

@@ -155,3 +155,20 @@ def test_jobs_and_machines_are_compared(camtool: Run, samples: Path, tmp_path: P
     alone = camtool("diff", samples / "mount.dxf", *job, "-t", "grbl")
     assert alone.returncode == 2
     assert b"nothing to compare with" in alone.stderr
+
+
+def test_a_page_shows_both_stocks_and_both_differences(
+    camtool: Run, cut: Path, tmp_path: Path
+) -> None:
+    other = tmp_path / "<b>other.ngc"
+    other.write_text(PROGRAM.replace("Z-1 F100", "Z-1.4 F100"))
+    done = camtool("diff", cut, other, *EXACT, "--preview", "page.html", "-q")
+    assert done.returncode == 1, done.stderr
+    page = (tmp_path / "page.html").read_text()
+    assert page.count("<svg") == 4
+    assert "<b>" not in page  # names of files are no markup
+    assert "&lt;b&gt;other.ngc" in page
+    assert "up to 0.4 mm lower than A" in page
+    assert "nowhere more than 0.002 mm higher than A" in page
+    done = camtool("diff", cut, other, *EXACT, "--preview", "picture.svg", "-q")
+    assert "up to 0.4 mm lower than A" in (tmp_path / "picture.svg").read_text()
