@@ -176,6 +176,23 @@ def test_a_pull_request_posts_changed_drawings(repository: Path) -> None:
     assert git(repository, "status", "--porcelain") == ""
 
 
+def test_a_pull_request_shows_what_is_cut_differently(repository: Path) -> None:
+    """The first commit has no job: a tool without width would leave no stock to compare."""
+    job = 'kind = "pocket"\ndepth = "{depth}mm"\ntool_diameter = "2mm"\n'
+    committed(repository, {"parts/changed.toml": job.format(depth=0.5)})
+    base = committed(repository, {"parts/changed.toml": job.format(depth=0.7),
+                                  "parts/changed.svg": RING.format(radius=9.5)})  # fmt: skip
+    ran = run_step(repository, request(base), target="grbl", diff="--max-difference 0.05mm")
+    assert (ran.code, ran.outputs["checked"]) == (0, "1")
+    text = (ran.made / "parts" / "changed.diff.txt").read_text()
+    assert "B cuts more: by 0.5" in text  # in the plane; the floor is 0.2 mm deeper
+    assert "B cuts less: nowhere by more than" in text
+    assert text in ran.summary
+    assert (ran.made / "parts" / "changed.diff.html").read_text().count("<svg") == 4
+    assert "base" not in {file.name for file in ran.made.iterdir()}
+    assert git(repository, "status", "--porcelain") == ""
+
+
 @pytest.mark.slow
 def test_it_fails_with_a_page_of_why(repository: Path) -> None:
     base = git(repository, "rev-parse", "HEAD~1")
