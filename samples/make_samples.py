@@ -1,5 +1,5 @@
 """Writes the sample drawings of camtool: logo.dxf, logo.svg, star.csv, coupon.dxf, plate.dxf,
-mount.dxf, mount.svg, sign.svg and board.dxf.
+mount.dxf, mount.svg, sign.svg, tray.svg and board.dxf.
 
     python samples/make_samples.py [FOLDER]
 
@@ -198,9 +198,9 @@ def plate() -> Sheet:
     return Sheet("front plate", (80.0, 50.0), layers, {})
 
 
-def moved(shape: Polyline, x: float, y: float) -> Polyline:
-    """The shape somewhere else."""
-    vertices = [(a + x, b + y, bulge) for a, b, bulge in shape.vertices]
+def moved(shape: Polyline, x: float, y: float, scale: float = 1.0) -> Polyline:
+    """The shape somewhere else, in another size."""
+    vertices = [(a * scale + x, b * scale + y, bulge) for a, b, bulge in shape.vertices]
     return Polyline(vertices, shape.closed)
 
 
@@ -237,6 +237,26 @@ def sign() -> Sheet:
     return Sheet("name plate", (60.0, 24.0), layers, {})
 
 
+def rose(centre: complex) -> Polyline:
+    """A compass rose: long rays to the four quarters, short ones between them."""
+    radii = (19.0, 4.6, 11.5, 4.6)
+    points = [centre + cmath.rect(radii[k % 4], math.radians(90.0 + 22.5 * k)) for k in range(16)]
+    return straight([xy(z) for z in points])
+
+
+def tray() -> Sheet:
+    """A tray for the desk, 110 by 76 mm: a dish, a groove for a pen, a compass rose and a name."""
+    letters = [(letter_a(), 72.0), (letter_d(), 81.0), (letter_a(), 89.4)]
+    name = [moved(path, x, 20.0, 0.6) for paths, x in letters for path in paths]
+    layers = [
+        Layer("DISH", 1, "#ff0000", [Circle((36.0, 45.0), 23.0)]),
+        Layer("GROOVE", 3, "#00ff00", [Line((17.0, 11.0), (93.0, 11.0))]),
+        Layer("CARVED", 7, "#000000", [rose(84.0 + 51.0j), *name]),
+        Layer("EDGE", 5, "#0000ff", [rounded(0.0, 0.0, 110.0, 76.0, 12.0)]),
+    ]
+    return Sheet("tray", (110.0, 76.0), layers, {})
+
+
 def board() -> Sheet:
     """A circuit board, 40 by 30 mm, as layout programs export it: an outline and holes of 0.8 and
     3.2 mm on one layer."""
@@ -270,6 +290,7 @@ def main(folder: Path) -> None:
         "mount.dxf": dxf(mount()),
         "mount.svg": svg(mount()),
         "sign.svg": svg(sign()),
+        "tray.svg": svg(tray()),
         "board.dxf": dxf(board()),
     }
     for name, text in texts.items():

@@ -105,7 +105,7 @@ BAR_STEPS = 200
 GREY = "#b9bec4"
 FROM_ABOVE = ("top", "leftover", "gouge")
 BAR_NAMES = {"leftover": "left (mm)", "gouge": "too deep (mm)"}
-GHOST_PEN = 1.3
+GHOST_PEN, GHOST_ALPHA = 1.3, "8c"
 
 
 class Solid(Struct, frozen=True, eq=False):
@@ -328,9 +328,11 @@ def _ghost(scene: Scene, camera: Camera, view: View) -> str:
     sides = [view.page(*camera.place(x, y, 0.0)) for x, y in ((1.0, 0.0), (0.0, 1.0))]
     parts = [f"{side[k] - zero[k]:.9g}" for side in sides for k in (0, 1)]
     matrix = f"matrix({' '.join(parts)} {zero[0]:.9g} {zero[1]:.9g})"
-    pen: Look = {"fill": "none", "stroke": OUTLINE, "stroke-width": view.mm(GHOST_PEN)}
+    # On dark paper too the material is light, and so its lines stay dark.
+    pen: Look = {"fill": "none", "stroke": OUTLINE + GHOST_ALPHA}
+    pen["stroke-width"] = view.mm(GHOST_PEN)
     data = path_data(chains_of(scene.drawing.paths))
-    lines = element("path", {"d": data, **pen, "stroke-opacity": "0.55"})
+    lines = element("path", {"d": data, **pen})
     return element("g", {"id": "ghost", "transform": matrix}, lines)
 
 

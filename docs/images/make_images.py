@@ -30,6 +30,7 @@ PAGES = (
     "docs/reversals.md",
     "docs/verifying.md",
     "docs/pictures.md",
+    "docs/gallery.md",
 )
 FIRST = "logo.png"
 DISTANCE_MM = 1.6

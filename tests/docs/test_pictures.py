@@ -38,9 +38,9 @@ def compare(name: str, made: bytes, shown: bytes) -> None:
     assert (np.abs(new - old).max(axis=2) > CHANGED).mean() <= MAX_CHANGED_SHARE, mend
 
 
-QUICK = {"layers.png", "outline.png", "polar.png", make_images.FIRST}
-"""A drawing, a job, a prediction and the README's: the default run looks at these, the nightly one
-at all."""
+QUICK = {"layers.png", "outline.png", "polar.png", "sign-iso.png", make_images.FIRST}
+"""A drawing, a job, a prediction, a stock and the README's: the default run looks at these, the
+nightly one at all."""
 
 
 @pytest.mark.parametrize(

@@ -27,6 +27,7 @@ NAMES = (
     "mount.dxf",
     "mount.svg",
     "sign.svg",
+    "tray.svg",
     "board.dxf",
 )
 
