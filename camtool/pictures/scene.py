@@ -7,6 +7,7 @@ program. The viewer also asks for its `Playback`: seconds, errors, the program's
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -33,6 +34,9 @@ if TYPE_CHECKING:
 
 LINES_SHOWN = 200
 """Most lines of a table of the viewer; the JSON report has all of them."""
+
+_WHERE = re.compile(r"X ?(-?\d+\.?\d*) Y ?(-?\d+\.?\d*)")
+"""A place in the words of a finding, mm."""
 
 NAME_WIDTH = 11
 """Width of the names at the left of the report's text, in characters."""
@@ -146,10 +150,12 @@ class StockPair(Struct, frozen=True, eq=False):
 
 
 class TableLine(Struct, frozen=True):
-    """A line of a table: its cells, and the row of the toolpath to which it refers."""
+    """A line of a table: its cells, and the row of the toolpath or the place (x, y) mm to which it
+    refers."""
 
     cells: tuple[str, ...]
     move: int | None = None
+    at_mm: tuple[float, float] | None = None
 
 
 class ReportTable(Struct, frozen=True):
@@ -435,20 +441,28 @@ def _playback(
 
 
 def _tables(report: Report) -> Iterator[ReportTable]:
-    """The tables of a report: its figures, findings, worst moves and contours, none without a
-    line."""
+    """The tables of a report: its figures, findings, worst moves, contours and dimensions, none
+    without a line."""
     lines = report.to_text(findings=False).splitlines()
     facts = [(line[:NAME_WIDTH].strip(), line[NAME_WIDTH:].strip()) for line in lines]
     yield ReportTable("Report", (), tuple(map(TableLine, facts)))
-    for title, columns, found in (_findings(report), _worst(report), _contours(report)):
+    for title, columns, found in (
+        _findings(report),
+        _worst(report),
+        _contours(report),
+        _dimensions(report),
+    ):
         if found:
             yield ReportTable(title, columns, tuple(found[:LINES_SHOWN]))
 
 
 def _findings(report: Report) -> tuple[str, tuple[str, ...], list[TableLine]]:
-    lines = [
-        TableLine((item.severity, item.code, item.where, item.message)) for item in report.findings
-    ]
+    lines = []
+    for item in report.findings:
+        found = _WHERE.search(item.where)
+        place = None if found is None else (float(found[1]), float(found[2]))
+        cells = item.severity, item.code, item.where, item.message
+        lines.append(TableLine(cells, at_mm=place))
     return "Findings", ("severity", "code", "where", "message"), lines
 
 
@@ -476,11 +490,33 @@ def _worst(report: Report) -> tuple[str, tuple[str, ...], list[TableLine]]:
 def _contours(report: Report) -> tuple[str, tuple[str, ...], list[TableLine]]:
     lines = [
         TableLine(
-            (item.name, _um(item.max_um), _um(item.rms_um), _um(item.mean_um), _place(item.at_mm))
+            (item.name, _um(item.max_um), _um(item.rms_um), _um(item.mean_um), _place(item.at_mm)),
+            at_mm=item.at_mm,
         )
         for item in sorted(report.contour_errors, key=lambda item: -item.max_um)
     ]
     return "Contours", ("contour", "max µm", "rms µm", "mean µm", "worst near mm"), lines
+
+
+def _dimensions(report: Report) -> tuple[str, tuple[str, ...], list[TableLine]]:
+    lines = []
+    for item in report.inspection:
+        (x, y), (u, v) = item.places_mm
+        sizes = (
+            f"{size:.4f}" for size in (item.nominal_mm, item.fit_mm, item.low_mm, item.high_mm)
+        )
+        cells = item.name, item.limits, *sizes, item.verdict
+        lines.append(TableLine(cells, at_mm=(0.5 * (x + u), 0.5 * (y + v))))
+    names = (
+        "dimension",
+        "limits",
+        "nominal mm",
+        "best fit mm",
+        "least mm",
+        "largest mm",
+        "verdict",
+    )
+    return "Dimensions", names, lines
 
 
 def _um(value: float | None) -> str:

@@ -116,7 +116,7 @@ def test_names_stay_names(words: str) -> None:
     head = head_of(page)
     assert head["layers"] == [{"name": words, "light": "#2b4c6f", "dark": "#cfdbe8"}]
     assert head["tables"] == [
-        {"title": words, "columns": [words], "rows": [{"cells": [words], "move": 0}]}
+        {"title": words, "columns": [words], "rows": [{"cells": [words], "move": 0, "at": None}]}
     ]
     assert str(head["blocks"]).count("\n") == 2
 

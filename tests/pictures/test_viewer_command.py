@@ -62,6 +62,49 @@ def test_the_report_names_the_moves_that_it_speaks_of(drawing: str) -> None:
     assert str(page["blocks"]).split("\n")[-1] == Path("a.nc").read_text().strip().split("\n")[-1]
 
 
+def test_dimensions_and_contours_have_their_places(drawing: str) -> None:
+    limits = """[[dimension]]
+    name = "length"
+    kind = "distance"
+    from = [0, 1]
+    to = [4, 1]
+    limits = "±0.5"
+    """
+    Path("limits.toml").write_text(limits, encoding="utf-8")
+    Path("b.csv").write_text("0,0\n4,0\n4,3\n0,3\n0,0\n", encoding="utf-8")
+    line = ("post", "b.csv", "--target", "grbl", "--tool-diameter", "1mm", "-o", "a.nc")
+    page = head(*line, "--tolerances", "limits.toml", "--preview", "a.html")
+    tables = page["tables"]
+    assert isinstance(tables, list)
+    named = {table["title"]: table for table in tables}
+    (row,) = named["Dimensions"]["rows"]
+    assert row["cells"][:3] == ["length", "±0.5", "4.0000"]
+    assert row["cells"][-1] in ("in", "undecided")
+    assert row["at"] == [2.0, 1.0]
+    for row in named["Contours"]["rows"]:
+        assert row["cells"][-1] == f"({row['at'][0]:.3f}, {row['at'][1]:.3f})"
+
+
+def test_a_finding_has_the_place_of_its_words(drawing: str) -> None:
+    samples = Path(__file__).parents[2] / "samples"
+    line = ("post", str(samples / "plate.dxf"), "--job", str(samples / "plate.toml"))
+    page = head(*line, "-t", "linuxcnc", "-o", "b.ngc", "--preview", "b.html", page="b.html")
+    tables = page["tables"]
+    assert isinstance(tables, list)
+    (found,) = (table for table in tables if table["title"] == "Findings")
+    placed = {row["cells"][1]: row["at"] for row in found["rows"] if row["at"]}
+    # The window's corner, and the point of the star.
+    assert placed["LOOSE_PIECE"] == [17.0, 17.0]
+    assert placed["DEPTH_LIMITED"] == [66.0, 35.0]
+    stock = page["stock"]
+    assert stock == {"box": [-8.0, -8.0, 88.0, 58.0], "bottom": -6.0}
+    cutters = page["cutters"]
+    assert isinstance(cutters, list)
+    # Seven operations: the mill thrice, the drill, the bit twice, and the mill again.
+    assert [round(each[1], 3) for each in cutters] == [1.5, 1.5, 1.5, 1.5, 3.0, 3.0, 1.5]
+    assert [each[4] > 0.0 for each in cutters] == [*[False] * 3, *[True] * 3, False]
+
+
 def test_several_ways_make_no_page(drawing: str) -> None:
     head("post", drawing, "--target", "pic-mmh", "-o", "a.pic", "--preview", "a.html")
     compared = ["verify", "a.pic", "--target", "pic-mmh", "--compare", "mechanics"]

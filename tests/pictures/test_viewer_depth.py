@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from camtool.arrays import Floats
-from camtool.pictures.scene import Scene
+from camtool.pictures.scene import ReportTable, Scene, TableLine
 from camtool.pictures.viewer.page import viewer_page
 from camtool.planning.job import Tool
 from camtool.records import replace
@@ -22,7 +22,7 @@ from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
 from tests.oracles.stock import Cutter, Move, Stock
 from tests.pictures.viewer_browser import NEEDS_BROWSER, browser, shown
-from tests.pictures.viewer_pages import busy, head_of
+from tests.pictures.viewer_pages import busy, head_of, with_run
 
 __all__ = ["browser", "shown"]
 
@@ -205,6 +205,24 @@ class TestShown:
         tip = view.text("#tip")
         assert "place\nX 8." in tip
         assert "block" in tip
+
+    def test_a_table_shows_a_place(self, shown: Any) -> None:
+        scene = scene_of_cuts(random_path(3), (0, MILL))
+        assert scene.playback is not None
+        line = TableLine(("here",), at_mm=(4.0, 6.0))
+        run = replace(scene.playback(), tables=(ReportTable("Findings", ("what",), (line,)),))
+        view = shown(with_run(scene, run))
+        view.press("g", "t")
+        before = picture(view)
+        view.page.get_by_role("button", name="show X 4 Y 6").click()
+        assert picture(view) != before
+        view.page.mouse.move(*view.place_of(0.5, 0.5))
+        tip = view.text("#tip").split()
+        x, y = float(tip[tip.index("X") + 1]), float(tip[tip.index("Y") + 1])
+        assert (x, y) == pytest.approx((4.0, 6.0), abs=0.1)
+        view.press("g")
+        view.page.get_by_role("button", name="show X 4 Y 6").click()
+        assert view.pixels("over") > 0
 
     def test_without_webgl_the_plan_stays_and_says_so(self, shown: Any) -> None:
         view = shown(scene_of_cuts(random_path(3), (0, MILL)))

@@ -15,7 +15,7 @@ const FULL_AFTER_MS = 250;
 /** [azimuth, elevation] by key: from the front, the side, the top, and between all of them. */
 const SIDES = {
   f: [0, 0], 1: [0, 0], s: [Math.PI / 2, 0], 3: [Math.PI / 2, 0],
-  t: [0, Math.PI / 2], 7: [0, Math.PI / 2], i: [0.6, 0.62],
+  t: [0, Math.PI / 2], 7: [0, Math.PI / 2], i: [0.45, 0.75],
 };
 
 const PLACE = `
@@ -219,7 +219,7 @@ class Depth {
   /** Start WebGL; false where the browser does not have it. */
   start() {
     if (this.gl) return true;
-    const gl = this.canvas.getContext("webgl2", { antialias: false, alpha: false });
+    const gl = this.canvas.getContext("webgl2", { antialias: true, alpha: false });
     if (!gl) return false;
     this.gl = gl;
     const { box, bottom } = this.head.stock;
@@ -365,9 +365,10 @@ class Depth {
     this.changed();
   }
 
-  /** Look at the end of a move. */
-  show(row) {
-    this.centre = [...this.moves.at(row, 1), Math.min(0, this.z[row + 1])];
+  /** Put a place (x, y) mm of the stock in the middle, under a post. */
+  look([x, y]) {
+    this.centre = [x, y, this.solid.heightAt(x, y) || 0];
+    this.mark = this.centre.slice();
     this.changed();
   }
 
@@ -505,6 +506,7 @@ class Depth {
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
     this.paintLines(colours);
     this.paintTool(colours);
+    if (this.mark) this.paintMark(colours);
     return isCut;
   }
 
@@ -596,6 +598,25 @@ class Depth {
     gl.enable(gl.CULL_FACE);
     gl.drawArrays(gl.TRIANGLES, 0, this.toolCount);
     gl.disable(gl.CULL_FACE);
+  }
+
+  /** A post on the place that a table speaks of, seen through the stock. */
+  paintMark(colours) {
+    const { gl, mark: [x, y, high] } = this, at = this.use(this.given);
+    this.post = this.post || this.given3d(new Float32Array(0));
+    const top = high + 60 / this.scale, arm = 8 / this.scale, points = [x, y, high, x, y, top];
+    for (let k = 0; k < 12; k++) {
+      for (const step of [k, k + 1]) points.push(x + arm * Math.cos((step * TURN) / 12), y + arm * Math.sin((step * TURN) / 12), high);
+    }
+    this.fill(this.post.points, new Float32Array(points));
+    this.fill(this.post.tints, new Uint8Array((points.length / 3) * 4).fill(255));
+    gl.bindVertexArray(this.post.array);
+    gl.uniform3f(at.shift, 0, 0, 0);
+    gl.uniform4f(at.over, ...rgb(colours.pick), 1);
+    gl.uniform1i(at.isLine, 1);
+    gl.disable(gl.DEPTH_TEST);
+    gl.drawArrays(gl.LINES, 0, points.length / 3);
+    gl.enable(gl.DEPTH_TEST);
   }
 
   /** Turn the profile of a tool round its axis; a needle where its shape is not known. */

@@ -251,7 +251,14 @@ function begin() {
   };
   if (tracks.moves.count) player = new Player(run, moved);
   else document.body.classList.add("still");
-  showTables(head, (row) => { player.toRow(row); centre(stage, row); });
+  const look = (at) => {
+    stage.shown.look(at);
+    stage.place.scrollIntoView({ block: "nearest" });
+  };
+  showTables(head, (row) => {
+    player.toRow(row);
+    look(tracks.moves.at(row, 1));
+  }, look);
 
   const hovered = (move, drawn, px, py, at) => {
     stage.hover = { moves: move, drawing: drawn, at };
@@ -365,11 +372,6 @@ function listenDepth(stage) {
 function showHelp(isShown) {
   find("help").hidden = !isShown;
   find("help-button").setAttribute("aria-expanded", String(isShown));
-}
-
-function centre(stage, row) {
-  stage.shown.show(row);
-  stage.place.scrollIntoView({ block: "nearest" });
 }
 
 /** The current move, beside the picture. */

@@ -204,7 +204,9 @@ def _table(table: ReportTable) -> dict[str, object]:
     return {
         "title": table.title,
         "columns": table.columns,
-        "rows": [{"cells": line.cells, "move": line.move} for line in table.lines],
+        "rows": [
+            {"cells": line.cells, "move": line.move, "at": line.at_mm} for line in table.lines
+        ],
     }
 
 

@@ -235,8 +235,8 @@ function firstRows(blockOf, count) {
   return rows;
 }
 
-/** The report's tables below the picture; a row about a move has a button that shows it. */
-function showTables(head, go) {
+/** The report's tables below the picture; a row about a move or a place has a button that shows it. */
+function showTables(head, go, look) {
   for (const table of head.tables) {
     const made = element("table"), body = element("tbody");
     made.append(element("caption", table.title));
@@ -250,10 +250,10 @@ function showTables(head, go) {
     for (const row of table.rows) {
       const line = element("tr");
       row.cells.forEach((cell) => line.append(element("td", cell)));
-      if (row.move !== null) {
-        const name = `show move ${row.move + 1}`;
+      if (row.move !== null || row.at) {
+        const name = row.at ? `show X ${row.at[0]} Y ${row.at[1]}` : `show move ${row.move + 1}`;
         const button = element("button", "show", { type: "button", "aria-label": name });
-        button.addEventListener("click", () => go(row.move));
+        button.addEventListener("click", () => (row.at ? look(row.at) : go(row.move)));
         const last = element("td");
         last.append(button);
         line.append(last);

@@ -321,9 +321,10 @@ class Stage {
     this.changed();
   }
 
-  /** Look at the end of a move. */
-  show(row) {
-    [this.view.x, this.view.y] = this.moves.at(row, 1);
+  /** Put a place (x, y) mm in the middle, with a ring about it. */
+  look([x, y]) {
+    Object.assign(this.view, { x, y, isFitted: false });
+    this.mark = [x, y];
     this.changed();
   }
 
@@ -450,6 +451,7 @@ class Stage {
       if (row < 0) continue;
       paintTrack(ctx, view, track, { from: row, to: row + 1 }, { [row]: 0 }, [picked]);
     }
+    if (this.mark) paintDots(ctx, view, this.mark, 14, { line: colours.pick, width: 3 });
     if (moves.count) paintTool(ctx, view, moves, run, this.layers.widthAt(run), colours);
   }
 
