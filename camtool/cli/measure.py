@@ -19,6 +19,7 @@ from camtool.cli.options import (
     machine_options,
     talk_options,
 )
+from camtool.cli.picture_options import is_viewer, picture_name
 from camtool.units import UM_PER_MM, parse_length
 
 if TYPE_CHECKING:
@@ -69,6 +70,12 @@ def _sections(_: click.Context, option: click.Parameter, values: tuple[str, ...]
 )
 @click.option("--volume", is_flag=True, help="The volume that is cut, and the greatest depth.")
 @click.option("--json", "report", metavar="FILE", help="All of it as JSON; - is stdout.")
+@click.option(
+    "--preview",
+    metavar="FILE",
+    callback=picture_name,
+    help="Picture of the section, .svg or .png.",
+)
 @click.option("--csv", "table", metavar="FILE", help="The sections as a table; - is stdout.")
 @job_options
 @drawing_options
@@ -80,6 +87,7 @@ def measure(
     sections: list[tuple[str, float]],
     volume: bool,
     report: str | None,
+    preview: str | None,
     table: str | None,
     job: JobFlags,
     drawing: DrawingFlags,
@@ -97,7 +105,9 @@ def measure(
         raise click.UsageError("--csv is a table of sections: give --section")
     if table == STDOUT and report == STDOUT:
         raise click.UsageError("only one of --csv and --json can be stdout")
-    check_places([program, *machine.files(), *job.files()], [report, table])
+    if preview is not None and (len(sections) != 1 or is_viewer(preview)):
+        raise click.UsageError("--preview shows one --section, as .svg or .png")
+    check_places([program, *machine.files(), *job.files()], [report, preview, table])
 
     from camtool.pipeline import read_program
     from camtool.stock.cut import cut_stock
@@ -115,6 +125,8 @@ def measure(
         files[report] = (json.dumps(facts, indent=2) + "\n").encode()
     if table is not None:
         files[table] = _table(profiles).encode()
+    if preview is not None:
+        files[preview] = _picture(display_name(program), profiles[0], stock, preview)
     write_all(files)
     if not quiet and STDOUT not in files:
         show_text(_text(stock, points, profiles, with_volume=volume))
@@ -171,6 +183,16 @@ def _facts(
             "at_mm": lowest.at_mm,
         }
     return facts
+
+
+def _picture(title: str, profile: tuple[str, float, Floats], stock: CutStock, file: str) -> bytes:
+    """Return the picture of a section."""
+    from camtool.pictures.draw import rendered
+    from camtool.pictures.options import AS_USUAL
+    from camtool.pictures.section import StockSection, section_svg
+
+    section = StockSection(*profile, stock.bottom_mm)
+    return rendered(lambda sized: section_svg(title, section, sized), file, AS_USUAL)
 
 
 def _table(profiles: Profiles) -> str:

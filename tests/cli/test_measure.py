@@ -74,6 +74,9 @@ def test_a_section_and_a_volume_are_those_of_the_needles(camtool: Run, cut: Path
     assert far.sum() > 200
     assert told[far] == pytest.approx(seen[far], abs=5e-3)
 
+    done = camtool("measure", cut, *EXACT, "--section", "x=10", "--preview", "cut.svg", "-q")
+    assert (cut.parent / "cut.svg").read_text().startswith("<svg")
+
     done = camtool("measure", cut, *EXACT, "--volume", "--json", "-")
     low, high = json.loads(done.stdout)["removed_mm3"]
     volume = float(-stock.height.sum() * stock.cell**2)
@@ -87,6 +90,8 @@ def test_a_section_and_a_volume_are_those_of_the_needles(camtool: Run, cut: Path
         (("--at", "5"), "no point"),
         (("--at", "5,abc"), "abc"),
         (("--section", "z=5"), "no section"),
+        (("--section", "x=5", "--section", "x=6", "--preview", "x.svg"), "one --section"),
+        (("--section", "x=5", "--preview", "x.html"), "one --section"),
         (("--at", "5,5", "--csv", "x.csv"), "--csv is a table of sections"),
     ],
 )
