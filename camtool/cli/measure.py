@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from camtool.cli.files import STDOUT, check_places, display_name, read_bytes, write_all
-from camtool.cli.messages import say, show_text
+from camtool.cli.messages import say, say_findings, show_text
 from camtool.cli.options import (
     DrawingFlags,
     JobFlags,
@@ -118,6 +118,7 @@ def measure(
         run = read_program(read_bytes(program), target, source=display_name(program))
         assert run.decoded is not None
         stock = cut_stock(run.decoded, target, wanted)
+    say_findings(run.findings, quiet=quiet, verbose=verbose)
     profiles = [(axis, at, stock.section(axis, at)) for axis, at in sections]
     files: dict[str, bytes] = {}
     if report is not None:
@@ -135,7 +136,7 @@ def measure(
         " measured",
         quiet=quiet or not verbose,
     )
-    return 0
+    return int(run.failed)
 
 
 Profiles = list[tuple[str, float, "Floats"]]

@@ -103,6 +103,13 @@ def test_what_cannot_be_measured_is_refused(
     assert words in done.stderr.decode()
 
 
+def test_what_is_wrong_with_a_program_is_said(camtool: Run, cut: Path) -> None:
+    cut.write_text(PROGRAM.replace("X20\n", "X20 M77\n"))
+    done = camtool("measure", cut, *EXACT, "--at", "1,1")
+    assert done.returncode != 0
+    assert b"M77" in done.stderr or b"77" in done.stderr
+
+
 def test_a_program_without_a_known_tool_is_refused(camtool: Run, cut: Path) -> None:
     done = camtool("measure", cut, "-t", "linuxcnc", "--at", "1,1")
     assert done.returncode == 2
