@@ -4,6 +4,7 @@
     depth = "0.1mm"                 # keys of operations up here hold for all that have them
     [place]                         # the drawing in the work frame
     [stock]
+    [[keep_out]]                    # clamps
     [tools.finish]
     [[operations]]                  # in the order in which they are cut
 
@@ -19,7 +20,8 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +30,7 @@ from msgspec import Struct, field
 from camtool.errors import MachineError, OptionError
 from camtool.jobs.keys import (
     FINISH_TOOL,
+    KEEP_OUT,
     OPERATION,
     PLACE,
     STOCK,
@@ -39,7 +42,15 @@ from camtool.jobs.keys import (
 )
 from camtool.jobs.tools import Described, Shop, Tools, Used, tool_tables, tools_for
 from camtool.keys import Given, Table, record_of, table_of, why_idle
-from camtool.planning.job import Job, Operation, Placement, Stock, operation_of, rested
+from camtool.planning.job import (
+    Job,
+    KeepOutBox,
+    Operation,
+    Placement,
+    Stock,
+    operation_of,
+    rested,
+)
 from camtool.records import replace
 from camtool.tables import read_table
 
@@ -55,7 +66,7 @@ _OF_FINISH = ("finish", "finish_feed", "finish_spindle", FINISH_TOOL)
 _OF_WALLS = ("allowance", *_OF_FINISH)
 """Keys whose fields depend on tools."""
 
-TABLES = ("place", "stock", "tools", "operations")
+TABLES = ("place", "stock", "keep_out", "tools", "operations")
 """Tables of a job file."""
 
 AT_THE_TOP = (*WHOLE, *OF_OPERATIONS, "origin", *TABLES)
@@ -72,6 +83,8 @@ EITHER = {"depth": "breakthrough", "breakthrough": "depth", "scale": "fit", "fit
 
 _ANY_STOCK = {"thickness_mm": 1.0}
 
+_ANY_BOX = partial(KeepOutBox, name="", x_mm=(0.0, 1.0), y_mm=(0.0, 1.0))
+
 
 class JobTables(Struct, frozen=True):
     """The tables of a job as a file gives them, or flags. `defaults` hold for all `operations`;
@@ -80,6 +93,7 @@ class JobTables(Struct, frozen=True):
     whole: Table = field(default_factory=Table)
     place: Table = field(default_factory=Table)
     stock: Table | None = None
+    keep_out: tuple[Table, ...] = ()
     tools: Mapping[str, Described] = field(default_factory=dict)
     defaults: Table = field(default_factory=Table)
     operations: tuple[Table, ...] | None = None
@@ -121,6 +135,7 @@ def tables_of(values: dict[str, Any], path: Path) -> JobTables:
         stock=table_of(values["stock"], STOCK, "table [stock]", file)
         if "stock" in values
         else None,
+        keep_out=_list_of_tables(values, "keep_out", "boxes", KEEP_OUT, file),
         tools=tool_tables(values, file),
         defaults=defaults,
         operations=operations,
@@ -132,16 +147,23 @@ def _operation_tables(values: dict[str, Any], file: str) -> tuple[Table, ...] | 
     """The tables of `[[operations]]`, None without any."""
     if "operations" not in values:
         return None
-    rows = values["operations"]
-    if not isinstance(rows, list) or not rows:
+    return _list_of_tables(values, "operations", "operations", OF_OPERATIONS, file)
+
+
+def _list_of_tables(
+    values: dict[str, Any], key: str, of: str, known: Iterable[str], file: str
+) -> tuple[Table, ...]:
+    """Return the tables `[[key]]`, each with keys of the known ones; () without any."""
+    rows = values.get(key, ())
+    if key in values and not (isinstance(rows, list) and rows):
         raise OptionError(
-            "is no list of operations",
+            f"is no list of {of}",
             file=file,
-            where="key operations",
-            mend="begin each operation with [[operations]]",
+            where=f"key {key}",
+            mend=f"begin each with [[{key}]]",
         )
     return tuple(
-        table_of(row, OF_OPERATIONS, f"table [[operations]] {_called(n, row)}", file)
+        table_of(row, known, f"table [[{key}]] {_called(n, row)}", file)
         for n, row in enumerate(rows, start=1)
     )
 
@@ -195,6 +217,7 @@ def build_job(
         operations=tuple(operations[n] for n in rows),
         placement=_placement(file, flags),
         stock=stock,
+        keep_out=tuple(_keep_out(n, table) for n, table in enumerate(file.keep_out, start=1)),
     )
 
 
@@ -388,3 +411,12 @@ def _stock(table: Table | None) -> Stock | None:
     if "thickness" not in table.given:
         raise table.refused("key thickness is missing", "give thickness, and corner and size")
     return record_of(Stock, STOCK, table, _ANY_STOCK)
+
+
+def _keep_out(number: int, table: Table) -> KeepOutBox:
+    """The box of a table `[[keep_out]]`, named by its number where it has no name."""
+    for key in ("x", "y"):
+        if key not in table.given:
+            raise table.refused(f"key {key} is missing", "give x and y, and z if it ends")
+    box = record_of(_ANY_BOX, KEEP_OUT, table)
+    return box if box.name else replace(box, name=f"box {number}")

@@ -68,6 +68,8 @@ def together(file: JobTables, flags: JobTables, folder: Path) -> Values:
         tables["place"] = place
     if file.stock is not None:
         tables["stock"] = _raw(file.stock)
+    if file.keep_out:
+        tables["keep_out"] = [_raw(each) for each in file.keep_out]
     if file.tools:
         tables["tools"] = {
             name: {

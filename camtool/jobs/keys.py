@@ -1,6 +1,7 @@
 """The keys of job files: the field that each fills, and the flag that says the same.
 
-    WHOLE, PLACE, STOCK, TOOL, OPERATION: every key, table by table; FLAGS: those that are flags
+    WHOLE, PLACE, STOCK, KEEP_OUT, TOOL, OPERATION: every key, table by table
+    FLAGS: those that are flags
 
 Kinds of operations name the keys that they know, and may bring keys of their own
 (`camtool.planning.kinds`). docs/jobs.md explains the keys; a test keeps the page and these tables
@@ -95,7 +96,14 @@ def number_range(value: object) -> tuple[float, float]:
     return _range(value, number)
 
 
-def _range(value: object, convert: Callable[[object], float]) -> tuple[float, float]:
+def span(value: object) -> tuple[float, float]:
+    """["-5mm", "8mm"] or "-5..8mm"; an end that is left out is nowhere."""
+    return _range(value, length, -math.inf)
+
+
+def _range(
+    value: object, convert: Callable[[object], float], least: float = 0.0
+) -> tuple[float, float]:
     if not isinstance(value, str):
         return _two(value, convert, '["3mm", "8mm"]')
     one, dots, two = (part.strip() for part in value.partition(".."))
@@ -104,7 +112,7 @@ def _range(value: object, convert: Callable[[object], float]) -> tuple[float, fl
     unit = _UNIT.search(two)
     if one and unit and not _UNIT.search(one):
         one += unit[0]
-    return convert(one) if one else 0.0, convert(two) if two else math.inf
+    return convert(one) if one else least, convert(two) if two else math.inf
 
 
 def colours(value: object) -> tuple[str, ...]:
@@ -250,6 +258,7 @@ def _two(value: object, convert: Callable[[object], _T], like: str) -> tuple[_T,
 
 LENGTHS = Value(plain(length_range), "RANGE")
 NUMBERS = Value(plain(number_range), "RANGE")
+SPAN = Value(plain(span), "RANGE")
 
 
 # Tables that are values: `entry`, `lead_in` and `lead_out`, `tabs`.
@@ -342,6 +351,14 @@ STOCK = {
 }
 """Keys of `[stock]`: all but the last must be there."""
 
+KEEP_OUT = {
+    "name": Key("name", TEXT),
+    "x": Key("x_mm", SPAN),
+    "y": Key("y_mm", SPAN),
+    "z": Key("z_mm", SPAN),
+}
+"""Keys of `[[keep_out]]`: `x` and `y` must be there."""
+
 TOOL = {
     "diameter": Key("diameter_mm", LENGTH, "0 for a point (default)."),
     "kind": Key("kind", one_of(TOOL_KINDS), "Its shape.", '"v"'),
@@ -354,6 +371,10 @@ TOOL = {
     "corner_radius": Key("corner_radius_mm", LENGTH, "Of a bull nose.", only=("kind", ("bull",))),
     "flutes": Key("flutes", COUNT, "How many edges it has.", "2"),
     "cutting_length": Key("cutting_length_mm", LENGTH, "How long they are.", '"12mm"'),
+    "shank_diameter": Key("shank_diameter_mm", LENGTH),
+    "stickout": Key("stickout_mm", LENGTH),
+    "holder_diameter": Key("holder_diameter_mm", LENGTH),
+    "holder_length": Key("holder_length_mm", LENGTH),
     "centre_cutting": Key("centre_cutting", SWITCH),
     "chip_load": Key("chip_load_mm", LENGTHS),
     "surface_speed": Key("surface_speed_m_min", NUMBERS),

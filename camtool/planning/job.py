@@ -231,8 +231,10 @@ class Tool:
     a `corner_radius_mm`.
 
     What is not known is None: how many `flutes` it has, how long they cut (`cutting_length_mm`),
-    and whether it cuts at its centre, and so plunges. Limits of the feed per tooth, mm, and of the
-    speed of the cutting edge, m/min, are (least, most). `materials`: those of its presets.
+    and whether it cuts at its centre, and so plunges. Above its flutes it is a cylinder, the
+    shank, up to the holder: a cylinder too, from `stickout_mm` above the tip on and
+    `holder_length_mm` long (None: endless). Limits of the feed per tooth, mm, and of the speed of
+    the cutting edge, m/min, are (least, most). `materials`: those of its presets.
     """
 
     diameter_mm: float = 0.0
@@ -244,6 +246,10 @@ class Tool:
     name: str = ""
     flutes: int | None = None
     cutting_length_mm: float | None = None
+    shank_diameter_mm: float | None = None
+    stickout_mm: float | None = None
+    holder_diameter_mm: float | None = None
+    holder_length_mm: float | None = None
     centre_cutting: bool | None = None
     chip_load_mm: tuple[float, float] | None = None
     surface_speed_m_min: tuple[float, float] | None = None
@@ -255,6 +261,10 @@ class Tool:
         at_least_zero("corner radius", self.corner_radius_mm, "mm", MAX_WIDTH_MM)
         above_zero("number of flutes", self.flutes, "")
         above_zero("cutting length", self.cutting_length_mm, "mm")
+        above_zero("shank diameter", self.shank_diameter_mm, "mm")
+        above_zero("stickout", self.stickout_mm, "mm")
+        above_zero("holder diameter", self.holder_diameter_mm, "mm")
+        above_zero("holder length", self.holder_length_mm, "mm")
         one_of("kind of tool", self.kind, TOOL_KINDS)
         refuse_range("chip_load", self.chip_load_mm)
         refuse_range("surface_speed", self.surface_speed_m_min)
@@ -276,6 +286,20 @@ class Tool:
                 where="key corner_radius",
                 mend=f"give {0.5 * self.diameter_mm:g} mm or less, or a wider tool",
             )
+
+    @property
+    def bodies(self) -> tuple[tuple[str, float, float, float], ...]:
+        """The cylinders above the flutes that are known: "shank" or "holder", radius, and the
+        heights above the tip where it begins and ends, mm."""
+        found = []
+        ends = math.inf if self.stickout_mm is None else self.stickout_mm
+        begins, shank = self.cutting_length_mm, self.shank_diameter_mm
+        if begins is not None and shank is not None and begins < ends:
+            found.append(("shank", 0.5 * shank, begins, ends))
+        if self.stickout_mm is not None and self.holder_diameter_mm is not None:
+            top = ends + (self.holder_length_mm or math.inf)
+            found.append(("holder", 0.5 * self.holder_diameter_mm, ends, top))
+        return tuple(found)
 
     @property
     def radius_mm(self) -> float:
@@ -895,14 +919,34 @@ class Stock:
 
 
 @dataclass(frozen=True)
+class KeepOutBox:
+    """A box of the work frame that no part of a tool may enter, as a clamp: from and to along each
+    axis, mm; `name` as the job calls it."""
+
+    name: str
+    x_mm: tuple[float, float]
+    y_mm: tuple[float, float]
+    z_mm: tuple[float, float] = (-math.inf, math.inf)
+
+    def __post_init__(self) -> None:
+        for key, (low, high) in (("x", self.x_mm), ("y", self.y_mm), ("z", self.z_mm)):
+            if not low < high:
+                raise OptionError(
+                    f"{low:g} to {high:g} mm is no range",
+                    where=f"key {key}",
+                    mend="give the lesser one first",
+                )
+
+
+@dataclass(frozen=True)
 class Job:
     """A job: all that is to be cut of a drawing.
 
     `approach`: every cut starts after a move that takes up the backlash of both axes. `minimise`:
     one of GOALS. `compensate`: what is written is bent beforehand against the mechanics of its
     machine. `frames`: patterns of the layers whose contours, where they are not cut, are no edges
-    of parts. Operations with a breakthrough get their depth,
-    those with a finishing pass become two. Raises OptionError for what no job can be."""
+    of parts. `keep_out`: boxes that no tool may enter. Operations with a breakthrough get their
+    depth, those with a finishing pass become two. Raises OptionError for what no job can be."""
 
     operations: tuple[Operation, ...] = field(default_factory=lambda: (Operation(),))
     placement: Placement = Placement()
@@ -912,6 +956,7 @@ class Job:
     approach: bool = False
     compensate: bool = False
     frames: tuple[str, ...] = FRAMES
+    keep_out: tuple[KeepOutBox, ...] = ()
 
     def __post_init__(self) -> None:
         above_zero("safe Z", self.safe_z_mm, "mm")

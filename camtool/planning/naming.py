@@ -47,6 +47,8 @@ def tool_words(tool: Tool) -> str:
         words.append(f"{tool.flutes} flute{'s' if tool.flutes > 1 else ''}")
     if tool.cutting_length_mm:
         words.append(f"cuts {tool.cutting_length_mm:g} mm")
+    if tool.stickout_mm:
+        words.append(f"sticks out {tool.stickout_mm:g} mm")
     return ", ".join(words)
 
 

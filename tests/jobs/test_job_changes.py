@@ -29,6 +29,14 @@ KEYED = """depth = "1mm"
 tool_diameter = "2mm"
 [stock]
 thickness = "3mm"
+[[keep_out]]
+name = "left clamp"
+x = "-20..-2mm"
+y = [0, 10]
+z = "..15mm"
+[[keep_out]]
+x = "90mm.."
+y = ["0mm", "1in"]
 [tools.mill]
 diameter = "3mm"
 flutes = 2

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from camtool.errors import OptionError
 from camtool.jobs.build import AT_THE_TOP, OF_OPERATIONS, JobTables, build_job, tables_of
-from camtool.jobs.keys import ENTRY, LEAD, PLACE, STOCK, TABS, TOOL
+from camtool.jobs.keys import ENTRY, KEEP_OUT, LEAD, PLACE, STOCK, TABS, TOOL
 from camtool.planning.job import ENTRIES, LEADS, Job
 from camtool.planning.kinds import installed_kinds
 
@@ -57,6 +57,7 @@ def _files(draw: st.DrawFn) -> dict[str, Any]:
     for name, table in (
         ("place", _table(*PLACE)),
         ("stock", _table(*STOCK)),
+        ("keep_out", st.lists(_table(*KEEP_OUT), max_size=2)),
         ("tools", st.dictionaries(st.just("a"), _table(*TOOL))),
         ("operations", st.lists(_table(*OF_OPERATIONS), max_size=3)),
     ):

@@ -4,8 +4,29 @@ import re
 from dataclasses import fields
 from pathlib import Path
 
-from camtool.jobs.keys import ENTRY, LEAD, OPERATION, PLACE, STOCK, TABS, TOOL, WHOLE, is_known
-from camtool.planning.job import Entry, Job, Lead, Operation, Placement, Stock, Tabs, Tool
+from camtool.jobs.keys import (
+    ENTRY,
+    KEEP_OUT,
+    LEAD,
+    OPERATION,
+    PLACE,
+    STOCK,
+    TABS,
+    TOOL,
+    WHOLE,
+    is_known,
+)
+from camtool.planning.job import (
+    Entry,
+    Job,
+    KeepOutBox,
+    Lead,
+    Operation,
+    Placement,
+    Stock,
+    Tabs,
+    Tool,
+)
 from camtool.planning.kinds import installed_kinds
 
 PAGE = Path("docs/jobs.md").read_text(encoding="utf-8")
@@ -19,14 +40,16 @@ def test_every_field_of_a_job_has_a_key() -> None:
     made_by_jobs = {"tool", "material", "preset", "stage", "rest_of", "own"}
     assert missing(Operation, OPERATION) == made_by_jobs
     assert missing(Placement, PLACE) == missing(Stock, STOCK) == set()
+    assert missing(KeepOutBox, KEEP_OUT) == set()
     assert missing(Entry, ENTRY) == missing(Lead, LEAD) == missing(Tabs, TABS) == set()
     assert missing(Tool, TOOL) == {"name", "materials"}
-    assert missing(Job, WHOLE) == {"operations", "placement", "stock"}
+    assert missing(Job, WHOLE) == {"operations", "placement", "stock", "keep_out"}
 
 
 def test_the_page_has_every_key_and_no_other() -> None:
     parts = re.split(r"^## ", PAGE, flags=re.MULTILINE)
     tables = {"The job": WHOLE, "`[place]`": PLACE, "`[stock]`": STOCK, "`[tools": TOOL}
+    tables["`[[keep_out]]`"] = KEEP_OUT
     tables["`[[operations]]`"] = {**OPERATION, "tool": None}
     for heading, keys in tables.items():
         (part,) = (part for part in parts if part.startswith(heading))
