@@ -7,7 +7,7 @@ lowest room that all of them may import. A machine's own sentences stand in its 
 plug-in adds codes of its own there too (`TargetCode`). docs/findings.md is made from all of them.
 
 Numbers are stable: add, never renumber. Hundreds: 1xx drawing, 2xx planning, 3xx program, 4xx
-motion and result, 5xx inspection.
+motion and result, 5xx inspection, 6xx stock.
 """
 
 from __future__ import annotations

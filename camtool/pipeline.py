@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, TypeVar
 from msgspec import Struct, field
 
 from camtool.bounds import TooLongError
-from camtool.errors import ProgramError
+from camtool.errors import OptionError, ProgramError
 from camtool.findings import Finding, Severity, worst
 from camtool.planning.job import Job
 from camtool.progress import Progress
@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     from camtool.planning.job import Job, Tool
     from camtool.planning.plan import Plan
     from camtool.simulation.motion import Effects
+    from camtool.stock.checks import StockRequest
     from camtool.target.registry import LoadedTarget
     from camtool.toolpath.moves import CompensatedToolpath, Toolpath
     from camtool.toolpath.program import Program
@@ -69,6 +70,9 @@ if TYPE_CHECKING:
 
 
 T = TypeVar("T")
+
+WALL_COVERAGES = 2.0
+"""The stock is judged so many tolerances of coverage beside its walls."""
 
 PLANNING = "planning"
 """The name of the stage that makes moves of a job."""
@@ -103,6 +107,7 @@ class _Posting(Struct, frozen=True):
     gates: Gates | None = None
     trace_points: int | None = None
     brief: bool = False
+    is_whole: bool = True
     progress: Progress = field(default_factory=Progress)
 
 
@@ -126,7 +131,7 @@ def post_drawing(
     """
     from camtool.planning.plan import planned
 
-    how = _Posting(check, gates, trace_points, brief, progress or Progress())
+    how = _Posting(check, gates, trace_points, brief, progress=progress or Progress())
 
     def plain() -> Run | None:
         other = _without_measures(job)
@@ -163,6 +168,7 @@ def post_by_tool(
     how.progress.begin(PLANNING)
     every = planned(drawing, job, machine)
     turns = turns_of_tools(every)
+    how = replace(how, is_whole=len(turns) == 1)
     plans = parted(every, turns, drawing, machine)
 
     @cache
@@ -222,6 +228,7 @@ def _post_plan(
     if judged is None:
         return replace(run, program=program, decoded=decoded, findings=findings)
     from camtool.planning.drawn import kept_of
+    from camtool.stock.checks import stock_request
     from camtool.verification.cuts import rapid_length_mm
     from camtool.verification.report import Planned, rounded
 
@@ -260,8 +267,10 @@ def _post_plan(
         zero=job.placement.origin,
         cut_mm=_cut_mm(wanted),
     )
+    asked = stock_request(judged.steps, job, _beside_mm(case), is_whole=how.is_whole)
     del judged, whole  # the paths of the stages are not needed any more
     verification = _judge_program(case, program.data, progress)
+    findings = _merge_findings(findings, _stock_findings(case, asked, job, findings))
     figures = _with_times(figures, written, case, verification)
     beyond = _gate_findings(verification, how.gates, findings)
     findings = _merge_findings(findings, verification.findings, beyond, without=repeated)
@@ -295,11 +304,13 @@ def verify_program(
     assert decoded is not None
     case = Case(decoded, target)
     kept: tuple[ProtectedRegion, ...] = ()
+    asked_of_stock: StockRequest | None = None
     if drawing is not None and judging.found:
         case, job = _register_drawing(case, drawing, job or Job(), align=judging.align)
     elif drawing is not None:
         from camtool.planning.drawn import kept_of
         from camtool.planning.plan import planned
+        from camtool.stock.checks import stock_request
 
         wanted, machine = job or Job(), target.machine
         progress.begin(PLANNING)
@@ -316,6 +327,7 @@ def verify_program(
             asked=asked,
         )
         kept = kept_of(plan.steps)
+        asked_of_stock = stock_request(plan.steps, wanted, _beside_mm(case))
     options = VerifyOptions(
         interpolator=judging.interpolator,
         effects=judging.effects or ALL,
@@ -329,6 +341,9 @@ def verify_program(
     )
     found = _judge_program(replace(case, options=options), data, progress)
     beyond = _gate_findings(found, judging.gates)
+    if asked_of_stock is not None:
+        planning = case.wanted.findings if case.wanted is not None else ()
+        beyond = (*_stock_findings(case, asked_of_stock, job or Job(), planning), *beyond)
     if beyond:
         found = found.with_findings((*found.findings, *beyond))
     return replace(
@@ -655,6 +670,37 @@ def _judge_program(case: Case, data: bytes, progress: Progress) -> Verification:
         stray_mm=target.stray_mm(machine),
     )
     return verify(replace(case, options=options), progress)
+
+
+def _beside_mm(case: Case) -> float:
+    """Return the distance in the plane that a wall may be off without a finding of the stock, mm:
+    the tolerance of coverage, and how far the planned lines are off the drawing."""
+    drawn = None if case.wanted is None else case.wanted.drawn
+    off_mm = 0.0 if drawn is None else float(drawn.off_mm[:, 0].max(initial=0.0))
+    return WALL_COVERAGES * case.coverage_mm + off_mm
+
+
+def _stock_findings(
+    case: Case, request: StockRequest, job: Job, planning: tuple[Finding, ...]
+) -> tuple[Finding, ...]:
+    """Return the findings of a program in its stock: of the path that its controller decodes, or
+    of the slides where that is bent against the mechanics. None where tools are not known, or cut
+    no width."""
+    from camtool.stock.checks import stock_findings
+    from camtool.stock.moves import stock_moves_of_toolpath
+    from camtool.stock.slides import slide_moves, tools_of_rows
+
+    try:
+        tools = tools_of_rows(case.decoded, job)
+    except OptionError:
+        return ()
+    if not any(cutter.radius_mm for cutter in tools.cutters):
+        return ()
+    if case.compensated is None:
+        moves = stock_moves_of_toolpath(case.decoded, tools.index, tools.cutters)
+    else:
+        moves = slide_moves(case.decoded, case.target, tools, case.simulation)
+    return stock_findings(case.decoded, moves, request, case.depth_mm, planning)
 
 
 def _with_operations(decoded: Toolpath, written: Toolpath, program: Program) -> Toolpath:

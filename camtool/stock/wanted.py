@@ -194,11 +194,14 @@ def wanted_solid(steps: Sequence[Step], wall_mm: float = DEFAULT_WALL_MM) -> Wan
     its setting; what cuts no width leaves all."""
     may: list[WantedLayer] = []
     must: list[WantedLayer] = []
+    names = {step.operation.name for step in steps}
     for step in steps:
         if step.operation.tool.radius_at(-step.setting.levels_mm[-1]) > 0.0:
             maker = _Layers(step)
             may += maker.may()
-            must += maker.must()
+            # The rest of what another program clears is not all that is to be cleared.
+            if not step.operation.rest or step.operation.rest in names:
+                must += maker.must()
     return WantedSolid(tuple(may), tuple(must), wall_mm)
 
 

@@ -22,10 +22,10 @@ SHORTEST_MEANING = 10
 GIVEN = {"where", "measured", "limit", "severity"}
 
 
-ROOMS = ("geometry", "importers", "planning", "toolpath", "verification", "inspection")
+ROOMS = ("geometry", "importers", "planning", "toolpath", "verification", "inspection", "stock")
 """The rooms that have codes and sentences, in the order of the page."""
-HUNDREDS = (1, 2, 3, 4, 5)
-"""Drawing, planning, program, motion and result, inspection."""
+HUNDREDS = (1, 2, 3, 4, 5, 6)
+"""Drawing, planning, program, motion and result, inspection, stock."""
 
 
 def modules() -> dict[str, list[str]]:

@@ -18,6 +18,7 @@ from camtool.planning.findings import PlanningCode
 from camtool.planning.job import Entry, Job, Lead, Operation, Tabs, Tool
 from camtool.planning.plan import plan
 from camtool.records import replace
+from camtool.stock.findings import StockCode
 from camtool.target.registry import LoadedTarget, load_target
 from camtool.toolpath.findings import ProgramCode
 from tests.drawings import drawing_of
@@ -128,7 +129,7 @@ def test_the_report_sees_a_gouge_that_is_a_warning() -> None:
     posted = post_drawing(
         drawing_of([closed(*path) for path in paths]), Job((operation_of(asked),)), linuxcnc()
     )
-    assert {ProgramCode.GOUGE} == {
+    assert {ProgramCode.GOUGE, StockCode.CUT_TOO_DEEP} == {
         f.code for f in posted.findings if f.severity > Severity.INFO
     } - {PlanningCode.CUT_DOUBTFUL}
     assert posted.verification is not None

@@ -1,0 +1,526 @@
+"""Checks of a program in its stock: depths, what is left, passes, tabs, shank, holder and clamps.
+
+All of them need the moves of the program, and know from the job alone what should be. Depths are
+exact at each point that is looked at: along the axis and the edges of every cut, since nothing is
+cut but by moves; on a lattice over the stock for what is left. The worst of them is then searched
+for around it by branch and bound.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+from msgspec import Struct
+
+from camtool.arrays import Bools, Floats, Ints
+from camtool.findings import Finding, Severity
+from camtool.geometry.polylines import POSITION_EPS_MM
+from camtool.kernels.stock import StockTree
+from camtool.planning.items import Bridge, Step
+from camtool.planning.job import Job, KeepOutBox, Operation, Stock, Tool
+from camtool.planning.naming import operation_name, tool_name
+from camtool.simulation.rows import block_of
+from camtool.stock.cutters import cutter_profile
+from camtool.stock.findings import (
+    CUT_TOO_DEEP,
+    KEEP_OUT_ENTERED,
+    MATERIAL_LEFT,
+    PASS_TOO_DEEP,
+    TAB_MISSING,
+    TAB_MISSING_ALL,
+    TAB_THIN,
+    TOOL_IN_STOCK,
+    TOOL_NOT_KNOWN,
+)
+from camtool.stock.heights import greatest_value, stock_tree
+from camtool.stock.moves import StockMoves
+from camtool.stock.wanted import WantedSolid, wanted_solid
+from camtool.toolpath.findings import ProgramCode
+from camtool.toolpath.moves import Toolpath
+from camtool.toolpath.rapids import STOCK_TOP_MM
+
+ALONG_MM = 1.0
+"""Along a cut the stock is looked at no farther apart than this, and at both ends."""
+
+EDGE_SHARE = 0.98
+"""... and on both sides of its axis, this part of the radius away from it."""
+
+LATTICE_POINTS = 40_000
+"""Points of the lattice on which material is looked for that is left."""
+
+SAME_PLACE_MM = 5.0
+"""Places of one kind that are nearer to each other than this are one finding."""
+
+REFINED_SQUARES = 20_000
+"""The worst place is searched for in no more squares than this."""
+
+BODY_SHARE = 0.25
+"""Shank and holder are looked at in steps of this part of their radius."""
+
+RIM_POINTS = 16
+"""... and at so many points of their rim, and as many halfway to it."""
+
+FINDINGS_LISTED = 10
+"""At most this many findings of one kind are listed; the last says how many more there are."""
+
+TAB_SLACK_MM = 0.05
+"""A tab may be narrower by this much, and by the band beside the walls."""
+
+MIN_CHORDS = 48
+"""A tab is looked at in as many steps as this along its contour."""
+
+
+class StockRequest(Struct, frozen=True, eq=False):
+    """The solid that a job asks for, its operations that cut, in their order, each with its depth,
+    mm, and the bridges of its tabs; the boxes that are to be kept free, and the stock. `is_whole`:
+    nothing has cut before: passes, and what is left, can be judged."""
+
+    solid: WantedSolid
+    operations: tuple[Operation, ...]
+    depths_mm: tuple[float, ...]
+    bridges: tuple[tuple[Bridge, ...], ...]
+    tabs_left_out: bool
+    keep_out: tuple[KeepOutBox, ...]
+    stock: Stock | None
+    is_whole: bool = True
+
+
+def stock_request(
+    steps: Sequence[Step], job: Job, wall_mm: float, *, is_whole: bool = True
+) -> StockRequest:
+    """Return what a job asks of the stock, of the steps of its plan; for the rest see
+    `StockRequest`."""
+    cutting = [step for step in steps if step.runs]
+    said = {finding.code.name for step in steps for finding in step.findings}
+    return StockRequest(
+        wanted_solid(steps, wall_mm),
+        tuple(step.operation for step in cutting),
+        tuple(-step.setting.levels_mm[-1] for step in cutting),
+        tuple(step.bridges for step in cutting),
+        "TAB_LEFT_OUT" in said,
+        job.keep_out,
+        job.stock,
+        is_whole,
+    )
+
+
+def stock_findings(
+    decoded: Toolpath,
+    moves: StockMoves,
+    request: StockRequest,
+    deep_mm: float,
+    findings: Sequence[Finding] = (),
+) -> tuple[Finding, ...]:
+    """Return the findings of a program whose tools make these moves. Depths may be off by
+    `deep_mm`. `findings`: those of planning."""
+    checks = _Checks(decoded, request, moves, deep_mm)
+    gouged = any(each.code is ProgramCode.GOUGE for each in findings)
+    found = [
+        *checks.too_deep(Severity.WARNING if gouged else Severity.ERROR),
+        *checks.tabs(),
+        *checks.keep_out(),
+        *checks.not_known(),
+    ]
+    if request.is_whole:
+        found += [*checks.left(), *checks.passes(), *checks.bodies()]
+    return tuple(found)
+
+
+class _Points(Struct, frozen=True, eq=False):
+    """Points (P, 2) beside the axes of moves, the move of each (P,), and the height of the tool's
+    surface there (P,), mm."""
+
+    at: Floats
+    move: Ints
+    z: Floats
+
+
+class _Checks:
+    """The stock of a program, and what the job asks of it."""
+
+    def __init__(
+        self,
+        decoded: Toolpath,
+        request: StockRequest,
+        moves: StockMoves,
+        deep_mm: float,
+    ) -> None:
+        self.decoded, self.request, self.moves = decoded, request, moves
+        tools = dict.fromkeys(operation.tool for operation in request.operations)
+        self.tools: list[tuple[int, Tool]] = [
+            (number, tool)
+            for number, cutter in enumerate(moves.cutters)
+            for tool in tools
+            if cutter_profile(tool) == cutter
+        ]
+        self.solid, self.deep_mm = request.solid, deep_mm
+        self.tree: StockTree = stock_tree(moves)
+        lowest = np.minimum(moves.start[:, 2], moves.end[:, 2])
+        self.low: Ints = np.flatnonzero(lowest < STOCK_TOP_MM - POSITION_EPS_MM)
+        self.cuts: _Points = self._beside(self.low, self._radii(), EDGE_SHARE)
+
+    def _radii(self) -> Floats:
+        """Radius of the cutter of each move (M,), mm."""
+        return np.asarray(self.moves.table[self.moves.tool, 0])
+
+    def _beside(self, rows: Ints, radii: Floats, share: float) -> _Points:
+        """Return points along moves, on the axis and on both sides of it."""
+        start, travel = self.moves.start[rows], self.moves.end[rows] - self.moves.start[rows]
+        length = np.hypot(travel[:, 0], travel[:, 1])
+        count = np.ceil(length / ALONG_MM).astype(np.int64) + 1
+        which = np.repeat(np.arange(len(rows)), count)
+        step = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
+        part = step / np.maximum(count[which] - 1, 1)
+        # Straight down the lower end is what cuts.
+        straight = (length == 0.0) & (travel[:, 2] < 0.0)
+        part = np.where(straight[which], 1.0, part)
+        axis = start[which] + part[:, None] * travel[which]
+        ahead = np.divide(
+            travel[:, :2],
+            length[:, None],
+            out=np.tile([1.0, 0.0], (len(rows), 1)),
+            where=length[:, None] > 0.0,
+        )
+        left = np.column_stack([-ahead[:, 1], ahead[:, 0]])[which]
+        off = share * radii[rows][which]
+        moved = [axis[:, :2] + side * off[:, None] * left for side in (0.0, -1.0, 1.0)]
+        return _Points(np.concatenate(moved), np.tile(rows[which], 3), np.tile(axis[:, 2], 3))
+
+    def _in_stock(self, points: Floats) -> Bools:
+        """True (P,) for points within the stock, where its sides are known."""
+        box = None if self.request.stock is None else self.request.stock.box_mm
+        if box is None:
+            return np.ones(len(points), dtype=np.bool_)
+        return np.asarray(((points >= box[:2]) & (points <= box[2:])).all(axis=1))
+
+    def too_deep(self, severity: Severity) -> Iterator[Finding]:
+        """Yield CUT_TOO_DEEP for places at which the stock is below the lowest that is allowed."""
+
+        def deep(at: Floats) -> Floats:
+            return np.asarray(self.solid.bands(at)[:, 0] - self.tree.heights(at)[0])
+
+        def upper(squares: Floats) -> Floats:
+            return np.asarray(self.solid.bounds(squares)[:, 1] - self.tree.least(squares))
+
+        points = self.cuts.at[self._in_stock(self.cuts.at)]
+        for place, more in self._worst(points, deep(points), deep, upper):
+            z, which = self.tree.heights(place[None])
+            row = int(self.moves.row[which[0]])
+            low = float(self.solid.bands(place[None])[0, 0])
+            name = self.solid.cut_by((float(place[0]), float(place[1])))
+            yield CUT_TOO_DEEP(
+                where=self._where(row, place),
+                measured=low - float(z[0]),
+                limit=self.deep_mm,
+                severity=severity,
+                by=f"operation {name!r}: " if name else "",
+                z=float(z[0]),
+                low=low,
+                more=more,
+            )
+
+    def left(self) -> Iterator[Finding]:
+        """Yield MATERIAL_LEFT for places at which the stock is above the highest that is asked."""
+
+        def standing(at: Floats) -> Floats:
+            return np.asarray(self.tree.heights(at)[0] - self.solid.bands(at)[:, 1])
+
+        def upper(squares: Floats) -> Floats:
+            lowest = self.solid.bounds(squares)[:, 2]
+            return np.asarray(self.tree.greatest(squares) - lowest)
+
+        boxes = [layer.curves.boxes for layer in self.solid.must if len(layer.lines)]
+        if not boxes:
+            return
+        every = np.concatenate(boxes)
+        wide = max(layer.shift_mm for layer in self.solid.must)
+        low, high = every[:, :2].min(axis=0) - wide, every[:, 2:].max(axis=0) + wide
+        step = math.sqrt(float(np.prod(high - low)) / LATTICE_POINTS)
+        x, y = (np.arange(low[k] + 0.5 * step, high[k], step) for k in (0, 1))
+        points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+        points = points[self._in_stock(points)]
+        for place, more in self._worst(points, standing(points), standing, upper):
+            z, high_z = self.tree.heights(place[None])[0], self.solid.bands(place[None])[0, 1]
+            yield MATERIAL_LEFT(
+                where=_at(place),
+                measured=float(z[0] - high_z),
+                limit=self.deep_mm,
+                z=float(z[0]),
+                high=float(high_z),
+                more=more,
+            )
+
+    def _worst(
+        self,
+        points: Floats,
+        found: Floats,
+        value: Callable[[Floats], Floats],
+        upper: Callable[[Floats], Floats],
+    ) -> Iterator[tuple[Floats, int]]:
+        """Yield the places (2,) of the greatest of the values (P,) at points (P, 2) that are above
+        the tolerance, each the greatest around it, and how many more there are."""
+        over = np.flatnonzero(found > self.deep_mm)
+        over = over[np.argsort(-found[over], kind="stable")]
+        places: list[Floats] = []
+        while len(over):
+            places.append(points[over[0]])
+            apart = np.hypot(*(points[over] - places[-1]).T)
+            over = over[apart > SAME_PLACE_MM]
+        for number, place in enumerate(places[:FINDINGS_LISTED], start=1):
+            (x, y), half = place.tolist(), 0.5 * ALONG_MM
+            best = greatest_value(
+                value,
+                upper,
+                (x - half, y - half, x + half, y + half),
+                0.1 * self.deep_mm,
+                max_squares=REFINED_SQUARES,
+            )
+            here = np.array([place, best.at_mm])
+            more = len(places) - FINDINGS_LISTED if number == FINDINGS_LISTED else 0
+            yield here[int(value(here).argmax())], more
+
+    def passes(self) -> Iterator[Finding]:
+        """Yield PASS_TOO_DEEP for feeds that take more at once than their operation allows."""
+        limit = self._chips_mm()
+        feeds = ~self.moves.rapid[self.cuts.move] & self._in_stock(self.cuts.at)
+        at, move = np.ascontiguousarray(self.cuts.at[feeds]), self.cuts.move[feeds]
+        before, _ = self.tree.heights(at, move)
+        after, _ = self.tree.heights(at, move + 1)
+        chip = before - after
+        over = chip - limit[move]
+        blocks: dict[int, int] = {}
+        for k in np.argsort(-over, kind="stable").tolist():
+            if over[k] <= self.deep_mm:
+                break
+            blocks.setdefault(int(self.moves.row[move[k]]), k)
+        for number, (row, k) in enumerate(list(blocks.items())[:FINDINGS_LISTED], start=1):
+            operations = self._operations_of(row)
+            yield PASS_TOO_DEEP(
+                where=self._where(row, at[k]),
+                measured=float(chip[k]),
+                limit=float(limit[move[k]]),
+                operation=operation_name(self.request.operations[operations[0]]),
+                more=len(blocks) - FINDINGS_LISTED if number == FINDINGS_LISTED else 0,
+            )
+
+    def _operations_of(self, row: int) -> list[int]:
+        """The operations that a row of the program may be of: its own, or all of its tool."""
+        planned = self.decoded.operations
+        if planned is not None and len(planned.notes) == len(self.request.operations):
+            turn = int(np.searchsorted(planned.begin, row, side="right")) - 1
+            return [max(turn, 0)]
+        move = int(np.searchsorted(self.moves.row, row))
+        return self._with_cutter(int(self.moves.tool[min(move, len(self.moves) - 1)]))
+
+    def _chips_mm(self) -> Floats:
+        """The thickest chip that each move (M,) may take, mm."""
+        operations, planned = self.request.operations, self.decoded.operations
+        most = np.array(list(map(_chip_mm, operations, self.request.depths_mm)))
+        if planned is not None and len(planned.notes) == len(operations):
+            turn = np.searchsorted(planned.begin, self.moves.row, side="right") - 1
+            return np.asarray(most[turn.clip(min=0)])
+        of_cutter = [
+            max([most[k] for k in self._with_cutter(number)], default=math.inf)
+            for number in range(len(self.moves.cutters))
+        ]
+        return np.asarray(np.array(of_cutter)[self.moves.tool])
+
+    def _with_cutter(self, number: int) -> list[int]:
+        """The operations whose tool has the shape of this cutter."""
+        cutter, operations = self.moves.cutters[number], self.request.operations
+        return [k for k, each in enumerate(operations) if cutter_profile(each.tool) == cutter]
+
+    def tabs(self) -> Iterator[Finding]:
+        """Yield TAB_MISSING and TAB_THIN for bridges that do not stand as the job asks."""
+        given = (self.request.operations, self.request.depths_mm, self.request.bridges)
+        for operation, depth_mm, bridges in zip(*given, strict=True):
+            tabs, name = operation.tabs, operation_name(operation)
+            if tabs is None:
+                continue
+            if not bridges and not self.request.tabs_left_out:
+                yield TAB_MISSING_ALL(operation=name)
+            for bridge in bridges:
+                slack_mm = TAB_SLACK_MM + 2.0 * self.solid.wall_mm
+                wide, high = self._tab(bridge, tabs.width_mm, tabs.height_mm, depth_mm)
+                if high < tabs.height_mm - self.deep_mm:
+                    yield TAB_MISSING(
+                        where=_at(bridge.centre),
+                        measured=max(high, 0.0),
+                        limit=tabs.height_mm,
+                        operation=name,
+                    )
+                elif wide < tabs.width_mm - slack_mm:
+                    yield TAB_THIN(
+                        where=_at(bridge.centre),
+                        measured=wide,
+                        limit=tabs.width_mm,
+                        operation=name,
+                    )
+
+    def _tab(
+        self, bridge: Bridge, width_mm: float, height_mm: float, depth_mm: float
+    ) -> tuple[float, float]:
+        """Return how wide the stock stands up to the top of a tab, and how high in its middle
+        above the floor of the cut, mm."""
+        half = 0.5 * width_mm
+        step = half * np.arange(-MIN_CHORDS, MIN_CHORDS + 1) / MIN_CHORDS
+        at = bridge.centre + step[:, None] * bridge.ahead
+        z, _ = self.tree.heights(np.ascontiguousarray(at))
+        gone = z < height_mm - depth_mm - self.deep_mm
+        low, high = step[gone & (step <= 0.0)], step[gone & (step >= 0.0)]
+        wide = high.min(initial=half) - low.max(initial=-half)
+        return float(wide), float(z[MIN_CHORDS] + depth_mm)
+
+    def bodies(self) -> Iterator[Finding]:
+        """Yield TOOL_IN_STOCK for shanks and holders that meet the stock as it stands after their
+        own move has cut."""
+        for number, tool in self.tools:
+            for body, radius, begin, _ in tool.bodies:
+                wider = radius > tool.radius_mm + POSITION_EPS_MM
+                rows = self.low[self.moves.tool[self.low] == number]
+                lowest = np.minimum(self.moves.start[rows, 2], self.moves.end[rows, 2]) + begin
+                rows = rows[lowest < STOCK_TOP_MM - self.deep_mm]
+                if wider and len(rows):
+                    yield from self._body(rows, tool, body, radius, begin)
+
+    def _body(
+        self, rows: Ints, tool: Tool, body: str, radius: float, begin: float
+    ) -> Iterator[Finding]:
+        start, travel = self.moves.start[rows], self.moves.end[rows] - self.moves.start[rows]
+        step = BODY_SHARE * radius
+        count = np.ceil(np.hypot(travel[:, 0], travel[:, 1]) / step).astype(np.int64) + 1
+        which = np.repeat(np.arange(len(rows)), count)
+        part = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
+        part = np.where(count[which] > 1, part / np.maximum(count[which] - 1, 1), 1.0)
+        axis = start[which] + part[:, None] * travel[which]
+        turn = np.arange(RIM_POINTS) * (math.tau / RIM_POINTS)
+        rim = (radius - self.solid.wall_mm) * np.column_stack([np.cos(turn), np.sin(turn)])
+        worst: dict[int, tuple[float, Floats]] = {}
+        for offset in (*rim, *(0.5 * (rim + tool.radius_mm * rim / radius))):
+            at = np.ascontiguousarray(axis[:, :2] + offset)
+            z, _ = self.tree.heights(at, rows[which] + 1)
+            deep = np.where(self._in_stock(at), z - (axis[:, 2] + begin), -np.inf)
+            for k in np.flatnonzero(deep > self.deep_mm).tolist():
+                row = int(self.moves.row[rows[which[k]]])
+                if deep[k] > worst.get(row, (0.0,))[0]:
+                    worst[row] = (float(deep[k]), at[k])
+        ordered = sorted(worst.items(), key=lambda each: -each[1][0])
+        for row, (deep_mm, place) in ordered[:1]:
+            yield TOOL_IN_STOCK(
+                where=self._where(row, place),
+                measured=deep_mm,
+                limit=0.0,
+                body=body,
+                tool=tool_name(tool),
+                more=len(ordered) - 1,
+            )
+
+    def keep_out(self) -> Iterator[Finding]:
+        """Yield KEEP_OUT_ENTERED for moves, rapids too, at which a part of a tool is in a box."""
+        for box in self.request.keep_out:
+            for number, tool in self.tools:
+                rows = np.flatnonzero(self.moves.tool == number)
+                top = min([begin for _, _, begin, _ in tool.bodies], default=math.inf)
+                for body, radius, begin, end in (
+                    ("cutter", tool.radius_mm, 0.0, top),
+                    *tool.bodies,
+                ):
+                    deep, place = self._entered(rows, box, (radius, begin, end))
+                    blocks = np.unique(self.moves.row[rows[deep > POSITION_EPS_MM]])
+                    if len(blocks):
+                        k = int(deep.argmax())
+                        yield KEEP_OUT_ENTERED(
+                            where=self._where(int(self.moves.row[rows[k]]), place[k]),
+                            measured=float(deep[k]),
+                            limit=0.0,
+                            body=body,
+                            tool=tool_name(tool),
+                            box=box.name,
+                            more=len(blocks) - 1,
+                        )
+
+    def _entered(
+        self, rows: Ints, box: KeepOutBox, body: tuple[float, float, float]
+    ) -> tuple[Floats, Floats]:
+        """Return how far the side of a cylinder gets into a box at moves (R,), mm: its radius
+        where its axis does, below 0 where it stays out; and the nearest places (R, 2)."""
+        radius, begin, end = body
+        start, travel = self.moves.start[rows], self.moves.end[rows] - self.moves.start[rows]
+        # The part of each move in which the heights of both meet.
+        parts = np.tile([0.0, 1.0], (len(rows), 1))
+        is_met = np.ones(len(rows), dtype=np.bool_)
+        for sign, limit in ((1.0, box.z_mm[1] - begin), (-1.0, end - box.z_mm[0])):
+            # sign · z < limit
+            room = limit - sign * start[:, 2]
+            fall = sign * travel[:, 2]
+            with np.errstate(divide="ignore", invalid="ignore"):
+                crossing = np.clip(room / fall, 0.0, 1.0)
+            parts[:, 1] = np.where(fall > 0.0, np.minimum(parts[:, 1], crossing), parts[:, 1])
+            parts[:, 0] = np.where(fall < 0.0, np.maximum(parts[:, 0], crossing), parts[:, 0])
+            is_met &= np.maximum(room, room - fall) > 0.0
+        is_met &= parts[:, 0] <= parts[:, 1]
+        a = start[:, :2] + parts[:, :1] * travel[:, :2]
+        b = start[:, :2] + parts[:, 1:] * travel[:, :2]
+        away, place = _from_box(a, b, box)
+        return np.where(is_met, radius - away, -np.inf), place
+
+    def not_known(self) -> Iterator[Finding]:
+        """Yield TOOL_NOT_KNOWN where a job describes shanks, holders or boxes, for the tools whose
+        shank or holder is not known."""
+        told = [{body for body, *_ in tool.bodies} for _, tool in self.tools]
+        if not self.request.keep_out and not any(told):
+            return
+        lacking = [
+            f"{body} of {tool_name(tool)}"
+            for (_, tool), known in zip(self.tools, told, strict=True)
+            for body in ("shank", "holder")
+            if body not in known
+        ]
+        if lacking:
+            yield TOOL_NOT_KNOWN(bodies=", ".join(lacking))
+
+    def _where(self, row: int, place: Floats) -> str:
+        return f"{block_of(self.decoded, row)} {_at(place)}"
+
+
+def _at(place: Floats) -> str:
+    return f"at X {float(place[0]):.3f} Y {float(place[1]):.3f}"
+
+
+def _chip_mm(operation: Operation, depth_mm: float) -> float:
+    """Return the thickest chip that an operation may take, mm: its step down or peck, no longer
+    than the edges of its tool. What slopes or finishes may take all of its depth."""
+    descent = operation.contract.descent
+    step = operation.peck_mm if descent == "pecks" else operation.step_down_mm
+    if descent == "slopes" or operation.stage == "finish" or step is None:
+        step = depth_mm
+    return min(max(step, operation.last_pass_mm or 0.0), operation.tool.cutting_length_mm or step)
+
+
+def _from_box(a: Floats, b: Floats, box: KeepOutBox) -> tuple[Floats, Floats]:
+    """Return the distances (R,) of lines from a to b (R, 2) from a box in the plane, 0 where they
+    enter it, and the nearest places (R, 2) on them."""
+    low = np.array([box.x_mm[0], box.y_mm[0]])
+    high = np.array([box.x_mm[1], box.y_mm[1]])
+    travel = b - a
+    length2 = (travel**2).sum(axis=1)
+    shares = [np.zeros(len(a)), np.ones(len(a))]
+    safe = np.where(length2 > 0.0, length2, 1.0)
+    for x in (low[0], high[0]):
+        for y in (low[1], high[1]):
+            if math.isfinite(x) and math.isfinite(y):
+                foot = ((np.array([x, y]) - a) * travel).sum(axis=1) / safe
+                shares.append(np.clip(foot, 0.0, 1.0))
+    for axis in (0, 1):
+        for side in (low[axis], high[axis]):
+            if math.isfinite(side):
+                safe = np.where(travel[:, axis] != 0.0, travel[:, axis], 1.0)
+                shares.append(np.clip((side - a[:, axis]) / safe, 0.0, 1.0))
+    places = a + np.stack(shares)[:, :, None] * travel
+    beyond = np.maximum(np.maximum(low - places, places - high), 0.0)
+    away = np.hypot(beyond[..., 0], beyond[..., 1])
+    best = away.argmin(axis=0)
+    every = np.arange(len(a))
+    return away[best, every], places[best, every]

@@ -1,0 +1,111 @@
+"""Codes and sentences of the stock: what is cut too deep or left, and what the tools run into."""
+
+from __future__ import annotations
+
+from camtool.findings import ERROR, INFO, WARNING, Code, Sentence, and_more
+
+
+class StockCode(Code):
+    """Codes of the stock."""
+
+    CUT_TOO_DEEP = (
+        601,
+        (ERROR, WARNING),
+        "the stock is cut deeper than drawing and job allow there: below a floor, or into what is "
+        "to stay; the depth and its place are given. A warning where planning has reported a "
+        "gouge of the lines already",
+        "post again; look at the block that is named, and at the depth and the tool of the job",
+    )
+    MATERIAL_LEFT = (
+        602,
+        WARNING,
+        "material stands higher than drawing and job ask for, where the tool could have cut it; "
+        "its height and place are given",
+        "post again; look whether a contour or a pass is missing",
+    )
+    PASS_TOO_DEEP = (
+        603,
+        ERROR,
+        "a move takes a thicker chip at once than the step down of its operation, its peck, or "
+        "the length of the tool's edges allows",
+        "post again; look whether a pass is missing before this block",
+    )
+    TAB_MISSING = (
+        604,
+        ERROR,
+        "a tab that holds the part is cut away; its place is given",
+        "post again, or fasten the part in another way",
+    )
+    TAB_THIN = (
+        605,
+        WARNING,
+        "a tab is narrower or lower than the job asks for",
+        "post again; look at the cuts beside it",
+    )
+    TOOL_IN_STOCK = (
+        606,
+        ERROR,
+        "the shank or the holder of a tool runs into the stock as it stands before that move; "
+        "places are looked at no farther apart than a quarter of its radius",
+        "a longer tool, a larger `stickout`, or less depth",
+    )
+    KEEP_OUT_ENTERED = (
+        607,
+        ERROR,
+        "a tool, its shank or its holder enters a box of the job that is to be kept free "
+        "(`[[keep_out]]`), such as a clamp",
+        "move the clamp, the part or its start, or raise `--safe-z`",
+    )
+    TOOL_NOT_KNOWN = (
+        608,
+        INFO,
+        "the shank or the holder of some tools is not known, so that it was not looked for in the "
+        "stock and in boxes that are to be kept free",
+        "`shank_diameter` with `cutting_length`, `holder_diameter` with `stickout` in "
+        "`[tools.NAME]`",
+    )
+
+
+CUT_TOO_DEEP = Sentence(
+    StockCode.CUT_TOO_DEEP,
+    "{by}cut {measured:.4g} mm too deep, to Z {z:.4f} where Z {low:.4f} is the lowest"
+    + and_more("places"),
+    "mm",
+)
+MATERIAL_LEFT = Sentence(
+    StockCode.MATERIAL_LEFT,
+    "{measured:.4g} mm of material is left, up to Z {z:.4f} where Z {high:.4f} is the highest"
+    + and_more("places"),
+    "mm",
+)
+PASS_TOO_DEEP = Sentence(
+    StockCode.PASS_TOO_DEEP,
+    "{operation} takes {measured:.4g} mm at once, where {limit:.4g} mm is the most"
+    + and_more("blocks"),
+    "mm",
+)
+TAB_MISSING = Sentence(
+    StockCode.TAB_MISSING,
+    "{operation}: the tab here is cut away, {measured:.4g} mm of {limit:.4g} mm of its height are "
+    "left",
+    "mm",
+)
+TAB_MISSING_ALL = Sentence(
+    StockCode.TAB_MISSING, "{operation}: tabs are asked for, and none is left"
+)
+TAB_THIN = Sentence(
+    StockCode.TAB_THIN,
+    "{operation}: the tab here is {measured:.4g} mm wide instead of {limit:.4g} mm",
+    "mm",
+)
+TOOL_IN_STOCK = Sentence(
+    StockCode.TOOL_IN_STOCK,
+    "the {body} of {tool} is {measured:.4g} mm deep in the stock" + and_more("blocks"),
+    "mm",
+)
+KEEP_OUT_ENTERED = Sentence(
+    StockCode.KEEP_OUT_ENTERED,
+    "the {body} of {tool} enters {box!r} by {measured:.4g} mm" + and_more("blocks"),
+    "mm",
+)
+TOOL_NOT_KNOWN = Sentence(StockCode.TOOL_NOT_KNOWN, "not known, and not judged: {bodies}")
