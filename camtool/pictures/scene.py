@@ -139,7 +139,10 @@ class Round(Struct, frozen=True, eq=False):
 class StockPair(Struct, frozen=True, eq=False):
     """The moves that cut the stock, and those that should, None where these are not known; the
     left, lower, right and upper edge of the stock and its thickness, mm. `known`: the job gives
-    this block; otherwise it is as large as the cuts need. `against`: a word for what should be."""
+    this block; otherwise it is as large as the cuts need. `against`: a word for what should be.
+    `bands` makes, of a distance from walls, mm, in which nothing is judged, the function that
+    gives the least and the greatest height (N, 2) mm that drawing and job allow at points (N, 2);
+    None without a drawing."""
 
     moves: StockMoves
     wanted: StockMoves | None
@@ -147,6 +150,7 @@ class StockPair(Struct, frozen=True, eq=False):
     thickness_mm: float
     known: bool
     against: str = "wanted"
+    bands: Callable[[float], Callable[[Floats], Floats]] | None = None
 
 
 class TableLine(Struct, frozen=True):
@@ -241,6 +245,7 @@ def scene_of(
     """
     if drawing is not None and toolpath is None:
         return scene_of_drawing(drawing, title)
+    drawn = drawing
     if drawing is not None and job is not None:
         from camtool.planning.place import place
 
@@ -273,7 +278,13 @@ def scene_of(
         tabs=tabs,
         inspected=() if verification is None else verification.report.inspection,
         playback=_playback(toolpath, verification, machine, listing),
-        cut=_stock_pair(toolpath, job, wanted, target if verification is not None else None),
+        cut=_stock_pair(
+            toolpath,
+            job,
+            wanted,
+            target if verification is not None else None,
+            _bands(drawn, job, wanted, machine),
+        ),
     )
 
 
@@ -287,6 +298,7 @@ def _stock_pair(
     job: Job | None,
     wanted: Toolpath | None,
     target: LoadedTarget | None,
+    bands: Callable[[float], Callable[[Floats], Floats]] | None,
 ) -> Callable[[], StockPair] | None:
     """The function that gives the moves that cut the stock."""
     if toolpath is None:
@@ -320,9 +332,28 @@ def _stock_pair(
             box = left - by, bottom - by, right + by, top + by
         other = wanted is not None and wanted is not toolpath
         beside = as_planned(wanted) if other and wanted is not None else None
-        return StockPair(moves, beside, box, depth or 1.0, known)
+        return StockPair(moves, beside, box, depth or 1.0, known, bands=bands)
 
     return pair
+
+
+def _bands(
+    drawing: Drawing | None, job: Job | None, wanted: Toolpath | None, machine: Machine | None
+) -> Callable[[float], Callable[[Floats], Floats]] | None:
+    """The function that gives the heights which a drawing and its job allow, as `StockPair` has
+    it; None where the wanted moves are not those of a plan of them."""
+    if drawing is None or job is None or machine is None:
+        return None
+    if wanted is None or wanted.operations is None:
+        return None
+
+    def bands(wall_mm: float) -> Callable[[Floats], Floats]:
+        from camtool.planning.plan import planned
+        from camtool.stock.wanted import wanted_solid
+
+        return wanted_solid(planned(drawing, job, machine).steps, wall_mm).bands
+
+    return bands
 
 
 def rounds_of(verification: Verification) -> tuple[Round, ...]:

@@ -91,6 +91,12 @@ LABEL_ROOM = 34.0
 ISO_SCALE = math.sqrt(2.0 / 3.0)
 """Lengths on the picture over lengths along the axes, in the view "iso"."""
 
+MAX_COMPARED = 1_000_000
+"""Cells of a map whose heights are compared with the wanted ones."""
+
+WALL_CELLS = 1.0
+"""Width of the band beside walls in which heights are not compared, in cells."""
+
 BESIDE_CELLS = 1
 """Heights within so many cells are taken together where two stocks are compared: a wall that is
 moved by less than a cell is no difference of heights."""
@@ -167,23 +173,36 @@ def _solid(pair: StockPair, window: Box, options: PictureOptions) -> Solid:
             mend="it lies between ({:g}, {:g}) and ({:g}, {:g}) mm".format(*pair.box_mm),
         )
     pixels = (options.size_px or SVG_WIDTH_PX) * SAMPLES
-    cell = max(side / pixels, cell_for(box, MAP_CELLS))
+    cells = MAP_CELLS if options.view not in BAR_NAMES else MAX_COMPARED
+    cell = max(side / pixels, cell_for(box, cells))
     found = height_map(pair.moves, box, cell, owners=True)
     if options.view not in BAR_NAMES:
         return Solid(pair, found, box[2:])
+    least, most = _wanted(pair, found, box, options)
+    heights = found.heights.clip(-pair.thickness_mm)
+    off = heights - most if options.view == "leftover" else least - heights
+    return Solid(pair, found, box[2:], off.astype(np.float64))
+
+
+def _wanted(
+    pair: StockPair, found: HeightMap, box: Box, options: PictureOptions
+) -> tuple[Floats, Floats]:
+    """The least and the greatest height (NY, NX) mm that are wanted in each cell."""
+    if pair.bands is not None:
+        bands = pair.bands(WALL_CELLS * found.cell_mm)
+        rows = [
+            bands(np.column_stack([found.x, np.full(len(found.x), y)])) for y in found.y.tolist()
+        ]
+        both = np.stack(rows).clip(-pair.thickness_mm, 0.0)
+        return both[..., 0], both[..., 1]
     if pair.wanted is None:
         raise OptionError(
             f"the view {options.view} compares the stock with the wanted one, which is not known",
             mend="give the drawing and its job (verify --against), or use --view top",
         )
-    wanted = height_map(pair.wanted, box, cell)
-    heights = found.heights.clip(-pair.thickness_mm)
-    others = wanted.heights.clip(-pair.thickness_mm)
-    if options.view == "leftover":
-        off = heights - _extreme(others, np.maximum)
-    else:
-        off = _extreme(others, np.minimum) - heights
-    return Solid(pair, found, box[2:], off.astype(np.float64))
+    others = height_map(pair.wanted, box, found.cell_mm).heights.clip(-pair.thickness_mm)
+    low, high = (_extreme(others, of).astype(np.float64) for of in (np.minimum, np.maximum))
+    return low, high
 
 
 def _extreme(heights: np.ndarray, of: np.ufunc) -> np.ndarray:

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 from camtool.cli.main import cli
 from camtool.errors import OptionError
+from camtool.geometry.polylines import Polyline
 from camtool.kernels.heightmap import project
 from camtool.pictures.colours import PAPER, channels, on_dark
 from camtool.pictures.draw import draw, render
@@ -24,11 +25,14 @@ from camtool.pictures.picture import Picture
 from camtool.pictures.relief import CAMERAS, Camera, png_of, stage_of
 from camtool.pictures.scene import Scene, scene_of
 from camtool.planning.job import Job, Operation, Stock, Tool
+from camtool.planning.plan import plan
 from camtool.records import replace
 from camtool.stock.cutters import CutterProfile
 from camtool.stock.heightmap import height_map
+from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
+from tests.drawings import drawing_of
 from tests.oracles.png import decode
 from tests.stock.cuts import moves_of
 
@@ -138,6 +142,26 @@ def test_a_cut_that_is_too_deep_is_coloured_where_it_is() -> None:
     assert any("0.5 mm lower than wanted" in line for line in text)
     text = spoken(draw(scene(-1.7), PictureOptions(size_px=300, view="leftover")))
     assert any("0.3 mm higher than wanted" in line for line in text)
+
+
+def test_a_fault_of_the_plan_is_seen_too() -> None:
+    corners = np.array([[5, 5, 0], [25, 5, 0], [25, 20, 0], [5, 20, 0.0]])
+    drawing = drawing_of([Polyline(corners, closed=True)])
+    pocket = Operation("pocket", tool=Tool(4.0), depth_mm=2.0)
+    job = Job((pocket,), stock=Stock(5.0, (0.0, 0.0), (30.0, 25.0)))
+    machine = load_target("linuxcnc").machine
+    good = plan(drawing, job, machine)
+    off = {"gouge": -0.3, "leftover": 0.2}
+    for view, by in off.items():
+        end = good.end.copy()
+        end[end[:, 2] < 0.0, 2] += by
+        faulty = replace(good, end=end)
+        for moves, said in ((good, "nowhere more than"), (faulty, f"up to {abs(by)} mm")):
+            seen = scene_of(
+                title="", drawing=drawing, job=job, toolpath=moves, machine=machine, wanted=moves
+            )
+            text = spoken(draw(seen, PictureOptions(size_px=200, view=view)))
+            assert said in text[-1]
 
 
 @pytest.mark.parametrize("view", VIEWS[1:])
