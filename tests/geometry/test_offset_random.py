@@ -14,6 +14,7 @@ from camtool.geometry.polylines import Polyline, Segments, begin_at, reverse, ro
 from tests.oracles.contours import RANDOM, is_simple
 from tests.oracles.offset import complaints, distance, distance_complaints
 from tests.paths import mirrored, offset, there_and_back
+from tests.strategies import examples
 
 pytestmark = pytest.mark.checked
 
@@ -42,7 +43,7 @@ SHARES = st.one_of(st.floats(1e-3, 0.1), st.floats(0.1, 0.9))
 """Distance as a share of the size: from small to where most collapse."""
 
 
-@settings(max_examples=80)
+@examples(40, 2000)
 @given(contours(), SHARES, st.sampled_from([1.0, -1.0]))
 def test_contours(source: tuple[Polyline, float], share: float, sign: float) -> None:
     p, size = source

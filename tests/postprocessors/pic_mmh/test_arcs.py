@@ -102,8 +102,8 @@ def check_ends(target: LoadedTarget, wanted: Toolpath, within_steps: float) -> P
     return program
 
 
-@pytest.mark.parametrize("count", [2_000, pytest.param(10_000, marks=pytest.mark.slow)])
-def test_thousands_of_arcs_and_lines_end_where_they_were_programmed_to(count: int) -> None:
+@pytest.mark.parametrize("count", [800, pytest.param(10_000, marks=pytest.mark.slow)])
+def test_many_arcs_and_lines_end_where_they_were_programmed_to(count: int) -> None:
     target = load_target("pic-mmh", settings=EQUAL)
     wanted = random_path(np.random.default_rng(SEED), count, 0.05, 3.0)
     program = check_ends(target, wanted, within_steps=4.0)
@@ -113,11 +113,11 @@ def test_thousands_of_arcs_and_lines_end_where_they_were_programmed_to(count: in
     assert program.data.count(b"G03") > 0.4 * count
 
 
-def test_a_thousand_in_the_annex_form() -> None:
+def test_hundreds_in_the_annex_form() -> None:
     target = load_target("pic-mmh", settings=["dialect.form=annex", *EQUAL])
-    wanted = random_path(np.random.default_rng(SEED), 1_000, 0.05, 3.0)
+    wanted = random_path(np.random.default_rng(SEED), 400, 0.05, 3.0)
     program = check_ends(target, wanted, within_steps=25.0)
-    assert program.data.count(b"G02") + program.data.count(b"G03") > 600
+    assert program.data.count(b"G02") + program.data.count(b"G03") > 240
 
 
 @pytest.mark.parametrize("form", ["example", "annex"])
