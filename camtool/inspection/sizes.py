@@ -643,19 +643,23 @@ def minimise_many(goal: Floats, rows: Floats, bounds: Floats) -> Floats:
     """Minimise goal · x, x (N, K), for N bounds (N, J) with the same rows.
 
     Uses the dual simplex method, from a wide box: K conditions hold exactly; the most violated one
-    replaces one of them until none is violated.
-
-    By the dual simplex method, from a wide box: K conditions hold exactly; the one that is broken
-    most takes the place of one of them, until none is broken.
+    replaces one of them until none is violated. Conditions that are optimal for the first bounds
+    are a start for all, which differ little.
     """
-    count, parts = len(goal), len(bounds)
     wide = 1e3 * (1.0 + np.abs(bounds).max(axis=1, initial=0.0))
     signs = np.where(goal >= 0.0, 1.0, -1.0)
     every = np.vstack([rows, np.diag(signs)])
-    limits = np.hstack([bounds, np.repeat(-wide[:, None], count, axis=1)])
-    active = np.tile(np.arange(len(rows), len(every)), (parts, 1))
-    found = np.zeros((parts, count))
-    open_ = np.arange(parts)
+    limits = np.hstack([bounds, np.repeat(-wide[:, None], len(goal), axis=1)])
+    active = np.arange(len(rows), len(every))[None]
+    _, active = _exchange(goal, every, limits[:1], active)
+    return _exchange(goal, every, limits, np.repeat(active, len(bounds), axis=0))[0]
+
+
+def _exchange(goal: Floats, every: Floats, limits: Floats, active: Ints) -> tuple[Floats, Ints]:
+    """Exchange active conditions (N, K) of rows (J, K) and their limits (N, J) until none is
+    violated; return x (N, K) and the conditions that are active then."""
+    active, found = active.copy(), np.zeros(active.shape)
+    open_ = np.arange(len(active))
     for _ in range(MAX_EXCHANGES):
         own = active[open_]
         basis = every[own]
@@ -676,4 +680,4 @@ def minimise_many(goal: Floats, rows: Floats, bounds: Floats) -> Floats:
         if not len(open_):
             break
         active[open_, leaves[each]] = enters[each]
-    return found
+    return found, active
