@@ -27,6 +27,9 @@ Heights = npt.NDArray[np.float32]
 SAMPLES = 2
 """Pixels are computed so many times finer, in each direction, than they are written."""
 
+ROWS_AT_ONCE = 64
+"""Rows of a picture that are coloured together."""
+
 THROUGH_MM = 1e-4
 """What is left of the stock, if thinner, is none."""
 
@@ -104,6 +107,11 @@ class Stage(Struct, frozen=True, eq=False):
     margin: int = 0
     marks: Heights | None = None
     tint: Heights | None = None
+
+    @property
+    def size_mm(self) -> float:
+        """The longer side of the map, mm."""
+        return float(self.cell_mm * max(self.heights.shape))
 
 
 def stage_of(
@@ -184,32 +192,63 @@ def picture_of(
         cell,
         level,
     )
-    colours = _colours(stage, camera, cell, level, light_of(ground))
-    # The mean of the light of SAMPLES² points; the first row of a picture is its highest.
-    mean = sum(
-        colours[i::SAMPLES, j::SAMPLES] for i in range(SAMPLES) for j in range(SAMPLES)
-    ) / np.float32(SAMPLES * SAMPLES)
-    return np.asarray((np.sqrt(mean) * 255.0 + 0.5).astype(np.uint8)[::-1])
+    lit = _lit(stage, camera)
+    out = np.empty((sizes[1], sizes[0], 3), dtype=np.uint8)
+    for first in range(0, sizes[1], ROWS_AT_ONCE):
+        rows = slice(first * SAMPLES, (first + ROWS_AT_ONCE) * SAMPLES)
+        colours = _colours(lit, cell[rows], level[rows], light_of(ground))
+        # The mean of the light of SAMPLES² points; the first row of a picture is its highest.
+        mean = sum(
+            colours[i::SAMPLES, j::SAMPLES] for i in range(SAMPLES) for j in range(SAMPLES)
+        ) / np.float32(SAMPLES * SAMPLES)
+        last = sizes[1] - first
+        out[max(last - ROWS_AT_ONCE, 0) : last] = (np.sqrt(mean) * 255.0 + 0.5)[::-1]
+    return out
+
+
+class _LitStage(Struct, frozen=True, eq=False):
+    """A stage and what the lamp does to its cells (NY, NX): how far they face it as floors and as
+    walls, the height below which it does not shine, the share of the sky that is open, and how far
+    the board shows this (0 at its edges). `open_board`: the light of the board in the open."""
+
+    stage: Stage
+    flat: Heights
+    steep: Heights
+    shade: Heights
+    open_sky: Heights
+    fade: Heights
+    open_board: float
+
+
+def _lit(stage: Stage, camera: Camera) -> _LitStage:
+    """Compute the light on a stage."""
+    return _LitStage(
+        stage,
+        *_facing(stage, camera),
+        _shadows(stage.heights, camera.light, stage.cell_mm),
+        _openness(stage, stage.size_mm),
+        _fade(stage),
+        AMBIENT + SKY + KEY * camera.light[2],
+    )
 
 
 def _colours(
-    stage: Stage, camera: Camera, cell: npt.NDArray[np.int32], level: Heights, ground: Floats
+    lit: _LitStage, cell: npt.NDArray[np.int32], level: Heights, ground: Floats
 ) -> Heights:
     """The light (H, W, 3) of each pixel."""
+    stage, size = lit.stage, lit.stage.size_mm
     beside = cell == -1
     wall = (cell < 0) & ~beside
     number = np.where(wall, ~cell, np.maximum(cell, 0))
-    flat, steep = _facing(stage, camera)
-    lit = np.where(wall, steep.ravel()[number], flat.ravel()[number])
-    size = stage.cell_mm * max(stage.heights.shape)
-    shade = _shadows(stage.heights, camera.light, stage.cell_mm).ravel()[number]
+    facing = np.where(wall, lit.steep.ravel()[number], lit.flat.ravel()[number])
+    shade = lit.shade.ravel()[number]
     clear = np.clip((level - shade) / np.float32(PENUMBRA * size) + 1.0, 0.0, 1.0)
-    open_sky = _openness(stage, size).ravel()[number]
+    open_sky = lit.open_sky.ravel()[number]
     # A wall is as open as its foot below, and as the top above.
     foot = stage.heights.ravel()[number]
     deep = np.clip((level - foot) / np.float32(0.06 * size), 0.0, 1.0)
     open_sky = open_sky + np.where(wall, (1.0 - open_sky) * deep, 0.0)
-    light = AMBIENT * open_sky + SKY * open_sky * open_sky + KEY * lit * clear
+    light = AMBIENT * open_sky + SKY * open_sky * open_sky + KEY * facing * clear
     share = np.clip(level / np.float32(min(stage.deep_mm, -1e-6)), 0.0, 1.0)[..., None]
     top, low, side = (light_of(each).astype(np.float32) for each in (TOP, DEEP, SIDE))
     material = top + (low - top) * share
@@ -221,13 +260,10 @@ def _colours(
         tint = stage.tint.reshape(-1, 3)[number]
         material = np.where(wall[..., None], material, tint)
     # The board gives back what the lamp gives it in the open.
-    open_board = AMBIENT + SKY + KEY * camera.light[2]
-    light = np.where(
-        board, open_board + (light - open_board) * _fade(stage).ravel()[number], light
-    )
-    material = np.where(
-        board[..., None], ground.astype(np.float32) / np.float32(open_board), material
-    )
+    faded = lit.open_board + (light - lit.open_board) * lit.fade.ravel()[number]
+    light = np.where(board, faded, light)
+    paper = ground.astype(np.float32) / np.float32(lit.open_board)
+    material = np.where(board[..., None], paper, material)
     out = material * light[..., None].astype(np.float32)
     out[beside] = ground
     return np.asarray(np.clip(out, 0.0, 1.0), dtype=np.float32)

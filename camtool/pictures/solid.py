@@ -79,6 +79,9 @@ from camtool.stock.heightmap import Box, HeightMap, cell_for, height_map
 MAP_CELLS = 3_000_000
 """Cells of a height map, at most: 12 MB, and as much for the moves that cut them."""
 
+MAX_RASTER_PX = 2400
+"""Wider pictures show larger pixels: the map has no finer cells."""
+
 BOARD_SHARE = 0.14
 """Width of the board around the stock, as a share of its longer side."""
 
@@ -172,7 +175,7 @@ def _solid(pair: StockPair, window: Box, options: PictureOptions) -> Solid:
             where="--crop",
             mend="it lies between ({:g}, {:g}) and ({:g}, {:g}) mm".format(*pair.box_mm),
         )
-    pixels = (options.size_px or SVG_WIDTH_PX) * SAMPLES
+    pixels = min(options.size_px or SVG_WIDTH_PX, MAX_RASTER_PX) * SAMPLES
     cells = MAP_CELLS if options.view not in BAR_NAMES else MAX_COMPARED
     cell = max(side / pixels, cell_for(box, cells))
     found = height_map(pair.moves, box, cell, owners=True)
@@ -320,9 +323,10 @@ def _stage(solid: Solid, bar: MmBar, options: PictureOptions) -> Stage:
 def _raster(
     stage: Stage, camera: Camera, view: View, box: PageBox, options: PictureOptions
 ) -> str:
-    """The image that fills a box of the page, its pixels those of the picture as it is written."""
+    """The image that fills a box of the page, its pixels those of the picture as it is written,
+    or of one that is MAX_RASTER_PX wide."""
     size_px = options.size_px or SVG_WIDTH_PX
-    per_unit = size_px / page_width(size_px)
+    per_unit = min(size_px, MAX_RASTER_PX) / page_width(size_px)
     left, right = math.floor(box.left * per_unit), math.ceil(box.right * per_unit)
     top, foot = math.floor(box.top * per_unit), math.ceil(box.bottom * per_unit)
     (u, _), (_, v) = view.x_range, view.y_range

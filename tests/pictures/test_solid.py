@@ -18,6 +18,7 @@ from camtool.cli.main import cli
 from camtool.errors import OptionError
 from camtool.geometry.polylines import Polyline
 from camtool.kernels.heightmap import project
+from camtool.pictures import relief, solid
 from camtool.pictures.colours import PAPER, channels, on_dark
 from camtool.pictures.draw import draw, render
 from camtool.pictures.options import VIEWS, PictureOptions
@@ -170,6 +171,21 @@ def test_equal_scenes_give_equal_bytes(view: str) -> None:
     one, other = (Picture(scene(), options) for _ in range(2))
     assert one.svg == other.svg
     assert one.render("a.png") == other.render("a.png")
+
+
+def test_very_wide_pictures_have_larger_pixels(monkeypatch: pytest.MonkeyPatch) -> None:
+    small = raster(draw(scene(), PictureOptions(size_px=150, view="iso")))
+    monkeypatch.setattr(solid, "MAX_RASTER_PX", 150)
+    svg = draw(scene(), PictureOptions(size_px=300, view="iso"))
+    assert 'width="300"' in svg
+    assert raster(svg).shape == small.shape
+
+
+def test_strips_of_a_picture_join(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = draw(scene(), PictureOptions(size_px=150, view="iso"))
+    for rows in (1, 7, 10_000):
+        monkeypatch.setattr(relief, "ROWS_AT_ONCE", rows)
+        assert draw(scene(), PictureOptions(size_px=150, view="iso")) == whole
 
 
 @pytest.mark.parametrize("view", OUTSIDE)
