@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path, PurePath
@@ -270,7 +271,11 @@ def _post_plan(
     asked = stock_request(judged.steps, job, _beside_mm(case), is_whole=how.is_whole)
     del judged, whole  # the paths of the stages are not needed any more
     verification = _judge_program(case, program.data, progress)
-    findings = _merge_findings(findings, _stock_findings(case, asked, job, findings))
+    findings = _merge_findings(
+        findings,
+        _stock_findings(case, asked, job, findings),
+        _stock_gates(case, asked, job, how.gates),
+    )
     figures = _with_times(figures, written, case, verification)
     beyond = _gate_findings(verification, how.gates, findings)
     findings = _merge_findings(findings, verification.findings, beyond, without=repeated)
@@ -341,6 +346,7 @@ def verify_program(
     )
     found = _judge_program(replace(case, options=options), data, progress)
     beyond = _gate_findings(found, judging.gates)
+    beyond = (*_stock_gates(case, asked_of_stock, job, judging.gates), *beyond)
     if asked_of_stock is not None:
         planning = case.wanted.findings if case.wanted is not None else ()
         beyond = (*_stock_findings(case, asked_of_stock, job or Job(), planning), *beyond)
@@ -701,6 +707,33 @@ def _stock_findings(
     else:
         moves = slide_moves(case.decoded, case.target, tools, case.simulation)
     return stock_findings(case.decoded, moves, request, case.depth_mm, planning)
+
+
+def _stock_gates(
+    case: Case, request: StockRequest | None, job: Job | None, gates: Gates | None
+) -> tuple[Finding, ...]:
+    """Return a finding for each limit of the stock that the moves of the slides exceed."""
+    if gates is None or (gates.gouge_mm is None and gates.leftover_mm is None):
+        return ()
+    from camtool.stock.checks import proved_gouge, proved_leftover
+    from camtool.stock.cut import cut_stock
+    from camtool.verification.report import stock_gate_findings
+
+    stock = None
+    with suppress(OptionError):
+        stock = cut_stock(case.decoded, case.target, job, case.simulation)
+    found: list[Finding] = []
+    if gates.gouge_mm is not None:
+        limit_mm, gouge = gates.gouge_mm, None
+        if stock is not None and request is not None:
+            gouge = proved_gouge(stock, request, limit_mm)
+        found += stock_gate_findings("gouge", limit_mm, gouge)
+    if gates.leftover_mm is not None:
+        limit_mm, left = gates.leftover_mm, None
+        if stock is not None and request is not None and request.is_whole:
+            left = proved_leftover(stock, request, limit_mm)
+        found += stock_gate_findings("leftover", limit_mm, left)
+    return tuple(found)
 
 
 def _with_operations(decoded: Toolpath, written: Toolpath, program: Program) -> Toolpath:

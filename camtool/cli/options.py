@@ -259,16 +259,19 @@ _LIMITS = "Limits (exit code 1 beyond them)"
 
 @dataclass(frozen=True)
 class GateFlags:
-    """`--max-error` (mm), `--max-reversals`, `--max-time` (s)."""
+    """`--max-error` (mm), `--max-reversals`, `--max-time` (s), `--max-gouge` and `--max-leftover`
+    (mm)."""
 
     max_error: float | None
     max_reversals: int | None
     max_time: float | None
+    max_gouge: float | None = None
+    max_leftover: float | None = None
 
     @property
     def given(self) -> bool:
         """True if there is any limit."""
-        return (self.max_error, self.max_reversals, self.max_time) != (None, None, None)
+        return any(getattr(self, each.name) is not None for each in fields(self))
 
     def gates(self) -> Gates | None:
         """Return the limits; None if there are none."""
@@ -276,7 +279,9 @@ class GateFlags:
             return None
         from camtool.verification.report import Gates
 
-        return Gates(self.max_error, self.max_reversals, self.max_time)
+        return Gates(
+            self.max_error, self.max_reversals, self.max_time, self.max_gouge, self.max_leftover
+        )
 
 
 def gate_options(command: Command) -> Command:
@@ -306,6 +311,20 @@ def gate_options(command: Command) -> Command:
                 callback=duration,
                 metavar="TIME",
                 help="Time of the whole program, such as 90min or 1h.",
+            ),
+            option(
+                _LIMITS,
+                "--max-gouge",
+                callback=length,
+                metavar="LENGTH",
+                help="Largest proved gouge of the part, in depth.",
+            ),
+            option(
+                _LIMITS,
+                "--max-leftover",
+                callback=length,
+                metavar="LENGTH",
+                help="Largest proved height of material that is left.",
             ),
         ],
     )

@@ -22,6 +22,7 @@ from camtool.planning.items import Bridge, Step
 from camtool.planning.job import Job, KeepOutBox, Operation, Stock, Tool
 from camtool.planning.naming import operation_name, tool_name
 from camtool.simulation.rows import block_of
+from camtool.stock.cut import CutStock
 from camtool.stock.cutters import cutter_profile
 from camtool.stock.findings import (
     CUT_TOO_DEEP,
@@ -34,7 +35,7 @@ from camtool.stock.findings import (
     TOOL_IN_STOCK,
     TOOL_NOT_KNOWN,
 )
-from camtool.stock.heights import greatest_value, stock_tree
+from camtool.stock.heights import Bracket, greatest_value, stock_tree
 from camtool.stock.moves import StockMoves
 from camtool.stock.wanted import WantedSolid, wanted_solid
 from camtool.toolpath.findings import ProgramCode
@@ -55,6 +56,12 @@ SAME_PLACE_MM = 5.0
 
 REFINED_SQUARES = 20_000
 """The worst place is searched for in no more squares than this."""
+
+PROVED_SHARE = 0.05
+"""Of a limit, the width to which a value is bracketed at it."""
+
+MAX_PROVED_SQUARES = 2_000_000
+"""A limit that is not proved within so many squares counts as exceeded."""
 
 BODY_SHARE = 0.25
 """Shank and holder are looked at in steps of this part of their radius."""
@@ -126,6 +133,46 @@ def stock_findings(
     if request.is_whole:
         found += [*checks.left(), *checks.passes(), *checks.bodies()]
     return tuple(found)
+
+
+def proved_gouge(stock: CutStock, request: StockRequest, limit_mm: float) -> Bracket:
+    """Return the greatest depth, mm, to which the slides cut below the wanted solid, outside of a
+    band of `limit_mm` beside its walls, between proved bounds; depths below the limit are not
+    searched further."""
+    solid = WantedSolid(request.solid.may, request.solid.must, limit_mm)
+    return _proved(
+        stock,
+        limit_mm,
+        lambda at: solid.bands(at)[:, 0] - stock.tree.heights(at)[0],
+        lambda squares: solid.bounds(squares)[:, 1] - stock.tree.least(squares),
+    )
+
+
+def proved_leftover(stock: CutStock, request: StockRequest, limit_mm: float) -> Bracket:
+    """Return the greatest height, mm, to which material stands above what must be cut, as
+    `proved_gouge` does."""
+    solid = WantedSolid(request.solid.may, request.solid.must, limit_mm)
+    return _proved(
+        stock,
+        limit_mm,
+        lambda at: stock.tree.heights(at)[0] - solid.bands(at)[:, 1],
+        lambda squares: stock.tree.greatest(squares) - solid.bounds(squares)[:, 2],
+    )
+
+
+def _proved(
+    stock: CutStock,
+    limit_mm: float,
+    value: Callable[[Floats], Floats],
+    upper: Callable[[Floats], Floats],
+) -> Bracket:
+    """Bracket a value over the stock, the distance of the slides from their moves included."""
+    slack_mm, beside_mm = PROVED_SHARE * limit_mm, stock.moves.beside_mm
+    floor = max(limit_mm - slack_mm - beside_mm, 0.0)
+    found = greatest_value(
+        value, upper, stock.box_mm, slack_mm, floor=floor, max_squares=MAX_PROVED_SQUARES
+    )
+    return Bracket(found.low, found.high + beside_mm, found.at_mm, found.squares)
 
 
 class _Points(Struct, frozen=True, eq=False):

@@ -45,7 +45,8 @@ class VerificationCode(Code):
         408,
         ERROR,
         "the part would come out worse, turn back more often or take longer than "
-        "`--max-error`, `--max-reversals` or `--max-time` allow",
+        "`--max-error`, `--max-gouge`, `--max-leftover`, `--max-reversals` or `--max-time` allow, "
+        "or it is not proved that it keeps to one of the limits of the stock",
         "another machine setting, fewer reversals ([reversals.md](reversals.md)), or a wider "
         "limit",
     )
@@ -378,6 +379,22 @@ ABOVE_GATE_UNKNOWN = Sentence(
 ABOVE_GATE_GOUGED = Sentence(
     VerificationCode.ABOVE_GATE,
     "what stays is gouged by {measured:.2f} µm or more (see GOUGE); {limit:.2f} µm is allowed",
+    "um",
+)
+ABOVE_GATE_STOCK = Sentence(
+    VerificationCode.ABOVE_GATE,
+    "the {what} is {measured:.2f} µm at X {x:.3f} Y {y:.3f}, and proved to be {most:.2f} µm at "
+    "most; {limit:.2f} µm is allowed",
+    "um",
+)
+ABOVE_GATE_NOT_PROVED = Sentence(
+    VerificationCode.ABOVE_GATE,
+    "no {what} above {limit:.2f} µm was found, but only {measured:.2f} µm is proved",
+    "um",
+)
+ABOVE_GATE_NO_STOCK = Sentence(
+    VerificationCode.ABOVE_GATE,
+    "no {what} is known without a drawing, a job and its tools, so the limit is not met",
     "um",
 )
 ABOVE_GATE_REVERSALS = Sentence(

@@ -17,7 +17,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
 from itertools import groupby
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 import msgspec
@@ -32,10 +32,16 @@ from camtool.units import UM_PER_MM
 from camtool.verification.findings import (
     ABOVE_GATE,
     ABOVE_GATE_GOUGED,
+    ABOVE_GATE_NO_STOCK,
+    ABOVE_GATE_NOT_PROVED,
     ABOVE_GATE_REVERSALS,
+    ABOVE_GATE_STOCK,
     ABOVE_GATE_TIME,
     ABOVE_GATE_UNKNOWN,
 )
+
+if TYPE_CHECKING:
+    from camtool.stock.heights import Bracket
 
 DECIMALS = 6
 """Decimal places of all numbers of the report (mm, µm, s, per cent)."""
@@ -543,12 +549,14 @@ def rounded(value: float) -> float:
 
 @dataclass(frozen=True)
 class Gates:
-    """The largest allowed total error (mm), number of reversals of X and Y while cutting, and time
-    (s); None: no limit."""
+    """The largest allowed total error (mm), number of reversals of X and Y while cutting, time
+    (s), and gouge and leftover of the stock (mm); None: no limit."""
 
     error_mm: float | None = None
     reversals: int | None = None
     time_s: float | None = None
+    gouge_mm: float | None = None
+    leftover_mm: float | None = None
 
 
 def gate_findings(
@@ -573,6 +581,28 @@ def gate_findings(
             limit=gates.time_s,
             takes=clock(report.time_s),
             allowed=clock(gates.time_s),
+        )
+
+
+def stock_gate_findings(what: str, limit_mm: float, found: Bracket | None) -> Iterator[Finding]:
+    """Yield ABOVE_GATE where the `what` of the stock, "gouge" or "leftover", exceeds its limit, is
+    not proved to keep to it, or (None) is not known."""
+    where, limit_um = f"--max-{what}", limit_mm * UM_PER_MM
+    if found is None:
+        yield ABOVE_GATE_NO_STOCK(where=where, limit=limit_um, what=what)
+    elif found.low > limit_mm:
+        yield ABOVE_GATE_STOCK(
+            where=where,
+            measured=found.low * UM_PER_MM,
+            limit=limit_um,
+            what=what,
+            x=found.at_mm[0],
+            y=found.at_mm[1],
+            most=found.high * UM_PER_MM,
+        )
+    elif found.high > limit_mm:
+        yield ABOVE_GATE_NOT_PROVED(
+            where=where, measured=found.high * UM_PER_MM, limit=limit_um, what=what
         )
 
 

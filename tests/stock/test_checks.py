@@ -14,16 +14,25 @@ from hypothesis import strategies as st
 
 from camtool.arrays import Floats
 from camtool.findings import Finding, Severity
+from camtool.pipeline import Judging, post_drawing, verify_program
 from camtool.planning.job import Job, KeepOutBox, Operation, Stock, Tabs, Tool
 from camtool.planning.plan import Plan, planned
 from camtool.records import replace
-from camtool.stock.checks import StockRequest, stock_findings, stock_request
+from camtool.stock.checks import (
+    StockRequest,
+    proved_gouge,
+    proved_leftover,
+    stock_findings,
+    stock_request,
+)
+from camtool.stock.cut import cut_stock
 from camtool.stock.cutters import cutter_profile
 from camtool.stock.findings import StockCode
 from camtool.stock.moves import stock_moves_of_toolpath
 from camtool.stock.slides import tools_of_rows
 from camtool.target.registry import load_target
 from camtool.toolpath.moves import Kind, Toolpath
+from camtool.verification.report import Gates
 from tests.drawings import drawing_of
 from tests.oracles.contours import closed
 from tests.oracles.stock import Cutter, Move
@@ -225,6 +234,61 @@ def test_a_rapid_through_the_part_is_found() -> None:
     finding = one(judged(plan, wrong), StockCode.CUT_TOO_DEEP)
     assert finding.measured == pytest.approx(1.0, abs=0.5)
     assert place_of(finding)[0] > 30.0 - 2.0
+
+
+@pytest.mark.parametrize(("deeper", "limit"), [(0.05, 0.03), (0.05, 0.06), (0.0, 0.03)])
+def test_a_gouge_is_bracketed(deeper: float, limit: float) -> None:
+    plan = plan_of(Operation(kind="pocket", tool=MILL, depth_mm=2.0))
+    change = lowered(plan.toolpath, lambda z: np.where(z == -2.0, -2.0 - deeper, z))
+    target = load_target("linuxcnc")
+    stock = cut_stock(change, target, plan.job)
+    found = proved_gouge(stock, stock_request(plan.steps, plan.job, 0.01), limit)
+    slack = 0.05 * limit + stock.moves.beside_mm
+    if deeper > limit:
+        assert found.low == pytest.approx(deeper, abs=stock.moves.beside_mm)
+        assert found.low <= deeper + stock.moves.beside_mm <= found.high + slack
+    else:
+        assert found.low < limit
+        assert found.high <= limit + 1e-9
+
+
+def test_what_is_left_is_bracketed() -> None:
+    plan = plan_of(Operation(kind="pocket", tool=MILL, depth_mm=2.0))
+    higher = lowered(plan.toolpath, lambda z: np.where(z == -2.0, -1.9, z))
+    stock = cut_stock(higher, load_target("linuxcnc"), plan.job)
+    request = stock_request(plan.steps, plan.job, 0.01)
+    found = proved_leftover(stock, request, 0.05)
+    assert found.low == pytest.approx(0.1, abs=stock.moves.beside_mm)
+    assert found.high >= 0.1
+    exact = cut_stock(plan.toolpath, load_target("linuxcnc"), plan.job)
+    assert proved_leftover(exact, request, 0.05).high <= 0.05
+
+
+def test_limits_of_the_stock_are_gates() -> None:
+    operation = Operation(kind="pocket", tool=MILL, depth_mm=2.0)
+    target, drawing = load_target("linuxcnc"), drawing_of([SQUARE])
+    wide = Gates(gouge_mm=0.05, leftover_mm=0.05)
+    program = post_drawing(drawing, Job((operation,)), target, gates=wide)
+    assert not program.failed
+    tight = post_drawing(drawing, Job((operation,)), target, gates=Gates(leftover_mm=1e-4))
+    assert tight.failed
+    assert "ABOVE_GATE" in codes(tight.findings)
+    deeper = Job((replace(operation, depth_mm=2.2),))
+    assert program.program is not None
+    found = verify_program(
+        program.program.data,
+        target,
+        source="a.ngc",
+        drawing=drawing,
+        job=deeper,
+        judging=Judging(gates=wide),
+    )
+    left = [each for each in found.findings if each.where == "--max-leftover"]
+    assert [each.measured for each in left] == pytest.approx([200.0], abs=10.0)
+    alone = verify_program(
+        program.program.data, target, source="a.ngc", judging=Judging(gates=wide)
+    )
+    assert sum("is known without a drawing" in each.message for each in alone.findings) == 2
 
 
 @pytest.mark.parametrize("stickout", [8.0, 10.0, 10.5])
