@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -59,7 +60,7 @@ class Scene:
     toolpath from which on it cuts; `rounds` are full circles with their errors.
     `tabs` are the places of tabs, mm; `inspected` the dimensions with their verdicts. `playback`
     gives how the toolpath runs; only the viewer calls it. `cut` gives the moves that cut the
-    stock; only views of the stock call it.
+    stock; only views of the stock call it. `goal` gives those that should cut it, for the viewer.
 
     With a trace the picture leaves out rapids and plunges, and feeds are pale. ValueError when the
     trace is incomplete or not finite.
@@ -86,6 +87,7 @@ class Scene:
     tabs: tuple[tuple[float, float], ...] = ()
     inspected: tuple[InspectedReport, ...] = ()
     cut: Callable[[], StockPair] | None = None
+    goal: Callable[[], StockMoves] | None = None
 
     def __post_init__(self) -> None:
         points, error = self.trace_points, self.trace_error_mm
@@ -285,12 +287,22 @@ def scene_of(
             target if verification is not None else None,
             _bands(drawn, job, wanted, machine),
         ),
+        goal=None if wanted is None or wanted is toolpath else partial(_as_planned, wanted, job),
     )
 
 
 BESIDE_SHARE, BELOW_SHARE = 0.06, 0.25
 """A stock that is not known reaches so far beyond the cuts (a share of their longer side), and so
 far below them (a share of their depth)."""
+
+
+def _as_planned(path: Toolpath, job: Job | None) -> StockMoves:
+    """The moves of a toolpath through the stock, as planned."""
+    from camtool.stock.moves import stock_moves_of_toolpath
+    from camtool.stock.slides import tools_of_rows
+
+    tools = tools_of_rows(path, job)
+    return stock_moves_of_toolpath(path, tools.index, tools.cutters)
 
 
 def _stock_pair(
@@ -308,10 +320,6 @@ def _stock_pair(
         from camtool.stock.cut import cut_box
         from camtool.stock.moves import stock_moves_of_toolpath
         from camtool.stock.slides import slide_moves, tools_of_rows
-
-        def as_planned(path: Toolpath) -> StockMoves:
-            tools = tools_of_rows(path, job)
-            return stock_moves_of_toolpath(path, tools.index, tools.cutters)
 
         plan = None if wanted is None else wanted.operations
         tools = tools_of_rows(toolpath, job, plan)
@@ -331,7 +339,7 @@ def _stock_pair(
             by = BESIDE_SHARE * max(right - left, top - bottom)
             box = left - by, bottom - by, right + by, top + by
         other = wanted is not None and wanted is not toolpath
-        beside = as_planned(wanted) if other and wanted is not None else None
+        beside = _as_planned(wanted, job) if other and wanted is not None else None
         return StockPair(moves, beside, box, depth or 1.0, known, bands=bands)
 
     return pair

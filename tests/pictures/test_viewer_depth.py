@@ -3,6 +3,7 @@ what a browser shows of it."""
 
 from __future__ import annotations
 
+import io
 import json
 import math
 from collections.abc import Callable
@@ -11,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from camtool.arrays import Floats
 from camtool.pictures.scene import ReportTable, Scene, TableLine
@@ -18,8 +20,10 @@ from camtool.pictures.viewer.page import viewer_page
 from camtool.planning.job import Tool
 from camtool.records import replace
 from camtool.stock.cutters import cutter_profile
+from camtool.stock.moves import StockMoves, stock_moves_of_toolpath
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
+from tests.oracles.page_paths import viewer_column
 from tests.oracles.stock import Cutter, Move, Stock
 from tests.pictures.viewer_browser import NEEDS_BROWSER, browser, shown
 from tests.pictures.viewer_pages import busy, head_of, with_run
@@ -27,6 +31,7 @@ from tests.pictures.viewer_pages import busy, head_of, with_run
 __all__ = ["browser", "shown"]
 
 BOX = (-2.0, -3.0, 18.0, 12.0)
+GRID = (161, 121)
 MILL, BIT, BALL = Tool(3.0), Tool(6.0, "v", math.radians(60.0), 0.4), Tool(4.0, "ball")
 BULL = Tool(4.0, "bull", corner_radius_mm=1.0)
 
@@ -52,6 +57,18 @@ def random_path(seed: int) -> Toolpath:
     return path.finish()
 
 
+def slot(depth: float) -> Toolpath:
+    """A slot through the middle of the stock."""
+    path = ToolpathBuilder().rapid(2.0, 4.5, 2.0).line(z=depth, feed=50.0)
+    return path.line(14.0, 4.5, feed=50.0).rapid(z=2.0).rapid(0.0, 0.0).finish()
+
+
+def goal_of(path: Toolpath, tool: Tool) -> Callable[[], StockMoves]:
+    """What the moves of a path with one tool should cut."""
+    which = np.zeros(len(path), dtype=np.int64)
+    return lambda: stock_moves_of_toolpath(path, which, (cutter_profile(tool),))
+
+
 def scene_of_cuts(path: Toolpath, *turns: tuple[int, Tool]) -> Scene:
     return busy(Scene("cuts", toolpath=path, tools=turns, stock_mm=BOX, thickness_mm=3.0))
 
@@ -69,7 +86,7 @@ def cut_by(script: Callable[[str], Any], path: Toolpath, tool: Tool, *rows: int)
         "bends": np.column_stack([path.centre, path.sweeps()])[arcs].ravel().tolist(),
         "z": [float(path.start[2]), *path.end[:, 2].tolist()],
         "cutter": cutter_profile(tool).columns,
-        "box": BOX,
+        "stock": {"box": BOX, "grid": GRID},
         "rows": rows,
     }
     made = script(
@@ -78,7 +95,7 @@ def cut_by(script: Callable[[str], Any], path: Toolpath, tool: Tool, *rows: int)
           const given = {json.dumps(given)}, from = Float64Array.from(given.from);
           const track = new Track(from, Float64Array.from(given.to), given.arcs, given.bends);
           const turns = [[0, new Cutter(given.cutter)]];
-          const solid = new Solid(given.box, turns, track, given.z, 20000);
+          const solid = new Solid(given.stock, turns, track, given.z);
           const all = given.rows.map((row) => {{
             solid.toward(row, 1);
             return Array.from(solid.heights);
@@ -149,9 +166,13 @@ def picture(view: Any) -> bytes:
 
 
 class TestShown:
-    """The page in a browser."""
+    """The page in a browser, with a coarse grid: without a graphics card this is slow."""
 
     pytestmark = NEEDS_BROWSER
+
+    @pytest.fixture(autouse=True)
+    def _coarse(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr("camtool.pictures.viewer.page.MAX_HEIGHTS", 30_000)
 
     @pytest.fixture
     def view(self, shown: Any) -> Any:
@@ -224,6 +245,18 @@ class TestShown:
         view.page.get_by_role("button", name="show X 4 Y 6").click()
         assert view.pixels("over") > 0
 
+    def test_gouges_and_leftovers_have_their_colours(self, shown: Any) -> None:
+        wanted = slot(-1.0)
+        for depth, red, blue in ((-1.0, False, False), (-1.2, True, False), (-0.8, False, True)):
+            scene = replace(scene_of_cuts(slot(depth), (0, MILL)), goal=goal_of(wanted, MILL))
+            view = shown(scene)
+            view.press("g", "t")
+            view.page.select_option("#colour-by", "beside")
+            data = np.array(Image.open(io.BytesIO(picture(view))).convert("RGB")).astype(int)
+            floor = data[data.shape[0] // 2, data.shape[1] // 2]
+            assert bool(floor[0] - floor[2] > 100) == red
+            assert bool(floor[2] - floor[0] > 100) == blue
+
     def test_without_webgl_the_plan_stays_and_says_so(self, shown: Any) -> None:
         view = shown(scene_of_cuts(random_path(3), (0, MILL)))
         view.page.evaluate("() => { HTMLCanvasElement.prototype.getContext = () => null; }")
@@ -236,7 +269,12 @@ def test_the_head_has_the_stock_and_each_tool() -> None:
     head = head_of(
         viewer_page(scene_of_cuts(random_path(3), (0, MILL), (12, BIT))).decode("utf-8")
     )
-    assert head["stock"] == {"box": [*BOX], "bottom": -3.0}
+    stock = head["stock"]
+    assert isinstance(stock, dict)
+    across, upwards = stock.pop("grid")
+    assert stock == {"box": [*BOX], "bottom": -3.0}
+    assert 400_000 < across * upwards < 530_000
+    assert (across - 1) / (upwards - 1) == pytest.approx(20.0 / 15.0, rel=1e-4)
     cutters = head["cutters"]
     assert isinstance(cutters, list)
     assert [row for row, *_ in cutters] == [0, 12]
@@ -244,8 +282,27 @@ def test_the_head_has_the_stock_and_each_tool() -> None:
     assert cutters[1][1:] == pytest.approx([3.0, 0.2, 0.0, math.sqrt(3.0)])
 
 
+def test_the_page_holds_the_wanted_heights() -> None:
+    path = random_path(4)
+    scene = replace(scene_of_cuts(path, (0, BIT)), goal=goal_of(path, BIT))
+    page = viewer_page(scene).decode("utf-8")
+    stock = head_of(page)["stock"]
+    assert isinstance(stock, dict)
+    across, upwards = stock["grid"]
+    counts = viewer_column(page, "goal_count").astype(int)
+    heights = np.repeat(viewer_column(page, "goal_height"), counts) * 3.0 / 32_000
+    slow = cut_slowly(path, BIT, (upwards, across), len(path) - 1)
+    apart = np.abs(heights.reshape(upwards, across) - slow)
+    assert np.quantile(apart, 0.995) < 0.005
+    without = head_of(viewer_page(scene_of_cuts(path, (0, BIT))).decode("utf-8"))["columns"]
+    assert isinstance(without, dict)
+    assert without["goal_height"][2] == 0
+
+
 def test_without_a_stock_it_is_as_large_as_the_cuts() -> None:
     path = ToolpathBuilder().rapid(0.0, 0.0, 2.0).line(10.0, 4.0, -1.5, feed=50.0).finish()
     scene = replace(scene_of_cuts(path, (0, MILL)), stock_mm=None, thickness_mm=None)
     stock = head_of(viewer_page(scene).decode("utf-8"))["stock"]
+    assert isinstance(stock, dict)
+    stock.pop("grid")
     assert stock == {"box": [-1.5, -1.5, 11.5, 5.5], "bottom": -2.5}

@@ -19,6 +19,7 @@ from camtool.pictures.content import Content
 from camtool.pictures.layers import LineGroup, Part
 from camtool.pictures.scene import Playback, Scene
 from camtool.pictures.trace import ErrorTrace, bins_of, nearest_points
+from camtool.stock.heightmap import HeightMap, add_moves
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.units import UM_PER_MM
 
@@ -61,6 +62,34 @@ def part_columns(name: str, part: Part) -> Columns:
         f"{name}_from": np.concatenate([chain.points[:-1] for chain in chains]).astype(FLOAT),
         f"{name}_to": np.concatenate([chain.points[1:] for chain in chains]).astype(FLOAT),
     }
+
+
+class StockBox(Struct, frozen=True):
+    """The left, lower, right and upper edge of the stock, mm, the Z of its bottom, and how many
+    heights its grid has along X and Y; the outermost stand on its edges."""
+
+    box: tuple[float, float, float, float]
+    bottom: float
+    grid: tuple[int, int]
+
+
+def goal_columns(scene: Scene, stock: StockBox | None) -> Columns:
+    """The heights that the stock should have, row by row on its grid, each as often as the column
+    of counts says, in shares of 1/MAX_COUNTS of its thickness; empty where this is not known."""
+    values, counts = np.empty(0, dtype=SHORT), np.empty(0, dtype=INT)
+    if stock is not None and scene.goal is not None and scene.tools:
+        left, low, right, _ = stock.box
+        across, upwards = stock.grid
+        cell = (right - left) / (across - 1)
+        corner = (left - 0.5 * cell, low - 0.5 * cell)
+        heights = HeightMap(np.zeros((upwards, across), dtype=np.float32), cell, corner)
+        add_moves(heights, scene.goal())
+        shares = np.rint(heights.heights.ravel() * (MAX_COUNTS / -stock.bottom))
+        whole = np.maximum(shares, -MAX_COUNTS).astype(SHORT)
+        begins = np.concatenate([[0], np.flatnonzero(np.diff(whole)) + 1])
+        values = whole[begins]
+        counts = np.diff(np.append(begins, whole.size)).astype(INT)
+    return {"goal_height": values, "goal_count": counts}
 
 
 def packed(columns: Columns) -> tuple[dict[str, tuple[str, int, int]], bytes]:

@@ -1,5 +1,7 @@
 // The stock in depth: one mesh whose heights are a texture, its sides, the tool and the path.
 
+/** The page holds wanted heights in this many shares of the thickness. */
+const GOAL_COUNTS = 32000;
 const TILE = 32;
 const RIM = TILE + 1;
 const TOOL_SIDES = 40;
@@ -17,6 +19,9 @@ const SIDES = {
   f: [0, 0], 1: [0, 0], s: [Math.PI / 2, 0], 3: [Math.PI / 2, 0],
   t: [0, Math.PI / 2], 7: [0, Math.PI / 2], i: [0.45, 0.75],
 };
+
+/** What is gouged or left is coloured from the first of these on, and fully from the second, mm. */
+const BESIDE_MM = ["0.003", "0.1"];
 
 const PLACE = `
 uniform vec3 right, up, toward, centre, scales;
@@ -102,6 +107,8 @@ uniform vec3 stock, cut, face;
 uniform int kind, colouring;
 uniform highp usampler2D bins;
 uniform sampler2D map;
+uniform highp sampler2D goal;
+uniform vec3 gouge, rest;
 uniform vec2 span;
 
 float high(ivec2 node) {
@@ -122,6 +129,20 @@ vec3 wall(ivec2 node, vec3 rough) {
   return normalize(vec3(fall / grid.zw / size * length(rough.xy), rough.z));
 }
 
+/** The colour of what is gouged or left, beyond what the wanted heights around it allow. */
+vec3 beside(ivec2 node, vec3 tone) {
+  float here = high(node), low = 1e9, top = -1e9;
+  for (int k = 0; k < 9; k++) {
+    ivec2 near = clamp(node + ivec2(k % 3 - 1, k / 3 - 1), ivec2(0), textureSize(heights, 0) - 1);
+    float height = texelFetch(goal, near, 0).r;
+    low = min(low, height);
+    top = max(top, height);
+  }
+  float under = max(low - max(here, bottom), 0.0), over = max(here - top, 0.0), size = under + over;
+  if (size < ${BESIDE_MM[0]}) return tone;
+  return mix(tone, under > 0.0 ? gouge : rest, 0.4 + 0.6 * min(size / ${BESIDE_MM[1]}, 1.0));
+}
+
 void main() {
   if (at.z < bottom || (kind != 2 && dot(plane.xyz, at) > plane.w)) discard;
   vec2 spot = (at.xy - grid.xy) / grid.zw;
@@ -140,7 +161,7 @@ void main() {
     normal = face;
   } else {
     if (normal.z < 0.5) normal = wall(node, normal);
-    if (at.z > -1e-4) tone = stock;
+    if (at.z > -1e-4) tone = colouring == 3 ? beside(node, stock) : stock;
     else if (colouring == 1) {
       // What cut the lowest height beside a wall has cut the wall.
       ivec2 lowest = ivec2(spot);
@@ -149,7 +170,8 @@ void main() {
         if (high(other) < high(lowest)) lowest = other;
       }
       tone = texelFetch(map, ivec2(texelFetch(bins, lowest, 0).r, 0), 0).rgb;
-    } else if (colouring == 2) {
+    } else if (colouring == 3) tone = beside(node, tone);
+    else if (colouring == 2) {
       float part = (span.y - at.z) / max(span.y - span.x, 1e-6), count = float(textureSize(map, 0).x - 1);
       tone = texelFetch(map, ivec2(clamp(part, 0.0, 0.9999) * count, 0), 0).rgb;
     } else tone *= 1.0 - 0.22 * clamp(at.z / bottom, 0.0, 1.0);
@@ -222,9 +244,8 @@ class Depth {
     const gl = this.canvas.getContext("webgl2", { antialias: true, alpha: false });
     if (!gl) return false;
     this.gl = gl;
-    const { box, bottom } = this.head.stock;
-    this.bottom = bottom;
-    this.solid = new Solid(box, this.turns, this.moves, this.z);
+    this.bottom = this.head.stock.bottom;
+    this.solid = new Solid(this.head.stock, this.turns, this.moves, this.z);
     this.surface = program(gl, SURFACE, STUFF);
     this.curtain = program(gl, CURTAIN, STUFF);
     this.given = program(gl, GIVEN, SHADED);
@@ -253,6 +274,13 @@ class Depth {
     this.texture(1, gl.R8UI, gl.RED_INTEGER, gl.UNSIGNED_BYTE, nx, ny);
     this.texture(2, gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, 1, 1);
     this.bins = new Uint8Array(nx * ny);
+    const { goal_height: goals, goal_count: counts } = this.layers.columns;
+    this.texture(3, gl.R32F, gl.RED, gl.FLOAT, goals.length ? nx : 1, goals.length ? ny : 1);
+    if (goals.length) {
+      const all = new Float32Array(nx * ny), share = -this.bottom / GOAL_COUNTS;
+      for (let k = 0, at = 0; k < goals.length; at += counts[k], k++) all.fill(goals[k] * share, at, at + counts[k]);
+      gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, nx, ny, gl.RED, gl.FLOAT, all);
+    }
     const faces = [], middle = (TILE / 2) * (RIM + 1), last = TILE * RIM;
     for (let k = 0; k < TILE; k++) {
       faces.push(middle, k, k + 1, middle, last + k + 1, last + k);
@@ -522,7 +550,7 @@ class Depth {
   /** The mesh, the sides of the stock, its bottom and the cut face of the section. */
   paintSolid(colours) {
     const { gl, solid, tiles, surface, curtain, layers } = this, plane = this.planeNow();
-    const colouring = { kind: 0, error: 1, height: 2 }[layers.by];
+    const colouring = { kind: 0, error: 1, height: 2, beside: 3 }[layers.by];
     const styled = (kind, at, face) => {
       gl.uniform4f(at.grid, solid.left, solid.low, solid.dx, solid.dy);
       gl.uniform1f(at.bottom, this.bottom);
@@ -536,6 +564,9 @@ class Depth {
       gl.uniform1i(at.heights, 0);
       gl.uniform1i(at.bins, 1);
       gl.uniform1i(at.map, 2);
+      gl.uniform1i(at.goal, 3);
+      gl.uniform3fv(at.gouge, rgb(colours.tool));
+      gl.uniform3fv(at.rest, rgb(colours.feed));
     };
     let at = this.use(surface);
     styled(0, at, [0, 0, 1]);

@@ -17,6 +17,7 @@ from collections.abc import Mapping
 from importlib import resources
 from itertools import cycle
 
+import msgspec
 import numpy as np
 
 from camtool.arrays import Floats
@@ -42,9 +43,11 @@ from camtool.pictures.scene import Playback, ReportTable, Scene, by_feed
 from camtool.pictures.svg import Look, element, number
 from camtool.pictures.viewer.columns import (
     Columns,
+    StockBox,
     Traced,
     columns_of,
     drawing_layers,
+    goal_columns,
     packed,
     part_columns,
     traced_of,
@@ -75,6 +78,8 @@ def viewer_page(scene: Scene, live: str = "") -> bytes:
     run, content = _run(scene), content_of(scene)
     traced = traced_of(scene, run, _top_um(scene, run))
     rows, columns = _rows(content)
+    stock = None if run is None else _stock(scene)
+    columns |= goal_columns(scene, stock)
     named, data = packed({**columns_of(content, run), **traced.columns, **columns})
     script = '(() => {\n"use strict";\n' + "\n".join(map(_file, SCRIPTS)) + "})();\n"
     style = _file("viewer.css")
@@ -88,7 +93,7 @@ def viewer_page(scene: Scene, live: str = "") -> bytes:
         "script": script,
         "circles": circles_of(scene),
         "live": live,
-        "head": _json({"columns": named, **_head(content, run, traced), "rows": rows}),
+        "head": _json({"columns": named, **_head(content, run, traced, stock), "rows": rows}),
         "columns": base64.b64encode(data).decode("ascii"),
     }
     # One pass: the contents of a slot are not searched for slots.
@@ -102,7 +107,9 @@ def _run(scene: Scene) -> Playback | None:
     return by_feed(scene.toolpath, np.inf) if scene.playback is None else scene.playback()
 
 
-def _head(content: Content, run: Playback | None, traced: Traced) -> dict[str, object]:
+def _head(
+    content: Content, run: Playback | None, traced: Traced, stock: StockBox | None
+) -> dict[str, object]:
     scene, drawing, toolpath = content.scene, content.scene.drawing, content.scene.toolpath
     names = [] if drawing is None else drawing_layers(drawing)
     blocks = None if run is None or run.blocks is None else run.blocks
@@ -126,7 +133,7 @@ def _head(content: Content, run: Playback | None, traced: Traced) -> dict[str, o
             for place, off in zip(scene.worst, traced.worst_off.tolist(), strict=True)
         ],
         "travel_mm": scene.travel_mm,
-        "stock": None if run is None else _stock(scene),
+        "stock": None if stock is None else msgspec.structs.asdict(stock),
         "cutters": [(row, *cutter_profile(tool).columns) for row, tool in scene.tools],
         "ambiguous": [] if drawing is None else _ambiguous(drawing),
     }
@@ -135,10 +142,16 @@ def _head(content: Content, run: Playback | None, traced: Traced) -> dict[str, o
 MIN_FLOOR_MM = 1.0
 """Without a stock in the job, so much stays below the deepest cut."""
 
+MAX_HEIGHTS = 1 << 19
+"""Most heights of the grid of the stock."""
 
-def _stock(scene: Scene) -> dict[str, object] | None:
-    """The box of the stock, left, lower, right and upper edge, and its bottom, mm. What the job
-    does not say is as large as the cuts with their tools; None without moves."""
+MIN_STEP_MM = 0.005
+"""They are no nearer to each other."""
+
+
+def _stock(scene: Scene) -> StockBox | None:
+    """The box of the stock and its grid. What the job does not say is as large as the cuts with
+    their tools; None without moves."""
     toolpath = scene.toolpath
     if toolpath is None or not toolpath.is_motion.any():
         return None
@@ -146,10 +159,17 @@ def _stock(scene: Scene) -> dict[str, object] | None:
     wide = [tool.radius_at(max(-deepest, 0.0)) for _, tool in scene.tools]
     more = max([*wide, 0.02 * max(right - left, high - low), 0.1])
     deepest = min(deepest, 0.0)
-    return {
-        "box": scene.stock_mm or (left - more, low - more, right + more, high + more),
-        "bottom": -(scene.thickness_mm or max(-1.2 * deepest, MIN_FLOOR_MM - deepest)),
-    }
+    box = scene.stock_mm or (left - more, low - more, right + more, high + more)
+    across, upwards = box[2] - box[0], box[3] - box[1]
+    finest = max(math.sqrt(across * upwards / MAX_HEIGHTS), MIN_STEP_MM)
+    most = max(int(across / finest), 2)
+    # Of the grids that end at the right edge, the one that ends nearest to the upper edge.
+    tries = np.arange(max(2, int(0.9 * most)), most + 1)
+    steps = upwards / (across / tries)
+    count = int(tries[np.argmin(np.abs(steps - np.rint(steps)))])
+    rows = max(1, round(upwards * count / across))
+    bottom = -(scene.thickness_mm or max(-1.2 * deepest, MIN_FLOOR_MM - deepest))
+    return StockBox(box, bottom, (count + 1, rows + 1))
 
 
 def _rows(content: Content) -> tuple[list[dict[str, object]], Columns]:

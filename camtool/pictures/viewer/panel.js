@@ -114,6 +114,7 @@ class LayerPanel {
     const known = columns.move_error.some((um) => um >= 0);
     if (known) choice.append(element("option", "error", { value: "error" }));
     if (heights[1] > heights[0]) choice.append(element("option", "height", { value: "height" }));
+    if (columns.goal_height.length) choice.append(element("option", "gouged and left", { value: "beside" }));
     choice.addEventListener("change", () => {
       this.layers.by = choice.value;
       this.scale();
@@ -154,6 +155,7 @@ class LayerPanel {
     this.swatches();
     const { layers } = this, { by, heights, columns } = layers, place = find("scale");
     place.hidden = by === "kind" && !columns.trace_row.length;
+    find("beside").hidden = by !== "beside";
     if (place.hidden) return;
     const bar = find("scale-bar"), height = by === "height";
     bar.width = layers.mapColours().length;

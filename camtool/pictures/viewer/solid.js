@@ -1,11 +1,9 @@
 // The stock as heights on a grid, cut move by move: forwards at once, backwards from copies.
 
-/** Most heights of the grid, and bytes of all copies of it. */
-const MOST_HEIGHTS = 1 << 19;
+/** Bytes of all copies of the grid, about. */
 const COPIES_BYTES = 96e6;
 /** Chords of arcs are within this share of the distance between two heights. */
 const SAG_SHARE = 0.02;
-const LEAST_CELL_MM = 0.005;
 /** Halvings of the place on a sloping move where a round corner is lowest. */
 const HALVINGS = 32;
 
@@ -35,18 +33,15 @@ class Cutter {
 }
 
 class Solid {
-  /** `box` [left, low, right, high] mm of the stock with its top at 0; `turns` [[row, cutter]]:
-   * from which row on each cuts; `moves` their track and `z` (N + 1,) heights of their ends. */
-  constructor(box, turns, moves, z, most = MOST_HEIGHTS) {
-    const wide = box[2] - box[0], tall = box[3] - box[1];
-    this.cell = Math.max(Math.sqrt((wide * tall) / most), LEAST_CELL_MM);
-    this.left = box[0];
-    this.low = box[1];
-    // The outermost heights stand on the edges of the stock.
-    this.nx = Math.max(2, Math.round(wide / this.cell) + 1);
-    this.ny = Math.max(2, Math.round(tall / this.cell) + 1);
-    this.dx = wide / (this.nx - 1);
-    this.dy = tall / (this.ny - 1);
+  /** `box` [left, low, right, high] mm of the stock with its top at 0; `grid` how many heights it
+   * has along X and Y, the outermost on its edges; `turns` [[row, cutter]]: from which row on each
+   * cuts; `moves` their track and `z` (N + 1,) heights of their ends. */
+  constructor({ box, grid }, turns, moves, z) {
+    [this.left, this.low] = box;
+    [this.nx, this.ny] = grid;
+    this.dx = (box[2] - box[0]) / (this.nx - 1);
+    this.dy = (box[3] - box[1]) / (this.ny - 1);
+    this.cell = Math.min(this.dx, this.dy);
     this.turns = turns;
     this.moves = moves;
     this.z = z;

@@ -167,6 +167,9 @@ class Layers {
     return { error, height };
   }
 
+  /** Whether moves have the colours of their kinds. */
+  get isPlain() { return this.by === "kind" || this.by === "beside"; }
+
   get isDark() { return matchMedia("(prefers-color-scheme: dark)").matches && !this.printing; }
 
   /** A colour that is given for light and for dark ground; undefined for none. */
@@ -179,7 +182,7 @@ class Layers {
     const drawn = (sort, style) => (this.on.get(sort) ? style : null);
     const rapid = drawn("rapid", { colour: colours.rapid, width: 1, dash: [5, 4] });
     const plunge = drawn("plunge", { colour: colours.plunge, width: 1.5 });
-    if (this.by === "kind") {
+    if (this.isPlain) {
       const feed = drawn("feed", { colour: colours.feed, width: 1.5 });
       return { of: this.sortOf, styles: [rapid, feed, plunge] };
     }
@@ -423,7 +426,7 @@ class Stage {
     if (whole === this.done.row) return;
     const { of, styles } = layers.moveStyles(colours), rows = { from: this.done.row, to: whole };
     const traced = layers.on.get("trace") && layers.columns.trace_row.length;
-    const plain = traced && layers.by === "kind" ? { ...layers.paleStyles(colours) } : { of, styles };
+    const plain = traced && layers.isPlain ? { ...layers.paleStyles(colours) } : { of, styles };
     const swept = layers.sweptStyles(colours, view.scale);
     paintTrack(this.contexts.ground, view, moves, rows, layers.sortOf, swept);
     const wide = layers.on.get("swept") ? layers.columns.move_wide : [];
