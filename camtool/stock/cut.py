@@ -139,12 +139,16 @@ def cut_stock(
 
 
 def cut_box(moves: StockMoves) -> Box:
-    """Return the box of all that the tools cut; that of all moves where nothing is cut."""
+    """Return the box of all that the tools cut, cones as wide as at their depth; that of all moves
+    where nothing is cut."""
     cuts = np.minimum(moves.start[:, 2], moves.end[:, 2]) < 0.0
     chosen = moves.select(cuts) if cuts.any() else moves
-    wide = chosen.table[chosen.tool, 0][:, None]
     if not len(chosen):
         return 0.0, 0.0, 1.0, 1.0
+    radius, flat, _, rise = chosen.table[chosen.tool].T
+    deep = -np.minimum(chosen.start[:, 2], chosen.end[:, 2]).clip(max=0.0)
+    cone = flat + deep / np.where(rise > 0.0, rise, 1.0)
+    wide = np.where(rise > 0.0, np.minimum(radius, cone), radius)[:, None]
     low = (np.minimum(chosen.start, chosen.end)[:, :2] - wide).min(axis=0)
     high = (np.maximum(chosen.start, chosen.end)[:, :2] + wide).max(axis=0)
     return float(low[0]), float(low[1]), float(high[0]), float(high[1])

@@ -13,6 +13,8 @@ from camtool.arrays import Floats
 from camtool.errors import OptionError
 from camtool.planning.job import Job, Operation, Tool
 from camtool.planning.link import tool_note
+from camtool.records import replace
+from camtool.stock.cut import cut_box
 from camtool.stock.cutters import CutterProfile, cutter_profile
 from camtool.stock.heightmap import (
     MAX_CELLS,
@@ -226,3 +228,18 @@ def test_a_program_for_one_of_the_tools_of_a_job() -> None:
         (OperationNote("profile", "", tool_note(BIT), 1.0, 1.0, 1.0),), np.zeros(1, dtype=np.int64)
     )
     assert tools_of_rows(bare, BOTH, of_bit).cutters == (cutter_profile(BIT),)
+
+
+def test_the_box_of_cuts_holds_a_cone_as_wide_as_its_depth() -> None:
+    bit = cutter_profile(replace(BIT, diameter_mm=0.0))  # only its cone is known
+    moves = moves_of([(1.0, 2.0, -1.0)], [(9.0, 2.0, -2.0)], 0, bit)
+    wide = 0.1 + 2.0 * math.tan(0.5)
+    assert cut_box(moves) == pytest.approx((1.0 - wide, 2.0 - wide, 9.0 + wide, 2.0 + wide))
+    box = (-3.0, -3.0, 13.0, 7.0)
+    found = height_map(moves, box, 0.05)
+    rows, columns = np.nonzero(found.heights < 0.0)
+    assert cut_box(moves)[2] == pytest.approx(found.x[columns.max()], abs=0.06)
+    assert cut_box(moves)[0] <= found.x[columns.min()]
+    assert cut_box(moves)[1] <= found.y[rows.min()]
+    above = moves_of([(1.0, 2.0, 1.0)], [(9.0, 2.0, 2.0)], 0, CutterProfile(1.5, 1.5))
+    assert cut_box(above) == (-0.5, 0.5, 10.5, 3.5)
