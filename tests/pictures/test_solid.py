@@ -173,6 +173,36 @@ def test_equal_scenes_give_equal_bytes(view: str) -> None:
     assert one.render("a.png") == other.render("a.png")
 
 
+LIFTED = ToolpathBuilder().rapid(5.0, 5.0, 5.0).finish()
+LONG = ToolpathBuilder().rapid(z=5.0).line(z=-1.0, feed=9.0).line(2e3, feed=9.0).finish()
+FAR = ToolpathBuilder().rapid(1e6, 1e6, 5.0).line(z=-1.0, feed=9.0).line(1e6 + 20.0, feed=9.0)
+TINY = ToolpathBuilder().rapid(z=1.0).line(z=-1e-4, feed=9.0).line(1e-3, feed=9.0).finish()
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("view", ["iso", "side", "top"])
+@pytest.mark.parametrize(
+    ("moves", "wide", "stock"),
+    [
+        (LIFTED, 4.0, None),
+        (ToolpathBuilder().finish(), 4.0, None),
+        (LONG, 4.0, None),
+        (FAR.finish(), 4.0, None),
+        (TINY, 1e-3, None),
+        (plate(), 4.0, Stock(900.0, (0.0, 0.0), (40.0, 40.0))),
+        (plate(), 4.0, Stock(1e-3, (0.0, 0.0), (40.0, 40.0))),
+    ],
+)
+def test_odd_stocks_have_pictures(
+    moves: Toolpath, wide: float, stock: Stock | None, view: str
+) -> None:
+    job = Job((Operation(tool=Tool(wide)),), stock=stock)
+    odd = scene_of(title="odd", job=job, toolpath=moves)
+    for size_px in (16, 100):
+        pixels = raster(draw(odd, PictureOptions(size_px=size_px, view=view)))
+        assert len(np.unique(pixels.reshape(-1, 3), axis=0)) > 1
+
+
 def test_very_wide_pictures_have_larger_pixels(monkeypatch: pytest.MonkeyPatch) -> None:
     small = raster(draw(scene(), PictureOptions(size_px=150, view="iso")))
     monkeypatch.setattr(solid, "MAX_RASTER_PX", 150)
