@@ -46,7 +46,8 @@ ALONG_MM = 1.0
 """Along a cut the stock is looked at no farther apart than this, and at both ends."""
 
 EDGE_SHARE = 0.98
-"""... and on both sides of its axis, this part of the radius away from it."""
+"""... and on both sides of its axis: this part of the radius away from it, less the band beside
+walls, since passes need not lie exactly on each other."""
 
 LATTICE_POINTS = 40_000
 """Points of the lattice on which material is looked for that is left."""
@@ -231,7 +232,7 @@ class _Checks:
             where=length[:, None] > 0.0,
         )
         left = np.column_stack([-ahead[:, 1], ahead[:, 0]])[which]
-        off = share * radii[rows][which]
+        off = np.maximum(share * radii[rows] - self.solid.wall_mm, 0.0)[which]
         moved = [axis[:, :2] + side * off[:, None] * left for side in (0.0, -1.0, 1.0)]
         return _Points(np.concatenate(moved), np.tile(rows[which], 3), np.tile(axis[:, 2], 3))
 

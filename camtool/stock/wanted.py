@@ -77,7 +77,8 @@ DEFAULT_WALL_MM = 0.01
 """Width of the band beside a wall in which nothing is judged, if it is not given."""
 
 DIAGONAL = math.sqrt(2.0)
-"""Of a square over its side: also by how much farther apart rings of a pocket are at a corner."""
+"""Of a square over its side, and of a quarter arc over its radius; and by how much farther apart
+rings of a pocket are at a corner than along its sides."""
 
 NOSE_SHARE = 0.5
 """Of the groove of a round nose, the share of its corner beside the flat that must be cut."""
@@ -303,8 +304,11 @@ class _Layers:
 
     @property
     def _leads_mm(self) -> float:
+        """The farthest that leads take the tool from its path, mm: the ends of a quarter arc are
+        as far apart as the diagonal of its radius."""
+        reach = {"none": 0.0, "line": 1.0, "arc": DIAGONAL}
         leads = (self.operation.lead_in, self.operation.lead_out)
-        return max(each.length_mm if each.kind != "none" else 0.0 for each in leads)
+        return max(reach[each.kind] * each.length_mm for each in leads)
 
     def _holes(self) -> Iterator[WantedLayer]:
         """The discs of drilled holes."""
