@@ -49,7 +49,7 @@ EDGE_SHARE = 0.98
 """... and on both sides of its axis: this part of the radius away from it, less the band beside
 walls, since passes need not lie exactly on each other."""
 
-LATTICE_POINTS = 40_000
+LATTICE_POINTS = 20_000
 """Points of the lattice on which material is looked for that is left."""
 
 SAME_PLACE_MM = 5.0

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +15,8 @@ from hypothesis import strategies as st
 
 from camtool.arrays import Floats
 from camtool.findings import Finding, Severity
-from camtool.pipeline import Judging, post_drawing, verify_program
+from camtool.importers.read import read_drawing
+from camtool.pipeline import Judging, post_by_tool, post_drawing, verify_program
 from camtool.planning.job import Job, KeepOutBox, Operation, Stock, Tabs, Tool
 from camtool.planning.plan import Plan, planned
 from camtool.records import replace
@@ -46,7 +48,8 @@ MILL = Tool(4.0)
 SQUARE = closed((0, 0), (30, 0), (30, 20), (0, 20))
 STOCK = Stock(3.0, (-10.0, -10.0), (50.0, 40.0))
 
-SEEDS = range(60)
+SEEDS = (*range(60), 120, 158, 160, 264, 313, 344, 424)
+"""Random jobs of all kinds; the last with leads about corners."""
 
 
 def plan_of(*operations: Operation, **job: object) -> Plan:
@@ -289,6 +292,26 @@ def test_limits_of_the_stock_are_gates() -> None:
         program.program.data, target, source="a.ngc", judging=Judging(gates=wide)
     )
     assert sum("is known without a drawing" in each.message for each in alone.findings) == 2
+
+
+def test_the_slides_of_a_compensated_program_raise_no_alarm() -> None:
+    """Its passes lie a few micrometres beside each other, and the program itself is bent."""
+    drawing = read_drawing(Path("samples/logo.dxf"))
+    operation = Operation(tool=Tool(0.1), depth_mm=0.05, step_down_mm=0.02, layers=("CUT",))
+    run = post_drawing(drawing, Job((operation,), compensate=True), load_target("pic-mmh"))
+    assert run.verification is not None
+    assert not codes(run.findings) & {each.name for each in StockCode}
+
+
+def test_parts_of_a_program_do_not_miss_what_the_others_clear() -> None:
+    """The small tool clears the corners that the wide one has left, in a program of its own."""
+    wide = Operation(kind="pocket", name="wide", tool=Tool(6.0, number=1), depth_mm=2.0)
+    small = Operation(kind="pocket", name="rest", rest="wide", tool=Tool(2.0, number=2))
+    runs = post_by_tool(drawing_of([SQUARE]), Job((wide, small)), load_target("linuxcnc"))
+    assert len(runs) == 2
+    for run in runs:
+        assert run.verification is not None
+        assert not codes(run.findings) & {each.name for each in StockCode}
 
 
 @pytest.mark.parametrize("stickout", [8.0, 10.0, 10.5])
