@@ -335,6 +335,10 @@ class _Checks:
         feeds = ~self.moves.rapid[self.cuts.move] & self._in_stock(self.cuts.at)
         at, move = np.ascontiguousarray(self.cuts.at[feeds]), self.cuts.move[feeds]
         before, _ = self.tree.heights(at, move)
+        # No move cuts below its lower end.
+        lowest = np.minimum(self.moves.start[move, 2], self.moves.end[move, 2])
+        doubtful = before - lowest > limit[move] + self.deep_mm
+        at, move, before = at[doubtful], move[doubtful], before[doubtful]
         after, _ = self.tree.heights(at, move + 1)
         chip = before - after
         over = chip - limit[move]
