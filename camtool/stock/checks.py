@@ -45,6 +45,9 @@ from camtool.toolpath.rapids import STOCK_TOP_MM
 ALONG_MM = 1.0
 """Along a cut the stock is looked at no farther apart than this, and at both ends."""
 
+MAX_PLACES = 50_000
+"""... or so far that there are about this many places, where cuts are longer."""
+
 EDGE_SHARE = 0.98
 """... and on both sides of its axis: this part of the radius away from it, less the band beside
 walls, since passes need not lie exactly on each other."""
@@ -217,7 +220,8 @@ class _Checks:
         """Return points along moves, on the axis and on both sides of it."""
         start, travel = self.moves.start[rows], self.moves.end[rows] - self.moves.start[rows]
         length = np.hypot(travel[:, 0], travel[:, 1])
-        count = np.ceil(length / ALONG_MM).astype(np.int64) + 1
+        along_mm = max(ALONG_MM, float(length.sum()) / MAX_PLACES)
+        count = np.ceil(length / along_mm).astype(np.int64) + 1
         which = np.repeat(np.arange(len(rows)), count)
         step = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
         part = step / np.maximum(count[which] - 1, 1)
