@@ -200,6 +200,43 @@ class TestShown:
         assert view.pixels("plan") > 0
         assert picture(view) not in seen
 
+    def test_fingers_turn_move_and_zoom(self, view: Any) -> None:
+        box = view.page.locator("#stage").bounding_box()
+        x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
+        session = view.page.context.new_cdp_session(view.page)
+
+        def touch(kind: str, *places: tuple[float, float]) -> None:
+            points = [{"x": x + a, "y": y + b, "id": k} for k, (a, b) in enumerate(places)]
+            session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+        def drag(*ways: tuple[tuple[float, float], tuple[float, float]]) -> bytes:
+            touch("touchStart", *(begin for begin, _ in ways))
+            touch("touchMove", *(end for _, end in ways))
+            touch("touchEnd")
+            return picture(view)
+
+        seen = [picture(view)]
+        seen.append(drag(((0, 0), (60, 20))))
+        seen.append(drag(((-50, 0), (-100, 0)), ((50, 0), (100, 0))))
+        seen.append(drag(((-50, 0), (-50, 40)), ((50, 0), (50, 40))))
+        assert len(set(seen)) == 4
+        # Two fingers that move together do not zoom: the opposite way leads back.
+        assert drag(((-50, 40), (-50, 0)), ((50, 40), (50, 0))) == seen[2]
+
+    def test_it_is_drawn_again_after_the_picture_is_lost(self, view: Any) -> None:
+        before = picture(view)
+        view.page.evaluate(
+            """() => new Promise((done) => {
+              const canvas = document.getElementById("solid"), gl = canvas.getContext("webgl2");
+              const lost = gl.getExtension("WEBGL_lose_context");
+              const restore = () => setTimeout(() => lost.restoreContext(), 50);
+              canvas.addEventListener("webglcontextrestored", () => setTimeout(done, 50));
+              canvas.addEventListener("webglcontextlost", restore);
+              lost.loseContext();
+            })"""
+        )
+        assert picture(view) == before
+
     def test_the_slider_cuts_and_fills_again(self, view: Any) -> None:
         whole = picture(view)
         view.page.locator("#slider").fill("3000")

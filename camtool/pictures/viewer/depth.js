@@ -13,6 +13,8 @@ const KEY_TURN = Math.PI / 24;
  * 2nd, 4th … height, and a smaller share of the pixels. */
 const SLOW_FRAME_MS = 28;
 const DETAILS = [[1, 1], [2, 0.8], [4, 0.6], [8, 0.5], [8, 0.35]];
+/** Then only so many ends of the latest lines of the path are drawn. */
+const COARSE_ENDS = 10000;
 const FULL_AFTER_MS = 250;
 /** [azimuth, elevation] by key: from the front, the side, the top, and between all of them. */
 const SIDES = {
@@ -236,12 +238,19 @@ class Depth {
     // Without a tool there is nothing else to see.
     this.hasPath = find("path-shown").checked = !this.turns.length;
     this.turn(...SIDES.i);
+    // A computer that slept may have lost what it held for the picture.
+    this.canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
+    this.canvas.addEventListener("webglcontextrestored", () => {
+      this.gl = this.post = this.shaped = null;
+      this.start();
+      stage.soon("all");
+    });
   }
 
   /** Start WebGL; false where the browser does not have it. */
   start() {
     if (this.gl) return true;
-    const gl = this.canvas.getContext("webgl2", { antialias: true, alpha: false });
+    const gl = this.canvas.getContext("webgl2", { antialias: false, alpha: false });
     if (!gl) return false;
     this.gl = gl;
     this.bottom = this.head.stock.bottom;
@@ -607,7 +616,9 @@ class Depth {
     gl.uniform1i(at.isLine, 1);
     const done = first[run.row + (run.share === 1 ? 1 : 0)];
     gl.uniform4f(at.over, 0, 0, 0, 0);
-    gl.drawArrays(gl.LINES, 0, done);
+    const from = this.detail ? Math.max(0, done - COARSE_ENDS) : 0;
+    gl.drawArrays(gl.LINES, from, done - from);
+    if (this.detail) return;
     gl.uniform4f(at.over, ...rgb(colours.pale), 1);
     gl.drawArrays(gl.LINES, done, first[moves.count] - done);
   }
