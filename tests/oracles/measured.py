@@ -17,7 +17,7 @@ from camtool.machine.model import Machine
 from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import ALL
 
-CHORD_RAD = 0.002
+CHORD_RAD = 0.0005
 
 
 def readings(
