@@ -222,7 +222,7 @@ class _Layers:
         operation, contract, depth = self.operation, self.operation.contract, self.depth_mm
         if contract.cuts == "over":
             yield self._straight(Polylines.of([]), OUTSIDE, depth)
-        elif contract.cuts == "at":
+        elif contract.cuts == "at" and contract.takes == "holes":
             yield from self._holes()
         elif contract.cuts == "within" and contract.leaves_walls:
             yield self._straight(self._region(), INSIDE, depth, shift_mm=-self._left_mm)
@@ -245,7 +245,8 @@ class _Layers:
                 box = Polyline(np.array(corners, dtype=np.float64), closed=True)
                 yield self._straight(Polylines.of([box]), INSIDE, self._floor_mm)
         elif contract.cuts == "at":
-            yield from self._holes()
+            if contract.takes == "holes":  # others may cut anywhere along their lines
+                yield from self._holes()
         elif contract.cuts == "within" and contract.leaves_walls:
             if tool.kind in MILLS:
                 region = offset_shape(self._region(), self._left_mm + tool.radius_mm)
