@@ -285,7 +285,8 @@ def post_by_tool(
     compensate: bool = False,
     gates: Gates | None = None,
 ) -> tuple[Run, ...]:
-    """As `post`, a program for each turn of a tool, for machines that change none.
+    """As `post`, with one program for each stretch that one tool cuts: for machines without a tool
+    changer.
 
     All of them are planned together, in one work frame; each is complete, and judged alone against
     what its operations ask for. Raises as `post` does. Source: docs/verifying.md.

@@ -157,7 +157,8 @@ def post_by_tool(
     trace_points: int | None = None,
     progress: Progress | None = None,
 ) -> tuple[Run, ...]:
-    """As `post_drawing`, a program for each turn of a tool: for machines that change none.
+    """As `post_drawing`, with one program for each stretch that one tool cuts, for machines
+    without a tool changer.
 
     All are planned together, in one frame, so that they cut what the one program would; each is
     complete and judged alone, against what its operations ask for.

@@ -169,9 +169,9 @@ class MachineFlags:
     def of(
         cls, target: str | None, machine: str | None, settings: tuple[str, ...]
     ) -> MachineFlags:
-        """Resolve the flags: the name of a machine becomes its file, also for a target if the user
-        has a machine with that name; without either flag, the default of the project or the user
-        applies."""
+        """Resolve the flags. The name of a machine is replaced by its file; so is the name of a
+        target, if the user has a machine so called. Without either flag the default of the project
+        applies, else that of the user."""
         from camtool.project import project_of
         from camtool.target.registry import target_names
 

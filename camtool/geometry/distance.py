@@ -99,8 +99,8 @@ def nearest(points: Floats, segments: Segments) -> Nearest:
 
 
 def approach(a: Polyline, b: Polyline) -> NearestApproach:
-    """Compute the least distance of two paths, and a point of one of them at that distance from
-    the other; 0 where they cross."""
+    """Return the least distance between two paths, and a point on either where it is reached; 0
+    where they cross."""
     first, second = Segments.of(a), Segments.of(b)
     boxes, others = segment_boxes(first), segment_boxes(second)
     if len(a.vertices) * len(second) <= FEW_PAIRS:

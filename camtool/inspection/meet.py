@@ -610,7 +610,8 @@ class Bench(Struct, eq=False, dict=True):
         return trial
 
     def try_changes(self, proposal: JobChanges) -> MeetingTrial | None:
-        """Try a proposal; None if it cannot be cut or the program has errors."""
+        """Post the job with the changes of a proposal and inspect the part. Return the trial; None
+        if the job cannot be cut or the program has errors."""
         self.trials += 1
         self.progress.done += 1
         try:

@@ -80,7 +80,7 @@ class _Reader:
         self._realtime: list[int] = []
 
     def read(self) -> Toolpath:
-        """The moves, with the findings."""
+        """Read the program and return its moves, which hold the findings about it."""
         number, parser = 0, self.parser
         while number < self._lines.count:
             if parser.reads_columns and not parser.ended:

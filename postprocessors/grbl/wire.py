@@ -625,8 +625,8 @@ class GrblConversation(Conversation):
             self._write(JOG_CANCEL + HOLD if state == "Jog" else HOLD)
 
     def _where(self, fields: str, now: float) -> None:
-        """Compute the position in the work frame from the fields of a report, and whether it slows
-        down."""
+        """Store the position in the work frame from the fields of a status report, and whether the
+        feed falls from one report to the next: the machine slows down."""
         said = dict(field.split(":", 1) for field in fields.split("|") if field)
         feed, before = said.get("FS", said.get("F", "")).partition(",")[0], self._feed
         self._feed = float(feed) if _FEED.fullmatch(feed) else 0.0

@@ -207,7 +207,8 @@ def _job_of_arrays(
 
 
 def _check_repeats(job: ReadJob, xy: Ints) -> None:
-    """Check that xy repeats the first point, lxy and the signs of velxy."""
+    """Refuse a job whose tables disagree: xy must begin at first_pointx and first_pointy, its
+    steps must have the lengths in lxy and the signs of the speeds in velxy."""
     for axis, name in enumerate(("first_pointx", "first_pointy")):
         if int(job.first[axis]) != int(xy[axis, 0]):
             fail(

@@ -82,7 +82,8 @@ def _why_nothing_drawn(kind: str, height: float | None) -> str:
 def _choose_faces(
     body: Body, box: tuple[float, ...], height: float | None
 ) -> tuple[str, list[Any], list[Any], float | None]:
-    """Kind, faces, loose edges and height of what is drawn of one body."""
+    """Choose the faces of a body whose outlines become the drawing; return their kind, the faces,
+    the edges that belong to no face, and their height."""
     from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SOLID
 
     flat = box[5] - box[2] <= POSITION_EPS_MM

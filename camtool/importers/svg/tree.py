@@ -160,7 +160,8 @@ class _Builder(ContentHandler):
         self._count = 0
 
     def start(self, name: str, attributes: dict[str, str], line: int) -> None:
-        """An element: names are "namespace name prefix", or bare without a namespace."""
+        """Handle a start tag. The parser gives names as "namespace name prefix", separated by
+        spaces, or bare without a namespace."""
         self._count += 1
         if len(self._open) >= MAX_DEPTH or self._count > MAX_ELEMENTS:
             deep = len(self._open) >= MAX_DEPTH

@@ -33,8 +33,8 @@ ALIGN_BYTES = 4
 
 
 def columns_of(content: Content, run: Playback | None) -> Columns:
-    """The columns for which the page's script has functions of its own; those of what the scene
-    does not have are empty."""
+    """Return the columns of numbers that the page's script draws by functions of its own (moves,
+    drawing, trace …); a column is empty where the scene has nothing of that kind."""
     scene = content.scene
     places = {
         "start_at": content.moves.starts,
