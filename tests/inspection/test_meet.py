@@ -254,7 +254,7 @@ def test_grids_of_allowances_hold_nothing_cheaper(tmp_path: Path, allowance: str
     names = sorted({*bench.contours.of_path})
     circle, window, outline = names
     scores = []
-    for one, other in itertools.product(np.arange(0.0, 0.03, 0.005) + shift, repeat=2):
+    for one, other in itertools.product(np.arange(0.0, 0.03, 0.0075) + shift, repeat=2):
         left = bench.contours.left({circle: float(one), outline: float(other), window: shift})
         trial = bench.try_changes(JobChanges(left=left))
         assert trial is not None

@@ -1,6 +1,5 @@
 """Verdicts of parts that are really planned, written, read back and simulated."""
 
-import itertools
 import math
 from pathlib import Path
 
@@ -217,7 +216,7 @@ def test_the_probability_is_the_worst_of_all_rooms(plate: Path) -> None:
     assert unknown.verdict == "in"
     step = at_room(plate).target.machine.axes.x.coded_step_mm
     chances = []
-    for share in np.linspace(-GROWS, GROWS, 5):
+    for share in np.linspace(-GROWS, GROWS, 3):
         real = step * (1.0 + float(share))
         larger = f"axes.x.real_step_mm={real}", f"axes.y.real_step_mm={real}"
         one = verdicts(at_room(plate, *larger, *KNOWN), hole)[0]
@@ -441,9 +440,7 @@ def test_each_copy_is_inspected(plate: Path) -> None:
     assert found[0].fit_mm == pytest.approx(found[1].fit_mm, abs=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("rotate", "mirror"), [*itertools.product(("0deg", "90deg"), (None, "x"))]
-)
+@pytest.mark.parametrize(("rotate", "mirror"), [("0deg", "x"), ("90deg", None), ("90deg", "x")])
 def test_turned_and_mirrored_with_exchanged_axes_no_verdict_changes(
     plate: Path, rotate: str, mirror: str | None
 ) -> None:
