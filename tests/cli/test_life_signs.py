@@ -14,7 +14,7 @@ import pytest
 from camtool.cli import life_signs as module
 from camtool.cli.life_signs import LifeSigns, life_signs
 from camtool.progress import Progress
-from tests.waiting import all_written
+from tests.waiting import HANG_S, all_written
 
 
 class Terminal(io.StringIO):
@@ -44,7 +44,7 @@ def test_the_stage_is_shown_and_wiped_out_at_the_end() -> None:
     stream = Terminal()
     with life_signs(stream, ["post", "a.dxf"]) as signs:
         signs.progress.begin("planning")
-        assert stream.seen.wait(60.0)
+        assert stream.seen.wait(HANG_S)
     lines = stream.getvalue().split("\r")
     assert lines[0] in ("camtool: 0 s", "camtool: planning, 0 s")
     assert lines[-1] == ""

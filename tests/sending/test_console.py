@@ -17,7 +17,7 @@ from camtool.target.terminal import Terminal
 from tests.postprocessors.grbl.test_wire import Small
 from tests.sending.test_ends import hosted
 from tests.sending.test_send import behind_a_terminal
-from tests.waiting import heard_from
+from tests.waiting import HANG_S, heard_from
 
 
 def typed(name: str, text: str, *more: str) -> str:
@@ -26,7 +26,7 @@ def typed(name: str, text: str, *more: str) -> str:
     with hosted(twin, 20.0) as port:
         command = [sys.executable, "-m", "camtool", "console", name, port, "--baud", "9600", *more]
         done = subprocess.run(
-            command, input=text, capture_output=True, text=True, check=False, timeout=60
+            command, input=text, capture_output=True, text=True, check=False, timeout=HANG_S
         )
     assert done.returncode == 0, done.stderr
     return done.stdout
@@ -65,13 +65,13 @@ def test_at_a_terminal_ctrl_c_stops_the_machine_and_then_ends() -> None:
             os.write(master, b"G1 X100 F600\n")
             heard_from(running, "ok")
             running.send_signal(signal.SIGINT)
-            deadline = time.monotonic() + 20.0
+            deadline = time.monotonic() + HANG_S
             while twin.state != "Hold:0" and time.monotonic() < deadline:
                 time.sleep(0.05)
             assert twin.state == "Hold:0"
             assert running.poll() is None
             running.send_signal(signal.SIGINT)
-            assert running.wait(20.0) == 0
+            assert running.wait(HANG_S) == 0
     os.close(master)
     os.close(slave)
 

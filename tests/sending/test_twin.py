@@ -15,6 +15,7 @@ import serial
 from camtool.cli.twin import parse_address, parse_speed
 from camtool.errors import OptionError
 from tests.feeding import logo, made, motion
+from tests.waiting import HANG_S
 
 BANNER = b"Grbl 1.1h ['$' for help]\r\n"
 
@@ -53,9 +54,9 @@ def test_the_logo_over_a_pseudo_terminal(tmp_path: Path) -> None:
     program, file = logo("grbl"), tmp_path / "slides.csv"
     wanted = motion(program, made("grbl")[1])
     with running("grbl", "--speed", "max", "--once", "--trace", str(file)) as (it, name):
-        with serial.Serial(name, 115200, timeout=30) as port:
+        with serial.Serial(name, 115200, timeout=HANG_S) as port:
             feed_grbl(port, program)
-        assert it.wait(60) == 0
+        assert it.wait(HANG_S) == 0
     rows = traced(file)
     assert [row[2:5] for row in rows] == wanted.commanded.tolist()
     assert [row[5:] for row in rows] == wanted.slide.tolist()
@@ -66,11 +67,11 @@ def test_a_program_of_echoes_over_a_pseudo_terminal(tmp_path: Path) -> None:
     block, file = b"G01X00014.00Y00007.00F08;", tmp_path / "slides.csv"
     outputs = len(motion(block, made("pic-mmh")[1]))
     with running("pic-mmh", "--speed", "max", "--once", "--trace", str(file)) as (it, name):
-        with serial.Serial(name, 9600, timeout=30) as port:
+        with serial.Serial(name, 9600, timeout=HANG_S) as port:
             port.write(block)
             assert port.read(len(block)) == block
             assert len(port.read(outputs)) == outputs
-        assert it.wait(60) == 0
+        assert it.wait(HANG_S) == 0
     assert len(traced(file)) == outputs
 
 
@@ -78,7 +79,7 @@ def test_tcp_is_on_loopback_and_serves_one_client_after_another() -> None:
     with running("grbl", "--tcp", "0", "--speed", "max") as (_, name):
         assert name.startswith("socket://127.0.0.1:")
         for place in (b"1.000", b"2.000"):
-            with serial.serial_for_url(name, timeout=30) as port:
+            with serial.serial_for_url(name, timeout=HANG_S) as port:
                 feed_grbl(port, b"G1X%sF500\nG4P0.01\n" % place)
                 port.write(b"?")
                 assert b"MPos:" + place in port.read_until(b"\r\n")
@@ -86,7 +87,7 @@ def test_tcp_is_on_loopback_and_serves_one_client_after_another() -> None:
 
 def test_a_plug_that_is_pulled_ends_it() -> None:
     with running("grbl", "--tcp", "0", "--fault", "unplug=100ms") as (it, _):
-        assert it.wait(30) == 0
+        assert it.wait(HANG_S) == 0
 
 
 @pytest.mark.parametrize(
@@ -102,7 +103,7 @@ def test_a_plug_that_is_pulled_ends_it() -> None:
 )
 def test_wrong_use_is_one_line(arguments: list[str], words: str) -> None:
     made_of = [sys.executable, "-m", "camtool", "twin", *arguments]
-    result = subprocess.run(made_of, capture_output=True, text=True, timeout=60)
+    result = subprocess.run(made_of, capture_output=True, text=True, timeout=HANG_S)
     assert result.returncode == 2
     assert words in result.stderr
     assert len(result.stderr.splitlines()) == 1
