@@ -233,5 +233,6 @@ def _text(
         removed, lowest = stock.removed_mm3(), stock.lowest
         x, y = lowest.at_mm
         lines.append(f"cut away: between {removed.low:.4g} and {removed.high:.4g} mm³")
-        lines.append(f"deepest: {lowest.low:.4f} mm at X {x:.3f} Y {y:.3f}")
+        deep = f"deepest: {lowest.low:.4f} mm at X {x:.3f} Y {y:.3f}"
+        lines.append(deep if lowest.high > 0.0 else "nothing is cut")
     return "\n".join(lines)

@@ -110,6 +110,14 @@ def test_what_is_wrong_with_a_program_is_said(camtool: Run, cut: Path) -> None:
     assert b"M77" in done.stderr or b"77" in done.stderr
 
 
+def test_a_program_above_the_stock_cuts_nothing(camtool: Run, cut: Path) -> None:
+    cut.write_text("G21 G90 G17 G94\nG0 X0 Y0 Z1\nG1 X20 F100\nM2\n")
+    done = camtool("measure", cut, *EXACT, "--volume", "--at", "5,0")
+    assert done.returncode == 0, done.stderr
+    assert b"nothing is cut" in done.stdout
+    assert b"X 5 Y 0: Z 0.0000 mm" in done.stdout
+
+
 def test_a_program_without_a_known_tool_is_refused(camtool: Run, cut: Path) -> None:
     done = camtool("measure", cut, "-t", "linuxcnc", "--at", "1,1")
     assert done.returncode == 2
