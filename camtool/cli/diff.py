@@ -139,7 +139,7 @@ def diff(
 
 
 class _Side:
-    """One side of the comparison: a file, its machine and its job."""
+    """A side of the comparison: a file, its machine and its job."""
 
     def __init__(
         self, file: str, machine: MachineFlags, job: JobFlags, drawing: DrawingFlags

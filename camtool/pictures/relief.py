@@ -31,7 +31,7 @@ ROWS_AT_ONCE = 64
 """Rows of a picture that are coloured together."""
 
 THROUGH_MM = 1e-4
-"""What is left of the stock, if thinner, is none."""
+"""Stock thinner than this under a cut counts as cut through."""
 
 TOP, DEEP, SIDE = "#ecd2a6", "#b07a45", "#d3a973"
 """Colours of the material: its top, the deepest floors, and between them the walls."""
@@ -52,7 +52,7 @@ WALL_REACHES = (3, 2)
 """Cells over which heights are averaged for the direction of a wall."""
 
 GLOSS = 0.05
-"""How much lighter and darker the marks of a tool are, by the direction in which it cut."""
+"""Change of brightness of the marks of a tool, by the direction in which it cut."""
 
 
 class Camera(Struct, frozen=True):
@@ -94,7 +94,7 @@ CAMERAS = {
 
 
 class Stage(Struct, frozen=True, eq=False):
-    """What is lit: heights (NY, NX) mm of the stock and of the board around it, `margin` cells
+    """The lit scene: heights (NY, NX) mm of the stock and of the board around it, `margin` cells
     wide; the heights of the board (`bottom_mm`) and of the deepest floor (`deep_mm`). `marks`
     (NY, NX): how the marks of the tool catch the light, −1 … 1. `tint` (NY, NX, 3): the light of
     the colours of floors, in place of those of the material."""

@@ -118,7 +118,7 @@ GHOST_PEN, GHOST_ALPHA = 1.3, "8c"
 
 
 class Solid(Struct, frozen=True, eq=False):
-    """What a picture of the stock shows: the block and its moves, the map of the part that is
+    """The content of a picture of the stock: the block and its moves, the map of the part that is
     shown, where that part ends in X and Y, and how much (NY, NX) mm it is higher or lower than
     wanted, None if not asked for."""
 

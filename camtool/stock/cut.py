@@ -155,7 +155,7 @@ def cut_box(moves: StockMoves) -> Box:
 
 
 class StockDifference(Struct, frozen=True):
-    """What the second of two stocks has cut differently from the first.
+    """The difference of two stocks.
 
     `deeper`, `shallower`: the greatest distance, mm, by which the second cuts where the first does
     not, and the reverse, each with its place; `more_mm3`, `less_mm3`: the volumes of these.

@@ -125,7 +125,7 @@ def svg_paths(element: svg_page.Element, flipped: bool = False) -> list[Floats]:
 
 
 def live_rows(page: str) -> int:
-    """How many rows of the viewer's page of `send --live` are done."""
+    """Number of rows that the page of `send --live` shows as done."""
     return int(json.loads(_of(page, "sent"))["row"]) + 1
 
 
