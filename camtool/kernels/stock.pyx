@@ -11,8 +11,9 @@ facts make bounds over a square:
 - So is every mean of the heights of two moves, and the stock lies below each such mean. Between
   two passes the slopes of both cancel in it, so the bound errs by the square of the square's size
   instead of by the size itself.
-- The mean of a convex function over a square is at least its value at the middle, and at most the
-  mean of its values at the corners (Hermite and Hadamard).
+- The mean of a convex function over a square is at most that of its values at the corners, and
+  that of a concave one at least (Hermite and Hadamard). A convex function lies above its tangent
+  planes, and the least of several planes is concave.
 
 `tests/oracles/stock_heights.py` is the twin.
 """
@@ -125,6 +126,43 @@ cdef inline double height_of(
     return move[AZ] + move[SLOPE] * s + profile(tool, min(apart, wide), grow)
 
 
+cdef inline double tangent_of(
+    const double* move, const double* tool, double x, double y, double* slope
+) noexcept nogil:
+    """Height to which a move cuts a point, and the slope in x and y of a plane through it below
+    which the height of the move nowhere lies; inf where there is none or it is not known: beyond
+    the tool, and where the edge of the tool cuts deepest."""
+    cdef double px = x - move[AX], py = y - move[AY], wide = tool[RADIUS]
+    cdef double along, aside, s, apart, reach, dx, dy, out, steep
+    slope[0], slope[1] = 0.0, 0.0
+    along = px * move[UX] + py * move[UY]
+    s = min(max(along, 0.0), move[LONG])
+    if move[SLOPE] != 0.0:
+        aside = math.fabs(px * move[UY] - py * move[UX])
+        if aside >= wide:
+            return math.INFINITY
+        reach = math.sqrt(wide * wide - aside * aside)
+        s = downhill(tool, aside, math.fabs(move[SLOPE]), reach, 0.0)
+        if s >= reach:
+            return math.INFINITY
+        s = along - s if move[SLOPE] > 0.0 else along + s
+        s = min(max(s, 0.0), move[LONG])
+    dx, dy = px - s * move[UX], py - s * move[UY]
+    apart = math.sqrt(dx * dx + dy * dy)
+    if apart >= wide:
+        return math.INFINITY
+    out = apart - tool[FLAT]
+    if out > 0.0:
+        if tool[CORNER] > 0.0:
+            if out >= tool[CORNER]:
+                return math.INFINITY
+            steep = out / math.sqrt(tool[CORNER] * tool[CORNER] - out * out)
+        else:
+            steep = tool[RISE]
+        slope[0], slope[1] = steep * dx / apart, steep * dy / apart
+    return move[AZ] + move[SLOPE] * s + profile(tool, apart, 0.0)
+
+
 cdef class StockTree:
     """The moves (M, 7) in the order of a curve through the plane, the tool (M,) and the number in
     the order of cutting (M,) of each; tools (T, 4); the nodes (N, 7) of all levels, the root's
@@ -216,29 +254,77 @@ cdef class StockTree:
     cdef void mean_of(
         self, const double* square, double bottom, Int* guess, double* low, double* high
     ) noexcept nogil:
-        """Bounds of the mean height over a square: those of the move that is lowest at its middle,
-        if no other is lower anywhere; else the least and the greatest height."""
-        cdef double x = square[0], y = square[1], half = square[2], most, other, average
-        cdef double room = half * math.sqrt(2.0)
+        """Bounds of the mean height over a square. From below: the least of the tangent planes of
+        all moves that may be lowest there is concave, so its mean is at least that of the four
+        corners. From above: the mean of the corners of the best move."""
+        cdef Int stack[FAN * DEPTH]
+        cdef int levels[FAN * DEPTH]
+        cdef double x = square[0], y = square[1], half = square[2]
+        cdef double room = half * math.sqrt(2.0), best, z, average
         cdef double[2] level
+        cdef double[2] slope
         cdef double[4] now
-        cdef Int row = -1, ignored = -1
-        cdef int k
-        cdef double middle = self.lowest(x, y, 0.0, self.top, -1, &row, guess[0])
+        cdef double[4] least
+        cdef int count, depth, k
+        cdef Int node, child, end, row = -1
         level[0], level[1] = 0.0, 0.0
+        low[0], high[0] = self.top, self.top
+        if self.height == 0:
+            return
+        self.lowest(x, y, 0.0, self.top, -1, &row, guess[0])
+        best = self.top
         if row >= 0:
             guess[0] = row
-            most = self.corners(row, square, level, 0.0, now)
-            if most <= self.top:
-                other = self.lowest(x, y, room, self.top, -1, &ignored, -1, row)
+            z = self.corners(row, square, level, 0.0, now)
+            if z <= best:
+                best, average = z, 0.0
+                for k in range(4):
+                    average += 0.25 * max(now[k], bottom)
+                high[0] = average
+        # Moves that are nowhere lower than `best` are not looked at; they leave no less than it.
+        for k in range(4):
+            least[k] = best
+        stack[0], levels[0], count = 0, self.height - 1, 1
+        while count:
+            count -= 1
+            node, depth = stack[count], levels[count]
+            row = self.levels[depth] + node
+            if not self.nearer(&self.nodes[row, 0], x, y, room, 0.0) < best:
+                continue
+            end = min(FAN * (node + 1), self.members(depth))
+            if depth:
+                for child in range(FAN * node, end):
+                    stack[count], levels[count] = child, depth - 1
+                    count += 1
+                continue
+            for child in range(FAN * node, end):
+                if self.moves[child, AZ] + min(
+                    self.moves[child, SLOPE] * self.moves[child, LONG], 0.0
+                ) >= best:
+                    continue
+                z = tangent_of(
+                    &self.moves[child, 0], &self.tools[self.tool[child], 0], x, y, slope
+                )
+                if z == math.INFINITY:
+                    z = height_of(
+                        &self.moves[child, 0], &self.tools[self.tool[child], 0], x, y, room
+                    )
+                    slope[0], slope[1] = 0.0, 0.0
+                for k in range(4):
+                    least[k] = min(
+                        least[k],
+                        z
+                        + (half if k & 1 else -half) * slope[0]
+                        + (half if k & 2 else -half) * slope[1],
+                    )
+                if self.corners(child, square, level, 0.0, now) == math.INFINITY:
+                    continue
                 average = 0.0
                 for k in range(4):
                     average += 0.25 * max(now[k], bottom)
-                if other >= most:
-                    low[0], high[0] = max(middle, bottom), average
-                    return
-        low[0] = max(self.lowest(x, y, room, self.top, -1, &ignored, guess[0]), bottom)
-        high[0] = max(self.bound(square, level, 0.0, guess), bottom)
+                high[0] = min(high[0], average)
+        low[0] = max(0.25 * (least[0] + least[1] + least[2] + least[3]), bottom)
+        high[0] = max(high[0], low[0])
 
     cdef inline double nearer(
         self, const double* node, double x, double y, double room, double grow
@@ -265,10 +351,9 @@ cdef class StockTree:
         Int before,
         Int* which,
         Int guess,
-        Int skipped=-1,
     ) noexcept nogil:
         """Least height over a point, below `top`, and the row of the move there. `guess`: a move
-        that may be low there; one may be `skipped`."""
+        that may be low there."""
         cdef Int stack[FAN * DEPTH]
         cdef int levels[FAN * DEPTH]
         cdef int count = 0, level
@@ -295,8 +380,6 @@ cdef class StockTree:
                     if self.moves[child, AZ] + min(
                         self.moves[child, SLOPE] * self.moves[child, LONG], 0.0
                     ) >= best or (before >= 0 and self.number[child] >= before):
-                        continue
-                    if child == skipped:
                         continue
                     z = height_of(
                         &self.moves[child, 0], &self.tools[self.tool[child], 0], x, y, grow
