@@ -260,7 +260,7 @@ cdef class StockTree:
         cdef Int stack[FAN * DEPTH]
         cdef int levels[FAN * DEPTH]
         cdef double x = square[0], y = square[1], half = square[2]
-        cdef double room = half * math.sqrt(2.0), best, z, average
+        cdef double room = half * math.sqrt(2.0), best, floor, z, average
         cdef double[2] level
         cdef double[2] slope
         cdef double[4] now
@@ -282,6 +282,7 @@ cdef class StockTree:
                     average += 0.25 * max(now[k], bottom)
                 high[0] = average
         # Moves that are nowhere lower than `best` are not looked at; they leave no less than it.
+        floor = best
         for k in range(4):
             least[k] = best
         stack[0], levels[0], count = 0, self.height - 1, 1
@@ -302,14 +303,19 @@ cdef class StockTree:
                     self.moves[child, SLOPE] * self.moves[child, LONG], 0.0
                 ) >= best:
                     continue
-                z = tangent_of(
+                z = height_of(
+                    &self.moves[child, 0], &self.tools[self.tool[child], 0], x, y, room
+                )
+                if z >= best:
+                    continue
+                floor = min(floor, z)
+                average = tangent_of(
                     &self.moves[child, 0], &self.tools[self.tool[child], 0], x, y, slope
                 )
-                if z == math.INFINITY:
-                    z = height_of(
-                        &self.moves[child, 0], &self.tools[self.tool[child], 0], x, y, room
-                    )
+                if average == math.INFINITY:
                     slope[0], slope[1] = 0.0, 0.0
+                else:
+                    z = average
                 for k in range(4):
                     least[k] = min(
                         least[k],
@@ -323,7 +329,7 @@ cdef class StockTree:
                 for k in range(4):
                     average += 0.25 * max(now[k], bottom)
                 high[0] = min(high[0], average)
-        low[0] = max(0.25 * (least[0] + least[1] + least[2] + least[3]), bottom)
+        low[0] = max(0.25 * (least[0] + least[1] + least[2] + least[3]), floor, bottom)
         high[0] = max(high[0], low[0])
 
     cdef inline double nearer(
