@@ -1681,6 +1681,10 @@ class GrblTwin(Twin):
             (begin + self._signs * moved[:last]) * step_mm, seconds, np.zeros(last), total
         )
         self.slides.begin(travel, self.now, -1)
+        if whole:
+            # Its blocks have no spindle, so their segments stop it (`st_prep_buffer`); a startup
+            # line with the same M3 and S as before does not start it again.
+            self._rpm, self._lit, self._fresh_rpm = 0.0, False, False
         while self.slides.ends_s is not None and not self._flags & {"door", "reset"}:
             yield None
         done = self.slides.done
