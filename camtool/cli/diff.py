@@ -29,9 +29,11 @@ from camtool.units import UM_PER_MM
 
 if TYPE_CHECKING:
     from camtool.pictures.scene import Scene
+    from camtool.planning.job import Job
     from camtool.run import Run
     from camtool.stock.cut import CutStock, StockDifference
     from camtool.stock.heights import Bracket
+    from camtool.target.registry import LoadedTarget
 
 DEFAULT_LIMIT_MM = 0.01
 """Stocks that differ by no more count as equal."""
@@ -131,10 +133,9 @@ def diff(
     if not quiet and STDOUT not in files:
         show_text(_text(found, names))
     if differs:
-        say(
-            f"camtool: the two differ by more than {limit_mm:g} mm",
-            quiet=quiet,
-        )
+        proved = max(found.deeper.low, found.shallower.low) > limit_mm
+        how = "differ by" if proved else "may differ by"
+        say(f"camtool: the two {how} more than {limit_mm:g} mm", quiet=quiet)
     return int(differs)
 
 
@@ -157,23 +158,21 @@ class _Side:
         are said."""
         from camtool.stock.cut import cut_stock
 
-        job = self.job.job(self.drawing)
+        target, job = self.machine.load(), self.job.job(self.drawing)
         with self.job.name_job_file():
-            run = self._run()
+            run = self._run(target, job)
             say_findings(run.findings, quiet=quiet, verbose=verbose)
             if run.failed or run.decoded is None:
                 say(f"camtool: error: {self.name}: its errors above come first", quiet=False)
                 return None
-            return cut_stock(run.decoded, self.machine.load(), job)
+            return cut_stock(run.decoded, target, job)
 
-    def _run(self) -> Run:
+    def _run(self, target: LoadedTarget, job: Job) -> Run:
         """Return the program of this side, read or made."""
         from camtool.pipeline import post_drawing, read_program
 
-        target = self.machine.load()
         if self.drawing.is_program(self.file, target):
             return read_program(read_bytes(self.file), target, source=display_name(self.file))
-        job = self.job.job(self.drawing)
         read = self.drawing.read(self.file, target.machine, job)
         return post_drawing(read, job, target, check=False, progress=progress())
 

@@ -1,9 +1,9 @@
 """The motions of the tools through the stock: straight moves of tips, in the order of cutting.
 
-They are those of the simulated slides, with all of the mechanics, thinned: of the samples of a
-controller only those are kept that a straight move between kept ones would miss by more than
-`beside_mm`. Every sample lies within that distance of the moves, so every figure of the stock is
-known to within what this distance does to it.
+They are those of the simulated slides, with all of the mechanics, thinned
+(`camtool.stock.slides`), or those of a toolpath, whose arcs become chords. The true path lies
+nowhere farther than `beside_mm` from them, so every figure of the stock is known to within what
+this distance does to it.
 """
 
 from __future__ import annotations
