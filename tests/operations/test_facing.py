@@ -47,7 +47,7 @@ def posted(drawing: Path, *operations: Operation, target: str = "linuxcnc") -> P
 
 
 def cut_at(run: Posted, z_mm: float, radius_mm: float) -> Any:
-    """What the tool sweeps with its tip at a height, as a polygon."""
+    """Return the polygon that the tool sweeps with its tip at a height."""
     toolpath = run.wanted
     assert toolpath is not None
     level = toolpath.is_feed & np.isclose(toolpath.end[:, 2], z_mm)

@@ -130,7 +130,7 @@ def test_a_cut_that_is_too_deep_is_coloured_where_it_is() -> None:
     )
 
     def colour(pixels: Pixels, x: float, y: float) -> float:
-        """How far a colour is from grey."""
+        """Return the distance of a colour from grey."""
         return max(patch(pixels, x, y)) - min(patch(pixels, x, y))
 
     ring = [(9.6, 15.0), (20.4, 15.0), (15.0, 9.6), (15.0, 20.4), (12.0, 12.0)]

@@ -64,7 +64,7 @@ def slot(depth: float) -> Toolpath:
 
 
 def goal_of(path: Toolpath, tool: Tool) -> Callable[[], StockMoves]:
-    """What the moves of a path with one tool should cut."""
+    """Return a function that gives the moves of a path with one tool, as those that are wanted."""
     which = np.zeros(len(path), dtype=np.int64)
     return lambda: stock_moves_of_toolpath(path, which, (cutter_profile(tool),))
 
