@@ -6,10 +6,11 @@ import itertools
 import json
 import math
 from random import Random
+from unittest.mock import ANY
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from camtool.errors import DrawingError
@@ -18,6 +19,7 @@ from camtool.geometry.drawing import Drawing, Mark, Skipped, Units
 from camtool.geometry.facts import drawing_facts
 from camtool.geometry.findings import ContourCode
 from camtool.geometry.measure import path_lengths, signed_areas
+from camtool.geometry.overlaps import SAME_LINE_MM
 from camtool.geometry.polylines import Polyline
 from camtool.importers import healing
 from camtool.importers.assemble import MAX_PLACES, assemble
@@ -387,20 +389,47 @@ def test_exploded_outlines_are_joined_as_they_were_drawn(gap: float, seed: int) 
     check_exploded_outlines(gap, seed)
 
 
-@settings(derandomize=True)
 @given(seed=st.integers(0, 10**9))
 def test_exploded_outlines_with_a_wide_gap(seed: int) -> None:
-    """The same seeds each time: one of some thousands fails, that of the next test."""
     check_exploded_outlines(0.5, seed)
 
 
-@pytest.mark.xfail(strict=True, reason="a gap of 0.5 mm joins an outline in another way")
-def test_an_outline_that_a_wide_gap_joins_in_another_way() -> None:
-    check_exploded_outlines(0.5, 223768752)
+@pytest.mark.parametrize(("gap", "said"), [(0.003, "GAP_OPEN"), (0.5, "GAP_CLOSED")])
+def test_a_speck_that_doubles_back_is_drawn_twice(gap: float, said: str) -> None:
+    """A line of 6.1 µm lies within 0.1 µm of the next line, which begins at its end: it counts as
+    drawn twice, and the gap that is left is told or closed."""
+    _, drawing = heal_outlines(gap, 223768752)
+    found = {finding.code.name: finding.measured for finding in drawing.findings}
+    assert found == {"DRAWN_TWICE": pytest.approx(0.006115, abs=1e-6), said: ANY}
 
 
 def check_exploded_outlines(gap: float, seed: int) -> None:
     """Explode outlines at random, and compare what healing joins with what was drawn."""
+    rings, drawing = heal_outlines(gap, seed)
+    assume(not any(doubles_back(ring) for ring in rings))
+    assert len(drawing.paths) == len(rings)
+    for ring in rings:
+        assert sum(is_ring(path, ring, 1e-6) for path in drawing.paths) == 1
+    assert not [
+        f for f in drawing.findings if f.code in (DrawingCode.GAP_CLOSED, ContourCode.BRANCHED)
+    ]
+
+
+def doubles_back(ring: list[list[float]]) -> bool:
+    """True if two lines that follow each other lie within the width of one line."""
+    place = np.array(ring)[:, :2]
+    ways = np.roll(place, -1, axis=0) - place
+    straight = np.array(ring)[:, 2] == 0.0
+    length = np.hypot(*ways.T)
+    following, after = np.roll(ways, -1, axis=0), np.roll(length, -1)
+    across = np.abs(ways[:, 0] * following[:, 1] - ways[:, 1] * following[:, 0])
+    back = (ways * following).sum(axis=1) < 0.0
+    thin = across / np.maximum(length, after) <= 1.1 * SAME_LINE_MM
+    return bool((straight & np.roll(straight, -1) & back & thin).any())
+
+
+def heal_outlines(gap: float, seed: int) -> tuple[list[list[list[float]]], Drawing]:
+    """Draw outlines with specks, explode them into pieces, shuffle and heal these."""
     random = Random(seed)
     rings = [outline_with_specks(random, 10.0, (0.0, 0.0))]
     # An island, and one beside it by less than the gap.
@@ -414,10 +443,4 @@ def check_exploded_outlines(gap: float, seed: int) -> None:
         row[1], row[2] = math.sin(turn) * x + math.cos(turn) * y, flip * row[2]
     pieces = [one for ring in rings for one in exploded(ring, random)]
     random.shuffle(pieces)
-    drawing = put(*pieces, gap_mm=gap, tolerance_mm=1e-4)
-    assert len(drawing.paths) == len(rings)
-    for ring in rings:
-        assert sum(is_ring(path, ring, 1e-6) for path in drawing.paths) == 1
-    assert not [
-        f for f in drawing.findings if f.code in (DrawingCode.GAP_CLOSED, ContourCode.BRANCHED)
-    ]
+    return rings, put(*pieces, gap_mm=gap, tolerance_mm=1e-4)
