@@ -17,6 +17,7 @@ from camtool.bounds import stream_bytes
 from camtool.errors import CamtoolError, DrawingError, OptionError
 from camtool.importers.formats import find_format
 from camtool.importers.options import DEFAULTS, ReadOptions, flags_of
+from camtool.plugins import entry_points
 
 if TYPE_CHECKING:
     from camtool.geometry.drawing import Drawing
@@ -86,9 +87,7 @@ def _read_by_others(data: bytes, file: str, suffix: str, options: ReadOptions) -
 
     DrawingError, which names the plug-in, for one that is broken.
     """
-    from importlib.metadata import entry_points
-
-    for point in sorted(entry_points(group=GROUP), key=lambda point: point.name):
+    for point in sorted(entry_points(GROUP), key=lambda point: point.name):
         try:
             importer = cast(Importer, point.load())
             if importer.recognises(data, suffix):

@@ -16,12 +16,13 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 from pkgutil import iter_modules
 from typing import Any
 
 from camtool.errors import CamtoolError, OptionError
 from camtool.keys import Key
+from camtool.plugins import entry_points
 
 GROUP = "camtool.operations"
 
@@ -159,7 +160,7 @@ def _loaded() -> tuple[dict[str, OperationKind], dict[str, _Broken]]:
 def _entry_points() -> list[EntryPoint]:
     """The entry points of all kinds; also of our own that the installation does not know yet, in a
     checkout that was updated and not installed again."""
-    points = list(entry_points(group=GROUP))
+    points = entry_points(GROUP)
     known = {point.name for point in points}
     ours = iter_modules(import_module(GROUP).__path__)
     missing = (module.name for module in ours if module.name not in known)

@@ -13,7 +13,7 @@ import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, cast, get_args
 
@@ -21,6 +21,7 @@ import msgspec
 
 from camtool.errors import CamtoolError, MachineError, OptionError, PostError, UnknownTargetError
 from camtool.machine.model import Machine, PathController, TargetNames
+from camtool.plugins import entry_points
 from camtool.records import replace
 from camtool.tables import Table, read_table
 from camtool.target.contract import Target
@@ -173,7 +174,7 @@ class ListedTarget:
 
 def target_names() -> list[str]:
     """The names of all installed targets, sorted; no target is imported."""
-    return sorted(point.name for point in entry_points(group=GROUP))
+    return sorted(point.name for point in entry_points(GROUP))
 
 
 def load_target(
@@ -264,7 +265,7 @@ def find_target(name: str) -> tuple[Target, Path]:
 def _entry_point(name: str) -> EntryPoint:
     """Return the entry point of a target; UnknownTargetError with the nearest names if there is
     none."""
-    found = {point.name: point for point in entry_points(group=GROUP)}
+    found = {point.name: point for point in entry_points(GROUP)}
     if name not in found:
         near = difflib.get_close_matches(name, found, n=3, cutoff=0.4) or sorted(found)
         raise UnknownTargetError(

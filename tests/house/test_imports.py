@@ -14,6 +14,7 @@ BASE = {
     "arrays",
     "bounds",
     "plain",
+    "plugins",
     "errors",
     "units",
     "findings",
@@ -32,6 +33,7 @@ MADE = JUDGE | {"stock", "verification", "pictures", "run", "pipeline", "compari
 # Which rooms each room may import from (besides itself); docs/overview.md draws it.
 ALLOWED = {
     "plain": set(),
+    "plugins": set(),
     "errors": {"plain"},
     "bounds": {"errors"},
     "units": {"errors"},

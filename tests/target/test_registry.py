@@ -1,7 +1,10 @@
 """Targets are found by entry point; a broken one harms nothing else."""
 
+import os
 import pickle
-from importlib.metadata import EntryPoint, EntryPoints
+import sys
+from importlib.metadata import EntryPoint
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -30,7 +33,7 @@ def test_a_broken_plug_in_is_named_and_harms_nothing_else(
 ) -> None:
     broken = EntryPoint("broken", "no_such_module:POST", registry.GROUP)
     good = EntryPoint("pic-mmh", "camtool_postprocessors.pic_mmh:POST", registry.GROUP)
-    monkeypatch.setattr(registry, "entry_points", lambda group: EntryPoints([broken, good]))
+    monkeypatch.setattr(registry, "entry_points", lambda group: (broken, good))
     assert target_names() == ["broken", "pic-mmh"]
     assert load_target("pic-mmh").machine.target.name == "pic-mmh"
     with pytest.raises(MachineError, match="'broken' cannot be loaded") as caught:
@@ -40,6 +43,24 @@ def test_a_broken_plug_in_is_named_and_harms_nothing_else(
     assert [name for name, _ in each_target(list_target, broken=errors)] == ["pic-mmh"]
     assert [str(error) for error in errors] == [str(caught.value)]
     assert not list(each_target(list_target, prefix="grbl"))
+
+
+def test_a_package_installed_meanwhile_is_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "path", [*sys.path, str(tmp_path)])
+    os.utime(tmp_path, (1, 1))  # the clock of files may stand still for some milliseconds
+    before = target_names()
+    metadata = tmp_path / "meanwhile-1.0.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: meanwhile\nVersion: 1.0\n")
+    (metadata / "entry_points.txt").write_text(f"[{registry.GROUP}]\nmeanwhile = nowhere:POST\n")
+    assert target_names() == sorted([*before, "meanwhile"])
+    os.utime(tmp_path, (1, 1))
+    (metadata / "METADATA").unlink()
+    (metadata / "entry_points.txt").unlink()
+    metadata.rmdir()
+    assert target_names() == before
 
 
 def test_a_dialect_checks_its_own_table() -> None:
