@@ -105,6 +105,20 @@ def test_cells_are_as_high_as_the_tree_says(seed: int, count: int) -> None:
     assert off.sum() <= on_rim(moves, centres(found)[off]).sum()
 
 
+@pytest.mark.parametrize("slope", [1e-4, -1e-3, 0.01, -0.05, 0.3, -1.0, 4.0])
+@pytest.mark.parametrize("flat", [0.2, 1.2, 1.95])
+def test_a_bull_nose_may_slope_as_it_likes(slope: float, flat: float) -> None:
+    start = np.array([[3.0, 4.0, -2.5 + max(-slope, 0.0)]])
+    moves = moves_of(
+        start, [*start, [2.4, 0.7, 2.5 * slope]], 0, CutterProfile(2.0, flat, corner_mm=2.0 - flat)
+    )
+    found = height_map(moves, BOX, 0.083)
+    exact, _ = stock_tree(moves).heights(centres(found))
+    off = found.heights.ravel() - exact
+    assert off.min() > -1e-6
+    assert off.max() < 1e-6
+
+
 @settings(max_examples=10)
 @given(seed=st.integers(0, 10_000), count=st.integers(2, 60), part=st.integers(1, 59))
 def test_maps_add_up(seed: int, count: int, part: int) -> None:
