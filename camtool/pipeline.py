@@ -228,6 +228,7 @@ def _post_plan(
     repeated = _repeated_findings(program, decoded)
     findings = _merge_findings(findings, program.findings, decoded.findings, without=repeated)
     if judged is None:
+        findings = _merge_findings(findings, _stock_findings(Case(decoded, target), None, job))
         return replace(run, program=program, decoded=decoded, findings=findings)
     from camtool.planning.drawn import kept_of
     from camtool.stock.checks import stock_request
@@ -348,9 +349,8 @@ def verify_program(
     found = _judge_program(replace(case, options=options), data, progress)
     beyond = _gate_findings(found, judging.gates)
     beyond = (*_stock_gates(case, asked_of_stock, job, judging.gates), *beyond)
-    if asked_of_stock is not None:
-        planning = case.wanted.findings if case.wanted is not None else ()
-        beyond = (*_stock_findings(case, asked_of_stock, job or Job(), planning), *beyond)
+    planning = case.wanted.findings if case.wanted is not None else ()
+    beyond = (*_stock_findings(case, asked_of_stock, job or Job(), planning), *beyond)
     if beyond:
         found = found.with_findings((*found.findings, *beyond))
     return replace(
@@ -592,7 +592,7 @@ def _cut_mm(wanted: Toolpath) -> tuple[float, float, float, float] | None:
     None where nothing is cut, or nobody knows by which operation."""
     import numpy as np
 
-    from camtool.toolpath.rapids import feeds_below_top
+    from camtool.toolpath.moves import feeds_below_top
     from camtool.verification.cuts import is_flat
 
     operations = wanted.operations
@@ -688,26 +688,30 @@ def _beside_mm(case: Case) -> float:
 
 
 def _stock_findings(
-    case: Case, request: StockRequest, job: Job, planning: tuple[Finding, ...]
+    case: Case, request: StockRequest | None, job: Job, planning: tuple[Finding, ...] = ()
 ) -> tuple[Finding, ...]:
     """Return the findings of a program in its stock: of the path that its controller decodes, or
-    of the slides where that is bent against the mechanics. None where tools are not known, or cut
-    no width."""
-    from camtool.stock.checks import stock_findings
+    of the slides where that is bent against the mechanics. Where tools are not known, or cut no
+    width, or nothing is asked for (`request` None), only rapids are looked at."""
     from camtool.stock.moves import stock_moves_of_toolpath
+    from camtool.stock.rapids import rapid_findings
     from camtool.stock.slides import slide_moves, tools_of_rows
 
-    try:
-        tools = tools_of_rows(case.decoded, job)
-    except OptionError:
-        return ()
+    decoded, moves, tools = case.decoded, None, None
+    with suppress(OptionError):
+        tools = tools_of_rows(decoded, job)
+        moves = stock_moves_of_toolpath(decoded, tools.index, tools.cutters)
+    beside_mm = WALL_COVERAGES * case.coverage_mm
+    rapids = tuple(rapid_findings(decoded, moves, job.stock, beside_mm))
+    if moves is None or tools is None or request is None:
+        return rapids
     if not any(cutter.radius_mm for cutter in tools.cutters):
-        return ()
-    if case.compensated is None:
-        moves = stock_moves_of_toolpath(case.decoded, tools.index, tools.cutters)
-    else:
-        moves = slide_moves(case.decoded, case.target, tools, case.simulation)
-    return stock_findings(case.decoded, moves, request, case.depth_mm, planning)
+        return rapids
+    from camtool.stock.checks import stock_findings
+
+    if case.compensated is not None:
+        moves = slide_moves(decoded, case.target, tools, case.simulation)
+    return (*rapids, *stock_findings(decoded, moves, request, case.depth_mm, planning))
 
 
 def _stock_gates(

@@ -222,19 +222,31 @@ cdef class StockTree:
                 last = row
         return np.asarray(found)
 
-    def greatest(self, squares: Floats, tilt: Floats | None = None, double grow=0.0):
-        """(K,) an upper bound of the heights over each square: middle and half a side (K, 3). With
-        `tilt` (K, 2) it is one of the heights over the plane through 0 at the middle that rises so
-        much for each mm of x and y."""
+    def greatest(
+        self,
+        squares: Floats,
+        tilt: Floats | None = None,
+        double grow=0.0,
+        before: Ints | None = None,
+    ):
+        """(K,) an upper bound of the heights over each square: middle and half a side (K, 3);
+        after the first `before` (K,) moves only. With `tilt` (K, 2) it is one of the heights over
+        the plane through 0 at the middle that rises so much for each mm of x and y."""
         cdef double[:, ::1] at = np.ascontiguousarray(squares, dtype=np.float64)
         cdef double[:, ::1] slope
         cdef Py_ssize_t k, count = at.shape[0]
         cdef double[::1] found = np.empty(count)
+        cdef Int[::1] until
+        cdef bint timed = before is not None
         cdef Int last = -1
         slope = np.zeros((count, 2)) if tilt is None else np.ascontiguousarray(tilt)
+        if timed:
+            until = np.ascontiguousarray(before, dtype=np.int64)
         with nogil:
             for k in range(count):
-                found[k] = self.bound(&at[k, 0], &slope[k, 0], grow, &last)
+                found[k] = self.bound(
+                    &at[k, 0], &slope[k, 0], grow, until[k] if timed else -1, &last
+                )
         return np.asarray(found)
 
     def means(self, squares: Floats, double bottom=-math.INFINITY):
@@ -405,7 +417,7 @@ cdef class StockTree:
         return self.levels[level] - self.levels[level - 1]
 
     cdef double bound(
-        self, const double* square, const double* tilt, double grow, Int* guess
+        self, const double* square, const double* tilt, double grow, Int before, Int* guess
     ) noexcept nogil:
         """Upper bound of the heights over a square, and over a plane."""
         cdef double x = square[0], y = square[1], half = square[2]
@@ -420,7 +432,7 @@ cdef class StockTree:
         cdef double best = self.top + steep, z, room = half * math.sqrt(2.0), average
         if self.height == 0:
             return best
-        self.lowest(x, y, grow, self.top, -1, &middle, guess[0])
+        self.lowest(x, y, grow, self.top, before, &middle, guess[0])
         if middle < 0:
             return best
         guess[0] = middle
@@ -430,6 +442,8 @@ cdef class StockTree:
             count -= 1
             node, level = stack[count], levels[count]
             row = self.levels[level] + node
+            if before >= 0 and self.nodes[row, EARLIEST] >= before:
+                continue
             if not self.nearer(&self.nodes[row, 0], x, y, room, grow) - steep < best:
                 continue
             end = min(FAN * (node + 1), self.members(level))
@@ -441,7 +455,7 @@ cdef class StockTree:
             for child in range(FAN * node, end):
                 if self.moves[child, AZ] + min(
                     self.moves[child, SLOPE] * self.moves[child, LONG], 0.0
-                ) - steep >= best:
+                ) - steep >= best or (before >= 0 and self.number[child] >= before):
                     continue
                 z = self.corners(child, square, tilt, grow, now)
                 if z == math.INFINITY:
@@ -505,6 +519,21 @@ cdef inline double mean_bound(const double* one, const double* other, double bes
                 most = max(most, value)
             best = min(best, most)
     return best
+
+
+def heights_of_moves(moves: Floats, tools: Floats, points: Floats, grow: Floats):
+    """(K,) the least height to which each move (K, 7), its tool (K, 4) begun `grow` (K,) farther
+    out, cuts its point (K, 2); inf where it does not get."""
+    cdef double[:, ::1] columns = np.ascontiguousarray(moves, dtype=np.float64)
+    cdef double[:, ::1] tool = np.ascontiguousarray(tools, dtype=np.float64)
+    cdef double[:, ::1] at = np.ascontiguousarray(points, dtype=np.float64)
+    cdef double[::1] more = np.ascontiguousarray(grow, dtype=np.float64)
+    cdef Py_ssize_t k, count = columns.shape[0]
+    cdef double[::1] found = np.empty(count)
+    with nogil:
+        for k in range(count):
+            found[k] = height_of(&columns[k, 0], &tool[k, 0], at[k, 0], at[k, 1], more[k])
+    return np.asarray(found)
 
 
 def thinned(points: Floats, row: Ints, start: Floats, double beside):

@@ -1,8 +1,8 @@
-"""Checks before anything is written: travel, stock, rapids, tools, feeds; what looks forgotten.
+"""Checks before anything is written: travel, stock, tools, feeds; what looks forgotten.
 
 Everything that is cut lies below the stock top, z < 0. The stock, where the job knows one, ends at
-its sides and at its thickness; beside it is air, so leads and overrun may go there, and so may
-rapids. What earlier cuts have cleared is that of `camtool.toolpath.rapids`.
+its sides and at its thickness; beside it is air, so leads and overrun may go there. Rapids through
+it are found in `camtool.stock.rapids`.
 """
 
 from __future__ import annotations
@@ -47,7 +47,6 @@ from camtool.planning.findings import (
     OUT_OF_STOCK_PARTLY,
     OUT_OF_STOCK_WHOLLY,
     OUT_OF_TRAVEL,
-    RAPID_IN_STOCK,
     TOOL_CHANGE_NOT_STATED,
     TOOL_NOT_SAID,
     TOOL_NOT_SAID_APART,
@@ -64,17 +63,20 @@ from camtool.planning.naming import (
 from camtool.planning.settings import lowered_feeds
 from camtool.planning.sides import runs_beside
 from camtool.records import replace
-from camtool.toolpath.moves import Kind, Toolpath, mounted_before, toolpath_extents
-from camtool.toolpath.rapids import STOCK_TOP_MM, Reach, feeds_below_top, rapids_through_stock
+from camtool.toolpath.moves import (
+    STOCK_TOP_MM,
+    Kind,
+    Toolpath,
+    feeds_below_top,
+    mounted_before,
+    toolpath_extents,
+)
 
 LIMIT_SLACK = 1e-6
 """A chip load or surface speed may be beyond its limits by this part of them, by rounding."""
 
 FEED_TOLERANCE = 1e-6
 """A feed may exceed its limit by this part of it, by rounding alone."""
-
-MAX_LISTED = 10
-"""At most this many rapids are listed; the last finding counts the others."""
 
 MAX_BEYOND_SHARE = 0.25
 """An allowance that takes a tool farther beyond a line than this part of its radius looks like a
@@ -100,10 +102,9 @@ def checked(
 ) -> tuple[Finding, ...]:
     """Find what no program may do, and what looks like a mistake; () when all is well.
 
-    Errors: an axis beyond its travel, a cut deeper than the stock, a rapid through what is not
-    cleared, a feed that the machine cannot make (on slopes: along Z), an operation whose tool the
-    program cannot ask for; of the `steps` what is drawn beside the stock. A warning: something is
-    cut wholly beside the stock.
+    Errors: an axis beyond its travel, a cut deeper than the stock, a feed that the machine cannot
+    make (on slopes: along Z), an operation whose tool the program cannot ask for; of the `steps`
+    what is drawn beside the stock. A warning: something is cut wholly beside the stock.
     """
     off = [finding for step in steps for finding in _off_stock(step, job.stock)]
     return (
@@ -113,7 +114,6 @@ def checked(
         *(off or _beside_stock(toolpath, job)),
         *_tools_not_said(job),
         *_change_not_stated(toolpath, machine),
-        *_rapids_in_stock(toolpath, job),
         *_feeds_above_limits(toolpath, machine),
     )
 
@@ -188,8 +188,7 @@ def _beside_stock(toolpath: Toolpath, job: Job) -> Iterator[Finding]:
     stock, cuts = job.stock, feeds_below_top(toolpath)
     if stock is None or stock.box_mm is None or not cuts.any():
         return
-    _, sweeps = _radii(toolpath, job)
-    beside = _beside(toolpath, stock.box_mm, sweeps)
+    beside = _beside(toolpath, stock.box_mm, _radii(toolpath, job))
     stay = np.cumsum((toolpath.kind == Kind.RAPID) & (toolpath.end[:, 2] >= STOCK_TOP_MM))
     within = np.unique(stay[cuts & ~beside])
     outside = cuts & ~np.isin(stay, within)
@@ -302,42 +301,18 @@ def _shape(tool: Tool) -> tuple[object, ...]:
     return tool.kind, *sizes
 
 
-def _radii(toolpath: Toolpath, job: Job) -> tuple[Floats, Floats]:
-    """(N,), (N,) mm: of what the tool of each row clears at the depth of its tip, and of what it
-    needs free. Where it is not known which tool is in, the least and the most of all."""
+def _radii(toolpath: Toolpath, job: Job) -> Floats:
+    """Radius (N,) mm of the tool of each row; the most of all where it is not known which one is
+    in."""
     tools = [operation.tool for operation in job.operations]
-    every = np.array([(_cleared_mm(tool), tool.radius_mm) for tool in tools])
-    cuts = np.full(len(toolpath), every[:, 0].min())
-    sweeps = np.full(len(toolpath), every[:, 1].max())
+    radii = np.full(len(toolpath), max(tool.radius_mm for tool in tools))
     numbered = {tool.number: tool for tool in tools if tool.number is not None}
     changes = np.flatnonzero(toolpath.kind == Kind.TOOL_CHANGE).tolist()
     for begin, end in pairwise([*changes, len(toolpath)]):
         tool = numbered.get(int(toolpath.value[begin]))
         if tool is not None:
-            cuts[begin:end], sweeps[begin:end] = _cleared_mm(tool), tool.radius_mm
-    return cuts, sweeps
-
-
-def _cleared_mm(tool: Tool) -> float:
-    """Radius of its tip, mm; 0 of a drill."""
-    return 0.0 if tool.kind == "drill" else tool.radius_at(0.0)
-
-
-def _rapids_in_stock(toolpath: Toolpath, job: Job) -> Iterator[Finding]:
-    """Rapids below the stock top outside what is cleared."""
-    cuts, sweeps = _radii(toolpath, job)
-    solid = None if job.stock is None else job.stock.box_mm
-    found = rapids_through_stock(toolpath, Reach(cuts, sweeps, solid))
-    more = len(found) - MAX_LISTED
-    for number, one in enumerate(found[:MAX_LISTED], 1):
-        x, y = one.at_mm
-        yield RAPID_IN_STOCK(
-            where=f"{_place(toolpath, one.row)} near ({x:.3f}, {y:.3f}) mm",
-            measured=one.z_mm,
-            limit=STOCK_TOP_MM,
-            depth=STOCK_TOP_MM - one.z_mm,
-            more=max(more, 0) if number == MAX_LISTED else 0,
-        )
+            radii[begin:end] = tool.radius_mm
+    return radii
 
 
 def _feeds_above_limits(toolpath: Toolpath, machine: Machine) -> Iterator[Finding]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from camtool.findings import ERROR, INFO, WARNING, Code, Sentence, and_more
+from camtool.findings import ERROR, INFO, WARNING, Code, Sentence
 from camtool.geometry.findings import ContourCode
 from camtool.toolpath.findings import ProgramCode
 
@@ -412,11 +412,6 @@ OUT_OF_STOCK_PARTLY = Sentence(
 )
 OUT_OF_STOCK_MORE = Sentence(
     PlanningCode.OUT_OF_STOCK, "{measured:# more contour|# more contours} like this"
-)
-RAPID_IN_STOCK = Sentence(
-    ProgramCode.RAPID_IN_STOCK,
-    "a rapid runs through the stock, {depth:.4g} mm below its top" + and_more("rapids"),
-    "mm",
 )
 SLOT_AS_WIDE = Sentence(
     PlanningCode.SLOT_AS_WIDE, "{tool} is as wide as this contour: it runs in its middle"

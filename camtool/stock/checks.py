@@ -26,6 +26,7 @@ from camtool.stock.cut import CutStock
 from camtool.stock.cutters import cutter_profile
 from camtool.stock.findings import (
     CUT_TOO_DEEP,
+    FINDINGS_LISTED,
     KEEP_OUT_ENTERED,
     MATERIAL_LEFT,
     PASS_TOO_DEEP,
@@ -34,13 +35,13 @@ from camtool.stock.findings import (
     TAB_THIN,
     TOOL_IN_STOCK,
     TOOL_NOT_KNOWN,
+    place_words,
 )
 from camtool.stock.heights import Bracket, greatest_value, stock_tree
 from camtool.stock.moves import StockMoves
 from camtool.stock.wanted import WantedSolid, wanted_solid
 from camtool.toolpath.findings import ProgramCode
-from camtool.toolpath.moves import Toolpath
-from camtool.toolpath.rapids import STOCK_TOP_MM
+from camtool.toolpath.moves import STOCK_TOP_MM, Toolpath
 
 ALONG_MM = 1.0
 """Along a cut the stock is looked at no farther apart than this, and at both ends."""
@@ -72,9 +73,6 @@ BODY_SHARE = 0.25
 
 RIM_POINTS = 16
 """... and at so many points of their rim, and as many halfway to it."""
-
-FINDINGS_LISTED = 10
-"""At most this many findings of one kind are listed; the last says how many more there are."""
 
 TAB_SLACK_MM = 0.05
 """A tab may be narrower by this much, and by the band beside the walls."""
@@ -296,7 +294,7 @@ class _Checks:
         for place, more in self._worst(points, standing(points), standing, upper):
             z, high_z = self.tree.heights(place[None])[0], self.solid.bands(place[None])[0, 1]
             yield MATERIAL_LEFT(
-                where=_at(place),
+                where=place_words(place),
                 measured=float(z[0] - high_z),
                 limit=self.deep_mm,
                 z=float(z[0]),
@@ -402,14 +400,14 @@ class _Checks:
                 wide, high = self._tab(bridge, tabs.width_mm, tabs.height_mm, depth_mm)
                 if high < tabs.height_mm - self.deep_mm:
                     yield TAB_MISSING(
-                        where=_at(bridge.centre),
+                        where=place_words(bridge.centre),
                         measured=max(high, 0.0),
                         limit=tabs.height_mm,
                         operation=name,
                     )
                 elif wide < tabs.width_mm - slack_mm:
                     yield TAB_THIN(
-                        where=_at(bridge.centre),
+                        where=place_words(bridge.centre),
                         measured=wide,
                         limit=tabs.width_mm,
                         operation=name,
@@ -538,11 +536,7 @@ class _Checks:
             yield TOOL_NOT_KNOWN(bodies=", ".join(lacking))
 
     def _where(self, row: int, place: Floats) -> str:
-        return f"{block_of(self.decoded, row)} {_at(place)}"
-
-
-def _at(place: Floats) -> str:
-    return f"at X {float(place[0]):.3f} Y {float(place[1]):.3f}"
+        return f"{block_of(self.decoded, row)} {place_words(place)}"
 
 
 def _chip_mm(operation: Operation, depth_mm: float) -> float:

@@ -2,7 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from camtool.arrays import Floats
 from camtool.findings import ERROR, INFO, WARNING, Code, Sentence, and_more
+from camtool.toolpath.findings import ProgramCode
+
+FINDINGS_LISTED = 10
+"""At most this many findings of one kind are listed; the last says how many more there are."""
+
+
+def place_words(place: Sequence[float] | Floats) -> str:
+    """Name a place (x, y) mm as pictures find it in a finding."""
+    return f"at X {place[0]:.3f} Y {place[1]:.3f}"
 
 
 class StockCode(Code):
@@ -106,6 +118,11 @@ TOOL_IN_STOCK = Sentence(
 KEEP_OUT_ENTERED = Sentence(
     StockCode.KEEP_OUT_ENTERED,
     "the {body} of {tool} enters {box!r} by {measured:.4g} mm" + and_more("blocks"),
+    "mm",
+)
+RAPID_IN_STOCK = Sentence(
+    ProgramCode.RAPID_IN_STOCK,
+    "a rapid runs through the stock, {depth:.4g} mm below its top" + and_more("rapids"),
     "mm",
 )
 TOOL_NOT_KNOWN = Sentence(StockCode.TOOL_NOT_KNOWN, "not known, and not judged: {bodies}")

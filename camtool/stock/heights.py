@@ -50,28 +50,33 @@ MIN_HALF_MM = 1e-9
 def stock_tree(moves: StockMoves, top_mm: float = TOP_MM) -> StockTree:
     """Index the moves for searches of heights; tools that cut no width are left out."""
     number = np.flatnonzero(moves.table[moves.tool, 0] > 0.0)
-    start, end = moves.start[number], moves.end[number]
-    apart = end - start
-    length = np.hypot(apart[:, 0], apart[:, 1])
-    flat = length > 0.0
-    safe = np.where(flat, length, 1.0)
-    low = np.where(flat, start[:, 2], np.minimum(start[:, 2], end[:, 2]))
-    columns = np.column_stack(
-        [
-            start[:, :2],
-            low,
-            np.where(flat[:, None], apart[:, :2] / safe[:, None], 0.0),
-            length,
-            np.where(flat, apart[:, 2] / safe, 0.0),
-        ]
-    )
-    order = hilbert_order(start[:, :2], end[:, :2]) if len(number) else number
+    chosen = moves.select(number)
+    columns = move_columns(chosen)
+    order = hilbert_order(chosen.start[:, :2], chosen.end[:, :2]) if len(number) else number
     return StockTree(
         np.ascontiguousarray(columns[order]),
         np.ascontiguousarray(moves.tool[number][order].astype(np.int64)),
         np.ascontiguousarray(number[order].astype(np.int64)),
         moves.table,
         top_mm,
+    )
+
+
+def move_columns(moves: StockMoves) -> Floats:
+    """Return the moves (M, 7) as the compiled loops read them: start, direction and length in the
+    plane, slope; of those straight up or down the lower end."""
+    start, apart = moves.start, moves.end - moves.start
+    length = np.hypot(apart[:, 0], apart[:, 1])
+    flat = length > 0.0
+    safe = np.where(flat, length, 1.0)
+    return np.column_stack(
+        [
+            start[:, :2],
+            np.where(flat, start[:, 2], np.minimum(start[:, 2], moves.end[:, 2])),
+            np.where(flat[:, None], apart[:, :2] / safe[:, None], 0.0),
+            length,
+            np.where(flat, apart[:, 2] / safe, 0.0),
+        ]
     )
 
 
@@ -140,7 +145,7 @@ def greatest_value(
         open_ = (bounds > max(best, floor) + tolerance) & ~ends
         proved = max(proved, float(bounds[~open_].max(initial=-np.inf)))
         if open_.any():
-            quarters = _quarters(squares[open_])
+            quarters = divided(squares[open_])
             bounds = np.repeat(bounds[open_], 4)
             # The most promising squares are looked at first: they raise the best value soon.
             order = np.argsort(bounds, kind="stable")
@@ -184,7 +189,7 @@ def integral(
         chosen = order[~small][-room:]
         kept = np.ones(len(squares), dtype=np.bool_)
         kept[chosen] = False
-        quarters = _quarters(squares[chosen])
+        quarters = divided(squares[chosen])
         lows, highs = _parts(quarters, means, extremes, box)
         squares = np.concatenate([squares[kept], quarters])
         low, high = np.append(low[kept], lows), np.append(high[kept], highs)
@@ -222,7 +227,8 @@ def _first_squares(box: tuple[float, float, float, float]) -> Floats:
     return np.column_stack([grid, np.full(len(grid), 0.5 * side)])
 
 
-def _quarters(squares: Floats) -> Floats:
+def divided(squares: Floats) -> Floats:
+    """Return the four quarters of each square: (4 K, 3) of (K, 3)."""
     half = 0.5 * squares[:, 2]
     signs = np.array([[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]])
     middles = squares[:, None, :2] + signs * half[:, None, None]

@@ -67,7 +67,7 @@ from camtool.planning.reliefs import add_reliefs
 from camtool.planning.settings import Cone
 from camtool.planning.sides import runs_beside
 from camtool.stock.cutters import cutter_profile
-from camtool.toolpath.rapids import STOCK_TOP_MM
+from camtool.toolpath.moves import STOCK_TOP_MM
 
 INSIDE, OUTSIDE, ABOUT = 1, -1, 0
 """Sides of a layer's lines: within closed ones (even-odd), beyond them, or on both sides of any

@@ -37,6 +37,12 @@ COLUMNS: dict[str, tuple[type[np.generic], tuple[int, ...]]] = {
 }
 """The columns of a Toolpath: their types, and the shape of one row."""
 
+STOCK_TOP_MM = 0.0
+"""Z of the stock top: part zero lies on it."""
+
+LEVEL_MM = 1e-6
+"""What is less than this below the stock top is on it."""
+
 ROWS_AT_ONCE = 1 << 15
 """Rows computed at a time, for columns that follow from each row and its start alone."""
 
@@ -263,6 +269,21 @@ class Toolpath:
 def are_arcs(kind: Codes | Ints) -> Bools:
     """Mask (K,) of the kinds that are ARC_CW or ARC_CCW."""
     return np.asarray((kind == Kind.ARC_CW) | (kind == Kind.ARC_CCW))
+
+
+def are_below_top(toolpath: Toolpath) -> Bools:
+    """Mask (N,) of rows that begin or end below the stock top."""
+
+    def low(part: Toolpath) -> Bools:
+        lowest = np.minimum(part.starts[:, 2], part.end[:, 2])
+        return np.asarray(lowest < STOCK_TOP_MM - LEVEL_MM)
+
+    return toolpath.by_parts(low)
+
+
+def feeds_below_top(toolpath: Toolpath) -> Bools:
+    """Mask (N,) of moves at a feed that begin or end below the stock top."""
+    return toolpath.is_feed & are_below_top(toolpath)
 
 
 def _sweeps(kind: Codes, begin: Floats, end: Floats, centre: Floats) -> Floats:

@@ -74,8 +74,8 @@ class VerifyOptions(Struct, frozen=True):
     """Options of verification, and figures of the program for the report.
 
     `interpolator` None: that of the machine. `effects`: the parts of the mechanics that act.
-    `tool_diameter_mm`: the tool clears the way for rapids below the stock top; None: not known,
-    nothing is cleared. `nose`: the tool has that diameter only above its cone or nose.
+    `tool_diameter_mm`: None where it is not known. `nose`: the tool has that diameter only above
+    its cone or nose.
     `kept`: which runs cut, and what must stay; () where that is not known. `size_bytes`: size of
     the file; `line_bytes`: what is sent over the line to the machine. `stray_mm`: how far the
     dialect may leave the wanted path on purpose. `trace_points`: points of the slides' path for

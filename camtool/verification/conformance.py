@@ -23,8 +23,7 @@ from camtool.findings import Finding, Severity
 from camtool.geometry.boxes import near_points
 from camtool.geometry.measure import point_at
 from camtool.geometry.polylines import POSITION_EPS_MM
-from camtool.toolpath.moves import Kind, Toolpath
-from camtool.toolpath.rapids import STOCK_TOP_MM
+from camtool.toolpath.moves import STOCK_TOP_MM, Kind, Toolpath
 from camtool.verification.coverage import (
     Limits,
     NearPairs,

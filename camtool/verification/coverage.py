@@ -27,8 +27,7 @@ from camtool.geometry.measure import point_at, segment_boxes, segment_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
 from camtool.records import replace
 from camtool.simulation.rows import block_of
-from camtool.toolpath.moves import ROWS_AT_ONCE, Kind, Toolpath, are_arcs
-from camtool.toolpath.rapids import STOCK_TOP_MM
+from camtool.toolpath.moves import ROWS_AT_ONCE, STOCK_TOP_MM, Kind, Toolpath, are_arcs
 from camtool.verification.cuts import (
     NO_LOOP,
     CutMoves,

@@ -22,8 +22,7 @@ from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.geometry.measure import point_at, segment_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
 from camtool.kernels.chaining import latest_near
-from camtool.toolpath.moves import ROWS_AT_ONCE, Kind, Toolpath, are_arcs
-from camtool.toolpath.rapids import feeds_below_top
+from camtool.toolpath.moves import ROWS_AT_ONCE, Kind, Toolpath, are_arcs, feeds_below_top
 
 MIN_PARTS = 4
 """Each line and arc is sampled in at least this many parts, so that short moves are sampled

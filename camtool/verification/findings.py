@@ -165,11 +165,6 @@ OUT_OF_TRAVEL_IN_PROGRAM = Sentence(
     "the program spans {measured:.3f} mm of {axis}, the axis has {limit:g} mm: {mend}",
     "mm",
 )
-RAPID_IN_STOCK_IN_PROGRAM = Sentence(
-    ProgramCode.RAPID_IN_STOCK,
-    "a rapid runs through the stock, {depth:.3f} mm below its top" + and_more("rapids"),
-    "mm",
-)
 DRAWING_PLACE_NOWHERE = Sentence(
     VerificationCode.DRAWING_PLACE,
     "{measured:.0f} % of the cuts follow the drawing, wherever it is moved",

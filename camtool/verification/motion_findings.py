@@ -1,4 +1,4 @@
-"""Findings about the motion: endless arcs, missed ends, travel, rapids, reversals, backlash."""
+"""Findings about the motion: endless arcs, missed ends, travel, reversals, backlash."""
 
 from __future__ import annotations
 
@@ -12,13 +12,6 @@ from camtool.findings import Finding, Severity
 from camtool.machine.model import Machine
 from camtool.planning.naming import own_numbers
 from camtool.toolpath.moves import Kind, Toolpath
-from camtool.toolpath.rapids import (
-    CLEARED_MM,
-    RapidThroughStock,
-    Reach,
-    low_rapids,
-    rapids_through_stock,
-)
 from camtool.units import UM_PER_MM
 from camtool.verification.case import Case
 from camtool.verification.coverage import at_point, block_name, first_items, holes_of
@@ -33,15 +26,10 @@ from camtool.verification.findings import (
     NO_MOTION_BELOW,
     OUT_OF_TRAVEL_IN_PROGRAM,
     PLAY_NOT_KNOWN,
-    RAPID_IN_STOCK_IN_PROGRAM,
     RETURN_TO_MACHINE_ZERO,
 )
 
 AXES = "XYZ"
-CLEARED_COVERAGES = 2.0
-"""A rapid may leave the cleared area by this many tolerances of coverage: it and the cuts beside
-it are rounded separately."""
-
 TRAVEL_EPS_MM = 1e-6
 """A span may exceed the travel by this much, by rounding alone."""
 
@@ -57,7 +45,6 @@ def motion_findings(
         *case.target.model.findings(case.decoded, machine, case.simulation),
         *_missed_ends(decoded, case, rows),
         *_out_of_travel(machine, extents),
-        *_rapids_in_stock(decoded, case),
         *_many_reversals(machine, tally, cuts),
         *_nothing_moves(cuts),
         *_homing(decoded, machine),
@@ -107,32 +94,6 @@ def _out_of_travel(machine: Machine, extents: Floats) -> Iterator[Finding]:
                 axis=name,
                 mend=own_numbers(machine, [f"axes.{name.lower()}.travel_mm={math.ceil(span)}"]),
             )
-
-
-def _rapids_in_stock(decoded: Toolpath, case: Case) -> Iterator[Finding]:
-    for one, more in first_items(_through_stock(decoded, case)):
-        yield RAPID_IN_STOCK_IN_PROGRAM(
-            where=f"{block_name(decoded, one.row)} near {at_point(one.at_mm)}",
-            measured=one.z_mm,
-            limit=0.0,
-            depth=-one.z_mm,
-            more=more,
-        )
-
-
-def _through_stock(decoded: Toolpath, case: Case) -> list[RapidThroughStock]:
-    """Return rapids through stock that the tool has not cleared. Where the tool is not known: all
-    rapids in XY below the stock top, and those straight down to where no feed has been."""
-    diameter = case.options.tool_diameter_mm
-    if diameter is not None:
-        radius = np.full(len(decoded), 0.5 * diameter)
-        tolerance = max(CLEARED_MM, CLEARED_COVERAGES * case.coverage_mm)
-        return rapids_through_stock(decoded, Reach(radius, radius), tolerance)
-    rows = np.array(low_rapids(decoded), dtype=np.int64)
-    end = decoded.end[rows]
-    low = np.minimum(decoded.starts_of(rows)[:, 2], end[:, 2])
-    columns = (rows.tolist(), low.tolist(), end[:, :2].tolist())
-    return [RapidThroughStock(row, z, (x, y)) for row, z, (x, y) in zip(*columns, strict=True)]
 
 
 def _many_reversals(machine: Machine, tally: Tally, cuts: CutMoves) -> Iterator[Finding]:

@@ -34,8 +34,7 @@ from camtool.simulation.mechanics import Mechanics
 from camtool.simulation.motion import Effects
 from camtool.simulation.samples import PathSamples, move_lengths
 from camtool.toolpath.findings import ProgramCode
-from camtool.toolpath.moves import Toolpath
-from camtool.toolpath.rapids import STOCK_TOP_MM
+from camtool.toolpath.moves import STOCK_TOP_MM, Toolpath
 from camtool.toolpath.wanted import ProtectedRegion
 from camtool.verification.case import VerifyOptions
 from camtool.verification.cuts import CutMoves, row_lengths

@@ -1,4 +1,4 @@
-"""The slow, obvious twin of camtool.toolpath.rapids: points of the rapid's disc, one by one."""
+"""The slow, obvious twin of camtool.stock.rapids: points of the rapid's disc, one by one."""
 
 from __future__ import annotations
 

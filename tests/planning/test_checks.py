@@ -22,7 +22,6 @@ from camtool.records import replace
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.findings import ProgramCode
-from camtool.toolpath.moves import Kind
 from tests.drawings import drawing_of
 from tests.oracles.path_machine import path_machine
 
@@ -144,48 +143,9 @@ def test_arcs_reach_into_the_stock_by_their_bulge() -> None:
     assert codes(path, job) == []
 
 
-def test_rapids_below_the_top_need_room_for_the_tool() -> None:
-    slot = down(1, 1).line(5, 1, feed=10)
-    job = job_of(tool_diameter_mm=1.0)
-    assert codes(slot.rapid(1, 1).rapid(z=-0.5), job) == []
-    slot.source = "CUT/LINE 1"
-    slot.rapid(1, 2)
-    (finding,) = found(slot, job)
-    assert (finding.code, finding.severity) == (ProgramCode.RAPID_IN_STOCK, Severity.ERROR)
-    assert finding.where.startswith("move 6 (CUT/LINE 1) near (")
-    assert finding.message == "a rapid runs through the stock, 0.5 mm below its top"
-
-
-def test_a_v_bit_clears_but_its_tip() -> None:
-    path = down(1, 1).line(5, 1, feed=10).rapid(1, 1)
-    bit = {"tool_diameter_mm": 3.0, "tool_kind": "v", "tool_tip_angle_rad": 1.0}
-    assert codes(path, job_of(tool_diameter_mm=3.0)) == []
-    assert codes(path, job_of(**bit)) == [ProgramCode.RAPID_IN_STOCK]
-
-
-def test_many_rapids_are_counted() -> None:
-    path = down(1, 1).line(1, 50, feed=10)
-    for y in range(25):
-        path.rapid(30, 2 * y + 1).rapid(1, 2 * y + 1)
-    listed = found(path, job_of(tool_diameter_mm=1.0))
-    assert len(listed) == 10
-    assert listed[-1].message.endswith("; and 40 more rapids")
-    assert "more" not in listed[0].message
-
-
 def two(number: int | None) -> Job:
     one = Operation(name="coarse", tool=Tool(4.0, number=1))
     return Job(operations=(one, Operation(name="fine", tool=Tool(1.0, number=number))))
-
-
-def test_rapids_are_those_of_the_tool_that_is_in() -> None:
-    path = ToolpathBuilder().event(Kind.TOOL_CHANGE, 2).rapid(1, 1).line(z=-1, feed=10)
-    path.line(5, 1, feed=10).rapid(1, 1).rapid(z=5)
-    assert codes(path, two(2)) == []
-    path.event(Kind.TOOL_CHANGE, 1).rapid(1, 1).rapid(z=-1)
-    stated = ("defaults.change_mm=[0, 0]", "defaults.change_z_mm=9")
-    assert codes(path, two(2), *stated) == [ProgramCode.RAPID_IN_STOCK]
-    assert codes(path, two(2)) == [PlanningCode.TOOL_CHANGE_NOT_STATED, ProgramCode.RAPID_IN_STOCK]
 
 
 def test_a_tool_without_a_number_of_its_own_cannot_be_asked_for() -> None:

@@ -152,7 +152,7 @@ def test_an_arc_that_never_ends_is_an_error_with_its_block() -> None:
     assert found.report.blocks == 12
 
 
-def test_travel_play_homing_and_rapids_in_stock() -> None:
+def test_travel_play_and_homing() -> None:
     b = cut(ToolpathBuilder(), -1.0, 1.0).line(9.5, 1.0, feed=1).rapid(9.5, 2.0).rapid(z=0.2)
     found = judged(b.event(Kind.HOME_Z).finish())
     (travel,) = [f for f in found.findings if f.code == ProgramCode.OUT_OF_TRAVEL]
@@ -160,8 +160,6 @@ def test_travel_play_homing_and_rapids_in_stock() -> None:
     assert travel.where.startswith("axis X")
     (play,) = [f for f in found.findings if f.code == ProgramCode.PLAY_NOT_KNOWN]
     assert play.where == "axis Z"
-    (rapid,) = [f for f in found.findings if f.code == ProgramCode.RAPID_IN_STOCK]
-    assert rapid.where.startswith("move 5")
     assert codes(found).count(VerificationCode.RETURN_TO_MACHINE_ZERO) == 1
 
 

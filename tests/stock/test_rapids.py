@@ -7,10 +7,25 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from camtool.findings import Severity
+from camtool.records import replace
+from camtool.stock.cutters import CutterProfile
+from camtool.stock.moves import StockMoves, stock_moves_of_toolpath
+from camtool.stock.rapids import (
+    RapidThroughStock,
+    low_rapids,
+    rapid_findings,
+    rapids_through_stock,
+)
 from camtool.toolpath.builder import ToolpathBuilder
-from camtool.toolpath.moves import Toolpath
-from camtool.toolpath.rapids import RapidThroughStock, Reach, low_rapids, rapids_through_stock
+from camtool.toolpath.findings import ProgramCode
+from camtool.toolpath.moves import Kind, Toolpath
 from tests.oracles.cleared import most_uncut
+from tests.oracles.deep_moves import Shop, everything
+from tests.oracles.lowering import sweep_of
+from tests.oracles.stock import Cutter
+from tests.oracles.stock import Move as Needle
+from tests.oracles.stock import Stock as Needles
 from tests.waiting import no_chewing
 
 RADIUS_MM = 0.5
@@ -18,14 +33,25 @@ NEAR_MM = 0.12
 """What the oracle's points may miss: their spacing, the tolerance, and pieces of slopes."""
 
 
+def flat(*radii: float) -> tuple[CutterProfile, ...]:
+    return tuple(CutterProfile(radius, radius) for radius in radii)
+
+
+def moves_of(
+    path: ToolpathBuilder | Toolpath, cutters: tuple[CutterProfile, ...], first: int | None = None
+) -> StockMoves:
+    """The moves of a path, of the first cutter; from a row on of the second."""
+    made = path.finish() if isinstance(path, ToolpathBuilder) else path
+    tool = (np.arange(len(made)) >= (len(made) if first is None else first)).astype(np.int64)
+    return stock_moves_of_toolpath(made, tool, cutters)
+
+
 def through(
     path: ToolpathBuilder | Toolpath,
     radius: float = RADIUS_MM,
     solid: tuple[float, float, float, float] | None = None,
 ) -> list[RapidThroughStock]:
-    made = path.finish() if isinstance(path, ToolpathBuilder) else path
-    radii = np.full(len(made), radius)
-    return rapids_through_stock(made, Reach(radii, radii, solid))
+    return rapids_through_stock(moves_of(path, flat(radius)), solid)
 
 
 def rows(path: ToolpathBuilder, radius: float = RADIUS_MM) -> list[int]:
@@ -109,9 +135,10 @@ def test_the_tool_counts_not_its_middle() -> None:
 
 def test_a_wider_tool_does_not_fit_where_another_has_been() -> None:
     path = down().line(5.0, 0.0, feed=1).rapid(0.0, 0.0).finish()
-    cuts, sweeps = np.full(5, 0.5), np.full(5, 0.5)
-    assert rapids_through_stock(path, Reach(cuts, sweeps)) == []
-    assert [one.row for one in rapids_through_stock(path, Reach(cuts, 2 * sweeps))] == [4]
+    assert rapids_through_stock(moves_of(path, flat(0.5))) == []
+    (found,) = rapids_through_stock(moves_of(path, flat(0.5, 1.0), 4))
+    assert found.row == 4
+    assert 0.5 < abs(found.at_mm[1]) < 1.0 or found.at_mm[0] < -0.5
 
 
 def test_ramps_clear_where_they_are_deep_enough() -> None:
@@ -155,7 +182,23 @@ def test_rapids_below_the_stock_top_whatever_the_tool() -> None:
     """They go along, or straight down to where no feed has been; up they may go."""
     path = ToolpathBuilder().rapid(z=0.2).rapid(1, 1).line(z=-1, feed=1).rapid(2, 1)
     path.rapid(z=0.2).rapid(3, 1).rapid(z=-1.0).line(z=-2, feed=1).rapid(z=0.2).rapid(z=-1.9)
-    assert low_rapids(path.finish()) == [3, 6]
+    assert [one.row for one in low_rapids(path.finish())] == [3, 6]
+
+
+@pytest.mark.parametrize("size", [5.0, 20.0])
+def test_no_rapid_of_a_whole_part_is_found_but_the_one_added(size: float) -> None:
+    cutters = flat(0.15 * size)
+    whole = everything(size, 1.0, 100.0)
+    assert rapids_through_stock(moves_of(whole, cutters)) == []
+    made = Shop(size, 1.0, 100.0)
+    made.pocket(2.0 * size, 2.0 * size)
+    middle = made.path.position[:2]
+    made.path.rapid(2.0 * size, 2.0 * size)
+    assert rapids_through_stock(moves_of(made.path, cutters)) == []
+    assert [one.row for one in low_rapids(made.path.finish())] == [len(made.path.finish()) - 1]
+    made.path.rapid(*middle).line(z=-3.0, feed=9).rapid(4.0 * size, 2.0 * size)
+    (found,) = rapids_through_stock(moves_of(made.path, cutters))
+    assert (found.row, found.z_mm) == (len(made.path.finish()) - 1, -3.0)
 
 
 def test_nothing_is_nothing() -> None:
@@ -173,9 +216,84 @@ def test_thousands_of_pecks_are_not_chewed() -> None:
         assert through(path) == []
 
 
+def test_a_v_bit_runs_in_its_groove_and_no_cylinder_does() -> None:
+    path = down().line(5.0, 0.0, feed=1).rapid(0.0, 0.0).finish()
+    bit, mill = CutterProfile(1.5, 0.0, rise=1.0), CutterProfile(1.0, 1.0)
+    assert rapids_through_stock(moves_of(path, (bit,))) == []
+    (found,) = rapids_through_stock(moves_of(path, (bit, mill), 4))
+    assert (found.row, found.z_mm) == (4, -1.0)
+    assert rapids_through_stock(moves_of(path, (mill, bit), 4)) == []
+    blunt = CutterProfile(1.5, 0.0, rise=0.9)
+    (found,) = rapids_through_stock(moves_of(path, (mill, blunt), 4))
+    assert -0.1 < found.z_mm < 0.0
+
+
+def test_the_place_and_the_depth_are_those_of_the_deepest_contact() -> None:
+    path = down().line(5.0, 0.0, feed=1).rapid(z=-0.5).rapid(5.0, 3.0, -0.8)
+    (found,) = through(path)
+    assert found.z_mm == pytest.approx(-0.8, abs=0.02)
+    assert 2.4 < found.at_mm[1] < 3.5
+
+
+def test_many_rapids_are_counted() -> None:
+    path = down(1.0, 1.0).line(1.0, 50.0, feed=1)
+    for y in range(25):
+        path.rapid(30.0, 2.0 * y + 1.0).rapid(1.0, 2.0 * y + 1.0)
+    made = path.finish()
+    listed = list(rapid_findings(made, moves_of(made, flat(0.5)), None, 0.01))
+    assert len(listed) == 10
+    assert {(one.code, one.severity) for one in listed} == {
+        (ProgramCode.RAPID_IN_STOCK, Severity.ERROR)
+    }
+    assert listed[0].where.startswith("move 4 at X ")
+    assert listed[0].message == "a rapid runs through the stock, 1 mm below its top"
+    assert listed[-1].message.endswith("; and 40 more rapids")
+
+
+SHAPES = (
+    (Cutter(0.5), CutterProfile(0.5, 0.5)),
+    (Cutter(1.0), CutterProfile(1.0, 1.0)),
+    (Cutter(0.8, 0.5, 0.1), CutterProfile(0.8, 0.1, rise=2.0)),
+)
+ROOM_MM, CELL_MM = 0.04, 0.04
+"""What needles may miss: their spacing and the tolerance; they are this far apart."""
+
+
+@given(toolpaths(), st.data())
+def test_rapids_of_several_tools_are_found_as_needles_say(
+    path: Toolpath, data: st.DataObject
+) -> None:
+    """Needles of the feeds alone; the rapid's own tool, slimmer by the room, must lower some of
+    them, or wider by it none."""
+    tool = data.draw(st.lists(st.integers(0, 2), min_size=len(path), max_size=len(path)))
+    moves = stock_moves_of_toolpath(path, np.array(tool), tuple(one for _, one in SHAPES))
+    last, starts = len(path) - 1, path.starts
+    if (starts[last, :2] == path.end[last, :2]).all() and path.end[last, 2] >= starts[last, 2]:
+        return
+    deep = []
+    for room in (ROOM_MM, -ROOM_MM):
+        wood = Needles((-2.0, -2.0), (7.0, 6.0), CELL_MM)
+        for row, move in enumerate(path):
+            if move.kind is Kind.RAPID and row < last:
+                continue
+            cutter = SHAPES[tool[row]][0]
+            wide = replace(cutter, radius=cutter.radius + (-room if row == last else room))
+            if cutter.slope:  # the cone begins as much farther out
+                wide = replace(wide, tip=wide.tip + (-room if row == last else room))
+            sweep = 0.0 if move.centre is None else sweep_of(move)
+            chip = wood.cut(
+                Needle(False, move.start, move.end, row, move.centre, sweep), wide
+            ).chip
+        deep.append(chip)
+    found = last in [one.row for one in rapids_through_stock(moves)]
+    if deep[0] > 0.02:
+        assert found
+    if deep[1] <= 0.0:
+        assert not found
+
+
 @pytest.mark.parametrize("tolerance", [0.001, 0.05])
 def test_the_tolerance_is_what_may_stick_out(tolerance: float) -> None:
     path = down().line(5.0, 0.0, feed=1).rapid(1.0).rapid(1.0, 0.02).finish()
-    radii = np.full(len(path), 0.5)
-    found = rapids_through_stock(path, Reach(radii, radii), tolerance)
+    found = rapids_through_stock(moves_of(path, flat(0.5)), None, tolerance)
     assert [one.row for one in found] == ([5] if tolerance < 0.02 else [])

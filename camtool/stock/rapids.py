@@ -1,0 +1,266 @@
+"""Rapids through the stock as it stands before them, in the order of the moves.
+
+A rapid is wrong where the tool's own shape goes below the stock that all feeds before it have
+left. Rapids clear nothing, so a rapid through material is found each time. One that goes straight
+up is never wrong.
+
+    tool of the rapid, drawn in by the room  <  stock of all tools begun the room farther out
+
+so that a way that is cleared exactly is accepted, and a rapid that gets farther than the tolerance
+into a wall never is. Squares round each rapid are divided until the stock is proved to lie below
+the rapid over all of a square, or a point is found where it does not.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from msgspec import Struct
+
+from camtool.arrays import Bools, Floats, Ints
+from camtool.findings import Finding
+from camtool.kernels.stock import heights_of_moves
+from camtool.planning.job import Stock
+from camtool.records import replace
+from camtool.simulation.rows import block_of
+from camtool.stock.cutters import CutterProfile
+from camtool.stock.findings import FINDINGS_LISTED, RAPID_IN_STOCK, place_words
+from camtool.stock.heights import divided, greatest_value, move_columns, stock_tree
+from camtool.stock.moves import StockMoves
+from camtool.toolpath.moves import STOCK_TOP_MM, Kind, Toolpath, are_below_top
+
+CLEARED_MM = 0.01
+"""A rapid's tool may get so far into walls: it and the cuts beside it are rounded separately."""
+
+ROOM_SHARE = 0.45
+"""Of that, by how much the tool of a rapid is drawn in, and the tools of the cuts are widened."""
+
+MIN_HALF_SHARE = 0.035
+"""Of that, half a side of the smallest squares, so that twice the room and the size of the least
+shape with a square's middle in it, 2 √2 of these, are the tolerance."""
+
+MIN_RADIUS_SHARE = 2.0
+"""Of that, the radius that a tool has at least: a point clears its line, and needs it."""
+
+HEIGHT_EPS_MM = 1e-6
+"""Heights that differ by less are equal."""
+
+RAPIDS_AT_ONCE = 64
+"""Rapids that are looked at together: this bounds the memory."""
+
+SIZE_SQUARES = 4096
+"""The place where a rapid is deepest in the stock is searched for in about so many squares."""
+
+
+class RapidThroughStock(Struct, frozen=True):
+    """A rapid through the stock: its row, a point of the contact, and the height there of the
+    lowest that the tool touches, mm."""
+
+    row: int
+    z_mm: float
+    at_mm: tuple[float, float]
+
+
+def rapids_through_stock(
+    moves: StockMoves,
+    box_mm: tuple[float, float, float, float] | None = None,
+    tolerance_mm: float = CLEARED_MM,
+) -> list[RapidThroughStock]:
+    """Return the rapids through what the feeds before them have left of the stock, in order;
+    `box_mm`: its sides (low x, low y, high x, high y), None without limits."""
+    start, end = moves.start, moves.end
+    low = np.minimum(start[:, 2], end[:, 2]) < STOCK_TOP_MM - HEIGHT_EPS_MM
+    is_up = (start[:, :2] == end[:, :2]).all(axis=1) & (end[:, 2] >= start[:, 2])
+    if not (moves.rapid & low & ~is_up).any():
+        return []
+    search = _Search(moves, np.flatnonzero(moves.rapid & low & ~is_up), box_mm, tolerance_mm)
+    doubtful = np.flatnonzero(~search.follow_a_feed())
+    found: list[RapidThroughStock] = []
+    for first in range(0, len(doubtful), RAPIDS_AT_ONCE):
+        found += search.touching(doubtful[first : first + RAPIDS_AT_ONCE])
+    return found
+
+
+def rapid_findings(
+    decoded: Toolpath, moves: StockMoves | None, stock: Stock | None, tolerance_mm: float
+) -> Iterator[Finding]:
+    """Yield RAPID_IN_STOCK for the rapids of a program that get farther than a tolerance into what
+    is not cut before them; without the moves of its tools for all below the stock top that may."""
+    if moves is None:
+        found = low_rapids(decoded)
+    else:
+        box_mm = None if stock is None else stock.box_mm
+        found = rapids_through_stock(moves, box_mm, max(CLEARED_MM, tolerance_mm))
+    for number, one in enumerate(found[:FINDINGS_LISTED], start=1):
+        yield RAPID_IN_STOCK(
+            where=f"{block_of(decoded, one.row)} {place_words(one.at_mm)}",
+            measured=one.z_mm,
+            limit=STOCK_TOP_MM,
+            depth=STOCK_TOP_MM - one.z_mm,
+            more=max(len(found) - FINDINGS_LISTED, 0) if number == FINDINGS_LISTED else 0,
+        )
+
+
+def low_rapids(toolpath: Toolpath) -> list[RapidThroughStock]:
+    """Return the rapids below the stock top that move in XY, or straight down deeper than any feed
+    at the same XY before: all that can be said where tools are not known."""
+    start, end = toolpath.starts, toolpath.end
+    is_across = np.asarray((start[:, :2] != end[:, :2]).any(axis=1))
+    chosen = (toolpath.kind == Kind.RAPID) & are_below_top(toolpath)
+    chosen &= is_across | (end[:, 2] < start[:, 2])
+    if chosen.any():
+        chosen &= is_across | (_fed_depths(toolpath, is_across) > end[:, 2] + HEIGHT_EPS_MM)
+    found = []
+    for row in np.flatnonzero(chosen).tolist():
+        x, y, z = end[row].tolist()
+        found.append(RapidThroughStock(row, min(float(start[row, 2]), z), (x, y)))
+    return found
+
+
+def _fed_depths(toolpath: Toolpath, is_across: Bools) -> Floats:
+    """Compute the lowest Z (N,) of feeds before each row since the tool last moved in XY."""
+    deep, deepest = np.empty(len(toolpath)), math.inf
+    feeds = np.where(toolpath.is_feed, toolpath.end[:, 2], math.inf)
+    moves = (is_across | toolpath.is_arc).tolist()
+    for row, (moved, z) in enumerate(zip(moves, feeds.tolist(), strict=True)):
+        deep[row] = deepest
+        deepest = z if moved else min(deepest, z)
+    return deep
+
+
+class _Search:
+    """The R rapids of a program that may touch the stock: their parts below its top."""
+
+    def __init__(
+        self,
+        moves: StockMoves,
+        chosen: Ints,
+        box_mm: tuple[float, float, float, float] | None,
+        tolerance_mm: float,
+    ) -> None:
+        self.room_mm = ROOM_SHARE * tolerance_mm
+        self.least_mm = MIN_HALF_SHARE * tolerance_mm
+        self.low, self.high = np.array(box_mm or (-np.inf, -np.inf, np.inf, np.inf)).reshape(2, 2)
+        moves = replace(
+            moves, cutters=tuple(_widened(each, tolerance_mm) for each in moves.cutters)
+        )
+        self.feeds = moves.select(~moves.rapid)
+        self.tree = stock_tree(self.feeds)
+        self.before = np.cumsum(~moves.rapid, dtype=np.int64)[chosen]
+        rapids = moves.select(chosen)
+        # What is above the stock top touches nothing.
+        begin, end = rapids.start.copy(), rapids.end.copy()
+        for one, other in ((begin, rapids.end), (end, rapids.start)):
+            above = one[:, 2] > STOCK_TOP_MM
+            share = (one[above, 2] - STOCK_TOP_MM) / (one[above, 2] - other[above, 2])
+            one[above] += share[:, None] * (other[above] - one[above])
+        self.rapids = replace(rapids, start=begin, end=end)
+        self.columns = move_columns(self.rapids)
+        self.tools: Floats = moves.table[rapids.tool]
+
+    def follow_a_feed(self) -> Bools:
+        """True (R,) for rapids along the line of one feed before, or above it, with a tool of the
+        same shape: they are fine."""
+        feeds, rapids = self.feeds, self.rapids
+        fine = np.zeros(len(rapids), dtype=np.bool_)
+        if not len(feeds):
+            return fine
+        for middle in (0.5 * (rapids.start + rapids.end), rapids.start, rapids.end):
+            _, feed = self.tree.heights(middle[:, :2], self.before)
+            one, way = feeds.start[feed], feeds.end[feed] - feeds.start[feed]
+            square = (way[:, :2] ** 2).sum(axis=1)
+            good = (feed >= 0) & (feeds.tool[feed] == rapids.tool)
+            for point in (rapids.start, rapids.end):
+                share = ((point - one)[:, :2] * way[:, :2]).sum(axis=1)
+                share = np.clip(share / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
+                share = np.where(square > 0.0, share, way[:, 2] < 0.0)
+                off = point - (one + share[:, None] * way)
+                good &= np.hypot(off[:, 0], off[:, 1]) <= self.room_mm
+                good &= off[:, 2] >= -HEIGHT_EPS_MM
+            fine |= good
+        return fine
+
+    def touching(self, chosen: Ints) -> list[RapidThroughStock]:
+        """Return those of these rapids that touch the stock."""
+        of, squares = self._first_squares(chosen)
+        touches = np.zeros(len(self.rapids), dtype=np.bool_)
+        while len(of):
+            touches[of[self._taken(of, squares) > HEIGHT_EPS_MM]] = True
+            open_ = ~touches[of] & (squares[:, 2] > self.least_mm)
+            of, squares = of[open_], squares[open_]
+            open_ = self._most_taken(of, squares) > HEIGHT_EPS_MM
+            of, squares = np.repeat(of[open_], 4), divided(squares[open_])
+        return [self._deepest(rapid) for rapid in chosen[touches[chosen]].tolist()]
+
+    def _deepest(self, rapid: int) -> RapidThroughStock:
+        """Return where a rapid that touches the stock is deepest in it, as far as `SIZE_SQUARES`
+        show."""
+        _, squares = self._first_squares(np.array([rapid]))
+
+        def taken(at: Floats) -> Floats:
+            return self._taken(np.full(len(at), rapid), at)
+
+        def most(at: Floats) -> Floats:
+            return self._most_taken(np.full(len(at), rapid), at)
+
+        wide = squares[:, 2:]
+        low, high = (squares[:, :2] - wide).min(axis=0), (squares[:, :2] + wide).max(axis=0)
+        low, high = np.maximum(low, self.low), np.minimum(high, self.high)
+        best = greatest_value(
+            taken, most, (*low.tolist(), *high.tolist()), max_squares=SIZE_SQUARES
+        )
+        place = best.at_mm
+        z = heights_of_moves(
+            self.columns[[rapid]], self.tools[[rapid]], np.array([place]), np.zeros(1)
+        )
+        return RapidThroughStock(int(self.rapids.row[rapid]), float(z[0]), place)
+
+    def _first_squares(self, chosen: Ints) -> tuple[Ints, Floats]:
+        """Return squares (K, 3) that cover what the tools of rapids sweep below the stock top, and
+        the rapid (K,) of each."""
+        begin, end = self.rapids.start[chosen], self.rapids.end[chosen]
+        radius, flat, _, rise = self.tools[chosen].T
+        deep = STOCK_TOP_MM - np.minimum(begin[:, 2], end[:, 2])
+        cone = flat + deep / np.where(rise > 0.0, rise, 1.0)
+        wide = np.where(rise > 0.0, np.minimum(radius, cone), radius)
+        length = np.hypot(*(end - begin)[:, :2].T)
+        count = np.ceil(0.5 * length / wide).astype(np.int64).clip(min=1)
+        which = np.repeat(np.arange(len(chosen)), count)
+        step = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
+        share = (step + 0.5) / count[which]
+        middle = begin[which, :2] + share[:, None] * (end - begin)[which, :2]
+        half = (wide + 0.5 * length / count)[which]
+        return chosen[which], np.column_stack([middle, half])
+
+    def _taken(self, of: Ints, at: Floats) -> Floats:
+        """Return by how much each rapid (K,) goes below the stock over its point, the first two
+        columns of (K, …), mm."""
+        points = np.ascontiguousarray(at[:, :2])
+        stock, _ = self.tree.heights(points, self.before[of], self.room_mm)
+        mine = heights_of_moves(
+            self.columns[of], self.tools[of], points, np.full(len(of), -self.room_mm)
+        )
+        within = ((points >= self.low) & (points <= self.high)).all(axis=1)
+        return np.where(within, stock - mine, -np.inf)
+
+    def _most_taken(self, of: Ints, squares: Floats) -> Floats:
+        """Return upper bounds (K,) of the same over squares (K, 3)."""
+        half = squares[:, 2:]
+        reach = math.sqrt(2.0) * squares[:, 2]
+        mine = heights_of_moves(
+            self.columns[of], self.tools[of], squares[:, :2], reach - self.room_mm
+        )
+        within = (squares[:, :2] + half > self.low) & (squares[:, :2] - half < self.high)
+        most = np.full(len(of), -np.inf)
+        near = np.flatnonzero(within.all(axis=1) & np.isfinite(mine))
+        stock = self.tree.greatest(squares[near], None, self.room_mm, self.before[of[near]])
+        most[near] = stock - mine[near]
+        return most
+
+
+def _widened(cutter: CutterProfile, tolerance_mm: float) -> CutterProfile:
+    """Return a cutter; a cylinder for one of no width."""
+    radius = MIN_RADIUS_SHARE * tolerance_mm
+    return CutterProfile(radius, radius) if cutter.radius_mm < radius else cutter
