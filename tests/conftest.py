@@ -13,6 +13,10 @@ os.environ["XDG_CONFIG_HOME"] = "/nonexistent"
 # Commands that tests start would compile all sources anew, each time.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
+# What tests write need not survive a crash of this computer, and a disk takes some 50 ms to say
+# that it would. tests/cli/test_files.py shows that files are synchronised.
+os.fsync = lambda handle: None
+
 # Hypothesis draws some values from the constants of all modules that are loaded. Which those are
 # depends on the tests that ran before in the same process: examples would differ between runs.
 providers.is_local_module_file = lambda path: False
