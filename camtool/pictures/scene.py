@@ -10,7 +10,6 @@ import math
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -60,7 +59,7 @@ class Scene:
     toolpath from which on it cuts; `rounds` are full circles with their errors.
     `tabs` are the places of tabs, mm; `inspected` the dimensions with their verdicts. `playback`
     gives how the toolpath runs; only the viewer calls it. `cut` gives the moves that cut the
-    stock; only views of the stock call it. `goal` gives those that should cut it, for the viewer.
+    stock, and those that should; only views of the stock and the viewer call it.
 
     With a trace the picture leaves out rapids and plunges, and feeds are pale. ValueError when the
     trace is incomplete or not finite.
@@ -87,7 +86,6 @@ class Scene:
     tabs: tuple[tuple[float, float], ...] = ()
     inspected: tuple[InspectedReport, ...] = ()
     cut: Callable[[], StockPair] | None = None
-    goal: Callable[[], StockMoves] | None = None
 
     def __post_init__(self) -> None:
         points, error = self.trace_points, self.trace_error_mm
@@ -287,13 +285,15 @@ def scene_of(
             target if verification is not None else None,
             _bands(drawn, job, wanted, machine),
         ),
-        goal=None if wanted is None or wanted is toolpath else partial(_as_planned, wanted, job),
     )
 
 
 BESIDE_SHARE, BELOW_SHARE = 0.06, 0.25
 """A stock that is not known reaches so far beyond the cuts (a share of their longer side), and so
 far below them (a share of their depth)."""
+
+MIN_BESIDE_MM = 0.01
+"""A stock that is not known reaches at least so far beyond the cuts."""
 
 
 def _as_planned(path: Toolpath, job: Job | None) -> StockMoves:
@@ -317,7 +317,6 @@ def _stock_pair(
         return None
 
     def pair() -> StockPair:
-        from camtool.stock.cut import cut_box
         from camtool.stock.moves import stock_moves_of_toolpath
         from camtool.stock.slides import slide_moves, tools_of_rows
 
@@ -328,21 +327,31 @@ def _stock_pair(
         else:
             moves = stock_moves_of_toolpath(toolpath, tools.index, tools.cutters)
         stock = None if job is None else job.stock
-        box, depth = None if stock is None else stock.box_mm, 0.0
-        if stock is not None:
-            depth = stock.thickness_mm
-        elif len(moves):
-            depth = max(-(1.0 + BELOW_SHARE) * float(moves.end[:, 2].min()), 0.0)
-        known = box is not None
-        if box is None:
-            left, bottom, right, top = cut_box(moves)
-            by = BESIDE_SHARE * max(right - left, top - bottom)
-            box = left - by, bottom - by, right + by, top + by
+        box = None if stock is None else stock.box_mm
+        made = stock_pair(moves, box, None if stock is None else stock.thickness_mm)
         other = wanted is not None and wanted is not toolpath
         beside = _as_planned(wanted, job) if other and wanted is not None else None
-        return StockPair(moves, beside, box, depth or 1.0, known, bands=bands)
+        return replace(made, wanted=beside, bands=bands)
 
     return pair
+
+
+def stock_pair(
+    moves: StockMoves,
+    box_mm: tuple[float, float, float, float] | None,
+    thickness_mm: float | None,
+) -> StockPair:
+    """Return the stock that moves cut; what is None of its box is as large as they need."""
+    from camtool.stock.cut import cut_box
+
+    box, depth = box_mm, thickness_mm or 0.0
+    if thickness_mm is None and len(moves):
+        depth = max(-(1.0 + BELOW_SHARE) * float(moves.end[:, 2].min()), 0.0)
+    if box is None:
+        left, bottom, right, top = cut_box(moves)
+        by = max(BESIDE_SHARE * max(right - left, top - bottom), MIN_BESIDE_MM)
+        box = left - by, bottom - by, right + by, top + by
+    return StockPair(moves, None, box, depth or 1.0, box_mm is not None)
 
 
 def _bands(

@@ -131,11 +131,20 @@ def live_rows(page: str) -> int:
 
 def viewer_column(page: str, name: str) -> Floats:
     """A column of numbers of the viewer's page."""
-    kind, offset, count = json.loads(_of(page, "head"))["columns"][name]
-    types = {"u1": "u1", "i2": "<i2", "i4": "<i4", "f4": "<f4", "d1": "i1"}
+    kind, offset, count, *unit = json.loads(_of(page, "head"))["columns"][name]
     data = base64.b64decode(_of(page, "columns"))
-    numbers = np.frombuffer(data, types[kind], count, offset).astype(float)
-    return np.cumsum(numbers) if kind == "d1" else numbers
+    if not kind.startswith("v"):
+        return np.frombuffer(data, {"u1": "u1", "f4": "<f4"}[kind], count, offset).astype(float)
+    found, stride = [0] * int(kind[1:]), int(kind[1:])
+    for _ in range(count):
+        digits = [data[offset] & 127]
+        while data[offset] & 128:
+            offset += 1
+            digits.append(data[offset] & 127)
+        offset += 1
+        number = sum(digit << 7 * place for place, digit in enumerate(digits))
+        found.append(found[-stride] + (-(number + 1) // 2 if number % 2 else number // 2))
+    return np.array(found[stride:], dtype=float) * (unit[0] if unit else 1.0)
 
 
 def viewer_paths(page: str, rows: int | None = None) -> Paths:

@@ -2,6 +2,7 @@
 
 import base64
 import hashlib
+import json
 import re
 import tomllib
 from html.parser import HTMLParser
@@ -18,11 +19,12 @@ from camtool.pictures.draw import render
 from camtool.pictures.layers import LAYERS
 from camtool.pictures.scene import Playback, ReportTable, Round, Scene, TableLine, by_feed
 from camtool.pictures.trace import bins_of, exaggerated, trace_of
-from camtool.pictures.viewer.columns import columns_of, packed, traced_of
+from camtool.pictures.viewer.columns import CountColumn, columns_of, packed, traced_of
 from camtool.pictures.viewer.page import MAX_PLOTS, SCRIPTED, SCRIPTS, viewer_page
 from camtool.records import replace
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Kind
+from tests.oracles.page_paths import viewer_column
 from tests.pictures.conftest import NASTY, SCENES, circle, drawing_of, followed, line
 from tests.pictures.viewer_pages import (
     HOSTILE,
@@ -136,18 +138,23 @@ def test_columns_come_back_as_they_went_in(scenes: dict[str, Scene]) -> None:
         scene.playback().error_mm,
         np.arange(len(scene.trace_points if scene.trace_points is not None else ())),
     )
-    wide = {"wide": np.array([7, -70_000], dtype="<i4"), "short": np.array([0, 900], dtype="<i4")}
-    columns = {**columns_of(content_of(scene), run), **traced_of(scene, run, 20.0).columns, **wide}
+    wide = {"wide": np.array([7, -70_000], dtype="<i4"), "far": np.array([0, 2**40, -(2**40)])}
+    wide |= {"none": np.array([], dtype="<i4"), "zero": np.array([0, 0, 0, 0], dtype="<i4")}
+    counted = {name: CountColumn(column, 0.5, 2) for name, column in wide.items()}
+    columns = {**columns_of(content_of(scene), run), **traced_of(scene, run, 20.0).columns}
+    columns |= wide | {f"{name}_counted": column for name, column in counted.items()}
+    columns["far"] = CountColumn(wide["far"])
     named, data = packed(columns)
-    for name, (kind, offset, count) in named.items():
-        assert offset % 4 == 0
-        stepped = kind == "d1"
-        held = np.frombuffer(data, dtype="i1" if stepped else kind, count=count, offset=offset)
-        held = held.cumsum() if stepped else held
-        np.testing.assert_array_equal(held, columns[name].ravel())
-    assert [named[name][0] for name in ("trace_row", "short", "wide")] == ["d1", "i2", "i4"]
-    np.testing.assert_allclose(columns["move_end"], scene.toolpath.end, atol=1e-6)
-    assert len(columns["trace_row"]) == len(columns["trace_bin"]) > 100
+    assert all(offset % 4 == 0 for _, offset, *_ in named.values())
+    head, block = json.dumps({"columns": named}), base64.b64encode(data).decode()
+    page = (
+        f'<script type="a" id="head">{head}</script><script type="a" id="columns">{block}</script>'
+    )
+    for name, column in columns.items():
+        known = column.counts * column.unit if isinstance(column, CountColumn) else column
+        np.testing.assert_array_equal(viewer_column(page, name), known.ravel())
+    np.testing.assert_allclose(np.asarray(columns["move_end"]), scene.toolpath.end, atol=1e-6)
+    assert named["trace_row"][2] == len(columns["trace_bin"]) > 100
     page = text_of(scene)
     block = re.search(r'id="columns">([^<]*)<', page)
     assert block is not None
@@ -161,8 +168,11 @@ def test_the_page_draws_deviations_as_pictures_do() -> None:
     assert scene.trace_points is not None
     assert scene.trace_cutting is not None
     found = traced_of(scene, scene.playback(), 20.0)
-    off = found.columns["trace_off"].astype(float) * found.count_mm
-    assert np.abs(found.columns["trace_off"]).max() == 32_000
+    column = found.columns["trace_off"]
+    assert isinstance(column, CountColumn)
+    counts = column.counts.astype(float)
+    off = counts * found.count_mm
+    assert np.abs(counts).max() == 4_000
     cut = scene.trace_cutting
     drawn = scene.trace_points + 49.0 * off
     wanted = exaggerated(scene.trace_points, ring, 50.0)
@@ -172,7 +182,9 @@ def test_the_page_draws_deviations_as_pictures_do() -> None:
     np.testing.assert_allclose(worst + 49.0 * found.worst_off, moved, atol=1e-9)
     picture = trace_of(scene)
     assert picture is not None
-    shown = found.columns["trace_bin"][1:].astype(int)
+    bins = found.columns["trace_bin"]
+    assert isinstance(bins, np.ndarray)
+    shown = bins[1:].astype(int)
     np.testing.assert_array_equal(
         np.where(shown == BINS, -1, shown), bins_of(replace(picture, top_um=20.0))
     )
@@ -184,9 +196,10 @@ def test_the_wanted_path_breaks_where_it_does() -> None:
     toolpath = followed(drawing_of(paths, ["a", "b"]))
     scene = Scene("t", toolpath=toolpath, wanted=wanted)
     columns = columns_of(content_of(scene), run_of(toolpath))
-    assert columns["wanted_break"].tolist() == [0, 2]
-    assert columns["wanted_begin"].tolist() == [[0.0, 0.0], [5.0, 5.0]]
-    assert columns["wanted_arc"].tolist() == [1]
+    found = {
+        name: np.asarray(columns[f"wanted_{name}"]).tolist() for name in ("break", "begin", "arc")
+    }
+    assert found == {"break": [0, 2], "begin": [[0.0, 0.0], [5.0, 5.0]], "arc": [1]}
 
 
 def test_full_circles_are_plotted_in_the_colours_of_the_page() -> None:

@@ -25,7 +25,7 @@ def counts(page: dict[str, object]) -> dict[str, int]:
     """Return the length of each column of the page."""
     columns = page["columns"]
     assert isinstance(columns, dict)
-    return {name: count for name, (_, _, count) in columns.items()}
+    return {name: count for name, (_, _, count, *_) in columns.items()}
 
 
 def test_a_drawing_alone_has_no_time(drawing: str) -> None:
@@ -102,9 +102,12 @@ def test_a_finding_has_the_place_of_its_words(drawing: str) -> None:
     assert stock == {"box": [-8.0, -8.0, 88.0, 58.0], "bottom": -6.0}
     cutters = page["cutters"]
     assert isinstance(cutters, list)
-    # Seven operations: the mill thrice, the drill, the bit twice, and the mill again.
-    assert [round(each[1], 3) for each in cutters] == [1.5, 1.5, 1.5, 1.5, 3.0, 3.0, 1.5]
-    assert [each[4] > 0.0 for each in cutters] == [*[False] * 3, *[True] * 3, False]
+    # Seven operations with four turns of a tool: the mill, the drill, the bit, the mill again.
+    assert [round(each[1], 3) for each in cutters] == [1.5, 1.5, 3.0, 1.5]
+    bodies = page["bodies"]
+    assert isinstance(bodies, list)
+    assert len(bodies) == 7
+    assert [each[4] > 0.0 for each in cutters] == [False, True, True, False]
 
 
 def test_several_ways_make_no_page(drawing: str) -> None:

@@ -14,13 +14,17 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import camtool
 from camtool.arrays import Floats
-from camtool.pictures.scene import ReportTable, Scene, TableLine
+from camtool.kernels.stock import StockTree
+from camtool.pictures.scene import ReportTable, Scene, StockPair, TableLine, stock_pair
 from camtool.pictures.viewer.page import viewer_page
-from camtool.planning.job import Tool
+from camtool.planning.job import Job, Tool
 from camtool.records import replace
 from camtool.stock.cutters import cutter_profile
+from camtool.stock.heights import stock_tree
 from camtool.stock.moves import StockMoves, stock_moves_of_toolpath
+from camtool.stock.slides import tools_of_rows
 from camtool.toolpath.builder import ToolpathBuilder
 from camtool.toolpath.moves import Toolpath
 from tests.oracles.page_paths import viewer_column
@@ -63,14 +67,24 @@ def slot(depth: float) -> Toolpath:
     return path.line(14.0, 4.5, feed=50.0).rapid(z=2.0).rapid(0.0, 0.0).finish()
 
 
-def goal_of(path: Toolpath, tool: Tool) -> Callable[[], StockMoves]:
-    """Return a function that gives the moves of a path with one tool, as those that are wanted."""
-    which = np.zeros(len(path), dtype=np.int64)
-    return lambda: stock_moves_of_toolpath(path, which, (cutter_profile(tool),))
+def cuts_of(path: Toolpath, *turns: tuple[int, Tool]) -> StockMoves:
+    """The moves of a path with tools that begin at rows."""
+    begins = [row for row, _ in turns]
+    which = np.searchsorted(begins, np.arange(len(path)), side="right") - 1
+    return stock_moves_of_toolpath(path, which, tuple(cutter_profile(tool) for _, tool in turns))
 
 
-def scene_of_cuts(path: Toolpath, *turns: tuple[int, Tool]) -> Scene:
-    return busy(Scene("cuts", toolpath=path, tools=turns, stock_mm=BOX, thickness_mm=3.0))
+def cuts_of_job(path: Toolpath, job: Job) -> StockTree:
+    """The stock that a toolpath would leave on a machine without any error."""
+    tools = tools_of_rows(path, job)
+    return stock_tree(stock_moves_of_toolpath(path, tools.index, tools.cutters))
+
+
+def scene_of_cuts(
+    path: Toolpath, *turns: tuple[int, Tool], wanted: StockMoves | None = None
+) -> Scene:
+    cut = StockPair(cuts_of(path, *turns), wanted, BOX, 3.0, known=True)
+    return busy(Scene("cuts", toolpath=path, tools=turns, cut=lambda: cut))
 
 
 def cut_by(script: Callable[[str], Any], path: Toolpath, tool: Tool, *rows: int) -> list[Floats]:
@@ -78,13 +92,10 @@ def cut_by(script: Callable[[str], Any], path: Toolpath, tool: Tool, *rows: int)
     names = ("data.js", "solid.js")
     folder = resources.files("camtool.pictures.viewer")
     text = "\n".join(folder.joinpath(name).read_text() for name in names)
-    arcs = np.flatnonzero(path.is_arc)
+    moves = cuts_of(path, (0, tool))
     given = {
-        "from": path.starts[:, :2].ravel().tolist(),
-        "to": path.end[:, :2].ravel().tolist(),
-        "arcs": arcs.tolist(),
-        "bends": np.column_stack([path.centre, path.sweeps()])[arcs].ravel().tolist(),
-        "z": [float(path.start[2]), *path.end[:, 2].tolist()],
+        "at": np.vstack([moves.start[:1], moves.end]).ravel().tolist(),
+        "counts": np.bincount(moves.row, minlength=len(path)).tolist(),
         "cutter": cutter_profile(tool).columns,
         "stock": {"box": BOX, "grid": GRID},
         "rows": rows,
@@ -92,10 +103,10 @@ def cut_by(script: Callable[[str], Any], path: Toolpath, tool: Tool, *rows: int)
     made = script(
         f"""() => {{
           {text}
-          const given = {json.dumps(given)}, from = Float64Array.from(given.from);
-          const track = new Track(from, Float64Array.from(given.to), given.arcs, given.bends);
+          const given = {json.dumps(given)};
+          const slides = new Slides(Float64Array.from(given.at), given.counts);
           const turns = [[0, new Cutter(given.cutter)]];
-          const solid = new Solid(given.stock, turns, track, given.z);
+          const solid = new Solid(given.stock, turns, slides);
           const all = given.rows.map((row) => {{
             solid.toward(row, 1);
             return Array.from(solid.heights);
@@ -264,6 +275,41 @@ class TestShown:
         assert "place\nX 8." in tip
         assert "block" in tip
 
+    def test_its_heights_are_those_of_the_simulated_slides(
+        self, shown: Any, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("camtool.pictures.viewer.page.MAX_HEIGHTS", 500_000)
+        worn = {"axes.x.backlash_mm": 1.0, "axes.y.backlash_mm": 1.0}
+        job = camtool.read_job("samples/mount.toml")
+        machine = camtool.load_target("grbl", settings=worn)
+        run = camtool.post("samples/mount.dxf", machine, job)
+        page = viewer_page(run.scene()).decode("utf-8")
+        stock = head_of(page)["stock"]
+        assert isinstance(stock, dict)
+        cell = (stock["box"][2] - stock["box"][0]) / (stock["grid"][0] - 1)
+        exact = camtool.cut_stock(run)
+        assert run.decoded is not None
+        planned = cuts_of_job(run.decoded, job)
+        view = shown(page)
+        view.press("g", "t")
+        view.settled()
+        seen, besides = 0, 0
+        for across in np.linspace(0.1, 0.9, 120):
+            view.page.mouse.move(*view.place_of(across, 0.5 + 0.5 * (across - 0.5)))
+            words = view.text("#tip").split()
+            if "place" not in words:
+                continue
+            x, y, z = (float(words[words.index(axis) + 1]) for axis in "XYZ")
+            near = np.linspace(-1.0, 1.0, 9) * (cell + 0.005)
+            places = np.stack(np.meshgrid(x + near, y + near), axis=-1).reshape(-1, 2)
+            heights = exact.heights(places).clip(stock["bottom"])
+            assert heights.min() - 0.002 <= z <= heights.max() + 0.002, (x, y)
+            seen += 1
+            low, high = np.sort(planned.heights(places)[0])[[0, -1]]
+            besides += bool(z < low - 0.01 or z > high + 0.01)
+        assert seen > 15
+        assert besides  # the decoded moves cut elsewhere
+
     def test_a_table_shows_a_place(self, shown: Any) -> None:
         scene = scene_of_cuts(random_path(3), (0, MILL))
         assert scene.playback is not None
@@ -283,10 +329,9 @@ class TestShown:
         assert view.pixels("over") > 0
 
     def test_gouges_and_leftovers_have_their_colours(self, shown: Any) -> None:
-        wanted = slot(-1.0)
+        wanted = cuts_of(slot(-1.0), (0, MILL))
         for depth, red, blue in ((-1.0, False, False), (-1.2, True, False), (-0.8, False, True)):
-            scene = replace(scene_of_cuts(slot(depth), (0, MILL)), goal=goal_of(wanted, MILL))
-            view = shown(scene)
+            view = shown(scene_of_cuts(slot(depth), (0, MILL), wanted=wanted))
             view.press("g", "t")
             view.page.select_option("#colour-by", "beside")
             data = np.array(Image.open(io.BytesIO(picture(view))).convert("RGB")).astype(int)
@@ -321,7 +366,7 @@ def test_the_head_has_the_stock_and_each_tool() -> None:
 
 def test_the_page_holds_the_wanted_heights() -> None:
     path = random_path(4)
-    scene = replace(scene_of_cuts(path, (0, BIT)), goal=goal_of(path, BIT))
+    scene = scene_of_cuts(path, (0, BIT), wanted=cuts_of(path, (0, BIT)))
     page = viewer_page(scene).decode("utf-8")
     stock = head_of(page)["stock"]
     assert isinstance(stock, dict)
@@ -338,8 +383,11 @@ def test_the_page_holds_the_wanted_heights() -> None:
 
 def test_without_a_stock_it_is_as_large_as_the_cuts() -> None:
     path = ToolpathBuilder().rapid(0.0, 0.0, 2.0).line(10.0, 4.0, -1.5, feed=50.0).finish()
-    scene = replace(scene_of_cuts(path, (0, MILL)), stock_mm=None, thickness_mm=None)
-    stock = head_of(viewer_page(scene).decode("utf-8"))["stock"]
+    pair = stock_pair(cuts_of(path, (0, MILL)), None, None)
+    page = viewer_page(replace(scene_of_cuts(path, (0, MILL)), cut=lambda: pair)).decode("utf-8")
+    stock = head_of(page)["stock"]
     assert isinstance(stock, dict)
-    stock.pop("grid")
-    assert stock == {"box": [-1.5, -1.5, 11.5, 5.5], "bottom": -2.5}
+    beside = 1.5 + 0.06 * 13.0
+    box = (-beside, -beside, 10.0 + beside, 4.0 + beside)
+    assert stock["box"] == pytest.approx(box)
+    assert stock["bottom"] == pytest.approx(-1.25 * 1.5)

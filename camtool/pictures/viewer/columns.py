@@ -1,8 +1,10 @@
 """A scene as columns of numbers, packed for the page.
 
 All columns follow each other in one block of bytes, little-endian, each beginning at a multiple of
-four: f4 (float), u1 (byte), i2 and i4 (integer), d1 (integers as differences of a byte from the
-number before, the first from 0). Floats of 32 bits hold a place on a table of 8 m to 1 µm.
+four: f4 (float), u1 (byte), or v1, v2, v3: integers as differences from the number one, two or
+three before (the first ones from 0), each as 7 bits a byte, the lowest first, with the sign in the
+lowest bit. Floats of 32 bits hold a place on a table of 8 m to 1 µm; integers may be counts of a
+unit, with which the page multiplies them.
 """
 
 from __future__ import annotations
@@ -14,22 +16,44 @@ from msgspec import Struct
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.polylines import POSITION_EPS_MM, Segments
+from camtool.kernels.stock import thinned as thinned_moves
 from camtool.pictures.colours import BINS
 from camtool.pictures.content import Content
 from camtool.pictures.layers import LineGroup, Part
-from camtool.pictures.scene import Playback, Scene
+from camtool.pictures.scene import Playback, Scene, StockPair
 from camtool.pictures.trace import ErrorTrace, bins_of, nearest_points
 from camtool.stock.heightmap import HeightMap, add_moves
 from camtool.toolpath.moves import Kind, Toolpath
 from camtool.units import UM_PER_MM
 
-Columns = dict[str, npt.NDArray[np.generic]]
+
+class CountColumn(Struct, frozen=True, eq=False):
+    """A column of integers: counts of `unit`, of which `stride` after each other are one place."""
+
+    counts: npt.NDArray[np.integer]
+    unit: float = 1.0
+    stride: int = 1
+
+
+Columns = dict[str, npt.NDArray[np.generic] | CountColumn]
 
 FLOAT, INT, BYTE = np.dtype("<f4"), np.dtype("<i4"), np.dtype("u1")
-SHORT, STEP = np.dtype("<i2"), np.dtype("i1")
 
 ALIGN_BYTES = 4
 """Every column begins at a multiple of this; browsers refuse others."""
+
+MAX_NUMBER_BYTES = 7
+"""Of an integer below 2**48: a unit of 0.1 µm is then enough for 28,000 km."""
+
+GOAL_COUNTS = 32_000
+"""Wanted heights are whole shares of the thickness, one of so many."""
+
+SLIDE_UNIT_MM = 1e-4
+"""Places of the slides are multiples of this."""
+
+THIN_CELLS = 0.01
+"""What cuts the stock bends by this share of a cell of the page's grid, or as much as it is known
+to, before it is told."""
 
 
 def columns_of(content: Content, run: Playback | None) -> Columns:
@@ -73,50 +97,85 @@ class StockBox(Struct, frozen=True):
     grid: tuple[int, int]
 
 
-def goal_columns(scene: Scene, stock: StockBox | None) -> Columns:
+def goal_columns(pair: StockPair | None, stock: StockBox | None) -> Columns:
     """The heights that the stock should have, row by row on its grid, each as often as the column
-    of counts says, in shares of 1/MAX_COUNTS of its thickness; empty where this is not known."""
-    values, counts = np.empty(0, dtype=SHORT), np.empty(0, dtype=INT)
-    if stock is not None and scene.goal is not None and scene.tools:
+    of counts says, in shares of 1/GOAL_COUNTS of its thickness; empty where this is not known."""
+    values, counts = np.empty(0, dtype=INT), np.empty(0, dtype=INT)
+    if stock is not None and pair is not None and pair.wanted is not None:
         left, low, right, _ = stock.box
         across, upwards = stock.grid
         cell = (right - left) / (across - 1)
         corner = (left - 0.5 * cell, low - 0.5 * cell)
         heights = HeightMap(np.zeros((upwards, across), dtype=np.float32), cell, corner)
-        add_moves(heights, scene.goal())
-        shares = np.rint(heights.heights.ravel() * (MAX_COUNTS / -stock.bottom))
-        whole = np.maximum(shares, -MAX_COUNTS).astype(SHORT)
+        add_moves(heights, pair.wanted)
+        shares = np.rint(heights.heights.ravel() * (GOAL_COUNTS / -stock.bottom))
+        whole = np.maximum(shares, -GOAL_COUNTS).astype(INT)
         begins = np.concatenate([[0], np.flatnonzero(np.diff(whole)) + 1])
         values = whole[begins]
         counts = np.diff(np.append(begins, whole.size)).astype(INT)
     return {"goal_height": values, "goal_count": counts}
 
 
-def packed(columns: Columns) -> tuple[dict[str, tuple[str, int, int]], bytes]:
-    """({name: (type, byte offset, count)}, all bytes)."""
-    named: dict[str, tuple[str, int, int]] = {}
+def slide_columns(pair: StockPair | None, rows: int, cell_mm: float) -> Columns:
+    """The moves of the tips that cut the stock: where the first one begins and each one ends, and
+    how many of them each of the `rows` of the toolpath makes. Moves between which nothing bends by
+    more than a share of `cell_mm` are one; there are MAX_POINTS at most, if need be coarser."""
+    moves = None if pair is None else pair.moves
+    if moves is None or not len(moves):
+        none = np.empty(0, dtype=INT)
+        return {"slide_at": CountColumn(none, SLIDE_UNIT_MM, 3), "slide_count": none}
+    kept, near_mm = np.arange(len(moves)), max(moves.beside_mm, THIN_CELLS * cell_mm)
+    while True:
+        kept = kept[thinned_moves(moves.end[kept], moves.row[kept], moves.start[0], near_mm)]
+        if len(kept) <= MAX_POINTS or near_mm > np.ptp(moves.end, axis=0).max():
+            break
+        near_mm *= COARSER
+    places = np.concatenate([moves.start[:1], moves.end[kept]])
+    counts = np.rint(places / SLIDE_UNIT_MM).astype(np.int64)
+    of_rows = np.bincount(moves.row[kept], minlength=rows)
+    return {"slide_at": CountColumn(counts, SLIDE_UNIT_MM, 3), "slide_count": of_rows.astype(INT)}
+
+
+Named = dict[str, tuple[str, int, int] | tuple[str, int, int, float]]
+
+
+def packed(columns: Columns) -> tuple[Named, bytes]:
+    """({name: (type, byte offset, count)}, all bytes); a column of counts has its unit besides."""
+    named: Named = {}
     parts: list[bytes] = []
     at = 0
     for name, column in columns.items():
-        kind, narrow = _narrow(column)
-        data = narrow.tobytes()
+        if isinstance(column, np.ndarray) and column.dtype != INT:
+            named[name] = (column.dtype.str.lstrip("<|"), at, column.size)
+            data = column.tobytes()
+        else:
+            known = (
+                column if isinstance(column, CountColumn) else CountColumn(column.astype(np.int64))
+            )
+            kind = f"v{known.stride}"
+            size = known.counts.size
+            named[name] = (kind, at, size) if known.unit == 1.0 else (kind, at, size, known.unit)
+            data = stepped(known.counts, known.stride)
         data += bytes(-len(data) % ALIGN_BYTES)
-        named[name] = (kind, at, column.size)
         parts.append(data)
         at += len(data)
     return named, b"".join(parts)
 
 
-def _narrow(column: npt.NDArray[np.generic]) -> tuple[str, npt.NDArray[np.generic]]:
-    """A column in the smallest of the types that hold it, and the name of that type."""
-    if column.dtype != INT:
-        return column.dtype.str.lstrip("<|"), column
-    steps = np.diff(column.astype(np.int64), prepend=0)
-    for kind, values, dtype in (("d1", steps, STEP), ("i2", column, SHORT)):
-        limits = np.iinfo(dtype)
-        if not column.size or (values.min() >= limits.min and values.max() <= limits.max):
-            return kind, values.astype(dtype)
-    return "i4", column
+def stepped(numbers: npt.NDArray[np.integer], stride: int) -> bytes:
+    """Return integers as differences from the number `stride` before, in as many bytes as each
+    needs: 7 bits a byte, the lowest first; the highest bit says that more follow."""
+    flat = numbers.ravel().astype(np.int64)
+    steps = flat - np.concatenate([np.zeros(stride, dtype=np.int64), flat[:-stride]])[: len(flat)]
+    rest = (steps << 1) ^ (steps >> 63)
+    found = np.zeros((len(rest), MAX_NUMBER_BYTES), dtype=BYTE)
+    size = np.ones(len(rest), dtype=np.int64)
+    for k in range(MAX_NUMBER_BYTES):
+        found[:, k] = rest & 0x7F
+        rest = rest >> 7
+        found[:, k] |= np.where(rest > 0, 0x80, 0).astype(BYTE)
+        size += rest > 0
+    return found[np.arange(MAX_NUMBER_BYTES) < size[:, None]].tobytes()
 
 
 def drawing_layers(drawing: Drawing) -> list[str]:
@@ -152,22 +211,26 @@ def _moves(scene: Scene, run: Playback | None) -> Columns:
     if toolpath is None or run is None:
         none = np.empty(0)
         floats = (
-            *("move_start", "move_end", "move_feed", "move_seconds", "move_error"),
+            *("move_start", "move_end", "feed_value", "move_seconds", "move_error"),
             "move_wide",
         )
         return {
             **_arc_columns("move", none.astype(np.bool_), none.reshape(0, 2), none),
             **{name: none.astype(FLOAT) for name in floats},
-            **{name: none.astype(INT) for name in ("move_block", "move_source")},
+            **{name: none.astype(INT) for name in ("feed_count", "move_block", "move_source")},
             **{name: none.astype(BYTE) for name in ("move_kind", "move_sort")},
         }
     if len(run.seconds) != len(toolpath):
         raise ValueError("the playback is that of another toolpath")
+    feed = toolpath.feed.astype(FLOAT)
+    known = np.nan_to_num(feed, nan=-1.0)
+    begins = np.flatnonzero(np.diff(known, prepend=np.inf))
     return {
         **_arc_columns("move", toolpath.is_arc, toolpath.centre, toolpath.sweeps()),
         "move_start": toolpath.start.astype(FLOAT),
         "move_end": toolpath.end.astype(FLOAT),
-        "move_feed": toolpath.feed.astype(FLOAT),
+        "feed_value": feed[begins],
+        "feed_count": np.diff(np.append(begins, len(feed))).astype(INT),
         "move_seconds": run.seconds.astype(FLOAT),
         "move_error": (run.error_mm * UM_PER_MM).astype(FLOAT),
         "move_block": toolpath.block.astype(INT),
@@ -243,8 +306,9 @@ def _arc_columns(
 # Of a point p of the slides and the nearest point q of the wanted path, the page holds p and p−q,
 # and draws p + (N − 1)(p − q) for a deviation N times as large (see `camtool.pictures.trace`).
 
-MAX_COUNTS = 32_000
-"""Deviations are whole numbers of counts, this many for the largest."""
+MAX_COUNTS = 4_000
+"""Deviations are whole numbers of counts, this many for the largest: drawn a thousand times as
+large, it is true to a quarter of itself."""
 
 
 class Traced(Struct, frozen=True, eq=False):
@@ -263,14 +327,15 @@ def traced_of(scene: Scene, run: Playback | None, top_um: float) -> Traced:
     points, error, cutting = scene.trace_points, scene.trace_error_mm, scene.trace_cutting
     if points is None or error is None or cutting is None or run is None or not len(run.trace_row):
         none = np.empty(0)
-        nothing = _columns(none.reshape(0, 2), none.astype(np.int64), none, none)
+        nothing = _columns(none.reshape(0, 2), none.astype(np.int64), none, none, FINEST_MM)
         return Traced(nothing, 0.0, np.zeros_like(worst))
     if len(run.trace_row) != len(points):
         raise ValueError("the playback does not have a row for each point of the trace")
     error_um = np.where(cutting, np.abs(error) * UM_PER_MM, 0.0)
     steps = bins_of(ErrorTrace(points, error_um, cutting, top_um))
     bins = np.concatenate([[BINS], np.where(steps < 0, BINS, steps)])
-    kept = thinned(points, bins, float(error_um.max(initial=0.0)) / UM_PER_MM)
+    largest_mm = float(error_um.max(initial=0.0)) / UM_PER_MM
+    kept = thinned(points, bins, largest_mm)
     # A cut begins at the point before its first one.
     drawn = (cutting | np.append(cutting[1:], False))[kept]
     points, bins, row = points[kept], bins[kept], run.trace_row[kept]
@@ -279,7 +344,8 @@ def traced_of(scene: Scene, run: Playback | None, top_um: float) -> Traced:
     count_mm = largest / MAX_COUNTS if scene.wanted is not None and largest > 0.0 else 0.0
     counts = np.rint(off / count_mm) if count_mm else np.zeros_like(off)
     ever = np.ones(len(worst), dtype=np.bool_)
-    return Traced(_columns(points, bins, row, counts), count_mm, _off(worst, ever, scene.wanted))
+    columns = _columns(points, bins, row, counts, finest_mm(largest_mm))
+    return Traced(columns, count_mm, _off(worst, ever, scene.wanted))
 
 
 def _off(points: Floats, chosen: np.ndarray, wanted: Segments | None) -> Floats:
@@ -291,12 +357,15 @@ def _off(points: Floats, chosen: np.ndarray, wanted: Segments | None) -> Floats:
     return off
 
 
-def _columns(points: Floats, bins: Ints, row: Ints | Floats, counts: Floats) -> Columns:
+def _columns(
+    points: Floats, bins: Ints, row: Ints | Floats, counts: Floats, unit_mm: float
+) -> Columns:
+    places = np.rint(points / unit_mm).astype(np.int64)
     return {
-        "trace_point": points.astype(FLOAT),
+        "trace_point": CountColumn(places, unit_mm, 2),
         "trace_bin": bins.astype(BYTE),
         "trace_row": row.astype(INT),
-        "trace_off": counts.astype(SHORT),
+        "trace_off": CountColumn(counts.astype(INT), stride=2),
     }
 
 
@@ -315,6 +384,9 @@ FINEST_MM = 1e-4
 FINEST_SHARE = 0.01
 """... or within this share of the largest error, where that is less ..."""
 
+MIN_UNIT_MM = 1e-6
+"""... but always within this ..."""
+
 COARSER = 4.0
 """... and the distance grows by this factor while there are too many points."""
 
@@ -323,7 +395,7 @@ def thinned(points: Floats, bins: Ints, largest_mm: float, most: int = MAX_POINT
     """Ascending rows of the points (T, 2) mm, with their colours (T,), that are kept: among them
     the ends of all pieces of one colour, unless these alone are more than `most`."""
     kept = np.arange(len(points))
-    near_mm = min(FINEST_MM, FINEST_SHARE * largest_mm)
+    near_mm = finest_mm(largest_mm)
     while True:
         fewer = _halved(points, bins, kept, near_mm)
         if len(fewer) < len(kept):
@@ -334,6 +406,12 @@ def thinned(points: Floats, bins: Ints, largest_mm: float, most: int = MAX_POINT
             return kept[:: -(-len(kept) // most)]
         else:
             near_mm *= COARSER
+
+
+def finest_mm(largest_mm: float) -> float:
+    """Return the distance by which a path with this largest error may be coarser, mm: also the
+    unit of its points."""
+    return max(min(FINEST_MM, FINEST_SHARE * largest_mm), MIN_UNIT_MM)
 
 
 def _halved(points: Floats, bins: Ints, kept: Ints, near_mm: float) -> Ints:

@@ -1,24 +1,91 @@
 // The page's data: a head of words (JSON) and columns of numbers (base64, little-endian).
 
-const NUMBERS = { u1: Uint8Array, i2: Int16Array, i4: Int32Array, f4: Float32Array, d1: Int8Array };
+const NUMBERS = { u1: Uint8Array, f4: Float32Array };
 
-/** name -> typed array, by the head's `columns` {name: [type, byte offset, count]}. */
+/** name -> typed array, by the head's `columns` {name: [type, byte offset, count, unit]}. */
 function readColumns(columns, base64) {
   const text = atob(base64.trim());
   const bytes = new Uint8Array(text.length);
   for (let at = 0; at < text.length; at++) bytes[at] = text.charCodeAt(at);
   const named = {};
-  for (const [name, [type, offset, count]] of Object.entries(columns)) {
-    const column = new NUMBERS[type](bytes.buffer, offset, count);
-    named[name] = type === "d1" ? summed(column) : column;
+  for (const [name, [type, offset, count, unit]] of Object.entries(columns)) {
+    if (type[0] === "v") named[name] = summed(bytes, offset, count, Number(type[1]), unit);
+    else named[name] = new NUMBERS[type](bytes.buffer, offset, count);
   }
+  named.move_feed = repeated(named.feed_value, named.feed_count);
   return named;
 }
 
-/** Numbers from their differences. */
-function summed(steps) {
-  let sum = 0;
-  return Int32Array.from(steps, (step) => (sum += step));
+/** Each of the values as often as its count says. */
+function repeated(values, counts) {
+  const all = new Float32Array(counts.reduce((sum, count) => sum + count, 0));
+  for (let k = 0, at = 0; k < values.length; at += counts[k], k++) all.fill(values[k], at, at + counts[k]);
+  return all;
+}
+
+/** Numbers from their differences to the number `stride` before, of 7 bits a byte; floats where
+ * they have a unit. */
+function summed(bytes, at, count, stride, unit) {
+  const sums = new (unit ? Float64Array : Int32Array)(count);
+  for (let k = 0; k < count; k++) {
+    let size = 0, weight = 1, byte = 128;
+    for (; byte & 128; weight *= 128) {
+      byte = bytes[at++];
+      size += (byte & 127) * weight;
+    }
+    const half = Math.floor(size / 2);
+    sums[k] = (size % 2 ? -1 - half : half) + (k < stride ? 0 : sums[k - stride]);
+  }
+  return unit ? sums.map((sum) => sum * unit) : sums;
+}
+
+/** The straight moves of the tips, and which of them each row of the toolpath makes. */
+class Slides {
+  /** `at` (3 K + 3) mm: where the first begins and each ends; `counts` (N,) of each row. */
+  constructor(at, counts) {
+    this.at = at;
+    this.count = counts.length;
+    this.first = new Int32Array(this.count + 1);
+    for (let row = 0; row < this.count; row++) this.first[row + 1] = this.first[row] + counts[row];
+  }
+
+  /** Call use(x, y, z, u, v, w) for each straight piece between two shares of a row's length. */
+  pieces(row, from, to, use) {
+    const { at, first } = this;
+    const size = (k) => Math.hypot(at[3 * k + 3] - at[3 * k], at[3 * k + 4] - at[3 * k + 1], at[3 * k + 5] - at[3 * k + 2]);
+    let whole = 0, passed = 0;
+    for (let k = first[row]; k < first[row + 1]; k++) whole += size(k);
+    for (let k = first[row]; k < first[row + 1]; k++) {
+      const length = size(k);
+      if (!length) continue;
+      const begin = Math.max(0, (from * whole - passed) / length);
+      const end = to < 1 ? Math.min(1, (to * whole - passed) / length) : 1;
+      passed += length;
+      if (begin >= 1 || end <= 0) continue;
+      const [x, y, z, u, v, w] = at.subarray(3 * k, 3 * k + 6);
+      const [dx, dy, dz] = [u - x, v - y, w - z];
+      const last = end < 1 ? [x + end * dx, y + end * dy, z + end * dz] : [u, v, w];
+      use(x + begin * dx, y + begin * dy, z + begin * dz, ...last);
+    }
+  }
+
+  /** [x, y, z] mm of the tip at a share of a row. */
+  place(row, share) {
+    let found = this.at.slice(3 * this.first[row], 3 * this.first[row] + 3);
+    this.pieces(row, 0, share, (x, y, z, ...end) => { found = end; });
+    return found;
+  }
+
+  /** [length along X and Y, lowest Z] mm of a row; Infinity where it does not move. */
+  reach(row) {
+    let length = 0, low = Infinity;
+    for (let k = this.first[row]; k < this.first[row + 1]; k++) {
+      const [x, y, z, u, v, w] = this.at.subarray(3 * k, 3 * k + 6);
+      length += Math.hypot(u - x, v - y);
+      low = Math.min(low, z, w);
+    }
+    return [length, low];
+  }
 }
 
 /** The moves of the toolpath, each of which begins where the one before ended. */

@@ -5,7 +5,6 @@ const GOAL_COUNTS = 32000;
 const TILE = 32;
 const RIM = TILE + 1;
 const TOOL_SIDES = 40;
-const CHORD_TURN = 0.12;
 const CUT_MS = 12;
 const ORBIT_PX = 0.008;
 const KEY_TURN = Math.PI / 24;
@@ -229,12 +228,9 @@ class Depth {
     this.isOn = false;
     this.section = { axis: "", share: 0.5 };
     this.detail = 0;
-    this.moves = stage.moves;
-    const count = this.moves.count;
-    this.z = new Float64Array(count + 1);
-    for (let row = 0; row < count; row++) this.z[row + 1] = columns.move_end[3 * row + 2];
-    this.z[0] = columns.move_start.length ? columns.move_start[2] : 0;
+    this.slides = new Slides(columns.slide_at, columns.slide_count);
     this.turns = head.cutters.map(([row, ...profile]) => [row, new Cutter(profile)]);
+    this.bodies = head.bodies;
     // Without a tool there is nothing else to see.
     this.hasPath = find("path-shown").checked = !this.turns.length;
     this.turn(...SIDES.i);
@@ -254,7 +250,7 @@ class Depth {
     if (!gl) return false;
     this.gl = gl;
     this.bottom = this.head.stock.bottom;
-    this.solid = new Solid(this.head.stock, this.turns, this.moves, this.z);
+    this.solid = new Solid(this.head.stock, this.turns, this.slides);
     this.surface = program(gl, SURFACE, STUFF);
     this.curtain = program(gl, CURTAIN, STUFF);
     this.given = program(gl, GIVEN, SHADED);
@@ -286,8 +282,7 @@ class Depth {
     const { goal_height: goals, goal_count: counts } = this.layers.columns;
     this.texture(3, gl.R32F, gl.RED, gl.FLOAT, goals.length ? nx : 1, goals.length ? ny : 1);
     if (goals.length) {
-      const all = new Float32Array(nx * ny), share = -this.bottom / GOAL_COUNTS;
-      for (let k = 0, at = 0; k < goals.length; at += counts[k], k++) all.fill(goals[k] * share, at, at + counts[k]);
+      const share = -this.bottom / GOAL_COUNTS, all = repeated(goals, counts).map((count) => count * share);
       gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, nx, ny, gl.RED, gl.FLOAT, all);
     }
     const faces = [], middle = (TILE / 2) * (RIM + 1), last = TILE * RIM;
@@ -312,24 +307,13 @@ class Depth {
     solid.dirty = [0, ny - 1];
   }
 
-  /** The moves as lines: two ends of each line, and which is the first of each row. */
+  /** The path of the tips as lines: two ends of each. */
   makeLines() {
-    const { gl, moves, z } = this, points = [], first = new Int32Array(moves.count + 1);
-    for (let row = 0; row < moves.count; row++) {
-      first[row] = points.length / 3;
-      const arc = moves.arc(row), count = arc ? Math.ceil(Math.abs(arc.sweep) / CHORD_TURN) || 1 : 1;
-      let from = [moves.from[2 * row], moves.from[2 * row + 1], z[row]];
-      for (let piece = 1; piece <= count; piece++) {
-        const to = [...moves.at(row, piece / count), z[row] + (piece / count) * (z[row + 1] - z[row])];
-        points.push(...from, ...to);
-        from = to;
-      }
-    }
-    first[moves.count] = points.length / 3;
-    this.first = first;
-    this.lines = this.given3d(new Float32Array(points));
+    const { at, first, count } = this.slides, lines = new Float32Array(6 * first[count]);
+    for (let k = 0; k < first[count]; k++) lines.set(at.subarray(3 * k, 3 * k + 6), 6 * k);
+    this.lines = this.given3d(lines);
     this.tool = this.given3d(new Float32Array(0));
-    this.tints = new Uint8Array((points.length / 3) * 4);
+    this.tints = new Uint8Array(8 * first[count]);
   }
 
   /** Places of triangles or lines, and their colours. */
@@ -437,11 +421,11 @@ class Depth {
 
   /** The colours of the path and of the map, after a change of the layers. */
   restyle() {
-    const { gl, layers, tints, first, solid } = this, colours = palette();
+    const { gl, layers, tints, solid, slides: { first, count } } = this, colours = palette();
     const { of, styles } = layers.moveStyles(colours);
     const tones = styles.map((style) => (style ? [...rgb(style.colour).map((part) => 255 * part), 255] : [0, 0, 0, 0]));
-    for (let row = 0; row < this.moves.count; row++) {
-      for (let at = first[row]; at < first[row + 1]; at++) tints.set(tones[of[row]], 4 * at);
+    for (let row = 0; row < count; row++) {
+      for (let at = 2 * first[row]; at < 2 * first[row + 1]; at++) tints.set(tones[of[row]], 4 * at);
     }
     this.fill(this.lines.tints, tints);
     const map = [...layers.mapColours(), colours.pale].flatMap((colour) => [...rgb(colour).map((part) => 255 * part), 255]);
@@ -609,32 +593,30 @@ class Depth {
 
   /** The moves that are done, in their colours, and those to come, pale. */
   paintLines(colours) {
-    const { gl, run, first, moves } = this, at = this.use(this.given);
-    if (!moves.count || !this.hasPath) return;
+    const { gl, run, slides: { first, count } } = this, at = this.use(this.given);
+    if (!this.hasPath) return;
     gl.bindVertexArray(this.lines.array);
     gl.uniform3f(at.shift, 0, 0, 0);
     gl.uniform1i(at.isLine, 1);
-    const done = first[run.row + (run.share === 1 ? 1 : 0)];
+    const done = 2 * first[run.row + (run.share === 1 ? 1 : 0)];
     gl.uniform4f(at.over, 0, 0, 0, 0);
     const from = this.detail ? Math.max(0, done - COARSE_ENDS) : 0;
     gl.drawArrays(gl.LINES, from, done - from);
     if (this.detail) return;
     gl.uniform4f(at.over, ...rgb(colours.pale), 1);
-    gl.drawArrays(gl.LINES, done, first[moves.count] - done);
+    gl.drawArrays(gl.LINES, done, 2 * first[count] - done);
   }
 
   /** The tool where it is, in its shape. */
   paintTool(colours) {
-    const { gl, moves, run, turns, z } = this;
-    if (!moves.count) return;
-    let cutter = null;
-    for (const [row, each] of turns) if (row <= run.row || !cutter) cutter = each;
-    const key = `${turns.findIndex((one) => one[1] === cutter)} ${colours.tool}`;
-    if (this.shaped !== key) this.shapeTool(cutter, rgb(colours.tool));
+    const { gl, run, turns, bodies, slides } = this, now = ([row]) => row <= run.row;
+    const turn = turns.findLast(now) || turns[0], body = bodies.findLast(now) || bodies[0];
+    const key = `${turns.indexOf(turn)} ${bodies.indexOf(body)} ${colours.tool} ${colours.quiet}`;
+    if (this.shaped !== key) this.shapeTool(turn ? turn[1] : null, body || [], colours);
     this.shaped = key;
-    const at = this.use(this.given), high = z[run.row] + run.share * (z[run.row + 1] - z[run.row]);
+    const at = this.use(this.given);
     gl.bindVertexArray(this.tool.array);
-    gl.uniform3fv(at.shift, run.place || [...moves.at(run.row, run.share), high]);
+    gl.uniform3fv(at.shift, run.place || slides.place(run.row, run.share));
     gl.uniform1i(at.isLine, 0);
     gl.uniform4f(at.over, 0, 0, 0, 0);
     gl.enable(gl.CULL_FACE);
@@ -661,31 +643,41 @@ class Depth {
     gl.enable(gl.DEPTH_TEST);
   }
 
-  /** Turn the profile of a tool round its axis; a needle where its shape is not known. */
-  shapeTool(cutter, tone) {
-    const size = 0.5 * this.most, known = cutter && cutter.radius > 0;
-    const radius = known ? Math.min(cutter.radius, size) : 0.02 * size, ring = [[0, 0]];
-    if (!known) ring.push([radius, 4 * radius]);
+  /** Turn the profile of a tool round its axis, with shank and holder where they are known; a
+   * needle where its shape is not. */
+  shapeTool(cutter, [, cutting, shank, stickout, holder, holderLength], colours) {
+    const size = 0.5 * this.most, radius = cutter ? Math.min(cutter.radius, size) : 0.02 * size;
+    const ring = [[0, 0]];
+    if (!cutter) ring.push([radius, 4 * radius]);
     else {
       for (let k = 0; k <= 8; k++) {
         const out = cutter.flat + (radius - cutter.flat) * Math.sin((k / 8) * QUARTER);
         ring.push([out, cutter.height(out)]);
       }
     }
-    ring.push([radius, ring[ring.length - 1][1] + Math.max(4 * radius, 0.25 * size)], [0, ring[ring.length - 1][1] + Math.max(4 * radius, 0.25 * size)]);
-    const points = [], turned = ([out, z], k) => {
+    const full = ring[ring.length - 1][1], long = full + Math.max(4 * radius, 0.25 * size);
+    const flutes = Math.max(full, cutting || stickout || long);
+    ring.push([radius, flutes]);
+    const edges = ring.length - 1;
+    // A shank or holder without a length is drawn as long as can be seen.
+    const top = Math.max(stickout || 0, flutes + (shank || holder ? size / 4 : 0));
+    if (shank && top > flutes) ring.push([shank, flutes], [shank, top]);
+    if (holder) ring.push([holder, stickout || top], [holder, (stickout || top) + (holderLength || size / 2)]);
+    ring.push([0, ring[ring.length - 1][1]]);
+    const points = [], tints = [], turned = ([out, z], k) => {
       const angle = (k / TOOL_SIDES) * TURN;
       return [out * Math.cos(angle), out * Math.sin(angle), z];
     };
+    const [edge, body] = [colours.tool, colours.quiet].map((tone) => [...rgb(tone).map((part) => 255 * part), 150]);
     for (let k = 0; k < TOOL_SIDES; k++) {
       for (let j = 1; j < ring.length; j++) {
         const [a, b, c, d] = [turned(ring[j - 1], k), turned(ring[j - 1], k + 1), turned(ring[j], k + 1), turned(ring[j], k)];
         points.push(...a, ...b, ...c, ...a, ...c, ...d);
+        for (let corner = 0; corner < 6; corner++) tints.push(...(j <= edges ? edge : body));
       }
     }
     this.toolCount = points.length / 3;
     this.fill(this.tool.points, new Float32Array(points));
-    const paint = [...tone.map((part) => 255 * part), 150];
-    this.fill(this.tool.tints, Uint8Array.from({ length: 4 * this.toolCount }, (_, at) => paint[at % 4]));
+    this.fill(this.tool.tints, new Uint8Array(tints));
   }
 }

@@ -14,13 +14,16 @@ import json
 import math
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from importlib import resources
 from itertools import cycle
+from typing import TYPE_CHECKING
 
 import msgspec
 import numpy as np
 
 from camtool.arrays import Floats
+from camtool.errors import OptionError
 from camtool.geometry.drawing import Drawing
 from camtool.pictures.colours import (
     BACK,
@@ -39,7 +42,14 @@ from camtool.pictures.colours import (
 from camtool.pictures.content import Content, content_of
 from camtool.pictures.layers import LineGroup, Part, TextGroup, from_the_ground_up, swept_words
 from camtool.pictures.polar import ROOM, circle_pair, dial_of, notes, plot
-from camtool.pictures.scene import Playback, ReportTable, Scene, by_feed
+from camtool.pictures.scene import (
+    Playback,
+    ReportTable,
+    Scene,
+    StockPair,
+    by_feed,
+    stock_pair,
+)
 from camtool.pictures.svg import Look, element, number
 from camtool.pictures.viewer.columns import (
     Columns,
@@ -50,11 +60,15 @@ from camtool.pictures.viewer.columns import (
     goal_columns,
     packed,
     part_columns,
+    slide_columns,
     traced_of,
 )
-from camtool.stock.cutters import cutter_profile
-from camtool.toolpath.moves import toolpath_extents
+from camtool.stock.cutters import CutterProfile
+from camtool.stock.moves import stock_moves_of_toolpath
 from camtool.units import UM_PER_MM
+
+if TYPE_CHECKING:
+    from camtool.planning.job import Tool
 
 SCRIPTS = ("data.js", "paint.js", "stage.js", "solid.js", "depth.js", "panel.js", "main.js")
 """The files of the script in their order; the last one starts it."""
@@ -78,8 +92,12 @@ def viewer_page(scene: Scene, live: str = "") -> bytes:
     run, content = _run(scene), content_of(scene)
     traced = traced_of(scene, run, _top_um(scene, run))
     rows, columns = _rows(content)
-    stock = None if run is None else _stock(scene)
-    columns |= goal_columns(scene, stock)
+    pair = None if run is None else _stock_of(scene)
+    stock = None if pair is None else _box_of(pair)
+    columns |= goal_columns(pair, stock)
+    if scene.toolpath is not None and stock is not None:
+        cell_mm = (stock.box[2] - stock.box[0]) / (stock.grid[0] - 1)
+        columns |= slide_columns(pair, len(scene.toolpath), cell_mm)
     named, data = packed({**columns_of(content, run), **traced.columns, **columns})
     script = '(() => {\n"use strict";\n' + "\n".join(map(_file, SCRIPTS)) + "})();\n"
     style = _file("viewer.css")
@@ -93,7 +111,14 @@ def viewer_page(scene: Scene, live: str = "") -> bytes:
         "script": script,
         "circles": circles_of(scene),
         "live": live,
-        "head": _json({"columns": named, **_head(content, run, traced, stock), "rows": rows}),
+        "head": _json(
+            {
+                "columns": named,
+                **_head(content, run, traced),
+                **_cutting(scene, pair, stock),
+                "rows": rows,
+            }
+        ),
         "columns": base64.b64encode(data).decode("ascii"),
     }
     # One pass: the contents of a slot are not searched for slots.
@@ -107,9 +132,7 @@ def _run(scene: Scene) -> Playback | None:
     return by_feed(scene.toolpath, np.inf) if scene.playback is None else scene.playback()
 
 
-def _head(
-    content: Content, run: Playback | None, traced: Traced, stock: StockBox | None
-) -> dict[str, object]:
+def _head(content: Content, run: Playback | None, traced: Traced) -> dict[str, object]:
     scene, drawing, toolpath = content.scene, content.scene.drawing, content.scene.toolpath
     names = [] if drawing is None else drawing_layers(drawing)
     blocks = None if run is None or run.blocks is None else run.blocks
@@ -133,14 +156,9 @@ def _head(
             for place, off in zip(scene.worst, traced.worst_off.tolist(), strict=True)
         ],
         "travel_mm": scene.travel_mm,
-        "stock": None if stock is None else msgspec.structs.asdict(stock),
-        "cutters": [(row, *cutter_profile(tool).columns) for row, tool in scene.tools],
         "ambiguous": [] if drawing is None else _ambiguous(drawing),
     }
 
-
-MIN_FLOOR_MM = 1.0
-"""Without a stock in the job, so much stays below the deepest cut."""
 
 MAX_HEIGHTS = 1 << 19
 """Most heights of the grid of the stock."""
@@ -149,17 +167,54 @@ MIN_STEP_MM = 0.005
 """They are no nearer to each other."""
 
 
-def _stock(scene: Scene) -> StockBox | None:
-    """The box of the stock and its grid. What the job does not say is as large as the cuts with
-    their tools; None without moves."""
+def _cutting(scene: Scene, pair: StockPair | None, stock: StockBox | None) -> dict[str, object]:
+    """The stock, the cutters with the first row of the turn of each, and what is known of the
+    tools above their flutes, for JSON."""
+    if pair is None or stock is None:
+        return {"stock": None, "cutters": [], "bodies": []}
+    begins = np.flatnonzero(np.diff(pair.moves.tool, prepend=-1))
+    table = pair.moves.table[pair.moves.tool[begins]].tolist()
+    turns = zip(pair.moves.row[begins].tolist(), table, strict=True)
+    return {
+        "stock": msgspec.structs.asdict(stock),
+        "cutters": [(row, *profile) for row, profile in turns if profile[0] > 0.0],
+        "bodies": [(row, *_body(tool)) for row, tool in scene.tools],
+    }
+
+
+def _body(tool: Tool) -> tuple[float | None, ...]:
+    """How long its flutes cut, the radius of its shank, its stickout, and radius and length of its
+    holder, mm; None where not known."""
+
+    def half(diameter: float | None) -> float | None:
+        return None if diameter is None else 0.5 * diameter
+
+    return (
+        tool.cutting_length_mm,
+        half(tool.shank_diameter_mm),
+        tool.stickout_mm,
+        half(tool.holder_diameter_mm),
+        tool.holder_length_mm,
+    )
+
+
+def _stock_of(scene: Scene) -> StockPair | None:
+    """The stock and the moves that cut it; those of a point where no tool is known; None without
+    moves."""
     toolpath = scene.toolpath
     if toolpath is None or not toolpath.is_motion.any():
         return None
-    (left, right), (low, high), (deepest, _) = toolpath_extents(toolpath).tolist()
-    wide = [tool.radius_at(max(-deepest, 0.0)) for _, tool in scene.tools]
-    more = max([*wide, 0.02 * max(right - left, high - low), 0.1])
-    deepest = min(deepest, 0.0)
-    box = scene.stock_mm or (left - more, low - more, right + more, high + more)
+    if scene.cut is not None:
+        with suppress(OptionError):
+            return scene.cut()
+    nothing = (CutterProfile(0.0, 0.0),)
+    moves = stock_moves_of_toolpath(toolpath, np.zeros(len(toolpath), dtype=np.int64), nothing)
+    return stock_pair(moves, scene.stock_mm, scene.thickness_mm)
+
+
+def _box_of(pair: StockPair) -> StockBox:
+    """The box of the stock and its grid, as fine as MAX_HEIGHTS allows."""
+    box = pair.box_mm
     across, upwards = box[2] - box[0], box[3] - box[1]
     finest = max(math.sqrt(across * upwards / MAX_HEIGHTS), MIN_STEP_MM)
     most = max(int(across / finest), 2)
@@ -168,8 +223,7 @@ def _stock(scene: Scene) -> StockBox | None:
     steps = upwards / (across / tries)
     count = int(tries[np.argmin(np.abs(steps - np.rint(steps)))])
     rows = max(1, round(upwards * count / across))
-    bottom = -(scene.thickness_mm or max(-1.2 * deepest, MIN_FLOOR_MM - deepest))
-    return StockBox(box, bottom, (count + 1, rows + 1))
+    return StockBox(box, -pair.thickness_mm, (count + 1, rows + 1))
 
 
 def _rows(content: Content) -> tuple[list[dict[str, object]], Columns]:

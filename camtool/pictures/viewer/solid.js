@@ -2,8 +2,6 @@
 
 /** Bytes of all copies of the grid, about. */
 const COPIES_BYTES = 96e6;
-/** Chords of arcs are within this share of the distance between two heights. */
-const SAG_SHARE = 0.02;
 /** Halvings of the place on a sloping move where a round corner is lowest. */
 const HALVINGS = 32;
 
@@ -35,16 +33,15 @@ class Cutter {
 class Solid {
   /** `box` [left, low, right, high] mm of the stock with its top at 0; `grid` how many heights it
    * has along X and Y, the outermost on its edges; `turns` [[row, cutter]]: from which row on each
-   * cuts; `moves` their track and `z` (N + 1,) heights of their ends. */
-  constructor({ box, grid }, turns, moves, z) {
+   * cuts; `slides` the moves of their tips. */
+  constructor({ box, grid }, turns, slides) {
     [this.left, this.low] = box;
     [this.nx, this.ny] = grid;
     this.dx = (box[2] - box[0]) / (this.nx - 1);
     this.dy = (box[3] - box[1]) / (this.ny - 1);
     this.cell = Math.min(this.dx, this.dy);
     this.turns = turns;
-    this.moves = moves;
-    this.z = z;
+    this.slides = slides;
     this.heights = new Float32Array(this.nx * this.ny);
     this.by = new Int32Array(this.nx * this.ny).fill(-1);
     this.row = this.share = 0;
@@ -57,12 +54,12 @@ class Solid {
 
   /** Heights that are looked at before each move, about. */
   workOf() {
-    const work = new Float64Array(this.moves.count + 1);
-    for (let row = 0, turn = 0; row < this.moves.count; row++) {
+    const { count } = this.slides, work = new Float64Array(count + 1);
+    for (let row = 0, turn = 0; row < count; row++) {
       while (turn + 1 < this.turns.length && this.turns[turn + 1][0] <= row) turn++;
-      const cuts = Math.min(this.z[row], this.z[row + 1]) < 0 && this.turns.length;
+      const [length, low] = this.slides.reach(row), cuts = low < 0 && this.turns.length;
       const width = cuts ? 2 * Math.min(this.turns[turn][1].radius, 50) : 0;
-      work[row + 1] = work[row] + 1 + (cuts ? (this.moves.length(row) + width) * width / this.cell ** 2 : 0);
+      work[row + 1] = work[row] + 1 + (cuts ? ((length + width) * width) / this.cell ** 2 : 0);
     }
     return work;
   }
@@ -81,7 +78,7 @@ class Solid {
   toward(row, share, deadline = Infinity) {
     if (row < this.row || (row === this.row && share < this.share)) this.back(row, share);
     let next = this.copies[this.copies.length - 1].row;
-    const every = this.work[this.moves.count] / this.most;
+    const every = this.work[this.slides.count] / this.most;
     while (this.row < row) {
       this.cutMove(this.row, this.share, 1);
       this.row++;
@@ -112,21 +109,9 @@ class Solid {
 
   cutMove(row, from, to) {
     while (this.turn + 1 < this.turns.length && this.turns[this.turn + 1][0] <= row) this.turn++;
-    const z0 = this.z[row], z1 = this.z[row + 1];
-    if (!this.turns.length || Math.min(z0, z1) >= 0) return;
-    const cutter = this.turns[this.turn][1], arc = this.moves.arc(row);
-    let count = 1;
-    if (arc) {
-      const sag = Math.min(1, (SAG_SHARE * this.cell) / Math.max(arc.radius, 1e-9));
-      count = Math.max(1, Math.ceil(((to - from) * Math.abs(arc.sweep)) / (2 * Math.acos(1 - sag))));
-    }
-    let share = from, [x, y] = this.moves.at(row, from), z = z0 + from * (z1 - z0);
-    for (let piece = 1; piece <= count; piece++) {
-      share = from + ((to - from) * piece) / count;
-      const [u, v] = this.moves.at(row, share), w = z0 + share * (z1 - z0);
-      this.cutLine(x, y, z, u, v, w, cutter, row);
-      [x, y, z] = [u, v, w];
-    }
+    if (!this.turns.length) return;
+    const cutter = this.turns[this.turn][1];
+    this.slides.pieces(row, from, to, (...piece) => this.cutLine(...piece, cutter, row));
   }
 
   /** Lower the heights below a tool that goes straight from x, y, z to u, v, w. */
