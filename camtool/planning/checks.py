@@ -9,15 +9,15 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
 
 from camtool.arrays import Bools, Floats
 from camtool.findings import Finding, Sentence
-from camtool.geometry.measure import extents, path_extents, signed_areas
-from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, reverse_lines
+from camtool.geometry.measure import path_extents
+from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.machine.model import Machine
 from camtool.planning.findings import (
     CUT_DOUBTFUL,
@@ -37,8 +37,6 @@ from camtool.planning.findings import (
     CUT_DOUBTFUL_WIDTH,
     FEED_ABOVE_LIMIT,
     FEED_ABOVE_LIMIT_ON_SLOPE,
-    LOOSE_PIECE,
-    LOOSE_PIECE_MORE,
     OUT_OF_STOCK,
     OUT_OF_STOCK_AS_ALLOWED,
     OUT_OF_STOCK_BESIDE,
@@ -51,7 +49,7 @@ from camtool.planning.findings import (
     TOOL_NOT_SAID,
     TOOL_NOT_SAID_APART,
 )
-from camtool.planning.items import Fixed, Setting, Step, contours_of
+from camtool.planning.items import Fixed, Setting, Step
 from camtool.planning.job import MILLS, Job, Stock, Tool
 from camtool.planning.naming import (
     at_place,
@@ -62,7 +60,6 @@ from camtool.planning.naming import (
 )
 from camtool.planning.settings import lowered_feeds
 from camtool.planning.sides import runs_beside
-from camtool.records import replace
 from camtool.toolpath.moves import (
     STOCK_TOP_MM,
     Kind,
@@ -81,10 +78,6 @@ FEED_TOLERANCE = 1e-6
 MAX_BEYOND_SHARE = 0.25
 """An allowance that takes a tool farther beyond a line than this part of its radius looks like a
 mistake: corrections of wear and play are hundredths of millimetres."""
-
-MIN_PIECE_SHARE = 0.25
-"""The smallest piece that comes loose within a contour, as a share of the area of the tool's disc:
-smaller ones go away with the chips."""
 
 OFF_STOCK_MM = 0.01
 """A drawing may lie beyond the edge of the stock by this much: nobody measures it finer."""
@@ -445,82 +438,6 @@ def _loose(step: Step, stock: Stock | None, steps: Sequence[Step]) -> Iterator[s
         later = steps[steps.index(step) + 1 :]
         finished = operation.stage == "rough" and later and later[0].operation.stage == "finish"
         yield (CUT_DOUBTFUL_LOOSE_FINISH if finished else CUT_DOUBTFUL_LOOSE).words()
-
-
-def with_loose_pieces(steps: Sequence[Step], stock: Stock | None) -> list[Step]:
-    """The steps with findings of the pieces within closed contours that are cut through the stock
-    and that nothing holds.
-
-    Each is what the tool leaves within the path of its centre: none where it is milled away. What
-    a pocket has cleared before through the stock is gone, and a contour that is cut again frees
-    nothing. Parts themselves are looked at with the settings of the cut.
-    """
-    if stock is None:
-        return list(steps)
-    gone = set[int]()
-    made = []
-    for step in steps:
-        through = -step.setting.levels_mm[-1] >= stock.thickness_mm - POSITION_EPS_MM
-        if through and step.runs:
-            contract = step.operation.contract
-            loose: Iterator[Finding] = iter(())
-            if contract.clears and contract.takes == "paths":
-                loose = _loose_islands(step)
-            elif contract.cuts in ("beside", "along") and not contract.breaks_edges:
-                loose = _loose_pieces(step, gone)
-            found = shortened_list(list(loose), LOOSE_PIECE_MORE)
-            step = replace(step, findings=(*step.findings, *found))
-        if through:
-            gone.update(step.chosen.source[step.chosen.lines.closed].tolist())
-        made.append(step)
-    return made
-
-
-def _loose_pieces(step: Step, gone: Container[int]) -> Iterator[Finding]:
-    """The pieces that an operation cuts out within its closed contours, but those that are `gone`:
-    of holes, and of contours that the tool runs on, where the part without may be what stays."""
-    from camtool.geometry.offset import offset_shape
-
-    tool = step.operation.tool
-    if tool.diameter_mm == 0.0 or step.operation.stage == "finish":
-        return
-    beside = runs_beside(step.operation)
-    parts = set(step.chosen.source[step.chosen.rim].tolist()) if beside else set[int]()
-    held = {bridge.name for bridge in step.bridges}
-    for contour in contours_of(step.items):
-        if not contour.path.closed or contour.name in held:
-            continue
-        if contour.source in parts or contour.source in gone:
-            continue
-        path = Polylines.of([contour.path])
-        round_ = reverse_lines(path, signed_areas(path) < 0.0)
-        pieces = offset_shape(round_, tool.radius_mm)
-        areas = signed_areas(pieces)
-        if not len(areas) or areas.max() <= MIN_PIECE_SHARE * math.pi * tool.radius_mm**2:
-            continue
-        largest = pieces.select([int(areas.argmax())])
-        mend = "give it tabs in an operation of its own, or clear it with a pocket"
-        yield _loose_piece(contour.name, largest, mend)
-
-
-def _loose_islands(step: Step) -> Iterator[Finding]:
-    """The islands of pockets that are cut through."""
-    chosen = step.chosen
-    islands = chosen.lines.closed & (chosen.nesting.levels.depth % 2 == 1)
-    for row in np.flatnonzero(islands).tolist():
-        mend = "cut the pocket less deep, or fasten the island from below"
-        yield _loose_piece(chosen.names[row], chosen.lines.select([row]), mend)
-
-
-def _loose_piece(name: str, outline: Polylines, mend: str) -> Finding:
-    box = extents(outline)
-    return LOOSE_PIECE(
-        where=at_place(name, box.mean(axis=1)),
-        measured=abs(float(signed_areas(outline)[0])),
-        width=float(np.ptp(box[0])),
-        height=float(np.ptp(box[1])),
-        mend=mend,
-    )
 
 
 def _beyond_tool(step: Step, stock: Stock | None) -> Iterator[str]:

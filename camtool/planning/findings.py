@@ -195,14 +195,6 @@ class PlanningCode(Code):
         "`change_mm` and `change_z_mm` in `[defaults]` of the machine file, where the hand and "
         "the longest tool have room ([machines.md](machines.md))",
     )
-    LOOSE_PIECE = (
-        232,
-        WARNING,
-        "a closed contour within a part is cut through the stock without tabs, so that the piece "
-        "within it comes loose beside the running tool, which may throw it or jam; place and size "
-        "are given. What the tool mills away leaves no piece",
-        "tabs in an operation of its own, a pocket that clears it, or tape below",
-    )
     LINES_RUN_TOGETHER = (
         233,
         WARNING,
@@ -462,15 +454,6 @@ ENTRY_CHANGED_IN_NARROW_BORE = Sentence(
     "the middle{pecks}, and goes once round at the bottom; a drill or a smaller tool cuts it more "
     "easily",
     "mm",
-)
-LOOSE_PIECE = Sentence(
-    PlanningCode.LOOSE_PIECE,
-    "a piece of {width:.4g} by {height:.4g} mm comes loose within this contour beside the running "
-    "tool, because nothing holds it: {mend}",
-    "mm2",
-)
-LOOSE_PIECE_MORE = Sentence(
-    PlanningCode.LOOSE_PIECE, "{measured:# more piece comes|# more pieces come} loose like this"
 )
 DEPTH_LIMITED = Sentence(
     PlanningCode.DEPTH_LIMITED,

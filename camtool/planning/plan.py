@@ -23,7 +23,7 @@ from camtool.geometry.drawing import Drawing, is_text
 from camtool.geometry.measure import path_lengths
 from camtool.geometry.polylines import Polylines
 from camtool.machine.model import Machine
-from camtool.planning.checks import checked, with_loose_pieces
+from camtool.planning.checks import checked
 from camtool.planning.contours import runs_of, with_starts
 from camtool.planning.drawn import drawn_of
 from camtool.planning.findings import (
@@ -117,7 +117,7 @@ def planned(drawing: Drawing, job: Job, machine: Machine, *, undivided: bool = F
             step = _step(placed, plain, setting, machine, (here, there), sides, before)
         here = end
         steps.append(step)
-    steps = with_loose_pieces(_rested(_sparing(steps)), job.stock)
+    steps = _rested(_sparing(steps))
     found = Plan(job, placed, tuple(steps), ToolpathBuilder().finish())
     return _linked(found, drawing, job, machine, undivided=undivided)
 

@@ -16,11 +16,14 @@ from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.findings import Finding, Severity
-from camtool.geometry.polylines import POSITION_EPS_MM
+from camtool.geometry.measure import path_extents, signed_areas
+from camtool.geometry.nesting import inside
+from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, Segments
 from camtool.kernels.stock import StockTree
 from camtool.planning.items import Bridge, Step
 from camtool.planning.job import Job, KeepOutBox, Operation, Stock, Tool
 from camtool.planning.naming import operation_name, tool_name
+from camtool.planning.sides import runs_beside
 from camtool.simulation.rows import block_of
 from camtool.stock.cut import CutStock
 from camtool.stock.cutters import cutter_profile
@@ -28,6 +31,8 @@ from camtool.stock.findings import (
     CUT_TOO_DEEP,
     FINDINGS_LISTED,
     KEEP_OUT_ENTERED,
+    LOOSE_PIECE,
+    LOOSE_PIECE_CUT,
     MATERIAL_LEFT,
     PASS_TOO_DEEP,
     TAB_MISSING,
@@ -39,6 +44,7 @@ from camtool.stock.findings import (
 )
 from camtool.stock.heights import Bracket, greatest_value, stock_tree
 from camtool.stock.moves import StockMoves
+from camtool.stock.pieces import LoosePiece, loose_pieces
 from camtool.stock.wanted import WantedSolid, wanted_solid
 from camtool.toolpath.findings import ProgramCode
 from camtool.toolpath.moves import STOCK_TOP_MM, Toolpath
@@ -77,16 +83,22 @@ RIM_POINTS = 16
 TAB_SLACK_MM = 0.05
 """A tab may be narrower by this much, and by the band beside the walls."""
 
+PIECE_POINTS = 50
+"""Points at which it is looked whether a loose piece is a part."""
+
 MIN_CHORDS = 48
 """A tab is looked at in as many steps as this along its contour."""
 
 
 class StockRequest(Struct, frozen=True, eq=False):
-    """The solid that a job asks for, its operations that cut, in their order, each with its depth,
-    mm, and the bridges of its tabs; the boxes that are to be kept free, and the stock. `is_whole`:
-    nothing has cut before: passes, and what is left, can be judged."""
+    """The solid that a job asks for, its closed contours, and which of them (C,) are the outlines
+    of parts without tabs; its operations that cut, in their order, each with its depth, mm, and
+    the bridges of its tabs; the boxes that are to be kept free, and the stock. `is_whole`: nothing
+    has cut before: passes, and what is left, can be judged."""
 
     solid: WantedSolid
+    contours: Polylines
+    is_part: Bools
     operations: tuple[Operation, ...]
     depths_mm: tuple[float, ...]
     bridges: tuple[tuple[Bridge, ...], ...]
@@ -103,8 +115,17 @@ def stock_request(
     `StockRequest`."""
     cutting = [step for step in steps if step.runs]
     said = {finding.code.name for step in steps for finding in step.findings}
+    closed = [step.chosen.lines.closed for step in cutting]
+    parts = [
+        step.chosen.rim & (runs_beside(step.operation) and step.operation.tabs is None)
+        for step in cutting
+    ]
+    lines = Polylines.joined([step.chosen.lines for step in cutting])
+    every = np.concatenate([*closed, np.zeros(0, dtype=np.bool_)])
     return StockRequest(
         wanted_solid(steps, wall_mm),
+        lines.select(np.flatnonzero(every).tolist()),
+        np.concatenate([*parts, np.zeros(0, dtype=np.bool_)])[every],
         tuple(step.operation for step in cutting),
         tuple(-step.setting.levels_mm[-1] for step in cutting),
         tuple(step.bridges for step in cutting),
@@ -129,6 +150,7 @@ def stock_findings(
     found = [
         *checks.too_deep(Severity.WARNING if gouged else Severity.ERROR),
         *checks.tabs(),
+        *checks.loose(),
         *checks.keep_out(),
         *checks.not_known(),
     ]
@@ -426,6 +448,46 @@ class _Checks:
         low, high = step[gone & (step <= 0.0)], step[gone & (step >= 0.0)]
         wide = high.min(initial=half) - low.max(initial=-half)
         return float(wide), float(z[MIN_CHORDS] + depth_mm)
+
+    def loose(self) -> Iterator[Finding]:
+        """Yield LOOSE_PIECE for pieces that come loose, and for parts that are cut after that."""
+        stock = self.request.stock
+        if stock is None:
+            return
+        found = [
+            (piece, is_part)
+            for piece in loose_pieces(self.moves, stock.thickness_mm, stock.box_mm)
+            for is_part in (self._is_part(piece),)
+            if not is_part or piece.again >= 0
+        ]
+        for number, (piece, is_part) in enumerate(found[:FINDINGS_LISTED], start=1):
+            left, low, right, high = piece.box_mm
+            yield (LOOSE_PIECE_CUT if is_part else LOOSE_PIECE)(
+                where=self._where(
+                    int(self.moves.row[piece.move]),
+                    np.array([0.5 * (left + right), 0.5 * (low + high)]),
+                ),
+                measured=piece.area_mm2,
+                width=right - left,
+                height=high - low,
+                again=block_of(self.decoded, int(self.moves.row[piece.again])),
+                more=max(len(found) - FINDINGS_LISTED, 0) if number == FINDINGS_LISTED else 0,
+            )
+
+    def _is_part(self, piece: LoosePiece) -> bool:
+        """True if the innermost contour round most of a piece is the outline of a part."""
+        contours = self.request.contours
+        if not len(contours):
+            return False
+        points = piece.points[:: max(1, len(piece.points) // PIECE_POINTS)]
+        boxes, areas = path_extents(contours), np.abs(signed_areas(contours))
+        near = (boxes[:, :, 0] < points.max(axis=0)) & (boxes[:, :, 1] > points.min(axis=0))
+        innermost = np.full(len(points), -1, dtype=np.int64)
+        rows = np.flatnonzero(near.all(axis=1))
+        for row in rows[np.argsort(-areas[rows])].tolist():
+            innermost[inside(points, Segments.of(contours.select([row])))] = row
+        parts = self.request.is_part[innermost] & (innermost >= 0)
+        return bool(2 * int(parts.sum()) > len(points))
 
     def bodies(self) -> Iterator[Finding]:
         """Yield TOOL_IN_STOCK for shanks and holders that meet the stock as it stands after their

@@ -125,4 +125,17 @@ RAPID_IN_STOCK = Sentence(
     "a rapid runs through the stock, {depth:.4g} mm below its top" + and_more("rapids"),
     "mm",
 )
+LOOSE_PIECE = Sentence(
+    ProgramCode.LOOSE_PIECE,
+    "a piece of {width:.3g} by {height:.3g} mm comes loose here beside the running tool, because "
+    "nothing holds it: give it tabs in an operation of its own, clear it with a pocket, or fasten "
+    "it from below" + and_more("pieces"),
+    "mm2",
+)
+LOOSE_PIECE_CUT = Sentence(
+    ProgramCode.LOOSE_PIECE,
+    "the part of {width:.3g} by {height:.3g} mm comes loose here, and is cut again from {again} "
+    "on: cut its outline last, or give it tabs" + and_more("pieces"),
+    "mm2",
+)
 TOOL_NOT_KNOWN = Sentence(StockCode.TOOL_NOT_KNOWN, "not known, and not judged: {bodies}")

@@ -35,6 +35,14 @@ class ProgramCode(Code):
         "a rapid runs through material below the stock top that is not yet cleared",
         "raise `safe_z`",
     )
+    LOOSE_PIECE = (
+        232,
+        WARNING,
+        "a piece that is no part is cut off through the stock, so that it comes loose beside the "
+        "running tool, which may throw it or jam; or a part is cut again after it has come loose. "
+        "Block, place and size are given. What the tool mills away leaves no piece",
+        "tabs in an operation of its own, a pocket that clears it, tape below; outlines last",
+    )
     BLOCK_TOO_LONG = (
         301,
         (INFO, WARNING),

@@ -1,7 +1,6 @@
 """What no program may do: travel, stock, rapids, tools, feeds."""
 
 import math
-import re
 
 import numpy as np
 import pytest
@@ -16,7 +15,7 @@ from camtool.machine.model import Machine
 from camtool.pipeline import post_drawing
 from camtool.planning.checks import checked
 from camtool.planning.findings import PlanningCode
-from camtool.planning.job import Job, Operation, Placement, Stock, Tabs, Tool, job_of
+from camtool.planning.job import Job, Operation, Placement, Stock, Tool, job_of
 from camtool.planning.plan import plan
 from camtool.records import replace
 from camtool.target.registry import load_target
@@ -276,96 +275,6 @@ def test_a_point_to_drill_beside_the_stock_is_an_error() -> None:
     assert finding.severity is Severity.ERROR
     assert "POINT 1" in finding.where
     assert finding.measured == pytest.approx(1.0)
-
-
-def loose(job: Job, *paths: Polyline, layers: list[str] | None = None) -> list[Finding]:
-    findings = plan(drawing_of(paths, layers), job, path_machine()).findings
-    return [each for each in findings if each.code == PlanningCode.LOOSE_PIECE]
-
-
-SHEET = Stock(3.0)
-THROUGH = Operation(tool=Tool(3.0), depth_mm=3.2)
-
-
-@given(
-    width=st.floats(3.5, 40.0),
-    height=st.floats(3.5, 40.0),
-    cut=st.floats(-0.3, 20.0),
-    side=st.sampled_from(["auto", "inside"]),
-)
-@settings(max_examples=60)
-def test_a_piece_that_comes_loose_is_as_large_as_the_tool_leaves_it(
-    width: float, height: float, cut: float, side: str
-) -> None:
-    """A window with a cut corner, less twice the tool's radius all round; what is milled away is
-    no piece."""
-    cut = min(max(cut, 0.0), 0.4 * min(width, height))
-    corners = [
-        (0.0, 0.0),
-        (width, 0.0),
-        (width, height - cut),
-        (width - cut, height),
-        (0.0, height),
-    ]
-    corners = [(x + 10.0, y + 10.0) for x, y in corners]
-    if cut < 0.01:
-        corners = [corners[0], corners[1], (width + 10.0, height + 10.0), corners[4]]
-    window = Polyline(np.array([(*corner, 0.0) for corner in corners]), closed=True)
-    operation = replace(THROUGH, side=side, select=("inner",))
-    found = loose(Job((operation,), stock=SHEET), box(0, 0, 60, 60), window)
-    path = shapely.Polygon(corners).buffer(-1.5, quad_segs=64)
-    piece = path.buffer(-1.5, quad_segs=64)
-    least = 0.25 * math.pi * 1.5**2
-    if piece.area < least - 0.05:
-        assert found == []
-    elif piece.area > least + 0.05:
-        (finding,) = found
-        assert finding.measured == pytest.approx(piece.area, rel=2e-3, abs=0.01)
-        low, high = np.array(piece.bounds).reshape(2, 2)
-        wide, tall = map(float, re.findall(r"([\d.]+) by ([\d.]+) mm", finding.message)[0])
-        assert [wide, tall] == pytest.approx(list(high - low), rel=1e-3, abs=0.01)
-        x, y = map(float, re.findall(r"X ([\d.]+) Y ([\d.]+)", str(finding.where))[0])
-        assert [x, y] == pytest.approx(list(0.5 * (low + high)), abs=0.01)
-
-
-def test_which_pieces_come_loose() -> None:
-    plate, window, part = box(0, 0, 100, 60), box(10, 10, 60, 40), box(20, 20, 30, 20)
-    slug = box(24, 24, 20, 12)
-    job = Job((THROUGH,), stock=SHEET)
-    # Of contours in one another those of holes, and not those of parts.
-    assert [each.where.split(" at")[0] for each in loose(job, plate, window, part, slug)] == [
-        "0/PATH 1",
-        "0/PATH 3",
-    ]
-    assert loose(Job((THROUGH,)), plate, window) == []  # nobody knows how thick the stock is
-    assert loose(Job((THROUGH,), stock=Stock(4.0)), plate, window) == []
-    # Tabs hold it, if they are its own: those of parts leave holes out.
-    own = replace(THROUGH, tabs=Tabs(2))
-    assert loose(Job((replace(own, select=("inner",)),), stock=SHEET), plate, window) == []
-    assert len(loose(Job((own,), stock=SHEET), plate, window)) == 1
-    # A tool on the line cuts out what is within; a point cuts nothing out.
-    assert len(loose(Job((replace(THROUGH, side="on"),), stock=SHEET), window)) == 1
-    assert loose(Job((replace(THROUGH, tool=Tool(0.0)),), stock=SHEET), window) == []
-
-
-def test_what_a_pocket_cleared_before_comes_not_loose() -> None:
-    plate, window = box(0, 0, 100, 60), box(10, 10, 60, 40)
-    pocket = Operation("pocket", "clear", tool=Tool(3.0), depth_mm=3.2, layers=("IN",))
-    wall = replace(THROUGH, name="wall")
-    for operations, count in (
-        ((pocket, wall), 0),
-        ((wall, pocket), 1),
-        ((replace(pocket, depth_mm=2.0), wall), 1),
-    ):
-        job = Job(operations, stock=SHEET)
-        assert len(loose(job, plate, window, layers=["OUT", "IN"])) == count
-    # An island of a pocket that goes through is a piece too.
-    (island,) = loose(Job((pocket,), stock=SHEET), window, box(30, 20, 20, 12), layers=["IN"] * 2)
-    assert "20 by 12 mm" in island.message
-    # Boring leaves no core.
-    bore = Operation("bore", tool=Tool(3.0), depth_mm=3.2)
-    circle = Polyline(np.array([[0, 0, 1], [30, 0, 1.0]]), closed=True)
-    assert loose(Job((bore,), stock=SHEET), circle) == []
 
 
 @pytest.mark.parametrize("side", ["auto", "inside"])

@@ -1,0 +1,284 @@
+"""Pieces that come loose: what a program cuts off through the whole thickness of the stock.
+
+Only cuts through the stock count. A cell of a raster is gone when a single move has cut all of it
+through; so whatever holds a piece, however thin, keeps a cell, and cells that touch at an edge or
+a corner hold each other. The cells are a third of the narrowest cut wide, so that gone cells close
+round every piece that is cut out. What reaches the edge of the stock, or beyond all cuts, is held.
+
+Backwards in time, gone cells come back, those cut last first: where one joins two pieces, its move
+has parted them, and the one that is not held has come loose then. Of a loose piece that is cut in
+two only the smaller part counts, and only if something is left of it at the end.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import groupby
+
+import numpy as np
+from msgspec import Struct
+
+from camtool.arrays import Bools, Floats, Ints
+from camtool.records import replace
+from camtool.stock.cutters import CutterProfile
+from camtool.stock.heightmap import Box, HeightMap, cell_for, height_map
+from camtool.stock.moves import StockMoves
+
+CELL_SHARE = 1.0 / 3.0
+"""Of the width of the narrowest cut through the stock, the width of a cell."""
+
+MAX_RASTER_CELLS = 4_000_000
+"""Cells are wider where there would be more; pieces within narrower cuts are then missed."""
+
+MIN_PIECE_SHARE = 0.25
+"""The smallest piece that comes loose, as a share of the area of the narrowest tool's disc:
+smaller ones go away with the chips."""
+
+MIN_CUT_SHARE = 1.0
+"""Of that disc, how much of a piece is cut away after it has come loose, at least: less are the
+ends of the cut that frees it."""
+
+MAX_PIECE_CELLS = 400_000
+"""The size of a piece is measured with about so many cells, or fewer where there are many pieces:
+its area is wrong by half of such a cell along its edge at most, its box by a cell."""
+
+STANDING = np.iinfo(np.int64).max
+"""Time of cells that are never cut through."""
+
+
+class LoosePiece(Struct, frozen=True, eq=False):
+    """A piece as it comes loose: the number of the move that frees it, its area, mm², its box (low
+    x, low y, high x, high y), mm, and points (P, 2) in it. `again`: the move from which on it is
+    cut through once more (−1: none)."""
+
+    move: int
+    area_mm2: float
+    box_mm: Box
+    points: Floats
+    again: int
+
+
+class _Parting(Struct, frozen=True):
+    """A piece of cells that comes loose: its time, the row and column of a cell of it, the least
+    and the greatest of all its rows and columns, and how many of its cells are cut later."""
+
+    time: int
+    place: tuple[int, int]
+    rows: tuple[int, int]
+    columns: tuple[int, int]
+    cut: int
+
+
+def loose_pieces(moves: StockMoves, thickness_mm: float, box_mm: Box | None) -> list[LoosePiece]:
+    """Return the pieces that come loose of a stock with this thickness and these sides (None:
+    without limits), in the order of time."""
+    cuts, number = _through(moves, -thickness_mm)
+    across = (cuts.start[:, :2] != cuts.end[:, :2]).any(axis=1)
+    if not across.any():
+        return []
+    radius = cuts.table[cuts.tool, 0]
+    narrow = float(radius[across].min())
+    low = np.minimum(cuts.start, cuts.end)[:, :2] - radius[:, None]
+    high = np.maximum(cuts.start, cuts.end)[:, :2] + radius[:, None]
+    edge = 3.0 * narrow
+    low, high = low.min(axis=0) - edge, high.max(axis=0) + edge
+    if box_mm is not None:
+        low, high = np.maximum(low, box_mm[:2]), np.minimum(high, box_mm[2:])
+    if (low >= high).any():
+        return []
+    box = (*low.tolist(), *high.tolist())
+    cell = max(CELL_SHARE * 2.0 * narrow, cell_for(box, MAX_RASTER_CELLS))
+    whole = _raster(cuts, box, cell, math.sqrt(0.5) * cell)
+    assert whole.owner is not None
+    time = np.where(whole.owner >= 0, whole.owner, STANDING).astype(np.int64)
+    disc = math.pi * narrow**2
+    partings = list(_partings(time, MIN_PIECE_SHARE * disc / cell**2))
+    cells = min(MAX_PIECE_CELLS, MAX_RASTER_CELLS // max(len(partings), 1))
+    found = []
+    for parting in partings:
+        piece = _measured(cuts, whole, time, parting, cells)
+        if piece is not None and piece.area_mm2 >= MIN_PIECE_SHARE * disc:
+            is_cut = parting.cut * cell**2 >= MIN_CUT_SHARE * disc
+            again = int(number[piece.again]) if is_cut else -1
+            found.append(replace(piece, move=int(number[piece.move]), again=again))
+    return sorted(found, key=lambda each: each.move)
+
+
+def _through(moves: StockMoves, bottom_mm: float) -> tuple[StockMoves, Ints]:
+    """Return the parts of moves that cut through the stock, as level moves of flat tools that are
+    as wide there as the tool is at the bottom, and the number of each among all moves."""
+    start, end = moves.start, moves.end
+    low = np.minimum(start[:, 2], end[:, 2]) <= bottom_mm
+    low &= moves.table[moves.tool, 0] > 0.0
+    number = np.flatnonzero(low)
+    chosen = moves.select(number)
+    begin, finish = chosen.start.copy(), chosen.end.copy()
+    for one, other in ((begin, chosen.end), (finish, chosen.start)):
+        above = one[:, 2] > bottom_mm
+        share = (one[above, 2] - bottom_mm) / (one[above, 2] - other[above, 2])
+        one[above] += share[:, None] * (other[above] - one[above])
+    # A cone is nowhere narrower along a move than at its higher end.
+    higher = np.maximum(begin[:, 2], finish[:, 2])
+    radius, flat, corner, rise = chosen.table[chosen.tool].T
+    deep = np.maximum(bottom_mm - higher, 0.0)
+    cone = flat + deep / np.where(rise > 0.0, rise, 1.0)
+    round_ = flat + np.sqrt(np.maximum(corner**2 - np.maximum(corner - deep, 0.0) ** 2, 0.0))
+    wide = np.where(rise > 0.0, cone, np.where(corner > 0.0, round_, radius))
+    wide = np.floor(np.minimum(wide, radius) / WIDTH_STEP_MM) * WIDTH_STEP_MM
+    begin[:, 2] = finish[:, 2] = LEVEL_MM
+    widths, tool = np.unique(wide, return_inverse=True)
+    cutters = tuple(CutterProfile(width, width) for width in widths.tolist())
+    keep = wide > 0.0
+    flat_moves = StockMoves(
+        begin, finish, chosen.row, chosen.rapid, tool.astype(np.int64), cutters, moves.beside_mm
+    )
+    return flat_moves.select(keep), number[keep]
+
+
+LEVEL_MM = -1.0
+"""Height at which cuts through the stock are drawn into a raster."""
+
+WIDTH_STEP_MM = 1e-3
+"""Widths of cuts are rounded down to this."""
+
+
+def _raster(cuts: StockMoves, box: Box, cell: float, inwards_mm: float) -> HeightMap:
+    """Draw cuts into a raster, with tools that are slimmer by `inwards_mm`; its owners are the
+    first moves that cut each cell."""
+    slim = [max(each.radius_mm - inwards_mm, 0.0) for each in cuts.cutters]
+    cutters = tuple(CutterProfile(radius, radius) for radius in slim)
+    wide = np.array(slim)[cuts.tool] > 0.0
+    kept = np.flatnonzero(wide)
+    drawn = height_map(replace(cuts, cutters=cutters).select(kept), box, cell, owners=True)
+    assert drawn.owner is not None
+    owner = np.where(drawn.owner >= 0, kept[drawn.owner.clip(min=0)] if len(kept) else -1, -1)
+    return replace(drawn, owner=owner)
+
+
+def _partings(time: Ints, least: float) -> Iterator[_Parting]:
+    """Yield each piece of `least` cells or more that comes loose. `time` (NY, NX): when each cell
+    is cut through."""
+    label = _labels(time == STANDING)
+    count = int(label.max()) + 1
+    size = np.bincount(label[label >= 0], minlength=count).tolist()
+    edges = np.concatenate([label[0], label[-1], label[:, 0], label[:, -1]])
+    is_held = np.isin(np.arange(count), edges).tolist()
+    y, x = np.nonzero(time != STANDING)
+    order = np.argsort(-time[y, x], kind="stable")
+    y, x = y[order], x[order]
+    node = np.pad(label, 1, constant_values=-1)
+    width = node.shape[1]
+    spans = [*_spans(label, count), *zip(*np.stack([y, y, x, x]).tolist(), strict=True)]
+    owner, cells = node.ravel().tolist(), ((y + 1) * width + x + 1).tolist()
+    _, first = np.unique(label, return_index=True)
+    sample = [*first[-count:].tolist(), *(y * label.shape[1] + x).tolist()]
+    root, cut = list(range(count + len(cells))), [0] * (count + len(cells))
+    size += [0] * len(cells)
+    is_held += [False] * len(cells)
+    around = [dy * width + dx for dy in (-1, 0, 1) for dx in (-1, 0, 1) if dy or dx]
+
+    def top(one: int) -> int:
+        while root[one] != one:
+            root[one] = root[root[one]]
+            one = root[one]
+        return one
+
+    times = time[y, x].tolist()
+    for now, group in groupby(range(len(cells)), key=times.__getitem__):
+        added = [count + k for k in group]
+        for mine in added:
+            cell = cells[mine - count]
+            owner[cell] = mine
+            for near in [owner[cell + step] for step in around]:
+                one, other = top(mine), top(near) if near >= 0 else -1
+                if other < 0 or one == other:
+                    continue
+                if is_held[one] or (not is_held[other] and size[one] > size[other]):
+                    one, other = other, one
+                left_over = size[one] if is_held[other] else size[one] - cut[one]
+                if left_over >= least and not is_held[one]:
+                    low, high, left, right = spans[one]
+                    place = divmod(sample[one], label.shape[1])
+                    yield _Parting(now, place, (low, high), (left, right), cut[one])
+                root[one] = other
+                size[other] += size[one]
+                cut[other] += cut[one]
+                a, b = spans[one], spans[other]
+                spans[other] = min(a[0], b[0]), max(a[1], b[1]), min(a[2], b[2]), max(a[3], b[3])
+        for mine in added:
+            # The cells of one move come back at once.
+            one = top(mine)
+            size[one] += 1
+            cut[one] += 1
+
+
+def _spans(label: Ints, count: int) -> list[tuple[int, int, int, int]]:
+    """Return the least and the greatest row and column of each label."""
+    y, x = np.nonzero(label >= 0)
+    of = label[y, x]
+    ends = np.empty((4, count), dtype=np.int64)
+    for k, column in ((0, y), (2, x)):
+        ends[k], ends[k + 1] = label.size, -1
+        np.minimum.at(ends[k], of, column)
+        np.maximum.at(ends[k + 1], of, column)
+    return list(zip(*ends.tolist(), strict=True))
+
+
+def _labels(standing: Bools) -> Ints:
+    """Return the number of the piece (NY, NX) of each standing cell, −1 elsewhere: cells that
+    touch at an edge or a corner are one piece."""
+    padded = np.pad(standing, ((0, 0), (1, 1)))
+    turns = np.diff(padded.astype(np.int8), axis=1)
+    run = np.cumsum((turns == 1).ravel()).reshape(turns.shape)[:, :-1] - 1
+    run[~standing] = -1
+    pairs = []
+    for shift in (-1, 0, 1):
+        one = run[:-1, max(shift, 0) : run.shape[1] + min(shift, 0)]
+        other = run[1:, max(-shift, 0) : run.shape[1] + min(-shift, 0)]
+        both = (one >= 0) & (other >= 0)
+        pairs.append(np.column_stack([one[both], other[both]]))
+    pair = np.unique(np.concatenate(pairs), axis=0)
+    label = np.arange(int((turns == 1).sum()))
+    while len(pair):
+        least = label[pair].min(axis=1)
+        for side in (0, 1):
+            np.minimum.at(label, label[pair[:, side]], least)
+        label = label[label]
+        pair = pair[label[pair[:, 0]] != label[pair[:, 1]]]
+    while (label[label] != label).any():
+        label = label[label]
+    _, label = np.unique(label, return_inverse=True)
+    if not len(label):
+        return np.full(standing.shape, -1, dtype=np.int64)
+    return np.where(standing, label[run.clip(min=0)], -1).astype(np.int64)
+
+
+def _measured(
+    cuts: StockMoves, whole: HeightMap, time: Ints, parting: _Parting, cells: int
+) -> LoosePiece | None:
+    """Return a piece as it is when a move frees it; None where all its cells are cut in part."""
+    (low, high), (left, right) = parting.rows, parting.columns
+    time = time[low : high + 1, left : right + 1]
+    label = _labels(time > parting.time)
+    row, column = parting.place
+    mine = label == label[row - low, column - left]
+    cell = whole.cell_mm
+    corner = np.array(whole.corner_mm) + cell * np.array([left, low])
+    size = cell * np.array(mine.shape[::-1])
+    box = (*corner.tolist(), *(corner + size).tolist())
+    before = cuts.select(slice(0, parting.time + 1))
+    fine = _raster(before, box, min(cell, cell_for(box, cells)), 0.0)
+    assert fine.owner is not None
+    rows, columns = np.nonzero(fine.owner < 0)
+    points = np.column_stack([fine.x[columns], fine.y[rows]])
+    x, y = np.floor((points - corner) / cell).astype(np.int64).T
+    inside = mine[y.clip(max=len(mine) - 1), x.clip(max=mine.shape[1] - 1)]
+    points = points[inside]
+    if not len(points):
+        return None
+    half = 0.5 * fine.cell_mm
+    ends = (*(points.min(axis=0) - half).tolist(), *(points.max(axis=0) + half).tolist())
+    later = time[mine & (time != STANDING)]
+    again = int(later.min()) if len(later) else -1
+    return LoosePiece(parting.time, len(points) * fine.cell_mm**2, ends, points, again)
