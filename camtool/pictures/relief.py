@@ -86,11 +86,12 @@ class Camera(Struct, frozen=True):
 _HALF = math.sqrt(0.5)
 CAMERAS = {
     "iso": Camera((_HALF, _HALF), math.sqrt(1.0 / 3.0), (-1.0, 0.25), 1.15),
-    "front": Camera((0.0, 1.0), 0.5, (-1.0, 0.3), 1.15),
-    "side": Camera((-1.0, 0.0), 0.5, (-1.0, 0.3), 1.15),
+    "front": Camera((0.0, 1.0), 0.0, (-1.0, -0.6), 1.15),
+    "side": Camera((-1.0, 0.0), 0.0, (-1.0, -0.6), 1.15),
     "top": Camera((0.0, 1.0), 1.0, (-0.8, 0.7), 1.9),
 }
-"""Views by name. In "iso" lengths along all three axes are seen at one scale."""
+"""Views by name. In "iso" lengths along all three axes are seen at one scale; "front" and "side"
+are those of a drawing, level with the table."""
 
 
 class Stage(Struct, frozen=True, eq=False):

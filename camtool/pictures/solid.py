@@ -1,8 +1,8 @@
 """Pictures of the stock after a program: its shaded height map on a page.
 
-`iso`, `front` and `side` show the block from outside, with its sizes along its edges; `top`,
-`leftover` and `gouge` show it from above, with axes. The raster is a PNG within the SVG; all that
-is written stands in the SVG itself.
+`iso` shows the block from outside, aslant, `front` and `side` as a drawing does, with its sizes
+along its edges; `top`, `leftover` and `gouge` show it from above, with axes. The raster is a PNG
+within the SVG; all that is written stands in the SVG itself.
 """
 
 from __future__ import annotations
@@ -113,6 +113,10 @@ MAX_BAR = 320.0
 BAR_STEPS = 200
 GREY = "#b9bec4"
 FROM_ABOVE = ("top", "leftover", "gouge")
+LEVEL = ("front", "side")
+"""Views along the table, in which the block hides what is cut: its outline is dashed."""
+
+DASHES = "7 4"
 BAR_NAMES = {"leftover": "left (mm)", "gouge": "too deep (mm)"}
 GHOST_PEN, GHOST_ALPHA = 1.3, "8c"
 
@@ -278,9 +282,10 @@ def _from_outside(
     """The page of a view of the block with its sizes."""
     width = page_width(options.size_px or SVG_WIDTH_PX)
     camera, bar = CAMERAS[options.view], _bar_of(solid, options)
+    level = options.view in LEVEL
     corners = _corners(solid, camera)
     low, high = corners.min(axis=0), corners.max(axis=0)
-    box_right = width - MARGIN - bar.width
+    box_right = width - MARGIN - (0.0 if level else bar.width)
     thick = text.width(_thickness(solid), TICK_CAP) + 8.0
     room = LABEL_ROOM * float(high[0] - low[0]) / (box_right - MARGIN - thick)
     shown = np.column_stack([low - np.array([0.0, room]), high + np.array([0.0, 0.5 * room])])
@@ -296,10 +301,10 @@ def _from_outside(
         sizes,
         options,
         _raster(_stage(solid, bar, options), camera, view, all_across, options),
-        _ghost(scene, camera, view),
+        _deepest(solid, camera, view) if level else _ghost(scene, camera, view),
         head,
         _sizes(solid, camera, view),
-        bar.draw(PageBox(view.box.left, view.box.top, box_right, view.box.bottom)),
+        "" if level else bar.draw(replace(view.box, right=box_right)),
         legend_rows(table, view.box.left, legend_y),
         scale_bar(along, view.box.right, bar_y - 30.0),
     )
@@ -359,8 +364,36 @@ def _ghost(scene: Scene, camera: Camera, view: View) -> str:
     return element("g", {"id": "ghost", "transform": matrix}, lines)
 
 
+def _deepest(solid: Solid, camera: Camera, view: View) -> str:
+    """The face of the block, and the outline of the deepest cuts behind it, dashed."""
+    front = camera.away[0] == 0.0
+    low = solid.found.heights.min(axis=0 if front else 1).clip(-solid.pair.thickness_mm)
+    begins = np.concatenate([[0], np.flatnonzero(np.diff(low)) + 1])
+    first = solid.found.corner_mm[0 if front else 1]
+    edges = first + solid.found.cell_mm * np.append(begins, len(low))
+    edges[-1] = solid.ends_mm[0 if front else 1]
+    data, before = PathData(), 0.0
+    for left, right, z in zip(edges[:-1], edges[1:], low[begins].tolist(), strict=True):
+        if before == 0.0 > z:
+            data.move(*view.page(float(left), 0.0))
+        if before < 0.0 or z < 0.0:
+            data.line(*view.page(float(left), z))
+        if z < 0.0:
+            data.line(*view.page(float(right), z))
+        before = z
+    pen: Look = {"fill": "none", "stroke": OUTLINE, "stroke-width": GHOST_PEN}
+    pen["stroke-linejoin"] = "round"
+    corners = np.array([view.page(*place) for place in _corners(solid, camera).tolist()])
+    (x, y), (width, height) = corners.min(axis=0).tolist(), np.ptp(corners, axis=0).tolist()
+    face: Look = {"id": "face", "x": x, "y": y, "width": width, "height": height, **pen}
+    look: Look = {"id": "deepest", "d": str(data), "stroke-dasharray": DASHES, **pen}
+    return element("rect", face) + element("path", look)
+
+
 def _entries(scene: Scene, options: PictureOptions) -> list[LegendEntry]:
     """The legend."""
+    if options.view in LEVEL:
+        return [LegendEntry(line_swatch(OUTLINE, GHOST_PEN, DASHES), "deepest cuts behind")]
     if scene.drawing is None or not len(scene.drawing.paths) or options.view == "top":
         return []
     return [LegendEntry(line_swatch(OUTLINE, GHOST_PEN), "drawing")]

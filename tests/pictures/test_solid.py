@@ -199,8 +199,14 @@ def test_odd_stocks_have_pictures(
     job = Job((Operation(tool=Tool(wide)),), stock=stock)
     odd = scene_of(title="odd", job=job, toolpath=moves)
     for size_px in (16, 100):
-        pixels = raster(draw(odd, PictureOptions(size_px=size_px, view=view)))
-        assert len(np.unique(pixels.reshape(-1, 3), axis=0)) > 1
+        svg = draw(odd, PictureOptions(size_px=size_px, view=view))
+        # From the side a block may be thinner than a pixel: its outline is drawn over the raster.
+        face = re.search(r'<rect id="face"[^>]* width="([\d.]+)"', svg)
+        assert (face is not None) == (view == "side")
+        if face is None:
+            assert len(np.unique(raster(svg).reshape(-1, 3), axis=0)) > 1
+        else:
+            assert float(face[1]) > 0.1 * size_px
 
 
 def test_very_wide_pictures_have_larger_pixels(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -224,6 +230,28 @@ def test_the_sizes_of_the_block_stand_beside_it(view: str) -> None:
     assert text.count("40 mm") == (2 if view == "iso" else 1)
     assert "5 mm" in text
     assert "stock 40 × 40 × 5 mm; cut 5.5 mm deep, through it" in text[-1]
+
+
+@pytest.mark.parametrize("view", ["front", "side"])
+def test_a_level_view_shows_the_face_and_how_deep_it_is_cut_behind(view: str) -> None:
+    svg = draw(scene(), PictureOptions(size_px=800, view=view))
+    pixels = raster(svg).astype(int)
+    face = np.abs(pixels - pixels[0, 0]).max(axis=2) > 30
+    rows, columns = np.flatnonzero(face.any(axis=1)), np.flatnonzero(face.any(axis=0))
+    wide, high = np.ptp(columns) + 1, np.ptp(rows) + 1
+    assert wide / high == pytest.approx(40.0 / 5.0, rel=0.03)
+    assert face[rows[0] : rows[-1], columns[0] : columns[-1]].all()
+    found = re.search(r'<path id="deepest" d="([^"]*)"', svg)
+    assert found is not None
+    steps = re.findall(r"([ML])(-?[\d.]+) (-?[\d.]+)", found[1])
+    places = np.array([[float(x), float(y)] for _, x, y in steps])
+    # From X the slot hides the pocket, which is cut beside it along Y.
+    ends = (4.0, 36.0) if view == "front" else (9.0, 21.0, 33.0, 37.0)
+    mm = (places[:, 0] - places[0, 0]) / np.ptp(places[:, 0]) * (ends[-1] - ends[0]) + ends[0]
+    upright = np.abs(np.diff(places[:, 1])) > 5.0
+    assert sorted({*np.round(mm[1:][upright]).astype(int).tolist()}) == [*map(int, ends)]
+    depth = np.ptp(places[:, 1]) / np.ptp(places[:, 0]) * (ends[-1] - ends[0])
+    assert depth == pytest.approx(5.0, rel=0.02)
 
 
 def test_a_stock_that_is_not_known_is_as_large_as_the_cuts() -> None:
