@@ -155,7 +155,8 @@ def as_drawing(
     if isinstance(drawing, Drawing):
         return drawing
     data, name = content(Path(drawing))
-    return ShownDrawing.of(read_for_job(data, name, options_of({}, _machine_of(target)), job))
+    options = options_of({"text": job.text} if job.text else {}, _machine_of(target))
+    return ShownDrawing.of(read_for_job(data, name, options, job))
 
 
 def as_bytes(program: bytes | Program | str | Path) -> tuple[bytes, str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -23,6 +23,11 @@ from camtool.cli.options import (
 )
 from camtool.cli.picture_options import PictureFlags, picture_name
 from camtool.plain import one_line, to_json
+from camtool.records import replace
+
+if TYPE_CHECKING:
+    from camtool.jobs.template import Proposal
+    from camtool.planning.job import Tool
 
 MAX_GROUPS = 12
 """So many groups of contours of an operation are printed."""
@@ -67,7 +72,8 @@ def new(
     the thickness of the stock they go through it, and outlines keep tabs. It works as it is;
     every other key stands there as a comment.
     """
-    from camtool.jobs.template import Proposal, job_template
+    from camtool.geometry.drawing import is_text
+    from camtool.jobs.template import Proposal, job_template, proposed
     from camtool.planning.job import above_zero
     from camtool.project import project_of
 
@@ -85,15 +91,50 @@ def new(
         proposal = Proposal(
             known.diameter_mm, proposal.thickness_mm, tool, known.materials, material or ""
         )
+    proposal = _with_library(proposal)
     output = output or "job.toml"
     check_places([source, *machine.files()], [output])
     check_new(output)
     target = machine.load().machine if machine.name() is not None else None
-    read = drawing.read(source, target)
-    write_all({output: job_template(read, target, proposal).encode()})
+    text = drawing.given.get("text", "stroke")
+    read = DrawingFlags({**drawing.given, "text": text}).read(source, target)
+    has_text = any(is_text(name) for name in read.sources)
+    parts = proposed(read, proposal)
+    made = job_template(read, target, proposal, parts, text if has_text else "")
+    write_all({output: made.encode()})
     say_findings(read.findings, quiet=quiet, verbose=verbose)
+    for each in parts:
+        if each.part.why:
+            say(
+                one_line(f"{each.part.name}: {each.part.kind}, since {each.part.why}"), quiet=quiet
+            )
     where = "stdout" if output == STDOUT else output
     say(f"written: {where}; look at the kinds, the tool and the depth", quiet=quiet)
+
+
+def _with_library(proposal: Proposal) -> Proposal:
+    """Return the proposal with the tools of the libraries that may cut its material; of a job that
+    names no tool and no diameter, the first end mill is its tool."""
+    from camtool.jobs.tools import read_library, tool_of
+    from camtool.project import project_of
+
+    every: dict[str, Tool] = {}
+    for file in project_of(Path.cwd()).libraries:
+        every = {
+            **{name: tool_of(name, each) for name, each in read_library(file).items()},
+            **every,
+        }
+    said = proposal.material
+    library = tuple(
+        tool for tool in every.values() if not said or not tool.materials or said in tool.materials
+    )
+    if not proposal.tool_mm and not proposal.tool:
+        mill = next((tool for tool in library if tool.kind == "flat" and tool.diameter_mm), None)
+        if mill is not None:
+            proposal = replace(
+                proposal, tool=mill.name, tool_mm=mill.diameter_mm, materials=mill.materials
+            )
+    return replace(proposal, library=library)
 
 
 @job.command(cls=SectionedCommand, short_help="What a job file says.")

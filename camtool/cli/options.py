@@ -433,7 +433,8 @@ class DrawingFlags:
         from camtool.importers.read import content, read_bytes
         from camtool.jobs.drawing import read_for_job
 
-        options = options_of(self.given, machine)
+        said = {"text": job.text} if job is not None and job.text else {}
+        options = options_of({**said, **self.given}, machine)
         progress().begin(f"reading {Path(name).name}")
         data, file = content(Path(name)) if data is None else (data, name)
         if job is None:

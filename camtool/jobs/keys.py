@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from camtool.errors import OptionError
+from camtool.importers.options import TEXTS
 from camtool.keys import (
     ANGLE,
     COUNT,
@@ -309,6 +310,12 @@ WHOLE = {
         "Layers that hold no edges of parts: frames, stock.",
         '["SHEET"]',
     ),
+    "text": Key(
+        "text",
+        one_of(TEXTS),
+        "How text of the drawing is read, where --text does not say it.",
+        '"stroke"',
+    ),
     "material": Key(
         "material", Value(plain(text), "NAME"), "What is cut: whose presets tools have."
     ),
@@ -536,7 +543,9 @@ PRESET = {
 # The same keys by other names: as flags, and as fields from Python.
 
 FLAGS: dict[str, dict[str, Key]] = {
-    "Job (every key of docs/jobs.md is a flag)": WHOLE,
+    "Job (every key of docs/jobs.md is a flag)": {
+        name: key for name, key in WHOLE.items() if name != "text"
+    },
     "Where the drawing lies, in this order": {
         **{name: key for name, key in PLACE.items() if name != "origin"},
         "origin": PLACE["origin"],
@@ -547,7 +556,7 @@ FLAGS: dict[str, dict[str, Key]] = {
     },
     "How it is cut": {name: key for name, key in OPERATION.items() if key.help},
 }
-"""The keys that are flags too, under the headings of the help."""
+"""The keys that are flags too, under the headings of the help. `--text` is one of the drawing."""
 
 _FLAGS_OF_OTHER_NAMES = {"tool_tip_angle": "--tool-angle"}
 

@@ -1,15 +1,21 @@
 """A job file to fill in: what `camtool job new` writes from the layers of a drawing.
 
 Of each layer (of each colour when there is one layer) the kinds of operation take what they
-propose to cut, one after the other: engraving what is text or open, or has a name that says so;
-drilling points and small circles; boring circles wider than the tool; profiles the rest. What is
+propose to cut, one after the other, by `proposal_rank`:
+
+    engrave ▶ drill ▶ bore ▶ pocket ▶ profile
+
+Each says why, and names a tool of the library where another one than the job's is right. What is
 larger comes later, so that parts are cut free last. Every other key stands there as a comment,
-with an example.
+with an example. docs/jobs.md has the rules in a table.
 """
 
 from __future__ import annotations
 
 import itertools
+import math
+import re
+import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import PurePath
 from typing import TYPE_CHECKING
@@ -18,11 +24,13 @@ import numpy as np
 from msgspec import Struct
 
 from camtool.geometry.facts import drawing_extents
-from camtool.geometry.measure import extents
+from camtool.geometry.measure import extents, path_extents
 from camtool.jobs.keys import OPERATION, PLACE, TOOL, WHOLE, is_known
-from camtool.keys import Key
-from camtool.planning.job import Operation, Stock
-from camtool.planning.kinds import function_of, installed_kinds, kind_named
+from camtool.jobs.widths import crowded
+from camtool.keys import Given, Key
+from camtool.planning.holes import circle_of
+from camtool.planning.job import Operation, Stock, Tool
+from camtool.planning.kinds import SELECTING_KEYS, function_of, installed_kinds, kind_named
 from camtool.planning.sides import CONTINUOUS, Traits
 from camtool.records import replace
 from camtool.tables import toml_string
@@ -36,6 +44,24 @@ BREAKTHROUGH_MM = 0.3
 """Through cuts are proposed to go so far below the stock."""
 
 TOOL_NAME = "tool"
+
+HABITS = {
+    "engrave": ("engrav", "etch", "scribe", "mark", "score"),
+    "drill": ("drill", "hole", "bore"),
+    "pocket": ("pocket", "recess"),
+    "profile": ("cut", "outline", "profile"),
+}
+"""Beginnings of words in the names of layers, by the kind of operation that they ask for."""
+
+COLOURS = {"#ff0000": "profile", "#0000ff": "engrave"}
+"""Colours that those who cut with lasers draw in: red is cut, blue marks lines."""
+
+_DEPTH = re.compile(r"(\d+(?:[.,]\d+)?)\s*mm\b|\b(?:d|depth|z)\s*=\s*-?(\d+(?:[.,]\d+)?)")
+"""Depths in names of layers, mm."""
+
+MAX_DEPTH_MM = 50.0
+"""Larger numbers in names of layers are no depths, where the stock is not known."""
+
 CUTTING_ORDER = ("over", "at", "along", "within", "beside")
 """Operations by where they cut: what frees parts comes last."""
 
@@ -59,13 +85,25 @@ class _Group(Struct, frozen=True):
 class Proposal(Struct, frozen=True):
     """The known sizes of the cut, mm, 0 where it is not: the tool's diameter, the stock's
     thickness. `tool`: its name in a library, and the materials that it has presets for, which say
-    how deep passes are; `material`: the one of them that is cut, where that is said."""
+    how deep passes are; `material`: the one of them that is cut, where that is said. `library`:
+    all tools that the job may name for it."""
 
     tool_mm: float = 0.0
     thickness_mm: float = 0.0
     tool: str = ""
     materials: tuple[str, ...] = ()
     material: str = ""
+    library: tuple[Tool, ...] = ()
+
+    def tools(self, kind: str) -> list[Tool]:
+        """Return the tools of this kind in the library, the widest first."""
+        found = [tool for tool in self.library if tool.kind == kind]
+        return sorted(found, key=lambda tool: -tool.diameter_mm)
+
+    @property
+    def finer_mills(self) -> list[Tool]:
+        """The end mills of the library that are narrower than the tool, the widest first."""
+        return [tool for tool in self.tools("flat") if 0.0 < tool.diameter_mm < self.tool_mm]
 
     @property
     def breakthrough_mm(self) -> float:
@@ -82,29 +120,51 @@ def _materials(proposal: Proposal) -> Iterator[str]:
         yield _row(f"{'' if said else '# '}material = {toml_string(name)}", "as --material")
 
 
+def proposed(drawing: Drawing, proposal: Proposal) -> list[Proposed]:
+    """Return the operations that a drawing is cut by, in the order of cutting, each with its own
+    name and the group of paths that it takes from."""
+    (left, right), (low, high) = drawing_extents(drawing).tolist()
+    groups = sorted(_groups(drawing), key=lambda group: _extent(drawing, group))
+    made = [
+        Proposed(group, part)
+        for group in groups
+        for part in _parts(drawing, group, max(right - left, high - low), proposal)
+    ]
+    made.sort(key=lambda each: CUTTING_ORDER.index(kind_named(each.part.kind).cuts))
+    names = set[str]()
+    for row, each in enumerate(made):
+        name = each.part.name
+        number = next(n for n in itertools.count(1) if _numbered(name, n) not in names)
+        made[row] = Proposed(each.group, replace(each.part, name=_numbered(name, number)))
+        names.add(made[row].part.name)
+    return made
+
+
 def job_template(
-    drawing: Drawing, machine: Machine | None = None, proposal: Proposal | None = None
+    drawing: Drawing,
+    machine: Machine | None = None,
+    proposal: Proposal | None = None,
+    parts: Sequence[Proposed] | None = None,
+    text: str = "",
 ) -> str:
     """TOML text of a job for the drawing; for `machine`, when it is known, with its numbers. With
-    a proposal of tool and stock, contours are told apart by what they are."""
+    a proposal of tool and stock, contours are told apart by what they are. `parts`: its
+    operations, if not those that are `proposed`; `text`: how the drawing's text was read."""
     proposal = proposal or Proposal()
     (left, right), (low, high) = drawing_extents(drawing).tolist()
     size = (right - left, high - low)
-    groups = sorted(_groups(drawing), key=lambda group: _extent(drawing, group))
-    parts = [
-        (group, part) for group in groups for part in _parts(drawing, group, max(size), proposal)
-    ]
-    parts.sort(key=lambda each: CUTTING_ORDER.index(kind_named(each[1].kind).cuts))
+    parts = proposed(drawing, proposal) if parts is None else parts
     lines = [
         *_head(drawing, size, machine),
-        *_comments(WHOLE),
+        *_comments({name: key for name, key in WHOLE.items() if not (name == "text" and text)}),
+        *([_row(f'text = "{text}"', WHOLE["text"].help)] if text else []),
         *_materials(proposal),
         "",
         "[place]",
         _row('origin = "lower-left"', PLACE["origin"].help),
         *_comments(PLACE),
         "",
-        *_stock(size, proposal),
+        *_stock(size, proposal, parts),
         "",
     ]
     if not proposal.tool:
@@ -113,16 +173,15 @@ def job_template(
             _row(f'diameter = "{proposal.tool_mm:.6g}mm"', TOOL["diameter"].help),
             *_comments(TOOL),
         ]
-    names = set[str]()
-    for group, part in parts:
-        number = next(n for n in itertools.count(1) if _numbered(part.name, n) not in names)
-        part = replace(part, name=_numbered(part.name, number))
-        names.add(part.name)
-        lines += ["", *_text(drawing, group, part, proposal)]
+    for each in parts:
+        lines += ["", *_text(drawing, each.group, each.part, proposal)]
     return "\n".join(lines) + "\n"
 
 
-def _stock(size: tuple[float, float], proposal: Proposal) -> Iterator[str]:
+def _stock(
+    size: tuple[float, float], proposal: Proposal, parts: Sequence[Proposed]
+) -> Iterator[str]:
+    """Yield the rows of the stock; where a drill goes through, its board takes the point."""
     known = bool(proposal.thickness_mm)
     thickness = f"{proposal.thickness_mm:.6g}" if known else "1"
     remark = "its top is Z0; the corner is its lower left one"
@@ -130,7 +189,14 @@ def _stock(size: tuple[float, float], proposal: Proposal) -> Iterator[str]:
     yield '# corner = ["0mm", "0mm"]'
     yield f'# size = ["{size[0]:.6g}mm", "{size[1]:.6g}mm"]'
     yield f'{"" if known else "# "}thickness = "{thickness}mm"'
-    yield '# spoilboard = "0.5mm"'
+    points = {tool.name: tool.point_mm for tool in proposal.library}
+    drilled = [points.get(each.part.tool, 0.0) for each in parts if each.part.kind == "drill"]
+    deep = proposal.breakthrough_mm + max(drilled, default=0.0)
+    if known and deep > Stock(proposal.thickness_mm).through_mm:
+        board = math.ceil(10.0 * deep) / 10.0
+        yield _row(f'spoilboard = "{board:g}mm"', "so deep goes the point of the drill below it")
+    else:
+        yield '# spoilboard = "0.5mm"'
 
 
 def _head(drawing: Drawing, size: tuple[float, float], machine: Machine | None) -> Iterator[str]:
@@ -179,7 +245,8 @@ def _extent(drawing: Drawing, group: _Group) -> float:
 class Part(Struct, frozen=True):
     """An operation that a kind proposes: its name, what it takes of a group (rows of the drawing's
     paths, and how many single points), and keys as TOML text, each with a remark. `excludes`: the
-    word by which the other operations of the group leave these paths out."""
+    word by which the other operations of the group leave these paths out. `tool`: one of the
+    library, "" for that of the job. `why`: the reason, in a few words, "" where there is none."""
 
     name: str
     kind: str
@@ -187,6 +254,15 @@ class Part(Struct, frozen=True):
     marks: int = 0
     keys: tuple[tuple[str, str, str], ...] = ()
     excludes: str = ""
+    tool: str = ""
+    why: str = ""
+
+
+class Proposed(Struct, frozen=True):
+    """An operation of a job, and the group that it takes its paths of."""
+
+    group: _Group
+    part: Part
 
 
 class Remaining(Struct, frozen=True):
@@ -203,6 +279,46 @@ class Remaining(Struct, frozen=True):
     size_mm: float
     proposal: Proposal
     is_divided: bool = False
+
+    @property
+    def habit(self) -> str:
+        """The kind of operation that the name of the layer asks for, "" if it asks for none."""
+        words = re.split(r"[^a-z]+", self.name.casefold())
+        for kind, starts in HABITS.items():
+            if any(word.startswith(start) for word in words for start in starts):
+                return kind
+        return COLOURS.get(self.name.casefold(), "")
+
+    @property
+    def depth_mm(self) -> float | None:
+        """The depth that the name of the layer says (`POCKET 2mm`, `d=3`), mm; None if it says
+        none, and for holes, whose names say diameters."""
+        found = _DEPTH.search(self.name.casefold())
+        if found is None or self.habit == "drill":
+            return None
+        depth = float(next(filter(None, found.groups())).replace(",", "."))
+        return depth if 0.0 < depth <= (self.proposal.thickness_mm or MAX_DEPTH_MM) else None
+
+    def crowded(self, width_mm: float) -> tuple[int, ...]:
+        """Rows of the closed paths that a tool of this width cannot run beside or within."""
+        found = crowded(self.drawing, width_mm)
+        return tuple(row for row in self.contours if row in found)
+
+    @property
+    def branched(self) -> tuple[int, ...]:
+        """Rows of the paths of which it is not clear what they enclose."""
+        found = {path for branch in self.drawing.healing.branches for path in branch.paths}
+        return tuple(row for row in self.rows if row in found)
+
+    @property
+    def holes(self) -> dict[int, float]:
+        """Rows of the circles that are holes, with their diameters, mm: those within parts, or of
+        a layer for holes, that hold nothing."""
+        inner = self.contours if self.habit == "drill" else self.contours_that_are("inner")
+        parents = set(self.drawing.nesting.levels.parent.tolist())
+        empty = [row for row in inner if row not in parents]
+        found = {row: circle_of(self.drawing.paths[row]) for row in empty}
+        return {row: circle[1] for row, circle in found.items() if circle}
 
     @property
     def contours(self) -> tuple[int, ...]:
@@ -243,7 +359,54 @@ def _parts(drawing: Drawing, group: _Group, size_mm: float, proposal: Proposal) 
             found += made
             left = left.without(made)
     excluded = [part.excludes for part in found if part.excludes]
-    return [part if part.excludes else _excluding(part, excluded) for part in found]
+    found = [part if part.excludes else _excluding(part, excluded) for part in found]
+    depth = left.depth_mm
+    if depth is not None:
+        said = ("depth", f'"{depth:g}mm"', "as the layer is called")
+        kept = ([key for key in part.keys if key[0] not in ("depth", "tabs")] for part in found)
+        found = [
+            replace(part, keys=(*keys, said)) if is_known("depth", part.kind) else part
+            for part, keys in zip(found, kept, strict=True)
+        ]
+    return [_exact(drawing, group, part) for part in found]
+
+
+def _exact(drawing: Drawing, group: _Group, part: Part) -> Part:
+    """The part, which says sizes or names entities if its words would take others of the group;
+    entities of one name may still be taken together."""
+    own = {key: value for key, value, _ in part.keys if key in SELECTING_KEYS}
+    rows = np.zeros(len(drawing.paths), dtype=np.bool_)
+    rows[list(group.paths)] = True
+    edges = np.array(
+        [kind.casefold() in CONTINUOUS for kind in drawing.line_types], dtype=np.bool_
+    )
+    every = drawing.nesting.among(np.arange(len(rows)))
+    traits = Traits(every, drawing.sources, edges)
+    for more in _narrower(drawing, part):
+        words = {**own, **more}
+        fields = {
+            OPERATION[key].field: OPERATION[key].read(Given(tomllib.loads(f"v={value}")["v"], key))
+            for key, value in words.items()
+        }
+        taken = np.flatnonzero(traits.selected(Operation(**fields), rows)).tolist()
+        if taken == sorted(part.rows):
+            break
+    added = [(key, value, "") for key, value in more.items()]
+    return replace(part, keys=(*(key for key in part.keys if key[0] not in more), *added))
+
+
+def _narrower(drawing: Drawing, part: Part) -> Iterator[dict[str, str]]:
+    """Yield keys by which a part may say more exactly what it takes, the simplest first."""
+    yield {}
+    if not part.rows:
+        return
+    lines = drawing.paths.select(part.rows)
+    sizes = np.ptp(path_extents(lines), axis=2).max(axis=1)
+    if not any(key == "select_size" for key, _, _ in part.keys):
+        low, high = math.floor(1e3 * sizes.min()) / 1e3, math.ceil(1e3 * sizes.max()) / 1e3
+        yield {"select_size": f'"{low:g}..{high:g}mm"'}
+    names = dict.fromkeys(pattern_of(drawing.sources[row]) for row in part.rows)
+    yield {"select_entities": f"[{', '.join(map(toml_string, names))}]"}
 
 
 def _excluding(part: Part, words: Sequence[str]) -> Part:
@@ -267,6 +430,7 @@ def _text(drawing: Drawing, group: _Group, part: Part, proposal: Proposal) -> li
     lines = drawing.paths.select(part.rows)
     marks = f", {part.marks} points" if part.marks else ""
     text = [
+        *([f"# {_commented(part.why)}"] if part.why else []),
         "[[operations]]",
         f"name = {toml_string(part.name)}",
         f'kind = "{part.kind}"',
@@ -274,15 +438,18 @@ def _text(drawing: Drawing, group: _Group, part: Part, proposal: Proposal) -> li
             f"{group.key} = [{toml_string(pattern_of(group.name))}]", f"{_counted(lines)}{marks}"
         ),
         *(_row(f"{key} = {value}", remark) for key, value, remark in part.keys),
-        f"tool = {toml_string(proposal.tool or TOOL_NAME)}",
+        f"tool = {toml_string(part.tool or proposal.tool or TOOL_NAME)}",
     ]
     contract = kind_named(part.kind)
     if contract.leaves_walls and proposal.tool_mm:
         text.append(_row('direction = "climb"', OPERATION["direction"].help))
-    if proposal.breakthrough_mm and is_known("breakthrough", part.kind):
+    keys = {key for key, _, _ in part.keys}
+    is_through = is_known("breakthrough", part.kind) and "depth" not in keys
+    if proposal.breakthrough_mm and is_through:
         through = f'breakthrough = "{proposal.breakthrough_mm:.6g}mm"'
         text.append(_row(through, "through the stock, and so far into the board below"))
-        if contract.runs_beside and proposal.tool_mm and not proposal.materials:
+        is_stepped = contract.leaves_walls and contract.descent == "passes"
+        if is_stepped and proposal.tool_mm and not proposal.materials and not part.tool:
             text.append(f'step_down = "{0.5 * proposal.tool_mm:.3g}mm"')
     if marks and contract.takes != "holes":
         text.append("# The points are not cut by this: they need an operation of the kind drill.")

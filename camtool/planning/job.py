@@ -945,8 +945,9 @@ class Job:
     `approach`: every cut starts after a move that takes up the backlash of both axes. `minimise`:
     one of GOALS. `compensate`: what is written is bent beforehand against the mechanics of its
     machine. `frames`: patterns of the layers whose contours, where they are not cut, are no edges
-    of parts. `keep_out`: boxes that no tool may enter. Operations with a breakthrough get their
-    depth, those with a finishing pass become two. Raises OptionError for what no job can be."""
+    of parts. `keep_out`: boxes that no tool may enter. `text`: how the drawing's text is read, ""
+    where the job does not say it. Operations with a breakthrough get their depth, those with a
+    finishing pass become two. Raises OptionError for what no job can be."""
 
     operations: tuple[Operation, ...] = field(default_factory=lambda: (Operation(),))
     placement: Placement = Placement()
@@ -957,6 +958,7 @@ class Job:
     compensate: bool = False
     frames: tuple[str, ...] = FRAMES
     keep_out: tuple[KeepOutBox, ...] = ()
+    text: str = ""
 
     def __post_init__(self) -> None:
         above_zero("safe Z", self.safe_z_mm, "mm")

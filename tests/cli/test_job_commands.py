@@ -161,6 +161,33 @@ def test_text_is_no_window(camtool: Run, labelled: Path, mode: str, target: str)
     assert "GOUGE" not in told
 
 
+SVG_TEXT = (
+    '<svg xmlns="http://www.w3.org/2000/svg" width="80mm" height="40mm" viewBox="0 0 80 40">'
+    '<rect width="80" height="40" fill="none" stroke="#000"/>'
+    '<text x="8" y="24" font-size="12">BRASS</text></svg>'
+)
+
+
+def test_a_new_job_engraves_text_without_a_flag(camtool: Run, labelled: Path) -> None:
+    """The job says how text is read, for which a flag of post stands above it."""
+    (labelled.parent / "label.svg").write_text(SVG_TEXT)
+    for name in ("plate.dxf", "label.svg"):
+        begun = camtool("job", "new", name, "--tool-diameter", "3mm", "-o", f"{name}.toml")
+        assert begun.returncode == 0, begun.stderr
+        assert b"text: engrave, since text is engraved" in begun.stderr
+        whole = tomllib.loads((labelled.parent / f"{name}.toml").read_text())
+        assert whole["text"] == "stroke"
+        post = ("post", name, "-t", "grbl", "--job", f"{name}.toml", "--no-verify", "-o", "-")
+        done = camtool(*post)
+        assert done.returncode == 0, done.stderr
+        assert b"is text: read it with" not in done.stderr
+        skipped = camtool(*post, "--text", "skip")
+        assert skipped.returncode == 2
+        assert b"operation '0 text': nothing on the layers 0 is text" in skipped.stderr
+    plain = camtool("post", "label.svg", "-t", "grbl", "--no-verify", "-o", "-")
+    assert b"is text: read it with" in plain.stderr
+
+
 def test_text_that_is_cut_as_parts_is_named(camtool: Run, labelled: Path) -> None:
     """Gouges alone say nothing of the text that they come from."""
     cut = ("post", labelled, "-t", "grbl", "--tool-diameter", "3.175mm", "--depth", "1mm",

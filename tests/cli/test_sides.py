@@ -78,7 +78,7 @@ def _without(text: str, *layers: str) -> str:
 
 def test_a_new_job_cuts_a_right_part(camtool: Run, tmp_path: Path, plate: Path) -> None:
     whole = camtool("job", "new", plate, "-o", "-").stdout.decode()
-    (tmp_path / "job.toml").write_text(_without(_job(whole), "AXES", "SHEET BORDER"))
+    (tmp_path / "job.toml").write_text(_without(_job(whole), "AXES", "SHEET BORDER", "TEXT"))
     flags = ("-t", "linuxcnc", "--job", "job.toml")
     done = camtool("post", plate, *flags, "-o", "a.ngc")
     assert done.returncode == 0, done.stderr

@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 from camtool.jobs.template import Part, Remaining
-from camtool.planning.holes import HOLE_SIZE_MM, circle_of
+from camtool.planning.holes import HOLE_SIZE_MM
+from camtool.planning.ramps import MIN_HELIX_SHARE
 
 
 def propose(left: Remaining) -> list[Part]:
     """Return one operation for the circles in which the tool has room to go round."""
-    paths, least = left.drawing.paths, left.proposal.tool_mm + HOLE_SIZE_MM
-    if not left.proposal.tool_mm:
+    tool, least = left.proposal.tool_mm, left.proposal.tool_mm + HOLE_SIZE_MM
+    if not tool or left.habit == "pocket":
         return []
-    inner = left.contours_that_are("inner", "circle")
-    wider = tuple(row for row in inner if (circle := circle_of(paths[row])) and circle[1] > least)
+    widths = {row: width for row, width in left.holes.items() if width > least}
+    wider = tuple(widths)
     keys = (
         ("select", '["inner", "circle"]', ""),
         ("select_size", f'"{least:.6g}mm.."', "wider than the tool"),
         ("entry", '"helix:3deg"', "how steeply it goes down"),
     )
-    return [Part(f"{left.title} holes", "bore", wider, 0, keys)] if wider else []
+    narrow = sum(width < tool * (1.0 + MIN_HELIX_SHARE) for width in widths.values())
+    plunged = (
+        f"; {narrow} of them hardly wider: plunged in pecks, then once round" if narrow else ""
+    )
+    why = f"circles wider than the mill are bored{plunged}"
+    return [Part(f"{left.title} holes", "bore", wider, 0, keys, "", "", why)] if wider else []

@@ -1,4 +1,4 @@
-"""Holes that `camtool job new` proposes: points, small circles, circles as wide as the tool."""
+"""Holes that `camtool job new` proposes: points, small circles, circles as wide as a drill."""
 
 from __future__ import annotations
 
@@ -10,25 +10,40 @@ SMALL_HOLE = 0.1
 
 
 def propose(left: Remaining) -> list[Part]:
-    """Holes at the points, and in the circles that are small, or fit the tool."""
-    paths, tool = left.drawing.paths, left.proposal.tool_mm
-    circles = {row: circle_of(paths[row]) for row in left.rows}
-    limit = SMALL_HOLE * left.size_mm
-    are_small = all(circle and circle[1] <= limit for circle in circles.values())
-    if are_small and not left.is_divided and not tool:
-        return [Part(left.title, "drill", left.rows, left.marks)]
+    """Holes at the points, and in the circles that are small, or fit a drill or the tool."""
+    tool = left.proposal.tool_mm
+    if left.habit == "pocket":
+        return []
+    if not tool:
+        circles = [circle_of(left.drawing.paths[row]) for row in left.rows]
+        limit = SMALL_HOLE * left.size_mm
+        are_small = all(circle and circle[1] <= limit for circle in circles)
+        if are_small and not left.is_divided:
+            return [Part(left.title, "drill", left.rows, left.marks)]
+    drills = left.proposal.tools("drill")
     found: list[Part] = []
     if left.marks:
         select = (("select", '["point"]', ""),) if left.rows or left.is_divided else ()
-        found.append(Part(f"{left.title} points", "drill", (), left.marks, select))
+        bit = drills[-1] if drills else None
+        said = "" if bit is None else f" with {bit.name}, the finest drill"
+        why = f"points are drilled{said}; a point says no diameter"
+        name = f"{left.title} points"
+        found.append(Part(name, "drill", (), left.marks, select, "", bit.name if bit else "", why))
     if not tool:
         return found
-    inner = left.contours_that_are("inner", "circle")
-    wide = {row: circle[1] for row in inner if (circle := circles[row])}
-    fits = tuple(row for row, width in wide.items() if abs(width - tool) <= HOLE_SIZE_MM)
-    if fits:
-        size = f'"{tool - HOLE_SIZE_MM:.6g}..{tool + HOLE_SIZE_MM:.6g}mm"'
-        words = ("select", '["inner", "circle"]', "")
-        keys = (words, ("select_size", size, "as wide as the tool"))
-        found.append(Part(f"{left.title} drilled", "drill", fits, 0, keys))
+    holes = left.holes
+    sizes = [(each.diameter_mm, each.name) for each in drills]
+    for width, name in [*sizes, (tool, "")]:
+        fits = tuple(row for row, hole in holes.items() if abs(hole - width) <= HOLE_SIZE_MM)
+        if not fits:
+            continue
+        size = f'"{width - HOLE_SIZE_MM:.6g}..{width + HOLE_SIZE_MM:.6g}mm"'
+        keys = (
+            ("select", '["inner", "circle"]', ""),
+            ("select_size", size, "as wide as the tool"),
+        )
+        why = f"circles as wide as the {'drill ' + name if name else 'mill'} are drilled"
+        called = f"{left.title} drilled {name}".rstrip()
+        found.append(Part(called, "drill", fits, 0, keys, "", name, why))
+        holes = {row: hole for row, hole in holes.items() if row not in fits}
     return found

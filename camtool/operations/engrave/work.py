@@ -56,22 +56,31 @@ def run_together(chosen: Chosen, setting: Setting) -> Iterator[Finding]:
     """Yield one finding for the lines under the tool that are nearer to each other than it is
     wide at the depth of its tip: lines that do not touch, and what touching lines enclose."""
     width = 2.0 * setting.operation.tool.radius_at(-setting.levels_mm[-1])
-    if width == 0.0 or not len(chosen.lines):
+    found = widest_groove(chosen.lines, width)
+    if found is None:
         return
-    lines = np.array([*_chords(chosen.lines)], dtype=object)
-    found = narrow = _narrow_places(lines, chosen.lines.closed, width)
-    fits = place = None
-    while narrow:  # what touches in a wide groove may be apart in a narrower one
-        fits, place, row = min(narrow, key=lambda each: each[0])
-        narrow = _narrow_places(lines, chosen.lines.closed, fits)
-    if fits is None or place is None:
-        return
+    fits, place, row, count = found
     yield LINES_RUN_TOGETHER(
         where=at_place(chosen.names[row], (place.x, place.y)),
         measured=width,
         limit=fits,
-        more=len(found) - 1,
+        more=count - 1,
     )
+
+
+def widest_groove(lines: Polylines, width: float) -> tuple[float, Any, int, int] | None:
+    """Return the width of the widest groove that keeps what is between the lines, mm, the place
+    that limits it, the row of one of its lines, and how many places are too narrow for a groove of
+    this `width`, mm; None if there are none."""
+    if width == 0.0 or not len(lines):
+        return None
+    chords = np.array([*_chords(lines)], dtype=object)
+    found = narrow = _narrow_places(chords, lines.closed, width)
+    fits = None
+    while narrow:  # what touches in a wide groove may be apart in a narrower one
+        fits = min(narrow, key=lambda each: each[0])
+        narrow = _narrow_places(chords, lines.closed, fits[0])
+    return None if fits is None else (*fits, len(found))
 
 
 def _narrow_places(lines: Any, closed: Bools, width: float) -> list[tuple[float, Any, int]]:

@@ -5,6 +5,7 @@ from camtool.planning.kinds import COMMON_KEYS, SELECTING_KEYS, WALL_KEYS, Opera
 POCKET = OperationKind(
     name="pocket",
     work="camtool.operations.pocket.work:pocket",
+    propose="camtool.operations.pocket.proposal:propose",
     keys=(
         *COMMON_KEYS,
         *SELECTING_KEYS,
@@ -20,6 +21,7 @@ POCKET = OperationKind(
         "angle",
     ),
     rank=2,
+    proposal_rank=4,
     cuts="within",
     leaves_walls=True,
     rest="corners",

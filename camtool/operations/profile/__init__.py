@@ -26,7 +26,7 @@ PROFILE = OperationKind(
         "mitre_limit",
     ),
     rank=1,
-    proposal_rank=4,
+    proposal_rank=5,
     cuts="beside",
     leaves_walls=True,
 )

@@ -1,0 +1,85 @@
+"""Widths of what is drawn: the contours beside or within which a tool has no room, and slots.
+
+Tools run in waste: around outer contours, and within inner ones. Contours that bound the same
+waste must be at least as far from each other as the tool is wide, or it cuts into one of them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from camtool.arrays import Bools
+from camtool.errors import GeometryError
+from camtool.geometry.distance import approach, near_paths
+from camtool.geometry.drawing import Drawing, is_text
+from camtool.geometry.measure import path_extents, signed_areas
+from camtool.geometry.offset import offset_each
+from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, reverse_lines
+
+SLOT_MM = 0.01
+"""A slot is as wide as a tool when a tool so much smaller in radius goes through it, and one so
+much larger does not: walls of such slots are cut so far beyond the line."""
+
+LETTER_SHARE = 10.0
+"""What lies within a crowded contour no larger than so many widths of the tool belongs to it, as
+counters belong to letters."""
+
+NEAR_SHARE = 1e-6
+"""Contours that are nearer than the width by this part of it are not crowded, by rounding."""
+
+
+def has_room(lines: Polylines, radius_mm: float) -> Bools:
+    """Mask (N,) of the closed paths within which the centre of a tool of this radius has room; of
+    paths that enclose no clear region, those whose box is large enough."""
+    ccw = reverse_lines(lines, signed_areas(lines) < 0.0)
+    found: Bools = (
+        np.ptp(path_extents(lines), axis=2).min(axis=1, initial=np.inf) > 2.0 * radius_mm
+    )
+    if not found.any():
+        return found
+    rows = np.flatnonzero(found)
+    try:
+        owners = offset_each(ccw.select(rows), radius_mm)[1]
+    except GeometryError:
+        return found
+    found[:] = False
+    found[rows[np.unique(owners)]] = True
+    return found
+
+
+def is_slot(lines: Polylines, width_mm: float) -> Bools:
+    """Mask (N,) of the closed paths whose widest place is as wide as a tool of this width."""
+    radius = 0.5 * width_mm
+    if not radius > SLOT_MM:
+        return np.zeros(len(lines), dtype=np.bool_)
+    return np.asarray(has_room(lines, radius - SLOT_MM) & ~has_room(lines, radius + SLOT_MM))
+
+
+def crowded(drawing: Drawing, width_mm: float) -> frozenset[int]:
+    """Rows of the closed paths, letters aside, that a tool of this width cannot run beside or
+    within without cutting into a neighbour, and of those that cross others; small ones with all
+    that lies within them."""
+    lettered = np.array([is_text(source) for source in drawing.sources], dtype=np.bool_)
+    rows = np.flatnonzero(drawing.paths.closed & ~lettered)
+    lines = drawing.paths.select(rows)
+    if not len(rows) or not width_mm > 2.0 * SLOT_MM:
+        return frozenset()
+    levels = drawing.nesting.among(rows).levels
+    is_outer = levels.depth % 2 == 0
+    waste = np.where(is_outer, levels.parent, np.arange(len(rows)))
+    found = np.zeros(len(lines), dtype=np.bool_)
+    found[~is_outer] = ~has_room(lines.select(np.flatnonzero(~is_outer)), 0.5 * width_mm - SLOT_MM)
+    least = width_mm * (1.0 - NEAR_SHARE)
+    for one, other in near_paths(lines, lines, width_mm):
+        if one >= other or (found[one] and found[other]):
+            continue
+        apart = approach(lines[one], lines[other]).distance
+        # Contours of which one crosses the other bound no waste that anybody could name.
+        if apart < (least if waste[one] == waste[other] else POSITION_EPS_MM):
+            found[one] = found[other] = True
+    sizes = np.ptp(path_extents(lines), axis=2).max(axis=1)
+    small = sizes <= LETTER_SHARE * width_mm
+    for row in np.argsort(levels.depth, kind="stable").tolist():  # holders before what they hold
+        parent = int(levels.parent[row])
+        found[row] |= bool(parent >= 0 and found[parent] and small[parent])
+    return frozenset(rows[found].tolist())

@@ -1,0 +1,297 @@
+"""What `camtool job new` chooses for a drawing; the jobs that it writes can be planned."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from camtool.findings import Severity
+from camtool.geometry.drawing import Branch, Drawing, Healing, Units
+from camtool.geometry.polylines import Polyline, Polylines
+from camtool.jobs.build import job_of_file
+from camtool.jobs.template import Proposal, job_template, proposed
+from camtool.jobs.widths import crowded, is_slot
+from camtool.planning.job import Tool
+from camtool.planning.plan import plan
+from camtool.records import replace
+from camtool.target.registry import load_target
+
+MILL_MM = 3.0
+
+FINE = Tool(1.0, name="fine")
+
+BIT = Tool(6.0, "v", math.radians(60.0), name="bit")
+
+DRILL = Tool(4.2, "drill", math.radians(118.0), name="drill-42")
+
+LIBRARY = (Tool(MILL_MM, name="mill"), BIT, DRILL)
+
+TOOLS = """
+[tools.mill]
+number = 1
+diameter = "3mm"
+[tools.fine]
+number = 2
+diameter = "1mm"
+[tools.bit]
+number = 3
+diameter = "6mm"
+tip_angle = "60deg"
+[tools.drill-42]
+number = 4
+diameter = "4.2mm"
+kind = "drill"
+tip_angle = "118deg"
+"""
+
+
+def box(x: float, y: float, wide: float, high: float) -> Polyline:
+    corners = [[x, y, 0], [x + wide, y, 0], [x + wide, y + high, 0], [x, y + high, 0.0]]
+    return Polyline(np.array(corners), True)
+
+
+def circle(x: float, y: float, diameter: float) -> Polyline:
+    radius = 0.5 * diameter
+    return Polyline(np.array([[x - radius, y, 1.0], [x + radius, y, 1.0]]), True)
+
+
+def slot(x: float, y: float, length: float, width: float) -> Polyline:
+    """An obround from x, y to the right; its ends are half circles."""
+    low, high = y - 0.5 * width, y + 0.5 * width
+    rows = [[x, low, 0], [x + length, low, 1], [x + length, high, 0], [x, high, 1.0]]
+    return Polyline(np.array(rows), True)
+
+
+def stroke(*points: tuple[float, float]) -> Polyline:
+    return Polyline(np.array([(*point, 0.0) for point in points]))
+
+
+def moved(path: Polyline, turn_rad: float, mirrored: bool) -> Polyline:
+    """The path turned about the origin, and before that mirrored in x."""
+    vertices = path.vertices.copy()
+    if mirrored:
+        vertices[:, 0] *= -1.0
+        vertices[:, 2] *= -1.0
+    turn = np.array([[math.cos(turn_rad), math.sin(turn_rad)],
+                     [-math.sin(turn_rad), math.cos(turn_rad)]])  # fmt: skip
+    vertices[:, :2] = vertices[:, :2] @ turn
+    return Polyline(vertices, path.closed)
+
+
+def drawn(
+    *paths: Polyline, layer: str = "0", layers: tuple[str, ...] = (), **more: object
+) -> Drawing:
+    """A drawing of these paths, each an entity of its own."""
+    count = len(paths)
+    names = tuple(f"PATH {row}" for row in range(count))
+    return Drawing(Polylines.of(paths), (layer,) * count, ("",) * count, names, "part.dxf",
+                   Units("mm", 1.0, "said by the test"), **more)  # type: ignore[arg-type]  # fmt: skip
+
+
+def with_mill(*library: Tool, thickness_mm: float = 3.0) -> Proposal:
+    return Proposal(MILL_MM, thickness_mm, "mill", library=(LIBRARY[0], *library))
+
+
+def chosen(drawing: Drawing, proposal: Proposal) -> dict[int, tuple[str, str]]:
+    """Kind and tool by the row of each path; each path is taken once."""
+    found: dict[int, tuple[str, str]] = {}
+    for each in proposed(drawing, proposal):
+        for row in each.part.rows:
+            assert row not in found
+            found[row] = (each.part.kind, each.part.tool or proposal.tool)
+        assert each.part.why
+    return found
+
+
+def errors_of(drawing: Drawing, proposal: Proposal, folder: Path) -> list[str]:
+    """The errors of the plan of the job that is written."""
+    (folder / "tools.toml").write_text(TOOLS, encoding="utf-8")
+    text = 'tool_library = "tools.toml"\n' + job_template(drawing, None, proposal)
+    (folder / "made.toml").write_text(text, encoding="utf-8")
+    made = plan(drawing, job_of_file(folder / "made.toml"), load_target("linuxcnc").machine)
+    return [str(each) for each in made.findings if each.severity is Severity.ERROR]
+
+
+PLATE = (
+    box(0, 0, 100, 60),
+    box(60, 25, 30, 20),  # a window, held by tabs
+    box(10, 40, 12, 11.9),  # so small that it is cleared, though its diagonal is larger
+    slot(12, 10, 20, MILL_MM),
+    circle(50, 10, 4.2),  # a drill is as wide
+    circle(60, 10, 3.1),  # hardly wider than the mill
+    circle(75, 12, 10),
+    stroke((5, 55), (40, 55)),
+)
+
+CHOSEN = {
+    0: ("profile", "mill"),
+    1: ("profile", "mill"),
+    2: ("pocket", "mill"),
+    3: ("profile", "mill"),
+    4: ("drill", "drill-42"),
+    5: ("bore", "mill"),
+    6: ("bore", "mill"),
+    7: ("engrave", "bit"),
+}
+
+
+def test_each_shape_of_a_plate_is_cut_as_a_machinist_would(tmp_path: Path) -> None:
+    drawing, proposal = drawn(*PLATE), with_mill(BIT, DRILL)
+    assert chosen(drawing, proposal) == CHOSEN
+    assert errors_of(drawing, proposal, tmp_path) == []
+    text = (tmp_path / "made.toml").read_text(encoding="utf-8")
+    assert "# circles as wide as the drill drill-42 are drilled" in text
+    assert 'spoilboard = "1.6mm"' in text  # the point of the drill, ½·4.2/tan 59°, and 0.3 mm
+    assert "1 of them hardly wider: plunged in pecks" in text
+    assert text.count("\ntabs = ") == 2
+    made = plan(drawing, job_of_file(tmp_path / "made.toml"), load_target("linuxcnc").machine)
+    assert "LOOSE_PIECE" not in {each.code.name for each in made.findings}
+
+
+@settings(max_examples=25)
+@given(st.floats(0.0, 2.0 * math.pi), st.booleans(), st.permutations(range(len(PLATE))))
+def test_turned_mirrored_and_shuffled_drawings_are_cut_alike(
+    turn_rad: float, mirrored: bool, order: list[int]
+) -> None:
+    paths = [moved(PLATE[row], turn_rad, mirrored) for row in order]
+    found = chosen(drawn(*paths), with_mill(BIT, DRILL))
+    expected = {row: CHOSEN[was] for row, was in enumerate(order)}
+    assert found == expected
+
+
+@settings(max_examples=25)
+@given(st.floats(0.5, 40.0), st.floats(-0.05, 0.05), st.floats(0.0, math.pi))
+def test_a_slot_is_as_wide_as_the_mill_or_not(
+    length: float, wider: float, turn_rad: float
+) -> None:
+    path = moved(slot(0, 0, length, MILL_MM + wider), turn_rad, False)
+    if abs(abs(wider) - 0.02) < 1e-6:
+        return
+    assert bool(is_slot(Polylines.of([path]), MILL_MM)[0]) == (abs(wider) < 0.02)
+
+
+def test_a_slot_as_wide_as_the_mill_is_cut_along_its_middle(tmp_path: Path) -> None:
+    drawing, proposal = drawn(box(0, 0, 60, 20), slot(10, 10, 30, MILL_MM)), with_mill()
+    assert errors_of(drawing, proposal, tmp_path) == []
+    made = plan(drawing, job_of_file(tmp_path / "made.toml"), load_target("linuxcnc").machine)
+    assert "UNREACHED" not in {each.code.name for each in made.findings}
+    cut = made.end[made.end[:, 2] < 0.0]
+    within = cut[(cut[:, 0] > 5) & (cut[:, 0] < 55) & (cut[:, 1] > 2) & (cut[:, 1] < 18)]
+    assert len(within)
+    # Origin of the job: the lower left corner of the outline, as drawn.
+    assert np.abs(within[:, 1] - 10.0).max() <= 0.011
+
+
+@settings(max_examples=40)
+@given(st.lists(st.tuples(st.floats(0, 60), st.floats(0, 60), st.floats(1, 12), st.floats(1, 12)),
+                min_size=1, max_size=8))  # fmt: skip
+def test_crowded_parts_are_those_whose_buffers_meet(
+    rows: list[tuple[float, float, float, float]],
+) -> None:
+    """Of boxes that lie apart, those are crowded that are nearer than the tool is wide."""
+    kept: list[tuple[float, float, float, float]] = []
+    for row in rows:
+        shape = shapely.box(row[0], row[1], row[0] + row[2], row[1] + row[3])
+        if all(shape.distance(shapely.box(x, y, x + w, y + h)) > 1e-3 for x, y, w, h in kept):
+            kept.append(row)
+    shapes = [shapely.box(x, y, x + w, y + h) for x, y, w, h in kept]
+    gaps = np.array([[one.distance(other) for other in shapes] for one in shapes])
+    np.fill_diagonal(gaps, np.inf)
+    if (np.abs(gaps - MILL_MM) < 1e-3).any():
+        return
+    expected = frozenset(np.flatnonzero((gaps < MILL_MM).any(axis=1)).tolist())
+    assert crowded(drawn(*(box(*row) for row in kept)), MILL_MM) == expected
+
+
+def test_letters_are_engraved_with_their_counters(tmp_path: Path) -> None:
+    letter = (box(10, 10, 6, 8), box(12, 12, 2, 4))
+    near = (box(17, 10, 6, 8), box(19, 12, 2, 4))
+    drawing = drawn(box(0, 0, 60, 30), box(5, 5, 50, 20), *letter, *near)
+    found = chosen(drawing, with_mill(BIT))
+    assert [found[row] for row in range(2, 6)] == [("engrave", "bit")] * 4
+    assert found[0] == found[1] == ("profile", "mill")
+    assert errors_of(drawing, with_mill(BIT), tmp_path) == []
+
+
+def test_parts_too_near_for_the_mill_get_a_finer_one(tmp_path: Path) -> None:
+    drawing = drawn(box(0, 0, 40, 40), box(42, 0, 40, 40), box(100, 0, 40, 40))
+    assert chosen(drawing, with_mill(FINE)) == {
+        0: ("profile", "fine"),
+        1: ("profile", "fine"),
+        2: ("profile", "mill"),
+    }
+    assert errors_of(drawing, with_mill(FINE), tmp_path) == []
+    assert chosen(drawing, with_mill(BIT))[0] == ("engrave", "bit")
+
+
+def test_a_circle_that_holds_a_part_is_no_bore(tmp_path: Path) -> None:
+    drawing = drawn(box(0, 0, 60, 60), circle(30, 30, 40), circle(30, 30, 20))
+    assert chosen(drawing, with_mill())[1] == ("profile", "mill")
+    assert errors_of(drawing, with_mill(), tmp_path) == []
+
+
+def test_entities_of_one_name_are_told_apart_by_their_size(tmp_path: Path) -> None:
+    """In a file of one line the outline and both windows are `rect at line 1`."""
+    drawing = drawn(box(0, 0, 100, 60), box(50, 10, 30, 30), box(10, 10, 8, 8))
+    drawing = replace(drawing, sources=("rect at line 1",) * 3)
+    assert chosen(drawing, with_mill()) == {
+        0: ("profile", "mill"),
+        1: ("profile", "mill"),
+        2: ("pocket", "mill"),
+    }
+    assert errors_of(drawing, with_mill(), tmp_path) == []
+    text = (tmp_path / "made.toml").read_text(encoding="utf-8")
+    assert [line for line in text.splitlines() if line.startswith("select_")] == [
+        'select_size = "8..8mm"',
+        'select_size = "30..30mm"',
+    ]
+
+
+def test_contours_that_cross_are_marked(tmp_path: Path) -> None:
+    drawing = drawn(circle(20, 20, 20), circle(30, 20, 20))
+    assert set(chosen(drawing, with_mill(BIT)).values()) == {("engrave", "bit")}
+    assert errors_of(drawing, with_mill(BIT), tmp_path) == []
+
+
+def test_branched_contours_are_marked() -> None:
+    branch = Healing(branches=(Branch((0.0, 0.0), 3, "0", (0,)),))
+    drawing = drawn(box(0, 0, 40, 40), box(60, 0, 40, 40), healing=branch)
+    found = chosen(drawing, with_mill(BIT))
+    assert found == {0: ("engrave", "bit"), 1: ("profile", "mill")}
+
+
+@pytest.mark.parametrize(
+    ("layer", "kind", "key"),
+    [
+        ("ENGRAVE", "engrave", 'depth = "0.2mm"'),
+        ("Etching 0,5 mm", "engrave", 'depth = "0.5mm"'),
+        ("POCKET 2mm", "pocket", 'depth = "2mm"'),
+        ("Pocket d=1.5", "pocket", 'depth = "1.5mm"'),
+        ("POCKET", "pocket", 'depth = "1.5mm"'),
+        ("CUT", "profile", "breakthrough"),
+        ("anything 9mm", "profile", "breakthrough"),  # deeper than the stock
+        ("anything 2.5mm", "profile", 'depth = "2.5mm"'),
+    ],
+)
+def test_layers_are_named_by_habit(layer: str, kind: str, key: str) -> None:
+    drawing, proposal = drawn(box(0, 0, 40, 40), layer=layer), with_mill(BIT)
+    assert chosen(drawing, proposal)[0][0] == kind
+    lines = job_template(drawing, None, proposal).splitlines()
+    assert any(line.startswith(key) for line in lines)
+
+
+def test_circles_of_a_layer_for_holes_are_holes() -> None:
+    drawing = drawn(circle(10, 10, 4.2), circle(30, 10, 8), layer="DRILL 4.2mm")
+    found = chosen(drawing, with_mill(DRILL))
+    assert found == {0: ("drill", "drill-42"), 1: ("bore", "mill")}
+
+
+def test_red_is_cut_and_blue_is_marked() -> None:
+    drawing = drawn(box(0, 0, 40, 40), box(60, 0, 40, 40))
+    colours = ("#ff0000", "#0000ff")
+    drawing = replace(drawing, colours=colours)
+    assert chosen(drawing, with_mill(BIT)) == {0: ("profile", "mill"), 1: ("engrave", "bit")}
