@@ -440,7 +440,14 @@ def test_each_copy_is_inspected(plate: Path) -> None:
     assert found[0].fit_mm == pytest.approx(found[1].fit_mm, abs=1e-6)
 
 
-@pytest.mark.parametrize(("rotate", "mirror"), [("0deg", "x"), ("90deg", None), ("90deg", "x")])
+@pytest.mark.parametrize(
+    ("rotate", "mirror"),
+    [
+        pytest.param("0deg", "x", marks=pytest.mark.slow),
+        pytest.param("90deg", None, marks=pytest.mark.slow),
+        ("90deg", "x"),
+    ],
+)
 def test_turned_and_mirrored_with_exchanged_axes_no_verdict_changes(
     plate: Path, rotate: str, mirror: str | None
 ) -> None:
