@@ -16,13 +16,12 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
-from importlib.metadata import EntryPoint
 from pkgutil import iter_modules
 from typing import Any
 
 from camtool.errors import CamtoolError, OptionError
 from camtool.keys import Key
-from camtool.plugins import entry_points
+from camtool.plugins import EntryPoint, entry_points
 
 GROUP = "camtool.operations"
 
@@ -164,7 +163,7 @@ def _entry_points() -> list[EntryPoint]:
     known = {point.name for point in points}
     ours = iter_modules(import_module(GROUP).__path__)
     missing = (module.name for module in ours if module.name not in known)
-    made = (EntryPoint(name, f"{GROUP}.{name}:{name.upper()}", GROUP) for name in missing)
+    made = (EntryPoint(name, f"{GROUP}.{name}:{name.upper()}") for name in missing)
     return [*points, *made]
 
 

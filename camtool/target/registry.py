@@ -13,7 +13,6 @@ import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, cast, get_args
 
@@ -21,7 +20,7 @@ import msgspec
 
 from camtool.errors import CamtoolError, MachineError, OptionError, PostError, UnknownTargetError
 from camtool.machine.model import Machine, PathController, TargetNames
-from camtool.plugins import entry_points
+from camtool.plugins import EntryPoint, entry_points
 from camtool.records import replace
 from camtool.tables import Table, read_table
 from camtool.target.contract import Target

@@ -15,8 +15,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cache
-from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,6 +22,7 @@ from msgspec import Struct
 
 from camtool.arrays import Floats, Indices
 from camtool.findings import Finding
+from camtool.plugins import version_of
 from camtool.progress import Progress
 from camtool.records import replace
 from camtool.simulation.controller import FusedRun
@@ -289,7 +288,7 @@ class ReportBuilder(Struct, frozen=True, eq=False):
             contours=self.cuts.contour_count,
             time_split_s=_time_split(tally, link_s),
             interpolator=_interpolator(case),
-            camtool_version=_version(),
+            camtool_version=version_of("camtool"),
             contour_errors=self._contours(),
             bidirectional=self._both_ways(),
             unreached=self._unreached(),
@@ -503,12 +502,6 @@ def _max_rms(figure: Figure) -> record.MaxRms:
     return record.MaxRms(
         rounded_or_none(figure.max, UM_PER_MM), rounded_or_none(figure.rms, UM_PER_MM)
     )
-
-
-@cache
-def _version() -> str:
-    """Return the installed version of camtool."""
-    return version("camtool")
 
 
 def _interpolator(case: Case) -> str:

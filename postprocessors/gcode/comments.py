@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from importlib.metadata import version
 
 import numpy as np
 
 from camtool.arrays import Floats, Ints
 from camtool.errors import PostError
 from camtool.machine.model import Machine
+from camtool.plugins import version_of
 from camtool.toolpath.moves import Kind, Toolpath, toolpath_extents
 from camtool.toolpath.wanted import TOOL_SHAPES, OperationNote, Operations, ToolNote
 
@@ -44,7 +44,7 @@ def header(toolpath: Toolpath, machine: Machine, dialect: GcodeDialect) -> list[
     ]
     made = [toolpath.made_from, f"settings {machine.short_digest}"] if toolpath.made_from else []
     lines = [
-        f"{MAKER}{version('camtool')} for {machine.target.name}: {machine.target.title}",
+        f"{MAKER}{version_of('camtool')} for {machine.target.name}: {machine.target.title}",
         *made,
         f"{unit} and {unit}/min - part zero at X0 Y0 Z0",
         *bounds,

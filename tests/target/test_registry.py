@@ -3,7 +3,7 @@
 import os
 import pickle
 import sys
-from importlib.metadata import EntryPoint
+from importlib import metadata
 from pathlib import Path
 
 import pytest
@@ -11,6 +11,7 @@ from click.testing import CliRunner
 
 from camtool.cli.targets import targets
 from camtool.errors import CamtoolError, MachineError, PostError, UnknownTargetError
+from camtool.plugins import EntryPoint, entry_points, version_of
 from camtool.target import registry
 from camtool.target.registry import each_target, list_target, load_target, target_names
 
@@ -31,8 +32,8 @@ def test_an_unknown_target_is_told_the_nearest(name: str) -> None:
 def test_a_broken_plug_in_is_named_and_harms_nothing_else(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    broken = EntryPoint("broken", "no_such_module:POST", registry.GROUP)
-    good = EntryPoint("pic-mmh", "camtool_postprocessors.pic_mmh:POST", registry.GROUP)
+    broken = EntryPoint("broken", "no_such_module:POST")
+    good = EntryPoint("pic-mmh", "camtool_postprocessors.pic_mmh:POST")
     monkeypatch.setattr(registry, "entry_points", lambda group: (broken, good))
     assert target_names() == ["broken", "pic-mmh"]
     assert load_target("pic-mmh").machine.target.name == "pic-mmh"
@@ -45,21 +46,52 @@ def test_a_broken_plug_in_is_named_and_harms_nothing_else(
     assert not list(each_target(list_target, prefix="grbl"))
 
 
+@pytest.mark.parametrize(
+    "group", [registry.GROUP, "camtool.operations", "console_scripts", "none"]
+)
+def test_entry_points_are_those_of_the_standard_library(
+    group: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
+    for package, text in {
+        "one-1.0": f"[other]\nx = y:z\n\n[{group}]\n# x = none\na.b = one:Thing.of\nc=two\n",
+        "Camtool-99": f"[{group}]\nfirst = of.two : INSTALLED\n",
+        "none-2": "",
+    }.items():
+        folder = tmp_path / f"{package}.dist-info"
+        folder.mkdir()
+        name, _, version = package.partition("-")
+        (folder / "METADATA").write_text(
+            f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n"
+        )
+        (folder / "entry_points.txt").write_text(text)
+    theirs = metadata.entry_points(group=group)
+    assert len(theirs) >= 3
+    assert sorted((each.name, each.module, each.attr) for each in entry_points(group)) == sorted(
+        (each.name, each.module, each.attr or "") for each in theirs
+    )
+    assert version_of("camtool") == "99"
+    archive = tmp_path / "archive.zip"
+    archive.write_bytes(b"")
+    monkeypatch.setattr(sys, "path", [*sys.path, str(archive)])
+    assert sorted(each.name for each in entry_points(group)) == sorted(theirs.names)
+
+
 def test_a_package_installed_meanwhile_is_found(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys, "path", [*sys.path, str(tmp_path)])
     os.utime(tmp_path, (1, 1))  # the clock of files may stand still for some milliseconds
     before = target_names()
-    metadata = tmp_path / "meanwhile-1.0.dist-info"
-    metadata.mkdir()
-    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: meanwhile\nVersion: 1.0\n")
-    (metadata / "entry_points.txt").write_text(f"[{registry.GROUP}]\nmeanwhile = nowhere:POST\n")
+    folder = tmp_path / "meanwhile-1.0.dist-info"
+    folder.mkdir()
+    (folder / "METADATA").write_text("Metadata-Version: 2.1\nName: meanwhile\nVersion: 1.0\n")
+    (folder / "entry_points.txt").write_text(f"[{registry.GROUP}]\nmeanwhile = nowhere:POST\n")
     assert target_names() == sorted([*before, "meanwhile"])
     os.utime(tmp_path, (1, 1))
-    (metadata / "METADATA").unlink()
-    (metadata / "entry_points.txt").unlink()
-    metadata.rmdir()
+    (folder / "METADATA").unlink()
+    (folder / "entry_points.txt").unlink()
+    folder.rmdir()
     assert target_names() == before
 
 
