@@ -82,11 +82,7 @@ def comments(
     own: list[tuple[int, str]] = []
     if dialect.comments in ("contours", "operations") and toolpath.operations is not None:
         unit = UNITS[dialect.units]
-        at_feeds = seconds is None
-        if seconds is None:
-            seconds = _feed_seconds(toolpath) * unit.mm
-        cutting = np.where(toolpath.is_feed, seconds, 0.0)
-        own += _of_operations(toolpath, toolpath.operations, unit, cutting, at_feeds=at_feeds)
+        own += _of_operations(toolpath, toolpath.operations, unit, seconds)
     own += [
         (row, f"({message}{comment(line)[1:]}") for row, lines in mounted.items() for line in lines
     ]
@@ -117,13 +113,16 @@ def _message(toolpath: Toolpath, row: int, message: str) -> str:
 
 
 def _of_operations(
-    toolpath: Toolpath, operations: Operations, unit: Unit, cutting_s: Floats, *, at_feeds: bool
+    toolpath: Toolpath, operations: Operations, unit: Unit, seconds: Floats | None
 ) -> Iterator[tuple[int, str]]:
-    """(row, comment): what each operation does, where it begins. `cutting_s` (N,): how long each
-    row cuts; `at_feeds`: if it has its feed from end to end."""
-    how = " at these feeds" if at_feeds else ""
+    """(row, comment): what each operation does, where it begins. `seconds` (N,): how long the
+    controller takes for each row; None: only the cuts are timed, at their feeds."""
+    how = "takes {}"
+    if seconds is None:
+        seconds, how = _feed_seconds(toolpath) * unit.mm, "cuts {} at these feeds"
     count, ends = len(operations.notes), [*operations.begin[1:].tolist(), len(toolpath)]
     begins = operations.begin.tolist()
+    total_s = np.concatenate([[0.0], np.cumsum(seconds)])
     for number, (note, low, high) in enumerate(
         zip(operations.notes, begins, ends, strict=True), 1
     ):
@@ -131,11 +130,12 @@ def _of_operations(
             continue
         of = f"operation {number} of {count}" if count > 1 else "operation"
         speed = [] if note.spindle_rpm is None else [f"{note.spindle_rpm:g} rev/min"]
-        cuts = f"cuts {duration(float(cutting_s[low:high].sum()))}{how}"
+        # Rows before the first operation are its own, as in the report.
+        taken_s = total_s[high] - total_s[0 if number == 1 else low]
         for line in (
             f"{of}: {note.name or note.kind}",
             *pack([tool_words(note.tool, unit), *speed]),
-            *pack([*_depth_words(note, unit), cuts]),
+            *pack([*_depth_words(note, unit), how.format(duration(float(taken_s)))]),
         ):
             yield low, comment(line)
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 import shapely
 
+from camtool.target.registry import load_target
 from camtool.verification.report import SETUP, PlannedStock, _zero_words
 from tests.cli.conftest import Run
 from tests.oracles.page_paths import program_paths
@@ -78,6 +79,47 @@ def test_the_sample_plate(camtool: Run, samples: Path, tmp_path: Path) -> None:
     times = [each["time_s"] for each in planned["operations"]]
     assert min(times) > 0.0
     assert sum(times) == pytest.approx(report["time_s"], abs=1e-3)
+
+
+def seconds_in(words: str) -> float:
+    """`1 h 2 min 5 s`, or `1:02:05`, as seconds."""
+    if ":" in words:
+        return float(sum(int(part) * 60**k for k, part in enumerate(reversed(words.split(":")))))
+    units = {"h": 3600, "min": 60, "s": 1}
+    return float(sum(int(n) * units[u] for n, u in re.findall(r"(\d+) (h|min|s)\b", words)))
+
+
+@pytest.mark.parametrize("target", ["grbl", "linuxcnc"])
+def test_sheet_comments_and_twin_agree_about_the_time_of_every_operation(
+    camtool: Run, samples: Path, tmp_path: Path, target: str
+) -> None:
+    """Pecking is mostly rapids: the cuts of the holes take a quarter of their time on grbl."""
+    args = (str(samples / "plate.dxf"), "-t", target, "--job", str(samples / "plate.toml"))
+    done = camtool("post", *args, "-o", "plate.nc", "--report", "plate.html", "-q")
+    assert done.returncode == 0, done.stderr
+    program = (tmp_path / "plate.nc").read_bytes()
+    said = [seconds_in(each) for each in re.findall(r"takes (.+)\)", program.decode())]
+    page = Tables((tmp_path / "plate.html").read_text(encoding="utf-8"))
+    shown = [seconds_in(row[-1]) for row in page.tables[2][1:]]
+    machine = load_target(target)
+    taken: dict[int, float] = {}  # by block of the program
+    decoded = machine.target.read(program, machine.machine)
+    for chunk in machine.simulate(decoded):
+        for row, seconds in zip(chunk.ledger.row, chunk.ledger.duration_s, strict=True):
+            line = int(decoded.block[row])
+            taken[line] = taken.get(line, 0.0) + float(seconds)
+    lines = program.decode().splitlines()
+    begins = [k for k, line in enumerate(lines) if line.startswith("(operation ")]
+    blocks = [k for k, line in enumerate(lines) if line and line[0] not in "(%"]
+    starts = [0, *(sum(k < begin for k in blocks) for begin in begins[1:])]
+    ends = [*starts[1:], len(lines)]
+    wanted = [
+        sum(each for block, each in taken.items() if low <= block < high)
+        for low, high in zip(starts, ends, strict=True)
+    ]
+    assert len(said) == 7
+    assert said == pytest.approx(wanted, abs=0.6)
+    assert shown == pytest.approx(wanted, abs=0.6)
 
 
 @pytest.mark.parametrize("flags", [(), ("--compensate",), ("--minimise", "reversals")])

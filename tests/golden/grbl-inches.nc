@@ -11,7 +11,7 @@ G0 Z0.19685
 (operation 1 of 3: holes)
 (tool 2 pilot: drill 0.1181 inch 118 deg - 8000 rev/min)
 (0.1575 inch deep by 0.05906 inch - plunge 7.874 inch/min)
-(cuts 3 s)
+(takes 17 s)
 M3 S8000
 (0/PATH 1)
 X0.31496 Y0.31496
@@ -29,7 +29,7 @@ X0 Y0
 (operation 2 of 3: window)
 (tool 1 end mill 0.125 inch - 12000 rev/min)
 (0.126 inch deep in 3 passes)
-(feed 11.811 plunge 3.5433 inch/min - cuts 24 s)
+(feed 11.811 plunge 3.5433 inch/min - takes 34 s)
 (stop: mount tool 1 end mill 0.125 inch)
 (set its tip to Z 0.9843 inch or zero Z again - then start)
 T1 M0
@@ -56,7 +56,7 @@ G0 Z0.19685
 (operation 3 of 3: profile)
 (tool 1 end mill 0.125 inch - 12000 rev/min)
 (0.1575 inch deep in 3 passes)
-(feed 11.811 plunge 3.5433 inch/min - cuts 1 min 25 s)
+(feed 11.811 plunge 3.5433 inch/min - takes 1 min 33 s)
 (0/PATH 0)
 X0 Y-0.0625
 G1 Z-0.05249 F3.543

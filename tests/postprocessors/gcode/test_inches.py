@@ -70,7 +70,7 @@ def test_operations_and_stops_speak_inches(name: str) -> None:
     assert any(line.startswith("(feed 11.811 plunge 3.5433 inch/min - ") for line in lines)
     metric = post_drawing(DRAWING, JOB, load_target(name), check=False)
     assert metric.program is not None
-    times = [re.findall(r"cuts .+\)", each.program.data.decode())
+    times = [re.findall(r"takes .+\)", each.program.data.decode())
              for each in (run, metric) if each.program is not None]  # fmt: skip
     assert times[0] == times[1]
     assert len(times[0]) == 3

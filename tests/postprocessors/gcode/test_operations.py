@@ -92,7 +92,7 @@ def test_a_program_says_what_each_operation_does() -> None:
     said = lines[at : at + 4]
     assert said[1] == "(tool 1 end mill 3.175 mm - 12000 rev/min)"
     assert said[2] == "(3.2 mm deep in 3 passes - feed 300 plunge 90 mm/min)"
-    assert re.fullmatch(r"\(cuts (\d+ min )?(\d+ s)?\)", said[3])
+    assert re.fullmatch(r"\(takes (\d+ min )?(\d+ s)?\)", said[3])
     assert "(tool 2 pilot: drill 3 mm 118 deg - 8000 rev/min)" in lines
     assert "(4 mm deep by 1.5 mm - plunge 90 mm/min)" not in lines
     assert "(operation 3 of 3: profile)" in lines
@@ -123,8 +123,9 @@ def test_names_of_operations_and_tools_are_never_commands(name: str, text: str) 
 
 
 @st.composite
-def cut_paths(draw: st.DrawFn) -> tuple[Toolpath, list[float]]:
-    """Draw operations of a few moves each, with the duration of their cuts, s, move by move."""
+def cut_paths(draw: st.DrawFn) -> tuple[Toolpath, list[tuple[float, float]]]:
+    """Draw operations of a few moves each, with the duration of the cuts of each, s, and the rise
+    of its rapid, mm."""
     path, seconds = ToolpathBuilder().rapid(z=5.0), []
     for k in range(draw(st.integers(1, 4))):
         path.operation(OperationNote("profile", f"{k}", ToolNote(), 9.0, 9.0, 1.0))
@@ -140,29 +141,40 @@ def cut_paths(draw: st.DrawFn) -> tuple[Toolpath, list[float]]:
                 radius = draw(st.floats(0.5, 20.0))
                 path.arc(x, y + 2 * radius, z + dz, centre=(x, y + radius), ccw=True, feed=feed)
                 cut += math.hypot(math.pi * radius, dz) / feed * 60.0
+        seconds.append((cut, abs(5.0 - path.position[2])))
         path.rapid(z=5.0)
-        seconds.append(cut)
     return path.event(Kind.END).finish(), seconds
 
 
 @given(cut_paths())
-def test_the_time_of_an_operation_is_that_of_its_cuts(case: tuple[Toolpath, list[float]]) -> None:
-    from camtool_postprocessors.gcode.comments import _feed_seconds, duration
+def test_the_time_of_an_operation_is_that_of_its_moves(
+    case: tuple[Toolpath, list[tuple[float, float]]],
+) -> None:
+    from camtool_postprocessors.gcode.comments import _feed_seconds
 
-    path, seconds = case
+    path, parts = case
     assert path.operations is not None
     ends = [*path.operations.begin[1:].tolist(), len(path)]
-    for low, high, wanted in zip(path.operations.begin, ends, seconds, strict=True):
+    for low, high, (wanted, _) in zip(path.operations.begin, ends, parts, strict=True):
         found = float(_feed_seconds(path.part(int(low), int(high))).sum())
         assert found == pytest.approx(wanted, rel=1e-9, abs=1e-9)
-    # A controller that follows every line at its feed takes just that.
+    # A controller that follows every line at its feed takes just that, and its rapids.
     exact = target("grbl", "controller.model=path", "controller.grid=none")
+    rate_mm_s = exact.machine.axes.z.max_rate_mm_min / 60.0
     lines = exact.target.write(path, exact.machine).data.decode()
-    assert re.findall(r"cuts (.+)\)", lines) == [duration(each) for each in seconds]
+    said = [seconds_of(each) for each in re.findall(r"takes (.+)\)", lines)]
+    first_mm = 5.0  # the rise from part zero, before the first operation
+    wanted_s = [
+        cut + (rise + first_mm * (k == 0)) / rate_mm_s for k, (cut, rise) in enumerate(parts)
+    ]
+    assert len(said) == len(parts)
+    assert said == pytest.approx(wanted_s, abs=0.5 + 1e-6)
 
 
 def seconds_of(words: str) -> float:
-    """`1 min 5 s` as seconds."""
+    """`1 min 5 s` as seconds; `less than 1 s` as none, since it is less than half of one."""
+    if words.startswith("less"):
+        return 0.0
     units = {"h": 3600.0, "min": 60.0, "s": 1.0}
     return sum(float(number) * units[unit] for number, unit in re.findall(r"(\d+) (\w+)", words))
 
@@ -183,14 +195,14 @@ def test_the_times_in_comments_are_those_of_the_simulated_program(name: str) -> 
     run = post_drawing(drawing_of(small), Job(operations), machine, check=False)
     assert run.program is not None
     text = run.program.data.decode()
-    said = [seconds_of(each) for each in re.findall(r"cuts (.+)\)", text)]
+    said = [seconds_of(each) for each in re.findall(r"takes (.+)\)", text)]
     decoded = machine.target.read(run.program.data, machine.machine)
     taken = np.zeros(len(decoded))
     for chunk in machine.simulate(decoded):
         np.add.at(taken, chunk.ledger.row, chunk.ledger.duration_s)
     wanted = float(taken[decoded.is_feed].sum())
     assert len(said) == 2
-    assert sum(said) == pytest.approx(wanted, abs=1.0)  # each is rounded to a second
+    assert sum(said) == pytest.approx(float(taken.sum()), abs=1.0)  # each is rounded to a second
     steps = np.linalg.norm(np.diff(decoded.end, axis=0, prepend=0.0), axis=1)
     steps[decoded.is_arc] *= 0.5 * math.pi  # half circles
     at_feeds = float((60.0 * steps[decoded.is_feed] / decoded.feed[decoded.is_feed]).sum())
