@@ -1,4 +1,5 @@
-"""A PNG decoder for what resvg writes: 8 bits a channel, RGB or RGBA, not interlaced."""
+"""A PNG decoder for what camtool and its pages have: 8 bits a channel, RGB, RGBA or a palette
+(which becomes RGBA), not interlaced."""
 
 from __future__ import annotations
 
@@ -15,7 +16,7 @@ def decode(data: bytes) -> npt.NDArray[np.uint8]:
     """(height, width, channels) of a PNG; ValueError when it is broken or of another kind."""
     if not data.startswith(SIGNATURE):
         raise ValueError("no PNG signature")
-    at, packed, header = len(SIGNATURE), b"", b""
+    at, packed, header, palette = len(SIGNATURE), b"", b"", b""
     while at < len(data):
         length, kind = struct.unpack_from(">I4s", data, at)
         body = data[at + 8 : at + 8 + length]
@@ -23,19 +24,25 @@ def decode(data: bytes) -> npt.NDArray[np.uint8]:
         if crc != zlib.crc32(kind + body):
             raise ValueError(f"checksum of {kind!r}")
         header = body if kind == b"IHDR" else header
+        palette = body if kind == b"PLTE" else palette
         packed += body if kind == b"IDAT" else b""
         at += 12 + length
     width, height, depth, colour, _, _, interlaced = struct.unpack(">IIBBBBB", header)
-    if depth != 8 or colour not in (2, 6) or interlaced:
-        raise ValueError("not 8-bit RGB or RGBA")
-    channels = 3 if colour == 2 else 4
+    channels = {2: 3, 3: 1, 6: 4}.get(colour)
+    if depth != 8 or channels is None or interlaced:
+        raise ValueError("not 8-bit RGB, RGBA or palette")
     packed, step = zlib.decompress(packed), 1 + width * channels
     above = bytes(width * channels)
     out = []
     for begin in range(0, height * step, step):
         above = _unfiltered(packed[begin], packed[begin + 1 : begin + step], above, channels)
         out.append(above)
-    return np.frombuffer(b"".join(out), np.uint8).reshape(height, width, channels)
+    pixels = np.frombuffer(b"".join(out), np.uint8).reshape(height, width, channels)
+    if colour != 3:
+        return pixels
+    colours = np.frombuffer(palette, np.uint8).reshape(-1, 3)
+    opaque = np.full((len(colours), 1), 255, dtype=np.uint8)
+    return np.hstack([colours, opaque])[pixels[:, :, 0]]
 
 
 def _unfiltered(kind: int, line: bytes, above: bytes, channels: int) -> bytes:
