@@ -693,25 +693,31 @@ def _stock_findings(
     """Return the findings of a program in its stock: of the path that its controller decodes, or
     of the slides where that is bent against the mechanics. Where tools are not known, or cut no
     width, or nothing is asked for (`request` None), only rapids are looked at."""
+    from camtool.stock.findings import STOCK_NOT_JUDGED_TOOLS
     from camtool.stock.moves import stock_moves_of_toolpath
     from camtool.stock.rapids import rapid_findings
     from camtool.stock.slides import slide_moves, tools_of_rows
 
     decoded, moves, tools = case.decoded, None, None
-    with suppress(OptionError):
+    found: list[Finding] = []
+    try:
         tools = tools_of_rows(decoded, job)
         moves = stock_moves_of_toolpath(decoded, tools.index, tools.cutters)
+    except OptionError as error:
+        shapes = {operation.tool for operation in job.operations if operation.tool.diameter_mm}
+        if request is not None and shapes:
+            found.append(STOCK_NOT_JUDGED_TOOLS(measured=len(shapes), mend=error.mend))
     beside_mm = WALL_COVERAGES * case.coverage_mm
-    rapids = tuple(rapid_findings(decoded, moves, job.stock, beside_mm))
+    found += rapid_findings(decoded, moves, job.stock, beside_mm)
     if moves is None or tools is None or request is None:
-        return rapids
+        return tuple(found)
     if not any(cutter.radius_mm for cutter in tools.cutters):
-        return rapids
+        return tuple(found)
     from camtool.stock.checks import stock_findings
 
     if case.compensated is not None:
         moves = slide_moves(decoded, case.target, tools, case.simulation)
-    return (*rapids, *stock_findings(decoded, moves, request, case.depth_mm, planning))
+    return (*found, *stock_findings(decoded, moves, request, case.depth_mm, planning))
 
 
 def _stock_gates(

@@ -35,6 +35,7 @@ from camtool.stock.findings import (
     LOOSE_PIECE_CUT,
     MATERIAL_LEFT,
     PASS_TOO_DEEP,
+    STOCK_NOT_JUDGED_BEFORE,
     TAB_MISSING,
     TAB_MISSING_ALL,
     TAB_THIN,
@@ -156,6 +157,8 @@ def stock_findings(
     ]
     if request.is_whole:
         found += [*checks.left(), *checks.passes(), *checks.bodies()]
+    else:
+        found.append(STOCK_NOT_JUDGED_BEFORE())
     return tuple(found)
 
 

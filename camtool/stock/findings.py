@@ -76,6 +76,13 @@ class StockCode(Code):
         "`shank_diameter` with `cutting_length`, `holder_diameter` with `stickout` in "
         "`[tools.NAME]`",
     )
+    STOCK_NOT_JUDGED = (
+        609,
+        INFO,
+        "something of the stock is not judged, because it is not known which tools cut, or what "
+        "the programs before this one have cut; the finding says what",
+        "tools with the numbers that the program calls; or one program with all tools",
+    )
 
 
 CUT_TOO_DEEP = Sentence(
@@ -137,5 +144,16 @@ LOOSE_PIECE_CUT = Sentence(
     "the part of {width:.3g} by {height:.3g} mm comes loose here, and is cut again from {again} "
     "on: cut its outline last, or give it tabs" + and_more("pieces"),
     "mm2",
+)
+STOCK_NOT_JUDGED_TOOLS = Sentence(
+    StockCode.STOCK_NOT_JUDGED,
+    "it is not known which of {measured:.0f} tools cuts what: depths, passes, tabs, loose pieces, "
+    "shanks and holders are not judged, and of rapids all below the stock top count: {mend}",
+    "tools",
+)
+STOCK_NOT_JUDGED_BEFORE = Sentence(
+    StockCode.STOCK_NOT_JUDGED,
+    "what other programs of this job cut is not known here: material that is left, passes, shanks "
+    "and holders are not judged, and pieces only if this program alone cuts them off",
 )
 TOOL_NOT_KNOWN = Sentence(StockCode.TOOL_NOT_KNOWN, "not known, and not judged: {bodies}")

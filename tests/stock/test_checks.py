@@ -311,7 +311,35 @@ def test_parts_of_a_program_do_not_miss_what_the_others_clear() -> None:
     assert len(runs) == 2
     for run in runs:
         assert run.verification is not None
-        assert not codes(run.findings) & {each.name for each in StockCode}
+        assert codes(run.findings) & {each.name for each in StockCode} == {"STOCK_NOT_JUDGED"}
+
+
+def test_a_program_whose_tools_are_not_known_says_what_is_not_judged() -> None:
+    """Two tools without numbers: depths are not judged, a rapid in the stock is found all the
+    same; with numbers all is judged."""
+    two = [
+        Operation(kind="pocket", name="wide", tool=Tool(6.0), depth_mm=2.0),
+        Operation(kind="pocket", rest="wide", tool=Tool(2.0)),
+    ]
+    numbered = [
+        replace(each, tool=replace(each.tool, number=k)) for k, each in enumerate(two, start=1)
+    ]
+    target, drawing = load_target("linuxcnc"), drawing_of([SQUARE])
+    run = post_drawing(drawing, Job(tuple(numbered)), target)
+    assert run.program is not None
+    text = run.program.data.decode()
+    damaged = text.replace("M2", "G0 Z-1\nG0 X50 Y10\nG0 Z5\nM2")
+    assert damaged != text
+    for operations, unknown in ((two, True), (numbered, False)):
+        for data, wrong in ((text, False), (damaged, True)):
+            found = verify_program(
+                data.encode(), target, source="a.ngc", drawing=drawing, job=Job(tuple(operations))
+            )
+            assert ("STOCK_NOT_JUDGED" in codes(found.findings)) == unknown
+            assert ("RAPID_IN_STOCK" in codes(found.findings)) == wrong
+            if unknown:
+                said = one(found.findings, StockCode.STOCK_NOT_JUDGED)
+                assert "not known which of 2 tools" in said.message
 
 
 @pytest.mark.parametrize("stickout", [8.0, 10.0, 10.5])
