@@ -109,9 +109,8 @@ def test_cells_are_as_high_as_the_tree_says(seed: int, count: int) -> None:
 @pytest.mark.parametrize("flat", [0.2, 1.2, 1.95])
 def test_a_bull_nose_may_slope_as_it_likes(slope: float, flat: float) -> None:
     start = np.array([[3.0, 4.0, -2.5 + max(-slope, 0.0)]])
-    moves = moves_of(
-        start, [*start, [2.4, 0.7, 2.5 * slope]], 0, CutterProfile(2.0, flat, corner_mm=2.0 - flat)
-    )
+    end = start + np.array([[2.4, 0.7, 2.5 * slope]])
+    moves = moves_of(start, end, 0, CutterProfile(2.0, flat, corner_mm=2.0 - flat))
     found = height_map(moves, BOX, 0.083)
     exact, _ = stock_tree(moves).heights(centres(found))
     off = found.heights.ravel() - exact
