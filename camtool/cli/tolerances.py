@@ -11,7 +11,15 @@ import click
 from camtool.cli.files import STDOUT, check_new, check_places, write_all
 from camtool.cli.life_signs import progress
 from camtool.cli.messages import say, say_findings, show_text
-from camtool.cli.options import DrawingFlags, SectionedCommand, drawing_options, talk_options
+from camtool.cli.options import (
+    DrawingFlags,
+    JobFlags,
+    MachineFlags,
+    SectionedCommand,
+    drawing_options,
+    machine_options,
+    talk_options,
+)
 from camtool.findings import Finding, Severity
 from camtool.importers.findings import DrawingCode
 from camtool.plain import one_line, to_json
@@ -37,22 +45,44 @@ def tolerances() -> None:
 @tolerances.command(cls=SectionedCommand, short_help="Begin a file of tolerances.")
 @click.argument("source", metavar="DRAWING")
 @click.option("-o", "--output", metavar="FILE", help=f"The file; - is stdout.  [{FILE}]")
+@click.option(
+    "--job", "job_file", metavar="FILE", help="Also the depths that this job cuts, on --target."
+)
+@machine_options
 @drawing_options
 @talk_options
 def new(
-    source: str, output: str | None, drawing: DrawingFlags, quiet: bool, verbose: bool
+    source: str,
+    output: str | None,
+    job_file: str | None,
+    machine: MachineFlags,
+    drawing: DrawingFlags,
+    quiet: bool,
+    verbose: bool,
 ) -> None:
     """Write the dimensions of DRAWING (- is stdin): those that it says itself with their limits,
-    then its circles, slots and the overall sizes of its outlines, to which you give limits.
+    then its circles, slots and the overall sizes of its outlines, to which you give limits. With
+    --job the depths of its pockets, grooves and blind holes, and what is left under its floors.
     """
     from camtool.inspection.proposal import propose_file
+    from camtool.project import project_of
 
     output = output or FILE
-    check_places([source], [output])
+    flags = JobFlags(job_file, project=project_of(Path.cwd()))
+    check_places([source, *flags.files(), *machine.files()], [output])
     check_new(output)
-    read = drawing.read(source)
+    floors: list[Dimension] = []
+    if job_file is None:
+        read = drawing.read(source)
+    else:
+        from camtool.inspection.depths import proposed_floors
+
+        target, job = machine.load().machine, flags.job(drawing)
+        read = drawing.read(source, target, job)
+        progress().begin("planning")
+        floors = list(proposed_floors(read, job, target))
     progress().begin("finding what can be measured")
-    text, findings, faults = propose_file(read)
+    text, findings, faults = propose_file(read, floors)
     write_all({output: text.encode()})
     say_findings((*_relevant_findings(read.findings), *findings), quiet=quiet, verbose=verbose)
     for fault in faults:

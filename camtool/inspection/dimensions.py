@@ -14,9 +14,16 @@ Kind = Literal[
     "straightness",
     "roundness",
     "profile",
+    "depth",
+    "thickness",
 ]
 """Kinds of dimensions. "distance" is between two edges, two centres, or an edge and a centre:
-widths are distances."""
+widths are distances. "depth" is that of a floor below the top of the stock, "thickness" that of
+the stock which is left under it."""
+
+DEPTHS: Final = ("depth", "thickness")
+"""Kinds along Z, of the floor at a place. The drawing has no size of them: what the job
+asks for is nominal unless the file says it."""
 
 ZONES: Final = ("position", "straightness", "roundness", "profile")
 """Kinds that are the widths of zones of ISO 1101: nothing nominal, and no lower limit."""
@@ -38,7 +45,8 @@ class Dimension(Struct, frozen=True):
 
     `places_mm` say of what it is: of a diameter, radius, roundness or position one point, the
     centre or a point on the circle; of a distance two points, each on an edge, at a corner, at the
-    centre of a circle or on it; of a straightness or profile one point on the edge or outline.
+    centre of a circle or on it; of a straightness or profile one point on the edge or outline; of
+    a depth or thickness one point on the floor.
     `direction_rad`: along which a distance is measured (None: from place to place).
     `nominal_mm` None: as drawn; `limits` None: none are known, and it is only predicted, unless
     they depend on the nominal value and this is not known yet: `words` of limits ("H7"), and the

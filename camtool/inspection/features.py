@@ -19,7 +19,7 @@ from camtool.arrays import Bools, Floats
 from camtool.findings import Finding
 from camtool.geometry.boxes import BoxIndex
 from camtool.geometry.polylines import Polyline, Polylines, Segments
-from camtool.inspection.dimensions import Dimension, Place
+from camtool.inspection.dimensions import DEPTHS, Dimension, Place
 from camtool.inspection.findings import DIMENSION_UNBOUND
 from camtool.planning.place import AffineMap
 from camtool.records import replace
@@ -255,9 +255,11 @@ def _edges(index: int, segments: Segments, *, closed: bool) -> Iterator[EdgeFeat
 
 def bind(dimension: Dimension, features: Features, file: str) -> BoundDimension | Finding:
     """Find the features of a dimension; return it with them, or the finding that says why there
-    are none."""
+    are none. Those along Z have none in the drawing."""
     if dimension.kind == "distance":
         return _distance(dimension, features, file)
+    if dimension.kind in DEPTHS:
+        return BoundDimension(dimension, (), (), np.zeros(2), dimension.nominal_mm or 0.0)
     here = features.at(dimension.places_mm[0])
     if dimension.kind == "straightness":
         found: list[Feature] = [

@@ -28,7 +28,8 @@ class InspectionCode(Code):
         (WARNING, ERROR),
         "the program does not cut a feature of a dimension, or cuts little of it, so that it "
         "cannot be inspected; an error with `--require`, if it is to have limits",
-        "cut it in the same program, or take the dimension out of tolerances.toml",
+        "cut it in the same program, name a place on the floor (`at`), give the job a stock, or "
+        "take the dimension out of tolerances.toml",
     )
     DIMENSION_NOT_IN = (
         503,
@@ -95,6 +96,30 @@ DIMENSION_NOT_CUT = Sentence(
 DIMENSION_NOT_CUT_THERE = Sentence(
     InspectionCode.DIMENSION_NOT_CUT,
     "{name} is not inspected: the slides leave what is drawn by too much, or may leave it",
+    severity=WARNING,
+)
+DIMENSION_NOT_CUT_NO_FLOOR = Sentence(
+    InspectionCode.DIMENSION_NOT_CUT,
+    "{name} is not inspected: the job cuts no floor at its place",
+    severity=WARNING,
+)
+DIMENSION_NOT_CUT_THROUGH = Sentence(
+    InspectionCode.DIMENSION_NOT_CUT,
+    "{name} is not inspected: the cut at its place goes through the stock, {measured:.4g} mm deep "
+    "in {limit:.4g} mm",
+    "mm",
+    WARNING,
+)
+DIMENSION_NOT_CUT_NARROW = Sentence(
+    InspectionCode.DIMENSION_NOT_CUT,
+    "{name} is not inspected: no depth is measured within {measured:.4g} mm of walls, and its "
+    "floor has no other place",
+    "mm",
+    WARNING,
+)
+DIMENSION_NOT_CUT_NO_STOCK = Sentence(
+    InspectionCode.DIMENSION_NOT_CUT,
+    "{name} is not inspected: the job does not say how thick its stock is",
     severity=WARNING,
 )
 CALLOUT_TEXT = Sentence(

@@ -15,9 +15,18 @@ from msgspec import Struct
 from camtool.arrays import Floats, Ints
 from camtool.errors import OptionError
 from camtool.findings import Finding
-from camtool.inspection.dimensions import Dimension
+from camtool.geometry.polylines import POSITION_EPS_MM
+from camtool.inspection.depths import Z_WEIGHT, Floor, FloorDepths, Floors, depths_of
+from camtool.inspection.dimensions import DEPTHS, Dimension
 from camtool.inspection.features import BoundDimension, EdgeFeature, bind, features_of
-from camtool.inspection.findings import DIMENSION_NOT_CUT
+from camtool.inspection.findings import (
+    DIMENSION_NOT_CUT,
+    DIMENSION_NOT_CUT_NARROW,
+    DIMENSION_NOT_CUT_NO_FLOOR,
+    DIMENSION_NOT_CUT_NO_STOCK,
+    DIMENSION_NOT_CUT_THROUGH,
+)
+from camtool.inspection.limits import limited
 from camtool.inspection.sizes import (
     Cut,
     MachinedSize,
@@ -29,13 +38,21 @@ from camtool.inspection.sizes import (
     size_of,
     sizes_of,
 )
-from camtool.inspection.uncertainty import MachineVariant, edges_of, opposite_edges
-from camtool.machine.model import Machine
+from camtool.inspection.uncertainty import (
+    MachineVariant,
+    edges_of,
+    opposite_edges,
+    without_scatter,
+)
+from camtool.machine.model import Axis, Machine
 from camtool.planning.job import Job, Tool
 from camtool.planning.place import SCALE_SHARE, placements
+from camtool.planning.plan import planned
 from camtool.records import replace
 from camtool.run import Run
+from camtool.stock.slides import slide_moves, tools_of_rows
 from camtool.toolpath.moves import Toolpath
+from camtool.units import UM_PER_MM
 from camtool.verification.case import TRACE_POINTS, tool_mm
 from camtool.verification.cuts import CutMoves, row_lengths, sample_cuts
 from camtool.verification.slides import SlideTrace
@@ -53,11 +70,14 @@ MAX_EDGES_AT_ONCE = 1_000_000
 
 class Inspected(Struct, frozen=True, eq=False):
     """A dimension in the work frame, the cut of each of its features, and the number of its copy
-    (None for a single part)."""
+    (None for a single part). A depth or thickness has a `floor` instead, and the thickness of the
+    stock, mm (0 for a depth)."""
 
     bound: BoundDimension
     cuts: tuple[Cut, ...]
     copy: int | None = None
+    floor: Floor | None = None
+    stock_mm: float = 0.0
 
     @property
     def name(self) -> str:
@@ -85,8 +105,11 @@ class Inspector:
         self._points = _points(wanted)
         self._last: tuple[Machine, SweptSegments] | None = None
         self._edges_of: tuple[Machine, float, dict[int, Floats]] | None = None
+        self._job = run.job
+        self._depths_by_z: dict[Axis, dict[int, FloorDepths | None]] = {}
         found: list[tuple[Dimension, Finding]] = []
         self.dimensions: tuple[Inspected, ...] = tuple(_inspected(run, dimensions, moves, found))
+        self._leave_out_narrow_floors(found)
         self.left_out = tuple(found)
 
     def sizes(
@@ -105,6 +128,9 @@ class Inspector:
         more = left_mm or {}
         sizes = []
         for each in self.dimensions:
+            if each.floor is not None:
+                sizes.append(self._depth(each, variant or MachineVariant(self._target.machine)))
+                continue
             moved = [
                 lies[id(cut)] + (0.0 if cut.on_path else cut.side * more.get(feature.path, 0.0))
                 for feature, cut in zip(each.bound.features, each.cuts, strict=True)
@@ -116,6 +142,8 @@ class Inspector:
     def _edges(self, variant: MachineVariant) -> dict[int, Floats]:
         """Compute the position of the edge of each cut on a variant of the machine, by its
         `id`."""
+        if not any(each.cuts for each in self.dimensions):
+            return {}
         known = self._edges_of
         if known is None or known[0] is not variant.machine or known[1] != variant.wider_mm:
             slides = self._slides(variant.machine).wider(0.5 * variant.wider_mm)
@@ -137,9 +165,53 @@ class Inspector:
 
     def machined(self, variant: MachineVariant) -> Floats:
         """Compute the positions (T,) mm of the edges of all cuts on a variant of the machine, one
-        cut after the other; NaN where one is not cut."""
+        cut after the other, NaN where one is not cut; then the three values of each depth."""
         lies = self._edges(variant).values()
-        return np.concatenate([np.zeros(0), *(each.reshape(-1) for each in lies)])
+        depths = (self._depth(each, variant) for each in self.dimensions if each.floor is not None)
+        sizes = ((each.fit_mm, each.low_mm, each.high_mm) for each in depths)
+        return np.concatenate([np.zeros(0), *(each.reshape(-1) for each in lies), *sizes])
+
+    def _depth(self, each: Inspected, variant: MachineVariant) -> MachinedSize:
+        """Measure a depth or a thickness on a variant of the machine. What changes the motion in
+        the plane alone changes no depth."""
+        z = variant.machine.axes.z
+        if z not in self._depths_by_z:
+            plain = without_scatter(MachineVariant(self._target.machine)).machine
+            machine = replace(plain, axes=replace(plain.axes, z=z))
+            target = replace(self._target, machine=machine)
+            tools = tools_of_rows(self._decoded, self._job)
+            moves = slide_moves(self._decoded, target, tools, z_weight=Z_WEIGHT)
+            floors = [one.floor for one in self.dimensions if one.floor is not None]
+            found = zip(floors, depths_of(floors, moves), strict=True)
+            self._depths_by_z[z] = {id(floor): depth for floor, depth in found}
+        depth = self._depths_by_z[z][id(each.floor)]
+        if depth is None:
+            return MachinedSize(math.nan, math.nan, math.nan)
+        down = (depth.here_mm, depth.least_mm, depth.greatest_mm)
+        here, least, greatest = (value + variant.deeper_mm for value in down)
+        if not each.stock_mm:
+            return MachinedSize(here, least, greatest)
+        thick = each.stock_mm + variant.thicker_mm
+        return MachinedSize(thick - here, thick - greatest, thick - least)
+
+    def _leave_out_narrow_floors(self, found: list[tuple[Dimension, Finding]]) -> None:
+        """Leave out floors of which the band beside their walls leaves nothing."""
+        if not any(each.floor is not None for each in self.dimensions):
+            return
+        plain = MachineVariant(self._target.machine)
+        narrow = [
+            each
+            for each in self.dimensions
+            if each.floor is not None and math.isnan(self._depth(each, plain).fit_mm)
+        ]
+        for each in narrow:
+            assert each.floor is not None
+            band_mm = each.floor.solid.wall_mm
+            where = each.bound.dimension.source
+            why = DIMENSION_NOT_CUT_NARROW(where=where, name=each.name, measured=band_mm)
+            found.append((each.bound.dimension, why))
+        if narrow:
+            self.dimensions = tuple(each for each in self.dimensions if each not in narrow)
 
     def measured(self, nodes: Floats, weights: Floats) -> Floats:
         """Compute the values (N, 3 D) mm of N parts whose edges are mixed with the weights (N, M)
@@ -154,6 +226,10 @@ class Inspector:
             own[key] = cut.levels_mm[kept], edges[:, kept]
         found = np.empty((len(weights), len(self.dimensions), 3))
         for index, each in enumerate(self.dimensions):
+            if each.floor is not None:
+                found[:, index] = weights @ nodes[:, begin : begin + 3]
+                begin += 3
+                continue
             levels = [own[id(cut)][0] for cut in each.cuts]
             simulated = [own[id(cut)][1] for cut in each.cuts]
             most = max(1, MAX_EDGES_AT_ONCE // max(one[0].size for one in simulated))
@@ -165,8 +241,13 @@ class Inspector:
 
     @property
     def edges(self) -> Floats:
-        """Derivatives (3 D, E, 2) of the values by the position of each machined edge."""
+        """Derivatives (3 D, E, 2 or 3) of the values by the position of each machined edge."""
         return edges_of([(3, _edges_of(each.bound)) for each in self.dimensions])
+
+    @property
+    def has_depths(self) -> bool:
+        """True if a depth or thickness is inspected."""
+        return any(each.floor is not None for each in self.dimensions)
 
     @property
     def tool_diameter_mm(self) -> float:
@@ -191,6 +272,8 @@ def _edges_of(bound: BoundDimension) -> Floats:
     midway between two edges, a zone is as wide as the error of one. Round features have edges on
     all sides, which count in X and in Y alike."""
     kind = bound.dimension.kind
+    if kind in DEPTHS:
+        return np.array([[0.0, 0.0, 1.0]])
     if kind == "diameter":
         return opposite_edges(0.25 * math.pi)
     if kind == "distance":
@@ -223,7 +306,18 @@ def _inspected(
             mend="limits hold for the part as drawn: leave out fit and scale",
         )
     known: dict[tuple[int, int], Cut | None] = {}
+    floors: Floors | None = None
     for dimension in dimensions:
+        if dimension.kind in DEPTHS:
+            floors = floors or _floors(run)
+            for copy, where in enumerate(maps):
+                place = where.point(dimension.places_mm[0])
+                each = _inspected_depth(run, dimension, floors.at(place))
+                if isinstance(each, Finding):
+                    found.append((dimension, each))
+                    continue
+                yield replace(each, copy=copy if len(maps) > 1 else None)
+            continue
         bound = bind(dimension, features, run.drawing.file)
         if isinstance(bound, Finding):
             found.append((dimension, bound))
@@ -247,6 +341,39 @@ def _inspected(
                 what="edge" if isinstance(missing, EdgeFeature) else "circle",
             )
             found.append((dimension, finding))
+
+
+def _floors(run: Run) -> Floors:
+    """Return the floors that the job of a run asks for."""
+    assert run.drawing is not None
+    assert run.job is not None
+    assert run.verification is not None
+    plan = planned(run.drawing, run.job, run.target.machine, undivided=True)
+    off_um = run.verification.report.error_um.total.max or 0.0
+    return Floors(plan.steps, off_um / UM_PER_MM)
+
+
+def _inspected_depth(run: Run, dimension: Dimension, floor: Floor | None) -> Inspected | Finding:
+    """Return a depth or thickness with its floor, its nominal size and its limits, or the finding
+    that says why there is none."""
+    assert run.job is not None
+    stock, name = run.job.stock, dimension.name
+    x, y = dimension.places_mm[0]
+    place = f"{dimension.source}, at ({x:.3f}, {y:.3f}) mm"
+    if floor is None:
+        return DIMENSION_NOT_CUT_NO_FLOOR(where=place, name=name)
+    if dimension.kind == "thickness" and stock is None:
+        return DIMENSION_NOT_CUT_NO_STOCK(where=place, name=name)
+    thick = 0.0 if stock is None else stock.thickness_mm
+    if stock is not None and floor.depth_mm >= thick - POSITION_EPS_MM:
+        deep = floor.depth_mm
+        return DIMENSION_NOT_CUT_THROUGH(where=place, name=name, measured=deep, limit=thick)
+    stock_mm = thick if dimension.kind == "thickness" else 0.0
+    asked = stock_mm - floor.depth_mm if stock_mm else floor.depth_mm
+    known, _ = limited(dimension, asked)
+    known = replace(known, places_mm=(floor.place_mm,))
+    bound = BoundDimension(known, (), (), np.zeros(2), asked)
+    return Inspected(bound, (), None, floor, stock_mm)
 
 
 class ToolAt:

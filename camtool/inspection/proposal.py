@@ -18,7 +18,7 @@ from camtool.errors import DrawingError, InputError
 from camtool.findings import Finding
 from camtool.geometry.drawing import Drawing
 from camtool.geometry.polylines import POSITION_EPS_MM
-from camtool.inspection.dimensions import Dimension, Place
+from camtool.inspection.dimensions import DEPTHS, Dimension, Place
 from camtool.inspection.features import (
     BoundDimension,
     CircleFeature,
@@ -47,11 +47,13 @@ _HEADER = """\
 """
 
 
-def propose_file(drawing: Drawing) -> tuple[str, tuple[Finding, ...], tuple[DrawingError, ...]]:
-    """Return the text of a file with the dimensions of this drawing, the findings about its
-    callouts, and the callouts whose limits are wrong: these are written without limits. A
-    dimension that fits no drawn feature is a comment. InputError for a drawing without anything to
-    measure."""
+def propose_file(
+    drawing: Drawing, floors: Iterable[Dimension] = ()
+) -> tuple[str, tuple[Finding, ...], tuple[DrawingError, ...]]:
+    """Return the text of a file with the dimensions of this drawing and of `floors` that a job
+    cuts into it, the findings about its callouts, and the callouts whose limits are wrong: these
+    are written without limits. A dimension that fits no drawn feature is a comment. InputError for
+    a drawing without anything to measure."""
     faults: list[DrawingError] = []
     said, findings = dimensions_of(drawing, faults=faults)
     features = features_of(drawing.paths)
@@ -66,12 +68,14 @@ def propose_file(drawing: Drawing) -> tuple[str, tuple[Finding, ...], tuple[Draw
         else:
             lost.append((each, bound))
     left = 0
-    for each in _sizes(features, drawing.paths.closed.tolist()):
+    for each in chain(_sizes(features, drawing.paths.closed.tolist()), floors):
         if len(rows) >= MAX_DIMENSIONS:
             left += 1
             continue
         bound = bind(each, features, drawing.file)
-        if isinstance(bound, BoundDimension) and measured_by(bound) not in known:
+        if each.kind in DEPTHS:
+            rows.append(each)
+        elif isinstance(bound, BoundDimension) and measured_by(bound) not in known:
             known.add(measured_by(bound))
             rows.append(limited(each, bound.drawn_mm)[0])
     if not rows and not lost:

@@ -22,7 +22,7 @@ from msgspec import Struct
 from camtool.errors import DrawingError, InputError, OptionError
 from camtool.findings import Finding
 from camtool.geometry.drawing import Callout, Drawing
-from camtool.inspection.dimensions import ZONES, Dimension, Kind, Limits
+from camtool.inspection.dimensions import DEPTHS, ZONES, Dimension, Kind, Limits
 from camtool.inspection.features import (
     BIND_MM,
     BoundDimension,
@@ -148,6 +148,8 @@ def _with_limits(
     """Return the dimension with its limits, now that the size of its feature is known, or without
     limits if its nominal size differs. A dimension without a feature keeps what is known."""
     drawn = bound.drawn_mm if isinstance(bound, BoundDimension) else dimension.nominal_mm
+    if dimension.kind in DEPTHS:
+        drawn = dimension.nominal_mm
     if drawn is None or dimension.kind in ZONES:
         return [dimension]
     nominal = dimension.nominal_mm
@@ -178,7 +180,7 @@ def unbound_findings(drawing: Drawing, dimensions: Iterable[Dimension]) -> list[
 def _measures(dimension: Dimension, bound: BoundDimension | Finding) -> object:
     """Return a key of what is measured; for a dimension that fits no feature, of the places that
     it names."""
-    if isinstance(bound, BoundDimension):
+    if isinstance(bound, BoundDimension) and dimension.kind not in DEPTHS:
         return measured_by(bound)
     places = frozenset((round(x, 3), round(y, 3)) for x, y in dimension.places_mm)
     angle = dimension.direction_rad
@@ -221,6 +223,8 @@ class _Row(msgspec.Struct, forbid_unknown_fields=True, rename={"start": "from"})
         "straightness",
         "roundness",
         "profile",
+        "depth",
+        "thickness",
     ]
     name: str = ""
     at: tuple[Length, Length] | None = None

@@ -11,9 +11,14 @@ mm; and `measure`, which takes K sizes from such edges, mm. All inputs act on a 
     direction      what is moved                   inputs that move along it, with their factors
     backlash       of an axis, by region too       backlash: 1; compensation: −(real / coded step)
     scale          real step of an axis, relative  scale: 1
-    growth         both scales at once             temperature: α_machine − α_part
+    growth         all scales at once              temperature: α_machine − α_part
     squareness     of X and Y                      squareness: 1
     tool           its diameter                    tool diameter: 1; run-out: 1
+    Z zero         all cuts, downwards             zero of Z: 1
+    stock          its thickness                   thickness as measured: 1
+
+Depths depend on the play and scale of Z, its zero, temperature and process, thicknesses of floors
+on that of the stock too; these inputs are there where depths are inspected.
 
 Compensation. At a reversal the motor moves by C more, of which the mechanics lose B: only B − k·C
 matters (camtool/calibration/model.py), and to add δ more is to lose k·δ less.
@@ -37,9 +42,11 @@ compensation equals it, if that is near: there an edge beside a reversal has its
 are extremes, so have scale and squareness.
 
 Edges. The process and the scatter of an axis shift each machined edge by itself. `edges`
-(K, E, 2) says by how much the values change with the place of E edges in X and Y: a width in X has
-(1, 0) for one edge and (−1, 0) for the other. With the process u, and the repeatability of
-the axes u_x and u_y, their covariance is Σ_E (u² + u_x²) w_x w_xᵀ + (u² + u_y²) w_y w_yᵀ.
+(K, E, 2), or (K, E, 3) where depths are among them, says by how much the values change with the
+place of E edges in X, Y and Z: a width in X has (1, 0) for one edge and (−1, 0) for the other, a
+depth (0, 0, 1) for its floor. With the process u, and the repeatability u_x, u_y and u_z of the
+axes, their covariance is the sum over E of (u² + u_x²) w_x w_xᵀ + (u² + u_y²) w_y w_yᵀ +
+(u² + u_z²) w_z w_zᵀ.
 
 An input that is not known has no part in a covariance; `Budget.unknown` names those on which a
 value depends, which a single step shows. Where physics bounds what is not known, `Budget.at_most`
@@ -103,11 +110,14 @@ CERTAIN = 1e-12
 @dataclass(frozen=True)
 class MachineVariant:
     """A machine that differs from the one in the file, with a tool that is wider by `wider_mm`
-    than in the job. Variants of the tool alone share the machine object of the original, so that
-    its motion is not simulated again."""
+    than in the job, cuts deeper by `deeper_mm`, and has a stock that is thicker by `thicker_mm`.
+    Variants of these alone share the machine object of the original, so that its motion is not
+    simulated again."""
 
     machine: Machine
     wider_mm: float = 0.0
+    deeper_mm: float = 0.0
+    thicker_mm: float = 0.0
 
 
 STEP_IN_BENDS = math.sqrt(3.0)
@@ -163,9 +173,9 @@ class Input(Struct, frozen=True):
     `probe`, a step that reveals the values that depend on it.
 
     It moves the machine along `along`, (direction, factor), or the machined edges: then `edges`
-    are its shares in X and Y. Where it is not known, `missing` are the keys that would say it, and
-    `most` bounds by how much its value can be off, as `within` says in words (infinite and "":
-    nothing bounds it).
+    are its shares in X, Y and Z. Where it is not known, `missing` are the keys that would say it,
+    and `most` bounds by how much its value can be off, as `within` says in words (infinite and
+    "": nothing bounds it).
     """
 
     name: str
@@ -174,7 +184,7 @@ class Input(Struct, frozen=True):
     standard: float | None
     probe: float
     along: tuple[tuple[Direction, float], ...] = ()
-    edges: tuple[float, float] = (0.0, 0.0)
+    edges: tuple[float, float, float] = (0.0, 0.0, 0.0)
     missing: tuple[str, ...] = ()
     most: float = math.inf
     within: str = ""
@@ -229,8 +239,9 @@ class Inputs(Struct, frozen=True, dict=True):
 # From a machine to its inputs.
 
 
-def inputs_of(machine: Machine, tool_diameter_mm: float) -> Inputs:
-    """Collect the uncertain inputs of this machine with a tool of this diameter (0: no width).
+def inputs_of(machine: Machine, tool_diameter_mm: float, *, depths: bool = False) -> Inputs:
+    """Collect the uncertain inputs of this machine with a tool of this diameter (0: no width);
+    with `depths` those of Z and of the stock too.
 
     What nothing depends on is left out: the uncertainty of a compensation of 0, that of a tool
     without width, and scatter that is not modelled. Sizes are predicted without scatter.
@@ -241,6 +252,8 @@ def inputs_of(machine: Machine, tool_diameter_mm: float) -> Inputs:
         ("x", machine.axes.x, said.x, machine.play_map.used[0]),
         ("y", machine.axes.y, said.y, machine.play_map.used[1]),
     ]
+    if depths:
+        axes.append(("z", machine.axes.z, said.z, None))
     length, part, angle = (
         partial(_input, unit, probe)
         for unit, probe in (("mm", PROBE_MM), ("", PROBE_SCALE), ("rad", PROBE_RAD))
@@ -250,6 +263,11 @@ def inputs_of(machine: Machine, tool_diameter_mm: float) -> Inputs:
         wider = Direction("tool", _with_tool), 1.0
         found.append(length("tool_diameter_mm", tool_diameter_mm, said.tool_diameter_mm, wider))
         found.append(length("runout_mm", 0.0, said.runout_mm, wider))
+    if depths:
+        lower, thicker = Direction("z.zero", _with_depth), Direction("stock", _with_stock)
+        found.append(length("z_zero_mm", 0.0, said.z_zero_mm, (lower, 1.0)))
+        thickness = length("stock_thickness_mm", 0.0, said.stock_thickness_mm, (thicker, 1.0))
+        found.append(thickness)
     for name, axis, known, cells in axes:
         plays = [play for row in cells.play_mm for play in row] if cells else [axis.backlash_mm]
         scale = Direction(f"{name}.scale", _with_scale(name), distorts=True)
@@ -271,8 +289,9 @@ def inputs_of(machine: Machine, tool_diameter_mm: float) -> Inputs:
     value = machine.mechanics.squareness_rad
     found.append(angle("squareness_rad", value, said.squareness_rad, lean))
     found.append(_temperature(machine))
-    found.append(length("process_mm", 0.0, said.process_mm, edges=(1.0, 1.0)))
-    for name, axis, shares in (("x", axes[0][1], (1.0, 0.0)), ("y", axes[1][1], (0.0, 1.0))):
+    found.append(length("process_mm", 0.0, said.process_mm, edges=(1.0, 1.0, 1.0)))
+    for name, axis, *_ in axes:
+        shares = (float(name == "x"), float(name == "y"), float(name == "z"))
         if axis.repeatability_mm > 0.0:
             scatter = axis.repeatability_mm
             found.append(length(f"{name}.repeatability_mm", 0.0, scatter, edges=shares))
@@ -287,7 +306,7 @@ def _input(
     value: float,
     standard: float | None,
     *along: tuple[Direction, float],
-    edges: tuple[float, float] = (0.0, 0.0),
+    edges: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Input:
     missing = (name,) if standard is None else ()
     return Input(name, unit, value, standard, probe, along, edges, missing)
@@ -338,12 +357,12 @@ def _temperature(machine: Machine) -> Input:
 def _with_backlash(name: str) -> Moved:
     def moved(variant: MachineVariant, by_mm: float) -> MachineVariant:
         machine = variant.machine
-        index = "xy".index(name)
+        index = "xyz".index(name)
         cells = machine.play_map.used[index]
         if cells is not None:
             own: dict[str, Any] = {name: _more_play(cells, by_mm)}
             return _varied(variant, play_map=replace(machine.play_map, **own))
-        axis = (machine.axes.x, machine.axes.y)[index]
+        axis = tuple(machine.axes)[index]
         own_axis = replace(axis, backlash_mm=max(0.0, axis.backlash_mm + by_mm))
         return _varied(variant, axes=replace(machine.axes, **{name: own_axis}))
 
@@ -358,7 +377,7 @@ def _more_play(cells: PlayCells, by_mm: float) -> PlayCells:
 def _with_scale(name: str) -> Moved:
     def moved(variant: MachineVariant, by: float) -> MachineVariant:
         axes = variant.machine.axes
-        axis = axes.x if name == "x" else axes.y
+        axis = tuple(axes)["xyz".index(name)]
         axis = replace(axis, real_step_mm=axis.real_step_mm * (1.0 + by))
         return _varied(variant, axes=replace(axes, **{name: axis}))
 
@@ -366,7 +385,9 @@ def _with_scale(name: str) -> Moved:
 
 
 def _grown(variant: MachineVariant, by: float) -> MachineVariant:
-    return _with_scale("y")(_with_scale("x")(variant, by), by)
+    for name in "xyz":
+        variant = _with_scale(name)(variant, by)
+    return variant
 
 
 def _with_squareness(variant: MachineVariant, by_rad: float) -> MachineVariant:
@@ -377,6 +398,14 @@ def _with_squareness(variant: MachineVariant, by_rad: float) -> MachineVariant:
 
 def _with_tool(variant: MachineVariant, by_mm: float) -> MachineVariant:
     return replace(variant, wider_mm=variant.wider_mm + by_mm)
+
+
+def _with_depth(variant: MachineVariant, by_mm: float) -> MachineVariant:
+    return replace(variant, deeper_mm=variant.deeper_mm + by_mm)
+
+
+def _with_stock(variant: MachineVariant, by_mm: float) -> MachineVariant:
+    return replace(variant, thicker_mm=variant.thicker_mm + by_mm)
 
 
 def _varied(variant: MachineVariant, **records: Any) -> MachineVariant:
@@ -405,13 +434,15 @@ def opposite_edges(direction_rad: float) -> Floats:
 
 
 def edges_of(features: Sequence[tuple[int, Floats]]) -> Floats:
-    """Return weights (K, E, 2) from the weights (E_f, 2) of some features, each with a number of
-    values, such as a least and a greatest diameter. Features share no edges."""
+    """Return weights (K, E, 2), or (K, E, 3) where one has Z, from the weights (E_f, 2) or
+    (E_f, 3) of some features, each with a number of values, such as a least and a greatest
+    diameter. Features share no edges."""
+    axes = max((own.shape[1] for _, own in features), default=2)
     rows = sum(count for count, _ in features)
-    weights = np.zeros((rows, sum(len(own) for _, own in features), 2))
+    weights = np.zeros((rows, sum(len(own) for _, own in features), axes))
     row = column = 0
     for count, own in features:
-        weights[row : row + count, column : column + len(own)] = own
+        weights[row : row + count, column : column + len(own), : own.shape[1]] = own
         row, column = row + count, column + len(own)
     return weights
 
@@ -531,7 +562,7 @@ def propagate(
 ) -> Budget:
     """Return the budget of K values: by at most eleven simulations, fourteen where the values are
     `extremes` (minima and maxima along a feature), and one more measurement where the tool has a
-    width. `edges` (K, E, 2) are the weights of the values' edges."""
+    width. `edges` (K, E, 2 or 3) are the weights of the values' edges."""
     base = without_scatter(inputs.variant)
     factors, covariance = inputs.factors, inputs.covariance
     spread = np.sqrt(np.clip(np.diag(factors @ covariance @ factors.T), 0.0, None))
@@ -680,8 +711,8 @@ def _quantiles(count: int) -> Floats:
 
 
 def _weights(edges: Floats, each: Input) -> Floats:
-    """Return the weights (K, 2E) of the edges with the shares of an input in X and Y."""
-    shared: Floats = edges * np.array(each.edges)
+    """Return the weights (K, 2E) or (K, 3E) of the edges with the shares of an input."""
+    shared: Floats = edges * np.array(each.edges[: edges.shape[2]])
     return shared.reshape(len(edges), -1)
 
 

@@ -135,7 +135,7 @@ def verdicts_of(inspector: Inspector, run: Run) -> Iterator[InspectedReport | Fi
     feature the slides leave, or may leave on a machine that differs by an uncertainty."""
     if not inspector.dimensions:
         return
-    inputs = inputs_of(run.target.machine, inspector.tool_diameter_mm)
+    inputs = inputs_of(run.target.machine, inspector.tool_diameter_mm, depths=inspector.has_depths)
     budget = propagate(
         inspector.machined, inputs, inspector.edges, measure=inspector.measured, extremes=True
     )
@@ -281,7 +281,10 @@ def _deciding(
 
 def _shown_between(each: Inspected) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return two places in the work frame between which a picture shows the dimension."""
-    bound, first = each.bound, each.bound.features[0]
+    bound = each.bound
+    if each.floor is not None:
+        return each.floor.place_mm, each.floor.place_mm
+    first = bound.features[0]
     if bound.ends:
         one, other = bound.dimension.places_mm
         return one, other

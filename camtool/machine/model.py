@@ -271,9 +271,14 @@ CORRELATED_KEYS = (
     "y.backlash_mm",
     "y.scale",
     "y.compensation_mm",
+    "z.backlash_mm",
+    "z.scale",
+    "z.compensation_mm",
+    "z_zero_mm",
     "squareness_rad",
     "tool_diameter_mm",
     "runout_mm",
+    "stock_thickness_mm",
     "temperature_k",
 )
 """The keys of `[uncertainty]` that may be correlated: one error for all of a part. `process_mm` is
@@ -311,12 +316,14 @@ class Uncertainty(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     `tool_diameter_mm`: of the tool as measured; `runout_mm`: of the diameter that it cuts, by
     run-out; `temperature_k`: of the room, about 20 °C, where machine and part grow by
     `machine_expansion_per_k` and `part_expansion_per_k`; `process_mm`: of the place of a machined
-    edge, for deflection and all else that is not modelled. `correlations`: two keys, such as
-    "x.scale" and "squareness_rad", with their coefficient; pairs that are not named are not
-    correlated. The scatter of an axis is its `repeatability_mm`."""
+    edge or floor, for deflection and all else that is not modelled; `z_zero_mm`: of the height of
+    zero, by touching off; `stock_thickness_mm`: of the stock as measured. `correlations`: two
+    keys, such as "x.scale" and "squareness_rad", with their coefficient; pairs that are not named
+    are not correlated. The scatter of an axis is its `repeatability_mm`."""
 
     x: AxisUncertainty = AxisUncertainty()
     y: AxisUncertainty = AxisUncertainty()
+    z: AxisUncertainty = AxisUncertainty()
     squareness_rad: Annotated[float, Meta(ge=0.0, le=MAX_SQUARENESS_RAD)] | None = None
     tool_diameter_mm: Lost | None = None
     runout_mm: Lost | None = None
@@ -324,6 +331,8 @@ class Uncertainty(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     machine_expansion_per_k: Expansion | None = None
     part_expansion_per_k: Expansion | None = None
     process_mm: Lost | None = None
+    z_zero_mm: Lost | None = None
+    stock_thickness_mm: Lost | None = None
     correlations: tuple[tuple[str, str, Coefficient], ...] = ()
 
     def standard(self, key: str) -> float | None:

@@ -83,18 +83,26 @@ def _of_profiles(profiles: list[CutterProfile], row: Ints) -> ToolsOfRows:
 
 
 def slide_moves(
-    decoded: Toolpath, target: LoadedTarget, tools: ToolsOfRows, options: Options | None = None
+    decoded: Toolpath,
+    target: LoadedTarget,
+    tools: ToolsOfRows,
+    options: Options | None = None,
+    *,
+    z_weight: float = 1.0,
 ) -> StockMoves:
-    """Simulate a program and return the moves of the tips that its slides make. Raises what
+    """Simulate a program and return the moves of the tips that its slides make; they are
+    `z_weight` times nearer to the slides in Z than in the plane. Raises what
     `LoadedTarget.simulate` raises."""
     machine = target.machine
     axes = (machine.axes.x, machine.axes.y, machine.axes.z)
     step_mm = max(abs(axis.coded_step_mm) for axis in axes)
     beside_mm = max(THIN_MM, THIN_STEPS * step_mm)
+    weight = np.array([1.0, 1.0, z_weight])
     points, rows = [decoded.start[None]], [np.zeros(1, dtype=np.int64)]
     for chunk in target.simulate(decoded, options):
         if len(chunk.row):
-            kept = thinned(chunk.slide, chunk.row, points[-1][-1], beside_mm)
+            last = points[-1][-1] * weight
+            kept = thinned(chunk.slide * weight, chunk.row, last, beside_mm)
             points.append(chunk.slide[kept])
             rows.append(chunk.row[kept])
     path, row = np.concatenate(points), np.concatenate(rows)[1:].astype(np.int64)

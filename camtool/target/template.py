@@ -38,6 +38,8 @@ _ABOUT = {
 _UNCERTAIN = {
     "uncertainty": {
         "process_mm": "mm, of the place of a machined edge: deflection, and what is not modelled",
+        "z_zero_mm": "mm, of the height of zero: touching off",
+        "stock_thickness_mm": "mm, of the stock as measured",
         "tool_diameter_mm": "mm, of the tool as measured",
         "runout_mm": "mm, of the diameter that it cuts, by run-out",
         "squareness_rad": "rad, of mechanics.squareness_rad",
@@ -51,7 +53,7 @@ _UNCERTAIN = {
             "scale": f"of axes.{axis}.real_step_mm, as a part of it",
             "compensation_mm": "mm; 0 where the controller adds just what it is set to",
         }
-        for axis in "xy"
+        for axis in "xyz"
     },
 }
 """Keys that a target's own file may leave out: the uncertainty of its numbers, key by key."""

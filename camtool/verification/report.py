@@ -327,7 +327,8 @@ class InspectedReport(msgspec.Struct, frozen=True):
     @property
     def asked(self) -> str:
         """The requirement in words: "Ø5 H7", "roundness zone 0.02"."""
-        sign = {"diameter": "Ø", "radius": "R"}.get(self.kind, "")
+        signs = {"diameter": "Ø", "radius": "R", "depth": "depth ", "thickness": "thickness "}
+        sign = signs.get(self.kind, "")
         nominal = f"{sign}{self.nominal_mm:g}" if self.nominal_mm else self.kind
         return f"{nominal} {self.limits}".rstrip()
 

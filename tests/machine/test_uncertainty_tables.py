@@ -29,7 +29,7 @@ def built(*settings: str) -> Machine:
 def test_what_is_left_out_is_not_known() -> None:
     said = built("uncertainty.process_mm=0.0").uncertainty
     assert said.process_mm == 0.0
-    assert [said.standard(key) for key in CORRELATED_KEYS] == [None] * 10
+    assert [said.standard(key) for key in CORRELATED_KEYS] == [None] * 15
     assert said.standard("process_mm") == 0.0
     assert said.machine_expansion_per_k is None
 
@@ -65,7 +65,7 @@ def test_programs_do_not_depend_on_it(target: str) -> None:
     ("settings", "words"),
     [
         (["uncertainty.process=0.1"], ["[uncertainty], key process", "did you mean process_mm"]),
-        (["uncertainty.z.scale=0.1"], ["[uncertainty], key z", "unknown key"]),
+        (["uncertainty.w.scale=0.1"], ["[uncertainty], key w", "unknown key"]),
         (["uncertainty.x.scales=0.1"], ["[uncertainty.x], key scales", "mean scale?"]),
         (["uncertainty.x.scale=0.2"], ["[uncertainty.x], key scale", "between 0 and 0.1"]),
         (["uncertainty.process_mm=-0.1"], ["key process_mm", "-0.1 is not between 0 and 100"]),
@@ -147,8 +147,8 @@ PAIRS = [(a, b) for i, a in enumerate(CORRELATED_KEYS) for b in CORRELATED_KEYS[
 def uncertain(pairs: tuple[tuple[str, str, float], ...]) -> Uncertainty:
     said = built(*ALL).uncertainty
     return Uncertainty(
-        x=said.x, y=said.y, squareness_rad=0.01, tool_diameter_mm=0.01, runout_mm=0.01,
-        temperature_k=1.0, correlations=pairs,
+        x=said.x, y=said.y, z=said.x, squareness_rad=0.01, tool_diameter_mm=0.01, runout_mm=0.01,
+        temperature_k=1.0, z_zero_mm=0.01, stock_thickness_mm=0.01, correlations=pairs,
     )  # fmt: skip
 
 

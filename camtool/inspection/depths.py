@@ -1,0 +1,327 @@
+"""Depths of floors: how deep the slides cut the bottom of a pocket, of a groove or of a hole.
+
+A floor is named by a place on it. What belongs to it follows from the wanted solid
+(`camtool.stock.wanted`), so from drawing and job and not from the moves: the contour around the
+place with its islands, or the line beside it, without what another operation cuts deeper, and
+without the tabs. Beside walls a band is left out that is wider than the slides are off in the
+plane: there the stock stands to its full height, and widths are other dimensions.
+
+The least and the greatest depth are bounds, proved by branch and bound to `TOLERANCE_MM`, of the
+moves of the predicted slides and of all that may lie beside them. Of a groove or hole whose bottom
+is a line or a point (V bits, drills, round noses) it is the deepest across, looked at along its
+line.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+from msgspec import Struct
+
+from camtool.arrays import Bools, Floats, Ints
+from camtool.geometry.drawing import Drawing
+from camtool.geometry.nesting import Nesting
+from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines
+from camtool.inspection.dimensions import Dimension
+from camtool.kernels.stock import StockTree
+from camtool.machine.model import Machine
+from camtool.planning.items import Step
+from camtool.planning.job import Job
+from camtool.planning.place import placements
+from camtool.planning.plan import planned
+from camtool.records import replace
+from camtool.stock.cut import Box
+from camtool.stock.cutters import cutter_profile
+from camtool.stock.heights import greatest_value, stock_tree
+from camtool.stock.moves import StockMoves
+from camtool.stock.wanted import ABOUT, INSIDE, WantedLayer, WantedSolid, wanted_solid
+from camtool.toolpath.moves import STOCK_TOP_MM
+
+SAME_DEPTH_MM = 1e-6
+"""Depths that differ by at most this are those of one floor."""
+
+MARGIN_MM = 0.05
+"""Width of the band beside walls in which no depth is measured, besides what the slides are off in
+the plane."""
+
+TOLERANCE_MM = 1e-4
+"""Least and greatest depth are proved to this, ..."""
+
+MAX_SQUARES = 300_000
+"""... or as far as so many squares show; the bounds are then wider."""
+
+POINTS_APART_MM = 0.1
+"""Pointed grooves are looked at no farther apart than this along their line."""
+
+LATTICE = 40
+"""Points along each side of the box of a region, of which one becomes its place."""
+
+Z_WEIGHT = 100.0
+"""Slides lie so many times nearer to their moves in Z than in the plane."""
+
+
+class Floor(Struct, frozen=True, eq=False):
+    """The floor at a place in the work frame, mm: the part of the `layer` that it belongs to, what
+    may be cut (`solid`, with the band that is left out), how far inwards of its lines it begins,
+    the discs of tabs (T, 3) as centre and radius, and the depth that the job asks for. `is_line`:
+    its bottom is a line or a point, as of V bits, drills and round noses."""
+
+    place_mm: tuple[float, float]
+    layer: WantedLayer
+    solid: WantedSolid
+    begins_mm: float
+    tabs: Floats
+    depth_mm: float
+    is_line: bool
+
+    @property
+    def box_mm(self) -> Box:
+        """The box of its lines, as wide as they cut."""
+        boxes = self.layer.curves.boxes
+        wide = max(self.layer.shift_mm, 0.0)
+        low, high = boxes[:, :2].min(axis=0) - wide, boxes[:, 2:].max(axis=0) + wide
+        return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+
+    def has(self, points: Floats) -> Bools:
+        """Mask (P,) of the points (P, 2) on the floor."""
+        found = self._holds(self.layer.inwards(points), 0.0)
+        found &= self.solid.bands(points)[:, 0] >= -self.depth_mm - SAME_DEPTH_MM
+        return np.asarray(found & self.is_beyond_tabs(points))
+
+    def meets(self, squares: Floats) -> Bools:
+        """Mask (K,) of the squares (K, 3), middle and half a side, that may have points of the
+        floor."""
+        reach = math.sqrt(2.0) * squares[:, 2]
+        found = self._holds(self.layer.inwards(squares[:, :2]), reach)
+        found &= self.solid.bounds(squares)[:, 1] >= -self.depth_mm - SAME_DEPTH_MM
+        return np.asarray(found & (self._beyond_tabs(squares[:, :2]) > -reach))
+
+    def _holds(self, s: Floats, reach: Floats | float) -> Bools:
+        band = self.solid.wall_mm
+        last = self.layer.reach_mm - band
+        return np.asarray((s + reach >= self.begins_mm + band) & (s - reach <= last))
+
+    def is_beyond_tabs(self, points: Floats) -> Bools:
+        """Mask (P,) of the points (P, 2) that are not near a tab."""
+        return np.asarray(self._beyond_tabs(points) > 0.0)
+
+    def _beyond_tabs(self, points: Floats) -> Floats:
+        """Return how far (P,) points lie beyond the discs of the tabs, mm; inf without any."""
+        away = [np.hypot(*(points - tab[:2]).T) - tab[2] for tab in self.tabs]
+        return np.asarray(np.min(away, axis=0) if away else np.full(len(points), np.inf))
+
+
+class FloorDepths(Struct, frozen=True):
+    """Depths of a floor, mm: at its place, and bounds of the least and of the greatest."""
+
+    here_mm: float
+    least_mm: float
+    greatest_mm: float
+
+
+class Floors:
+    """The floors that the operations of a plan leave."""
+
+    def __init__(self, steps: Sequence[Step], beside_mm: float) -> None:
+        """Take the steps, and by how much the slides are off in the plane at most, mm."""
+        self._exact = wanted_solid(steps, 0.0)
+        band_mm = MARGIN_MM + beside_mm
+        self._solid = WantedSolid(self._exact.may, (), band_mm)
+        tabs = [
+            (*bridge.centre, 0.5 * tabs.width_mm + 2.0 * step.operation.tool.radius_mm + band_mm)
+            for step in steps
+            if (tabs := step.operation.tabs) is not None
+            for bridge in step.bridges
+        ]
+        self._steps = {step.operation.name or step.operation.kind: step for step in steps}
+        self._tabs = np.array(tabs, dtype=np.float64).reshape(-1, 3)
+
+    def at(self, place_mm: tuple[float, float]) -> Floor | None:
+        """Return the floor at a place in the work frame; None where none is asked for, and on a
+        slope."""
+        at = np.array([place_mm])
+        low = float(self._exact.bands(at)[0, 0])
+        layers = [(float(each.depths(s, s, 0.0)[1][0]), float(s[0]), each)
+                  for each in self._exact.must for s in (each.inwards(at),)]  # fmt: skip
+        depth, s, layer = max(layers, key=lambda each: each[0], default=(-math.inf, 0.0, None))
+        if layer is None or depth <= 0.0:
+            return None
+        begins = 0.0
+        if layer.rise > 0.0:
+            begins = (layer.depth_mm - layer.base_mm) / layer.rise
+            if layer.side != ABOUT and s < begins:
+                return None
+        step, part = self._steps[layer.name], _part_of(layer, place_mm)
+        round_ = cutter_profile(step.operation.tool).corner_mm > 0.0
+        is_line = layer.side == ABOUT and (layer.rise > 0.0 or round_)
+        wanted = -step.setting.levels_mm[-1] if is_line else STOCK_TOP_MM - low
+        return Floor(place_mm, part, self._solid, begins, self._tabs, wanted, is_line)
+
+    def places(self) -> Iterator[tuple[float, float]]:
+        """Yield a place on each floor, several on some: in closed regions the one of a lattice
+        that is farthest from the walls, on lines their middle."""
+        for layer in self._exact.must:
+            for line in layer.lines:
+                alone = _with_lines(layer, Polylines.of([line]))
+                if layer.side == ABOUT:
+                    points = _points_along(alone)
+                    px, py = points[len(points) // 2].tolist()
+                    yield px, py
+                elif layer.side == INSIDE:
+                    low, high = np.reshape(alone.curves.boxes, (-1, 2, 2)).transpose(1, 0, 2)
+                    shares = (np.arange(LATTICE) + 0.5) / LATTICE
+                    x, y = (low.min(axis=0) + shares[:, None] * np.ptp(
+                        np.concatenate([low, high]), axis=0)).T  # fmt: skip
+                    points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+                    # Islands are other lines of the layer, around which `at` finds no floor.
+                    inner = np.minimum(layer.inwards(points), alone.inwards(points))
+                    px, py = points[int(inner.argmax())].tolist()
+                    yield px, py
+
+
+def _points_along(layer: WantedLayer) -> Floats:
+    """Return points (P, 2) along the lines of a layer."""
+    every = layer.segments
+    chord = every.end - every.start
+    length = np.hypot(chord[:, 0], chord[:, 1])
+    arcs = every.is_arc
+    length[arcs] = every.radius[arcs] * np.abs(every.sweep[arcs])
+    count = np.ceil(length / POINTS_APART_MM).astype(np.int64) + 1
+    which = np.repeat(np.arange(len(count)), count)
+    place = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
+    part = place / np.maximum(count[which] - 1, 1)
+    points = every.start[which] + part[:, None] * chord[which]
+    bent = arcs[which]
+    of = which[bent]
+    angle = every.start_angle[of] + part[bent] * every.sweep[of]
+    spoke = np.column_stack([np.cos(angle), np.sin(angle)])
+    points[bent] = every.centre[of] + every.radius[of, None] * spoke
+    return np.asarray(points)
+
+
+def _part_of(layer: WantedLayer, place_mm: tuple[float, float]) -> WantedLayer:
+    """Return the layer with those of its lines alone that bound the floor at a place: the contour
+    around it with the islands in it, or the nearest line."""
+    lines = layer.lines
+    if layer.side == INSIDE:
+        levels = Nesting(lines).levels
+        around = [row for row in range(len(lines)) if _is_within(lines[row], place_mm)]
+        outer = max(around, key=lambda row: int(levels.depth[row]), default=-1)
+        rows: Ints = np.flatnonzero(levels.parent == outer)
+        if outer >= 0:
+            rows = np.append(rows, outer)
+    elif layer.side == ABOUT:
+        at = np.array([place_mm])
+        away = [-float(_with_lines(layer, lines.select([row])).inwards(at)[0])
+                for row in range(len(lines))]  # fmt: skip
+        rows = np.array([int(np.argmin(away))])
+    else:
+        return layer
+    return _with_lines(layer, lines.select(np.sort(rows).tolist()))
+
+
+def _with_lines(layer: WantedLayer, lines: Polylines) -> WantedLayer:
+    return WantedLayer(
+        layer.name,
+        lines,
+        layer.side,
+        layer.shift_mm,
+        layer.base_mm,
+        layer.rise,
+        layer.depth_mm,
+        layer.reach_mm,
+    )
+
+
+def _is_within(line: Polyline, place_mm: tuple[float, float]) -> bool:
+    alone = WantedLayer("", Polylines.of([line]), INSIDE, 0.0, 0.0, 0.0, 0.0)
+    return bool(alone.inwards(np.array([place_mm]))[0] >= 0.0)
+
+
+def depths_of(floors: Sequence[Floor], moves: StockMoves) -> list[FloorDepths | None]:
+    """Measure floors in the stock after moves, whose Z is exact to 1 / Z_WEIGHT of what they are
+    beside the slides; None where the band beside the walls leaves nothing of a floor."""
+    tree, deep = stock_tree(moves), moves.beside_mm / Z_WEIGHT
+    measured = (
+        (_along_line if floor.is_line else _over_region)(floor, tree, moves.beside_mm)
+        for floor in floors
+    )
+    return [
+        each and FloorDepths(each.here_mm, max(each.least_mm - deep, 0.0), each.greatest_mm + deep)
+        for each in measured
+    ]
+
+
+def _along_line(floor: Floor, tree: StockTree, beside_mm: float) -> FloorDepths | None:
+    """Measure the deepest across a line, within the band beside it, all along it."""
+    points, band = _points_along(floor.layer), floor.solid.wall_mm
+    points = points[floor.is_beyond_tabs(points)]
+    if not len(points):
+        return None
+    here = int(np.hypot(*(points - floor.place_mm).T).argmin())
+    least, middle, greatest = (
+        STOCK_TOP_MM - tree.heights(points, None, band + more)[0]
+        for more in (-beside_mm, 0.0, beside_mm)
+    )
+    return FloorDepths(float(middle[here]), float(least.min()), float(greatest.max()))
+
+
+def _over_region(floor: Floor, tree: StockTree, beside_mm: float) -> FloorDepths | None:
+    """Bracket the heights over a floor."""
+
+    def greatest(value: Callable[[Floats], Floats], upper: Callable[[Floats], Floats]) -> float:
+        found = greatest_value(
+            lambda at: np.where(floor.has(at), value(at), -np.inf),
+            lambda squares: np.where(floor.meets(squares), upper(squares), -np.inf),
+            floor.box_mm,
+            TOLERANCE_MM,
+            max_squares=MAX_SQUARES,
+        )
+        return found.high if found.low > -math.inf else -math.inf
+
+    highest = greatest(
+        lambda at: tree.heights(at, None, -beside_mm)[0],
+        lambda squares: tree.greatest(squares, None, -beside_mm),
+    )
+    deepest = greatest(
+        lambda at: -tree.heights(at, None, beside_mm)[0],
+        lambda squares: -tree.least(squares, beside_mm),
+    )
+    if not math.isfinite(highest + deepest):
+        return None
+    least, most = STOCK_TOP_MM - min(highest, STOCK_TOP_MM), STOCK_TOP_MM + deepest
+    here = STOCK_TOP_MM - float(tree.heights(np.array([floor.place_mm]))[0][0])
+    return FloorDepths(min(max(here, least), most), least, most)
+
+
+def proposed_floors(drawing: Drawing, job: Job, machine: Machine) -> Iterator[Dimension]:
+    """Yield the depth of each floor that a job cuts into a drawing, and the thickness that is left
+    under those of pockets if the job knows its stock; places in the frame of the drawing. What
+    goes through the stock has none."""
+    placement = replace(job.placement, copies=(1, 1), pitch_mm=(0.0, 0.0))
+    single = replace(job, placement=placement)
+    floors = Floors(planned(drawing, single, machine, undivided=True).steps, 0.0)
+    where = placements(drawing, single)[0]
+    back = np.linalg.inv(where.matrix)
+    thick = math.inf if job.stock is None else job.stock.thickness_mm
+    known: set[bytes] = set()
+    counts: Counter[str] = Counter()
+    for place in floors.places():
+        floor = floors.at(place)
+        if floor is None or floor.depth_mm >= thick - POSITION_EPS_MM:
+            continue
+        lines = floor.layer.lines.vertices.tobytes()
+        if lines in known:
+            continue
+        known.add(lines)
+        counts[floor.layer.name] += 1
+        name = f"{floor.layer.name} {counts[floor.layer.name]}"
+        x, y = (back @ (np.array(place) - where.shift)).tolist()
+        deep = floor.depth_mm
+        yield Dimension(f"{name} depth", "depth", ((x, y),), "", nominal_mm=deep)
+        if floor.layer.side == INSIDE and math.isfinite(thick):
+            left = thick - deep
+            yield Dimension(f"{name} floor", "thickness", ((x, y),), "", nominal_mm=left)
