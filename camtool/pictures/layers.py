@@ -311,7 +311,7 @@ def swept_words(scene: Scene) -> str:
     widths = {tool.diameter_mm for tool in tools if tool.kind != "v" and tool.diameter_mm}
     words = [f"{wide:.4g} mm" for wide in sorted(widths)]
     words += ["V bit"] * any(tool.kind == "v" for tool in tools)
-    return f"width of cuts: {', '.join(words)}" if words else ""
+    return f"cuts: {', '.join(words)}" if words else ""
 
 
 def _travel(content: Content, plot: Plot) -> str:

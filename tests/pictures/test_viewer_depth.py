@@ -339,6 +339,33 @@ class TestShown:
             assert bool(floor[0] - floor[2] > 100) == red
             assert bool(floor[2] - floor[0] > 100) == blue
 
+    def test_without_a_tool_the_path_is_shown_and_it_says_so(self, shown: Any) -> None:
+        view = shown(busy(Scene("no tool", toolpath=random_path(3))))
+        assert not view.page.locator("#no-tool").is_visible()
+        view.press("g")
+        assert "No tool is known" in view.text("#tools")
+        assert view.page.locator("#path-shown").is_checked()
+        before = picture(view)
+        view.press("l")
+        assert picture(view) != before
+        known = shown(scene_of_cuts(random_path(3), (0, MILL)))
+        known.press("g")
+        assert not known.page.locator("#no-tool").is_visible()
+
+    def test_shank_and_holder_are_drawn_where_they_are_known(self, shown: Any) -> None:
+        seen = []
+        bare = replace(MILL, cutting_length_mm=5.0)
+        shank = replace(bare, shank_diameter_mm=4.0, stickout_mm=8.0)
+        holder = replace(shank, holder_diameter_mm=10.0, holder_length_mm=6.0)
+        for tool in (bare, shank, holder):
+            view = shown(scene_of_cuts(slot(-1.0), (0, tool)))
+            view.press("g", "f", "-", "-")
+            view.page.locator("#slider").fill("5000")
+            view.page.mouse.move(0, 0)
+            data = np.array(Image.open(io.BytesIO(picture(view))).convert("RGB")).astype(int)
+            seen.append((np.abs(data - data[5, 5]).max(axis=2) > 20).sum())
+        assert seen[0] < seen[1] < seen[2]
+
     def test_without_webgl_the_plan_stays_and_says_so(self, shown: Any) -> None:
         view = shown(scene_of_cuts(random_path(3), (0, MILL)))
         view.page.evaluate("() => { HTMLCanvasElement.prototype.getContext = () => null; }")

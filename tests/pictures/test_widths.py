@@ -148,7 +148,7 @@ def test_cuts_of_several_tools_are_as_wide_as_each_cuts() -> None:
     swept = shapely.union_all(shown)
     assert cut.difference(swept.buffer(0.02)).is_empty
     assert swept.difference(cut.buffer(0.02)).is_empty
-    assert "width of cuts: 1 mm, 3 mm, V bit" in draw(scene)
+    assert "cuts: 1 mm, 3 mm, V bit" in draw(scene)
 
 
 def test_tools_of_a_program_from_a_file_are_those_of_its_job() -> None:
@@ -160,7 +160,7 @@ def test_tools_of_a_program_from_a_file_are_those_of_its_job() -> None:
     tools = [tool for _, tool in replace(read, job=SEVERAL).scene().turns]
     mounted = list(dict.fromkeys(tool for _, tool in run.scene().turns))
     assert list(dict.fromkeys(tools)) == mounted
-    assert "width of cuts: 1 mm, 3 mm, V bit" in draw(replace(read, job=SEVERAL).scene())
+    assert "cuts: 1 mm, 3 mm, V bit" in draw(replace(read, job=SEVERAL).scene())
     other = replace(SEVERAL, operations=SEVERAL.operations[:2])
     assert replace(read, job=other).scene().turns == ()
 
@@ -177,4 +177,4 @@ def test_the_viewer_knows_the_width_of_each_of_several_tools() -> None:
         for ends, tool in zip(found.z, found.tools, strict=True)
     ]
     assert shown == pytest.approx(np.array(expected), abs=1e-4)
-    assert '"swept":"width of cuts: 1 mm, 3 mm, V bit"' in page
+    assert '"swept":"cuts: 1 mm, 3 mm, V bit"' in page

@@ -356,6 +356,7 @@ function listenDepth(stage) {
     button.setAttribute("aria-pressed", String(depth.isOn));
     stage.place.classList.toggle("deep", depth.isOn);
     find("section").hidden = !depth.isOn;
+    find("no-tool").hidden = !depth.isOn || depth.turns.length > 0;
     find("tip").hidden = true;
     stage.wantsAll = true;
     stage.soon("all");
