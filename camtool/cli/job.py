@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,12 +23,16 @@ from camtool.cli.options import (
     talk_options,
 )
 from camtool.cli.picture_options import PictureFlags, picture_name
+from camtool.errors import OptionError
 from camtool.plain import one_line, to_json
 from camtool.records import replace
 
 if TYPE_CHECKING:
-    from camtool.jobs.template import Proposal
+    from camtool.jobs.template import Proposal, Proposed
     from camtool.planning.job import Tool
+
+NOT_CUT = "leave"
+"""The answer that leaves a group uncut."""
 
 MAX_GROUPS = 12
 """So many groups of contours of an operation are printed."""
@@ -51,6 +56,7 @@ def job() -> None:
 @click.option("--tool", metavar="NAME", help="The end mill; see camtool tools.")
 @click.option("--material", metavar="NAME", help="What is cut, for which the tool has a preset.")
 @click.option("--thickness", callback=length, metavar="LENGTH", help="Of the stock: cut through.")
+@click.option("--ask", is_flag=True, help="Ask what is meant where that is in doubt.")
 @machine_options
 @drawing_options
 @talk_options
@@ -61,6 +67,7 @@ def new(
     tool: str | None,
     material: str | None,
     thickness: float | None,
+    ask: bool,
     machine: MachineFlags,
     drawing: DrawingFlags,
     quiet: bool,
@@ -68,8 +75,8 @@ def new(
 ) -> None:
     """Write a job file for DRAWING (- is stdin): operations for each of its layers.
 
-    With the tool's diameter, holes, windows and outlines get operations of their own, and with
-    the thickness of the stock they go through it, and outlines keep tabs. It works as it is;
+    With a tool, or a library that has an end mill, it cuts the drawing as a machinist would, and
+    says why; with the thickness of the stock it cuts through it, over tabs. It works as it is;
     every other key stands there as a comment.
     """
     from camtool.geometry.drawing import is_text
@@ -92,6 +99,10 @@ def new(
             known.diameter_mm, proposal.thickness_mm, tool, known.materials, material or ""
         )
     proposal = _with_library(proposal)
+    if ask and (source == STDOUT or not sys.stdin.isatty()):
+        raise click.UsageError(
+            "--ask needs a terminal: leave it out, and read above each operation why it is so"
+        )
     output = output or "job.toml"
     check_places([source, *machine.files()], [output])
     check_new(output)
@@ -100,6 +111,10 @@ def new(
     read = DrawingFlags({**drawing.given, "text": text}).read(source, target)
     has_text = any(is_text(name) for name in read.sources)
     parts = proposed(read, proposal)
+    if ask:
+        parts = [part for each in parts if (part := _asked(each)) is not None]
+        if not parts:
+            raise OptionError("nothing is left to cut", mend="let one operation cut something")
     made = job_template(read, target, proposal, parts, text if has_text else "")
     write_all({output: made.encode()})
     say_findings(read.findings, quiet=quiet, verbose=verbose)
@@ -110,6 +125,18 @@ def new(
             )
     where = "stdout" if output == STDOUT else output
     say(f"written: {where}; look at the kinds, the tool and the depth", quiet=quiet)
+
+
+def _asked(each: Proposed) -> Proposed | None:
+    """Ask for the kind of operation of a part that is in doubt; None if it is not to be cut."""
+    if not each.part.others:
+        return each
+    kinds = (each.part.kind, *each.part.others, NOT_CUT)
+    text = one_line(f"{each.part.name}: {each.part.why}. How is it cut")
+    kind = click.prompt(text, kinds[0], type=click.Choice(kinds), err=True)
+    if kind == NOT_CUT:
+        return None
+    return each if kind == each.part.kind else each.of_kind(kind)
 
 
 def _with_library(proposal: Proposal) -> Proposal:

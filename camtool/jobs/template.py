@@ -246,7 +246,8 @@ class Part(Struct, frozen=True):
     """An operation that a kind proposes: its name, what it takes of a group (rows of the drawing's
     paths, and how many single points), and keys as TOML text, each with a remark. `excludes`: the
     word by which the other operations of the group leave these paths out. `tool`: one of the
-    library, "" for that of the job. `why`: the reason, in a few words, "" where there is none."""
+    library, "" for that of the job. `why`: the reason, in a few words, "" where there is none.
+    `others`: kinds that may be meant as well, of a part that is in doubt."""
 
     name: str
     kind: str
@@ -256,6 +257,12 @@ class Part(Struct, frozen=True):
     excludes: str = ""
     tool: str = ""
     why: str = ""
+    others: tuple[str, ...] = ()
+
+    def of_kind(self, kind: str) -> Part:
+        """Return the part cut by another kind of operation with the tool of the job."""
+        keys = tuple(key for key in self.keys if key[0] in SELECTING_KEYS)
+        return replace(self, kind=kind, keys=keys, tool="", why="asked for", others=())
 
 
 class Proposed(Struct, frozen=True):
@@ -263,6 +270,10 @@ class Proposed(Struct, frozen=True):
 
     group: _Group
     part: Part
+
+    def of_kind(self, kind: str) -> Proposed:
+        """Return the same, cut by another kind of operation."""
+        return Proposed(self.group, self.part.of_kind(kind))
 
 
 class Remaining(Struct, frozen=True):

@@ -1,6 +1,9 @@
 """`camtool job new` writes files that load, whatever a drawing holds; `job check` says what is."""
 
+import os
 import re
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -200,3 +203,41 @@ def test_text_that_is_cut_as_parts_is_named(camtool: Run, labelled: Path) -> Non
     without = camtool(*cut, "--text", "outline", "--select", "not text")
     assert without.returncode == 0, without.stderr
     assert b"TEXT_AS_EDGE" not in without.stderr
+
+
+@pytest.mark.parametrize(
+    ("answer", "kinds"),
+    [("", ["engrave", "profile"]), ("profile", ["profile", "profile"]), ("leave", ["profile"])],
+)
+def test_what_is_in_doubt_is_asked_at_a_terminal(
+    tmp_path: Path, answer: str, kinds: list[str]
+) -> None:
+    """Two parts that are too near to each other for the mill, and one that is not."""
+    boxes = "".join(f'<rect x="{x}" width="30" height="40"/>' for x in (0, 32, 100))
+    (tmp_path / "parts.svg").write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" width="150mm" height="40mm" '
+        f'viewBox="0 0 150 40"><g fill="none" stroke="#000">{boxes}</g></svg>'
+    )
+    command = [sys.executable, "-m", "camtool", "job", "new", "parts.svg", "--ask"]
+    flags = ["--tool-diameter", "3mm", "--thickness", "3mm"]
+    environment = {**os.environ, "XDG_CONFIG_HOME": str(tmp_path)}
+    master, slave = os.openpty()
+    try:
+        os.write(master, f"{answer}\n".encode())
+        done = subprocess.run(
+            [*command, *flags], cwd=tmp_path, stdin=slave, capture_output=True, env=environment
+        )
+    finally:
+        os.close(master)
+        os.close(slave)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.count(b"How is it cut (engrave, profile, leave) [engrave]") == 1
+    whole = tomllib.loads((tmp_path / "job.toml").read_text())
+    assert [each["kind"] for each in whole["operations"]] == kinds
+
+
+def test_questions_need_a_terminal(camtool: Run, tmp_path: Path, samples: Path) -> None:
+    done = camtool("job", "new", samples / "mount.dxf", "--ask", stdin=b"profile\n")
+    assert done.returncode == 2
+    assert b"--ask needs a terminal: leave it out" in done.stderr
+    assert not (tmp_path / "job.toml").exists()

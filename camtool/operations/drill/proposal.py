@@ -28,7 +28,9 @@ def propose(left: Remaining) -> list[Part]:
         said = "" if bit is None else f" with {bit.name}, the finest drill"
         why = f"points are drilled{said}; a point says no diameter"
         name = f"{left.title} points"
-        found.append(Part(name, "drill", (), left.marks, select, "", bit.name if bit else "", why))
+        tool_name = bit.name if bit else ""
+        part = Part(name, "drill", (), left.marks, select, "", tool_name, why, ("engrave",))
+        found.append(part)
     if not tool:
         return found
     holes = left.holes

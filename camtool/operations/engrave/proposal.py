@@ -10,6 +10,7 @@ from camtool.geometry.drawing import is_text
 from camtool.jobs.template import Part, Remaining
 from camtool.operations.engrave.work import widest_groove
 from camtool.planning.job import Tool
+from camtool.records import replace
 
 TEXT_DEPTH_MM = 0.2
 
@@ -47,12 +48,12 @@ def propose(left: Remaining) -> list[Part]:
     if small:
         part = Part(f"{left.title} fine", "engrave", small)
         why = f"lines too near to each other, or too small within, for a mill of {finest:g} mm"
-        found.append(_cut(left, part, f"{why}: marked"))
+        found.append(replace(_cut(left, part, f"{why}: marked"), others=("profile",)))
     unclear = tuple(row for row in branched if row not in small)
     if unclear:
         part = Part(f"{left.title} branched", "engrave", unclear)
         why = "more than two ends meet, so that it is not clear what they enclose: marked"
-        found.append(_cut(left, part, why))
+        found.append(replace(_cut(left, part, why), others=("profile",)))
     return found
 
 

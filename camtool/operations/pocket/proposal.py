@@ -28,7 +28,8 @@ def propose(left: Remaining) -> list[Part]:
         if left.depth_mm is None and thickness:
             why += f"; its name says no depth, as POCKET 2mm would: {deep:g} mm, half the stock"
             keys = (*keys, ("depth", f'"{deep:g}mm"', "half the stock"))
-        return [Part(left.title, "pocket", left.contours, 0, keys, "", "", why)]
+        others = ("profile",) if left.depth_mm is None else ()
+        return [Part(left.title, "pocket", left.contours, 0, keys, "", "", why, others)]
     windows = left.contours_that_are("inner")
     if not windows:
         return []
