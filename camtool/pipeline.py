@@ -538,9 +538,20 @@ def _operations(steps: Sequence[Step]) -> tuple[PlannedOperation, ...]:
                 passes=len(setting.levels_mm) if in_passes else None,
                 deepest_pass_mm=deepest_pass(setting) if in_passes else None,
                 coolant=operation.coolant,
+                chip_load_limits_mm=_open_ended(operation.tool.chip_load_mm),
+                surface_speed_limits_m_min=_open_ended(operation.tool.surface_speed_m_min),
+                leaves_mm=rounded(operation.allowance_mm),
+                tabs=len({tuple(bridge.centre.tolist()) for bridge in step.bridges}),
             )
         )
     return tuple(found)
+
+
+def _open_ended(limits: tuple[float, float] | None) -> tuple[float, float | None] | None:
+    """Return limits with None for an upper end that is nowhere."""
+    if limits is None:
+        return None
+    return limits[0], limits[1] if math.isfinite(limits[1]) else None
 
 
 def _deepest_mm(step: Step) -> float:

@@ -26,6 +26,7 @@ from msgspec.structs import asdict
 
 from camtool.findings import Finding
 from camtool.plain import one_line, to_json
+from camtool.planning.naming import range_words
 from camtool.records import replace
 from camtool.toolpath.findings import ProgramCode
 from camtool.units import UM_PER_MM
@@ -364,7 +365,9 @@ class PlannedOperation(msgspec.Struct, frozen=True):
     passes. `coolant`: "off", "mist", "flood" or "both". `tool` is the index of its tool;
     `tool_name` and `material`, that of its preset, are "" where there are none; the feed per tooth
     and the speed of the edge are None where the flutes, or the speed, are not known, and the
-    predicted time where it is not."""
+    predicted time where it is not. Their limits are those of the tool, or of its preset: from and
+    to (None: any), None where none are given. `leaves_mm`: what stays on the walls for a later
+    cut; `tabs` and `loose`: how many tabs it leaves, and pieces that nothing holds."""
 
     name: str
     kind: str
@@ -382,6 +385,10 @@ class PlannedOperation(msgspec.Struct, frozen=True):
     deepest_pass_mm: float | None = None
     coolant: str = "off"
     time_s: float | None = None
+    chip_load_limits_mm: tuple[float, float | None] | None = None
+    surface_speed_limits_m_min: tuple[float, float | None] | None = None
+    leaves_mm: float = 0.0
+    tabs: int = 0
 
 
 class PlannedTool(msgspec.Struct, frozen=True):
@@ -1143,7 +1150,7 @@ def mounting_lines(report: Report) -> Iterator[tuple[str, str]]:
     stock = None if planned is None else planned.stock
     if stock is not None:
         yield "stock", _stock_words(stock)
-    if planned is not None and planned.cut_mm and (stock is None or stock.size_mm is None):
+    if planned is not None and planned.cut_mm:
         left, low, right, top = planned.cut_mm
         ends = f"X {mm(left)} to {mm(right)}, Y {mm(low)} to {mm(top)}"
         size = f"{mm(right - left)} × {mm(top - low)} mm"
@@ -1152,6 +1159,8 @@ def mounting_lines(report: Report) -> Iterator[tuple[str, str]]:
     if planned is not None and len(planned.tools) > 1:
         rows = [key for key, _ in groupby(each.tool for each in planned.operations)]
         yield "mounted", ", then ".join(_tool_called(planned, row) for row in rows)
+    if by_hand := "; ".join(_by_hand(report)):
+        yield "by hand", by_hand
     axes = zip("XYZ", (extents.x, extents.y, extents.z), strict=True)
     yield "travel", ", ".join(f"{axis} {mm(low)} to {mm(high)}" for axis, (low, high) in axes)
     yield "time", clock(report.time_s)
@@ -1200,7 +1209,20 @@ def setup_sheets(planned: Planned) -> Iterator[ReportSheet]:
     )
     heads = ("tool", "shape", "sticks out more than mm", "edges mm")
     yield ReportSheet("tools", heads, rows, words=2)
-    yield ReportSheet("operations", *_setup_operations(planned), words=4)
+    yield ReportSheet("operations", *_setup_operations(planned), words=3)
+
+
+def _by_hand(report: Report) -> Iterator[str]:
+    """Yield the tabs to cut, by operation and tool, and the pieces to take out."""
+    planned = report.planned
+    for each in () if planned is None else planned.operations:
+        if planned is not None and each.tabs:
+            tabs = f"{each.tabs} tab{'s' * (each.tabs > 1)}"
+            yield f"cut {tabs} of {each.name or each.kind} ({_tool_called(planned, each.tool)})"
+    loose = [one for one in report.findings if one.code == ProgramCode.LOOSE_PIECE.name]
+    if loose:
+        places = ", ".join(one.where for one in loose if one.where)
+        yield f"take out what comes loose: {places}" if places else "take out what comes loose"
 
 
 def _tool_called(planned: Planned, row: int) -> str:
@@ -1211,8 +1233,8 @@ def _tool_called(planned: Planned, row: int) -> str:
 
 
 def _setup_operations(planned: Planned) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]:
-    whole = ("operation", "kind", "tool", "coolant", "depth mm", "passes")
-    heads = (*whole, "rev/min", "feed mm/min", "plunge mm/min", "time")
+    whole = ("operation", "kind", "tool", "coolant", "depth mm", "passes", "leaves mm")
+    speeds = ("rev/min", "m/min", "feed mm/min", "mm per tooth", "plunge mm/min")
     rows = tuple(
         (
             each.name or each.kind,
@@ -1221,14 +1243,37 @@ def _setup_operations(planned: Planned) -> tuple[tuple[str, ...], tuple[tuple[st
             each.coolant,
             f"{each.depth_mm:.4g}",
             "–" if each.passes is None else str(each.passes),
+            f"{each.leaves_mm:.4g}" if each.leaves_mm else "–",
             "off" if each.spindle_rpm is None else f"{each.spindle_rpm:g}",
+            _within_words(each.surface_speed_m_min, 3, each.surface_speed_limits_m_min),
             f"{each.feed_mm_min:g}",
+            _within_words(each.chip_load_mm, 2, each.chip_load_limits_mm),
             f"{each.plunge_mm_min:g}",
             "–" if each.time_s is None else clock(each.time_s),
         )
         for each in planned.operations
     )
-    return heads, rows
+    heads = (*whole, *speeds, "time")
+    # A column of dashes says nothing, nor one of coolant that is off.
+    says = [
+        set(column) - ({"off"} if head == "coolant" else {"–"})
+        for head, column in zip(heads, zip(*rows, strict=True), strict=True)
+    ]
+    kept = [k for k, words in enumerate(says) if words]
+    return tuple(heads[k] for k in kept), tuple(tuple(row[k] for k in kept) for row in rows)
+
+
+def _within_words(
+    value: float | None, digits: int, limits: tuple[float, float | None] | None
+) -> str:
+    """Return a number beside its limits: `0.04 (0.02 to 0.06)`; a dash where it is not known."""
+    if value is None:
+        return "–"
+    shown = f"{value:.{digits}g}"
+    if limits is None:
+        return shown
+    least, most = limits
+    return f"{shown} ({range_words((least, math.inf if most is None else most))})"
 
 
 def gravest_findings(page: ReportPage) -> tuple[FindingReport, ...]:
@@ -1363,6 +1408,7 @@ th, td { overflow-wrap: break-word; max-width: 40rem; }
 .wide { overflow-x: auto; } .pairs td { overflow-wrap: anywhere; }
 img { max-width: 100%; height: auto; background: #fff; }
 figure { margin: 1rem 0; } figcaption { opacity: .7; }
+.setup .rows :is(th, td) { padding: .2rem .45rem; }
 .error { color: #c5221f; } .warning { color: #a56300; } .fine { color: #2c7a32; }
 @media (prefers-color-scheme: dark) {
   .error { color: #ff8a80; } .warning { color: #ffc266; } .fine { color: #8fd694; } }
@@ -1377,7 +1423,7 @@ figure { margin: 1rem 0; } figcaption { opacity: .7; }
 @media print {
   @page { size: A4; margin: 12mm; }
   :root { font-size: 11px; } body { margin: 0; max-width: none; padding: 0; }
-  .wide { overflow: visible; } .setup { break-after: page; } .setup img { max-height: 85mm; }
+  .wide { overflow: visible; } .setup { break-after: page; } .setup img { max-height: 78mm; }
   table { margin: .5rem 0; } .setup .rows :is(th, td) { padding: .15rem .35rem; } }
 """
 

@@ -1,6 +1,7 @@
 """What a page says for the machine: the stock and its zero, tools, operations, warnings."""
 
 import json
+import math
 import re
 from html.parser import HTMLParser
 from pathlib import Path
@@ -59,6 +60,7 @@ def test_the_sample_plate(camtool: Run, samples: Path, tmp_path: Path) -> None:
     page = Tables((tmp_path / "plate.html").read_text(encoding="utf-8"))
     facts, tools, operations = page.tables
     told = dict(facts)
+    assert told["blank"].startswith("at least 86.000 × 58.000 mm")
     assert told["stock"] == "96 × 66 × 6 mm; on a board that may be cut 1 mm deep"
     assert told["zero"].startswith("X0 Y0 is 8 mm right of and 8 mm above the lower left corner")
     assert told["mounted"] == "T1 mill, then T2 drill, then T3 bit, then T1 mill"
@@ -120,6 +122,37 @@ def test_sheet_comments_and_twin_agree_about_the_time_of_every_operation(
     assert len(said) == 7
     assert said == pytest.approx(wanted, abs=0.6)
     assert shown == pytest.approx(wanted, abs=0.6)
+
+
+def test_chips_speeds_allowance_and_work_by_hand(
+    camtool: Run, samples: Path, tmp_path: Path
+) -> None:
+    """Against arithmetic: 450 mm/min by 2 flutes at 12000 rev/min, and the edge of 3 mm at that
+    speed."""
+    job = (samples / "plate.toml").read_text(encoding="utf-8")
+    limits = "flutes = 2\nchip_load = '..0.05mm'\nsurface_speed = '60..300'"
+    job = job.replace("[tools.mill]", f"[tools.mill]\n{limits}")
+    job = job.replace('layers = ["POCKET"]', 'layers = ["POCKET"]\nfinish = "0.25mm"')
+    (tmp_path / "job.toml").write_text(job, encoding="utf-8")
+    args = (str(samples / "plate.dxf"), "-t", "linuxcnc", "--job", "job.toml", "-o", "a.nc", "-q")
+    done = camtool("post", *args, "--report", "a.html", "--json", "a.json")
+    assert done.returncode == 0, done.stderr
+    facts, _, shown = Tables((tmp_path / "a.html").read_text(encoding="utf-8")).tables
+    heads, first = shown[:2]
+    rows = {row[0]: dict(zip(heads, row, strict=True)) for row in shown[1:]}
+    assert first[0] == "pocket"
+    chip, speed = 450.0 / (2 * 12000.0), math.pi * 3.0 * 12000.0 / 1000.0
+    assert rows["pocket"]["mm per tooth"] == f"{chip:.2g} (at most 0.05)"
+    assert rows["pocket"]["m/min"] == f"{speed:.3g} (60 to 300)"
+    assert rows["sign"]["mm per tooth"] == "–"  # nobody says how many flutes the bit has
+    left = {name: row["leaves mm"] for name, row in rows.items() if row["leaves mm"] != "–"}
+    assert left == {"pocket": "0.25"}
+    assert "pocket finish" in rows
+    report = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))
+    (loose,) = [each for each in report["findings"] if each["code"] == "LOOSE_PIECE"]
+    assert dict(facts)["by hand"] == (
+        f"cut 4 tabs of outline (T1 mill); take out what comes loose: {loose['where']}"
+    )
 
 
 @pytest.mark.parametrize("flags", [(), ("--compensate",), ("--minimise", "reversals")])
