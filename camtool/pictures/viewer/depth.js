@@ -15,10 +15,10 @@ const DETAILS = [[1, 1], [2, 0.8], [4, 0.6], [8, 0.5], [8, 0.35]];
 /** Then only so many ends of the latest lines of the path are drawn. */
 const COARSE_ENDS = 10000;
 const FULL_AFTER_MS = 250;
-/** [azimuth, elevation] by key: from the front, the side, the top, and between all of them. */
+/** [azimuth, elevation] by key: from the front, the side, the top, and isometric, as in pictures. */
 const SIDES = {
   f: [0, 0], 1: [0, 0], s: [Math.PI / 2, 0], 3: [Math.PI / 2, 0],
-  t: [0, Math.PI / 2], 7: [0, Math.PI / 2], i: [0.45, 0.75],
+  t: [0, Math.PI / 2], 7: [0, Math.PI / 2], i: [-Math.PI / 4, Math.atan(Math.SQRT1_2)],
 };
 
 /** What is gouged or left is coloured from the first of these on, and fully from the second, mm. */
