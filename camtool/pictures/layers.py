@@ -62,6 +62,7 @@ WORST_MARK: Look = {"r": RING, "fill": "none", "stroke": GAP, "stroke-width": 2.
 GAP_MARK: Look = {"r": RING, "fill": "none", "stroke": GAP, "stroke-width": 2.4}
 POINT_MARK: Look = {"r": 4.0, "fill": INK, "stroke": PAPER, "stroke-width": 1.2}
 TAB_MARK: Look = {"r": 6.5, "fill": "none", "stroke": PLUNGE, "stroke-width": 3.0}
+FAULT_MARK: Look = {"r": 9.0, "fill": "none", "stroke": GAP, "stroke-width": 3.0}
 CROSSING_MARK: Look = {"r": 5.0, "fill": GAP, "stroke": PAPER, "stroke-width": 1.2}
 
 
@@ -273,13 +274,19 @@ def _drawing_legend(content: Content, view: View) -> Iterator[LegendEntry]:
 
 
 def _noted(content: Content) -> list[Part]:
-    """Open ends, drill centres, and places where a contour is ambiguous."""
+    """Open ends, drill centres, places where a contour is ambiguous, and faults of the stock."""
     places = content.places
     return [
         DotGroup("gaps", "open end", places.gaps.tolist(), GAP_MARK),
         DotGroup("points", "point", places.points.tolist(), POINT_MARK),
         DotGroup("doubts", "crossing or branch", places.ambiguous.tolist(), CROSSING_MARK),
+        faults_of(content.scene),
     ]
+
+
+def faults_of(scene: Scene) -> DotGroup:
+    """Return the marks of the findings of the stock."""
+    return DotGroup("faults", "finding of the stock", scene.faults, FAULT_MARK)
 
 
 # Moves.

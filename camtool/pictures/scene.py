@@ -55,7 +55,8 @@ class Scene:
     `wanted` are the lines and arcs with which the trace
     was compared, `worst` the places of its largest errors, mm, the largest first; `tool_mm` is the
     diameter of the tool, if there is only one, and `nose` a tool that is as wide as it is deep,
-    where that changes along the path; `turns` are the tools of several, each with the row of the
+    where that changes along the path; `faults` are the places of findings of the stock, mm;
+    `turns` are the tools of several, each with the row of the
     toolpath from which on it cuts; `rounds` are full circles with their errors.
     `tabs` are the places of tabs, mm; `inspected` the dimensions with their verdicts. `playback`
     gives how the toolpath runs; only the viewer calls it. `cut` gives the moves that cut the
@@ -75,6 +76,7 @@ class Scene:
     notes: tuple[str, ...] = ()
     wanted: Segments | None = None
     worst: tuple[tuple[float, float], ...] = ()
+    faults: tuple[tuple[float, float], ...] = ()
     tool_mm: float | None = None
     nose: Tool | None = None
     turns: tuple[tuple[int, Tool], ...] = ()
@@ -271,6 +273,7 @@ def scene_of(
         notes=verification.report.notes() if verification is not None else (),
         wanted=verification.wanted.segments if verification is not None else None,
         worst=tuple(one.at_mm for one in worst),
+        faults=() if verification is None else _faults(verification.report),
         tool_mm=width,
         nose=nose,
         turns=_turns(job, toolpath) if several and job and toolpath else (),
@@ -504,13 +507,28 @@ def _tables(report: Report) -> Iterator[ReportTable]:
             yield ReportTable(title, columns, tuple(found[:LINES_SHOWN]))
 
 
+def _place_in(words: str) -> tuple[float, float] | None:
+    """Return the place that a finding names, mm."""
+    found = _WHERE.search(words)
+    return None if found is None else (float(found[1]), float(found[2]))
+
+
+def _faults(report: Report) -> tuple[tuple[float, float], ...]:
+    """Return the places of the findings of the stock."""
+    from camtool.stock.findings import StockCode
+    from camtool.toolpath.findings import ProgramCode
+
+    codes = {each.name for each in StockCode}
+    codes |= {ProgramCode.RAPID_IN_STOCK.name, ProgramCode.LOOSE_PIECE.name}
+    places = [_place_in(item.where) for item in report.findings if item.code in codes]
+    return tuple(dict.fromkeys(place for place in places if place is not None))
+
+
 def _findings(report: Report) -> tuple[str, tuple[str, ...], list[TableLine]]:
     lines = []
     for item in report.findings:
-        found = _WHERE.search(item.where)
-        place = None if found is None else (float(found[1]), float(found[2]))
         cells = item.severity, item.code, item.where, item.message
-        lines.append(TableLine(cells, at_mm=place))
+        lines.append(TableLine(cells, at_mm=_place_in(item.where)))
     return "Findings", ("severity", "code", "where", "message"), lines
 
 

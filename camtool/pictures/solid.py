@@ -26,7 +26,7 @@ from camtool.pictures.colours import (
     channels,
     on_dark,
 )
-from camtool.pictures.layers import LegendEntry, line_swatch
+from camtool.pictures.layers import LegendEntry, faults_of, line_swatch
 from camtool.pictures.options import SVG_WIDTH_PX, PictureOptions
 from camtool.pictures.page import (
     BAR_GAP,
@@ -45,6 +45,7 @@ from camtool.pictures.page import (
     table_of,
     title_and_notes,
 )
+from camtool.pictures.plot import Plot
 from camtool.pictures.relief import (
     CAMERAS,
     SAMPLES,
@@ -257,7 +258,8 @@ def _from_above(
     bar = _bar_of(solid, options)
     shown = np.array([[left, right], [bottom, top]])
     view, ticks = fitted(shown, down + HEAD_GAP, width, shapes, lambda _: bar.width)
-    entries = _entries(scene, options)
+    faults = faults_of(scene)
+    entries = [*_entries(scene, options), *faults.entries(view)]
     table, bar_y = table_of(entries, view, view.box)
     legend_y = view.box.bottom + LEGEND_DROP
     sizes = (width, foot_of(table, legend_y))
@@ -267,6 +269,7 @@ def _from_above(
         options,
         _raster(_stage(solid, bar, options), CAMERAS["top"], view, view.box, options),
         _ghost(scene, CAMERAS["top"], view) if options.view != "top" else "",
+        faults.draw(Plot(view)) if faults else "",
         mat(view.box, *sizes),
         head,
         axes_around(view, ticks),
