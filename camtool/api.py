@@ -28,6 +28,7 @@ from camtool.pictures.options import PictureOptions
 from camtool.pictures.picture import Picture
 from camtool.pictures.scene import Scene
 from camtool.pipeline import Judging, convert_program, post_drawing, verify_program
+from camtool.pipeline import post_by_setup as by_setup
 from camtool.pipeline import post_by_tool as by_tool
 from camtool.planning.job import Job, Operation, Placement, Stock, Tool
 from camtool.planning.job import job_of as made
@@ -83,6 +84,7 @@ __all__ = [
     "meet",
     "plan",
     "post",
+    "post_by_setup",
     "post_by_tool",
     "preview",
     "read_drawing",
@@ -295,6 +297,25 @@ def post_by_tool(
     loaded, wanted = as_target(target), _with_compensation(job, compensate)
     read = as_drawing(drawing, loaded, wanted)
     return by_tool(read, wanted, loaded, check=check, gates=gates)
+
+
+def post_by_setup(
+    drawing: Drawing | str | Path,
+    target: str | LoadedTarget,
+    job: Job,
+    *,
+    check: bool = True,
+    compensate: bool = False,
+    gates: Gates | None = None,
+) -> tuple[Run, ...]:
+    """As `post`, with one program for each set-up of the job, in the order of the job.
+
+    `job.setup(NAME)` is the job of one of them. Raises as `post` does, and OptionError for a job
+    without set-ups. Source: docs/jobs.md.
+    """
+    loaded, wanted = as_target(target), _with_compensation(job, compensate)
+    read = as_drawing(drawing, loaded, wanted)
+    return by_setup(read, wanted, loaded, check=check, gates=gates)
 
 
 def _with_compensation(job: Job | None, compensate: bool) -> Job:

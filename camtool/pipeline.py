@@ -2,6 +2,7 @@
 
     post_drawing     Drawing + Job + target → program, read back, simulated and judged
     post_by_tool     the same as a program for each turn of a tool
+    post_by_setup    the same as a program for each set-up of the job
     verify_program   bytes of any program → judged, against a drawing if there is one
     convert_program  bytes of a program of one target → the program of another, judged as above
     read_program     bytes of a program → decoded, not judged
@@ -194,6 +195,81 @@ def post_by_tool(
     return tuple(runs)
 
 
+def post_by_setup(
+    drawing: Drawing,
+    job: Job,
+    target: LoadedTarget,
+    *,
+    check: bool = True,
+    gates: Gates | None = None,
+    trace_points: int | None = None,
+    progress: Progress | None = None,
+) -> tuple[Run, ...]:
+    """As `post_drawing`, with one program for each set-up of the job, in their order.
+
+    Each is judged alone, in its own frame; what set-ups from both faces leave of the stock between
+    them is compared besides. OptionError for a job without set-ups."""
+    if not job.setups:
+        raise OptionError("the job has no set-ups", where="[[setups]]", mend="post it as it is")
+    runs = []
+    for setup in job.setups:
+        run = post_drawing(
+            drawing,
+            job.setup(setup.name),
+            target,
+            check=check,
+            gates=gates,
+            trace_points=trace_points,
+            progress=progress,
+        )
+        runs.append(replace(run, part=f"set-up {setup.name}"))
+    if not check or any(run.failed for run in runs):
+        return tuple(runs)
+    return tuple(_add_findings(run, _meetings(run, runs[k + 1 :])) for k, run in enumerate(runs))
+
+
+def _meetings(run: Run, others: Sequence[Run]) -> tuple[Finding, ...]:
+    """Return FACES_MEET for each of the other set-ups that meets this one within the stock, with
+    the place in this one's frame. None where the thickness of the stock is not known."""
+    from camtool.stock.cut import MEETING_MM, cut_stock, greatest_meeting
+    from camtool.stock.findings import FACES_MEET, place_words
+
+    assert run.job is not None
+    assert run.decoded is not None
+    found = []
+    for other in others:
+        assert other.job is not None
+        assert other.decoded is not None
+        assert other.job.setup_of is not None
+        mine, its = run.job.placement.flip, other.job.placement.flip
+        turn = mine or its
+        if run.job.stock is None or turn is None or (mine is None) == (its is None):
+            continue
+        meeting = greatest_meeting(
+            cut_stock(run.decoded, run.target, run.job),
+            cut_stock(other.decoded, other.target, other.job),
+            turn,
+            run.job.stock.thickness_mm,
+        )
+        if meeting.low > MEETING_MM:
+            found.append(
+                FACES_MEET(
+                    where=place_words(meeting.at_mm),
+                    measured=meeting.low,
+                    other=other.job.setup_of[1].name,
+                )
+            )
+    return tuple(found)
+
+
+def _add_findings(run: Run, more: tuple[Finding, ...]) -> Run:
+    """Return the run and its report with more findings."""
+    if not more or run.verification is None:
+        return run
+    findings = _merge_findings(run.findings, more)
+    return replace(run, findings=findings, verification=run.verification.with_findings(findings))
+
+
 def _kth_of(several: Callable[[], tuple[T, ...]], k: int) -> T:
     return several()[k]
 
@@ -231,6 +307,7 @@ def _post_plan(
         findings = _merge_findings(findings, _stock_findings(Case(decoded, target), None, job))
         return replace(run, program=program, decoded=decoded, findings=findings)
     from camtool.planning.drawn import kept_of
+    from camtool.planning.naming import setup_words
     from camtool.stock.checks import stock_request
     from camtool.verification.cuts import rapid_length_mm
     from camtool.verification.report import Planned, rounded
@@ -269,6 +346,7 @@ def _post_plan(
         stock=_stock(job),
         zero=job.placement.origin,
         cut_mm=_cut_mm(wanted),
+        setup=setup_words(job),
     )
     asked = stock_request(judged.steps, job, _beside_mm(case), is_whole=how.is_whole)
     del judged, whole  # the paths of the stages are not needed any more

@@ -505,19 +505,21 @@ ReadJob = Callable[["Table"], "Job"]
 
 @dataclass(frozen=True)
 class JobFlags:
-    """`--job`, `--operation` and the flags that set the same keys; `given` has the values of those
-    that were given. `project`: the defaults of the project."""
+    """`--job`, `--operation`, `--setup` and the flags that set the same keys as a job; `given` has
+    the values of those that were given. `project`: the defaults of the project."""
 
     file: str | None = None
     operations: tuple[str, ...] = ()
     given: Mapping[str, Any] = field(default_factory=dict)
     project: Project | None = None
+    setup: str | None = None
 
     @property
     def is_given(self) -> bool:
         """True if a flag sets anything of the job."""
         own = None if self.project is None or self.project.job is None else str(self.project.job)
-        return bool(self.operations or self.given) or self.file not in (None, own)
+        chosen = self.operations or self.setup is not None
+        return bool(chosen or self.given) or self.file not in (None, own)
 
     def job(self, drawing: DrawingFlags) -> Job:
         """Return the job of the file, with the given flags over it.
@@ -533,8 +535,8 @@ class JobFlags:
             file, tables_of_flags(self.given), self.operations, self._tools_and_defaults()
         )
         if drawing.layers and len(job.operations) == 1:
-            return replace(job, operations=(replace(job.operations[0], layers=drawing.layers),))
-        return job
+            job = replace(job, operations=(replace(job.operations[0], layers=drawing.layers),))
+        return job if self.setup is None else job.setup(self.setup)
 
     def as_file(self, drawing: DrawingFlags, place: Path) -> tuple[Job, Table, ReadJob]:
         """Return the job, its tables as one file at this place, and the function that makes a job
@@ -545,8 +547,9 @@ class JobFlags:
         from camtool.jobs.build import JobTables, read_job_file, tables_of_flags
         from camtool.jobs.changes import job_of_tables, together
 
-        if self.operations:
-            raise click.UsageError("--operation leaves a part of the job; this needs all of it")
+        if self.operations or self.setup is not None:
+            flag = "--operation" if self.operations else "--setup"
+            raise click.UsageError(f"{flag} leaves a part of the job; this needs all of it")
         wanted = self.job(drawing)
         file = (
             JobTables()
@@ -643,15 +646,18 @@ def own_tolerances(drawing: Path) -> Path | None:
 def job_options(command: Command) -> Command:
     """Add `job: JobFlags`."""
 
-    def made(job: str | None, operation: tuple[str, ...], **keys: Any) -> JobFlags:
+    def made(
+        job: str | None, operation: tuple[str, ...], setup: str | None, **keys: Any
+    ) -> JobFlags:
         from camtool.project import project_of
 
         given = {name: value for name, value in keys.items() if value is not None}
         project = project_of(Path.cwd())
         default = project.job if job is None else None
-        return JobFlags(job if default is None else str(default), operation, given, project)
+        file = job if default is None else str(default)
+        return JobFlags(file, operation, given, project, setup)
 
-    names = ["job", "operation", *(name for keys in FLAGS.values() for name in keys)]
+    names = ["job", "operation", "setup", *(name for keys in FLAGS.values() for name in keys)]
     of_job = next(iter(FLAGS))
     options = [
         option(of_job, "--job", metavar="FILE", help="A TOML file with values for these flags."),
@@ -662,6 +668,7 @@ def job_options(command: Command) -> Command:
             metavar="NAME",
             help="Only this operation of the file, by name or number.",
         ),
+        option(of_job, "--setup", metavar="NAME", help="Only this set-up of the file."),
         *(
             _key_flag(head, name, key)
             for head, keys in FLAGS.items()

@@ -57,6 +57,7 @@ from camtool.records import replace
 
 if TYPE_CHECKING:
     from camtool.pictures.scene import Scene
+    from camtool.planning.job import Job
     from camtool.run import Run
     from camtool.target.registry import LoadedTarget
     from camtool.toolpath.wanted import ToolNote
@@ -115,16 +116,22 @@ class Posting:
             run = post_drawing(read, wanted, target, **self._settings(pictures))
         return self.inspection.inspect_run(run)
 
-    def make_by_tool(
-        self, source: str, target: LoadedTarget, *, pictures: Sequence[str] = ()
+    def make_parts(
+        self,
+        source: str,
+        target: LoadedTarget,
+        job: Job,
+        *,
+        by_tool: bool,
+        pictures: Sequence[str] = (),
     ) -> tuple[Run, ...]:
-        """Post the drawing as a program for each turn of a tool."""
-        from camtool.pipeline import post_by_tool
+        """Post the drawing as a program for each set-up of the job, or for each turn of a tool."""
+        from camtool.pipeline import post_by_setup, post_by_tool
 
-        wanted = self.job.job(self.drawing)
-        read = self.drawing.read(source, target.machine, wanted)
+        read = self.drawing.read(source, target.machine, job)
         with self.job.name_job_file():
-            return post_by_tool(read, wanted, target, **self._settings(pictures))
+            parts = post_by_tool if by_tool else post_by_setup
+            return parts(read, job, target, **self._settings(pictures))
 
     def _settings(self, pictures: Sequence[str]) -> dict[str, Any]:
         """Return the settings of posting, for pictures of these names."""
@@ -224,8 +231,13 @@ def post(
         reads = [*posting.files(source), str(target.file)]
         asked = RequestedOutputs(source, output, outputs, reads)
         asked.check(target.machine.target.extension, verified=not posting.no_verify)
-        if split is not None:
-            runs = posting.make_by_tool(source, target, pictures=outputs.pictures)
+        job = posting.job.job(posting.drawing)
+        if job.setups:
+            _refuse_beside_setups(posting, split, (output or source, preview, page), job)
+        if split is not None or job.setups:
+            runs = posting.make_parts(
+                source, target, job, by_tool=split is not None, pictures=outputs.pictures
+            )
             painters = [
                 picture.painter(lambda run=run: scenes_of(run, before=before_after), quiet=quiet)  # type: ignore[misc]
                 for run in runs
@@ -236,6 +248,19 @@ def post(
         return finish(run, asked, picture=painter, quiet=quiet, verbose=verbose)
 
     return watch(once, lambda: posting.files(source), quiet=quiet) if watching else once()
+
+
+def _refuse_beside_setups(
+    posting: Posting, split: str | None, names: Sequence[str | None], job: Job
+) -> None:
+    """Refuse what programs of several set-ups cannot have."""
+    known = ", ".join(each.name for each in job.setups)
+    one = f"name one of them with --setup: {known}"
+    if split is not None:
+        raise click.UsageError(f"--split is for the tools of one set-up; {one}")
+    if STDOUT in names:
+        raise click.UsageError(f"a program is written for each set-up; name a file, or {one}")
+    posting.inspection.check(without=f"[[setups]] without --setup; {one}")
 
 
 # How `post` and `convert` end: all files or none, and a short summary.
@@ -384,10 +409,11 @@ def _placeholder_words(names: Sequence[str]) -> str:
 
 
 def _part(run: Run, asked: RequestedOutputs, number: int, count: int) -> RequestedOutputs:
-    """Return the outputs of one program of `count`: all names with its number and its tool, which
-    sort in the order of the runs."""
+    """Return the outputs of one program of `count`: all names with its number, and its set-up or
+    its tool, which sort in the order of the runs."""
     tool = _tool(run)
     kind = "tool" if tool is None else tool.name or SHORT.get(tool.kind, tool.kind)
+    kind = _setup_name(run) or kind
     plain = re.sub(r"[^A-Za-z0-9_]+", "-", kind).strip("-")[:MAX_NAME_CHARS] or "tool"
     mark = f"-{number:0{len(str(count))}}-{plain}"
 
@@ -410,14 +436,21 @@ def _tool(run: Run) -> ToolNote | None:
     return None if operations is None else operations.notes[0].tool
 
 
+def _setup_name(run: Run) -> str | None:
+    """Return the name of the set-up of a program that is one of several."""
+    whole = None if run.job is None else run.job.setup_of
+    return None if whole is None else whole[1].name
+
+
 def _programs_json(runs: Sequence[Run], parts: Sequence[RequestedOutputs]) -> bytes:
-    """Return JSON with file, tool, picture, page and report of each program."""
+    """Return JSON with file, set-up, tool, picture, page and report of each program."""
     programs = []
     for run, part in zip(runs, parts, strict=True):
         tool = _tool(run)
         programs.append(
             {
                 "program": part.output,
+                "setup": _setup_name(run),
                 "tool": None if tool is None else {"number": tool.number, "name": tool.name},
                 "preview": part.outputs.preview,
                 "page": part.outputs.page,

@@ -5,6 +5,7 @@
     [place]                         # the drawing in the work frame
     [stock]
     [[keep_out]]                    # clamps
+    [[setups]]                      # sides of the part
     [tools.finish]
     [[operations]]                  # in the order in which they are cut
 
@@ -33,6 +34,7 @@ from camtool.jobs.keys import (
     KEEP_OUT,
     OPERATION,
     PLACE,
+    SETUP,
     STOCK,
     TOOL_KEYS,
     TOOL_NAME,
@@ -44,6 +46,7 @@ from camtool.jobs.tools import Described, Shop, Tools, Used, tool_tables, tools_
 from camtool.keys import Given, Table, record_of, table_of, why_idle
 from camtool.planning.job import (
     Job,
+    JobSetup,
     KeepOutBox,
     Operation,
     Placement,
@@ -66,7 +69,7 @@ _OF_FINISH = ("finish", "finish_feed", "finish_spindle", FINISH_TOOL)
 _OF_WALLS = ("allowance", *_OF_FINISH)
 """Keys whose fields depend on tools."""
 
-TABLES = ("place", "stock", "keep_out", "tools", "operations")
+TABLES = ("place", "stock", "keep_out", "setups", "tools", "operations")
 """Tables of a job file."""
 
 AT_THE_TOP = (*WHOLE, *OF_OPERATIONS, "origin", *TABLES)
@@ -83,6 +86,8 @@ EITHER = {"depth": "breakthrough", "breakthrough": "depth", "scale": "fit", "fit
 
 _ANY_STOCK = {"thickness_mm": 1.0}
 
+_ANY_SETUP = partial(JobSetup, name="", operations=())
+
 _ANY_BOX = partial(KeepOutBox, name="", x_mm=(0.0, 1.0), y_mm=(0.0, 1.0))
 
 
@@ -94,6 +99,7 @@ class JobTables(Struct, frozen=True):
     place: Table = field(default_factory=Table)
     stock: Table | None = None
     keep_out: tuple[Table, ...] = ()
+    setups: tuple[Table, ...] = ()
     tools: Mapping[str, Described] = field(default_factory=dict)
     defaults: Table = field(default_factory=Table)
     operations: tuple[Table, ...] | None = None
@@ -136,6 +142,7 @@ def tables_of(values: dict[str, Any], path: Path) -> JobTables:
         if "stock" in values
         else None,
         keep_out=_list_of_tables(values, "keep_out", "boxes", KEEP_OUT, file),
+        setups=_list_of_tables(values, "setups", "set-ups", SETUP, file),
         tools=tool_tables(values, file),
         defaults=defaults,
         operations=operations,
@@ -212,13 +219,40 @@ def build_job(
         )
     keys = {name for name in WHOLE if name not in _OF_TOOLS}
     job = record_of(Job, WHOLE, whole.only(keys))
-    return replace(
+    job = replace(
         job,
         operations=tuple(operations[n] for n in rows),
         placement=_placement(file, flags),
         stock=stock,
         keep_out=tuple(_keep_out(n, table) for n, table in enumerate(file.keep_out, start=1)),
     )
+    return _with_setups(job, file.setups, [operation.name for operation in operations])
+
+
+def _with_setups(job: Job, tables: Sequence[Table], names: Sequence[str]) -> Job:
+    """Return the job with its set-ups: where it has some of the operations of these `names` alone,
+    with as many of each set-up."""
+    gone = set(names) - {each.name for each in job.operations}
+    setups = []
+    for table in tables:
+        for key in ("name", "operations"):
+            if key not in table.given:
+                raise table.refused(f"key {key} is missing", "give name and operations")
+        setup = record_of(_ANY_SETUP, SETUP, table.only(["name", "operations", "flip"]))
+        others = {SETUP[key].field: SETUP[key].read(table.given[key]) for key in table.given}
+        try:
+            setup = replace(setup, **others)
+        except OptionError as error:
+            raise table.refused(error.message, error.mend) from error
+        left = tuple(name for name in setup.operations if name not in gone)
+        if left:
+            setups.append(replace(setup, operations=left))
+    try:
+        return replace(job, setups=tuple(setups))
+    except OptionError as error:
+        if tables and not error.file:
+            error.file = tables[0].file
+        raise
 
 
 def job_of_file(path: Path, chosen: tuple[str, ...] = (), libraries: tuple[Path, ...] = ()) -> Job:

@@ -70,6 +70,8 @@ def together(file: JobTables, flags: JobTables, folder: Path) -> Values:
         tables["stock"] = _raw(file.stock)
     if file.keep_out:
         tables["keep_out"] = [_raw(each) for each in file.keep_out]
+    if file.setups:
+        tables["setups"] = [_raw(each) for each in file.setups]
     if file.tools:
         tables["tools"] = {
             name: {

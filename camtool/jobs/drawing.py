@@ -28,9 +28,10 @@ knows its size within the tolerance of the previous one."""
 
 
 def read_for_job(data: bytes, file: str, options: ReadOptions, job: Job) -> Drawing:
-    """The drawing in the content of a file, of the layers that the job's operations take, or of
-    those that `options` select. OptionError for a layer or colour of the job that the drawing has
-    not, unless `options` select some."""
+    """The drawing in the content of a file, of the layers that the job's operations take, in all
+    set-ups of the part, or of those that `options` select. OptionError for a layer or colour of
+    the job that the drawing has not, unless `options` select some."""
+    job = job.whole
     chosen, wanted = options.select, layers_of(job)
     options = replace(options, select=replace(chosen, layers=chosen.layers or wanted))
     try:

@@ -1,6 +1,6 @@
 """The keys of job files: the field that each fills, and the flag that says the same.
 
-    WHOLE, PLACE, STOCK, KEEP_OUT, TOOL, OPERATION: every key, table by table
+    WHOLE, PLACE, STOCK, KEEP_OUT, SETUP, TOOL, OPERATION: every key, table by table
     FLAGS: those that are flags
 
 Kinds of operations name the keys that they know, and may bring keys of their own
@@ -84,6 +84,13 @@ def layers(value: object) -> tuple[str, ...]:
 def words(value: object) -> tuple[str, ...]:
     """A list of words to select by, or one text with commas between them."""
     return tuple(word(SELECTED)(Given(each, "")) for each in layers(value))
+
+
+def names(value: object) -> tuple[str, ...]:
+    """A list of names of operations."""
+    if not isinstance(value, list) or not value:
+        raise OptionError(f"{value!r} is no list of names", mend='write it like ["holes", "edge"]')
+    return tuple(text(each) for each in value)
 
 
 def length_range(value: object) -> tuple[float, float]:
@@ -365,6 +372,16 @@ KEEP_OUT = {
     "z": Key("z_mm", SPAN),
 }
 """Keys of `[[keep_out]]`: `x` and `y` must be there."""
+
+SETUP = {
+    "name": Key("name", TEXT),
+    "operations": Key("operations", Value(plain(names))),
+    "flip": Key("flip", one_of(("x", "y"))),
+    "line": Key("line_mm", LENGTH),
+    "pins": Key("pins_mm", Value(plain(places))),
+    "flip_error": Key("flip_error_mm", LENGTH),
+}
+"""Keys of `[[setups]]`: `name` and `operations` must be there."""
 
 TOOL = {
     "diameter": Key("diameter_mm", LENGTH, "0 for a point (default)."),

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from camtool.errors import OptionError
-from camtool.patterns import matches
+from camtool.patterns import guess, matches
 from camtool.planning.kinds import OperationKind, function_of, installed_kinds, kind_named
 from camtool.records import replace
 
@@ -46,6 +46,12 @@ LEADS = ("none", "line", "arc")
 
 STARTS = ("nearest", "longest-line", "corner")
 """Places at which a closed contour may begin, if not at a place given by hand."""
+
+FINISH = " finish"
+"""Ends the names of finishing passes."""
+
+PIN_SLACK_MM = 0.001
+"""Pins meet within this, when a part is turned over."""
 
 ORIGINS = ("drawing", "lower-left", "centre")
 """Places of part zero: at the drawing's own zero, or at a place of the paths that are cut."""
@@ -696,7 +702,7 @@ class Operation:
             replace(
                 plain,
                 stage="finish",
-                name=f"{self.name or self.kind} finish",
+                name=f"{self.name or self.kind}{FINISH}",
                 tool=self.finish_tool or self.tool,
                 feed_mm_min=self.feed_mm_min if feed is None else feed,
                 spindle_rpm=self.spindle_rpm if speed is None else speed,
@@ -828,7 +834,9 @@ class Placement:
     """The way of the drawing into the work frame, in this order: mirrored ("x" turns the sign of
     x, "y" of y), rotated, scaled by `scale` or to fit into `fit_mm` (width, height; 0: any),
     repeated `copies` (columns, rows) times at `pitch_mm`; then `origin` becomes part zero: one
-    of ORIGINS, or the place (x, y) mm of the drawing so changed."""
+    of ORIGINS, or the place (x, y) mm of the drawing so changed. Last the part is turned over, as
+    `flip` says: about a line along "x" or "y", which lies so far from zero, mm. A set-up gives
+    that."""
 
     origin: str | tuple[float, float] = "drawing"
     mirror: str | None = None
@@ -837,6 +845,7 @@ class Placement:
     fit_mm: tuple[float, float] | None = None
     copies: tuple[int, int] = (1, 1)
     pitch_mm: tuple[float, float] = (0.0, 0.0)
+    flip: tuple[str, float] | None = None
 
     def __post_init__(self) -> None:
         if isinstance(self.origin, str):
@@ -910,6 +919,15 @@ class Stock:
         (x, y), (width, height) = self.corner_mm, self.size_mm
         return x, y, x + width, y + height
 
+    def turned(self, axis: str, line_mm: float) -> Stock:
+        """Return the stock turned over about a line along an axis, so far from zero."""
+        if self.corner_mm is None or self.size_mm is None:
+            return self
+        across = 0 if axis == "y" else 1
+        corner = list(self.corner_mm)
+        corner[across] = 2.0 * line_mm - corner[across] - self.size_mm[across]
+        return replace(self, corner_mm=(corner[0], corner[1]))
+
     @property
     def through_mm(self) -> float:
         """Greatest depth of cuts below the stock, mm."""
@@ -939,6 +957,41 @@ class KeepOutBox:
 
 
 @dataclass(frozen=True)
+class JobSetup:
+    """One clamping of the part: a name, and the names of the operations that are done in it.
+
+    `flip`: the part lies turned over, about a line along "x" or "y" that is `line_mm` from zero
+    (None: through the middle of the stock), so that its other face is up, and the top of the stock
+    is Z0 again; X0 Y0 stays where it is. `pins_mm`: places (x, y) of alignment pins, which meet
+    again when the part is turned. `flip_error_mm`: how far the faces may lie beside each other,
+    None if that is not known."""
+
+    name: str
+    operations: tuple[str, ...]
+    flip: str | None = None
+    line_mm: float | None = None
+    pins_mm: tuple[tuple[float, float], ...] = ()
+    flip_error_mm: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.flip is not None:
+            one_of("flip", self.flip, ("x", "y"))
+            at_least_zero("flip error", self.flip_error_mm or 0.0, "mm")
+            return
+        for key, value in (
+            ("line", self.line_mm),
+            ("flip_error", self.flip_error_mm),
+            ("pins", self.pins_mm or None),
+        ):
+            if value is not None:
+                raise OptionError(
+                    f"{key} has no effect without flip",
+                    where=f"key {key}",
+                    mend='give flip = "y" for a part that is turned over left to right',
+                )
+
+
+@dataclass(frozen=True)
 class Job:
     """A job: all that is to be cut of a drawing.
 
@@ -946,8 +999,10 @@ class Job:
     one of GOALS. `compensate`: what is written is bent beforehand against the mechanics of its
     machine. `frames`: patterns of the layers whose contours, where they are not cut, are no edges
     of parts. `keep_out`: boxes that no tool may enter. `text`: how the drawing's text is read, ""
-    where the job does not say it. Operations with a breakthrough get their depth, those with a
-    finishing pass become two. Raises OptionError for what no job can be."""
+    where the job does not say it. `setups`: the clampings of a part that is cut from several
+    sides, each of which is a job of its own (`setup`), with the whole job and what that says of it
+    in `setup_of`. Operations with a breakthrough get their depth, those with a finishing pass
+    become two. Raises OptionError for what no job can be."""
 
     operations: tuple[Operation, ...] = field(default_factory=lambda: (Operation(),))
     placement: Placement = Placement()
@@ -959,6 +1014,8 @@ class Job:
     frames: tuple[str, ...] = FRAMES
     keep_out: tuple[KeepOutBox, ...] = ()
     text: str = ""
+    setups: tuple[JobSetup, ...] = ()
+    setup_of: tuple[Job, JobSetup] | None = None
 
     def __post_init__(self) -> None:
         above_zero("safe Z", self.safe_z_mm, "mm")
@@ -968,6 +1025,104 @@ class Job:
         deep = [each.settled(self.stock) for each in self.operations]
         made = [stage for each in rested(deep) for stage in each.stages()]
         object.__setattr__(self, "operations", tuple(made))
+        self._refuse_setups()
+
+    def _refuse_setups(self) -> None:
+        """Refuse set-ups of one name or of unknown operations, and operations of no set-up."""
+        names = [each.name for each in self.setups]
+        known = [each.name for each in self.operations if each.stage != "finish"]
+        for row, setup in enumerate(self.setups):
+            where = f"table [[setups]] {row + 1} {setup.name!r}"
+            if not setup.name or setup.name in names[:row]:
+                raise OptionError(
+                    "set-ups have names of their own", where=where, mend="give each a name"
+                )
+            for name in setup.operations:
+                if name not in known:
+                    raise OptionError(
+                        f"there is no operation {name!r}",
+                        where=f"{where}, key operations",
+                        mend=guess(name, known) or f"known: {', '.join(known)}",
+                    )
+            if not setup.operations:
+                raise OptionError(
+                    "has no operations", where=where, mend=f"known: {', '.join(known)}"
+                )
+            if setup.flip is not None:
+                self._turned(setup, where)
+        taken = {name for setup in self.setups for name in setup.operations}
+        for name in known:
+            if self.setups and name not in taken:
+                raise OptionError(
+                    f"operation {name!r} is in no set-up",
+                    where="table [[setups]]",
+                    mend="name it under operations of one of them",
+                )
+
+    def setup(self, name: str) -> Job:
+        """Return the job of one set-up: its operations, the drawing turned over as it says, and
+        the stock as it lies then. OptionError for a name that no set-up has."""
+        chosen = next((each for each in self.setups if each.name == name), None)
+        if chosen is None:
+            names = [each.name for each in self.setups]
+            raise OptionError(
+                f"there is no set-up {name!r}",
+                where="--setup",
+                mend=guess(name, names)
+                or (f"known: {', '.join(names)}" if names else "the job has no [[setups]]"),
+            )
+        operations = tuple(
+            each
+            for each in self.operations
+            if each.name.removesuffix(FINISH if each.stage == "finish" else "")
+            in chosen.operations
+        )
+        placement, stock = self.placement, self.stock
+        if chosen.flip is not None:
+            line = self._turned(chosen, f"set-up {name!r}")
+            placement = replace(placement, flip=(chosen.flip, line))
+            stock = None if stock is None else stock.turned(chosen.flip, line)
+        return replace(
+            self,
+            operations=operations,
+            placement=placement,
+            stock=stock,
+            setups=(),
+            setup_of=(self, chosen),
+        )
+
+    def _turned(self, setup: JobSetup, where: str) -> float:
+        """Return where the line lies about which a set-up is turned over, mm; OptionError where
+        nobody knows, and for pins that do not meet again."""
+        across = 0 if setup.flip == "y" else 1
+        line = setup.line_mm
+        if line is None:
+            box = None if self.stock is None else self.stock.box_mm
+            if box is None:
+                raise OptionError(
+                    "the line about which the part is turned over is not known",
+                    where=where,
+                    mend="give line, its distance from zero, or [stock] with corner and size: then"
+                    " it goes through the middle of the stock",
+                )
+            line = 0.5 * (box[across] + box[across + 2])
+        for x, y in setup.pins_mm:
+            place = [x, y]
+            place[across] = 2.0 * line - place[across]
+            if not any(math.dist(place, pin) <= PIN_SLACK_MM for pin in setup.pins_mm):
+                raise OptionError(
+                    f"the pin at X{x:g} Y{y:g} meets no other one, nor itself, when the part is"
+                    f" turned over: there is none at X{place[0]:g} Y{place[1]:g}",
+                    where=f"{where}, key pins",
+                    mend=f"put pins on the line {'XY'[across]}{line:g}, or the same distance on"
+                    " both sides of it",
+                )
+        return line
+
+    @property
+    def whole(self) -> Job:
+        """The job with all set-ups of the part, of which it may be one."""
+        return self if self.setup_of is None else self.setup_of[0]
 
     @property
     def layers(self) -> tuple[str, ...]:

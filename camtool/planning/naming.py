@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from camtool.findings import Finding, Sentence
 from camtool.machine.model import Machine
-from camtool.planning.job import Operation, Tool
+from camtool.planning.job import Job, Operation, Tool
 from camtool.toolpath.wanted import TOOL_SHAPES
 
 MAX_LISTED = 12
@@ -88,3 +88,24 @@ def shortened_list(findings: Sequence[Finding], more: Sentence) -> list[Finding]
     if rest:
         listed.append(more(where=rest[0].where, measured=len(rest), severity=rest[0].severity))
     return listed
+
+
+def setup_words(job: Job) -> str:
+    """Return in words what set-up of a part this is, how the part lies in it, and how far its face
+    may lie beside the other; "" for a job that is no set-up."""
+    if job.setup_of is None:
+        return ""
+    setup, turn = job.setup_of[1], job.placement.flip
+    if turn is None:
+        return setup.name
+    axis, line_mm = turn
+    sides = ("left and right", "X") if axis == "y" else ("front and back", "Y")
+    words = [f"{setup.name}: turned over about {sides[1]} {line_mm:g}, {sides[0]} change places"]
+    if setup.pins_mm:
+        words.append("pins at " + ", ".join(f"X{x:g} Y{y:g}" for x, y in setup.pins_mm))
+    beside = setup.flip_error_mm
+    known = "an unknown length" if beside is None else f"up to {beside:g} mm"
+    words.append(
+        f"its cuts lie {known} beside those of the other face (flip_error), which is in no error"
+    )
+    return "; ".join(words)

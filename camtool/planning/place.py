@@ -1,9 +1,10 @@
 """The drawing in the work frame: mirrored, turned, scaled, repeated, its zero where the job says.
 
-    mirror ──▶ rotate ──▶ scale or fit ──▶ copies at their pitch ──▶ origin
+    mirror ──▶ rotate ──▶ scale or fit ──▶ copies at their pitch ──▶ origin ──▶ turned over
 
 Every point goes through one map, p ↦ M p + d, with M = s · R · F: the scale s, the rotation R and
-the mirror F. All three keep angles, so a bulge keeps its size; a mirror changes its sign.
+the mirror F. All three keep angles, so a bulge keeps its size; a mirror changes its sign. A set-up
+that turns the part over is a mirror too, behind all others.
 """
 
 from __future__ import annotations
@@ -107,7 +108,17 @@ def placements(drawing: Drawing, job: Job) -> list[AffineMap]:
     """
     first, shifts = _first_map(drawing, job), _copy_shifts(job.placement)
     first = first.moved(-_origin(drawing, job, first, shifts))
-    return [first.moved(shift) for shift in shifts]
+    return [_turn_over(first.moved(shift), job.placement.flip) for shift in shifts]
+
+
+def _turn_over(where: AffineMap, flip: tuple[str, float] | None) -> AffineMap:
+    """Return the map followed by turning over about a line along an axis, so far from zero."""
+    if flip is None:
+        return where
+    axis, line_mm = flip
+    turn = np.diag([-1.0, 1.0] if axis == "y" else [1.0, -1.0])
+    shift = np.array([2.0 * line_mm, 0.0] if axis == "y" else [0.0, 2.0 * line_mm])
+    return AffineMap(turn @ where.matrix, turn @ where.shift + shift, where.scale)
 
 
 def part_scale(drawing: Drawing, job: Job) -> float:
@@ -279,6 +290,7 @@ def _box(drawing: Drawing, job: Job, where: AffineMap) -> Floats | None:
 def rows_taken(drawing: Drawing, job: Job) -> tuple[list[int], list[int]]:
     """Return the indices of the paths that any operation takes, and of the marks that any one
     drills."""
+    job = job.whole  # all set-ups of a part have one place
     drills = [operation for operation in job.operations if operation.contract.takes == "holes"]
     takes = _cached(job.takes)
     drilled = _cached(lambda *names: any(drill.takes(*names) for drill in drills))

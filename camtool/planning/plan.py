@@ -102,8 +102,15 @@ def planned(drawing: Drawing, job: Job, machine: Machine, *, undivided: bool = F
     divided into runs to avoid axis reversals are left whole. Those that were not keep their chosen
     start points, on which ramps, leads and tabs depend. No approach moves are added.
     """
+    if job.setups:
+        names = ", ".join(setup.name for setup in job.setups)
+        raise OptionError(
+            "the job has several set-ups, and a program cuts one of them",
+            where="table [[setups]]",
+            mend=f"name one with --setup: {names}",
+        )
     placed = place(drawing, job)
-    sides = Sides.of(placed, job, machine.defaults.cut_depth_mm)
+    sides = Sides.of(placed, _with_all_setups(job), machine.defaults.cut_depth_mm)
     here: Point = HOME
     steps: list[Step] = []
     settings = [setting_of(operation, job, machine) for operation in job.operations]
@@ -120,6 +127,13 @@ def planned(drawing: Drawing, job: Job, machine: Machine, *, undivided: bool = F
     steps = _rested(_sparing(steps))
     found = Plan(job, placed, tuple(steps), ToolpathBuilder().finish())
     return _linked(found, drawing, job, machine, undivided=undivided)
+
+
+def _with_all_setups(job: Job) -> Job:
+    """Return the job with the operations of the part's other set-ups behind its own: edges that
+    are cut in these are edges too."""
+    others = [each for each in job.whole.operations if each not in job.operations]
+    return replace(job, operations=(*job.operations, *others)) if others else job
 
 
 def _linked(

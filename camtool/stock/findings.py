@@ -83,6 +83,13 @@ class StockCode(Code):
         "the programs before this one have cut; the finding says what",
         "tools with the numbers that the program calls; or one program with all tools",
     )
+    FACES_MEET = (
+        610,
+        WARNING,
+        "set-ups from both faces cut so deep that they meet: the floor between them is cut away, "
+        "though neither goes through the stock there; its place and by how much are given",
+        "less depth in one of the set-ups, unless they shall meet",
+    )
 
 
 CUT_TOO_DEEP = Sentence(
@@ -157,3 +164,9 @@ STOCK_NOT_JUDGED_BEFORE = Sentence(
     "and holders are not judged, and pieces only if this program alone cuts them off",
 )
 TOOL_NOT_KNOWN = Sentence(StockCode.TOOL_NOT_KNOWN, "not known, and not judged: {bodies}")
+FACES_MEET = Sentence(
+    StockCode.FACES_MEET,
+    "this set-up and {other!r} meet: together they cut {measured:.4g} mm more than the stock is "
+    "thick",
+    "mm",
+)

@@ -417,7 +417,7 @@ class Planned(msgspec.Struct, frozen=True):
     the starts of the drawing; how the operations cut, their tools, and the stock, if the job says
     it. `zero`: where part zero is on the drawing, "drawing" for its own, "lower-left" or "centre"
     of what is cut, or a place (x, y) mm of it; `cut_mm`: left, lower, right and upper end of what
-    the tools cut."""
+    the tools cut; `setup`: which set-up of the part this is, in words."""
 
     rapid_drawn_mm: float
     rapid_mm: float
@@ -426,6 +426,7 @@ class Planned(msgspec.Struct, frozen=True):
     stock: PlannedStock | None = None
     zero: str | tuple[float, float] = "drawing"
     cut_mm: tuple[float, float, float, float] | None = None
+    setup: str = ""
 
 
 class BaselineReport(msgspec.Struct, frozen=True):
@@ -683,6 +684,8 @@ def summary_lines(report: Report) -> Iterator[tuple[str, str]]:
         f"X {total.x}, Y {total.y}, Z {total.z} (while cutting X {cutting.x}, Y {cutting.y})",
     )
     if report.planned is not None:
+        if report.planned.setup:
+            yield "set-up", report.planned.setup
         yield from (("cut", line) for line in _operation_words(report.planned.operations))
         far, drawn = report.planned.rapid_mm, report.planned.rapid_drawn_mm
         yield "rapids", f"{mm(far)} mm in XY ({mm(drawn)} mm in the order of the drawing)"
@@ -1147,6 +1150,8 @@ def mounting_lines(report: Report) -> Iterator[tuple[str, str]]:
     """Yield (name, value) of the place of the stock, the extents of the program, and its time and
     tools."""
     planned, extents = report.planned, report.extents_mm
+    if planned is not None and planned.setup:
+        yield "set-up", planned.setup
     stock = None if planned is None else planned.stock
     if stock is not None:
         yield "stock", _stock_words(stock)

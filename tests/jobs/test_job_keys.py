@@ -10,6 +10,7 @@ from camtool.jobs.keys import (
     LEAD,
     OPERATION,
     PLACE,
+    SETUP,
     STOCK,
     TABS,
     TOOL,
@@ -19,6 +20,7 @@ from camtool.jobs.keys import (
 from camtool.planning.job import (
     Entry,
     Job,
+    JobSetup,
     KeepOutBox,
     Lead,
     Operation,
@@ -39,17 +41,26 @@ def test_every_field_of_a_job_has_a_key() -> None:
 
     made_by_jobs = {"tool", "material", "preset", "stage", "rest_of", "own"}
     assert missing(Operation, OPERATION) == made_by_jobs
-    assert missing(Placement, PLACE) == missing(Stock, STOCK) == set()
+    assert missing(Placement, PLACE) == {"flip"}
+    assert missing(Stock, STOCK) == missing(JobSetup, SETUP) == set()
     assert missing(KeepOutBox, KEEP_OUT) == set()
     assert missing(Entry, ENTRY) == missing(Lead, LEAD) == missing(Tabs, TABS) == set()
     assert missing(Tool, TOOL) == {"name", "materials"}
-    assert missing(Job, WHOLE) == {"operations", "placement", "stock", "keep_out"}
+    assert missing(Job, WHOLE) == {
+        "operations",
+        "placement",
+        "stock",
+        "keep_out",
+        "setups",
+        "setup_of",
+    }
 
 
 def test_the_page_has_every_key_and_no_other() -> None:
     parts = re.split(r"^## ", PAGE, flags=re.MULTILINE)
     tables = {"The job": WHOLE, "`[place]`": PLACE, "`[stock]`": STOCK, "`[tools": TOOL}
     tables["`[[keep_out]]`"] = KEEP_OUT
+    tables["`[[setups]]`"] = SETUP
     tables["`[[operations]]`"] = {**OPERATION, "tool": None}
     for heading, keys in tables.items():
         (part,) = (part for part in parts if part.startswith(heading))
