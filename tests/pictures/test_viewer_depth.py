@@ -339,6 +339,17 @@ class TestShown:
             assert bool(floor[0] - floor[2] > 100) == red
             assert bool(floor[2] - floor[0] > 100) == blue
 
+    def test_the_tip_and_the_axes_of_part_zero_are_shown(self, shown: Any) -> None:
+        view = shown(scene_of_cuts(slot(-1.0), (0, MILL)))
+        view.page.locator("#play").focus()
+        for key, tip in (("Home", "X 0.000"), ("ArrowRight", "X 2.000"), ("End", "X 0.000")):
+            view.press(key)
+            assert view.text("#now").startswith(f"tool at\n{tip}"), key
+        view.press("g")
+        before = picture(view)
+        view.press("z")
+        assert picture(view) != before
+
     def test_without_a_tool_the_path_is_shown_and_it_says_so(self, shown: Any) -> None:
         view = shown(busy(Scene("no tool", toolpath=random_path(3))))
         assert not view.page.locator("#no-tool").is_visible()

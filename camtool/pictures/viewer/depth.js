@@ -7,6 +7,9 @@ const RIM = TILE + 1;
 const TOOL_SIDES = 40;
 const CUT_MS = 12;
 const ORBIT_PX = 0.008;
+/** Colours of the axes of X, Y and Z at part zero, and their length on the screen. */
+const AXIS_TINTS = [[214, 39, 40, 255], [44, 160, 44, 255], [31, 119, 220, 255]];
+const AXIS_PX = 36;
 const KEY_TURN = Math.PI / 24;
 /** While frames take longer than this, they are painted coarser, until the view rests: with every
  * 2nd, 4th … height, and a smaller share of the pixels. */
@@ -313,6 +316,8 @@ class Depth {
     for (let k = 0; k < first[count]; k++) lines.set(at.subarray(3 * k, 3 * k + 6), 6 * k);
     this.lines = this.given3d(lines);
     this.tool = this.given3d(new Float32Array(0));
+    this.axes = this.given3d(new Float32Array(18));
+    this.fill(this.axes.tints, Uint8Array.from(AXIS_TINTS.flatMap((tint) => [...tint, ...tint])));
     this.tints = new Uint8Array(8 * first[count]);
   }
 
@@ -527,6 +532,7 @@ class Depth {
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
     this.paintLines(colours);
     this.paintTool(colours);
+    if (this.layers.on.get("zero")) this.paintAxes();
     if (this.mark) this.paintMark(colours);
     return isCut;
   }
@@ -622,6 +628,17 @@ class Depth {
     gl.enable(gl.CULL_FACE);
     gl.drawArrays(gl.TRIANGLES, 0, this.toolCount);
     gl.disable(gl.CULL_FACE);
+  }
+
+  /** The axes of the work frame at part zero. */
+  paintAxes() {
+    const { gl } = this, at = this.use(this.given), long = AXIS_PX / this.scale;
+    this.fill(this.axes.points, Float32Array.from([0, 0, 0, long, 0, 0, 0, 0, 0, 0, long, 0, 0, 0, 0, 0, 0, long]));
+    gl.bindVertexArray(this.axes.array);
+    gl.uniform3f(at.shift, 0, 0, 0);
+    gl.uniform4f(at.over, 0, 0, 0, 0);
+    gl.uniform1i(at.isLine, 1);
+    gl.drawArrays(gl.LINES, 0, 6);
   }
 
   /** A post on the place that a table speaks of, seen through the stock. */

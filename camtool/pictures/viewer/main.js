@@ -245,7 +245,7 @@ function begin() {
   const moved = (isTold) => {
     stage.soon("moved");
     if (!isTold) return;
-    showMove(head, columns, run);
+    showMove(head, columns, run, stage.depth);
     const block = columns.move_block[run.row];
     listing.show(block, block);
   };
@@ -375,9 +375,14 @@ function showHelp(isShown) {
   find("help-button").setAttribute("aria-expanded", String(isShown));
 }
 
-/** The current move, beside the picture. */
-function showMove(head, columns, run) {
-  find("now").replaceChildren(factTable(moveFacts(head, columns, run, run.row)));
+/** The current move, and where the tip of the tool is now, beside the picture. */
+function showMove(head, columns, run, depth) {
+  const facts = moveFacts(head, columns, run, run.row);
+  if (depth) {
+    const [x, y, z] = (run.place || [...depth.slides.place(run.row, run.share)]).map((value) => value.toFixed(3));
+    facts.unshift(["tool at", `X ${x}  Y ${y}  Z ${z} mm`]);
+  }
+  find("now").replaceChildren(factTable(facts));
 }
 
 /** The facts of what lies under the cursor, beside the cursor. */
