@@ -17,6 +17,7 @@ from camtool.run import Run, Shown
 from camtool.simulation.motion import ALL, IDEAL, Options
 from camtool.toolpath.moves import toolpath_extents
 from camtool.units import UM_PER_MM
+from camtool.verification.contrast import contrast_row, contrast_table, paths_within, worst_place
 from camtool.verification.cuts import cut_moves
 
 if TYPE_CHECKING:
@@ -81,8 +82,6 @@ class Comparison(Shown):
     @property
     def rows(self) -> tuple[ContrastRow, ...]:
         """A row for each variant: errors µm, time s, counts."""
-        from camtool.verification.contrast import contrast_row
-
         return tuple(contrast_row(name, each.report) for name, each in self.verdicts.items())
 
     def scene(self) -> Overlay:
@@ -91,7 +90,6 @@ class Comparison(Shown):
         import numpy as np
 
         from camtool.pictures.overlay import Overlay
-        from camtool.verification.contrast import paths_within, worst_place
 
         commanded = all(each.judging.interpolator is not None for each in self.ways)
         first, decoded = self.ways[0].target, self.runs[0].decoded
@@ -131,8 +129,6 @@ class Comparison(Shown):
         return np.array([[x - half, x + half], [y - half, y + half]])
 
     def __str__(self) -> str:
-        from camtool.verification.contrast import contrast_table
-
         return contrast_table(self.rows)
 
     def __repr__(self) -> str:

@@ -26,11 +26,12 @@ from camtool.bounds import TooLongError
 from camtool.errors import OptionError, ProgramError
 from camtool.findings import Finding, Severity, worst
 from camtool.planning.job import Job
+from camtool.planning.naming import tool_words
 from camtool.progress import Progress
 from camtool.records import replace
 from camtool.run import Run
 from camtool.simulation.motion import ALL
-from camtool.toolpath.moves import toolpath_extents
+from camtool.toolpath.moves import feeds_below_top, toolpath_extents
 from camtool.toolpath.program import Program
 from camtool.verification.case import (
     TRACE_POINTS,
@@ -40,6 +41,16 @@ from camtool.verification.case import (
     coverage_of,
     nose_of,
     tool_mm,
+)
+from camtool.verification.report import (
+    BaselineReport,
+    Planned,
+    PlannedOperation,
+    PlannedStock,
+    PlannedTool,
+    gate_findings,
+    rounded,
+    stock_gate_findings,
 )
 
 if TYPE_CHECKING:
@@ -310,7 +321,6 @@ def _post_plan(
     from camtool.planning.naming import setup_words
     from camtool.stock.checks import stock_request
     from camtool.verification.cuts import rapid_length_mm
-    from camtool.verification.report import Planned, rounded
 
     plain = plain_run()
     # Contours that are divided at reversals are judged as the whole contours of the drawing.
@@ -589,7 +599,6 @@ def _repeated_findings(program: Program, decoded: Toolpath) -> set[Finding]:
 def _operations(steps: Sequence[Step]) -> tuple[PlannedOperation, ...]:
     """Return the rows of the report for the operations that cut something."""
     from camtool.planning.checks import deepest_pass
-    from camtool.verification.report import PlannedOperation, rounded
 
     cutting = [step for step in steps if step.runs]
     tools = list(dict.fromkeys(step.operation.tool for step in cutting))
@@ -639,9 +648,6 @@ def _deepest_mm(step: Step) -> float:
 
 def _tools(steps: Sequence[Step]) -> tuple[PlannedTool, ...]:
     """The tools of the operations that cut something, in the order of first use."""
-    from camtool.planning.naming import tool_words
-    from camtool.verification.report import PlannedTool, rounded
-
     deepest: dict[Tool, float] = {}
     for step in steps:
         if step.runs:
@@ -659,8 +665,6 @@ def _with_times(
     """The operations with the time that each takes, from where it has its turn: a change of tools
     and the way to its first cut are its own."""
     import numpy as np
-
-    from camtool.verification.report import rounded
 
     if written.operations is None or case.row_from is None:
         return planned
@@ -681,7 +685,6 @@ def _cut_mm(wanted: Toolpath) -> tuple[float, float, float, float] | None:
     None where nothing is cut, or nobody knows by which operation."""
     import numpy as np
 
-    from camtool.toolpath.moves import feeds_below_top
     from camtool.verification.cuts import is_flat
 
     operations = wanted.operations
@@ -707,8 +710,6 @@ def _cut_mm(wanted: Toolpath) -> tuple[float, float, float, float] | None:
 
 
 def _stock(job: Job) -> PlannedStock | None:
-    from camtool.verification.report import PlannedStock
-
     stock = job.stock
     if stock is None:
         return None
@@ -721,8 +722,6 @@ def _gate_findings(
     """A finding for each of the limits that is exceeded."""
     if gates is None:
         return ()
-    from camtool.verification.report import gate_findings
-
     return tuple(gate_findings(verification.report, gates, findings))
 
 
@@ -740,8 +739,6 @@ def _without_measures(job: Job) -> Job:
 
 def _before_figures(plain: Run | None) -> BaselineReport | None:
     """The figures of the plain run, for the report."""
-    from camtool.verification.report import BaselineReport
-
     if plain is None:
         return None
     if plain.verification is None or plain.failed:
@@ -817,7 +814,6 @@ def _stock_gates(
         return ()
     from camtool.stock.checks import proved_gouge, proved_leftover
     from camtool.stock.cut import cut_stock
-    from camtool.verification.report import stock_gate_findings
 
     stock = None
     with suppress(OptionError):

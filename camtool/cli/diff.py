@@ -24,6 +24,7 @@ from camtool.cli.options import (
     talk_options,
 )
 from camtool.cli.picture_options import is_viewer, picture_name
+from camtool.pictures.options import PictureOptions
 from camtool.records import replace
 from camtool.units import UM_PER_MM
 
@@ -234,7 +235,6 @@ def _picture(
 ) -> bytes:
     """Return the picture of the greater of the two differences."""
     from camtool.pictures.draw import render
-    from camtool.pictures.options import PictureOptions
 
     more = found.deeper.high >= found.shallower.high
     scene = _scene(stocks[1], stocks[0], f"{names[1]} against {names[0]}", "A")
@@ -244,7 +244,6 @@ def _picture(
 def _page(stocks: tuple[CutStock, CutStock], names: Sequence[str], text: str) -> str:
     """Return a page with both stocks and both differences; texts of names are escaped."""
     from camtool.pictures.draw import draw
-    from camtool.pictures.options import PictureOptions
 
     first, second = stocks
     shown = [

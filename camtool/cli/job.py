@@ -23,8 +23,10 @@ from camtool.cli.options import (
     talk_options,
 )
 from camtool.cli.picture_options import PictureFlags, picture_name
+from camtool.cli.preview import SceneSource
 from camtool.errors import OptionError
 from camtool.plain import one_line, to_json
+from camtool.planning.job import above_zero
 from camtool.records import replace
 
 if TYPE_CHECKING:
@@ -81,7 +83,6 @@ def new(
     """
     from camtool.geometry.drawing import is_text
     from camtool.jobs.template import Proposal, job_template, proposed
-    from camtool.planning.job import above_zero
     from camtool.project import project_of
 
     above_zero("tool diameter", tool_diameter, "mm")
@@ -204,8 +205,6 @@ def check(
     facts, findings = described(job, read, target)
     files: dict[str, bytes] = {}
     if preview is not None and against is not None:
-        from camtool.cli.preview import SceneSource
-
         scene, _ = SceneSource(machine, False, True, flags, drawing, preview).scene(against)
         files[preview] = PictureFlags().painter(lambda: [scene], quiet=quiet)(preview)
     if report is not None:

@@ -20,6 +20,7 @@ from camtool.cli.options import (
     talk_options,
 )
 from camtool.cli.picture_options import is_viewer, picture_name
+from camtool.pictures.options import AS_USUAL
 from camtool.units import UM_PER_MM, parse_length
 
 if TYPE_CHECKING:
@@ -189,7 +190,6 @@ def _facts(
 def _picture(title: str, profile: tuple[str, float, Floats], stock: CutStock, file: str) -> bytes:
     """Return the picture of a section."""
     from camtool.pictures.draw import rendered
-    from camtool.pictures.options import AS_USUAL
     from camtool.pictures.section import StockSection, section_svg
 
     section = StockSection(*profile, stock.bottom_mm)

@@ -33,6 +33,7 @@ from camtool.cli.picture_options import (
 )
 from camtool.errors import CamtoolError
 from camtool.findings import Finding
+from camtool.pictures.options import points_for
 from camtool.records import replace
 
 if TYPE_CHECKING:
@@ -140,7 +141,6 @@ class SceneSource:
         return scene_of_drawing(read, Path(read.file).name), read.findings
 
     def _program_scene(self, source: str, target: LoadedTarget) -> Scene:
-        from camtool.pictures.options import points_for
         from camtool.pipeline import Judging, read_program, verify_program
 
         progress().begin(f"reading {Path(source).name}")
@@ -154,7 +154,6 @@ class SceneSource:
         return replace(run, job=job).scene()
 
     def _job_scene(self, source: str, target: LoadedTarget) -> tuple[Scene, Findings]:
-        from camtool.pictures.options import points_for
         from camtool.pipeline import post_drawing
         from camtool.planning.compensating import compensate
         from camtool.planning.plan import plan

@@ -20,6 +20,7 @@ from camtool.cli.messages import say, say_findings, show_facts, show_text
 from camtool.cli.options import MachineFlags, machine_options, talk_options
 from camtool.errors import InputError, OptionError, OutputError
 from camtool.plain import one_line
+from camtool.records import replace
 
 if TYPE_CHECKING:
     from camtool.sending.journal import JournalState
@@ -284,8 +285,6 @@ class _Sending:
                 raise OutputError(
                     f"cannot be written ({error.strerror})", file=self.live
                 ) from error
-        from camtool.records import replace
-
         progress().begin("sending", len(one.packets))
         real = not self.port.is_virtual
         manner = manner_of(

@@ -12,6 +12,7 @@ from camtool.cli.files import STDOUT, check_new, check_places, write_all
 from camtool.cli.messages import say, show_text
 from camtool.cli.options import talk_options
 from camtool.errors import OptionError
+from camtool.jobs.keys import PRESET, TOOL
 from camtool.patterns import guess
 from camtool.plain import one_line, to_json
 
@@ -137,8 +138,6 @@ def _items(incomplete: str) -> Iterator[CompletionItem]:
 def _row(name: str, described: Described, file: Path) -> dict[str, Any]:
     """Return a tool as data for JSON: the values of its keys in mm, rad, mm/min, rev/min and
     m/min."""
-    from camtool.jobs.keys import PRESET, TOOL
-
     given = described.keys.given
     presets = {}
     for material, preset in described.presets.items():

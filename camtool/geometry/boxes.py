@@ -16,7 +16,9 @@ from msgspec import Struct
 from camtool.arrays import Bools, Floats, Indices, Ints
 from camtool.geometry.measure import segment_boxes
 from camtool.geometry.polylines import Segments
+from camtool.kernels.chaining import touching
 from camtool.kernels.move_tree import LEAF, hilbert_order, move_tree
+from camtool.kernels.offsets import SegmentTree, curve_boxes, curve_rows, tree_of
 
 if TYPE_CHECKING:
     from camtool.kernels.near import Moves
@@ -138,8 +140,6 @@ def touching_boxes(
     `asked` for (K,). No more than `max_pairs` pairs, and none of boxes that come late in a sweep
     of more than MAX_COMPARISONS: both bound time and memory, far beyond any real drawing.
     """
-    from camtool.kernels.chaining import touching
-
     along_x, along_y = boxes, boxes[:, [1, 0, 3, 2]]
     work, turned, order = min(
         ((_count_comparisons(way), number, np.argsort(way[:, 0], kind="stable"))
@@ -173,8 +173,6 @@ class IndexedCurves(Struct, frozen=True, eq=False):
     @classmethod
     def of(cls, segments: Segments, *, margin_mm: float = 0.0) -> IndexedCurves:
         """Return the segments with boxes that are grown by a margin on all sides."""
-        from camtool.kernels.offsets import curve_boxes, tree_of
-
         rows = curve_rows_of(segments)
         boxes = curve_boxes(rows, margin_mm)
         return cls(rows, boxes, tree_of(boxes))
@@ -184,7 +182,6 @@ def segment_tree(vertices: Floats, begin: Indices, end: Indices) -> SegmentTree:
     """The segments between the rows `begin` and `end` (K,) of vertices (N, 3), to be asked which
     of them lie beside points; along Hilbert's curve, since what is near in the plane need not be
     near in a file."""
-    from camtool.kernels.offsets import SegmentTree, curve_boxes
 
     def boxes(which: Ints | Indices) -> Floats:
         here, there = vertices.take(begin[which], axis=0), vertices.take(end[which], axis=0)
@@ -196,8 +193,6 @@ def segment_tree(vertices: Floats, begin: Indices, end: Indices) -> SegmentTree:
 
 def curve_rows_of(segments: Segments) -> Floats:
     """Return the segments as rows (K, 11) of camtool.kernels.offsets."""
-    from camtool.kernels.offsets import curve_rows
-
     columns = (segments.start, segments.end, segments.bulge)
     return curve_rows(*(np.ascontiguousarray(column) for column in columns))
 

@@ -23,6 +23,7 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.errors import GeometryError
 from camtool.geometry.measure import segment_boxes, segment_lengths
 from camtool.geometry.polylines import Polylines, Segments
+from camtool.kernels.discs import AX, AY, BLOCK, CONVEX, REFLEX, SMOOTH, SMOOTH_RAD, largest_discs
 
 FIRST_SAMPLES = 9
 """Number of places on each element at which discs are computed first."""
@@ -76,8 +77,6 @@ def discs_at(
     """Compute the largest disc within the region that touches each of these places; `guess` (N,
     2): elements that are likely to be touched besides, which makes it quick. GeometryError where
     nothing ends a disc: paths that lie on each other enclose no region there."""
-    from camtool.kernels.discs import largest_discs
-
     result, partner = np.empty((len(t), 4)), np.empty(len(t), dtype=np.int64)
     if guess is None:
         guess = np.column_stack([element, element])
@@ -213,8 +212,6 @@ class Boundary(Struct, frozen=True, eq=False):
     @classmethod
     def of(cls, region: Polylines) -> Boundary:
         """The elements of closed paths, outer ones CCW and holes CW."""
-        from camtool.kernels.discs import CONVEX, REFLEX, SMOOTH, SMOOTH_RAD
-
         segments = Segments.of(region)
         leave, arrive = _tangents(segments)
         before, behind = _neighbours(segments.path)
@@ -274,8 +271,6 @@ def _neighbours(path: Ints) -> tuple[Ints, Ints]:
 
 def _blocks(table: Floats, segment_box: Floats, place: Ints) -> Floats:
     """Boxes around BLOCK elements each."""
-    from camtool.kernels.discs import AX, AY, BLOCK
-
     corners = table[:, [AX, AY]]
     boxes = np.concatenate([corners, corners], axis=1)
     boxes[place] = segment_box

@@ -18,6 +18,7 @@ from camtool.errors import GeometryError
 from camtool.geometry.boxes import BoxIndex, IndexedCurves
 from camtool.geometry.measure import path_extents, point_at, signed_areas
 from camtool.geometry.polylines import POSITION_EPS_MM, Polylines, Segments, reverse_lines
+from camtool.kernels.offsets import HELD, ON_LINE, holds, insides
 
 HOLDERS_AT_A_TIME = 256
 """Closed paths whose boxes are compared with all others together: it bounds the memory."""
@@ -119,8 +120,6 @@ class _Pairs(Struct, frozen=True, eq=False):
 
 def inside(points: Floats, ring: Segments) -> Bools:
     """Mask (P,) of the points (P, 2) within a closed path; a point on its line may be either."""
-    from camtool.kernels.offsets import insides
-
     curves = IndexedCurves.of(ring)
     return insides(
         np.ascontiguousarray(points, dtype=np.float64), curves.rows, ring.bulge, curves.tree
@@ -155,8 +154,6 @@ class _Places(Struct, frozen=True, eq=False):
     def contained_paths(self, inner: Ints, j: int) -> tuple[Ints, Ints]:
         """Return those of the paths `inner` that have all their points within path j, and those
         that have all of them on its line."""
-        from camtool.kernels.offsets import HELD, ON_LINE, holds
-
         ring = self.segments[self.first_segment[j] : self.first_segment[j + 1]]
         curves = IndexedCurves.of(ring)
         arrays = (curves.rows, ring.bulge, curves.tree)

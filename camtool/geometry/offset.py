@@ -88,6 +88,24 @@ from camtool.geometry.polylines import (
     reverse_lines,
 )
 from camtool.kernels.move_tree import hilbert_order
+from camtool.kernels.offsets import (
+    TA,
+    TB,
+    X,
+    Y,
+    doubles_left,
+    far_enough,
+    in_order,
+    kite_boxes,
+    leading_on,
+    meetings_of,
+    merged,
+    pairs_of,
+    traced,
+    tree_of,
+    trimmed_ends,
+    written,
+)
 from camtool.records import replace
 
 NODE_EPS_MM = 1e-8
@@ -280,8 +298,6 @@ Arrays = tuple[Floats, Floats, Floats, Floats]
 def source_arrays(source: Segments, kites: Floats) -> Arrays:
     """Return the forbidden zone of elements as the kernels take it: the rows of the source and
     their tree, the kites (J, 10) of mitres and theirs."""
-    from camtool.kernels.offsets import kite_boxes, tree_of
-
     curves = IndexedCurves.of(source)
     return curves.rows, curves.tree, kites, tree_of(kite_boxes(kites))
 
@@ -289,8 +305,6 @@ def source_arrays(source: Segments, kites: Floats) -> Arrays:
 def _touching_paths(lines: Polylines) -> Ints:
     """Return the two paths (J, 2) at each common point of closed paths, except those of
     neighbours."""
-    from camtool.kernels.offsets import TA, TB, meetings_of, pairs_of
-
     segments = Segments.of(lines)
     curves = IndexedCurves.of(segments, margin_mm=POSITION_EPS_MM)
     pairs = pairs_of(curves.boxes, curves.tree, curves.boxes, curves.tree, True)
@@ -490,8 +504,6 @@ def trim_raw(raw: RawOffset, source: Arrays, offset: Offset) -> RawOffset:
     What goes could never be kept, and what is kept is not cut by it: this only saves cuts, which
     would grow with the square of the number of elements where the distance is large against them.
     """
-    from camtool.kernels.offsets import trimmed_ends
-
     spare = TRIM_SPARE * VALIDITY_EPS_MM
     ends = trimmed_ends(curve_rows_of(raw.elements), source, (offset.distance_mm, spare))
     low, high = ends.T
@@ -555,8 +567,6 @@ class Slices(Struct, frozen=True, eq=False):
 
 def slice_elements(elements: Segments, others: Segments | None) -> Slices:
     """Cut the elements at all meetings with each other and with `others`."""
-    from camtool.kernels.offsets import TA, TB, X, Y, meetings_of, pairs_of
-
     eps = NODE_EPS_MM
     own = IndexedCurves.of(elements, margin_mm=eps)
     pairs = pairs_of(own.boxes, own.tree, own.boxes, own.tree, True)
@@ -574,8 +584,6 @@ def slice_elements(elements: Segments, others: Segments | None) -> Slices:
 
 def _cut_elements(elements: Segments, rows: Ints, found: Floats) -> Slices:
     """Cut the elements at `found` (J, 3), the fraction and the place on the element rows[j]."""
-    from camtool.kernels.offsets import in_order
-
     count = len(elements)
     every = np.arange(count)
     # Ends come first, so that a node is at an end of an element rather than at a meeting.
@@ -596,8 +604,6 @@ def merge_points(points: Floats, eps_mm: float) -> tuple[Ints, Floats]:
 
     Points within `eps_mm` share a node, and so do chains of such points.
     """
-    from camtool.kernels.offsets import merged
-
     skew = points @ np.array(SKEW)
     node, first = merged(points, skew, np.argsort(skew), eps_mm)
     return node, points[first]
@@ -611,8 +617,6 @@ def valid_slices(slices: Slices, elements: Segments, source: Arrays, offset: Off
     The raw offset changes between valid and invalid only where it meets itself, so that one point
     would do; several guard against slices that are hardly too near anywhere.
     """
-    from camtool.kernels.offsets import far_enough
-
     limits = (offset.distance_mm, VALIDITY_EPS_MM)
     curves = curve_rows_of(elements)
     return far_enough(curves, slices.element, slices.span, source, limits)
@@ -626,8 +630,6 @@ def without_doubles(slices: Slices, elements: Segments) -> Slices:
 
     Such a pair encloses nothing: it is where the offset falls apart, or collapses to a line.
     """
-    from camtool.kernels.offsets import doubles_left
-
     middle = 0.5 * (slices.t0 + slices.t1)
     eps = 2.0 * NODE_EPS_MM
     return slices[doubles_left(curve_rows_of(elements), slices.element, middle, slices.ends, eps)]
@@ -635,8 +637,6 @@ def without_doubles(slices: Slices, elements: Segments) -> Slices:
 
 def without_dead_ends(slices: Slices) -> Slices:
     """Keep the slices that others lead to and lead on from."""
-    from camtool.kernels.offsets import leading_on
-
     return slices[leading_on(*slices.ends)]
 
 
@@ -647,8 +647,6 @@ def trace_loops(slices: Slices, elements: Segments) -> list[Ints]:
     enough from the source is on the left, and so it falls into parts that only touch. Each loop
     begins with its first slice, and they come in the order of these.
     """
-    from camtool.kernels.offsets import traced
-
     rows, begins = traced(curve_rows_of(elements), slices.element, slices.span, slices.ends)
     loops = [rows[low:high] for low, high in pairwise(begins.tolist())]
     rolled = (np.roll(loop, -int(loop.argmin())) for loop in loops)
@@ -662,8 +660,6 @@ def paths_of(loops: list[Ints], slices: Slices, elements: Segments) -> tuple[Pol
     Segments up to POSITION_EPS_MM go. A path of which nothing is left goes, and so does one whose
     mean width, area over half the length, is no more than that.
     """
-    from camtool.kernels.offsets import written
-
     eps = POSITION_EPS_MM
     begins = np.concatenate([[0], np.cumsum([len(loop) for loop in loops])]).astype(np.int64)
     rows = np.concatenate([np.empty(0, dtype=np.int64), *loops])

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 
 from camtool.errors import OptionError
 from camtool.keys import LENGTH, Key
+from camtool.planning.job import MILLS, refuse_endless
 from camtool.planning.kinds import COMMON_KEYS, OperationKind
 
 if TYPE_CHECKING:
@@ -67,7 +68,6 @@ def overhang_mm(operation: Operation) -> float:
 def checked(operation: Operation, stock: Stock | None) -> Operation:
     """Return the operation; OptionError without a stock of known size, for a depth of all of it,
     for a tool that leaves no flat top, and for an overhang below 0 or above MAX_OVERHANG_MM."""
-    from camtool.planning.job import MILLS
     from camtool.planning.naming import key_of
 
     if stock is None or stock.box_mm is None:
@@ -112,7 +112,6 @@ def faced(_: Chosen, setting: Setting) -> Work:
     from camtool.operations.pocket.work import clearing_paths, down_for, lowered, over_floor
     from camtool.planning.clearing import ConnectedRegion
     from camtool.planning.items import CutRun, Fixed, Work
-    from camtool.planning.job import refuse_endless
     from camtool.planning.naming import key_of
     from camtool.planning.paths import reverse_vertices
 

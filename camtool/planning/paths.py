@@ -18,6 +18,7 @@ from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.distance import nearest
 from camtool.geometry.measure import Frames, dot, point_at, segment_lengths, turn_left
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
+from camtool.kernels.passes import Tracks, piece, reaches
 
 QUARTER = math.tan(math.pi / 8.0)
 """Bulge of a quarter circle."""
@@ -36,8 +37,6 @@ class MeasuredPaths:
     of each path. It gives the single ones in turn, each a `MeasuredPath`."""
 
     def __init__(self, lines: Polylines) -> None:
-        from camtool.kernels.passes import Tracks, reaches
-
         self.lines, self.segments = lines, Segments.of(lines)
         self.first = np.concatenate([[0], np.cumsum(np.diff(lines.offsets) - ~lines.closed)])
         self.reach = reaches(segment_lengths(self.segments), self.first)
@@ -152,8 +151,6 @@ class MeasuredPath:
 
         Vertices nearer than POSITION_EPS_MM to an end are that end. The last bulge is 0.
         """
-        from camtool.kernels.passes import piece
-
         found = piece(self.paths.tracks, self.index, begin, end)
         return np.ascontiguousarray(found[:, [0, 1, 3]])
 

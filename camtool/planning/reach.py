@@ -25,6 +25,7 @@ from camtool.geometry.measure import Frames, extents, point_at, segment_lengths,
 from camtool.geometry.nesting import Nesting, regions
 from camtool.geometry.offset import merge_points, offset_shape
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments, reverse
+from camtool.kernels.offsets import curves_within, nearest_distances
 from camtool.planning.findings import (
     GOUGE_BEYOND,
     GOUGE_MORE,
@@ -185,8 +186,6 @@ class _Parts(Struct, frozen=True, eq=False):
 
 def _split(segments: Segments, points: Floats) -> tuple[Ints, Floats, Floats]:
     """Rows and the parts from .. to (in fractions) into which the points on them divide them."""
-    from camtool.kernels.offsets import curves_within, nearest_distances
-
     curves, points = IndexedCurves.of(segments), np.ascontiguousarray(points)
     away = nearest_distances(points, curves.rows, curves.tree)
     on = (away <= TOGETHER_MM) & ~_at_any(points, segments.start)
@@ -208,8 +207,6 @@ def _split(segments: Segments, points: Floats) -> tuple[Ints, Floats, Floats]:
 
 def _distances(points: Floats, segments: Segments) -> Floats:
     """(P,) distance of each point (P, 2) from the nearest segment."""
-    from camtool.kernels.offsets import nearest_distances
-
     curves = IndexedCurves.of(segments)
     return nearest_distances(np.ascontiguousarray(points), curves.rows, curves.tree)
 

@@ -30,6 +30,7 @@ from camtool.findings import Finding
 from camtool.geometry.distance import point_to_segment
 from camtool.geometry.measure import point_at, segment_lengths
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Segments, reverse
+from camtool.kernels.play import play_limits
 from camtool.machine.model import Axis, Machine, PlayCells, SlideStart
 from camtool.planning.findings import (
     PLAY_NOT_KNOWN_TO_SAVE,
@@ -745,8 +746,6 @@ def residuals(machine: Machine) -> tuple[Residual, Residual]:
 
 def residual(axis: Axis, controller: SlideStart) -> Residual:
     """Compute the residual of one axis of a machine with this controller."""
-    from camtool.kernels.play import play_limits
-
     first = 1 if controller.start_direction == "+" else -1
     low, high = play_limits(axis.backlash_mm, controller.start_play, first)
     errors = {1: low, -1: high}

@@ -32,6 +32,7 @@ from msgspec import Struct
 
 from camtool.errors import MachineError
 from camtool.machine.model import Machine
+from camtool.target.terminal import Terminal
 
 if TYPE_CHECKING:
     from camtool.arrays import Floats, Ints
@@ -494,8 +495,6 @@ class Wire(ABC):
 
     def terminal(self, machine: Machine[Any, Any]) -> Terminal:
         """Return the terminal that translates typed lines into bytes and explains answers."""
-        from camtool.target.terminal import Terminal
-
         return Terminal()
 
 

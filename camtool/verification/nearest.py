@@ -22,6 +22,8 @@ from msgspec import Struct
 
 from camtool.arrays import Floats, Indices, Ints
 from camtool.geometry.boxes import moves_of
+from camtool.kernels import near as at
+from camtool.kernels.near import nearest, pairs
 from camtool.verification.cuts import CutMoves
 
 if TYPE_CHECKING:
@@ -74,8 +76,6 @@ class MoveIndex:
         place nearest to the point (more on slopes, where a shift in XY changes the height), of
         points (J, 2) at heights (J,) mm; of equally near moves the last. `choice` (J,): the only
         contour whose moves are found, neighbours of one contour together; None: those of all."""
-        from camtool.kernels.near import nearest
-
         if len(points) == 0:  # the tables need not be made
             return NearestMoves(np.empty(0), np.empty(0, dtype=np.int64))
         places = np.column_stack([points, height])
@@ -101,15 +101,11 @@ class MoveIndex:
     ) -> tuple[Ints, Ints, Floats]:
         """Return all pairs (point, move) within the limits, as `nearest` takes them, in order, and
         their distances in XY, mm."""
-        from camtool.kernels.near import pairs
-
         return pairs(self._moves, np.column_stack([points, height]), limits_mm)
 
     def shares(self, points: Floats, which: Ints) -> Floats:
         """Return (J,) the position along segment which[j], from 0 to 1, of its point nearest to
         point j."""
-        from camtool.kernels import near as at
-
         moves = self._moves
         start = moves.start[which]
         x, y = (points - start).T

@@ -48,6 +48,7 @@ from camtool.geometry.polylines import (
     reverse,
     reverse_lines,
 )
+from camtool.kernels.passes import lifted
 from camtool.planning.holes import circle_of
 from camtool.planning.paths import Cuts, MeasuredPaths
 from camtool.planning.paths import cuts as joined_moves
@@ -1144,8 +1145,6 @@ def _as_cuts(paths: Polylines) -> CutMoves:
 
 def _with_tracks(of: _Follower, chosen: _FollowedTracks, follow: _RowTracks) -> Toolpath:
     """Return the program with the tracks in the place of the moves that follow them."""
-    from camtool.kernels.passes import lifted
-
     toolpath = of.cuts.toolpath
     rows = np.flatnonzero(follow.rows)
     if not len(rows):

@@ -51,6 +51,7 @@ from camtool.geometry.medial import (
 from camtool.geometry.nesting import regions
 from camtool.geometry.offset import merge_points
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines, Segments
+from camtool.kernels.discs import SWEEP, frame
 from camtool.operations.vcarve import VCARVE
 from camtool.planning.findings import (
     CONTOUR_TOO_SMALL_FOR_TIP,
@@ -64,6 +65,7 @@ from camtool.planning.job import Operation
 from camtool.planning.naming import at_place, key_of
 from camtool.planning.paths import join_paths, reverse_vertices
 from camtool.planning.ramps import feeds_along
+from camtool.planning.reach import unreached
 from camtool.planning.settings import Cone
 
 CROSSINGS_SHOWN = 3
@@ -215,8 +217,6 @@ def _run(path: Floats, setting: Setting, cone: Cone, name: str) -> CutRun:
 def _too_narrow(region: _Region, trace: MedialTrace, cone: Cone) -> Iterator[Finding]:
     """Yield a finding for what a flat tip cannot enter: all of the region, or its corners and
     narrow places."""
-    from camtool.planning.reach import unreached
-
     tip, widest = 2.0 * cone.tip_mm, 2.0 * float(trace.rho.max())
     if widest <= tip:
         yield CONTOUR_TOO_SMALL_FOR_TIP(
@@ -334,8 +334,6 @@ def _wall(
     boundary: Boundary, element: int, part: tuple[float, float], distance_mm: float
 ) -> Floats:
     """Return the parallel of a part of an element: a line, or an arc of the same sweep."""
-    from camtool.kernels.discs import SWEEP, frame
-
     rows = []
     for t in part:
         x, y, nx, ny = frame(boundary.table, element, t)
