@@ -47,6 +47,7 @@ from camtool.keys import (
 )
 from camtool.patterns import guess
 from camtool.planning.job import (
+    ALLOWED,
     COOLANTS,
     CORNERS,
     DIRECTIONS,
@@ -91,6 +92,11 @@ def names(value: object) -> tuple[str, ...]:
     if not isinstance(value, list) or not value:
         raise OptionError(f"{value!r} is no list of names", mend='write it like ["holes", "edge"]')
     return tuple(text(each) for each in value)
+
+
+def allowed(value: object) -> tuple[str, ...]:
+    """A list of words that a job may allow, or one text with commas between them."""
+    return tuple(word(ALLOWED)(Given(each, "")) for each in layers(value))
 
 
 def length_range(value: object) -> tuple[float, float]:
@@ -310,6 +316,12 @@ WHOLE = {
         SWITCH,
         "Compensate the path for the machine's backlash, scale and squareness.",
         "true",
+    ),
+    "allow": Key(
+        "allow",
+        Value(plain(allowed), "WORDS"),
+        "What is no error here: long, off-stock.",
+        '["off-stock"]',
     ),
     "frames": Key(
         "frames",

@@ -127,6 +127,7 @@ def faced(_: Chosen, setting: Setting) -> Work:
         key_of(operation, "step_over"),
         f"{lines:.3g} lines {step:g} mm apart",
         "give a larger step-over, or a larger tool",
+        is_long=operation.may_be_long,
     )
     corners = np.array([[left, low], [right, low], [right, high], [left, high]])
     region = Polylines.of([Polyline(np.insert(corners, 2, 0.0, axis=1), closed=True)])

@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from camtool.arrays import Bools, Floats
-from camtool.findings import Finding, Sentence
+from camtool.findings import Finding, Sentence, Severity
 from camtool.geometry.measure import path_extents
 from camtool.geometry.polylines import POSITION_EPS_MM
 from camtool.machine.model import Machine
@@ -37,6 +37,8 @@ from camtool.planning.findings import (
     CUT_DOUBTFUL_WIDTH,
     FEED_ABOVE_LIMIT,
     FEED_ABOVE_LIMIT_ON_SLOPE,
+    LONG_DRAWING,
+    LONG_PROGRAM,
     OUT_OF_STOCK,
     OUT_OF_STOCK_AS_ALLOWED,
     OUT_OF_STOCK_BESIDE,
@@ -50,7 +52,7 @@ from camtool.planning.findings import (
     TOOL_NOT_SAID_APART,
 )
 from camtool.planning.items import Fixed, Setting, Step
-from camtool.planning.job import MILLS, Job, Stock, Tool
+from camtool.planning.job import MAX_MOVES, MILLS, Job, Stock, Tool
 from camtool.planning.naming import (
     at_place,
     operation_name,
@@ -58,8 +60,10 @@ from camtool.planning.naming import (
     range_words,
     shortened_list,
 )
+from camtool.planning.place import MAX_SIZE_MM
 from camtool.planning.settings import lowered_feeds
 from camtool.planning.sides import runs_beside
+from camtool.records import replace
 from camtool.toolpath.moves import (
     STOCK_TOP_MM,
     Kind,
@@ -100,6 +104,8 @@ def checked(
     what is drawn beside the stock. A warning: something is cut wholly beside the stock.
     """
     off = [finding for step in steps for finding in _off_stock(step, job.stock)]
+    if "off-stock" in job.allow:
+        off = [replace(each, severity=min(each.severity, Severity.WARNING)) for each in off]
     return (
         *out_of_travel(toolpath, machine),
         *lowered_feeds(job, machine),
@@ -108,7 +114,18 @@ def checked(
         *_tools_not_said(job),
         *_change_not_stated(toolpath, machine),
         *_feeds_above_limits(toolpath, machine),
+        *_long(toolpath),
     )
+
+
+def _long(toolpath: Toolpath) -> Iterator[Finding]:
+    """Yield warnings for sizes and numbers of moves that only a job that allows them may have."""
+    reach = toolpath_extents(toolpath)[:2]
+    size = float(max(np.ptp(reach, axis=1).max(), np.abs(reach).max())) if len(toolpath) else 0.0
+    if size > MAX_SIZE_MM:
+        yield LONG_DRAWING(measured=size, limit=MAX_SIZE_MM)
+    if len(toolpath) > MAX_MOVES:
+        yield LONG_PROGRAM(measured=len(toolpath), limit=MAX_MOVES)
 
 
 def out_of_travel(toolpath: Toolpath, machine: Machine) -> Iterator[Finding]:

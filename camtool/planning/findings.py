@@ -195,6 +195,13 @@ class PlanningCode(Code):
         "`change_mm` and `change_z_mm` in `[defaults]` of the machine file, where the hand and "
         "the longest tool have room ([machines.md](machines.md))",
     )
+    LONG = (
+        235,
+        WARNING,
+        "what is cut is larger than any machine, far from part zero, or makes very many moves, "
+        "and the job allows it (`allow`)",
+        "look at units and steps; leave `long` out of `allow`",
+    )
     LINES_RUN_TOGETHER = (
         233,
         WARNING,
@@ -545,6 +552,17 @@ TOOL_CHANGE_NOT_STATED = Sentence(
     "{count:a tool is|# tools are} changed {measured:.4g} mm above the stock here, because the "
     "file of {machine} states no place: give {keys} in its [defaults]",
     "mm",
+)
+LONG_DRAWING = Sentence(
+    PlanningCode.LONG,
+    "what is cut is {measured:.4g} mm long, or as far from part zero; {limit:g} mm is more than "
+    "any machine has: check the units",
+    "mm",
+)
+LONG_PROGRAM = Sentence(
+    PlanningCode.LONG,
+    "{measured:# move|# moves} are more than {limit:g}: check the steps",
+    "moves",
 )
 LINES_RUN_TOGETHER = Sentence(
     PlanningCode.LINES_RUN_TOGETHER,

@@ -70,6 +70,7 @@ def refuse_endless_pecks(
         key_of(operation, key),
         f"{len(holes)} holes in pecks of {peck_mm:g} mm",
         f"give a larger {key}",
+        is_long=operation.may_be_long,
     )
 
 

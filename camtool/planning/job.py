@@ -170,14 +170,27 @@ def finite(name: str, value: float, unit: str, most: float | None = None) -> Non
     _at_most(name, abs(value), unit, most)
 
 
-def refuse_endless(moves: float, where: str, asked: str, mend: str) -> None:
-    """OptionError when so many moves are estimated to result from what was `asked`, such as
-    "10000 passes"."""
-    if moves > MAX_MOVES:
+MAX_LONG_MOVES = 3_000_000
+"""As many moves at most where the job allows "long": no program may have more
+(`camtool.bounds.MAX_MOVES`)."""
+
+ALLOWED = ("long", "off-stock")
+"""What a job may allow: programs of more than MAX_MOVES moves and drawings larger than any
+machine; parts, copies and cuts that lie beside the stock."""
+
+
+def refuse_endless(
+    moves: float, where: str, asked: str, mend: str, *, is_long: bool = False
+) -> None:
+    """OptionError when more than MAX_MOVES moves (MAX_LONG_MOVES if `is_long`) are estimated to
+    result from what was `asked`, such as "10000 passes"."""
+    most = MAX_LONG_MOVES if is_long else MAX_MOVES
+    if moves > most:
+        meant = f", or --allow long if it is meant (up to {MAX_LONG_MOVES:,})"
         raise OptionError(
-            f"{asked} would make {moves:.3g} moves, more than {MAX_MOVES:,}",
+            f"{asked} would make {moves:.3g} moves, more than {most:,}",
             where=where,
-            mend=mend,
+            mend=mend if moves > MAX_LONG_MOVES else mend + meant,
         )
 
 
@@ -453,6 +466,7 @@ class Operation:
     finish_spindle_rpm: float | None = None
     finish_tool: Tool | None = None
     stage: str = ""
+    may_be_long: bool = False
     rest: str = ""
     rest_of: Operation | None = None
     feed_mm_min: float | None = None
@@ -999,10 +1013,10 @@ class Job:
     one of GOALS. `compensate`: what is written is bent beforehand against the mechanics of its
     machine. `frames`: patterns of the layers whose contours, where they are not cut, are no edges
     of parts. `keep_out`: boxes that no tool may enter. `text`: how the drawing's text is read, ""
-    where the job does not say it. `setups`: the clampings of a part that is cut from several
-    sides, each of which is a job of its own (`setup`), with the whole job and what that says of it
-    in `setup_of`. Operations with a breakthrough get their depth, those with a finishing pass
-    become two. Raises OptionError for what no job can be."""
+    where the job does not say it. `allow`: words of ALLOWED. `setups`: the clampings of a part
+    that is cut from several sides, each of which is a job of its own (`setup`), with the whole job
+    and what that says of it in `setup_of`. Operations with a breakthrough get their depth, those
+    with a finishing pass become two. Raises OptionError for what no job can be."""
 
     operations: tuple[Operation, ...] = field(default_factory=lambda: (Operation(),))
     placement: Placement = Placement()
@@ -1016,14 +1030,19 @@ class Job:
     text: str = ""
     setups: tuple[JobSetup, ...] = ()
     setup_of: tuple[Job, JobSetup] | None = None
+    allow: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         above_zero("safe Z", self.safe_z_mm, "mm")
         one_of("goal", self.minimise, GOALS)
+        for each in self.allow:
+            one_of("word to allow", each, ALLOWED)
         if not self.operations:
             raise OptionError("the job has no operations", mend="give it at least one")
         deep = [each.settled(self.stock) for each in self.operations]
         made = [stage for each in rested(deep) for stage in each.stages()]
+        if "long" in self.allow:
+            made = [replace(each, may_be_long=True) for each in made]
         object.__setattr__(self, "operations", tuple(made))
         self._refuse_setups()
 

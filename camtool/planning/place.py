@@ -39,6 +39,9 @@ MAX_SIZE_MM = 1e5
 MAX_DISTANCE_MM = 1e6
 """Largest distance of the cut geometry from part zero: a kilometre."""
 
+ALLOWED_TIMES = 10.0
+"""Size and distance may be so many times as large where the job allows "long"."""
+
 MAX_POINTS = 10_000_000
 """Vertices of all copies together: far beyond any program, well within memory."""
 
@@ -86,7 +89,7 @@ def place(drawing: Drawing, job: Job) -> Drawing:
     larger than any machine.
     """
     placed = drawing if job.placement == Placement() else _place(drawing, job)
-    _refuse_too_large(placed, job.placement)
+    _refuse_too_large(placed, job)
     return placed
 
 
@@ -333,27 +336,30 @@ def _refuse_too_many(drawing: Drawing, placement: Placement) -> None:
         )
 
 
-def _refuse_too_large(placed: Drawing, placement: Placement) -> None:
+def _refuse_too_large(placed: Drawing, job: Job) -> None:
     """Refuse a drawing that is larger in the work frame than any machine, or far from part
     zero."""
+    times = ALLOWED_TIMES if "long" in job.allow else 1.0
+    most, farthest = MAX_SIZE_MM * times, MAX_DISTANCE_MM * times
     places = placed.paths.vertices[:, :2]
     if len(places) == 0:
         return
     size = float(np.ptp(places, axis=0).max())
-    if not size <= MAX_SIZE_MM:
-        key = _enlarging_key(placement)
+    if not size <= most:
+        key = _enlarging_key(job.placement)
         raise OptionError(
-            f"what is cut is {size:.4g} mm long, more than {MAX_SIZE_MM:g} mm",
+            f"what is cut is {size:.4g} mm long, more than {most:g} mm",
             file=placed.file,
             where=f"key {key}" if key else None,
             mend=f"give a smaller {key}"
             if key
-            else "give --units, a scale, or with --layer what is to be cut",
+            else "give --units, a scale, or with --layer what is to be cut; or --allow long if it "
+            "is meant",
         )
     away = float(np.abs(places).max())
-    if away > MAX_DISTANCE_MM:
+    if away > farthest:
         raise OptionError(
-            f"what is cut lies {away:.4g} mm from part zero, more than {MAX_DISTANCE_MM:g} mm",
+            f"what is cut lies {away:.4g} mm from part zero, more than {farthest:g} mm",
             file=placed.file,
             where="key origin",
             mend="use an origin on what is cut: lower-left or centre",

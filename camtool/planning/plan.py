@@ -345,6 +345,7 @@ def _refuse_endless(items: Items, setting: Setting) -> None:
             key_of(operation, "step_down"),
             f"{passes} passes",
             "give a larger step",
+            is_long=operation.may_be_long,
         )
     closed = [path for path in paths if path.closed]
     if operation.overlap_mm > 0.0 and closed:

@@ -349,6 +349,7 @@ def _tab_count(total_mm: float, operation: Operation) -> int:
             key_of(operation, "tabs"),
             f"tabs each {tabs.spacing_mm:g} mm",
             "give a larger spacing",
+            is_long=operation.may_be_long,
         )
         return math.ceil(total_mm / tabs.spacing_mm * (1.0 - COUNT_SLACK))
     assert tabs.count is not None

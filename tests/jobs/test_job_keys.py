@@ -39,7 +39,7 @@ def test_every_field_of_a_job_has_a_key() -> None:
         assert isinstance(keys, dict)
         return {each.name for each in fields(record)} - {key.field for key in keys.values()}
 
-    made_by_jobs = {"tool", "material", "preset", "stage", "rest_of", "own"}
+    made_by_jobs = {"tool", "material", "preset", "stage", "may_be_long", "rest_of", "own"}
     assert missing(Operation, OPERATION) == made_by_jobs
     assert missing(Placement, PLACE) == {"flip"}
     assert missing(Stock, STOCK) == missing(JobSetup, SETUP) == set()

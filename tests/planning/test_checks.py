@@ -8,6 +8,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from camtool.errors import OptionError
 from camtool.findings import Code, Finding, Severity
 from camtool.geometry.drawing import Mark
 from camtool.geometry.polylines import Polyline
@@ -224,6 +225,51 @@ def test_a_part_must_lie_within_the_stock(x: float, y: float, width: float, heig
         assert ("wholly" in error.message) == (part.intersection(stock).area == 0.0)
         if "wholly" not in error.message:
             assert error.measured == pytest.approx(beyond)
+
+
+def test_a_part_off_the_stock_is_a_warning_where_the_job_allows_it() -> None:
+    for y in (26.0, 40.0):  # partly, and wholly
+        for allow, severity in (((), Severity.ERROR), (("off-stock",), Severity.WARNING)):
+            (finding,) = off_stock(job_on(PROFILE, allow=allow), box(2.0, y, 6.0, 6.0))
+            assert finding.severity == severity
+
+
+def long_findings(drawn: Polyline, **more: object) -> list[Finding]:
+    job = Job((Operation(side="on", depth_mm=1.0, **more),), allow=("long",))  # type: ignore[arg-type]
+    made = plan(drawing_of([drawn]), job, path_machine())
+    return [each for each in made.findings if each.code == PlanningCode.LONG]
+
+
+def test_long_drawings_are_refused_or_warned_about() -> None:
+    """150 m is more than any machine has; 1500 m is refused anyway."""
+    wide, wider = (box(0.0, 0.0, width, 5.0) for width in (150_000.0, 1_500_000.0))
+    with pytest.raises(OptionError, match="more than 100000 mm") as refused:
+        plan(drawing_of([wide]), Job(), path_machine())
+    assert "--allow long" in str(refused.value.mend)
+    with pytest.raises(OptionError, match=r"more than 1e\+06 mm"):
+        long_findings(wider)
+    (finding,) = long_findings(wide)
+    assert (finding.severity, finding.measured) == (Severity.WARNING, pytest.approx(150_000.0))
+    assert long_findings(box(0.0, 0.0, 90_000.0, 5.0)) == []
+
+
+def test_long_programs_are_refused_or_warned_about(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Limits small enough for a test: ten passes round a square of four corners."""
+    monkeypatch.setattr("camtool.planning.job.MAX_MOVES", 30)
+    monkeypatch.setattr("camtool.planning.checks.MAX_MOVES", 30)
+    square = box(0.0, 0.0, 5.0, 5.0)
+    passes = Operation(side="on", depth_mm=1.0, step_down_mm=0.1)
+    with pytest.raises(OptionError, match="40 moves, more than 30") as refused:
+        plan(drawing_of([square]), Job((passes,)), path_machine())
+    assert "--allow long" in str(refused.value.mend)
+    (finding,) = long_findings(square, step_down_mm=0.1)
+    assert finding.severity == Severity.WARNING
+    monkeypatch.setattr("camtool.planning.job.MAX_LONG_MOVES", 35)
+    with pytest.raises(OptionError, match="more than 35") as refused:
+        long_findings(square, step_down_mm=0.1)
+    assert "--allow" not in str(refused.value.mend)
+    with pytest.raises(OptionError, match="word to allow"):
+        Job(allow=("all",))
 
 
 def test_each_copy_off_the_stock_is_named() -> None:
