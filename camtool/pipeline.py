@@ -17,6 +17,7 @@ from collections.abc import Collection, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, partial
+from itertools import combinations
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, TypeVar
 
@@ -236,41 +237,47 @@ def post_by_setup(
         runs.append(replace(run, part=f"set-up {setup.name}"))
     if not check or any(run.failed for run in runs):
         return tuple(runs)
-    return tuple(_add_findings(run, _meetings(run, runs[k + 1 :])) for k, run in enumerate(runs))
+    more: list[list[Finding]] = [[] for _ in runs]
+    for (row, run), (column, other) in combinations(enumerate(runs), 2):
+        for k, finding in zip((row, column), _meeting_findings(run, other), strict=False):
+            more[k].append(finding)
+    return tuple(_add_findings(run, tuple(each)) for run, each in zip(runs, more, strict=True))
 
 
-def _meetings(run: Run, others: Sequence[Run]) -> tuple[Finding, ...]:
-    """Return FACES_MEET for each of the other set-ups that meets this one within the stock, with
-    the place in this one's frame. None where the thickness of the stock is not known."""
-    from camtool.stock.cut import MEETING_MM, cut_stock, greatest_meeting
+def _meeting_findings(run: Run, other: Run) -> tuple[Finding, ...]:
+    """Return FACES_MEET for each of two set-ups that meet within the stock, with the place in its
+    own frame; () where they do not, or the thickness of the stock is not known."""
+    import numpy as np
+
+    from camtool.planning.naming import setup_name
+    from camtool.stock.cut import MEETING_MM, cut_stock, greatest_meeting, turned_over
     from camtool.stock.findings import FACES_MEET, place_words
 
-    assert run.job is not None
+    (decoded, job), (other_decoded, other_job) = _cut_of(run), _cut_of(other)
+    turn = job.placement.flip or other_job.placement.flip
+    same_face = (job.placement.flip is None) == (other_job.placement.flip is None)
+    if job.stock is None or turn is None or same_face:
+        return ()
+    meeting = greatest_meeting(
+        cut_stock(decoded, run.target, job),
+        cut_stock(other_decoded, other.target, other_job),
+        turn,
+        job.stock.thickness_mm,
+    )
+    if meeting.low <= MEETING_MM:
+        return ()
+    place = np.array([meeting.at_mm])
+    places = (place, turned_over(place, turn))
+    return tuple(
+        FACES_MEET(where=place_words(place[0]), measured=meeting.low, other=setup_name(beside))
+        for place, beside in zip(places, (other_job, job), strict=True)
+    )
+
+
+def _cut_of(run: Run) -> tuple[Toolpath, Job]:
     assert run.decoded is not None
-    found = []
-    for other in others:
-        assert other.job is not None
-        assert other.decoded is not None
-        assert other.job.setup_of is not None
-        mine, its = run.job.placement.flip, other.job.placement.flip
-        turn = mine or its
-        if run.job.stock is None or turn is None or (mine is None) == (its is None):
-            continue
-        meeting = greatest_meeting(
-            cut_stock(run.decoded, run.target, run.job),
-            cut_stock(other.decoded, other.target, other.job),
-            turn,
-            run.job.stock.thickness_mm,
-        )
-        if meeting.low > MEETING_MM:
-            found.append(
-                FACES_MEET(
-                    where=place_words(meeting.at_mm),
-                    measured=meeting.low,
-                    other=other.job.setup_of[1].name,
-                )
-            )
-    return tuple(found)
+    assert run.job is not None
+    return run.decoded, run.job
 
 
 def _add_findings(run: Run, more: tuple[Finding, ...]) -> Run:

@@ -411,9 +411,11 @@ def _placeholder_words(names: Sequence[str]) -> str:
 def _part(run: Run, asked: RequestedOutputs, number: int, count: int) -> RequestedOutputs:
     """Return the outputs of one program of `count`: all names with its number, and its set-up or
     its tool, which sort in the order of the runs."""
+    from camtool.planning.naming import setup_name
+
     tool = _tool(run)
     kind = "tool" if tool is None else tool.name or SHORT.get(tool.kind, tool.kind)
-    kind = _setup_name(run) or kind
+    kind = (run.job and setup_name(run.job)) or kind
     plain = re.sub(r"[^A-Za-z0-9_]+", "-", kind).strip("-")[:MAX_NAME_CHARS] or "tool"
     mark = f"-{number:0{len(str(count))}}-{plain}"
 
@@ -436,21 +438,17 @@ def _tool(run: Run) -> ToolNote | None:
     return None if operations is None else operations.notes[0].tool
 
 
-def _setup_name(run: Run) -> str | None:
-    """Return the name of the set-up of a program that is one of several."""
-    whole = None if run.job is None else run.job.setup_of
-    return None if whole is None else whole[1].name
-
-
 def _programs_json(runs: Sequence[Run], parts: Sequence[RequestedOutputs]) -> bytes:
     """Return JSON with file, set-up, tool, picture, page and report of each program."""
+    from camtool.planning.naming import setup_name
+
     programs = []
     for run, part in zip(runs, parts, strict=True):
         tool = _tool(run)
         programs.append(
             {
                 "program": part.output,
-                "setup": _setup_name(run),
+                "setup": (run.job and setup_name(run.job)) or None,
                 "tool": None if tool is None else {"number": tool.number, "name": tool.name},
                 "preview": part.outputs.preview,
                 "page": part.outputs.page,

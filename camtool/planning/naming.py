@@ -90,6 +90,11 @@ def shortened_list(findings: Sequence[Finding], more: Sentence) -> list[Finding]
     return listed
 
 
+def setup_name(job: Job) -> str:
+    """Return the name of the set-up that a job is of a part, "" for others."""
+    return "" if job.setup_of is None else job.setup_of[1].name
+
+
 def setup_words(job: Job) -> str:
     """Return in words what set-up of a part this is, how the part lies in it, and how far its face
     may lie beside the other; "" for a job that is no set-up."""
