@@ -363,6 +363,7 @@ def _post_plan(
         stock=_stock(job),
         zero=job.placement.origin,
         cut_mm=_cut_mm(wanted),
+        swept_mm=_swept_mm(wanted, judged.steps),
         setup=setup_words(job),
     )
     asked = stock_request(judged.steps, job, _beside_mm(case), is_whole=how.is_whole)
@@ -661,7 +662,15 @@ def _tools(steps: Sequence[Step]) -> tuple[PlannedTool, ...]:
             tool, depth = step.operation.tool, rounded(_deepest_mm(step))
             deepest[tool] = max(depth, deepest.get(tool, 0.0))
     return tuple(
-        PlannedTool(tool.number, tool.name, tool_words(tool), depth, tool.cutting_length_mm)
+        PlannedTool(
+            tool.number,
+            tool.name,
+            tool_words(tool),
+            depth,
+            tool.cutting_length_mm,
+            tool.stickout_mm,
+            tool.holder_diameter_mm,
+        )
         for tool, depth in deepest.items()
     )
 
@@ -709,6 +718,30 @@ def _cut_mm(wanted: Toolpath) -> tuple[float, float, float, float] | None:
             deep = note.depth_mm * math.tan(0.5 * note.tool.tip_angle_rad)
             reach = min(deep, reach or math.inf)
         boxes.append(toolpath_extents(part, rows=cuts)[:2] + np.array([-reach, reach]))
+    if not boxes:
+        return None
+    every = np.array(boxes)
+    (left, lowest), (right, top) = every[:, :, 0].min(axis=0), every[:, :, 1].max(axis=0)
+    return float(left), float(lowest), float(right), float(top)
+
+
+def _swept_mm(wanted: Toolpath, steps: Sequence[Step]) -> tuple[float, float, float, float] | None:
+    """Left, lower, right and upper end of what tools, shanks and holders pass over, at any height
+    and in rapids too, as far as they are known. None where nobody knows which tool moves."""
+    import numpy as np
+
+    tools = [step.operation.tool for step in steps if step.runs]
+    operations = wanted.operations
+    if operations is None or len(operations.begin) != len(tools):
+        return None
+    begins = [0, *operations.begin[1:].tolist()]
+    boxes = []
+    for tool, low, high in zip(tools, begins, [*begins[1:], len(wanted)], strict=True):
+        part = wanted.part(low, high)
+        if part.is_motion.any():
+            reach = max([tool.radius_mm, *(radius for _, radius, *_ in tool.bodies)])
+            box = toolpath_extents(part, rows=part.is_motion)[:2]
+            boxes.append(box + np.array([-reach, reach]))
     if not boxes:
         return None
     every = np.array(boxes)

@@ -303,12 +303,13 @@ class Painter:
         for caption, options in closeups(self.scenes[-1], self.flags.options()):
             yield caption, render(self.scenes[-1], CLOSEUP, options)
 
-    def stock(self) -> bytes | None:
-        """Draw the SVG of the stock on the machine; None without a drawing."""
+    def stock(self, swept_mm: tuple[float, float, float, float] | None = None) -> bytes | None:
+        """Draw the SVG of the stock on the machine, with the box that tools and holders pass over;
+        None without a drawing."""
         from camtool.pictures.draw import render
         from camtool.pictures.picture import on_stock
 
-        found = on_stock(self.scenes[-1])
+        found = on_stock(self.scenes[-1], swept_mm)
         return None if found is None else render(found[0], CLOSEUP, found[1])
 
     def _not_shown(self, scenes: Sequence[Scene]) -> Iterator[str]:

@@ -117,7 +117,8 @@ class ReportOutputs:
         if name != STDOUT and suffix == ".html":
             pictures = ((_CAPTION, picture(EMBEDDED)), *picture.closeups())
             shown = tuple((caption, _embedded_address(data)) for caption, data in pictures)
-            stock = picture.stock()
+            planned = None if run.report is None else run.report.planned
+            stock = picture.stock(None if planned is None else planned.swept_mm)
             page = _page(run, shown, "" if stock is None else _embedded_address(stock))
             return {name: page_html(page).encode()}
         links = () if self.linked is None else ((_CAPTION, _relative_address(name, self.linked)),)

@@ -145,9 +145,18 @@ class Content(Struct, frozen=True, eq=False, dict=True):
     @property
     def stock(self) -> tuple[Chain, ...]:
         """The outline of the stock, where it is known."""
-        if self.scene.stock_mm is None:
+        return self._box(self.scene.stock_mm)
+
+    @property
+    def passed_over(self) -> tuple[Chain, ...]:
+        """The box that tools and holders pass over, where it is known."""
+        return self._box(self.scene.swept_mm)
+
+    @staticmethod
+    def _box(box_mm: tuple[float, float, float, float] | None) -> tuple[Chain, ...]:
+        if box_mm is None:
             return ()
-        left, low, right, high = self.scene.stock_mm
+        left, low, right, high = box_mm
         corners = [[left, low, 0.0], [right, low, 0.0], [right, high, 0.0], [left, high, 0.0]]
         return chains_of(Polylines.of([Polyline(np.array(corners), closed=True)]))
 

@@ -341,7 +341,11 @@ def _stock(content: Content) -> list[Part]:
         return []
     left, low, right, high = content.scene.stock_mm
     name = f"stock {right - left:g} × {high - low:g} mm"
-    return [LineGroup("stock", name, content.stock, STOCK_LINE)]
+    parts: list[Part] = [LineGroup("stock", name, content.stock, STOCK_LINE)]
+    if content.scene.swept_mm is not None:
+        line = {**STOCK_LINE, "stroke-dasharray": "6 5"}
+        parts.append(LineGroup("passed-over", "no clamps within", content.passed_over, line))
+    return parts
 
 
 def _feeds(content: Content, plot: Plot) -> str:

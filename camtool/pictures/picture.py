@@ -92,9 +92,13 @@ LAID = frozenset({"drawing", "stock", "zero"})
 """The layers of a picture that shows how the stock lies on the machine."""
 
 
-def on_stock(scene: Scene) -> tuple[Scene, PictureOptions] | None:
-    """The scene of the drawing on its stock, with part zero, and its options; None without a
-    drawing."""
+def on_stock(
+    scene: Scene, swept_mm: tuple[float, float, float, float] | None = None
+) -> tuple[Scene, PictureOptions] | None:
+    """The scene of the drawing on its stock, with part zero and the box that tools and holders
+    pass over, and its options; None without a drawing."""
     if scene.drawing is None:
         return None
-    return Scene(drawing=scene.drawing, stock_mm=scene.stock_mm), PictureOptions(layers=LAID)
+    return Scene(
+        drawing=scene.drawing, stock_mm=scene.stock_mm, swept_mm=swept_mm
+    ), PictureOptions(layers=LAID)

@@ -50,7 +50,8 @@ class Scene:
     trace_error_mm (T,) its distance from the wanted path, trace_cutting (T,) whether the tool cuts
     between the point before and this one (None: always); errors count only there. travel_mm is the
     size of the table's travel from (0, 0), stock_mm the stock's left, lower, right and upper edge,
-    thickness_mm its thickness. `tools` are the tools with the first row of the turn of each, ()
+    swept_mm those of what tools and holders pass over; thickness_mm the stock's thickness.
+    `tools` are the tools with the first row of the turn of each, ()
     where they are not known.
     `wanted` are the lines and arcs with which the trace
     was compared, `worst` the places of its largest errors, mm, the largest first; `tool_mm` is the
@@ -83,6 +84,7 @@ class Scene:
     rounds: tuple[Round, ...] = ()
     playback: Callable[[], Playback] | None = None
     stock_mm: tuple[float, float, float, float] | None = None
+    swept_mm: tuple[float, float, float, float] | None = None
     thickness_mm: float | None = None
     tools: tuple[tuple[int, Tool], ...] = ()
     tabs: tuple[tuple[float, float], ...] = ()

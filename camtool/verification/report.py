@@ -393,13 +393,16 @@ class PlannedOperation(msgspec.Struct, frozen=True):
 
 class PlannedTool(msgspec.Struct, frozen=True):
     """A tool in the order of first use; `words` say its shape. It must stick out of its holder by
-    more than `reach_mm`, the depth of its deepest cut, and what stands above the stock."""
+    more than `reach_mm`, the depth of its deepest cut, and what stands above the stock; how far
+    it does, and how wide its holder is, None where the job does not say it."""
 
     number: int | None
     name: str
     words: str
     reach_mm: float
     cutting_length_mm: float | None = None
+    stickout_mm: float | None = None
+    holder_diameter_mm: float | None = None
 
 
 class PlannedStock(msgspec.Struct, frozen=True):
@@ -417,7 +420,8 @@ class Planned(msgspec.Struct, frozen=True):
     the starts of the drawing; how the operations cut, their tools, and the stock, if the job says
     it. `zero`: where part zero is on the drawing, "drawing" for its own, "lower-left" or "centre"
     of what is cut, or a place (x, y) mm of it; `cut_mm`: left, lower, right and upper end of what
-    the tools cut; `setup`: which set-up of the part this is, in words."""
+    the tools cut, `swept_mm` of what tools and holders pass over, at any height; `setup`: which
+    set-up of the part this is, in words."""
 
     rapid_drawn_mm: float
     rapid_mm: float
@@ -426,6 +430,7 @@ class Planned(msgspec.Struct, frozen=True):
     stock: PlannedStock | None = None
     zero: str | tuple[float, float] = "drawing"
     cut_mm: tuple[float, float, float, float] | None = None
+    swept_mm: tuple[float, float, float, float] | None = None
     setup: str = ""
 
 
@@ -1164,6 +1169,8 @@ def mounting_lines(report: Report) -> Iterator[tuple[str, str]]:
     if planned is not None and len(planned.tools) > 1:
         rows = [key for key, _ in groupby(each.tool for each in planned.operations)]
         yield "mounted", ", then ".join(_tool_called(planned, row) for row in rows)
+    if planned is not None and planned.swept_mm is not None:
+        yield "clamps", _clamp_words(planned, planned.swept_mm)
     if by_hand := "; ".join(_by_hand(report)):
         yield "by hand", by_hand
     axes = zip("XYZ", (extents.x, extents.y, extents.z), strict=True)
@@ -1208,13 +1215,41 @@ def setup_sheets(planned: Planned) -> Iterator[ReportSheet]:
             _tool_called(planned, row),
             tool.words,
             f"{tool.reach_mm:.4g}",
+            "–" if tool.stickout_mm is None else f"{tool.stickout_mm:g}",
             "–" if tool.cutting_length_mm is None else f"{tool.cutting_length_mm:g}",
         )
         for row, tool in enumerate(planned.tools)
     )
-    heads = ("tool", "shape", "sticks out more than mm", "edges mm")
+    heads = ("tool", "shape", "must stick out more than mm", "sticks out mm", "edges mm")
     yield ReportSheet("tools", heads, rows, words=2)
     yield ReportSheet("operations", *_setup_operations(planned), words=3)
+
+
+MIN_CLAMP_MM = 3.0
+"""A strip of the stock that is narrower is no place for a clamp."""
+
+
+def _clamp_words(planned: Planned, swept_mm: tuple[float, float, float, float]) -> str:
+    """Return the strips of the stock over which no tool and no holder passes, or the box outside
+    of which none does where the stock is not known."""
+    bare = [tool.holder_diameter_mm is None for tool in planned.tools]
+    what = (
+        "no tool or holder passes" if not any(bare) else "no tool passes (holders are not known)"
+    )
+    left, low, right, top = swept_mm
+    stock = planned.stock
+    if stock is None or stock.corner_mm is None or stock.size_mm is None:
+        return f"{what} outside X {mm(left)} to {mm(right)}, Y {mm(low)} to {mm(top)}"
+    (x, y), (wide, high) = stock.corner_mm, stock.size_mm
+    strips = ("X", x, left), ("X", right, x + wide), ("Y", y, low), ("Y", top, y + high)
+    free = [
+        f"{axis} {mm(begin)} to {mm(end)}"
+        for axis, begin, end in strips
+        if end - begin >= MIN_CLAMP_MM
+    ]
+    if not free:
+        return f"no edge of the stock has {MIN_CLAMP_MM:g} mm over which {what}"
+    return f"on the stock at {', '.join(free)}: {what} there"
 
 
 def _by_hand(report: Report) -> Iterator[str]:
@@ -1428,7 +1463,7 @@ figure { margin: 1rem 0; } figcaption { opacity: .7; }
 @media print {
   @page { size: A4; margin: 12mm; }
   :root { font-size: 11px; } body { margin: 0; max-width: none; padding: 0; }
-  .wide { overflow: visible; } .setup { break-after: page; } .setup img { max-height: 78mm; }
+  .wide { overflow: visible; } .setup { break-after: page; } .setup img { max-height: 70mm; }
   table { margin: .5rem 0; } .setup .rows :is(th, td) { padding: .15rem .35rem; } }
 """
 

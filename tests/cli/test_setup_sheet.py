@@ -1,5 +1,6 @@
 """What a page says for the machine: the stock and its zero, tools, operations, warnings."""
 
+import base64
 import json
 import math
 import re
@@ -274,3 +275,50 @@ def test_it_fits_one_printed_side(camtool: Run, samples: Path, tmp_path: Path) -
     whole, setup = sheets
     assert setup == 1
     assert whole > 1
+
+
+@pytest.mark.parametrize("holder", [None, 20.0])
+def test_clamps_may_be_where_no_tool_and_no_holder_passes(
+    camtool: Run, samples: Path, tmp_path: Path, holder: float | None
+) -> None:
+    """The strips of the stock, against all moves of the program as wide as its widest tool."""
+    job = (samples / "plate.toml").read_text(encoding="utf-8")
+    if holder is not None:
+        body = f'stickout = "25mm"\nholder_diameter = "{holder:g}mm"'
+        for name in ("mill", "drill", "bit"):
+            job = job.replace(f"[tools.{name}]", f"[tools.{name}]\n{body}")
+    job = job.replace('size = ["96mm", "66mm"]', 'size = ["120mm", "90mm"]')
+    (tmp_path / "job.toml").write_text(job, encoding="utf-8")
+    args = (str(samples / "plate.dxf"), "-t", "linuxcnc", "--job", "job.toml", "-o", "a.nc", "-q")
+    done = camtool("post", *args, "--report", "a.html")
+    assert done.returncode == 0, done.stderr
+    page = (tmp_path / "a.html").read_text(encoding="utf-8")
+    facts, tools, _ = Tables(page).tables
+    told = dict(facts)["clamps"].replace("−", "-")
+    strips = re.findall(r"([XY]) (-?[\d.]+) to (-?[\d.]+)", told)
+    assert len(strips) >= 2
+    assert ("holders are not known" in told) == (holder is None)
+    assert {row[3] for row in tools[1:]} == ({"–"} if holder is None else {"25"})
+    stock = shapely.box(-8.0, -8.0, 112.0, 82.0)
+    # As wide as the bit, 6 mm, or the holder: what the mill passes over is narrower.
+    least, most = (1.5, 3.0) if holder is None else (0.5 * holder, 0.5 * holder)
+    program = program_paths((tmp_path / "a.nc").read_text())
+    lines = [
+        shapely.LineString(path) for path in (*program.cuts, *program.rapids) if len(path) > 1
+    ]
+    passed = shapely.union_all([line.buffer(least) for line in lines])
+    inner, outer = passed.bounds, passed.buffer(most - least).bounds
+    for axis, begin, end in strips:
+        low, high = float(begin), float(end)
+        strip = shapely.box(low, -8.0, high, 82.0)
+        strip = strip if axis == "X" else shapely.box(-8.0, low, 112.0, high)
+        assert stock.buffer(2e-3).contains(strip)
+        assert strip.buffer(-2e-3).intersection(passed).area == 0.0
+        row = "XY".index(axis) + (0 if low == -8.0 else 2)
+        within = high if low == -8.0 else low
+        ends = sorted((inner[row], outer[row]))
+        assert ends[0] - 2e-3 <= within <= ends[1] + 2e-3
+    assert (
+        "no clamps within"
+        in base64.b64decode(re.findall(r"base64,([A-Za-z0-9+/=]+)", page)[0]).decode()
+    )
