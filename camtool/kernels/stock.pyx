@@ -14,6 +14,9 @@ facts make bounds over a square:
 - The mean of a convex function over a square is at most that of its values at the corners, and
   that of a concave one at least (Hermite and Hadamard). A convex function lies above its tangent
   planes, and the least of several planes is concave.
+- At a wall no single move covers a square. The tool of each lies on one side of its tangent, so
+  beyond the farthest of these lines nothing is cut; and all before the chord of the edge of one
+  move is. Between both lies an area as thin as the square of the square's size.
 
 `tests/oracles/stock_heights.py` is the twin.
 """
@@ -31,6 +34,7 @@ cdef enum:
     FAN = 8  # children of a node, and moves of a leaf
     DEPTH = 24  # levels of a tree, at most: 8 to the 24 is more than any computer holds
     NEAREST = 8  # moves that are kept for the means of pairs
+    MAX_CORNERS = 6  # of a square that a line cuts
 
 # Columns of a move: start, unit direction in the plane, length in the plane, slope.
 cdef enum:
@@ -47,6 +51,8 @@ cdef enum:
 
 # A sloping move of a bull nose: halvings of the place on the move at which it is lowest.
 cdef int HALVINGS = 54
+
+cdef double BEND_MM = 1e-9  # a place of a cone nearer than this to its tip or flat lies on its bend
 
 
 cdef inline double profile(const double* tool, double apart, double grow) noexcept nogil:
@@ -152,6 +158,18 @@ cdef inline double tangent_of(
     if apart >= wide:
         return math.INFINITY
     out = apart - tool[FLAT]
+    if out <= BEND_MM and tool[CORNER] <= 0.0:
+        # At a bend of a cone: along the move the height rises as the move does, unless an end of
+        # it is deepest.
+        if (s <= 0.0 and move[SLOPE] > 0.0) or (s >= move[LONG] and move[SLOPE] < 0.0):
+            return move[AZ] + move[SLOPE] * s
+        slope[0], slope[1] = move[SLOPE] * move[UX], move[SLOPE] * move[UY]
+        along = (dx * move[UX] + dy * move[UY]) / apart if apart > BEND_MM else 1.0
+        if apart > BEND_MM and along != 0.0:
+            slope[0], slope[1] = (
+                move[SLOPE] / along * dx / apart, move[SLOPE] / along * dy / apart
+            )
+        return move[AZ] + move[SLOPE] * s
     if out > 0.0:
         if tool[CORNER] > 0.0:
             if out >= tool[CORNER]:
@@ -279,7 +297,10 @@ cdef class StockTree:
         cdef double[4] least
         cdef int count, depth, k
         cdef Int node, child, end, row = -1
+        cdef double[2] way
+        cdef double cover = -math.INFINITY, part
         level[0], level[1] = 0.0, 0.0
+        way[0], way[1] = 0.0, 0.0
         low[0], high[0] = self.top, self.top
         if self.height == 0:
             return
@@ -293,6 +314,19 @@ cdef class StockTree:
                 for k in range(4):
                     average += 0.25 * max(now[k], bottom)
                 high[0] = average
+        if best == self.top:
+            # No single move is known to cover the square: a wall may stand in it.
+            if row < 0:
+                self.lowest(x, y, room, self.top, -1, &row, guess[0])
+            if row < 0:
+                return
+            guess[0] = row
+            part = self.beyond(row, x, y, way)
+            if part == math.INFINITY:
+                cover = part
+            else:
+                average = self.covered(row, square, way, part, bottom)
+                high[0] = min(high[0], average)
         # Moves that are nowhere lower than `best` are not looked at; they leave no less than it.
         floor = best
         for k in range(4):
@@ -321,6 +355,8 @@ cdef class StockTree:
                 if z >= best:
                     continue
                 floor = min(floor, z)
+                if best == self.top:
+                    cover = max(cover, self.support(child, x, y, way, room))
                 average = tangent_of(
                     &self.moves[child, 0], &self.tools[self.tool[child], 0], x, y, slope
                 )
@@ -342,7 +378,65 @@ cdef class StockTree:
                     average += 0.25 * max(now[k], bottom)
                 high[0] = min(high[0], average)
         low[0] = max(0.25 * (least[0] + least[1] + least[2] + least[3]), floor, bottom)
+        if best == self.top and cover < room:
+            low[0] = max(low[0], half_plane_mean(half, way, cover, least, self.top))
         high[0] = max(high[0], low[0])
+
+    cdef double beyond(self, Int move, double x, double y, double* way) noexcept nogil:
+        """Return how far the tool of a move gets beyond a point, along the direction `way` from
+        the nearest place of its axis to the point, below 0 where it ends before it; inf where the
+        point lies on the axis."""
+        cdef double* columns = &self.moves[move, 0]
+        cdef double px = x - columns[AX], py = y - columns[AY], s, apart
+        s = min(max(px * columns[UX] + py * columns[UY], 0.0), columns[LONG])
+        px, py = px - s * columns[UX], py - s * columns[UY]
+        apart = math.sqrt(px * px + py * py)
+        if apart <= 0.0:
+            return math.INFINITY
+        way[0], way[1] = px / apart, py / apart
+        return self.tools[self.tool[move], RADIUS] - apart
+
+    cdef double support(
+        self, Int move, double x, double y, const double* way, double room
+    ) noexcept nogil:
+        """Upper bound of how far the tool of a move gets along a direction from a point, within a
+        disc of radius `room` round it. The tool lies on one side of its tangent."""
+        cdef double[2] own
+        cdef double far = self.beyond(move, x, y, own), cosine
+        if far >= room:
+            return room
+        if far <= -room:
+            return -room
+        cosine = own[0] * way[0] + own[1] * way[1]
+        if cosine * room <= far:
+            return room
+        return far * cosine + math.sqrt(
+            max(room * room - far * far, 0.0) * max(1.0 - cosine * cosine, 0.0)
+        )
+
+    cdef double covered(
+        self, Int move, const double* square, const double* way, double far, double bottom
+    ) noexcept nogil:
+        """Upper bound of the mean height over a square, of which a move covers a part: all that
+        lies before the chord of its edge."""
+        cdef double* columns = &self.moves[move, 0]
+        cdef double* tool = &self.tools[self.tool[move], 0]
+        cdef double half = square[2], radius = tool[RADIUS], room = 2.0 * half * half
+        cdef double[3][MAX_CORNERS] at
+        cdef double[4] none
+        cdef int count, k
+        if room >= radius * radius:
+            return self.top
+        far -= radius - math.sqrt(radius * radius - room) + 1e-12 * radius
+        for k in range(4):
+            none[k] = 0.0
+        count = clipped(half, way, far, none, at)
+        for k in range(count):
+            at[2][k] = height_of(columns, tool, square[0] + at[0][k], square[1] + at[1][k], 0.0)
+            if at[2][k] == math.INFINITY:
+                return self.top
+            at[2][k] = max(at[2][k], bottom) - self.top
+        return self.top + fan_integral(count, at) / (4.0 * half * half)
 
     cdef inline double nearer(
         self, const double* node, double x, double y, double room, double grow
@@ -498,6 +592,66 @@ cdef class StockTree:
             if most == math.INFINITY:
                 break
         return most
+
+
+cdef int clipped(
+    double half, const double* way, double far, const double* value, double[3][MAX_CORNERS] at
+) noexcept nogil:
+    """Store the corners of the part of a square about 0 that lies no farther than `far` along a
+    direction: x, y and the value, which is given at the corners of the square and linear along its
+    sides; return their number."""
+    cdef int count = 0, k, here, there
+    cdef double[4] off
+    cdef double share
+    cdef int[4] order
+    order[0], order[1], order[2], order[3] = 0, 1, 3, 2
+    for k in range(4):
+        off[k] = (half if k & 1 else -half) * way[0] + (half if k & 2 else -half) * way[1] - far
+    for k in range(4):
+        here, there = order[k], order[(k + 1) & 3]
+        if off[here] <= 0.0:
+            at[0][count] = half if here & 1 else -half
+            at[1][count] = half if here & 2 else -half
+            at[2][count] = value[here]
+            count += 1
+        if (off[here] < 0.0 < off[there]) or (off[there] < 0.0 < off[here]):
+            share = off[here] / (off[here] - off[there])
+            at[0][count] = (half if here & 1 else -half) * (1.0 - share) + (
+                half if there & 1 else -half
+            ) * share
+            at[1][count] = (half if here & 2 else -half) * (1.0 - share) + (
+                half if there & 2 else -half
+            ) * share
+            at[2][count] = value[here] * (1.0 - share) + value[there] * share
+            count += 1
+    return count
+
+
+cdef double fan_integral(int count, double[3][MAX_CORNERS] at) noexcept nogil:
+    """Integral over a convex polygon of a function that is linear in each triangle of a fan."""
+    cdef double found = 0.0, area
+    cdef int k
+    for k in range(2, count):
+        area = 0.5 * (
+            (at[0][k - 1] - at[0][0]) * (at[1][k] - at[1][0])
+            - (at[0][k] - at[0][0]) * (at[1][k - 1] - at[1][0])
+        )
+        found += area * (at[2][0] + at[2][k - 1] + at[2][k]) / 3.0
+    return found
+
+
+cdef double half_plane_mean(
+    double half, const double* way, double far, const double* value, double top
+) noexcept nogil:
+    """Mean over a square of a concave function with these values at the corners, at least, where
+    it is `top` beyond a line across a direction."""
+    cdef double[3][MAX_CORNERS] at
+    cdef double[4] below
+    cdef int count, k
+    for k in range(4):
+        below[k] = value[k] - top
+    count = clipped(half, way, far, below, at)
+    return top + fan_integral(count, at) / (4.0 * half * half)
 
 
 cdef inline double mean_bound(const double* one, const double* other, double best) noexcept nogil:

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from camtool.arrays import Floats
+from camtool.stock.cut import CutStock
 from camtool.stock.cutters import CutterProfile
 from camtool.stock.heights import greatest_value, stock_tree
 from camtool.stock.moves import StockMoves
@@ -116,6 +117,31 @@ def test_means_lie_between_their_bounds(seed: int, count: int, size: float) -> N
     assert (high <= np.maximum(tree.greatest(squares), bottom) + 1e-12).all()
 
 
+@settings(max_examples=15)
+@given(seed=st.integers(0, 10_000), count=st.integers(1, 60), size=st.floats(1e-3, 2.0))
+def test_means_agree_with_those_of_small_squares(seed: int, count: int, size: float) -> None:
+    """Without any slack: extremes over 32 × 32 squares hold the mean of the whole one. Some lie on
+    the very axis of a move, where a cone bends."""
+    moves = random_moves(seed, count)
+    tree, rng = stock_tree(moves), np.random.default_rng(seed)
+    places = np.concatenate(
+        [
+            rng.uniform(0.0, 10.0, (25, 2)),
+            0.5 * (moves.start + moves.end)[:10, :2],
+            moves.start[:10, :2],
+        ]
+    )
+    squares = np.column_stack([places, np.full(len(places), size)])
+    bottom = float(rng.choice([-1.0, -6.0, -math.inf]))
+    low, high = tree.means(squares, bottom)
+    off = (np.arange(32) + 0.5) / 16.0 - 1.0
+    grid = np.stack(np.meshgrid(off, off), axis=-1).reshape(-1, 2) * size
+    for square, least, most in zip(squares, low.tolist(), high.tolist(), strict=True):
+        small = np.column_stack([square[:2] + grid, np.full(len(grid), size / 32.0)])
+        assert least <= np.maximum(tree.greatest(small), bottom).mean() + 1e-9
+        assert most >= np.maximum(tree.least(small), bottom).mean() - 1e-9
+
+
 @settings(max_examples=20)
 @given(seed=st.integers(0, 10_000), grow=st.floats(-0.05, 0.05))
 def test_a_grown_profile_holds_moves_that_lie_beside(seed: int, grow: float) -> None:
@@ -199,3 +225,19 @@ def test_a_search_that_may_not_look_on_says_so() -> None:
     assert short.low <= full.high
     assert full.low <= short.high
     assert short.margin > 1e-9
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3, 1.1])
+def test_squares_at_walls_converge_with_the_square_of_their_size(angle: float) -> None:
+    """A slot whose walls lie across the squares: its volume is told to 1 in 10,000 with squares
+    that are a thousand times as large as the area between the bounds."""
+    along = np.array([math.cos(angle), math.sin(angle), 0.0])
+    start = np.array([[0.0, 0.0, -1.0]])
+    moves = moves_of(start, start + 6.0 * along, 0, CutterProfile(1.5, 1.5))
+    tree = stock_tree(moves)
+    stock = CutStock(moves, tree, (-3.0, -3.0, 9.0, 9.0), -6.0)
+    found = stock.removed_mm3(1e-4)
+    exact = 2.0 * 1.5 * 6.0 + math.pi * 1.5**2
+    assert found.low <= exact <= found.high
+    assert found.high - found.low <= 1e-4 * found.high
+    assert found.squares < 12_000
