@@ -57,6 +57,28 @@ def test_the_first_library_is_one_that_jobs_find(
     assert "exists already" in again.stderr.decode()
 
 
+def test_the_first_library_drills_and_engraves(camtool: Run, tmp_path: Path) -> None:
+    """Without naming a tool: the first end mill of the library, its drills and its bits."""
+    assert camtool("tools", "new").returncode == 0
+    holes = "".join(f'<circle cx="{x}" cy="10" r="{d / 2}"/>' for x, d in ((10, 3), (20, 4)))
+    (tmp_path / "a.svg").write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" width="60mm" height="20mm" viewBox="0 0 60 20">'
+        '<g fill="none" stroke="#000"><rect width="60" height="20"/><path d="M30 10H50"/>'
+        f"{holes}</g></svg>"
+    )
+    for material in ((), ("--material", "plywood")):
+        flags = ("--thickness", "3mm", "--tool", "mill", *material) if material else ()
+        assert camtool("job", "new", "a.svg", "-o", "-", *flags).returncode == 0
+        rows = tomllib.loads(camtool("job", "new", "a.svg", "-o", "-", *flags).stdout.decode())
+        found = [(each["kind"], each["tool"]) for each in rows["operations"]]
+        assert sorted(found) == [
+            ("drill", "drill-3"),
+            ("drill", "drill-4"),
+            ("engrave", "bit-90"),
+            ("profile", "mill"),
+        ]
+
+
 def test_every_chip_load_of_the_sample_is_within_its_limits(camtool: Run) -> None:
     camtool("tools", "new")
     (rows,) = json.loads(camtool("tools", "--json").stdout).values()
