@@ -28,7 +28,7 @@ from camtool.geometry.measure import extents, path_extents
 from camtool.jobs.keys import OPERATION, PLACE, TOOL, WHOLE, is_known
 from camtool.jobs.widths import crowded
 from camtool.keys import Given, Key
-from camtool.planning.holes import circle_of
+from camtool.planning.holes import HOLE_SIZE_MM, SAME_HOLE_MM, circle_of
 from camtool.planning.job import Operation, Stock, Tool
 from camtool.planning.kinds import SELECTING_KEYS, function_of, installed_kinds, kind_named
 from camtool.planning.sides import CONTINUOUS, Traits
@@ -58,6 +58,9 @@ COLOURS = {"#ff0000": "profile", "#0000ff": "engrave"}
 
 _DEPTH = re.compile(r"(\d+(?:[.,]\d+)?)\s*mm\b|\b(?:d|depth|z)\s*=\s*-?(\d+(?:[.,]\d+)?)")
 """Depths in names of layers, mm."""
+
+MAX_STEP_SHARE = 3.0
+"""A circle wider than so many times the one within it is no counterbore of it."""
 
 MAX_DEPTH_MM = 50.0
 """Larger numbers in names of layers are no depths, where the stock is not known."""
@@ -99,6 +102,11 @@ class Proposal(Struct, frozen=True):
         """Return the tools of this kind in the library, the widest first."""
         found = [tool for tool in self.library if tool.kind == kind]
         return sorted(found, key=lambda tool: -tool.diameter_mm)
+
+    def has_drill(self, width_mm: float) -> bool:
+        """True if a drill of the library is as wide as a hole of this diameter."""
+        drills = self.tools("drill")
+        return any(abs(width_mm - tool.diameter_mm) <= HOLE_SIZE_MM for tool in drills)
 
     @property
     def finer_mills(self) -> list[Tool]:
@@ -312,7 +320,8 @@ class Remaining(Struct, frozen=True):
 
     def crowded(self, width_mm: float) -> tuple[int, ...]:
         """Rows of the closed paths that a tool of this width cannot run beside or within."""
-        found = crowded(self.drawing, width_mm)
+        stepped = self.stepped_holes
+        found = crowded(self.drawing, width_mm) - {*stepped, *stepped.values()}
         return tuple(row for row in self.contours if row in found)
 
     @property
@@ -330,6 +339,28 @@ class Remaining(Struct, frozen=True):
         empty = [row for row in inner if row not in parents]
         found = {row: circle_of(self.drawing.paths[row]) for row in empty}
         return {row: circle[1] for row, circle in found.items() if circle}
+
+    @property
+    def stepped_holes(self) -> dict[int, int]:
+        """Rows of the counterbores, with the row of the hole in each: circles within parts that
+        hold one circle about the same centre, and nothing else. The stock's thickness is known,
+        and both have a tool."""
+        tool = self.proposal.tool_mm
+        if not tool or not self.proposal.thickness_mm:
+            return {}
+        parents = self.drawing.nesting.levels.parent.tolist()
+        found: dict[int, int] = {}
+        for row in self.contours_that_are("inner", "circle"):
+            held = [other for other, parent in enumerate(parents) if parent == row]
+            if len(held) != 1 or held[0] not in self.rows or held[0] in parents:
+                continue
+            wide, narrow = (circle_of(self.drawing.paths[each]) for each in (row, held[0]))
+            if not wide or not narrow or math.dist(wide[0], narrow[0]) > SAME_HOLE_MM:
+                continue
+            has_tool = narrow[1] >= tool - HOLE_SIZE_MM or self.proposal.has_drill(narrow[1])
+            if has_tool and tool + HOLE_SIZE_MM < wide[1] <= MAX_STEP_SHARE * narrow[1]:
+                found[row] = held[0]
+        return found
 
     @property
     def contours(self) -> tuple[int, ...]:

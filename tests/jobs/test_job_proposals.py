@@ -229,9 +229,30 @@ def test_parts_too_near_for_the_mill_get_a_finer_one(tmp_path: Path) -> None:
 
 
 def test_a_circle_that_holds_a_part_is_no_bore(tmp_path: Path) -> None:
-    drawing = drawn(box(0, 0, 60, 60), circle(30, 30, 40), circle(30, 30, 20))
+    drawing = drawn(box(0, 0, 60, 60), circle(30, 30, 40), circle(33, 30, 20))
     assert chosen(drawing, with_mill())[1] == ("profile", "mill")
     assert errors_of(drawing, with_mill(), tmp_path) == []
+
+
+def test_circles_about_one_centre_are_a_counterbore(tmp_path: Path) -> None:
+    drawing = drawn(box(0, 0, 60, 30), circle(15, 15, 12), circle(15, 15, 6))
+    made = {each.part.rows: each.part for each in proposed(drawing, with_mill())}
+    assert [made[row,].kind for row in (1, 2)] == ["bore", "bore"]
+    assert made[1,].keys[0][:2] == ("depth", '"1.5mm"')
+    assert errors_of(drawing, with_mill(), tmp_path) == []
+    cut = plan(drawing, job_of_file(tmp_path / "made.toml"), load_target("linuxcnc").machine).end
+    away = np.hypot(cut[:, 0] - 15.0, cut[:, 1] - 15.0)
+    assert cut[away < 1.6, 2].min() == pytest.approx(-3.3)
+    within = (away > 1.6) & (away < 7.0)
+    assert cut[within, 2].min() == pytest.approx(-1.5)
+    assert away[within].max() == pytest.approx(4.5, abs=1e-3)
+
+
+def test_the_hole_of_a_counterbore_is_drilled_where_there_is_a_drill(tmp_path: Path) -> None:
+    drawing = drawn(box(0, 0, 60, 30), circle(15, 15, 9), circle(15, 15, 4.2))
+    found = chosen(drawing, with_mill(DRILL))
+    assert (found[1], found[2]) == (("bore", "mill"), ("drill", "drill-42"))
+    assert errors_of(drawing, with_mill(DRILL), tmp_path) == []
 
 
 def test_entities_of_one_name_are_told_apart_by_their_size(tmp_path: Path) -> None:
@@ -295,3 +316,13 @@ def test_red_is_cut_and_blue_is_marked() -> None:
     colours = ("#ff0000", "#0000ff")
     drawing = replace(drawing, colours=colours)
     assert chosen(drawing, with_mill(BIT)) == {0: ("profile", "mill"), 1: ("engrave", "bit")}
+
+
+def test_a_hole_too_small_for_the_mill_is_drilled_where_there_is_a_drill() -> None:
+    small = Tool(2.0, "drill", math.radians(118.0), name="drill-2")
+    drawing = drawn(box(0, 0, 40, 40), circle(10, 10, 2), circle(20, 20, 2.5))
+    assert chosen(drawing, with_mill(BIT, small)) == {
+        0: ("profile", "mill"),
+        1: ("drill", "drill-2"),
+        2: ("engrave", "bit"),
+    }

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from camtool.jobs.template import Part, Remaining
-from camtool.planning.holes import HOLE_SIZE_MM
+from camtool.planning.holes import HOLE_SIZE_MM, circle_of
 from camtool.planning.ramps import MIN_HELIX_SHARE
+
+HALF = 0.5
+"""Counterbores of unknown depth go so far into the stock."""
 
 
 def propose(left: Remaining) -> list[Part]:
@@ -24,4 +27,34 @@ def propose(left: Remaining) -> list[Part]:
         f"; {narrow} of them hardly wider: plunged in pecks, then once round" if narrow else ""
     )
     why = f"circles wider than the mill are bored{plunged}"
-    return [Part(f"{left.title} holes", "bore", wider, 0, keys, "", "", why)] if wider else []
+    found = _stepped(left)
+    if wider:
+        found.append(Part(f"{left.title} holes", "bore", wider, 0, keys, "", "", why))
+    return found
+
+
+def _stepped(left: Remaining) -> list[Part]:
+    """Return the counterbores of the stock whose thickness is known, and the holes in them."""
+    stepped = left.stepped_holes
+    if not stepped:
+        return []
+    deep = left.depth_mm or HALF * left.proposal.thickness_mm
+    why = f"two circles about one centre are a counterbore; the wider is {deep:g} mm deep"
+    entry = ("entry", '"helix:3deg"', "")
+    keys = (("depth", f'"{deep:g}mm"', "of the counterbore"), entry)
+    name, others = f"{left.title} counterbored", ("profile",)
+    found = [Part(name, "bore", tuple(stepped), 0, keys, "", "", why, others)]
+    drills = {tool.name: tool.diameter_mm for tool in left.proposal.tools("drill")}
+    drills[""] = left.proposal.tool_mm
+    bored = {row: circle_of(left.drawing.paths[row]) for row in stepped.values()}
+    widths = {row: circle[1] for row, circle in bored.items() if circle}
+    name = f"{left.title} counterbore holes"
+    said = "the hole in a counterbore goes on through the stock"
+    for drill, width in drills.items():
+        holes = tuple(row for row, hole in widths.items() if abs(hole - width) <= HOLE_SIZE_MM)
+        if holes:
+            found.append(Part(name, "drill", holes, 0, (), "", drill, said))
+        widths = {row: hole for row, hole in widths.items() if row not in holes}
+    if widths:
+        found.append(Part(name, "bore", tuple(widths), 0, (entry,), "", "", said))
+    return found

@@ -44,7 +44,8 @@ def propose(left: Remaining) -> list[Part]:
     branched = [row for row in left.branched if closed[row]]
     mills = [tool.diameter_mm for tool in left.proposal.finer_mills]
     finest = mills[-1] if mills else left.proposal.tool_mm
-    small = left.crowded(finest)
+    drilled = [row for row, width in left.holes.items() if left.proposal.has_drill(width)]
+    small = tuple(row for row in left.crowded(finest) if row not in drilled)
     if small:
         part = Part(f"{left.title} fine", "engrave", small)
         why = f"lines too near to each other, or too small within, for a mill of {finest:g} mm"
