@@ -6,12 +6,23 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from fnmatch import translate
+from functools import lru_cache
 
 
 def matches(patterns: Iterable[str], name: str) -> bool:
     """True if any of the patterns matches the whole name."""
+    names, wild = _compiled(tuple(patterns))
     folded = name.casefold()
-    return any(re.fullmatch(translate(pattern.casefold()), folded) for pattern in patterns)
+    return folded in names or any(each.fullmatch(folded) for each in wild)
+
+
+@lru_cache(maxsize=64)
+def _compiled(patterns: tuple[str, ...]) -> tuple[frozenset[str], tuple[re.Pattern[str], ...]]:
+    """Return the patterns that are plain names, casefolded, and the others compiled. A job may
+    name thousands of entities."""
+    folded = [pattern.casefold() for pattern in patterns]
+    wild = [pattern for pattern in folded if any(char in pattern for char in "*?[")]
+    return frozenset(folded).difference(wild), tuple(re.compile(translate(each)) for each in wild)
 
 
 def guess(word: str, known: Iterable[str]) -> str:

@@ -8,13 +8,13 @@ from collections.abc import Sequence
 
 from camtool.geometry.drawing import is_text
 from camtool.jobs.template import Part, Remaining
-from camtool.operations.engrave.work import widest_groove
+from camtool.operations.engrave.work import leaves_all
 from camtool.planning.job import Tool
 from camtool.records import replace
 
 TEXT_DEPTH_MM = 0.2
 
-MAX_LINES = 2000
+MAX_LINES = 1000
 """Of more lines the narrowest place is not looked for: the finest bit is taken."""
 
 
@@ -79,7 +79,7 @@ def _fitting(left: Remaining, rows: Sequence[int], bits: Sequence[Tool]) -> Tool
     widest = sorted(bits, key=_width, reverse=True)
     if len(rows) <= MAX_LINES:
         for bit in widest:
-            if widest_groove(lines, _width(bit)) is None:
+            if leaves_all(lines, _width(bit)):
                 return bit
     return widest[-1]
 

@@ -68,6 +68,12 @@ def run_together(chosen: Chosen, setting: Setting) -> Iterator[Finding]:
     )
 
 
+def leaves_all(lines: Polylines, width: float) -> bool:
+    """True if a groove of this width, mm, keeps all that is between the lines."""
+    chords = np.array([*_chords(lines)], dtype=object)
+    return not len(lines) or not _narrow_places(chords, lines.closed, width)
+
+
 def widest_groove(lines: Polylines, width: float) -> tuple[float, Any, int, int] | None:
     """Return the width of the widest groove that keeps what is between the lines, mm, the place
     that limits it, the row of one of its lines, and how many places are too narrow for a groove of
