@@ -222,6 +222,7 @@ def complaints(case: Case, made: Made) -> Iterator[str]:
     yield from _errors(case, made)
     yield from _shapes(case, made)
     yield from _blank(case, made)
+    yield from _clamps(case, made)
 
 
 def _counts(made: Made) -> Iterator[str]:
@@ -330,6 +331,17 @@ def _blank(case: Case, made: Made) -> Iterator[str]:
         said = [number for number, _ in numbers(words)]
         if said != pytest.approx(wanted, abs=3e-3):
             yield f"blank: {words} is {wanted}"
+
+
+def _clamps(case: Case, made: Made) -> Iterator[str]:
+    """Check the box outside of which no tool passes: the axes with half the tool on both sides."""
+    radius = case.asked.cutter.radius
+    reach = made.program.extents()[:2]
+    wanted = [limit for low, high in reach for limit in (low - radius, high + radius)]
+    for words in made.forms["html"][0].values("clamps"):
+        said = [number for number, _ in numbers(words)]
+        if said != pytest.approx(wanted, abs=3e-3):
+            yield f"clamps: {words} is {wanted}"
 
 
 def _shapes(case: Case, made: Made) -> Iterator[str]:

@@ -284,6 +284,8 @@ LINES: dict[str, Callable[[Json, str], str]] = {
 }
 PROSE = (
     "blank",
+    "by hand",
+    "clamps",
     "cut",
     "machine",
     "stock",
@@ -435,16 +437,31 @@ def wrong_tables(report: Json, form: Form, most: int) -> Iterator[str]:
                 if wrong := differ(cell, [value]):
                     yield f"{name}: {wrong}"
     if "operation" in heads:
-        yield from _wrong_operations(report, heads["operation"][1])
+        yield from _wrong_operations(report, *heads["operation"])
 
 
-def _wrong_operations(report: Json, rows: list[list[str]]) -> Iterator[str]:
+OPERATION_COLUMNS = {
+    "depth mm": "depth_mm",
+    "leaves mm": "leaves_mm",
+    "m/min": "surface_speed_m_min",
+    "feed mm/min": "feed_mm_min",
+    "mm per tooth": "chip_load_mm",
+    "plunge mm/min": "plunge_mm_min",
+}
+
+
+def _wrong_operations(report: Json, head: list[str], rows: list[list[str]]) -> Iterator[str]:
+    """Yield the cells that differ; a column that is not there says a dash."""
     for operation, row in zip(report["planned"]["operations"], rows, strict=False):
-        depth, passes, rpm, feed, plunge, time = row[-6:]
-        pairs = [(depth, "depth_mm"), (feed, "feed_mm_min"), (plunge, "plunge_mm_min")]
-        for cell, key in pairs:
-            if wrong := differ(cell, [operation[key]], significant=4):
+        cells = dict(zip(head, row, strict=True))
+        for name, key in OPERATION_COLUMNS.items():
+            cell, value = cells.get(name, "–").partition(" (")[0], operation[key]
+            if cell == "–" and not value:
+                continue
+            digits = {"surface_speed_m_min": 3, "chip_load_mm": 2}.get(key, 4)
+            if wrong := differ(cell, [value], significant=digits):
                 yield f"operations, {key}: {wrong}"
+        passes, rpm, time = cells.get("passes", "–"), cells["rev/min"], cells["time"]
         if passes != ("–" if operation["passes"] is None else str(operation["passes"])):
             yield f"operations: {passes} passes of {operation['passes']}"
         if (rpm == "off") != (operation["spindle_rpm"] is None):
