@@ -47,6 +47,7 @@ from msgspec import Struct, field
 from camtool.arrays import Floats
 from camtool.errors import CamtoolError, OptionError
 from camtool.findings import Severity
+from camtool.inspection.dimensions import DEPTHS
 from camtool.inspection.inspector import Inspected, Inspector
 from camtool.inspection.sizes import minimise
 from camtool.inspection.tolerances import unbound_findings
@@ -263,7 +264,11 @@ def meet(
     best one and a certificate. The result is never worse than the start. Raises the errors of
     `post` and `inspect` for the job as it is."""
     _check_readable(case)
-    asked = tuple(each for each in case.tolerances.dimensions if each.limits is not None)
+    asked = tuple(
+        each
+        for each in case.tolerances.dimensions
+        if each.limits is not None or (each.kind in DEPTHS and each.asks)
+    )
     case = replace(case, tolerances=replace(case.tolerances, dimensions=asked))
     bench = Bench(case, progress or Progress())
     bench.progress.begin("trying programs", most)

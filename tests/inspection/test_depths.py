@@ -314,3 +314,12 @@ def test_wrong_rows_name_their_place(row: str, message: str, tmp_path: Path) -> 
         read_tolerances(file)
     assert message in str(error.value)
     assert "dimension 1" in str(error.value)
+
+
+def test_meet_judges_a_depth_whose_nominal_size_is_the_jobs(tmp_path: Path) -> None:
+    posted(tmp_path)
+    file = tmp_path / "limits.toml"
+    file.write_text('[[dimension]]\nkind = "depth"\nat = [28, 12]\nlimits = "±0.02"\n')
+    target = camtool.load_target("grbl", settings=CERTAIN)
+    met = camtool.meet(tmp_path / "part.svg", target, file, job=tmp_path / "part.toml")
+    assert not met.certificate
