@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import re
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,10 +32,15 @@ FLAG = "--{} at camtool init"
 
 
 def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise OptionError(f"{text!r} is no number") from None
+    with suppress(ValueError):
+        value = float(text)
+        if math.isfinite(value):
+            return value
+    raise OptionError(f"{text[:MAX_SHOWN]!r} is no number")
+
+
+MAX_SHOWN = 40
+"""So many characters of a wrong number are shown."""
 
 
 def _step(text: str) -> float:

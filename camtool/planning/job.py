@@ -47,6 +47,9 @@ LEADS = ("none", "line", "arc")
 STARTS = ("nearest", "longest-line", "corner")
 """Places at which a closed contour may begin, if not at a place given by hand."""
 
+MIN_TIP_ANGLE_RAD = math.radians(0.1)
+"""No tool has a sharper cone; a narrower one is a needle a kilometre long."""
+
 FINISH = " finish"
 """Ends the names of finishing passes."""
 
@@ -288,9 +291,10 @@ class Tool:
         refuse_range("chip_load", self.chip_load_mm)
         refuse_range("surface_speed", self.surface_speed_m_min)
         angle = self.tip_angle_rad
-        if angle is not None and not 0.0 < angle < math.pi:
+        if angle is not None and not MIN_TIP_ANGLE_RAD <= angle < math.pi:
             raise OptionError(
-                f"tip angle {math.degrees(angle):g}° is not between 0 and 180°",
+                f"tip angle {math.degrees(angle):g}° is not between"
+                f" {math.degrees(MIN_TIP_ANGLE_RAD):g} and 180°",
                 mend="give the full angle of the cone, such as 60deg",
             )
         if 0.0 < self.diameter_mm <= self.tip_diameter_mm:

@@ -141,7 +141,10 @@ def test_what_is_left_halfway_is_whole_and_can_be_gone_on_with(tmp_path: Path, l
     whole = json.loads((tmp_path / "all.json").read_text())
     if lost == "scheduler":
         assert run.returncode == 2, said
-        assert "camtool: error: --scheduler: the scheduler was lost; what is written" in said
+        assert (
+            "camtool: error: --scheduler: the scheduler was lost; all written files are complete"
+            in said
+        )
         assert 1 <= assert_whole(tmp_path / "cluster") == whole["made"] == 40 - whole["not_run"]
         here = [*BATCH, "-o", "cluster", "-q"]
         subprocess.run(here, cwd=tmp_path, check=True, timeout=HANG_S)
