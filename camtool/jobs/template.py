@@ -99,8 +99,15 @@ class Proposal(Struct, frozen=True):
     library: tuple[Tool, ...] = ()
 
     def tools(self, kind: str) -> list[Tool]:
-        """Return the tools of this kind in the library, the widest first."""
-        found = [tool for tool in self.library if tool.kind == kind]
+        """Return the tools of this kind in the library, the widest first. Where the materials are
+        known, only those with presets for the material that is cut, or for one of all: a tool
+        without would cut with its spindle off."""
+        wanted = {self.material} if self.material else set(self.materials)
+        found = [
+            tool
+            for tool in self.library
+            if tool.kind == kind and (not wanted or wanted & set(tool.materials))
+        ]
         return sorted(found, key=lambda tool: -tool.diameter_mm)
 
     def has_drill(self, width_mm: float) -> bool:

@@ -30,6 +30,22 @@ DRILL = Tool(4.2, "drill", math.radians(118.0), name="drill-42")
 
 LIBRARY = (Tool(MILL_MM, name="mill"), BIT, DRILL)
 
+
+def test_tools_without_presets_for_the_material_are_not_chosen() -> None:
+    """They would cut with the spindle off; where no material is known, all tools are."""
+    fit = replace(DRILL, name="fit", materials=("pine", "oak"))
+    library = (*LIBRARY, fit)
+    for materials, material, names in (
+        ((), "", ["drill-42", "fit"]),
+        (("oak", "brass"), "", ["fit"]),
+        (("oak", "brass"), "brass", []),
+        (("steel",), "", []),
+    ):
+        proposal = Proposal(MILL_MM, 3.0, "mill", materials, material, library)
+        assert [tool.name for tool in proposal.tools("drill")] == names
+        assert proposal.has_drill(4.2) == bool(names)
+
+
 TOOLS = """
 [tools.mill]
 number = 1
