@@ -60,6 +60,7 @@ from camtool.geometry.polylines import (
 )
 from camtool.kernels.move_tree import hilbert_order
 from camtool.planning.checks import ridge_mm
+from camtool.planning.findings import PlanningCode
 from camtool.planning.holes import HOLE_SIZE_MM, circle_of, drilled_holes
 from camtool.planning.items import Chosen, Step
 from camtool.planning.job import MILLS, Operation
@@ -196,9 +197,14 @@ def wanted_solid(steps: Sequence[Step], wall_mm: float = DEFAULT_WALL_MM) -> Wan
     may: list[WantedLayer] = []
     must: list[WantedLayer] = []
     names = {step.operation.name for step in steps}
+    highest_mm = max((_tabs_mm(step.operation) for step in steps), default=0.0)
     for step in steps:
         if step.operation.tool.radius_at(-step.setting.levels_mm[-1]) > 0.0:
-            maker = _Layers(step)
+            # The tabs of other operations stand in its way too.
+            shares = step.operation.stage == "finish" or any(
+                finding.code is PlanningCode.TAB_SHARED for finding in step.findings
+            )
+            maker = _Layers(step, highest_mm if shares else _tabs_mm(step.operation))
             may += maker.may()
             # The rest of what another program clears is not all that is to be cleared.
             if not step.operation.rest or step.operation.rest in names:
@@ -206,10 +212,15 @@ def wanted_solid(steps: Sequence[Step], wall_mm: float = DEFAULT_WALL_MM) -> Wan
     return WantedSolid(tuple(may), tuple(must), wall_mm)
 
 
-class _Layers:
-    """The layers of an operation."""
+def _tabs_mm(operation: Operation) -> float:
+    return 0.0 if operation.tabs is None else operation.tabs.height_mm
 
-    def __init__(self, step: Step) -> None:
+
+class _Layers:
+    """The layers of an operation, on whose path tabs stand up to a height, mm."""
+
+    def __init__(self, step: Step, tabs_mm: float) -> None:
+        self.tabs_mm = tabs_mm
         self.operation: Operation = step.operation
         self.chosen: Chosen = step.chosen
         self.stock = step.setting.stock
@@ -426,7 +437,6 @@ class _Layers:
             corner = profile.corner_mm
             depth -= corner - math.sqrt(corner * corner - beside * beside)
             base = depth
-        if not whole and self.operation.tabs is not None:
-            base -= self.operation.tabs.height_mm
-            depth -= self.operation.tabs.height_mm
+        if not whole:
+            base, depth = base - self.tabs_mm, max(depth - self.tabs_mm, 0.0)
         yield WantedLayer(self.name, lines, ABOUT, radius + more_mm, base, rise, depth)

@@ -152,6 +152,21 @@ def test_a_cut_into_the_part_is_found_where_it_is() -> None:
     assert 0.0 < y < 20.0
 
 
+@pytest.mark.parametrize("finish", [None, 0.3])
+def test_tabs_are_no_material_that_is_left(finish: float | None) -> None:
+    """The finishing pass has no tabs itself, and is raised over those of the first one."""
+    tabs = Tabs(count=4, width_mm=5.0, height_mm=1.0)
+    operation = Operation(
+        kind="profile", tool=MILL, depth_mm=3.0, side="outside", tabs=tabs, finish_mm=finish
+    )
+    plan = plan_of(operation, stock=STOCK)
+    stock, _ = needles(plan.toolpath, Cutter(2.0))
+    ring = stock.at(np.array([[15.0, -1.5], [-1.5, 10.0]]))
+    assert (ring <= -2.0).all()
+    assert -2.0 in np.round(stock.height, 9)
+    assert "MATERIAL_LEFT" not in codes(judged(plan))
+
+
 def test_what_is_left_is_found() -> None:
     plan = plan_of(Operation(kind="pocket", tool=MILL, depth_mm=2.0))
     rows = np.flatnonzero(plan.toolpath.is_feed)
