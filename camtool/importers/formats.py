@@ -19,7 +19,6 @@ import zlib
 
 from camtool.errors import DrawingError
 from camtool.importers.options import FORMATS
-from camtool.importers.points.tables import NPY_START, is_npz
 
 BINARY_DXF = b"AutoCAD Binary DXF\r\n\x1a\x00"
 
@@ -121,6 +120,8 @@ def find_format(data: bytes, suffix: str, file: str) -> str:
 
 def _by_bytes(data: bytes, file: str) -> str | None:
     """The format whose first bytes these are; DrawingError for what is no drawing."""
+    from camtool.importers.points.tables import NPY_START, is_npz
+
     if data.startswith(BINARY_DXF):
         return "dxf"
     if data.startswith(NPY_START) or is_npz(data):
