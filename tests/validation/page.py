@@ -26,7 +26,8 @@ def check(
     scatter: Mapping[tuple[str, str], float] | None = None,
 ) -> None:
     """The table `name` of the page is this one, but for so many of the last places, or for those
-    of `scatter` in the cells that it names by row and head; with `bless` it becomes it."""
+    of `scatter` in the cells that it names by row, or "" for all rows, and head; with `bless` it
+    becomes it."""
     page = PAGE.read_text(encoding="utf-8")
     text = _table(heads, rows)
     begin, end = f"<!-- {name} -->\n", "<!-- end -->"
@@ -42,7 +43,8 @@ def check(
         row, told = wanted.split("|")[1].strip(), f"{line}\n{wanted}\n{again}"
         assert line.count("|") == wanted.count("|"), told
         for head, *cells in zip(["", *heads, ""], line.split("|"), wanted.split("|"), strict=True):
-            assert same(*cells, (scatter or {}).get((row, head), places)), told
+            more = scatter or {}
+            assert same(*cells, more.get((row, head), more.get(("", head), places))), told
     assert len(held.splitlines()) == len(text.splitlines()), again
 
 
