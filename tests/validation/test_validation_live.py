@@ -260,8 +260,7 @@ def test_programs_of_linuxcnc_s_planner(bless: bool, tmp_path: Path) -> None:
     folder = Path(os.environ.get("CAMTOOL_LIVE", tmp_path)).absolute()
     programs, models, seen = {}, {}, set()
     names = {
-        file.relative_to(source).with_suffix("").as_posix(): file
-        for file in source.rglob("*.ngc")
+        file.relative_to(source).with_suffix("").as_posix(): file for file in source.rglob("*.ngc")
     }
     for name, file in sorted(names.items()):
         data = file.read_bytes()
