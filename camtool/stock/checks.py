@@ -56,6 +56,10 @@ ALONG_MM = 1.0
 MAX_PLACES = 50_000
 """... or so far that there are about this many places, where cuts are longer."""
 
+MAX_CUTS = 500_000
+"""Of programs with more cuts than this every second one is looked at, or every third, ...: of
+millions of cuts thousands lie beside each other."""
+
 EDGE_SHARE = 0.98
 """... and on both sides of its axis: this part of the radius away from it, less the band beside
 walls, since passes need not lie exactly on each other."""
@@ -233,7 +237,8 @@ class _Checks:
         self.tree: StockTree = stock_tree(moves)
         lowest = np.minimum(moves.start[:, 2], moves.end[:, 2])
         self.low: Ints = np.flatnonzero(lowest < STOCK_TOP_MM - POSITION_EPS_MM)
-        self.cuts: _Points = self._beside(self.low, self._radii(), EDGE_SHARE)
+        every = -(-len(self.low) // MAX_CUTS) or 1
+        self.cuts: _Points = self._beside(self.low[::every], self._radii(), EDGE_SHARE)
 
     def _radii(self) -> Floats:
         """Radius of the cutter of each move (M,), mm."""
