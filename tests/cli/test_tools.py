@@ -57,7 +57,7 @@ def test_the_first_library_is_one_that_jobs_find(
     assert "exists already" in again.stderr.decode()
 
 
-def test_the_first_library_drills_and_engraves(camtool: Run, tmp_path: Path) -> None:
+def test_the_first_library_drills_and_engraves(camtool: Run, tmp_path: Path, config: Path) -> None:
     """Without naming a tool: the first end mill of the library, its drills and its bits."""
     assert camtool("tools", "new").returncode == 0
     holes = "".join(f'<circle cx="{x}" cy="10" r="{d / 2}"/>' for x, d in ((10, 3), (20, 4)))
@@ -66,12 +66,24 @@ def test_the_first_library_drills_and_engraves(camtool: Run, tmp_path: Path) -> 
         '<g fill="none" stroke="#000"><rect width="60" height="20"/><path d="M30 10H50"/>'
         f"{holes}</g></svg>"
     )
+
+    def chosen(*flags: str) -> list[tuple[str, str]]:
+        done = camtool("job", "new", "a.svg", "-o", "-", *flags)
+        assert done.returncode == 0
+        rows = tomllib.loads(done.stdout.decode())
+        return sorted((each["kind"], each["tool"]) for each in rows["operations"])
+
+    # Its drills have no presets: their spindle would stay off.
+    assert "drill" not in dict(chosen())
+    presets = "".join(
+        f'[tools.drill-{size}.presets.plywood]\nspindle = 5000\nfeed = "100mm/min"\n'
+        for size in (3, 4)
+    )
+    with (config / "tools.toml").open("a", encoding="utf-8") as file:
+        file.write(f"\n{presets}")
     for material in ((), ("--material", "plywood")):
         flags = ("--thickness", "3mm", "--tool", "mill", *material) if material else ()
-        assert camtool("job", "new", "a.svg", "-o", "-", *flags).returncode == 0
-        rows = tomllib.loads(camtool("job", "new", "a.svg", "-o", "-", *flags).stdout.decode())
-        found = [(each["kind"], each["tool"]) for each in rows["operations"]]
-        assert sorted(found) == [
+        assert chosen(*flags) == [
             ("drill", "drill-3"),
             ("drill", "drill-4"),
             ("engrave", "bit-90"),
