@@ -1,4 +1,4 @@
-"""What is installed: versions, and entry points by which packages add machines, operations and
+"""Versions of installed packages, and entry points by which they add machines, operations and
 importers.
 
 `importlib.metadata` finds both too, but to import it takes longer than to read them: it loads the

@@ -23,6 +23,7 @@ from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
 from camtool.geometry.drawing import Drawing
+from camtool.geometry.measure import point_at, segment_lengths
 from camtool.geometry.nesting import Nesting
 from camtool.geometry.polylines import POSITION_EPS_MM, Polyline, Polylines
 from camtool.inspection.dimensions import Dimension
@@ -165,7 +166,7 @@ class Floors:
         that is farthest from the walls, on lines their middle."""
         for layer in self._exact.must:
             for line in layer.lines:
-                alone = _with_lines(layer, Polylines.of([line]))
+                alone = replace(layer, lines=Polylines.of([line]))
                 if layer.side == ABOUT:
                     points = _points_along(alone)
                     px, py = points[len(points) // 2].tolist()
@@ -185,21 +186,11 @@ class Floors:
 def _points_along(layer: WantedLayer) -> Floats:
     """Return points (P, 2) along the lines of a layer."""
     every = layer.segments
-    chord = every.end - every.start
-    length = np.hypot(chord[:, 0], chord[:, 1])
-    arcs = every.is_arc
-    length[arcs] = every.radius[arcs] * np.abs(every.sweep[arcs])
-    count = np.ceil(length / POINTS_APART_MM).astype(np.int64) + 1
+    count = np.ceil(segment_lengths(every) / POINTS_APART_MM).astype(np.int64) + 1
     which = np.repeat(np.arange(len(count)), count)
     place = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
     part = place / np.maximum(count[which] - 1, 1)
-    points = every.start[which] + part[:, None] * chord[which]
-    bent = arcs[which]
-    of = which[bent]
-    angle = every.start_angle[of] + part[bent] * every.sweep[of]
-    spoke = np.column_stack([np.cos(angle), np.sin(angle)])
-    points[bent] = every.centre[of] + every.radius[of, None] * spoke
-    return np.asarray(points)
+    return point_at(every, which, part)
 
 
 def _part_of(layer: WantedLayer, place_mm: tuple[float, float]) -> WantedLayer:
@@ -215,25 +206,12 @@ def _part_of(layer: WantedLayer, place_mm: tuple[float, float]) -> WantedLayer:
             rows = np.append(rows, outer)
     elif layer.side == ABOUT:
         at = np.array([place_mm])
-        away = [-float(_with_lines(layer, lines.select([row])).inwards(at)[0])
+        away = [-float(replace(layer, lines=lines.select([row])).inwards(at)[0])
                 for row in range(len(lines))]  # fmt: skip
         rows = np.array([int(np.argmin(away))])
     else:
         return layer
-    return _with_lines(layer, lines.select(np.sort(rows).tolist()))
-
-
-def _with_lines(layer: WantedLayer, lines: Polylines) -> WantedLayer:
-    return WantedLayer(
-        layer.name,
-        lines,
-        layer.side,
-        layer.shift_mm,
-        layer.base_mm,
-        layer.rise,
-        layer.depth_mm,
-        layer.reach_mm,
-    )
+    return replace(layer, lines=lines.select(np.sort(rows).tolist()))
 
 
 def _is_within(line: Polyline, place_mm: tuple[float, float]) -> bool:

@@ -21,8 +21,8 @@ SLOT_MM = 0.01
 much larger does not: walls of such slots are cut so far beyond the line."""
 
 LETTER_SHARE = 10.0
-"""What lies within a crowded contour no larger than so many widths of the tool belongs to it, as
-counters belong to letters."""
+"""A crowded contour no larger than so many widths of the tool takes along all that lies in it, as
+letters take their counters."""
 
 NEAR_SHARE = 1e-6
 """Contours that are nearer than the width by this part of it are not crowded, by rounding."""

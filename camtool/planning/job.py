@@ -178,8 +178,8 @@ MAX_LONG_MOVES = 3_000_000
 (`camtool.bounds.MAX_MOVES`)."""
 
 ALLOWED = ("long", "off-stock")
-"""What a job may allow: programs of more than MAX_MOVES moves and drawings larger than any
-machine; parts, copies and cuts that lie beside the stock."""
+"""Words by which a job allows what is refused without: programs of more than MAX_MOVES moves and
+drawings larger than any machine; parts, copies and cuts that lie beside the stock."""
 
 
 def refuse_endless(
@@ -976,7 +976,7 @@ class KeepOutBox:
 
 @dataclass(frozen=True)
 class JobSetup:
-    """One clamping of the part: a name, and the names of the operations that are done in it.
+    """A clamping of the part: its name, and the names of the operations that are done in it.
 
     `flip`: the part lies turned over, about a line along "x" or "y" that is `line_mm` from zero
     (None: through the middle of the stock), so that its other face is up, and the top of the stock

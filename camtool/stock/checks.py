@@ -237,7 +237,7 @@ class _Checks:
         self.tree: StockTree = stock_tree(moves)
         lowest = np.minimum(moves.start[:, 2], moves.end[:, 2])
         self.low: Ints = np.flatnonzero(lowest < STOCK_TOP_MM - POSITION_EPS_MM)
-        every = -(-len(self.low) // MAX_CUTS) or 1
+        every = max(1, math.ceil(len(self.low) / MAX_CUTS))
         self.cuts: _Points = self._beside(self.low[::every], self._radii(), EDGE_SHARE)
 
     def _radii(self) -> Floats:

@@ -12,6 +12,7 @@ import numpy as np
 from msgspec import Struct
 
 from camtool.arrays import Bools, Floats, Ints
+from camtool.records import replace
 from camtool.stock.cutters import CutterProfile
 from camtool.toolpath.moves import Kind, Toolpath
 
@@ -54,6 +55,15 @@ class StockMoves(Struct, frozen=True, eq=False):
             self.cutters,
             self.beside_mm,
         )
+
+    def below(self, z_mm: float) -> StockMoves:
+        """Return the moves without their parts above a height, below which each of them gets."""
+        start, end = self.start.copy(), self.end.copy()
+        for one, other in ((start, self.end), (end, self.start)):
+            above = one[:, 2] > z_mm
+            share = (one[above, 2] - z_mm) / (one[above, 2] - other[above, 2])
+            one[above] += share[:, None] * (other[above] - one[above])
+        return replace(self, start=start, end=end)
 
     @property
     def table(self) -> Floats:

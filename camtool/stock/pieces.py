@@ -112,12 +112,8 @@ def _through(moves: StockMoves, bottom_mm: float) -> tuple[StockMoves, Ints]:
     low = np.minimum(start[:, 2], end[:, 2]) <= bottom_mm
     low &= moves.table[moves.tool, 0] > 0.0
     number = np.flatnonzero(low)
-    chosen = moves.select(number)
-    begin, finish = chosen.start.copy(), chosen.end.copy()
-    for one, other in ((begin, chosen.end), (finish, chosen.start)):
-        above = one[:, 2] > bottom_mm
-        share = (one[above, 2] - bottom_mm) / (one[above, 2] - other[above, 2])
-        one[above] += share[:, None] * (other[above] - one[above])
+    chosen = moves.select(number).below(bottom_mm)
+    begin, finish = chosen.start, chosen.end
     # A cone is nowhere narrower along a move than at its higher end.
     higher = np.maximum(begin[:, 2], finish[:, 2])
     radius, flat, corner, rise = chosen.table[chosen.tool].T

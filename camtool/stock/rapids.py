@@ -149,16 +149,10 @@ class _Search:
         self.feeds = moves.select(~moves.rapid)
         self.tree = stock_tree(self.feeds)
         self.before = np.cumsum(~moves.rapid, dtype=np.int64)[chosen]
-        rapids = moves.select(chosen)
         # What is above the stock top touches nothing.
-        begin, end = rapids.start.copy(), rapids.end.copy()
-        for one, other in ((begin, rapids.end), (end, rapids.start)):
-            above = one[:, 2] > STOCK_TOP_MM
-            share = (one[above, 2] - STOCK_TOP_MM) / (one[above, 2] - other[above, 2])
-            one[above] += share[:, None] * (other[above] - one[above])
-        self.rapids = replace(rapids, start=begin, end=end)
+        self.rapids = moves.select(chosen).below(STOCK_TOP_MM)
         self.columns = move_columns(self.rapids)
-        self.tools: Floats = moves.table[rapids.tool]
+        self.tools: Floats = moves.table[self.rapids.tool]
 
     def follow_a_feed(self) -> Bools:
         """True (R,) for rapids along the line of one feed before, or above it, with a tool of the

@@ -41,7 +41,7 @@ STOCK_TOP_MM = 0.0
 """Z of the stock top: part zero lies on it."""
 
 LEVEL_MM = 1e-6
-"""What is less than this below the stock top is on it."""
+"""Moves that are less than this below the stock top are on it."""
 
 ROWS_AT_ONCE = 1 << 15
 """Rows computed at a time, for columns that follow from each row and its start alone."""

@@ -31,8 +31,8 @@ WINDOW_MM = 12.0
 
 @dataclass(frozen=True)
 class Fault:
-    """What is replaced in the job before the program is made (`asked`), in the program after
-    (`cut`, from the first `since` on), or in the job by which it is judged (`really`)."""
+    """A change of the job before the program is made (`asked`), of the program after (`cut`, from
+    the first `since` on), or of the job by which it is judged (`really`)."""
 
     code: str
     box: tuple[float, float, float, float]

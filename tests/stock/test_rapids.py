@@ -256,7 +256,7 @@ SHAPES = (
     (Cutter(0.8, 0.5, 0.1), CutterProfile(0.8, 0.1, rise=2.0)),
 )
 ROOM_MM, CELL_MM = 0.04, 0.04
-"""What needles may miss: their spacing and the tolerance; they are this far apart."""
+"""Needles are this far apart, and miss as much: their spacing, and the tolerance."""
 
 
 @given(toolpaths(), st.data())

@@ -52,8 +52,8 @@ SLIDE_UNIT_MM = 1e-4
 """Places of the slides are multiples of this."""
 
 THIN_CELLS = 0.01
-"""What cuts the stock bends by this share of a cell of the page's grid, or as much as it is known
-to, before it is told."""
+"""Slides are thinned until they lie this share of a cell of the page's grid beside the predicted
+ones, or as far as these are known, where that is more."""
 
 
 def columns_of(content: Content, run: Playback | None) -> Columns:

@@ -183,8 +183,8 @@ def _cutting(scene: Scene, pair: StockPair | None, stock: StockBox | None) -> di
 
 
 def _body(tool: Tool) -> tuple[float | None, ...]:
-    """How long its flutes cut, the radius of its shank, its stickout, and radius and length of its
-    holder, mm; None where not known."""
+    """Return the length of a tool's edges, the radius of its shank, its stickout, and radius and
+    length of its holder, mm; None where not known."""
 
     def half(diameter: float | None) -> float | None:
         return None if diameter is None else 0.5 * diameter
