@@ -137,7 +137,7 @@ def _axis_flags(command: Callable[..., None]) -> Callable[..., None]:
 )
 @click.option("--project", is_flag=True, help="Keep it here, for this folder alone.")
 @click.option("-o", "--output", metavar="FILE", help="Only write this file; - is stdout.")
-@click.option("--force", is_flag=True, help="Replace a machine of this name; its file is kept.")
+@click.option("--replace", is_flag=True, help="Replace a machine of this name; its file is kept.")
 @click.option("--ask/--no-ask", default=None, help="Ask for what is not said.  [at a terminal]")
 @talk_options
 def init(
@@ -148,7 +148,7 @@ def init(
     project: bool,
     output: str | None,
     spindle: str | None,
-    force: bool,
+    replace: bool,
     ask: bool | None,
     quiet: bool,
     verbose: bool,
@@ -200,7 +200,7 @@ def init(
     default = output is None and (project or not names_machine(names / FILE))
     if default:
         files[str(names / FILE)] = text_naming_machine(names / FILE, name).encode()
-    kept = _write(files, settings, force=force)
+    kept = _write(files, settings, is_replaced=replace)
     say(f"written: {display_name(str(place))}", quiet=quiet)
     if kept is not None:
         say(f"the machine that it replaces is kept: {display_name(kept)}", quiet=quiet)
@@ -360,16 +360,16 @@ def _place(name: str, output: str | None, *, project: bool) -> Path:
     return (Path() if project else user_folder() / MACHINES) / f"{name}.toml"
 
 
-def _write(files: dict[str, bytes], settings: str | None, *, force: bool) -> str | None:
-    """Write the machine file, which must be new, and the `camtool.toml` that names it. With
-    `force` an old file is kept under another name, which is returned: its numbers may have been
+def _write(files: dict[str, bytes], settings: str | None, *, is_replaced: bool) -> str | None:
+    """Write the machine file, which must be new, and the `camtool.toml` that names it. One that
+    `is_replaced` is kept under another name, which is returned: its numbers may have been
     measured."""
     place, kept = next(iter(files)), None
-    if force and Path(place).is_file():
+    if is_replaced and Path(place).is_file():
         kept = f"{place}.old"
         files = {kept: read_bytes(place), **files}
     else:
-        check_new(place, "give another name, or --force, which replaces it")
+        check_new(place, "give another name, or --replace, which replaces it")
     if place != STDOUT:
         for name in files:
             Path(name).parent.mkdir(parents=True, exist_ok=True)

@@ -388,14 +388,14 @@ def test_a_machine_is_replaced_when_that_is_asked(camtool: Run, config: Path) ->
     measured = file.read_bytes()
     done = camtool("init", "mine", "-t", "grbl", "--travel", "200")
     assert done.returncode == 2
-    assert b"--force, which replaces it" in done.stderr
+    assert b"--replace, which replaces it" in done.stderr
     assert file.read_bytes() == measured
-    done = camtool("init", "mine", "-t", "grbl", "--travel", "200", "--force")
+    done = camtool("init", "mine", "-t", "grbl", "--travel", "200", "--replace")
     assert done.returncode == 0, done.stderr
     assert said(file)["travel_mm"] == 200.0
     # What was measured on the old one is not lost.
     assert (config / "machines" / "mine.toml.old").read_bytes() == measured
     assert b"mine.toml.old" in done.stderr
     # A machine that is new needs no old one.
-    assert camtool("init", "other", "-t", "grbl", "--force").returncode == 0
+    assert camtool("init", "other", "-t", "grbl", "--replace").returncode == 0
     assert not (config / "machines" / "other.toml.old").exists()
