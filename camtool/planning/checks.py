@@ -42,7 +42,10 @@ from camtool.planning.findings import (
     OUT_OF_STOCK,
     OUT_OF_STOCK_AS_ALLOWED,
     OUT_OF_STOCK_BESIDE,
+    OUT_OF_STOCK_CLAMP,
+    OUT_OF_STOCK_LEAD,
     OUT_OF_STOCK_MORE,
+    OUT_OF_STOCK_MORE_LEADS,
     OUT_OF_STOCK_PART,
     OUT_OF_STOCK_PARTLY,
     OUT_OF_STOCK_WHOLLY,
@@ -101,9 +104,14 @@ def checked(
 
     Errors: an axis beyond its travel, a cut deeper than the stock, a feed that the machine cannot
     make (on slopes: along Z), an operation whose tool the program cannot ask for; of the `steps`
-    what is drawn beside the stock. A warning: something is cut wholly beside the stock.
+    what is drawn beside the stock, leads and clamps beside it. A warning: something is cut wholly
+    beside the stock.
     """
-    off = [finding for step in steps for finding in _off_stock(step, job.stock)]
+    off = [
+        *_clamps_off_stock(job),
+        *(each for step in steps for each in _off_stock(step, job.stock)),
+        *(each for step in steps for each in _leads_off_stock(step, job.stock)),
+    ]
     if "off-stock" in job.allow:
         off = [replace(each, severity=min(each.severity, Severity.WARNING)) for each in off]
     return (
@@ -261,6 +269,56 @@ def _off_stock(step: Step, stock: Stock | None) -> list[Finding]:
         )
         found[sentence].append(one)
     return [each for some in found.values() for each in shortened_list(some, OUT_OF_STOCK_MORE)]
+
+
+def _clamps_off_stock(job: Job) -> Iterator[Finding]:
+    """Yield an error for each box to be kept free that does not reach the stock, as a clamp does
+    that holds it; not for boxes without end, which keep an area free."""
+    stock = job.stock
+    if stock is None or stock.box_mm is None:
+        return
+    left, low, right, high = stock.box_mm
+    for box in job.keep_out:
+        (x, wide), (y, deep) = box.x_mm, box.y_mm
+        beyond = (left - wide, x - right, low - deep, y - high)
+        if max(beyond) > OFF_STOCK_MM and math.isfinite(sum((x, wide, y, deep))):
+            yield OUT_OF_STOCK_CLAMP(
+                where=f"[[keep_out]] {box.name!r}",
+                measured=max(beyond),
+                limit=OFF_STOCK_MM,
+                edge=EDGES[beyond.index(max(beyond))],
+            )
+
+
+def _leads_off_stock(step: Step, stock: Stock | None) -> list[Finding]:
+    """Return errors for leads that begin or end with the whole tool beside the stock, where clamps
+    may be."""
+    operation, runs = step.operation, step.runs
+    if stock is None or stock.box_mm is None or not runs:
+        return []
+    left, low, right, high = stock.box_mm
+    radius, first = operation.tool.radius_mm, runs.first
+    found = []
+    for lead, name, rows in (
+        (operation.lead_in, "lead-in", first[:-1]),
+        (operation.lead_out, "lead-out", first[1:] - 1),
+    ):
+        if lead.kind == "none":
+            continue
+        x, y = runs.vertices[rows, :2].T
+        beyond = np.column_stack([left - x, x - right, low - y, y - high]) - radius
+        for row in np.flatnonzero((beyond > OFF_STOCK_MM).any(axis=1)).tolist():
+            edge = int(beyond[row].argmax())
+            found.append(
+                OUT_OF_STOCK_LEAD(
+                    where=f"{operation_name(operation)} at X {x[row]:.3f} Y {y[row]:.3f}",
+                    measured=float(beyond[row, edge]),
+                    limit=OFF_STOCK_MM,
+                    lead=name,
+                    edge=EDGES[edge],
+                )
+            )
+    return shortened_list(found, OUT_OF_STOCK_MORE_LEADS)
 
 
 def _beside(toolpath: Toolpath, box: Box, radius: Floats) -> Bools:

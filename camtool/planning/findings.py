@@ -47,8 +47,9 @@ class PlanningCode(Code):
         (INFO, WARNING, ERROR),
         "info: a cut goes through the stock into what lies below, as far as `spoilboard` in "
         "`[stock]` allows; error: farther, or a part or an engraving that goes beyond its edge, "
-        "or what lies wholly beside it; warning: a pocket, a hole or an open line goes beyond the "
-        "edge, or a cut runs wholly beside it",
+        "or what lies wholly beside it, as clamps (`[[keep_out]]`) and the ends of leads may; "
+        "warning: a pocket, a hole or an open line goes beyond the edge, or a cut runs wholly "
+        "beside it",
         "correct `[stock]`, the origin or the depth",
     )
     SLOT_AS_WIDE = (
@@ -411,6 +412,24 @@ OUT_OF_STOCK_PARTLY = Sentence(
 )
 OUT_OF_STOCK_MORE = Sentence(
     PlanningCode.OUT_OF_STOCK, "{measured:# more contour|# more contours} like this"
+)
+OUT_OF_STOCK_CLAMP = Sentence(
+    PlanningCode.OUT_OF_STOCK,
+    "the box lies {measured:.4g} mm beside the {edge} edge of the stock, so that no clamp there "
+    "holds it: correct the box or [stock], or --allow off-stock if it is no clamp",
+    "mm",
+    ERROR,
+)
+OUT_OF_STOCK_LEAD = Sentence(
+    PlanningCode.OUT_OF_STOCK,
+    "at the end of the {lead} the whole tool is beside the stock, {measured:.4g} mm beyond its "
+    "{edge} edge: a shorter lead, another start, a larger stock, or --allow off-stock if it is "
+    "free there",
+    "mm",
+    ERROR,
+)
+OUT_OF_STOCK_MORE_LEADS = Sentence(
+    PlanningCode.OUT_OF_STOCK, "{measured:# more lead|# more leads} like this", severity=ERROR
 )
 SLOT_AS_WIDE = Sentence(
     PlanningCode.SLOT_AS_WIDE, "{tool} is as wide as this contour: it runs in its middle"

@@ -119,6 +119,9 @@ MAX_BY_UNIT = {"mm": 1e5, "mm/min": 1e7, "rev/min": 1e7, "s": 1e6, "rad": 1e6, "
 """Upper bounds of numbers by their unit, as in `camtool.machine.ranges`: 100 m, 167 m/s,
 eleven days; and a million of what has no unit."""
 
+ALLOWED_TIMES = 10.0
+"""Sizes, and distances from part zero, may be so many times as large where a job allows "long"."""
+
 MIN_POSITIVE = 1e-6
 """Numbers above 0 are no smaller, in any unit: a nanometre."""
 
@@ -226,7 +229,7 @@ def refuse_range(key: str, limits: tuple[float, float] | None, named: str = "") 
 
 
 def _refuse_fit(fit_mm: tuple[float, float]) -> None:
-    _refuse_beyond("fit", fit_mm, 0.0, MAX_BY_UNIT["mm"])
+    _refuse_beyond("fit", fit_mm, 0.0, ALLOWED_TIMES * MAX_BY_UNIT["mm"])
     if not any(fit_mm):
         raise OptionError(
             f"fit {fit_mm[0]:g} by {fit_mm[1]:g} mm gives neither a width nor a height",
@@ -885,7 +888,8 @@ class Placement:
                     where="key scale",
                     mend="give one of the two",
                 )
-        _refuse_beyond("pitch", self.pitch_mm, -MAX_BY_UNIT["mm"], MAX_BY_UNIT["mm"])
+        farthest = ALLOWED_TIMES * MAX_BY_UNIT["mm"]
+        _refuse_beyond("pitch", self.pitch_mm, -farthest, farthest)
         if not isinstance(self.origin, str):
             _refuse_beyond("origin", self.origin, -MAX_POSITION_MM, MAX_POSITION_MM)
         for what, count, pitch in zip(

@@ -30,7 +30,7 @@ from camtool.geometry.polylines import (
     without_repeats,
 )
 from camtool.planning.findings import POINTS_MERGED
-from camtool.planning.job import Job, Placement
+from camtool.planning.job import ALLOWED_TIMES, Job, Placement
 from camtool.records import replace
 
 MAX_SIZE_MM = 1e5
@@ -38,9 +38,6 @@ MAX_SIZE_MM = 1e5
 
 MAX_DISTANCE_MM = 1e6
 """Largest distance of the cut geometry from part zero: a kilometre."""
-
-ALLOWED_TIMES = 10.0
-"""Size and distance may be so many times as large where the job allows "long"."""
 
 MAX_POINTS = 10_000_000
 """Vertices of all copies together: far beyond any program, well within memory."""
@@ -339,31 +336,35 @@ def _refuse_too_many(drawing: Drawing, placement: Placement) -> None:
 def _refuse_too_large(placed: Drawing, job: Job) -> None:
     """Refuse a drawing that is larger in the work frame than any machine, or far from part
     zero."""
-    times = ALLOWED_TIMES if "long" in job.allow else 1.0
-    most, farthest = MAX_SIZE_MM * times, MAX_DISTANCE_MM * times
     places = placed.paths.vertices[:, :2]
     if len(places) == 0:
         return
-    size = float(np.ptp(places, axis=0).max())
+    times = ALLOWED_TIMES if "long" in job.allow else 1.0
+    size, most = float(np.ptp(places, axis=0).max()), MAX_SIZE_MM * times
     if not size <= most:
         key = _enlarging_key(job.placement)
+        mend = f"give a smaller {key}" if key else "give --units, a scale, or the --layer to cut"
         raise OptionError(
             f"what is cut is {size:.4g} mm long, more than {most:g} mm",
             file=placed.file,
             where=f"key {key}" if key else None,
-            mend=f"give a smaller {key}"
-            if key
-            else "give --units, a scale, or with --layer what is to be cut; or --allow long if it "
-            "is meant",
+            mend=mend + _or_allow(size, MAX_SIZE_MM),
         )
-    away = float(np.abs(places).max())
+    away, farthest = float(np.abs(places).max()), MAX_DISTANCE_MM * times
     if away > farthest:
         raise OptionError(
             f"what is cut lies {away:.4g} mm from part zero, more than {farthest:g} mm",
             file=placed.file,
             where="key origin",
-            mend="use an origin on what is cut: lower-left or centre",
+            mend="use an origin on what is cut: lower-left or centre"
+            + _or_allow(away, MAX_DISTANCE_MM),
         )
+
+
+def _or_allow(length_mm: float, most_mm: float) -> str:
+    """Return the words for what a job may allow; "" where it is more than that."""
+    allowed = length_mm <= ALLOWED_TIMES * most_mm
+    return "; or --allow long if it is meant" if allowed else ""
 
 
 def _enlarging_key(placement: Placement) -> str:

@@ -16,8 +16,17 @@ from camtool.machine.model import Machine
 from camtool.pipeline import post_drawing
 from camtool.planning.checks import checked
 from camtool.planning.findings import PlanningCode
-from camtool.planning.job import Job, Operation, Placement, Stock, Tool, job_of
-from camtool.planning.plan import plan
+from camtool.planning.job import (
+    Job,
+    KeepOutBox,
+    Lead,
+    Operation,
+    Placement,
+    Stock,
+    Tool,
+    job_of,
+)
+from camtool.planning.plan import plan, planned
 from camtool.records import replace
 from camtool.target.registry import load_target
 from camtool.toolpath.builder import ToolpathBuilder
@@ -234,6 +243,57 @@ def test_a_part_off_the_stock_is_a_warning_where_the_job_allows_it() -> None:
             assert finding.severity == severity
 
 
+@given(
+    x=st.floats(-30.0, 60.0),
+    y=st.floats(-30.0, 50.0),
+    width=st.floats(1.0, 20.0),
+    height=st.floats(1.0, 20.0),
+)
+def test_a_clamp_reaches_the_stock(x: float, y: float, width: float, height: float) -> None:
+    """Shapely tells how far a box is from the stock; one without an end is no clamp."""
+    clamp = KeepOutBox("clamp", (x, x + width), (y, y + height), (5.0, 20.0))
+    apart = shapely.box(*(x, y, x + width, y + height)).distance(shapely.box(0, 0, 40, 30))
+    if 0.0 < apart < 0.05:
+        return
+    part = box(10.0, 10.0, 5.0, 5.0)
+    found = off_stock(job_on(PROFILE, keep_out=(clamp,)), part)
+    assert len(found) == (apart > 0.0)
+    for each in found:
+        assert each.severity is Severity.ERROR
+        assert each.where == "[[keep_out]] 'clamp'"
+        assert 0.0 < (each.measured or 0.0) <= apart + 1e-9
+        assert "--allow off-stock" in each.message
+    allowed = off_stock(job_on(PROFILE, keep_out=(clamp,), allow=("off-stock",)), part)
+    assert [each.severity for each in allowed] == [Severity.WARNING] * len(found)
+    area = replace(clamp, y_mm=(-math.inf, clamp.y_mm[1]))
+    assert off_stock(job_on(PROFILE, keep_out=(area,)), part) == []
+
+
+@pytest.mark.parametrize("lead", ["line", "arc"])
+@given(length=st.floats(0.5, 12.0), gap=st.floats(0.0, 12.0))
+@settings(max_examples=30)
+def test_leads_stay_over_the_stock(lead: str, length: float, gap: float) -> None:
+    """A part `gap` from the left edge of the stock, which the tool reaches from there: where the
+    path ends is looked up in the plan."""
+    leads = {"lead_in": Lead(lead, length), "lead_out": Lead(lead, length)}
+    operation = replace(PROFILE, start=(gap, 15.0), **leads)
+    job = job_on(operation)
+    made = planned(drawing_of([box(gap, 5.0, 20.0, 20.0)]), job, path_machine())
+    (step,) = made.steps
+    ends = [run.vertices[row, :2] for run in step.runs for row in (0, -1)]
+    stock = shapely.box(0, 0, 40, 30)
+    apart = [float(shapely.Point(end).distance(stock)) - 1.5 for end in ends]
+    if any(abs(each - 0.01) < 1e-6 for each in apart):
+        return
+    found = [each for each in made.toolpath.findings if each.code == PlanningCode.OUT_OF_STOCK]
+    assert len(found) == sum(each > 0.01 for each in apart)
+    for each, beyond in zip(found, (each for each in apart if each > 0.01), strict=True):
+        assert each.severity is Severity.ERROR
+        assert each.measured == pytest.approx(beyond)
+    allowed = off_stock(replace(job, allow=("off-stock",)), box(gap, 5.0, 20.0, 20.0))
+    assert [each.severity for each in allowed] == [Severity.WARNING] * len(found)
+
+
 def long_findings(drawn: Polyline, **more: object) -> list[Finding]:
     job = Job((Operation(side="on", depth_mm=1.0, **more),), allow=("long",))  # type: ignore[arg-type]
     made = plan(drawing_of([drawn]), job, path_machine())
@@ -251,6 +311,37 @@ def test_long_drawings_are_refused_or_warned_about() -> None:
     (finding,) = long_findings(wide)
     assert (finding.severity, finding.measured) == (Severity.WARNING, pytest.approx(150_000.0))
     assert long_findings(box(0.0, 0.0, 90_000.0, 5.0)) == []
+
+
+@pytest.mark.parametrize(
+    ("placement", "key"),
+    [
+        (Placement(scale=30_000.0), "scale"),
+        (Placement(fit_mm=(150_000.0, 0.0)), "fit"),
+        (Placement(copies=(2, 1), pitch_mm=(149_995.0, 0.0)), "pitch"),
+        (Placement(origin=(-1_500_000.0, 0.0)), "origin"),
+    ],
+)
+def test_what_a_flag_makes_long_names_the_flag_that_allows_it(
+    placement: Placement, key: str
+) -> None:
+    """150 m by each key, and 1.5 km from part zero; ten times as much is refused without it."""
+    square = drawing_of([box(0.0, 0.0, 5.0, 5.0)])
+    job = Job((Operation(side="on", depth_mm=1.0),), placement)
+    with pytest.raises(OptionError) as refused:
+        plan(square, job, path_machine())
+    assert refused.value.where == f"key {key}"
+    assert "--allow long" in str(refused.value.mend)
+    made = plan(square, replace(job, allow=("long",)), path_machine())
+    assert PlanningCode.LONG in {each.code for each in made.findings}
+
+
+@pytest.mark.parametrize("more", [{"scale": 300_000.0}, {"origin": (-2e7, 0.0)}])
+def test_what_nothing_allows_names_no_flag(more: dict[str, object]) -> None:
+    job = Job((Operation(side="on", depth_mm=1.0),), Placement(**more))  # type: ignore[arg-type]
+    with pytest.raises(OptionError) as refused:
+        plan(drawing_of([box(0.0, 0.0, 5.0, 5.0)]), job, path_machine())
+    assert "--allow" not in str(refused.value.mend)
 
 
 def test_long_programs_are_refused_or_warned_about(monkeypatch: pytest.MonkeyPatch) -> None:
