@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+import re
+from itertools import combinations
 
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from camtool.errors import OptionError
@@ -147,3 +149,83 @@ def test_a_v_bit_cuts_as_wide_as_it_is_deep() -> None:
     (finding,) = narrow(paths, bit, 0.6)
     assert finding.measured == pytest.approx(1.3)
     assert "PATH 0 at" in str(finding.where)
+
+
+PLACES = st.tuples(st.floats(0.0, 40.0), st.floats(0.0, 40.0))
+
+
+def ring(place: tuple[float, float], radius: float) -> Polyline:
+    (x, y), r = place, radius
+    return Polyline(np.array([[x - r, y, 1.0], [x + r, y, 1.0]]), closed=True)
+
+
+def bar(place: tuple[float, float], long: float, wide: float, turn: float) -> Polyline:
+    along = np.array([math.cos(turn), math.sin(turn)]) * long
+    across = np.array([-math.sin(turn), math.cos(turn)]) * wide
+    corners = np.array(place) + np.array([0 * along, along, along + across, across])
+    return Polyline(np.column_stack([corners, np.zeros(4)]), closed=True)
+
+
+def stroke(place: tuple[float, float], long: float, turn: float) -> Polyline:
+    x, y = place
+    return shapes.opened(place, (x + long * math.cos(turn), y + long * math.sin(turn)))
+
+
+SHAPES = st.one_of(
+    st.builds(ring, PLACES, st.floats(0.8, 6.0)),
+    st.builds(bar, PLACES, st.floats(2.0, 12.0), st.floats(1.0, 8.0), st.floats(0.0, 6.0)),
+    st.builds(stroke, PLACES, st.floats(1.0, 20.0), st.floats(0.0, 6.0)),
+)
+
+
+def line_of(path: Polyline) -> shapely.Geometry:
+    points = sample(path, 0.02)
+    return shapely.linearrings(points) if path.closed else shapely.linestrings(points)
+
+
+def keeps_all(lines: list[shapely.Geometry], width: float) -> bool:
+    """True if grooves of this width stay apart, and leave ground within each closed line."""
+    cut = [shapely.buffer(line, 0.5 * width, quad_segs=32) for line in lines]
+    closed = sum(line.geom_type == "LinearRing" for line in lines)
+    grounds = sum(shapely.get_num_interior_rings(each) for each in cut)
+    apart = len(shapely.get_parts(shapely.union_all(cut))) == len(lines)
+    return apart and grounds == closed
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(SHAPES, min_size=1, max_size=6), st.floats(0.6, 1.9))
+def test_random_lines_run_together_where_buffers_meet(paths: list[Polyline], share: float) -> None:
+    """Against shapely alone: which lines overlap when all are as wide as the tool, where, and the
+    widest tool with which none do, by halving."""
+    lines = [line_of(path) for path in paths]
+    assume(all(line.is_simple for line in lines) and keeps_all(lines, 0.4))
+    low, high = 0.4, 40.0
+    while high - low > 1e-3:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if keeps_all(lines, middle) else (low, middle)
+    assume(high < 39.0)
+    fits, width = low, share * low
+    assume(abs(share - 1.0) > 0.03)
+    found = narrow(paths, Tool(width))
+    assert bool(found) == (share > 1.0)
+    if not found:
+        return
+    (finding,) = found
+    assert finding.limit == pytest.approx(fits, rel=0.02, abs=5e-3)
+    told = re.fullmatch(r"PATH (\d+) at X ([-\d.]+) Y ([-\d.]+)", str(finding.where))
+    assert told
+    row, place = int(told[1]), shapely.points(float(told[2]), float(told[3]))
+    away = sorted(shapely.distance(place, line) for line in lines)
+    # In the middle between two lines, or in that of what one encloses.
+    assert away[0] == pytest.approx(0.5 * fits, rel=0.05, abs=0.01)
+    assert shapely.distance(place, lines[row]) == pytest.approx(0.5 * fits, rel=0.05, abs=0.01)
+    rooms = [
+        2.0 * shapely.length(shapely.maximum_inscribed_circle(shapely.Polygon(line)))
+        for line in lines
+        if line.geom_type == "LinearRing"
+    ]
+    rooms += [shapely.distance(one, other) for one, other in combinations(lines, 2)]
+    more = re.search(r"and at (\d+) more", finding.message)
+    places = 1 + (int(more[1]) if more else 0)
+    sure = sum(room < 0.97 * width for room in rooms)
+    assert sure <= places <= sure + sum(0.97 * width <= room < width for room in rooms)
