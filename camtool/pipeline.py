@@ -32,8 +32,9 @@ from camtool.progress import Progress
 from camtool.records import replace
 from camtool.run import Run
 from camtool.simulation.motion import ALL
-from camtool.toolpath.moves import feeds_below_top, toolpath_extents
+from camtool.toolpath.moves import Kind, feeds_below_top, mounted_before, toolpath_extents
 from camtool.toolpath.program import Program
+from camtool.toolpath.touching import untouched_place
 from camtool.verification.case import (
     TRACE_POINTS,
     WORST_LISTED,
@@ -364,6 +365,7 @@ def _post_plan(
         zero=job.placement.origin,
         cut_mm=_cut_mm(wanted),
         swept_mm=_swept_mm(wanted, judged.steps),
+        touch_mm=_touch_mm(wanted),
         setup=setup_words(job),
     )
     asked = stock_request(judged.steps, job, _beside_mm(case), is_whole=how.is_whole)
@@ -747,6 +749,14 @@ def _swept_mm(wanted: Toolpath, steps: Sequence[Step]) -> tuple[float, float, fl
     every = np.array(boxes)
     (left, lowest), (right, top) = every[:, :, 0].min(axis=0), every[:, :, 1].max(axis=0)
     return float(left), float(lowest), float(right), float(top)
+
+
+def _touch_mm(wanted: Toolpath) -> tuple[tuple[float, float] | None, ...]:
+    """Return where each tool that is mounted in the program can be touched off."""
+    import numpy as np
+
+    rows = np.flatnonzero((wanted.kind == Kind.TOOL_CHANGE) & ~mounted_before(wanted))
+    return tuple(untouched_place(wanted, row) for row in rows.tolist())
 
 
 def _stock(job: Job) -> PlannedStock | None:

@@ -420,8 +420,9 @@ class Planned(msgspec.Struct, frozen=True):
     the starts of the drawing; how the operations cut, their tools, and the stock, if the job says
     it. `zero`: where part zero is on the drawing, "drawing" for its own, "lower-left" or "centre"
     of what is cut, or a place (x, y) mm of it; `cut_mm`: left, lower, right and upper end of what
-    the tools cut, `swept_mm` of what tools and holders pass over, at any height; `setup`: which
-    set-up of the part this is, in words."""
+    the tools cut, `swept_mm` of what tools and holders pass over, at any height; `touch_mm`: for
+    each tool that is mounted in the program, a place (x, y) mm where the top of the stock is not
+    cut yet, None where there is none; `setup`: which set-up of the part this is, in words."""
 
     rapid_drawn_mm: float
     rapid_mm: float
@@ -431,6 +432,7 @@ class Planned(msgspec.Struct, frozen=True):
     zero: str | tuple[float, float] = "drawing"
     cut_mm: tuple[float, float, float, float] | None = None
     swept_mm: tuple[float, float, float, float] | None = None
+    touch_mm: tuple[tuple[float, float] | None, ...] = ()
     setup: str = ""
 
 
@@ -1168,7 +1170,8 @@ def mounting_lines(report: Report) -> Iterator[tuple[str, str]]:
     yield "zero", _zero_words(stock, "drawing" if planned is None else planned.zero)
     if planned is not None and len(planned.tools) > 1:
         rows = [key for key, _ in groupby(each.tool for each in planned.operations)]
-        yield "mounted", ", then ".join(_tool_called(planned, row) for row in rows)
+        mounted = ", then ".join(_tool_called(planned, row) for row in rows)
+        yield "mounted", mounted + _touch_words(planned.touch_mm)
     if planned is not None and planned.swept_mm is not None:
         yield "clamps", _clamp_words(planned, planned.swept_mm)
     if by_hand := "; ".join(_by_hand(report)):
@@ -1252,13 +1255,22 @@ def _clamp_words(planned: Planned, swept_mm: tuple[float, float, float, float]) 
     return f"on the stock at {', '.join(free)}: {what} there"
 
 
+def _touch_words(places: tuple[tuple[float, float] | None, ...]) -> str:
+    """Return where each tool that is mounted later touches the stock, to set Z0 again."""
+    words = ["where it is whole" if at is None else f"at X{at[0]:.4g} Y{at[1]:.4g}"
+             for at in places]  # fmt: skip
+    where = words[:1] if len(set(words)) == 1 else words
+    return f"; touch off on the stock {', then '.join(where)}" if where else ""
+
+
 def _by_hand(report: Report) -> Iterator[str]:
     """Yield the tabs to cut, by operation and tool, and the pieces to take out."""
     planned = report.planned
     for each in () if planned is None else planned.operations:
         if planned is not None and each.tabs:
             tabs = f"{each.tabs} tab{'s' * (each.tabs > 1)}"
-            yield f"cut {tabs} of {each.name or each.kind} ({_tool_called(planned, each.tool)})"
+            tool = _tool_called(planned, each.tool).strip("()")
+            yield f"cut {tabs} of {each.name or each.kind} ({tool})"
     loose = [one for one in report.findings if one.code == ProgramCode.LOOSE_PIECE.name]
     if loose:
         places = ", ".join(one.where for one in loose if one.where)

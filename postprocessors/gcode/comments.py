@@ -17,6 +17,7 @@ from camtool.errors import PostError
 from camtool.machine.model import Machine
 from camtool.plugins import version_of
 from camtool.toolpath.moves import Kind, Toolpath, toolpath_extents
+from camtool.toolpath.touching import untouched_place
 from camtool.toolpath.wanted import TOOL_SHAPES, OperationNote, Operations, ToolNote
 
 from .dialect import UNITS, GcodeDialect, Unit
@@ -173,9 +174,15 @@ def mounting_messages(toolpath: Toolpath, row: int, unit: Unit) -> list[str]:
         note = operations.notes[max(later, 0)].tool
         tool = note if note.number == tool.number else tool
     what = tool_words(tool, unit) if tool.diameter_mm else f"tool {tool.number}"
+    place, tip = untouched_place(toolpath, row, unit.mm), f"Z {toolpath.end[row, 2]:.4g}"
+    if place is None:
+        where = "zero Z again"
+    else:
+        where = f"zero Z on top of the stock at X{place[0]:.4g} Y{place[1]:.4g}"
     return [
         f"stop: mount {what}",
-        f"set its tip to Z {toolpath.end[row, 2]:.4g} {unit.name} or zero Z again - then start",
+        f"{where} - not cut yet" if place else where,
+        f"or set its tip to {tip} {unit.name} here - then start",
     ]
 
 

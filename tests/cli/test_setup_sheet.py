@@ -64,7 +64,8 @@ def test_the_sample_plate(camtool: Run, samples: Path, tmp_path: Path) -> None:
     assert told["blank"].startswith("at least 86.000 × 58.000 mm")
     assert told["stock"] == "96 × 66 × 6 mm; on a board that may be cut 1 mm deep"
     assert told["zero"].startswith("X0 Y0 is 8 mm right of and 8 mm above the lower left corner")
-    assert told["mounted"] == "T1 mill, then T2 drill, then T3 bit, then T1 mill"
+    mounted = "T1 mill, then T2 drill, then T3 bit, then T1 mill"
+    assert told["mounted"] == f"{mounted}; touch off on the stock at X0 Y0"
     assert [row[0] for row in tools[1:]] == ["T1 mill", "T2 drill", "T3 bit"]
     assert [row[1] for row in tools[1:]] == [
         "end mill 3 mm",

@@ -31,7 +31,8 @@ X0 Y0
 (0.126 inch deep in 3 passes)
 (feed 11.811 plunge 3.5433 inch/min - takes 34 s)
 (stop: mount tool 1 end mill 0.125 inch)
-(set its tip to Z 0.9843 inch or zero Z again - then start)
+(zero Z on top of the stock at X0 Y0 - not cut yet)
+(or set its tip to Z 0.9843 inch here - then start)
 T1 M0
 G0 Z0.98425
 M3 S12000

@@ -31,7 +31,8 @@ X0.000 Y60.000
 (3.2 mm deep in 3 passes - feed 300 plunge 90 mm/min)
 (takes 39 s)
 (stop: mount tool 1 end mill 3.175 mm)
-(set its tip to Z 30 mm or zero Z again - then start)
+(zero Z on top of the stock at X0 Y0 - not cut yet)
+(or set its tip to Z 30 mm here - then start)
 T1 M0
 G0 Z30.000
 M3 S12000

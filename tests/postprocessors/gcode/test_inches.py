@@ -75,7 +75,7 @@ def test_operations_and_stops_speak_inches(name: str) -> None:
     assert times[0] == times[1]
     assert len(times[0]) == 3
     if name == "grbl":
-        assert "(set its tip to Z 0.9843 inch or zero Z again - then start)" in lines
+        assert "(or set its tip to Z 0.9843 inch here - then start)" in lines
     assert not any(" mm" in line for line in lines)
 
 

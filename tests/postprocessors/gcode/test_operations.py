@@ -316,15 +316,19 @@ def test_no_tool_moves_before_its_length_is_in_force(
 def test_the_operator_reads_what_to_mount() -> None:
     lines = program(JOB, "grbl")
     at = lines.index("T1 M0")
-    assert lines[at - 2] == "(stop: mount tool 1 end mill 3.175 mm)"
-    assert lines[at - 1] == "(set its tip to Z 25 mm or zero Z again - then start)"
+    mount = "(stop: mount tool 1 end mill 3.175 mm)"
+    assert lines[at - 3 : at] == [
+        mount,
+        "(zero Z on top of the stock at X0 Y0 - not cut yet)",
+        "(or set its tip to Z 25 mm here - then start)",
+    ]
     assert lines[at + 1] == "G0 Z25.000"
     assert "T2 M0" not in lines
     quiet = program(JOB, "grbl", "dialect.comments=none")
-    assert quiet[quiet.index("T1 M0") - 2] == lines[at - 2]
+    assert quiet[quiet.index("T1 M0") - 3] == mount
     by_hand = Job(tuple(replace(each, spindle_rpm=None) for each in JOB.operations))
     told = program(by_hand, "grbl", "spindle.switched=hand")
-    assert told[told.index("T1 M0") - 3] == "(the spindle does not stop by itself: stop it)"
+    assert told[told.index("T1 M0") - 4] == "(the spindle does not stop by itself: stop it)"
 
 
 def test_a_spindle_that_another_controller_stops_is_stopped_before_hands_come_near() -> None:
@@ -335,7 +339,7 @@ def test_a_spindle_that_another_controller_stops_is_stopped_before_hands_come_ne
     data = target("grbl", "coolant.flood=true")
     lines = data.target.write(path.finish(), data.machine).data.decode().splitlines()
     at = lines.index("T2 M0")
-    assert lines[at - 4 :: 1][:2] == ["(stop: mount tool 2)", lines[at - 3]]
+    assert lines[at - 5] == "(stop: mount tool 2)"
     assert lines[at - 2 : at] == ["M9", "M5"]
     assert lines[-3:] == ["G0 Z5.000", "M5", "M2"]
 
