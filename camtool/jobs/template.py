@@ -3,7 +3,7 @@
 Of each layer (of each colour when there is one layer) the kinds of operation take what they
 propose to cut, one after the other, by `proposal_rank`:
 
-    engrave ▶ drill ▶ bore ▶ pocket ▶ profile
+    chamfer (countersinks) ▶ engrave ▶ drill ▶ bore ▶ pocket ▶ profile
 
 Each says why, and names a tool of the library where another one than the job's is right. What is
 larger comes later, so that parts are cut free last. Every other key stands there as a comment,
@@ -26,9 +26,10 @@ from msgspec import Struct
 from camtool.geometry.facts import drawing_extents
 from camtool.geometry.measure import extents, path_extents
 from camtool.jobs.keys import OPERATION, PLACE, TOOL, WHOLE, is_known
+from camtool.jobs.stepped import Steps, stepped_holes
 from camtool.jobs.widths import crowded
 from camtool.keys import Given, Key
-from camtool.planning.holes import HOLE_SIZE_MM, SAME_HOLE_MM, circle_of
+from camtool.planning.holes import HOLE_SIZE_MM, circle_of
 from camtool.planning.job import Operation, Stock, Tool
 from camtool.planning.kinds import SELECTING_KEYS, function_of, installed_kinds, kind_named
 from camtool.planning.sides import CONTINUOUS, Traits
@@ -46,21 +47,20 @@ BREAKTHROUGH_MM = 0.3
 TOOL_NAME = "tool"
 
 HABITS = {
+    "countersink": ("countersink", "countersunk", "csk", "csink", "senk"),
     "engrave": ("engrav", "etch", "scribe", "mark", "score"),
     "drill": ("drill", "hole", "bore"),
-    "pocket": ("pocket", "recess"),
+    "pocket": ("pocket", "recess", "counterbore", "cbore"),
     "profile": ("cut", "outline", "profile"),
 }
-"""Beginnings of words in the names of layers, by the kind of operation that they ask for."""
+"""Beginnings of words in the names of layers, by what they ask for: kinds of operation, and
+countersinks."""
 
 COLOURS = {"#ff0000": "profile", "#0000ff": "engrave"}
 """Colours that those who cut with lasers draw in: red is cut, blue marks lines."""
 
 _DEPTH = re.compile(r"(\d+(?:[.,]\d+)?)\s*mm\b|\b(?:d|depth|z)\s*=\s*-?(\d+(?:[.,]\d+)?)")
 """Depths in names of layers, mm."""
-
-MAX_STEP_SHARE = 3.0
-"""A circle wider than so many times the one within it is no counterbore of it."""
 
 MAX_DEPTH_MM = 50.0
 """Larger numbers in names of layers are no depths, where the stock is not known."""
@@ -115,6 +115,10 @@ class Proposal(Struct, frozen=True):
         drills = self.tools("drill")
         return any(abs(width_mm - tool.diameter_mm) <= HOLE_SIZE_MM for tool in drills)
 
+    def fits_hole(self, width_mm: float) -> bool:
+        """True if a drill or the mill makes a hole of this diameter."""
+        return width_mm >= self.tool_mm - HOLE_SIZE_MM or self.has_drill(width_mm)
+
     @property
     def finer_mills(self) -> list[Tool]:
         """The end mills of the library that are narrower than the tool, the widest first."""
@@ -140,12 +144,15 @@ def proposed(drawing: Drawing, proposal: Proposal) -> list[Proposed]:
     name and the group of paths that it takes from."""
     (left, right), (low, high) = drawing_extents(drawing).tolist()
     groups = sorted(_groups(drawing), key=lambda group: _extent(drawing, group))
+    habits = {row: _habit(group.name) for group in groups for row in group.paths}
+    steps = stepped_holes(drawing, proposal, habits)
+    size = max(right - left, high - low)
     made = [
         Proposed(group, part)
         for group in groups
-        for part in _parts(drawing, group, max(right - left, high - low), proposal)
+        for part in _parts(drawing, group, size, proposal, steps)
     ]
-    made.sort(key=lambda each: CUTTING_ORDER.index(kind_named(each.part.kind).cuts))
+    made.sort(key=_turn)
     names = set[str]()
     for row, each in enumerate(made):
         name = each.part.name
@@ -153,6 +160,12 @@ def proposed(drawing: Drawing, proposal: Proposal) -> list[Proposed]:
         made[row] = Proposed(each.group, replace(each.part, name=_numbered(name, number)))
         names.add(made[row].part.name)
     return made
+
+
+def _turn(each: Proposed) -> tuple[int, bool]:
+    """Return when a part is cut: what frees parts comes last, and edges are broken before."""
+    kind = kind_named(each.part.kind)
+    return CUTTING_ORDER.index(kind.cuts), kind.leaves_walls
 
 
 def job_template(
@@ -262,7 +275,8 @@ class Part(Struct, frozen=True):
     paths, and how many single points), and keys as TOML text, each with a remark. `excludes`: the
     word by which the other operations of the group leave these paths out. `tool`: one of the
     library, "" for that of the job. `why`: the reason, in a few words, "" where there is none.
-    `others`: kinds that may be meant as well, of a part that is in doubt."""
+    `others`: kinds that may be meant as well, of a part that is in doubt; `instead`: the part of
+    one of them, where it takes other paths. `is_shared`: another operation takes its paths too."""
 
     name: str
     kind: str
@@ -273,9 +287,17 @@ class Part(Struct, frozen=True):
     tool: str = ""
     why: str = ""
     others: tuple[str, ...] = ()
+    instead: Part | None = None
+    is_shared: bool = False
+
+    def in_doubt(self, instead: Part) -> Part:
+        """Return the part, of which this one may be meant instead."""
+        return replace(self, others=(instead.kind,), instead=instead)
 
     def of_kind(self, kind: str) -> Part:
         """Return the part cut by another kind of operation with the tool of the job."""
+        if self.instead is not None and self.instead.kind == kind:
+            return self.instead
         keys = tuple(key for key in self.keys if key[0] in SELECTING_KEYS)
         return replace(self, kind=kind, keys=keys, tool="", why="asked for", others=())
 
@@ -294,8 +316,10 @@ class Proposed(Struct, frozen=True):
 class Remaining(Struct, frozen=True):
     """The part of a group that no operation takes yet: paths (rows of the drawing's), and how many
     single points. `name`: that of the layer or colour; `title`: the same for names of operations.
-    `size_mm`: the longer side of the drawing. `is_divided`: operations before take other paths of
-    the group, so that those that follow have to select."""
+    `size_mm`: the longer side of the drawing; `steps`: its counterbores and countersinks,
+    `sunk`: the wider circles of the latter in the group, which are cut with the holes in them.
+    `is_divided`: operations before take other paths of the group, so that those that follow have
+    to select."""
 
     drawing: Drawing
     name: str
@@ -304,31 +328,28 @@ class Remaining(Struct, frozen=True):
     marks: int
     size_mm: float
     proposal: Proposal
+    steps: Steps = Steps()
+    sunk: tuple[int, ...] = ()
     is_divided: bool = False
 
     @property
     def habit(self) -> str:
         """The kind of operation that the name of the layer asks for, "" if it asks for none."""
-        words = re.split(r"[^a-z]+", self.name.casefold())
-        for kind, starts in HABITS.items():
-            if any(word.startswith(start) for word in words for start in starts):
-                return kind
-        return COLOURS.get(self.name.casefold(), "")
+        return _habit(self.name)
 
     @property
     def depth_mm(self) -> float | None:
         """The depth that the name of the layer says (`POCKET 2mm`, `d=3`), mm; None if it says
         none, and for holes, whose names say diameters."""
         found = _DEPTH.search(self.name.casefold())
-        if found is None or self.habit == "drill":
+        if found is None or self.habit in ("drill", "countersink"):
             return None
         depth = float(next(filter(None, found.groups())).replace(",", "."))
         return depth if 0.0 < depth <= (self.proposal.thickness_mm or MAX_DEPTH_MM) else None
 
     def crowded(self, width_mm: float) -> tuple[int, ...]:
         """Rows of the closed paths that a tool of this width cannot run beside or within."""
-        stepped = self.stepped_holes
-        found = crowded(self.drawing, width_mm) - {*stepped, *stepped.values()}
+        found = crowded(self.drawing, width_mm) - self.steps.rows
         return tuple(row for row in self.contours if row in found)
 
     @property
@@ -348,28 +369,6 @@ class Remaining(Struct, frozen=True):
         return {row: circle[1] for row, circle in found.items() if circle}
 
     @property
-    def stepped_holes(self) -> dict[int, int]:
-        """Rows of the counterbores, with the row of the hole in each: circles within parts that
-        hold one circle about the same centre, and nothing else. The stock's thickness is known,
-        and both have a tool."""
-        tool = self.proposal.tool_mm
-        if not tool or not self.proposal.thickness_mm:
-            return {}
-        parents = self.drawing.nesting.levels.parent.tolist()
-        found: dict[int, int] = {}
-        for row in self.contours_that_are("inner", "circle"):
-            held = [other for other, parent in enumerate(parents) if parent == row]
-            if len(held) != 1 or held[0] not in self.rows or held[0] in parents:
-                continue
-            wide, narrow = (circle_of(self.drawing.paths[each]) for each in (row, held[0]))
-            if not wide or not narrow or math.dist(wide[0], narrow[0]) > SAME_HOLE_MM:
-                continue
-            has_tool = narrow[1] >= tool - HOLE_SIZE_MM or self.proposal.has_drill(narrow[1])
-            if has_tool and tool + HOLE_SIZE_MM < wide[1] <= MAX_STEP_SHARE * narrow[1]:
-                found[row] = held[0]
-        return found
-
-    @property
     def contours(self) -> tuple[int, ...]:
         """Rows of the closed paths."""
         return tuple(row for row in self.rows if self.drawing.paths.closed[row])
@@ -387,6 +386,7 @@ class Remaining(Struct, frozen=True):
 
     def without(self, parts: Sequence[Part]) -> Remaining:
         """Return the paths and points that are left when these operations have taken theirs."""
+        parts = [part for part in parts if not part.is_shared]
         taken = {row for part in parts for row in part.rows}
         return replace(
             self,
@@ -396,10 +396,23 @@ class Remaining(Struct, frozen=True):
         )
 
 
-def _parts(drawing: Drawing, group: _Group, size_mm: float, proposal: Proposal) -> list[Part]:
+def _habit(name: str) -> str:
+    """Return what the name of a layer, or its colour, asks for: a key of HABITS, or ""."""
+    words = re.split(r"[^a-z]+", name.casefold())
+    for kind, starts in HABITS.items():
+        if any(word.startswith(start) for word in words for start in starts):
+            return kind
+    return COLOURS.get(name.casefold(), "")
+
+
+def _parts(
+    drawing: Drawing, group: _Group, size_mm: float, proposal: Proposal, steps: Steps
+) -> list[Part]:
     """The operations that a group is cut by, as the kinds propose them one after the other."""
-    rows, marks = group.paths, len(group.marks)
-    left = Remaining(drawing, group.name, group.called, rows, marks, size_mm, proposal)
+    sunk = tuple(row for row in group.paths if row in steps.sunk)
+    rows, marks = tuple(row for row in group.paths if row not in sunk), len(group.marks)
+    title = group.called
+    left = Remaining(drawing, group.name, title, rows, marks, size_mm, proposal, steps, sunk)
     proposing = [kind for kind in installed_kinds().values() if kind.propose]
     found: list[Part] = []
     for kind in sorted(proposing, key=lambda kind: (kind.proposal_rank, kind.name)):
@@ -423,6 +436,8 @@ def _parts(drawing: Drawing, group: _Group, size_mm: float, proposal: Proposal) 
 def _exact(drawing: Drawing, group: _Group, part: Part) -> Part:
     """The part, which says sizes or names entities if its words would take others of the group;
     entities of one name may still be taken together."""
+    if part.instead is not None:
+        part = replace(part, instead=_exact(drawing, group, part.instead))
     own = {key: value for key, value, _ in part.keys if key in SELECTING_KEYS}
     rows = np.zeros(len(drawing.paths), dtype=np.bool_)
     rows[list(group.paths)] = True

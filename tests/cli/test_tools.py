@@ -73,14 +73,6 @@ def test_the_first_library_drills_and_engraves(camtool: Run, tmp_path: Path, con
         rows = tomllib.loads(done.stdout.decode())
         return sorted((each["kind"], each["tool"]) for each in rows["operations"])
 
-    # Its drills have no presets: their spindle would stay off.
-    assert "drill" not in dict(chosen())
-    presets = "".join(
-        f'[tools.drill-{size}.presets.plywood]\nspindle = 5000\nfeed = "100mm/min"\n'
-        for size in (3, 4)
-    )
-    with (config / "tools.toml").open("a", encoding="utf-8") as file:
-        file.write(f"\n{presets}")
     for material in ((), ("--material", "plywood")):
         flags = ("--thickness", "3mm", "--tool", "mill", *material) if material else ()
         assert chosen(*flags) == [
@@ -101,10 +93,28 @@ def test_every_chip_load_of_the_sample_is_within_its_limits(camtool: Run) -> Non
                 least, most = preset["chip_load_mm"]
                 assert least <= preset["feed_per_tooth_mm"] <= most
                 checked += 1
+            if "surface_speed_m_min" in preset:
+                assert preset["edge_m_min"] <= preset["surface_speed_m_min"][1]
             assert preset["plunge_feed_mm_min"] <= preset["feed_mm_min"]
             if row["kind"] != "drill" and "step_down_mm" in preset:
                 assert preset["step_down_mm"] <= 0.5 * row["diameter_mm"]
     assert checked >= 8
+
+
+def test_every_drill_of_the_sample_turns(camtool: Run) -> None:
+    """Holes are drilled in every material that the mill cuts, but for wide ones in aluminium, for
+    which a small router is too weak."""
+    camtool("tools", "new")
+    (rows,) = json.loads(camtool("tools", "--json").stdout).values()
+    tools = {row["name"]: row for row in rows}
+    drills = [row for row in rows if row["kind"] == "drill" and row["name"] != "drill-08"]
+    assert len(drills) == 5
+    for row in drills:
+        lacking = set(tools["mill"]["presets"]) - set(row["presets"])
+        assert lacking == ({"aluminium"} if row["diameter_mm"] > 3.0 else set())
+        for preset in row["presets"].values():
+            assert preset["spindle_rpm"] <= 10000
+            assert preset["peck_mm"] <= row["diameter_mm"]
 
 
 def test_a_preset_counts_for_what_the_job_does_not_say(

@@ -16,9 +16,10 @@ from camtool.jobs.build import job_of_file
 from camtool.jobs.template import Proposal, job_template, proposed
 from camtool.jobs.widths import crowded, is_slot
 from camtool.planning.job import Tool
-from camtool.planning.plan import plan
+from camtool.planning.plan import plan, planned
 from camtool.records import replace
 from camtool.target.registry import load_target
+from tests.oracles.run_sweep import dense
 
 MILL_MM = 3.0
 
@@ -113,9 +114,12 @@ def with_mill(*library: Tool, thickness_mm: float = 3.0) -> Proposal:
 
 
 def chosen(drawing: Drawing, proposal: Proposal) -> dict[int, tuple[str, str]]:
-    """Kind and tool by the row of each path; each path is taken once."""
+    """Kind and tool by the row of each path; each path is taken once, but for holes that are
+    countersunk too."""
     found: dict[int, tuple[str, str]] = {}
     for each in proposed(drawing, proposal):
+        if each.part.is_shared:
+            continue
         for row in each.part.rows:
             assert row not in found
             found[row] = (each.part.kind, each.part.tool or proposal.tool)
@@ -269,6 +273,108 @@ def test_the_hole_of_a_counterbore_is_drilled_where_there_is_a_drill(tmp_path: P
     found = chosen(drawing, with_mill(DRILL))
     assert (found[1], found[2]) == (("bore", "mill"), ("drill", "drill-42"))
     assert errors_of(drawing, with_mill(DRILL), tmp_path) == []
+
+
+SINKER = Tool(6.0, "v", math.radians(90.0), name="sinker")
+
+SUNK = (box(0, 0, 60, 30), circle(15, 15, 8.6), circle(15, 15, 4.5))
+"""A plate with a hole for a countersunk screw M4."""
+
+
+def sunk(drawing: Drawing, proposal: Proposal) -> list[tuple[tuple[int, ...], str]]:
+    """The rows of the holes that are countersunk, and the bits."""
+    made = proposed(drawing, proposal)
+    return [(each.part.rows, each.part.tool) for each in made if each.part.kind == "chamfer"]
+
+
+@pytest.mark.parametrize(
+    ("drawing", "tools", "thickness_mm", "is_sunk"),
+    [
+        (drawn(*SUNK), (SINKER,), 6.0, True),
+        (drawn(*SUNK), (BIT,), 6.0, False),  # 60 degrees
+        (drawn(*SUNK), (replace(SINKER, tip_angle_rad=math.radians(82.0)),), 6.0, True),
+        (drawn(*SUNK), (replace(SINKER, diameter_mm=4.0),), 6.0, False),  # too narrow
+        (drawn(*SUNK), (SINKER,), 2.0, False),  # the slope would be 2.15 mm deep
+        (drawn(*SUNK[::2], circle(15, 15, 11)), (SINKER,), 6.0, False),  # 2.4 times as wide
+        (drawn(*SUNK[::2], circle(15, 15, 7)), (SINKER,), 6.0, False),  # 1.6 times
+        (drawn(*SUNK[::2], circle(15.1, 15, 8.6)), (SINKER,), 6.0, False),  # beside each other
+    ],
+)
+def test_countersinks_are_told_by_their_widths_and_the_bits(
+    drawing: Drawing, tools: tuple[Tool, ...], thickness_mm: float, is_sunk: bool
+) -> None:
+    proposal = with_mill(*tools, thickness_mm=thickness_mm)
+    assert bool(sunk(drawing, proposal)) == is_sunk
+
+
+@pytest.mark.parametrize("layer", ["COUNTERSINK M4", "Senkung 90", "csk"])
+@pytest.mark.parametrize("which", [(1,), (2,), (1, 2)])
+def test_layers_called_countersink_are_countersunk(
+    layer: str, which: tuple[int, ...], tmp_path: Path
+) -> None:
+    """Whatever the widths, with any V bit; the name may be that of either circle."""
+    drawing = drawn(box(0, 0, 60, 30), circle(15, 15, 8), circle(15, 15, 5))
+    layers = tuple(layer if row in which else "0" for row in range(3))
+    drawing = replace(drawing, layers=layers)
+    assert sunk(drawing, with_mill(BIT, thickness_mm=6.0)) == [((2,), "bit")]
+    assert chosen(drawing, with_mill(BIT, thickness_mm=6.0)) == {
+        0: ("profile", "mill"),
+        2: ("bore", "mill"),
+    }
+    assert errors_of(drawing, with_mill(BIT, thickness_mm=6.0), tmp_path) == []
+
+
+@settings(max_examples=20, deadline=None)
+@given(hole=st.floats(3.2, 5.4), share=st.floats(1.8, 2.1), degrees=st.sampled_from([82.0, 90.0]))
+def test_a_countersink_is_as_wide_as_drawn(
+    hole: float, share: float, degrees: float, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """The cone of the bit, along the planned path, cuts to the wider circle at the stock's top,
+    and from there down to the hole at its own angle."""
+    folder = tmp_path_factory.mktemp("sunk")
+    bit = replace(SINKER, diameter_mm=10.0, tip_angle_rad=math.radians(degrees))
+    drawing = drawn(box(0, 0, 60, 30), circle(15, 15, share * hole), circle(15, 15, hole))
+    tools = f'[tools.sinker]\nnumber = 5\ndiameter = "10mm"\ntip_angle = "{degrees:g}deg"\n'
+    (folder / "tools.toml").write_text(TOOLS + tools, encoding="utf-8")
+    text = job_template(drawing, None, with_mill(bit, thickness_mm=8.0))
+    (folder / "made.toml").write_text('tool_library = "tools.toml"\n' + text, encoding="utf-8")
+    job, machine = job_of_file(folder / "made.toml"), load_target("linuxcnc").machine
+    made = planned(drawing, job, machine)
+    assert [each for each in made.toolpath.findings if each.severity is Severity.ERROR] == []
+    (step,) = (step for step in made.steps if step.operation.kind == "chamfer")
+    tips = np.concatenate([dense(run, 400) for run in step.runs])
+    radii = np.linspace(0.5 * hole + 0.01, 0.6 * share * hole, 60)
+    away = np.hypot(15.0 + radii - tips[:, :1], 15.0 - tips[:, 1:2])
+    slope = math.tan(math.radians(0.5 * degrees))
+    lowest = np.minimum((tips[:, 2:3] + away / slope).min(axis=0), 0.0)
+    wanted = np.minimum((radii - 0.5 * share * hole) / slope, 0.0)
+    # The job says the width in micrometres; chords of the path's arcs leave the rest.
+    assert lowest == pytest.approx(wanted, abs=0.002)
+
+
+def test_a_countersink_in_doubt_may_be_a_counterbore() -> None:
+    drawing, proposal = drawn(*SUNK), with_mill(SINKER, thickness_mm=6.0)
+    (made,) = (each for each in proposed(drawing, proposal) if each.part.kind == "chamfer")
+    assert made.part.others == ("bore",)
+    assert "a counterbore would take more away" in made.part.why
+    bored = made.of_kind("bore").part
+    assert bored.rows == (1,)
+    assert ("depth", '"3mm"') in [key[:2] for key in bored.keys]
+
+
+def test_a_ring_of_countersinks_is_one_operation(tmp_path: Path) -> None:
+    drawing = drawn(
+        box(0, 0, 90, 30),
+        *(circle(15 + 20 * row, 15, d) for row in range(3) for d in (8.4, 4.2)),
+        *(circle(75, 15, d) for d in (6.4, 3.4)),
+    )
+    proposal = with_mill(SINKER, DRILL, thickness_mm=6.0)
+    assert sunk(drawing, proposal) == [((2, 4, 6), "sinker"), ((8,), "sinker")]
+    found = chosen(drawing, proposal)
+    assert [found[row] for row in (2, 4, 6)] == [("drill", "drill-42")] * 3
+    assert found[8] == ("bore", "mill")
+    kinds = [each.part.kind for each in proposed(drawing, proposal)]
+    assert kinds == ["drill", "bore", "chamfer", "chamfer", "profile"]
 
 
 def test_entities_of_one_name_are_told_apart_by_their_size(tmp_path: Path) -> None:

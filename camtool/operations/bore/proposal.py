@@ -9,6 +9,8 @@ from camtool.planning.ramps import MIN_HELIX_SHARE
 HALF = 0.5
 """Counterbores of unknown depth go so far into the stock."""
 
+ENTRY = ("entry", '"helix:3deg"', "how steeply it goes down")
+
 
 def propose(left: Remaining) -> list[Part]:
     """Return one operation for the circles in which the tool has room to go round."""
@@ -20,7 +22,7 @@ def propose(left: Remaining) -> list[Part]:
     keys = (
         ("select", '["inner", "circle"]', ""),
         ("select_size", f'"{least:.6g}mm.."', "wider than the tool"),
-        ("entry", '"helix:3deg"', "how steeply it goes down"),
+        ENTRY,
     )
     narrow = sum(width < tool * (1.0 + MIN_HELIX_SHARE) for width in widths.values())
     plunged = (
@@ -34,27 +36,33 @@ def propose(left: Remaining) -> list[Part]:
 
 
 def _stepped(left: Remaining) -> list[Part]:
-    """Return the counterbores of the stock whose thickness is known, and the holes in them."""
-    stepped = left.stepped_holes
-    if not stepped:
-        return []
-    deep = left.depth_mm or HALF * left.proposal.thickness_mm
-    why = f"two circles about one centre are a counterbore; the wider is {deep:g} mm deep"
-    entry = ("entry", '"helix:3deg"', "")
-    keys = (("depth", f'"{deep:g}mm"', "of the counterbore"), entry)
-    name, others = f"{left.title} counterbored", ("profile",)
-    found = [Part(name, "bore", tuple(stepped), 0, keys, "", "", why, others)]
+    """Return the counterbores of the stock whose thickness is known, and the holes in them and in
+    countersinks."""
+    found = [counterbore(left, wide)] if (wide := _wider(left)) else []
+    holes = [row for row in left.rows if row in left.steps.holes]
+    bored = {row: circle_of(left.drawing.paths[row]) for row in holes}
+    widths = {row: circle[1] for row, circle in bored.items() if circle}
     drills = {tool.name: tool.diameter_mm for tool in left.proposal.tools("drill")}
     drills[""] = left.proposal.tool_mm
-    bored = {row: circle_of(left.drawing.paths[row]) for row in stepped.values()}
-    widths = {row: circle[1] for row, circle in bored.items() if circle}
-    name = f"{left.title} counterbore holes"
-    said = "the hole in a counterbore goes on through the stock"
+    name = f"{left.title} stepped holes"
+    said = "the hole in a counterbore or countersink goes on through the stock"
     for drill, width in drills.items():
-        holes = tuple(row for row, hole in widths.items() if abs(hole - width) <= HOLE_SIZE_MM)
-        if holes:
-            found.append(Part(name, "drill", holes, 0, (), "", drill, said))
-        widths = {row: hole for row, hole in widths.items() if row not in holes}
+        fits = tuple(row for row, hole in widths.items() if abs(hole - width) <= HOLE_SIZE_MM)
+        if fits:
+            found.append(Part(name, "drill", fits, 0, (), "", drill, said))
+        widths = {row: hole for row, hole in widths.items() if row not in fits}
     if widths:
-        found.append(Part(name, "bore", tuple(widths), 0, (entry,), "", "", said))
+        found.append(Part(name, "bore", tuple(widths), 0, (ENTRY,), "", "", said))
     return found
+
+
+def _wider(left: Remaining) -> tuple[int, ...]:
+    return tuple(row for row in left.rows if row in left.steps.bored)
+
+
+def counterbore(left: Remaining, rows: tuple[int, ...]) -> Part:
+    """Return the operation for the wider circles of counterbores."""
+    deep = left.depth_mm or HALF * left.proposal.thickness_mm
+    why = f"two circles about one centre are a counterbore; the wider is {deep:g} mm deep"
+    keys = (("depth", f'"{deep:g}mm"', "of the counterbore"), ENTRY)
+    return Part(f"{left.title} counterbored", "bore", rows, 0, keys, why=why, others=("profile",))

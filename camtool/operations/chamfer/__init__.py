@@ -5,6 +5,8 @@ from camtool.planning.kinds import COMMON_KEYS, SELECTING_KEYS, OperationKind
 CHAMFER = OperationKind(
     name="chamfer",
     work="camtool.operations.chamfer.work:chamfer",
+    propose="camtool.operations.chamfer.proposal:propose",
+    proposal_rank=0,
     keys=(
         *COMMON_KEYS,
         *SELECTING_KEYS,

@@ -1,0 +1,132 @@
+"""Stepped holes: two circles about one centre, which are a counterbore or a countersink.
+
+    ──┐     ┌──        ──╲     ╱──
+      └┐   ┌┘             ╲   ╱
+       │   │               │ │
+
+Seen from above both are the same. The name of a layer decides, and else the sizes: heads of
+countersunk screws are about twice as wide as their holes (ISO 15065 and ISO 273: 1.8 to 2.1 times
+for M1.6 to M10), and a countersink needs a V bit of 90 or 82 degrees that is wide enough. In doubt
+it is a countersink, which takes less away: it can be bored out afterwards.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from msgspec import Struct, field
+
+from camtool.planning.holes import HOLE_SIZE_MM, SAME_HOLE_MM, circle_of
+from camtool.planning.job import Operation, Tool
+
+if TYPE_CHECKING:
+    from camtool.geometry.drawing import Drawing
+    from camtool.jobs.template import Proposal
+
+MAX_STEP_SHARE = 3.0
+"""A circle wider than so many times the one within it is no counterbore of it."""
+
+SINK_SHARES = (1.75, 2.15)
+"""Circles so many times as wide as the one within them may be countersinks of screws."""
+
+SINK_ANGLES_DEG = (90.0, 82.0)
+"""Angles of countersunk screws, metric and of inches ..."""
+
+SINK_ANGLE_SLACK_DEG = 1.0
+"""... which a bit has within this."""
+
+PLAIN = ("", "drill", "profile")
+"""Layers of these habits say nothing against a stepped hole."""
+
+
+class Sink(Struct, frozen=True):
+    """A countersink: the row of the hole in it, how wide its slope is from above, mm, the bit that
+    cuts it, and whether a layer is called so."""
+
+    hole: int
+    width_mm: float
+    bit: Tool
+    is_named: bool
+
+
+class Steps(Struct, frozen=True):
+    """The stepped holes of a drawing by the row of their wider circle: those that are `bored`,
+    with the row of the hole within, and those that are `sunk`."""
+
+    bored: Mapping[int, int] = field(default_factory=dict)
+    sunk: Mapping[int, Sink] = field(default_factory=dict)
+
+    @property
+    def holes(self) -> frozenset[int]:
+        """The rows of the holes."""
+        return frozenset((*self.bored.values(), *(sink.hole for sink in self.sunk.values())))
+
+    @property
+    def rows(self) -> frozenset[int]:
+        """The rows of both circles."""
+        return frozenset((*self.bored, *self.sunk)) | self.holes
+
+
+def stepped_holes(drawing: Drawing, proposal: Proposal, habits: Mapping[int, str]) -> Steps:
+    """Return the stepped holes that the tools of a proposal can cut. `habits`: what the layers of
+    the paths are called, by their rows."""
+    tool, thickness = proposal.tool_mm, proposal.thickness_mm
+    bored: dict[int, int] = {}
+    sunk: dict[int, Sink] = {}
+    if not tool:
+        return Steps()
+    depth = drawing.nesting.levels.depth
+    for wide, narrow, (outer, inner) in _circles_about_one_centre(drawing):
+        is_named = "countersink" in (habits[wide], habits[narrow])
+        is_within_part = habits[wide] in PLAIN and depth[wide] % 2 == 1
+        if not proposal.fits_hole(inner) or not (is_named or is_within_part):
+            continue
+        share = outer / inner
+        if is_named or (thickness and SINK_SHARES[0] <= share <= SINK_SHARES[1]):
+            bit = sinking_bit(proposal, 0.5 * (outer - inner), is_named=is_named)
+            if bit is not None:
+                sunk[wide] = Sink(narrow, 0.5 * (outer - inner), bit, is_named)
+                continue
+        if thickness and tool + HOLE_SIZE_MM < outer <= MAX_STEP_SHARE * inner:
+            bored[wide] = narrow
+    return Steps(bored, sunk)
+
+
+def sinking_bit(proposal: Proposal, width_mm: float, *, is_named: bool) -> Tool | None:
+    """Return the V bit that cuts a slope so wide, and not through the stock; one of another angle
+    than screws have only where the layer says that it is a countersink."""
+    fits = []
+    for bit in proposal.tools("v"):
+        angle = bit.tip_angle_rad
+        if angle is None:
+            continue
+        off = min(abs(math.degrees(angle) - each) for each in SINK_ANGLES_DEG)
+        offset = Operation(tool=bit).tip_offset_mm
+        room = not bit.diameter_mm or bit.radius_at(offset) + width_mm <= bit.radius_mm
+        deep = width_mm / math.tan(0.5 * angle) + offset
+        is_screw = off <= SINK_ANGLE_SLACK_DEG
+        thickness = proposal.thickness_mm or math.inf
+        if room and deep < thickness and (is_screw or is_named):
+            fits.append((off, bit))
+    return min(fits, key=lambda each: each[0])[1] if fits else None
+
+
+def _circles_about_one_centre(
+    drawing: Drawing,
+) -> list[tuple[int, int, tuple[float, float]]]:
+    """Return the rows of circles that hold one circle about the same centre and nothing else, the
+    row of that, and the diameters of both, mm."""
+    parent = drawing.nesting.levels.parent
+    held = np.bincount(parent[parent >= 0], minlength=len(parent))
+    found = []
+    for narrow in np.flatnonzero(parent >= 0).tolist():
+        wide = int(parent[narrow])
+        if held[wide] != 1 or held[narrow] or max(wide, narrow) >= len(drawing.paths):
+            continue
+        one, other = (circle_of(drawing.paths[row]) for row in (wide, narrow))
+        if one and other and math.dist(one[0], other[0]) <= SAME_HOLE_MM:
+            found.append((wide, narrow, (one[1], other[1])))
+    return found
